@@ -24,16 +24,16 @@ COMPILING = (
 )
 METHOD = "one method"  # a part of which nothing but a few functions is its own
 WHAT = {
-    "auto": ("dry joints", 60),
-    METHOD: ("solve.method {}", 5),
-    "horizon": ("the horizon of dry joints", 10),
-    "lanes-1": ("jobs side by side, big end", 55),
-    "lanes-2": ("jobs side by side, small end", 55),
-    "lanes-3": ("jobs side by side, both joints", 70),
-    "laws": ("other laws of contact and friction", 60),
-    "laws-horizon": ("the horizon of other laws", 10),
-    "features": ("mechanisms with features, such as oil or an elastic rod", 75),
-    "features-horizon": ("the horizon of mechanisms with features", 20),
+    "auto": ("dry joints", 20),
+    METHOD: ("solve.method {}", 2),
+    "horizon": ("the horizon of dry joints", 5),
+    "lanes-1": ("jobs side by side, big end", 25),
+    "lanes-2": ("jobs side by side, small end", 25),
+    "lanes-3": ("jobs side by side, both joints", 35),
+    "laws": ("other laws of contact and friction", 20),
+    "laws-horizon": ("the horizon of other laws", 8),
+    "features": ("mechanisms with features, such as oil or an elastic rod", 40),
+    "features-horizon": ("the horizon of mechanisms with features", 6),
 }  # by part: what it is, and the seconds that it takes an idle core
 LANES = {1: "big_end", 2: "small_end", 3: "both"}  # scenes of which runs march side by side
 MIN_JOBS_TO_LOAD, MIN_JOBS_TO_COMPILE = 16, 4000  # of a scene, for its lanes

@@ -168,7 +168,7 @@ def test_compiling_that_is_ahead_is_told(studies, monkeypatch, tmp_path, capsys)
     studies(one={**NINE, "joint": "both", "clearance_mm": 0.1})
     assert cli.main(["plan", "one.yaml", "-j", "1"]) == 0
     said = capsys.readouterr().out
-    assert "(by 9 timed jobs), after about 70 s of compiling, and " in said
+    assert "(by 9 timed jobs), after about 35 s of compiling, and " in said
     warm_up.marker("lanes-3").touch()
     assert cli.main(["plan", "one.yaml", "-j", "1"]) == 0
     assert "compiling" not in capsys.readouterr().out

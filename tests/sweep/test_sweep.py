@@ -266,7 +266,7 @@ def test_compiling_is_told_once_for_each_version(studies, tmp_path, monkeypatch,
     assert (
         remarks[0::2]
         == [
-            "compiling the equations, part 1 of 1: dry joints, about 60 s; each part once for each "
+            "compiling the equations, part 1 of 1: dry joints, about 20 s; each part once for each "
             "version of the program, and a stop loses nothing"
         ]
         * 2
@@ -280,7 +280,7 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     needs = warm_up.Needs(("auto", "Radau"), True, (3,), laws=True)
     ahead = ["Radau", "auto", "horizon", "lanes-3", "laws", "laws-horizon"]
     assert sorted(needs.parts) == ahead
-    assert warm_up.compile_seconds(needs) == 60 + 5 + 10 + 70 + 60 + 10
+    assert warm_up.compile_seconds(needs) == 20 + 2 + 5 + 35 + 20 + 8
     loaded, told = [], []
 
     def load(alone):
@@ -295,12 +295,12 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         warm_up.compile_once(needs, pytest.fail)
     assert list(needs.uncompiled) == ["lanes-3", "laws", "laws-horizon"]
-    assert warm_up.compile_seconds(needs) == 70 + 60 + 10
+    assert warm_up.compile_seconds(needs) == 35 + 20 + 8
     loaded.clear()
     warm_up.compile_once(needs, pytest.fail)
     assert loaded == [needs.parts[part] for part in ("lanes-3", "laws", "laws-horizon")]
-    assert "part 2 of 6: solve.method Radau, about 5 s" in told[1]
-    assert "part 1 of 3: jobs side by side, both joints, about 70 s" in told[3]
+    assert "part 2 of 6: solve.method Radau, about 2 s" in told[1]
+    assert "part 1 of 3: jobs side by side, both joints, about 35 s" in told[3]
     assert not needs.uncompiled
     assert warm_up.compile_seconds(needs) == 0
 
