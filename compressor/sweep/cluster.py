@@ -36,6 +36,7 @@ from compressor.sweep.execution import (
     WorkersFailed,
     cores,
     memory_share,
+    pack_payloads,
 )
 from compressor.sweep.run_job import Carried, run_job
 from compressor.sweep.sweep import GRACE, LazyCases
@@ -93,7 +94,8 @@ class Batch(NamedTuple):
     versions: dict[str, str]  # that are asked for
     work: Callable[[Any], Any]
     rules: Workers
-    jobs: list[Job]
+    timeouts: list[float]  # of its jobs
+    payloads: bytes  # theirs, which may be unpickled where versions agree
 
 
 def on_worker(data: bytes) -> bytes:
@@ -112,7 +114,9 @@ def on_worker(data: bytes) -> bytes:
         share = int(MEMORY_SHARE * limit / count) if limit else memory_share(max(cores(), count))
         rules = replace(batch.rules, count=count, memory=share)
         with POOL_LOCK:
-            return in_processes(batch.work, rules, batch.jobs)
+            numbered = zip(pickle.loads(batch.payloads), batch.timeouts, strict=True)
+            jobs = [Job(number, *job) for number, job in enumerate(numbered)]
+            return in_processes(batch.work, rules, jobs)
     except (Unfit, WorkersFailed) as error:
         raise Unfit(f"{worker.address}: {error}") from error
 
@@ -177,8 +181,8 @@ class Remote(Batches):
         return [] if on_way > MAX_BYTES else super().next_batch()
 
     def submit(self, number: int, batch: list[Job]) -> "Future[bytes]":
-        jobs = [Job(n, *job[1:3]) for n, job in enumerate(batch)]
-        request = Batch(self.versions, self.work, self.rules, jobs)
+        timeouts = [job.timeout for job in batch]
+        request = Batch(self.versions, self.work, self.rules, timeouts, pack_payloads(batch))
         data = pickle.dumps(request, pickle.HIGHEST_PROTOCOL)
         self.distant[number] = self.client.submit(on_worker, data, pure=False)
         ended: Future[bytes] = Future()

@@ -57,7 +57,7 @@ class Job(NamedTuple):
     """A job that is not finished; one that is retried runs alone."""
 
     id: Any
-    payload: bytes
+    payload: Any
     timeout: float
     retried: bool = False
 
@@ -168,7 +168,7 @@ class Batches:
         """Return the next job of the source, None at its end."""
         for name, payload, timeout in self.source:
             self.left = max(self.left - 1, 0)
-            return Job(name, pickle.dumps(payload, pickle.HIGHEST_PROTOCOL), timeout)
+            return Job(name, payload, timeout)
         self.drained = True
         return None
 
@@ -210,6 +210,11 @@ class Batches:
             yield replace(
                 end, id=job.id, detail=f"{end.detail}, {FAILED_ALONE}" if again else end.detail
             )
+
+
+def pack_payloads(batch: list[Job]) -> bytes:
+    """Return the pickled payloads of a batch, in which what jobs share stands once."""
+    return pickle.dumps([job.payload for job in batch], pickle.HIGHEST_PROTOCOL)
 
 
 def error_of(ended: "Future[Any]") -> BaseException | None:
@@ -329,9 +334,10 @@ class Local(Batches):
 
     def submit(self, number: int, batch: list[Job]) -> "Future[Any]":
         self.executor = self.executor or self.start()
+        data = pack_payloads(batch)
         self.files[number] = file = SharedFile()
         self.last_news = time.monotonic()
-        return self.executor.submit(do_batch, file.path, [job.payload for job in batch])
+        return self.executor.submit(do_batch, file.path, data, len(batch))
 
     def ends_of(self, number: int, problem: str) -> list[End]:
         """Return how jobs ended, from the file of their batch. Raises WorkersFailed."""

@@ -122,11 +122,11 @@ def limit(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (wanted, most))
 
 
-def do_batch(path: str, payloads: Sequence[bytes]) -> str:
+def do_batch(path: str, data: bytes, count: int) -> str:
     """Run the jobs of a batch; return what keeps this process from any job, or "".
 
-    The file gets a note of who is at which job, and in the end how jobs ended, all but a rest that
-    is given back.
+    data: their pickled payloads; count: how many they are. The file gets a note of who is at which
+    job, and in the end how jobs ended, all but a rest that is given back.
     """
     if not HERE["prepared"] and (problem := prepare()):
         return problem
@@ -134,9 +134,9 @@ def do_batch(path: str, payloads: Sequence[bytes]) -> str:
         found: list[JobResult | JobLost] = []
         start = time.monotonic()
         NOTE.pack_into(note, 0, os.getpid(), 0, start)
-        jobs = look_ahead(payloads)
+        jobs = look_ahead(data, count)
         began = time.monotonic()  # jobs that are given back would lose what was computed ahead
-        each = (began - start) / len(payloads)
+        each = (began - start) / count
         try:
             with sync_later():  # or each job would wait for the disk
                 for position, job in enumerate(jobs):
@@ -154,21 +154,20 @@ def do_batch(path: str, payloads: Sequence[bytes]) -> str:
     return ""
 
 
-def look_ahead(payloads: Sequence[bytes]) -> Sequence[Callable[[], tuple[Any, ...]]]:
+def look_ahead(data: bytes, count: int) -> Sequence[Callable[[], tuple[Any, ...]]]:
     """Return for each job of a batch a function that returns the arguments of its work."""
-    if HERE["rules"].ahead is None:
-        return [partial(only, payload) for payload in payloads]
+    ahead = HERE["rules"].ahead
     try:
-        jobs = [pickle.loads(payload) for payload in payloads]
-        known = HERE["rules"].ahead(jobs)
+        jobs = pickle.loads(data)
+        known = [(job,) for job in jobs] if ahead is None else zip(jobs, ahead(jobs), strict=True)
+        return [partial(tuple, arguments) for arguments in known]
     except MemoryError:  # each job by itself will need less, or fail alone
-        return [partial(only, payload) for payload in payloads]
-    return [partial(tuple, pair) for pair in zip(jobs, known, strict=True)]
+        return [partial(only, data, position) for position in range(count)]
 
 
-def only(payload: bytes) -> tuple[Any]:
+def only(data: bytes, position: int) -> tuple[Any]:
     """Return the single argument of a job's work."""
-    return (pickle.loads(payload),)
+    return (pickle.loads(data)[position],)
 
 
 def perform(job: Callable[[], tuple[Any, ...]], start: float) -> JobResult | JobLost:

@@ -98,7 +98,8 @@ def run_batch(folder, monkeypatch):
         monkeypatch.setitem(HERE, name, value)
     shared = folder / "batch"
     shared.write_bytes(bytes(NOTE.size))
-    assert do_batch(str(shared), [pickle.dumps(number) for number in range(5)]) == ""
+    payloads = pickle.dumps([*range(5)])
+    assert do_batch(str(shared), payloads, 5) == ""
     data = shared.read_bytes()
     pid, _, since = NOTE.unpack(data[: NOTE.size])
     assert (pid, since < 0) == (os.getpid(), True)  # nobody is at work

@@ -305,10 +305,8 @@ class ClientThatIsDone:
     status = "running"
 
     def submit(self, _, data, pure):
-        jobs = cluster.Batch(*pickle.loads(data)).jobs
-        return DoneAtOnce(
-            pickle.dumps([JobResult(job.id, pickle.dumps(job.id), 0.01) for job in jobs])
-        )
+        jobs = range(len(cluster.Batch(*pickle.loads(data)).timeouts))
+        return DoneAtOnce(pickle.dumps([JobResult(n, pickle.dumps(n), 0.01) for n in jobs]))
 
     def nthreads(self):
         return dict.fromkeys("abc", 1)
