@@ -26,6 +26,7 @@ from compressor.cases.checks import (
     values_given,
 )
 from compressor.cases.conflicts import conflicts, values_read
+from compressor.cases.groups import Contact, Solve
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
 from compressor.cases.optional_groups import fill_guide, fill_wear
 from compressor.cases.parameter import (
@@ -113,6 +114,7 @@ def model_of(values: Mapping[str, Any]) -> str:
 # version of program and libraries on one kind of processor
 # keys of stored jobs were made with the loads' older names, and stay
 LOADS_IN_KEYS = {"spring": "design", "gas": "typical", "none": "none"}
+MAX_TEXTS = 4096  # groups whose texts are remembered
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 # the groups with a key that results depend on; of `solve` the span and the solver are parts
@@ -264,30 +266,18 @@ class Case(Settings):
         >>> compressor.Case.from_values(case.values()) == case
         True
         """
-        plain: dict[str, Any] = {"name": self.name, "load": self.load, "joint": self.joint}
-        for name in GROUPS:
-            group = getattr(self, name)
-            if group is None and WORDS[name]:
-                continue
-            # `vars` has the fields in their order, since a group has nothing but fields
-            plain[name] = (
-                {key: value for key, value in vars(group).items() if value is not None}
-                if group is not None
-                else False
-            )
-        if self.contact.materials:
-            plain["contact"]["materials"] = list(self.contact.materials)
-            if self.contact.law not in CYLINDRICAL:
-                # also the default: that of a file depends on whether it gives a pin radius
-                plain["contact"].setdefault("geometry", "external")
-        if self.joint == "none":
-            for name in OF_JOINTS:
-                del plain[name]
-        if self.solve.rtol is not None:
-            del plain["solve"]["accuracy"]
-        elif self.targets:
-            plain["solve"]["accuracy"] = dict(self.targets)
-        return plain
+        return {
+            name: _plain_value(value) if name in GROUPS else value
+            for name, value in self._given_fields()
+        }
+
+    def _given_fields(self) -> Iterator[tuple[str, Any]]:
+        """Yield the words and groups that make the case, by name; None of a group that is off."""
+        for name in ("name", "load", "joint", *GROUPS):
+            value = getattr(self, name)
+            is_default = value is None and WORDS[name]
+            if not (is_default or (self.joint == "none" and name in OF_JOINTS)):
+                yield name, value
 
     @property
     def rtol(self) -> float:
@@ -350,7 +340,11 @@ class Case(Settings):
 
         The keys of a case with values that none can be made of, such as a speed of 0, are "".
         """
-        found = {"name": self.name, "case": json.dumps(self.values(), sort_keys=True)}
+        texts = [
+            f'"{name}": {_value_text(value) if name in GROUPS else json.dumps(value)}'
+            for name, value in sorted(self._given_fields())
+        ]
+        found = {"name": self.name, "case": "{" + ", ".join(texts) + "}"}
         keys = {"key": "", "physics_key": ""}
         with contextlib.suppress(ArithmeticError, TypeError, ValueError):
             keys = {"key": self.key, "physics_key": self.physics_key}
@@ -418,15 +412,59 @@ def identity_parts(case: Case, names: Container[str] = IDENTITY) -> dict[str, st
             continue
         group = getattr(case, name)
         if group is not None:
-            texts[name] = _object_text(vars(group))
+            texts[name] = _identity_text(group)
         elif not WORDS[name]:
             texts[name] = "false"
     return texts
 
 
-def _object_text(values: Mapping[str, Any]) -> str:
-    """Return the values that are not None as a JSON object, as `KEY_TEXT` writes it, but faster."""
-    texts = []
+def _once_an_object(text: Callable[[Any], str]) -> Callable[[Any], str]:
+    """Return a function that makes the text of a group once, since many cases share the group.
+
+    By the object and not by its value: 1 and 1.0 are equal, and their texts are not.
+    """
+    known: dict[int, tuple[Any, str]] = {}  # with the object, whose number is its own meanwhile
+
+    def remembered(group: Any) -> str:
+        found = known.get(id(group))
+        if found is None:
+            if len(known) >= MAX_TEXTS:
+                known.clear()
+            found = known[id(group)] = group, text(group)
+        return found[1]
+
+    return remembered
+
+
+def _plain_value(group: Any) -> dict[str, Any] | bool:
+    """Return a group as a mapping of what it gives, as a case file has it; False for None."""
+    if group is None:
+        return False
+    # `vars` has the fields in their order, since a group has nothing but fields
+    plain = {key: value for key, value in vars(group).items() if value is not None}
+    if isinstance(group, Contact) and group.materials:
+        plain["materials"] = list(group.materials)
+        if group.law not in CYLINDRICAL:
+            # also the default: that of a file depends on whether it gives a pin radius
+            plain.setdefault("geometry", "external")
+    if isinstance(group, Solve):
+        if group.rtol is not None:
+            del plain["accuracy"]
+        elif group.accuracy and not isinstance(group.accuracy, str):
+            plain["accuracy"] = dict(group.accuracy)
+    return plain
+
+
+@_once_an_object
+def _value_text(group: Any) -> str:
+    """Return `_plain_value` of a group as JSON."""
+    return json.dumps(_plain_value(group), sort_keys=True)
+
+
+@_once_an_object
+def _identity_text(group: Any) -> str:
+    """Return what a group gives as JSON, as `KEY_TEXT` writes it, but faster."""
+    values, texts = vars(group), []
     for key in sorted(values):
         value = values[key]
         if type(value) is float and math.isfinite(value):
