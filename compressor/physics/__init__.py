@@ -25,10 +25,12 @@ from compressor.physics.onset import approach_at
 from compressor.physics.record import (
     MAX_SECTORS,
     Coordinate,
+    Fields,
     Load,
     Scene,
     is_featured,
     new_record,
+    read_fields,
     state_names,
 )
 from compressor.physics.runge_kutta import FLOWS, RungeKuttaPair

@@ -7,6 +7,7 @@ compression, discharge); the caller names the phase, so that both sides of a cor
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -150,14 +151,21 @@ def complete(p, pressure_ratio, printed):
 def segments(p, duration):
     """Return the segments into which the load's corners cut [0, duration] (s).
 
-    Returns edges, shape (n + 1,) in s, and phases, shape (n,). A corner closer than a
-    billionth of a turn to the end opens no segment of its own.
+    Returns edges, shape (n + 1,) in s, and phases, shape (n,), which are not to be written: other
+    runs have the same. A corner closer than a billionth of a turn to the end opens no segment of
+    its own.
     """
     if p["load"] == Load.NONE:
         return np.array([0.0, duration]), np.zeros(1, dtype=np.int64)
-    turn = 2.0 * math.pi / p["omega"]
+    return _segments_between(p["corners"].tobytes(), float(p["omega"]), duration)
+
+
+@lru_cache(maxsize=64)
+def _segments_between(corners, omega, duration):
+    """Return `segments` of a load's corners (rad, as bytes) at a speed (rad/s)."""
+    turn = 2.0 * math.pi / omega
     starts = np.zeros(4)
-    starts[1:] = p["corners"] / p["omega"]
+    starts[1:] = np.frombuffer(corners) / omega
     revolutions = np.arange(math.ceil(duration / turn * (1 + 1e-9)))
     starts = (revolutions[:, None] * turn + starts).ravel()
     phases = np.arange(starts.searchsorted(duration - 1e-9 * turn)) % 4

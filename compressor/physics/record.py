@@ -5,6 +5,8 @@ machine code of functions that take it in its disk cache.
 """
 
 from enum import IntEnum
+from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -197,23 +199,50 @@ FEATURED = np.dtype([*FIELDS, *FILM, *WEAR, *FEATURES, ("laws", "f8", (MECHANISM
 
 def zero(kind: np.dtype) -> np.record:
     """Return a record of a kind, of zeros, that compiled functions may write."""
-    return np.zeros(1, np.dtype((np.record, kind)))[0]
+    return np.zeros(1, record_type(kind))[0]
 
 
-def new_record(chosen: bool = False, featured: bool = False) -> np.record:
-    """Return a record of zeros, to be filled field by field.
+@cache
+def record_type(kind: np.dtype) -> np.dtype:
+    """Return the type of a kind's records, the same object each time.
+
+    Numba looks it up at each call: a type that it has not seen before it compares field by field.
+    """
+    return np.dtype((np.record, kind))
+
+
+def new_record(
+    chosen: bool = False, featured: bool = False, values: dict[str, Any] | None = None
+) -> np.record:
+    """Return a record with these values by field, and zeros elsewhere.
 
     chosen: for laws but the default ones; featured: for a mechanism with `FEATURES` and any laws.
     """
-    return zero(FEATURED if featured else CHOSEN if chosen else RECORD)
+    kind = FEATURED if featured else CHOSEN if chosen else RECORD
+    if values is None:
+        return zero(kind)
+    # all fields at once: to set them one by one takes four times as long
+    fields = dict.fromkeys(kind.names or (), 0.0) | values
+    return np.array([tuple(fields.values())], record_type(kind))[0]
 
 
-def is_featured(p: np.record) -> bool:
+def read_fields(p: np.record) -> dict[str, Any]:
+    """Return the fields of a record by name, as numbers of Python where they are no arrays.
+
+    To read one from the record takes ten times as long.
+    """
+    return dict(zip(p.dtype.names or (), p.item(), strict=True))
+
+
+Fields = np.record | dict[str, Any]  # a record, or its `read_fields`
+
+
+def is_featured(p: Fields) -> bool:
     """Return whether a record is that of a mechanism with features."""
     return bool(p["laws"].size == MECHANISM)
 
 
-def find_coordinates(p: np.record) -> list[Coordinate]:
+def find_coordinates(p: Fields) -> list[Coordinate]:
     """Return the coordinates, but the crank's, of a mechanism's features and clearances."""
     coordinates = []
     if p["clearance"][BIG_END] > 0.0:
@@ -241,7 +270,7 @@ def place_coordinates(p: np.record) -> None:
     p["degrees"], p["coordinates"] = len(moving), moving + [-1] * (len(at) - len(moving))
 
 
-def state_names(p: np.record) -> tuple[str, ...]:
+def state_names(p: Fields) -> tuple[str, ...]:
     """Return the names of the numbers of a record's state, each with its unit.
 
     Deviations, their rates, and what contacts carry. Of a mechanism: its coordinates and their

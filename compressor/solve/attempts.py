@@ -112,7 +112,7 @@ def prepare_run(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, n
 
     z: motion and flows at the start, (n + 4,).
     """
-    edges, phases = segments(request.p, float(request.times[-1]))
+    edges, phases = segments(request.fields, float(request.times[-1]))
     owner = sample_segments(request.times, edges)
     states = np.full((request.times.size, request.start.size), math.nan)
     result = Trajectory(request.times, states, phases[owner], new_tally(request.p))
@@ -283,9 +283,24 @@ class Times(NamedTuple):
     all: np.ndarray
 
 
+TIMES: dict[tuple, Times] = {}  # of the last cases, by what they depend on
+MAX_TIMES = 16
+
+
 def times_of(case: Case, sampled: bool) -> Times:
-    """Return the times at which a run of a case is sampled."""
-    samples = finer(case) * round(case.steps) if sampled else 1
+    """Return the times at which a run of a case is sampled, those of many cases in common."""
+    stride = finer(case) if sampled else 0
+    key = case.solve, case.machine.speed_rpm, case.output.signals, stride
+    if (known := TIMES.get(key)) is None:
+        if len(TIMES) >= MAX_TIMES:
+            TIMES.clear()
+        known = TIMES[key] = make_times(case, stride)
+    return known
+
+
+def make_times(case: Case, stride: int) -> Times:
+    """Return the times at which a run is sampled; stride: output times a step, 0 for both ends."""
+    samples = stride * round(case.steps) or 1
     output = case.duration * (np.arange(samples + 1) / samples)
     compared = compared_times(case) if case.wants_bars else output[:0]
     metered = sampled_times(case)

@@ -142,9 +142,9 @@ def prepare_stepper(request: Request, size: np.ndarray) -> np.record:
     mode, pair = COMPILED[request.method]
     stepper = new_stepper(mode)
     stepper["pair"], stepper["rtol"] = pair, request.rtol
-    length, speed = contact_sizes(request.p, size)
+    length, speed = contact_sizes(request.fields, size)
     stepper["watch"], stepper["contact_step"] = 1, CONTACT_STEP * length / speed
-    stepper["deepest"] = greatest_depth(request.p)[0]
+    stepper["deepest"] = greatest_depth(request.fields)[0]
     return stepper
 
 
@@ -220,7 +220,7 @@ def chunks(request: Request, stepper: np.record) -> Iterator[int]:
 def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
     """Integrate by the compiled loop into `result`. Raises Stop."""
     deadline = time.monotonic() + request.timeout
-    size = natural_sizes(request.p)
+    size = natural_sizes(request.fields)
     stepper = prepare_stepper(request, size)
     edges, phases, stepper["settle"] = with_edge(edges, phases, request.settle)
     edges, phases, ends = with_cuts(edges, phases, request.cuts)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,12 @@ from compressor.physics import (
     FLOWS,
     STALLED,
     Coordinate,
+    Fields,
     beyond_model,
     elastic_form,
     is_featured,
     new_tally,
+    read_fields,
 )
 from compressor.reasons import Reason
 
@@ -141,6 +144,11 @@ class Request:
     timeout: float = math.inf  # s
     cuts: Cuts | None = None
 
+    @cached_property
+    def fields(self) -> dict[str, Any]:
+        """Return `read_fields` of the record, for functions that read many of them."""
+        return read_fields(self.p)
+
 
 @dataclass
 class History:
@@ -225,9 +233,10 @@ def check_state(p: np.record, state: np.ndarray) -> None:
         raise Stop(Reason.ROD_IMPLAUSIBLE, detail)
 
 
-def greatest_depth(p: np.record) -> tuple[float, str]:
+def greatest_depth(p: Fields) -> tuple[float, str]:
     """Return the penetration (m) beyond which a run stops, and what that is in words."""
-    each = zip(p["stiffness"], p["clearance"].tolist(), p["pin_radius"].tolist(), strict=True)
+    names = ("stiffness", "clearance", "pin_radius")
+    each = zip(*(p[name].tolist() for name in names), strict=True)
     joints = [joint for joint in each if joint[1] > 0.0]
     tenth = IMPLAUSIBLE * min((pin for *_, pin in joints), default=math.inf)
     most = min((elastic_form(k, c, p).deepest for k, c, _ in joints), default=math.inf)

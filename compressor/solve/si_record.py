@@ -1,7 +1,8 @@
 """The SI record of a case, the sizes that tolerances are relative to, and its initial state.
 
 Gathered in a dict, for which the record is filled once: to read a field back would take ten times
-as long, for every job.
+as long, for every job. What reads many fields of a record may be given `physics.read_fields` of it
+in its place.
 
 The motion at the start of a case: top dead centre, ideal rates, and an elastic rod bent as it is
 then, at rest in itself. Without this deflection under what moves it, it would ring from the first
@@ -9,6 +10,7 @@ moment on.
 """
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from compressor.physics import (
     FLOWS,
     MAX_SECTORS,
     Coordinate,
+    Fields,
     Load,
     Scene,
     bore_fields,
@@ -71,10 +74,7 @@ def record(case: Case, worn: np.ndarray | None = None) -> np.record:
         p |= bore_fields(worn.shape[1])
         p["worn"] = np.pad(worn, ((0, 0), (0, MAX_SECTORS - worn.shape[1])))
     complete(p, ratio, printed=case.gas.switching == "paper")
-    result = new_record(case.chooses_laws, featured)
-    for name, value in p.items():
-        result[name] = value
-    return result
+    return new_record(case.chooses_laws, featured, p)
 
 
 def offsets(case: Case) -> np.ndarray:
@@ -220,7 +220,7 @@ MODES = {  # of the rod: stiffness over E I / L^3 or E A / L, share of its mass 
 UNCONTROLLED = 1e12
 
 
-def mechanism_sizes(p: np.record, joints: tuple[float, float], bristle: float) -> np.ndarray:
+def mechanism_sizes(p: Fields, joints: tuple[float, float], bristle: float) -> np.ndarray:
     """Return the size of each number of a mechanism's state, (n,).
 
     Deflections are those under the forces at hand. joints: length (m) and speed (m/s) of the
@@ -260,7 +260,7 @@ def mechanism_sizes(p: np.record, joints: tuple[float, float], bristle: float) -
     return sizes
 
 
-def _guide_sizes(p: np.record, force: float) -> tuple[float, float]:
+def _guide_sizes(p: Fields, force: float) -> tuple[float, float]:
     """Return the length (m) and speed (m/s) of the crosshead in its guide, as of a journal."""
     across = force * p["crank_ratio"] + p["reciprocating_mass"] * p["gravity"]
     stiffness, exponent = p["guide_stiffness"], p["guide_exponent"]
@@ -270,7 +270,7 @@ def _guide_sizes(p: np.record, force: float) -> tuple[float, float]:
     return length, length * math.sqrt(tangent / p["reciprocating_mass"])
 
 
-def length_and_speed(p: np.record) -> tuple[float, float]:
+def length_and_speed(p: Fields) -> tuple[float, float]:
     """Return the length (m) and speed (m/s) that absolute tolerances are relative to.
 
     The length is the smaller of the clearance and the penetration under the forces at hand, but
@@ -279,7 +279,8 @@ def length_and_speed(p: np.record) -> tuple[float, float]:
     """
     moving = p["reciprocating_mass"]
     force = moving * p["crank_radius"] * p["omega"] ** 2 + static_load(p)
-    joints = [j for j in zip(p["clearance"].tolist(), p["stiffness"], strict=True) if j[0] > 0.0]
+    both = zip(p["clearance"].tolist(), p["stiffness"].tolist(), strict=True)
+    joints = [joint for joint in both if joint[0] > 0.0]
     clearance = min(clearance for clearance, _ in joints)
     contact = elastic_form(max(stiffness for _, stiffness in joints), clearance, p)
     depth = contact.static_depth(force)
@@ -291,7 +292,7 @@ def length_and_speed(p: np.record) -> tuple[float, float]:
     return length, speed
 
 
-def film_damping(p: np.record) -> float:
+def film_damping(p: Fields) -> float:
     """Return the damping (N s/m) of a film that is pressed against the wall; 0 of dry joints.
 
     Of the joint with the smaller clearance, whose film is the stiffer one.
@@ -303,7 +304,7 @@ def film_damping(p: np.record) -> float:
     return float(size * p["film_constants"][joint, -1] / clearance)
 
 
-def natural_sizes(p: np.record) -> np.ndarray:
+def natural_sizes(p: Fields) -> np.ndarray:
     """Return the size of each number of the state: deviations, then their rates.
 
     (2 n,), in m, rad and per s. With chosen laws also of what contacts carry (`state_names`):
@@ -314,23 +315,20 @@ def natural_sizes(p: np.record) -> np.ndarray:
         return mechanism_sizes(p, joints, bristle_size(p, joints[0]))
     length, speed = length_and_speed(p)
     n = int(p["freedoms"])
-    sizes = np.full(2 * n, length)
-    sizes[n:] = speed
-    sizes[n - 1 :: n] *= 1.0 / p["rod_length"]  # the last freedom is an angle
-    carried = len(state_names(p)) - sizes.size
-    if not carried:
-        return sizes
-    bristle = bristle_size(p, length)
-    return np.concatenate((sizes, np.full(2, speed), np.full(2, bristle)))
+    per_length = 1.0 / p["rod_length"]  # the last freedom is an angle
+    sizes = [length] * (n - 1) + [length * per_length] + [speed] * (n - 1) + [speed * per_length]
+    if len(state_names(p)) > len(sizes):
+        sizes += [speed] * 2 + [bristle_size(p, length)] * 2
+    return np.array(sizes)
 
 
-def bristle_size(p: np.record, length: float) -> float:
+def bristle_size(p: Fields, length: float) -> float:
     """Return the deflection (m) of bristles that slide; a length where there are none."""
     stiffness = float(p["bristle_stiffness"])
     return float(p["dynamic"]) / stiffness if stiffness and p["dynamic"] else length
 
 
-def contact_sizes(p: np.record, sizes: np.ndarray) -> tuple[float, float]:
+def contact_sizes(p: Fields, sizes: np.ndarray) -> tuple[float, float]:
     """Return the length (m) and speed (m/s) of the journals in their bores.
 
     sizes: by `natural_sizes`. Of a mechanism with ideal joints no step need be as short as theirs.
@@ -356,10 +354,26 @@ def initial_state(case: Case, p: np.record, shift: np.ndarray | float = 0.0) -> 
     shift: of the journals (m), (joint, axis), beside the case's own offsets. An elastic rod is bent
     as it is then, at rest in itself.
     """
+    journals = offsets(case) + shift
+    if p["laws"].size == 1:
+        return plain_start(journals.tobytes(), p["scene"], p["rod_length"], p["rod_centre"]).copy()
     y = np.zeros(len(state_names(p)))
-    start(offsets(case) + shift, y, p)
+    start(journals, y, p)
     if is_featured(p) and p["elastic"]:
         deflect(p, y)
+    return y
+
+
+@lru_cache(maxsize=64)
+def plain_start(journals: bytes, scene: int, rod_length: float, rod_centre: float) -> np.ndarray:
+    """Return the state at time 0 of default laws and no features, which reads no other number.
+
+    journals: their positions in their bores (m), (joint, axis), as bytes: of 0.0 and -0.0, which
+    are equal, the states differ.
+    """
+    p = new_record(values={"scene": scene, "rod_length": rod_length, "rod_centre": rod_centre})
+    y = np.zeros(len(state_names(p)))
+    start(np.frombuffer(journals).reshape(2, 2).copy(), y, p)
     return y
 
 

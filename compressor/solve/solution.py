@@ -197,7 +197,7 @@ def lane_request(number: int, case: Case, rtol: float, p: np.record, times: Time
     """Return an attempt of a case in the form that lanes take."""
     request = build_request(case, rtol, p, times)
     trajectory, edges, phases, z = prepare_run(request)
-    size = natural_sizes(p)
+    size = natural_sizes(request.fields)
     stepper = prepare_stepper(request, size)
     edges, phases, stepper["settle"] = with_edge(edges, phases, request.settle)
     run = Run(stepper, p, z, size, edges, phases, times.all, trajectory.states, trajectory.tally)
