@@ -113,9 +113,10 @@ class Outcome:
             "status": ((), self.status, {"long_name": "ok or failed"}),
             "reason": ((), self.reason, {"long_name": "why a run failed, by a stable name"}),
         }
-        for name, metric in NUMBERS.items():
-            if not metric.when or not np.isnan(self.numbers[name]).all():
-                named[name] = (metric.dims, self.numbers[name], metric.attributes)
+        for (name, metric), value in zip(NUMBERS.items(), self.numbers.item(), strict=True):
+            is_absent = np.isnan(value).all() if metric.dims else math.isnan(value)
+            if not (metric.when and is_absent):
+                named[name] = (metric.dims, value, metric.attributes)
         return named
 
 

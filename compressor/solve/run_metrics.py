@@ -18,40 +18,43 @@ import numpy as np
 
 from compressor.cases import Case
 from compressor.metrics import METRICS, NUMBERS, QUANTILES
-from compressor.physics import Column, is_featured
+from compressor.physics import Column, is_featured, read_fields
 from compressor.solve.error_bars import Companion, Metrics, energy_residual
 from compressor.solve.request import Trajectory, last_state, merge_turns
 
 ROUNDING = 1e-12
 
 
-def metrics(p: np.record, tally: np.record) -> Metrics:
+def metrics(p: np.record, tallied: np.record) -> Metrics:
     """Return the metrics by name, from what was tallied after settling.
 
     In the units and shapes of `compressor.metrics.TABLE`: (), (joint,) or (joint, axis).
     """
-    ideal = p["clearance"] == 0
+    tally = read_fields(tallied)
     seconds = tally["seconds"] or math.nan
     axes, sizes = Column.FORCE - Column.ACCELERATION, Column.FORCE_SIZE - Column.ACCELERATION
     # the spans of steps add up to within rounding: whole revolutions are to stay whole
     name = "steady_seconds" if is_featured(p) else "seconds"
     steady = tally[name] or math.nan
     revolutions = round(float(steady * p["omega"]) / math.tau, 9)
+    of_joints = {
+        "max_penetration": tally["max_penetration"],
+        "contact_loss_fraction": tally["loss_seconds"] / seconds,
+        "impact_count": tally["impacts"],
+        "release_count": tally["releases"],
+        "impacts_per_rev": tally["impacts"] / revolutions,
+        "releases_per_rev": tally["releases"] / revolutions,
+    }
+    clear = np.where(p["clearance"] == 0, 0.0, [*of_joints.values()])
     numbers = {
         "peak_acceleration": tally["peak"][0],
         "rms_acceleration": math.sqrt(tally["square_acceleration"] / seconds),
         "rms_acceleration_deviation": math.sqrt(tally["square_deviation"] / seconds),
         "peak_contact_force": tally["peak"][sizes:],
         "peak_contact_force_axis": tally["peak"][axes:sizes].reshape(2, 2),
-        "max_penetration": np.where(ideal, 0.0, tally["max_penetration"]),
-        "contact_loss_fraction": np.where(ideal, 0.0, tally["loss_seconds"] / seconds),
         "mean_crank_torque": tally["crank_torque"] / seconds,
         "mean_guide_moment": tally["guide_moment"] / seconds,
-        "impact_count": np.where(ideal, 0.0, tally["impacts"]),
-        "release_count": np.where(ideal, 0.0, tally["releases"]),
-        "impacts_per_rev": np.where(ideal, 0.0, tally["impacts"] / revolutions),
-        "releases_per_rev": np.where(ideal, 0.0, tally["releases"] / revolutions),
-    }
+    } | dict(zip(of_joints, clear, strict=True))
     return {name: value for name, value in numbers.items() if has_metric(p, NUMBERS[name].when)}
 
 

@@ -63,7 +63,8 @@ def rows_of(p: np.record, run: Trajectory, columns: int = WIDE) -> np.ndarray:
     """Return the observed rows of a run at its times, (m, columns); nan from where it stopped."""
     rows = np.empty((run.times.size, columns))
     observe_all(run.times, run.states, run.phases, p, rows)
-    rows[np.isnan(run.states).any(axis=1)] = math.nan
+    if run.reason:
+        rows[np.isnan(run.states).any(axis=1)] = math.nan
     return rows
 
 

@@ -230,7 +230,7 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
     time = passed_time(p, times, states)
     angles = np.where(np.isnan(time), np.nan, p.omega * times)  # a stalled crank turns no further
     variables: dict[str, tuple] = {
-        "time": (("time",), time, {"units": "s", "long_name": "time"}),
+        "time": (("time",), time.copy(), {"units": "s", "long_name": "time"}),
         "crank_angle": (("time",), angles, angle_attrs),
     }
     for name, (dims, unit, phrase) in SERIES.items():
