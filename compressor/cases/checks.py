@@ -325,8 +325,6 @@ def _stem(name: str) -> str:
     """Return a key's name without its unit."""
     if name in map(_leaf, DOUBLES):
         return name.removesuffix("_mm")
-    if name in map(_leaf, DOUBLES):
-        return name.removesuffix("_mm")
     for row in table().values():
         if _leaf(row.key) == name and row.unit:
             unit = row.unit.replace(" ", "_").replace("/", "_per_").replace("^p", "15")
