@@ -37,10 +37,16 @@ COPIED = ("compressor", "cmd", "tests", "configs", "pyproject.toml", "README.md"
 DRAWN = 60
 # the order in which tests are tried, but for a file's own, which come first
 PURE = ("kinematics", "contact", "loads", "observe", "cam", "tally", "onset", "step_control",
-        "runge_kutta", "rosenbrock", "case", "integrate", "motion", "march")  # fmt: skip
+        "runge_kutta", "rosenbrock", "case", "integrate", "motion", "march",
+        "general_mechanism")  # fmt: skip
 COMPILED = ("invariances", "march", "integrate", "rosenbrock", "simulate", "accuracy",
             "horizon")  # fmt: skip
-TESTED_IN = {"twin": "horizon"}  # where not in the module of the same name
+LAWS = ("contact_laws", "friction_laws")
+TESTED_IN = {
+    **dict.fromkeys(("mechanism", "mechanism_motion", "mechanism_rows"), ("general_mechanism",)),
+    "motion": ("motion", *LAWS),
+    "contact": ("contact", *LAWS),
+}  # where not in the module of the same name alone
 NO_JIT, JIT = "not slow and not compiled", "not slow"
 # s of processor time with the JIT off and on; a mutant that takes longer is caught: it never ends
 PATIENCE = {False: 120, True: 900}
@@ -171,25 +177,31 @@ def load_reference():
     reference.ideal_joint_forces(0.0, 0, reference.paper_params("none", "none", 0.0))
 
 
-def in_turn(modules, mutant):
-    """Modules of tests, that of the mutant's own file first."""
+def put_first(own, modules):
+    """Modules of tests, a mutant's own first."""
+    return [*own, *(name for name in modules if name not in own)]
+
+
+def own_modules(mutant):
+    """The modules of tests of a mutant's file."""
     stem = Path(mutant.file).stem
-    return sorted(modules, key=lambda name: name != TESTED_IN.get(stem, stem))
+    return TESTED_IN.get(stem, (stem,))
 
 
 def try_mutant(mutant, tree, pure, compiled):
     """What became of a mutant: its row of the kept measurement."""
     began = time.monotonic()
     row = {"kind": mutant.kind, "mutant": mutant.identity, "jit": False, "caught_by": ""}
-    reason = EQUIVALENT.get(mutant.identity)
+    own, reason = own_modules(mutant), EQUIVALENT.get(mutant.identity)
     if reason:
         row["equivalent"] = reason
     try:
         if pure:
-            row["caught_by"] = tree.attempt(mutant, False, in_turn(pure, mutant))
+            first = [name for name in own if name in pure]  # some take minutes without the JIT
+            row["caught_by"] = tree.attempt(mutant, False, put_first(first, pure))
         if compiled and not reason and not row["caught_by"]:
             row["jit"] = True
-            row["caught_by"] = tree.attempt(mutant, True, in_turn(compiled, mutant))
+            row["caught_by"] = tree.attempt(mutant, True, put_first(own, compiled))
     except CannotBeLoaded as error:
         row["cannot_be_loaded"] = str(error)
     tell(began, f"{mutant.identity}\n        {outcome(row)}")

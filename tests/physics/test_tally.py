@@ -62,6 +62,10 @@ def test_tally_of_a_known_step():
     assert (tally.impacts.tolist(), tally.releases.tolist()) == ([1, 0], [0, 0])
     assert tally.max_penetration[0] == pytest.approx(0.5)
     assert tally.loss_seconds.tolist() == [pytest.approx(0.25e-4), 0.0]
+    assert (tally.touching[0], tally.flown[0]) == (1, 0)
+    rows[:, Column.NORMAL], rows[:, Column.PENETRATION] = 0.0, -1.0
+    tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, True, tally, p)
+    assert (tally.touching[0], tally.flown[0]) == (0, 1)
 
 
 @pytest.mark.parametrize(
