@@ -379,14 +379,16 @@ def scale_table():
 def page_table():
     found = kept("page.json")
     lines = [
-        "| report of | written in, s | page, MB | data of figures, MB | CSV, MB | PNG and SVG, MB "
-        "| opens in, s | first figure live after, s |",
-        "|---|---|---|---|---|---|---|---|",
+        "| report of | written in, s | written again, s | page, MB | data of figures, MB | CSV, MB "
+        "| PNG and SVG, MB | opens in, s | first figure live after, s |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, one in found["stores"].items():
         sizes = (one[f"{kind}_bytes"] / 1e6 for kind in ("page", "data", "csv", "picture"))
-        cells = (f"{one['write_seconds']:.1f}", *(f"{size:.2f}" for size in sizes),
-                 f"{one['open_seconds']:.2f}", f"{one['first_figure_seconds']:.2f}")  # fmt: skip
+        opens = ("–" if one[of] is None else f"{one[of]:.2f}"
+                 for of in ("open_seconds", "first_figure_seconds"))  # fmt: skip
+        cells = (f"{one['write_seconds']:.1f}", f"{one['rewrite_seconds']:.1f}",
+                 *(f"{size:.2f}" for size in sizes), *opens)  # fmt: skip
         lines.append(f"| {name}, {one['figures']} figures | {' | '.join(cells)} |")
     library = {one["library_bytes"] for one in found["stores"].values()}
     (size,) = library
