@@ -418,22 +418,22 @@ def identity_parts(case: Case, names: Container[str] = IDENTITY) -> dict[str, st
     return texts
 
 
-def _once_an_object(text: Callable[[Any], str]) -> Callable[[Any], str]:
-    """Return a function that makes the text of a group once, since many cases share the group.
+def _remember_texts(make_text: Callable[[Any], str]) -> Callable[[Any], str]:
+    """Return `make_text` that makes the text of each group once, since many cases share a group.
 
     By the object and not by its value: 1 and 1.0 are equal, and their texts are not.
     """
     known: dict[int, tuple[Any, str]] = {}  # with the object, whose number is its own meanwhile
 
-    def remembered(group: Any) -> str:
+    def find_text(group: Any) -> str:
         found = known.get(id(group))
         if found is None:
             if len(known) >= MAX_TEXTS:
                 known.clear()
-            found = known[id(group)] = group, text(group)
+            found = known[id(group)] = group, make_text(group)
         return found[1]
 
-    return remembered
+    return find_text
 
 
 def _plain_value(group: Any) -> dict[str, Any] | bool:
@@ -455,13 +455,13 @@ def _plain_value(group: Any) -> dict[str, Any] | bool:
     return plain
 
 
-@_once_an_object
+@_remember_texts
 def _value_text(group: Any) -> str:
     """Return `_plain_value` of a group as JSON."""
     return json.dumps(_plain_value(group), sort_keys=True)
 
 
-@_once_an_object
+@_remember_texts
 def _identity_text(group: Any) -> str:
     """Return what a group gives as JSON, as `KEY_TEXT` writes it, but faster."""
     values, texts = vars(group), []

@@ -168,6 +168,7 @@ def compared(commit):
                 said(["-c", SOLVER], folder, tree)
                 said(["-c", CALLS], folder, tree)
                 Path(folder, "many.yaml").write_text(many(MIN_JOBS_TO_COMPILE), encoding="utf-8")
+                # each into a folder of its own, or the second finds all jobs stored
                 lanes = ["run", "many.yaml", "--quiet", "-o", "now" if tree == ROOT else "then"]
                 said(["-m", "compsim", *lanes], folder, tree)
             pairs = []

@@ -373,9 +373,9 @@ def shared_title(drawing: Drawing, panel: Panel, way: Way) -> str:
 def as_csv(drawing: Drawing) -> str:
     """Return all numbers of a figure. Curves over the same x share a column of it, and stand once.
 
-    So do points of the same jobs, in all panels, share the column of the jobs' keys. A column is
-    headed "panel: curve: title of the axis", with " below" and " above" for the ends
-    of error bars, counted from the value. A map has a row a cell, x and y in its middle.
+    Points of the same jobs share the column of the jobs' keys, across panels. A column is headed
+    "panel: curve: title of the axis", with " below" and " above" for the ends of error bars,
+    counted from the value. A map has a row a cell, x and y in its middle.
     """
     columns: list[tuple[str, Sequence[str]]] = []
     last, seen = ("", b""), set()
