@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 from compressor.cases.checks import (
-    PER_JOINT,
+    PER_PART,
     SHORTHANDS,
     SWEEP,
     check_part,
@@ -384,7 +384,7 @@ def plain_values(values: Mapping[str, Any], problems: list[Problem]) -> dict[str
     """Return nested values without shorthands and synonyms, and with the geometry of materials."""
     whole = expand_shorthands(expand_synonyms(values, problems))
     given = values_given(whole)
-    pins = given.keys() & {*PER_JOINT["machine.pin_radius_mm"].values()}
+    pins = given.keys() & {*PER_PART["machine.pin_radius_mm"].values()}
     if pins and "contact.materials" in given and "contact.geometry" not in given:
         whole["contact"] = {**whole["contact"], "geometry": "internal"}
     return whole

@@ -6,7 +6,7 @@ stays one until a case is built.
 
 Words of the trade: keys that are twice one of ours, and other units that are answered. A synonym is
 written out as its key when values are read, so that nothing else knows it; so is a value that a key
-has for each joint, such as `pin_radius_mm: {big_end: 60, small_end: 35}`.
+has for each part, such as `pin_radius_mm: {big_end: 60, small_end: 35}`.
 
 Keys that are not there, and groups that are none: their errors, in files and values alike. That of
 an unknown key names what was probably meant, or else what there is.
@@ -102,8 +102,8 @@ DOUBLES = {
     "machine.stroke_mm": "machine.crank_radius_mm",
     "gas.bore_mm": "gas.piston_radius_mm",
 }
-# key that may have a value for each joint -> the keys that these are of
-PER_JOINT = {
+# key that may have a value for each part of a thing -> the keys that these are of
+PER_PART = {
     "machine.pin_radius_mm": {
         "big_end": "machine.pin_radius_mm", "small_end": "machine.small_end_pin_radius_mm",
     },
@@ -123,19 +123,19 @@ def halve(value: Any) -> Any:
     return value / 2 if is_number else value
 
 
-def by_joint(key: str, value: Any) -> Mapping[str, str]:
-    """Return the keys that a value for each joint is of, by joint; none of any other value."""
-    keys = PER_JOINT.get(key, {})
+def by_part(key: str, value: Any) -> Mapping[str, str]:
+    """Return the keys that a value for each part is of, by part; none of any other value."""
+    keys = PER_PART.get(key, {})
     return keys if isinstance(value, Mapping) and {*value} & {*keys} else {}
 
 
-def lacking_joint(key: str, value: Mapping[str, Any]) -> str:
-    """Return what is wrong with the joints of a value for each; "" if nothing is."""
-    joints = [*PER_JOINT[key]]
-    if {*value} == {*joints}:
+def lacking_part(key: str, value: Mapping[str, Any]) -> str:
+    """Return what is wrong with the parts of a value for each; "" if nothing is."""
+    parts = [*PER_PART[key]]
+    if {*value} == {*parts}:
         return ""
     given = ", ".join(map(str, value))
-    return f"needs both, {' and '.join(joints)}, not {given}; or one number for both joints"
+    return f"needs both, {' and '.join(parts)}, not {given}; or one number for both"
 
 
 def expand_synonyms(values: Mapping[str, Any], problems: list[Problem]) -> dict[str, Any]:
@@ -150,17 +150,17 @@ def expand_synonyms(values: Mapping[str, Any], problems: list[Problem]) -> dict[
             problems.append(Problem(synonym, TWICE.format(key)))
         rest = {inner: value for inner, value in within.items() if inner != name}
         whole[group] = {own: halve(within[name])} | rest
-    for key in PER_JOINT:
+    for key in PER_PART:
         group, _, name = key.partition(".")
         within = whole.get(group)
         value: Any = within.get(name) if isinstance(within, Mapping) else None
-        keys = by_joint(key, value)
+        keys = by_part(key, value)
         if not keys or not isinstance(within, Mapping):
             continue
-        if message := lacking_joint(key, value):
+        if message := lacking_part(key, value):
             problems.append(Problem(key, message))
         rest = {inner: one for inner, one in within.items() if inner != name}
-        each = {keys[joint].rpartition(".")[2]: value[joint] for joint in keys if joint in value}
+        each = {keys[part].rpartition(".")[2]: value[part] for part in keys if part in value}
         whole[group] = each | rest
     return whole
 

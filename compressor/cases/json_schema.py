@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED
-from compressor.cases.checks import DOUBLES, SHORTHANDS, row_of
+from compressor.cases.checks import DOUBLES, PER_PART, SHORTHANDS, row_of
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.parameter import NAME, TARGET, Parameter
 from compressor.cases.swept import FORMS, SAMPLED, is_number
@@ -51,7 +51,7 @@ def _group(name: str) -> Schema:
     rows += [
         _synonym_row(word, key) for word, key in DOUBLES.items() if word.startswith(f"{name}.")
     ]
-    mapping = _mapping({row.key.removeprefix(f"{name}."): _value(row) for row in rows})
+    mapping = _mapping({row.key.removeprefix(f"{name}."): _value_or_parts(row) for row in rows})
     pairs = (*IN_PLACE_OF, *DOUBLES.items())
     rivals = [pair for pair in pairs if pair[0].startswith(f"{name}.")]
     if rivals:
@@ -72,6 +72,15 @@ def _synonym_row(word: str, key: str) -> Parameter:
     row = table()[key]
     span = {"default": 2 * row.default, "low": 2 * row.low, "high": 2 * row.high}
     return replace(row, key=word, phrase=f"twice {key}, in its place", **span)
+
+
+def _value_or_parts(row: Parameter) -> Schema:
+    """Return the schema of a parameter that may have a value for each part."""
+    found = _value(row)
+    if parts := PER_PART.get(row.key):
+        each = _mapping({part: _value(table()[key]) for part, key in parts.items()})
+        found["anyOf"] = [*found["anyOf"], each | {"required": [*parts]}]
+    return found
 
 
 def _value(row: Parameter) -> Schema:

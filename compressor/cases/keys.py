@@ -14,10 +14,10 @@ from compressor.cases.checks import (
     SHORTHANDS,
     TWICE,
     accepted_keys,
-    by_joint,
+    by_part,
     describe_unknown,
     halve,
-    lacking_joint,
+    lacking_part,
     no_mapping,
     stands_for,
 )
@@ -61,14 +61,14 @@ def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
 
 
 def _add_leaf(found: Leaves, key: str, node: Node, problems: list[FileProblem]) -> None:
-    """Add a leaf of a group to those found: a synonym as its key, a value by joint as several."""
-    if keys := by_joint(key, node.value):
-        if message := lacking_joint(key, node.value):
+    """Add a leaf of a group to those found: a synonym as its key, a value by part as several."""
+    if keys := by_part(key, node.value):
+        if message := lacking_part(key, node.value):
             problems.append(FileProblem(node.place, key, message))
-        for joint, one in keys.items():
-            if joint in node.value:
-                found.values[one] = node.value[joint]
-                found.places[one] = node.value[joint].key_place
+        for part, one in keys.items():
+            if part in node.value:
+                found.values[one] = node.value[part]
+                found.places[one] = node.value[part].key_place
         return
     own = DOUBLES.get(key, key)
     doubled = next((word for word, half in DOUBLES.items() if half == own), own)

@@ -23,6 +23,7 @@ OTHERS = [
     "joint: both\nclearance_mm: {big_end: 0.1, small_end: [0.1, 0.2]}",
     "joint: both\nclearance_mm: {random: [0.01, 1], log: true}\nsample: {n: 2, seed: 3}",
     "load: [none, spring]\nexclude: [load == none]\nfriction: false",
+    "joint: both\nclearance_mm: 0.1\nmachine: {pin_radius_mm: {big_end: [50, 60], small_end: 35}}",
 ]
 WRONG = [
     "joint: big_en",
@@ -37,6 +38,7 @@ WRONG = [
     "machine: {rod_mass_kg: {lnspace: [1, 2, 3]}}",
     "machine: {rod_mass_kg: {linspace: [1, 2, 3], log: true}}",
     "machine: {rod_mass_kg: [4, 4]}",
+    "joint: both\nclearance_mm: 0.1\nmachine: {pin_radius_mm: {big_end: 60}}",
     "output: {keep: [series, metrics]}",
     "name: ../x",
     "name: .x",
