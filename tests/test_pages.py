@@ -165,9 +165,9 @@ def write_case_files(place):
 def test_case_files_have_the_jobs_that_they_say(tmp_path):
     jobs = write_case_files(tmp_path)
     assert [*jobs] == [
-        "bearing-wear.yaml", "machines.yaml", "grid.yaml", "zipped.yaml", "random.yaml",
-        "latin.yaml", "sampled.yaml", "sensitivity.yaml", "bounded.yaml", "blocks.yaml",
-        "regimes.yaml", "bearings.yaml",
+        "bearing-wear.yaml", "machines.yaml", "cylinder.yaml", "grid.yaml", "zipped.yaml",
+        "random.yaml", "latin.yaml", "sampled.yaml", "sensitivity.yaml", "bounded.yaml",
+        "blocks.yaml", "regimes.yaml", "bearings.yaml",
     ]  # fmt: skip
     for name, count in jobs.items():
         (study,) = load_studies(tmp_path / name)

@@ -11,6 +11,7 @@ from compressor.analysis.contacts import (
     joints_with_clearance,
     mode_shares,
 )
+from compressor.analysis.cylinder import cylinder_words
 from compressor.analysis.effects import (
     Effects,
     grid_effects,

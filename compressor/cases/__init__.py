@@ -15,6 +15,7 @@ from compressor.cases.checks import SHORTHANDS, phrase_of, row_of, stands_for, s
 from compressor.cases.conflicts import back_action, judged_range, outside_judged, reads
 from compressor.cases.examples import templates
 from compressor.cases.groups import (
+    ENDS,
     METHODS,
     Contact,
     Friction,

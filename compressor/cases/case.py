@@ -189,7 +189,7 @@ class Case(Settings):
     def _of_values(cls, values: Mapping[str, Any], lenient: bool = False) -> "Case":
         parts, given = parts_of(values, lenient)
         case = cls(**parts)
-        problems = [*conflicts(case, given, {} if lenient else values_given(values))]
+        problems = [*conflicts(case, given, {} if lenient else _values_to_read(values))]
         if problems:
             raise CaseError(_as_written(values, problems))
         vars(case)["problems"] = ()  # known: see `problems`
@@ -375,9 +375,15 @@ def parts_of(
     whole = plain_values(values, problems)
     parts = {key: check_part(key, value, problems) for key, value in whole.items()}
     if problems:
-        wrong = _everything_wrong(whole, parts, problems, {} if lenient else values_given(values))
+        to_read = {} if lenient else _values_to_read(values)
+        wrong = _everything_wrong(whole, parts, problems, to_read)
         raise CaseError(_as_written(values, wrong))
     return parts, frozenset(values_given(whole))
+
+
+def _values_to_read(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values given, by dotted key, synonyms as the keys that they stand for."""
+    return values_given(expand_synonyms(values, []))
 
 
 def plain_values(values: Mapping[str, Any], problems: list[Problem]) -> dict[str, Any]:

@@ -13,7 +13,6 @@ an unknown key names what was probably meant, or else what there is.
 """
 
 import dataclasses
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
@@ -107,6 +106,12 @@ PER_PART = {
     "machine.pin_radius_mm": {
         "big_end": "machine.pin_radius_mm", "small_end": "machine.small_end_pin_radius_mm",
     },
+    "gas.clearance_percent": {
+        "head": "gas.clearance_percent", "crank": "gas.crank_clearance_percent",
+    },
+    "gas.valve_loss_percent": {
+        "suction": "gas.valve_loss_percent", "discharge": "gas.discharge_loss_percent",
+    },
 }  # fmt: skip
 # unit at the end of an unknown key -> the unit of ours, and what one of it is there
 OTHER_UNITS = {
@@ -184,29 +189,14 @@ def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
     return f"; write {key}: " + (f"[{amounts}]" if isinstance(value, list | tuple) else amounts)
 
 
-def of_percent(name: str, group: str, value: Any, stroke: float) -> str:
-    """Return the hint at the key that stands for a clearance in per cent; "" for another name.
-
-    stroke: of the piston (mm), of which a cylinder's clearance is a share; nan where it is swept.
-    """
+def of_percent(name: str, group: str) -> str:
+    """Return the hint at the key of a cylinder's clearance in per cent; "" for another name."""
     if not PERCENT.fullmatch(name) or group not in ("", "gas", "machine"):
         return ""
-    amount = f", {name.rpartition('_')[2]} of the stroke, in mm"
-    if isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(stroke):
-        amount = f": {value / 100 * stroke:.4g}, of a stroke of {stroke:g} mm"
+    form = "clearance_percent, a number or {head: 12, crank: 14}"
     if group == "gas":
-        return f"; write head_clearance_mm{amount}"
-    return f"; of the cylinder, write gas.head_clearance_mm{amount}; of joints, clearance_mm in mm"
-
-
-def stroke_in(values: Any) -> float:
-    """Return the stroke of a case's nested values (mm), else the default's; nan for no number."""
-    machine = values.get("machine") if isinstance(values, Mapping) else None
-    given = machine if isinstance(machine, Mapping) else {}
-    radius = given.get("crank_radius_mm", table()["machine.crank_radius_mm"].default)
-    stroke = given.get("stroke_mm", 2 * radius if isinstance(radius, int | float) else None)
-    is_number = isinstance(stroke, int | float) and not isinstance(stroke, bool)
-    return float(stroke) if is_number and stroke is not None else math.nan
+        return f"; write {form}"
+    return f"; of the cylinder, write gas.{form}; of joints, clearance_mm in mm"
 
 
 # keys of a case file that are no part of a case: how values are swept together, groups of studies
@@ -230,17 +220,12 @@ def accepted_keys(group: str, file: bool = True) -> list[str]:
     return [*known_keys(group, file), *synonyms_of(group)]
 
 
-def describe_unknown(
-    name: str, group: str, file: bool = True, value: Any = None, values: Any = None
-) -> str:
-    """Return the error of a key that a group does not have.
-
-    value: the key's. values: the whole case's, nested, as far as they are known.
-    """
+def describe_unknown(name: str, group: str, file: bool = True, value: Any = None) -> str:
+    """Return the error of a key that a group does not have; value: the key's."""
     whole = group or ("a case file" if file else "a case")
     hint = (
         in_our_unit(name, value, accepted_keys(group))
-        or of_percent(name, group, value, stroke_in(values))
+        or of_percent(name, group)
         or suggestion(name, group)
         or f"; {whole} has {', '.join(known_keys(group, file))}"
     )
@@ -327,7 +312,12 @@ def _stem(name: str) -> str:
         return name.removesuffix("_mm")
     for row in table().values():
         if _leaf(row.key) == name and row.unit:
-            unit = row.unit.replace(" ", "_").replace("/", "_per_").replace("^p", "15")
+            unit = (
+                row.unit.replace(" ", "_")
+                .replace("/", "_per_")
+                .replace("^p", "15")
+                .replace("%", "percent")
+            )
             return name.removesuffix(f"_{unit}")
     return name
 

@@ -16,6 +16,7 @@ from types import FunctionType
 from typing import Any, cast
 
 from compressor.cases.checks import SHORTHANDS, row_of, value_in
+from compressor.cases.groups import CYLINDER_KEYS, ENDS
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
 from compressor.cases.parameter import IMPLAUSIBLE, Problem, Reader
@@ -285,6 +286,7 @@ IN_PLACE_OF = (
     ("solve.rtol", "solve.accuracy"),
     ("contact.materials", "contact.stiffness_N_per_mm15"),
     ("contact.materials", "contact.modulus_GPa"),
+    ("gas.clearance_percent", "gas.head_clearance_mm"),
 )
 MAX_MOVING_SHARE = 0.1  # the moving parts' share of a body's mass
 MAX_BACK_ACTION = 0.3  # of a force that a body's motion may change at the speed's first two orders
@@ -292,6 +294,7 @@ MAX_REVOLUTIONS_TOLD = 1e9  # revolutions, more than any run has
 SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 
 
+OF_CYLINDER = tuple(f"gas.{key}" for key in CYLINDER_KEYS)
 # keys that a case fills in where others are not given or not used, and those that decide it
 FILLED_IN = {
     "machine.rod_centre_mm": ("machine.rod_length_mm",),
@@ -306,6 +309,13 @@ FILLED_IN = {
     "lubricant": ("joint",),
     "wear": ("joint",),
     "wear.limit_mm": ("joint", "clearance_mm.big_end", "clearance_mm.small_end"),
+    "gas.action": OF_CYLINDER,
+    "gas.unloaded": OF_CYLINDER,
+    "gas.valve_loss_percent": OF_CYLINDER,
+    "gas.switching": OF_CYLINDER,
+    "gas.head_clearance_mm": ("gas.clearance_percent",),
+    "gas.crank_clearance_percent": ("gas.clearance_percent",),
+    "gas.discharge_loss_percent": ("gas.valve_loss_percent",),
 }  # fmt: skip
 # groups that fill in values by several of their others: each may decide all of them
 FILLING = ("contact", "friction", "solve")
@@ -484,28 +494,39 @@ def _load_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         )
     if case.load != "gas":
         return
-    play = _play(case)
-    if gas.head_clearance_mm <= play:
+    play, stroke = _play(case), 2 * machine.crank_radius_mm
+    for end in filter(gas.presses, ENDS):
+        clearance = gas.clearance(end, stroke)
+        if clearance <= play:
+            cover = "head" if end == "head" else "cover at the crank end"
+            yield Problem(
+                gas.clearance_key(end),
+                f"{clearance:g} mm does not exceed the clearances, {play:g} mm in all: the piston "
+                f"would reach the cylinder {cover}, where the gas force has no bound; raise it",
+            )
+    if gas.unloaded not in (None, "none") and not gas.presses(gas.unloaded):
         yield Problem(
-            "gas.head_clearance_mm",
-            f"{gas.head_clearance_mm:g} mm does not exceed the clearances, {play:g} mm in all: the "
-            "piston would reach the cylinder head, where the gas force has no bound; raise it",
+            "gas.unloaded", f"no gas presses in the {gas.unloaded} end with action: {gas.action}"
         )
+    if gas.presses("crank"):
+        yield from _rod_conflicts(case)
     if gas.discharge_MPa <= gas.suction_MPa:
         yield Problem(
             "gas.discharge_MPa",
             f"{gas.discharge_MPa:g} MPa must exceed suction_MPa, {gas.suction_MPa:g} MPa",
         )
     elif gas.switching == "exact":
-        full = 2 * machine.crank_radius_mm + gas.head_clearance_mm
-        growth = (gas.discharge_MPa / gas.suction_MPa) ** (1 / gas.exponent)
-        if gas.head_clearance_mm * growth >= full:
-            yield Problem(
-                "gas.head_clearance_mm",
-                "the gas left at the head never expands to the suction pressure; "
-                "lower it, or the pressure ratio",
-            )
-    elif _gas_geometry(case) != _gas_geometry(Settings()):
+        suction, discharge = gas.open_pressures
+        growth = (discharge / suction) ** (1 / gas.exponent)
+        for end in filter(gas.has_cycle, ENDS):
+            clearance = gas.clearance(end, stroke)
+            if clearance * growth >= stroke + clearance:
+                yield Problem(
+                    gas.clearance_key(end),
+                    f"the gas left at the {end} never expands to the suction pressure; "
+                    "lower it, or the pressure ratio",
+                )
+    elif gas.is_cylinder or _gas_geometry(case) != _gas_geometry(Settings()):
         yield Problem(
             "gas.switching",
             "the printed corners hold for the paper's geometry and pressures only; "
@@ -513,12 +534,22 @@ def _load_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         )
 
 
+def _rod_conflicts(case: Settings) -> Iterator[Problem]:
+    """Yield a piston rod that is missing, or fills the cylinder."""
+    rod, bore = case.gas.rod_diameter_mm, 2 * case.gas.piston_radius_mm
+    if rod is None:
+        needed = f"is needed with action: {case.gas.action}; give it in mm, such as {bore / 4:g}"
+        yield Problem("gas.rod_diameter_mm", needed)
+    elif rod >= bore:
+        yield Problem("gas.rod_diameter_mm", f"{rod:g} mm must be less than the bore, {bore:g} mm")
+
+
 def _play(case: Settings) -> float:
     """Return how much farther than ideal joints those with clearance let the crosshead go (mm)."""
     return case.clearance_mm.big_end + case.clearance_mm.small_end
 
 
-def _gas_geometry(case: Settings) -> tuple[float, ...]:
+def _gas_geometry(case: Settings) -> tuple[float | None, ...]:
     """Return what decides where the gas cycle's corners lie."""
     gas, machine = case.gas, case.machine
     return (

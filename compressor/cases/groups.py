@@ -13,7 +13,9 @@ from compressor.cases.parameter import (
     BIG_CLEARANCE,
     BIG_END,
     CLEARANCE,
+    CRANK_END,
     DAMPED,
+    HEAD_CLEARANCE,
     IDEAL_JOINT,
     LAW,
     MATERIALS,
@@ -170,6 +172,19 @@ class Machine:
         return self.pin_radius_mm if own is None else own
 
 
+# ends of a cylinder, and the actions by which the gas in them presses
+ENDS = {"head": ("single", "double"), "crank": ("double", "crank_end")}
+# what the paper's gas load has not; any of them makes the corners exact
+CYLINDER_KEYS = (
+    "action", "rod_diameter_mm", "clearance_percent", "crank_clearance_percent",
+    "valve_loss_percent", "discharge_loss_percent", "unloaded",
+)  # fmt: skip
+# key of its own -> the key whose value it has without
+AS_THE_OTHER = {
+    "crank_clearance_percent": "clearance_percent", "discharge_loss_percent": "valve_loss_percent",
+}  # fmt: skip
+
+
 @document_fields
 @dataclass(frozen=True)
 class Gas:
@@ -181,14 +196,23 @@ class Gas:
     >>> gas = {"discharge_MPa": 0.5, "switching": "exact"}
     >>> compressor.Case.from_values({"load": "gas", "gas": gas}).gas.discharge_MPa
     0.5
+
+    The gas presses on the piston from the cylinder's head alone, or, by `action`, from both ends or
+    from the crank end. Clearances and valve losses may differ by end and by valve:
+
+    >>> gas = {"action": "double", "rod_diameter_mm": 30, "clearance_percent": {"head": 12,
+    ...        "crank": 14}, "valve_loss_percent": 4}
+    >>> compressor.Case.from_values({"load": "gas", "gas": gas}).gas.switching
+    'exact'
     """
 
     piston_radius_mm: float = parameter(
         50.0, "mm", (0, 1e4), "Table 1", "piston radius", above=True
     )
-    head_clearance_mm: float = parameter(
-        20.0, "mm", (0, 1e5), "Eq. 13", "clearance of the cylinder head s0", above=True
-    )
+    head_clearance_mm: float | None = parameter(
+        20.0, "mm", (0, 1e5), "Eq. 13", "clearance of the cylinder head s0", above=True,
+        optional=True, read=HEAD_CLEARANCE,
+    )  # fmt: skip
     suction_MPa: float = parameter(
         0.105, "MPa", (0, 1e3), "Table 1", "suction pressure (absolute)", above=True
     )
@@ -197,11 +221,95 @@ class Gas:
     )
     exponent: float = parameter(1.4, "", (1, 5), "Eq. 13", "isentropic exponent")
     back_pressure_MPa: float = parameter(
-        0.0, "MPa", (0, 1e3), "assumed", "pressure on the piston's other face"
-    )
-    switching: str = choice(
-        "paper", ("paper", "exact"), "Eq. 13", "corners as printed, or where the pressures meet"
-    )
+        0.0, "MPa", (0, 1e3), "assumed",
+        "pressure on what no gas cycle presses: the piston's other face, or the rod's "
+        "cross-section in a double-acting cylinder",
+    )  # fmt: skip
+    switching: str | None = choice(
+        None, ("paper", "exact"), "Eq. 13",
+        "corners as printed, or where the pressures meet (the default with any of the keys below)",
+        optional=True,
+    )  # fmt: skip
+    action: str | None = choice(
+        None, ("single", "double", "crank_end"), "ours",
+        "ends in which the gas has a cycle: the head's (the default), both, the crank's",
+        optional=True,
+    )  # fmt: skip
+    rod_diameter_mm: float | None = parameter(
+        None, "mm", (0, 1e4), "ours", "piston rod, which takes its section off the crank end",
+        above=True, optional=True, read=CRANK_END,
+    )  # fmt: skip
+    clearance_percent: float | None = parameter(
+        None, "%", (0, 1000), "ours",
+        "clearance volume over swept volume of each end, or of the head's; in place of "
+        "head_clearance_mm", above=True, optional=True, read=HEAD_CLEARANCE,
+    )  # fmt: skip
+    crank_clearance_percent: float | None = parameter(
+        None, "%", (0, 1000), "as the head's", "clearance volume over swept volume, crank end",
+        above=True, optional=True, read=CRANK_END,
+    )  # fmt: skip
+    valve_loss_percent: float | None = parameter(
+        None, "%", (0, 90), "ours",
+        "loss of absolute pressure while a valve is open, of both or of the suction's; 0 without",
+        optional=True,
+    )  # fmt: skip
+    discharge_loss_percent: float | None = parameter(
+        None, "%", (0, 90), "as the suction's",
+        "loss of absolute pressure while the discharge valve is open", optional=True,
+    )  # fmt: skip
+    unloaded: str | None = choice(
+        None, ("none", "head", "crank"), "ours",
+        "end whose gas stays at suction pressure, its valves held open; none by default",
+        optional=True,
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Fill in what a cylinder's keys leave open; what is as without a key goes without it."""
+        values = vars(self)
+        if self.is_cylinder:
+            filled = {"action": "single", "unloaded": "none", "valve_loss_percent": 0.0}
+            values.update({key: value for key, value in filled.items() if values[key] is None})
+        if self.switching is None:
+            values["switching"] = "exact" if self.is_cylinder else "paper"
+        if self.clearance_percent is not None:
+            values["head_clearance_mm"] = None
+        for own, shared in AS_THE_OTHER.items():
+            if values[own] == values[shared]:
+                values[own] = None
+
+    @property
+    def is_cylinder(self) -> bool:
+        """Return whether any key beyond the paper's gas load is given."""
+        return any(getattr(self, key) is not None for key in CYLINDER_KEYS)
+
+    @property
+    def open_pressures(self) -> tuple[float, float]:
+        """Return the pressures (MPa) while the suction and the discharge valve is open."""
+        loss = self.valve_loss_percent or 0.0
+        own = self.discharge_loss_percent
+        raised = 1.0 + (loss if own is None else own) / 100
+        return self.suction_MPa * (1.0 - loss / 100), self.discharge_MPa * raised
+
+    def presses(self, end: str) -> bool:
+        """Return whether an end, head or crank, holds gas that presses on the piston."""
+        return (self.action or "single") in ENDS[end]
+
+    def has_cycle(self, end: str) -> bool:
+        """Return whether the gas in an end, head or crank, is compressed."""
+        return self.presses(end) and self.unloaded != end
+
+    def clearance_key(self, end: str) -> str:
+        """Return the key that gives the clearance of an end, head or crank."""
+        if end == "crank" and self.crank_clearance_percent is not None:
+            return "gas.crank_clearance_percent"
+        percent = self.clearance_percent is not None
+        return "gas.clearance_percent" if percent else "gas.head_clearance_mm"
+
+    def clearance(self, end: str, stroke: float) -> float:
+        """Return the clearance (mm) of an end, head or crank, at a stroke (mm)."""
+        key = self.clearance_key(end).removeprefix("gas.")
+        value = float(getattr(self, key) or 0.0)
+        return value if key == "head_clearance_mm" else value / 100 * stroke
 
 
 @document_fields

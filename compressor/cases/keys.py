@@ -43,13 +43,13 @@ class Leaves:
 def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
     """Return the leaves of a tree; unknown keys, and values in place of groups, are problems."""
     found = Leaves({}, {})
-    for name, node in _known_entries("", root, problems, root):
+    for name, node in _known_entries("", root, problems):
         found.places[name] = node.key_place
         mapping = isinstance(node.value, dict)
         if mapping and not node.value and WORDS.get(name):
             found.values[name] = replace(node, value=True)  # all of its defaults
         elif (name in GROUPS or name in MAPPINGS) and mapping and not _is_sweep(name, node):
-            for inner, item in _known_entries(name, node, problems, root):
+            for inner, item in _known_entries(name, node, problems):
                 _add_leaf(found, f"{name}.{inner}", item, problems)
         elif name in SHORTHANDS or (name in WORDS and node.value is WORDS[name]):
             found.values[name] = node
@@ -102,14 +102,14 @@ def _is_sweep(name: str, node: Node) -> bool:
 
 
 def _known_entries(
-    group: str, node: Node, problems: list[FileProblem], root: Node
+    group: str, node: Node, problems: list[FileProblem]
 ) -> Iterable[tuple[str, Node]]:
     """Yield the entries of a group (for "", of a file) that are known and have a value."""
     for name, item in node.value.items():
         if name not in accepted_keys(group):
             message = "unknown key"
             if len(problems) < MAX_SUGGESTIONS:
-                message = describe_unknown(name, group, value=item.plain(), values=root.plain())
+                message = describe_unknown(name, group, value=item.plain())
             key = f"{group}.{name}" if group else name
             problems.append(FileProblem(item.key_place, key, message))
         elif item.value is not None:

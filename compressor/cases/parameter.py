@@ -65,6 +65,13 @@ def damps_guide(case: Any) -> bool:
 
 
 GAS = Reader("load: gas", lambda case: case.load == "gas")
+CRANK_END = Reader(
+    "gas.action: double or crank_end", lambda case: case.gas.action in ("double", "crank_end")
+)
+HEAD_CLEARANCE = Reader(
+    "a head end that presses, or one gas.clearance_percent for both",
+    lambda case: case.gas.action != "crank_end" or case.gas.crank_clearance_percent is None,
+)
 SPRING = Reader("load: spring", lambda case: case.load == "spring")
 A_JOINT = Reader("joint: big_end, small_end or both", lambda case: case.joint != "none")
 BIG_END = Reader("joint: big_end or both", lambda case: case.joint in ("big_end", "both"))
@@ -180,6 +187,7 @@ AS_NUMBER = re.compile(r"\s*([-+]?\d+(?:([.,])\d+)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*
 # case-file unit -> (SI unit, numerator, denominator): SI value = value * numerator / denominator
 UNITS = {
     "": ("1", 1, 1),
+    "%": ("1", 1, 100),
     "mm": ("m", 1, 1000),
     "m": ("m", 1, 1),
     "kg": ("kg", 1, 1),

@@ -324,7 +324,7 @@ class Run(NamedTuple):
 def fits_lane(p: np.record) -> bool:
     """Return whether runs of a record can march in lanes: default laws and powers of 1.5."""
     default = p["laws"].size == 1
-    return bool(default and p["load"] != Load.GAS and p["exponent"] == 1.5)
+    return bool(default and p["load"] in (Load.NONE, Load.SPRING) and p["exponent"] == 1.5)
 
 
 def march_side_by_side(runs: Sequence[Run], limit: int) -> list[Run | None]:

@@ -48,6 +48,7 @@ def _rows(count=1):
 
 CHOICES = ("scene", "load", "law", "friction", "freedoms", "wide", "exponent", "corners",
            "hysteresis", "least_approach", "bristle_stiffness", "bristle_damping", "viscous",
+           "crank_suction_force", "crank_discharge_force", "crank_clearance", "crank_corners",
            "laws")  # fmt: skip
 # fields of the record that are rows, in its order; those of a joint are two
 FIELDS = tuple(
@@ -124,7 +125,7 @@ def lane_record(scene, W, j):
         W[b + 24 * LANES], W[b + 25 * LANES], W[b + 26 * LANES], W[b + 27 * LANES],
         W[b + 28 * LANES], W[b + 29 * LANES], W[b + 30 * LANES], W[b + 31 * LANES],
         W[b + 32 * LANES], W[b + 33 * LANES], W[b + 34 * LANES], W[b + 35 * LANES],
-        0.0, 0.0, 0.0, 0.0, 0.0, (0.0,),
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, NO_CORNERS[:2], (0.0,),
     )  # fmt: skip
 
 

@@ -1,9 +1,11 @@
-"""Piston force: the ideal gas cycle, and the spring on a cam (the paper's "design model").
+"""Piston force: the ideal gas cycle of one end or of both, and the spring on a cam.
 
 physics/README.md, Loads.
 
 The force is positive towards the crank. A load has four phases a revolution (expansion, suction,
-compression, discharge); the caller names the phase, so that both sides of a corner are exact.
+compression, discharge); the caller names the phase, so that both sides of a corner are exact. A
+cylinder's two ends have phases of their own, and its phase is the head end's plus four times the
+crank end's.
 """
 
 import math
@@ -17,27 +19,48 @@ from compressor.physics.record import Load, derive
 
 GAS = int(Load.GAS)
 SPRING = int(Load.SPRING)
+CYLINDER = int(Load.CYLINDER)
 EXPANSION, SUCTION, COMPRESSION, DISCHARGE = range(4)
 
 
 @inline_llvm
-def gas_force(phase, x, p):
-    """Return the gas force (N), less the back pressure: Eq. 6, isentropic.
+def end_force(phase, space, clearance, suction_force, discharge_force, p):
+    """Return the force (N) of the gas in one end of a cylinder: Eq. 6, polytropic.
 
-    x: of the crosshead (m).
+    phase: the end's. space: between piston and cover (m); clearance: the least that it may be. The
+    forces are those while its valves are open.
     """
     if phase == 1:
-        return p.suction_force - p.back_force
+        return suction_force
     if phase == 3:
-        return p.discharge_force - p.back_force
-    space = p.rod_length + p.crank_radius + p.head_clearance - x
+        return discharge_force
     if phase == 0:
-        full = p.head_clearance
-        force = p.discharge_force
+        full = clearance
+        force = discharge_force
     else:
-        full = p.head_clearance + 2.0 * p.crank_radius
-        force = p.suction_force
-    return force * (full / space) ** p.gas_exponent - p.back_force
+        full = clearance + 2.0 * p.crank_radius
+        force = suction_force
+    return force * (full / space) ** p.gas_exponent
+
+
+@inline_llvm
+def head_force(phase, x, p):
+    """Return the force (N) of the gas in the head end; x: of the crosshead (m)."""
+    space = p.rod_length + p.crank_radius + p.head_clearance - x
+    return end_force(phase, space, p.head_clearance, p.suction_force, p.discharge_force, p)
+
+
+@inline_llvm
+def cylinder_force(phase, x, p):
+    """Return the force (N) of the gas on both faces of a piston, less the back pressure's.
+
+    phase: the head end's plus four times the crank end's; x: of the crosshead (m).
+    """
+    crank = end_force(
+        phase >> 2, x - (p.rod_length - p.crank_radius) + p.crank_clearance, p.crank_clearance,
+        p.crank_suction_force, p.crank_discharge_force, p,
+    )  # fmt: skip
+    return head_force(phase & 3, x, p) - crank - p.back_force
 
 
 @inline_llvm
@@ -65,7 +88,9 @@ def piston_force(phase, x, v, deviation, deviation_rate, p):
     if p.load == SPRING:
         return spring_force(phase, x, v, deviation, deviation_rate, p)
     if p.load == GAS:
-        return gas_force(phase, x, p)
+        return head_force(phase, x, p) - p.back_force
+    if p.load == CYLINDER:
+        return cylinder_force(phase, x, p)
     return 0.0
 
 
@@ -73,12 +98,16 @@ def static_load(p):
     """Return the greatest force (N) of the record's load on a piston that stands still.
 
     p: a record, or a dict with its fields; the spring's at its full stroke (Eq. 8-10), or that of
-    the discharge pressure.
+    the discharge pressure, of a cylinder at the end where it presses harder.
     """
     if p["load"] == Load.SPRING:
         return p["preload"] + p["spring_stiffness"] * p["spring_stroke"]
     if p["load"] == Load.GAS:
         return p["discharge_force"]
+    if p["load"] == Load.CYLINDER:
+        towards_crank = p["discharge_force"] - p["crank_suction_force"] - p["back_force"]
+        towards_head = p["crank_discharge_force"] - p["suction_force"] + p["back_force"]
+        return max(towards_crank, towards_head)
     return 0.0
 
 
@@ -91,7 +120,7 @@ def greatest_load(p):
         return static_load(p) + p["spring_damping"] * p["omega"] * p["crank_radius"]
     if p["load"] == Load.GAS:
         return max(static_load(p), p["back_force"])
-    return 0.0
+    return static_load(p)
 
 
 def printed_corners():
@@ -115,6 +144,39 @@ def gas_corners(p, pressure_ratio):
     return expansion, math.pi, 2.0 * math.pi - compression
 
 
+def has_cycle(p, end=""):
+    """Return whether the gas in an end of a cylinder has a cycle; end: "" of the head, "crank_"."""
+    return p[f"{end}discharge_force"] > p[f"{end}suction_force"]
+
+
+def head_corners(p):
+    """Return the corners (rad) of the head end of a cylinder, (3,); zeros where it has no cycle.
+
+    Raises ValueError as `gas_corners`.
+    """
+    if not has_cycle(p):
+        return 0.0, 0.0, 0.0
+    return gas_corners(p, p["discharge_force"] / p["suction_force"])
+
+
+def crank_corners(p):
+    """Return the corners (rad) of the crank end of a cylinder, (2,); zeros where it has no cycle.
+
+    Its discharge and its suction begin there; its compression does at 0, its expansion at pi.
+    Raises ValueError as `gas_corners`.
+    """
+    if not has_cycle(p, "crank_"):
+        return 0.0, 0.0
+    crank_radius, rod_length, clearance = p["crank_radius"], p["rod_length"], p["crank_clearance"]
+    ratio = p["crank_discharge_force"] / p["crank_suction_force"]
+    expansion_ratio = ratio ** (1.0 / float(p["gas_exponent"]))
+    cover = rod_length - crank_radius - clearance
+    compressed = cover + (2.0 * crank_radius + clearance) / expansion_ratio
+    expanded = cover + clearance * expansion_ratio
+    discharge = angle_at(compressed, crank_radius, rod_length)
+    return discharge, 2.0 * math.pi - angle_at(expanded, crank_radius, rod_length)
+
+
 def cam_corners(crank_radius, rod_length, stroke):
     """Return the corners (rad) of the closed cam, whose follower dwells for `stroke` (m) each way.
 
@@ -136,6 +198,8 @@ def load_corners(p, pressure_ratio, printed):
         return 0.0, 0.0, 0.0
     if p["load"] == Load.SPRING:
         return cam_corners(p["crank_radius"], p["rod_length"], p["spring_stroke"])
+    if p["load"] == Load.CYLINDER:
+        return head_corners(p)
     return printed_corners() if printed else gas_corners(p, pressure_ratio)
 
 
@@ -145,6 +209,8 @@ def complete(p, pressure_ratio, printed):
     p: a record, or a dict with its fields. Raises ValueError as `gas_corners` and `cam_corners`.
     """
     p["corners"] = load_corners(p, pressure_ratio, printed)
+    if p["load"] == Load.CYLINDER:
+        p["crank_corners"] = crank_corners(p)
     derive(p)
 
 
@@ -157,18 +223,49 @@ def segments(p, duration):
     """
     if p["load"] == Load.NONE:
         return np.array([0.0, duration]), np.zeros(1, dtype=np.int64)
-    return _segments_between(p["corners"].tobytes(), float(p["omega"]), duration)
+    corners, phases = p["corners"].tobytes(), (0, 1, 2, 3)
+    if p["load"] == Load.CYLINDER:
+        angles, phases = cylinder_phases(p)
+        corners = np.array(angles[1:]).tobytes()
+    return _segments_between(corners, phases, float(p["omega"]), duration)
+
+
+def cylinder_phases(p):
+    """Return the angles (rad), from 0 on, at which phases of a cylinder begin, and these.
+
+    Corners of its ends that are closer than a billionth of a turn are one.
+    """
+    head = crank = [(0.0, SUCTION)]  # without a cycle: as where the suction valve stays open
+    if has_cycle(p):
+        head = [(angle, i) for i, angle in enumerate((0.0, *p["corners"]))]
+    if has_cycle(p, "crank_"):
+        full, empty = p["crank_corners"]
+        crank = [(0.0, COMPRESSION), (full, DISCHARGE), (math.pi, EXPANSION), (empty, SUCTION)]
+    angles = [0.0]
+    for angle in sorted(angle for angle, _ in (*head, *crank)):
+        if angle > angles[-1] + 2e-9 * math.pi:
+            angles.append(angle)
+    phases = [_phase_at(angle, head) + 4 * _phase_at(angle, crank) for angle in angles]
+    return angles, tuple(phases)
+
+
+def _phase_at(angle, corners):
+    """Return the phase of an end that begins at an angle (rad), or a billionth of a turn later."""
+    return [phase for begin, phase in corners if begin <= angle + 2e-9 * math.pi][-1]
 
 
 @lru_cache(maxsize=64)
-def _segments_between(corners, omega, duration):
-    """Return `segments` of a load's corners (rad, as bytes) at a speed (rad/s)."""
+def _segments_between(corners, cycle, omega, duration):
+    """Return `segments` of a load's corners (rad, as bytes) at a speed (rad/s).
+
+    cycle: the phases of a revolution, the first of which begins at 0 and the others at corners.
+    """
     turn = 2.0 * math.pi / omega
-    starts = np.zeros(4)
+    starts = np.zeros(len(cycle))
     starts[1:] = np.frombuffer(corners) / omega
     revolutions = np.arange(math.ceil(duration / turn * (1 + 1e-9)))
     starts = (revolutions[:, None] * turn + starts).ravel()
-    phases = np.arange(starts.searchsorted(duration - 1e-9 * turn)) % 4
+    phases = np.array(cycle)[np.arange(starts.searchsorted(duration - 1e-9 * turn)) % len(cycle)]
     edges = np.full(phases.size + 1, duration)
     edges[:-1] = starts[: phases.size]
     return edges, phases

@@ -29,6 +29,7 @@ class Load(IntEnum):
     NONE = 0
     GAS = 1
     SPRING = 2
+    CYLINDER = 3
 
 
 # the state of each scene: deviations from the ideal motion, then their rates
@@ -143,6 +144,11 @@ FIELDS: list[tuple] = [
     ("bristle_stiffness", "f8"),  # LuGre's sigma_0 over the normal force, 1/m
     ("bristle_damping", "f8"),  # sigma_1, s/m
     ("viscous", "f8"),  # sigma_2, s/m
+    # the crank end of a cylinder; an end without a cycle has one force, at suction as at discharge
+    ("crank_suction_force", "f8"),  # N
+    ("crank_discharge_force", "f8"),  # N
+    ("crank_clearance", "f8"),  # m
+    ("crank_corners", "f8", (2,)),  # angles at which its discharge and its suction begin, rad
 ]
 # of a mechanism whose worn joints are lubricated
 FILM: list[tuple] = [

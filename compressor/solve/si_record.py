@@ -60,7 +60,8 @@ def record(case: Case, worn: np.ndarray | None = None) -> np.record:
     """
     p: dict[str, Any] = {}  # what is not set stays zero
     p["scene"] = scene(case)
-    p["load"] = Load[case.load.upper()]
+    cylinder = case.load == "gas" and case.gas.is_cylinder
+    p["load"] = Load.CYLINDER if cylinder else Load[case.load.upper()]
     _machine(case, p)
     _contact(case, p)
     _gas(case, p)
@@ -126,13 +127,23 @@ def _contact(case: Case, p: dict[str, Any]) -> None:
 
 def _gas(case: Case, p: dict[str, Any]) -> None:
     """Set the forces of the gas on the piston, and its cycle."""
-    gas = case.gas
+    gas, stroke = case.gas, 2 * case.machine.crank_radius_mm
     area = math.pi * to_si(gas.piston_radius_mm, "mm") ** 2
-    p["suction_force"] = to_si(gas.suction_MPa, "MPa") * area
-    p["discharge_force"] = to_si(gas.discharge_MPa, "MPa") * area
+    suction, discharge = (to_si(pressure, "MPa") for pressure in gas.open_pressures)
+    p["suction_force"], p["discharge_force"] = suction * area, discharge * area
     p["back_force"] = to_si(gas.back_pressure_MPa, "MPa") * area
-    p["head_clearance"] = to_si(gas.head_clearance_mm, "mm")
+    p["head_clearance"] = to_si(gas.clearance("head", stroke), "mm")
     p["gas_exponent"] = gas.exponent
+    if gas.is_cylinder:
+        rod = math.pi * to_si((gas.rod_diameter_mm or 0.0) / 2, "mm") ** 2
+        areas = {"head": area * gas.presses("head"), "crank": (area - rod) * gas.presses("crank")}
+        for end, prefix in (("head", ""), ("crank", "crank_")):
+            idle = to_si(gas.suction_MPa, "MPa")
+            open_at = (suction, discharge) if gas.has_cycle(end) else (idle, idle)
+            p[f"{prefix}suction_force"] = open_at[0] * areas[end]
+            p[f"{prefix}discharge_force"] = open_at[1] * areas[end]
+        p["crank_clearance"] = to_si(gas.clearance("crank", stroke), "mm")
+        p["back_force"] = to_si(gas.back_pressure_MPa, "MPa") * (areas["head"] - areas["crank"])
 
 
 def _spring(case: Case, p: dict[str, Any]) -> None:

@@ -35,7 +35,7 @@ BUGS = [
     ("a wrong term of the series of cosine", "physics/kinematics.py",
      "C4, C6, C8 = 1 / 24", "C4, C6, C8 = 1 / 12"),
     ("the stroke is a radius, not a diameter", "physics/loads.py",
-     "p.head_clearance + 2.0 * p.crank_radius", "p.head_clearance + p.crank_radius"),
+     "full = clearance + 2.0 * p.crank_radius", "full = clearance + p.crank_radius"),
     ("the cam does not close", "physics/loads.py",
      "angle_at(rod_length - crank_radius + stroke", "angle_at(rod_length + crank_radius - stroke"),
     ("the follower's lift is the spring's stroke", "analysis/cam.py",

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from compressor.cases.case import Case, to_yaml
 from compressor.cases.checks import known_keys
 from compressor.cases.conflicts import values_read
+from compressor.cases.groups import CYLINDER_KEYS
 from compressor.cases.laws import USUAL
 from compressor.cases.load import CaseFileError, load_cases, load_studies
 from compressor.cases.parameter import parameter_table
@@ -574,6 +575,11 @@ TIMES = [
     {"duration_s": 0.6, "output_step_s": 1e-4, "settle_rev": 0},
 ]
 SOLVES = [{"accuracy": "draft"}, {"rtol": 1e-7}, {"method": "BDF", "max_steps": 7}]
+EXACT = {"switching": "exact"}
+CYLINDERS = st.fixed_dictionaries(
+    {"action": st.just("double"), "rod_diameter_mm": st.floats(20, 40)},
+    optional={"crank_clearance_percent": st.floats(5, 14)},
+)
 CASES = st.fixed_dictionaries(
     {"name": st.from_regex(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}", fullmatch=True)},
     optional={
@@ -583,7 +589,10 @@ CASES = st.fixed_dictionaries(
             lambda offsets: {key: 0.6 * mm for key, mm in offsets.items()}
         ),
         "machine": group("machine", "small_end_pin_radius_mm"),
-        "gas": group("gas", "switching").map(lambda gas: gas | {"switching": "exact"}),
+        "gas": group("gas", "switching", *CYLINDER_KEYS).map(lambda gas: gas | EXACT)
+        | st.tuples(group("gas", "switching", *CYLINDER_KEYS[:4]), CYLINDERS).map(
+            lambda parts: parts[0] | parts[1]
+        ),
         "spring": group("spring"),
         "contact": group("contact", "materials", "exponent", "geometry", *OF_LAWS)
         | group("contact", "materials", "geometry", "restitution").map(as_hertz)

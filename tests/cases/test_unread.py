@@ -23,6 +23,9 @@ BIG = WORN | {"joint": "big_end", "clearance_mm": {"big_end": 0.2}}
 SMALL = WORN | {"joint": "small_end", "clearance_mm": {"small_end": 0.2}}
 FREE = WORN | {"load": "none"}
 GAS = WORN | {"load": "gas", "gas": {"switching": "exact"}}
+DOUBLE = WORN | {"load": "gas", "gas": {"action": "double", "rod_diameter_mm": 30}}
+CRANK_END = WORN | {"load": "gas", "gas": {"action": "crank_end", "rod_diameter_mm": 30,
+                                           "crank_clearance_percent": 12}}  # fmt: skip
 HERTZ = WORN | {"contact": {"law": "hertz"}}
 DAMPED = WORN | {"contact": {"law": "hunt_crossley", "restitution": 0.5}}
 PIN = {"law": "johnson", "length_mm": 20, "modulus_GPa": 100}
@@ -81,10 +84,14 @@ ENTRIES = {
     "machine.pin_radius_mm": Entry(12, WORN, (IDEAL,)),
     "machine.small_end_pin_radius_mm": Entry(12, WORN, (IDEAL, BIG)),
     **entries(
-        GAS, WORN, FREE, gas__piston_radius_mm=60, gas__head_clearance_mm=25,
-        gas__suction_MPa=0.11, gas__discharge_MPa=0.5, gas__exponent=1.3,
-        gas__back_pressure_MPa=0.1,
+        GAS, WORN, FREE, gas__piston_radius_mm=60, gas__suction_MPa=0.11,
+        gas__discharge_MPa=0.5, gas__exponent=1.3, gas__back_pressure_MPa=0.1,
+        gas__valve_loss_percent=5, gas__discharge_loss_percent=5, gas__unloaded="head",
     ),
+    "gas.head_clearance_mm": Entry(25, GAS, (WORN, FREE, CRANK_END)),
+    "gas.action": Entry("crank_end", DOUBLE, (WORN, FREE)),
+    "gas.clearance_percent": Entry(10, DOUBLE, (WORN, CRANK_END)),
+    **entries(DOUBLE, GAS, WORN, gas__rod_diameter_mm=40, gas__crank_clearance_percent=12),
     "gas.switching": Entry("exact", WORN | {"load": "gas"}, (WORN, FREE)),
     **entries(
         WORN, GAS, FREE, spring__stiffness_N_per_mm=30, spring__damping_N_s_per_mm=0.1,

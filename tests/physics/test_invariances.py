@@ -140,9 +140,12 @@ DIMENSIONS = {
     "head_clearance": (1, 0, 0), "spring_stiffness": (0, 1, -2), "spring_damping": (0, 1, -1),
     "preload": (1, 1, -2), "spring_stroke": (1, 0, 0), "least_approach": (1, 0, -1),
     "bristle_stiffness": (-1, 0, 0), "bristle_damping": (-1, 0, 1), "viscous": (-1, 0, 1),
+    "crank_suction_force": (1, 1, -2), "crank_discharge_force": (1, 1, -2),
+    "crank_clearance": (1, 0, 0),
 }  # fmt: skip
 PURE_NUMBERS = {"scene", "load", "law", "friction", "freedoms", "wide", "exponent", "static",
-                "dynamic", "corners", "gas_exponent", "hysteresis", "laws"}  # fmt: skip
+                "dynamic", "corners", "crank_corners", "gas_exponent", "hysteresis",
+                "laws"}  # fmt: skip
 DERIVED = {"crank_ratio", "per_rod_mass", "per_rod_inertia", "per_reciprocating_mass",
            "per_full_damping", "per_stiction", "per_transition"}  # fmt: skip
 

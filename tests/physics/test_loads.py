@@ -1,4 +1,4 @@
-"""Both loads: printed numbers, corners, continuity, and the segments they cut."""
+"""The loads: printed numbers, corners, continuity, and the segments they cut."""
 
 import math
 
@@ -16,6 +16,12 @@ from compressor.physics.loads import (
 )
 from compressor.solve.si_record import record
 
+MACHINE = {"stroke_mm": 180, "rod_length_mm": 450, "speed_rpm": 740}
+DOUBLE = {
+    "action": "double", "bore_mm": 220, "rod_diameter_mm": 60, "suction_MPa": 0.2,
+    "discharge_MPa": 0.7, "exponent": 1.3, "clearance_percent": {"head": 12, "crank": 14},
+    "valve_loss_percent": {"suction": 4, "discharge": 5}, "back_pressure_MPa": 0.1,
+}  # fmt: skip
 EXACT = {"load": "gas", "gas": {"switching": "exact"}}
 GAS, SPRING = {"load": "gas"}, {"load": "spring"}
 
@@ -134,3 +140,111 @@ def test_greatest_loads(values, at_rest, greatest):
     p = record(Case.from_values(values))
     assert static_load(p) == pytest.approx(at_rest, abs=0.01)
     assert greatest_load(p) == pytest.approx(greatest, abs=0.01)
+
+
+def cylinder(**gas):
+    """The record of a double-acting cylinder, with other keys of `gas`."""
+    values = {key: value for key, value in (DOUBLE | gas).items() if value is not None}
+    return record(Case.from_values({"load": "gas", "machine": MACHINE, "gas": values}))
+
+
+HEAD_ALONE = {"action": "single", "rod_diameter_mm": None, "clearance_percent": 12}
+CRANK_ALONE = {"action": "crank_end", "clearance_percent": 14}
+
+
+def pressures(degrees):
+    """Pressures (Pa) in the head and the crank end of `DOUBLE`, from the greater of two curves.
+
+    No phases: while the space grows the gas expands down to the suction pressure, and while it
+    shrinks it is compressed up to the discharge pressure, each behind its valve.
+    """
+    x, *_ = exact_motion(math.radians(degrees), 0.09, 0.45, 1.0)
+    inlet, outlet = 0.2e6 * 0.96, 0.7e6 * 1.05
+    found = []
+    for space, clearance, grows in (
+        (0.54 + 0.12 * 0.18 - x, 0.12 * 0.18, degrees < 180),
+        (x - 0.36 + 0.14 * 0.18, 0.14 * 0.18, degrees >= 180),
+    ):
+        if grows:
+            found.append(max(inlet, outlet * (clearance / space) ** 1.3))
+        else:
+            found.append(min(outlet, inlet * ((clearance + 0.18) / space) ** 1.3))
+    return found
+
+
+def in_segments(p, degrees):
+    """The force of the ideal machine in the phase of the segment that a crank angle lies in."""
+    edges, phases = segments(p, 2 * math.pi / p.omega)
+    time = np.array([math.radians(degrees) / p.omega])
+    return ideal_force(p, degrees, int(phases[sample_segments(time, edges)][0]))
+
+
+@pytest.mark.parametrize("degrees", np.linspace(0.5, 359.5, 30))
+@pytest.mark.parametrize(
+    ("gas", "head", "crank"),
+    [({}, 1, 1), (HEAD_ALONE, 1, 0), (CRANK_ALONE, 0, 1), ({"unloaded": "head"}, 0.2e6, 1),
+     ({"unloaded": "crank"}, 1, 0.2e6), ({**HEAD_ALONE, "unloaded": "head"}, 0.2e6, 0)],
+)  # fmt: skip
+def test_forces_of_both_faces(gas, head, crank, degrees):
+    """1: an end's cycle, 0: the back pressure, else its constant pressure."""
+    faces, cycle = [math.pi * 0.11**2, math.pi * (0.11**2 - 0.03**2)], pressures(degrees)
+    inside = [{0: 0.1e6, 1: cycle[i]}.get(kind, kind) for i, kind in enumerate((head, crank))]
+    rod = 0.1e6 * (faces[0] - faces[1])
+    expected = faces[0] * inside[0] - faces[1] * inside[1] - rod
+    assert in_segments(cylinder(**gas), degrees) == pytest.approx(expected, rel=1e-12, abs=1e-8)
+
+
+def test_a_cylinder_is_continuous_at_its_corners():
+    p = cylinder()
+    edges, phases = segments(p, 2 * math.pi / p.omega)
+    assert [(int(phase) & 3, int(phase) >> 2) for phase in phases] == [
+        (0, 2), (1, 2), (1, 3), (2, 0), (2, 1), (3, 1)
+    ]  # fmt: skip
+    for edge, before, after in zip(edges[1:], phases, [*phases[1:], phases[0]], strict=True):
+        degrees = math.degrees(edge * p.omega)
+        change = ideal_force(p, degrees, int(before)) - ideal_force(p, degrees, int(after))
+        assert abs(change) < 1e-7
+
+
+@pytest.mark.parametrize("phase", range(4))
+def test_the_crank_end_mirrors_the_head_end(phase):
+    """The same faces, at a piston as far from the other cover; the force is the other way round."""
+    alike = {"back_pressure_MPa": 0, "clearance_percent": 13}
+    head, crank = cylinder(**HEAD_ALONE | alike), cylinder(**CRANK_ALONE | alike)
+    faces = (0.11**2 - 0.03**2) / 0.11**2
+    for x in (0.37, 0.45, 0.52):
+        one = piston_force(phase + 4, 2 * 0.45 - x, 0.0, 0.0, 0.0, head)
+        other = piston_force(4 * phase + 1, x, 0.0, 0.0, 0.0, crank)
+        assert other == pytest.approx(-faces * one, rel=1e-13)
+
+
+def test_a_single_acting_cylinder_is_the_paper_s_gas_load():
+    """With exact corners; all forces to rounding."""
+    values = {"load": "gas", "gas": {"back_pressure_MPa": 0.05, "switching": "exact"}}
+    plain = record(Case.from_values(values))
+    values["gas"]["action"] = "single"
+    single = record(Case.from_values(values))
+    ours, theirs = segments(single, 0.5), segments(plain, 0.5)
+    assert ours[0] == pytest.approx(theirs[0], rel=1e-14)
+    assert (ours[1] - 4).tolist() == theirs[1].tolist()
+    for degrees in np.linspace(1, 359, 40):
+        assert in_segments(single, degrees) == pytest.approx(in_segments(plain, degrees), rel=1e-13)
+
+
+@pytest.mark.parametrize("away", [0.0, 1e-11, -1e-11])
+def test_corners_that_coincide_open_one_segment(away):
+    """The crank end's discharge begins where the head end's suction does."""
+    p = cylinder()
+    p.crank_corners[0] = p.corners[0] + away
+    edges, phases = segments(p, 2 * math.pi / p.omega)
+    assert phases.size == 5
+    assert (np.diff(edges) > 1e-3).all()
+    assert int(phases[1]) == 1 + 4 * 3
+
+
+@pytest.mark.parametrize("gas", [{}, HEAD_ALONE, CRANK_ALONE, {"unloaded": "head"}])
+def test_the_greatest_load_of_a_cylinder(gas):
+    p = cylinder(**gas)
+    most = max(abs(in_segments(p, degrees)) for degrees in np.linspace(0, 359.9, 3600))
+    assert most == pytest.approx(greatest_load(p), rel=1e-6)
+    assert static_load(p) == greatest_load(p)

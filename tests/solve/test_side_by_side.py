@@ -100,6 +100,7 @@ def test_a_run_that_fails_touches_no_neighbour():
     "values",
     [
         {"load": "gas"},
+        {"load": "gas", "gas": {"action": "double", "rod_diameter_mm": 30}},
         {"contact": {"exponent": 1.4}},
         {"clearance_mm": 0.0},
         {"solve": {"method": "DOPRI5"}},
@@ -127,7 +128,8 @@ def test_lanes_know_every_field_of_the_record():
     choices = {"scene": 2, "load": rows.SPRING, "law": 0, "friction": 1, "freedoms": 2, "wide": 0,
                "exponent": 1.5, "corners": (0.0, 0.0, 0.0), "hysteresis": 0.0,
                "least_approach": 0.0, "bristle_stiffness": 0.0, "bristle_damping": 0.0,
-               "viscous": 0.0, "laws": (0.0,)}  # fmt: skip
+               "viscous": 0.0, "crank_suction_force": 0.0, "crank_discharge_force": 0.0,
+               "crank_clearance": 0.0, "crank_corners": (0.0, 0.0), "laws": (0.0,)}  # fmt: skip
     assert {*choices} == {*rows.CHOICES}
     for name in RECORD.names:
         if name in choices:

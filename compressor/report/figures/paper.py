@@ -225,7 +225,8 @@ def gas_state(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     case = case_of(run)
     machine, gas = case.machine, case.gas
     area = math.pi * gas.piston_radius_mm**2  # mm^2
-    head = machine.rod_length_mm + machine.crank_radius_mm + gas.head_clearance_mm
+    clearance = gas.clearance("head", 2 * machine.crank_radius_mm)
+    head = machine.rod_length_mm + machine.crank_radius_mm + clearance
     volume = area * (head - run["displacement"].values * 1e3) * 1e-6
     return volume, run["piston_force"].values / area + gas.back_pressure_MPa
 

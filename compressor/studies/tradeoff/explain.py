@@ -12,6 +12,7 @@ from typing import Any
 
 import xarray as xr
 
+from compressor.analysis import cylinder_words
 from compressor.cases import (
     ACCURACY,
     CYLINDRICAL,
@@ -201,6 +202,8 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
     used = [f for f in shown if f.paid(case) and not (ideal and f.key == "friction")]
     active = {feature.name: paid_value(case, feature) for feature in used}
     absent = tuple(feature.name for feature in shown if feature not in used)
+    if case.load == "gas" and case.gas.is_cylinder:
+        active["cylinder"] = cylinder_words(case)
     if ideal:
         return active, (*absent, "clearance", "contact")
     widths = [f"{getattr(case.clearance_mm, joint):g} mm at the {joint.replace('_', ' ')}"

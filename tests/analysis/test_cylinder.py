@@ -1,0 +1,105 @@
+"""The ideal cycle by closed form: against quadrature, textbook numbers, and runs."""
+
+import math
+
+import numpy as np
+import pytest
+
+from compressor.analysis.cylinder import cylinder_words, ideal_cycles
+from compressor.cases.case import Case
+from compressor.solve.simulate import measure, simulate
+
+MACHINE = {"stroke_mm": 180, "rod_length_mm": 450, "speed_rpm": 740}
+DOUBLE = {
+    "action": "double", "bore_mm": 220, "rod_diameter_mm": 60, "suction_MPa": 0.2,
+    "discharge_MPa": 0.7, "exponent": 1.3, "clearance_percent": {"head": 12, "crank": 14},
+}  # fmt: skip
+LOSSES = {"valve_loss_percent": {"suction": 4, "discharge": 5}}
+SINGLE = {"action": "single", "rod_diameter_mm": None, "clearance_percent": 12}
+CYLINDERS = {
+    "double": {},
+    "losses": LOSSES,
+    "single": SINGLE,
+    "crank end": {"action": "crank_end", "clearance_percent": 14},
+    "head unloaded": {"unloaded": "head"},
+    "crank unloaded": {"unloaded": "crank", **LOSSES},
+    "isothermal": {"exponent": 1},
+    "all idle": {**SINGLE, "unloaded": "head"},
+}
+
+
+def cylinder(gas, **more):
+    values = {key: value for key, value in (DOUBLE | gas).items() if value is not None}
+    return Case.from_values({"load": "gas", "machine": MACHINE, "gas": values, **more})
+
+
+def test_textbook_numbers_of_one_end():
+    """V = pi/4 0.22^2 0.18, e = 1.12 - 0.12 3.5^(1/1.3), W = 1.3/0.3 p e V (3.5^(0.3/1.3) - 1)."""
+    cycle = ideal_cycles(cylinder({}))["head"]
+    assert cycle.swept_volume == pytest.approx(6.84239e-3, rel=1e-5)
+    assert cycle.clearance_volume == pytest.approx(0.12 * 6.84239e-3, rel=1e-5)
+    assert cycle.volumetric_efficiency == pytest.approx(0.805446, abs=1e-6)
+    assert cycle.indicated_work == pytest.approx(1601.148, abs=1e-3)
+    assert cycle.capacity == pytest.approx(0.805446 * 6.84239e-3, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", CYLINDERS)
+def test_the_work_is_the_area_of_the_card(name):
+    """By quadrature of the card: polytropics between the pressures inside."""
+    case = cylinder(CYLINDERS[name])
+    inlet, outlet = (1e6 * pressure for pressure in case.gas.open_pressures)
+    for cycle in ideal_cycles(case).values():
+        pressure = np.linspace(inlet, outlet, 20001)
+        c, n = cycle.clearance_volume, case.gas.exponent
+        compressed = (c + cycle.swept_volume) * (inlet / pressure) ** (1 / n)
+        expanded = c * (outlet / pressure) ** (1 / n)
+        area = np.trapezoid(compressed - expanded, pressure)
+        assert cycle.indicated_work == pytest.approx(area, rel=1e-8)
+
+
+@pytest.mark.parametrize("name", CYLINDERS)
+def test_an_ideal_run_does_the_work_of_the_closed_form(name):
+    """Four revolutions, both ends; the crank gives what the gas takes."""
+    case = cylinder(CYLINDERS[name], solve={"duration_rev": 4, "settle_rev": 1})
+    work = 4 * sum(cycle.indicated_work for cycle in ideal_cycles(case).values())
+    numbers = measure(case).numbers
+    assert numbers["load_work"] == pytest.approx(-work, rel=1e-12, abs=1e-8)
+    assert numbers["crank_work"] == pytest.approx(work, rel=1e-9, abs=1e-6)
+
+
+def test_the_back_pressure_does_no_work_in_a_revolution():
+    loads = [
+        measure(cylinder({"back_pressure_MPa": back})).numbers["load_work"] for back in (0, 0.5)
+    ]
+    assert loads[0] == pytest.approx(loads[1], rel=1e-12)
+
+
+def test_a_worn_machine_takes_nearly_the_ideal_work():
+    """The piston's stroke is longer by parts of the clearance; energy closes."""
+    case = cylinder(
+        LOSSES, joint="both", clearance_mm=0.2, solve={"duration_rev": 3, "settle_rev": 1}
+    )
+    run = simulate(case)
+    work = 3 * sum(cycle.indicated_work for cycle in ideal_cycles(case).values())
+    assert float(run.load_work) == pytest.approx(-work, rel=3e-3)
+    assert float(run.load_work) != pytest.approx(-work, rel=1e-4)
+    assert float(run.energy_residual) < 1e-5
+
+
+def test_words_say_power_and_flow():
+    case = cylinder(LOSSES)
+    work = [cycle.indicated_work for cycle in ideal_cycles(case).values()]
+    assert f"{sum(work) * 740 / 60e3:.4g} kW indicated" in cylinder_words(case)
+    assert "430 m³/h at suction conditions" in cylinder_words(case)
+    assert cylinder_words(cylinder(CYLINDERS["all idle"])) == "no gas is compressed"
+
+
+def test_a_valve_s_loss_lowers_the_flow_by_its_pressure():
+    """By hand: inside p_s (1 - 0.04) and p_d (1 + 0.05)."""
+    ideal, lossy = (ideal_cycles(cylinder(gas))["crank"] for gas in ({}, LOSSES))
+    ratio = 3.5 * 1.05 / 0.96
+    efficiency = 1.14 - 0.14 * ratio ** (1 / 1.3)
+    assert lossy.volumetric_efficiency == pytest.approx(efficiency, rel=1e-12)
+    swept = math.pi / 4 * (0.22**2 - 0.06**2) * 0.18
+    assert lossy.capacity == pytest.approx(0.96 * efficiency * swept, rel=1e-12)
+    assert lossy.indicated_work > ideal.indicated_work

@@ -1,0 +1,112 @@
+"""Keys of a cylinder: what may be left out, what is refused, and keys of jobs that stay."""
+
+import pytest
+
+from compressor.cases.case import Case, CaseError
+from compressor.cases.groups import CYLINDER_KEYS
+from compressor.cases.load import CaseFileError, load_studies
+from compressor.solve.si_record import record
+
+DOUBLE = {"action": "double", "rod_diameter_mm": 30}
+
+
+def case(gas, **more):
+    return Case.from_values({"load": "gas", "gas": gas, **more})
+
+
+def refused(gas, **more):
+    with pytest.raises(CaseError) as caught:
+        case(gas, **more)
+    return str(caught.value)
+
+
+def test_jobs_without_these_keys_have_the_keys_of_before():
+    """Stored by commit 3b84837, which had no cylinder."""
+    assert case({}).key == "9029c47d255089c63d98"
+    assert case({"switching": "exact", "bore_mm": 120}).key == "9b385c25debdd9a7243b"
+    assert not {*case({}).values()["gas"]} & {*CYLINDER_KEYS}
+
+
+@pytest.mark.parametrize("gas", [{}, {"switching": "exact"}, DOUBLE, {"action": "crank_end",
+                         "rod_diameter_mm": 30, "clearance_percent": 12}, {"unloaded": "head"},
+                         {**DOUBLE, "clearance_percent": {"head": 12, "crank": 14}}])  # fmt: skip
+def test_values_read_back(gas):
+    one = case(gas)
+    assert Case.from_values(one.values()) == one
+    assert Case.from_attribute(one.attributes()["case"]).key == one.key
+    assert one.problems == ()
+
+
+def test_what_is_so_by_default_makes_no_other_job():
+    whole = {"unloaded": "none", "valve_loss_percent": 0, "switching": "exact"}
+    assert case(DOUBLE).key == case(DOUBLE | whole).key
+    for key, parts in (("clearance_percent", ("head", "crank")),
+                       ("valve_loss_percent", ("suction", "discharge"))):  # fmt: skip
+        assert case(DOUBLE | {key: 12}).key == case(DOUBLE | {key: dict.fromkeys(parts, 12)}).key
+    assert case({"unloaded": "none"}).key == case({"action": "single"}).key
+
+
+def test_clearances_are_of_the_stroke():
+    """240 mm here; the crank end has the head's millimetres where nothing else is given."""
+    found = record(case(DOUBLE | {"clearance_percent": {"head": 10, "crank": 12.5}}))
+    assert (found.head_clearance, found.crank_clearance) == pytest.approx((0.024, 0.03))
+    found = record(case(DOUBLE))
+    assert (found.head_clearance, found.crank_clearance) == (0.02, 0.02)
+    found = record(case(DOUBLE | {"crank_clearance_percent": 12.5}))
+    assert (found.head_clearance, found.crank_clearance) == pytest.approx((0.02, 0.03))
+
+
+@pytest.mark.parametrize(
+    ("gas", "words"),
+    [
+        ({"action": "double"}, "gas.rod_diameter_mm: is needed with action: double; give it in mm, "
+         "such as 25"),
+        (DOUBLE | {"rod_diameter_mm": 100}, "100 mm must be less than the bore, 100 mm"),
+        ({"rod_diameter_mm": 20, "action": "single"}, "gas.rod_diameter_mm: nothing reads this"),
+        ({"clearance_percent": {"head": 10, "crank": 12}}, "gas.crank_clearance_percent: nothing"),
+        ({"action": "crank_end", "rod_diameter_mm": 20,
+          "clearance_percent": {"head": 10, "crank": 12}}, "gas.clearance_percent: nothing reads"),
+        ({"clearance_percent": {"head": 10}}, "needs both, head and crank, not head; or one"),
+        ({"clearance_percent": 10, "head_clearance_mm": 20}, "gas.clearance_percent: stands in "
+         "place of gas.head_clearance_mm"),
+        (DOUBLE | {"switching": "paper"}, "gas.switching: the printed corners hold for"),
+        ({"unloaded": "crank"}, "gas.unloaded: no gas presses in the crank end with action"),
+        (DOUBLE | {"clearance_percent": {"head": 10, "crank": 90}},
+         "gas.crank_clearance_percent: the gas left at the crank never expands"),
+        (DOUBLE | {"clearance_percent": 90}, "gas.clearance_percent: the gas left at the head"),
+        (DOUBLE | {"clearance_percent": 25, "valve_loss_percent": 60}, "never expands"),
+        ({"action": "doubel"}, "did you mean double?"),
+        (DOUBLE | {"valve_loss_percent": {"suction": 4, "exhaust": 5}}, "needs both, suction and"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_told(gas, words):
+    assert words in refused(gas)
+
+
+def test_a_piston_that_would_reach_a_cover():
+    worn = {"joint": "both", "clearance_mm": 0.3}
+    found = refused(DOUBLE | {"clearance_percent": {"head": 10, "crank": 0.2}}, **worn)
+    assert "gas.crank_clearance_percent: 0.48 mm does not exceed the clearances, 0.6 mm" in found
+    assert "the cylinder cover at the crank end" in found
+
+
+def test_studies_sweep_ends_and_valves(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = """
+load: gas
+gas:
+  action: [single, double, crank_end]
+  rod_diameter_mm: 30
+  clearance_percent: {head: [10, 12], crank: 14}
+  valve_loss_percent: [0, 4]
+"""
+    (tmp_path / "case.yaml").write_text(text)
+    (study,) = load_studies("case.yaml")
+    assert study.jobs == 12
+    assert [axis.key for axis in study.axes] == [
+        "gas.action", "gas.clearance_percent", "gas.valve_loss_percent"
+    ]  # fmt: skip
+    assert list(study.keys) == [one.key for one in study.cases]
+    (tmp_path / "case.yaml").write_text(text + "  unloaded: crank\n")
+    with pytest.raises(CaseFileError, match="no gas presses in the crank end"):
+        load_studies("case.yaml")
