@@ -138,6 +138,14 @@ TABLE = (
         "peak of the smaller side of the rod load over that of the other",
         "contact_force", source="samples", when="signals", joint=1,
     ),
+    Metric(
+        "peak_rod_load_tension", (), "N", "greatest pull of the rod load at the crosshead pin",
+        "contact_force", source="samples", when="signals", joint=1,
+    ),
+    Metric(
+        "peak_rod_load_compression", (), "N", "greatest push of the rod load at the crosshead pin",
+        "contact_force", source="samples", when="signals", joint=1,
+    ),
     *(
         Metric(name, (), unit, phrase, source="run")
         for name, unit, phrase in (

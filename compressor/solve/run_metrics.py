@@ -1,8 +1,8 @@
 """The metrics of a run: from its tally, from samples, and averages where it is chaotic.
 
 How the rod load at the crosshead pin changes its side, which keeps the pin's bearing oiled. API 618
-(5th edition) judges the combined rod load there: for how many degrees of a revolution it lies on
-its smaller side, and how great its peak on that side is beside the other one's.
+(5th edition, 6.6.4) judges the combined rod load there: for how many degrees of a revolution it
+lies on its smaller side, and how great its peak on that side is beside the other one's.
 
 What is known of a chaotic motion: averages and peaks over revolutions, with standard errors.
 Revolutions follow on each other and are no independent draws. So standard errors come from batch
@@ -114,10 +114,19 @@ def reversal_angle(rows: np.ndarray) -> float:
     return 2.0 * math.pi * min(tension, 1.0 - tension)
 
 
+def greatest_pull(rows: np.ndarray) -> float:
+    """Return the greatest tension (N) of the rod load by samples; 0 without any."""
+    return max(float(rows[:, SMALL_END].max()), 0.0)
+
+
+def greatest_push(rows: np.ndarray) -> float:
+    """Return the greatest compression (N) of the rod load by samples; 0 without any."""
+    return max(float(-rows[:, SMALL_END].min()), 0.0)
+
+
 def reversal_share(rows: np.ndarray) -> float:
     """Return the peak of the rod load's smaller side over that of the greater one, by samples."""
-    load = rows[:, SMALL_END]
-    pull, push = max(load.max(), 0.0), max(-load.min(), 0.0)
+    pull, push = greatest_pull(rows), greatest_push(rows)
     greater = max(pull, push)
     return min(pull, push) / greater if greater else 0.0
 
@@ -126,6 +135,8 @@ def reversal_share(rows: np.ndarray) -> float:
 SAMPLED: dict[str, Callable[[np.ndarray], float]] = {
     "rod_load_reversal_angle": reversal_angle,
     "rod_load_reversal_share": reversal_share,
+    "peak_rod_load_tension": greatest_pull,
+    "peak_rod_load_compression": greatest_push,
 }
 
 

@@ -11,8 +11,8 @@ from compsim.job_text import reversal_verdict
 from conftest import store
 
 from compressor.cases.case import Case
-from compressor.physics import WIDE
-from compressor.solve.run_metrics import SMALL_END, sampled_metrics
+from compressor.physics import WIDE, exact_motion
+from compressor.solve.run_metrics import SAMPLED, SMALL_END, sampled_metrics
 from compressor.solve.simulate import measure
 
 SIGNALLED = {"output": {"signals": True}}
@@ -34,11 +34,15 @@ def test_of_a_shifted_sine(shift):
     assert found["rod_load_reversal_angle"] == pytest.approx(expected, rel=1e-3)
     share = (1 - abs(shift)) / (1 + abs(shift))
     assert found["rod_load_reversal_share"] == pytest.approx(share, rel=1e-5)
+    assert found["peak_rod_load_tension"] == pytest.approx(800 * (1 + shift), rel=1e-5)
+    assert found["peak_rod_load_compression"] == pytest.approx(800 * (1 - shift), rel=1e-5)
 
 
 def test_of_a_load_that_keeps_its_side():
-    for load in (np.full(100, 3.0), np.full(100, -3.0), np.zeros(100)):
-        found = sampled_metrics(loads(load))
+    for load in (3.0, -3.0, 0.0):
+        found = sampled_metrics(loads(np.full(100, load)))
+        peaks = [found.pop(f"peak_rod_load_{side}") for side in ("tension", "compression")]
+        assert peaks == [max(load, 0.0), max(-load, 0.0)]
         assert set(found.values()) == {0.0}
     assert sampled_metrics(loads([])) == {}
 
@@ -52,14 +56,49 @@ def test_of_the_ideal_machine(load, degrees, share):
     assert numbers["rod_load_reversal_share"] == pytest.approx(share, abs=0.01)
 
 
+def test_of_a_double_acting_cylinder():
+    """Combined rod load of the ideal machine: gas on both faces, less the ideal m a."""
+    gas = {
+        "action": "double", "bore_mm": 220, "rod_diameter_mm": 60, "suction_MPa": 0.2,
+        "discharge_MPa": 0.7, "exponent": 1.3, "clearance_percent": {"head": 12, "crank": 14},
+    }  # fmt: skip
+    machine = {"stroke_mm": 180, "rod_length_mm": 450, "speed_rpm": 740,
+               "reciprocating_mass_kg": 30}  # fmt: skip
+    values = {"load": "gas", "machine": machine, "gas": gas, "solve": TURN, **SIGNALLED}
+    numbers = measure(Case.from_values(values)).numbers
+    theta = np.radians(np.arange(0, 360, 0.05) + 0.025)
+    x, _, a = exact_motion(theta, 0.09, 0.45, 740 * math.pi / 30)
+    faces, shares = (math.pi * 0.11**2, math.pi * (0.11**2 - 0.03**2)), (0.12, 0.14)
+    push = np.zeros_like(x)
+    for face, share, gap, sign in zip(faces, shares, (0.54 - x, x - 0.36), (1, -1), strict=True):
+        space, clearance = gap + share * 0.18, share * 0.18
+        grows = (theta < math.pi) == (sign == 1)
+        expanded = np.maximum(2e5, 7e5 * (clearance / space) ** 1.3)
+        compressed = np.minimum(7e5, 2e5 * ((clearance + 0.18) / space) ** 1.3)
+        push += sign * face * np.where(grows, expanded, compressed)
+    load = -push - 30 * a  # positive in tension
+    pull, push = load.max(), -load.min()
+    tension = 360 * np.mean(load > 0)
+    assert numbers["peak_rod_load_tension"] == pytest.approx(pull, rel=2e-3)
+    assert numbers["peak_rod_load_compression"] == pytest.approx(push, rel=2e-3)
+    share = min(pull, push) / max(pull, push)
+    assert numbers["rod_load_reversal_share"] == pytest.approx(share, rel=4e-3)
+    angle = math.degrees(numbers["rod_load_reversal_angle"])
+    assert angle == pytest.approx(min(tension, 360 - tension), abs=0.2)
+
+
+CYLINDER = {"action": "double", "rod_diameter_mm": 30, "clearance_percent": 9}
+
+
 @pytest.mark.parametrize("joint", ["big_end", "small_end"])
-@pytest.mark.parametrize("load", ["spring", "gas"])
+@pytest.mark.parametrize("load", ["spring", "gas", CYLINDER])
 def test_bars_hold_the_error(joint, load):
     """Against a run at rtol 1e-11, whose own samples are as dense."""
     values = {"joint": joint, "clearance_mm": 0.2, "load": load, **SIGNALLED}
+    values |= {"load": "gas", "gas": load} if load is CYLINDER else {}
     ours = measure(Case.from_values({**values, "solve": {**TURN, "accuracy": "draft"}})).numbers
     exact = measure(Case.from_values({**values, "solve": {**TURN, "rtol": 1e-11}})).numbers
-    for name in ("rod_load_reversal_angle", "rod_load_reversal_share"):
+    for name in SAMPLED:
         away = abs(ours[name] - exact[name])
         assert away <= ours[f"{name}_error"] < 0.2 * ours[name], name
 
