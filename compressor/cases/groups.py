@@ -154,6 +154,10 @@ class Machine:
         None, "mm", (0, 1e4), "as the big end's", "journal radius of the small end",
         above=True, optional=True, read=SMALL_RUBBING,
     )  # fmt: skip
+    counterweight_kg_mm: float | None = parameter(
+        None, "kg mm", (0, 1e9), "none", "counterweight on the crank, opposite to its pin: mass "
+        "times its centre's distance from the axis", optional=True,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Fill in a uniform rod, as far as the rod is not given."""
@@ -165,6 +169,8 @@ class Machine:
             values["rod_inertia_kg_m2"] = mass * (length / 1000) ** 2 / 12
         if self.small_end_pin_radius_mm == self.pin_radius_mm:  # as without the key
             values["small_end_pin_radius_mm"] = None
+        if not self.counterweight_kg_mm:  # as without the key
+            values["counterweight_kg_mm"] = None
 
     def pin_radius(self, joint: str) -> float:
         """Return the journal radius of a joint, mm."""

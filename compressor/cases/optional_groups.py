@@ -165,7 +165,8 @@ class Drive:
     )
     unbalance_kg_mm: float = parameter(
         0.0, "kg mm", (0, 1e9), OURS,
-        "the crank's mass times its centre's distance from the axis, on which gravity acts",
+        "the crank's mass times its centre's distance from the axis, towards its pin, on which "
+        "gravity acts; machine.counterweight_kg_mm is opposite",
     )  # fmt: skip
 
 

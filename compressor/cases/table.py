@@ -116,6 +116,15 @@ class Settings:
         return 60.0 / self.machine.speed_rpm
 
     @property
+    def unbalance(self) -> float:
+        """Return what is out of balance on the crank, towards its pin, kg mm; SI: times 1e-3.
+
+        A drive's own unbalance less the counterweight, and so below 0 where that is the greater.
+        """
+        own = self.drive.unbalance_kg_mm if self.drive else 0.0
+        return own - (self.machine.counterweight_kg_mm or 0.0)
+
+    @property
     def duration(self) -> float:
         """Return the duration, s; with `duration_rev: auto` the longest that it may come to."""
         if self.solve.duration_s is not None:

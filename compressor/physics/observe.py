@@ -207,10 +207,12 @@ def write_frame_forces(guide, turning, row):
 
 
 @jit
-def write_scene_frame(p, row):
-    """Write `write_frame_forces` of a scene: a crosshead at its height, a balanced crank."""
+def write_scene_frame(cos_theta, sin_theta, p, row):
+    """Write `write_frame_forces` of a scene: a crosshead at its height, a steady crank."""
     guide = 0.0, -row[FORCE + 3] - p.reciprocating_mass * p.gravity
-    write_frame_forces(guide, (0.0, 0.0), row)
+    inward = p.unbalance * p.omega * p.omega
+    # 0 less a zero has no sign, so that a balanced crank leaves the bits of the forces
+    write_frame_forces(guide, (0.0 - inward * cos_theta, 0.0 - inward * sin_theta), row)
 
 
 @jit
@@ -225,7 +227,7 @@ def frame_of_series(crank, friction, p, rows):
         row[CRANK_TORQUE], row[GUIDE_MOMENT] = torque_and_moment(
             crank[:, i], row[DISPLACEMENT], forces, friction[i], penetration, p
         )
-        write_scene_frame(p, row)
+        write_scene_frame(crank[0, i], crank[1, i], p, row)
 
 
 @inline_once
@@ -314,7 +316,7 @@ def observe(t, y, phase, p, row):
     write_columns(now, y, joint_forces(now, y, p), p, row)
     row[PACE] = 1.0
     if row.size == WIDE:
-        write_scene_frame(p, row)
+        write_scene_frame(motion.cos_theta, motion.sin_theta, p, row)
 
 
 @inline_llvm

@@ -107,6 +107,8 @@ FIELDS: list[tuple] = [
     ("rod_inertia", "f8"),  # about the mass centre, kg m^2
     ("reciprocating_mass", "f8"),  # crosshead, piston rod and piston, kg
     ("gravity", "f8"),  # along -y, m/s^2
+    # of the crank, less its counterweight: mass times its centre's distance towards the pin, kg m
+    ("unbalance", "f8"),
     # contact, per joint: big end, small end
     ("pin_radius", "f8", (2,)),  # journal radius R_j, m
     ("clearance", "f8", (2,)),  # radial, m; 0 for an ideal joint
@@ -175,7 +177,6 @@ FEATURES: list[tuple] = [
     ("degrees", "i8"),  # of freedom: how many coordinates move
     ("coordinates", "i8", (len(Coordinate),)),  # these
     ("crank_inertia", "f8"),  # about the crank's axis, with the flywheel, kg m^2
-    ("unbalance", "f8"),  # of the crank: mass times its centre's distance, kg m
     ("torque", "f8"),  # of the motor at the speed omega, N m
     ("torque_slope", "f8"),  # by which it grows as the speed falls, N m s
     ("guide_clearance", "f8"),  # of each side, m

@@ -10,12 +10,12 @@ towards the crank, and g gravity against y:
 
 - what acts on the rod's big end acts on the main bearing: -F_b; beside it the force of a crank that
   is out of balance, U (omega^2 e_r - alpha e_t) with e_r along the crank and e_t a quarter turn on.
-  The crank's weight is not known and left out;
+  A counterweight makes U less, or negative. The crank's weight is not known and left out;
 - the crosshead does not move along y: the guide bears -F_sy - m_p g, and the couple that friction
   puts on the crosshead's pin, (R_j - delta) F_t;
 - the gas, or the spring, pushes the cylinder as it pushes the piston: F_load along x;
-- so the frame feels X = -F_bx + F_load and Y = -F_by - F_sy - m_p g. Both are the loss of momentum
-  of all moving parts a second, less their weight;
+- so the frame feels X = -F_bx + F_load and Y = -F_by - F_sy - m_p g, and what is out of balance.
+  Both are the loss of momentum of all moving parts a second, less their weight;
 - the crank is driven by the torque that the rod asks for, R (cos theta F_by - sin theta F_bx) -
   (R_j - delta) F_t. A drive's motor gives another: what is between them turns the flywheel.
 

@@ -102,6 +102,7 @@ def _machine(case: Case, p: dict[str, Any]) -> None:
     p["rod_inertia"] = machine.rod_inertia_kg_m2 or 0.0
     p["reciprocating_mass"] = machine.reciprocating_mass_kg
     p["gravity"] = machine.gravity_m_per_s2
+    p["unbalance"] = to_si(case.unbalance, "kg mm")
     p["pin_radius"] = [to_si(machine.pin_radius(joint), "mm") for joint in JOINTS]
 
 
@@ -207,7 +208,6 @@ def _features(case: Case, p: dict[str, Any]) -> None:
         p["crosshead_inertia"] = guide.crosshead_inertia_kg_m2 or 0.0
     if drive:
         p["crank_inertia"] = drive.flywheel_kg_m2
-        p["unbalance"] = to_si(drive.unbalance_kg_mm, "kg mm")
         p["torque"] = drive.torque_N_m
         p["torque_slope"] = drive.slope_N_m_s
     if rod:

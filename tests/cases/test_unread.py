@@ -80,6 +80,7 @@ ENTRIES = {
         WORN, machine__crank_radius_mm=100, machine__rod_length_mm=550, machine__speed_rpm=550,
         machine__rod_mass_kg=5, machine__rod_centre_mm=280, machine__rod_inertia_kg_m2=0.2,
         machine__reciprocating_mass_kg=15, machine__gravity_m_per_s2=9.81,
+        machine__counterweight_kg_mm=500,
     ),
     "machine.pin_radius_mm": Entry(12, WORN, (IDEAL,)),
     "machine.small_end_pin_radius_mm": Entry(12, WORN, (IDEAL, BIG)),

@@ -64,3 +64,5 @@ def test_words_say_what_the_picture_does_not():
     assert mechanism_words(case()) == (
         "500 rpm; rod 4.7 kg, crosshead with piston 14 kg; pins of 10 mm radius."
     )
+    balanced = mechanism_words(case(machine={"counterweight_kg_mm": 900}))
+    assert balanced.endswith("pins of 10 mm radius; counterweight 900 kg mm.")

@@ -20,6 +20,7 @@ from compressor.cases import (
     Contact,
     Study,
     points,
+    to_si,
     with_ideal_joints,
 )
 from compressor.metrics import JOINTS
@@ -204,6 +205,8 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
     absent = tuple(feature.name for feature in shown if feature not in used)
     if case.load == "gas" and case.gas.is_cylinder:
         active["cylinder"] = cylinder_words(case)
+    if case.machine.counterweight_kg_mm:
+        active["counterweight"] = counterweight_words(case)
     if ideal:
         return active, (*absent, "clearance", "contact")
     widths = [f"{getattr(case.clearance_mm, joint):g} mm at the {joint.replace('_', ' ')}"
@@ -211,6 +214,13 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
     active["clearance"] = ", ".join(widths)
     active["contact"] = contact_words(case)
     return active, absent
+
+
+def counterweight_words(case: Case) -> str:
+    """Return what a counterweight comes to in words, and by how much it lowers order 1."""
+    counterweight = case.machine.counterweight_kg_mm or 0.0
+    force = to_si(counterweight, "kg mm") * case.omega**2
+    return f"{counterweight:g} kg mm opposite to the crank pin, {force:.4g} N"
 
 
 def contact_words(case: Case) -> str:
