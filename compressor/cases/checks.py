@@ -112,6 +112,9 @@ PER_PART = {
     "gas.valve_loss_percent": {
         "suction": "gas.valve_loss_percent", "discharge": "gas.discharge_loss_percent",
     },
+    "machine.balance": {
+        "rotating": "machine.balance", "reciprocating": "machine.balance_reciprocating",
+    },
 }  # fmt: skip
 # unit at the end of an unknown key -> the unit of ours, and what one of it is there
 OTHER_UNITS = {

@@ -287,6 +287,8 @@ IN_PLACE_OF = (
     ("contact.materials", "contact.stiffness_N_per_mm15"),
     ("contact.materials", "contact.modulus_GPa"),
     ("gas.clearance_percent", "gas.head_clearance_mm"),
+    ("machine.balance", "machine.counterweight_kg_mm"),
+    ("machine.balance_reciprocating", "machine.counterweight_kg_mm"),
 )
 MAX_MOVING_SHARE = 0.1  # the moving parts' share of a body's mass
 MAX_BACK_ACTION = 0.3  # of a force that a body's motion may change at the speed's first two orders
@@ -300,6 +302,7 @@ FILLED_IN = {
     "machine.rod_centre_mm": ("machine.rod_length_mm",),
     "machine.rod_inertia_kg_m2": ("machine.rod_mass_kg", "machine.rod_length_mm"),
     "machine.small_end_pin_radius_mm": ("machine.pin_radius_mm",),
+    "machine.balance_reciprocating": ("machine.balance",),
     "body.casing_mass_kg": ("body.mass_kg",),
     "guide.crosshead_inertia_kg_m2": (
         "machine.reciprocating_mass_kg", "guide.crosshead_length_mm", "guide.crosshead_height_mm",

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, fill_by_law
 from compressor.cases.parameter import (
     ACCURACY,
+    BALANCE,
     BIG_CLEARANCE,
     BIG_END,
     CLEARANCE,
@@ -158,6 +159,15 @@ class Machine:
         None, "kg mm", (0, 1e9), "none", "counterweight on the crank, opposite to its pin: mass "
         "times its centre's distance from the axis", optional=True,
     )  # fmt: skip
+    balance: float | None = parameter(
+        None, "", (0, 1), "none", "share of what turns with the crank pin, or also of what "
+        "reciprocates, that a counterweight balances; in place of counterweight_kg_mm",
+        optional=True,
+    )  # fmt: skip
+    balance_reciprocating: float | None = parameter(
+        None, "", (0, 1), "as balance", "share of what reciprocates that a counterweight balances",
+        optional=True, read=BALANCE,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Fill in a uniform rod, as far as the rod is not given."""
@@ -171,6 +181,8 @@ class Machine:
             values["small_end_pin_radius_mm"] = None
         if not self.counterweight_kg_mm:  # as without the key
             values["counterweight_kg_mm"] = None
+        if self.balance_reciprocating == self.balance:  # as without the key
+            values["balance_reciprocating"] = None
 
     def pin_radius(self, joint: str) -> float:
         """Return the journal radius of a joint, mm."""

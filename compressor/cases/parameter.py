@@ -114,6 +114,7 @@ GUIDE = Reader(
     "guide.friction above 0 or guide.clearance_mm above 0",
     lambda case: case.guide and (case.guide.friction > 0 or case.guide.clearance_mm > 0),
 )
+BALANCE = Reader("machine.balance", lambda case: case.machine.balance is not None)
 GUIDE_FRICTION = Reader(
     "guide.friction above 0", lambda case: case.guide and case.guide.friction > 0
 )

@@ -117,12 +117,34 @@ class Settings:
 
     @property
     def unbalance(self) -> float:
-        """Return what is out of balance on the crank, towards its pin, kg mm; SI: times 1e-3.
+        """Return what is out of balance on the crank, towards its pin, kg mm.
 
         A drive's own unbalance less the counterweight, and so below 0 where that is the greater.
         """
-        own = self.drive.unbalance_kg_mm if self.drive else 0.0
-        return own - (self.machine.counterweight_kg_mm or 0.0)
+        return self._own_unbalance - self.counterweight
+
+    @property
+    def counterweight(self) -> float:
+        """Return the crank's counterweight, kg mm: as given, or by what it balances; 0 for none.
+
+        What turns with the crank pin is the rod's share there, m (1 - a / L), and the crank's own
+        unbalance, if a drive names one; the rest of the rod reciprocates.
+        """
+        machine = self.machine
+        rotating, reciprocating = machine.balance, machine.balance_reciprocating
+        if rotating is None:
+            return machine.counterweight_kg_mm or 0.0
+        reciprocating = rotating if reciprocating is None else reciprocating
+        at_crosshead = machine.rod_mass_kg * (machine.rod_centre_mm or 0.0) / machine.rod_length_mm
+        at_pin = machine.rod_mass_kg - at_crosshead
+        turning = at_pin * machine.crank_radius_mm + self._own_unbalance
+        back_and_forth = (machine.reciprocating_mass_kg + at_crosshead) * machine.crank_radius_mm
+        return rotating * turning + reciprocating * back_and_forth
+
+    @property
+    def _own_unbalance(self) -> float:
+        """Return the crank's unbalance without its counterweight, kg mm, as a drive names it."""
+        return self.drive.unbalance_kg_mm if self.drive else 0.0
 
     @property
     def duration(self) -> float:

@@ -160,11 +160,10 @@ def mechanism_words(case: Case) -> str:
     """Return the data that the picture does not show: speed, masses and the pin."""
     machine = case.machine
     pins = " and ".join(dict.fromkeys(f"{machine.pin_radius(joint):g}" for joint in JOINTS))
-    balance = machine.counterweight_kg_mm
     return (
         f"{machine.speed_rpm:g} rpm; rod {machine.rod_mass_kg:g} kg, crosshead with piston "
         f"{machine.reciprocating_mass_kg:g} kg; pins of {pins} mm radius"
-        + (f"; counterweight {balance:g} kg mm." if balance else ".")
+        + (f"; counterweight {case.counterweight:g} kg mm." if case.counterweight else ".")
     )
 
 

@@ -405,6 +405,8 @@ def test_the_table_says_which_values_make_another_job(key):
         base |= BIG_END
     if group in ("lubricant", "guide", "drive", "rod", "wear"):
         base |= {group: {"clearance_mm": 0.1} if group == "guide" else True}
+    if key == "machine.balance_reciprocating":
+        base |= {"machine": {"balance": 1.0}}
     if key == "guide.restitution":
         base |= {"contact": {"law": "flores", "restitution": 0.5}}
     elif name in OF_LAWS:

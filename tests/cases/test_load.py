@@ -588,7 +588,7 @@ CASES = st.fixed_dictionaries(
         "initial_offset_mm": group("initial_offset_mm").map(
             lambda offsets: {key: 0.6 * mm for key, mm in offsets.items()}
         ),
-        "machine": group("machine", "small_end_pin_radius_mm"),
+        "machine": group("machine", "small_end_pin_radius_mm", "balance", "balance_reciprocating"),
         "gas": group("gas", "switching", *CYLINDER_KEYS).map(lambda gas: gas | EXACT)
         | st.tuples(group("gas", "switching", *CYLINDER_KEYS[:4]), CYLINDERS).map(
             lambda parts: parts[0] | parts[1]

@@ -82,6 +82,10 @@ ENTRIES = {
         machine__reciprocating_mass_kg=15, machine__gravity_m_per_s2=9.81,
         machine__counterweight_kg_mm=500,
     ),
+    "machine.balance": Entry(0.5, WORN),
+    "machine.balance_reciprocating": Entry(
+        0.25, IDEAL | {"machine": {"balance": 0.5}}, (IDEAL, WORN)
+    ),
     "machine.pin_radius_mm": Entry(12, WORN, (IDEAL,)),
     "machine.small_end_pin_radius_mm": Entry(12, WORN, (IDEAL, BIG)),
     **entries(

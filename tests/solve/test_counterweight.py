@@ -1,18 +1,23 @@
 """A counterweight on the crank: what it takes off the force on the frame, by hand, and no more."""
 
+import json
 import math
 
 import numpy as np
 import pytest
 
 from compressor.analysis.shaking import frame_forces
-from compressor.cases.case import Case
+from compressor.cases.case import Case, CaseError
+from compressor.cases.load import load_studies
 from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
+from compressor.store.reader import open_study
 from compressor.studies.tradeoff.explain import counterweight_words
+from compressor.sweep.sweep import sweep
 
 TURN = {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 0.3}
 WORN = {"joint": "big_end", "clearance_mm": 0.2}
+BALANCE = {"rotating": 1.0, "reciprocating": 0.5}
 OMEGA = 500 * math.pi / 30
 ROTATING = 4.7 * 0.5 * 120.0  # kg mm: of a uniform rod half is at the crank pin
 
@@ -114,3 +119,75 @@ def test_none_is_as_without_the_key():
 def test_explain_says_what_it_comes_to():
     some = Case.from_values({"machine": {"counterweight_kg_mm": 1000}})
     assert counterweight_words(some) == "1000 kg mm opposite to the crank pin, 2742 N"
+    shared = Case.from_values({"machine": {"balance": BALANCE}})
+    assert counterweight_words(shared) == (
+        "1263 kg mm opposite to the crank pin, 3463 N: 1 of what turns with the pin and 0.5 of "
+        "what reciprocates"
+    )
+
+
+def test_a_share_of_the_masses_is_balanced():
+    """By hand: 4.7 kg with the centre at 250 of 600 mm, 14 kg, and a crank of 120 mm."""
+    machine = {"rod_centre_mm": 250, "rod_inertia_kg_m2": 0.15, "balance": BALANCE}
+    case = Case.from_values({"machine": machine})
+    at_crosshead = 4.7 * 250 / 600
+    expected = 120 * ((4.7 - at_crosshead) + 0.5 * (14 + at_crosshead))
+    assert case.counterweight == pytest.approx(expected, rel=1e-14)
+    assert record(case)["unbalance"] == pytest.approx(-1e-3 * expected, rel=1e-14)
+    assert Case.from_values(case.values()) == case
+    assert Case.from_attribute(case.attributes()["case"]).key == case.key
+
+
+def test_one_number_is_the_share_of_both():
+    one, two = (
+        Case.from_values({"machine": {"balance": balance}})
+        for balance in (0.5, {"rotating": 0.5, "reciprocating": 0.5})
+    )
+    assert one == two
+    assert one.key == two.key
+    assert one.counterweight == pytest.approx(0.5 * 120 * (14 + 4.7), rel=1e-14)
+
+
+def test_what_turns_with_the_pin_has_the_crank_s_own_unbalance():
+    drive = {"unbalance_kg_mm": 700}
+    case = Case.from_values(
+        {"drive": drive, "machine": {"balance": {"rotating": 1, "reciprocating": 0}}}
+    )
+    assert case.counterweight == pytest.approx(700 + ROTATING, rel=1e-14)
+    assert case.unbalance == pytest.approx(-ROTATING, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("machine", "key", "words"),
+    [
+        ({"balance": {"rotating": 1}}, "machine.balance", "needs both, rotating and reciprocating"),
+        ({"balance": 1, "counterweight_kg_mm": 9}, "machine.balance", "give one of the two"),
+        ({"balance_reciprocating": 1}, "machine.balance_reciprocating", "needs machine.balance"),
+        ({"balance": 1.5}, "machine.balance", "outside"),
+    ],
+)
+def test_what_is_wrong_with_a_balance_is_told(machine, key, words):
+    with pytest.raises(CaseError) as error:
+        Case.from_values({"machine": machine})
+    assert any(one.key == key and words in one.message for one in error.value.problems)
+
+
+def test_a_study_sweeps_counterweights_and_shares(tmp_path, monkeypatch, in_process):
+    monkeypatch.chdir(tmp_path)
+    brief = {"duration_rev": 0.25, "settle_rev": 0, "output_step_deg": 0.9, "accuracy": "draft"}
+    machines = {
+        "given": {"counterweight_kg_mm": [0, 500]},
+        "shared": {"balance": {"rotating": 1.0, "reciprocating": [0.5, 1.0]}},
+    }
+    for name, machine in machines.items():
+        values = {"machine": machine, "solve": brief, "output": {"signals": True}}
+        (tmp_path / f"{name}.yaml").write_text(json.dumps(values))
+        sweep(load_studies(tmp_path / f"{name}.yaml"), tmp_path / "results")
+    given = open_study(tmp_path / "results", "given")
+    assert given["counterweight_kg_mm"].values.tolist() == [0, 500]
+    shared = open_study(tmp_path / "results", "shared")
+    assert shared["balance_reciprocating"].values.tolist() == [0.5, 1.0]
+    first = float(shared["bearing_force"].sel(axis="x").isel(time=0, balance_reciprocating=0))
+    last = float(shared["bearing_force"].sel(axis="x").isel(time=0, balance_reciprocating=1))
+    half = 1e-3 * 120 * 0.5 * (14 + 2.35)  # at top dead centre it pulls towards the crank
+    assert last - first == pytest.approx(-half * OMEGA**2, rel=1e-9)

@@ -205,7 +205,7 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
     absent = tuple(feature.name for feature in shown if feature not in used)
     if case.load == "gas" and case.gas.is_cylinder:
         active["cylinder"] = cylinder_words(case)
-    if case.machine.counterweight_kg_mm:
+    if case.counterweight:
         active["counterweight"] = counterweight_words(case)
     if ideal:
         return active, (*absent, "clearance", "contact")
@@ -218,9 +218,16 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
 
 def counterweight_words(case: Case) -> str:
     """Return what a counterweight comes to in words, and by how much it lowers order 1."""
-    counterweight = case.machine.counterweight_kg_mm or 0.0
-    force = to_si(counterweight, "kg mm") * case.omega**2
-    return f"{counterweight:g} kg mm opposite to the crank pin, {force:.4g} N"
+    force = to_si(case.counterweight, "kg mm") * case.omega**2
+    words = f"{case.counterweight:g} kg mm opposite to the crank pin, {force:.4g} N"
+    rotating, reciprocating = case.machine.balance, case.machine.balance_reciprocating
+    if rotating is None:
+        return words
+    reciprocating = rotating if reciprocating is None else reciprocating
+    return (
+        f"{words}: {rotating:g} of what turns with the pin and {reciprocating:g} of what "
+        "reciprocates"
+    )
 
 
 def contact_words(case: Case) -> str:
