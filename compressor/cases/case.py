@@ -37,7 +37,7 @@ from compressor.cases.parameter import (
     first_tolerance,
     quote_value,
 )
-from compressor.cases.swept import FORMS
+from compressor.cases.swept import FORMS, PAIRS
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, outside_identity, table
 from compressor.cases.yaml_reader import resolve_scalar
 from compressor.metrics import JOINTS
@@ -450,6 +450,8 @@ def _plain_value(group: Any) -> dict[str, Any] | bool:
     plain = {key: value for key, value in vars(group).items() if value is not None}
     if isinstance(group, Contact) and group.materials:
         plain["materials"] = list(group.materials)
+        if group.small_end_materials:
+            plain["small_end_materials"] = list(group.small_end_materials)
         if group.law not in CYLINDRICAL:
             # also the default: that of a file depends on whether it gives a pin radius
             plain.setdefault("geometry", "external")
@@ -531,7 +533,7 @@ def _is_swept(key: str, value: Any) -> bool:
     if isinstance(value, Mapping):
         return bool({*value} & {*FORMS})
     many = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-    return (many and key != "contact.materials") or getattr(value, "ndim", 0) > 0
+    return (many and key not in PAIRS) or getattr(value, "ndim", 0) > 0
 
 
 def _as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> list[Problem]:

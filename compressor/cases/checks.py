@@ -112,6 +112,16 @@ PER_PART = {
     "gas.valve_loss_percent": {
         "suction": "gas.valve_loss_percent", "discharge": "gas.discharge_loss_percent",
     },
+    "contact.materials": {
+        "big_end": "contact.materials", "small_end": "contact.small_end_materials",
+    },
+    "contact.length_mm": {
+        "big_end": "contact.length_mm", "small_end": "contact.small_end_length_mm",
+    },
+    "lubricant.bearing_length_mm": {
+        "big_end": "lubricant.bearing_length_mm",
+        "small_end": "lubricant.small_end_bearing_length_mm",
+    },
     "machine.balance": {
         "rotating": "machine.balance", "reciprocating": "machine.balance_reciprocating",
     },

@@ -226,10 +226,11 @@ def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
         return
     for joint in JOINTS:
         width = 2.0 * case.machine.pin_radius(joint)
-        ratio = case.lubricant.bearing_length_mm / width
+        ratio = case.lubricant.bearing_length(joint) / width
+        own = joint == "small_end" and case.lubricant.small_end_bearing_length_mm
         if case.joint in (joint, "both") and not MIN_RATIO <= ratio <= MAX_RATIO:
             yield Problem(
-                "lubricant.bearing_length_mm",
+                f"lubricant.{'small_end_' if own else ''}bearing_length_mm",
                 f"is {ratio:.3g} times the diameter of the pin, {width:g} mm; the film's numbers "
                 f"hold from {MIN_RATIO:g} to {MAX_RATIO:g} times",
             )
@@ -303,6 +304,9 @@ FILLED_IN = {
     "machine.rod_inertia_kg_m2": ("machine.rod_mass_kg", "machine.rod_length_mm"),
     "machine.small_end_pin_radius_mm": ("machine.pin_radius_mm",),
     "machine.balance_reciprocating": ("machine.balance",),
+    "contact.small_end_materials": ("contact.materials",),
+    "contact.small_end_length_mm": ("contact.length_mm", "contact.law"),
+    "lubricant.small_end_bearing_length_mm": ("lubricant.bearing_length_mm",),
     "body.casing_mass_kg": ("body.mass_kg",),
     "guide.crosshead_inertia_kg_m2": (
         "machine.reciprocating_mass_kg", "guide.crosshead_length_mm", "guide.crosshead_height_mm",

@@ -5,7 +5,7 @@ units, which stand in the field's name; `compressor.solve.si_record` turns them 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, fill_by_law
 from compressor.cases.parameter import (
@@ -380,7 +380,8 @@ class Contact:
         judged=JUDGED_STIFFNESS,
     )  # fmt: skip
     materials: tuple[str, str] | None = choice(
-        None, ("steel", "copper"), "Table 2, Eq. 15", "two materials in place of a stiffness",
+        None, ("steel", "copper"), "Table 2, Eq. 15", "two materials in place of a stiffness, of "
+        "both joints or of the big end",
         kind="materials", optional=True, read=CLEARANCE,
     )  # fmt: skip
     geometry: str | None = choice(
@@ -421,7 +422,8 @@ class Contact:
         judged=(1.0, 100.0),
     )  # fmt: skip
     length_mm: float | None = parameter(
-        None, "mm", (0, 1e4), "ours", "joint length (johnson, liu)", above=True, optional=True,
+        None, "mm", (0, 1e4), "ours", "length of both joints, or of the big end (johnson, liu)",
+        above=True, optional=True,
         read=(CLEARANCE, by_law("contact", "length_mm")),
         judged=(10.0, 100.0),
     )  # fmt: skip
@@ -430,6 +432,15 @@ class Contact:
         optional=True, read=(CLEARANCE, by_law("contact", "modulus_GPa")),
         judged=(10.0, 250.0),
     )  # fmt: skip
+    small_end_materials: tuple[str, str] | None = choice(
+        None, ("steel", "copper"), "as the big end's", "two materials of the small end",
+        kind="materials", optional=True, read=(SMALL_CLEARANCE, MATERIALS),
+    )  # fmt: skip
+    small_end_length_mm: float | None = parameter(
+        None, "mm", (0, 1e4), "as the big end's", "length of the small end (johnson, liu)",
+        above=True, optional=True,
+        read=(SMALL_CLEARANCE, by_law("contact", "small_end_length_mm")),
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Fill in what the law reads, and leave out a stiffness where others make it."""
@@ -437,7 +448,21 @@ class Contact:
             vars(self)["stiffness_N_per_mm15"] = None
         if self.geometry == "external":  # as without the key
             vars(self)["geometry"] = None
+        for name in ("materials", "length_mm"):
+            # as without the key, which stands beside the big end's alone
+            if vars(self)[name] in (None, vars(self)[f"small_end_{name}"]):
+                vars(self)[f"small_end_{name}"] = None
         fill_by_law("contact", self)
+
+    def at(self, joint: str) -> "Contact":
+        """Return the contact of a joint: with the small end's own materials and length there."""
+        if joint != "small_end" or not (self.small_end_materials or self.small_end_length_mm):
+            return self
+        return replace(
+            self,
+            materials=self.small_end_materials or self.materials,
+            length_mm=self.small_end_length_mm or self.length_mm,
+        )
 
 
 @document_fields

@@ -16,6 +16,7 @@ from compressor.cases.parameter import (
     PLAY,
     RANDOM,
     ROCKING,
+    SMALL_CLEARANCE,
     STEADY,
     choice,
     document_fields,
@@ -46,8 +47,9 @@ class Lubricant:
         above=True, judged=(3.0, 300.0),
     )  # fmt: skip
     bearing_length_mm: float = parameter(
-        20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of the bearings", above=True
-    )
+        20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of both bearings, or of the big "
+        "end's", above=True,
+    )  # fmt: skip
     last_share: float = parameter(
         0.02,
         "",
@@ -56,6 +58,20 @@ class Lubricant:
         "of the clearance, in which the film bears no more",
         judged=(0.01, 0.1),
     )
+    small_end_bearing_length_mm: float | None = parameter(
+        None, "mm", (0, 1e4), "as the big end's", "length of the small end's bearing",
+        above=True, optional=True, read=SMALL_CLEARANCE,
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Leave out a length that is the big end's."""
+        if self.small_end_bearing_length_mm == self.bearing_length_mm:  # as without the key
+            vars(self)["small_end_bearing_length_mm"] = None
+
+    def bearing_length(self, joint: str) -> float:
+        """Return the length of a joint's bearing, mm."""
+        own = self.small_end_bearing_length_mm if joint == "small_end" else None
+        return self.bearing_length_mm if own is None else own
 
 
 OURS = "ours"

@@ -25,6 +25,7 @@ from typing import Any, NoReturn
 
 from compressor.cases.checks import row_of, suggestion
 from compressor.cases.parameter import Parameter, quote_value
+from compressor.cases.table import table
 from compressor.cases.yaml_reader import FileProblem, Node, resolve_scalar, shorten
 from compressor.program import did_you_mean, ignore_warnings
 
@@ -36,6 +37,9 @@ FORMS = {
     "logspace": "[first, last, count]",
     "range": "[first, last, step]",
 } | dict.fromkeys(SAMPLED, "[least, greatest]")
+
+# keys whose one value is a list
+PAIRS = frozenset(row.key for row in table().values() if row.kind == "materials")
 
 Make = Callable[[], list[float]]
 Spread = Callable[[float], float]  # of a coordinate in [0, 1)
@@ -67,7 +71,7 @@ def is_swept(key: str, node: Node) -> bool:
         return key != "solve.accuracy"
     if not isinstance(node.value, list):
         return False
-    return key != "contact.materials" or any(isinstance(n.value, list) for n in node.value)
+    return key not in PAIRS or any(isinstance(n.value, list) for n in node.value)
 
 
 def sweep_of(key: str, node: Node, problems: list[FileProblem]) -> SweptKey | None:

@@ -165,9 +165,10 @@ def film(joint, eccentricity, spins, p):
     nx, ny = (ex / distance, ey / distance) if distance > 0.0 else (1.0, 0.0)
     radial, across = ex_rate * nx + ey_rate * ny, ey_rate * nx - ex_rate * ny
     eps = bounded_eccentricity(distance / clearance, p.film_share)
-    ratio = 0.5 * p.film_length / pin
+    length = p.film_length[joint]
+    ratio = 0.5 * length / pin
     relative = clearance / pin
-    size = fade * 2.0 * p.film_length * pin * p.viscosity / (relative * relative)
+    size = fade * 2.0 * length * pin * p.viscosity / (relative * relative)
     journal_spin, bore_spin = spins
     per_distance = eps / distance if distance > 0.0 else 1.0 / clearance
     wedge = eps * (journal_spin + bore_spin) - 2.0 * across * per_distance  # eps w
@@ -186,7 +187,7 @@ def film(joint, eccentricity, spins, p):
     normal -= 0.5 * (pressed + pulled) * closing + 0.5 * (pressed - pulled) * pressing
     side = rotation * wedge * math.sin(beta)
     fx, fy = normal * nx - side * ny, normal * ny + side * nx
-    shear = fade * 2.0 * math.pi * p.viscosity * p.film_length * pin**3
+    shear = fade * 2.0 * math.pi * p.viscosity * length * pin**3
     shear *= (journal_spin - bore_spin) / (clearance * math.sqrt(1.0 - eps * eps))
     half = 0.5 * distance * side
     lost = shear * (journal_spin - bore_spin) + half * (journal_spin + bore_spin)

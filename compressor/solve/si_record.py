@@ -88,7 +88,7 @@ def offsets(case: Case) -> np.ndarray:
 def stiffness_of(case: Case, joint: str) -> float:
     """Return the contact stiffness (N/m^p) of a joint, as of `joint_stiffness`."""
     clearance = getattr(case.clearance_mm, joint)
-    return joint_stiffness(case.contact, case.machine.pin_radius(joint), clearance)
+    return joint_stiffness(case.contact.at(joint), case.machine.pin_radius(joint), clearance)
 
 
 def _machine(case: Case, p: dict[str, Any]) -> None:
@@ -163,11 +163,12 @@ def _film(case: Case, p: dict[str, Any]) -> None:
         return
     from compressor.solve.bearing import film_numbers
 
-    length = to_si(lubricant.bearing_length_mm, "mm")
+    lengths = [to_si(lubricant.bearing_length(joint), "mm") for joint in JOINTS]
     p["viscosity"] = to_si(lubricant.viscosity_mPa_s, "mPa s")
-    p["film_length"], p["film_share"] = length, lubricant.last_share
+    p["film_length"], p["film_share"] = lengths, lubricant.last_share
     p["film_constants"] = [
-        film_numbers(0.5 * length / pin, lubricant.last_share) for pin in p["pin_radius"]
+        film_numbers(0.5 * length / pin, lubricant.last_share)
+        for length, pin in zip(lengths, p["pin_radius"], strict=True)
     ]
 
 
@@ -311,7 +312,8 @@ def film_damping(p: Fields) -> float:
     if not is_featured(p) or p["viscosity"] == 0.0:
         return 0.0
     clearance, joint = min((one, j) for j, one in enumerate(p["clearance"].tolist()) if one > 0.0)
-    size = 2.0 * p["film_length"] * p["viscosity"] * p["pin_radius"][joint] ** 3 / clearance**2
+    length, pin = p["film_length"][joint], p["pin_radius"][joint]
+    size = 2.0 * length * p["viscosity"] * pin**3 / clearance**2
     return float(size * p["film_constants"][joint, -1] / clearance)
 
 

@@ -374,10 +374,18 @@ OTHER = {  # valid values beside the defaults, which cannot be scaled
     "sensor.seed": 2,
     "guide.exponent": 1.4,
     "machine.small_end_pin_radius_mm": 12.0,
+    "contact.small_end_materials": ["steel", "copper"],
+    "contact.small_end_length_mm": 12.0,
+    "lubricant.small_end_bearing_length_mm": 12.0,
 }
 CLEARANCES = {"big_end": 0.1, "small_end": 0.1}
 OF_PINS = {"length_mm": 20, "modulus_GPa": 110}
-OF_LAWS = {*USUAL, "restitution", *OF_PINS}  # keys that the default laws do not read
+OF_LAWS = {
+    *USUAL,
+    "restitution",
+    *OF_PINS,
+    "small_end_length_mm",
+}  # keys that the default laws do not read
 
 
 def other_value(key):
@@ -393,7 +401,7 @@ def other_value(key):
 def test_the_table_says_which_values_make_another_job(key):
     base = {"joint": "both", "clearance_mm": CLEARANCES}
     group, _, name = key.rpartition(".")
-    if key == "contact.geometry":
+    if key in ("contact.geometry", "contact.small_end_materials"):
         base |= {"contact": {"materials": ["steel", "steel"]}}
     if key == "joint":
         base |= {"clearance_mm": 0.1}
@@ -411,7 +419,7 @@ def test_the_table_says_which_values_make_another_job(key):
         base |= {"contact": {"law": "flores", "restitution": 0.5}}
     elif name in OF_LAWS:
         law = {"law": "flores", "restitution": 0.5} if group == "contact" else {"law": "lugre"}
-        law = {"law": "johnson", **OF_PINS} if name in OF_PINS else law
+        law = {"law": "johnson", **OF_PINS} if name.removeprefix("small_end_") in OF_PINS else law
         base |= {group: law}
     there = base.get(group, {})
     there = {} if there is True else there

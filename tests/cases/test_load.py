@@ -557,7 +557,8 @@ def group(name: str, *left_out: str):
 
 
 # keys that need the name of a law beside them; the law itself
-OF_LAWS = ["law", "restitution", "length_mm", "modulus_GPa", *USUAL]
+OF_LAWS = ["law", "restitution", "length_mm", "small_end_length_mm", "modulus_GPa", *USUAL]
+OF_MATERIALS = ["materials", "small_end_materials", "geometry"]
 
 
 def as_hertz(values):
@@ -594,10 +595,10 @@ CASES = st.fixed_dictionaries(
             lambda parts: parts[0] | parts[1]
         ),
         "spring": group("spring"),
-        "contact": group("contact", "materials", "exponent", "geometry", *OF_LAWS)
-        | group("contact", "materials", "geometry", "restitution").map(as_hertz)
+        "contact": group("contact", *OF_MATERIALS, "exponent", *OF_LAWS)
+        | group("contact", *OF_MATERIALS, "restitution").map(as_hertz)
         | st.just({"materials": ["steel", "copper"]})
-        | group("contact", "materials", "geometry", "restitution").map(as_pin)
+        | group("contact", *OF_MATERIALS, "restitution").map(as_pin)
         | st.just({"materials": ["steel", "steel"], "geometry": "internal"}),
         "friction": st.just(False)
         | group("friction", *OF_LAWS)

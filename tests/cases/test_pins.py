@@ -1,11 +1,14 @@
 """Pins of the machine that is there: a radius each, their contact, and what is told of it."""
 
 import json
+import math
 
 import pytest
 
 from compressor.cases.case import Case, CaseError
-from compressor.cases.materials import contact_stiffness
+from compressor.cases.load import load_studies
+from compressor.cases.materials import composite_modulus, contact_stiffness
+from compressor.physics.film import film
 from compressor.solve.cautions import remarks
 from compressor.solve.si_record import record
 from compressor.studies.tradeoff.explain import contact_words
@@ -69,6 +72,73 @@ def test_a_stored_case_of_before_keeps_its_discs():
     old = Case.from_attribute(json.dumps(values))
     discs = case(contact=MATERIALS | {"geometry": "external"}, machine={"pin_radius_mm": 35})
     assert old.key == discs.key
+
+
+LENGTHS = {"big_end": 60, "small_end": 40}
+PINS = {"pin_radius_mm": {"big_end": 60, "small_end": 35}}
+
+
+def test_each_bearing_has_a_length_of_its_own():
+    """The film of a joint is that of a machine whose bearings are all as long as its own."""
+    oil = {"lubricant": {"bearing_length_mm": LENGTHS}, "machine": PINS}
+    two = case(**oil)
+    assert Case.from_values(two.values()) == two
+    assert record(two)["film_length"].tolist() == [0.06, 0.04]
+    for number, length in enumerate(LENGTHS.values()):
+        one = case(machine=PINS, lubricant={"bearing_length_mm": length})
+        assert one.lubricant.small_end_bearing_length_mm is None
+        forces = [
+            film(number, (1e-4, -5e-5, 0.02, 0.01), (52.0, -8.0), record(both))
+            for both in (two, one)
+        ]
+        assert forces[0] == forces[1]
+        assert forces[0][0] != 0.0
+    alike = case(lubricant={"bearing_length_mm": {"big_end": 15, "small_end": 15}})
+    assert alike.key == case(lubricant={"bearing_length_mm": 15}).key
+
+
+def test_each_pin_has_materials_and_a_length_of_its_own():
+    pairs = {"big_end": ["steel", "steel"], "small_end": ["steel", "copper"]}
+    two = case(machine=PINS, contact={"materials": pairs})
+    expected = [
+        contact_stiffness(*pair, radius, radius + 2e-4, internal=True)
+        for pair, radius in zip(pairs.values(), (0.06, 0.035), strict=True)
+    ]
+    assert record(two)["stiffness"].tolist() == pytest.approx(expected, rel=1e-14)
+    assert "steel on steel and steel on copper" in contact_words(two)
+    line = case(machine=PINS, contact={"law": "johnson", "materials": pairs, "length_mm": LENGTHS})
+    expected = [
+        math.pi * composite_modulus(*pair) * length / 1e3
+        for pair, length in zip(pairs.values(), LENGTHS.values(), strict=True)
+    ]
+    assert record(line)["stiffness"].tolist() == pytest.approx(expected, rel=1e-14)
+    assert "60 and 40 mm long" in contact_words(line)
+    for one in (two, line):
+        assert Case.from_values(one.values()) == one
+        assert Case.from_attribute(one.attributes()["case"]).key == one.key
+
+
+def test_files_have_a_pair_for_each_pin_and_sweep_lengths(tmp_path):
+    values = WORN | {
+        "machine": PINS,
+        "contact": {
+            "law": "liu",
+            "materials": {"big_end": ["steel", "steel"], "small_end": ["steel", "copper"]},
+            "length_mm": {"big_end": [50, 60], "small_end": 40},
+        },
+    }
+    (tmp_path / "s.yaml").write_text(json.dumps(values))
+    (study,) = load_studies(tmp_path / "s.yaml")
+    assert [axis.key for axis in study.axes] == ["contact.length_mm"]
+    assert [one.contact.length_mm for one in study.cases] == [50, 60]
+    assert {one.contact.at("small_end").materials for one in study.cases} == {("steel", "copper")}
+    assert {one.contact.at("small_end").length_mm for one in study.cases} == {40}
+
+
+def test_what_is_wrong_with_one_bearing_is_told_of_it():
+    lengths = {"big_end": 60, "small_end": 80}  # beyond the pin's diameter
+    with pytest.raises(CaseError, match=r"small_end_bearing_length_mm: is 1\.14 times"):
+        case(machine=PINS, lubricant={"bearing_length_mm": lengths})
 
 
 @pytest.mark.parametrize("more", [{"contact": MATERIALS}, {"machine": {"speed_rpm": 400}}])

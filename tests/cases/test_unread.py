@@ -31,9 +31,12 @@ DAMPED = WORN | {"contact": {"law": "hunt_crossley", "restitution": 0.5}}
 PIN = {"law": "johnson", "length_mm": 20, "modulus_GPa": 100}
 JOHNSON = WORN | {"contact": PIN}
 COPPER = WORN | {"contact": {"materials": ["steel", "copper"]}}
+BIG_COPPER = BIG | {"contact": {"materials": ["steel", "copper"]}}
+BIG_JOHNSON = BIG | {"contact": PIN}
 TANH = WORN | {"friction": {"law": "coulomb_tanh"}}
 LUGRE = WORN | {"friction": {"law": "lugre"}}
 OIL = WORN | {"lubricant": True}
+BIG_OIL = BIG | {"lubricant": True}
 SLIDING = IDEAL | {"guide": True}
 PLAYING = IDEAL | {"guide": {"clearance_mm": 0.1}}
 SMOOTH = IDEAL | {"guide": {"clearance_mm": 0.1, "friction": 0}}
@@ -105,6 +108,11 @@ ENTRIES = {
     "contact.law": Entry("hertz", WORN, (IDEAL, PLAYING)),
     "contact.stiffness_N_per_mm15": Entry(4e5, WORN, (IDEAL, JOHNSON)),
     "contact.materials": Entry(["steel", "copper"], WORN, (IDEAL,)),
+    "contact.small_end_materials": Entry(
+        ["steel", "steel"], COPPER, (WORN, BIG_COPPER, JOHNSON)
+    ),
+    "contact.small_end_length_mm": Entry(15, JOHNSON, (WORN, BIG_JOHNSON)),
+    "lubricant.small_end_bearing_length_mm": Entry(15, OIL, (BIG_OIL, IDEAL)),
     "contact.geometry": Entry("internal", COPPER, (WORN, JOHNSON)),
     "contact.exponent": Entry(1.4, WORN, (IDEAL, JOHNSON, OWN_CORNER)),
     **entries(

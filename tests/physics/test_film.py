@@ -36,7 +36,7 @@ def record_of(ratio=1.0, share=0.02):
 def unit_force():
     """The film's force for a Sommerfeld number of 1, at a speed of 1 rad/s."""
     p, pin = record_of(), record_of()["pin_radius"][0]
-    return p["viscosity"] * p["film_length"] * 2 * pin * (pin / CLEARANCE) ** 2
+    return p["viscosity"] * p["film_length"][0] * 2 * pin * (pin / CLEARANCE) ** 2
 
 
 def force(e, rate=(0.0, 0.0), spins=(SPEED, 0.0), p=None):
@@ -178,12 +178,12 @@ def test_thin_oil_is_nearly_dry():
 
 def both_at_once(p, eps, angle):
     """Numbers of the film at a direction of its velocity: the model's, Holland's, Reynolds'."""
-    ratio, constants = 0.5 * p["film_length"] / p["pin_radius"][0], p["film_constants"][0]
+    ratio, constants = 0.5 * p["film_length"][0] / p["pin_radius"][0], p["film_constants"][0]
     turning, squeeze = math.cos(angle), math.sin(angle)
     rate = (squeeze * CLEARANCE, 0.0)
     fx, fy = force((eps * CLEARANCE, 0.0), rate, (turning / eps, 0.0), p)[:2]
     ours = np.array([-fx, fy]) * CLEARANCE**2
-    ours /= 2.0 * p["film_length"] * p["pin_radius"][0] ** 3 * p["viscosity"]
+    ours /= 2.0 * p["film_length"][0] * p["pin_radius"][0] ** 3 * p["viscosity"]
     rotation, beta = rotation_number(eps, ratio, constants), attitude(eps, ratio, constants)
     pressed = squeeze_number(math.copysign(eps, squeeze), ratio, constants) * squeeze
     holland = (

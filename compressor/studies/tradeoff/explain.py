@@ -230,20 +230,27 @@ def counterweight_words(case: Case) -> str:
     )
 
 
+def material_words(case: Case) -> str:
+    """Return the materials of the joints with clearance in words; "" without any."""
+    pairs = dict.fromkeys(case.contact.at(joint).materials for joint in faulty(case))
+    return " and ".join(" on ".join(pair) for pair in pairs if pair)
+
+
 def contact_words(case: Case) -> str:
     """Return the law, stiffness, exponent and damping of a contact in words, with their sources."""
     contact, usual = case.contact, Contact()
     shape = f"p = {contact.exponent:g}"
     if contact.law in CYLINDRICAL:
-        material = " on ".join(contact.materials or ()) or f"E* = {contact.modulus_GPa:g} GPa"
-        shape = f"{contact.length_mm:g} mm long"
+        material = material_words(case) or f"E* = {contact.modulus_GPa:g} GPa"
+        lengths = dict.fromkeys(contact.at(joint).length_mm for joint in faulty(case))
+        shape = f"{' and '.join(f'{length:g}' for length in lengths)} mm long"
     elif contact.materials:
         where = "in their bores" if contact.geometry == "internal" else "as of two discs"
         each = {
             f"{stiffness_of(case, joint) / 1000.0**contact.exponent:.4g}" for joint in faulty(case)
         }
         material = f"K = {' and '.join(sorted(each))} N/mm^p (Eq. 15, pins {where}: "
-        material += " on ".join(contact.materials) + ")"
+        material += material_words(case) + ")"
     else:
         paper = contact.stiffness_N_per_mm15 == usual.stiffness_N_per_mm15
         source = "Table 3, of a pin of 10 mm radius" if paper else "given"

@@ -130,6 +130,8 @@ def with_contact(case: Case, law: str) -> Case | None:
     known = contact.materials or contact.modulus_GPa
     if law in ("johnson", "liu"):
         values["length_mm"] = contact.length_mm or bearing_length(case)
+        if case.lubricant and not contact.length_mm:
+            values["small_end_length_mm"] = case.lubricant.small_end_bearing_length_mm
         if not known:
             values |= {"materials": STEEL, "stiffness_N_per_mm15": None}
     elif not (contact.materials or contact.stiffness_N_per_mm15):

@@ -17,6 +17,7 @@ import xarray as xr
 from compressor.cases import (
     READ_BY,
     Case,
+    Contact,
     Output,
     Study,
     joint_stiffness,
@@ -118,22 +119,34 @@ def with_stiffness(case: Case, name: str, factor: float) -> Choice:
     """Return a case with its contact stiffness, or the modulus that it follows from, scaled."""
     contact, machine = case.contact, case.machine
     if contact.law in ("johnson", "liu"):
-        modulus = contact.modulus_GPa
-        if modulus is None:  # of the materials: from the stiffness pi E* L of johnson
-            line = replace(contact, law="johnson")
-            length = (contact.length_mm or math.nan) / 1000
-            modulus = joint_stiffness(line, machine.pin_radius_mm, 0.1) / (math.pi * length) / 1e9
-        values: dict[str, Any] = {"materials": None, "modulus_GPa": factor * modulus}
-        return Choice(name, with_values(case, "contact", **values))
+        each = [composite_modulus_of(contact.at(joint)) for joint in faulty(case)]
+        modulus = math.prod(each) ** (1.0 / len(each))
+        values: dict[str, Any] = {"materials": None, "small_end_materials": None}
+        values["modulus_GPa"] = factor * modulus
+        alike = max(each) <= SAME_STIFFNESS * min(each)
+        note = "" if alike else "of both joints"
+        return Choice(name, with_values(case, "contact", **values), note)
     each = [
-        joint_stiffness(contact, machine.pin_radius(joint), getattr(case.clearance_mm, joint))
+        joint_stiffness(
+            contact.at(joint), machine.pin_radius(joint), getattr(case.clearance_mm, joint)
+        )
         for joint in faulty(case)
     ]
     # one key serves both joints: materials may give each a stiffness of its own
     middle = math.prod(each) ** (1.0 / len(each)) / 1000.0**contact.exponent
-    values = {"stiffness_N_per_mm15": factor * middle, "materials": None, "geometry": None}
+    values = {"stiffness_N_per_mm15": factor * middle, "materials": None, "geometry": None,
+              "small_end_materials": None}  # fmt: skip
     alike = max(each) <= SAME_STIFFNESS * min(each)
     return Choice(name, with_values(case, "contact", **values), "" if alike else "of both joints")
+
+
+def composite_modulus_of(contact: Contact) -> float:
+    """Return the composite modulus E* (GPa) of a joint's contact, as given or of its materials."""
+    if contact.modulus_GPa is not None:
+        return contact.modulus_GPa
+    # from the stiffness pi E* L of johnson, which reads no radius
+    length = (contact.length_mm or math.nan) / 1000
+    return joint_stiffness(replace(contact, law="johnson"), 1.0, 0.1) / (math.pi * length) / 1e9
 
 
 def check_choice(choice: Choice, case: Case) -> Choice:
