@@ -14,8 +14,8 @@ PAGE = Path(__file__).parent.parent / "compressor" / "API.md"
 SECTIONS = {
     "Cases": ("load_cases", "Case"),
     "Groups of a case": (
-        "PerJoint", "Offset", "Machine", "Gas", "Spring", "Contact", "Friction", "Lubricant",
-        "Guide", "Drive", "Rod", "Wear", "Body", "Sensor", "Solve", "Output",
+        "PerJoint", "HealthyClearance", "Offset", "Machine", "Gas", "Spring", "Contact", "Friction",
+        "Lubricant", "Guide", "Drive", "Rod", "Wear", "Body", "Sensor", "Solve", "Output",
     ),
     "Runs": ("simulate",),
     "Results": ("open_study", "read_job"),

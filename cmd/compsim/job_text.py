@@ -212,4 +212,19 @@ def facts(found: "JobReport") -> list[Line]:
     texts = {name: str(found.attributes[name]) for name in FACTS if name in found.attributes}
     lines = [(name, regime_words(text) if name == "regime" else text)
              for name, text in texts.items()]  # fmt: skip
+    lines += worn_joints(found)
     return [*lines, ("file", os.path.relpath(found.file))] if found.file else lines
+
+
+def worn_joints(found: "JobReport") -> list[Line]:
+    """Return which joints count as worn; [] where the case names no healthy clearance."""
+    from compressor.cases import Case
+
+    case = Case.from_attribute(found.attributes["case"])
+    sizes = [
+        f"{joint.replace('_', ' ')} {getattr(case.clearance_mm, joint):g} of up to {healthy:g} mm"
+        for joint in metrics.JOINTS
+        if (healthy := getattr(case.healthy_clearance_mm, joint)) > 0.0
+    ]
+    worn = case.worn_joint.replace("_", " ")
+    return [("worn", f"{worn} (healthy: {', '.join(sizes)})")] if sizes else []

@@ -20,6 +20,7 @@ from compressor.cases.groups import (
     Contact,
     Friction,
     Gas,
+    HealthyClearance,
     Machine,
     Offset,
     Output,
@@ -44,5 +45,5 @@ from compressor.cases.parameter import (
 )
 from compressor.cases.study import Axis, Study, StudyRequest, points
 from compressor.cases.swept import between, design
-from compressor.cases.table import OF_JOINTS, table
+from compressor.cases.table import OF_JOINTS, name_worn_joint, table
 from compressor.cases.yaml_reader import CaseFileError, FileProblem, Node, Place

@@ -26,7 +26,7 @@ from compressor.cases.checks import (
     values_given,
 )
 from compressor.cases.conflicts import conflicts, values_read
-from compressor.cases.groups import Contact, Solve
+from compressor.cases.groups import Contact, HealthyClearance, Solve
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
 from compressor.cases.optional_groups import fill_guide, fill_wear
 from compressor.cases.parameter import (
@@ -115,6 +115,7 @@ def model_of(values: Mapping[str, Any]) -> str:
 # keys of stored jobs were made with the loads' older names, and stay
 LOADS_IN_KEYS = {"spring": "design", "gas": "typical", "none": "none"}
 MAX_TEXTS = 4096  # groups whose texts are remembered
+SOUND = HealthyClearance()  # that no case need name
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 # the groups with a key that results depend on; of `solve` the span and the solver are parts
@@ -137,10 +138,10 @@ class Case(Settings):
 
     `Case.from_values` makes a valid one. `name` (of the study), `load` (spring, gas or none)
     and `joint` (none, big_end, small_end or both) are words. The groups are `clearance_mm`
-    (PerJoint), `initial_offset_mm` (Offset), `machine`, `gas`, `spring`, `contact`, `friction`,
-    `lubricant`, `guide`, `drive`, `rod`, `wear`, `body`, `sensor`, `solve` and `output`, each of
-    the class of that name; friction and the seven after it may be None. A case never changes;
-    `dataclasses.replace` makes another:
+    (PerJoint), `healthy_clearance_mm` (HealthyClearance), `initial_offset_mm` (Offset), `machine`,
+    `gas`, `spring`, `contact`, `friction`, `lubricant`, `guide`, `drive`, `rod`, `wear`, `body`,
+    `sensor`, `solve` and `output`, each of the class of that name; friction and the seven after it
+    may be None. A case never changes; `dataclasses.replace` makes another:
 
     >>> from dataclasses import replace
     >>> import compressor
@@ -275,7 +276,7 @@ class Case(Settings):
         """Yield the words and groups that make the case, by name; None of a group that is off."""
         for name in ("name", "load", "joint", *GROUPS):
             value = getattr(self, name)
-            is_default = value is None and WORDS[name]
+            is_default = (value is None and WORDS[name]) or value == SOUND
             if not (is_default or (self.joint == "none" and name in OF_JOINTS)):
                 yield name, value
 

@@ -38,7 +38,12 @@ SHORTHANDS = {
         tuple(f"clearance_mm.{joint}" for joint in JOINTS),
         "radial clearance, of both joints or each",
         "radial clearance",
-    )
+    ),
+    "healthy_clearance_mm": Shorthand(
+        tuple(f"healthy_clearance_mm.{joint}" for joint in JOINTS),
+        "radial clearance up to which a joint counts as sound, of both joints or each",
+        "healthy clearance",
+    ),
 }
 
 

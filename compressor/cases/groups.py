@@ -73,6 +73,28 @@ class PerJoint:
 
 @document_fields
 @dataclass(frozen=True)
+class HealthyClearance:
+    """The radial clearance up to which a joint counts as sound, mm; 0: a worn one has any.
+
+    A case's `healthy_clearance_mm`. It moves nothing, and is no part of a job's identity: it says
+    which joints are called worn.
+
+    >>> import compressor
+    >>> values = {"joint": "both", "clearance_mm": {"big_end": 0.08, "small_end": 0.25}}
+    >>> compressor.Case.from_values(values | {"healthy_clearance_mm": 0.1}).worn_joint
+    'small_end'
+    """
+
+    big_end: float = parameter(
+        0.0, "mm", (0, 1000), "ours", "clearance up to which the big end is sound", identity=False
+    )
+    small_end: float = parameter(
+        0.0, "mm", (0, 1000), "ours", "clearance up to which the small end is sound", identity=False
+    )
+
+
+@document_fields
+@dataclass(frozen=True)
 class Offset:
     """How far a journal starts from its bore's centre, mm; a case's `initial_offset_mm`.
 

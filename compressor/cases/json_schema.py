@@ -62,7 +62,7 @@ def _group(name: str) -> Schema:
         return {"description": about, "anyOf": [{"const": WORDS[name]}, mapping]}
     row = row_of(name)
     if row:
-        short = _value(row)["anyOf"]
+        short = _value(row).get("anyOf") or [_single_value(row)]
         return {"description": SHORTHANDS[name].phrase, "anyOf": [*short, mapping]}
     return {"description": about, **mapping}
 
@@ -158,5 +158,4 @@ def _study_group(module: Any) -> Schema:
 
 def _sweepable() -> Iterable[str]:
     """Yield the keys that can be swept, shorthands among them."""
-    yield from SHORTHANDS
-    yield from (key for key in table() if key not in outside_identity())
+    yield from (key for key in (*SHORTHANDS, *table()) if key not in outside_identity())

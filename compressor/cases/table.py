@@ -15,6 +15,7 @@ from compressor.cases.groups import (
     Contact,
     Friction,
     Gas,
+    HealthyClearance,
     Machine,
     Offset,
     Output,
@@ -36,11 +37,13 @@ from compressor.cases.parameter import (
     Reader,
     choice,
 )
+from compressor.metrics import JOINTS
 
 MAX_REV = 50.0  # with `duration_rev: auto`
 
 GROUPS: dict[str, type] = {
     "clearance_mm": PerJoint,
+    "healthy_clearance_mm": HealthyClearance,
     "initial_offset_mm": Offset,
     "machine": Machine,
     "gas": Gas,
@@ -89,6 +92,7 @@ class Settings:
         "none", ("none", "big_end", "small_end", "both"), "§3.2", "joints with clearance"
     )
     clearance_mm: PerJoint = group(PerJoint(), A_JOINT)
+    healthy_clearance_mm: HealthyClearance = HealthyClearance()
     initial_offset_mm: Offset = Offset()
     machine: Machine = Machine()
     gas: Gas = group(Gas(), GAS)
@@ -114,6 +118,14 @@ class Settings:
     def turn(self) -> float:
         """Return the time of one revolution, s."""
         return 60.0 / self.machine.speed_rpm
+
+    @property
+    def worn_joint(self) -> str:
+        """Return which joints count as worn: none, big_end, small_end or both.
+
+        Those that `joint` names, but for a clearance that is healthy.
+        """
+        return name_worn_joint(self.joint, self.clearance_mm, self.healthy_clearance_mm)
 
     @property
     def unbalance(self) -> float:
@@ -173,6 +185,16 @@ class Settings:
         return self.duration * self.machine.speed_rpm * 6.0 / (self.solve.output_step_deg or 1.0)
 
 
+def name_worn_joint(joint: str, clearance_mm: PerJoint, healthy_mm: HealthyClearance) -> str:
+    """Return which of the joints that `joint` names are worn: beyond a healthy clearance."""
+    named = JOINTS if joint == "both" else (joint,)
+    healthy = [
+        one for one in JOINTS if 0.0 < getattr(healthy_mm, one) >= getattr(clearance_mm, one)
+    ]
+    worn = [one for one in named if one not in healthy]
+    return "both" if len(worn) > 1 else worn[0] if worn else "none"
+
+
 def parameters() -> Iterator[Parameter]:
     """Yield the rows of the table, in the order of the case file."""
     for item in dataclasses.fields(Settings):
@@ -201,4 +223,8 @@ def table() -> dict[str, Parameter]:
 @cache
 def outside_identity() -> frozenset[str]:
     """Return the keys that no result depends on, so that no study can sweep them."""
-    return frozenset(row.key for row in parameters() if not row.identity)
+    keys = [row.key for row in parameters() if not row.identity]
+    groups = {key.partition(".")[0] for key in keys} - {
+        row.key.partition(".")[0] for row in parameters() if row.identity
+    }
+    return frozenset([*keys, *groups])

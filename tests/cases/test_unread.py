@@ -75,6 +75,8 @@ ENTRIES = {
     "joint": Entry("both", BIG | {"clearance_mm": 0.2}),
     "clearance_mm.big_end": Entry(0.25, WORN, (SMALL, IDEAL)),
     "clearance_mm.small_end": Entry(0.25, WORN, (BIG, IDEAL)),
+    "healthy_clearance_mm.big_end": Entry(0.25, WORN),
+    "healthy_clearance_mm.small_end": Entry(0.25, WORN),
     **entries(BIG, SMALL, IDEAL, initial_offset_mm__big_end_x=0.1,
               initial_offset_mm__big_end_y=0.1),
     **entries(SMALL, BIG, IDEAL, initial_offset_mm__small_end_x=0.1,
@@ -224,6 +226,7 @@ def stored(text: str) -> dict[str, str]:
     found = {name: repr(item.values.tolist()) for name, item in run.variables.items()}
     del found["seconds"]
     found["name"] = run.attrs["name"]
+    found["worn"] = Case.from_attribute(run.attrs["case"]).worn_joint
     if case.output.keep == "metrics":
         return {name: text for name, text in found.items() if name != "time"}
     found["file"] = str(len(series_image(run, case.output)) // 1000)

@@ -21,13 +21,15 @@ LEFT_OUT = {  # reasons that are the data set's; others are those of `compsim st
     "too_short": "fewer revolutions than a window",
     "silent_record": "a record of zeros, or with values that are no numbers",
 }
+SOUND = (
+    "**Sound joints with a clearance.** A joint that `joint` does not name is ideal, while a sound "
+    "bearing has a working clearance: to tell faults from sound joints is easier here."
+)
 ABSENT = (
     "**Measured data.** Everything is simulated. Scores on this data say nothing of a real machine "
     "until they are repeated on one.",
     "**Feedback of the body.** The machine drives the body, and the body's motion does not come "
     "back.",
-    "**Sound joints with a clearance.** A joint that `joint` does not name is ideal, while a sound "
-    "bearing has a working clearance: to tell faults from sound joints is easier here.",
     "**Other faults.** Valves, rings, pistons, bearings and couplings are sound. Other machines on "
     "the same floor are absent. Noise is white: neighbours, flow and gear meshes are not.",
     "**Progress.** A clearance is constant over a record; nothing wears, and there is no history.",
@@ -178,7 +180,14 @@ def labels(dataset: "xr.Dataset") -> str:
     for name, (unit, phrase, _) in LABELS.items():
         values = dataset[name].values
         rows.append((f"`{name}`", unit, phrase, f"{np.min(values):g} to {np.max(values):g}"))
-    return table(("label", "unit", "what it is", "values"), rows)
+    text = table(("label", "unit", "what it is", "values"), rows)
+    healthy = json.loads(dataset.attrs["fixed"]).get("healthy_clearance_mm")
+    if not healthy:
+        return text
+    ends = " and ".join(
+        f"up to {size:g} mm at the {joint.replace('_', ' ')}" for joint, size in healthy.items()
+    )
+    return f"{text}\n\nA joint counts as sound, and not as a fault, with a clearance {ends}."
 
 
 def _words(dataset: "xr.Dataset", name: str) -> str:
@@ -249,6 +258,8 @@ def absent(fixed: dict[str, Any], models: dict[str, dict[str, int]]) -> list[str
     """Describe the parts that the data set does not have."""
     body, sensor = fixed.get("body") or {}, fixed.get("sensor") or {}
     found = [*ABSENT, *unmodelled_parts(models)]
+    if not fixed.get("healthy_clearance_mm"):
+        found.insert(2, SOUND)
     if body:
         found.append(
             f"**Other foundations.** The body of the first job has {body['mass_kg']:g} kg and "

@@ -10,23 +10,27 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compressor.cases import Case, Sensor
+from compressor.cases import Case, HealthyClearance, Sensor
 from compressor.outcome import Regime, regime_words
 from compressor.program import PROGRAM, CompsimError, Progress, no_progress
 from compressor.store import DamagedJob, Folder, Stored, StoredStudy, find_study, read_store
 from compressor.studies.diagnosis.features import FEATURES, MIN_REVOLUTIONS, RecordError, features
+from compressor.studies.diagnosis.library import healthy_clearance
 
 if TYPE_CHECKING:
     import xarray as xr
 
 RECORD = ("sensor_time", "sensor_acceleration", "tacho_time")
 CLIPPED = "clipped_share"  # the name that files of all versions have
-NOT_BUILT = ("name", "load", "sensor", "solve", "output", "initial_offset_mm")  # groups of a case
+# groups of a case
+NOT_BUILT = (
+    "name", "load", "sensor", "solve", "output", "initial_offset_mm", "healthy_clearance_mm",
+)  # fmt: skip
 LABELS = {  # name -> (unit, phrase, key of a case file)
     "clearance_mm_big_end": ("mm", "radial clearance; 0: ideal joint", "clearance_mm.big_end"),
     "clearance_mm_small_end": ("mm", "radial clearance; 0: ideal joint", "clearance_mm.small_end"),
@@ -39,7 +43,7 @@ LABELS = {  # name -> (unit, phrase, key of a case file)
 WORDS = {
     "key": "the job that a window is of",
     "machine": "hash of what is built: all of a case but load, speed, sensor and numerics",
-    "joint": "joints with clearance: the fault",
+    "joint": "joints with clearance, or with more than is healthy: the fault",
     "load": "load on the piston",
     "regime": "; ".join(map(regime_words, Regime)),
 }
@@ -195,10 +199,10 @@ def make_data_set(
     rows: list[dict[str, Any]] = []
     left: Counter[str] = Counter()
     models: dict[str, Counter[str]] = {part: Counter() for part in MODELS}
-    keys = list(dict.fromkeys(source.keys))
+    keys, healthy = list(dict.fromkeys(source.keys)), healthy_clearance(source)
     for number, key in enumerate(keys):
         progress(number, len(keys), "")
-        found = job_rows(stored, key, options)
+        found = job_rows(stored, key, options, healthy)
         if isinstance(found, str):
             left[found] += 1
             continue
@@ -239,8 +243,13 @@ def _record(stored: Stored, key: str) -> dict[str, np.ndarray]:
     return found if found.keys() >= {*RECORD} else {}
 
 
-def job_rows(stored: Stored, key: str, options: DataSetOptions) -> list[dict[str, Any]] | str:
-    """Return the windows of a job, each with labels and features; or why there are none."""
+def job_rows(
+    stored: Stored, key: str, options: DataSetOptions, healthy: HealthyClearance
+) -> list[dict[str, Any]] | str:
+    """Return the windows of a job, each with labels and features; or why there are none.
+
+    healthy: the clearance up to which a joint counts as sound.
+    """
     position = stored.position(key)
     if position is None:
         return "missing"
@@ -248,7 +257,7 @@ def job_rows(stored: Stored, key: str, options: DataSetOptions) -> list[dict[str
     if status.status != "ok":
         return status.reason
     attributes = stored.outcome(position).attributes
-    case = Case.from_attribute(attributes["case"])
+    case = replace(Case.from_attribute(attributes["case"]), healthy_clearance_mm=healthy)
     try:
         record = _record(stored, key)
     except DamagedJob:
@@ -256,7 +265,7 @@ def job_rows(stored: Stored, key: str, options: DataSetOptions) -> list[dict[str
     if not record:
         return "without_record"
     base = {
-        "key": key, "machine": machine_of(case), "joint": case.joint, "load": case.load,
+        "key": key, "machine": machine_of(case), "joint": case.worn_joint, "load": case.load,
         "regime": str(attributes.get("regime", "")), **labels_of(case),
         "models": models_of(case),
         "clipped": float(record.get(CLIPPED, np.nan)),

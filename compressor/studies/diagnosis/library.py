@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.cases import Case, points
+from compressor.cases import Case, HealthyClearance, PerJoint, name_worn_joint, points
 from compressor.program import Progress, no_progress
 from compressor.store import (
     Folder,
@@ -39,9 +39,10 @@ IDENTIFIED_KEYS = ("joint", "clearance_mm")  # keys of what is asked for; all ot
 class Library:
     """The n jobs of a study that have a sensor's record.
 
-    joints: (n,) none, big_end, small_end or both; clearances: mm, (n, 2) of big and small end, 0
-    where there is none; features: (n, FEATURES), nan where a record does not have one; jobs: of the
-    study, with those that failed or are missing; swept: values (n,) by key of other swept keys.
+    joints: worn ones, (n,) none, big_end, small_end or both; clearances: mm, (n, 2) of big and
+    small end, 0 where there is none; features: (n, FEATURES), nan where a record does not have one;
+    jobs: of the study, with those that failed or are missing; swept: values (n,) by key of other
+    swept keys.
     """
 
     study: str
@@ -83,11 +84,26 @@ def open_library(folder: Folder, name: str, progress: Progress = no_progress) ->
     if not rows.sizes["job"]:
         remedy = "run it with body: true, sensor: true and output.keep: series"
         raise StoreError(folder, f"study {name!r} has no sensor's record", remedy)
-    keys = rows["key"].values.astype(str)
+    keys, healthy = rows["key"].values.astype(str), healthy_clearance(study)
+    labels = [
+        name_worn_joint(joint, PerJoint(*clearances), healthy)
+        for joint, clearances in zip(
+            rows["joint"].values.tolist(), rows["clearance"].values.tolist(), strict=True
+        )
+    ]
     return Library(
-        name, keys, rows["joint"].values.astype(str), rows["clearance"].values,
+        name, keys, np.array(labels, "U9"), rows["clearance"].values,
         rows["feature"].values, study.jobs, _swept(study, keys),
     )  # fmt: skip
+
+
+def healthy_clearance(study: StoredStudy) -> HealthyClearance:
+    """Return the clearance up to which a joint counts as sound, by the study.
+
+    Its jobs have no say: a job may have been stored by another study, which holds another
+    clearance to be healthy.
+    """
+    return HealthyClearance(**(study.fixed.get("healthy_clearance_mm") or {}))
 
 
 def job_record(stored: Stored, key: str) -> Record | None:

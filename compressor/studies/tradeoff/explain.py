@@ -212,6 +212,8 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
     widths = [f"{getattr(case.clearance_mm, joint):g} mm at the {joint.replace('_', ' ')}"
               for joint in faulty(case)]  # fmt: skip
     active["clearance"] = ", ".join(widths)
+    if case.worn_joint != case.joint:
+        active["clearance"] += f"; worn: {case.worn_joint.replace('_', ' ')}"
     active["contact"] = contact_words(case)
     return active, absent
 
