@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "physics": set(),
     "vibration": {"cases"},
     "solve": {"cases", "physics", "vibration", "outcome", "metrics", "reasons"},
-    "store": {"cases", "outcome", "metrics", "reasons", "digits"},
+    "store": {"cases", "vibration", "outcome", "metrics", "reasons", "digits"},
     "sweep": {"cases", "solve", "store", "outcome", "reasons"},
     "analysis": {"cases", "physics", "solve", "vibration", "metrics"},
     "report": {"analysis", "cases", "store", "outcome", "metrics", "reasons", "digits"},
@@ -67,6 +67,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "click": {"compsim", "compressor.studies", "compressor.studies.*command"},
     "rich": {"compsim.progress"},
     "pyarrow": {"compressor.studies.diagnosis"},
+    "pyuff": {"compressor.vibration.record_files"},
     "sklearn": set(),  # of campaigns alone
 }  # fmt: skip
 MAX_NAMES = 27  # on average, of those that other rooms import

@@ -1,4 +1,4 @@
-"""`compsim export`: results as netCDF or CSV, for other programs."""
+"""`compsim export`: results as netCDF or CSV, and sensors' records, for other programs."""
 
 import dataclasses
 import itertools
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 @click.command()
 @of_results("[STUDY|JOB]...", jobs)
 @click.option("-o", "--output", required=True, metavar="FILE|FOLDER",
-              help="A file, .nc or .csv, or a folder for a file each.")  # fmt: skip
-@click.option("--format", "form", type=click.Choice(["netcdf", "csv"]),
+              help="A file, .nc or .csv, of a record .wav, .mat, .uff; or a folder.")  # fmt: skip
+@click.option("--format", "form", type=click.Choice(["netcdf", "csv", "wav", "mat", "uff"]),
               help="Of the files in a folder; netcdf by default.")  # fmt: skip
 @click.option("--series", is_flag=True, help="Also the time series of each job of the studies.")
 @click.option("--force", is_flag=True, help="Replace files that exist.")
@@ -43,12 +43,14 @@ def export(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Write results as netCDF or CSV: a study's metrics, or the time series of a job.
+    """Write results for other programs: a study's metrics, a job's time series, or its record.
 
     A STUDY becomes one table of its jobs, failed and missing ones included; a JOB, named by its key
     or the beginning of it, a table of samples, in CSV with its sensor's record as identify reads
-    it. Without either, all studies. Several studies go into one FILE together, or into a FOLDER
-    with a file each: a name without suffix, or with a slash at its end.
+    it. As .wav, .mat or .uff a job becomes that record alone: acceleration in m/s2 and a tacho;
+    a .wav has 32-bit floats, of which 1.0 is 1 m/s2. Without either, all studies. Several studies
+    go into one FILE together, or into a FOLDER with a file each: a name without suffix, or with a
+    slash at its end.
     """
     folder, names = results_folder(given, folder)
     from compressor.store import ExportOptions, writable_folder

@@ -1,6 +1,6 @@
 """Outcomes on disk, and back."""
 
-from compressor.store.export import RECORD_HEADER, Exported, ExportOptions, export
+from compressor.store.export import Exported, ExportOptions, export
 from compressor.store.files import (
     Folder,
     StoreError,
@@ -11,6 +11,7 @@ from compressor.store.files import (
 )
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import Stored, open_study, read_job, read_store
+from compressor.store.sensor_records import find_record, job_record
 from compressor.store.series_file import (
     read_dataset,
     series_file,

@@ -1,5 +1,7 @@
 """Results for other programs: metrics of studies and time series of jobs, as netCDF or as CSV.
 
+Records of sensors, as programs that analyse vibration open them, are WAV, MAT and UFF files too.
+
 A CSV file has one header line, units in brackets where a name does not end in its unit, and
 numbers that read back to the bit; an empty cell is a number that there is not. A sensor's record
 has times of its own: its columns are those that `compsim identify` reads, and the shorter columns
@@ -23,14 +25,15 @@ from compressor.program import PROGRAM, CompsimError, Progress, no_progress
 from compressor.store.files import Folder, WrongName, publish, publishing
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import Stored, read_store
+from compressor.store.sensor_records import NEEDS_SENSOR
 from compressor.store.series_file import image_of, read_bytes, read_series
 from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
 
 if TYPE_CHECKING:
     import xarray as xr
 
-SUFFIXES = {"netcdf": ".nc", "csv": ".csv"}
-RECORD_HEADER = ("time_s", "acceleration_m_per_s2", "tacho")  # of a sensor's record in CSV
+RECORD_SUFFIXES = {"wav": ".wav", "mat": ".mat", "uff": ".uff"}  # of a sensor's record alone
+SUFFIXES = {"netcdf": ".nc", "csv": ".csv", **RECORD_SUFFIXES}
 BLOCK = 4096  # rows of a CSV file that are text at the same time
 HEXADECIMAL = re.compile("[0-9a-f]{1,20}")
 
@@ -45,8 +48,8 @@ class ExportError(CompsimError):
 class ExportOptions:
     """How to export.
 
-    form: of the files in a folder, netcdf (the default) or csv; series: also the time series of
-    every job of the studies, in a folder beside each; force: replace what is there.
+    form: of the files in a folder, of `SUFFIXES`, netcdf by default; series: also the time series
+    of every job of the studies, in a folder beside each; force: replace what is there.
     """
 
     form: str | None = None
@@ -59,7 +62,8 @@ class Exported:
     """A file that was written."""
 
     path: str
-    kind: str  # metrics: of studies, a row a job | series: of one job, a row a sample
+    # metrics: of studies, a row a job | series: of one job, a row a sample | record: of its sensor
+    kind: str
     name: str  # of the studies, or the job's key
     rows: int
     bytes: int
@@ -84,8 +88,9 @@ def export(
 ) -> tuple[list[Exported], list[DamagedJob]]:
     """Write what `names` name, studies and jobs by the beginning of their keys, else all studies.
 
-    output: a file, .nc or .csv, for the studies together as one table, or for one job; or a folder,
-    in which each gets a file: a name without a suffix, with a slash at its end, or of a folder.
+    output: a file, .nc or .csv, for the studies together as one table, or for one job; or .wav,
+    .mat or .uff for the sensor's record of one job; or a folder, in which each gets a file: a name
+    without a suffix, with a slash at its end, or of a folder.
 
     Returns what was written, and damage that was met, which costs the jobs in it alone. Raises
     ExportError before anything is written, StoreError where the store or the disk gives way.
@@ -95,6 +100,9 @@ def export(
     target = Path(output)
     options = options or ExportOptions()
     form, is_file = _form(output, options.form)
+    if studies and form in RECORD_SUFFIXES:
+        problem = f"a file of the type {SUFFIXES[form]} is the sensor's record of one job"
+        raise ExportError(f"{target}: {problem}: name jobs by their keys, not studies")
     if is_file:
         tasks = [_one_file(target, studies, keys, options.series)]
     else:
@@ -142,7 +150,8 @@ def _form(output: Folder, form: str | None) -> tuple[str, bool]:
     if known is None:
         raise ExportError(
             f"{target}: no files of the type {target.suffix} are written: end the name in "
-            f"{' or '.join(SUFFIXES.values())}, or, for a folder, in {os.sep}"
+            f".nc or .csv, for a job's record in {' or '.join(RECORD_SUFFIXES.values())}, or, for "
+            f"a folder, in {os.sep}"
         )
     if form not in (None, known):
         raise ExportError(f"{target} is no name for {form}: end it in {SUFFIXES[form or known]}")
@@ -216,14 +225,24 @@ def _series(task: _Task, stored: Stored, form: str) -> Exported:
     if source is None:
         remedy = "run its case file with --set output.keep=series, or export its study"
         raise WrongName(stored.folder, f"job {task.key} has no time series", remedy)
+    kind = "series"
     if form == "csv":
         dataset = read_series(source)
-        size = write_csv(task.path, columns(dataset, "time") | record_columns(dataset))
+        size = write_csv(task.path, columns(dataset, "time") | _record(dataset))
+    elif form in RECORD_SUFFIXES:
+        from compressor.vibration import encode_record  # loads parts of SciPy
+
+        record = _record(read_series(source))
+        if not record:
+            raise WrongName(stored.folder, f"job {task.key} has no sensor's record", NEEDS_SENSOR)
+        data = encode_record(record, SUFFIXES[form])
+        publish(task.path, data)
+        kind, samples, size = "record", len(next(iter(record.values()))), len(data)
     else:
         data = read_bytes(source)
         publish(task.path, data)
         size = len(data)
-    return Exported(os.fspath(task.path), "series", task.key, samples, size)
+    return Exported(os.fspath(task.path), kind, task.key, samples, size)
 
 
 def columns(table: "xr.Dataset", dim: str) -> dict[str, np.ndarray]:
@@ -243,23 +262,14 @@ def columns(table: "xr.Dataset", dim: str) -> dict[str, np.ndarray]:
     return found
 
 
-def record_columns(run: "xr.Dataset") -> dict[str, np.ndarray]:
-    """Return the sensor's record of a job by `RECORD_HEADER`; nothing where there is none.
-
-    The tacho is a sine of the crank angle that rises through 0 at top dead centre, so that a reader
-    finds the pulses between the samples; it stays low before the first pulse and high after the
-    last. With fewer than two pulses there is no such column.
-    """
+def _record(run: "xr.Dataset") -> dict[str, np.ndarray]:
+    """Return the columns of a job's record, as `compsim identify` reads them; nothing without."""
     if "sensor_time" not in run:
         return {}
-    times, pulses = run["sensor_time"].values, run["tacho_time"].values
-    found = [times, run["sensor_acceleration"].values]
-    if len(pulses) > 1:
-        quarter = np.diff(pulses)[[0, -1]] / 4.0
-        known = [pulses[0] - quarter[0], *pulses, pulses[-1] + quarter[1]]
-        turns = np.interp(times, known, [-0.25, *range(len(pulses)), len(pulses) - 0.75])
-        found.append(np.sin(2.0 * np.pi * turns))
-    return dict(zip(RECORD_HEADER, found, strict=False))
+    from compressor.vibration import record_columns  # loads parts of SciPy
+
+    names = ("sensor_time", "sensor_acceleration", "tacho_time")
+    return record_columns(*(run[name].values for name in names))
 
 
 def write_csv(path: Path, table: dict[str, np.ndarray]) -> int:

@@ -9,9 +9,15 @@ from compressor.vibration.envelope import (
     kurtogram,
     shape,
 )
+from compressor.vibration.record_files import RecordError, encode_record, record_columns
+from compressor.vibration.record_reader import (
+    MIN_REVOLUTIONS,
+    check_record,
+    read_record,
+    turns_at,
+)
 from compressor.vibration.spectra import (
     line_amplitudes,
     resample_angle,
     rms_above,
-    smooth_pulses,
 )

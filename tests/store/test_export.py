@@ -20,7 +20,7 @@ from compressor.store.export import ExportError, ExportOptions, export
 from compressor.store.files import StoreError
 from compressor.store.reader import open_study, read_job, read_store
 from compressor.store.studies import write_study
-from compressor.studies.diagnosis.record_files import read_record
+from compressor.vibration.record_reader import read_record
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 GRID = {
@@ -165,13 +165,16 @@ def test_a_folder_gets_a_file_each(results, tmp_path, capsys):
     assert len(table(out / "list.csv")) == 2
 
 
-@pytest.mark.parametrize("name", ["k.xlsx", "k.mat", "k.CSV"])
+@pytest.mark.parametrize("name", ["k.xlsx", "k.h5", "k.CSV"])
 def test_an_unknown_suffix_is_refused_and_makes_no_folder(results, name, tmp_path, capsys):
     out = str(tmp_path / name)
     assert cli.main(["export", "grid", "-i", str(results), "-o", out]) == 2
     suffix = name.partition(".")[2]
-    problem = f"no files of the type .{suffix} are written: end the name in .nc or .csv, or, for a"
-    assert f"compsim: {out}: {problem} folder, in /\n" == capsys.readouterr().err
+    problem = (
+        f"no files of the type .{suffix} are written: end the name in .nc or .csv, for a job's"
+    )
+    rest = "record in .wav or .mat or .uff, or, for a folder, in /\n"
+    assert f"compsim: {out}: {problem} {rest}" == capsys.readouterr().err
     assert not any(tmp_path.iterdir())
 
 
@@ -198,6 +201,40 @@ def test_a_record_in_csv_is_what_identify_reads(worn, tmp_path, capsys):
     np.testing.assert_allclose(found.times, job.sensor_time, atol=1e-12)
     np.testing.assert_array_equal(found.values, job.sensor_acceleration)
     np.testing.assert_allclose(found.tacho, job.tacho_time, atol=2e-7)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "hints"),
+    [(".wav", {"channel": "1", "tacho": "2", "unit": "m/s2"}), (".mat", {}), (".uff", {})],
+)
+def test_a_record_alone_is_what_analysts_open(suffix, hints, worn, tmp_path, capsys):
+    """Values to the digits of the type, whatever the job's own samples are."""
+    if suffix == ".uff":
+        pytest.importorskip("pyuff")
+    stored = read_store(worn)
+    one, two = (key for key in sorted(stored.keys())[:2])
+    job, path = stored.job(one), tmp_path / f"job{suffix}"
+    assert cli.main(["export", one, "-i", str(worn), "-o", str(path)]) == 0
+    assert f"{job.sizes['sensor_time']} samples" in capsys.readouterr().out
+    found = read_record(path, **hints)
+    np.testing.assert_allclose(found.times, job.sensor_time, atol=1e-5)
+    np.testing.assert_allclose(found.values, job.sensor_acceleration, rtol=6e-8, atol=1e-12)
+    np.testing.assert_allclose(found.tacho, job.tacho_time, atol=1e-5)
+    folder, words = tmp_path / "all", ["--format", suffix[1:], "--quiet"]
+    assert cli.main(["export", one, two, "-i", str(worn), "-o", str(folder), *words]) == 0
+    assert {file.name for file in folder.iterdir()} == {f"{one}{suffix}", f"{two}{suffix}"}
+    assert (folder / f"{one}{suffix}").read_bytes() == path.read_bytes()
+
+
+def test_a_record_is_of_a_job_with_a_sensor(results, tmp_path):
+    key = open_study(results, "list").key.values[0]
+    with pytest.raises(ExportError, match=r"x\.wav: a file of the type \.wav is the sensor"):
+        export(results, ["grid"], tmp_path / "x.wav")
+    with pytest.raises(ExportError, match="name jobs by their keys, not studies"):
+        export(results, [], tmp_path / "folder", ExportOptions(form="mat"))
+    with pytest.raises(StoreError, match=r"has no sensor's record; run it with body: true"):
+        export(results, [key], tmp_path / "x.mat")
+    assert not any(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 from compsim.progress import ProgressReporter
+from compsim.records import record_options
 from compsim.results import files, of_results, one_word, results_folder, studies
 from compsim.screen import (
     DONE,
@@ -102,42 +103,38 @@ def describe_dataset(data_set: "xr.Dataset") -> list[str]:
 
 
 @click.command()
-@of_results("RECORD.csv|JOB", files)
+@of_results("RECORD|JOB", files)
 @click.option("--study", required=True, shell_complete=studies,
               help="Stored study with sensor records, to explain it by.")  # fmt: skip
-@click.option("--rpm", type=float, help="Steady speed of a record without a tacho.")
-@click.option("--tdc", type=float, help="A time of top dead centre in it, s.")
+@record_options
 @as_json
 @click.option("--quiet", is_flag=True, help="No progress.")
 def identify(
     given: tuple[str, ...],
     study: str,
     folder: str | None,
-    rpm: float | None,
-    tdc: float | None,
+    hints: dict[str, Any],
     as_json: bool,
     quiet: bool,
 ) -> int:
     """Tell which joint, with which clearance, explains a record of an accelerometer.
 
-    The record is a CSV file with the columns time_s, acceleration_m_per_s2 and tacho, a signal that
-    rises at each top dead centre; or without tacho, with --rpm and --tdc. Or it is a stored job
-    with a sensor's record, named by its key or the beginning of it; it is then left out of the
+    The record is a file, .csv, .wav, .mat or .uff, of which the simplest is a CSV file with the
+    columns time_s, acceleration_m_per_s2 and tacho, a signal that rises at each top dead centre;
+    or without tacho, with --rpm and --tdc. What a file does not say, options do. Or it is a stored
+    job with a sensor's record, named by its key or the beginning of it; it is then left out of the
     study. Joints are ranked by probability, where the study's shares of them are the prior, and
     each clearance has a 90 % interval. Where no joint of the study fits, that is said first.
 
     Exit code 0 also where nothing fits: that is an answer.
     """
     folder, words = results_folder(given, folder)
-    record = one_word(words, "RECORD.csv|JOB")
+    record = one_word(words, "RECORD|JOB")
     one_thread_each()  # before numpy loads
-    from compressor.studies.diagnosis.identify import explain_record, find_record
-    from compressor.studies.diagnosis.record_files import SteadySpeed
+    from compressor.store import find_record
+    from compressor.studies.diagnosis.identify import explain_record
 
-    if (rpm is None) != (tdc is None):
-        raise click.UsageError("--rpm and --tdc belong together")
-    steady = None if rpm is None or tdc is None else SteadySpeed(rpm, tdc)
-    key, found = find_record(record, folder, steady)
+    key, found = find_record(record, folder, hints)
     with ProgressReporter(quiet) as progress:
         fitted, answer = explain_record(found, folder, study, key, progress)
     if as_json:

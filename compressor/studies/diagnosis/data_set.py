@@ -19,8 +19,9 @@ from compressor.cases import Case, HealthyClearance, Sensor
 from compressor.outcome import Regime, regime_words
 from compressor.program import PROGRAM, CompsimError, Progress, no_progress
 from compressor.store import DamagedJob, Folder, Stored, StoredStudy, find_study, read_store
-from compressor.studies.diagnosis.features import FEATURES, MIN_REVOLUTIONS, RecordError, features
+from compressor.studies.diagnosis.features import FEATURES, features
 from compressor.studies.diagnosis.library import healthy_clearance
+from compressor.vibration import MIN_REVOLUTIONS, RecordError
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,14 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compressor.program import CompsimError
 from compressor.vibration import (
+    RecordError,
+    check_record,
     energy_angle,
     envelope_spectrum,
     high_pass_orders,
     line_amplitudes,
     resample_angle,
     shape,
+    turns_at,
 )
 
 SWING = 12.0  # order up to which a machine without clearance shakes
@@ -25,14 +27,7 @@ SECTORS = 24  # of crank angle, 15 degrees each
 BANDS = (0.0, 200.0, 400.0, 700.0, 1100.0, 1700.0, 2300.0, 4000.0, 7000.0)  # edges, Hz
 ENVELOPE = (1700.0, 2300.0)  # Hz: the casing's mode; of another machine give its own
 BEATS = (1, 2, 3, 4)  # orders of the envelope
-MIN_REVOLUTIONS = 2  # whole revolutions of a record
 SMALLEST = 1e-6  # share that the logarithm of a share is taken of at least
-
-
-class RecordError(CompsimError):
-    """A record that tells nothing: too short, without tacho, or not finite."""
-
-    exit_code = 2
 
 
 @dataclass(frozen=True)
@@ -114,35 +109,6 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
         found[f"sector_{360 * k // SECTORS}"] = log_share(float(part), float(sectors.sum()))
     found |= envelope(even, a_turn, speed)
     return {name: float(found[name]) for name in FEATURES}
-
-
-def check_record(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> int:
-    """Return the whole revolutions of a record. Raises RecordError for one that tells nothing."""
-    whole = len(tacho) - 1
-    if whole < MIN_REVOLUTIONS:
-        text = f"{len(tacho)} tacho pulses are too few: at least {MIN_REVOLUTIONS + 1}"
-        raise RecordError(f"{text}, for whole revolutions")
-    if len(times) != len(values):
-        raise RecordError(f"{len(times)} times and {len(values)} values: pass one for each")
-    if not (np.diff(tacho) > 0.0).all():
-        raise RecordError("the tacho pulses do not increase: sort them, and drop double ones")
-    step = times[1] - times[0] if len(times) > 1 else math.nan
-    if not (tacho[0] > times[0] - step and tacho[-1] < times[-1] + step):
-        text = f"tacho pulses lie beyond the samples, {times[0]:g} to {times[-1]:g} s"
-        raise RecordError(f"{text}: pass those within")
-    if not np.isfinite(values).all():
-        raise RecordError("the record's values are not all numbers: fill or cut the gaps")
-    return whole
-
-
-def turns_at(times: np.ndarray, tacho: np.ndarray) -> np.ndarray:
-    """Return the revolutions since the first pulse at each time.
-
-    Beyond the pulses the nearest revolution's pace counts.
-    """
-    turns = np.interp(times, tacho, np.arange(len(tacho)))
-    turns += np.minimum(times - tacho[0], 0.0) / (tacho[1] - tacho[0])
-    return turns + np.maximum(times - tacho[-1], 0.0) / (tacho[-1] - tacho[-2])
 
 
 def bands(values: np.ndarray, rate: float) -> dict[str, float]:

@@ -7,8 +7,6 @@ those of `approximate`. Nothing fits where the record is stranger than all but f
 own jobs, by `strangeness`.
 """
 
-import os
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,15 +21,13 @@ from compressor.studies.diagnosis.approximate import (
     Posterior,
     Strangeness,
 )
-from compressor.studies.diagnosis.features import FEATURES, RecordError
+from compressor.studies.diagnosis.features import FEATURES
 from compressor.studies.diagnosis.library import (
     SIDES,
     Library,
     open_library,
-    stored_record,
     vector,
 )
-from compressor.studies.diagnosis.record_files import SteadySpeed, read_record
 from compressor.vibration import Record
 
 MIN_JOBS = 30  # of one joint, for it to be told
@@ -170,19 +166,6 @@ def _ends(joint: str, equal: bool) -> list[int]:
 
 def _sides(joint: str) -> list[str]:
     return [SIDES[k] for k in SHARES[joint]]
-
-
-def find_record(name: str, folder: Folder, steady: SteadySpeed | None) -> tuple[str, Record]:
-    """Return a record by the name of its CSV file, or by the beginning of a stored job's key.
-
-    With the job's key, "" of a file; steady: of a file without tacho. Raises RecordError and
-    StoreError, RecordError also where a job is given a speed.
-    """
-    if not re.fullmatch("[0-9a-f]{1,20}", name) or os.path.exists(name):
-        return "", read_record(name, steady)
-    if steady is not None:
-        raise RecordError("a stored job has a tacho: leave --rpm and --tdc out")
-    return stored_record(folder, name)
 
 
 def explain_record(

@@ -2,7 +2,6 @@
 
 import hashlib
 import inspect
-import math
 import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,16 +19,15 @@ from compressor.store import (
     StoreError,
     StoreWarning,
     find_study,
+    job_record,
     read_dataset,
     read_store,
-    report_job,
     write_dataset,
 )
 from compressor.studies.diagnosis import features as table
-from compressor.studies.diagnosis.features import FEATURES, RecordError, features
-from compressor.vibration import Record
+from compressor.studies.diagnosis.features import FEATURES, features
+from compressor.vibration import Record, RecordError
 
-SERIES = ("sensor_time", "sensor_acceleration", "tacho_time")
 SIDES = ("big_end", "small_end")
 
 IDENTIFIED_KEYS = ("joint", "clearance_mm")  # keys of what is asked for; all others are cautions
@@ -106,15 +104,6 @@ def healthy_clearance(study: StoredStudy) -> HealthyClearance:
     return HealthyClearance(**(study.fixed.get("healthy_clearance_mm") or {}))
 
 
-def job_record(stored: Stored, key: str) -> Record | None:
-    """Return the sensor's record of a stored job; None where it has none."""
-    found = stored.values(key, SERIES)
-    if set(found) != set(SERIES):
-        return None
-    times, values, tacho = (np.asarray(found[name], float) for name in SERIES)
-    return Record(times, values, tacho, math.nan)
-
-
 def vector(record: Record) -> np.ndarray:
     """Return the features of a record as a row of a library, (FEATURES,). Raises RecordError."""
     found = features(record.times, record.values, record.tacho)
@@ -180,16 +169,3 @@ def _swept(study: StoredStudy, keys: np.ndarray) -> dict[str, np.ndarray]:
     own: dict[str, dict[str, Any]] = dict(zip(study.keys, points(study), strict=True))
     others = [axis.key for axis in study.axes if axis.key.partition(".")[0] not in IDENTIFIED_KEYS]
     return {name: np.array([own[key].get(name) for key in keys.tolist()]) for name in others}
-
-
-def stored_record(folder: Folder, beginning: str) -> tuple[str, Record]:
-    """Return the key that begins so, and the sensor's record of that job.
-
-    Raises StoreError where there is no such job, or it has no record.
-    """
-    key = report_job(folder, beginning).key
-    record = job_record(read_store(folder), key)
-    if record is None:
-        remedy = "run it with body: true, sensor: true and output.keep: series"
-        raise StoreError(folder, f"job {key} has no sensor's record", remedy)
-    return key, record

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from compsim import cli
 from conftest import struck
+from scipy.io import wavfile
 
 from compressor.store.reader import read_store
 
@@ -107,6 +108,25 @@ def test_a_steady_speed_stands_in_for_a_tacho(tmp_path, folder, capsys):
     assert capsys.readouterr().out.splitlines()[2].split()[1] == "big_end"
 
 
+def test_what_a_file_does_not_say_options_do(tmp_path, folder, capsys):
+    """The same record as whole numbers of WAV, in g, its tacho a quarter of a turn late."""
+    times, values, tacho = struck("big_end", [0.3], 5002)
+    as_csv = written(tmp_path / "bare.csv", times, values, tacho, wave=False)
+    turns = (times - tacho[0]) / (tacho[1] - tacho[0])
+    full, late = np.abs(values).max(), np.sin(2 * np.pi * (turns - 0.25))
+    both = np.stack([late, values / full], axis=1)
+    wavfile.write(tmp_path / "record.wav", 8000, np.round(both * (2**31 - 1)).astype(np.int32))
+    hints = ["--channel", "2", "--unit", "g", "--full-scale", str(full / 9.80665), "--tacho", "1",
+             "--tacho-deg", "90"]  # fmt: skip
+    chances, steady = [], ["--rpm", "500", "--tdc", "0"]
+    for words in ([as_csv, *steady], [str(tmp_path / "record.wav"), *hints]):
+        assert cli.main(["identify", *words, "--study", "worn", "-i", folder, "--json"]) == 0
+        best = json.loads(capsys.readouterr().out)["candidates"][0]
+        chances.append(best["probability"])
+        assert best["joint"] == "big_end"
+    assert chances[1] == pytest.approx(chances[0], abs=0.01)
+
+
 def test_what_does_not_fit_is_said_first(tmp_path, folder, capsys):
     times, values, tacho = struck("none", [], 5003)
     values += 30 * np.sin(2 * np.pi * 300 * times)
@@ -127,7 +147,12 @@ def test_what_does_not_fit_is_said_first(tmp_path, folder, capsys):
         (["RECORD", "--study", "worn", "--rpm", "500"], 2, "--rpm and --tdc belong together"),
         (["RECORD", "--study", "worn", "--rpm", "500", "--tdc", "0"], 2, "has a tacho column"),
         (["abcdef", "--study", "worn"], 2, "no job's key begins with 'abcdef'"),
-        (["abcdef", "--study", "worn", "--rpm", "1", "--tdc", "0"], 2, "a stored job has a tacho"),
+        (
+            ["abcdef", "--study", "worn", "--rpm", "1", "--tdc", "0"],
+            2,
+            "a stored job such as abcdef says all of its record; leave --rpm --tdc out",
+        ),
+        (["RECORD", "--study", "worn", "--channel", "room"], 2, "--channel room: no channel of"),
     ],
 )
 def test_mistakes_are_named(arguments, code, told, record, folder, capsys):

@@ -9,9 +9,10 @@ from conftest import WORN_JOBS, struck
 
 from compressor.store.files import StoreError
 from compressor.store.reader import read_store
+from compressor.store.sensor_records import stored_record
 from compressor.studies.diagnosis import library as module
 from compressor.studies.diagnosis.features import FEATURES, features
-from compressor.studies.diagnosis.library import open_library, stored_record, vector
+from compressor.studies.diagnosis.library import open_library, vector
 from compressor.vibration.accelerometer import Record
 
 

@@ -11,9 +11,9 @@ from compressor.studies.diagnosis.features import (
     FEATURES,
     SECTORS,
     SMALLEST,
-    RecordError,
     features,
 )
+from compressor.vibration.record_files import RecordError
 
 RATE, SPEED, WHOLE = 25600.0, 8.0, 10  # Hz, rev/s, revolutions
 FIRST = 0.0123  # s, of the first pulse: between two samples

@@ -1,0 +1,382 @@
+"""Files of records: what was written is read, and what is wrong is named with its place."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+from scipy.io import loadmat, savemat, wavfile
+
+from compressor.vibration.record_files import (
+    UNITS,
+    RecordError,
+    encode_record,
+    record_columns,
+    unit_name,
+)
+from compressor.vibration.record_reader import read_record
+
+RATE, TURN = 1000.0, 0.1
+TIMES = np.arange(450) / RATE
+VALUES = np.sin(50 * TIMES)
+PULSES = np.array([0.0375, 0.1375, 0.2375, 0.3375, 0.4375])
+
+
+def voltage(times=TIMES):
+    """A tacho that passes the middle of its range upwards at PULSES."""
+    return 2.0 + 3.0 * np.sin(2 * np.pi * (times - PULSES[0]) / TURN)
+
+
+@pytest.fixture
+def written(tmp_path):
+    """Writes columns, or lines, as CSV."""
+
+    def write(columns, header="time_s,acceleration_m_per_s2,tacho", change=None):
+        lines = [",".join(map(repr, map(float, row))) for row in zip(*columns, strict=True)]
+        for number, line in (change or {}).items():
+            lines[number - 2] = line
+        path = tmp_path / "record.csv"
+        path.write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_a_record_reads_back(written):
+    found = read_record(written([TIMES, VALUES, voltage()]))
+    np.testing.assert_allclose(found.times, TIMES, atol=1e-12)
+    np.testing.assert_array_equal(found.values, VALUES)
+    np.testing.assert_allclose(found.tacho, PULSES, atol=1e-5)  # a sine is bent between samples
+    assert math.isnan(found.clipped)
+
+
+def test_columns_may_stand_in_any_order_among_others(written):
+    columns = [voltage(), 0 * TIMES, VALUES, TIMES]
+    found = read_record(written(columns, "tacho, room ,acceleration_m_per_s2, time_s"))
+    np.testing.assert_array_equal(found.values, VALUES)
+
+
+def test_a_tacho_of_zeros_and_ones_is_known_to_half_a_sample(written):
+    logic = (voltage() > 2.0).astype(float)
+    found = read_record(written([TIMES, VALUES, logic])).tacho
+    assert np.abs(found - PULSES).max() <= 0.5 / RATE
+
+
+@pytest.mark.parametrize("width", [0.001, 0.002, 0.05])  # s: one sample, two, half a revolution
+def test_a_pulse_s_shape_does_not_change_the_speed_of_a_steady_machine(width, written):
+    turn = 0.1003  # the pulses step through the samples
+    since = (TIMES - 0.01234) % turn
+    found = read_record(written([TIMES, VALUES, (since < width).astype(float)])).tacho
+    assert len(found) == 5
+    np.testing.assert_allclose(np.diff(found), turn, atol=0.2 / RATE)  # one sample apart, as read
+    wave = np.sin(2 * np.pi * (TIMES - 0.01234) / turn)
+    np.testing.assert_allclose(
+        np.diff(read_record(written([TIMES, VALUES, wave])).tacho), turn, atol=2e-5
+    )
+
+
+def test_a_record_may_begin_at_top_dead_centre(written):
+    """At the middle of the rise, as a record of ours does, but not far behind it."""
+    for first, count in ((0.0, 5), (0.0003, 5), (0.004, 4)):
+        wave = np.sin(2 * np.pi * (TIMES + first) / TURN - 1e-9 * (first == 0))
+        found = read_record(written([TIMES, VALUES, wave])).tacho
+        assert len(found) == count
+        assert found[0] == pytest.approx(-first if count == 5 else TURN - first, abs=2e-5)
+
+
+def test_lines_at_the_end_without_a_record_are_left_out(written):
+    rest = dict.fromkeys(range(TIMES.size - 8, TIMES.size + 2), ",,")
+    found = read_record(written([TIMES, VALUES, voltage()], change=rest))
+    assert found.times.size == TIMES.size - 10
+    with pytest.raises(RecordError, match=r"record\.csv:9: the cells are empty, and the record"):
+        read_record(written([TIMES, VALUES, voltage()], change={9: ",,"}))
+
+
+def test_a_tacho_that_chatters_at_its_middle_counts_once(written):
+    noisy = voltage() + np.random.default_rng(1).normal(0, 0.4, TIMES.size)
+    assert len(read_record(written([TIMES, VALUES, noisy])).tacho) == len(PULSES)
+
+
+def test_times_that_were_rounded_are_made_equal(written):
+    times = np.round(np.arange(2000) / 25600, 6)  # steps of 39 and 40 us
+    path = written([times, np.ones(2000)], "time_s,acceleration_m_per_s2")
+    found = read_record(path, rpm=3000, tdc=0.001)
+    assert np.diff(found.times) == pytest.approx(1 / 25600, rel=1e-4)
+
+
+def test_a_steady_speed_stands_in_for_a_tacho(written):
+    path = written([TIMES, VALUES], "time_s,acceleration_m_per_s2")
+    found = read_record(path, rpm=60 / TURN, tdc=PULSES[2])
+    np.testing.assert_allclose(found.tacho, PULSES, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({9: "0.007,abc,1"}, "record.csv:9:2: acceleration_m_per_s2: 'abc' is no number"),
+        ({9: "0.007,,1"}, "record.csv:9:2: acceleration_m_per_s2: '' is no number"),
+        ({9: "0.007"}, "record.csv:9:2: acceleration_m_per_s2: '' is no number"),
+        ({9: "0.007,nan,1"}, "record.csv:9:2: acceleration_m_per_s2: 'nan' is not finite"),
+        ({9: "inf,1,1"}, "record.csv:9:1: time_s: 'inf' is not finite"),
+        (
+            {9: "0.0075,1,1"},
+            "record.csv:9: time_s: a step of 0.0015 s, where the mean one is 0.001",
+        ),
+        ({9: "0.006,1,1"}, "record.csv:9: time_s: a step of 0 s"),
+    ],
+)
+def test_mistakes_name_line_and_column(change, told, written):
+    with pytest.raises(RecordError) as found:
+        read_record(written([TIMES, VALUES, voltage()], change=change))
+    assert told in str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("columns", "header", "hints", "told"),
+    [
+        ([TIMES, VALUES], "t,acceleration_m_per_s2", {}, ".csv:1: no column time_s, only t"),
+        ([TIMES], "time_s", {}, "no column acceleration_m_per_s2"),
+        ([TIMES, VALUES], "time_s,acceleration_m_per_s2", {}, "no column tacho: add it, or give"),
+        ([TIMES, VALUES, VALUES], "time_s,acceleration_m_per_s2,tacho", {"rpm": 500, "tdc": 0},
+         "has a tacho column: leave --rpm"),
+        ([TIMES, VALUES, 0 * TIMES], "time_s,acceleration_m_per_s2,tacho", {},
+         "tacho: is 0 all the time"),
+        ([TIMES[:200], VALUES[:200], voltage()[:200]], "time_s,acceleration_m_per_s2,tacho", {},
+         "2 passes of top dead centre in 0.199 s: at least 3; record for longer"),
+        ([TIMES, VALUES, np.where((TIMES > 0.2) & (TIMES < 0.3), -1, voltage())],
+         "time_s,acceleration_m_per_s2,tacho", {}, "one a revolution, none missed"),
+        ([TIMES, VALUES], "time_s,acceleration_m_per_s2", {"rpm": 0, "tdc": 0}, "0 rpm"),
+        ([TIMES[:1], VALUES[:1]], "time_s,acceleration_m_per_s2", {"rpm": 500, "tdc": 0},
+         "1 samples"),
+    ],
+)  # fmt: skip
+def test_what_is_no_record_is_refused(columns, header, hints, told, written):
+    with pytest.raises(RecordError) as found:
+        read_record(written(columns, header), **hints)
+    assert told in str(found.value)
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path):
+    with pytest.raises(RecordError, match=r"absent\.csv: cannot be read: No such file"):
+        read_record(tmp_path / "absent.csv")
+    (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(RecordError, match="is no CSV file in UTF-8"):
+        read_record(tmp_path / "binary.csv")
+
+
+COLUMNS = record_columns(TIMES, VALUES, PULSES)
+HEADER = "time_s,acceleration_m_per_s2"  # without tacho
+STEADY = {"rpm": 60 / TURN, "tdc": PULSES[2]}
+
+
+def encoded(folder, suffix):
+    """Writes the record to a file of a type."""
+    if suffix == ".uff":
+        pytest.importorskip("pyuff")
+    path = folder / f"record{suffix}"
+    path.write_bytes(encode_record(COLUMNS, suffix))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("suffix", "hints", "error"),
+    [
+        (".wav", {"channel": "1", "tacho": "2", "unit": "m/s2"}, 6e-8),  # of 32-bit floats
+        (".mat", {}, 0.0),
+        (".uff", {}, 5e-12),  # of 12 digits
+    ],
+)
+def test_every_type_that_is_written_is_read(suffix, hints, error, tmp_path):
+    path = encoded(tmp_path, suffix)
+    found = read_record(path, **hints)
+    np.testing.assert_allclose(found.times, TIMES, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found.values, VALUES, rtol=error, atol=0)
+    np.testing.assert_allclose(found.tacho, PULSES, atol=1e-5)
+    assert encode_record(COLUMNS, suffix) == path.read_bytes()  # no date in it
+
+
+def test_other_programs_find_what_the_page_says(tmp_path):
+    """SciPy's readers as the other program: values in m/s2 as they are, names, and the rate."""
+    rate, samples = wavfile.read(encoded(tmp_path, ".wav"))
+    assert (rate, samples.dtype, samples.shape) == (RATE, np.float32, (TIMES.size, 2))
+    np.testing.assert_array_equal(samples[:, 0], VALUES.astype(np.float32))
+    found = loadmat(encoded(tmp_path, ".mat"))
+    assert {*found} >= {"time_s", "acceleration_m_per_s2", "tacho", "rate_Hz"}
+    assert found["rate_Hz"].item() == pytest.approx(RATE, rel=1e-12)
+    assert found["acceleration_m_per_s2"].shape == (TIMES.size, 1)
+
+
+def test_a_universal_file_says_what_its_signals_are(tmp_path):
+    pyuff = pytest.importorskip("pyuff")
+    value, tacho = pyuff.UFF(str(encoded(tmp_path, ".uff"))).read_sets()
+    assert (value["type"], value["func_type"]) == (58, 1)  # a time response
+    assert (value["abscissa_spec_data_type"], value["abscissa_spacing"]) == (17, 1)  # even times
+    assert value["ordinate_spec_data_type"] == 12  # an acceleration
+    assert value["ordinate_axis_units_lab"].strip() == "m/s2"
+    assert tacho["id1"].strip() == "tacho"
+
+
+def laid_out(samples, step, title="point 7", unit="g", kind=12):
+    """A data set 58 by the published layout: real, single precision, even steps, 6E13.5."""
+    rows = [samples[k : k + 6] for k in range(0, len(samples), 6)]
+    return "\n".join([
+        f"{-1:6d}", f"{58:6d}", title, "NONE", "NONE", "NONE", "NONE",
+        f"{1:5d}{0:10d}{0:5d}{0:10d} {'NONE':<10}{7:10d}{2:4d} {'NONE':<10}{0:10d}{0:4d}",
+        f"{2:10d}{len(samples):10d}{1:10d}{0.0:13.5e}{step:13.5e}{0.0:13.5e}",
+        f"{17:10d}{0:5d}{0:5d}{0:5d} {'Time':<20} {'s':<20}",
+        f"{kind:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {unit:<20}",
+        f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
+        f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
+        *("".join(f"{value:13.5e}" for value in row) for row in rows), f"{-1:6d}", "",
+    ])  # fmt: skip
+
+
+def test_a_universal_file_of_the_published_layout_is_read(tmp_path):
+    """By columns of characters, as its specification has them, without pyuff's writer."""
+    pytest.importorskip("pyuff")
+    path = tmp_path / "x.unv"
+    path.write_text(laid_out(VALUES, 1 / RATE) + laid_out(voltage(), 1 / RATE, "Tacho", "V", 0))
+    found = read_record(path)
+    np.testing.assert_allclose(found.values, 9.80665 * VALUES, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(found.tacho, PULSES, atol=1e-5)
+    path.write_text(laid_out(VALUES, 1 / RATE, unit="furlong/s2"))
+    with pytest.raises(RecordError, match=r"channel point 7 has the unit 'furlong/s2': give --un"):
+        read_record(path, **STEADY)
+    assert read_record(path, unit="mm/s2", **STEADY).values[3] == pytest.approx(1e-3 * VALUES[3])
+    path.write_text(laid_out(VALUES, 1 / RATE) + laid_out(voltage(), 2 / RATE, "tacho", "V", 0))
+    with pytest.raises(RecordError, match="channels begin at different times or steps"):
+        read_record(path)
+    path.write_text("nothing of the kind")
+    with pytest.raises(RecordError, match="no column acceleration_m_per_s2, only nothing"):
+        read_record(path, **STEADY)
+
+
+def test_without_pyuff_the_remedy_is_named(monkeypatch, tmp_path):
+    (tmp_path / "x.uff").touch()
+    monkeypatch.setitem(sys.modules, "pyuff", None)
+    for act in (lambda: read_record(tmp_path / "x.uff"), lambda: encode_record(COLUMNS, ".uff")):
+        with pytest.raises(RecordError, match=r"pyuff is not installed; get it by pip install 'co"):
+            act()
+
+
+@pytest.mark.parametrize(
+    ("dtype", "full", "scale"),
+    [(np.int16, 2**15, 1.0), (np.int32, 2**31, 1.0), (np.uint8, 2**7, 128.0)],
+)
+def test_whole_numbers_of_wav_are_shares_of_the_full_scale(dtype, full, scale, tmp_path):
+    """A sample of half the full scale is half of what the greatest means."""
+    path = tmp_path / "x.wav"
+    half = np.where(TIMES < 0.2, 0.5, -0.25) * full + (128 if dtype == np.uint8 else 0)
+    wavfile.write(path, 1000, half.astype(dtype))
+    found = read_record(path, unit="g", full_scale=50.0, **STEADY).values
+    np.testing.assert_array_equal(found, np.where(TIMES < 0.2, 25.0, -12.5) * 9.80665)
+    with pytest.raises(RecordError, match="has whole numbers: give --full-scale"):
+        read_record(path, unit="g", **STEADY)
+
+
+def test_wav_says_neither_unit_nor_which_channel(tmp_path):
+    path = encoded(tmp_path, ".wav")
+    with pytest.raises(RecordError, match="only 1, 2; name the channel by --channel and --unit"):
+        read_record(path, **STEADY)
+    with pytest.raises(RecordError, match="channel 1 has no unit: give --unit, one of m/s2, mm/s2"):
+        read_record(path, channel="1", **STEADY)
+    with pytest.raises(RecordError, match="has the values themselves: leave --full-scale out"):
+        read_record(path, channel="1", unit="g", full_scale=50.0, **STEADY)
+    with pytest.raises(RecordError, match=r"--tacho 3: no channel of this name; there are 1, 2;"):
+        read_record(path, channel="1", unit="g", tacho="3")
+    with pytest.raises(RecordError, match="says its times: leave --rate out"):
+        read_record(path, channel="1", unit="g", rate=1000, **STEADY)
+    with pytest.raises(RecordError, match=r"whole number of samples a second, and the record 1500"):
+        encode_record(record_columns(TIMES * 1000 / 1500.5, VALUES, PULSES), ".wav")
+
+
+def test_a_matlab_file_may_hold_a_matrix_and_a_rate(tmp_path):
+    path = tmp_path / "x.mat"
+    savemat(path, {"data": np.column_stack([voltage(), VALUES]), "rate_Hz": RATE, "note": "text"})
+    found = read_record(path, channel="data(:,2)", tacho="data(:,1)", unit="m/s^2")
+    np.testing.assert_array_equal(found.values, VALUES)
+    np.testing.assert_allclose(found.tacho, PULSES, atol=1e-5)
+    savemat(path, {"acceleration_g": VALUES, "tacho": voltage()})
+    with pytest.raises(RecordError, match=r"x\.mat: no column time_s, only acceleration_g, tacho"):
+        read_record(path)
+    found = read_record(path, rate=RATE)
+    np.testing.assert_array_equal(found.values, 9.80665 * VALUES)
+    savemat(path, {"acceleration_g": VALUES, "tacho": voltage()[:-1], "rate_Hz": RATE})
+    with pytest.raises(RecordError, match="different length: acceleration_g 450, tacho 449; cut"):
+        read_record(path)
+    broken = np.where(np.arange(450) == 16, np.nan, VALUES)
+    savemat(path, {"acceleration_g": broken, "tacho": voltage(), "rate_Hz": RATE})
+    with pytest.raises(RecordError, match=r"x\.mat: acceleration_g: sample 17: nan is not finite"):
+        read_record(path)
+
+
+@pytest.mark.parametrize("suffix", [".wav", ".mat", ".uff"])
+def test_a_file_that_is_cut_or_of_something_else_is_named(suffix, tmp_path):
+    """A cut of whole lines of a text leaves a shorter record; nothing else is read."""
+    whole = encoded(tmp_path, suffix).read_bytes()
+    path = tmp_path / f"cut{suffix}"
+    hints = {"channel": "1", "tacho": "2", "unit": "m/s2"} if suffix == ".wav" else {}
+    for data in (
+        b"",
+        b"RIFF",
+        b"\xff\xfe\x00" * 99,
+        *(whole[:n] for n in range(1, len(whole) - 9, 371)),
+    ):
+        path.write_bytes(data)
+        try:
+            found = read_record(path, **hints)
+        except RecordError as error:
+            assert str(path) in str(error)  # noqa: PT017
+        else:
+            assert suffix == ".uff"
+            assert found.values.size < TIMES.size
+    with pytest.raises(RecordError, match=r"absent\.\w+: cannot be read: No such file"):
+        read_record(tmp_path / f"absent{suffix}")
+
+
+def test_other_types_are_refused(tmp_path):
+    with pytest.raises(RecordError, match=r"no records of the type \.tdms are read, only \.csv"):
+        read_record(tmp_path / "x.tdms")
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [("m/s^2", "m/s2"), (" m/s² ", "m/s2"), ("(m/sec2)", "m/s2"), ("G", "g"),
+     ("mm_per_s2", "mm/s2"),
+     ("m_per_s2", "m/s2"), ("in/s**2", "in/s2"), ("m/s", ""), ("", ""), ("V", "")],
+)  # fmt: skip
+def test_units_have_several_spellings(written, meant):
+    assert unit_name(written) == meant
+
+
+def test_units_are_what_the_international_system_says():
+    assert {name: round(size, 9) for name, size in UNITS.items()} == {
+        "m/s2": 1.0, "mm/s2": 0.001, "g": 9.80665, "in/s2": 0.0254, "ft/s2": 0.3048,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("degrees", [30.0, -90.0, 400.0])
+def test_a_tacho_may_rise_at_another_angle(degrees, written):
+    """The wave is moved by the angle, so that top dead centre stays where it was."""
+    wave = voltage(TIMES - degrees / 360 * TURN)
+    found = read_record(written([TIMES, VALUES, wave]), tacho_deg=degrees).tacho
+    np.testing.assert_allclose(found, PULSES, atol=2e-5)
+    with pytest.raises(RecordError, match="leave it out with --rpm"):
+        read_record(
+            written([TIMES, VALUES], "time_s,acceleration_m_per_s2"), tacho_deg=30, **STEADY
+        )
+
+
+def test_columns_of_other_names_are_chosen(written):
+    """By name or number; what is not chosen may be anything."""
+    path = written([TIMES, VALUES, VALUES, voltage()], "time_s,a1,a1,key phase")
+    with pytest.raises(RecordError, match=r"--channel a1: 2 channels of this name.*number, 1 to 4"):
+        read_record(path, channel="a1", unit="g", tacho="key phase")
+    found = read_record(path, channel="3", unit="g", tacho="key phase")
+    np.testing.assert_array_equal(found.values, 9.80665 * VALUES)
+    with pytest.raises(RecordError, match=r"key fase: no channel of this name; did you mean key"):
+        read_record(path, channel="3", unit="g", tacho="key fase")
+    two = written([TIMES, VALUES, VALUES, voltage()],
+                  "time_s,acceleration_g,acceleration_m_per_s2,tacho")  # fmt: skip
+    with pytest.raises(RecordError, match=r"csv:1: 2 accelerations among time_s, .*by --channel"):
+        read_record(two)
