@@ -10,6 +10,7 @@ from compressor.report.figures.drawing import (
     Scale,
     Trace,
     Way,
+    as_csv,
     box,
     entry,
     join_with_gaps,

@@ -65,6 +65,7 @@ STUDIES = (
     StudyKind("tradeoff", ("tradeoff", "explain"), has_page=True, files=StudyFiles("models/*.nc")),
     StudyKind("stress", ("stress",)),
     StudyKind("search", ("find",)),
+    StudyKind("compare", ("compare",)),
 )  # fmt: skip
 STUDY_FILES[:] = [kind.files for kind in STUDIES if kind.files]
 STUDY_GROUPS.update({kind.group: partial(kind.module, "group") for kind in STUDIES if kind.group})

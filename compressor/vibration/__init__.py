@@ -16,6 +16,7 @@ from compressor.vibration.record_reader import (
     read_record,
     turns_at,
 )
+from compressor.vibration.segments import segment_levels
 from compressor.vibration.spectra import (
     line_amplitudes,
     resample_angle,

@@ -130,6 +130,8 @@ def test_studies_keys_and_values_are_completed(complete):
     assert complete("export", "-i", "wear", key[:5]) == [key]
     assert complete("dataset", "b") == ["big-end", "both"]
     assert complete("identify", "x.csv", "--study", "t") == ["typical"]
+    assert complete("compare", "x.csv", "big") == ["big-end"]
+    assert "x" in complete("compare", "x")  # a file
     assert complete("run", "conf") == ["conf"]  # a file: the shell goes on
     assert complete("completion", "z") == ["zsh"]
 

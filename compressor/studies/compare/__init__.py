@@ -1,0 +1,1 @@
+"""A measured record beside simulated ones: how alike they are, and what does not fit."""

@@ -1,0 +1,150 @@
+"""`compsim compare`: a measured record beside simulated ones."""
+
+import dataclasses
+import json
+import os
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+from compsim.records import record_options
+from compsim.results import Items, files, jobs, of_results, results_folder
+from compsim.screen import DONE, as_json, plural, print_text, say, without_nan
+
+if TYPE_CHECKING:
+    from compressor.report import Drawing
+    from compressor.studies.compare.comparison import Compared, Comparison
+    from compressor.studies.compare.likeness import Measured
+
+MOST = 20  # jobs that are listed
+KINDS = (".png", ".svg", ".csv")
+HEAD = (f"{'job':<12}{'correlation':>18}{'envelope':>18}{'rms ratio':>18}{'distance, dB':>18}"
+        "  most different peak")  # fmt: skip
+
+
+def record_then_jobs(context: click.Context, parameter: click.Parameter, word: str) -> Items:
+    """Return what lets the shell complete a file as the first word, and jobs and studies."""
+    found = jobs(context, parameter, word)
+    return found if context.params.get("given") else [*found, *files(context, parameter, word)]
+
+
+@click.command()
+@of_results("RECORD JOB|STUDY...", record_then_jobs)
+@record_options
+@click.option("-o", "--output", metavar="FILE",
+              help="Also draw: .png or .svg, or .csv for the figure's numbers.")  # fmt: skip
+@as_json
+def compare(
+    given: tuple[str, ...],
+    folder: str | None,
+    hints: dict[str, Any],
+    output: str | None,
+    as_json: bool,
+) -> int:
+    """Compare a record with the sensor's records of stored jobs: how alike, and what does not fit.
+
+    RECORD is a file, as of compsim identify, or a job; after it come jobs, by the beginnings of
+    their keys, and studies, which stand for all their jobs. The most alike job comes first.
+
+    \b
+    correlation   of the mean revolutions: 1 is the same shape at the same crank angles, whatever
+                  the size; 0 is no likeness, -1 the opposite sign
+    envelope      correlation of the envelopes above order 12: 1 is the same bursts at the same
+                  crank angles, whatever rings in them
+    rms ratio     of the record over the job: 1 is as strong
+    distance      of the spectra in third octaves of orders, both scaled to one level: 0 is the
+                  same, 3 dB a factor of two in the power of a band; 60 dB at most
+
+    A number's error, behind +-, is the standard error by the record's revolutions, of which at
+    least three are needed. What does not fit (speed, sampling rate, length, unit, crank angle) is
+    said below the table; a file does not say where its sensor was.
+    """
+    folder, words = results_folder(given, folder)
+    if len(words) < 2:
+        raise click.UsageError("Missing argument 'RECORD JOB|STUDY...'")
+    kind = os.path.splitext(output or "")[1]
+    if output and kind not in KINDS:
+        raise click.UsageError(f"-o {output}: end the name in {', '.join(KINDS)}")
+    from compressor.store import writable_folder
+    from compressor.studies.compare.comparison import compare_record
+
+    if output:
+        writable_folder(os.path.dirname(output) or os.curdir, make=False)
+    found = compare_record(words[0], words[1:], folder, hints)
+    if as_json:
+        print_text(json.dumps(jsonable_comparison(found), indent=1))
+    else:
+        for line in list_comparison(found):
+            print_text(line)
+    if output:
+        from compressor.studies.compare.figures import caption, draw_comparison
+
+        write_figure(draw_comparison(found), output, kind)
+        say(output) if as_json else print_text(f"{output}\n  {caption(found)}")
+    return DONE
+
+
+def write_figure(drawing: "Drawing", output: str, kind: str) -> None:
+    """Write a figure as a picture, or its numbers as CSV."""
+    from pathlib import Path
+
+    from compressor.report import as_csv, render
+    from compressor.store import publish
+
+    data = as_csv(drawing).encode() if kind == ".csv" else render(drawing, kind[1:])
+    publish(Path(output), data)
+
+
+def list_comparison(found: "Comparison") -> Iterator[str]:
+    """Yield the record, the table of jobs, and what does not fit."""
+    mine = found.turned
+    rms = (found.curves.spectrum**2).sum() ** 0.5
+    yield (f"{found.name}: {plural(len(mine.spectra), 'revolution')} at {mine.rpm:.4g} rpm, "
+           f"{mine.rate:.6g} Hz, {rms:.4g} m/s2 rms up to order {found.orders}")  # fmt: skip
+    yield HEAD
+    for job in found.jobs[:MOST]:
+        yield job_line(job)
+    if len(found.jobs) > MOST:
+        yield f"and {len(found.jobs) - MOST} less alike, which --json lists"
+    if found.left_out:
+        yield f"left out: {plural(found.left_out)} without a sensor's record"
+    if found.inside == found.inside:
+        yield (f"envelope: inside the range of the {len(found.jobs)} jobs at {found.inside:.0%} of "
+               "crank angles")  # fmt: skip
+    for text in found.misfits:
+        yield f"does not fit: {text}"
+
+
+def job_line(job: "Compared") -> str:
+    """Return a job's numbers in a line."""
+    like = job.likeness
+    numbers = like.correlation, like.envelope, like.rms_ratio, like.spectral_distance
+    columns = "".join(f"{number(one):>18}" for one in numbers)
+    where = f"{like.segment_ratio:.2f} times at {like.segment} to {like.segment + 10} deg"
+    return f"{job.key[:10]:<12}{columns}  {where}"
+
+
+def number(found: "Measured") -> str:
+    """Return a number with its standard error, where it has one."""
+    error = f" +- {found.error:.2g}" if found.error == found.error else ""
+    return f"{found.value:.3f}{error}"
+
+
+def jsonable_comparison(found: "Comparison") -> dict[str, Any]:
+    """Return a comparison as JSON says it."""
+    mine = found.turned
+    return without_nan({
+        "record": found.name, "revolutions": len(mine.spectra), "rpm": mine.rpm,
+        "rate_Hz": mine.rate, "orders": found.orders, "left_out": found.left_out,
+        "envelope_inside": found.inside, "misfits": list(found.misfits),
+        "peak_m_per_s2": found.curves.peak.tolist(), "rms_m_per_s2": found.curves.rms.tolist(),
+        "jobs": [
+            {
+                "key": job.key, "rpm": job.turned.rpm, "sensor": job.sensor,
+                **dataclasses.asdict(job.likeness),
+                "peak_m_per_s2": job.curves.peak.tolist(),
+                "rms_m_per_s2": job.curves.rms.tolist(),
+            }
+            for job in found.jobs
+        ],
+    })  # fmt: skip

@@ -1,0 +1,177 @@
+"""Compare a record with stored jobs: their numbers, and what does not fit."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from compressor.cases import Case
+from compressor.program import CompsimError
+from compressor.store import (
+    Folder,
+    Stored,
+    find_record,
+    find_study,
+    job_record,
+    read_store,
+    read_studies,
+    report_job,
+)
+from compressor.studies.compare.likeness import (
+    SWING,
+    Curves,
+    Likeness,
+    Turned,
+    compare_lines,
+    curves,
+    share_inside,
+    turn_record,
+)
+
+SAME_SPEED = 0.01  # share by which speeds may differ, beyond which forces do by 2 %
+FEW = 5  # revolutions, below which the mean revolution is noisy
+MIN_SHIFT, MIN_GAIN = 2.0, 0.1  # degrees and correlation from which a shift is named
+FAR = 3.0  # ratio of rms beyond which the level is named
+NEAR = 0.25  # share by which a ratio may differ from one between two units
+MISTAKES = {  # ratio of rms -> what was probably mistaken
+    9.80665: "m/s2 were perhaps read as g", 1 / 9.80665: "g were perhaps read as m/s2",
+    1000.0: "mm/s2 were perhaps read as m/s2", 1e-3: "m/s2 were perhaps read as mm/s2",
+}  # fmt: skip
+
+
+class CompareError(CompsimError):
+    """A comparison that cannot be made."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A job beside the record. sensor: where it sits and what it measures along, in words."""
+
+    key: str
+    turned: Turned
+    sensor: str
+    likeness: Likeness
+    curves: Curves
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A record beside jobs, the most alike first.
+
+    key: of a record that is a stored job's, else ""; orders: the highest order that all hold;
+    left_out: jobs without a record; inside: share of crank angle at which the record's envelope
+    lies in the range of the jobs', nan of a single job; misfits: sentences on what does not fit.
+    """
+
+    name: str
+    key: str
+    turned: Turned
+    curves: Curves
+    orders: int
+    jobs: tuple[Compared, ...]
+    left_out: int
+    inside: float
+    misfits: tuple[str, ...]
+
+
+def compare_record(
+    name: str, words: Sequence[str], folder: Folder, hints: Mapping[str, Any]
+) -> Comparison:
+    """Return a record, a file or a stored job's, beside the jobs that words name.
+
+    words: beginnings of jobs' keys, and names of studies; hints: of `find_record`. Raises
+    RecordError, StoreError, and CompareError where no job is left or orders are too few.
+    """
+    key, record = find_record(name, folder, hints)
+    mine = turn_record(record)
+    stored = read_store(folder).warned()
+    found, left_out = {}, 0
+    for one in dict.fromkeys(_keys(words, folder, stored)):
+        other = job_record(stored, one)
+        if other is None:
+            left_out += 1
+        elif one != key or len(words) == 1:  # beside others, a job is not compared with itself
+            found[one] = turn_record(other)
+    if not found:
+        text = f"none of the {left_out} jobs has a sensor's record"
+        raise CompareError(f"{text}: run them with body: true, sensor: true and series kept")
+    orders = min(turned.highest for turned in (mine, *found.values()))
+    if orders <= SWING:
+        text = f"the sampling rates hold the orders up to {orders} alone"
+        raise CompareError(f"{text}: record with more than {SWING + 1} times 2.56 samples a turn")
+    lines = mine.lines(orders)
+    own = curves(lines)
+    jobs = []
+    for one, turned in found.items():
+        others = turned.lines(orders)
+        other_curves = curves(others)
+        likeness = compare_lines(lines, others, own, other_curves)
+        jobs.append(Compared(one, turned, _sensor(stored, one), likeness, other_curves))
+    jobs.sort(key=lambda job: -np.nan_to_num(job.likeness.correlation.value, nan=-2.0))
+    several = np.array([job.curves.envelope for job in jobs])
+    inside = share_inside(own.envelope, several) if len(jobs) > 1 else math.nan
+    misfits = tuple(find_misfits(mine, jobs, is_file=not key))
+    return Comparison(name, key, mine, own, orders, tuple(jobs), left_out, inside, misfits)
+
+
+def _keys(words: Sequence[str], folder: Folder, stored: Stored) -> Iterator[str]:
+    """Yield the keys of the jobs that words name. Raises StoreError."""
+    names = {study.name for study in read_studies(folder)}
+    for word in words:
+        if word in names:
+            yield from find_study(folder, word).keys
+        else:
+            yield report_job(folder, word).key
+
+
+def _sensor(stored: Stored, key: str) -> str:
+    """Return where the sensor of a stored job sits, and what it measures along."""
+    position = stored.position(key)
+    assert position is not None
+    sensor = Case.from_attribute(str(stored.rows.attributes(position)["case"])).sensor
+    assert sensor
+    return f"{sensor.place} along {sensor.direction}"
+
+
+def is_shifted(likeness: Likeness) -> bool:
+    """Return whether a record is clearly more alike at another crank angle."""
+    gain = likeness.shifted - likeness.correlation.value
+    return abs(likeness.shift_deg) >= MIN_SHIFT and gain >= MIN_GAIN
+
+
+def find_misfits(record: Turned, jobs: Sequence[Compared], is_file: bool) -> Iterator[str]:
+    """Yield a sentence for what does not fit between a record and jobs, the most alike first."""
+    best = jobs[0]
+    other, likeness = best.turned, best.likeness
+    if abs(record.rpm / other.rpm - 1.0) > SAME_SPEED:
+        more = (record.rpm / other.rpm) ** 2
+        yield (
+            f"speed: {record.rpm:.4g} rpm, and the job has {other.rpm:.4g}: forces of inertia "
+            f"are {more:.3g} times as large; run it at machine.speed_rpm: {record.rpm:.4g}"
+        )
+    if abs(record.rate / other.rate - 1.0) > 1e-6:
+        yield (f"sampling rate: {record.rate:.6g} Hz, and the job has {other.rate:.6g}: what only "
+               "the faster one holds is left out")  # fmt: skip
+    if len(record.spectra) < FEW:
+        yield (f"length: {len(record.spectra)} revolutions: noise falls by their root alone; "
+               f"record {FEW} or more")  # fmt: skip
+    ratio = likeness.rms_ratio.value
+    meant = [text for size, text in MISTAKES.items() if abs(ratio / size - 1.0) <= NEAR]
+    if meant:
+        yield f"unit: the rms is {ratio:.3g} times the job's: {meant[0]}; check --unit"
+    elif not 1.0 / FAR <= ratio <= FAR:
+        yield (f"level: the rms is {ratio:.3g} times the job's: check unit and full scale, then "
+               "masses, foundation and the sensor's place")  # fmt: skip
+    if is_shifted(likeness):
+        yield (
+            f"crank angle: most alike ({likeness.shifted:.2f}) where the record comes "
+            f"{likeness.shift_deg:+.1f} degrees later: check the tacho (--tacho-deg)"
+        )
+    if is_file:
+        places = " or ".join(dict.fromkeys(job.sensor for job in jobs))
+        yield (f"place: the jobs' sensor is at the {places}; a file does not say where its sensor "
+               "was")  # fmt: skip

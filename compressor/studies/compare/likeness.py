@@ -1,0 +1,234 @@
+"""How alike two records are, over crank angle and over orders of the crank's speed.
+
+Everything follows from the lines of each revolution: its Fourier coefficients at whole orders, up
+to the highest order that both records hold. The mean is left out, since accelerometers lose it.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compressor.vibration import (
+    Record,
+    check_record,
+    resample_angle,
+    segment_levels,
+    turns_at,
+)
+
+USABLE = 2.56  # sampling rate over the highest usable frequency, as analysers have it
+SEGMENTS = 36
+SWING = 12  # order up to which a machine without clearance shakes; the envelope is of what is above
+FINE = 4  # points on a curve for each cycle of its highest order
+SMALLEST = 1e-6  # share of the mean square that a band counts with at least: -60 dB
+MIN_FOR_ERRORS = 3  # revolutions
+STEPS = 3600  # angles at which a shift of one record against the other is tried
+LOUD = 0.1  # share of the greatest peak from which a segment is compared
+
+
+@dataclass(frozen=True)
+class Turned:
+    """A record by revolutions.
+
+    spectra: rms lines (m/s2) of the orders 0, 1, 2, ... of each revolution from top dead centre on,
+    (n, k), complex; rpm: mean speed; rate: Hz.
+    """
+
+    spectra: np.ndarray
+    rpm: float
+    rate: float
+
+    @property
+    def highest(self) -> int:
+        """Return the highest order that the sampling rate holds."""
+        return math.floor(self.rate / USABLE / (self.rpm / 60.0))
+
+    def lines(self, orders: int) -> np.ndarray:
+        """Return the lines of the orders 1, 2, ... of each revolution, (n, orders)."""
+        return self.spectra[:, 1 : orders + 1]
+
+
+def turn_record(record: Record) -> Turned:
+    """Return a record by whole revolutions. Raises RecordError for one that tells nothing."""
+    whole = check_record(record.times, record.values, record.tacho)
+    turns = turns_at(record.times, record.tacho)
+    # from the last sample that is not after the first pulse: the rest then reach over all turns
+    first = max(int(np.searchsorted(turns, 0.0, side="right")) - 1, 0)
+    inside = slice(first, int(np.searchsorted(turns, whole)) + 2)
+    rate = 1.0 / (record.times[1] - record.times[0])
+    speed = whole / (record.tacho[-1] - record.tacho[0])
+    a_turn = SEGMENTS * math.ceil(rate / speed / SEGMENTS)
+    angle = 2.0 * math.pi * turns[inside]
+    even = resample_angle(angle, record.values[inside], a_turn)[: whole * a_turn]
+    spectra = np.fft.rfft(even.reshape(-1, a_turn), axis=1) * (math.sqrt(2.0) / a_turn)
+    # the first sample is up to a step off top dead centre: turn the lines back by its angle
+    spectra *= np.exp(-1j * angle[0] * np.arange(spectra.shape[1]))
+    return Turned(spectra, 60.0 * speed, rate)
+
+
+@dataclass(frozen=True)
+class Curves:
+    """What is drawn of a record.
+
+    mean: m/s2 over `angle` (deg), its mean revolution, (m,); peak, rms: m/s2 of each segment,
+    averaged over revolutions, (36,); spectrum: m/s2 rms of the orders 1, 2, ..., (orders,);
+    envelopes: m/s2 above order `SWING` of each revolution, averaged over each degree, (n, 360).
+    """
+
+    angle: np.ndarray
+    mean: np.ndarray
+    peak: np.ndarray
+    rms: np.ndarray
+    spectrum: np.ndarray
+    envelopes: np.ndarray
+
+    @property
+    def envelope(self) -> np.ndarray:
+        """Return the envelope over crank angle, averaged over revolutions, (360,)."""
+        return self.envelopes.mean(axis=0)
+
+    def part(self, kept: np.ndarray) -> "Curves":
+        """Return the same with the envelopes of some revolutions alone."""
+        return replace(self, envelopes=self.envelopes[kept])
+
+
+def curves(lines: np.ndarray) -> Curves:
+    """Return the curves of a record from its lines, (n, orders)."""
+    orders = lines.shape[1]
+    size = 360 * math.ceil(FINE * orders / 360)
+    whole = np.zeros((len(lines), size), complex)  # of the analytic signal
+    whole[:, 1 : orders + 1] = lines * (math.sqrt(2.0) * size)
+    each = np.fft.ifft(whole, axis=1).real
+    whole[:, : SWING + 1] = 0.0
+    envelopes = np.abs(np.fft.ifft(whole, axis=1)).reshape(len(lines), 360, -1).mean(axis=2)
+    angle = np.arange(size) * (360.0 / size)
+    levels = np.array([segment_levels(angle, turn, SEGMENTS) for turn in each])
+    peak, rms = levels.mean(axis=0)
+    spectrum = np.sqrt(np.mean(np.abs(lines) ** 2, axis=0))
+    return Curves(angle, each.mean(axis=0), peak, rms, spectrum, envelopes)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A number with its standard error by the record's revolutions; nan where there are too few."""
+
+    value: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """How alike a record and a job are.
+
+    correlation: of the mean revolutions, -1 to 1: 1 is the same shape at the same angles, whatever
+    the size; shift_deg: by how many degrees the record comes later where it is most alike, and
+    shifted: the correlation there. envelope: correlation of the envelopes over crank angle, -1 to
+    1: 1 is the same bursts at the same angles, whatever rings in them. rms_ratio: of the record
+    over the job, from 0: 1 is as strong. spectral_distance: dB, from 0 to 60: rms difference of the
+    shares of third octaves of orders in the mean square; 3 dB is a factor of 2, whatever the size.
+    segment: the first degree of the 10 whose peaks differ most, beside the usual ratio;
+    segment_ratio: the record's peak there over the job's.
+    """
+
+    correlation: Measured
+    shift_deg: float
+    shifted: float
+    envelope: Measured
+    rms_ratio: Measured
+    spectral_distance: Measured
+    segment: int
+    segment_ratio: float
+
+
+def compare_lines(record: np.ndarray, job: np.ndarray, mine: Curves, other: Curves) -> Likeness:
+    """Return how alike a record and a job are by their lines, (n, orders) each, and curves.
+
+    Errors are of the jackknife: each revolution of the record is left out in turn (Efron and Stein,
+    Annals of Statistics 9, 1981), from three on.
+    """
+    shift, shifted = _best_shift(record.mean(axis=0), job.mean(axis=0))
+    found, errors = np.array(_numbers(record, mine, job, other)), np.full(4, math.nan)
+    if (count := len(record)) >= MIN_FOR_ERRORS:
+        rests = (np.arange(count) != k for k in range(count))
+        left = np.array([_numbers(record[rest], mine.part(rest), job, other) for rest in rests])
+        errors = np.sqrt((count - 1) / count * ((left - left.mean(axis=0)) ** 2).sum(axis=0))
+    alike, bursts, ratio, distance = map(Measured, found.tolist(), errors.tolist())
+    loud = np.maximum(mine.peak / mine.peak.max(), other.peak / other.peak.max()) >= LOUD
+    ratios = mine.peak / np.maximum(other.peak, np.finfo(float).tiny)
+    # the level is another number: the segment is that whose share of the peaks is most another one
+    odd = np.where(loud, np.abs(np.log(np.maximum(ratios, 1e-300) / np.median(ratios))), -1.0)
+    worst = int(odd.argmax())
+    return Likeness(
+        alike, shift, shifted, bursts, ratio, distance, worst * 360 // SEGMENTS,
+        float(ratios[worst]),
+    )  # fmt: skip
+
+
+def _numbers(
+    record: np.ndarray, mine: Curves, job: np.ndarray, other: Curves
+) -> tuple[float, float, float, float]:
+    """Return both correlations, ratio of rms and spectral distance of lines, (n, orders) each."""
+    one, two = record.mean(axis=0), job.mean(axis=0)
+    size = math.sqrt(float((np.abs(one) ** 2).sum() * (np.abs(two) ** 2).sum()))
+    correlation = float((one * two.conj()).real.sum()) / size if size else math.nan
+    power, others = (np.mean(np.abs(lines) ** 2, axis=0) for lines in (record, job))
+    ratio = math.sqrt(float(power.sum() / others.sum())) if others.sum() else math.nan
+    bursts = [one - one.mean() for one in (mine.envelope, other.envelope)]
+    sizes = math.sqrt(float((bursts[0] ** 2).sum() * (bursts[1] ** 2).sum()))
+    envelope = float((bursts[0] * bursts[1]).sum()) / sizes if sizes else math.nan
+    return correlation, envelope, ratio, spectral_distance(power, others)
+
+
+def _best_shift(record: np.ndarray, job: np.ndarray) -> tuple[float, float]:
+    """Return by how many degrees a record comes later where it is most alike, and how alike.
+
+    record, job: lines of the mean revolutions, (orders,).
+    """
+    size = math.sqrt(float((np.abs(record) ** 2).sum() * (np.abs(job) ** 2).sum()))
+    if not size:
+        return math.nan, math.nan
+    steps = max(STEPS, FINE * (record.size + 1))
+    cross = np.zeros(steps, complex)
+    cross[1 : record.size + 1] = record * job.conj()
+    alike = np.fft.ifft(cross).real * (steps / size)
+    best = int(alike.argmax())
+    return (360.0 * best / steps + 180.0) % 360.0 - 180.0, float(alike[best])
+
+
+def third_octaves(orders: int) -> np.ndarray:
+    """Return the third octave of each of the orders 1, 2, ..., from 0, (orders,).
+
+    Middle orders are 2^(k/3), edges a sixth of an octave beside them; those without an order are
+    left out.
+    """
+    place = np.round(3.0 * np.log2(np.arange(1, orders + 1))).astype(int)
+    return np.unique(place, return_inverse=True)[1]
+
+
+def spectral_distance(record: np.ndarray, job: np.ndarray) -> float:
+    """Return the rms difference (dB) of the shares of third octaves in the mean square.
+
+    record, job: mean squares of the orders 1, 2, ..., (orders,). Shares below `SMALLEST` count as
+    that, so that the distance is at most 60 dB; third octaves below it in both are left out. It is
+    the log spectral distance (Gray and Markel, IEEE Transactions on Acoustics, Speech and Signal
+    Processing 24, 1976) of spectra that are scaled to the same level.
+    """
+    band = third_octaves(record.size)
+    shares = []
+    for squares in (record, job):
+        powers = np.bincount(band, squares)
+        if not powers.sum():
+            return math.nan
+        shares.append(powers / powers.sum())
+    heard = np.maximum(*shares) > SMALLEST
+    one, two = (np.maximum(share[heard], SMALLEST) for share in shares)
+    return float(np.sqrt(np.mean((10.0 * np.log10(one / two)) ** 2)))
+
+
+def share_inside(record: np.ndarray, jobs: np.ndarray) -> float:
+    """Return the share of crank angle at which a record's envelope lies in the jobs' range.
+
+    record: (360,); jobs: (jobs, 360).
+    """
+    return float(np.mean((record >= jobs.min(axis=0)) & (record <= jobs.max(axis=0))))

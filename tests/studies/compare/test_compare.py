@@ -1,0 +1,159 @@
+"""`compsim compare`: jobs beside a record of another, what the page says of it, and mistakes."""
+
+import csv
+import json
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+from compsim import cli
+from conftest import store
+
+PAGE = Path(__file__).parents[3] / "compressor/README.md"
+HEARD = {"length_rev": 10, "noise_m_per_s2": 0.05}
+CASE = {
+    "joint": "big_end", "clearance_mm": 0.2, "body": True, "sensor": HEARD,
+    "solve": {"accuracy": "draft"},
+}  # fmt: skip
+OTHERS = {  # the page's words -> what differs
+    "itself, with other noise": {"sensor": HEARD | {"seed": 2}},
+    "the same with noise of 2 m/s²": {"sensor": HEARD | {"noise_m_per_s2": 2.0, "seed": 2}},
+    "the same with noise of 10 m/s²": {"sensor": HEARD | {"noise_m_per_s2": 10.0, "seed": 2}},
+    "a clearance of 0.1 mm": {"clearance_mm": 0.1},
+    "a clearance of 0.3 mm": {"clearance_mm": 0.3},
+    "Threlfall's friction law": {"friction": {"law": "threlfall"}},
+    "no friction": {"friction": False},
+    "520 rpm, not 500": {"machine": {"speed_rpm": 520}},
+}
+TOLERANCE = {"correlation": 0.1, "envelope": 0.05, "rms_ratio": 0.05, "spectral_distance": 0.3}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A job `base`, and `others` that differ from it."""
+    place = tmp_path_factory.mktemp("compare")
+    (place / "base.yaml").write_text(json.dumps(CASE))
+    (place / "others.yaml").write_text(json.dumps(CASE | {"blocks": [*OTHERS.values()]}))
+    (place / "deaf.yaml").write_text(json.dumps({"solve": CASE["solve"]}))
+    studies = store(place / "results", *(place / f"{n}.yaml" for n in ("base", "others", "deaf")))
+    keys = [[case.key for case in study.cases] for study in studies]
+    return place, keys[0][0], dict(zip(OTHERS, keys[1], strict=True)), keys[2][0]
+
+
+def run(folder, capsys, *words, code=0):
+    assert cli.main(["compare", *words, "-i", str(folder[0] / "results")]) == code
+    found = capsys.readouterr()
+    return found.err if code else found.out
+
+
+def exported(folder, suffix=".csv"):
+    path = folder[0] / f"record{suffix}"
+    out = ["-i", str(folder[0] / "results"), "-o", str(path), "--force"]
+    assert cli.main(["export", folder[1], *out]) == 0
+    return str(path)
+
+
+@pytest.mark.compiled
+def test_the_page_says_what_the_numbers_are_worth(folder, capsys):
+    found = json.loads(run(folder, capsys, folder[1], "others", "--json"))
+    jobs = {job["key"]: job for job in found["jobs"]}
+    rows = re.findall(r"^\| ([^|]+) \| (-?[\d.]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$",
+                      PAGE.read_text(encoding="utf-8"), re.MULTILINE)  # fmt: skip
+    said = {name: [*map(float, numbers)] for name, *numbers in rows}
+    assert {*said} == {*OTHERS}
+    for name, key in folder[2].items():
+        for (number, tolerance), value in zip(TOLERANCE.items(), said[name], strict=True):
+            assert jobs[key][number]["value"] == pytest.approx(value, abs=tolerance), (name, number)
+    first = [job["correlation"]["value"] for job in found["jobs"]]
+    assert first == sorted(first, reverse=True)
+
+
+@pytest.mark.compiled
+def test_an_exported_record_is_its_job(folder, capsys):
+    path = exported(folder)
+    capsys.readouterr()
+    out = run(folder, capsys, path, folder[1])
+    record, head, job, place = out.splitlines()
+    assert record.endswith("record.csv: 9 revolutions at 500 rpm, 25600 Hz, 5.153 m/s2 rms up to "
+                           "order 1200")  # fmt: skip
+    assert head.split()[0] == "job"
+    key, *numbers = job.split()
+    assert folder[1].startswith(key)
+    assert [numbers[k] for k in (0, 3, 6, 9)] == ["1.000", "1.000", "1.000", "0.000"]
+    assert place.startswith("does not fit: place: the jobs' sensor is at the guide along y;")
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("hints", "told"),
+    [
+        (["--unit", "g"], "unit: the rms is 9.81 times the job's: m/s2 were perhaps read as g"),
+        (["--unit", "mm/s2"], "unit: the rms is 0.001 times the job's: m/s2 were perhaps read as"),
+        (["--unit", "in/s2"], "level: the rms is 0.0254 times the job's: check unit and full scal"),
+        (["--unit", "m/s2", "--tacho-deg", "20"],
+         "crank angle: most alike (1.00) where the record comes +20.0 degrees later: check the ta"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_said(hints, told, folder, capsys):
+    path = exported(folder, ".wav")
+    capsys.readouterr()
+    out = run(folder, capsys, path, folder[1], "--channel", "1", "--tacho", "2", *hints)
+    assert f"does not fit: {told}" in out
+
+
+@pytest.mark.compiled
+def test_other_speeds_rates_and_lengths_are_said(folder, capsys, tmp_path):
+    """Three revolutions of the exported record at half its rate, and a job that runs faster."""
+    with open(exported(folder), newline="") as file:
+        rows = [row[-3:] for row in csv.reader(file) if row[-3]]
+    capsys.readouterr()
+    path = tmp_path / "short.csv"
+    short = [rows[0], *rows[1 : 1 + round(3.2 * 0.12 * 25600) : 2]]
+    path.write_text("\n".join(",".join(row) for row in short))
+    out = run(folder, capsys, str(path), folder[2]["520 rpm, not 500"])
+    assert "speed: 500 rpm, and the job has 520: forces of inertia are 0.925 times as large" in out
+    assert "sampling rate: 12800 Hz, and the job has 25600: what only the faster one holds" in out
+    assert "length: 3 revolutions: noise falls by their root alone" in out
+    assert "rms up to order 600" in out  # 12800 / 2.56 / (500 / 60): what both hold
+
+
+@pytest.mark.compiled
+def test_the_figure_has_the_curves_of_both(folder, capsys, tmp_path):
+    picture, table = tmp_path / "x.svg", tmp_path / "x.csv"
+    out = run(folder, capsys, folder[1], "others", "-o", str(picture))
+    assert ET.parse(picture).getroot().tag.endswith("svg")
+    caption = out.splitlines()[-1]
+    found = json.loads(run(folder, capsys, folder[1], "others", "-o", str(table), "--json"))
+    best, share = found["jobs"][0], found["envelope_inside"]
+    assert f"correlation {best['correlation']['value']:.3f} with job {best['key'][:10]}" in caption
+    assert f"{best['segment']} to {best['segment'] + 10} degrees, " in caption
+    assert f"in the range of 8 jobs at {share:.0%} of crank angles" in caption
+    with open(table, newline="", encoding="utf-8") as file:
+        head, *rows = csv.reader(file)
+    peaks = [float(row[at]) for at in [head.index(next(
+        name for name in head if name == f"(b): {folder[1]}: peak of 10° segments (m/s²)"
+    ))] for row in rows if row[at]]  # fmt: skip
+    np.testing.assert_allclose(peaks[::2], found["peak_m_per_s2"], rtol=1e-6)
+
+
+@pytest.mark.compiled
+def test_mistakes_are_named(folder, capsys, tmp_path):
+    for words, told in (
+        (["absent.csv", "others"], "absent.csv: cannot be read"),
+        ([folder[1]], "Missing argument 'RECORD JOB|STUDY...'"),
+        ([folder[1], "othrs"], "did you mean others?"),
+        ([folder[1], "deaf"], "none of the 1 jobs has a sensor's record: run them with body: true"),
+        ([folder[1], "others", "-o", "x.pdf"], "-o x.pdf: end the name in .png, .svg, .csv"),
+        ([folder[1], "others", "--unit", "g"], "says all of its record; leave --unit out"),
+    ):
+        assert told in run(folder, capsys, *words, code=2)
+    assert "has no sensor's record" in run(folder, capsys, folder[3], "others", code=5)
+    slow = tmp_path / "slow.csv"
+    times = np.arange(200) / 200.0
+    wave = np.sin(2 * np.pi * (times - 0.01) / 0.12)
+    np.savetxt(slow, np.column_stack([times, wave, wave]), "%.9g", ",", comments="",
+               header="time_s,acceleration_m_per_s2,tacho")  # fmt: skip
+    out = run(folder, capsys, str(slow), "others", code=2)
+    assert "the sampling rates hold the orders up to 9 alone" in out
