@@ -3,7 +3,7 @@
 import contextlib
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,32 +33,61 @@ class SaltelliDesign:
         """
         return SaltelliDesign(self.a[:count], self.b[:count], self.mixed[:, :count])
 
+    def without(self, unknown: np.ndarray) -> "SaltelliDesign":
+        """Return the design without each block that has an unknown point, of all points (n,).
+
+        A block is a point of A, that of B, and those of A with a column of B: the estimators take
+        differences within it, so that what is left of one would count against nothing.
+        """
+        whole = ~(unknown[self.a] | unknown[self.b] | unknown[self.mixed].any(axis=0))
+        return SaltelliDesign(self.a[whole], self.b[whole], self.mixed[:, whole])
+
     def indices(self, values: np.ndarray, resamples: int = RESAMPLES) -> dict[str, np.ndarray]:
         """Return Sobol's indices of a quantity over k keys with 95 % intervals, (k,) each.
 
-        values: of all points, finite and not all the same, shape (n (k + 2),). `first_order` and
-        `total_order`, with `_low` and `_high`, by SciPy's sobol_indices (Saltelli et al., Computer
-        Physics Communications 181, 2010). A key that changes nothing has none of the variance,
+        values: of all points, finite and not all the same at the points of the design, shape
+        (n (k + 2),). `first_order` and `total_order`, with `_low` and `_high`, by Saltelli et al.,
+        Computer Physics Communications 181, 2010, Table 2 (b) and (f), less the mean; intervals by
+        the bootstrap BCa over blocks. SciPy's sobol_indices gives the same, but takes only a power
+        of two points, and several keys. A key that changes nothing has none of the variance,
         surely.
         """
-        from scipy.stats import sobol_indices  # takes half a second
+        from scipy.stats import bootstrap  # takes half a second
 
         a, b, mixed = values[self.a], values[self.b], values[self.mixed]
-        table = {"f_A": a[None], "f_B": b[None], "f_AB": mixed[:, None]}
+        idle = (mixed == a).all(axis=1)
+        mean = np.mean([a[None], b[None]], axis=(0, -1))
+        a, b, mixed = a - mean, b - mean, mixed - mean
+
+        def estimate(places: np.ndarray) -> np.ndarray:
+            return sobol_estimates(a[places], b[places], mixed[:, places])
+
         with (
             ignore_warnings(),
             seed_global_draws(),
         ):  # warnings: the bootstrap of what changes nothing
-            found = sobol_indices(func=table, n=a.size, rng=np.random.default_rng(SEED))
-            spread = found.bootstrap(confidence_level=LEVEL, n_resamples=resamples)
-        idle = (mixed == a).all(axis=1)
+            found = sobol_estimates(a, b, mixed)
+            interval = bootstrap(
+                [np.arange(a.size)], estimate, confidence_level=LEVEL, n_resamples=resamples,
+                vectorized=False,
+            ).confidence_interval  # fmt: skip
         rows = {}
-        for order in ORDERS:
-            interval = getattr(spread, order).confidence_interval
-            parts = ("", getattr(found, order)), ("_low", interval.low), ("_high", interval.high)
+        for n, order in enumerate(ORDERS):
+            parts = ("", found[n]), ("_low", interval.low[n]), ("_high", interval.high[n])
             for end, row in parts:
-                rows[f"{order}{end}"] = np.where(idle, 0.0, np.ravel(row))
+                rows[f"{order}{end}"] = np.where(idle, 0.0, row)
         return rows
+
+
+def sobol_estimates(a: np.ndarray, b: np.ndarray, mixed: np.ndarray) -> np.ndarray:
+    """Return the first and total indices of k keys, (2, k).
+
+    a, b: values at the parts A and B, (n,); mixed: at A with each column of B, (k, n).
+    """
+    variance = np.var([a[None], b[None]], axis=(0, -1))
+    first = np.mean(b * (mixed - a), axis=-1) / variance
+    total = 0.5 * np.mean((a - mixed) ** 2, axis=-1) / variance
+    return np.stack([first, total])
 
 
 @contextlib.contextmanager
@@ -113,7 +142,9 @@ class Effects:
     interactions; `rank`: correlations of ranks, of words the correlation ratio; no total.
     main, total: (k,); *_ends: the ends of the 95 % intervals, (2, k), None where the values are
     exact. filled: points without a value of their own. base: how many points of each part
-    of a `saltelli` design were taken, where not all were; else 0.
+    of a `saltelli` design were taken, where not all were; else 0. dropped: blocks of it with a
+    point without a value, which are left out; with_unknown: the effects with these blocks, their
+    unknown points having the median, None where there are none.
     """
 
     kind: str
@@ -123,6 +154,8 @@ class Effects:
     total_ends: np.ndarray | None = None
     filled: int = 0
     base: int = 0
+    dropped: int = 0
+    with_unknown: "Effects | None" = None
 
     @property
     def strength(self) -> np.ndarray:
@@ -186,8 +219,9 @@ def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effect
     """Return the effects of keys of which a design drew values; None where too little is known.
 
     columns: a key's value at each point, or words; values: (points,), nan where unknown. Of a
-    `saltelli` design Sobol's indices, unknown points having the median, of a large one of
-    its first MAX_BASE points; else correlations, each over the points that have its key.
+    `saltelli` design Sobol's indices, of a large one of its first MAX_BASE points, without the
+    blocks that have an unknown point, and besides with them; else correlations, each over the
+    points that have its key.
     """
     good = np.isfinite(values)
     if good.sum() < MIN_POINTS:
@@ -197,21 +231,37 @@ def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effect
     numeric = all(column.dtype.kind in "fiu" for column in columns)
     design = saltelli_design(np.stack(columns, axis=1).astype(float)) if numeric else None
     if design is not None and good.mean() >= 1.0 - MAX_GAPS:
-        whole = np.where(good, values, np.median(values[good]))
-        found = design.first(MAX_BASE).indices(whole, RANKING_RESAMPLES)
-        if not all(np.isfinite(row).all() for row in found.values()):
-            return None  # so few points differ that some resamples are all the same
-        ends = {
-            order: np.stack([found[f"{order}_low"], found[f"{order}_high"]])
-            for order in ("first_order", "total_order")
-        }
-        return Effects(
-            "saltelli", found["first_order"], found["total_order"], ends["first_order"],
-            ends["total_order"], int((~good).sum()), MAX_BASE if design.a.size > MAX_BASE else 0,
-        )  # fmt: skip
+        base = MAX_BASE if design.a.size > MAX_BASE else 0
+        design = design.first(MAX_BASE)
+        whole = design.without(~good)
+        dropped, unknown = design.a.size - whole.a.size, int((~good).sum())
+        if whole.a.size >= MIN_POINTS:
+            found = _saltelli_effects(whole, values, unknown, base)
+            if found is None or not dropped:
+                return found
+            filled = np.where(good, values, np.median(values[good]))
+            other = _saltelli_effects(design, filled, unknown, base)
+            return replace(found, dropped=dropped, with_unknown=other)
     known = [good & (c == c) & (c != "" if c.dtype.kind == "U" else True) for c in columns]
     rows = np.array([correlation(c[n], values[n]) for c, n in zip(columns, known, strict=True)])
     return Effects("rank", rows[:, 0], main_ends=rows[:, 1:].T, filled=int((~good).sum()))
+
+
+def _saltelli_effects(
+    design: SaltelliDesign, values: np.ndarray, unknown: int, base: int
+) -> Effects | None:
+    """Return Sobol's indices of a design; None where so few points differ that they have none."""
+    found = design.indices(values, RANKING_RESAMPLES)
+    if not all(np.isfinite(row).all() for row in found.values()):
+        return None  # some resamples are all the same
+    ends = {
+        order: np.stack([found[f"{order}_low"], found[f"{order}_high"]])
+        for order in ("first_order", "total_order")
+    }
+    return Effects(
+        "saltelli", found["first_order"], found["total_order"], ends["first_order"],
+        ends["total_order"], unknown, base,
+    )  # fmt: skip
 
 
 def correlation(column: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:

@@ -37,6 +37,7 @@ from compressor.cases import (
 from compressor.metrics import NUMBERS
 from compressor.outcome import Regime
 from compressor.program import STUDY_FILES
+from compressor.store.failures import describe_failures
 from compressor.store.files import Folder, StoreError, final_path, is_locked, no_results
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import places, read_store, unowned_series
@@ -52,6 +53,7 @@ from compressor.store.studies import (
     read_studies,
     read_study,
     study_paths,
+    swept_column,
 )
 
 if TYPE_CHECKING:
@@ -65,7 +67,24 @@ LONGER_REMEDY = "a longer run may give other numbers, or be chaotic"
 def study_caveats(rows: Rows, study: StoredStudy) -> list[str]:
     """Return what to know of a study's finished jobs beside their numbers, a sentence each."""
     outside = (f"{key}: {text}" for key, text in _outside_of_study(study).items())
-    return [*run_caveats(rows, study), *_of_stiffness(rows, study), *outside]
+    return [
+        *run_caveats(rows, study), *_of_stiffness(rows, study), *outside, *_of_failures(rows, study)
+    ]  # fmt: skip
+
+
+def _of_failures(rows: Rows, study: StoredStudy) -> list[str]:
+    """Return where in a study jobs fail, a sentence a region."""
+    positions = rows.find(study.keys)
+    there = positions >= 0
+    failed = rows.words["status"][positions[there]] == "failed"
+    if not failed.any() or not study.axes:
+        return []
+    swept = [*points(study)]
+    columns = {
+        axis.key: swept_column(axis.key, [point.get(axis.key) for point in swept])[0][there]
+        for axis in study.axes
+    }
+    return describe_failures(columns, failed)
 
 
 def run_caveats(rows: Rows, study: StoredStudy) -> list[str]:

@@ -93,6 +93,25 @@ def test_saltelli_s_designs_have_sobol_s_indices():
     assert found["clearance"]["main effect"] == pytest.approx([10, 10], abs=8)
 
 
+def test_both_answers_are_given_where_jobs_of_a_design_failed():
+    """y = 1 + x1 + 3 x2, of 64 blocks six with a failed job: 90 % without them, less with them."""
+    points = np.array(design("saltelli", 64, 2, 1))
+    columns = {"clearance_mm": points[:, 0], "speed_rpm": points[:, 1]}
+    status = np.full(256, "ok", dtype="U7")
+    status[[3, 9, 64 + 20, 128 + 30, 192 + 30, 192 + 40, 192 + 50]] = "failed"  # 30 twice
+    data = listed(columns, 1 + points[:, 0] + 3 * points[:, 1], status=status)
+    caption = plan(data)["ranking"].caption
+    found = ranking(sweep_of(data), measures(data))
+    (peak, _) = found.values()
+    assert (peak.filled, peak.dropped) == (7, 6)
+    without, with_them = (100 * one.total[1] for one in (peak, peak.with_unknown))
+    assert without == pytest.approx(90, abs=8)
+    assert abs(with_them - without) > 0.5
+    assert f"peak acceleration ({without:.0f} %; {with_them:.0f} % with them)" in caption
+    assert "Up to 7 jobs lack a value" in caption
+    assert "the 6 blocks of the design that have one are left out whole" in caption
+
+
 def test_what_changes_most_leads():
     data = grid(AXES, lambda c, n, load: 10 + c + 2 * n + 0 * load)
     data["rms_acceleration"] = data["clearance_mm"] ** 4 + 0 * data["peak_acceleration"]

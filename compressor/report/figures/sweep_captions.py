@@ -170,14 +170,18 @@ def ranking(sweep: PlottedSweep, found: Ranking, shown: Sequence[Measure]) -> st
     base = max(effects.base for effects in found.values())
     stands = {
         "grid": "counts with the sum of its axes' main effects",
-        "saltelli": "counts with the metric's median",
         "rank": "is left out",
     }
+    dropped = max(effects.dropped for effects in found.values())
+    blocks = (
+        f"Up to {most} jobs lack a value that is known within its error bar: the {dropped} blocks "
+        "of the design that have one are left out whole; “with them” such jobs have the median."
+    )
     gaps = f"Up to {most} jobs lack a value that is known within its error bar: such a job "
     return join_sentences(
         {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS}[kind],
         f"They are of the first {base:,} points of the design's sequence." if base else "",
         f"{describe_ranking(sweep, found)} In parentheses: {unit}.",
-        gaps + f"{stands[kind]}." if most else "",
+        (blocks if kind == "saltelli" else gaps + f"{stands[kind]}.") if most else "",
         f"Not ranked, since too few jobs tell of it: {'; '.join(left)}." if left else "",
     )

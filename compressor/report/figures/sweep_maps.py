@@ -253,7 +253,10 @@ def describe_ranking(sweep: PlottedSweep, found: Ranking) -> str:
     """
     groups: dict[tuple[int, ...], list[str]] = {}
     for measure, effects in found.items():
-        words = f"{measure.title} ({describe_strength(effects)})"
+        words = f"{measure.title} ({describe_strength(effects)}"
+        if effects.with_unknown is not None:
+            words += f"; {share(strength_of_first(effects))} with them"
+        words += ")"
         groups.setdefault(tuple(first_ones(effects)), []).append(words)
     parts = []
     for axes, metrics in groups.items():
@@ -277,6 +280,12 @@ def reaches(effects: Effects, weaker: int, stronger: int) -> bool:
     low, high = ends[:, stronger]
     least = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
     return bool(abs(ends[:, weaker]).max() >= least)
+
+
+def strength_of_first(effects: Effects) -> float:
+    """Return the strength of the strongest axis where unknown points have the median."""
+    other = effects.with_unknown
+    return math.nan if other is None else float(other.strength[order_of(effects)[0]])
 
 
 def describe_strength(effects: Effects) -> str:
