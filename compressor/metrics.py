@@ -11,7 +11,12 @@ from typing import Literal, NamedTuple
 JOINTS = ("big_end", "small_end")
 AXES = ("x", "y")
 QUANTILES = (0.5, 0.95)  # of the revolutions' greatest values
-SIZES = {"joint": len(JOINTS), "axis": len(AXES), "quantile": len(QUANTILES)}
+SEGMENTS = tuple(10.0 * number for number in range(36))  # of a revolution: where each begins, deg
+THRESHOLDS = ("first", "second")
+SIZES = {
+    "joint": len(JOINTS), "axis": len(AXES), "quantile": len(QUANTILES),
+    "segment": len(SEGMENTS), "threshold": len(THRESHOLDS),
+}  # fmt: skip
 
 
 class Bar(NamedTuple):
@@ -48,9 +53,12 @@ class Metric(NamedTuple):
     contact: bool = False  # of a contact: without meaning at an ideal joint
     # how it comes from the run; a count grows with it, a rate is a count by revolutions
     kind: Literal["greatest", "root", "share", "count", "rate"] = "share"
-    # what it is made from: sums over the dense solution or samples of it, both with an error bar;
-    # other numbers or series; the revolutions of a chaotic motion; anything else of the run
-    source: Literal["tally", "samples", "error", "series", "statistics", "sensor", "run"] = "tally"
+    # what it is made from: sums over the dense solution, samples of it, or the motion of the body
+    # and its sensor's record, with an error bar; other numbers or series; the revolutions of a
+    # chaotic motion; anything else of the run
+    source: Literal[
+        "tally", "samples", "body", "error", "series", "statistics", "sensor", "run"
+    ] = "tally"
     when: str = ""  # what few jobs have, others are nan: a flag of the record, or another word
     joint: int = 0  # whose part of its series counts for samples, in JOINTS
 
@@ -71,6 +79,8 @@ class Metric(NamedTuple):
 
 
 HORIZON = "predictability_horizon"
+# of the body and its sensor; rounding in spectra and splines leaves some 1e-12
+OF_BODY, OF_SEGMENT = Bar(5.0, 0.5, least=1e-9), Bar(5.0, 1.0, least=1e-9)
 TABLE = (
     Metric(
         "peak_acceleration", (), "m/s2", "greatest |acceleration|", "acceleration",
@@ -177,6 +187,41 @@ TABLE = (
         source="statistics", when="chaotic",
     ),
     Metric(
+        "body_velocity_rms", ("axis",), "m/s", "rms velocity of the body's mass centre, in a band",
+        bar=OF_BODY, source="body", when="body", kind="root",
+        shown=Shown("body velocity rms", "mm/s", 1e3),
+    ),
+    Metric(
+        "sensor_peak", (), "m/s2", "greatest |sample| of the sensor",
+        bar=OF_BODY, source="body", when="sensor", kind="greatest",
+        shown=Shown("sensor peak", "m/s²"),
+    ),
+    Metric(
+        "sensor_rms", (), "m/s2", "root mean square of the sensor's record",
+        bar=OF_BODY, source="body", when="sensor", kind="root", shown=Shown("sensor rms", "m/s²"),
+    ),
+    Metric(
+        "sensor_crest_factor", (), "1", "sensor_peak over sensor_rms",
+        bar=OF_BODY, source="body", when="sensor", shown=Shown("crest factor", ""),
+    ),
+    Metric(
+        "sensor_kurtosis", (), "1", "kurtosis of the sensor's record: 3 of Gaussian noise",
+        bar=OF_BODY, source="body", when="sensor", shown=Shown("kurtosis", ""),
+    ),
+    Metric(
+        "sensor_segment_peak", ("segment",), "m/s2", "greatest |sample| in 10 degrees of the crank",
+        bar=OF_SEGMENT, source="body", when="sensor", kind="greatest",
+    ),
+    Metric(
+        "sensor_segment_rms", ("segment",), "m/s2", "rms of the record in 10 degrees of the crank",
+        bar=OF_SEGMENT, source="body", when="sensor", kind="root",
+    ),
+    Metric(
+        "sensor_counts_per_rev", ("threshold",), "1/rev",
+        "peaks of the sensor's record in a revolution over a threshold",
+        bar=Bar(2.0, 0.0, False), source="body", when="threshold", kind="rate",
+    ),
+    Metric(
         "clipped_fraction", (), "1", "fraction of the sensor's samples beyond its range",
         source="sensor", when="sensor",
     ),
@@ -244,11 +289,11 @@ def every_number() -> Iterator[Metric]:
     for row in metrics:
         yield from () if row.when else statistics_of(row)
     yield from of_source("statistics")
-    for row in of_source("samples"):
+    for row in (*of_source("samples"), *of_source("body")):
         yield from (row, error_bar(row))
     yield from of_source("sensor")
 
 
 NUMBERS = {row.name: row for row in every_number()}
 METRICS = {row.name: row for row in of_source("tally") if not row.when}  # of every run
-BARRED = {row.name: row for row in NUMBERS.values() if row.source in ("tally", "samples")}
+BARRED = {row.name: row for row in NUMBERS.values() if row.source in ("tally", "samples", "body")}

@@ -12,7 +12,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compressor.metrics import AXES, JOINTS, NUMBERS, QUANTILES, SIZES
+from compressor.metrics import (
+    AXES,
+    JOINTS,
+    NUMBERS,
+    QUANTILES,
+    SEGMENTS,
+    SIZES,
+    THRESHOLDS,
+)
 from compressor.program import PROGRAM
 
 # a job's numbers as one structured scalar: what workers send home and segments hold
@@ -156,5 +164,10 @@ def coordinates(used: Iterable[Any] = SIZES) -> dict[str, tuple]:
         "joint": (("joint",), list(JOINTS), {"long_name": "joint of the rod"}),
         "axis": (("axis",), list(AXES), {"long_name": "direction; x along the cylinder, y up"}),
         "quantile": (("quantile",), list(QUANTILES), {"long_name": "share of values below"}),
-    }
+        "segment": (
+            ("segment",), list(SEGMENTS),
+            {"units": "deg", "long_name": "crank angle at which a segment of 10 degrees begins"},
+        ),
+        "threshold": (("threshold",), list(THRESHOLDS), {"long_name": "threshold of the sensor"}),
+    }  # fmt: skip
     return {name: variable for name, variable in every.items() if name in wanted}

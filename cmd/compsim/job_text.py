@@ -31,7 +31,7 @@ def sections(found: "JobReport", limits: tuple[float, float]) -> Iterator[tuple[
     limits: of the rod load's reversal, degrees and percent.
     """
     yield "", align_lines(stop(found))
-    known = numbers(found, "tally", "statistics", "samples")
+    known = numbers(found, "tally", "statistics", "samples", "body")
     lines = align_lines([*known, *reversal_verdict(found, *limits)])
     yield "metrics, with their error bars", [*lines, *cautions(found), *found.caveats]
     yield (
@@ -82,10 +82,13 @@ def numbers(found: "JobReport", *sources: str) -> list[Line]:
             continue
         values, (errors, relative, kind) = found.numbers[name], bar_of(found, name)
         unit, factor = unit_of(row)
+        highest = max(values) if "segment" in row.dims else -math.inf
         for place, label in places(row):
             value = pick_value(values, place)
             if math.isnan(value) or tells_nothing(found, row, place):
                 continue
+            if value < highest:
+                continue  # of the segments of a revolution the one that is highest
             error = math.nan if errors is None else pick_value(errors, place)
             text = format_measured(value * factor, error * factor, relative)
             if error == 0.0 and name.endswith("_per_rev"):
@@ -137,6 +140,8 @@ def places(row: metrics.Metric) -> Iterator[tuple[tuple[int, ...], str]]:
         "joint": metrics.JOINTS,
         "axis": metrics.AXES,
         "quantile": metrics.QUANTILES,
+        "segment": tuple(f"{at:g} to {at + 10:g} deg" for at in metrics.SEGMENTS),
+        "threshold": metrics.THRESHOLDS,
     }
     first = row.name.removesuffix("_error")
     first = LABELS.get(first, first.removesuffix("_rev").removesuffix("_per").replace("_", " "))

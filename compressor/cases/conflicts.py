@@ -420,6 +420,13 @@ def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
             "steady repeats whole settled revolutions: give duration_rev and settle_rev as whole "
             "numbers or auto, or set start: rest",
         )
+    low, high = body.band_Hz
+    if low >= high:
+        key = "band_high_Hz" if body.band_low_Hz is None else "band_low_Hz"
+        yield Problem(
+            f"body.{key}", f"the band of body_velocity_rms would be {low:g} to {high:g} Hz: give "
+            "band_low_Hz less than band_high_Hz",
+        )  # fmt: skip
     if sensor is None:
         return
     if sensor.low_pass_Hz is not None and sensor.low_pass_Hz >= sensor.rate_Hz / 2:

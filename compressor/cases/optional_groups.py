@@ -18,6 +18,7 @@ from compressor.cases.parameter import (
     ROCKING,
     SMALL_CLEARANCE,
     STEADY,
+    THRESHOLD,
     choice,
     document_fields,
     parameter,
@@ -297,6 +298,19 @@ class Body:
         "steady", ("steady", "rest"), OURS,
         "steady: as if the settled revolutions had always repeated; rest: at rest at time 0",
     )  # fmt: skip
+    band_low_Hz: float | None = parameter(
+        None, "Hz", (0, 1e5), "ours: 2", "lowest frequency of body_velocity_rms", optional=True
+    )
+    band_high_Hz: float | None = parameter(
+        None, "Hz", (0, 1e5), "ours: 1000", "highest frequency of body_velocity_rms", above=True,
+        optional=True,
+    )  # fmt: skip
+
+    @property
+    def band_Hz(self) -> tuple[float, float]:
+        """Return the frequencies between which the body's velocity counts."""
+        low, high = self.band_low_Hz, self.band_high_Hz
+        return 2.0 if low is None else low, 1000.0 if high is None else high
 
     def __post_init__(self) -> None:
         """Fill in the modal mass of a casing mode."""
@@ -354,6 +368,19 @@ class Sensor:
         None, "", (1, 10_000), "the settled ones", "revolutions of the record; more of them repeat",
         kind="integer", optional=True, read=STEADY,
     )  # fmt: skip
+    threshold_m_per_s2: float | None = parameter(
+        None, "m/s2", (0, 1e6), "none: no peaks are counted", "over which a peak of the record "
+        "counts (sensor_counts_per_rev)", above=True, optional=True,
+    )  # fmt: skip
+    second_threshold_m_per_s2: float | None = parameter(
+        None, "m/s2", (0, 1e6), "none", "a second threshold", above=True, optional=True,
+        read=THRESHOLD,
+    )  # fmt: skip
+
+    @property
+    def thresholds(self) -> tuple[float | None, float | None]:
+        """Return both thresholds, None where there is none."""
+        return self.threshold_m_per_s2, self.second_threshold_m_per_s2
 
     def report_clipping(self, fraction: float) -> str:
         """Return a sentence about a record with a fraction clipped; "" below a thousandth."""

@@ -151,6 +151,9 @@ RANDOM = Reader(
     "sensor.noise_m_per_s2 or sensor.speed_jitter above 0",
     lambda case: case.sensor and (case.sensor.noise_m_per_s2 > 0 or case.sensor.speed_jitter > 0),
 )
+THRESHOLD = Reader(
+    "sensor.threshold_m_per_s2", lambda case: case.sensor and case.sensor.threshold_m_per_s2
+)
 SERIES = Reader("output.keep: series", lambda case: case.output.keep == "series")
 
 

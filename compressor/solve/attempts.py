@@ -162,7 +162,7 @@ class Solution:
     `settle` (s): from where metrics count; `turns`: tallies of the settled revolutions, if they
     were cut; `statistics`: of a chaotic motion; `regime`: of `Regime`, or "" where nothing is
     known; `period`, `settled` (rev): of a periodic motion, nan of others; `rows`: observed at
-    `sampled_times`, none without signals.
+    `sampled_times`, none without signals; `companions`: the runs that errors are estimated by.
     """
 
     p: np.record
@@ -183,6 +183,7 @@ class Solution:
     period: float = math.nan
     settled: float = math.nan
     rows: np.ndarray = field(default_factory=lambda: np.empty((0, WIDE)))
+    companions: "tuple[Solution, ...]" = ()
 
     def journals_apart(self, other: "Solution") -> float:
         """Return the greatest distance of the journals of two runs of a case, over their room."""
@@ -207,15 +208,22 @@ class RunsAhead(dict[float, Solution]):
     is_planned = False
 
 
+def moves_body(case: Case) -> bool:
+    """Return whether a case's runs move a body, for which they are sampled."""
+    return case.body is not None and case.output.keep == "series"
+
+
 def take_run(
     ahead: Ahead, case: Case, rtol: float, timeout: float, sampled: bool = False
 ) -> Solution:
     """Return an attempt that was made before, or `run_at_tolerance`.
 
-    Raises RunNeeded in place of the latter while the attempts are planned.
+    Each run of a case with a body is `sampled`, since it moves the body for error bars. Raises
+    RunNeeded in place of `run_at_tolerance` while the attempts are planned.
     """
     if case.solve.method in LANE_METHODS and (made := ahead.get(rtol)):
         return made
+    sampled = sampled or moves_body(case)
     if isinstance(ahead, RunsAhead) and ahead.is_planned:
         raise RunNeeded(case, rtol, sampled)
     return run_at_tolerance(case, rtol, timeout, sampled)
@@ -392,6 +400,9 @@ def estimate_errors(solution: Solution, *others: Solution) -> None:
 
     The longest by any of them; inf without one that reached its end.
     """
+    for one in others:
+        one.companions = ()  # so that the runs of a long search are not all in memory
+    solution.companions = others
     residual = energy_residual(solution.trajectory.tally)
     companions = [compare_with_run(solution, one) for one in others if not one.reason]
     runs: list[Companion | None] = [*companions] or [None]

@@ -55,6 +55,7 @@ COLUMN = {
     "rod_load": Column.FORCE + 2,
 }
 COMPARED_PER_REV = 150  # times a revolution at which two runs are compared
+SAMPLES_PER_BAND = 2.56  # samples of the forces in a period of the highest frequency asked for
 SAMPLES_PER_PERIOD = 24  # samples of the forces in one of the body's fastest motion
 MIN_COMPARED, MAX_COMPARED = 64, 20_000  # of these times over a settled part
 
@@ -78,6 +79,8 @@ def finer(case: Case) -> int:
         return 1
     natural = (body.frequency_x_Hz, body.frequency_y_Hz, body.frequency_rocking_Hz)
     rate = SAMPLES_PER_PERIOD * max(natural)
+    if body.band_high_Hz is not None:
+        rate = max(rate, SAMPLES_PER_BAND * body.band_high_Hz)
     if case.sensor is not None:
         from compressor.vibration import analogue_rate
 

@@ -13,6 +13,7 @@ from compressor.physics import FLOWS, is_featured, state_names
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
 from compressor.solve.attempts import NOTHING_AHEAD, Ahead, Solution
+from compressor.solve.error_bars import Metrics
 from compressor.solve.request import NONE, Trajectory, last_state, passed_time
 from compressor.solve.run_metrics import ledger
 from compressor.solve.series import SIGNALS, block, features, finer, rows_of, signals
@@ -33,50 +34,43 @@ BODY = {  # over time and these dimensions: (dimensions, unit, long name)
 }
 
 
-def foundation(case: Case, solution: Solution, rows: np.ndarray) -> Variables:
-    """Return the body's motion on the output grid, and the sensor's record in time of its own.
+def foundation(case: Case, solution: Solution, rows: np.ndarray) -> tuple[Variables, Metrics]:
+    """Return the body's motion on the output grid, the sensor's record in time of its own, metrics.
 
     rows: observed at the grid that is `finer`, (m, WIDE). A steady body is nan before the
-    machine has settled; all is nan, and there is no record, of a run that did not reach its end.
-    `one_way_error`: bound of the relative L2 error of the body's velocity by leaving out what its
-    motion does to the machine: of the order m / M away from resonances. A journal's chatter may
-    come at other moments on a body that gives way, so that no bound is stated of accelerations.
+    machine has settled; all is nan, and there is no record and no metric, of a run that did not
+    reach its end. `one_way_error`: bound of the relative L2 error of the body's velocity by leaving
+    out what its motion does to the machine: of the order m / M away from resonances. A journal's
+    chatter may come at other moments on a body that gives way, so that no bound is stated of
+    accelerations. Metrics have their error bars beside them (`compressor.solve.body_metrics`).
     """
-    from compressor.vibration import Forces, body_motion, listen
+    from compressor.solve import body_metrics
 
-    body, stride = case.body, finer(case)
-    assert body is not None
-    step = solution.trajectory.times[1]
-    steady, whole = body.start == "steady", not solution.trajectory.reason
-    begin = round(solution.settle / step) if steady else 0
-    forces_by_name = {name: one[begin:] for name, one in signals(rows).items()}
-    forces = Forces(
-        step, forces_by_name["shaking_force"], forces_by_name["guide_moment"],
-        np.stack([np.zeros(len(rows) - begin), forces_by_name["guide_force"]], axis=1),
-        forces_by_name["bearing_force"],
-    )  # fmt: skip
+    stride, numbers, shaken = finer(case), {}, None
     variables: Variables = {}
     samples = (len(rows) - 1) // stride + 1
     values = {name: np.full((samples, 2)[: 1 + len(BODY[name][0])], math.nan) for name in BODY}
-    if whole:
-        motion = body_motion(body, forces, steady)
-        grid = slice(-begin % stride, None, stride)
+    if not solution.trajectory.reason:
+        shaken = body_metrics.shake_by(case, solution, rows)
+        begin = body_metrics.first_sample(case, solution)
+        motion, grid = shaken.motion, slice(-begin % stride, None, stride)
         for name, source in (("displacement", 0), ("velocity", 1), ("acceleration", 2)):
             both = np.stack([motion.x[source], motion.y[source]], axis=1)
             values[f"body_{name}"][-len(both[grid]) :] = both[grid]
         values["body_rocking"][-len(motion.x[0][grid]) :] = motion.rocking.displacement[grid]
     for name, (dims, unit, phrase) in BODY.items():
         variables[name] = (("time", *dims), values[name], {"units": unit, "long_name": phrase})
-    if whole:
+    if shaken:
         spectra = motion.x.velocity[:-1], motion.y.velocity[:-1]
         phrase = "bound of the relative error of the body's velocity: it is driven one way"
         attrs = {"units": "1", "long_name": phrase}
-        variables["one_way_error"] = (("axis",), one_way_errors(case, spectra, step), attrs)
-    if whole and case.sensor is not None:
-        guide = case.machine.rod_length_mm / 1e3
-        record = listen(body, case.sensor, forces, case.turn, guide, motion)
-        variables |= sensor_variables(record)
-    return variables
+        errors = one_way_errors(case, spectra, solution.trajectory.times[1])
+        variables["one_way_error"] = (("axis",), errors, attrs)
+        numbers = body_metrics.with_bars(case, solution, shaken)
+    if shaken and shaken.recorded:
+        variables |= sensor_variables(shaken.recorded)
+        numbers["clipped_fraction"] = shaken.recorded.clipped
+    return variables, numbers
 
 
 def sensor_variables(record: "Record") -> Variables:
@@ -203,9 +197,9 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, DatasetParts]:
     """
     has_series = case.output.keep == "series"
     result = outcome(case, solution)
-    variables = series(case, solution) if has_series else {}
-    if "clipped_share" in variables:
-        result.numbers["clipped_fraction"] = variables["clipped_share"][1]
+    variables, numbers = series(case, solution) if has_series else ({}, {})
+    for name, value in numbers.items():
+        result.numbers[name] = value
     return result, result.table(variables)
 
 
@@ -220,8 +214,11 @@ def refused_outcome(case: Case) -> Outcome:
     return without_run(case.attributes(), Reason.INVALID_INPUT, detail)
 
 
-def series(case: Case, solution: Solution) -> dict[str, tuple]:
-    """Return the time series as xarray variables, with the signals, body and sensor of the case."""
+def series(case: Case, solution: Solution) -> tuple[Variables, Metrics]:
+    """Return the time series as xarray variables, with the signals, body and sensor of the case.
+
+    And the metrics of body and sensor, by name.
+    """
     p, stride = solution.p, finer(case)
     fine_rows = rows_of(p, solution.trajectory)
     rows, times = fine_rows[::stride], solution.trajectory.times[::stride]
@@ -229,7 +226,7 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
     angle_attrs = {"units": "rad", "long_name": "crank angle from top dead centre"}
     time = passed_time(p, times, states)
     angles = np.where(np.isnan(time), np.nan, p.omega * times)  # a stalled crank turns no further
-    variables: dict[str, tuple] = {
+    variables: Variables = {
         "time": (("time",), time.copy(), {"units": "s", "long_name": "time"}),
         "crank_angle": (("time",), angles, angle_attrs),
     }
@@ -242,7 +239,10 @@ def series(case: Case, solution: Solution) -> dict[str, tuple]:
     if is_featured(p):
         for name, (values, unit, phrase) in features(p, states, rows).items():
             variables[name] = (("time",), values, {"units": unit, "long_name": phrase})
-    return variables | (foundation(case, solution, fine_rows) if case.body else {})
+    if not case.body:
+        return variables, {}
+    of_body, numbers = foundation(case, solution, fine_rows)
+    return variables | of_body, numbers
 
 
 def outcome(case: Case, solution: Solution) -> Outcome:

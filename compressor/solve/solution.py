@@ -28,6 +28,7 @@ from compressor.solve.attempts import (
     comparison_run,
     estimate_errors,
     looser_comparison_run,
+    moves_body,
     prepare_run,
     run_at_tolerance,
     solution_of_trajectory,
@@ -179,7 +180,9 @@ def attempts_of(number: int, case: Case) -> list[LaneRequest]:
     requests = [lane_request(number, case, case.rtol, p, times_of(case, sampled))]
     if case.wants_bars and (tighter := companion_rtol(p, case.rtol)):
         if sampled:
-            requests.append(lane_request(number, case, tighter, p, times_of(case, False)))
+            requests.append(
+                lane_request(number, case, tighter, p, times_of(case, moves_body(case)))
+            )
         else:  # all but the tolerance is the same
             requests.append(with_tolerance(requests[0], tighter))
     return [one for one in requests if one.times.all.size <= MAX_SAMPLES]

@@ -16,7 +16,7 @@ from xarray.core import indexing
 
 from compressor.cases import points, table, value_in
 from compressor.digits import is_known
-from compressor.metrics import METRICS, NUMBERS
+from compressor.metrics import METRICS, NUMBERS, SIZES
 from compressor.outcome import Regime, coordinates, regime_words
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
@@ -128,7 +128,7 @@ def mask_untrusted(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _with_coordinates(variables: dict[Any, Any], layout: Layout) -> xr.Dataset:
-    names = ["key", "study", "joint", "axis", "quantile", "time", *layout.coordinates]
+    names = ["key", "study", *SIZES, "time", *layout.coordinates]
     dataset = xr.Dataset(variables | layout.coordinates)
     return dataset.set_coords([name for name in names if name in dataset])
 
@@ -161,7 +161,8 @@ def _values_at(values: np.ndarray, positions: np.ndarray) -> np.ndarray:
 def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
     """Return all numbers of the rows, nan where a job has none, but for those that no job has."""
     found = {}
-    for name, metric in NUMBERS.items():
+    for name in rows.numbers.dtype.names or ():
+        metric = NUMBERS[name]
         values = np.array(rows.numbers[name][positions])
         values[positions < 0] = np.nan
         if not metric.when or not np.isnan(values).all():

@@ -71,6 +71,9 @@ def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:
     lacking = {}
     present = {"": is_ok, "signals": is_ok & signals}  # whether another job has one is not known
     for name, metric in BARRED.items():
+        if name not in (rows.numbers.dtype.names or ()):
+            lacking[name] = present.get(metric.when, np.zeros(len(positions), bool))
+            continue
         absent = np.isnan(rows.numbers[name][positions])
         missed = absent.all(axis=tuple(range(1, absent.ndim)))
         lacking[name] = missed & present.get(metric.when, False)
@@ -107,7 +110,7 @@ class JobStatus:
     @property
     def numbers(self) -> np.void:
         """Return the job's numbers, dtype ROW."""
-        return self.rows.numbers[self.position]
+        return self.rows.number_row(self.position)
 
     def satisfies(self, case: Case) -> bool:
         """Return whether a case needs no new run.
@@ -243,7 +246,8 @@ class Stored:
         """Return the outcome of the job at a position of `rows`."""
         words = {name: str(values[position]) for name, values in self.rows.words.items()}
         attributes = self.rows.attributes(position)
-        return Outcome(words["status"], words["reason"], self.rows.numbers[position], attributes)
+        numbers = self.rows.number_row(position)
+        return Outcome(words["status"], words["reason"], numbers, attributes)
 
     def job(self, key: str) -> "xr.Dataset":
         """Return a stored job's Dataset. Raises StoreError where it is missing or damaged."""

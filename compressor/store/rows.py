@@ -21,7 +21,7 @@ import numpy as np
 
 from compressor.cases import MODEL
 from compressor.metrics import BARRED, HORIZON, NUMBERS
-from compressor.outcome import ROW, Outcome, Regime, SeriesFile, coordinates
+from compressor.outcome import ROW, Outcome, Regime, SeriesFile, coordinates, row
 from compressor.program import PROGRAM
 from compressor.store.files import HEX20, pending_path
 from compressor.store.hdf5 import DamagedJob, digest, image, open_file, read_variable, storable
@@ -82,6 +82,14 @@ class Segment:
                 if name in file:
                     found[name] = read_variable(file[name], self.numbers_or_file)
         return found
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """Return the names of the numbers that the segment has; others are nan in all rows."""
+        if isinstance(self.numbers_or_file, np.ndarray):
+            return frozenset(NUMBERS)
+        with open_file(self.numbers_or_file, self.path, REMEDY) as file:
+            return frozenset(name for name in NUMBERS if name in file)
 
     @property
     def place(self) -> Path:
@@ -170,17 +178,21 @@ def encode(segment: Segment) -> bytes:
     The keys stand in it twice, first and last, so that damage can be told by the job's name.
     """
     columns = segment.columns
-    variables: dict[str, Any] = {}
     numbers = segment.numbers()
-    for name, (dims, values, attrs) in coordinates().items():
+    present = [
+        metric for name, metric in NUMBERS.items()
+        if not metric.when or not np.isnan(numbers[name]).all()
+    ]  # fmt: skip
+    dims = {dim for metric in present for dim in metric.dims}
+    variables: dict[str, Any] = {}
+    for name, (names, values, attrs) in coordinates({"quantile", *dims}).items():
         kind = object if isinstance(values[0], str) else float
-        variables[name] = (dims, np.array(values, kind), attrs)
+        variables[name] = (names, np.array(values, kind), attrs)
     for name, (_, phrase, _) in COLUMNS.items():
         variables[name] = (("row",), columns[name], {"long_name": phrase})
-    for name, metric in NUMBERS.items():
-        values = numbers[name]
-        if not metric.when or not np.isnan(values).all():
-            variables[name] = (("row", *metric.dims), values, metric.attributes)
+    for metric in present:
+        name = metric.name
+        variables[name] = (("row", *metric.dims), numbers[name], metric.attributes)
     for name, packed in (("attributes", segment.texts), ("details", segment.notes)):
         data = np.frombuffer(packed, np.uint8)
         attrs = {"long_name": "zlib of JSON, a line a row"}
@@ -244,7 +256,7 @@ def merge(segments: Sequence[Segment]) -> Segment:
     return Segment(
         Path(),
         rows.columns,
-        rows.numbers,
+        rows._numbers(*NUMBERS),
         pack_lines(texts[source][row] for source, row in chosen),
         pack_lines(segments[source].details[row] for source, row in chosen),
     )
@@ -300,8 +312,20 @@ class Rows:
 
     @cached_property
     def numbers(self) -> np.ndarray:
-        """Return all numbers of every job, dtype ROW, (jobs,): a kilobyte a job, read once."""
-        return self._numbers()
+        """Return the numbers of every job, (jobs,): a kilobyte a job, read once.
+
+        Those fields of ROW that every job has, or some segment: `number_row` has all of a job.
+        """
+        given = {name for name, row in NUMBERS.items() if not row.when}
+        given |= {name for segment in self.segments for name in segment.names}
+        return self._numbers(*[name for name in NUMBERS if name in given])
+
+    def number_row(self, position: int) -> np.void:
+        """Return all numbers of a job, dtype ROW."""
+        found, known = row(), self.numbers
+        for name in known.dtype.names or ():
+            found[name] = known[name][position]
+        return found
 
     @cached_property
     def has_bars(self) -> np.ndarray:
@@ -328,7 +352,7 @@ class Rows:
             mine = np.flatnonzero(self.source == number)
             numbers = segment.numbers(*names)
             if found is None:
-                found = np.empty(len(self), numbers.dtype)
+                found = np.empty(len(self), [(name, ROW[name]) for name in names])
             found[mine] = numbers[self.row[mine]]
         return np.empty(0, ROW) if found is None else found
 

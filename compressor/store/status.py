@@ -427,7 +427,8 @@ def report_job(folder: Folder, *words: str) -> JobReport:
     if position is None:
         return JobReport(key, "missing", "", "", "", mine, again, {}, {}, [])
     end, path = store.status_at(position), store.rows.path(position)
-    numbers = {name: np.asarray(end.numbers[name]).tolist() for name in NUMBERS}
+    known = end.numbers
+    numbers = {name: np.asarray(known[name]).tolist() for name in NUMBERS}
     attributes = {
         name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in store.rows.attributes(position).items()

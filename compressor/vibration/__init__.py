@@ -1,7 +1,7 @@
 """What a frame does with the forces on it, and how its signals are read."""
 
-from compressor.vibration.accelerometer import Record, analogue_rate, listen
-from compressor.vibration.body import Forces, body_motion
+from compressor.vibration.accelerometer import Record, analogue_rate
+from compressor.vibration.body import Forces
 from compressor.vibration.envelope import (
     energy_angle,
     envelope_spectrum,
@@ -9,6 +9,7 @@ from compressor.vibration.envelope import (
     kurtogram,
     shape,
 )
+from compressor.vibration.monitor import Monitored, shake_body
 from compressor.vibration.record_files import RecordError, encode_record, record_columns
 from compressor.vibration.record_reader import (
     MIN_REVOLUTIONS,

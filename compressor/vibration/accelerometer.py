@@ -1,6 +1,6 @@
 """What an accelerometer on the body records: mounting, filter, range, noise, sampling, tacho."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -29,13 +29,15 @@ class Record:
     """Samples (m/s2) of an accelerometer at `times` (s) from the record's begin, (n,).
 
     `tacho`: times (s) at which the crank passes top dead centre, within the record; `clipped`: the
-    share of samples beyond the range.
+    share of samples beyond the range; `turns`: revolutions of the crank at the samples,
+    (n,), empty where they are not known.
     """
 
     times: np.ndarray
     values: np.ndarray
     tacho: np.ndarray
     clipped: float
+    turns: np.ndarray = field(default_factory=lambda: np.empty(0))
 
 
 def analogue_rate(body: Body, sensor: Sensor) -> float:
@@ -60,12 +62,14 @@ def listen(
     turn: float,
     guide: float,
     motion: BodyMotion | None = None,
+    phase: float = 0.0,
 ) -> Record:
     """Return the record of a sensor on a body under forces.
 
     forces: with a first and last sample a whole number of revolutions of `turn` s apart where the
-    body is steady, in any case from top dead centre on; guide: mid-stroke from the crank, m;
-    motion: of the body under these forces, where it is known already.
+    body is steady; guide: mid-stroke from the crank, m;
+    motion: of the body under these forces, where it is known already; phase: revolutions of the
+    crank from top dead centre to the first sample.
 
     A steady motion is repeated as often as the record is long, with each revolution at its own
     pace where the speed jitters; the force at an angle stays what it is.
@@ -86,7 +90,7 @@ def listen(
         force = getattr(forces, sensor.place)[:, AXES.index(sensor.direction)]
         force = interpolate_periodic(force, forces.step, pace) if steady else force
         acceleration = acceleration + casing_acceleration(body, force, forces.step)
-    return record_signal(sensor, acceleration, times, pace / turn, rng)
+    return record_signal(sensor, acceleration, times, pace / turn + phase, rng)
 
 
 def interpolate_periodic(values: np.ndarray, step: float, times: np.ndarray) -> np.ndarray:
@@ -139,4 +143,4 @@ def record_signal(
     passes = np.arange(np.ceil(max(turns[0], 0.0) - 1e-9), np.floor(turns[-1]) + 1)
     tacho = np.interp(passes, turns, times)
     tacho = tacho[(tacho > -0.5 * step) & (tacho <= taken[-1])]
-    return Record(taken, values, tacho, float(beyond.mean()))
+    return Record(taken, values, tacho, float(beyond.mean()), np.interp(taken, times, turns))

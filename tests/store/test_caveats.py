@@ -9,6 +9,7 @@ from compsim import cli
 from conftest import jobs_here
 
 from compressor.cases.case import Case
+from compressor.metrics import NUMBERS
 from compressor.outcome import REGIME_WORDS, Regime
 from compressor.report.report import write_report
 from compressor.solve.simulate import simulate
@@ -109,7 +110,7 @@ def test_a_file_of_an_older_version_has_it_by_its_new_name(folder, monkeypatch):
     key = open_study(folder).key.values[0]
     old = read_store(folder).job(key)
     assert old["clipped_fraction"] == old["clipped_share"]
-    monkeypatch.setattr(Rows, "numbers", property(lambda rows: forgotten(rows._numbers())))
+    monkeypatch.setattr(Rows, "numbers", property(lambda rows: forgotten(rows._numbers(*NUMBERS))))
     assert report_job(folder, key).numbers["clipped_fraction"] == old["clipped_share"]
 
 

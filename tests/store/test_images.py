@@ -34,7 +34,11 @@ def make_job(random, samples, names, status):
     numbers = row()
     for name in NUMBERS:
         if not NUMBERS[name].when or status[0] == "ok":
-            numbers[name] = make_values(random, numbers[name].shape)
+            values = make_values(random, numbers[name].shape)
+            # nan of what few jobs have would be another layout
+            numbers[name] = (
+                np.where(np.isnan(values), 0.0, values) if NUMBERS[name].when else values
+            )
     attributes = {
         "key": "".join(random.choice([*"0123456789abcdef"], 20)),
         "case": TEXTS[random.integers(len(TEXTS))],

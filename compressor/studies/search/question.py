@@ -14,14 +14,17 @@ from typing import Any
 import numpy as np
 
 from compressor.cases import Study, load_studies, row_of
-from compressor.metrics import AXES, BARRED, JOINTS
+from compressor.metrics import AXES, BARRED, JOINTS, NUMBERS, SEGMENTS, THRESHOLDS
 from compressor.program import CompsimError, did_you_mean
 from compressor.solve import sure
 
 SIGNS = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
 COMPARISON = re.compile(r"\s*([\w.]+)\s*(>=|<=|>|<)\s*([^\s<>=]+)\s*")
 OVER = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*")
-WORDS = {"joint": JOINTS, "axis": AXES}
+WORDS = {
+    "joint": JOINTS, "axis": AXES, "threshold": THRESHOLDS,
+    "segment": tuple(f"{degrees:g}" for degrees in SEGMENTS),
+}  # fmt: skip
 DIGITS = 12  # of an argument: enough for any tolerance, and short to read
 NAME = 64  # characters that a study's name may have
 
@@ -89,8 +92,7 @@ class Goal:
         counts, with the 95 % interval that its standard error and Student's t give. The bars of
         other metrics of a chaotic motion are such intervals already.
         """
-        metric = BARRED[self.metric]
-        averaged = regime == "chaotic" and metric.kind == "greatest"
+        averaged = regime == "chaotic" and f"{self.metric}_mean" in NUMBERS
         if averaged:
             mean = f"{self.metric}_mean"
             value = self._at(numbers, mean)

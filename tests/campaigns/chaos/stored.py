@@ -5,7 +5,6 @@ import json
 
 import numpy as np
 
-from compressor.outcome import ROW
 from compressor.store import hdf5
 from compressor.store.files import StoreError
 from compressor.store.hdf5 import DamagedJob, open_file
@@ -41,7 +40,7 @@ def contents(folder, foreign=()):
     foreign: attributes that depend on which of several studies ran it.
     """
     stored, found = read_store(folder), {}
-    names = [name for name in ROW.names if name != TIMED]
+    names = [name for name in stored.rows.numbers.dtype.names if name != TIMED]
     columns = stored.rows.columns
     for position in np.argsort(stored.rows.source, kind="stable"):  # segment by segment: quicker
         parts = [stored.rows.numbers[name][position].tobytes() for name in names]

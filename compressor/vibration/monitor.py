@@ -1,0 +1,182 @@
+"""What a monitoring system reads of a vibration: a band's rms, crank-angle segments, counts."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from compressor.cases import Body, Sensor
+from compressor.vibration.accelerometer import Record, listen
+from compressor.vibration.body import BodyMotion, Forces, body_motion
+from compressor.vibration.envelope import crest_factor, kurtosis, rms
+from compressor.vibration.spectra import checked_positive, checked_signal
+
+SEGMENT = 10.0  # degrees of the crank
+Thresholds = Sequence[float | None]  # m/s2, None for none
+Numbers = dict[str, float | np.ndarray]  # metrics by name, SI
+
+
+@dataclass(frozen=True)
+class Monitored:
+    """How forces move a body, and what is monitored of it over whole settled revolutions.
+
+    `motion`: at all samples of the forces; `recorded`: by the sensor, None without one. Settled:
+    `velocity` in a band, m/s, (m, axis); `record`: m/s2, (n,), and `turns` of the crank there, in
+    revolutions from a top dead centre, `first` of them where it settles, (n,), none without a
+    sensor; `revolutions`: of each of the two.
+    """
+
+    motion: BodyMotion
+    recorded: Record | None
+    velocity: np.ndarray
+    record: np.ndarray
+    turns: np.ndarray
+    first: float
+    revolutions: tuple[int, int]
+
+    def measure(self, thresholds: Thresholds) -> Numbers:
+        """Return the metrics by name, of `compressor.metrics.TABLE`.
+
+        None of a body or a record without a whole revolution; no counts without a threshold.
+        """
+        numbers: Numbers = {}
+        if self.revolutions[0]:
+            numbers["body_velocity_rms"] = np.sqrt(np.mean(self.velocity**2, axis=0))
+        if self.revolutions[1] < 1:
+            return numbers
+        peak, root = self.segments(self.record)
+        numbers |= {
+            "sensor_peak": float(np.abs(self.record).max()),
+            "sensor_rms": rms(self.record),
+            "sensor_crest_factor": crest_factor(self.record),
+            "sensor_kurtosis": kurtosis(self.record),
+            "sensor_segment_peak": peak,
+            "sensor_segment_rms": root,
+        }
+        if any(one is not None for one in thresholds):
+            numbers["sensor_counts_per_rev"] = self.counts(thresholds)
+        return numbers
+
+    def counts(self, thresholds: Thresholds) -> np.ndarray:
+        """Return the peaks of the record in a revolution over each threshold; nan of None."""
+        return np.array([
+            math.nan if one is None else count_peaks(self.record, one) / self.revolutions[1]
+            for one in thresholds
+        ])  # fmt: skip
+
+    def segments(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the greatest magnitude and the rms in each segment, (36,) each.
+
+        values: at the samples of the record, or at the first of them, (k,).
+        """
+        segment = segments_of(self.turns[: len(values)])
+        return segment_peak(values, segment), segment_rms(values, segment)
+
+    def cut(self) -> list["Monitored"]:
+        """Return each revolution: of the velocity, and of the record where there is one.
+
+        A record may repeat the settled revolutions, which tells nothing more of them: no more
+        revolutions of it are taken than there are of the velocity.
+        """
+        whole, recorded = self.revolutions
+        count = min(whole, recorded) if recorded else whole
+        velocity = np.array_split(self.velocity, whole) if whole else []
+        of_turn = [np.floor(self.turns - self.first + 1e-9) == n for n in range(count)]
+        return [
+            replace(
+                self,
+                velocity=one,
+                record=self.record[mine],
+                turns=self.turns[mine],
+                revolutions=(1, min(1, recorded)),
+            )
+            for one, mine in zip(velocity, of_turn, strict=False)
+        ]
+
+
+def shake_body(
+    body: Body, sensor: Sensor | None, forces: Forces, turn: float, guide: float, settle: float
+) -> Monitored:
+    """Return the body's motion under forces, the sensor's record, and what is monitored.
+
+    forces, turn, guide: see `listen`; settle: s, from where revolutions count, which is the first
+    sample of the forces where the body is steady, else time after it.
+    """
+    steady = body.start == "steady"
+    first = round(settle / turn, 9) % 1.0 if steady else settle / turn
+    motion, recorded = body_motion(body, forces, steady), None
+    if sensor is not None:
+        phase = first if steady else 0.0
+        recorded = listen(body, sensor, forces, turn, guide, motion, phase)
+    velocity = np.stack([motion.x.velocity, motion.y.velocity], axis=1)
+    velocity = velocity[0 if steady else round(settle / forces.step) :]
+    whole = math.floor((len(velocity) - 1) * forces.step / turn * (1 + 1e-9))
+    velocity = velocity[: round(whole * turn / forces.step)]
+    if whole:
+        rate = 1.0 / forces.step
+        in_band = [band_signal(one, rate, *body.band_Hz) for one in velocity.T]
+        velocity = np.stack(in_band, axis=1)
+    if recorded is None:
+        nothing = np.empty(0)
+        return Monitored(motion, None, velocity, nothing, nothing, first, (whole, 0))
+    passed = recorded.turns - first
+    spacing = (passed[-1] - passed[0]) / max(len(passed) - 1, 1)
+    count = math.floor(passed[-1] + 2.0 * spacing)  # up to a sample may lack of the last one
+    inside = (passed > -1e-9) & (passed < count - 1e-9)
+    record, turns = recorded.values[inside], recorded.turns[inside]
+    return Monitored(motion, recorded, velocity, record, turns, first, (whole, count))
+
+
+def band_signal(values: np.ndarray, rate: float, low: float, high: float) -> np.ndarray:
+    """Return the part of a signal between two frequencies (Hz), both included, (m,).
+
+    values: (m,), at `rate` samples a second, as if they repeated themselves. The lines of the
+    spectrum outside of the band are removed, exactly and without a shift of phase. Raises
+    SignalError for values that are not finite or not in a row.
+    """
+    found = checked_signal(values)
+    lines = np.fft.rfft(found)
+    frequency = np.fft.rfftfreq(found.size, 1.0 / checked_positive(rate, "the rate"))
+    outside = (frequency < low * (1.0 - 1e-12)) | (frequency > high * (1.0 + 1e-12))
+    lines[outside] = 0.0
+    return np.fft.irfft(lines, found.size)
+
+
+def segments_of(turns: np.ndarray) -> np.ndarray:
+    """Return the segment, 0 to 35, of crank angles in revolutions from top dead centre, (m,)."""
+    count = round(360.0 / SEGMENT)
+    # an angle that rounding has put just before a segment's begin lies in it
+    return np.floor(np.asarray(turns) * count + 1e-9).astype(int) % count
+
+
+def segment_peak(values: np.ndarray, segment: np.ndarray) -> np.ndarray:
+    """Return the greatest magnitude of the samples in each of 36 segments; nan of an empty one.
+
+    values: (m,); segment: of each, (m,), by `segments_of`.
+    """
+    peak = np.full(round(360.0 / SEGMENT), -math.inf)
+    np.maximum.at(peak, segment, np.abs(values))
+    return np.where(np.isinf(peak), math.nan, peak)
+
+
+def segment_rms(values: np.ndarray, segment: np.ndarray) -> np.ndarray:
+    """Return the root mean square of the samples in each of 36 segments; nan of an empty one.
+
+    values: (m,); segment: of each, (m,), by `segments_of`.
+    """
+    count = round(360.0 / SEGMENT)
+    number = np.bincount(segment, minlength=count)
+    square = np.bincount(segment, np.asarray(values) ** 2, count)
+    return np.sqrt(np.divide(square, number, out=np.full(count, math.nan), where=number > 0))
+
+
+def count_peaks(values: np.ndarray, threshold: float) -> int:
+    """Return how many peaks of |values| pass a threshold.
+
+    A peak begins where |values| rises above the threshold, and counts once it is no longer above
+    it: one that the record's end cuts off does not count, one that its begin cuts off does. Each
+    swing of a casing that rings counts, to either side, so that one impact may give several counts.
+    """
+    above = np.abs(values) > threshold
+    return int(np.count_nonzero(above[:-1] & ~above[1:]))

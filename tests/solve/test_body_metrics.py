@@ -1,0 +1,236 @@
+"""Metrics of the body and of the sensor's record: plain NumPy of what is stored, and error bars."""
+
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+from compsim import cli
+from conftest import CHAOTIC, keep, store
+
+from compressor.cases.case import Case, CaseError
+from compressor.metrics import NUMBERS, of_source
+from compressor.solve import attempts
+from compressor.solve.series import finer
+from compressor.solve.simulate import measure, observe, simulate
+from compressor.store.reader import read_store
+
+TURNS = {"duration_rev": 3, "settle_rev": 1, "accuracy": "draft"}
+BODY = {"body": {"frequency_x_Hz": 4.0, "frequency_y_Hz": 30.0}}
+SENSED = {
+    "joint": "big_end", "clearance_mm": 0.2, "solve": TURNS, **BODY,
+    "sensor": {"threshold_m_per_s2": 10.0, "second_threshold_m_per_s2": 20.0},
+}  # fmt: skip
+OF_BODY = [row.name for row in of_source("body")]
+OF_SENSOR = [name for name in OF_BODY if name.startswith("sensor")]
+
+
+@pytest.fixture(scope="module")
+def sensed():
+    return simulate(Case.from_values(SENSED))
+
+
+def test_the_sensor_s_numbers_are_those_of_the_stored_record(sensed):
+    """By plain NumPy: 500 rpm, two settled revolutions of 3072 samples from top dead centre."""
+    record = sensed["sensor_acceleration"].values
+    assert record.size == 2 * 3072
+    assert sensed["tacho_time"].values[:2].tolist() == pytest.approx([0.0, 0.12], abs=1e-12)
+    square = np.mean(record**2)
+    assert float(sensed["sensor_peak"]) == np.abs(record).max()
+    assert float(sensed["sensor_rms"]) == pytest.approx(math.sqrt(square), rel=1e-12)
+    crest = np.abs(record).max() / math.sqrt(square)
+    assert float(sensed["sensor_crest_factor"]) == pytest.approx(crest, rel=1e-12)
+    central = record - record.mean()
+    fourth = np.mean(central**4) / np.mean(central**2) ** 2
+    assert float(sensed["sensor_kurtosis"]) == pytest.approx(fourth, rel=1e-12)
+    degrees = sensed["sensor_time"].values * 500 * 6 % 360
+    for begin, peak, rms in zip(
+        sensed["segment"].values, sensed["sensor_segment_peak"].values,
+        sensed["sensor_segment_rms"].values, strict=True,
+    ):  # fmt: skip
+        mine = record[(degrees >= begin - 1e-6) & (degrees < begin + 10 - 1e-6)]
+        assert peak == np.abs(mine).max()
+        assert rms == pytest.approx(np.sqrt(np.mean(mine**2)), rel=1e-12)
+    for name, threshold in (("first", 10.0), ("second", 20.0)):
+        over = (np.abs(record) > threshold).astype(int)
+        falls = int((np.diff(over) == -1).sum())
+        assert float(sensed["sensor_counts_per_rev"].sel(threshold=name)) == falls / 2 > 0
+    assert float(sensed["sensor_segment_peak"].max()) == float(sensed["sensor_peak"])
+    assert sensed["segment"].attrs["units"] == "deg"
+
+
+def test_the_body_s_number_is_that_of_the_stored_velocity(sensed):
+    """By the spectrum of the settled revolutions on the output grid, 10 kHz: lines 2 to 1000 Hz."""
+    velocity = sensed["body_velocity"].values
+    velocity = velocity[np.isfinite(velocity[:, 0])][:-1]
+    lines = np.abs(np.fft.rfft(velocity, axis=0) / len(velocity)) ** 2 * 2
+    frequency = np.arange(len(lines)) / 0.24
+    inside = (frequency >= 2) & (frequency <= 1000)
+    expected = np.sqrt(lines[inside].sum(axis=0))
+    np.testing.assert_allclose(sensed["body_velocity_rms"].values, expected, rtol=1e-5)
+
+
+def test_a_band_is_that_of_the_case():
+    """Above the force's orders 1 and 2 next to nothing is left of ideal joints."""
+    whole = measured({"solve": TURNS, **BODY})["body_velocity_rms"]
+    high = {"frequency_x_Hz": 4.0, "frequency_y_Hz": 30.0, "band_low_Hz": 100, "band_high_Hz": 800}
+    above = measured({"solve": TURNS, "body": high})["body_velocity_rms"]
+    assert (above < 1e-3 * whole).all()
+
+
+def measured(values):
+    return observe(Case.from_values(values))[0].numbers
+
+
+@pytest.mark.parametrize("joint", ["big_end", "small_end"])
+@pytest.mark.parametrize("place", [("guide", "y"), ("bearing", "x")])
+def test_bars_hold_the_error(joint, place, monkeypatch):
+    """Against a run at rtol 1e-11 whose forces are sampled three times as finely."""
+    sensor = {"place": place[0], "direction": place[1], "threshold_m_per_s2": 15.0}
+    values = {**SENSED, "joint": joint, "sensor": sensor}
+    ours, real = measured(values), finer
+    for module in (sys.modules["compressor.solve.simulate"], attempts):
+        monkeypatch.setattr(module, "finer", lambda case: 3 * real(case))
+    exact = measured({**values, "solve": {"duration_rev": 3, "settle_rev": 1, "rtol": 1e-11}})
+    for name in OF_BODY:
+        away, bar = np.abs(ours[name] - exact[name]), ours[f"{name}_error"]
+        known = np.isfinite(ours[name])
+        assert (away[known] <= bar[known]).all(), name
+        if known.any() and "counts" not in name:  # and are short: longer in a silent segment
+            assert np.median(bar[known] / np.abs(ours[name][known])) < 0.1, name
+        assert known.any()
+
+
+def test_a_bar_is_of_numerics_and_not_of_noise():
+    """Ten times the noise: the bar of rms stays, though it is far less than what noise changes."""
+    quiet, loud = (
+        measured({**SENSED, "sensor": {"noise_m_per_s2": noise}}) for noise in (0.0, 2.0)
+    )
+    noise = math.sqrt(loud["sensor_rms"] ** 2 - quiet["sensor_rms"] ** 2)
+    assert noise == pytest.approx(2.0, rel=0.1)
+    assert loud["sensor_rms_error"] < 2 * quiet["sensor_rms_error"] < 0.2
+
+
+def test_a_longer_record_repeats_the_same_numbers():
+    """Without noise and jitter; with jitter counts and segments stay near."""
+    one = measured({**SENSED, "sensor": {"noise_m_per_s2": 0, "threshold_m_per_s2": 10}})
+    long = {"noise_m_per_s2": 0, "threshold_m_per_s2": 10, "length_rev": 7}
+    more = measured({**SENSED, "sensor": long})
+    shaken = measured({**SENSED, "sensor": {**long, "speed_jitter": 0.002}})
+    for name in OF_SENSOR:
+        kept = np.isfinite(one[name])
+        np.testing.assert_allclose(more[name][kept], one[name][kept], rtol=0.05, err_msg=name)
+    for name in ("sensor_rms", "sensor_counts_per_rev"):
+        kept = np.isfinite(one[name])
+        np.testing.assert_allclose(shaken[name][kept], one[name][kept], rtol=0.1, err_msg=name)
+
+
+@pytest.mark.parametrize("start", ["steady", "rest"])
+def test_settled_revolutions_need_not_begin_at_top_dead_centre(start):
+    """Segments are those of the crank; the tacho has its pulses at top dead centre."""
+    body = {**BODY["body"], "start": start}
+    sensor = {"noise_m_per_s2": 0}
+    half, whole = (
+        simulate(Case.from_values({
+            **SENSED, "body": body, "sensor": sensor,
+            "solve": {"duration_rev": settle + 2, "settle_rev": settle, "rtol": 1e-8},
+        })) for settle in (2.5, 2)
+    )  # fmt: skip
+    if start == "steady":
+        assert half["tacho_time"].values[0] == pytest.approx(0.06, abs=1e-9)
+    for name in ("sensor_segment_rms", "sensor_segment_peak"):
+        apart = np.abs(half[name].values - whole[name].values).max()
+        assert apart < 0.05 * whole[name].values.max()
+
+
+def test_from_rest_the_settled_revolutions_count():
+    values = {
+        **SENSED,
+        "body": {**BODY["body"], "start": "rest"},
+        "solve": {**TURNS, "settle_rev": 1.5},
+    }
+    run = simulate(Case.from_values(values))
+    turns = run["sensor_time"].values / 0.12
+    record = run["sensor_acceleration"].values[(turns >= 1.5 - 1e-9) & (turns < 2.5 - 1e-9)]
+    assert float(run["sensor_peak"]) == np.abs(record).max()
+    assert float(run["sensor_rms"]) == pytest.approx(np.sqrt(np.mean(record**2)), rel=1e-12)
+
+
+def test_a_chaotic_motion_has_intervals_of_its_averages():
+    """Batch means over revolutions; peaks and what is made of them are not known."""
+    values = {**CHAOTIC, **BODY, "sensor": {"threshold_m_per_s2": 50.0},
+              "solve": {"duration_rev": 13, "settle_rev": 1, "accuracy": "draft"}}  # fmt: skip
+    run = simulate(Case.from_values(values))
+    assert run.attrs["regime"] == "chaotic"
+    for name in ("sensor_peak", "sensor_crest_factor", "sensor_kurtosis", "sensor_segment_peak"):
+        assert np.isinf(run[f"{name}_error"]).all()
+    per_turn = run["sensor_acceleration"].values.reshape(12, -1)
+    square = np.mean(per_turn**2, axis=1)
+    error = 2.200985 * square.std(ddof=1) / math.sqrt(12)  # Student's t of 11 degrees, 97.5 %
+    rms = float(run["sensor_rms"])
+    assert float(run["sensor_rms_error"]) == pytest.approx(error / (2 * rms), rel=1e-3)
+    bar = float(run["sensor_counts_per_rev_error"].sel(threshold="first"))
+    assert 0 < bar < 0.5 * float(run["sensor_counts_per_rev"].sel(threshold="first"))
+
+
+def test_without_body_or_sensor_there_is_nothing_of_them(tmp_path):
+    plain = {"joint": "big_end", "clearance_mm": 0.2, "solve": TURNS}
+    numbers = measure(Case.from_values(plain)).numbers
+    assert all(np.isnan(numbers[name]).all() for name in OF_BODY)
+    keep(tmp_path / "plain", simulate(Case.from_values(plain)))
+    rows = read_store(tmp_path / "plain").rows
+    assert not {*OF_BODY} & {*rows.numbers.dtype.names}
+    (path,) = (tmp_path / "plain" / "rows").glob("*.h5")
+    import h5py
+
+    with h5py.File(path) as file:
+        assert not {"segment", "threshold", *OF_BODY} & {*file}
+    bare = measured({**plain, **BODY})
+    assert np.isfinite(bare["body_velocity_rms"]).all()
+    assert all(np.isnan(bare[name]).all() for name in OF_SENSOR)
+    no_bars = measured({**SENSED, "solve": {**TURNS, "error_bars": False}})
+    assert np.isfinite(no_bars["sensor_peak"])
+    assert np.isnan(no_bars["sensor_peak_error"])
+
+
+def test_a_run_that_stops_has_none():
+    numbers = measured({**SENSED, "solve": {**TURNS, "max_steps": 60}})
+    assert all(np.isnan(numbers[name]).all() for name in OF_BODY)
+
+
+def test_keys_of_cases_stay_valid():
+    """Those of before there were bands and thresholds; one that gives them is another job."""
+    key = "4111e1fc53d23aafecdf"
+    assert Case.from_values({"body": True, "sensor": True}).key == key
+    assert Case.from_values({"body": {"band_low_Hz": 10}, "sensor": True}).key != key
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"body": {"band_low_Hz": 2000}}, "would be 2000 to 1000 Hz"),
+        ({"body": {"band_high_Hz": 1}}, "body.band_high_Hz: the band"),
+        ({"body": True, "sensor": {"second_threshold_m_per_s2": 3}}, "sensor.threshold_m_per_s2"),
+    ],
+)
+def test_what_does_not_fit_together(values, message):
+    with pytest.raises(CaseError, match=message.replace(".", r"\.")):
+        Case.from_values(values)
+
+
+def test_they_are_stored_shown_and_found(tmp_path, capsys, sensed):
+    (tmp_path / "sensed.yaml").write_text(json.dumps(SENSED))
+    store(tmp_path / "results", tmp_path / "sensed.yaml")
+    key = sensed.attrs["key"]
+    job = read_store(tmp_path / "results").job(key)
+    for name in OF_BODY:
+        np.testing.assert_array_equal(job[name], sensed[name])
+        assert job[name].dims == NUMBERS[name].dims
+    assert cli.main(["show", key, "-i", str(tmp_path / "results")]) == 0
+    out = capsys.readouterr().out
+    at = float(sensed["segment"][int(np.argmax(sensed["sensor_segment_rms"].values))])
+    assert f"sensor segment rms, {at:g} to {at + 10:g} deg" in out
+    assert out.count("sensor segment") == 2
+    assert "body velocity rms, x" in out
+    assert "sensor counts, second" in out

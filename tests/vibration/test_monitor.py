@@ -1,0 +1,111 @@
+"""What a monitoring system reads of a record: against closed forms and plain NumPy."""
+
+import math
+
+import numpy as np
+import pytest
+
+from compressor.vibration.body import oscillate
+from compressor.vibration.envelope import crest_factor, kurtosis, rms
+from compressor.vibration.monitor import (
+    band_signal,
+    count_peaks,
+    segment_peak,
+    segment_rms,
+    segments_of,
+)
+
+
+def test_of_a_sine():
+    """Amplitude A: rms A / sqrt 2, crest factor sqrt 2, kurtosis 3/2; two peaks a turn."""
+    turns = np.arange(36000) / 3600
+    wave = 7.0 * np.sin(2 * math.pi * turns)
+    assert rms(wave) == pytest.approx(7 / math.sqrt(2), rel=1e-12)
+    assert crest_factor(wave) == pytest.approx(math.sqrt(2), rel=1e-6)
+    assert kurtosis(wave) == pytest.approx(1.5, rel=1e-9)
+    assert count_peaks(wave, 3.5) == 20
+    assert count_peaks(wave, 7.1) == 0
+    segment = segments_of(turns)
+    assert np.bincount(segment).tolist() == [1000] * 36
+    edges = np.radians(np.arange(37) * 10.0)
+    square = 24.5 * (1 - np.diff(np.sin(2 * edges)) / (2 * np.diff(edges)))  # mean over 10 degrees
+    np.testing.assert_allclose(segment_rms(wave, segment), np.sqrt(square), atol=0.01)
+    highest = [np.abs(7 * np.sin(np.radians(at + np.linspace(0, 10, 99)))).max() for at in
+               range(0, 360, 10)]  # fmt: skip
+    np.testing.assert_allclose(segment_peak(wave, segment), highest, atol=0.02)
+
+
+def test_segments_against_plain_numpy():
+    random = np.random.default_rng(3)
+    turns, values = random.uniform(0, 5, 20_000), random.normal(size=20_000)
+    degrees = turns * 360 % 360
+    segment = segments_of(turns)
+    for number in range(36):
+        mine = values[(degrees >= 10 * number) & (degrees < 10 * number + 10)]
+        assert segment_peak(values, segment)[number] == np.abs(mine).max()
+        assert segment_rms(values, segment)[number] == pytest.approx(np.sqrt(np.mean(mine**2)))
+
+
+def test_an_angle_at_a_begin_lies_in_the_segment_that_begins_there():
+    at = np.arange(72) * 10.0 / 360.0  # of which some are rounded down
+    assert segments_of(at).tolist() == [*range(36)] * 2
+
+
+def test_a_segment_without_samples_has_no_number():
+    segment = segments_of(np.array([0.0, 0.5]))
+    for found in (segment_peak(np.ones(2), segment), segment_rms(np.ones(2), segment)):
+        assert np.isnan(found).sum() == 34
+        assert found[[0, 18]].tolist() == [1, 1]
+
+
+@pytest.mark.parametrize(
+    ("values", "count"),
+    [
+        ([0, 5, 0], 1),
+        ([0, 5, 6, 4, 0], 1),  # one peak, however long it lasts
+        ([0, 5, 3, 5, 0], 2),  # 3 is not above 3
+        ([0, 5, -5, 0], 1),  # does not come back below in between
+        ([0, 5, 0, -5, 0], 2),  # to either side
+        ([5, 0, 0], 1),  # cut off by the begin
+        ([0, 0, 5], 0),  # by the end
+        ([3, 3, 3], 0),
+    ],
+)
+def test_peaks_over_a_threshold(values, count):
+    assert count_peaks(np.array(values, float), 3.0) == count
+
+
+def test_counts_against_a_plain_loop():
+    values = np.random.default_rng(8).normal(size=5000)
+    count, over = 0, False
+    for value in values:
+        if over and abs(value) <= 1.2:
+            count += 1
+        over = abs(value) > 1.2
+    assert count_peaks(values, 1.2) == count > 500
+
+
+def test_a_band_holds_its_lines_alone():
+    """rms of lines at 10, 50 and 200 Hz of 3, 4 and 12: that of those inside, ends included."""
+    time = np.arange(4000) / 4000
+    values = sum(a * np.sin(2 * math.pi * f * time + f) for f, a in ((10, 3), (50, 4), (200, 12)))
+    for low, high, square in (
+        (2, 1000, 169),
+        (10, 50, 25),
+        (11, 199, 16),
+        (60, 100, 0),
+        (0, 49, 9),
+    ):
+        found = rms(band_signal(values + 100.0 * (low > 0), 4000.0, low, high))
+        assert found == pytest.approx(math.sqrt(square / 2), abs=1e-9)
+
+
+def test_the_velocity_of_an_oscillator_under_a_harmonic_force():
+    """f cos wt a unit of mass: velocity amplitude f w / |w0^2 - w^2 + 2 i zeta w w0|."""
+    step, cycles, f, w0, zeta = 1e-4, 10, 3.0, 2 * math.pi * 20.0, 0.03
+    w = 2 * math.pi * 12.5
+    force = f * np.cos(w * step * np.arange(round(cycles / 12.5 / step) + 1))
+    velocity = oscillate(force, step, 20.0, zeta, steady=True).velocity[:-1]
+    expected = f * w / abs(w0**2 - w**2 + 2j * zeta * w * w0) / math.sqrt(2)
+    assert rms(band_signal(velocity, 1 / step, 2, 1000)) == pytest.approx(expected, rel=1e-9)
+    assert rms(band_signal(velocity, 1 / step, 13, 1000)) < 1e-9 * expected
