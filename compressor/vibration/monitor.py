@@ -10,9 +10,9 @@ from compressor.cases import Body, Sensor
 from compressor.vibration.accelerometer import Record, listen
 from compressor.vibration.body import BodyMotion, Forces, body_motion
 from compressor.vibration.envelope import crest_factor, kurtosis, rms
+from compressor.vibration.segments import segment_levels
 from compressor.vibration.spectra import checked_positive, checked_signal
 
-SEGMENT = 10.0  # degrees of the crank
 Thresholds = Sequence[float | None]  # m/s2, None for none
 Numbers = dict[str, float | np.ndarray]  # metrics by name, SI
 
@@ -70,8 +70,7 @@ class Monitored:
 
         values: at the samples of the record, or at the first of them, (k,).
         """
-        segment = segments_of(self.turns[: len(values)])
-        return segment_peak(values, segment), segment_rms(values, segment)
+        return segment_levels(360.0 * self.turns[: len(values)], values)
 
     def cut(self) -> list["Monitored"]:
         """Return each revolution: of the velocity, and of the record where there is one.
@@ -141,34 +140,6 @@ def band_signal(values: np.ndarray, rate: float, low: float, high: float) -> np.
     outside = (frequency < low * (1.0 - 1e-12)) | (frequency > high * (1.0 + 1e-12))
     lines[outside] = 0.0
     return np.fft.irfft(lines, found.size)
-
-
-def segments_of(turns: np.ndarray) -> np.ndarray:
-    """Return the segment, 0 to 35, of crank angles in revolutions from top dead centre, (m,)."""
-    count = round(360.0 / SEGMENT)
-    # an angle that rounding has put just before a segment's begin lies in it
-    return np.floor(np.asarray(turns) * count + 1e-9).astype(int) % count
-
-
-def segment_peak(values: np.ndarray, segment: np.ndarray) -> np.ndarray:
-    """Return the greatest magnitude of the samples in each of 36 segments; nan of an empty one.
-
-    values: (m,); segment: of each, (m,), by `segments_of`.
-    """
-    peak = np.full(round(360.0 / SEGMENT), -math.inf)
-    np.maximum.at(peak, segment, np.abs(values))
-    return np.where(np.isinf(peak), math.nan, peak)
-
-
-def segment_rms(values: np.ndarray, segment: np.ndarray) -> np.ndarray:
-    """Return the root mean square of the samples in each of 36 segments; nan of an empty one.
-
-    values: (m,); segment: of each, (m,), by `segments_of`.
-    """
-    count = round(360.0 / SEGMENT)
-    number = np.bincount(segment, minlength=count)
-    square = np.bincount(segment, np.asarray(values) ** 2, count)
-    return np.sqrt(np.divide(square, number, out=np.full(count, math.nan), where=number > 0))
 
 
 def count_peaks(values: np.ndarray, threshold: float) -> int:

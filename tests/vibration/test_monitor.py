@@ -7,13 +7,8 @@ import pytest
 
 from compressor.vibration.body import oscillate
 from compressor.vibration.envelope import crest_factor, kurtosis, rms
-from compressor.vibration.monitor import (
-    band_signal,
-    count_peaks,
-    segment_peak,
-    segment_rms,
-    segments_of,
-)
+from compressor.vibration.monitor import band_signal, count_peaks
+from compressor.vibration.segments import segment_levels
 
 
 def test_of_a_sine():
@@ -25,37 +20,13 @@ def test_of_a_sine():
     assert kurtosis(wave) == pytest.approx(1.5, rel=1e-9)
     assert count_peaks(wave, 3.5) == 20
     assert count_peaks(wave, 7.1) == 0
-    segment = segments_of(turns)
-    assert np.bincount(segment).tolist() == [1000] * 36
+    peak, root = segment_levels(360.0 * turns, wave)
     edges = np.radians(np.arange(37) * 10.0)
     square = 24.5 * (1 - np.diff(np.sin(2 * edges)) / (2 * np.diff(edges)))  # mean over 10 degrees
-    np.testing.assert_allclose(segment_rms(wave, segment), np.sqrt(square), atol=0.01)
+    np.testing.assert_allclose(root, np.sqrt(square), atol=0.01)
     highest = [np.abs(7 * np.sin(np.radians(at + np.linspace(0, 10, 99)))).max() for at in
                range(0, 360, 10)]  # fmt: skip
-    np.testing.assert_allclose(segment_peak(wave, segment), highest, atol=0.02)
-
-
-def test_segments_against_plain_numpy():
-    random = np.random.default_rng(3)
-    turns, values = random.uniform(0, 5, 20_000), random.normal(size=20_000)
-    degrees = turns * 360 % 360
-    segment = segments_of(turns)
-    for number in range(36):
-        mine = values[(degrees >= 10 * number) & (degrees < 10 * number + 10)]
-        assert segment_peak(values, segment)[number] == np.abs(mine).max()
-        assert segment_rms(values, segment)[number] == pytest.approx(np.sqrt(np.mean(mine**2)))
-
-
-def test_an_angle_at_a_begin_lies_in_the_segment_that_begins_there():
-    at = np.arange(72) * 10.0 / 360.0  # of which some are rounded down
-    assert segments_of(at).tolist() == [*range(36)] * 2
-
-
-def test_a_segment_without_samples_has_no_number():
-    segment = segments_of(np.array([0.0, 0.5]))
-    for found in (segment_peak(np.ones(2), segment), segment_rms(np.ones(2), segment)):
-        assert np.isnan(found).sum() == 34
-        assert found[[0, 18]].tolist() == [1, 1]
+    np.testing.assert_allclose(peak, highest, atol=0.02)
 
 
 @pytest.mark.parametrize(

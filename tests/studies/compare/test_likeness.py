@@ -16,7 +16,6 @@ from compressor.studies.compare.likeness import (
 )
 from compressor.vibration.accelerometer import Record
 from compressor.vibration.record_files import RecordError
-from compressor.vibration.segments import segment_levels
 
 RATE, TURN, WHOLE = 8000.0, 0.1003, 6
 FIRST = 0.01237  # s, of the first pulse: between two samples
@@ -162,19 +161,6 @@ def test_a_share_inside_counts_angles():
     jobs = np.array([np.zeros(360), np.ones(360)])
     inside = np.where(np.arange(360) < 90, 0.5, 2.0)
     assert share_inside(inside, jobs) == 0.25
-
-
-def test_segments_are_those_of_plain_numpy():
-    rng = np.random.default_rng(2)
-    angle, values = np.sort(rng.uniform(-400, 1000, 5000)), rng.normal(size=5000)
-    peak, rms = segment_levels(angle, values)
-    for k in range(36):
-        inside = values[(angle % 360 >= 10 * k) & (angle % 360 < 10 * (k + 1))]
-        assert peak[k] == np.abs(inside).max()
-        assert rms[k] == pytest.approx(np.sqrt(np.mean(inside**2)), rel=1e-12)
-    peak, rms = segment_levels(np.array([0.0, 90.0, 360.0 - 1e-12]), np.array([1.0, -2.0, 3.0]), 4)
-    np.testing.assert_array_equal(peak, [3.0, 2.0, np.nan, np.nan])
-    np.testing.assert_allclose(rms, [math.sqrt(5.0), 2.0, np.nan, np.nan])
 
 
 def test_a_record_that_tells_nothing_is_refused():
