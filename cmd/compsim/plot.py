@@ -11,7 +11,7 @@ from compsim.screen import (
 )
 
 FIGURES = (
-    "signals", "spectra", "orbits", "modes", "impacts", "waterfall", "map",
+    "analyst", "signals", "spectra", "orbits", "modes", "impacts", "cycles", "waterfall", "map",
     *(name for kind in STUDIES for name in kind.figures),
 )  # fmt: skip
 MORE = "".join(f"; of a study of {k.name} {', '.join(k.figures)}" for k in STUDIES if k.figures)
@@ -33,7 +33,8 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 @of_results(ONE_JOB, jobs)
 @click.option(
     "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
-    help=f"Of a job signals, spectra, orbits, modes, impacts; of a study waterfall, map{MORE}.",
+    help="Of a job analyst, signals, spectra, orbits, modes, impacts; of a study cycles, "
+    f"waterfall, map{MORE}.",
 )  # fmt: skip
 @click.option("-o", "--output", default="plots", show_default=True, shell_complete=folders,
               help="Folder of the figures.")  # fmt: skip
@@ -65,10 +66,12 @@ def plot(
     compsim plot bearing-wear clearance_mm=0.2 machine.rod_mass_kg=3
     compsim plot bearing-wear --over clearance_mm --at machine.rod_mass_kg=3
 
-    A job's signals over crank angle, spectra, orbits, contact modes and impacts, beside the same
-    machine without clearance; a study's order spectra and contact modes over a swept axis; a
-    machine that was followed along a parameter (`regimes:`): its bifurcation diagram, Poincaré
-    sections, and a map of periods over two parameters. Nothing but what is stored is needed.
+    A job's revolution as an analyst reads it (the sensor's record, or the crosshead's acceleration,
+    above the rod load, with reversals, valve events and impacts), its signals over crank angle,
+    spectra, orbits, contact modes and impacts, beside the same machine without clearance; a
+    study's vibration over crank angle, order spectra and contact modes over a swept axis; a machine
+    that was followed along a parameter (`regimes:`): its bifurcation diagram, Poincaré sections,
+    and a map of periods over two parameters. Nothing but what is stored is needed.
     """
     folder, words = results_folder(given, folder)
     name, *values = some_words(words)

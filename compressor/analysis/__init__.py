@@ -11,6 +11,7 @@ from compressor.analysis.contacts import (
     joints_with_clearance,
     mode_shares,
 )
+from compressor.analysis.cycle import read_cycle
 from compressor.analysis.cylinder import cylinder_words
 from compressor.analysis.effects import (
     Effects,
@@ -19,7 +20,12 @@ from compressor.analysis.effects import (
     sampled_effects,
     trend,
 )
-from compressor.analysis.plot_captions import PLOT_CAPTIONS, SweptRow, plural, rows_modes
+from compressor.analysis.plot_captions import (
+    PLOT_CAPTIONS,
+    SweptRow,
+    plural,
+    rows_modes,
+)
 from compressor.analysis.runs import (
     CLEARANCES,
     FAULTS,

@@ -14,6 +14,7 @@ from compressor.analysis.contacts import (
     joints_with_clearance,
     mode_shares,
 )
+from compressor.analysis.cycle import GRAVITY, Cycle, read_cycle
 from compressor.analysis.orbit import orbit
 from compressor.analysis.runs import SPOKEN, case_of, settled_revolutions
 from compressor.analysis.shaking import (
@@ -39,13 +40,14 @@ class SweptRow:
     """One job: its value on the axis in words, and what its series tell.
 
     `shaking` is None, and `problem` says why, where the job has none. `modes`: as `angle_modes`
-    gives them, None of ideal joints. `chaotic`: single lines hold for this course of the motion
-    only. `lubricated`: its joints have oil.
+    gives them, None of ideal joints. `cycle`: its last revolution. `chaotic`: single lines hold for
+    this course of the motion only. `lubricated`: its joints have oil.
     """
 
     value: str
     shaking: Shaking | None = None
     modes: xr.Dataset | None = None
+    cycle: Cycle | None = None
     problem: str = ""
     chaotic: bool = False
     lubricated: bool = False
@@ -135,6 +137,49 @@ def spectra(run: xr.Dataset, twin: Twin) -> str:
     return " ".join(sentences) + caution(run)
 
 
+def analyst(run: xr.Dataset, twin: Twin) -> str:
+    """Describe a revolution as an analyst reads it: peaks, reversals, valve events, impacts."""
+    found, case = read_cycle(run), case_of(run)
+    kind = "The acceleration of the crosshead"
+    if found.is_sensed and case.sensor:
+        kind = f"The sensor's record ({case.sensor.place}, along {case.sensor.direction})"
+    peak, at = loudest(found)
+    rms = float(np.sqrt(np.mean(found.vibration**2)))
+    beside = ""
+    if twin is not None:
+        beside = f"; without clearance it reaches {loudest(read_cycle(twin))[0]:.3g}"
+    sentences = [
+        f"The last settled revolution. {kind} reaches {peak:.3g} m/s² ({peak / GRAVITY:.3g} g) at "
+        f"{at:.0f}°, rms {rms:.3g}{beside}.",
+        f"The rod load goes from {span(1e-3 * found.rod_load)} kN and changes its side at "
+        f"{angles(found.reversals)}." if found.reversals
+        else f"The rod load, {span(1e-3 * found.rod_load)} kN, does not change its side.",
+    ]  # fmt: skip
+    if found.events:
+        names = [f"{name} at {angle:.0f}°" for angle, name in found.events]
+        sentences.append(f"Load: {', '.join(names)}.")
+    for joint, struck in found.struck.items():
+        text = f"at {angles(struck)}" if len(struck) else "none"
+        sentences.append(f"Impacts after flight at the {SPOKEN[joint]}: {text}.")
+    return " ".join(sentences) + film(run) + caution(run)
+
+
+MAX_ANGLES = 12  # that a caption lists
+
+
+def angles(values: Sequence[float] | np.ndarray) -> str:
+    """Return crank angles (degrees) in words."""
+    words = [f"{value:.0f}°" for value in values[:MAX_ANGLES]]
+    more = len(values) - len(words)
+    return ", ".join(words) + (f" and {more} more" if more else "")
+
+
+def loudest(found: Cycle) -> tuple[float, float]:
+    """Return the greatest magnitude of a revolution's vibration (m/s2), and its angle (degrees)."""
+    place = int(np.argmax(np.abs(found.vibration)))
+    return float(np.abs(found.vibration[place])), float(found.angle[place])
+
+
 def orbits(run: xr.Dataset, twin: Twin) -> str:
     """Describe the orbits: how far out the journals are, and whether they leave the wall."""
     found = orbit(run)
@@ -210,6 +255,24 @@ def waterfall(rows: Sequence[SweptRow], axis: str) -> str:
     )
 
 
+def cycles(rows: Sequence[SweptRow], axis: str) -> str:
+    """Describe the vibration over crank angle along an axis: where it is least and greatest."""
+    known = [(*loudest(row.cycle), row.value) for row in rows if row.cycle]
+    least, greatest = min(known), max(known)
+    sensed = any(row.cycle.is_sensed for row in rows if row.cycle)
+    kind = "sensor's record" if sensed else "acceleration of the crosshead"
+    text = (
+        f"The greatest magnitude of the {kind} in each degree of the last settled revolution, a "
+        f"row for each value of {axis}. Over the revolution it is least, {least[0]:.3g} m/s², at "
+        f"{least[2]}, and greatest, {greatest[0]:.3g} m/s² ({greatest[0] / GRAVITY:.3g} g), at "
+        f"{greatest[2]}, where it comes at {greatest[1]:.0f}°."
+    )
+    counts = [len(row.cycle.reversals) for row in rows if row.cycle]
+    few, most = min(counts), max(counts)
+    number = f"{few}" if few == most else f"{few} to {most}"
+    return f"{text} The rod load changes its side {number} times a revolution.{left_out(rows)}"
+
+
 def mode_rows(rows: Sequence[SweptRow], axis: str) -> str:
     """Describe the mode map: the share of angles whose most frequent mode is flight."""
     sentences = [f"The most frequent contact mode in each degree, a row for each value of {axis}."]
@@ -249,11 +312,12 @@ def newtons(force: float) -> str:
 # of a job: functions of its run and its twin; of a study: of its rows and its axis
 PLOT_CAPTIONS: dict[str, dict[str, Callable[..., str]]] = {
     "job": {
+        "analyst": analyst,
         "signals": signals,
         "spectra": spectra,
         "orbits": orbits,
         "modes": modes,
         "impacts": struck,
     },
-    "study": {"waterfall": waterfall, "map": mode_rows},
+    "study": {"cycles": cycles, "waterfall": waterfall, "map": mode_rows},
 }

@@ -78,12 +78,13 @@ def last_revolution(run: xr.Dataset) -> tuple[np.ndarray, xr.Dataset]:
     return angle - 360.0 * np.floor(angle[0] / 360.0 + 1e-9), settled.isel(time=slice(first, None))
 
 
-def healthy_twin(run: xr.Dataset) -> xr.Dataset:
+def healthy_twin(run: xr.Dataset, sensed: bool = False) -> xr.Dataset:
     """Return the run of the same machine with ideal joints, on the run's output grid.
 
-    From closed forms, without body, sensor and error bars.
+    From closed forms and without error bars; with body and sensor where it is to be `sensed`.
     """
-    values = replace(with_ideal_joints(case_of(run)), body=None, sensor=None).values()
+    ideal = with_ideal_joints(case_of(run))
+    values = (ideal if sensed else replace(ideal, body=None, sensor=None)).values()
     values["solve"]["error_bars"] = False
     values["output"] = {"keep": "series"}
     return simulate(Case.resolve(values))

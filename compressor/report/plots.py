@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from compressor.analysis import (
@@ -15,6 +16,7 @@ from compressor.analysis import (
     case_of,
     healthy_twin,
     joints_with_clearance,
+    read_cycle,
     shaking,
 )
 from compressor.cases import points
@@ -22,6 +24,8 @@ from compressor.program import CompsimError
 from compressor.reasons import remedy
 from compressor.report.figures import Drawing
 from compressor.report.figures.job import (
+    draw_analyst,
+    draw_cycles,
     draw_impacts,
     draw_map,
     draw_modes,
@@ -33,6 +37,7 @@ from compressor.report.figures.job import (
 from compressor.report.figures.pictures import render_kinds
 from compressor.report.study_section import file_name
 from compressor.store import (
+    DamagedJob,
     Folder,
     Stored,
     StoredStudy,
@@ -97,6 +102,8 @@ def publish_drawings(
 
 JOB, STUDY = PLOT_CAPTIONS["job"], PLOT_CAPTIONS["study"]
 OF_CONTACT = {"orbits": draw_orbits, "modes": draw_modes, "impacts": draw_impacts}
+BESIDE_TWIN = {"analyst": draw_analyst, "signals": draw_signals, "spectra": draw_spectra}
+OVER_AXIS = {"cycles": draw_cycles, "waterfall": draw_waterfall, "map": draw_map}
 MAX_ROWS = 200  # of a map
 KEY_DIGITS = 10  # digits of a key in the name of a file
 KEEP = "run it again with --set output.keep=series"
@@ -137,7 +144,9 @@ def job_figures(
         worn = {}
     for name in (one for one in figures if one in OF_CONTACT and choice.what and not worn):
         raise PlotError(f"job {key} has ideal joints, so that there is no figure {name!r} of it")
-    twin = healthy_twin(run) if worn else None
+    twins = dict.fromkeys(figures, healthy_twin(run) if worn else None)
+    if worn and "analyst" in figures and "sensor_acceleration" in run:
+        twins["analyst"] = healthy_twin(run, sensed=True)
     try:
         for name in figures:
             if name in OF_CONTACT and not worn:
@@ -145,8 +154,8 @@ def job_figures(
             if name in OF_CONTACT:
                 drawing = OF_CONTACT[name](run)
             else:
-                drawing = (draw_signals if name == "signals" else draw_spectra)(run, twin)
-            yield name, JOB[name](run, twin), drawing
+                drawing = BESIDE_TWIN[name](run, twins[name])
+            yield name, JOB[name](run, twins[name]), drawing
     except NoSeriesError as error:
         raise PlotError(f"job {key}: {error}") from error
 
@@ -188,8 +197,41 @@ def study_figures(
             if choice.what:
                 raise PlotError(f"no joint of {study.name} has clearance: there is no mode map")
             continue
-        drawing = (draw_waterfall if name == "waterfall" else draw_map)(rows, over)
-        yield name, STUDY[name](rows, over) + where, drawing
+        yield name, STUDY[name](rows, over) + where, OVER_AXIS[name](rows, over)
+
+
+MAX_PAGE_ROWS = 12  # of a study's jobs whose series a page reads
+
+
+def page_figures(stored: Stored, study: StoredStudy) -> Iterator[tuple[str, str, str, Drawing]]:
+    """Yield what a page draws of a study over the crank angle: name, title, caption, drawing.
+
+    The vibration along an axis, and the revolution of the job where it is greatest. Nothing of a
+    study that kept no series.
+    """
+    over = choose_axis(stored.folder, study, "")
+    jobs, where = select_jobs(stored.folder, study, over, ())
+    number, count = len(jobs), min(len(jobs), MAX_PAGE_ROWS)
+    if count < number:
+        where += f" {count} of {number} jobs, evenly chosen."
+        jobs = [jobs[round(n * (number - 1) / (count - 1))] for n in range(count)]
+    rows = [swept_row(stored, value, key, brief=True) for value, key in jobs]
+    known = {n: row.cycle for n, row in enumerate(rows) if row.cycle}
+    if not known:
+        return
+    if len(known) > 1:
+        title = f"vibration over crank angle and {over}"
+        yield "cycles", title, STUDY["cycles"](rows, over) + where, draw_cycles(rows, over)
+    loudest = max(known, key=lambda n: np.abs(known[n].vibration).max())
+    run = stored.job(jobs[loudest][1])
+    case = case_of(run)
+    # of ideal joints that have a closed form: a page simulates nothing
+    has_twin = case.joint != "none" and not case.has_features
+    twin = healthy_twin(run, sensed="sensor_acceleration" in run) if has_twin else None
+    value = f"{over} {rows[loudest].value}" if jobs[loudest][0] != "" else rows[loudest].value
+    title = f"a revolution as an analyst reads it, {value}"
+    note = " It is the job with the greatest vibration of these." if len(known) > 1 else ""
+    yield "analyst", title, JOB["analyst"](run, twin) + note + where, draw_analyst(run, twin)
 
 
 def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]) -> str:
@@ -245,8 +287,11 @@ def select_jobs(
     return jobs, where + (f" Along with it vary {', '.join(varied)}." if varied else "")
 
 
-def swept_row(stored: Stored, value: Any, key: str) -> SweptRow:
-    """Return one job as a row of a figure over an axis, or with the reason why it has none."""
+def swept_row(stored: Stored, value: Any, key: str, brief: bool = False) -> SweptRow:
+    """Return one job as a row of a figure over an axis, or with the reason why it has none.
+
+    brief: its last revolution alone, and no error for a damaged job.
+    """
     name, status = (
         format_swept_value(value) if value != "" else key[:KEY_DIGITS],
         stored.status(key),
@@ -254,17 +299,25 @@ def swept_row(stored: Stored, value: Any, key: str) -> SweptRow:
     if status is None or status.status != "ok" or not status.samples:
         problem = "not run" if status is None else "failed" if status.reason else "no series"
         return SweptRow(name, problem=problem)
-    run = stored.job(key)
+    try:
+        run = stored.job(key)
+    except DamagedJob:
+        if brief:
+            return SweptRow(name, problem="damaged")
+        raise
     chaotic = run.attrs.get("regime") == "chaotic"
     try:
+        cycle = read_cycle(run)
+        if brief:
+            return SweptRow(name, cycle=cycle, chaotic=chaotic)
         found = shaking(run)
     except NoSeriesError:
         return SweptRow(name, problem="too short")
     try:
         oil = bool(case_of(run).lubricant)
-        return SweptRow(name, found, angle_modes(run), chaotic=chaotic, lubricated=oil)
+        return SweptRow(name, found, angle_modes(run), cycle, chaotic=chaotic, lubricated=oil)
     except ValueError:  # ideal joints
-        return SweptRow(name, found, chaotic=chaotic)
+        return SweptRow(name, found, cycle=cycle, chaotic=chaotic)
 
 
 def format_swept_value(value: Any) -> str:

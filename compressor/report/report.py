@@ -66,6 +66,7 @@ from compressor.report.paper_sections import (
     second_sets,
     shakings,
 )
+from compressor.report.plots import page_figures
 from compressor.report.study_section import (
     MAX_ROWS,
     file_name,
@@ -230,7 +231,8 @@ def drawn_study(
 ) -> DrawnStudy:
     """Return a user's own study: its sections, and its sweep, drawn; `notes`: lines on it.
 
-    The sweep is not drawn where all of the study is shown as another set of the paper's figures.
+    And revolutions over the crank angle. Neither is drawn where all of the study is shown as
+    another set of the paper's figures.
     """
     anchor = second_anchor(study.name) if other else ""
     whole = other is not None and other.keys.issuperset(study.keys)
@@ -240,6 +242,10 @@ def drawn_study(
                   one.caption, one.figure)
             for one in ([] if whole else draw_sweep(data))
         ]  # fmt: skip
+        plates += [
+            Plate(file_name(name, study.name), f"{study.name}: {title}", words, drawing)
+            for name, title, words, drawing in ([] if whole else page_figures(stored, study))
+        ]
         figures, table = study_sections(stored, study, data, plates, anchor, notes)
         keys = [*(key for plate in plates for key in plate.jobs), *study.keys[:MAX_ROWS]]
         counts = job_counts(data)

@@ -91,11 +91,12 @@ def test_a_job_is_drawn_with_its_numbers(plot, folder):
     names = [f"plots/{mine[:10]}-{name}.png" for name in PLOT_CAPTIONS["job"]]
     assert [*found] == names
     run = job(folder, "worn", 3)
-    signals, spectra, orbits, modes, impacts = found.values()
+    analyst, signals, spectra, orbits, modes, impacts = found.values()
     force = frame_forces(run)
     last = slice(2 * 720, None)
     x = force["shaking_force"][last, 0] / 1e3
     assert f"X {x.min():.2f} to {x.max():.2f} kN" in signals
+    assert f"acceleration of the crosshead reaches {peak(run, last):.3g} m/s²" in analyst
     torque = force["crank_torque"][last]
     assert f"torque {torque.min():.0f} to {torque.max():.0f} N m" in signals
     assert f"reaches {np.abs(run['acceleration'].values[last]).max():.0f} m/s²" in signals
@@ -111,6 +112,10 @@ def test_a_job_is_drawn_with_its_numbers(plot, folder):
     told = float(re.search(r"At the big end ([\d.]+) impacts a revolution", impacts)[1])
     counted = float(run["impacts_per_rev"].sel(joint="big_end"))
     assert 0.9 * counted <= told <= 1.001 * counted  # some lie between two samples
+
+
+def peak(run, last):
+    return np.abs(run["acceleration"].values[last]).max()
 
 
 def test_captions_of_oiled_joints_speak_of_dry_contact():
@@ -166,8 +171,15 @@ def test_chosen_figures_in_both_formats(plot, folder):
 def test_a_study_is_drawn_along_an_axis(plot, folder):
     code, found, _ = plot("worn", "--over", "speed_rpm", "--at", "clearance_mm=0.3")
     assert code == 0
-    waterfall, modes = found.values()
-    assert [*found] == ["plots/worn-waterfall.png", "plots/worn-map.png"]
+    cycles, waterfall, modes = found.values()
+    assert [*found] == [f"plots/worn-{name}.png" for name in ("cycles", "waterfall", "map")]
+    peaks = {speed: peak(job(folder, "worn", place), slice(1440, None))
+             for speed, place in ((400, 2), (500, 3))}  # fmt: skip
+    least, greatest = sorted(peaks, key=peaks.get)
+    assert f"it is least, {peaks[least]:.3g} m/s², at {least}, and greatest, " in cycles
+    assert (
+        f"{peaks[greatest]:.3g} m/s² ({peaks[greatest] / 9.80665:.3g} g), at {greatest}" in cycles
+    )
     assert "each value of machine.speed_rpm" in waterfall
     assert "Here clearance_mm 0.3." in waterfall
     above = {}
@@ -180,7 +192,7 @@ def test_a_study_is_drawn_along_an_axis(plot, folder):
     assert float(told[1]) == pytest.approx(above[least], rel=0.01)
     assert float(told[3]) == pytest.approx(above[greatest], rel=0.01)
     assert "of the revolution" in modes
-    default, _ = plot("worn")[1].values()
+    _, default, _ = plot("worn")[1].values()
     assert "each value of clearance_mm" in default
     assert "Here machine.speed_rpm 400." in default
 
@@ -202,13 +214,13 @@ def test_ideal_joints_have_no_contacts_to_draw(plot, folder, unpainted):
     mine = key(folder, "ideal")
     code, found, _ = plot(mine)
     assert code == 0
-    assert [name[-11:] for name in found] == ["signals.png", "spectra.png"]
-    assert "No joint has clearance" in next(iter(found.values()))
+    assert [name[-11:] for name in found] == ["analyst.png", "signals.png", "spectra.png"]
+    assert "No joint has clearance" in [*found.values()][1]
     code, found, err = plot(mine, "--what", "orbits")
     assert (code, found) == (2, {})
     assert "ideal joints" in err
     code, found, _ = plot("ideal")
-    assert (code, len(found)) == (0, 1)
+    assert (code, len(found)) == (0, 2)
 
 
 @pytest.mark.parametrize(
@@ -222,7 +234,7 @@ def test_ideal_joints_have_no_contacts_to_draw(plot, folder, unpainted):
         (["worn", "clearance_mm=0.2"], "no job of worn has clearance_mm=0.2; there are 0.1, 0.3"),
         ([], "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
         (["worn", "--what", "orbits"], "worn is a study: for orbits name a job, such as"),
-        (["worn", "--what", "noise"], "there is no figure 'noise'; there are signals"),
+        (["worn", "--what", "noise"], "there is no figure 'noise'; there are analyst"),
         (["worn", "--over", "mass"], "worn has no axis 'mass'; its axes are clearance_mm,"),
         (
             ["worn", "--at", "speed_rpm=450"],

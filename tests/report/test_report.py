@@ -13,6 +13,7 @@ import xarray as xr
 from conftest import CONFIGS, keep, part_of, store
 
 from compressor.analysis.runs import paper_cases
+from compressor.analysis.shaking import last_revolution
 from compressor.cases.case import Case
 from compressor.cases.load import load_cases
 from compressor.reasons import Reason
@@ -354,7 +355,7 @@ def test_only_jobs_with_the_paper_s_physics_are_opened(tmp_path, text, found):
 def test_a_sweep_has_its_table_and_plots(own, tmp_path):
     path = write_report(own, tmp_path / "out")
     assert path == tmp_path / "out" / "index.html"
-    drawn = {"sweep-own-ranking", "sweep-own-map"}
+    drawn = {"sweep-own-ranking", "sweep-own-map"}  # no revolution is settled
     assert {p.stem for p in (tmp_path / "out").glob("*.png")} == drawn
     found = read(tmp_path / "out")
     assert len(found.sources) == 2
@@ -369,6 +370,34 @@ def test_a_sweep_has_its_table_and_plots(own, tmp_path):
         assert float(rows[key][3].split(" ± ")[0]) == pytest.approx(peak, rel=1e-3)
     assert "4 jobs: 4 ok." in found.text
     assert found.ids.index("study-own") < found.ids.index("jobs-own")
+
+
+def test_a_sweep_is_drawn_over_the_crank_angle(tmp_path):
+    """By the greatest of two clearances at the rod's first mass; a damaged job is left out."""
+    file, own = tmp_path / "own.yaml", tmp_path / "results"
+    file.write_text("joint: big_end\nclearance_mm: [0.1, 0.2]\nmachine: {rod_mass_kg: [3, 5]}\n")
+    store(own, file, overrides=["solve.duration_rev=2", "solve.settle_rev=1", *DRAFT])
+    write_report(own, tmp_path / "out")
+    drawn = {"sweep-own-ranking", "sweep-own-map", "cycles-own", "analyst-own"}
+    assert {p.stem for p in (tmp_path / "out").glob("*.png")} == drawn
+    text = " ".join(read(tmp_path / "out").text.split())
+    (study,) = read_studies(own)
+    peaks = {}
+    for key, clearance in zip(study.keys[::2], (0.1, 0.2), strict=True):
+        with read_job(own, key) as run:
+            _, last = last_revolution(run)
+            peaks[clearance] = np.abs(last["acceleration"].values).max()
+    assert peaks[0.1] < peaks[0.2]
+    assert f"it is least, {peaks[0.1]:.3g} m/s², at 0.1, and greatest, " in text
+    assert "own: a revolution as an analyst reads it, clearance_mm 0.2" in text
+    assert f"acceleration of the crosshead reaches {peaks[0.2]:.3g} m/s² (" in text
+    assert "It is the job with the greatest vibration of these. Here machine.rod_mass_kg 3." in text
+    (path,) = (own / "jobs").glob(f"{study.keys[2]}-*.h5")
+    path.write_bytes(path.read_bytes()[:-9])
+    write_report(own, tmp_path / "out")
+    text = " ".join(read(tmp_path / "out").text.split())
+    assert "own: a revolution as an analyst reads it, clearance_mm 0.1" in text
+    assert "vibration over crank angle and clearance_mm" not in text
 
 
 def test_of_the_paper_nothing_stands_over_a_sweep_of_one_s_own(own, tmp_path):

@@ -12,11 +12,13 @@ from compressor.analysis import (
     SPOKEN,
     SweptRow,
     angle_modes,
+    case_of,
     deviation_spectrum,
     frame_forces,
     impacts,
     joints_with_clearance,
     last_revolution,
+    read_cycle,
     rows_modes,
     sensor_envelope,
     settled_revolutions,
@@ -178,6 +180,8 @@ Forces = dict[str, np.ndarray]
 THIS = LineStyle(BLUE, "-", 1.1, 2.3)
 TWIN = LineStyle(GOLD, "-", 2.2, 2.1)  # broader and lighter, below
 MARK = LineStyle(RED, (0, (4, 1.5)), 1.0, 2.2)
+EVENT = LineStyle(GREY, ":", 1.0, 2.0)
+LAST_LABEL = 270.0  # degrees: the names of later events stand before them
 NAMES = {"this": "this job", "twin": "the same machine without clearance"}
 MAX_ORDERS = 200  # that are drawn
 MAX_ENVELOPE = 60  # of an envelope
@@ -227,6 +231,72 @@ def draw_signals(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
     share_scales(figure.panels, "x")
     figure.legend = [] if twin is None else panels[0, 0].traces[::-1]
     return figure
+
+
+def draw_analyst(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
+    """Return a revolution as an analyst reads it: events, vibration and rod load.
+
+    twin: the ideal machine, with the same sensor where the run has one.
+    """
+    found = read_cycle(run)
+    lanes = 2 + len(found.struck)
+    figure, panels = make_grid(3, 1, 6.4 + 0.2 * lanes, heights=(0.34 * lanes, 3.4, 2.0))
+    strip, vibration, load = panels[:, 0]
+    for one, line, name in ((twin, TWIN, NAMES["twin"]), (run, THIS, NAMES["this"])):
+        if one is None:
+            continue
+        cycle = read_cycle(one)
+        vibration.plot(cycle.angle, cycle.vibration, line, name)
+        load.plot(cycle.load_angle, cycle.rod_load * KILONEWTON, line, name)
+    plot_events(strip, found.events, found.struck, found.reversals)
+    for panel in (strip, vibration, load):
+        panel.notes += [Note(x=angle, style=EVENT) for angle, _ in found.events]
+        panel.notes += [Note(x=angle, style=MARK) for angle in found.reversals]
+    load.notes.append(Note(y=0.0, style=ZERO))
+    vibration.title = "acceleration of the crosshead"
+    sensor = case_of(run).sensor
+    if found.is_sensed and sensor:
+        vibration.title = f"record of the sensor: {sensor.place}, along {sensor.direction}"
+    vibration.y.title = "a (m/s²)"
+    load.title = "rod load at the crosshead pin, tension positive; dashed: it changes its side"
+    load.y.title = "$F_r$ (kN)"
+    load.x.title = ANGLE_AXIS
+    share_turn(figure.panels)
+    figure.legend = [] if twin is None else vibration.traces[::-1]
+    return figure
+
+
+def plot_events(
+    panel: Panel,
+    events: Sequence[tuple[float, str]],
+    struck: dict[str, np.ndarray],
+    reversals: Sequence[float],
+) -> None:
+    """Draw a lane each for the load's corners, the impacts of each joint, and the reversals.
+
+    Crank angles in degrees; the corners have names, the impacts are by joint.
+    """
+    lanes: list[tuple[str, np.ndarray, LineStyle]] = [
+        ("load", np.array([angle for angle, _ in events]), mark(BLACK, "v", 6)),
+    ]
+    for joint, at in struck.items():
+        color, shape = BY_JOINT[joint]
+        lanes.append((f"impacts, {SPOKEN[joint]}", at, mark(color, shape, 5)))
+    lanes.append(("reversals", np.array(reversals), mark(RED, "s", 5)))
+    for number, (name, angles, style) in enumerate(lanes):
+        panel.plot(angles, np.full(angles.size, -float(number)), style, name)
+    shown: dict[int, list[str]] = {}
+    for angle, name in events:  # those of both ends at one angle share a text
+        shown.setdefault(round(angle), []).append(name)
+    for number, (angle, names) in enumerate(shown.items()):
+        side = "right" if angle > LAST_LABEL else "left"
+        shift = (-6.0 if side == "right" else 6.0, -5.0 if number % 2 else 5.0)
+        panel.notes.append(
+            Note(", ".join(names), angle, 0.0, shift=shift, side=side, level="center", size=8.0)
+        )
+    panel.y.words = {-float(number): name for number, (name, *_) in enumerate(lanes)}
+    panel.y.span(0.6 - len(lanes), 0.8)
+    panel.grid = ""
 
 
 def draw_spectra(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
@@ -299,6 +369,7 @@ def plot_envelope(
 MAX_TICKS = 12
 MAX_MAP_ORDERS = 150
 MAP_DECADES = 3  # below the greatest line above `ORDER`
+CYCLE_DECADES = 2  # below the greatest vibration
 ROW, LEAST = 0.24, 3.4  # inches: of a row, and of all
 
 
@@ -329,6 +400,42 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Drawing:
     beside.x.title = f"rms of X above\norder {ORDER} (N)"
     beside.x.span(0, max(1.0, 1.08 * np.nanmax(above)))
     share_scales(figure.panels, "y")
+    return figure
+
+
+def draw_cycles(rows: Sequence[SweptRow], title: str) -> Drawing:
+    """Return the vibration in each degree, a row a value, in colour; beside them its peaks.
+
+    Marks: the rod load changes its side; valves open and close, or the cam's follower stops.
+    """
+    figure, panels = make_grid(1, 2, height(len(rows)) + 0.9, widths=(3, 1))
+    image, beside = panels.flat
+    found = [row.cycle for row in rows]
+    table = np.array([one.degree_peaks if one else np.full(360, np.nan) for one in found])
+    top = np.nanmax(table)
+    least = top * 10.0**-CYCLE_DECADES
+    colors = ColorScale(palette("cividis"), least, top, True, "|a| (m/s²)", "top", 50, pointed=True)
+    edges = np.arange(361.0), np.arange(len(rows) + 1) - 0.5
+    image.traces.append(map_cells(*edges, np.maximum(table, least), colors))
+    corners = [[at for at, _ in one.events] if one else [] for one in found]
+    reversals = [one.reversals if one else () for one in found]
+    for name, shape, color, angles in (
+        ("corner of the load", "v", "#ffffff", corners),
+        ("rod load changes its side", "s", RED, reversals),
+    ):
+        x = np.array([at for some in angles for at in some])
+        y = np.array([float(n) for n, some in enumerate(angles) for _ in some])
+        image.plot(x, y, mark(color, shape, 4, edge=BLACK), name)
+    image.x.title = ANGLE_AXIS
+    label_rows(image, rows, title)
+    share_turn([image], 90.0)
+    peaks = np.nanmax(np.where(np.isnan(table), -1.0, table), axis=1)
+    dots = LineStyle(BLUE, linewidth=1.5, marker="o", markersize=3.5)
+    beside.plot(np.where(peaks < 0, np.nan, peaks), np.arange(len(rows), dtype=float), dots)
+    beside.x.title = "peak (m/s²)"
+    beside.x.span(0, 1.08 * top)
+    share_scales(figure.panels, "y")
+    figure.legend = [one for one in image.traces if one.is_points]
     return figure
 
 

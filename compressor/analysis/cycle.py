@@ -1,0 +1,156 @@
+"""One revolution as an analyst reads it: vibration, rod load, its reversals, valve events, impacts.
+
+The vibration is the sensor's record where a case has one, else the acceleration of the crosshead.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from compressor.analysis.contacts import impacts, joints_with_clearance
+from compressor.analysis.runs import case_of, record_of
+from compressor.analysis.shaking import NoSeriesError, whole_revolutions
+from compressor.physics import segments
+
+GRAVITY = 9.80665  # m/s2, of vibration in g (ISO 80000-3:2019)
+# what begins at a corner of the load, by the phase that it leads to
+VALVES = ("discharge closes", "suction opens", "suction closes", "discharge opens")
+CAM = ("cam: dwell ends", "cam: dwell begins", "cam: dwell ends", "cam: dwell begins")
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """The last settled revolution of a run over crank angle in degrees, 0 to 360.
+
+    `angle`, `vibration` (m/s2): (m,), of the sensor if `is_sensed`; `load_angle`, `rod_load` (N, at
+    the crosshead pin, positive in tension): (n,). `reversals`: angles at which the rod load changes
+    its side. `events`: angles and names of the load's corners. `struck`: angles of the impacts
+    after flight, by joint with clearance.
+    """
+
+    angle: np.ndarray
+    vibration: np.ndarray
+    is_sensed: bool
+    load_angle: np.ndarray
+    rod_load: np.ndarray
+    reversals: tuple[float, ...]
+    events: tuple[tuple[float, str], ...]
+    struck: dict[str, np.ndarray]
+
+    @property
+    def degree_peaks(self) -> np.ndarray:
+        """Return the vibration's greatest magnitude in each degree, (360,); nan of an empty one."""
+        peaks = np.full(360, -np.inf)
+        np.maximum.at(peaks, np.minimum(self.angle.astype(int), 359), np.abs(self.vibration))
+        return np.where(np.isinf(peaks), np.nan, peaks)
+
+
+def read_cycle(run: xr.Dataset) -> Cycle:
+    """Return the `Cycle` of a run with time series.
+
+    Of a record that is shorter than the settled revolutions its own last revolution, with the load
+    and the impacts of the same one. Raises NoSeriesError where no revolution is settled.
+    """
+    settled, count = whole_revolutions(run)
+    recorded = _recorded(run)
+    number = min(count, recorded[2]) if recorded else count
+    turns = settled["crank_angle"].values / math.tau
+    begin = turns[0] + number - 1
+    inside = (turns > begin - 1e-9) & (turns < begin + 1 + 1e-9)
+    revolution = settled.isel(time=inside)
+    degrees = 360.0 * (turns[inside] % 1.0)
+    load = revolution["contact_force"].sel(joint="small_end", axis="x").values
+    if recorded:
+        angle, vibration = _sorted(*_sensed(recorded, begin))
+    else:
+        angle, vibration = _sorted(degrees, revolution["acceleration"].values)
+    load_angle, sorted_load = _sorted(degrees, load)
+    return Cycle(
+        angle, vibration, recorded is not None, load_angle, sorted_load,
+        _reversals(turns[inside], load), _events(run, begin), _struck(run, begin),
+    )  # fmt: skip
+
+
+def _sorted(degrees: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return values by rising angle."""
+    order = np.argsort(degrees, kind="stable")
+    return degrees[order], values[order]
+
+
+def _recorded(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, int] | None:
+    """Return the crank's revolutions at the samples of a record, these, and how many are settled.
+
+    Revolutions count from the run's begin. By the tacho, at a steady pace before the first pulse
+    and behind the last. None without a record.
+    """
+    if "sensor_acceleration" not in run or not run.sizes["sensor_time"]:
+        return None
+    case, time, pulses = case_of(run), run["sensor_time"].values, run["tacho_time"].values
+    known = np.concatenate([pulses[:1] - case.turn, pulses, pulses[-1:] + case.turn])
+    if not pulses.size:
+        known = np.array([0.0, case.turn])
+    turns = np.interp(time, known, np.arange(known.size) - (1.0 if pulses.size else 0.0))
+    steady = case.body is not None and case.body.start == "steady"
+    first = float(run.attrs["settle"]) / case.turn
+    passed = turns - turns[0]  # a steady record begins where the settled part does
+    spacing = passed[-1] / max(turns.size - 1, 1)
+    whole = math.floor(passed[-1] + 2.0 * spacing - (0.0 if steady else first))
+    if whole < 1:
+        raise NoSeriesError("the sensor's record has no whole settled revolution")
+    return passed + (first if steady else 0.0), run["sensor_acceleration"].values, whole
+
+
+def _sensed(
+    recorded: tuple[np.ndarray, np.ndarray, int], begin: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return angles (degrees) and samples of a record in the revolution that begins there."""
+    turns, values, _ = recorded
+    inside = (turns > begin - 1e-9) & (turns < begin + 1 - 1e-9)
+    return 360.0 * ((turns[inside] + 1e-12) % 1.0), values[inside]
+
+
+def _reversals(turns: np.ndarray, load: np.ndarray) -> tuple[float, ...]:
+    """Return the crank angles (degrees) at which a force changes its sign, straight between."""
+    before, after = load[:-1], load[1:]
+    crossing = np.flatnonzero(before * after < 0.0)
+    part = before[crossing] / (before[crossing] - after[crossing])
+    at = turns[crossing] + part * (turns[crossing + 1] - turns[crossing])
+    return tuple(sorted(float(one) for one in 360.0 * (at % 1.0)))
+
+
+def _events(run: xr.Dataset, begin: float) -> tuple[tuple[float, str], ...]:
+    """Return the angles (degrees) and names of the load's corners in a revolution, as it has them.
+
+    The phase of a cylinder with two ends is that of its head end plus four times that of its crank
+    end: what changes of either is an event.
+    """
+    case, p = case_of(run), record_of(run)
+    edges, phases = segments(p, (begin + 2.0) * case.turn)
+    names = CAM if case.load == "spring" else VALVES
+    both = (np.asarray(phases) >> 2).any()
+    found = set()
+    for edge, before, after in zip(edges[1:-1], phases[:-1], phases[1:], strict=True):
+        turn = edge / case.turn
+        if not begin - 1e-9 < turn < begin + 1 - 1e-9:
+            continue
+        ends = (("head ", before & 3, after & 3), ("crank ", before >> 2, after >> 2))
+        for end, was, now in ends:
+            if was != now:
+                name = (end if both else "") + names[now]
+                found.add((round(360.0 * ((turn + 1e-12) % 1.0), 9), name))
+    return tuple(sorted(found))
+
+
+def _struck(run: xr.Dataset, begin: float) -> dict[str, np.ndarray]:
+    """Return the angles (degrees) of the impacts in a revolution by joint with clearance."""
+    try:
+        joints = joints_with_clearance(run)
+    except ValueError:
+        return {}
+    found = impacts(run)
+    angle, joint = found["crank_angle"].values, found["joint"].values
+    turn = found["revolution"].values - 1 + angle / 360.0
+    inside = (turn > begin - 1e-9) & (turn < begin + 1)
+    return {one: angle[inside & (joint == one)] for one in joints}

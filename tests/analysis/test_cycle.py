@@ -1,0 +1,164 @@
+"""A revolution as an analyst reads it: by plain NumPy of what is stored, and closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+
+from compressor.analysis.contacts import impacts
+from compressor.analysis.cycle import read_cycle
+from compressor.analysis.plot_captions import PLOT_CAPTIONS
+from compressor.analysis.runs import record_of
+from compressor.analysis.shaking import NoSeriesError, frame_forces, healthy_twin
+from compressor.cases.case import Case
+from compressor.report.figures.drawing import as_csv
+from compressor.report.figures.job import draw_analyst
+from compressor.solve.simulate import simulate
+
+SOLVE = {"duration_rev": 3, "settle_rev": 1, "accuracy": "draft", "error_bars": False}
+HARD = {  # a joint that leaves its bore: damped little
+    "joint": "big_end", "clearance_mm": 0.3, "load": "gas", "friction": False,
+    "contact": {"damping_N_s_per_mm": 10}, "machine": {"rod_mass_kg": 1}, "solve": SOLVE,
+}  # fmt: skip
+BODY = {"body": {"frequency_x_Hz": 4.0, "frequency_y_Hz": 30.0}}
+
+
+def run(**values):
+    return simulate(Case.from_values({**HARD, **values}))
+
+
+@pytest.fixture(scope="module")
+def sensed():
+    return run(**BODY, sensor=True)
+
+
+def test_the_last_settled_revolution_of_the_record_is_drawn(sensed):
+    """3072 samples a revolution at 500 rpm; the record begins where the run has settled."""
+    found = read_cycle(sensed)
+    assert found.is_sensed
+    np.testing.assert_array_equal(found.vibration, sensed["sensor_acceleration"].values[3072:])
+    np.testing.assert_allclose(found.angle, 360 * np.arange(3072) / 3072, atol=1e-6)
+    load = frame_forces(sensed)["rod_load"]
+    np.testing.assert_array_equal(found.rod_load[1:-1], load[2401:3600])
+    np.testing.assert_allclose(found.load_angle[1:-1], 0.3 * np.arange(1, 1200), atol=1e-6)
+
+
+def test_a_longer_record_shows_the_revolution_of_the_load():
+    short, long = (
+        read_cycle(run(**BODY, sensor={"noise_m_per_s2": 0, "length_rev": n})) for n in (1, 5)
+    )
+    whole = read_cycle(run(**BODY, sensor={"noise_m_per_s2": 0}))
+    np.testing.assert_allclose(long.vibration, whole.vibration, atol=0.05)
+    np.testing.assert_array_equal(long.rod_load, whole.rod_load)
+    assert not np.array_equal(short.rod_load, whole.rod_load)  # of the first one
+
+
+def test_without_a_sensor_the_crosshead_is_drawn():
+    plain = run()
+    found = read_cycle(plain)
+    assert not found.is_sensed
+    np.testing.assert_array_equal(found.vibration[1:-1], plain["acceleration"].values[2401:3600])
+
+
+def test_a_part_that_does_not_begin_at_top_dead_centre_is_drawn_from_0_to_360():
+    found = read_cycle(run(solve={**SOLVE, "settle_rev": 1.25, "duration_rev": 3}))
+    assert (np.diff(found.angle) >= 0).all()
+    assert found.angle[0] >= 0.0
+    assert found.angle[-1] < 360.0
+    assert found.angle.size == 1201
+
+
+def test_reversals_are_where_the_load_is_zero(sensed):
+    """And as many as it has changes of sign; of the ideal machine two."""
+    found = read_cycle(sensed)
+    assert len(found.reversals) == (np.diff(np.sign(found.rod_load[:-1])) != 0).sum() > 2
+    at = np.interp(found.reversals, found.load_angle, found.rod_load)
+    assert np.abs(at).max() < 2e-3 * np.abs(found.rod_load).max()
+    twin = read_cycle(healthy_twin(sensed))
+    assert len(twin.reversals) == 2
+
+
+def test_valve_events_are_the_corners_of_the_gas_cycle(sensed):
+    """Suction opens at 38.95 degrees and discharge at 294.2 (Eq. 13 of the paper)."""
+    events = {name: angle for angle, name in read_cycle(sensed).events}
+    corners = np.degrees(record_of(sensed)["corners"])
+    assert events == {
+        "discharge closes": 0.0,
+        "suction opens": pytest.approx(corners[0]),
+        "suction closes": pytest.approx(180.0),
+        "discharge opens": pytest.approx(corners[2]),
+    }
+    assert corners[[0, 2]] == pytest.approx([38.95, 294.2], abs=0.1)
+    cam = [name for _, name in read_cycle(run(load="spring")).events]
+    assert cam == ["cam: dwell ends", "cam: dwell begins"] * 2
+    assert read_cycle(run(load="none")).events == ()
+
+
+def test_events_of_two_ends_are_told_apart(sensed, monkeypatch):
+    """A cylinder's phase is its head end's plus four times its crank end's."""
+    turn = 0.12
+    edges = np.array([0.0, 0.1, 0.5, 0.8, 1.0, 1.1, 1.5, 1.8, 2.0, 2.1, 2.5, 2.8, 3.0]) * turn
+    phases = np.tile([0 + 4 * 2, 1 + 4 * 2, 2 + 4 * 0, 3 + 4 * 1], 3)
+    monkeypatch.setattr("compressor.analysis.cycle.segments", lambda p, end: (edges, phases))
+    assert [(round(at), name) for at, name in read_cycle(sensed).events] == [
+        (0, "crank suction closes"), (0, "head discharge closes"), (36, "head suction opens"),
+        (180, "crank discharge closes"), (180, "head suction closes"),
+        (288, "crank suction opens"), (288, "head discharge opens"),
+    ]  # fmt: skip
+
+
+def test_impacts_are_those_of_the_revolution(sensed):
+    found, every = read_cycle(sensed), impacts(sensed)
+    mine = every["crank_angle"].values[every["revolution"].values == 3]
+    np.testing.assert_array_equal(found.struck["big_end"], mine)
+    assert mine.size > 0
+    assert [*found.struck] == ["big_end"]
+    assert read_cycle(healthy_twin(sensed)).struck == {}
+
+
+def test_the_twin_has_the_same_sensor(sensed):
+    twin = healthy_twin(sensed, sensed=True)
+    assert np.abs(twin["sensor_acceleration"].values).max() < 0.1 * float(sensed["sensor_peak"])
+    assert "sensor_acceleration" not in healthy_twin(sensed)
+
+
+def test_the_caption_has_the_numbers(sensed):
+    twin = healthy_twin(sensed, sensed=True)
+    told = PLOT_CAPTIONS["job"]["analyst"](sensed, twin)
+    record = sensed["sensor_acceleration"].values[3072:]
+    peak, at = np.abs(record).max(), 360 * np.abs(record).argmax() / 3072
+    ideal = np.abs(twin["sensor_acceleration"].values[3072:]).max()
+    rms = math.sqrt(np.mean(record**2))
+    assert (
+        f"(guide, along y) reaches {peak:.3g} m/s² ({peak / 9.80665:.3g} g) at {at:.0f}°, rms "
+        f"{rms:.3g}; without clearance it reaches {ideal:.3g}."
+    ) in told
+    load = frame_forces(sensed)["rod_load"][2400:3601] / 1e3
+    assert f"goes from {load.min():.2f} to {load.max():.2f} kN and changes its side at " in told
+    assert "Load: discharge closes at 0°, suction opens at 39°, suction closes at 180°, " in told
+    assert f"at the big end: at {read_cycle(sensed).struck['big_end'][0]:.0f}°" in told
+    quiet = run(joint="none", clearance_mm=0, load="none", contact={}, machine={"speed_rpm": 60})
+    assert "Impacts" not in PLOT_CAPTIONS["job"]["analyst"](quiet, None)
+
+
+def test_all_that_is_marked_is_in_the_table(sensed):
+    drawing = draw_analyst(sensed, healthy_twin(sensed, sensed=True))
+    found = read_cycle(sensed)
+    strip, vibration, load = drawing.panels
+    assert [*strip.y.words.values()] == ["load", "impacts, big end", "reversals"]
+    lines = [note.x for note in load.notes if note.is_line and not math.isnan(note.x)]
+    assert sorted(lines) == sorted([*found.reversals, *(angle for angle, _ in found.events)])
+    assert vibration.title == "record of the sensor: guide, along y"
+    assert [one.name for one in drawing.legend] == [
+        "this job", "the same machine without clearance",
+    ]  # fmt: skip
+    head = as_csv(drawing).splitlines()[0]
+    for text in ("a (m/s²)", "F_r (kN)", "reversals", "impacts, big end"):
+        assert text in head
+
+
+def test_a_record_without_a_revolution_is_not_drawn():
+    short = run(**BODY, sensor=True, solve={**SOLVE, "duration_rev": 2})
+    cut = short.isel(sensor_time=slice(0, 2000), pulse=slice(0, 1))
+    with pytest.raises(NoSeriesError, match="no whole settled revolution"):
+        read_cycle(cut)
