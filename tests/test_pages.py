@@ -21,7 +21,7 @@ from measure_tradeoff import fingerprint
 import compressor
 from compressor.cases.json_schema import case_schema
 from compressor.cases.load import MAX_JOBS, load_cases, load_studies
-from compressor.cases.swept import FORMS
+from compressor.cases.swept import DISTRIBUTIONS, FORMS
 from compressor.solve.simulate import simulate
 
 ROOT = page_tables.ROOT
@@ -166,7 +166,8 @@ def test_case_files_have_the_jobs_that_they_say(tmp_path):
     jobs = write_case_files(tmp_path)
     assert [*jobs] == [
         "bearing-wear.yaml", "machines.yaml", "cylinder.yaml", "grid.yaml", "zipped.yaml",
-        "random.yaml", "latin.yaml", "sampled.yaml", "sensitivity.yaml", "bounded.yaml",
+        "random.yaml", "latin.yaml", "sampled.yaml", "sensitivity.yaml", "uncertain.yaml",
+        "bounded.yaml",
         "blocks.yaml", "regimes.yaml", "bearings.yaml",
     ]  # fmt: skip
     for name, count in jobs.items():
@@ -202,7 +203,7 @@ def test_plans_have_the_jobs_that_they_say(command, jobs, tmp_path, monkeypatch)
 
 def test_every_feature_of_the_grammar_has_an_example():
     files = "".join(blocks("yaml"))
-    features = [*FORMS, "zip", "exclude", "blocks", "sample", "log"]
+    features = [*FORMS, *DISTRIBUTIONS, "zip", "exclude", "blocks", "sample", "log"]
     assert [word for word in features if not re.search(rf"\b{word}:", files)] == []
     assert {word for command, _ in PLANS for word in command.split()} > {
         "--set", "--only", "--max-jobs"

@@ -114,8 +114,14 @@ class Draft:
         Of wrong values that a form such as `linspace` has made, the first alone.
         """
         valid = []
-        for node in nodes:
+        for number, node in enumerate(nodes, 1):
             value = check(sweep.key, node, self.problems)
+            if value is None and not sweep.has_ends:
+                wrong = self.problems.pop()
+                ends = "{triangular: [least, likeliest, greatest]}"
+                text = f"draw {number} of {len(nodes)}: {wrong.message}: a normal distribution has"
+                text += f" no ends; give it a smaller sd, or draw from {ends}"
+                self.problems.append(replace(wrong, message=text))
             if value:
                 valid.append(value)
             elif sweep.kind != "list":

@@ -12,7 +12,7 @@ from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED
 from compressor.cases.checks import DOUBLES, PER_PART, SHORTHANDS, row_of
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.parameter import NAME, TARGET, Parameter
-from compressor.cases.swept import FORMS, SAMPLED, is_number
+from compressor.cases.swept import DISTRIBUTIONS, FORMS, SAMPLED, is_number
 from compressor.cases.table import GROUPS, WORDS, outside_identity, table
 from compressor.metrics import METRICS
 from compressor.program import STUDY_GROUPS
@@ -33,7 +33,8 @@ def case_schema() -> Schema:
     blocks = {"type": "array", "minItems": 1, "items": _mapping(in_block)}
     blocks["description"] = "sets of jobs, one after the other; each over the keys of the file"
     top = _mapping(found | {"blocks": blocks})
-    return {"$schema": DIALECT, "title": "compsim case file", **top, "$defs": {"made": _forms()}}
+    made = {"made": _forms(), "distribution": _distributions()}
+    return {"$schema": DIALECT, "title": "compsim case file", **top, "$defs": made}
 
 
 def _top_keys() -> list[str]:
@@ -128,6 +129,22 @@ def _forms() -> Schema:
         more = {"log": {"type": "boolean"}} if word in SAMPLED else {}
         forms.append(_mapping({word: numbers | {"description": inside}} | more))
         forms[-1]["required"] = [word]
+        if word in SAMPLED:
+            forms.append(_mapping({word: {"$ref": "#/$defs/distribution"}}))
+            forms[-1]["required"] = [word]
+    return {"anyOf": forms}
+
+
+def _distributions() -> Schema:
+    """Return the schema of what designs draw from, such as {normal: {mean: 0.2, sd: 0.02}}."""
+    normal = _mapping({"mean": NUMBER, "sd": {**NUMBER, "exclusiveMinimum": 0}})
+    normal["required"] = ["mean", "sd"]
+    ends = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}
+    shapes = {"normal": normal, "triangular": ends}
+    forms = []
+    for name, inside in DISTRIBUTIONS.items():
+        forms.append(_mapping({name: shapes[name] | {"description": inside}}))
+        forms[-1]["required"] = [name]
     return {"anyOf": forms}
 
 

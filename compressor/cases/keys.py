@@ -85,7 +85,7 @@ def _halve_node(node: Node, first: int | None = None) -> Node:
     """
     if isinstance(node.value, dict):
         inner = {
-            word: _halve_node(item, None if word == "range" else 2)
+            word: _halve_node(item, None if word in ("range", "triangular") else 2)
             for word, item in node.value.items()
         }
         return replace(node, value=inner)

@@ -329,7 +329,10 @@ def _study(
     if is_grid:
         axes = [Axis(k[0], tuple(n.value for (n,) in rows)) for k, rows in found[0].factors]
     else:
-        spreads = {k: s.spread for d in drafts for k, s in d.sweeps.items() if s.kind in SAMPLED}
+        spreads = {
+            key: sweep.spread for one in drafts for key, sweep in one.sweeps.items()
+            if sweep.kind in SAMPLED and sweep.has_ends
+        }  # fmt: skip
         axes = [Axis(key, tuple(values[key]), spreads.get(key)) for key in swept]
     chains = _chains(draft, draft.request, cases, max_jobs) if draft.request else ()
     if draft.problems:

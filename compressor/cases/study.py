@@ -17,8 +17,8 @@ from compressor.cases.yaml_reader import FileProblem, Node
 class Axis:
     """One swept key of a study, such as `machine.rod_mass_kg`, and its values.
 
-    `spread`: where a design drew it, the function that takes shares of its range, 0 to 1, to
-    values.
+    `spread`: where a design drew it from a range, the function that takes shares of that, 0 to 1,
+    to values; a normal distribution has no range.
     """
 
     key: str

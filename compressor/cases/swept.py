@@ -18,9 +18,10 @@ import itertools
 import math
 import operator
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from statistics import NormalDist
 from typing import Any, NoReturn
 
 from compressor.cases.checks import row_of, suggestion
@@ -37,17 +38,26 @@ FORMS = {
     "logspace": "[first, last, count]",
     "range": "[first, last, step]",
 } | dict.fromkeys(SAMPLED, "[least, greatest]")
+# of what designs draw, in place of [least, greatest] -> what stands behind the word
+DISTRIBUTIONS = {
+    "normal": "{mean: number, sd: number}",
+    "triangular": "[least, likeliest, greatest]",
+}
 
 # keys whose one value is a list
 PAIRS = frozenset(row.key for row in table().values() if row.kind == "materials")
 
 Make = Callable[[], list[float]]
 Spread = Callable[[float], float]  # of a coordinate in [0, 1)
+LEAST_SHARE = 2.0**-54  # that a normal distribution is asked for: its quantile of 0 is infinite
 
 
 @dataclass(frozen=True)
 class SweptKey:
-    """One swept key. A list has `nodes`; a sampled key's values come from a design by `spread`."""
+    """One swept key. A list has `nodes`; a sampled key's values come from a design by `spread`.
+
+    has_ends: whether these values have a least and a greatest one, as all but normal ones have.
+    """
 
     key: str
     node: Node
@@ -55,6 +65,7 @@ class SweptKey:
     count: int  # 0 for a sampled key: its design has the count
     make: Make = list
     spread: Spread = float
+    has_ends: bool = True
 
     def nodes(self) -> list[Node]:
         """Return the values; those that a form has made have the place of its mapping."""
@@ -95,6 +106,8 @@ def sweep_of(key: str, node: Node, problems: list[FileProblem]) -> SweptKey | No
         refuse(f"log is true or false, and for {' '.join(SAMPLED)} alone", log)
     elif not is_number(row_of(key)):
         refuse(f"is no number, so that {words[0]} cannot sweep it: give a list")
+    elif words[0] in SAMPLED and isinstance(node.value[words[0]].value, dict):
+        return _sweep_distribution(key, node, words[0], refuse)
     else:
         numbers = _numbers(words[0], node.value[words[0]], refuse)
         if numbers:
@@ -150,12 +163,89 @@ def _sweep_range(
         refuse(message, node.value[word])
         return None
     if word in SAMPLED:
-        spread = _spread(float(first), float(last), log)
-        row = row_of(key)
-        if row and row.kind == "integer":
-            return SweptKey(key, node, word, 0, spread=lambda share: round(spread(share)))
-        return SweptKey(key, node, word, 0, spread=spread)
+        return _sampled_key(key, node, word, _spread(float(first), float(last), log))
     return SweptKey(key, node, word, count, make=between(word, first, last, count))
+
+
+def _sampled_key(
+    key: str, node: Node, word: str, spread: Spread, has_ends: bool = True
+) -> SweptKey:
+    """Return a key that a design draws by a spread; whole numbers are rounded."""
+    row = row_of(key)
+    if row and row.kind == "integer":
+        return SweptKey(
+            key, node, word, 0, spread=lambda share: round(spread(share)), has_ends=has_ends
+        )
+    return SweptKey(key, node, word, 0, spread=spread, has_ends=has_ends)
+
+
+def _sweep_distribution(
+    key: str, node: Node, word: str, refuse: Callable[..., None]
+) -> SweptKey | None:
+    """Return the sweep by a distribution, such as {lhs: {normal: {mean: 0.2, sd: 0.02}}}."""
+    inside = node.value[word]
+    names = [*inside.value]
+    if len(names) != 1 or names[0] not in DISTRIBUTIONS:
+        near = did_you_mean(names[0], DISTRIBUTIONS) if names else ""
+        known = " or ".join(f"{{{name}: {form}}}" for name, form in DISTRIBUTIONS.items())
+        refuse(f"{word} needs {FORMS[word]}, {known}" + (f"; {near}" if near else ""), inside)
+        return None
+    if "log" in node.value:
+        refuse(f"log is for {FORMS[word]}, not for {names[0]}", node.value["log"])
+        return None
+    name, body = names[0], inside.value[names[0]]
+    numbers = _parts(name, body)
+    if not numbers or not _is_distribution(name, numbers):
+        needs = "sd above 0" if name == "normal" else "in rising order, the ends different"
+        refuse(f"{name} needs {DISTRIBUTIONS[name]}, finite numbers, {needs}", body)
+        return None
+    row = row_of(key)
+    bad = (row.check(end) for end in (numbers[:1] if name == "normal" else numbers) if row)
+    if message := next(filter(None, bad), ""):
+        refuse(message, body)
+        return None
+    spread = _normal(*numbers) if name == "normal" else _triangular(*numbers)
+    return _sampled_key(key, node, word, spread, name != "normal")
+
+
+def _parts(name: str, body: Node) -> list[float]:
+    """Return the numbers of a distribution in their order; none where anything is wrong."""
+    if name == "normal":
+        whole = isinstance(body.value, dict) and {*body.value} == {"mean", "sd"}
+        items = [body.value[part].value for part in ("mean", "sd")] if whole else []
+    else:
+        whole = isinstance(body.value, list) and len(body.value) == 3
+        items = [item.value for item in body.value] if whole else []
+    return [float(item) for item in items] if items and all(map(_is_finite, items)) else []
+
+
+def _is_distribution(name: str, numbers: Sequence[float]) -> bool:
+    """Return whether numbers are those of a distribution."""
+    if name == "normal":
+        return numbers[1] > 0.0
+    return numbers[0] <= numbers[1] <= numbers[2] and numbers[0] < numbers[2]
+
+
+def _normal(mean: float, sd: float) -> Spread:
+    """Return the function that takes [0, 1) to the quantiles of a normal distribution."""
+    quantile = NormalDist(mean, sd).inv_cdf
+    return lambda share: round_made_value(
+        quantile(min(max(share, LEAST_SHARE), 1.0 - 2.0 * LEAST_SHARE))
+    )
+
+
+def _triangular(low: float, middle: float, high: float) -> Spread:
+    """Return the function that takes [0, 1) to the quantiles of a triangular distribution."""
+    below = (middle - low) / (high - low)
+
+    def spread(share: float) -> float:
+        if share < below:
+            value = low + math.sqrt(share * (high - low) * (middle - low))
+        else:
+            value = high - math.sqrt((1.0 - share) * (high - low) * (high - middle))
+        return min(max(round_made_value(value), low), high)
+
+    return spread
 
 
 def between(word: str, first: Fraction, last: Fraction, count: int) -> Make:

@@ -24,6 +24,8 @@ OTHERS = [
     "joint: both\nclearance_mm: {random: [0.01, 1], log: true}\nsample: {n: 2, seed: 3}",
     "load: [none, spring]\nexclude: [load == none]\nfriction: false",
     "joint: both\nclearance_mm: 0.1\nmachine: {pin_radius_mm: {big_end: [50, 60], small_end: 35}}",
+    "machine: {rod_mass_kg: {sobol: {normal: {mean: 4, sd: 0.2}}}}\nsample: {n: 2}",
+    "machine: {rod_mass_kg: {lhs: {triangular: [3, 4, 6]}}}\nsample: {n: 2}",
 ]
 WRONG = [
     "joint: big_en",
@@ -37,6 +39,12 @@ WRONG = [
     "machine: {rod_mass_kg: {linspace: [1, 2, 1]}}",
     "machine: {rod_mass_kg: {lnspace: [1, 2, 3]}}",
     "machine: {rod_mass_kg: {linspace: [1, 2, 3], log: true}}",
+    "machine: {rod_mass_kg: {lhs: {normal: {mean: 4}}}}\nsample: {n: 2}",
+    "machine: {rod_mass_kg: {lhs: {normal: {mean: 4, sd: 0}}}}\nsample: {n: 2}",
+    "machine: {rod_mass_kg: {lhs: {triangular: [3, 6]}}}\nsample: {n: 2}",
+    "machine: {rod_mass_kg: {lhs: {norml: {mean: 4, sd: 1}}}}\nsample: {n: 2}",
+    "machine: {rod_mass_kg: {lhs: {triangular: [3, 4, 6]}, log: true}}\nsample: {n: 2}",
+    "machine: {rod_mass_kg: {linspace: {triangular: [3, 4, 6]}}}",
     "machine: {rod_mass_kg: [4, 4]}",
     "joint: both\nclearance_mm: 0.1\nmachine: {pin_radius_mm: {big_end: 60}}",
     "output: {keep: [series, metrics]}",

@@ -1,6 +1,7 @@
 """The grammar of sweeps: how values are made, joined and left out, and what is refused."""
 
 import itertools
+import re
 import time
 import tracemalloc
 
@@ -9,6 +10,7 @@ import pytest
 from conftest import keep
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scipy.stats import norm, triang
 
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.study import points
@@ -247,6 +249,109 @@ def test_whole_numbers_are_drawn_as_such(plan, kind):
     assert [case.sensor.seed for case in study.cases] == drawn
     assert len({*drawn}) > 4
     assert all(isinstance(case.sensor.seed, int) for case in study.cases)
+
+
+DRAWN = """
+joint: big_end
+clearance_mm: {%s: {normal: {mean: 0.2, sd: 0.02}}}
+machine: {speed_rpm: {%s: {triangular: [300, 500, 900]}}, rod_mass_kg: {%s: [3, 6]}}
+sample: {n: 64, seed: 5}
+"""
+
+
+@pytest.mark.parametrize("kind", ["random", "lhs", "sobol", "saltelli"])
+def test_distributions_are_drawn_by_their_quantiles(plan, kind):
+    """The same shares as of ranges, by SciPy's quantile functions."""
+    shares = np.array(design(kind, 64, 3, 5))
+    found = np.array(rows(plan(DRAWN % (kind, kind, kind))))
+    expected = (
+        norm.ppf(shares[:, 0], 0.2, 0.02),
+        triang.ppf(shares[:, 1], 200 / 600, 300, 600),
+        3 + 3 * shares[:, 2],
+    )
+    np.testing.assert_allclose(found, np.stack(expected, axis=1), rtol=1e-11)
+    ranges = re.sub(r"{normal.*?}}", "[0.1, 0.3]", DRAWN).replace(
+        "{triangular: [300, 500, 900]}", "[300, 900]"
+    )
+    even = np.array(rows(plan(ranges % (kind, kind, kind))))
+    np.testing.assert_allclose((even[:, 0] - 0.1) / 0.2, shares[:, 0], atol=1e-9)
+    np.testing.assert_array_equal(even[:, 2], found[:, 2])
+
+
+@pytest.mark.parametrize("ends", [[300, 300, 900], [300, 900, 900]])
+def test_a_triangle_may_be_a_right_one(plan, ends):
+    text = DRAWN.replace("[300, 500, 900]", str(ends)) % (("lhs",) * 3)
+    speed = np.array(rows(plan(text)))[:, 1]
+    expected = triang.ppf(np.array(design("lhs", 64, 3, 5))[:, 1], (ends[1] - 300) / 600, 300, 600)
+    np.testing.assert_allclose(speed, expected, rtol=1e-11)
+
+
+def test_whole_numbers_and_halved_keys_are_drawn_from_distributions(plan):
+    """A stroke is twice the crank's radius: all numbers of its distribution are halved."""
+    text = ONE + "clearance_mm: 0.2\nbody: true\nsample: {n: 16, seed: 5}\n"
+    one = plan(text + "sensor: {seed: {lhs: {triangular: [1, 50, 900]}}}\nsolve: {settle_rev: 1}\n")
+    drawn = triang.ppf(np.array(design("lhs", 16, 1, 5))[:, 0], 49 / 899, 1, 899)
+    assert [case.sensor.seed for case in one.cases] == [*map(round, drawn)]
+    radius, stroke = (
+        rows(plan(f"{ONE}clearance_mm: 0.2\nsample: {{n: 16}}\nmachine: {{{form}}}"))
+        for form in ("crank_radius_mm: {lhs: {triangular: [100, 120, 160]}}",
+                     "stroke_mm: {lhs: {triangular: [200, 240, 320]}}")
+    )  # fmt: skip
+    assert stroke == radius
+    radius, stroke = (
+        rows(plan(f"{ONE}clearance_mm: 0.2\nsample: {{n: 16}}\nmachine: {{{form}}}"))
+        for form in ("crank_radius_mm: {lhs: {normal: {mean: 120, sd: 5}}}",
+                     "stroke_mm: {lhs: {normal: {mean: 240, sd: 10}}}")
+    )  # fmt: skip
+    assert stroke == radius
+
+
+@pytest.mark.parametrize(
+    ("form", "message"),
+    [
+        ("{lhs: {normal: {mean: 4}}}", "1:39: {}: normal needs {{mean: number, sd: number}}, "
+         "finite numbers, sd above 0"),
+        ("{lhs: {normal: {mean: 4, sd: 0}}}", "finite numbers, sd above 0"),
+        ("{lhs: {normal: {mean: 4, sd: x}}}", "finite numbers, sd above 0"),
+        ("{lhs: {normal: {mean: 4, sd: 1, max: 5}}}", "finite numbers, sd above 0"),
+        ("{lhs: {normal: [4, 1]}}", "normal needs {{mean: number, sd: number}}"),
+        ("{lhs: {normal: {mean: -4, sd: 1}}}", "-4 is outside (0, 1e+06] kg"),
+        ("{lhs: {triangular: [3, 4]}}", "triangular needs [least, likeliest, greatest], finite "
+         "numbers, in rising order, the ends different"),
+        ("{lhs: {triangular: [3, 2, 4]}}", "in rising order, the ends different"),
+        ("{lhs: {triangular: [3, 3, 3]}}", "in rising order, the ends different"),
+        ("{lhs: {triangular: [0, 3, 4]}}", "0 is outside (0, 1e+06] kg"),
+        ("{lhs: {norml: {mean: 4, sd: 1}}}", "lhs needs [least, greatest], {{normal: {{mean: "
+         "number, sd: number}}}} or {{triangular: [least, likeliest, greatest]}}; did you mean n"),
+        ("{lhs: {}}", "lhs needs [least, greatest], {{normal: "),
+        ("{lhs: {normal: {mean: 4, sd: 1}}, log: true}", "log is for [least, greatest], not for"),
+        ("{linspace: {normal: {mean: 4, sd: 1}}}", "linspace needs [first, last, count]"),
+    ],
+)  # fmt: skip
+def test_a_wrong_distribution_is_told(plan, form, message):
+    found = refused(plan, f"machine: {{rod_mass_kg: {form}}}\nsample: {{n: 8}}")[0]
+    assert message.format("machine.rod_mass_kg") in found
+
+
+def test_the_tail_of_a_normal_distribution_is_refused_with_its_draw(plan):
+    """Of 64 draws the first beyond the key's range, counted as the design draws them."""
+    text = "machine: {rod_mass_kg: {lhs: {normal: {mean: 2, sd: 1}}}}\nsample: {n: 64, seed: 1}"
+    drawn = norm.ppf(np.array(design("lhs", 64, 1, 1))[:, 0], 2, 1)
+    first = int(np.flatnonzero(drawn <= 0)[0])
+    (message,) = refused(plan, text)
+    assert message.endswith(
+        f"machine.rod_mass_kg: draw {first + 1} of 64: {drawn[first]:g} is outside (0, 1e+06] "
+        "kg: a normal distribution has no ends; give it a smaller sd, or draw from {triangular: "
+        "[least, likeliest, greatest]}"
+    )
+    assert "1:" in message
+
+
+def test_axes_without_ends_have_no_range(plan):
+    """`compsim claims` searches ranges: a triangle has one, a normal distribution has none."""
+    spreads = {axis.key: axis.spread for axis in plan(DRAWN % (("lhs",) * 3)).axes}
+    assert spreads["clearance_mm"] is None
+    assert [spreads["machine.speed_rpm"](share) for share in (0.0, 1.0)] == [300, 900]
 
 
 def test_saltelli_exchanges_one_key_after_another(plan):
