@@ -1,6 +1,7 @@
 """A record beside jobs: mean revolution, segments, orders and envelope, with a caption."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,7 +44,7 @@ def draw_comparison(found: Comparison) -> Drawing:
         panel.x.title, panel.x.ticks = "crank angle (deg)", range(0, 361, 60)
         panel.x.span(0.0, 360.0)
     mean.y.title = "mean revolution (m/s²)"
-    segments.y.title = "peak of 10° segments (m/s²)"
+    segments.y.title = "peak and rms of 10° segments (m/s²)"
     orders.x.title, orders.y.title = "order of the speed", "rms of an order (m/s²)"
     orders.x.log = orders.y.log = True
     orders.x.span(1.0, found.orders)
@@ -56,10 +57,11 @@ def draw_comparison(found: Comparison) -> Drawing:
 
 
 def plot_segments(panel: Panel, one: Curves, line: LineStyle, name: str) -> None:
-    """Draw the peaks of segments as steps, each over its 10 degrees."""
+    """Draw peaks and, paler, rms of segments as steps, each over its 10 degrees."""
     edges = np.arange(SEGMENTS + 1) * (360.0 / SEGMENTS)
     x = np.repeat(edges, 2)[1:-1]
     panel.plot(x, np.repeat(one.peak, 2), line, name)
+    panel.plot(x, np.repeat(one.rms, 2), replace(line, alpha=0.45), f"{name}, rms")
 
 
 def shade_range(panel: Panel, several: np.ndarray, count: int) -> None:
@@ -78,7 +80,8 @@ def caption(found: Comparison) -> str:
     text = (
         f"(a) Mean revolution of {found.name} ({len(found.turned.spectra)} revolutions) and of the "
         f"jobs most alike, orders 1 to {found.orders}: correlation {like.correlation.value:.3f} "
-        f"with job {best.key[:KEY]}. (b) Mean peak of each 10 degrees: most different at "
+        f"with job {best.key[:KEY]}. (b) Peak and, paler, rms of each 10 degrees, on average over "
+        f"revolutions: peaks most different at "
         f"{like.segment} to {like.segment + 10} degrees, {like.segment_ratio:.2f} times the job's. "
         f"(c) Orders: {like.spectral_distance.value:.1f} dB apart, rms {like.rms_ratio.value:.3g} "
         f"times the job's. (d) Envelope above order {SWING}"
