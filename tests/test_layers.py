@@ -52,6 +52,7 @@ LIBRARIES = {  # library -> the modules that may import it
         "compressor.studies.diagnosis.approximate",
         "compressor.studies.claims.search",
         "compressor.studies.search.find",
+        "compressor.studies.calibrate.fit",
         "compressor.solve.bearing",
         "compressor.solve.scipy_driver",
         "compressor.solve.run_metrics",

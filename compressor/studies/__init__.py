@@ -66,6 +66,7 @@ STUDIES = (
     StudyKind("stress", ("stress",)),
     StudyKind("search", ("find",)),
     StudyKind("compare", ("compare",)),
+    StudyKind("calibrate", ("calibrate",)),
 )  # fmt: skip
 STUDY_FILES[:] = [kind.files for kind in STUDIES if kind.files]
 STUDY_GROUPS.update({kind.group: partial(kind.module, "group") for kind in STUDIES if kind.group})

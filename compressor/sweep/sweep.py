@@ -226,6 +226,23 @@ def local(workers: int) -> Backend:
     return run
 
 
+def in_this_process(
+    place: Path,
+    cases: Sequence[Case],
+    remark: Callable[[str], None],
+    pulse: Callable[[], object],
+) -> Generator[JobResult | JobLost, None, None]:
+    """Yield how jobs end in this process, one after the other; the backend for a few short ones.
+
+    Starting workers takes longer than they do. A job that ends its process ends the sweep.
+    """
+    compile_once(Needs.of(cases), remark)
+    for case in cases:
+        began = time.monotonic()
+        yield JobResult(case, run_job(place, case), time.monotonic() - began)
+        pulse()
+
+
 def run_here(
     work: Callable[[Any], Any],
     jobs: Sequence[Input],

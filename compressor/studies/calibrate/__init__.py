@@ -1,0 +1,1 @@
+"""What is not known of a sound machine, fitted to a record of it."""

@@ -1,0 +1,122 @@
+"""Fits of orders by a model in closed form: an oscillator under harmonic forces."""
+
+import numpy as np
+import pytest
+
+from compressor.studies.calibrate.fit import MODEL_ERROR, fit_orders
+from compressor.studies.calibrate.orders import orders_of
+from compressor.vibration import Record
+
+ORDERS = np.arange(1, 25)
+FORCES = 1.0 / ORDERS**1.5
+
+
+def accelerations(shares, mass=True):
+    """Orders of a mass on a spring, whose frequency, damping and force are shares of a range.
+
+    The force counts over the mass, so that with both nothing tells them apart.
+    """
+    shares = np.asarray(shares, float)
+    frequency = 3.0 + 2.5 * shares[..., :1]
+    damping = 0.02 + 0.2 * shares[..., 1:2]
+    force = 1.0 + shares[..., 2:3]
+    body = 1.0 + shares[..., 3:4] if mass else 1.0
+    gain = -(ORDERS**2) / (frequency**2 - ORDERS**2 + 2j * damping * frequency * ORDERS)
+    return force / body * FORCES * gain
+
+
+def measured(truth, seed, noise=1e-3, model=0.0, mass=True):
+    """Orders with noise, and off by a share that no unknown can explain."""
+    rng = np.random.default_rng(seed)
+    exact = accelerations(truth, mass)
+    wrong = 1.0 + model * (rng.normal(size=ORDERS.size) + 1j * rng.normal(size=ORDERS.size))
+    errors = np.full(ORDERS.size, noise)
+    blur = rng.normal(size=(2, ORDERS.size)) * noise / np.sqrt(2)
+    return exact * wrong + blur[0] + 1j * blur[1], errors
+
+
+def design(unknowns, seed=1):
+    return np.random.default_rng(seed).random((12 * unknowns, unknowns))
+
+
+def fitted(truth, seed, **kinds):
+    amplitudes, errors = measured(truth, seed, **kinds)
+    mass = kinds.get("mass", True)
+    return fit_orders(
+        lambda shares: accelerations(shares, mass), amplitudes, errors, design(len(truth))
+    )
+
+
+def test_known_numbers_come_back():
+    truth = np.array([0.3, 0.6, 0.8])
+    found = fitted(truth, 1, noise=1e-9, mass=False)
+    # the drifts take a share of what a force of 2 % of the range less would explain
+    assert found.shares == pytest.approx(truth, abs=0.01)
+    assert found.misfit < 0.1
+    assert found.explained == pytest.approx(1.0, abs=1e-6)
+    assert found.open_directions == ()
+
+
+def test_intervals_hold_where_the_model_errs_as_it_may():
+    """95 % of intervals, over 100 machines; at most a tenth wider than they need be."""
+    rng = np.random.default_rng(7)
+    inside, sizes = [], []
+    for seed in range(100):
+        truth = 0.15 + 0.7 * rng.random(3)
+        found = fitted(truth, seed, model=MODEL_ERROR, mass=False)
+        off = (found.shares - truth) / found.deviations
+        inside += (np.abs(off) < 1.96).tolist()
+        sizes += off.tolist()
+    assert 0.9 <= np.mean(inside) <= 1.0
+    assert 0.6 < np.std(sizes) < 1.2
+
+
+def test_what_is_not_told_apart_is_named():
+    """Force and mass: their ratio alone is heard; each stays as wide as the other's range lets."""
+    truth = np.array([0.3, 0.6, 0.5, 0.5])
+    found = fitted(truth, 3)
+    assert found.open_directions == ((2, 3),)
+    assert found.deviations[0] < 0.02 < 0.15 < found.deviations[2]
+    ratio = (1 + found.shares[2]) / (1 + found.shares[3])
+    assert ratio == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_machine_that_is_another_says_so():
+    found = fitted(np.array([0.3, 0.6, 0.8]), 4, model=0.2, mass=False)
+    assert found.misfit > 5.0
+    usual = fitted(np.array([0.3, 0.6, 0.8]), 4, model=MODEL_ERROR, mass=False)
+    assert found.deviations.min() > 3.0 * usual.deviations.min()
+
+
+def test_points_that_fail_are_left():
+    """Half of the design fails: the fit begins at the rest."""
+    truth = np.array([0.7, 0.5, 0.4])
+    amplitudes, errors = measured(truth, 5, mass=False)
+
+    def half(shares):
+        found = accelerations(shares, False)
+        return np.where(np.asarray(shares)[..., :1] < 0.4, np.nan, found)
+
+    found = fit_orders(half, amplitudes, errors, design(3))
+    assert found.shares == pytest.approx(truth, abs=0.02)
+    nothing = fit_orders(lambda s: half(s) * np.nan, amplitudes, errors, design(3))
+    assert nothing is None
+
+
+def test_orders_are_amplitude_and_phase_from_top_dead_centre():
+    """Of a record that begins anywhere: cosines of the crank angle, and noise."""
+    rate, speed, late = 5000.0, 12.3, 0.0371
+    times = np.arange(6000) / rate
+    angle = 2 * np.pi * speed * (times - late)
+    values = 2.0 * np.cos(3 * angle + 0.5) + 0.25 * np.cos(20 * angle - 1.0)
+    noise = np.random.default_rng(2).normal(0.0, 0.1, times.size)
+    pulses = late + np.arange(14) / speed
+    found = orders_of(Record(times, values + noise, pulses[pulses < times[-1]], np.nan))
+    expected = np.zeros(found.amplitudes.size, complex)
+    expected[2], expected[19] = 2.0 * np.exp(0.5j), 0.25 * np.exp(-1j)
+    off = np.abs(found.amplitudes - expected)
+    assert off.max() < 5.0 * found.errors.max()
+    # white noise of sigma: each line of a revolution has 2 sigma / sqrt(samples)
+    scatter = 2 * 0.1 / np.sqrt(rate / speed) / np.sqrt(found.revolutions)
+    assert np.median(found.errors) == pytest.approx(scatter, rel=0.2)
+    assert found.amplitudes.size == int(rate / 2.56 / speed)
