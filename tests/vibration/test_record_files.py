@@ -2,6 +2,7 @@
 
 import math
 import sys
+import wave
 
 import numpy as np
 import pytest
@@ -251,6 +252,28 @@ def test_a_universal_file_of_the_published_layout_is_read(tmp_path):
         read_record(path, **STEADY)
 
 
+@pytest.mark.parametrize("binary", [0, 1])
+def test_universal_files_of_others_are_read(binary, tmp_path):
+    """Text and binary, the record at an offset, beside a spectrum, which is no time response."""
+    pyuff = pytest.importorskip("pyuff")
+    path = tmp_path / "x.uff"
+    of_all = {"binary": binary, "rsp_node": 1, "rsp_dir": 2, "ref_node": 0, "ref_dir": 0,
+              "abscissa_spacing": 1, "orddenom_spec_data_type": 0}  # fmt: skip
+    spectrum = {"func_type": 4, "ordinate_spec_data_type": 12, "data": VALUES + 0j, "x": TIMES}
+    value = {"func_type": 1, "ordinate_spec_data_type": 12, "ordinate_axis_units_lab": "m/s^2",
+             "data": VALUES, "x": 2.0 + TIMES}  # fmt: skip
+    tacho = {"func_type": 1, "ordinate_spec_data_type": 0, "id1": "TACHO", "data": voltage(),
+             "x": 2.0 + TIMES}  # fmt: skip
+    for one in (value, tacho):  # pyuff's mode "overwrite" cuts off the head of a binary set
+        pyuff.UFF(str(path)).write_sets([pyuff.prepare_58(**of_all, **one)], mode="add")
+    spectrum = pyuff.prepare_58(**(of_all | {"binary": 0}), **spectrum)
+    pyuff.UFF(str(path)).write_sets([spectrum], mode="add")
+    found = read_record(path)
+    np.testing.assert_allclose(found.values, VALUES, rtol=0 if binary else 5e-12)
+    np.testing.assert_allclose(found.times, 2.0 + TIMES, atol=1e-9)
+    np.testing.assert_allclose(found.tacho, 2.0 + PULSES, atol=1e-5)
+
+
 def test_without_pyuff_the_remedy_is_named(monkeypatch, tmp_path):
     (tmp_path / "x.uff").touch()
     monkeypatch.setitem(sys.modules, "pyuff", None)
@@ -272,6 +295,18 @@ def test_whole_numbers_of_wav_are_shares_of_the_full_scale(dtype, full, scale, t
     np.testing.assert_array_equal(found, np.where(TIMES < 0.2, 25.0, -12.5) * 9.80665)
     with pytest.raises(RecordError, match="has whole numbers: give --full-scale"):
         read_record(path, unit="g", **STEADY)
+
+
+def test_wav_of_24_bits_is_read(tmp_path):
+    """By the standard library, as recorders write it: three bytes a sample, the least first."""
+    path = tmp_path / "x.wav"
+    levels = np.where(TIMES < 0.2, 0.5, -0.25)
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 3, 1000, 0, "NONE", "NONE"))
+        whole = (levels * 2**23).astype(int).tolist()
+        file.writeframes(b"".join(one.to_bytes(3, "little", signed=True) for one in whole))
+    found = read_record(path, unit="m/s2", full_scale=50.0, **STEADY).values
+    np.testing.assert_array_equal(found, 50.0 * levels)
 
 
 def test_wav_says_neither_unit_nor_which_channel(tmp_path):

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
+from compsim.progress import ProgressReporter
 from compsim.records import record_options
 from compsim.results import Items, files, jobs, of_results, results_folder
 from compsim.screen import DONE, as_json, plural, print_text, say, without_nan
@@ -34,12 +35,14 @@ def record_then_jobs(context: click.Context, parameter: click.Parameter, word: s
 @click.option("-o", "--output", metavar="FILE",
               help="Also draw: .png or .svg, or .csv for the figure's numbers.")  # fmt: skip
 @as_json
+@click.option("--quiet", is_flag=True, help="No progress.")
 def compare(
     given: tuple[str, ...],
     folder: str | None,
     hints: dict[str, Any],
     output: str | None,
     as_json: bool,
+    quiet: bool,
 ) -> int:
     """Compare a record with the sensor's records of stored jobs: how alike, and what does not fit.
 
@@ -70,7 +73,8 @@ def compare(
 
     if output:
         writable_folder(os.path.dirname(output) or os.curdir, make=False)
-    found = compare_record(words[0], words[1:], folder, hints)
+    with ProgressReporter(quiet) as progress:
+        found = compare_record(words[0], words[1:], folder, hints, progress)
     if as_json:
         print_text(json.dumps(jsonable_comparison(found), indent=1))
     else:
@@ -107,7 +111,7 @@ def list_comparison(found: "Comparison") -> Iterator[str]:
     if len(found.jobs) > MOST:
         yield f"and {len(found.jobs) - MOST} less alike, which --json lists"
     if found.left_out:
-        yield f"left out: {plural(found.left_out)} without a sensor's record"
+        yield f"left out: {plural(found.left_out)} without a sensor's record of two revolutions"
     if found.inside == found.inside:
         yield (f"envelope: inside the range of the {len(found.jobs)} jobs at {found.inside:.0%} of "
                "crank angles")  # fmt: skip
@@ -140,7 +144,7 @@ def jsonable_comparison(found: "Comparison") -> dict[str, Any]:
         "peak_m_per_s2": found.curves.peak.tolist(), "rms_m_per_s2": found.curves.rms.tolist(),
         "jobs": [
             {
-                "key": job.key, "rpm": job.turned.rpm, "sensor": job.sensor,
+                "key": job.key, "rpm": job.rpm, "orders": job.orders, "sensor": job.sensor,
                 **dataclasses.asdict(job.likeness),
                 "peak_m_per_s2": job.curves.peak.tolist(),
                 "rms_m_per_s2": job.curves.rms.tolist(),

@@ -1,5 +1,6 @@
 """Compare a record with stored jobs: their numbers, and what does not fit."""
 
+import contextlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from compressor.cases import Case
-from compressor.program import CompsimError
+from compressor.program import CompsimError, Progress, no_progress
 from compressor.store import (
     Folder,
     Stored,
@@ -29,6 +30,7 @@ from compressor.studies.compare.likeness import (
     share_inside,
     turn_record,
 )
+from compressor.vibration import RecordError
 
 SAME_SPEED = 0.01  # share by which speeds may differ, beyond which forces do by 2 %
 FEW = 5  # revolutions, below which the mean revolution is noisy
@@ -49,11 +51,17 @@ class CompareError(CompsimError):
 
 @dataclass(frozen=True)
 class Compared:
-    """A job beside the record. sensor: where it sits and what it measures along, in words."""
+    """A job beside the record.
+
+    rpm, rate: of its record, rate in Hz; sensor: where it sits and what it measures along, in
+    words; orders: the highest order that both hold, up to which they are compared.
+    """
 
     key: str
-    turned: Turned
+    rpm: float
+    rate: float
     sensor: str
+    orders: int
     likeness: Likeness
     curves: Curves
 
@@ -62,9 +70,10 @@ class Compared:
 class Comparison:
     """A record beside jobs, the most alike first.
 
-    key: of a record that is a stored job's, else ""; orders: the highest order that all hold;
-    left_out: jobs without a record; inside: share of crank angle at which the record's envelope
-    lies in the range of the jobs', nan of a single job; misfits: sentences on what does not fit.
+    key: of a record that is a stored job's, else ""; orders: the highest that the record holds;
+    left_out: jobs without a record that can be used; inside: share of crank angle at which the
+    record's envelope lies in the range of the jobs', nan of a single job; misfits: sentences on
+    what does not fit.
     """
 
     name: str
@@ -79,51 +88,71 @@ class Comparison:
 
 
 def compare_record(
-    name: str, words: Sequence[str], folder: Folder, hints: Mapping[str, Any]
+    name: str,
+    words: Sequence[str],
+    folder: Folder,
+    hints: Mapping[str, Any],
+    progress: Progress = no_progress,
 ) -> Comparison:
     """Return a record, a file or a stored job's, beside the jobs that words name.
 
-    words: beginnings of jobs' keys, and names of studies; hints: of `find_record`. Raises
-    RecordError, StoreError, and CompareError where no job is left or orders are too few.
+    words: beginnings of jobs' keys, and names of studies, in which a record's own job is left out;
+    hints: of `find_record`. Raises RecordError, StoreError, and CompareError where no job is left
+    or orders are too few.
     """
     key, record = find_record(name, folder, hints)
     mine = turn_record(record)
+    _check_orders(mine.highest, name)
+    own = {mine.highest: curves(mine.lines(mine.highest))}  # by the highest order
     stored = read_store(folder).warned()
-    found, left_out = {}, 0
-    for one in dict.fromkeys(_keys(words, folder, stored)):
-        other = job_record(stored, one)
-        if other is None:
-            left_out += 1
-        elif one != key or len(words) == 1:  # beside others, a job is not compared with itself
-            found[one] = turn_record(other)
-    if not found:
-        text = f"none of the {left_out} jobs has a sensor's record"
-        raise CompareError(f"{text}: run them with body: true, sensor: true and series kept")
-    orders = min(turned.highest for turned in (mine, *found.values()))
-    if orders <= SWING:
-        text = f"the sampling rates hold the orders up to {orders} alone"
-        raise CompareError(f"{text}: record with more than {SWING + 1} times 2.56 samples a turn")
-    lines = mine.lines(orders)
-    own = curves(lines)
+    wanted = [*dict.fromkeys(_keys(words, folder, key))]
     jobs = []
-    for one, turned in found.items():
-        others = turned.lines(orders)
-        other_curves = curves(others)
-        likeness = compare_lines(lines, others, own, other_curves)
-        jobs.append(Compared(one, turned, _sensor(stored, one), likeness, other_curves))
+    for number, one in enumerate(wanted):
+        progress(number, len(wanted), "")
+        other = job_record(stored, one)
+        if other is not None:
+            with contextlib.suppress(RecordError):  # too short, or all zero
+                jobs.append(_compare_job(mine, own, turn_record(other), one, stored))
+    if not jobs:
+        text = f"none of the {len(wanted)} jobs has a sensor's record of two revolutions"
+        raise CompareError(f"{text}: run them with body: true, sensor: true and series kept")
     jobs.sort(key=lambda job: -np.nan_to_num(job.likeness.correlation.value, nan=-2.0))
+    curve = own[mine.highest]
     several = np.array([job.curves.envelope for job in jobs])
-    inside = share_inside(own.envelope, several) if len(jobs) > 1 else math.nan
-    misfits = tuple(find_misfits(mine, jobs, is_file=not key))
-    return Comparison(name, key, mine, own, orders, tuple(jobs), left_out, inside, misfits)
+    inside = share_inside(curve.envelope, several) if len(jobs) > 1 else math.nan
+    return Comparison(
+        name, key, mine, curve, mine.highest, tuple(jobs), len(wanted) - len(jobs), inside,
+        tuple(find_misfits(mine, jobs, is_file=not key)),
+    )  # fmt: skip
 
 
-def _keys(words: Sequence[str], folder: Folder, stored: Stored) -> Iterator[str]:
-    """Yield the keys of the jobs that words name. Raises StoreError."""
+def _compare_job(
+    mine: Turned, own: dict[int, Curves], turned: Turned, key: str, stored: Stored
+) -> Compared:
+    """Return a job beside the record; own: the record's curves by the highest order."""
+    orders = min(mine.highest, turned.highest)
+    _check_orders(orders, f"job {key}")
+    lines, others = mine.lines(orders), turned.lines(orders)
+    if orders not in own:
+        own[orders] = curves(lines)
+    drawn = curves(others)
+    likeness = compare_lines(lines, others, own[orders], drawn)
+    return Compared(key, turned.rpm, turned.rate, _sensor(stored, key), orders, likeness, drawn)
+
+
+def _check_orders(orders: int, what: str) -> None:
+    """Raise CompareError where a sampling rate holds too few orders."""
+    if orders <= SWING:
+        text = f"{what}: the sampling rate holds the orders up to {orders} alone"
+        raise CompareError(f"{text}: record with more than {SWING + 1} times 2.56 samples a turn")
+
+
+def _keys(words: Sequence[str], folder: Folder, own: str) -> Iterator[str]:
+    """Yield the keys of the jobs that words name, of studies without the record's own one."""
     names = {study.name for study in read_studies(folder)}
     for word in words:
         if word in names:
-            yield from find_study(folder, word).keys
+            yield from (key for key in find_study(folder, word).keys if key != own)
         else:
             yield report_job(folder, word).key
 
@@ -146,15 +175,15 @@ def is_shifted(likeness: Likeness) -> bool:
 def find_misfits(record: Turned, jobs: Sequence[Compared], is_file: bool) -> Iterator[str]:
     """Yield a sentence for what does not fit between a record and jobs, the most alike first."""
     best = jobs[0]
-    other, likeness = best.turned, best.likeness
-    if abs(record.rpm / other.rpm - 1.0) > SAME_SPEED:
-        more = (record.rpm / other.rpm) ** 2
+    likeness = best.likeness
+    if abs(record.rpm / best.rpm - 1.0) > SAME_SPEED:
+        more = (record.rpm / best.rpm) ** 2
         yield (
-            f"speed: {record.rpm:.4g} rpm, and the job has {other.rpm:.4g}: forces of inertia "
+            f"speed: {record.rpm:.4g} rpm, and the job has {best.rpm:.4g}: forces of inertia "
             f"are {more:.3g} times as large; run it at machine.speed_rpm: {record.rpm:.4g}"
         )
-    if abs(record.rate / other.rate - 1.0) > 1e-6:
-        yield (f"sampling rate: {record.rate:.6g} Hz, and the job has {other.rate:.6g}: what only "
+    if abs(record.rate / best.rate - 1.0) > 1e-6:
+        yield (f"sampling rate: {record.rate:.6g} Hz, and the job has {best.rate:.6g}: what only "
                "the faster one holds is left out")  # fmt: skip
     if len(record.spectra) < FEW:
         yield (f"length: {len(record.spectra)} revolutions: noise falls by their root alone; "

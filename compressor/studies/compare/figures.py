@@ -37,7 +37,7 @@ def draw_comparison(found: Comparison) -> Drawing:
     for name, one, line in shown:
         mean.plot(one.angle, one.mean, line, name)
         plot_segments(segments, one, line, name)
-        orders.plot(np.arange(1, found.orders + 1), one.spectrum, line, name)
+        orders.plot(np.arange(1, one.spectrum.size + 1), one.spectrum, line, name)
         envelope.plot(np.arange(360) + 0.5, one.envelope, line, name)
     figure.legend = mean.traces
     for panel in (mean, segments, envelope):
@@ -79,7 +79,7 @@ def caption(found: Comparison) -> str:
     like = best.likeness
     text = (
         f"(a) Mean revolution of {found.name} ({len(found.turned.spectra)} revolutions) and of the "
-        f"jobs most alike, orders 1 to {found.orders}: correlation {like.correlation.value:.3f} "
+        f"jobs most alike, orders 1 to {best.orders}: correlation {like.correlation.value:.3f} "
         f"with job {best.key[:KEY]}. (b) Peak and, paler, rms of each 10 degrees, on average over "
         f"revolutions: peaks most different at "
         f"{like.segment} to {like.segment + 10} degrees, {like.segment_ratio:.2f} times the job's. "

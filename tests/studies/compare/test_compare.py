@@ -150,7 +150,10 @@ def test_mistakes_are_named(folder, capsys, tmp_path):
         (["absent.csv", "others"], "absent.csv: cannot be read"),
         ([folder[1]], "Missing argument 'RECORD JOB|STUDY...'"),
         ([folder[1], "othrs"], "did you mean others?"),
-        ([folder[1], "deaf"], "none of the 1 jobs has a sensor's record: run them with body: true"),
+        (
+            [folder[1], "deaf"],
+            "none of the 1 jobs has a sensor's record of two revolutions: run them",
+        ),
         ([folder[1], "others", "-o", "x.pdf"], "-o x.pdf: end the name in .png, .svg, .csv"),
         ([folder[1], "others", "--unit", "g"], "says all of its record; leave --unit out"),
     ):
@@ -162,4 +165,16 @@ def test_mistakes_are_named(folder, capsys, tmp_path):
     np.savetxt(slow, np.column_stack([times, wave, wave]), "%.9g", ",", comments="",
                header="time_s,acceleration_m_per_s2,tacho")  # fmt: skip
     out = run(folder, capsys, str(slow), "others", code=2)
-    assert "the sampling rates hold the orders up to 9 alone" in out
+    assert "slow.csv: the sampling rate holds the orders up to 9 alone" in out
+
+
+@pytest.mark.compiled
+def test_a_job_is_compared_with_the_others_of_its_study(folder, capsys):
+    """Not with itself, unless it is named; a job without a record is counted."""
+    mine = folder[2]["a clearance of 0.1 mm"]
+    found = json.loads(run(folder, capsys, mine, "others", "deaf", "--json"))
+    assert {job["key"] for job in found["jobs"]} == {*folder[2].values()} - {mine}
+    assert found["left_out"] == 1
+    alone = json.loads(run(folder, capsys, mine, mine, "--json"))
+    assert [job["key"] for job in alone["jobs"]] == [mine]
+    assert alone["jobs"][0]["correlation"]["value"] == pytest.approx(1.0)
