@@ -50,13 +50,14 @@ def compare(
     their keys, and studies, which stand for all their jobs. The most alike job comes first.
 
     \b
-    correlation   of the mean revolutions: 1 is the same shape at the same crank angles, whatever
-                  the size; 0 is no likeness, -1 the opposite sign
-    envelope      correlation of the envelopes above order 12: 1 is the same bursts at the same
-                  crank angles, whatever rings in them
-    rms ratio     of the record over the job: 1 is as strong
-    distance      of the spectra in third octaves of orders, both scaled to one level: 0 is the
-                  same, 3 dB a factor of two in the power of a band; 60 dB at most
+    correlation  of the mean revolutions: 1 is the same shape at the same
+                 crank angles, whatever the size; -1 the opposite sign
+    envelope     correlation of the envelopes above order 12: 1 is the
+                 same bursts at the same angles, whatever rings in them
+    rms ratio    of the record over the job: 1 is as strong
+    distance     of the spectra in third octaves of orders, scaled to one
+                 level, in dB: 0 is the same, 3 a factor of two in the
+                 power of a band, 60 at most
 
     A number's error, behind +-, is the standard error by the record's revolutions, of which at
     least three are needed. What does not fit (speed, sampling rate, length, unit, crank angle) is
