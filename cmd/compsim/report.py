@@ -29,6 +29,11 @@ def page_folders(command: Callable[..., Any]) -> Callable[..., Any]:
 @of_results()
 @click.option("-o", "--output", default="report", show_default=True, shell_complete=folders,
               help="Folder of the report.")  # fmt: skip
+@click.option(
+    "--limit", "limits", multiple=True, metavar="NAME=VALUE,...",
+    help="Up to three limits of a metric, such as body_velocity_rms_mm_per_s=2,5: tables and "
+    "curves show its zones A to D.",
+)  # fmt: skip
 @page_folders
 @click.pass_context
 def report(
@@ -36,6 +41,7 @@ def report(
     given: tuple[str, ...],
     folder: str | None,
     output: str,
+    limits: tuple[str, ...],
     **places: str,
 ) -> int:
     """Draw figures and tables of stored studies; prints the path of the page."""
@@ -46,5 +52,6 @@ def report(
     writable_folder(output, make=False)
     from compressor.report import write_report
 
-    print_text(str(write_report(folder, output, context.obj, page_additions(places))))
+    add = page_additions(places)
+    print_text(str(write_report(folder, output, context.obj, add, None, limits)))
     return DONE

@@ -19,7 +19,7 @@ from markupsafe import Markup
 from compressor.analysis import SPOKEN, Claim
 from compressor.cases import MODEL, Case, CaseError
 from compressor.digits import is_known
-from compressor.metrics import JOINTS, METRICS
+from compressor.metrics import BARRED, JOINTS
 from compressor.program import PROGRAM, library_versions
 from compressor.report.figures.sweep_data import Measure, measures
 from compressor.report.page import Section, format_measure, templates
@@ -313,7 +313,7 @@ def rank_findings(
     """Return the findings of measures over jobs, the greatest change first, one a metric."""
     best: dict[str, MetricChange] = {}
     for measure, values, bars in rows:
-        if METRICS[measure.variable].counted or measure.variable in FROM_IDEAL:
+        if BARRED[measure.variable].counted or measure.variable in FROM_IDEAL:
             continue
         found = finding(measure, values, bars, names)
         if found and (measure.variable not in best or found.rank > best[measure.variable].rank):
@@ -328,7 +328,7 @@ def finding(
 
     Jobs whose value is not known within its bar, such as a chaotic motion's peak, do not count.
     """
-    relative = METRICS[measure.variable].bar.relative
+    relative = BARRED[measure.variable].bar.relative
     unbarred = np.isnan(bars)
     sure = [
         n

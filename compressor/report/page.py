@@ -16,12 +16,13 @@ from jinja2 import ChoiceLoader, Environment, FunctionLoader, PackageLoader, Str
 from markupsafe import Markup
 
 from compressor.digits import by_bar
-from compressor.metrics import METRICS
+from compressor.metrics import BARRED
 from compressor.outcome import Regime
 from compressor.report.figures.drawing import Drawing, as_csv
 from compressor.report.figures.pictures import DPI
 from compressor.report.figures.sweep_data import Measure
 from compressor.report.interactive import describe_figure, script
+from compressor.report.limits import NO_LIMITS, Limits
 from compressor.store import Folder, StoredStudy
 
 
@@ -29,12 +30,14 @@ from compressor.store import Folder, StoredStudy
 class Cell:
     """A cell: numbers stand to the right, words to the left, code in its own letters.
 
-    `value`: by what a column is sorted, where that is not the text.
+    `value`: by what a column is sorted, where that is not the text; `zone`: 1 for A, 2 for B and so
+    on, of a metric that has limits; 0 of others.
     """
 
     text: str
     kind: Literal["word", "number", "code"] = "word"
     value: float | None = None
+    zone: int = 0
 
 
 @dataclass(frozen=True)
@@ -75,12 +78,16 @@ def format_measure(measure: Measure, value: float, bar: float) -> str:
     """Return a metric and its error bar, both in its unit, to the digits that the bar allows."""
     if math.isnan(bar):
         return number(value)
-    return by_bar(value, bar, METRICS[measure.variable].bar.relative)
+    return by_bar(value, bar, BARRED[measure.variable].bar.relative)
 
 
-def measured_cell(measure: Measure, value: float, bar: float) -> Cell:
-    """Return a metric and its error bar."""
-    return Cell(format_measure(measure, value, bar), "number", None if math.isnan(value) else value)
+def measured_cell(measure: Measure, value: float, bar: float, limits: Limits = NO_LIMITS) -> Cell:
+    """Return a metric and its error bar, and the zone of its limits that it lies in."""
+    text, zone = format_measure(measure, value, bar), limits.zone(measure, value, bar)
+    known = None if math.isnan(value) else value
+    if zone is None:
+        return Cell(text, "number", known)
+    return Cell(f"{text} {zone.name}", "number", known, zone.number + 1)
 
 
 def value_cell(value: Any) -> Cell:

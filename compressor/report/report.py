@@ -35,6 +35,7 @@ from compressor.report.interactive import (
     publish_library,
     series_name,
 )
+from compressor.report.limits import Limits, read_limits
 from compressor.report.page import (
     Add,
     Additions,
@@ -95,17 +96,21 @@ def write_report(
     command: str = "",
     add: Sequence[Add] = (),
     running: Running | None = None,
+    limits: Sequence[str] = (),
 ) -> Path:
     """Write figures and `index.html` about a folder of results; returns the page's path.
 
     add: what makes more of the page, such as `compressor.studies.page_additions` gives. running:
     how the run stands that still adds to the results; the page says so, and loads itself again.
+    limits: of metrics, whose zones tables and curves show, such as
+    `body_velocity_rms_mm_per_s=2,5`.
 
-    Raises StoreError where there are no results, or the report's folder cannot be written.
+    Raises LimitError where these cannot be used, StoreError where there are no results, or the
+    report's folder cannot be written.
     """
-    folder = Path(report)
+    folder, zones = Path(report), read_limits(limits)
     with Painter(folder) as painter:
-        contents = build_report(results, command, add, running, painter)
+        contents = build_report(results, command, add, running, painter, zones)
         files = painter.finish()
     for plate in contents.plates:
         files |= {name: text.encode() for name, text in plate.texts.items()}
@@ -151,10 +156,11 @@ def build_report(
     add: Sequence[Add],
     running: Running | None,
     painter: Painter,
+    limits: Limits,
 ) -> ReportContent:
     """Return the figures, series and page of a report, in memory.
 
-    painter: it gets each figure as soon as there is one.
+    painter: it gets each figure as soon as there is one; limits: see `write_report`.
     """
 
     def begin(plates: Sequence[Plate]) -> None:
@@ -177,7 +183,7 @@ def build_report(
     own = [study for study in studies if not shown.issuperset(study.keys)]
     added = [one(results, studies) for one in add]
     drawn = [
-        drawn_study(stored, study, others.get(study.name), notes_on(study.name, added))
+        drawn_study(stored, study, others.get(study.name), notes_on(study.name, added), limits)
         for study in own
     ]
     sets = [
@@ -227,7 +233,11 @@ class DrawnStudy(NamedTuple):
 
 
 def drawn_study(
-    stored: Stored, study: StoredStudy, other: SecondSet | None, notes: Sequence[StudyNote]
+    stored: Stored,
+    study: StoredStudy,
+    other: SecondSet | None,
+    notes: Sequence[StudyNote],
+    limits: Limits,
 ) -> DrawnStudy:
     """Return a user's own study: its sections, and its sweep, drawn; `notes`: lines on it.
 
@@ -240,13 +250,13 @@ def drawn_study(
         plates = [
             Plate(file_name("sweep", study.name, one.name), f"{study.name}: {one.title}",
                   one.caption, one.figure)
-            for one in ([] if whole else draw_sweep(data))
+            for one in ([] if whole else draw_sweep(data, limits))
         ]  # fmt: skip
         plates += [
             Plate(file_name(name, study.name), f"{study.name}: {title}", words, drawing)
             for name, title, words, drawing in ([] if whole else page_figures(stored, study))
         ]
-        figures, table = study_sections(stored, study, data, plates, anchor, notes)
+        figures, table = study_sections(stored, study, data, plates, anchor, notes, limits)
         keys = [*(key for plate in plates for key in plate.jobs), *study.keys[:MAX_ROWS]]
         counts = job_counts(data)
         return DrawnStudy(

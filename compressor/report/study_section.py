@@ -11,6 +11,7 @@ import xarray as xr
 from compressor.outcome import Regime, regime_words
 from compressor.reasons import remedy
 from compressor.report.figures.sweep_data import measures
+from compressor.report.limits import NO_LIMITS, Limits
 from compressor.report.page import (
     Cell,
     JobFacts,
@@ -71,12 +72,16 @@ class StudyContent:
 
 @dataclass(frozen=True)
 class JobsContent:
-    """The table of a study's jobs, as far as a page can hold them; `regimes`: what they mean."""
+    """The table of a study's jobs, as far as a page can hold them.
+
+    `regimes`: what they mean; `zones`: what those of metrics with limits mean.
+    """
 
     study: str
     jobs: int
     table: PageTable
     regimes: Sequence[str]
+    zones: Sequence[str] = ()
 
 
 def study_sections(
@@ -86,10 +91,11 @@ def study_sections(
     plates: Sequence[Plate],
     second_set: str = "",
     notes: Sequence[StudyNote] = (),
+    limits: Limits = NO_LIMITS,
 ) -> tuple[Section, Section]:
     """Return the sections of a study as `open_study` gives it: figures and failures, and table.
 
-    notes: lines that others add to the first.
+    notes: lines that others add to the first; limits: of metrics, whose zones the table shows.
     """
     reasons = dict.fromkeys(data["reason"].values[data["status"].values == "failed"])
     anchor = table_anchor(study.name)
@@ -107,7 +113,11 @@ def study_sections(
     )
     regimes = [name for name in Regime if (data["regime"].values == name).any()]
     table = JobsContent(
-        study.name, data["status"].size, jobs_table(data), [*map(regime_words, regimes)]
+        study.name,
+        data["status"].size,
+        jobs_table(data, limits),
+        [*map(regime_words, regimes)],
+        limits.words,
     )
     return (
         Section(file_name("study", study.name), f"Study {study.name}", "study.html", content),
@@ -162,7 +172,7 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
     return rows
 
 
-def jobs_table(data: xr.Dataset) -> PageTable:
+def jobs_table(data: xr.Dataset, limits: Limits = NO_LIMITS) -> PageTable:
     """Return a row for every job of a study, as far as a page can hold them."""
     swept, shown = swept_values(data), measures(data)
     metrics = [(m, ravel_jobs(m.of(data)), ravel_jobs(m.bar(data))) for m in shown]
@@ -172,7 +182,9 @@ def jobs_table(data: xr.Dataset) -> PageTable:
     for place, (status, reason, regime, key) in zip(range(MAX_ROWS), ends, strict=False):
         cells = [value_cell(values[place]) for values in swept.values()]
         cells.append(Cell(status_text(status, reason, regime)))
-        cells += [measured_cell(m, float(of[place]), float(bar[place])) for m, of, bar in metrics]
+        cells += [
+            measured_cell(m, float(of[place]), float(bar[place]), limits) for m, of, bar in metrics
+        ]
         cells.append(Cell(str(key)[:KEY_DIGITS], "code"))
         rows.append(job_row(cells, str(status), str(regime), str(key)))
     return PageTable([*swept, "status", *map(column_title, shown), "job"], rows)

@@ -304,7 +304,8 @@ def test_store_errors_name_the_place_and_the_remedy(case_file, capsys):
 def reporter(monkeypatch):
     """Stands in for compressor.report, which draws for seconds."""
 
-    def write_report(results, report, command, add):
+    def write_report(results, report, command, add, running, limits):
+        assert (running, limits) == (None, ())
         read_studies(results)
         (place,) = [one.keywords["place"] for one in add if one.keywords["place"]]
         return Path(report, command, place)

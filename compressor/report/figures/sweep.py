@@ -6,9 +6,10 @@ from typing import NamedTuple
 import xarray as xr
 
 from compressor.report.figures import sweep_captions as captions
-from compressor.report.figures.drawing import Drawing
+from compressor.report.figures.drawing import Drawing, Note
 from compressor.report.figures.sweep_data import Measure, PlottedSweep, measures, sweep_of
 from compressor.report.figures.sweep_maps import (
+    LIMIT,
     Ranking,
     draw_maps,
     draw_ranking,
@@ -26,6 +27,7 @@ from compressor.report.figures.sweep_panels import (
     draw_scatter,
     roles_of,
 )
+from compressor.report.limits import NO_LIMITS, Limits
 
 MAX_ROWS = 3  # measures that stand in a figure with rows of them
 MAX_DETAILED = 2  # measures that have a figure of their own
@@ -40,8 +42,8 @@ class SweepFigure(NamedTuple):
     figure: Drawing
 
 
-def draw_sweep(data: xr.Dataset) -> list[SweepFigure]:
-    """Return the drawings of a study, as `open_study` gives it.
+def draw_sweep(data: xr.Dataset, limits: Limits = NO_LIMITS) -> list[SweepFigure]:
+    """Return the drawings of a study, as `open_study` gives it; curves show limits of metrics.
 
     None where nothing is swept or measured.
 
@@ -60,13 +62,22 @@ def draw_sweep(data: xr.Dataset) -> list[SweepFigure]:
     if len(sweep.axes) == 1:
         (axis,) = sweep.axes
         title = f"metrics against {axis.phrase}"
-        caption = captions.join_sentences(captions.curves(sweep), *marks)
-        return [SweepFigure(axis.name, title, caption, draw_curves(sweep, shown))]
-    return [*draw_grid(sweep, shown, marks)]
+        drawing = draw_curves(sweep, shown)
+        for panel, measure in zip(drawing.panels, shown, strict=False):
+            panel.notes += [Note(y=limit, style=LIMIT) for limit in limits.of(measure)]
+        words = captions.curves(sweep), *marks, *zone_words(shown, limits)
+        caption = captions.join_sentences(*words)
+        return [SweepFigure(axis.name, title, caption, drawing)]
+    return [*draw_grid(sweep, shown, marks, limits)]
+
+
+def zone_words(shown: Sequence[Measure], limits: Limits) -> list[str]:
+    """Return the sentences on zones, if any of the measures has limits; lines are dashed red."""
+    return limits.words if any(limits.of(one) for one in shown) else []
 
 
 def draw_grid(
-    sweep: PlottedSweep, shown: Sequence[Measure], marks: tuple[str, str]
+    sweep: PlottedSweep, shown: Sequence[Measure], marks: tuple[str, str], limits: Limits
 ) -> Iterator[SweepFigure]:
     """Yield the figures of a grid of two or more axes.
 
@@ -79,8 +90,8 @@ def draw_grid(
     first, second = (sweep.axes[n] for n in order[:2])
     if len(sweep.axes) == 2 and first.is_words == second.is_words:
         title = f"metrics over {first.phrase} and {second.phrase}"
-        caption = captions.join_sentences(captions.maps(sweep), *marks)
-        yield SweepFigure("map", title, caption, draw_maps(sweep, shown))
+        caption = captions.join_sentences(captions.maps(sweep), *marks, *zone_words(shown, limits))
+        yield SweepFigure("map", title, caption, draw_maps(sweep, shown, limits))
         return
     role = roles_of(sweep, order, False)
     title = f"metrics over {sweep.axes[role.x].phrase} and {sweep.axes[role.color].phrase}"

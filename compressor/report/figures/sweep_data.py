@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import SPOKEN
-from compressor.metrics import JOINTS, METRICS
+from compressor.metrics import AXES, BARRED, JOINTS
 from compressor.report.figures.style import RED, mark
 
 MARKS = {
@@ -23,13 +23,14 @@ FOOT = {"failed": 0.04, "missing": 0.11}  # height in a panel
 
 @dataclass(frozen=True)
 class Measure:
-    """A stored metric as it is shown: unit, factor from SI, and the joint, "" where it has none."""
+    """A stored metric as it is shown: unit, factor from SI, joint and axis, "" without one."""
 
     variable: str
     title: str
     unit: str
     factor: float = 1.0
     joint: str = ""
+    axis: str = ""
 
     @property
     def is_relative(self) -> bool:
@@ -37,7 +38,7 @@ class Measure:
 
         The bar of a share or a count is in its own unit.
         """
-        return METRICS[self.variable].bar.relative
+        return BARRED[self.variable].bar.relative
 
     def of(self, data: xr.Dataset) -> xr.DataArray:
         """Return the metric of a job or of a study's jobs, in the unit.
@@ -57,23 +58,28 @@ class Measure:
     def in_unit(self, data: xr.Dataset, name: str) -> xr.DataArray:
         """Return a variable of the metric in the measure's unit."""
         values = data[name]
-        if METRICS[self.variable].contact:
+        if BARRED[self.variable].contact:
             values = values.where(data["max_penetration"] != 0)
-        return (values.sel(joint=self.joint, drop=True) if self.joint else values) * self.factor
+        place = {"joint": self.joint} if self.joint else {"axis": self.axis} if self.axis else {}
+        return values.sel(place, drop=True) * self.factor
 
 
 def shown_variables(name: str) -> Iterator[Measure]:
-    """Yield a metric as the report draws it, if it does: of each joint apart."""
-    metric = METRICS[name]
+    """Yield a metric as the report draws it, if it does: of each joint, or axis, apart."""
+    metric = BARRED[name]
     if metric.shown and not metric.dims:
         yield Measure(name, *metric.shown)
+    elif metric.shown and metric.dims == ("axis",):
+        title, unit, factor = metric.shown
+        for axis in AXES:
+            yield Measure(name, f"{title}, {axis}", unit, factor, axis=axis)
     elif metric.shown:
         title, unit, factor = metric.shown
         for joint in JOINTS:
             yield Measure(name, f"{title}, {joint.replace('_', ' ')}", unit, factor, joint)
 
 
-MEASURES = tuple(measure for name in METRICS for measure in shown_variables(name))
+MEASURES = tuple(measure for name in BARRED for measure in shown_variables(name))
 
 
 def measures(data: xr.Dataset) -> list[Measure]:
@@ -205,7 +211,7 @@ class PlottedSweep:
         """
         values, bars = self.values(measure), self.bars(measure)
         good = np.isnan(bars) | np.isfinite(bars)
-        if METRICS[measure.variable].bar.relative:
+        if BARRED[measure.variable].bar.relative:
             good &= ~(bars >= abs(values)) | (bars == 0.0)
         return np.where(good, values, math.nan)
 

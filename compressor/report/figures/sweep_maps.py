@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.ticker import LogLocator, MaxNLocator
 
 from compressor.analysis import Effects, grid_effects, sampled_effects
-from compressor.metrics import METRICS
+from compressor.metrics import BARRED
 from compressor.report.figures.contours import contour_lines
 from compressor.report.figures.drawing import (
     ColorScale,
@@ -23,7 +23,7 @@ from compressor.report.figures.drawing import (
     share_scales,
     thin_places,
 )
-from compressor.report.figures.style import BLUE, GOLD, GREY, LineStyle, fill, palette
+from compressor.report.figures.style import BLUE, GOLD, GREY, RED, LineStyle, fill, palette
 from compressor.report.figures.sweep_data import (
     MARKS,
     NAMES,
@@ -41,8 +41,10 @@ from compressor.report.figures.sweep_panels import (
     marks_shown,
     metric_panels,
 )
+from compressor.report.limits import NO_LIMITS, Limits
 
 COLORS = "cividis"
+LIMIT = LineStyle(RED, (0, (4, 1.5)), 1.4, 2.4)  # of a metric
 MAX_CELLS = 64  # along an axis
 MAX_CONTOURS = 5
 MIN_RISEN = 0.2  # of the cells, above the least value
@@ -67,10 +69,12 @@ class Cells(NamedTuple):
     keys: np.ndarray
 
 
-def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> Drawing:
+def draw_maps(
+    sweep: PlottedSweep, measures: Sequence[Measure], limits: Limits = NO_LIMITS
+) -> Drawing:
     """Return a map of every measure over both axes of a grid, a cell a job.
 
-    At most MAX_CELLS along an axis.
+    At most MAX_CELLS along an axis. Over two axes of numbers, limits of a measure are lines.
     """
     in_x, in_y = orient_axes(sweep)
     x, y = sweep.axes[in_x], sweep.axes[in_y]
@@ -85,6 +89,7 @@ def draw_maps(sweep: PlottedSweep, measures: Sequence[Measure]) -> Drawing:
     tables = [table(sweep.values(measure)) for measure in measures]
     for panel, measure, values in zip(panels, measures, tables, strict=True):
         plot_map(panel, cells, values, measure)
+        plot_limits(panel, cells, values, limits.of(measure))
         mark_cells(panel, cells, status, chaotic)
         scale_map(panel.x, x, in_lines(x.words) if x.is_words else [])
         scale_map(panel.y, y, y.words if y.is_words else [])
@@ -112,6 +117,13 @@ def plot_map(panel: Panel, cells: Cells, table: np.ndarray, measure: Measure) ->
     if levels:
         lines = contour_lines(*cells.centres, table, levels)
         panel.plot(*lines, LineStyle("#ffffff", linewidth=0.9))
+
+
+def plot_limits(panel: Panel, cells: Cells, table: np.ndarray, limits: Sequence[float]) -> None:
+    """Draw lines where a measure is at its limits, if that is within two axes of numbers."""
+    inside = tuple(one for one in limits if np.nanmin(table) < one < np.nanmax(table))
+    if inside and min(table.shape) > 1 and not any(axis.is_words for axis in cells.axes):
+        panel.plot(*contour_lines(*cells.centres, table, inside), LIMIT)
 
 
 def has_lines(table: np.ndarray, axes: tuple[PlottedAxis, PlottedAxis]) -> bool:
@@ -177,7 +189,7 @@ def leading(sweep: PlottedSweep, measures: Sequence[Measure], most: int) -> list
     for measure in measures:
         values = sweep.known(measure)
         values = values[np.isfinite(values) & (values >= 0.0)]
-        row = METRICS[measure.variable]
+        row = BARRED[measure.variable]
         if values.size and not row.counted and measure.variable not in FROM_IDEAL:
             ratios[measure] = values.max() / values.min() if values.min() > 0.0 else 1.0
     chosen: dict[str, Measure] = {}

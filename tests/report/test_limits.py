@@ -1,0 +1,136 @@
+"""Zones by limits that a user gives, in tables and curves of a study."""
+
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+from compsim import cli
+from conftest import store
+
+from compressor.report.figures.sweep import draw_sweep
+from compressor.report.figures.sweep_data import MEASURES
+from compressor.report.figures.sweep_maps import LIMIT
+from compressor.report.limits import LimitError, limit_names, read_limits
+from compressor.report.page import measured_cell
+from compressor.store.reader import open_study
+
+PEAK = next(one for one in MEASURES if one.variable == "sensor_peak")
+VELOCITY = [one for one in MEASURES if one.variable == "body_velocity_rms"]
+
+
+@pytest.mark.parametrize(
+    ("value", "bar", "name", "number"),
+    [
+        (1.0, 0.1, "A", 0),
+        (2.0, 0.0, "B", 1),  # on a limit: above it
+        (2.1, 0.2, "A/B", 1),
+        (4.0, math.nan, "B", 1),  # without a bar
+        (6.0, 5.0, "A/C", 2),
+        (99.0, 1.0, "C", 2),
+    ],
+)
+def test_a_value_and_its_bar_lie_in_a_zone(value, bar, name, number):
+    zone = read_limits(["sensor_peak_m_per_s2=2, 5"]).zone(PEAK, value, bar)
+    assert (zone.name, zone.number) == (name, number)
+
+
+def test_what_is_not_known_has_no_zone():
+    limits = read_limits(["sensor_peak_m_per_s2=2"])
+    assert limits.zone(PEAK, math.nan, 0.1) is None
+    assert limits.zone(PEAK, 3.0, math.inf) is None
+    assert limits.zone(VELOCITY[0], 3.0, 0.1) is None
+    assert read_limits([]).zone(PEAK, 3.0, 0.1) is None
+    assert measured_cell(PEAK, 3.0, math.inf, limits).zone == 0
+
+
+def test_limits_are_in_the_unit_of_the_page():
+    """Both axes of the velocity have them, in mm/s."""
+    limits = read_limits(["body_velocity_rms_mm_per_s=2.8,4.5,7.1"])
+    assert [one.unit for one in VELOCITY] == ["mm/s", "mm/s"]
+    assert [limits.of(one) for one in VELOCITY] == [(2.8, 4.5, 7.1)] * 2
+    assert limits.words == [
+        "Zones of body velocity rms, by limits that were given: A below 2.8 mm/s, B from 2.8 mm/s "
+        "on, C from 4.5 mm/s on, D from 7.1 mm/s on."
+    ]
+
+
+def test_every_metric_of_the_report_has_a_name_for_its_limits():
+    assert {*limit_names().values()} == {one.variable for one in MEASURES}
+    assert limit_names()["peak_contact_force_kN"] == "peak_contact_force"
+    assert limit_names()["impacts_per_rev"] == "impacts_per_rev"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("body_velocity_rms=2", "did you mean body_velocity_rms_mm_per_s"),
+        ("sensor_peak_m_per_s2", "write NAME=VALUE"),
+        ("sensor_peak_m_per_s2=2,x", "limits are numbers"),
+        ("sensor_peak_m_per_s2=3,2", "each above the last"),
+        ("sensor_peak_m_per_s2=1,2,3,4", "one to 3 numbers"),
+        ("sensor_peak_m_per_s2=nan", "each above the last"),
+    ],
+)
+def test_what_is_no_limit_is_refused(text, message):
+    with pytest.raises(LimitError, match=re.escape(message)):
+        read_limits([text])
+    with pytest.raises(LimitError, match="has limits already"):
+        read_limits(["sensor_peak_m_per_s2=1", "sensor_peak_m_per_s2=2"])
+
+
+def test_the_page_and_the_curves_show_the_zones(tmp_path, capsys):
+    values = {
+        "joint": "big_end", "clearance_mm": [0.05, 0.2], "sensor": True,
+        "body": {"frequency_x_Hz": 4.0, "frequency_y_Hz": 30.0},
+        "solve": {"duration_rev": 2, "settle_rev": 1, "accuracy": "draft"},
+    }  # fmt: skip
+    (tmp_path / "sensed.yaml").write_text(json.dumps(values))
+    store(tmp_path / "results", tmp_path / "sensed.yaml")
+    study = open_study(tmp_path / "results")
+    low, high = study["sensor_peak"].values
+    assert high > 1.2 * low
+    middle = f"{(low + high) / 2:.6g}"
+    report = ["report", "-i", str(tmp_path / "results"), "-o", str(tmp_path / "out")]
+    assert cli.main([*report, "--limit", f"sensor_peak_m_per_s2={middle}"]) == 0
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert re.findall(r'class="zone-(\d)">[^<]* ([A-D/]+)<', page) == [("1", "A"), ("2", "B")]
+    sentence = f"A below {middle} m/s², B from {middle} m/s² on."
+    assert page.count(sentence) == 2  # of the table, and in the caption of the curves
+    (figure,) = draw_sweep(study, read_limits([f"sensor_peak_m_per_s2={middle}"]))
+    lines = {one.title: [note.y for note in one.notes if note.is_line] for one in
+             figure.figure.panels}  # fmt: skip
+    assert lines["sensor peak"] == [float(middle)]
+    assert not lines["sensor rms"]
+    capsys.readouterr()
+    assert cli.main([*report, "--limit", "sensor_peak=3"]) == 2
+    assert "did you mean sensor_peak_m_per_s2" in capsys.readouterr().err
+    assert cli.main(report) == 0
+    assert "zone-" not in re.sub("<style>.*?</style>", "", (
+        tmp_path / "out" / "index.html").read_text(encoding="utf-8"), flags=re.DOTALL)  # fmt: skip
+
+
+def test_limits_are_lines_in_maps_of_two_numbers():
+    """The measure is the product of both axes: along the line it is the limit."""
+    x, y = np.linspace(1.0, 3.0, 9), np.linspace(1.0, 2.0, 5)
+    values = x[:, None] * y
+    shape = ("speed_rpm", "clearance_mm")
+    data = xr.Dataset(
+        {
+            "sensor_peak": (shape, values, {"units": "m/s2"}),
+            "status": (shape, np.full(values.shape, "ok")),
+            "regime": (shape, np.full(values.shape, "")),
+            "key": (shape, np.array([[f"{i}{j}" for j in range(5)] for i in range(9)])),
+        },
+        {"speed_rpm": x, "clearance_mm": y},
+    )
+    (figure,) = [one for one in draw_sweep(data, read_limits(["sensor_peak_m_per_s2=3.5,99"]))
+                 if one.name == "map"]  # fmt: skip
+    (line,) = [one for one in figure.figure.panels[0].traces if one.style == LIMIT]
+    known = np.isfinite(line.x)
+    np.testing.assert_allclose(line.x[known] * line.y[known], 3.5, rtol=0.02)
+    assert "A below 3.5 m/s²" in figure.caption
+    bare = next(one for one in draw_sweep(data) if one.name == "map")
+    assert not [one for one in bare.figure.panels[0].traces if one.style == LIMIT]
