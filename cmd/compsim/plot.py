@@ -11,7 +11,8 @@ from compsim.screen import (
 )
 
 FIGURES = (
-    "analyst", "signals", "spectra", "orbits", "modes", "impacts", "cycles", "waterfall", "map",
+    "analyst", "signals", "spectra", "orbits", "modes", "impacts",
+    "cycles", "segments", "waterfall", "map",
     *(name for kind in STUDIES for name in kind.figures),
 )  # fmt: skip
 MORE = "".join(f"; of a study of {k.name} {', '.join(k.figures)}" for k in STUDIES if k.figures)
@@ -34,7 +35,7 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 @click.option(
     "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
     help="Of a job analyst, signals, spectra, orbits, modes, impacts; of a study cycles, "
-    f"waterfall, map{MORE}.",
+    f"segments, waterfall, map{MORE}.",
 )  # fmt: skip
 @click.option("-o", "--output", default="plots", show_default=True, shell_complete=folders,
               help="Folder of the figures.")  # fmt: skip
@@ -47,6 +48,10 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
     "--at", multiple=True, metavar="KEY=VALUE",
     help="The value of another axis; by default its first.",
 )  # fmt: skip
+@click.option(
+    "--limit", default="", metavar="LIMIT",
+    help="Of a segment's rms: m/s², such as 20, or times the machine without clearance, as 3x.",
+)  # fmt: skip
 def plot(
     given: tuple[str, ...],
     what: tuple[str, ...],
@@ -55,6 +60,7 @@ def plot(
     form: str,
     over: str,
     at: tuple[str, ...],
+    limit: str,
 ) -> int:
     """Draw one job, or a study; prints files and captions.
 
@@ -65,6 +71,7 @@ def plot(
     compsim plot 3fa9c2
     compsim plot bearing-wear clearance_mm=0.2 machine.rod_mass_kg=3
     compsim plot bearing-wear --over clearance_mm --at machine.rod_mass_kg=3
+    compsim plot machines --what segments --limit 3x
 
     A job's revolution as an analyst reads it (the sensor's record, or the crosshead's acceleration,
     above the rod load, with reversals, valve events and impacts), its signals over crank angle,
@@ -80,7 +87,7 @@ def plot(
     writable_folder(output, make=False)
     from compressor.report import PlotChoice, write_plots
 
-    choice = PlotChoice(what, over, at, KINDS[form])
+    choice = PlotChoice(what, over, at, limit, KINDS[form])
     kind = find_drawn(folder).get(name)
     if kind:
         if values:

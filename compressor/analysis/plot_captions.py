@@ -1,7 +1,7 @@
 """Captions of `compsim plot`: sentences that say the numbers of what is drawn."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -36,21 +36,68 @@ def plural(count: int, thing: str) -> str:
 
 
 @dataclass(frozen=True)
+class Segments:
+    """The rms of a sensor's record in 36 segments of 10 degrees, m/s2, (36,) each.
+
+    `rms` with its error `bar`; `healthy`: of the same machine without clearance; `limit`: nan where
+    none is given.
+    """
+
+    rms: np.ndarray
+    bar: np.ndarray
+    healthy: np.ndarray
+    limit: np.ndarray
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Return the rms over that of the machine without clearance, (36,)."""
+        return self.rms / self.healthy
+
+    @property
+    def tripped(self) -> np.ndarray:
+        """Return which segments are over their limit by more than their error bar, (36,)."""
+        return self.rms - self.bar > self.limit
+
+    @property
+    def doubtful(self) -> np.ndarray:
+        """Return which segments may be over their limit, within their error bar, (36,)."""
+        return (self.rms + self.bar > self.limit) & ~self.tripped
+
+
+@dataclass(frozen=True)
 class SweptRow:
     """One job: its value on the axis in words, and what its series tell.
 
     `shaking` is None, and `problem` says why, where the job has none. `modes`: as `angle_modes`
-    gives them, None of ideal joints. `cycle`: its last revolution. `chaotic`: single lines hold for
-    this course of the motion only. `lubricated`: its joints have oil.
+    gives them, None of ideal joints. `cycle`: its last revolution; `segments`: of its sensor's
+    record. `chaotic`: single lines hold for this course of the motion only. `lubricated`: its
+    joints have oil.
     """
 
     value: str
     shaking: Shaking | None = None
     modes: xr.Dataset | None = None
     cycle: Cycle | None = None
+    segments: Segments | None = None
     problem: str = ""
     chaotic: bool = False
     lubricated: bool = False
+
+    def with_segments(
+        self, run: xr.Dataset, healthy: np.ndarray, limit: tuple[float, bool] | None
+    ) -> "SweptRow":
+        """Return the row with the segments of a run that has a sensor.
+
+        healthy: rms in each segment without clearance, m/s2, (36,); limit: m/s2, or times that of
+        the healthy machine where the second is True.
+        """
+        rms = run["sensor_segment_rms"].values
+        bar = run["sensor_segment_rms_error"].values if "sensor_segment_rms_error" in run else None
+        limits = np.full(rms.size, np.nan)
+        if limit is not None:
+            limits = limit[0] * (healthy if limit[1] else np.ones(rms.size))
+        found = Segments(rms, np.zeros(rms.size) if bar is None else bar, healthy, limits)
+        return replace(self, segments=found)
 
 
 def rows_modes(rows: Sequence[SweptRow]) -> dict[str, np.ndarray]:
@@ -273,6 +320,46 @@ def cycles(rows: Sequence[SweptRow], axis: str) -> str:
     return f"{text} The rod load changes its side {number} times a revolution.{left_out(rows)}"
 
 
+def segment_rows(rows: Sequence[SweptRow], axis: str) -> str:
+    """Describe segments along an axis: the greatest, and which is over its limit first."""
+    known = [(row.segments, row.value) for row in rows if row.segments]
+    found, value = max(known, key=lambda one: np.nanmax(one[0].rms))
+    place = int(np.nanargmax(found.rms))
+    sentences = [
+        f"The rms of the sensor's record in 36 segments of 10°, over that of the same machine "
+        f"without clearance, a row for each value of {axis}. The greatest rms is "
+        f"{found.rms[place]:.3g} m/s², {segment_words(place)} at {value}, "
+        f"{found.ratio[place]:.3g} times that without clearance. Valves make no noise of their own "
+        f"in the model, so that a sound machine is quieter than a real one."
+    ]
+    if not np.isnan(known[0][0].limit).all():
+        sentences.append(first_tripped(known))
+    return " ".join(sentences) + left_out(rows)
+
+
+def first_tripped(known: Sequence[tuple[Segments, str]]) -> str:
+    """Return which segment is over its limit first, in the order of the rows, and how many last."""
+    over = [(found, value) for found, value in known if found.tripped.any()]
+    if not over:
+        doubtful = sum(int(found.doubtful.any()) for found, _ in known)
+        may = f"; within error bars in {plural(doubtful, 'row')}" if doubtful else ""
+        return f"No segment is over its limit{may}."
+    found, value = over[0]
+    place = int(np.nanargmax(np.where(found.tripped, found.rms / found.limit, np.nan)))
+    last, last_value = over[-1]
+    return (
+        f"The first over its limit of {found.limit[place]:.3g} m/s² is {segment_words(place)} at "
+        f"{value}, by {found.rms[place]:.3g} m/s²; over theirs are "
+        f"{plural(int(found.tripped.sum()), 'segment')} there and {int(last.tripped.sum())} at "
+        f"{last_value}."
+    )
+
+
+def segment_words(place: int) -> str:
+    """Return a segment's crank angles in words."""
+    return f"{10 * place} to {10 * place + 10}°"
+
+
 def mode_rows(rows: Sequence[SweptRow], axis: str) -> str:
     """Describe the mode map: the share of angles whose most frequent mode is flight."""
     sentences = [f"The most frequent contact mode in each degree, a row for each value of {axis}."]
@@ -319,5 +406,5 @@ PLOT_CAPTIONS: dict[str, dict[str, Callable[..., str]]] = {
         "modes": modes,
         "impacts": struck,
     },
-    "study": {"cycles": cycles, "waterfall": waterfall, "map": mode_rows},
+    "study": {"cycles": cycles, "segments": segment_rows, "waterfall": waterfall, "map": mode_rows},
 }

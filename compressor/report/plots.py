@@ -1,7 +1,8 @@
 """`compsim plot`: figures of one job, or of a study along one of its axes, as files."""
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ from compressor.report.figures.job import (
     draw_map,
     draw_modes,
     draw_orbits,
+    draw_segments,
     draw_signals,
     draw_spectra,
     draw_waterfall,
@@ -60,12 +62,14 @@ class PlotError(CompsimError):
 class PlotChoice:
     """What to draw: names of figures, all by default; of a study the axis and the other values.
 
-    over: the axis by its key or the end of it; at: `key=value` of other axes, else their first.
+    over: the axis by its key or the end of it; at: `key=value` of other axes, else their first;
+    limit: of a segment's rms, m/s2, or with an x behind it times the healthy machine's.
     """
 
     what: tuple[str, ...] = ()
     over: str = ""
     at: tuple[str, ...] = ()
+    limit: str = ""
     kinds: tuple[str, ...] = ("png",)
 
 
@@ -103,7 +107,12 @@ def publish_drawings(
 JOB, STUDY = PLOT_CAPTIONS["job"], PLOT_CAPTIONS["study"]
 OF_CONTACT = {"orbits": draw_orbits, "modes": draw_modes, "impacts": draw_impacts}
 BESIDE_TWIN = {"analyst": draw_analyst, "signals": draw_signals, "spectra": draw_spectra}
-OVER_AXIS = {"cycles": draw_cycles, "waterfall": draw_waterfall, "map": draw_map}
+OVER_AXIS = {
+    "cycles": draw_cycles,
+    "segments": draw_segments,
+    "waterfall": draw_waterfall,
+    "map": draw_map,
+}
 MAX_ROWS = 200  # of a map
 KEY_DIGITS = 10  # digits of a key in the name of a file
 KEEP = "run it again with --set output.keep=series"
@@ -135,8 +144,8 @@ def job_figures(
 ) -> Iterator[tuple[str, str, Drawing]]:
     """Yield the names, captions and drawings of a job that has time series."""
     figures = choose_figures(choice.what, [*JOB], f"job {key}")
-    if choice.over or choice.at:
-        raise PlotError(f"{key} is one job: --over and --at are for studies")
+    if choice.over or choice.at or choice.limit:
+        raise PlotError(f"{key} is one job: --over, --at and --limit are for studies")
     run = drawable(stored, studies, key)
     try:
         worn = joints_with_clearance(run)
@@ -192,12 +201,67 @@ def study_figures(
     rows = [swept_row(stored, value, key) for value, key in jobs]
     if not any(row.shaking for row in rows):
         raise PlotError(nothing_to_draw(stored, study, rows))
+    limit = read_limit(choice.limit)
+    if "segments" in figures:
+        rows = with_segments(stored, jobs, rows, limit)
     for name in figures:
+        if name == "segments" and not any(row.segments for row in rows):
+            if choice.what:
+                raise PlotError(
+                    f"no job of {study.name} has a sensor's record in segments: {SENSE}"
+                )
+            continue
         if name == "map" and not any(row.modes is not None for row in rows):
             if choice.what:
                 raise PlotError(f"no joint of {study.name} has clearance: there is no mode map")
             continue
         yield name, STUDY[name](rows, over) + where, OVER_AXIS[name](rows, over)
+
+
+SENSE = "run it with body: true and sensor: true, or again with --rerun stale"
+
+
+def read_limit(text: str) -> tuple[float, bool] | None:
+    """Return a segment's limit, and whether it is times the healthy machine's; None for "".
+
+    Raises PlotError.
+    """
+    if not text:
+        return None
+    try:
+        value = float(text.removesuffix("x"))
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise PlotError(f"--limit {text}: give m/s², such as 20, or times the machine without "
+                        "clearance, such as 3x")  # fmt: skip
+    return value, text.endswith("x")
+
+
+def with_segments(
+    stored: Stored,
+    jobs: Sequence[tuple[Any, str]],
+    rows: Sequence[SweptRow],
+    limit: tuple[float, bool] | None,
+) -> list[SweptRow]:
+    """Return rows of jobs with the segments of those that have a sensor; limit: see `PlotChoice`.
+
+    Machines that differ in clearance alone have one healthy machine.
+    """
+    healthy: dict[str, np.ndarray] = {}
+    found = []
+    for (_, key), row in zip(jobs, rows, strict=True):
+        run = None if row.problem else stored.job(key)
+        if run is None or "sensor_segment_rms" not in run:
+            found.append(row)
+            continue
+        case = case_of(run)
+        one = replace(case, joint="none", lubricant=None, wear=None).key
+        if one not in healthy:
+            twin = healthy_twin(run, sensed=True)
+            healthy[one] = twin["sensor_segment_rms"].values
+        found.append(row.with_segments(run, healthy[one], limit))
+    return found
 
 
 MAX_PAGE_ROWS = 12  # of a study's jobs whose series a page reads

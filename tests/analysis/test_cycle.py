@@ -4,15 +4,16 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from compressor.analysis.contacts import impacts
 from compressor.analysis.cycle import read_cycle
-from compressor.analysis.plot_captions import PLOT_CAPTIONS
+from compressor.analysis.plot_captions import PLOT_CAPTIONS, SweptRow
 from compressor.analysis.runs import record_of
 from compressor.analysis.shaking import NoSeriesError, frame_forces, healthy_twin
 from compressor.cases.case import Case
 from compressor.report.figures.drawing import as_csv
-from compressor.report.figures.job import draw_analyst
+from compressor.report.figures.job import draw_analyst, draw_segments
 from compressor.solve.simulate import simulate
 
 SOLVE = {"duration_rev": 3, "settle_rev": 1, "accuracy": "draft", "error_bars": False}
@@ -162,3 +163,35 @@ def test_a_record_without_a_revolution_is_not_drawn():
     cut = short.isel(sensor_time=slice(0, 2000), pulse=slice(0, 1))
     with pytest.raises(NoSeriesError, match="no whole settled revolution"):
         read_cycle(cut)
+
+
+def test_segments_over_their_limits_are_told():
+    """Rows of made-up numbers: 3 mm/s2 in all but two segments, of which one grows."""
+    rms = np.full((3, 36), 3.0)
+    rms[:, 8], rms[:, 32] = (5.0, 5.9, 9.0), (4.0, 7.0, 9.5)
+    bars = np.where(rms == 5.9, 0.2, 0.01)
+    rows = []
+    for value, one, bar in zip(("0.1", "0.2", "0.3"), rms, bars, strict=True):
+        run = xr.Dataset({"sensor_segment_rms": ("segment", one),
+                          "sensor_segment_rms_error": ("segment", bar)})  # fmt: skip
+        rows.append(SweptRow(value).with_segments(run, np.full(36, 3.0), (2.0, True)))
+    assert [row.segments.tripped.nonzero()[0].tolist() for row in rows] == [[], [32], [8, 32]]
+    assert [row.segments.doubtful.nonzero()[0].tolist() for row in rows] == [[], [8], []]
+    told = PLOT_CAPTIONS["study"]["segments"](rows, "clearance_mm")
+    assert "greatest rms is 9.5 m/s², 320 to 330° at 0.3, 3.17 times that without" in told
+    assert (
+        "The first over its limit of 6 m/s² is 320 to 330° at 0.2, by 7 m/s²; over theirs are 1 "
+        "segment there and 2 at 0.3."
+    ) in told
+    fixed = [row.with_segments(run, np.full(36, 3.0), (9.495, False)) for row in rows]
+    told = PLOT_CAPTIONS["study"]["segments"](fixed, "clearance_mm")
+    assert "No segment is over its limit; within error bars in 3 rows." in told
+    free = [row.with_segments(run, np.full(36, 3.0), None) for row in rows]
+    assert "limit" not in PLOT_CAPTIONS["study"]["segments"](free, "clearance_mm")
+    drawing = draw_segments(rows, "clearance_mm")
+    over, doubtful = drawing.legend
+    assert (over.name, over.x.tolist(), over.y.tolist()) == (
+        "over its limit", [325.0, 85.0, 325.0], [1.0, 2.0, 2.0],
+    )  # fmt: skip
+    assert (doubtful.x.tolist(), doubtful.y.tolist()) == ([85.0], [1.0])
+    np.testing.assert_allclose(drawing.panels[0].traces[0].z[2, 32], 9.5 / 3)

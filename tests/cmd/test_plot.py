@@ -270,7 +270,7 @@ def test_a_job_named_by_too_little_or_as_a_study(plot, folder):
     assert f"jobs' keys begin with '{first}'" in err
     code, _, err = plot(key(folder, "worn"), "--over", "clearance_mm")
     assert code == 2
-    assert "--over and --at are for studies" in err
+    assert "--over, --at and --limit are for studies" in err
     assert "has no figure 'map'" in plot(key(folder, "worn"), "--what", "map")[2]
 
 
@@ -280,3 +280,32 @@ def test_a_chaotic_job_is_drawn_and_said_to_be_chaotic(folder, paper_runs):
     run.attrs["regime"] = "chaotic"
     assert "The motion is chaotic" in PLOT_CAPTIONS["job"]["orbits"](run, None)
     assert "chaotic" not in calm
+
+
+def test_segments_of_a_study_are_drawn_beside_the_healthy_machine(tmp_path, capsys, unpainted):
+    """The limit is times the rms of the same machine without clearance; other studies have none."""
+    values = {
+        "joint": "big_end", "clearance_mm": [0.05, 0.2], "sensor": True,
+        "body": {"frequency_x_Hz": 4.0, "frequency_y_Hz": 30.0}, "solve": SOLVE,
+    }  # fmt: skip
+    (tmp_path / "heard.yaml").write_text(json.dumps(values))
+    home = tmp_path / "results"
+    (study,) = store(home, tmp_path / "heard.yaml")
+    sound = simulate(Case.from_values({**values, "joint": "none", "clearance_mm": 0}))
+    words = ["plot", "heard", "--what", "segments", "-i", str(home), "-o", str(tmp_path / "out")]
+    assert cli.main([*words, "--limit", "5x"]) == 0
+    told = capsys.readouterr().out
+    healthy = sound["sensor_segment_rms"].values
+    runs = [read_store(home).job(case.key)["sensor_segment_rms"].values for case in study.cases]
+    over = [(rms > 5 * healthy).sum() for rms in runs]
+    assert re.search(rf"over theirs are {over[0]} segments? there and {over[1]} at 0\.2\.", told)
+    place = int(np.argmax(runs[0] / healthy))
+    assert f"is {10 * place} to {10 * place + 10}° at 0.05, by {runs[0][place]:.3g} m/s²" in told
+    assert cli.main([*words, "--limit", "5g"]) == 2
+    assert "give m/s², such as 20, or times" in capsys.readouterr().err
+
+
+def test_a_study_without_a_sensor_has_no_segments(plot, unpainted):
+    code, found, err = plot("worn", "--what", "segments")
+    assert (code, found) == (2, {})
+    assert "no job of worn has a sensor's record in segments: run it with body: true" in err

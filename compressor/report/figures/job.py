@@ -439,6 +439,47 @@ def draw_cycles(rows: Sequence[SweptRow], title: str) -> Drawing:
     return figure
 
 
+def draw_segments(rows: Sequence[SweptRow], title: str) -> Drawing:
+    """Return the rms in segments of 10 degrees over the healthy machine's, a row a value.
+
+    In colour, with marks where a segment is over its limit; beside them the greatest rms.
+    """
+    figure, panels = make_grid(1, 2, height(len(rows)) + 0.9, widths=(3, 1))
+    image, beside = panels.flat
+    found = [row.segments for row in rows]
+    table = np.array([one.ratio if one else np.full(36, np.nan) for one in found])
+    top = max(float(np.nanmax(table)), 1.1)
+    name = "rms over that without clearance"
+    colors = ColorScale(palette("cividis"), 1.0, top, True, name, "top", 50, pointed=True)
+    edges = 10.0 * np.arange(37), np.arange(len(rows) + 1) - 0.5
+    image.traces.append(map_cells(*edges, np.maximum(table, 1.0), colors))
+    for name, shape, color, over in (
+        ("over its limit", "s", RED, [one.tripped if one else None for one in found]),
+        (
+            "over it within the error bar",
+            "o",
+            GOLD,
+            [one.doubtful if one else None for one in found],
+        ),
+    ):
+        marks = [(10.0 * at + 5.0, float(n)) for n, some in enumerate(over) if some is not None
+                 for at in np.flatnonzero(some)]  # fmt: skip
+        if marks:
+            x, y = np.array(marks).T
+            image.plot(x, y, mark(color, shape, 4, edge=BLACK), name)
+    image.x.title = ANGLE_AXIS
+    label_rows(image, rows, title)
+    share_turn([image], 90.0)
+    greatest = np.array([np.nanmax(one.rms) if one else np.nan for one in found])
+    dots = LineStyle(BLUE, linewidth=1.5, marker="o", markersize=3.5)
+    beside.plot(greatest, np.arange(len(rows), dtype=float), dots)
+    beside.x.title = "greatest rms of a\nsegment (m/s²)"
+    beside.x.span(0, 1.08 * float(np.nanmax(greatest)))
+    share_scales(figure.panels, "y")
+    figure.legend = [one for one in image.traces if one.is_points]
+    return figure
+
+
 def draw_map(rows: Sequence[SweptRow], title: str) -> Drawing:
     """Return the most frequent contact mode over the crank angle, a row a value, for each joint."""
     modes = rows_modes(rows)
