@@ -366,6 +366,7 @@ OTHER = {  # valid values beside the defaults, which cannot be scaled
     "output.keep": "metrics",
     "output.precision": "single",
     "body.freedoms": "y",
+    "body.band_high_Hz": 200.0,
     "body.start": "rest",
     "sensor.place": "bearing",
     "sensor.direction": "x",
@@ -413,6 +414,8 @@ def test_the_table_says_which_values_make_another_job(key):
         base |= BIG_END
     if group in ("lubricant", "guide", "drive", "rod", "wear"):
         base |= {group: {"clearance_mm": 0.1} if group == "guide" else True}
+    if key == "sensor.second_threshold_m_per_s2":
+        base |= {"sensor": {"threshold_m_per_s2": 5.0}}
     if key == "machine.balance_reciprocating":
         base |= {"machine": {"balance": 1.0}}
     if key == "guide.restitution":

@@ -45,6 +45,7 @@ DRIVEN = IDEAL | {"drive": {"torque_N_m": 10}, "machine": {"gravity_m_per_s2": 9
 ELASTIC = IDEAL | {"rod": True}
 WEARING = BIG | {"wear": {"limit_mm": 0.205}}
 HEARD = IDEAL | {"body": {"freedoms": "xy_rocking"}, "sensor": True}
+COUNTED = HEARD | {"sensor": {"threshold_m_per_s2": 0.1}}
 FLAT = HEARD | {"body": {"freedoms": "xy"}}
 STARTED = HEARD | {"body": {"start": "rest"}}
 CENTRAL = HEARD | {"sensor": {"place": "body"}}
@@ -183,6 +184,10 @@ ENTRIES = {
         sensor__low_pass_Hz=5000, sensor__mounting_Hz=20000, sensor__mounting_damping_ratio=0.1,
         sensor__range_m_per_s2=1, sensor__noise_m_per_s2=0.1,
     ),
+    "body.band_low_Hz": Entry(20, HEARD),
+    "body.band_high_Hz": Entry(20, HEARD),
+    "sensor.threshold_m_per_s2": Entry(0.1, HEARD, (IDEAL,)),
+    "sensor.second_threshold_m_per_s2": Entry(0.2, COUNTED, (HEARD, IDEAL)),
     "sensor.seed": Entry(2, HEARD, (QUIET, IDEAL)),
     **entries(HEARD, STARTED, IDEAL, sensor__speed_jitter=0.01, sensor__length_rev=3),
     **entries(
@@ -201,6 +206,7 @@ RIVALS = {"solve.duration_s": "duration_rev", "solve.output_step_s": "output_ste
 CONTRADICTING = {
     "contact.least_approach_mm_per_s", "friction.ideal_joints", "guide.restitution",
     "body.frequency_x_Hz", "body.frequency_y_Hz", "sensor.speed_jitter", "output.signals",
+    "sensor.second_threshold_m_per_s2",
 }  # fmt: skip
 UNREAD = [(key, where) for key, entry in ENTRIES.items() for where in entry.unread]
 
