@@ -6,7 +6,7 @@ splits of the same sweep with its failures shuffled.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ MIN_SIDE = 3  # jobs on each side of a split, and failed and fine ones of a stud
 LEVELS = 2
 SHUFFLES, MAX_AS_GOOD = 99, 4  # as good as the true split in fewer than 5 %: p < 0.05
 SEED = 1
-MAX_JOBS = 20_000  # of a study that are looked at, evenly drawn
+MAX_JOBS = 4000  # of a study that the tree is made of, evenly drawn; all are counted
 MIN_SHARE = 0.1  # of all failures, for a region to be named
 MIN_EXCESS = 1.5  # share of failures in it over that in the study
 
@@ -63,48 +63,54 @@ def find_regions(columns: Mapping[str, np.ndarray], failed: np.ndarray) -> list[
     """
     if min(failed.sum(), (~failed).sum()) < MIN_SIDE:
         return []
-    if failed.size > MAX_JOBS:
-        some = np.linspace(0, failed.size - 1, MAX_JOBS).astype(int)
-        columns, failed = {key: column[some] for key, column in columns.items()}, failed[some]
     known = {
         key: column
         for key, column in columns.items()
         if not (column.dtype.kind == "f" and np.isnan(column).any()) and np.unique(column).size > 1
     }
-    best = best_split(known, failed)
+    some = np.linspace(0, failed.size - 1, min(failed.size, MAX_JOBS)).astype(int)
+    drawn, drawn_failed = {key: column[some] for key, column in known.items()}, failed[some]
+    best = best_split(drawn, drawn_failed)
     if best is None:
         return []
     rng = np.random.default_rng(SEED)
-    gains = (best_split(known, rng.permutation(failed)) for _ in range(SHUFFLES))
+    gains = (best_split(drawn, rng.permutation(drawn_failed)) for _ in range(SHUFFLES))
     if sum(one is not None and one.gain >= best.gain for one in gains) > MAX_AS_GOOD:
         return []
-    usual, whole = failed.mean(), int(failed.sum())
-    found = [
+    found = []
+    for splits in _leaves(drawn, drawn_failed, (), LEVELS):
+        inside = np.logical_and.reduce([holds(split, known[split.key]) for split in splits])
+        found.append(Region(splits, int(inside.sum()), int(failed[inside].sum())))
+    usual, whole = failed.mean(), failed.sum()
+    named = (
         region
-        for region in _leaves(known, failed, (), LEVELS)
-        if region.failed >= MIN_SHARE * whole and region.failed >= MIN_EXCESS * usual * region.jobs
-    ]
-    return sorted(found, key=lambda region: -region.failed)
+        for region in found
+        if region.failed >= max(MIN_SHARE * whole, MIN_EXCESS * usual * region.jobs)
+    )
+    return sorted(named, key=lambda region: -region.failed)
 
 
 def _leaves(
     columns: Mapping[str, np.ndarray], failed: np.ndarray, splits: tuple[Split, ...], levels: int
-) -> Iterator[Region]:
-    """Yield the regions at the ends of a tree."""
+) -> Iterator[tuple[Split, ...]]:
+    """Yield the splits that lead to each end of a tree."""
     split = best_split(columns, failed) if levels else None
     if split is None:
-        yield Region(splits, failed.size, int(failed.sum()))
+        yield splits
         return
-    inside = holds(split, columns[split.key])
-    opposite = Split(split.key, {"<": ">=", "==": "!="}[split.sign], split.value, split.gain)
-    for one, side in ((split, inside), (opposite, ~inside)):
+    opposite = replace(split, sign={"<": ">=", "==": "!="}[split.sign])
+    for one in (split, opposite):
+        side = holds(one, columns[one.key])
         part = {key: column[side] for key, column in columns.items()}
         yield from _leaves(part, failed[side], (*splits, one), levels - 1)
 
 
+COMPARE = {"<": np.less, ">=": np.greater_equal, "==": np.equal, "!=": np.not_equal}
+
+
 def holds(split: Split, column: np.ndarray) -> np.ndarray:
     """Return whether a split's comparison holds, (n,)."""
-    return column < split.value if split.sign == "<" else column == split.value
+    return COMPARE[split.sign](column, split.value).astype(bool)
 
 
 def best_split(columns: Mapping[str, np.ndarray], failed: np.ndarray) -> Split | None:

@@ -60,6 +60,18 @@ def test_failures_by_chance_lie_nowhere(share):
     assert sum(map(bool, found)) <= 5
 
 
+def test_all_jobs_of_a_large_study_are_counted():
+    """The tree is made of a part of them."""
+    rng = np.random.default_rng(1)
+    columns = {"machine.speed_rpm": rng.uniform(300, 900, 50_000), "x": rng.random(50_000)}
+    failed = columns["machine.speed_rpm"] > 800
+    (region,) = find_regions(columns, failed)
+    assert (
+        region.failed == (failed & (columns["machine.speed_rpm"] >= region.splits[0].value)).sum()
+    )
+    assert failed.sum() * 0.99 < region.failed <= region.jobs < failed.sum() * 1.01
+
+
 def test_too_few_failures_are_no_region():
     few = np.zeros(N, bool)
     few[: MIN_SIDE - 1] = True
