@@ -3,4 +3,12 @@
 `measure_mutants` tries each of them all the same, and stops where a test catches one.
 """
 
-EQUIVALENT: dict[str, str] = {}
+EQUIVALENT: dict[str, str] = {
+    "linear.py, factorize: abs(matrix[i, j]) > abs(matrix[best, j]) -> "
+    "abs(matrix[i, j]) >= abs(matrix[best, j])": (
+        "of two equally large pivots either may be taken"
+    ),
+    "contact_laws.py, solve_rising: rising(middle) < value -> rising(middle) <= value": (
+        "where a middle has the value itself, both ends close in on it"
+    ),
+}

@@ -41,7 +41,7 @@ PURE = ("kinematics", "contact", "loads", "observe", "cam", "tally", "onset", "s
         "general_mechanism")  # fmt: skip
 COMPILED = ("invariances", "march", "integrate", "rosenbrock", "simulate", "accuracy",
             "horizon")  # fmt: skip
-LAWS = ("contact_laws", "friction_laws")
+LAWS = ("contact_laws", "friction_laws", "chosen_laws")
 TESTED_IN = {
     **dict.fromkeys(("mechanism", "mechanism_motion", "mechanism_rows"), ("general_mechanism",)),
     "motion": ("motion", *LAWS),

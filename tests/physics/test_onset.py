@@ -22,7 +22,7 @@ from compressor.physics.march import (
     new_stepper,
     new_work,
 )
-from compressor.physics.motion import evaluate, start
+from compressor.physics.motion import derivative, evaluate, start
 from compressor.physics.observe import (
     COLUMNS,
     Column,
@@ -36,6 +36,7 @@ from compressor.physics.onset import (
     MAX_SAMPLE,
     NEVER,
     STEP_EDGE,
+    approach_at,
     first_onset,
     joint_onset,
     locate_change,
@@ -49,7 +50,14 @@ from compressor.physics.runge_kutta import FLOWS, STAGES, RungeKuttaPair, interp
 from compressor.physics.tally import new_tally
 from compressor.solve.march_driver import COMPILED as METHODS
 from compressor.solve.march_driver import CONTACT_STEP
-from compressor.solve.si_record import length_and_speed, natural_sizes, offsets, record, scene
+from compressor.solve.si_record import (
+    initial_state,
+    length_and_speed,
+    natural_sizes,
+    offsets,
+    record,
+    scene,
+)
 
 H = 1e-3  # s, of the hand-made steps
 CLEARANCE = 2e-4  # m
@@ -209,6 +217,40 @@ def test_an_ideal_joint_never_touches():
     p = parameters("both")
     p.clearance[SMALL_END] = 0.0
     assert first_onset(0.0, H, both_ends(APART, CLOSING), 0, p, np.zeros(8)) == (NEVER, NEVER)
+
+
+@pytest.mark.parametrize("late", [-2e-6, -1e-6, 1e-6, 2e-6])
+def test_the_speed_of_approach_is_that_where_the_gap_closes(late):
+    """Seen a little before or after, to second order; the rate of the gap changes far more."""
+    case = Case.from_values({
+        "joint": "small_end", "load": "gas", "clearance_mm": 0.2,
+        "contact": {"law": "flores", "restitution": 0.7},
+        "initial_offset_mm": {"small_end_x": 0.2},
+    })  # fmt: skip
+    p = record(case)
+    y = initial_state(case, p)
+    n = FREEDOMS[scene(case)]
+    y[n] = 0.3 if contact_rate(y, n, 0.3, p) > 0.0 else -0.3
+    rates, scratch, middle = np.empty_like(y), np.empty_like(y), np.empty_like(y)
+    closed = approach_at(SMALL_END, 0.0, y, 0, p, rates, scratch)
+    assert closed[0] == pytest.approx(0.0, abs=1e-15)
+    assert closed[1] == pytest.approx(0.3, rel=1e-2)
+    derivative(0.0, y, 0, p, rates)
+    derivative(late / 2, y + late / 2 * rates, 0, p, middle)
+    seen = approach_at(SMALL_END, late, y + late * middle, 0, p, rates, scratch)
+    assert np.sign(seen[0]) == np.sign(late)
+    # beyond it the contact has begun to push
+    assert seen[1] == pytest.approx(closed[1], abs=1e-6 if late < 0.0 else 5e-5)
+    plain = contact_rate(y + late * middle, n, None, p)
+    assert abs(plain - closed[1]) > 1e-4
+
+
+def contact_rate(y, n, speed, p):
+    """The rate (m/s) of the small end's penetration, with this speed of the crosshead if any."""
+    moved = y.copy()
+    if speed is not None:
+        moved[n] = speed
+    return contact_at(SMALL_END, 0.0, moved, 0, p).rate
 
 
 @pytest.mark.parametrize("penetration", [-1e-3, -1e-9, 0.0, 1e-9, 1e-6, 2e-5, 5e-5, 2e-4])
