@@ -15,7 +15,10 @@ temperature, so that the capacity falls with the pressure behind it.
 import math
 from typing import NamedTuple
 
-from compressor.cases import ENDS, Case, to_si
+import numpy as np
+
+from compressor.cases import Case, open_card, to_si
+from compressor.physics import card_nodes, exact_motion
 
 
 class IdealCycle(NamedTuple):
@@ -33,14 +36,18 @@ def ideal_cycles(case: Case) -> dict[str, IdealCycle]:
 
     An end that does not press or is unloaded has none. case: of the gas load.
     """
-    return {end: _ideal_cycle(case, end) for end in ENDS if case.gas.has_cycle(end)}
+    return {end: _ideal_cycle(case, end) for end in case.gas.compressing_ends}
+
+
+def _face(case: Case, end: str) -> float:
+    """Return the area (m2) of the piston's face in an end."""
+    area = math.pi * to_si(case.gas.piston_radius_mm, "mm") ** 2
+    rod = math.pi * to_si((case.gas.rod_diameter_mm or 0.0) / 2, "mm") ** 2
+    return area - rod if end == "crank" else area
 
 
 def _ideal_cycle(case: Case, end: str) -> IdealCycle:
-    gas, stroke = case.gas, 2 * case.machine.crank_radius_mm
-    area = math.pi * to_si(gas.piston_radius_mm, "mm") ** 2
-    if end == "crank":
-        area -= math.pi * to_si((gas.rod_diameter_mm or 0.0) / 2, "mm") ** 2
+    gas, stroke, area = case.gas, 2 * case.machine.crank_radius_mm, _face(case, end)
     swept = area * to_si(stroke, "mm")
     clearance = area * to_si(gas.clearance(end, stroke), "mm")
     inlet, outlet = (to_si(pressure, "MPa") for pressure in gas.open_pressures)
@@ -54,8 +61,30 @@ def _ideal_cycle(case: Case, end: str) -> IdealCycle:
     )  # fmt: skip
 
 
+def card_works(case: Case) -> dict[str, float]:
+    """Return the work (J) that the gas takes in a revolution in each end that has a card.
+
+    Of the machine without clearance, by the trapezoidal rule in the volume over the card's table.
+    """
+    machine, works = case.machine, {}
+    radius, length = to_si(machine.crank_radius_mm, "mm"), to_si(machine.rod_length_mm, "mm")
+    for end, path in case.gas.cards.items():
+        card = open_card(path)
+        pressure = 1e6 * card_nodes(card.angles, card.pressures)[:, 0]
+        angles = np.linspace(0.0, 2.0 * math.pi, pressure.size + 1)
+        x, *_ = exact_motion(angles, radius, length, 1.0)
+        mean = (pressure + np.roll(pressure, -1)) / 2.0
+        sign = 1.0 if end == "head" else -1.0
+        works[end] = sign * _face(case, end) * float(mean @ np.diff(x))
+    return works
+
+
 def cylinder_words(case: Case) -> str:
     """Return indicated power, flow and volumetric efficiency of a case's cylinder in words."""
+    if case.gas.is_measured:
+        powers = {end: work / case.turn / 1e3 for end, work in card_works(case).items()}
+        each = ", ".join(f"{end} end {power:.4g} kW" for end, power in powers.items())
+        return f"{sum(powers.values()):.4g} kW indicated ({each}), by the cards"
     cycles, rate = ideal_cycles(case), 1.0 / case.turn
     if not cycles:
         return "no gas is compressed"

@@ -1,5 +1,6 @@
 """A YAML text -> checked cases and studies."""
 
+from compressor.cases.card import open_card
 from compressor.cases.case import (
     MODEL,
     MODEL_VERSION,
@@ -15,7 +16,6 @@ from compressor.cases.checks import SHORTHANDS, phrase_of, row_of, stands_for, s
 from compressor.cases.conflicts import back_action, judged_range, outside_judged, reads
 from compressor.cases.examples import templates
 from compressor.cases.groups import (
-    ENDS,
     METHODS,
     Contact,
     Friction,

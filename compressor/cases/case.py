@@ -14,6 +14,7 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
+from compressor.cases.card import CardError, open_card
 from compressor.cases.checks import (
     PER_PART,
     SHORTHANDS,
@@ -26,7 +27,7 @@ from compressor.cases.checks import (
     values_given,
 )
 from compressor.cases.conflicts import conflicts, values_read
-from compressor.cases.groups import Contact, HealthyClearance, Solve
+from compressor.cases.groups import CARD_KEYS, Contact, HealthyClearance, Solve
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
 from compressor.cases.optional_groups import fill_guide, fill_wear
 from compressor.cases.parameter import (
@@ -305,6 +306,15 @@ class Case(Settings):
         """Return whether metrics are to have error bars; accuracy by number needs them."""
         return self.solve.error_bars or bool(self.targets)
 
+    def find_changed_card(self) -> str:
+        """Return what is wrong with the file of an indicator card now; "" for nothing."""
+        try:
+            for card in self.gas.cards.values() if self.load == "gas" else ():
+                open_card(card)
+        except CardError as error:
+            return str(error)
+        return ""
+
     @property
     def chooses_laws(self) -> bool:
         """Return whether contact or friction has another law than the default one."""
@@ -312,9 +322,10 @@ class Case(Settings):
 
     @property
     def has_features(self) -> bool:
-        """Return whether oil, a guide, a drive, a rod or rubbing ideal joints are modelled."""
+        """Return whether oil, a guide, a drive, a rod, rubbing joints or a card are modelled."""
         rubbing = self.friction and self.friction.ideal_joints
-        return bool(self.lubricant or self.guide or self.drive or self.rod or rubbing)
+        featured = self.lubricant or self.guide or self.drive or self.rod or rubbing
+        return bool(featured or (self.load == "gas" and self.gas.is_measured))
 
     @property
     def is_plain(self) -> bool:
@@ -479,6 +490,8 @@ def _identity_text(group: Any) -> str:
         if type(value) is float and math.isfinite(value):
             texts.append(f'"{key}":{value!r}')
         elif value is not None:
+            if key in CARD_KEYS:  # the digest counts, wherever the file is
+                value = value.rpartition("@")[2]
             texts.append(f'"{key}":{KEY_TEXT.encode(value)}')
     return "{" + ",".join(texts) + "}"
 

@@ -19,6 +19,8 @@ from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+from compressor.cases.card import mark_card
+from compressor.cases.groups import CARD_KEYS
 from compressor.cases.parameter import NO_VALUE, Parameter, Problem, check_targets, quote_value
 from compressor.cases.table import GROUPS, WORDS, Settings, table
 from compressor.metrics import JOINTS
@@ -130,7 +132,9 @@ PER_PART = {
     "machine.balance": {
         "rotating": "machine.balance", "reciprocating": "machine.balance_reciprocating",
     },
+    "gas.indicator": {"head": "gas.indicator", "crank": "gas.crank_indicator"},
 }  # fmt: skip
+ONE_SUFFICES = ("gas.indicator",)  # of its parts: the gas may press on one face alone
 # unit at the end of an unknown key -> the unit of ours, and what one of it is there
 OTHER_UNITS = {
     "bar": ("MPa", 0.1), "kPa": ("MPa", 1e-3), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3),
@@ -155,7 +159,7 @@ def by_part(key: str, value: Any) -> Mapping[str, str]:
 def lacking_part(key: str, value: Mapping[str, Any]) -> str:
     """Return what is wrong with the parts of a value for each; "" if nothing is."""
     parts = [*PER_PART[key]]
-    if {*value} == {*parts}:
+    if {*value} == {*parts} or (key in ONE_SUFFICES and {*value} < {*parts}):
         return ""
     given = ", ".join(map(str, value))
     return f"needs both, {' and '.join(parts)}, not {given}; or one number for both"
@@ -361,6 +365,8 @@ def check_value(key: str, value: Any, problems: list[Problem]) -> Any:
         return float(value) + 0.0  # no -0.0: equal cases have one key
     if row.kind == "integer":
         return int(value)
+    if row.kind == "card":
+        return mark_card(value)
     return tuple(value) if row.kind == "materials" else row.choice_of(value)
 
 
@@ -381,6 +387,8 @@ def check_part(key: str, value: Any, problems: list[Problem]) -> Any:
             problems.append(Problem(key, NO_VALUE if value is None else no_mapping(key, value)))
             return None
         try:
+            if key == "gas" and not value.keys().isdisjoint(CARD_KEYS):
+                raise TypeError  # their files may have changed since
             found, wrong = _shared_group(key, tuple((n, v, type(v)) for n, v in value.items()))
         except TypeError:  # a list or a mapping is in it
             found, wrong = _group(key, value.items())

@@ -508,6 +508,11 @@ def _load_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         )
     if case.load != "gas":
         return
+    if gas.presses("crank"):
+        yield from _rod_conflicts(case)
+    if gas.is_measured:
+        yield from _card_conflicts(case)
+        return
     play, stroke = _play(case), 2 * machine.crank_radius_mm
     for end in filter(gas.presses, ENDS):
         clearance = gas.clearance(end, stroke)
@@ -522,8 +527,6 @@ def _load_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         yield Problem(
             "gas.unloaded", f"no gas presses in the {gas.unloaded} end with action: {gas.action}"
         )
-    if gas.presses("crank"):
-        yield from _rod_conflicts(case)
     if gas.discharge_MPa <= gas.suction_MPa:
         yield Problem(
             "gas.discharge_MPa",
@@ -532,7 +535,7 @@ def _load_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     elif gas.switching == "exact":
         suction, discharge = gas.open_pressures
         growth = (discharge / suction) ** (1 / gas.exponent)
-        for end in filter(gas.has_cycle, ENDS):
+        for end in gas.compressing_ends:
             clearance = gas.clearance(end, stroke)
             if clearance * growth >= stroke + clearance:
                 yield Problem(
@@ -546,6 +549,17 @@ def _load_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
             "the printed corners hold for the paper's geometry and pressures only; "
             "set switching: exact",
         )
+
+
+def _card_conflicts(case: Settings) -> Iterator[Problem]:
+    """Yield a card that is missing: each end in which gas presses has one."""
+    for end in filter(case.gas.presses, ENDS):
+        if end not in case.gas.cards:
+            key = "gas.indicator" if end == "head" else "gas.crank_indicator"
+            yield Problem(
+                key, f"is needed with action: {case.gas.action}, the other end being measured; "
+                "write indicator: {head: head.csv, crank: crank.csv}",
+            )  # fmt: skip
 
 
 def _rod_conflicts(case: Settings) -> Iterator[Problem]:

@@ -15,8 +15,10 @@ from compressor.cases.parameter import (
     BIG_END,
     CLEARANCE,
     CRANK_END,
+    CYCLE,
     DAMPED,
     HEAD_CLEARANCE,
+    HEAD_END,
     IDEAL_JOINT,
     LAW,
     MATERIALS,
@@ -217,8 +219,9 @@ ENDS = {"head": ("single", "double"), "crank": ("double", "crank_end")}
 # what the paper's gas load has not; any of them makes the corners exact
 CYLINDER_KEYS = (
     "action", "rod_diameter_mm", "clearance_percent", "crank_clearance_percent",
-    "valve_loss_percent", "discharge_loss_percent", "unloaded",
+    "valve_loss_percent", "discharge_loss_percent", "unloaded", "indicator", "crank_indicator",
 )  # fmt: skip
+CARD_KEYS = ("indicator", "crank_indicator")  # paths of files, with digests of what they hold
 # key of its own -> the key whose value it has without
 AS_THE_OTHER = {
     "crank_clearance_percent": "clearance_percent", "discharge_loss_percent": "valve_loss_percent",
@@ -251,15 +254,15 @@ class Gas:
     )
     head_clearance_mm: float | None = parameter(
         20.0, "mm", (0, 1e5), "Eq. 13", "clearance of the cylinder head s0", above=True,
-        optional=True, read=HEAD_CLEARANCE,
+        optional=True, read=(CYCLE, HEAD_CLEARANCE),
     )  # fmt: skip
     suction_MPa: float = parameter(
-        0.105, "MPa", (0, 1e3), "Table 1", "suction pressure (absolute)", above=True
+        0.105, "MPa", (0, 1e3), "Table 1", "suction pressure (absolute)", above=True, read=CYCLE
     )
     discharge_MPa: float = parameter(
-        0.393, "MPa", (0, 1e3), "Table 1", "discharge pressure (absolute)", above=True
+        0.393, "MPa", (0, 1e3), "Table 1", "discharge pressure (absolute)", above=True, read=CYCLE
     )
-    exponent: float = parameter(1.4, "", (1, 5), "Eq. 13", "isentropic exponent")
+    exponent: float = parameter(1.4, "", (1, 5), "Eq. 13", "isentropic exponent", read=CYCLE)
     back_pressure_MPa: float = parameter(
         0.0, "MPa", (0, 1e3), "assumed",
         "pressure on what no gas cycle presses: the piston's other face, or the rod's "
@@ -268,7 +271,7 @@ class Gas:
     switching: str | None = choice(
         None, ("paper", "exact"), "Eq. 13",
         "corners as printed, or where the pressures meet (the default with any of the keys below)",
-        optional=True,
+        optional=True, read=CYCLE,
     )  # fmt: skip
     action: str | None = choice(
         None, ("single", "double", "crank_end"), "ours",
@@ -282,25 +285,34 @@ class Gas:
     clearance_percent: float | None = parameter(
         None, "%", (0, 1000), "ours",
         "clearance volume over swept volume of each end, or of the head's; in place of "
-        "head_clearance_mm", above=True, optional=True, read=HEAD_CLEARANCE,
+        "head_clearance_mm", above=True, optional=True, read=(CYCLE, HEAD_CLEARANCE),
     )  # fmt: skip
     crank_clearance_percent: float | None = parameter(
         None, "%", (0, 1000), "as the head's", "clearance volume over swept volume, crank end",
-        above=True, optional=True, read=CRANK_END,
+        above=True, optional=True, read=(CYCLE, CRANK_END),
     )  # fmt: skip
     valve_loss_percent: float | None = parameter(
         None, "%", (0, 90), "ours",
         "loss of absolute pressure while a valve is open, of both or of the suction's; 0 without",
-        optional=True,
+        optional=True, read=CYCLE,
     )  # fmt: skip
     discharge_loss_percent: float | None = parameter(
         None, "%", (0, 90), "as the suction's",
-        "loss of absolute pressure while the discharge valve is open", optional=True,
+        "loss of absolute pressure while the discharge valve is open", optional=True, read=CYCLE,
     )  # fmt: skip
     unloaded: str | None = choice(
         None, ("none", "head", "crank"), "ours",
         "end whose gas stays at suction pressure, its valves held open; none by default",
-        optional=True,
+        optional=True, read=CYCLE,
+    )  # fmt: skip
+    indicator: str | None = choice(
+        None, (), "measured",
+        "card of the head end in place of pressures, exponent and clearance; {head: ..., crank: "
+        "...} of both ends", kind="card", optional=True, read=HEAD_END,
+    )  # fmt: skip
+    crank_indicator: str | None = choice(
+        None, (), "measured", "card of the crank end, over the crank's angle too", kind="card",
+        optional=True, read=CRANK_END,
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -323,6 +335,17 @@ class Gas:
         return any(getattr(self, key) is not None for key in CYLINDER_KEYS)
 
     @property
+    def is_measured(self) -> bool:
+        """Return whether indicator cards stand in place of a cycle."""
+        return bool(self.cards)
+
+    @property
+    def cards(self) -> dict[str, str]:
+        """Return the cards of the ends that press, by end, head or crank."""
+        given = {"head": self.indicator, "crank": self.crank_indicator}
+        return {end: card for end, card in given.items() if card is not None and self.presses(end)}
+
+    @property
     def open_pressures(self) -> tuple[float, float]:
         """Return the pressures (MPa) while the suction and the discharge valve is open."""
         loss = self.valve_loss_percent or 0.0
@@ -337,6 +360,11 @@ class Gas:
     def has_cycle(self, end: str) -> bool:
         """Return whether the gas in an end, head or crank, is compressed."""
         return self.presses(end) and self.unloaded != end
+
+    @property
+    def compressing_ends(self) -> list[str]:
+        """Return the ends, head or crank, in which gas is compressed."""
+        return [*filter(self.has_cycle, ENDS)]
 
     def clearance_key(self, end: str) -> str:
         """Return the key that gives the clearance of an end, head or crank."""

@@ -114,6 +114,7 @@ def _single_value(row: Parameter) -> Schema:
     kinds: dict[str, Schema] = {
         "boolean": {"enum": [*row.choices, True, False]},
         "choice": words,
+        "card": {"type": "string", "minLength": 1},
         "text": {"type": "string", "pattern": rf"^(?!\.){NAME.pattern}$"},
     }
     return kinds[row.kind]

@@ -3,6 +3,7 @@
 An unknown key is told what was probably meant (`describe_unknown`).
 """
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -22,6 +23,7 @@ from compressor.cases.checks import (
     stands_for,
 )
 from compressor.cases.conflicts import IN_PLACE_OF
+from compressor.cases.groups import CARD_KEYS
 from compressor.cases.swept import FORMS
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS
 from compressor.cases.yaml_reader import FileProblem, Node, Place, read_text, shorten
@@ -67,15 +69,31 @@ def _add_leaf(found: Leaves, key: str, node: Node, problems: list[FileProblem]) 
             problems.append(FileProblem(node.place, key, message))
         for part, one in keys.items():
             if part in node.value:
-                found.values[one] = node.value[part]
+                own = node.value[part]
+                found.values[one] = _beside_file(own) if one in CARDS else own
                 found.places[one] = node.value[part].key_place
         return
+    if key in CARDS:
+        node = _beside_file(node)
     own = DOUBLES.get(key, key)
     doubled = next((word for word, half in DOUBLES.items() if half == own), own)
     if own in found.values and own != doubled:
         problems.append(FileProblem(node.key_place, doubled, TWICE.format(own)))
     found.values[own] = node if own == key else _halve_node(node)
     found.places[own] = node.key_place
+
+
+CARDS = tuple(f"gas.{key}" for key in CARD_KEYS)
+
+
+def _beside_file(node: Node) -> Node:
+    """Return a node with the paths of cards in it as seen from the file that names them."""
+    if isinstance(node.value, list):
+        return replace(node, value=[*map(_beside_file, node.value)])
+    folder = os.path.dirname(node.place.file)
+    if not isinstance(node.value, str) or not os.path.isdir(folder):
+        return node
+    return replace(node, value=os.path.join(folder, node.value))
 
 
 def _halve_node(node: Node, first: int | None = None) -> Node:

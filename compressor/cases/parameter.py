@@ -22,6 +22,7 @@ from functools import lru_cache
 from inspect import cleandoc
 from typing import Any, TypeVar
 
+from compressor.cases.card import COLUMNS, CardError, mark_card
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, READ_BY, law_of
 from compressor.metrics import METRICS
 from compressor.program import CompsimError, did_you_mean
@@ -68,6 +69,8 @@ GAS = Reader("load: gas", lambda case: case.load == "gas")
 CRANK_END = Reader(
     "gas.action: double or crank_end", lambda case: case.gas.action in ("double", "crank_end")
 )
+HEAD_END = Reader("gas.action: single or double", lambda case: case.gas.action != "crank_end")
+CYCLE = Reader("no gas.indicator", lambda case: not case.gas.is_measured)
 HEAD_CLEARANCE = Reader(
     "a head end that presses, or one gas.clearance_percent for both",
     lambda case: case.gas.action != "crank_end" or case.gas.crank_clearance_percent is None,
@@ -314,6 +317,8 @@ class Parameter:
             return "two of " + ", ".join(self.choices)
         if self.kind == "text":
             return "[A-Za-z0-9._-], at most 64"
+        if self.kind == "card":
+            return "path of a CSV file"
         opening = "(" if self.above else "["
         return " | ".join([*self.choices, f"{opening}{self.low:g}, {self.high:g}]"])
 
@@ -331,6 +336,8 @@ class Parameter:
             return f"a pair of materials, {words}, such as [steel, steel]"
         if self.kind == "text":
             return "text"
+        if self.kind == "card":
+            return f"the path of a CSV file with columns {' and '.join(COLUMNS)}"
         span = f"{'(' if self.above else '['}{self.low:g}, {self.high:g}]"
         number = "a whole number" if self.kind == "integer" else "a number"
         return " or ".join([*self.choices, f"{number} in {span} {self.unit}".strip()])
@@ -364,6 +371,8 @@ class Parameter:
             return NO_VALUE
         if self.kind == "text":
             return self._check_name(value)
+        if self.kind == "card":
+            return self._check_card(value)
         if self.kind == "materials":
             good = isinstance(value, tuple | list) and len(value) == 2
             bad = [name for name in value if name not in self.choices] if good else []
@@ -413,6 +422,15 @@ class Parameter:
         return (
             None if good else f"{quote_value(value)} is no name: use {self.range}, no leading dot"
         )
+
+    def _check_card(self, value: Any) -> str | None:
+        if not isinstance(value, str) or not value:
+            return self._refused(value)
+        try:
+            mark_card(value)
+        except CardError as error:
+            return str(error)
+        return None
 
 
 def join_with_or(words: Sequence[str]) -> str:

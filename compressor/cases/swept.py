@@ -455,7 +455,7 @@ class _Reader:
         row = row_of(key)
         if row is None:
             self.refuse(node.col_offset, f"unknown key {quote_value(key)}{suggestion(key, '')}")
-        if row.kind in ("materials", "text"):
+        if row.kind in ("materials", "text", "card"):
             self.refuse(node.col_offset, f"{key} cannot be compared")
         return key, row
 

@@ -1,5 +1,6 @@
 """The mechanics: numbers in, numbers out; only numpy and the one door to numba."""
 
+from compressor.physics.card import card_nodes
 from compressor.physics.contact import choose_laws, hysteresis, steepest
 from compressor.physics.contact_laws import elastic_form
 from compressor.physics.film import film_constants

@@ -98,11 +98,11 @@ def static_load(p):
     """Return the greatest force (N) of the record's load on a piston that stands still.
 
     p: a record, or a dict with its fields; the spring's at its full stroke (Eq. 8-10), or that of
-    the discharge pressure, of a cylinder at the end where it presses harder.
+    the discharge pressure, of a cylinder at the end where it presses harder, or a card's greatest.
     """
     if p["load"] == Load.SPRING:
         return p["preload"] + p["spring_stiffness"] * p["spring_stroke"]
-    if p["load"] == Load.GAS:
+    if p["load"] in (Load.GAS, Load.CARD):
         return p["discharge_force"]
     if p["load"] == Load.CYLINDER:
         towards_crank = p["discharge_force"] - p["crank_suction_force"] - p["back_force"]
@@ -194,7 +194,7 @@ def load_corners(p, pressure_ratio, printed):
 
     printed: of a gas those of Eq. 13, not the exact ones.
     """
-    if p["load"] == Load.NONE:
+    if p["load"] in (Load.NONE, Load.CARD):
         return 0.0, 0.0, 0.0
     if p["load"] == Load.SPRING:
         return cam_corners(p["crank_radius"], p["rod_length"], p["spring_stroke"])
@@ -221,7 +221,7 @@ def segments(p, duration):
     runs have the same. A corner closer than a billionth of a turn to the end opens no segment of
     its own.
     """
-    if p["load"] == Load.NONE:
+    if p["load"] in (Load.NONE, Load.CARD):
         return np.array([0.0, duration]), np.zeros(1, dtype=np.int64)
     corners, phases = p["corners"].tobytes(), (0, 1, 2, 3)
     if p["load"] == Load.CYLINDER:

@@ -34,13 +34,15 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics._jit import fma, jit, square_root
+from compressor.physics.card import card_force
 from compressor.physics.contact import NO_CONTACT, ContactState, carried_numbers, joint_contact
 from compressor.physics.contact_laws import power, rise
 from compressor.physics.film import film
 from compressor.physics.loads import piston_force
-from compressor.physics.record import BIG_END, SMALL_END, Coordinate
+from compressor.physics.record import BIG_END, SMALL_END, Coordinate, Load
 from compressor.physics.worn_bore import worn_contact
 
+CARD = int(Load.CARD)
 MODES = 4  # two across, two along
 ACROSS = 2  # so many of them, the first, are across
 BIG_SLOPE = math.pi * np.array([1.0, 2.0, 0.0, 0.0])  # at the ends, times the length
@@ -472,6 +474,8 @@ def joints_of(phase, y, motion, pose, w, velocity, p):
         guide = corners(pose.height, pose.tilt, rates, p)
     ideal_v = motion.v * pose.speed / p.omega
     load = piston_force(phase, pose.x, velocity[8], pose.x - motion.x, velocity[8] - ideal_v, p)
+    if p.load == CARD:
+        load = card_force(motion.cos_theta, motion.sin_theta, p)
     return Joints(
         big, small, big_film, small_film, guide, load, big_spin, small_spin, pin_spin
     )  # fmt: skip

@@ -30,6 +30,7 @@ class Load(IntEnum):
     GAS = 1
     SPRING = 2
     CYLINDER = 3
+    CARD = 4
 
 
 # the state of each scene: deviations from the ideal motion, then their rates
@@ -167,6 +168,11 @@ WEAR: list[tuple] = [
     ("towards", "f8", (MAX_SECTORS, 2)),  # directions of the nodes between them, x and y
     ("worn", "f8", (2, MAX_SECTORS)),  # per joint, m
 ]
+CARD_NODES = 1440  # a revolution
+# of a mechanism whose gas was measured
+CARD: list[tuple] = [
+    ("card", "f8", (CARD_NODES, 2)),  # force (N) over the crank's angle, and its slope a node
+]
 # of a mechanism with more freedom than ideal guides, a steady crank and a rigid rod leave it
 FEATURES: list[tuple] = [
     ("rubbing", "i8"),  # whether ideal joints have friction
@@ -201,7 +207,9 @@ FEATURES: list[tuple] = [
 CHOICE, MECHANISM = 2, 3
 RECORD = np.dtype([*FIELDS, ("laws", "f8", (1,))], align=True)
 CHOSEN = np.dtype([*FIELDS, ("laws", "f8", (CHOICE,))], align=True)
-FEATURED = np.dtype([*FIELDS, *FILM, *WEAR, *FEATURES, ("laws", "f8", (MECHANISM,))], align=True)
+FEATURED = np.dtype(
+    [*FIELDS, *FILM, *WEAR, *CARD, *FEATURES, ("laws", "f8", (MECHANISM,))], align=True
+)
 
 
 def zero(kind: np.dtype) -> np.record:

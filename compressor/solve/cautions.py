@@ -25,6 +25,7 @@ import numpy as np
 from compressor.cases import (
     Case,
     Study,
+    open_card,
     outside_judged,
     paper_stiffness_note,
     reads,
@@ -309,6 +310,7 @@ def remarks(case: Case) -> Iterator[Remark]:
         yield from _depths(case, joint)
     yield from _rod(case)
     yield from _drive(case)
+    yield from _cards(case)
     if case.wear:
         yield Remark("wear", "compsim wear alone reads it: a run has bores that are new", "unread")
     friction = case.friction
@@ -407,6 +409,18 @@ def _drive(case: Case) -> Iterator[Remark]:
     if needed > 0.0 and needed > most:
         text = f"the load takes {needed:.3g} N m on average, more than the motor ever gives, "
         yield Remark("drive.torque_N_m", f"{text}{most:.3g} N m: the crank will stall", "load")
+
+
+def _cards(case: Case) -> Iterator[Remark]:
+    """Yield how far apart the revolutions of a card are, which stands for them by their mean."""
+    for end, path in case.gas.cards.items() if case.load == "gas" else ():
+        card = open_card(path)
+        if card.revolutions > 1:
+            key = "gas.indicator" if end == "head" else "gas.crank_indicator"
+            range_of = max(card.pressures) - min(card.pressures) or math.inf
+            text = f"{card.revolutions} revolutions were averaged; they scatter by "
+            text += f"{card.scatter:.2g} MPa (rms), {100 * card.scatter / range_of:.2g} % of the "
+            yield Remark(key, f"{text}card's range", "scatter")
 
 
 def _budgets(case: Case, joints: list[JointScales]) -> Iterator[Remark]:

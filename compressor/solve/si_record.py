@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case, Guide, joint_stiffness, to_si
+from compressor.cases import Case, Guide, joint_stiffness, open_card, to_si
 from compressor.metrics import JOINTS
 from compressor.physics import (
     FLOWS,
@@ -25,6 +25,7 @@ from compressor.physics import (
     Load,
     Scene,
     bore_fields,
+    card_nodes,
     choose_laws,
     complete,
     derivative_with_flows,
@@ -62,6 +63,8 @@ def record(case: Case, worn: np.ndarray | None = None) -> np.record:
     p["scene"] = scene(case)
     cylinder = case.load == "gas" and case.gas.is_cylinder
     p["load"] = Load.CYLINDER if cylinder else Load[case.load.upper()]
+    if case.load == "gas" and case.gas.is_measured:
+        p["load"] = Load.CARD
     _machine(case, p)
     _contact(case, p)
     _gas(case, p)
@@ -135,7 +138,9 @@ def _gas(case: Case, p: dict[str, Any]) -> None:
     p["back_force"] = to_si(gas.back_pressure_MPa, "MPa") * area
     p["head_clearance"] = to_si(gas.clearance("head", stroke), "mm")
     p["gas_exponent"] = gas.exponent
-    if gas.is_cylinder:
+    if gas.is_measured and case.load == "gas":
+        _cards(case, area, p)
+    elif gas.is_cylinder:
         rod = math.pi * to_si((gas.rod_diameter_mm or 0.0) / 2, "mm") ** 2
         areas = {"head": area * gas.presses("head"), "crank": (area - rod) * gas.presses("crank")}
         for end, prefix in (("head", ""), ("crank", "crank_")):
@@ -145,6 +150,19 @@ def _gas(case: Case, p: dict[str, Any]) -> None:
             p[f"{prefix}discharge_force"] = open_at[1] * areas[end]
         p["crank_clearance"] = to_si(gas.clearance("crank", stroke), "mm")
         p["back_force"] = to_si(gas.back_pressure_MPa, "MPa") * (areas["head"] - areas["crank"])
+
+
+def _cards(case: Case, area: float, p: dict[str, Any]) -> None:
+    """Set the force of measured gas over the crank's angle; area: of the head's face (m2)."""
+    gas = case.gas
+    rod = math.pi * to_si((gas.rod_diameter_mm or 0.0) / 2, "mm") ** 2
+    faces, nodes = {"head": area, "crank": rod - area}, 0.0
+    for end, path in gas.cards.items():
+        card = open_card(path)
+        nodes = nodes + faces[end] * 1e6 * card_nodes(card.angles, card.pressures)
+    table = np.array(nodes)
+    table[:, 0] -= to_si(gas.back_pressure_MPa, "MPa") * sum(faces[end] for end in gas.cards)
+    p["card"], p["discharge_force"] = table, np.abs(table[:, 0]).max()
 
 
 def _spring(case: Case, p: dict[str, Any]) -> None:

@@ -184,8 +184,7 @@ def as_dataset(table: DatasetParts) -> "xr.Dataset":
 
 def observe(case: Case, ahead: Ahead = NOTHING_AHEAD) -> tuple[Outcome, DatasetParts]:
     """Simulate one case; return its `Outcome` and what its Dataset is made of (see `simulate`)."""
-    if case.problems:
-        refused = refused_outcome(case)
+    if refused := refused_outcome(case):
         return refused, refused.table({})
     return with_series(case, solve(case, ahead))
 
@@ -205,13 +204,13 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, DatasetParts]:
 
 def measure(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Outcome:
     """Simulate one case; return its `Outcome` alone: what `simulate` gives less the time series."""
-    return refused_outcome(case) if case.problems else outcome(case, solve(case, ahead))
+    return refused_outcome(case) or outcome(case, solve(case, ahead))
 
 
-def refused_outcome(case: Case) -> Outcome:
-    """Return the outcome of a case that no case file could ask for."""
-    detail = "; ".join(map(str, case.problems))
-    return without_run(case.attributes(), Reason.INVALID_INPUT, detail)
+def refused_outcome(case: Case) -> Outcome | None:
+    """Return the outcome of a case that no case file could ask for, or whose card is not there."""
+    detail = "; ".join(map(str, case.problems)) or case.find_changed_card()
+    return without_run(case.attributes(), Reason.INVALID_INPUT, detail) if detail else None
 
 
 def series(case: Case, solution: Solution) -> tuple[Variables, Metrics]:

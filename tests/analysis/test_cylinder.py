@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from compressor.analysis.cylinder import cylinder_words, ideal_cycles
+from compressor.analysis.cylinder import card_works, cylinder_words, ideal_cycles
 from compressor.cases.case import Case
 from compressor.solve.simulate import measure, simulate
 
@@ -92,6 +92,21 @@ def test_words_say_power_and_flow():
     assert f"{sum(work) * 740 / 60e3:.4g} kW indicated" in cylinder_words(case)
     assert "430 m³/h at suction conditions" in cylinder_words(case)
     assert cylinder_words(cylinder(CYLINDERS["all idle"])) == "no gas is compressed"
+
+
+def test_the_work_of_a_card(tmp_path):
+    """A disc of pressure over volume: p = p0 + q sin(theta) in x = R cos(theta) of a long rod."""
+    degrees = np.arange(0, 360, 2)
+    pressure = 0.5 - 0.2 * np.sin(np.radians(degrees))
+    lines = [f"{a},{p!r}\n" for a, p in zip(degrees, pressure.tolist(), strict=True)]
+    (tmp_path / "head.csv").write_text("crank_angle_deg,pressure_MPa\n" + "".join(lines))
+    case = Case.from_values({
+        "load": "gas", "machine": {"crank_radius_mm": 90, "rod_length_mm": 9e5},
+        "gas": {"bore_mm": 220, "indicator": str(tmp_path / "head.csv")},
+    })  # fmt: skip
+    work = 0.2e6 * math.pi * 0.09 * math.pi * 0.11**2
+    assert card_works(case) == pytest.approx({"head": work}, rel=1e-4)
+    assert cylinder_words(case).endswith("kW), by the cards")
 
 
 def test_a_valve_s_loss_lowers_the_flow_by_its_pressure():

@@ -3,13 +3,14 @@
 import copy
 import json
 import pickle
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from compressor.cases.case import Case
-from compressor.cases.groups import CYLINDER_KEYS, Machine
+from compressor.cases.groups import CARD_KEYS, CYLINDER_KEYS, Machine
 from compressor.cases.laws import USUAL
 from compressor.cases.load import load_cases
 from compressor.cases.parameter import ACCURACY, CaseError, Problem, quote_value, to_si
@@ -347,6 +348,8 @@ OTHER = {  # valid values beside the defaults, which cannot be scaled
     "gas.clearance_percent": 12.0,
     "gas.crank_clearance_percent": 12.0,
     "gas.unloaded": "head",
+    "gas.indicator": str(Path(__file__).parent / "card.csv"),
+    "gas.crank_indicator": str(Path(__file__).parent / "card.csv"),
     "machine.gravity_m_per_s2": 9.81,
     "machine.rod_centre_mm": 200.0,
     "machine.rod_inertia_kg_m2": 0.1,
@@ -408,6 +411,10 @@ def test_the_table_says_which_values_make_another_job(key):
         base |= {"clearance_mm": 0.1}
     if group == "gas":
         base |= {"load": "gas", "gas": DOUBLE if name in CYLINDER_KEYS else EXACT_GAS}
+    if name in CARD_KEYS:
+        action = "single" if name == "indicator" else "crank_end"
+        rod = {} if action == "single" else {"rod_diameter_mm": 30}
+        base |= {"gas": {"action": action, **rod}}
     if group in ("body", "sensor"):
         base |= {"body": {"freedoms": "xy_rocking"}, "sensor": True}
     if key == "friction.ideal_joints":

@@ -72,7 +72,9 @@ def drawn(row, draw):
 
 
 SWEPT = [
-    key for key, row in table().items() if key not in outside_identity() and row.kind != "text"
+    key
+    for key, row in table().items()
+    if key not in outside_identity() and row.kind not in ("text", "card")
 ]
 
 

@@ -106,7 +106,9 @@ def test_what_is_wrong_is_marked(text, tmp_path):
 
 def values(row):
     """Values at, and just beyond, the bounds of a parameter, and some of other types."""
-    yield from ("nonsense", 7, True, [], {}, row.default)
+    if row.kind != "card":  # whether a file is there, no schema can tell
+        yield "nonsense"
+    yield from (7, True, [], {}, row.default)
     if row.kind in ("number", "integer"):
         yield from (row.low, row.high, row.low - 1, row.high * 1.01, (row.low + row.high) // 2)
     yield from row.choices

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from compressor.cases.case import Case, to_yaml
 from compressor.cases.checks import known_keys
 from compressor.cases.conflicts import values_read
-from compressor.cases.groups import CYLINDER_KEYS
+from compressor.cases.groups import CARD_KEYS, CYLINDER_KEYS
 from compressor.cases.laws import USUAL
 from compressor.cases.load import CaseFileError, load_cases, load_studies
 from compressor.cases.parameter import parameter_table
@@ -591,7 +591,7 @@ CASES = st.fixed_dictionaries(
         ),
         "machine": group("machine", "small_end_pin_radius_mm", "balance", "balance_reciprocating"),
         "gas": group("gas", "switching", *CYLINDER_KEYS).map(lambda gas: gas | EXACT)
-        | st.tuples(group("gas", "switching", *CYLINDER_KEYS[:4]), CYLINDERS).map(
+        | st.tuples(group("gas", "switching", *CYLINDER_KEYS[:4], *CARD_KEYS), CYLINDERS).map(
             lambda parts: parts[0] | parts[1]
         ),
         "spring": group("spring"),

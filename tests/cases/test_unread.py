@@ -3,6 +3,7 @@
 import copy
 import json
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -26,6 +27,9 @@ GAS = WORN | {"load": "gas", "gas": {"switching": "exact"}}
 DOUBLE = WORN | {"load": "gas", "gas": {"action": "double", "rod_diameter_mm": 30}}
 CRANK_END = WORN | {"load": "gas", "gas": {"action": "crank_end", "rod_diameter_mm": 30,
                                            "crank_clearance_percent": 12}}  # fmt: skip
+SINGLE = WORN | {"load": "gas", "gas": {"action": "single"}}
+CRANK_ALONE = WORN | {"load": "gas", "gas": {"action": "crank_end", "rod_diameter_mm": 30}}
+CARD = str(Path(__file__).parent / "card.csv")
 HERTZ = WORN | {"contact": {"law": "hertz"}}
 DAMPED = WORN | {"contact": {"law": "hunt_crossley", "restitution": 0.5}}
 PIN = {"law": "johnson", "length_mm": 20, "modulus_GPa": 100}
@@ -102,6 +106,8 @@ ENTRIES = {
     "gas.head_clearance_mm": Entry(25, GAS, (WORN, FREE, CRANK_END)),
     "gas.action": Entry("crank_end", DOUBLE, (WORN, FREE)),
     "gas.clearance_percent": Entry(10, DOUBLE, (WORN, CRANK_END)),
+    "gas.indicator": Entry(CARD, SINGLE, (WORN, FREE)),
+    "gas.crank_indicator": Entry(CARD, CRANK_ALONE, (WORN, GAS)),
     **entries(DOUBLE, GAS, WORN, gas__rod_diameter_mm=40, gas__crank_clearance_percent=12),
     "gas.switching": Entry("exact", WORN | {"load": "gas"}, (WORN, FREE)),
     **entries(

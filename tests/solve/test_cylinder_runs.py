@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
+from compressor.physics import exact_motion
 from compressor.solve.simulate import simulate
 
 MACHINE = {"stroke_mm": 180, "rod_length_mm": 450, "speed_rpm": 740, "reciprocating_mass_kg": 30}
@@ -73,3 +74,65 @@ def test_single_acting_with_exact_corners_is_the_plain_load():
     ours, theirs = (run(one, rtol=1e-9) for one in (single, plain))
     assert apart(ours, theirs) < 1e-9
     assert apart(ours, theirs, "contact_force") < 1e-9
+
+
+CYCLE = ("suction_MPa", "discharge_MPa", "exponent", "clearance_percent", "valve_loss_percent")
+MEASURED = {key: value for key, value in DOUBLE.items() if key not in CYCLE}
+
+
+def pressures(degrees):
+    """Pressures (MPa) of `DOUBLE`'s ideal cycle in the head and the crank end, without phases."""
+    x, *_ = exact_motion(np.radians(degrees), 0.09, 0.45, 1.0)
+    inlet, outlet, found = 0.2 * 0.96, 0.7 * 1.05, []
+    for gap, share, down in ((0.54 - x, 0.12, True), (x - 0.36, 0.14, False)):
+        space, clearance = gap + share * 0.18, share * 0.18
+        expanded = np.maximum(inlet, outlet * (clearance / space) ** 1.3)
+        compressed = np.minimum(outlet, inlet * ((clearance + 0.18) / space) ** 1.3)
+        found.append(np.where((degrees < 180) == down, expanded, compressed))
+    return found
+
+
+def cards(folder, step):
+    """Cards of the ideal cycle, sampled every so many degrees from a quarter of a step on."""
+    degrees = np.arange(0.25 * step, 360, step)
+    for name, values in zip(("head", "crank"), pressures(degrees), strict=True):
+        lines = [f"{a!r},{p!r}\n" for a, p in zip(degrees.tolist(), values.tolist(), strict=True)]
+        (folder / f"{name}.csv").write_text("crank_angle_deg,pressure_MPa\n" + "".join(lines))
+    return MEASURED | {"indicator": {end: str(folder / f"{end}.csv") for end in ("head", "crank")}}
+
+
+@pytest.mark.parametrize(
+    ("step", "force", "work"),
+    [(0.25, 6e-5, 1e-4), (0.5, 1e-4, 1e-4), (1, 3e-4, 2e-4), (2, 1e-3, 5e-4), (5, 5e-3, 2e-3)],
+)
+def test_a_card_of_the_ideal_cycle_gives_the_ideal_run_back(tmp_path, step, force, work):
+    """Within the error of its samples, which falls with their step (relative L2, and work)."""
+    ideal, ours = {"joint": "none", "clearance_mm": {}}, cards(tmp_path, step)
+    exact, found = run(ideal, rtol=1e-9), run(ideal | {"gas": ours}, rtol=1e-9)
+    assert force / 20 < apart(exact, found, "piston_force") < force
+    assert float(found.load_work / exact.load_work) == pytest.approx(1, abs=work)
+    assert float(found.energy_residual) < 1e-9
+
+
+def test_a_card_presses_by_the_crank_s_angle(tmp_path):
+    """In a worn machine as in the ideal one, whatever the piston does; integrators agree."""
+    ours = {"gas": cards(tmp_path, 1)}
+    ideal = run(ours | {"joint": "none", "clearance_mm": {}}, rtol=1e-9)
+    worn = [run(ours, rtol=1e-9, method=one) for one in ("TSIT5", "RODAS", "LSODA")]
+    assert apart(ideal, worn[0], "piston_force") < 1e-12
+    for other in worn[1:]:
+        assert apart(worn[0], other) < 2e-4
+    assert all(float(one.energy_residual) < 1e-5 for one in worn)
+
+
+def test_a_card_works_with_a_drive(tmp_path):
+    """Whose crank goes on at a speed of its own: the card follows its angle."""
+    ours = {"gas": cards(tmp_path, 1), "drive": FEATURES["drive"]["drive"]}
+    found = run(ours, rtol=1e-9, duration_rev=2)
+    node = np.array([0, 300, 700, 1000])
+    degrees = np.degrees(found.crank_angle.values[node]) % 360
+    head, crank = pressures(degrees)
+    faces = np.pi * 0.11**2, np.pi * (0.11**2 - 0.03**2)
+    force = 1e6 * (faces[0] * head - faces[1] * crank - (faces[0] - faces[1]) * 0.1)
+    assert found.piston_force.values[node] == pytest.approx(force, rel=5e-3, abs=60)
+    assert float(found.energy_residual) < 1e-5

@@ -1,0 +1,74 @@
+"""The load of measured indicator cards: the force of the gas over the crank's angle, from a table.
+
+Between samples a card is Akima's curve (J. ACM 17, 1970), closed to a period, and the table holds
+its values and slopes at 1440 angles. Errors of a card that is sampled from the ideal cycle of the
+head end, with its corners in pressure, in per cent of the discharge pressure (greatest, and rms;
+the worse of two shifts of the samples):
+
+| step      | Akima        | cubic spline | PCHIP        | straight lines |
+|-----------|--------------|--------------|--------------|----------------|
+| 0.25 deg  | 0.08, 0.0014 | 0.10, 0.0016 | 0.12, 0.0019 | 0.15, 0.0025   |
+| 0.5 deg   | 0.07, 0.0016 | 0.14, 0.0034 | 0.17, 0.0050 | 0.22, 0.0050   |
+| 1 deg     | 0.24, 0.006  | 0.37, 0.011  | 0.35, 0.014  | 0.57, 0.018    |
+| 2 deg     | 0.75, 0.027  | 0.95, 0.040  | 0.88, 0.040  | 1.37, 0.063    |
+| 5 deg     | 1.52, 0.100  | 1.54, 0.115  | 1.99, 0.161  | 2.34, 0.189    |
+"""
+
+import math
+
+import numpy as np
+
+from compressor.physics._jit import jit
+from compressor.physics.record import CARD_NODES
+
+PER_NODE = 2.0 * math.pi / CARD_NODES  # rad
+
+
+@jit
+def card_force(cos_theta, sin_theta, p):
+    """Return the force (N) of the gas, less the back pressure's, at a crank angle."""
+    place = math.atan2(sin_theta, cos_theta) / PER_NODE
+    if place < 0.0:
+        place += CARD_NODES
+    node = int(place)
+    s = place - node
+    node %= CARD_NODES
+    after = (node + 1) % CARD_NODES
+    rise = p.card[after, 0] - p.card[node, 0]
+    here, there = p.card[node, 1], p.card[after, 1]
+    bend = (1.0 - s) * (here - rise) + s * (rise - there)
+    return p.card[node, 0] + s * (rise + (1.0 - s) * bend)
+
+
+def card_nodes(angles, values):
+    """Return values, and slopes a node, of a card's curve at the table's angles: (CARD_NODES, 2).
+
+    angles: degrees in [0, 360), rising; values: at them.
+    """
+    x, y, slopes = closed_slopes(np.asarray(angles, float), np.asarray(values, float))
+    at = np.arange(CARD_NODES) * (360.0 / CARD_NODES)
+    place = x.searchsorted(at, side="right") - 1
+    width = x[place + 1] - x[place]
+    s = (at - x[place]) / width
+    rise = y[place + 1] - y[place]
+    here, there = slopes[place] * width - rise, rise - slopes[place + 1] * width
+    bend = (1.0 - s) * here + s * there
+    steepness = rise + (1.0 - 2.0 * s) * bend + s * (1.0 - s) * (there - here)
+    found = np.empty((CARD_NODES, 2))
+    found[:, 0] = y[place] + s * (rise + (1.0 - s) * bend)
+    found[:, 1] = steepness / width * (360.0 / CARD_NODES)
+    return found
+
+
+def closed_slopes(angles, values):
+    """Return angles (degrees), values and Akima's slopes of a closed curve, from below 0 to 360."""
+    count = angles.size
+    around = np.arange(-3, count + 3)
+    x = angles[around % count] + 360.0 * (around // count)
+    y = values[around % count]
+    steps = np.diff(y) / np.diff(x)
+    change = np.abs(np.diff(steps))
+    before, after = change[:-2], change[2:]  # of the sides: the straighter one counts more
+    total = before + after
+    weight = np.divide(after, total, out=np.full_like(total, 0.5), where=total > 0.0)
+    return x[2:-2], y[2:-2], weight * steps[1:-2] + (1.0 - weight) * steps[2:-1]
