@@ -70,6 +70,8 @@ def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:
     signals = rows.words["signals"][positions] == "yes"
     lacking = {}
     present = {"": is_ok, "signals": is_ok & signals}  # whether another job has one is not known
+    if CLIPPED in (rows.numbers.dtype.names or ()):  # which every job with a sensor has
+        present["sensor"] = is_ok & ~np.isnan(rows.numbers[CLIPPED][positions])
     for name, metric in BARRED.items():
         if name not in (rows.numbers.dtype.names or ()):
             lacking[name] = present.get(metric.when, np.zeros(len(positions), bool))
@@ -87,6 +89,7 @@ RERUN_REASONS = {
     Reason.OUT_OF_MEMORY,
     Reason.INVALID_INPUT,
 }
+CLIPPED = "clipped_fraction"
 NAMED = re.compile(rf"{HEX20}-{HEX20}\.h5")  # a file of time series that waits no longer
 ATTEMPTS = 100  # at reading segments that a writer replaces meanwhile
 

@@ -10,6 +10,7 @@ import pytest
 from compsim import cli
 
 from compressor.cases.load import load_studies
+from compressor.metrics import BARRED
 from compressor.program import PROGRAM
 from compressor.store import rows as segments
 from compressor.store.reader import open_study, read_store
@@ -63,6 +64,23 @@ def test_what_this_version_has_stored_is_not_stale(wear):
     assert (summary.stale, summary.gaining) == ({}, 0)
     again = sweep(wear(), "results", 1, options=Options(rerun_stale=True))
     assert again.run_now == 0
+
+
+def test_a_sensor_s_job_of_before_its_metrics_is_stale(wear, monkeypatch):
+    """Known by its clipped_fraction; a job without a sensor lacks nothing."""
+    new = [name for name, row in segments.NUMBERS.items() if row.when in ("sensor", "threshold")]
+    new = [name for name in new if name != "clipped_fraction"]
+    body = {"frequency_x_Hz": 4.0, "frequency_y_Hz": 30.0}
+    solve = {"duration_rev": 1}
+    sweep(wear(clearance_mm=0.1, body=body, sensor=True, solve=solve), "results", 1)
+    made_older(monkeypatch, new)
+    assert found() == {name: 1 for name in BARRED if name in new and "counts" not in name}
+    again = wear(clearance_mm=0.1, body=body, sensor=True, solve=solve)
+    assert sweep(again, "results", 1, options=Options(rerun_stale=True)).run_now == 1
+    assert found() == {}
+    sweep(wear(), "results", 1)
+    made_older(monkeypatch, new)
+    assert {*found().values()} == {1}
 
 
 def test_a_store_of_another_program_that_lacks_nothing_is_not_stale(wear, monkeypatch):
