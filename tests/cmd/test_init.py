@@ -61,7 +61,7 @@ def test_nothing_is_overwritten(capsys):
     ("words", "told"),
     [
         (["waer"], "there is no template 'waer'; did you mean wear or"),
-        (["xyzzy"], "there is no template 'xyzzy'; there are paper, wear, "),
+        (["xyzzy"], "there is no template 'xyzzy'; there are paper, machine, "),
         (["mine.yaml"], "a template comes first: compsim init wear -o mine.yaml"),
         (["wear", "-o", "my wear.yaml"], "'my wear.yaml' gives the study no name"),
         (["wear", "-o", "file/wear.yaml"], "file: is a file, where a folder is needed"),

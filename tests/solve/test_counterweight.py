@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from compressor.analysis.shaking import frame_forces
-from compressor.cases.case import Case, CaseError
+from compressor.cases.case import Case, CaseError, with_ideal_joints
+from compressor.cases.examples import example
 from compressor.cases.load import load_studies
 from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
@@ -191,3 +192,23 @@ def test_a_study_sweeps_counterweights_and_shares(tmp_path, monkeypatch, in_proc
     last = float(shared["bearing_force"].sel(axis="x").isel(time=0, balance_reciprocating=1))
     half = 1e-3 * 120 * 0.5 * (14 + 2.35)  # at top dead centre it pulls towards the crank
     assert last - first == pytest.approx(-half * OMEGA**2, rel=1e-9)
+
+
+def test_orders_of_the_nameplate_machine_by_hand():
+    """The example's, without clearance: 40 kg of rod, 2/3 of it at the pin, and 100 kg at 740 rpm.
+
+    Order 1 of Y is exact. Order 2 of X has the first two terms of the series of the crosshead's
+    acceleration by R / L; the third is a fortieth of the second.
+    """
+    (study,) = load_studies(example("machine"))
+    values = with_ideal_joints(study.cases[0]).values()
+    for group in ("body", "sensor"):
+        values.pop(group, None)
+    values |= {"solve": TURN, "output": {"signals": True}}
+    found, square = simulate(Case.resolve(values)), (740 * math.pi / 30) ** 2
+    along, up = orders(found, "x"), orders(found, "y")
+    pin, crosshead, ratio = 40 * (1 - 150 / 450), 100 + 40 * 150 / 450, 90 / 450
+    assert up[1].imag == pytest.approx(-(0.09 * pin - 9.0) * square, rel=1e-9)
+    assert along[1].real == pytest.approx((0.09 * (pin + crosshead) - 9.0) * square, rel=1e-6)
+    second = 0.09 * crosshead * (ratio + ratio**3 / 4 + 15 * ratio**5 / 128) * square
+    assert along[2].real == pytest.approx(second, rel=1e-5)

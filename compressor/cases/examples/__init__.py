@@ -6,7 +6,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 FOLDER = Path(__file__).parent
-STARTS = ("paper", "wear", "speed-sweep", "sampling", "diagnosis")  # those to begin with, in order
+STARTS = (
+    "paper",
+    "machine",
+    "wear",
+    "speed-sweep",
+    "sampling",
+    "diagnosis",
+)  # those to begin with, in order
 NEXT = "next: "
 
 
