@@ -11,7 +11,7 @@ from compsim.screen import (
 )
 
 FIGURES = (
-    "analyst", "signals", "spectra", "orbits", "modes", "impacts",
+    "analyst", "signals", "cards", "spectra", "orbits", "modes", "impacts",
     "cycles", "segments", "waterfall", "map",
     *(name for kind in STUDIES for name in kind.figures),
 )  # fmt: skip
@@ -34,7 +34,7 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 @of_results(ONE_JOB, jobs)
 @click.option(
     "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
-    help="Of a job analyst, signals, spectra, orbits, modes, impacts; of a study cycles, "
+    help="Of a job analyst, signals, cards, spectra, orbits, modes, impacts; of a study cycles, "
     f"segments, waterfall, map{MORE}.",
 )  # fmt: skip
 @click.option("-o", "--output", default="plots", show_default=True, shell_complete=folders,
@@ -75,10 +75,11 @@ def plot(
 
     A job's revolution as an analyst reads it (the sensor's record, or the crosshead's acceleration,
     above the rod load, with reversals, valve events and impacts), its signals over crank angle,
-    spectra, orbits, contact modes and impacts, beside the same machine without clearance; a
-    study's vibration over crank angle, order spectra and contact modes over a swept axis; a machine
-    that was followed along a parameter (`regimes:`): its bifurcation diagram, Poincaré sections,
-    and a map of periods over two parameters. Nothing but what is stored is needed.
+    spectra, orbits, contact modes and impacts, beside the same machine without clearance, and cards
+    of the gas in its cylinder; a study's vibration over crank angle, order spectra and contact
+    modes over a swept axis; a machine that was followed along a parameter (`regimes:`): its
+    bifurcation diagram, Poincaré sections, and a map of periods over two parameters. Nothing but
+    what is stored is needed.
     """
     folder, words = results_folder(given, folder)
     name, *values = some_words(words)

@@ -12,7 +12,7 @@ from compressor.analysis.contacts import (
     mode_shares,
 )
 from compressor.analysis.cycle import read_cycle
-from compressor.analysis.cylinder import cylinder_words
+from compressor.analysis.cylinder import cylinder_words, end_states
 from compressor.analysis.effects import (
     Effects,
     grid_effects,

@@ -16,9 +16,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
+from compressor.analysis.runs import case_of, record_of
 from compressor.cases import Case, open_card, to_si
-from compressor.physics import card_nodes, exact_motion
+from compressor.physics import card_nodes, exact_motion, sample_segments, segments
 
 
 class IdealCycle(NamedTuple):
@@ -77,6 +79,59 @@ def card_works(case: Case) -> dict[str, float]:
         sign = 1.0 if end == "head" else -1.0
         works[end] = sign * _face(case, end) * float(mean @ np.diff(x))
     return works
+
+
+class EndState(NamedTuple):
+    """The gas in one end of a cylinder over the samples of a run."""
+
+    volume: np.ndarray  # litres; of a measured card less the clearance, which nobody has given
+    pressure: np.ndarray  # MPa, absolute
+
+    @property
+    def work(self) -> float:
+        """Return the work (J) that the gas takes: the area of the card of its samples."""
+        mean = (self.pressure[1:] + self.pressure[:-1]) / 2.0
+        return -1e3 * float(mean @ np.diff(self.volume))
+
+
+def end_states(run: xr.Dataset) -> dict[str, EndState]:
+    """Return the gas in each end, head or crank, that presses; run: of the gas load, or a part."""
+    case, p = case_of(run), record_of(run)
+    gas, machine = case.gas, case.machine
+    angles, x = run["crank_angle"].values, 1e3 * run["displacement"].values
+    edges, phases = segments(p, angles[-1] / p.omega)
+    now = phases[sample_segments(angles / p.omega, edges)]
+    radius, states = machine.crank_radius_mm, {}
+    for end in filter(gas.presses, ("head", "crank")):
+        clearance = 0.0 if gas.is_measured else gas.clearance(end, 2 * radius)
+        top, bottom = machine.rod_length_mm + radius, machine.rod_length_mm - radius
+        space = clearance + (top - x if end == "head" else x - bottom)
+        if gas.is_measured:
+            pressure = _card_pressures(gas.cards[end], angles)
+        else:
+            phase = now % 4 if end == "head" else now // 4
+            pressure = _cycle_pressures(case, end, phase, space)
+        states[end] = EndState(1e3 * _face(case, end) * space / 1e3, pressure)
+    return states
+
+
+def _card_pressures(path: str, angles: np.ndarray) -> np.ndarray:
+    """Return the pressures (MPa) of a card at crank angles (rad)."""
+    card = open_card(path)
+    nodes = card_nodes(card.angles, card.pressures)[:, 0]
+    at = np.linspace(0.0, 2.0 * math.pi, nodes.size + 1)
+    return np.interp(angles % (2.0 * math.pi), at, np.append(nodes, nodes[0]))
+
+
+def _cycle_pressures(case: Case, end: str, phase: np.ndarray, space: np.ndarray) -> np.ndarray:
+    """Return the pressures (MPa) of an end's cycle by its phase and its space (mm)."""
+    gas, stroke = case.gas, 2 * case.machine.crank_radius_mm
+    if not gas.has_cycle(end):
+        return np.full(space.size, gas.suction_MPa)
+    (inlet, outlet), clearance = gas.open_pressures, gas.clearance(end, stroke)
+    expanded = outlet * (clearance / space) ** gas.exponent
+    compressed = inlet * ((clearance + stroke) / space) ** gas.exponent
+    return np.choose(phase, [expanded, inlet, compressed, outlet])
 
 
 def cylinder_words(case: Case) -> str:

@@ -15,6 +15,7 @@ from compressor.analysis.contacts import (
     mode_shares,
 )
 from compressor.analysis.cycle import GRAVITY, Cycle, read_cycle
+from compressor.analysis.cylinder import cylinder_words, end_states
 from compressor.analysis.orbit import orbit
 from compressor.analysis.runs import SPOKEN, case_of, settled_revolutions
 from compressor.analysis.shaking import (
@@ -154,6 +155,19 @@ def signals(run: xr.Dataset, twin: Twin) -> str:
         f"Acceleration reaches {peak:.0f} m/s²{beside}, X {span(x)} kN, Y {span(y)} kN, the "
         f"guide's force {span(1e-3 * forces['guide_force'])} kN, the torque "
         f"{span(torque, '.0f')} N m, the rod load {span(rod)} kN.{ideal_joints}{caution(run)}"
+    )
+
+
+def cards(run: xr.Dataset, twin: Twin) -> str:
+    """Describe the gas in the cylinder: its indicated power, and that of the ideal cycle."""
+    _, revolution = last_revolution(run)
+    seconds = float(revolution["time"][-1] - revolution["time"][0])
+    powers = {end: 1e-3 * one.work / seconds for end, one in end_states(revolution).items()}
+    each = ", ".join(f"{end} end {power:.2f} kW" for end, power in powers.items())
+    return (
+        "Pressure of the gas over its volume and over crank angle, in the last settled revolution, "
+        f"as it presses on the piston. Indicated power {sum(powers.values()):.2f} kW ({each}) by "
+        f"the areas; without clearance {cylinder_words(case_of(run))}.{caution(run)}"
     )
 
 
@@ -401,6 +415,7 @@ PLOT_CAPTIONS: dict[str, dict[str, Callable[..., str]]] = {
     "job": {
         "analyst": analyst,
         "signals": signals,
+        "cards": cards,
         "spectra": spectra,
         "orbits": orbits,
         "modes": modes,

@@ -26,6 +26,7 @@ from compressor.reasons import remedy
 from compressor.report.figures import Drawing
 from compressor.report.figures.job import (
     draw_analyst,
+    draw_cards,
     draw_cycles,
     draw_impacts,
     draw_map,
@@ -106,7 +107,10 @@ def publish_drawings(
 
 JOB, STUDY = PLOT_CAPTIONS["job"], PLOT_CAPTIONS["study"]
 OF_CONTACT = {"orbits": draw_orbits, "modes": draw_modes, "impacts": draw_impacts}
-BESIDE_TWIN = {"analyst": draw_analyst, "signals": draw_signals, "spectra": draw_spectra}
+BESIDE_TWIN = {
+    "analyst": draw_analyst, "signals": draw_signals, "cards": draw_cards,
+    "spectra": draw_spectra,
+}  # fmt: skip
 OVER_AXIS = {
     "cycles": draw_cycles,
     "segments": draw_segments,
@@ -156,9 +160,12 @@ def job_figures(
     twins = dict.fromkeys(figures, healthy_twin(run) if worn else None)
     if worn and "analyst" in figures and "sensor_acceleration" in run:
         twins["analyst"] = healthy_twin(run, sensed=True)
+    has_gas = case_of(run).load == "gas"
+    if "cards" in choice.what and not has_gas:
+        raise PlotError(f"job {key} has no gas in its cylinder: cards are of load: gas")
     try:
         for name in figures:
-            if name in OF_CONTACT and not worn:
+            if (name in OF_CONTACT and not worn) or (name == "cards" and not has_gas):
                 continue
             if name in OF_CONTACT:
                 drawing = OF_CONTACT[name](run)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from compressor.analysis.cylinder import card_works, cylinder_words, ideal_cycles
+from compressor.analysis.cylinder import card_works, cylinder_words, end_states, ideal_cycles
 from compressor.cases.case import Case
 from compressor.solve.simulate import measure, simulate
 
@@ -107,6 +107,33 @@ def test_the_work_of_a_card(tmp_path):
     work = 0.2e6 * math.pi * 0.09 * math.pi * 0.11**2
     assert card_works(case) == pytest.approx({"head": work}, rel=1e-4)
     assert cylinder_words(case).endswith("kW), by the cards")
+
+
+@pytest.mark.parametrize(
+    "name", ["losses", "single", "crank end", "head unloaded", "plain", "card"]
+)
+def test_the_pressures_of_a_run_are_those_that_press(tmp_path, name):
+    """The piston force of a worn machine, from the pressures on its faces; work by their areas."""
+    worn = {"joint": "both", "clearance_mm": 0.2, "solve": {"duration_rev": 2, "settle_rev": 1}}
+    if name == "plain":
+        case = Case.from_values({"load": "gas", "gas": {"back_pressure_MPa": 0.1}, **worn})
+    elif name == "card":
+        rows = [f"{a},{0.5 - 0.2 * math.sin(math.radians(a))!r}" for a in range(0, 360, 5)]
+        (tmp_path / "card.csv").write_text("\n".join(["crank_angle_deg,pressure_MPa", *rows]))
+        gas = {"back_pressure_MPa": 0.1, "bore_mm": 220, "indicator": str(tmp_path / "card.csv")}
+        case = Case.from_values({"load": "gas", "gas": gas, **worn})
+    else:
+        case = cylinder({**CYLINDERS[name], "back_pressure_MPa": 0.1}, **worn)
+    run = simulate(case)
+    found = end_states(run)
+    head = math.pi * (case.gas.piston_radius_mm / 1e3) ** 2
+    faces = {"head": head, "crank": math.pi * ((case.gas.rod_diameter_mm or 0) / 2e3) ** 2 - head}
+    force = sum(1e6 * faces[end] * (one.pressure - 0.1) for end, one in found.items())
+    exact = 1e-9 if name != "card" else 2e-5  # of a card straight lines between nodes
+    most = np.abs(run.piston_force.values).max()
+    assert force == pytest.approx(run.piston_force.values, abs=exact * most)
+    works = sum(one.work for one in found.values())
+    assert works == pytest.approx(-float(run.load_work), rel=5e-3)
 
 
 def test_a_valve_s_loss_lowers_the_flow_by_its_pressure():

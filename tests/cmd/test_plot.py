@@ -84,11 +84,26 @@ def job(folder, name, place=0):
     return read_store(folder).job(key(folder, name, place))
 
 
+def test_cards_are_of_the_gas(plot, folder, unpainted):
+    """Their power is the work that the piston force takes, over the time."""
+    mine = key(folder, "ideal")
+    code, found, err = plot(mine, "--what", "cards")
+    assert (code, err) == (0, "")
+    (caption,) = found.values()
+    power = -float(job(folder, "ideal")["load_work"]) / 0.36e3
+    said = float(re.search(r"Indicated power ([\d.]+) kW", caption)[1])
+    assert said == pytest.approx(power, rel=5e-3)
+    code, _, err = plot(key(folder, "worn"), "--what", "cards")
+    assert code == 2
+    assert "has no gas in its cylinder: cards are of load: gas" in err
+
+
 def test_a_job_is_drawn_with_its_numbers(plot, folder):
     mine = key(folder, "worn", 3)  # 0.3 mm, 500 rpm
     code, found, err = plot(mine[:8])
     assert (code, err) == (0, "")
-    names = [f"plots/{mine[:10]}-{name}.png" for name in PLOT_CAPTIONS["job"]]
+    drawn = [name for name in PLOT_CAPTIONS["job"] if name != "cards"]  # there is no gas
+    names = [f"plots/{mine[:10]}-{name}.png" for name in drawn]
     assert [*found] == names
     run = job(folder, "worn", 3)
     analyst, signals, spectra, orbits, modes, impacts = found.values()
@@ -214,7 +229,8 @@ def test_ideal_joints_have_no_contacts_to_draw(plot, folder, unpainted):
     mine = key(folder, "ideal")
     code, found, _ = plot(mine)
     assert code == 0
-    assert [name[-11:] for name in found] == ["analyst.png", "signals.png", "spectra.png"]
+    drawn = [name.rpartition("-")[2] for name in found]
+    assert drawn == ["analyst.png", "signals.png", "cards.png", "spectra.png"]
     assert "No joint has clearance" in [*found.values()][1]
     code, found, err = plot(mine, "--what", "orbits")
     assert (code, found) == (2, {})

@@ -1,4 +1,4 @@
-"""Figures of one job: signals, spectra, orbits, contact modes, impacts; and maps of a study."""
+"""Figures of one job: signals, cards, spectra, orbits, modes, impacts; and maps of a study."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from compressor.analysis import (
     angle_modes,
     case_of,
     deviation_spectrum,
+    end_states,
     frame_forces,
     impacts,
     joints_with_clearance,
@@ -239,7 +240,7 @@ def draw_analyst(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
     twin: the ideal machine, with the same sensor where the run has one.
     """
     found = read_cycle(run)
-    lanes = 2 + len(found.struck)
+    lanes = 1 + len(split_by_end(found.events)) + len(found.struck)
     figure, panels = make_grid(3, 1, 6.4 + 0.2 * lanes, heights=(0.34 * lanes, 3.4, 2.0))
     strip, vibration, load = panels[:, 0]
     for one, line, name in ((twin, TWIN, NAMES["twin"]), (run, THIS, NAMES["this"])):
@@ -266,6 +267,16 @@ def draw_analyst(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
     return figure
 
 
+def split_by_end(events: Sequence[tuple[float, str]]) -> dict[str, list[tuple[float, str]]]:
+    """Return the load's corners by lane: `load`, or those of a cylinder's two ends apart."""
+    found: dict[str, list[tuple[float, str]]] = {}
+    for angle, name in events:
+        end, _, rest = name.partition(" ")
+        lane, text = (f"gas, {end} end", rest) if end in BY_END else ("load", name)
+        found.setdefault(lane, []).append((angle, text))
+    return dict(sorted(found.items(), reverse=True)) or {"load": []}
+
+
 def plot_events(
     panel: Panel,
     events: Sequence[tuple[float, str]],
@@ -274,10 +285,13 @@ def plot_events(
 ) -> None:
     """Draw a lane each for the load's corners, the impacts of each joint, and the reversals.
 
-    Crank angles in degrees; the corners have names, the impacts are by joint.
+    Crank angles in degrees; the corners have names, those of a cylinder's two ends a lane each; the
+    impacts are by joint.
     """
+    by_end = split_by_end(events)
     lanes: list[tuple[str, np.ndarray, LineStyle]] = [
-        ("load", np.array([angle for angle, _ in events]), mark(BLACK, "v", 6)),
+        (lane, np.array([angle for angle, _ in own]), mark(BLACK, "v", 6))
+        for lane, own in by_end.items()
     ]
     for joint, at in struck.items():
         color, shape = BY_JOINT[joint]
@@ -285,18 +299,38 @@ def plot_events(
     lanes.append(("reversals", np.array(reversals), mark(RED, "s", 5)))
     for number, (name, angles, style) in enumerate(lanes):
         panel.plot(angles, np.full(angles.size, -float(number)), style, name)
-    shown: dict[int, list[str]] = {}
-    for angle, name in events:  # those of both ends at one angle share a text
-        shown.setdefault(round(angle), []).append(name)
-    for number, (angle, names) in enumerate(shown.items()):
-        side = "right" if angle > LAST_LABEL else "left"
-        shift = (-6.0 if side == "right" else 6.0, -5.0 if number % 2 else 5.0)
-        panel.notes.append(
-            Note(", ".join(names), angle, 0.0, shift=shift, side=side, level="center", size=8.0)
-        )
+    for lane, own in enumerate(by_end.values()):
+        for number, (angle, name) in enumerate(own):
+            side = "right" if angle > LAST_LABEL else "left"
+            shift = (-6.0 if side == "right" else 6.0, -5.0 if number % 2 else 5.0)
+            panel.notes.append(
+                Note(name, angle, -float(lane), shift=shift, side=side, level="center", size=8.0)
+            )
     panel.y.words = {-float(number): name for number, (name, *_) in enumerate(lanes)}
     panel.y.span(0.6 - len(lanes), 0.8)
     panel.grid = ""
+
+
+BY_END = {"head": LineStyle(BLUE, "-", 1.5, 2.3), "crank": LineStyle(RED, "--", 1.5, 2.3)}
+
+
+def draw_cards(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
+    """Return the pressure in each end over gas volume and over crank angle, a revolution."""
+    figure, panels = make_grid(1, 2, 4.6)
+    over_volume, over_angle = panels.flat
+    degrees, revolution = last_revolution(run)
+    for end, gas in end_states(revolution).items():
+        over_volume.plot(gas.volume, gas.pressure, BY_END[end], f"{end} end")
+        over_angle.plot(degrees, gas.pressure, BY_END[end], f"{end} end")
+    measured = case_of(run).gas.is_measured
+    over_volume.x.title = "displaced volume (litres)" if measured else "gas volume V (litres)"
+    over_volume.y.title = "pressure (MPa, absolute)"
+    over_angle.x.title = ANGLE_AXIS
+    over_angle.x.span(degrees[0], degrees[-1])
+    over_angle.x.step = 90.0
+    share_scales(figure.panels, "y")
+    figure.legend = over_volume.traces
+    return figure
 
 
 def draw_spectra(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
