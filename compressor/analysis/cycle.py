@@ -121,13 +121,16 @@ def _reversals(turns: np.ndarray, load: np.ndarray) -> tuple[float, ...]:
 
 
 def _events(run: xr.Dataset, begin: float) -> tuple[tuple[float, str], ...]:
-    """Return the angles (degrees) and names of the load's corners in a revolution, as it has them.
+    """Return the angles (degrees) and names of the load's corners in a revolution.
+
+    They are the same in each: those of the next one are read, which has one before it.
 
     The phase of a cylinder with two ends is that of its head end plus four times that of its crank
     end: what changes of either is an event.
     """
     case, p = case_of(run), record_of(run)
-    edges, phases = segments(p, (begin + 2.0) * case.turn)
+    begin += 1.0
+    edges, phases = segments(p, (begin + 1.5) * case.turn)
     names = CAM if case.load == "spring" else VALVES
     both = (np.asarray(phases) >> 2).any()
     found = set()

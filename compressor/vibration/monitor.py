@@ -38,7 +38,7 @@ class Monitored:
     def measure(self, thresholds: Thresholds) -> Numbers:
         """Return the metrics by name, of `compressor.metrics.TABLE`.
 
-        None of a body or a record without a whole revolution; no counts without a threshold.
+        None of a body or a record without a whole revolution; no counts without a first threshold.
         """
         numbers: Numbers = {}
         if self.revolutions[0]:
@@ -54,7 +54,7 @@ class Monitored:
             "sensor_segment_peak": peak,
             "sensor_segment_rms": root,
         }
-        if any(one is not None for one in thresholds):
+        if thresholds and thresholds[0] is not None:
             numbers["sensor_counts_per_rev"] = self.counts(thresholds)
         return numbers
 
