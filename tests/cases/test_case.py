@@ -376,6 +376,7 @@ OTHER = {  # valid values beside the defaults, which cannot be scaled
     "sensor.low_pass_Hz": 5000.0,
     "sensor.length_rev": 7,
     "sensor.seed": 2,
+    "body.band_high_Hz": 500.0,
     "guide.exponent": 1.4,
     "machine.small_end_pin_radius_mm": 12.0,
     "contact.small_end_materials": ["steel", "copper"],
@@ -417,6 +418,8 @@ def test_the_table_says_which_values_make_another_job(key):
         base |= {"gas": {"action": action, **rod}}
     if group in ("body", "sensor"):
         base |= {"body": {"freedoms": "xy_rocking"}, "sensor": True}
+    if key == "sensor.second_threshold_m_per_s2":
+        base |= {"sensor": {"threshold_m_per_s2": 1}}
     if key == "friction.ideal_joints":
         base |= BIG_END
     if group in ("lubricant", "guide", "drive", "rod", "wear"):
