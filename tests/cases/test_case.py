@@ -369,7 +369,6 @@ OTHER = {  # valid values beside the defaults, which cannot be scaled
     "output.keep": "metrics",
     "output.precision": "single",
     "body.freedoms": "y",
-    "body.band_high_Hz": 200.0,
     "body.start": "rest",
     "sensor.place": "bearing",
     "sensor.direction": "x",
