@@ -27,7 +27,7 @@ PRESSURES = (1e-3, 100.0)  # MPa: all below, or any above, are of another unit
 CLOSING = 1e-6  # degrees: a last sample so near to a whole revolution is the first one's angle
 
 
-class CardError(CompsimError, ValueError):
+class CardError(CompsimError):
     """A file that is no card; its text names file and line."""
 
     exit_code = 2
