@@ -8,6 +8,11 @@ import pytest
 from conftest import keep
 from scipy.integrate import solve_ivp
 
+from compressor.analysis.shaking import (
+    NoSeriesError,
+    body_velocity_rms,
+    healthy_body_velocity_rms,
+)
 from compressor.cases.case import Case, CaseError
 from compressor.cases.load import load_studies
 from compressor.physics import COLUMNS, derivative_with_flows
@@ -15,6 +20,7 @@ from compressor.physics.observe import observe
 from compressor.solve.si_record import record
 from compressor.solve.simulate import BODY, measure, simulate
 from compressor.store.reader import open_study, read_store
+from compressor.studies.tradeoff.explain import body_words
 
 TURN = {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 0.3}
 LOOSE = {"joint": "big_end", "clearance_mm": 0.2, "solve": TURN}
@@ -225,3 +231,19 @@ def test_what_a_body_needs_is_told(values, message):
     solve = TURN | values.get("solve", {})
     with pytest.raises(CaseError, match=message):
         Case.from_values({**LOOSE, **values, "solve": solve})
+
+
+def test_explain_says_how_fast_the_body_is_beside_the_healthy_one():
+    worn = run(body=True)
+    words = body_words(Case.from_values(LOOSE | {"body": True}), worn)
+    healthy = healthy_body_velocity_rms(Case.from_values({"body": True, "solve": TURN}))
+    ours, theirs = (
+        [f"{1e3 * one:.3g}" for one in rms] for rms in (body_velocity_rms(worn), healthy)
+    )
+    assert words == (
+        f"{ours[0]} and {ours[1]} mm/s rms along x and y, with ideal joints {theirs[0]} and "
+        f"{theirs[1]}"
+    )
+    assert float(ours[0]) > float(theirs[0])
+    with pytest.raises(NoSeriesError, match="no body"):
+        body_velocity_rms(run())

@@ -12,7 +12,12 @@ from typing import Any
 
 import xarray as xr
 
-from compressor.analysis import cylinder_words
+from compressor.analysis import (
+    NoSeriesError,
+    body_velocity_rms,
+    cylinder_words,
+    healthy_body_velocity_rms,
+)
 from compressor.cases import (
     ACCURACY,
     CYLINDRICAL,
@@ -108,6 +113,8 @@ def explain(
     repeats = repeats if seconds < SLOW_SECONDS else 1
     ended = complete(run)
     active, absent = terms(case)
+    if case.body and ended:
+        active["body"] = body_words(case, run)
     joints = tuple(ideal_scales(case))
     steps, expected = (0.0, 0.0) if case.has_features else expected_cost(case, joints)
     return Explanation(
@@ -216,6 +223,16 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
         active["clearance"] += f"; worn: {case.worn_joint.replace('_', ' ')}"
     active["contact"] = contact_words(case)
     return active, absent
+
+
+def body_words(case: Case, run: xr.Dataset) -> str:
+    """Return how fast a case's body moves in words, and that of the healthy machine."""
+    try:
+        both = body_velocity_rms(run), healthy_body_velocity_rms(case)
+    except NoSeriesError:
+        return "no whole settled revolution, by which its velocity would be known"
+    own, healthy = (" and ".join(f"{1e3 * one:.3g}" for one in rms) for rms in both)
+    return f"{own} mm/s rms along x and y, with ideal joints {healthy}"
 
 
 def counterweight_words(case: Case) -> str:
