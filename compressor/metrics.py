@@ -5,6 +5,7 @@ case files that name a metric are read at once. A new metric is a row of `TABLE`
 `compressor.solve.run_metrics`.
 """
 
+import math
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
@@ -141,7 +142,8 @@ TABLE = (
     Metric(
         "rod_load_reversal_angle", (), "rad",
         "crank angle a revolution on the smaller side of the rod load",
-        "contact_force", source="samples", when="signals", joint=1,
+        "contact_force", shown=Shown("rod load reversal", "°", math.degrees(1.0)),
+        source="samples", when="signals", joint=1,
     ),
     Metric(
         "rod_load_reversal_share", (), "1",
@@ -150,11 +152,13 @@ TABLE = (
     ),
     Metric(
         "peak_rod_load_tension", (), "N", "greatest pull of the rod load at the crosshead pin",
-        "contact_force", source="samples", when="signals", joint=1,
+        "contact_force", shown=Shown("peak rod load, tension", "kN", 1e-3),
+        source="samples", when="signals", joint=1,
     ),
     Metric(
         "peak_rod_load_compression", (), "N", "greatest push of the rod load at the crosshead pin",
-        "contact_force", source="samples", when="signals", joint=1,
+        "contact_force", shown=Shown("peak rod load, compression", "kN", 1e-3),
+        source="samples", when="signals", joint=1,
     ),
     *(
         Metric(name, (), unit, phrase, source="run")

@@ -476,7 +476,7 @@ class Figure {
     if (!note.text) {
       const across = note.x === undefined;
       const at = across ? log(note.y, panel.y) : log(note.x, panel.x);
-      layout.shapes.push({ type: "line", layer: "below",
+      layout.shapes.push({ type: "line", layer: note.dash.length ? "above" : "below",
         xref: across ? `${x} domain` : x, yref: across ? y : `${y} domain`,
         x0: across ? 0 : at, x1: across ? 1 : at, y0: across ? at : 0, y1: across ? at : 1,
         line: { color, width: 1, dash: note.dash.length ? "dash" : "solid" } });
