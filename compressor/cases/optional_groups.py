@@ -240,6 +240,7 @@ def fill_guide(guide: Guide, mass: float) -> Guide:
     return replace(guide, crosshead_inertia_kg_m2=mass * square / 12)
 
 
+BOLTED = "assumed: bolted to a block on firm ground"
 BODIES_PER_CASING = 25.0  # mass of the body over the modal mass of a casing mode
 
 
@@ -271,13 +272,13 @@ class Body:
         -200.0, "mm", (-1e5, 1e5), OURS, "mass centre from the crank's", read=ROCKING
     )
     frequency_x_Hz: float = parameter(
-        20.0, "Hz", (0, 1e5), OURS, "natural frequency along x", above=True, read=ALONG_X
+        60.0, "Hz", (0, 1e5), BOLTED, "natural frequency along x", above=True, read=ALONG_X
     )
     frequency_y_Hz: float = parameter(
-        20.0, "Hz", (0, 1e5), OURS, "natural frequency along y", above=True, read=ALONG_Y
+        60.0, "Hz", (0, 1e5), BOLTED, "natural frequency along y", above=True, read=ALONG_Y
     )
     frequency_rocking_Hz: float = parameter(
-        20.0, "Hz", (0, 1e5), OURS, "natural frequency of rocking", above=True, read=ROCKING
+        60.0, "Hz", (0, 1e5), BOLTED, "natural frequency of rocking", above=True, read=ROCKING
     )
     damping_ratio: float = parameter(0.03, "", (0, 0.99), OURS, "of the foundation", above=True)
     casing: bool = choice(

@@ -98,7 +98,7 @@ def test_a_steady_body_follows_newton_s_law():
     for axis in ("x", "y"):
         one = {n: found[f"body_{n}"].sel(axis=axis).values[kept] for n in
                ("displacement", "velocity", "acceleration")}  # fmt: skip
-        omega = 2 * math.pi * 20.0
+        omega = 2 * math.pi * 60.0
         felt = one["acceleration"] + 2 * 0.03 * omega * one["velocity"]
         felt += omega**2 * one["displacement"]
         force = found["shaking_force"].sel(axis=axis).values[kept] / 500.0
@@ -231,6 +231,21 @@ def test_what_a_body_needs_is_told(values, message):
     solve = TURN | values.get("solve", {})
     with pytest.raises(CaseError, match=message):
         Case.from_values({**LOOSE, **values, "solve": solve})
+
+
+def test_the_default_foundation_holds_the_healthy_machine_by_hand():
+    """Orders 1 and 2 of X, 6152.1 and 1086.7 N, and 1 of Y, 773.2 N, on 500 kg at 60 Hz."""
+    case = Case.from_values({"body": True, "solve": TURN})
+
+    def speed(order, force):
+        w, natural = order * case.omega, 2 * math.pi * 60.0
+        return force / 500.0 * w / abs(natural**2 - w**2 + 2j * 0.03 * natural * w)
+
+    along = math.hypot(speed(1, 6152.1), speed(2, 1086.7)) / math.sqrt(2)
+    expected = [along, speed(1, 773.2) / math.sqrt(2)]
+    assert expected == pytest.approx([3.49e-3, 0.41e-3], rel=0.01)  # what pages say
+    assert healthy_body_velocity_rms(case) == pytest.approx(expected, rel=1e-3)
+    assert body_velocity_rms(simulate(case)) == pytest.approx(healthy_body_velocity_rms(case))
 
 
 def test_explain_says_how_fast_the_body_is_beside_the_healthy_one():

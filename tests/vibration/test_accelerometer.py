@@ -38,7 +38,7 @@ def amplitude(record, frequency):
 def test_the_record_is_the_body_s_acceleration(order):
     """|H| = w^2 / |w0^2 - w^2 + 2 i zeta w w0| / M; mounting and filter add less than 1e-3."""
     record = shaken(order)
-    w, w0 = 2 * np.pi * order / TURN, 2 * np.pi * 20.0
+    w, w0 = 2 * np.pi * order / TURN, 2 * np.pi * 60.0
     expected = 5000 / 500 * w**2 / abs(w0**2 - w**2 + 2j * 0.03 * w * w0)
     resonance = 1 / (1 - (order / TURN / 5000.0) ** 2)
     assert amplitude(record, order / TURN) == pytest.approx(expected * resonance, rel=1e-5)
