@@ -324,8 +324,8 @@ class Case(Settings):
     def has_features(self) -> bool:
         """Return whether oil, a guide, a drive, a rod, rubbing joints or a card are modelled."""
         rubbing = self.friction and self.friction.ideal_joints
-        featured = self.lubricant or self.guide or self.drive or self.rod or rubbing
-        return bool(featured or (self.load == "gas" and self.gas.is_measured))
+        measured = self.load == "gas" and self.gas.is_measured
+        return bool(self.lubricant or self.guide or self.drive or self.rod or rubbing or measured)
 
     @property
     def is_plain(self) -> bool:
