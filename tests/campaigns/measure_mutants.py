@@ -43,7 +43,9 @@ COMPILED = ("invariances", "march", "integrate", "rosenbrock", "simulate", "accu
             "horizon")  # fmt: skip
 LAWS = ("contact_laws", "friction_laws", "chosen_laws")
 TESTED_IN = {
-    **dict.fromkeys(("mechanism", "mechanism_motion", "mechanism_rows"), ("general_mechanism",)),
+    **dict.fromkeys(("mechanism", "mechanism_motion"), ("general_mechanism",)),
+    "mechanism_rows": ("general_mechanism", "feature_runs"),
+    "march": ("march", "stages"),
     "motion": ("motion", *LAWS),
     "contact": ("contact", *LAWS),
 }  # where not in the module of the same name alone
@@ -67,7 +69,7 @@ class Copy:
     def attempt(self, mutant, jit, modules):
         """The first test of some modules that fails, "" if none does; raises CannotBeLoaded."""
         files = [
-            str(path) for name in modules for path in self.folder.glob(f"tests/*/test_{name}.py")
+            str(path) for name in modules for path in self.folder.glob(f"tests/**/test_{name}.py")
         ]
         if not mutant:
             return first_failure(self.folder, files, jit, "machine-code")

@@ -11,6 +11,7 @@ from compressor.cases.case import Case
 from compressor.metrics import JOINTS
 from compressor.physics import mechanism_rows
 from compressor.physics.kinematics import ideal
+from compressor.physics.mechanism import ACROSS, BIG_SLOPE, SMALL_SLOPE, shapes
 from compressor.physics.mechanism_motion import solve
 from compressor.physics.motion import (
     eccentricities_both,
@@ -275,3 +276,13 @@ def test_energy_changes_by_the_powers(joint, features, unbalance):
         assert change == pytest.approx(power * pace, abs=1e-4 * scale)
         assert row[Column.FRICTION_POWER] >= 0.0
         assert row[Column.DAMPING_POWER] >= 0.0
+
+
+def test_the_rod_s_ends_turn_with_its_shapes():
+    """By how much each mode turns an end: the slope of its shape there, times the length."""
+    step = 1e-6
+    for slopes, end in ((BIG_SLOPE, 0.0), (SMALL_SLOPE, 1.0)):
+        before, after = shapes(np.array([end - step])), shapes(np.array([end + step]))
+        found = (after - before)[:, 0] / (2.0 * step)
+        np.testing.assert_allclose(slopes[:ACROSS], found[:ACROSS], rtol=1e-9)
+        assert not slopes[ACROSS:].any()  # what stretches it turns nothing
