@@ -8,6 +8,7 @@ from compressor.cases.case import Case
 from compressor.cases.laws import CYLINDRICAL
 from compressor.cases.table import table
 from compressor.physics.contact_laws import (
+    FLATTEST,
     HYSTERESIS,
     Law,
     elastic_energy,
@@ -56,6 +57,21 @@ def test_the_energy_is_the_work_of_the_elastic_force(law, exponent):
     work, _ = quad(lambda depth: elastic_force(depth, stiffness, CLEARANCE, p), 0.0, DEPTH)
     elastic = elastic_force(DEPTH, stiffness, CLEARANCE, p)
     assert elastic_energy(elastic, DEPTH, stiffness, CLEARANCE, p) == pytest.approx(work, rel=1e-7)
+
+
+def test_johnson_s_energy_is_its_work_along_the_tangent_too():
+    """Beyond the depth from which the force goes on straight, half of the clearance."""
+    p, stiffness = contact("johnson")
+    for depth in (0.6 * CLEARANCE, 2.0 * CLEARANCE):
+        corner = [FLATTEST * 4.0 * CLEARANCE * np.exp(-1.0 - FLATTEST)]
+        work, _ = quad(
+            lambda reached: elastic_force(reached, stiffness, CLEARANCE, p), 0.0, depth,
+            points=corner,
+        )  # fmt: skip
+        elastic = elastic_force(depth, stiffness, CLEARANCE, p)
+        energy = elastic_energy(elastic, depth, stiffness, CLEARANCE, p)
+        assert corner[0] < depth
+        assert energy == pytest.approx(work, rel=1e-7)
 
 
 @laws

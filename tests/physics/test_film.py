@@ -87,8 +87,11 @@ def test_polynomials_keep_reynolds_numbers():
         if abs(eps) > 0.1:
             assert squeeze_number(eps, 0.5, constants) == pytest.approx(exact, rel=3e-3)
         if eps > 0.1:
-            exact = math.hypot(*reynolds(eps, 0.5))
+            found = reynolds(eps, 0.5)
+            exact = math.hypot(*found)
             assert rotation_number(eps, 0.5, constants) == pytest.approx(exact, rel=3e-3)
+            angle = math.atan2(found.across, found.normal)
+            assert attitude(eps, 0.5, constants) == pytest.approx(angle, abs=5e-3)
 
 
 def test_at_the_centre_the_film_resists_alike_in_all_directions():
