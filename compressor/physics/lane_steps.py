@@ -46,10 +46,11 @@ def _rows(count=1):
     return first
 
 
-CHOICES = ("scene", "load", "law", "friction", "freedoms", "wide", "exponent", "corners",
-           "hysteresis", "least_approach", "bristle_stiffness", "bristle_damping", "viscous",
-           "crank_suction_force", "crank_discharge_force", "crank_clearance", "crank_corners",
-           "laws")  # fmt: skip
+# what all cases of lanes have alike, or no equation of theirs reads
+CHOICES = ("scene", "load", "law", "friction", "freedoms", "wide", "unbalance", "exponent",
+           "corners", "hysteresis", "least_approach", "bristle_stiffness", "bristle_damping",
+           "viscous", "crank_suction_force", "crank_discharge_force", "crank_clearance",
+           "crank_corners", "laws")  # fmt: skip
 # fields of the record that are rows, in its order; those of a joint are two
 FIELDS = tuple(
     (name, joint)
@@ -118,7 +119,7 @@ def lane_record(scene, W, j):
     return LaneRecord(  # type: ignore[call-arg]
         number, SPRING, IMPACT, 1, freedoms, 0,
         W[b], W[b + LANES], W[b + 2 * LANES], W[b + 3 * LANES], W[b + 4 * LANES], W[b + 5 * LANES],
-        W[b + 6 * LANES], W[b + 7 * LANES], pins, clearance, stiffness, 1.5,
+        W[b + 6 * LANES], W[b + 7 * LANES], 0.0, pins, clearance, stiffness, 1.5,
         W[b + 14 * LANES], W[b + 15 * LANES], W[b + 16 * LANES], W[b + 17 * LANES],
         W[b + 18 * LANES], W[b + 19 * LANES], NO_CORNERS,
         W[b + 20 * LANES], W[b + 21 * LANES], W[b + 22 * LANES], W[b + 23 * LANES],

@@ -133,8 +133,9 @@ def test_a_mirrored_state_has_the_mirrored_rates(values, seed, t):
 DIMENSIONS = {
     "omega": (0, 0, -1), "crank_radius": (1, 0, 0), "rod_length": (1, 0, 0),
     "rod_mass": (0, 1, 0), "rod_centre": (1, 0, 0), "rod_inertia": (2, 1, 0),
-    "reciprocating_mass": (0, 1, 0), "gravity": (1, 0, -2), "pin_radius": (1, 0, 0),
-    "clearance": (1, 0, 0), "damping": (0, 1, -1), "full_damping": (1, 0, 0),
+    "reciprocating_mass": (0, 1, 0), "gravity": (1, 0, -2), "unbalance": (1, 1, 0),
+    "pin_radius": (1, 0, 0), "clearance": (1, 0, 0), "damping": (0, 1, -1),
+    "full_damping": (1, 0, 0),
     "stiction_velocity": (1, 0, -1), "friction_velocity": (1, 0, -1),
     "suction_force": (1, 1, -2), "discharge_force": (1, 1, -2), "back_force": (1, 1, -2),
     "head_clearance": (1, 0, 0), "spring_stiffness": (0, 1, -2), "spring_damping": (0, 1, -1),

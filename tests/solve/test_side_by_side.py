@@ -126,7 +126,7 @@ def test_lanes_know_every_field_of_the_record():
     made = lane_steps.lane_record.__wrapped__((0, 0), W, 3)
     places = {field: rows.FIRST_FIELD + i * rows.LANES + 3 for i, field in enumerate(rows.FIELDS)}
     choices = {"scene": 2, "load": rows.SPRING, "law": 0, "friction": 1, "freedoms": 2, "wide": 0,
-               "exponent": 1.5, "corners": (0.0, 0.0, 0.0), "hysteresis": 0.0,
+               "unbalance": 0.0, "exponent": 1.5, "corners": (0.0, 0.0, 0.0), "hysteresis": 0.0,
                "least_approach": 0.0, "bristle_stiffness": 0.0, "bristle_damping": 0.0,
                "viscous": 0.0, "crank_suction_force": 0.0, "crank_discharge_force": 0.0,
                "crank_clearance": 0.0, "crank_corners": (0.0, 0.0), "laws": (0.0,)}  # fmt: skip
