@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify stress chaos mutants measurements pages clean
+.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify calibrate stress chaos mutants measurements pages clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -107,6 +107,9 @@ regimes: install  ## follow a machine over its clearance, up and down (ten minut
 
 diagnosis: install  ## train on 2,000 simulated machines, and test on some it never saw (half an hour)
 	$(CAMPAIGN)/measure_diagnosis.py tests/results/diagnosis.json
+
+calibrate: install  ## measure what calibrate makes of known machines and of others (15 minutes)
+	$(CAMPAIGN)/measure_calibrate.py tests/results/calibrate.json
 
 identify: install  ## measure what is identified of other machines, and under another friction law (15 minutes)
 	$(CAMPAIGN)/measure_identify.py tests/results/identify.json

@@ -651,6 +651,23 @@ def identify_table():
     return markdown(head, rows)
 
 
+def calibrate_table():
+    measured = kept("calibrate.json")
+    head = ["the machine has besides", "key", "true value in its 95 % interval",
+            "best value off, share of the range", "interval's width, share of the range",
+            "said not to fit"]  # fmt: skip
+    rows = []
+    for other, row in measured["others"].items():
+        for key, one in row["keys"].items():
+            low, high = one["inside_95"]
+            rows.append([
+                other, f"`{key}`",
+                f"{one['inside']} of {row['machines']} [{low:.0%}, {high:.0%}]",
+                f"{one['off']:.1%}", f"{one['width']:.0%}", f"{row['said_not_to_fit']}",
+            ])  # fmt: skip
+    return markdown(head, rows)
+
+
 def unit(name, row):
     """A drawn parameter with its unit."""
     what = {"damping": "times the paper's", "rtol": "", "friction": "", "exponent": ""}
@@ -932,6 +949,7 @@ PAGES = {
         "ladders": ladders_table,
         "limit": limit_table,
         "identify": identify_table,
+        "calibrate": calibrate_table,
         "chaotic": chaotic_table,
         "chaotic-cases": chaotic_cases_table,
         "diagnosis": diagnosis_table,
