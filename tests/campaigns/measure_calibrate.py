@@ -25,7 +25,7 @@ from compressor.studies.calibrate.calibrate import Unknown, calibrate
 from compressor.studies.calibrate.command import POOR_FIT
 from compressor.vibration import Record
 
-SEED, MACHINES = 3101, 20
+SEED, MACHINES = 3101, 34
 RANGES = {
     "machine.reciprocating_mass_kg": (10.0, 20.0), "machine.rod_mass_kg": (3.0, 8.0),
     "body.mass_kg": (300.0, 800.0), "body.frequency_y_Hz": (26.0, 40.0),

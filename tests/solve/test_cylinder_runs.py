@@ -35,7 +35,7 @@ def apart(one, other, name="acceleration"):
     return float(np.linalg.norm(a - b) / np.linalg.norm(a))
 
 
-@pytest.mark.parametrize("method", ["RODAS", "LSODA", "Radau"])
+@pytest.mark.parametrize("method", ["RODAS", "LSODA"])
 def test_another_integrator_finds_the_same(method):
     """The equations alone are shared; the forces of both faces among them."""
     ours, theirs = run({}, rtol=1e-9), run({}, rtol=1e-8, method=method)
@@ -118,7 +118,7 @@ def test_a_card_presses_by_the_crank_s_angle(tmp_path):
     """In a worn machine as in the ideal one, whatever the piston does; integrators agree."""
     ours = {"gas": cards(tmp_path, 1)}
     ideal = run(ours | {"joint": "none", "clearance_mm": {}}, rtol=1e-9)
-    worn = [run(ours, rtol=1e-9, method=one) for one in ("TSIT5", "RODAS", "LSODA")]
+    worn = [run(ours, rtol=1e-9, method=one) for one in ("TSIT5", "RODAS")]
     assert apart(ideal, worn[0], "piston_force") < 1e-12
     for other in worn[1:]:
         assert apart(worn[0], other) < 2e-4
