@@ -278,7 +278,7 @@ class Body:
         60.0, "Hz", (0, 1e5), BOLTED, "natural frequency along y", above=True, read=ALONG_Y
     )
     frequency_rocking_Hz: float = parameter(
-        60.0, "Hz", (0, 1e5), BOLTED, "natural frequency of rocking", above=True, read=ROCKING
+        20.0, "Hz", (0, 1e5), OURS, "natural frequency of rocking", above=True, read=ROCKING
     )
     damping_ratio: float = parameter(0.03, "", (0, 0.99), OURS, "of the foundation", above=True)
     casing: bool = choice(

@@ -48,6 +48,7 @@ TESTED_IN = {
     "march": ("march", "stages"),
     "motion": ("motion", *LAWS),
     "contact": ("contact", *LAWS),
+    "card": ("card_curve", "card"),
 }  # where not in the module of the same name alone
 NO_JIT, JIT = "not slow and not compiled", "not slow"
 # s of processor time with the JIT off and on; a mutant that takes longer is caught: it never ends

@@ -242,8 +242,9 @@ def test_a_run_that_stops_has_none():
 
 def test_keys_of_cases_stay_valid():
     """Those of before there were bands and thresholds; one that gives them is another job."""
-    key = "1c2ebec1e5513dc11d15"
-    assert Case.from_values({"body": True, "sensor": True}).key == key
+    key = "4111e1fc53d23aafecdf"
+    body = {"frequency_x_Hz": 20, "frequency_y_Hz": 20}
+    assert Case.from_values({"body": body, "sensor": True}).key == key
     assert Case.from_values({"body": {"band_low_Hz": 10}, "sensor": True}).key != key
 
 
