@@ -147,7 +147,7 @@ def least_base_radius(p, allowed, with_displacement=True):
 
 
 @dataclass(frozen=True)
-class Comparison:
+class CamComparison:
     """One number of the paper beside the one that follows from its equations."""
 
     quantity: str
@@ -161,7 +161,7 @@ def comparisons(p=None):
     """Return the paper's numbers of spring and cam beside those that follow (Eq. 8-12, Table 1).
 
     `p` is a record of the spring load with the paper's pressures, by default the paper's; returns a
-    list of Comparison.
+    list of CamComparison.
     """
     p = record(Case()) if p is None else p
     stroke = p.spring_stroke
@@ -192,4 +192,4 @@ def comparisons(p=None):
         ("greatest pressure angle on the printed base circle", "deg", None,
          math.degrees(steepest), "Eq. 11"),
     )  # fmt: skip
-    return [Comparison(q, unit, a, float(b), source) for q, unit, a, b, source in rows]
+    return [CamComparison(q, unit, a, float(b), source) for q, unit, a, b, source in rows]

@@ -54,7 +54,7 @@ def read_cycle(run: xr.Dataset) -> Cycle:
     and the impacts of the same one. Raises NoSeriesError where no revolution is settled.
     """
     settled, count = whole_revolutions(run)
-    recorded = _recorded(run)
+    recorded = _read_sensor(run)
     number = min(count, recorded[2]) if recorded else count
     turns = settled["crank_angle"].values / math.tau
     begin = turns[0] + number - 1
@@ -63,23 +63,23 @@ def read_cycle(run: xr.Dataset) -> Cycle:
     degrees = 360.0 * (turns[inside] % 1.0)
     load = revolution["contact_force"].sel(joint="small_end", axis="x").values
     if recorded:
-        angle, vibration = _sorted(*_sensed(recorded, begin))
+        angle, vibration = _sort_by_angle(*_read_last_turn(recorded, begin))
     else:
-        angle, vibration = _sorted(degrees, revolution["acceleration"].values)
-    load_angle, sorted_load = _sorted(degrees, load)
+        angle, vibration = _sort_by_angle(degrees, revolution["acceleration"].values)
+    load_angle, sorted_load = _sort_by_angle(degrees, load)
     return Cycle(
         angle, vibration, recorded is not None, load_angle, sorted_load,
         _reversals(turns[inside], load), _events(run, begin), _struck(run, begin),
     )  # fmt: skip
 
 
-def _sorted(degrees: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _sort_by_angle(degrees: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return values by rising angle."""
     order = np.argsort(degrees, kind="stable")
     return degrees[order], values[order]
 
 
-def _recorded(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, int] | None:
+def _read_sensor(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, int] | None:
     """Return the crank's revolutions at the samples of a record, these, and how many are settled.
 
     Revolutions count from the run's begin. By the tacho, at a steady pace before the first pulse
@@ -102,7 +102,7 @@ def _recorded(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, int] | None:
     return passed + (first if steady else 0.0), run["sensor_acceleration"].values, whole
 
 
-def _sensed(
+def _read_last_turn(
     recorded: tuple[np.ndarray, np.ndarray, int], begin: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return angles (degrees) and samples of a record in the revolution that begins there."""
