@@ -55,14 +55,14 @@ class Segments:
         return self.rms / self.healthy
 
     @property
-    def tripped(self) -> np.ndarray:
+    def over_limit(self) -> np.ndarray:
         """Return which segments are over their limit by more than their error bar, (36,)."""
         return self.rms - self.bar > self.limit
 
     @property
     def doubtful(self) -> np.ndarray:
         """Return which segments may be over their limit, within their error bar, (36,)."""
-        return (self.rms + self.bar > self.limit) & ~self.tripped
+        return (self.rms + self.bar > self.limit) & ~self.over_limit
 
 
 @dataclass(frozen=True)
@@ -347,25 +347,25 @@ def segment_rows(rows: Sequence[SweptRow], axis: str) -> str:
         f"in the model, so that a sound machine is quieter than a real one."
     ]
     if not np.isnan(known[0][0].limit).all():
-        sentences.append(first_tripped(known))
+        sentences.append(describe_first_over(known))
     return " ".join(sentences) + left_out(rows)
 
 
-def first_tripped(known: Sequence[tuple[Segments, str]]) -> str:
+def describe_first_over(known: Sequence[tuple[Segments, str]]) -> str:
     """Return which segment is over its limit first, in the order of the rows, and how many last."""
-    over = [(found, value) for found, value in known if found.tripped.any()]
+    over = [(found, value) for found, value in known if found.over_limit.any()]
     if not over:
         doubtful = sum(int(found.doubtful.any()) for found, _ in known)
         may = f"; within error bars in {plural(doubtful, 'row')}" if doubtful else ""
         return f"No segment is over its limit{may}."
     found, value = over[0]
-    place = int(np.nanargmax(np.where(found.tripped, found.rms / found.limit, np.nan)))
+    place = int(np.nanargmax(np.where(found.over_limit, found.rms / found.limit, np.nan)))
     last, last_value = over[-1]
     return (
         f"The first over its limit of {found.limit[place]:.3g} m/s² is {segment_words(place)} at "
         f"{value}, by {found.rms[place]:.3g} m/s²; over theirs are "
-        f"{plural(int(found.tripped.sum()), 'segment')} there and {int(last.tripped.sum())} at "
-        f"{last_value}."
+        f"{plural(int(found.over_limit.sum()), 'segment')} there and "
+        f"{int(last.over_limit.sum())} at {last_value}."
     )
 
 

@@ -16,9 +16,9 @@ from compressor.report.figures.sweep_data import MEASURES, Measure
 MAX_LIMITS = 3  # of a metric: zones A to D, as of ISO 20816-1
 ZONES = "ABCD"
 # units as the report shows metrics -> how they end the name of a limit
-ENDINGS = {"°": "_deg", 
+ENDINGS = {
     "m/s²": "_m_per_s2", "mm/s": "_mm_per_s", "kN": "_kN", "µm": "_um", "%": "_percent",
-    "ms": "_ms", "per rev": "", "": "",
+    "ms": "_ms", "°": "_deg", "per rev": "", "": "",
 }  # fmt: skip
 TEXT = re.compile(r"\s*(\w+)\s*=\s*([^=]+)")
 

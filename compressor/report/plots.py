@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from compressor.analysis import (
     read_cycle,
     shaking,
 )
-from compressor.cases import points
+from compressor.cases import points, with_ideal_joints
 from compressor.program import CompsimError
 from compressor.reasons import remedy
 from compressor.report.figures import Drawing
@@ -209,6 +209,8 @@ def study_figures(
     if not any(row.shaking for row in rows):
         raise PlotError(nothing_to_draw(stored, study, rows))
     limit = read_limit(choice.limit)
+    if limit and "segments" not in figures:
+        raise PlotError(f"--limit {choice.limit} is of segments: add --what segments")
     if "segments" in figures:
         rows = with_segments(stored, jobs, rows, limit)
     for name in figures:
@@ -263,7 +265,7 @@ def with_segments(
             found.append(row)
             continue
         case = case_of(run)
-        one = replace(case, joint="none", lubricant=None, wear=None).key
+        one = with_ideal_joints(case).key
         if one not in healthy:
             twin = healthy_twin(run, sensed=True)
             healthy[one] = twin["sensor_segment_rms"].values

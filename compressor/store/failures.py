@@ -120,14 +120,14 @@ def best_split(columns: Mapping[str, np.ndarray], failed: np.ndarray) -> Split |
     """
     found: Split | None = None
     for key, column in columns.items():
-        best = (_threshold if column.dtype.kind in "fiu" else _word)(column, failed)
+        best = (find_threshold if column.dtype.kind in "fiu" else find_word)(column, failed)
         if best is not None and best[1] > (found.gain if found else 1e-12):
             sign = "<" if column.dtype.kind in "fiu" else "=="
             found = Split(key, sign, best[0], best[1])
     return found
 
 
-def _threshold(column: np.ndarray, failed: np.ndarray) -> tuple[float, float] | None:
+def find_threshold(column: np.ndarray, failed: np.ndarray) -> tuple[float, float] | None:
     """Return the threshold below which jobs differ most from the others, and its gain."""
     order = np.argsort(column, kind="stable")
     values, before = column[order].astype(float), np.cumsum(failed[order])[:-1]
@@ -140,7 +140,7 @@ def _threshold(column: np.ndarray, failed: np.ndarray) -> tuple[float, float] | 
     return round_between(values[at], values[at + 1]), float(gains[at])
 
 
-def _word(column: np.ndarray, failed: np.ndarray) -> tuple[str, float] | None:
+def find_word(column: np.ndarray, failed: np.ndarray) -> tuple[str, float] | None:
     """Return the word whose jobs differ most from the others, and its gain."""
     words, places = np.unique(column.astype(str), return_inverse=True)
     count, inside = np.bincount(places), np.bincount(places, failed)

@@ -16,6 +16,7 @@ from typing import Any, Protocol
 from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
 from compressor.program import Progress, no_progress
+from compressor.reasons import Reason
 from compressor.store import Folder, StoreError, Writer, write_study
 from compressor.sweep.execution import Input, drain, require_posix, run_batches
 from compressor.sweep.run_job import run_ahead, run_job
@@ -28,7 +29,7 @@ from compressor.sweep.wanted import (
     stored_ends,
 )
 from compressor.sweep.warm_up import Needs, compile_once, load
-from compressor.sweep.worker import JobLost, JobResult, Workers
+from compressor.sweep.worker import JobLost, JobResult, Workers, describe_error
 
 MANY_JOBS = 100_000  # jobs whose cases take a while to be made
 GRACE = 5.0  # s beyond its time in which a job may end by itself, before its worker is killed
@@ -234,12 +235,18 @@ def in_this_process(
 ) -> Generator[JobResult | JobLost, None, None]:
     """Yield how jobs end in this process, one after the other; the backend for a few short ones.
 
-    Starting workers takes longer than they do. A job that ends its process ends the sweep.
+    Starting workers takes longer than they do. A job that ends its process ends the sweep; one that
+    raises an exception is lost, as in a worker.
     """
     compile_once(Needs.of(cases), remark)
     for case in cases:
         began = time.monotonic()
-        yield JobResult(case, run_job(place, case), time.monotonic() - began)
+        try:
+            result = run_job(place, case)
+        except Exception as error:
+            yield JobLost(case, Reason.INTERNAL_ERROR, *describe_error(error))
+        else:
+            yield JobResult(case, result, time.monotonic() - began)
         pulse()
 
 

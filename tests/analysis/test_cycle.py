@@ -177,7 +177,7 @@ def test_segments_over_their_limits_are_told():
         run = xr.Dataset({"sensor_segment_rms": ("segment", one),
                           "sensor_segment_rms_error": ("segment", bar)})  # fmt: skip
         rows.append(SweptRow(value).with_segments(run, np.full(36, 3.0), (2.0, True)))
-    assert [row.segments.tripped.nonzero()[0].tolist() for row in rows] == [[], [32], [8, 32]]
+    assert [row.segments.over_limit.nonzero()[0].tolist() for row in rows] == [[], [32], [8, 32]]
     assert [row.segments.doubtful.nonzero()[0].tolist() for row in rows] == [[], [8], []]
     told = PLOT_CAPTIONS["study"]["segments"](rows, "clearance_mm")
     assert "greatest rms is 9.5 m/s², 320 to 330° at 0.3, 3.17 times that without" in told

@@ -319,6 +319,9 @@ def test_segments_of_a_study_are_drawn_beside_the_healthy_machine(tmp_path, caps
     assert f"is {10 * place} to {10 * place + 10}° at 0.05, by {runs[0][place]:.3g} m/s²" in told
     assert cli.main([*words, "--limit", "5g"]) == 2
     assert "give m/s², such as 20, or times" in capsys.readouterr().err
+    other = [word if word != "segments" else "map" for word in words]
+    assert cli.main([*other, "--limit", "5x"]) == 2
+    assert "--limit 5x is of segments: add --what segments" in capsys.readouterr().err
 
 
 def test_a_study_without_a_sensor_has_no_segments(plot, unpainted):

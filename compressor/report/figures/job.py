@@ -488,7 +488,7 @@ def draw_segments(rows: Sequence[SweptRow], title: str) -> Drawing:
     edges = 10.0 * np.arange(37), np.arange(len(rows) + 1) - 0.5
     image.traces.append(map_cells(*edges, np.maximum(table, 1.0), colors))
     for name, shape, color, over in (
-        ("over its limit", "s", RED, [one.tripped if one else None for one in found]),
+        ("over its limit", "s", RED, [one.over_limit if one else None for one in found]),
         (
             "over it within the error bar",
             "o",

@@ -8,7 +8,6 @@ import math
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from compressor.cases import Case, CaseFileError, Study, design, load_studies, r
 from compressor.program import Progress, no_progress
 from compressor.store import Folder, job_record, read_store
 from compressor.studies.calibrate.fit import Fit, fit_orders
-from compressor.studies.calibrate.orders import CalibrationError, Orders, orders_of
+from compressor.studies.calibrate.orders import LIMIT, CalibrationError, Orders, orders_of
 from compressor.sweep import Options, in_this_process, sweep
 from compressor.vibration import Record
 
@@ -41,8 +40,11 @@ class Unknown:
     def written(cls, text: str) -> "Unknown":
         """Return the unknown of a text KEY=LOW:HIGH. Raises CalibrationError."""
         key, _, span = text.partition("=")
-        ends = [_number(part) for part in span.split(":")]
-        if len(ends) != 2 or not ends[0] < ends[1]:
+        try:
+            ends = [float(part) for part in span.split(":")]
+        except ValueError:
+            ends = []
+        if len(ends) != 2 or not -math.inf < ends[0] < ends[1] < math.inf:
             raise CalibrationError(
                 f"{text!r} is no range: write KEY=LOW:HIGH, such as "
                 "machine.reciprocating_mass_kg=10:20"
@@ -50,19 +52,13 @@ class Unknown:
         row = row_of(key.strip())
         if row is None or row.kind != "number":
             raise CalibrationError(f"{key.strip()!r} is no key with a number that can be fitted")
+        if row.key == SPEED:
+            raise CalibrationError(f"{SPEED} is the record's own: leave it out of --fit")
         return cls(key.strip(), *ends)
 
     def value(self, share: float) -> float:
         """Return the key's value at a share of its range."""
         return float(f"{self.low + share * (self.high - self.low):.{DIGITS}g}")
-
-
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        return math.nan
-    return value if math.isfinite(value) else math.nan
 
 
 @dataclass(frozen=True)
@@ -93,6 +89,12 @@ class Calibration:
         return one.value(low), one.value(high)
 
 
+def replace_settings(overrides: Sequence[str], *new: str) -> list[str]:
+    """Return overrides `key=value` with new ones in place of those of the same keys."""
+    keys = {text.partition("=")[0].strip() for text in new}
+    return [text for text in overrides if text.partition("=")[0].strip() not in keys] + [*new]
+
+
 class FitJobs:
     """Evaluates orders of a case at values of its unknown keys, by jobs of one study."""
 
@@ -117,8 +119,7 @@ class FitJobs:
 
     def run_at(self, rpm: float) -> None:
         """Let the case run at a speed, in place of its own."""
-        kept = [text for text in self.overrides if text.partition("=")[0].strip() != SPEED]
-        self.overrides = (*kept, f"{SPEED}={rpm:.{DIGITS}g}")
+        self.overrides = tuple(replace_settings(self.overrides, f"{SPEED}={rpm:.{DIGITS}g}"))
 
     def study(self, points: Sequence[tuple[float, ...]], extra: Sequence[str] = QUIET) -> Study:
         """Return the study of some values of the unknown keys. Raises CaseFileError."""
@@ -134,20 +135,16 @@ class FitJobs:
 
     def settings(self, points: Sequence[tuple[float, ...]], extra: Sequence[str]) -> list[str]:
         """Return the overrides that make the study of some values."""
-        columns = zip(*points, strict=True)
-        texts = [*self.overrides, *extra]
+        texts = replace_settings(self.overrides, *extra)
         if self.name:
-            texts.append(f"name={self.name}")
+            texts = replace_settings(texts, f"name={self.name}")
+        for one, column in zip(self.unknowns, zip(*points, strict=True), strict=True):
+            listed = ", ".join(map(repr, column))
+            texts.append(f"{one.key}={listed}" if len(points) == 1 else f"{one.key}=[{listed}]")
         if len(points) == 1:
-            return texts + [f"{one.key}={column[0]!r}" for one, column in self._pairs(columns)]
-        texts += [
-            f"{one.key}=[{', '.join(map(repr, column))}]" for one, column in self._pairs(columns)
-        ]
+            return texts
         keys = ", ".join(one.key for one in self.unknowns)
         return texts + ([f"zip=[[{keys}]]"] if len(self.unknowns) > 1 else [])
-
-    def _pairs(self, columns: Any) -> list[tuple[Unknown, tuple[float, ...]]]:
-        return [*zip(self.unknowns, columns, strict=True)]
 
     def __call__(self, shares: np.ndarray) -> np.ndarray:
         """Return the orders (m/s2) at shares of the ranges; nan where a job failed.
@@ -218,6 +215,8 @@ def calibrate(
     measured = measured.up_to(jobs.highest)
     starts = np.array(design("lhs", POINTS_A_KEY * len(unknowns), len(unknowns), SEED))
     fit = fit_orders(jobs, measured.amplitudes, measured.errors, starts)
+    if not jobs.points:
+        raise next(iter(jobs.refused.values()))  # no point of the ranges makes a case
     if fit is None:
         raise CalibrationError(f"each job of study {jobs.name} failed: compsim status tells why")
     best = tuple(one.value(share) for one, share in zip(unknowns, fit.shares, strict=True))
@@ -231,5 +230,5 @@ def calibrate(
 def comparable_orders(measured: Orders, case: Case) -> int:
     """Return the highest order that both the record and the case's sensor hold."""
     assert case.sensor is not None
-    corner = case.sensor.low_pass_Hz or case.sensor.rate_Hz / 2.56
+    corner = case.sensor.low_pass_Hz or case.sensor.rate_Hz / LIMIT
     return min(len(measured.amplitudes), int(corner / measured.speed))
