@@ -44,7 +44,7 @@ from compressor.cases.yaml_reader import resolve_scalar
 from compressor.metrics import JOINTS
 
 MODEL_VERSION = "2"  # part of a job's key: see `compressor.cases.case`
-REVISION = 1
+REVISION = 2
 MODEL = f"{MODEL_VERSION}.{REVISION}"  # which results are stored with
 # what the text of a case holds if it may be one of `CHANGES`: quick to search a store for
 SUSPECT = re.compile(rb'"(drive|lubricant|rod|guide|body)\\?": |lugre|"signals\\?": true')
@@ -76,6 +76,17 @@ def _has_no_lugre_friction(values: Mapping[str, Any]) -> bool:
     return friction.get("law") == "lugre" and not (friction["static"] and friction["dynamic"])
 
 
+def _records_between_dead_centres(values: Mapping[str, Any]) -> bool:
+    """Return whether a sensor's record begins where the crank is not at top dead centre."""
+    settled = values["solve"]["settle_rev"]
+    return (
+        "sensor" in values
+        and values["body"]["start"] == "steady"
+        and isinstance(settled, int | float)
+        and settled != int(settled)
+    )
+
+
 CHANGES = (
     Revision(1, "times, torques and forces of a drive", lambda values: "drive" in values),
     Revision(1, "oil film", lambda values: "lubricant" in values and values["joint"] != "none"),
@@ -87,6 +98,7 @@ CHANGES = (
         lambda values: ("body" in values or bool(values["output"].get("signals")))
         and _rubs_on_the_pin(values),
     ),
+    Revision(2, "tacho of a sensor's record", _records_between_dead_centres),
 )  # fmt: skip
 
 

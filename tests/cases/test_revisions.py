@@ -28,6 +28,15 @@ def test_results_of_model_2_are_other_ones_now(values, what):
     case = Case.from_values(values)
     assert changes_since("2", case.values()) == [what]
     assert changes_since(MODEL, case.values()) == []
+    assert model_of(case.values()) == "2.1"
+    assert SUSPECT.search(case.attributes()["case"].encode())
+
+
+def test_the_tacho_between_dead_centres_is_another_one_since_2_1():
+    solve = {"duration_rev": 6.5, "settle_rev": 1.5}
+    case = Case.from_values({"body": True, "sensor": True, "solve": solve})
+    assert changes_since("2.1", case.values()) == ["tacho of a sensor's record"]
+    assert changes_since(MODEL, case.values()) == []
     assert model_of(case.values()) == MODEL
     assert SUSPECT.search(case.attributes()["case"].encode())
 
@@ -43,8 +52,11 @@ def test_results_of_model_2_are_other_ones_now(values, what):
         RUBS | {"friction": {"law": "lugre"}},
         BODY,
         RUBS | BODY | {"friction": False},
+        {"body": True, "sensor": True, "solve": {"duration_rev": 6, "settle_rev": 2}},
+        {"body": {"start": "rest"}, "sensor": True,
+         "solve": {"duration_rev": 6, "settle_rev": 1.5}},
     ],
-)
+)  # fmt: skip
 def test_results_of_all_other_cases_stay(values):
     case = Case.from_values(values)
     assert changes_since("2", case.values()) == []
