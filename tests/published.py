@@ -4,11 +4,14 @@ For the tests, and for the table of what was expected and what came out (`make v
 """
 
 import math
+from functools import cache
 
 import numpy as np
+import sympy
 from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case
+from compressor.cases.conflicts import back_action
 from compressor.physics.observe import COLUMNS, Column, observe
 from compressor.physics.record import state_names
 from compressor.solve import simulate
@@ -254,3 +257,107 @@ def uneven(joint):
     })  # fmt: skip
     angles = 2 * math.pi / 72 * np.arange(72)
     return case, record(case, np.array([lobes(angles)] * 2))
+
+
+# Exudyn's test model `sliderCrankFloatingTest`: a crank of 0.1 m and a rod of 0.3 m on a frame that
+# springs and dampers hold, driven by a torque of 0.1 N m from the dead centre on. Its result is the
+# slider's x after 0.3 s with the frame held, plus that with the frame free
+FLOATING = {
+    "lengths": (0.1, 0.3),  # m: crank, rod
+    "masses": (2.0, 0.2, 0.2, 0.4),  # kg: frame, crank, rod, slider
+    "inertias": (1.0, 0.2 * 0.1**2 / 12, 0.2 * 0.3**2 / 12, 0.4e-3),  # kg m2, of the same
+}
+FLOATING_STIFFNESS, FLOATING_DAMPING, TORQUE = 5000.0, 50.0, 0.1  # of x, y and rocking; N m
+SLIDERS = 0.5916491633788333  # m
+SLIDERS_WITHIN = 1e-8  # the tolerance of Exudyn's own test
+
+
+@cache
+def floating_slider_crank(lengths, masses, inertias):
+    """Functions of coordinates and rates, of a slider-crank on a frame that moves in the plane.
+
+    The first: mass matrix and bias forces, (4, 4) and (4, 1), by Lagrange's equations; the second:
+    the slider's place. Coordinates: the frame's x, y and angle, and the crank's angle on it.
+    """
+    at = x, y, rocking, crank = sympy.symbols("x y rocking crank")
+    rates = sympy.Matrix(sympy.symbols("vx vy spin rate"))
+    tilt = sympy.Matrix([
+        [sympy.cos(rocking), -sympy.sin(rocking)], [sympy.sin(rocking), sympy.cos(rocking)]
+    ])  # fmt: skip
+    rod = -sympy.asin(lengths[0] * sympy.sin(crank) / lengths[1])
+    pin = lengths[0] * sympy.Matrix([sympy.cos(crank), sympy.sin(crank)])
+    arm = lengths[1] * sympy.Matrix([sympy.cos(rod), sympy.sin(rod)])
+    centres = sympy.zeros(2, 1), pin / 2, pin + arm / 2, pin + arm
+    angles = rocking, rocking + crank, rocking + rod, rocking
+    mass, bias = sympy.zeros(4, 4), sympy.zeros(4, 1)
+    for kg, inertia, centre, angle in zip(masses, inertias, centres, angles, strict=True):
+        place = sympy.Matrix([x, y]) + tilt * centre
+        jacobian = sympy.Matrix([place[0], place[1], angle]).jacobian(at)
+        weights = sympy.diag(kg, kg, inertia)
+        mass += jacobian.T * weights * jacobian
+        bias += jacobian.T * weights * (jacobian * rates).jacobian(at) * rates
+    slider = list(sympy.Matrix([x, y]) + tilt * centres[3])
+    return (
+        sympy.lambdify((at, list(rates)), (mass, bias), "numpy", cse=True),
+        sympy.lambdify((at,), slider, "numpy"),
+    )
+
+
+def exudyn_sliders():
+    """The slider's x (m) at 0.3 s with the frame held, plus that with the frame free."""
+    forces, slider = floating_slider_crank(**FLOATING)
+
+    def total(free):
+        moving = [0, 1, 2, 3] if free else [3]
+
+        def flow(t, z):
+            mass, bias = forces(z[:4], z[4:])
+            load = -FLOATING_STIFFNESS * z[:3] - FLOATING_DAMPING * z[4:7]
+            # the torque turns the crank against space, so that it does the work of both angles
+            load = np.append(load, 0.0) + np.array([0.0, 0.0, TORQUE, TORQUE]) - bias[:, 0]
+            rates = np.zeros(4)
+            rates[moving] = np.linalg.solve(mass[np.ix_(moving, moving)], load[moving])
+            return np.concatenate([z[4:], rates])
+
+        end = solve_ivp(flow, (0.0, 0.3), np.zeros(8), "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        return slider(end[:4])[0]
+
+    return total(False) + total(True)
+
+
+FRAME = {
+    "joint": "none", "load": "none", "friction": False,
+    "machine": {"crank_radius_mm": 100, "rod_length_mm": 300, "speed_rpm": 300,
+                "rod_mass_kg": 0.2, "reciprocating_mass_kg": 0.4},
+    "body": {"mass_kg": 8, "frequency_x_Hz": 12, "frequency_y_Hz": 14, "damping_ratio": 0.1},
+    "solve": {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 1},
+}  # fmt: skip
+
+
+def frame_orders():
+    """Orders 1 and 2 of a body's velocity (m/s) along x and y, (2, 2): ours, and the frame's.
+
+    Complex. Ours is driven one way, and each line divided by what `back_action` says that it leaves
+    out. The frame is that of Exudyn's model, kept from rocking, at a steady crank speed.
+    """
+    case = Case.from_values(FRAME)
+    body, pace = case.body, 2.0 * math.pi / case.turn
+    masses = body.mass_kg, 0.0, case.machine.rod_mass_kg, case.machine.reciprocating_mass_kg
+    inertias = 1.0, 0.0, FLOATING["inertias"][2], 0.0
+    forces, _ = floating_slider_crank(FLOATING["lengths"], masses, inertias)
+    natural = 2.0 * math.pi * np.array([body.frequency_x_Hz, body.frequency_y_Hz])
+
+    def flow(t, z):
+        mass, bias = forces([z[0], z[1], 0.0, pace * t], [z[2], z[3], 0.0, pace])
+        springs = natural**2 * z[:2] + 2.0 * body.damping_ratio * natural * z[2:]
+        load = -body.mass_kg * springs - bias[:2, 0]
+        return np.concatenate([z[2:], np.linalg.solve(mass[:2, :2], load)])
+
+    settled = 14  # revolutions: what is left of the start is e^-21
+    times = (settled + np.arange(361) / 360) * case.turn
+    found = solve_ivp(flow, (0.0, times[-1]), np.zeros(4), "DOP853", times, rtol=1e-10, atol=1e-12)
+    ours = simulate(case)["body_velocity"].values[-361:]
+    lines = [np.fft.rfft(one[:-1], axis=0)[1:3] / 180 for one in (ours, found.y[2:].T)]
+    orders = np.array([1.0, 2.0]) / case.turn
+    back = np.stack([back_action(case, axis, orders) for axis in "xy"], axis=1)
+    return lines[0] / (1.0 - back), lines[1]
