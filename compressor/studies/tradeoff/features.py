@@ -18,6 +18,7 @@ from compressor.studies.tradeoff.work_precision import (
     complete,
     faulty,
     grid_values,
+    pin_span,
     solve_by_method,
     stored_values,
 )
@@ -352,11 +353,13 @@ def comparable(case: Case) -> Case:
 def compare(base: Case, other: Case, repeats: int, known: xr.Dataset | None = None) -> Effect:
     """Return the effect of another model on the joints in which the base has clearance.
 
-    Answers are compared at `EXACT`; the ratio of times is the median over `repeats` pairs of runs
-    in turn, each case by its own method and tolerance. known: the base's run to compare with, where
-    it was made before.
+    Answers are compared at `EXACT` and over the base's revolutions; the ratio of times is the
+    median over `repeats` pairs of runs in turn, each case by its own method and tolerance. known:
+    the base's run to compare with, where it was made before.
     """
-    runs = [simulate(comparable(base)) if known is None else known, simulate(comparable(other))]
+    known = simulate(comparable(base)) if known is None else known
+    base, other = pin_span(base, known), pin_span(other, known)
+    runs = [known, simulate(comparable(other))]
     # a body moves in time series; it changes neither the run nor the time of its solution
     timed = [
         replace(case, body=None, sensor=None, output=Output("metrics")) for case in (base, other)

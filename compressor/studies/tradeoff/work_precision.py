@@ -65,6 +65,18 @@ def solve_by_method(case: Case, method: str, rtol: float, timeout: float | None 
     return replace(case, solve=solve, output=Output())
 
 
+def pin_span(case: Case, run: xr.Dataset) -> Case:
+    """Return a case over as many revolutions as a whole run of it has, in place of `auto`.
+
+    What is compared with that run is then as long, however long it would take to settle itself.
+    """
+    if "auto" not in (case.solve.duration_rev, case.solve.settle_rev) or not complete(run):
+        return case
+    spans = run["time"].values[-1] / case.turn, run.attrs["settle"] / case.turn
+    duration, settle = (round(span, 6) for span in spans)  # whole ones, where they were `auto`
+    return replace(case, solve=replace(case.solve, duration_rev=duration, settle_rev=settle))
+
+
 def complete(run: xr.Dataset) -> bool:
     """Return whether a run reached its end."""
     return bool(run.attrs["complete"])
@@ -145,6 +157,7 @@ def work_precision(
         if not faulty(case):
             raise ValueError(f"{name} has no joint with clearance: nothing is integrated")
     tolerances = sorted(tolerances, reverse=True)
+    cases = {name: pin_span(case, simulate(case)) for name, case in cases.items()}
     study = empty(list(cases), methods, tolerances)
     first = solve_by_method(next(iter(cases.values())), "auto", tolerances[0])
     study["seconds_compile"] = (), seconds_compile(first), {"units": "s", "long_name": COMPILE}

@@ -12,6 +12,7 @@ from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.features import (
     CONTACT_LAWS,
     FEATURES,
+    comparable,
     compare,
     read_from_grid,
     series_errors,
@@ -91,6 +92,17 @@ def test_a_weightless_change_is_small_and_friction_is_not():
     assert compare(case(), replace(case(), friction=None), 1).change_acceleration > 0.01
     more = replace(case(), friction=Friction(static=0.5, dynamic=0.5))
     assert compare(case(), more, 1).change_acceleration > 0.01
+
+
+def test_a_machine_that_would_settle_later_is_compared_over_the_same_revolutions():
+    """Without damping, and with `auto`, this one settles after 10 revolutions and not after 4."""
+    span = {"duration_rev": "auto", "settle_rev": "auto", "accuracy": "draft"}
+    base = case(joint="small_end", clearance_mm=0.1, machine={"speed_rpm": 1000}, solve=span)
+    bouncing = replace(base, contact=replace(base.contact, damping_N_s_per_mm=0.0))
+    known = simulate(comparable(base))
+    assert simulate(comparable(bouncing))["time"].size > known["time"].size
+    effect = compare(base, bouncing, 1, known)
+    assert 0.01 < effect.change_acceleration < 10
 
 
 def test_a_run_that_fails_is_named():
