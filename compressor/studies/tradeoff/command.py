@@ -16,6 +16,7 @@ from compsim.screen import (
     SOME_FAILED,
     caution,
     configs_argument,
+    duration,
     limit,
     plural,
     print_text,
@@ -335,17 +336,22 @@ def scale_lines(joint: "JointScales") -> Iterator[str]:
 def cost_lines(facts: "Explanation") -> Iterator[str]:
     """Yield the cost of a job and of the sweep."""
     work = f" ({facts.steps} steps, {facts.evaluations} evaluations)" if facts.steps else ""
-    yield heading("cost", f"{1e3 * facts.seconds:.3g} ms a job{work}")
-    solved = f"{1e3 * facts.solution_seconds:.3g} ms of it for the solution (`seconds` in show)"
+    yield heading("cost", f"{short_time(facts.seconds)} a job{work}")
+    solved = f"{short_time(facts.solution_seconds)} of it for the solution (`seconds` in show)"
     rest = f", the rest for {', '.join(facts.other_work)}" if facts.other_work else ""
     yield heading("", solved + rest)
     if facts.expected_steps:
         yield heading("", f"by the scales alone about {facts.expected_steps:.1g} steps, "
-                      f"{1e3 * facts.expected_seconds:.1g} ms")  # fmt: skip
+                      f"{short_time(facts.expected_seconds, 1)}")  # fmt: skip
     if facts.jobs > 1:
         workers = plural(facts.workers, "worker")
         yield heading("", f"{facts.sweep_seconds:.2g} s for {plural(facts.jobs)} with {workers}, "
                       "if all cost the same")  # fmt: skip
+
+
+def short_time(seconds: float, digits: int = 3) -> str:
+    """Return a time in ms to some digits, or as `duration` does from a second on."""
+    return duration(seconds) if seconds >= 1 else f"{1e3 * seconds:.{digits}g} ms"
 
 
 def describe_advice(facts: "Explanation", number: int) -> str:
@@ -368,5 +374,5 @@ def describe_advice(facts: "Explanation", number: int) -> str:
 
 
 def percent(share: float, sign: str = "") -> str:
-    """Return a share in per cent, to two digits."""
-    return f"{100 * share:{sign}z.2g} %"
+    """Return a share in per cent, to two digits or whole."""
+    return f"{100 * share:{sign}z{'.0f' if abs(share) >= 1 else '.2g'}} %"
