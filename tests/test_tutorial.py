@@ -12,6 +12,7 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tutorial
 from compsim import cli
@@ -84,6 +85,11 @@ def opened(ran, name):
     return compressor.open_study(ran[0] / "results", name).sel(joint="big_end")
 
 
+def printed_by(ran, words):
+    """What the cell that holds some words prints."""
+    return next(out for one, (out, _) in zip(CELLS, ran[1], strict=True) if words in one.source)
+
+
 @pytest.mark.slow
 def test_each_command_prints_what_the_page_says(ran):
     _, printed = ran
@@ -137,16 +143,40 @@ def test_the_words_about_what_is_not_known_follow_from_the_runs(ran):
     assert told == [(below, str(count))]
     assert f"This file draws {count} machines" in WORDS
 
-    pairs = re.findall(r"^(\w+) +([-+][\d.]+)$", ran[1][-2][0], re.MULTILINE)
+    pairs = re.findall(r"^(\w+) +([-+][\d.]+)$", printed_by(ran, "xr.corr"), re.MULTILINE)
     ranked = sorted(dict(pairs), key=lambda name: -abs(float(dict(pairs)[name])))
     assert ranked[:2] == ["clearance_mm", "reciprocating_mass_kg"]
     assert "after the clearance, the reciprocating mass matters most" in WORDS
 
-    corners = [[float(n) for n in line.split()] for line in ran[1][-1][0].splitlines()[1:]]
+    lines = printed_by(ran, "itertools.product").splitlines()[1:]
+    corners = [[float(n) for n in line.split()] for line in lines]
     exceed = [row for row in corners if row[-1] > 15]
     assert (len(corners), len(exceed), {row[1] for row in exceed}) == (8, 2, {16.8})
     assert "Two corners exceed 15 kN at 0.1 mm already, both with the heavy crosshead" in WORDS
     assert "two of the eight corners exceed it at 0.1 mm" in WORDS
+
+
+@pytest.mark.slow
+def test_the_words_about_the_nameplate_s_machine_follow_from_the_runs(ran):
+    """Sections 8 to 10."""
+    machine = compressor.open_study(ran[0] / "results", "machine")
+    pin = machine.peak_contact_force.sel(joint="small_end").values / 1e3
+    (told,) = re.findall(r"the force on it rises from (\d+) to (\d+) kN", WORDS)
+    assert [f"{value:.0f}" for value in pin[:2]] == [*told]
+    assert "The rod load reverses over some 150 degrees at every clearance" in WORDS
+    assert (abs(np.degrees(machine.rod_load_reversal_angle) - 150) < 5).all()
+    (told,) = re.findall(r"moves (\d) mm/s when sound and ([\d.]+) mm/s when worn", WORDS)
+    body = 1e3 * machine.body_velocity_rms.sel(axis="x").values
+    assert (f"{body[0]:.0f}", f"{body.max():.1f}") == told
+    (told,) = re.findall(r"accelerometer's rms rises from ([\d.]+) to (\d+) m/s²", WORDS)
+    sensor, bar = machine.sensor_rms.values, machine.sensor_rms_error.values
+    assert (f"{sensor[0]:.1f}", f"{sensor[1]:.0f}") == told
+    assert "*not* louder at 0.24 mm than at 0.16 mm" in WORDS
+    assert sensor[2] + bar[2] < sensor[1] - bar[1]
+    (told,) = re.findall(r"The force is (\d+) kN instead of (\d+)", WORDS)
+    thin = compressor.open_study(ran[0] / "results", "thin")
+    other = thin.peak_contact_force.sel(joint="small_end").item() / 1e3
+    assert (f"{other:.0f}", f"{pin[1]:.0f}") == told
 
 
 @pytest.mark.slow
