@@ -3,8 +3,11 @@
 import json
 import re
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from statistics import median
+
+import findings
 
 from compressor.cases.parameter import parameter_table
 from compressor.cases.table import table
@@ -27,9 +30,11 @@ def markdown(head, rows):
 
 def accuracy_table():
     measured = kept("accuracy.json")
-    head = ["accuracy", "promise", "first rtol", "kept", "of these broken", "chaotic", "refused",
-            "error: median", "95 %", "worst", "told / error",
-            "without errors kept", "cost: mean", "median", "nine: worst error", "cost"]  # fmt: skip
+    head = ["accuracy level", "promised error", "first rtol", "runs reported as accurate",
+            "of these, error above the promise", "chaotic", "failed", "error: median", "95 %",
+            "largest", "estimated error / error", "accurate without the check",
+            "time with check / without: mean", "median", "paper's nine cases: largest error",
+            "time with check / without"]  # fmt: skip
     rows = [
         [word, f"{row['promise']:g}", f"{row['rtol']:g}", f"{row['kept']:,}", f"{row['broken']}",
          f"{row['regimes'].get('chaotic', 0)}", f"{sum(row['refused'].values())}"]
@@ -44,9 +49,9 @@ def accuracy_table():
 
 def calibration_table():
     measured = kept("calibration.json")
-    head = ["tolerance of the other run", "pairs", "error / distance: median",
+    head = ["tolerance of the second run", "pairs of runs", "error / distance: median",
             *(f"{share:g} %" for share in measured["cases"]["percentiles"][1:]),
-            "share used"]  # fmt: skip
+            "factor in the program"]  # fmt: skip
     rows = [
         [f"{row['ratio']:g} times", f"{row['pairs']:,}"]
         + [f"{value:.2g}" for value in row["error_over_distance"]]
@@ -58,8 +63,8 @@ def calibration_table():
 
 def trade_table():
     measured = kept("accuracy.json")["trade"]
-    head = ["rtol", "acceleration: median", "95 %", "peak: median", "95 %",
-            "energy residual / bound"]  # fmt: skip
+    head = ["rtol", "error of acceleration: median", "95 %", "error of its peak: median", "95 %",
+            "largest energy residual / bound"]  # fmt: skip
     rows = [
         [f"{row['rtol']:g}"]
         + [f"{row[what][k]:.1e}" for what in ("acceleration", "peak") for k in (0, 2)]
@@ -85,12 +90,12 @@ def bars_table():
         within = sum(row["within"] * row["of"] for row in metrics.values())
         shares.append(f"{within / sum(row['of'] for row in metrics.values()):.1%}")
     rows.append(["all", *shares])
-    return markdown(["error within its bar, bar / error", *measured], rows)
+    return markdown(["metric", *measured], rows)
 
 
 def broken_table():
-    head = ["accuracy", "clearance, mm", "joint", "load", "rpm", "rod, kg", "recipr., kg",
-            "error", "told"]  # fmt: skip
+    head = ["accuracy level", "clearance, mm", "joint", "load", "rpm", "rod mass, kg",
+            "reciprocating mass, kg", "error", "estimated error"]  # fmt: skip
     rows = [
         [word, f"{row['clearance_mm']:g}", row["joint"], row["load"], f"{row['speed_rpm']:g}",
          f"{row['rod_mass_kg']:g}", f"{row['reciprocating_mass_kg']:g}", f"{row['error']:.1e}",
@@ -104,18 +109,22 @@ def broken_table():
 def claims_table():
     measured = kept("claims.json")
     default, plane, drawn = measured["default"], measured["map"], measured["assumptions"]
-    head = ["claim", "at the defaults", "map: held", "neighbours that differ", "margin in between",
-            "assumptions: held", "decided most by"]  # fmt: skip
+    head = ["claim", "at the default masses", "map: machines where it holds",
+            "neighbours with different verdicts", "margin between them",
+            "random assumptions: machines where it holds",
+            "parameter with the largest total effect"]  # fmt: skip
     rows = []
     for place, statement in enumerate(measured["statements"]):
         claim = str(place + 1)
         value, error = default["margin"][place], default["error"][place]
         one, inside = measured["flips"][claim], measured["between"][claim]
-        closed = f"{inside['closed']} of {inside['pairs']} come within the error"
+        closed = f"{inside['closed']} of {inside['pairs']} fall to zero within the error"
         decided = drawn["deciding"][place].partition(": ")[2].removeprefix("most by ")
+        decided = decided.replace("not told from", "not distinguishable from")
         rows.append([
             f"{claim}. {statement}",
-            f"{'held' if value >= 0 else 'not held'}, {100 * value:+.3g} % ± {100 * error:.2g} %",
+            f"{'holds' if value >= 0 else 'does not hold'}, "
+            f"{100 * value:+.3g} % ± {100 * error:.2g} %",
             f"{plane['each'][claim]} of {plane['judged']}",
             f"{one['flips']} of {one['pairs']}", closed if inside["pairs"] else "–",
             f"{drawn['each'][claim]} of {drawn['judged']}", decided.rstrip("."),
@@ -163,7 +172,7 @@ def of_scenes(rows, key, digits):
 
 
 def validation_table():
-    head = ["subject", "what", "unit", "expected", "found", "may differ by", "expected by"]
+    head = ["subject", "quantity", "unit", "published", "computed", "tolerance", "source"]
     rows = []
     for one in kept("validation.json")["rows"]:
         digits = max(4, 2 + len(f"{abs(one['expected']) / one['within']:.0f}"))
@@ -199,7 +208,8 @@ def wear_table():
 def peers_table():
     kept_rows = kept("peers.json")["rows"]
     lines = [
-        "| tool | settings | CPU s | error | our CPU s | our rtol | times faster | solver alone |",
+        "| tool | settings | its CPU s | its error | our CPU s | our rtol | its CPU time / ours "
+        "| its wall time / our solver's |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for tool in dict.fromkeys(row["tool"] for row in kept_rows):
@@ -219,10 +229,10 @@ def peers_table():
 
 def sweeps_table():
     """The lines are there once `make peers` has measured them."""
-    head = ["way", "s in all", "ms a further job", "CPU ms a further job",
-            "error of peak acceleration: median", "worst", "of peak force", "worst",
-            "script's time over ours, in all", "of a further job",
-            "CPU of a further job"]  # fmt: skip
+    head = ["program", "total time, s", "ms per further job", "CPU ms per further job",
+            "error of peak acceleration: median", "largest", "of peak force: median", "largest",
+            "script's total time / ours", "time of a further job / ours",
+            "CPU time of a further job / ours"]  # fmt: skip
     keys = ["seconds", "ms_a_job", "cpu_ms_a_job", "peak_acceleration_error",
             "worst_peak_acceleration_error", "peak_contact_force_error",
             "worst_peak_contact_force_error", "ratio", "ratio_a_job",
@@ -280,7 +290,8 @@ def paper_table():
     measured = kept("tradeoff.json")
     standard = kept("accuracy.json")["words"]["standard"]["rtol"]
     lines = [
-        "| case | numerics | time | acceleration | its peak | its rms | peak contact force |",
+        "| case | numerics | time | error of acceleration | of its peak | of its rms "
+        "| of the peak contact force |",
         "|---|---|---|---|---|---|---|",
     ]
     for row in measured["paper"]:
@@ -325,7 +336,7 @@ def modelling_table():
 def throughput_table():
     found = kept("throughput.json")
     start, sweep = found["start"], found["sweep"]
-    lines = ["| warm, whole process | seconds |", "|---|---|"]
+    lines = ["| whole process, code compiled before | seconds |", "|---|---|"]
     lines += [f"| {name} | {seconds:.2g} |" for name, seconds in start.items()]
     lines += [
         "",
@@ -337,17 +348,21 @@ def throughput_table():
         f"{sweep['alone_jobs_per_s']:.0f} jobs a second on as many cores. "
         f"The same command again takes {sweep['again_s']:.1f} s.",
         "",
-        f"| compared in turn with commit {found['before']} | now | then | times as fast |",
+        f"| quantity | now | commit {found['before']} | then / now |",
         "|---|---|---|---|",
     ]
     lines += [
         f"| {name} | {one['now']:.3g} | {one['before']:.3g} | {one['times as fast']:.2f} |"
         for name, one in found["compared"].items()
     ]
-    for kind, cases in (("lanes", "random cases with error bars"), ("bare", "a sweep without")):
+    for kind, cases in (
+        ("lanes", "random cases with error bars"),
+        ("bare", "a sweep without error bars"),
+    ):
         lines += [
             "",
-            f"| {cases} | jobs | differ in a bit | ms a job alone | side by side | times as fast |",
+            f"| {cases} | jobs | jobs with a different bit | ms a job alone | in SIMD lanes "
+            "| times as fast |",
             "|---|---|---|---|---|---|",
         ]
         lines += [
@@ -358,8 +373,8 @@ def throughput_table():
     bare = {joint: one["lanes_ms"] for joint, one in found["bare"].items()}
     lines += [
         "",
-        f"Side by side, a bare job with both joints takes {bare['both'] / bare['big_end']:.1f} "
-        "times as long as one at the big end.",
+        f"In lanes, a job of that sweep with both joints takes "
+        f"{bare['both'] / bare['big_end']:.1f} times as long as one at the big end.",
     ]
     return "\n".join(lines) + "\n"
 
@@ -406,7 +421,7 @@ def million_table():
     core_s = sweep["workers"] / sweep["jobs_per_s"]
     segments = rows["segments"] * MILLION // rows["jobs"]
     lines = [
-        "| kept of each job | GB | files | hours on 2 cores | minutes on 8 nodes of 32 cores |",
+        "| stored per job | GB | files | hours on 2 cores | minutes on 8 nodes of 32 cores |",
         "|---|---|---|---|---|",
     ]
     none = {"bytes": 0, "write_ms": 0.0}
@@ -435,7 +450,7 @@ def million_table():
 def sweep_table():
     found = kept("sweep.json")
     lines = [
-        "| killed after | SIGKILL of | jobs reported done | jobs stored |",
+        "| killed after | SIGKILL of | jobs reported as done | jobs stored |",
         "|---|---|---|---|",
     ]
     for kill in found["kills"]:
@@ -459,7 +474,7 @@ def ladders_table():
     rows = kept("ladders.json")["ladder"]
     scenes = [*dict.fromkeys(row["scene"] for row in rows)]
     names = [scene.replace("_", " ") for scene in scenes]
-    head = ["rtol", *(f"{what}, {name}" for what in ("acceleration", "residual") for name in names)]
+    head = ["rtol", *(f"{what}, {name}" for what in ("error", "energy residual") for name in names)]
     lines = []
     for rtol in dict.fromkeys(row["rtol"] for row in rows):
         rung = {row["scene"]: row for row in rows if row["rtol"] == rtol}
@@ -472,8 +487,8 @@ def ladders_table():
 
 def limit_table():
     measured = kept("ladders.json")
-    head = ["joint", "slope", "by decade", "deviation / c at 1 mm", "at 1 nm",
-            "energy residual / bound, worst"]  # fmt: skip
+    head = ["joint", "slope", "slopes of single decades", "deviation / c at 1 mm", "at 1 nm",
+            "largest energy residual / bound"]  # fmt: skip
     lines = []
     for scene, slope in measured["slopes"].items():
         rows = [row for row in measured["limit"] if row["scene"] == scene]
@@ -486,8 +501,8 @@ def limit_table():
 
 
 def chaotic_table():
-    head = ["scene", "horizon", "acceleration within", "beyond", "statistic", "means",
-            "apart by"]  # fmt: skip
+    head = ["case", "horizon", "distance before the horizon", "after it", "statistic",
+            "means by the two methods", "difference"]  # fmt: skip
     lines = []
     for scene, row in kept("chaotic.json")["scenes"].items():
         (other,) = row["others"]
@@ -507,23 +522,25 @@ def chaotic_cases_table():
     row = kept("chaotic.json")["random"]
     others = [f"{name} {number}" for name, number in row["regimes"].items() if name != "chaotic"]
     lines = [
-        ["random cases with a thousandth of the damping", f"{row['drawn']}"],
-        ["say that they are chaotic", f"{row['regimes']['chaotic']}"],
-        ["the others say", ", ".join(others)],
-        [f"judged by {row['method']}", f"{row['judged']}"],
-        *([f"rms within {k} times the standard error", f"{n}"] for k, n in row["within"].items()),
-        ["standard error of rms: median, 90 %, greatest",
+        ["random cases", f"{row['drawn']}"],
+        ["reported as chaotic", f"{row['regimes']['chaotic']}"],
+        ["reported otherwise", ", ".join(others)],
+        [f"chaotic cases solved again by {row['method']}", f"{row['judged']}"],
+        *([f"their rms differs by at most {k} standard errors", f"{n}"]
+          for k, n in row["within"].items()),
+        ["standard error of the rms: median, 90 %, largest",
          ", ".join(f"{value:.2%}" for value in row["known"])],
-        ["rms differs by: median, 90 %, greatest",
+        ["difference of the rms: median, 90 %, largest",
          ", ".join(f"{value:.2%}" for value in row["relative"])],
-        ["horizon, rev: median, 90 %, greatest",
+        ["horizon in revolutions: median, 90 %, largest",
          ", ".join(f"{value:.2g}" for value in row["horizon_rev"])],
-        ["revolutions that would bring rms to 1 %: median, 90 %, greatest",
+        ["revolutions needed for an rms within 1 %: median, 90 %, largest",
          ", ".join(f"{value:.0f}" for value in row["more"])],
-        [f"the first {len(row['scipy']['apart'])} against SciPy's {row['scipy']['method']}, apart "
-         "by standard errors", ", ".join(f"{value:.1f}" for value in row["scipy"]["apart"])],
+        [f"the first {len(row['scipy']['apart'])} against SciPy's {row['scipy']['method']}: "
+         "difference in standard errors",
+         ", ".join(f"{value:.1f}" for value in row["scipy"]["apart"])],
     ]  # fmt: skip
-    return markdown(["", ""], lines)
+    return markdown(["quantity", "value"], lines)
 
 
 def joint_name(joint):
@@ -534,9 +551,10 @@ def joint_name(joint):
 def diagnosis_table():
     found = kept("diagnosis.json")
     joints = found["joints"]
-    head = ["added noise, m/s²", "accuracy", "balanced",
-            *(f"{joint_name(joint)} found" for joint in joints), "faults missed", "false alarms",
-            "without the level", "trained without noise"]  # fmt: skip
+    head = ["added noise, m/s²", "accuracy", "balanced accuracy",
+            *(f"recall: {joint_name(joint)}" for joint in joints), "missed faults", "false alarms",
+            "accuracy without the level feature",
+            "accuracy if trained without noise"]  # fmt: skip
     rows = []
     for level in found["levels"]:
         row = level["classifier"]
@@ -567,15 +585,15 @@ def diagnosis_sentences(found):
     )
     told = [confused_pairs(level["classifier"]["confused"]) for level in (first, last)]
     yield (
-        f"Taken for another in more than {found['confused_from']:.0%} of the windows, without "
-        f"added noise: {told[0]}. With {last['noise']:g} m/s² of it: {told[1]}."
+        f"Confused in more than {found['confused_from']:.0%} of the windows without added noise: "
+        f"{told[0]}; with {last['noise']:g} m/s² of it: {told[1]}."
     )
     second = found["levels"][1]
     yield (
         f"A forest that saw no noise in training falls from "
         f"{first['classifier']['trained_without_noise']:.1%} to "
-        f"{second['classifier']['trained_without_noise']:.1%} at {second['noise']:g} m/s²: noise "
-        "belongs into the training."
+        f"{second['classifier']['trained_without_noise']:.1%} at {second['noise']:g} m/s²: train "
+        "with noise."
         if second["classifier"]["trained_without_noise"] < second["classifier"]["accuracy"] - 0.1
         else "Training without noise costs less than 10 points at the first level of it."
     )
@@ -586,8 +604,8 @@ def diagnosis_sentences(found):
 def confusion_table():
     found = kept("diagnosis.json")
     joints, levels = found["joints"], found["levels"]
-    head = ["added noise, m/s²", "joint with clearance",
-            *(f"told: {joint_name(joint)}" for joint in joints)]  # fmt: skip
+    head = ["added noise, m/s²", "true joint",
+            *(f"predicted: {joint_name(joint)}" for joint in joints)]  # fmt: skip
     rows = []
     for level in (levels[0], levels[len(levels) // 2], levels[-1]):
         first = f"{level['noise']:g}"
@@ -601,7 +619,7 @@ def clearance_bins_table():
     found = kept("diagnosis.json")
     bins = found["levels"][0]["classifier"]["bins"]
     names = ["{:g} to {:g} mm".format(*one["clearance_mm"]) for one in bins]
-    head = ["added noise, m/s²", *(f"{name}: right joint, missed" for name in names)]
+    head = ["added noise, m/s²", *(f"{name}: correct joint, missed" for name in names)]
     rows = [
         [f"{level['noise']:g}"]
         + [f"{one['accuracy']:.1%}, {one['missed']:.1%}" for one in level["classifier"]["bins"]]
@@ -625,7 +643,7 @@ def clearance_table():
             for one in scores
         ])  # fmt: skip
     dummy = [found["levels"][0]["regressor"][e][j]["median_error_of_the_median"] for e, j in ends]
-    rows.append(["always the median", *(f"{value:.0%}" for value in dummy)])
+    rows.append(["always predicting the median", *(f"{value:.0%}" for value in dummy)])
     return markdown(["added noise, m/s²", *names], rows)
 
 
@@ -637,9 +655,10 @@ def share_cell(found):
 
 
 def identify_table():
-    head = ["records of", "joint right", "where one is worn", "clearance in its 90 % interval",
-            "whatever joint is first", "upper / lower end", "false alarms", "missed",
-            "nothing fits", "where one is worn"]  # fmt: skip
+    head = ["friction law of the records", "correct joint: all machines", "worn machines",
+            "clearance inside its 90 % interval: joint correct", "all worn machines",
+            "upper / lower end of the interval", "false alarms", "missed faults",
+            "reported as unlike the study: all machines", "worn machines"]  # fmt: skip
     names = ("right", "right_where_worn", "covered", "covered_all", "factor", "false_alarms",
              "missed", "nothing_fits", "nothing_fits_where_worn")  # fmt: skip
     rows = []
@@ -653,9 +672,9 @@ def identify_table():
 
 def calibrate_table():
     measured = kept("calibrate.json")
-    head = ["the machine has besides", "key", "true value in its 95 % interval",
-            "best value off, share of the range", "interval's width, share of the range",
-            "said not to fit"]  # fmt: skip
+    head = ["machine differs from the model by", "key", "true value inside its 95 % interval",
+            "error of the best value, % of the range", "width of the interval, % of the range",
+            "reported as not fitting"]  # fmt: skip
     rows = []
     for other, row in measured["others"].items():
         for key, one in row["keys"].items():
@@ -698,25 +717,31 @@ def stress_table():
     rows = [[f"`{name}`", *(str(ends[kind].get(name, 0)) for kind in ends)] for name in names]
     totals = {kind: sum(ends[kind].values()) for kind in ends}
     shares = [f"{ends[kind].get('ok', 0) / totals[kind]:.1%}" for kind in ends]
-    text = markdown(["end", "supported range", "whole range"], [*rows, ["ok share", *shares]])
+    text = markdown(
+        ["outcome", "supported range", "whole range"], [*rows, ["share of `ok`", *shares]]
+    )
     slow = found["slowest"]
     return text + (
-        f"\n{found['scenes']:,} scenes of seed {found['seed']} took "
-        f"{found['work_s'] / 60:.0f} minutes of workers' time, {found['workers']} at a time; "
-        f"{found['silent_wrong']} wrong in silence"
+        f"\n{found['scenes']:,} cases of seed {found['seed']} took "
+        f"{found['work_s'] / 60:.0f} minutes of workers' time, {found['workers']} at a time. "
+        f"Of their results "
+        f"{found['silent_wrong']} were wrong without a warning"
         + (
-            f", so that with 95 % confidence at most {found['at_most']:.2%} of such scenes are"
+            f": with 95 % confidence at most {found['at_most']:.2%} of such cases are"
             if not found["silent_wrong"]
             else ""
         )
-        + f". Of the ok ones, {found['unforeseeable']} go on beyond their horizon. Slowest ok run: "
-        f"{slow['seconds']:.2g} s (`{slow['command']}`); longest scene with all judges: "
+        + f". Of the confirmed ones, {found['unforeseeable']} are longer than their horizon of "
+        f"predictability. Slowest confirmed run: "
+        f"{slow['seconds']:.2g} s (`{slow['command']}`); slowest case with all its checks: "
         f"{found['slowest_judging_s']:.0f} s; peak memory of a worker: "
         f"{found['peak_memory_MiB']} MiB.\n"
-        + fresh_scenes("fresh scenes", with_drawn(found["fresh"], ""))
-        + fresh_scenes("fresh scenes with laws drawn", with_drawn(found["fresh"], "laws"), True)
+        + fresh_scenes("cases of other seeds", with_drawn(found["fresh"], ""))
         + fresh_scenes(
-            "fresh scenes with laws and features drawn",
+            "cases of other seeds with random laws", with_drawn(found["fresh"], "laws"), True
+        )
+        + fresh_scenes(
+            "cases of other seeds with random laws and features",
             with_drawn(found["fresh"], "features"),
             True,
         )
@@ -741,18 +766,17 @@ def fresh_scenes(what, found, ends=False):
         for row in one["silent_wrong"]
     )
     return (
-        f"\n**Of {scenes:,} {what}**, of the seed{plural} {seeds}, {wrong or 'none'} "
-        f"{'was' if wrong == 1 else 'were'} wrong in silence{f': {commands}' if wrong else ''}."
-        + (f" {all_ends(found)}" if ends else "")
-        + "\n"
+        f"\n**Of {scenes:,} {what}** (seed{plural} {seeds}), {wrong or 'none'} "
+        f"{'was' if wrong == 1 else 'were'} wrong without a warning"
+        f"{f': {commands}' if wrong else ''}." + (f" {all_ends(found)}" if ends else "") + "\n"
     )
 
 
 def amiss(row):
     """How far a number that is wrong in silence is off; beyond the horizon, of statistics."""
     if row["error"] is None:
-        return f"beyond the horizon, {row['excess_beyond']:.2g} times as far off as is let pass"
-    return f"off by {row['error']:.1e}, bar {row['bar']:.1e}"
+        return f"statistics, {row['excess_beyond']:.2g} times the allowed difference"
+    return f"error {row['error']:.1e}, error bar {row['bar']:.1e}"
 
 
 def all_ends(found):
@@ -780,14 +804,15 @@ def worst_table():
         + [cell(row["horizon"])]
         for row in kept("stress.json")["worst"]
     ]
-    head = ["repeat by", "verdict", "metric", "error / ten error bars",
-            "beyond the horizon", "error", "bar", "horizon / span"]  # fmt: skip
+    head = ["command that repeats it", "verdict", "metric", "error / allowed error",
+            "statistics after the horizon", "error", "error bar",
+            "horizon / run length"]  # fmt: skip
     return markdown(head, rows)
 
 
 def chaos_table():
     """What was tried, how often, and what did not survive; 0 of N has its 95 % bound, 3/N."""
-    head = ["what", "trials", "failed", "with 95 % confidence below"]
+    head = ["fault", "trials", "failed", "failure rate with 95 % confidence below"]
     rows = []
     for found in kept("chaos.json")["campaigns"].values():
         if "skipped" in found:
@@ -799,7 +824,8 @@ def chaos_table():
 
 def mutants_table():
     rows = kept("mutants.json")["mutants"]
-    lines = ["| mutants | of them | change nothing | caught | with the JIT off | escaped |",
+    lines = ["| kind of bug | bugs | change no result | caught "
+             "| of these with the compiler off | not caught |",
              "|---|---|---|---|---|---|"]  # fmt: skip
     kinds = list(dict.fromkeys(row["kind"] for row in rows))
     for name, group in [*((kind, {kind}) for kind in kinds), ("all drawn", {*kinds[1:]})]:
@@ -814,7 +840,7 @@ def mutants_table():
     lines.append("")
     for row in rows:
         if not row["caught_by"]:
-            lines.append(f"- `{row['mutant']}`: {row.get('equivalent', '**escaped**')}")
+            lines.append(f"- `{row['mutant']}`: {row.get('equivalent', '**not caught**')}")
     return "\n".join(lines) + "\n"
 
 
@@ -870,8 +896,7 @@ def numbers_list():
         f"**The paper's claims.** At our default masses {held_by_default()} of the eight hold. "
         f"Of {plane['judged']:,} machines with other masses all eight hold in "
         f"{plane['all'] or 'none'}, all but claim 7 in {plane['but_7']}. "
-        f"{search['said'][0].split('. ')[0].rstrip('.')}. [More](tests/results/README.md"
-        "#the-papers-claims).",
+        f"{search['said'][0].split('. ')[0].rstrip('.')}. [More](tests/results/claims.md).",
     ]
     return "".join(f"- {line}\n" for line in lines)
 
@@ -898,8 +923,8 @@ def regimes_table():
          span_of([r["error"] for r in one["rows"]], ".2g")]
         for one in runs
     ]  # fmt: skip
-    head = ["direction", "clearance, mm", "values", "regime", "Poincaré points", "exponent, 1/rev",
-            "error"]  # fmt: skip
+    head = ["direction", "clearance, mm", "values", "motion", "Poincaré points",
+            "Lyapunov exponent, 1/rev", "its error"]  # fmt: skip
     return markdown(head, lines)
 
 
@@ -915,50 +940,106 @@ def span_of(values, form):
     return low if low == high else f"{low} to {high}"
 
 
-MEASURED = "tests/results/README.md"
+def runs_of(name):
+    """Return when, how and of what each part of a campaign was measured, the newest first."""
+    found = kept(f"{name}.json")
+    parts = [found, *found.get("campaigns", {}).values(), *found.get("fresh", [])]
+    return sorted((one for one in parts if "date" in one), key=lambda one: one["date"])[::-1]
+
+
+def spans(runs):
+    """Return the command, dates, commits and machines of a campaign as texts."""
+    dates = sorted({one["date"] for one in runs})
+    commits = dict.fromkeys(one.get("commit", "not recorded") for one in runs)
+    machines = dict.fromkeys(one["machine"] for one in runs)
+    command = runs[0]["command"].partition(",")[0]
+    dates = " to ".join(dict.fromkeys((dates[0], dates[-1])))
+    return command, dates, ", ".join(commits), "; ".join(machines)
+
+
+def measured_words(name):
+    """Return the result of a campaign, and what it was measured with."""
+    runs = runs_of(name)
+    command, dates, commit, machine = spans(runs)
+    versions = ", ".join(f"{library} {number}" for library, number in runs[0]["versions"].items())
+    return findings.result_words(name, kept) + (
+        f"Measured by `{command}`, {dates}; commit: {commit}; {machine}, {versions}. "
+        f"Numbers: [{name}.json]({name}.json).\n"
+    )
+
+
+def campaigns_table():
+    rows = []
+    for name, (question, _) in CAMPAIGNS.items():
+        title = (RESULTS / f"{name}.md").read_text(encoding="utf-8").split("\n")[0].strip("# ")
+        command, *others = spans(runs_of(name))
+        rows.append([f"[{title}]({name}.md)", question, f"`{command}`", *others])
+    return markdown(["campaign", "question", "command", "date", "commit", "machine"], rows)
+
+
+def validation_summary():
+    rows = kept("validation.json")["rows"]
+    cells = []
+    for subject in dict.fromkeys(row["subject"] for row in rows):
+        some = [row for row in rows if row["subject"] == subject]
+        worst = max(abs(row["found"] - row["expected"]) / row["within"] for row in some)
+        sources = "; ".join(dict.fromkeys(row["source"] for row in some))
+        cells.append([subject, str(len(some)), f"{worst:.2g}", sources])
+    return markdown(["subject", "numbers", "largest difference / tolerance", "sources"], cells)
+
+
+# a campaign, which has the page and the file of its name in tests/results: its question and its
+# generated blocks; findings.FINDINGS are taken from them
+CAMPAIGNS = {
+    "validation": ("Are published numbers reproduced?",
+                   {"validation-summary": validation_summary, "validation": validation_table}),
+    "peers": ("How does it compare with other programs?",
+              {"peers": peers_table, "sweeps": sweeps_table}),
+    "accuracy": ("Is a result as accurate as it says?",
+                 {"accuracy": accuracy_table, "broken": broken_table, "bars": bars_table,
+                  "trade": trade_table}),
+    "calibration": ("How is the error estimated?", {"calibration": calibration_table}),
+    "ladders": ("Does the error fall with the tolerance, and the motion become ideal?",
+                {"ladders": ladders_table, "limit": limit_table}),
+    "tradeoff": ("Which method is fastest, and what does a feature of the model change?",
+                 {"fastest": fastest_table, "paper-numerics": paper_table,
+                  "modelling": modelling_table}),
+    "stress": ("What happens in extreme cases?",
+               {"stress": stress_table, "ranges": ranges_table, "worst": worst_table}),
+    "chaotic": ("Can averages of chaotic motion be trusted?",
+                {"chaotic-cases": chaotic_cases_table, "chaotic": chaotic_table}),
+    "claims": ("Which of the paper's claims hold?",
+               {"claims": claims_table, "machines": claims_words}),
+    "regimes": ("How does the motion change with the clearance?",
+                {"followed": regimes_words, "regimes": regimes_table}),
+    "wear": ("How accurate are hours until a limit?", {"wear": wear_table}),
+    "diagnosis": ("Does a classifier find the worn joint?",
+                  {"diagnosis": diagnosis_table, "confusion": confusion_table,
+                   "clearance-bins": clearance_bins_table, "clearances": clearance_table}),
+    "identify": ("Does `compsim identify` find the worn joint?", {"identify": identify_table}),
+    "calibrate": ("Does `compsim calibrate` find a machine's parameters?",
+                  {"calibrate": calibrate_table}),
+    "chaos": ("Do results survive kills, power cuts and damage?", {"chaos": chaos_table}),
+    "mutants": ("Would the tests notice a bug?", {"mutants": mutants_table}),
+    "sweep": ("Does an interrupted sweep lose a job?", {"sweep": sweep_table}),
+    "throughput": ("How many jobs a second?", {"throughput": throughput_table}),
+    "scale": ("What does a sweep of 100,000 or a million jobs take?",
+              {"scale": scale_table, "million": million_table}),
+    "store": ("How large and fast is the store?", {"store": store_table}),
+    "page": ("How fast is the report?", {"page": page_table}),
+}  # fmt: skip
 # page -> its generated blocks by name
 PAGES = {
     "README.md": {"numbers": numbers_list},
     "configs/README.md": {"parameters": lambda: parameter_table(table().values())},
     "compressor/solve/README.md": {"reasons": reason_table},
-    MEASURED: {
-        "accuracy": accuracy_table,
-        "validation": validation_table,
-        "wear": wear_table,
-        "bars": bars_table,
-        "broken": broken_table,
-        "calibration": calibration_table,
-        "trade": trade_table,
-        "claims": claims_table,
-        "machines": claims_words,
-        "followed": regimes_words,
-        "regimes": regimes_table,
-        "store": store_table,
-        "peers": peers_table,
-        "sweeps": sweeps_table,
-        "throughput": throughput_table,
-        "scale": scale_table,
-        "million": million_table,
-        "page": page_table,
-        "sweep": sweep_table,
-        "chaos": chaos_table,
-        "fastest": fastest_table,
-        "paper-numerics": paper_table,
-        "modelling": modelling_table,
-        "mutants": mutants_table,
-        "ladders": ladders_table,
-        "limit": limit_table,
-        "identify": identify_table,
-        "calibrate": calibrate_table,
-        "chaotic": chaotic_table,
-        "chaotic-cases": chaotic_cases_table,
-        "diagnosis": diagnosis_table,
-        "confusion": confusion_table,
-        "clearance-bins": clearance_bins_table,
-        "clearances": clearance_table,
-        "ranges": ranges_table,
-        "stress": stress_table,
-        "worst": worst_table,
+    "tests/results/README.md": {
+        "findings": lambda: findings.findings_table(kept),
+        "campaigns": campaigns_table,
+    },
+    **{
+        f"tests/results/{name}.md": {"measured": partial(measured_words, name)} | blocks
+        for name, (_, blocks) in CAMPAIGNS.items()
     },
 }
 

@@ -33,6 +33,7 @@ PAGES = {
         "compressor/store/README.md", "compressor/sweep/README.md",
         "compressor/physics/README.md", "compressor/README.md", "tests/README.md",
         "tests/results/README.md", "compressor/cases/examples/README.md",
+        *(f"tests/results/{name}.md" for name in page_tables.CAMPAIGNS),
     )
 }  # fmt: skip
 TEXT = "\n".join(PAGES.values())
@@ -88,7 +89,7 @@ def test_pages_are_known():
     tracked = subprocess.run(
         ["git", "ls-files", "*README.md"], cwd=ROOT, capture_output=True, text=True, check=True
     )
-    assert {*tracked.stdout.split()} == {*PAGES}
+    assert {*tracked.stdout.split()} == {page for page in PAGES if page.endswith("README.md")}
 
 
 def test_the_readme_is_short():

@@ -430,14 +430,14 @@ class Wear:
         above=True,
     )  # fmt: skip
     step_mm: float = value(
-        0.01, "mm", (0, 1e4), "ours: tests/results/README.md, Wear",
+        0.01, "mm", (0, 1e4), "ours: tests/results/wear.md",
         "wear at the deepest place for which one motion stands", above=True,
     )  # fmt: skip
     bore_length_mm: float = value(
         20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of the bores", above=True
     )
     sectors: int = value(
-        72, "", (24, 180), "ours: tests/results/README.md, Wear",
+        72, "", (24, 180), "ours: tests/results/wear.md",
         "that a bore is divided into by angle", kind="integer",
     )  # fmt: skip
 

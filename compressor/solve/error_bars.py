@@ -13,7 +13,7 @@ is made, and the longest bars count. Where a series or the acceleration may be w
 itself, no metric with a unit that is taken from it is known.
 
 Shares stand in `compressor.metrics`; those and the ones below were chosen on random cases that
-judge nothing (tests/results/README.md, "Calibration").
+judge nothing (tests/results/calibration.md).
 """
 
 from collections.abc import Mapping, Sequence

@@ -11,6 +11,7 @@ words cost and keep.
 import argparse
 import json
 import platform
+import subprocess
 import time
 from collections import Counter
 from datetime import date
@@ -259,12 +260,29 @@ def broken(word, cases, measured):
     ]
 
 
+def read_commit():
+    """Return the commit of the program that is measured, "" without git; whether files differ."""
+    git = ["git", "-C", str(Path(__file__).parent)]
+    try:
+        asked = {"check": True, "capture_output": True, "text": True}
+        head = subprocess.run([*git, "rev-parse", "--short=10", "HEAD"], **asked).stdout.strip()
+        # of the program and its campaigns: what earlier campaigns wrote does not count
+        folders = [":/compressor/**.py", ":/cmd/**.py", ":/tests/**.py"]
+        status = [*git, "status", "--porcelain", "--", *folders]
+        changed = subprocess.run(status, **asked).stdout
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return f"{head} with changes" if changed else head
+
+
 def provenance(command):
-    """Date, machine and versions of a kept measurement."""
+    """Return command, date, commit, machine and versions of a measurement, which its file keeps."""
     names = ("compsim", "numpy", "scipy", "numba")
+    commit = read_commit()
     return {
         "command": command,
         "date": date.today().isoformat(),
+        **({"commit": commit} if commit else {}),
         "machine": f"{platform.machine()}, Python {platform.python_version()}",
         "versions": {name: metadata.version(name) for name in names},
     }
