@@ -34,6 +34,7 @@ PAGES = {
         "compressor/physics/README.md", "compressor/README.md", "tests/README.md",
         "tests/results/README.md", "compressor/cases/examples/README.md",
         *(f"tests/results/{name}.md" for name in page_tables.CAMPAIGNS),
+        "compressor/docs/glossary.md",
     )
 }  # fmt: skip
 TEXT = "\n".join(PAGES.values())
@@ -94,6 +95,14 @@ def test_pages_are_known():
 
 def test_the_readme_is_short():
     assert PAGES["README.md"].count("\n") <= 200
+
+
+def test_the_glossary_is_short():
+    rows = re.findall(r"^\| (.*?) \| (.*) \|$", PAGES["compressor/docs/glossary.md"], re.MULTILINE)
+    words = [word.strip("`").lower() for word, _ in rows[1:]]
+    assert 20 <= len(words) <= 30
+    assert words == sorted(words)
+    assert [text for _, text in rows[1:] if len(re.findall(r"[.:)] [A-Z]", text)) > 1] == []
 
 
 def anchors(page):
