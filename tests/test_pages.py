@@ -97,6 +97,11 @@ def test_the_readme_is_short():
     assert PAGES["README.md"].count("\n") <= 200
 
 
+def test_no_line_begins_as_a_comment_of_the_site():
+    lines = (line for text in PAGES.values() for line in text.splitlines())
+    assert [line for line in lines if re.match(r"\s*%", line)] == []
+
+
 def test_the_glossary_is_short():
     rows = re.findall(r"^\| (.*?) \| (.*) \|$", PAGES["compressor/docs/glossary.md"], re.MULTILINE)
     words = [word.strip("`").lower() for word, _ in rows[1:]]
