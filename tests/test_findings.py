@@ -97,6 +97,15 @@ def test_every_campaign_has_a_page_and_every_page_a_campaign():
     assert pages == files == {*page_tables.CAMPAIGNS}
 
 
+def test_the_page_names_what_make_measurements_leaves_out():
+    makefile = (page_tables.ROOT / "Makefile").read_text(encoding="utf-8")
+    repeated = re.search(r"^measurements: (.*?) +##", makefile, re.MULTILINE)[1].split()
+    found = {page_tables.spans(page_tables.runs_of(name))[0] for name in page_tables.CAMPAIGNS}
+    page = (page_tables.RESULTS / "README.md").read_text(encoding="utf-8")
+    named = {*re.findall("`(make [a-z-]+)`", page.partition("campaigns except")[2])}
+    assert named == {one for one in found if one.removeprefix("make ") not in repeated}
+
+
 def test_every_campaign_says_what_it_measured():
     writers = [path for path in CAMPAIGNS.glob("*.py")
                if "json.dumps" in (text := path.read_text(encoding="utf-8"))

@@ -88,7 +88,9 @@ def dry_joint():
     }  # fmt: skip
     case = Case.from_values({**DRY, "contact": contact, "solve": {"duration_rev": 3}})
     parted = predictability_horizon(case) / case.turn
-    yield row("Dry joint", "undamped, twins part after", "rev", 1.6, parted, 0.1, source)
+    yield row(
+        "Dry joint", "undamped: close motions separate after", "rev", 1.6, parted, 0.1, source
+    )
     ours = contact_stiffness("steel", "steel", 0.0095, 0.0100, True)
     ours *= (1 - 0.29**2) / (1 - 0.3**2)  # of their Poisson's ratio
     yield row("Dry joint", "stiffness", "N/m^1.5", STIFFNESS, ours, 1e-3 * STIFFNESS, source)
