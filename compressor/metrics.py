@@ -127,7 +127,7 @@ TABLE = (
         "penetration", Bar(1.0, 0.0, False), None, True, "count",
     ),
     Metric(
-        "release_count", ("joint",), "1", "contacts that began while pressed in",
+        "release_count", ("joint",), "1", "contacts that began again without flight",
         "penetration", Bar(1.0, 0.0, False), None, True, "count",
     ),
     Metric(
@@ -136,8 +136,8 @@ TABLE = (
     ),
     Metric(
         "releases_per_rev", ("joint",), "1/rev",
-        "contacts in a revolution that began while pressed in", "penetration",
-        Bar(1.0, 0.0, False), Shown("releases while pressed in", "per rev"), True, "rate",
+        "contacts in a revolution that began again without flight", "penetration",
+        Bar(1.0, 0.0, False), Shown("contacts renewed without flight", "per rev"), True, "rate",
     ),
     Metric(
         "rod_load_reversal_angle", (), "rad",

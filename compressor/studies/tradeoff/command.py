@@ -318,18 +318,19 @@ def scale_lines(joint: "JointScales") -> Iterator[str]:
     """Yield the natural scales of a joint."""
     name = joint.joint.replace("_", " ")
     yield (
-        f"{name}: {joint.force:.0f} N at most in the ideal machine press "
-        f"{joint.penetration * 1e6:.0f} µm deep;"
+        f"{name}: the greatest force without clearance, {joint.force:.0f} N, presses the surfaces "
+        f"{joint.penetration * 1e6:.0f} µm into each other"
     )
-    along = "does not ring" if joint.damping_ratio >= 1.0 else "rings"
+    bounces = "does not bounce" if joint.damping_ratio >= 1.0 else "bounces"
     yield (
-        f"held there it {along} along the force (damping ratio {joint.damping_ratio:.2g}), and "
-        f"swings across it in its bore at about {joint.swing_frequency:.0f} Hz "
-        f"({1e3 / joint.swing_frequency:.2f} ms);"
+        f"in contact the journal {bounces} (damping ratio {joint.damping_ratio:.2g}), and swings "
+        f"sideways in its bore at about {joint.swing_frequency:.0f} Hz, once in "
+        f"{1e3 / joint.swing_frequency:.2f} ms"
     )
     yield (
-        f"{joint.limited_by} holds explicit steps to about {joint.explicit_step * 1e6:.3g} µs, "
-        f"the contact's stiffness implicit ones to {joint.implicit_step * 1e6:.3g} µs"
+        f"longest time steps: explicit about {joint.explicit_step * 1e6:.3g} µs, limited by "
+        f"{joint.limited_by}; implicit about {joint.implicit_step * 1e6:.3g} µs, limited by the "
+        f"stiffness of the contact"
     )
 
 

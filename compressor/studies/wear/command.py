@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from compressor.studies.wear.run import WearSummary, WornMachine
 
 MAX_DRAWN = 12  # machines that get a figure
-HEAD = f"{'worn out after, h':>17}  {'with f times to 1/f of the wear':>31}  at the end"
+HEAD = f"{'worn out after, h':>17}  {'from more to less wear, h':>31}  at the end"
 
 
 @click.command()
