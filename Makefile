@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify calibrate stress chaos mutants measurements pages clean
+.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify calibrate nameplate stress chaos mutants measurements pages clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -120,10 +120,13 @@ stress: install  ## run and judge 2,000 extreme scenes (within the hour on two c
 chaos: install  ## inject faults, thousands, and count what did not survive (an hour)
 	$(CAMPAIGN)/measure_chaos.py tests/results/chaos.json
 
+nameplate: install  ## run the case file of compsim init machine, for its page (two minutes)
+	$(CAMPAIGN)/measure_nameplate.py tests/results/nameplate.json
+
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: test-oldest calibration accuracy validation wear claims page tradeoff ladders chaotic regimes diagnosis identify store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
+measurements: test-oldest calibration accuracy validation wear claims page tradeoff ladders chaotic regimes diagnosis identify nameplate store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
 
 pages: install  ## write the pages' generated tables, compressor/API.md, the tutorial's notebook
 	$(BIN)/python tests/page_tables.py

@@ -72,7 +72,7 @@ def markdown(text):
 
 def linked(line):
     """A line with a link in place of each page in backquotes."""
-    return re.sub(r"`((?:[a-z]+/)?[A-Za-z]+\.md)`", lambda page: link(page[1]), line)
+    return re.sub(r"`((?:[a-z]+/)?[A-Za-z-]+\.md)`", lambda page: link(page[1]), line)
 
 
 def link(page):

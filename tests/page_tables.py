@@ -1,6 +1,7 @@
 """Generated blocks of the README pages: `make pages` writes them, tests/test_pages.py compares."""
 
 import json
+import math
 import re
 from collections import Counter
 from functools import partial
@@ -860,54 +861,150 @@ def span(values, digits=2):
 
 
 def numbers_list():
-    """The lines of README.md on speed, accuracy, error bars, stress, kills and claims."""
-    peers, accuracy, stress = kept("peers.json"), kept("accuracy.json"), kept("stress.json")
-    kills, sweep = kept("chaos.json")["campaigns"]["kill"], kept("sweep.json")
-    rows = {}
-    for row in peers["rows"]:
-        rows.setdefault(row["tool"], []).append(row)
-    ratio = {tool: span([row["ratio"] for row in of]) for tool, of in rows.items()}
-    exudyn, ours = "Exudyn DOPRI5, symbolic functions", peers["rows"]
-    cpu = span([1e3 * row["our_seconds"] for row in ours if row["tool"] == exudyn])
-    plane, search = (kept("claims.json")[name] for name in ("map", "search"))
-    word, bars = accuracy["words"]["standard"], accuracy["bars"]["standard"].values()
-    within = sum(bar["within"] * bar["of"] for bar in bars) / sum(bar["of"] for bar in bars)
-    range_, fresh = stress["ends"]["supported"], with_drawn(stress["fresh"], "")
-    rich = with_drawn(stress["fresh"], "features")
-    unjudged = sum(ends.get("unjudged", 0) for ends in stress["ends"].values())
-    link = "compressor/solve/README.md#supported-range-and-stress"
+    """The five lines of README.md: accuracy, error bars, speed, extremes, diagnosis."""
+    accuracy, stress = kept("accuracy.json"), kept("stress.json")
+    word, fresh = accuracy["words"]["standard"], stress["fresh"]
+    broken = f"all but {word['broken']}" if word["broken"] else "all"
+    ratio, cpu = peer_ratios()
+    models = kept("identify.json")["models"]
+    own, *others = (row["right_where_worn"]["share"] for row in models.values())
     lines = [
-        f"**Speed.** For the same run, with an error no smaller than ours, {exudyn.split(',')[0]} "
-        f"takes {ratio[exudyn]} times our CPU time. SciPy's LSODA with a Python function takes "
-        f"{ratio['SciPy LSODA, plain Python']} times, and a compiled LSODA (numbalsoda), which "
-        f"gives the acceleration alone, {ratio['LSODA in C++ (numbalsoda), numba']} times. Our run "
-        f"takes {cpu} ms.",
-        f"**Accuracy.** `standard` promises a relative L2 error of the acceleration below "
-        f"{word['promise']:g}, and checks it in every run. Of {accuracy['random']['cases']:,} "
-        f"random cases {word['kept']:,} say that they kept it, and "
-        f"{'all' if not word['broken'] else 'all but ' + str(word['broken'])} of these did. "
-        f"Of the others, {word['regimes'].get('chaotic', 0)} say that they are chaotic, and "
-        f"{sum(word['refused'].values())} failed. A run with its check takes "
-        f"{word['cost']['median']:.1f} times as long as without (median).",
-        f"**Error bars.** At `standard`, {within:.1%} of the true errors of the metrics in these "
-        f"random cases lie within their error bars.",
-        f"**Extremes.** Of {stress['scenes']:,} extreme cases, half of them inside the supported "
-        f"range, {range_['ok'] / sum(range_.values()):.1%} of that half ran to a result. The "
-        f"others failed with a named reason. Silently wrong ([meaning]({link})): "
-        f"{stress['silent_wrong'] or 'none'}; of {sum(one['scenes'] for one in fresh):,} "
-        f"others, drawn afterwards, {silent(fresh) or 'none'}; of "
-        f"{sum(one['scenes'] for one in rich):,} with laws and features, {silent(rich) or 'none'}. "
-        f"Not judged: {unjudged}.",
-        f"**Kills.** Of {kills['trials']} sweeps killed at random and resumed, "
-        f"{kills['failed'] or 'none'} had lost or changed a result. A sweep of {sweep['jobs']:,} "
-        f"jobs, killed {len(sweep['kills'])} times and resumed, equals the undisturbed one "
-        f"to the bit.",
-        f"**The paper's claims.** At our default masses {held_by_default()} of the eight hold. "
-        f"Of {plane['judged']:,} machines with other masses all eight hold in "
-        f"{plane['all'] or 'none'}, all but claim 7 in {plane['but_7']}. "
-        f"{search['said'][0].split('. ')[0].rstrip('.')}. [More](tests/results/claims.md).",
+        f"**Accuracy.** The default promises an error of the acceleration below "
+        f"{word['promise']:.1%} (rms), and each run checks it. In {word['kept']:,} of "
+        f"{accuracy['random']['cases']:,} random cases the check passed, and {broken} of these "
+        f"were as exact as that.",
+        f"**Error bars.** {within_bars():.1%} of the true errors of metrics were within their "
+        "bars.",
+        f"**Speed.** A run of four revolutions without error bars takes {cpu} ms of CPU time. "
+        f"Exudyn takes {ratio['Exudyn DOPRI5, symbolic functions']} times as long, with "
+        "no smaller error.",
+        f"**Extremes.** {stress['scenes']:,} extreme cases gave {stress['silent_wrong'] or 'no'} "
+        f"wrong number without a warning; {sum(one['scenes'] for one in fresh):,} fresh ones gave "
+        f"{silent(fresh) or 'none'}.",
+        f"**Diagnosis.** By a simulated sensor, the worn joint is named right in {own:.0%} of the "
+        f"records. If friction follows another law than the study assumes, in {min(others):.0%} to "
+        f"{max(others):.0%}.",
     ]
     return "".join(f"- {line}\n" for line in lines)
+
+
+def peer_ratios():
+    """Of each other tool how many times our CPU time it takes; and our CPU time, ms."""
+    rows = kept("peers.json")["rows"]
+    exudyn = [row for row in rows if row["tool"] == "Exudyn DOPRI5, symbolic functions"]
+    ratio = {
+        row["tool"]: span([one["ratio"] for one in rows if one["tool"] == row["tool"]])
+        for row in rows
+    }
+    return ratio, span([1e3 * row["our_seconds"] for row in exudyn])
+
+
+def within_bars():
+    """The share of the true errors of random cases at `standard` that are within their bars."""
+    bars = kept("accuracy.json")["bars"]["standard"].values()
+    return sum(bar["within"] * bar["of"] for bar in bars) / sum(bar["of"] for bar in bars)
+
+
+def extremes_words():
+    """How often extreme cases end with a result, and how often with a wrong one."""
+    stress = kept("stress.json")
+    range_, fresh = stress["ends"]["supported"], stress["fresh"]
+    unjudged = sum(ends.get("unjudged", 0) for ends in stress["ends"].values())
+    wrong = stress["silent_wrong"]
+    return (
+        f"Of {stress['scenes']:,} extreme cases half lie inside the supported range; "
+        f"{range_['ok'] / sum(range_.values()):.1%} of that half ran to a result, and the others "
+        f"failed with a named reason. {wrong or 'None'} of the {stress['scenes']:,} gave a wrong "
+        f"number without a warning; of {unjudged} no other integrator could say. Of "
+        f"{sum(one['scenes'] for one in fresh):,} fresh cases, drawn afterwards, some of them with "
+        f"other laws, oil or an elastic rod, {silent(fresh) or 'none'} did.\n"
+    )
+
+
+def paper_words():
+    """How many of the paper's claims hold, at which machines."""
+    plane, search = (kept("claims.json")[name] for name in ("map", "search"))
+    machines = re.search(r"found among ([\d,]+)", search["said"][0])[1]
+    return (
+        f"At our default masses {held_by_default()} of the eight hold. Of {plane['judged']:,} "
+        f"machines with other masses, all eight hold in {plane['all'] or 'none'}, and all but "
+        f"claim 7 in {plane['but_7']}. A search over masses, friction and contact among {machines} "
+        f"machines found one in which all eight hold, each by more than its error.\n"
+    )
+
+
+def choose_table():
+    """Six rows: what for, what to choose, and what it gives and costs."""
+    words = kept("accuracy.json")["words"]
+    draft, bare = words["draft"], words["draft"]["cost"]["median"]
+
+    def row(what, choose, word, seconds=None):
+        return [
+            what,
+            choose,
+            f"{word['error'][0]:.0e}",
+            milliseconds(seconds or word["seconds"][0]),
+        ]
+
+    rows = [
+        row("a first look, a map of many jobs", "`accuracy: draft`", draft),
+        row("a number to report", "nothing: `standard` is the default", words["standard"]),
+        row("a small difference between two machines", "`accuracy: fine`", words["fine"]),
+        row("to judge another program, or this one", "`accuracy: reference`", words["reference"]),
+        row("the fastest sweep, if a few wrong jobs do no harm",
+            "`accuracy: draft, error_bars: false`, with `output: {keep: metrics}`", draft,
+            draft["seconds"][0] / bare),
+        ["one metric to a given error", "`accuracy: {peak_contact_force: 0.01}`", "as asked",
+         "as it takes"],
+    ]  # fmt: skip
+    return markdown(["you want", "choose, in `solve`", "error", "time of a run"], rows)
+
+
+def parameter_tables():
+    """The table of parameters in parts, a heading each: the keys of a case, then its groups."""
+    rows = {}
+    for row in table().values():
+        group, dot, _ = row.key.partition(".")
+        alone = not dot or group in ("clearance_mm", "healthy_clearance_mm", "initial_offset_mm")
+        rows.setdefault("Load and joints" if alone else group, []).append(row)
+    return "\n".join(f"### {group}\n\n{parameter_table(of)}\n" for group, of in rows.items())
+
+
+def nameplate_table():
+    """What the case file of `compsim init machine` gives over the small end's clearance."""
+    scaled = (("peak_contact_force", 1e3), ("impacts_per_rev", 1.0),
+              ("rod_load_reversal_angle", math.pi / 180), ("sensor_rms", 1.0),
+              ("body_velocity_rms", 1e-3))  # fmt: skip
+    rows = [
+        [f"{row['clearance_mm']:g}"]
+        + [with_error(row[name] / unit, row[f"{name}_error"] / unit) for name, unit in scaled]
+        for row in kept("nameplate.json")["rows"]
+    ]
+    head = ["small end, mm", "peak force on it, kN", "impacts a revolution", "rod load reversal, °",
+            "sensor, m/s² rms", "body along x, mm/s rms"]  # fmt: skip
+    return markdown(head, rows)
+
+
+def oil_words():
+    """What the film of oil makes of the force on a worn pin."""
+    oils = kept("nameplate.json")["oils"]
+    forces = {
+        name: f"{row['force'] / 1e3:.3g} kN" if row["force"] else
+        "a motion that is chaotic, without a peak that means anything"
+        for name, row in oils.items()
+    }  # fmt: skip
+    return (
+        f"With a clearance of 0.2 mm at the small end, the peak force on it is {forces['file']} "
+        f"with the `last_share` of the file, 0.1, and {forces['default']} with the default of "
+        f"0.02. Without oil it is {forces['dry']}.\n"
+    )
+
+
+def with_error(value, error):
+    """A number to three digits, or with its error bar where that is longer."""
+    digits = f"{value:.3g}"
+    last = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 1.0
+    return f"{digits} ± {error:.1g}" if error > last / 2 else digits
 
 
 def held_by_default():
@@ -1036,12 +1133,16 @@ CAMPAIGNS = {
               {"scale": scale_table, "million": million_table}),
     "store": ("How large and fast is the store?", {"store": store_table}),
     "page": ("How fast is the report?", {"page": page_table}),
+    "nameplate": ("What does the case file of `compsim init machine` give?", {"oils": oil_words}),
 }  # fmt: skip
 # page -> its generated blocks by name
 PAGES = {
     "README.md": {"numbers": numbers_list},
-    "configs/README.md": {"parameters": lambda: parameter_table(table().values())},
-    "compressor/solve/README.md": {"reasons": reason_table},
+    "configs/README.md": {"parameters": parameter_tables},
+    "compressor/docs/extremes.md": {"reasons": reason_table, "stress-words": extremes_words},
+    "compressor/docs/my-machine.md": {"nameplate": nameplate_table},
+    "compressor/docs/speed-or-accuracy.md": {"choose": choose_table},
+    "compressor/docs/the-paper.md": {"paper": paper_words},
     "tests/results/README.md": {
         "findings": lambda: findings.findings_table(kept),
         "campaigns": campaigns_table,

@@ -12,6 +12,7 @@ import subprocess
 
 import page_tables
 import pytest
+import tutorial
 from click.testing import CliRunner
 from compsim.cli import cli
 from compsim.cli import main as cli_main
@@ -19,9 +20,12 @@ from conftest import jobs_here
 from measure_tradeoff import fingerprint
 
 import compressor
+from compressor.cases.checks import DOUBLES, stands_for
+from compressor.cases.examples import example
 from compressor.cases.json_schema import case_schema
 from compressor.cases.load import MAX_JOBS, load_cases, load_studies
 from compressor.cases.swept import DISTRIBUTIONS, FORMS
+from compressor.cases.table import table
 from compressor.solve.simulate import simulate
 
 ROOT = page_tables.ROOT
@@ -29,14 +33,19 @@ MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 PAGES = {
     page: (ROOT / page).read_text(encoding="utf-8")
     for page in (
-        "README.md", "configs/README.md", "compressor/solve/README.md",
-        "compressor/store/README.md", "compressor/sweep/README.md",
+        "README.md", "configs/README.md",
+        *(f"compressor/docs/{name}.md" for name in (
+            "the-paper", "my-machine", "a-run", "how-sure", "speed-or-accuracy", "extremes",
+            "regimes", "diagnosis", "wear", "sweeps", "commands", "glossary",
+        )),
+        "compressor/solve/README.md", "compressor/store/README.md", "compressor/sweep/README.md",
         "compressor/physics/README.md", "compressor/README.md", "tests/README.md",
         "tests/results/README.md", "compressor/cases/examples/README.md",
         *(f"tests/results/{name}.md" for name in page_tables.CAMPAIGNS),
-        "compressor/docs/glossary.md",
     )
 }  # fmt: skip
+COMMANDS = "compressor/docs/commands.md"
+MAX_WORDS = 700  # of README.md: code and tables counted, addresses of links not
 TEXT = "\n".join(PAGES.values())
 QUICK = ["--set", "solve.duration_rev=1", "--set", "solve.settle_rev=0"]
 
@@ -88,13 +97,25 @@ def test_modules_that_texts_name_are_there():
 
 def test_pages_are_known():
     tracked = subprocess.run(
-        ["git", "ls-files", "*README.md"], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    assert {*tracked.stdout.split()} == {page for page in PAGES if page.endswith("README.md")}
+        ["git", "ls-files", "*README.md", "compressor/docs/*.md", "tests/results/*.md"],
+        cwd=ROOT, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert {*tracked.stdout.split()} == {*PAGES}
 
 
 def test_the_readme_is_short():
-    assert PAGES["README.md"].count("\n") <= 200
+    text = re.sub(r"\]\([^)]*\)|<!--.*?-->", " ", PAGES["README.md"])
+    assert len(re.findall(r"\S*\w\S*", text)) <= MAX_WORDS
+
+
+def test_every_page_is_linked_from_another():
+    linked = {
+        str(((ROOT / page).parent / target).resolve().relative_to(ROOT))
+        for page, text in PAGES.items()
+        for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text)
+        if "README.md" in (page, target) or "docs" in page + target
+    }
+    assert {page for page in PAGES if "docs/" in page} <= linked
 
 
 def test_no_line_begins_as_a_comment_of_the_site():
@@ -157,9 +178,41 @@ def test_tests_that_are_named_exist():
     assert [name for name in named if f"def {name}(" not in sources] == []
 
 
-def test_every_verb_of_the_command_line_is_in_the_readme():
-    named = set(re.findall(r"`compsim ([a-z]+)`", PAGES["README.md"]))
+def test_every_verb_of_the_command_line_is_on_the_page_of_commands():
+    named = set(re.findall(r"`compsim ([a-z]+)`", PAGES[COMMANDS]))
     assert named == set(cli.commands)
+
+
+def test_keys_to_begin_with_are_keys():
+    text = PAGES["configs/README.md"].partition("## The ten keys")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| (`.*?) \|", text, re.MULTILINE)
+    assert len(rows) == 10
+    named = {key for row in rows for key in re.findall(r"`([\w.]+)`", row)}
+    given = {DOUBLES.get(key, key) for key in named}
+    assert [key for key in given if not (stands_for(key) or key in table())] == []
+
+
+def test_the_machine_of_a_nameplate_was_run_as_it_is():
+    (study,) = load_studies(example("machine"))
+    kept = page_tables.kept("nameplate.json")["rows"]
+    assert [row["key"] for row in kept] == [case.key for case in study.cases], "make nameplate"
+
+
+def test_what_features_cost_is_what_was_measured():
+    """The table of speed-or-accuracy.md, with a quarter of the number to spare."""
+    page = PAGES["compressor/docs/speed-or-accuracy.md"]
+    ratio = {}
+    for row in page_tables.kept("tradeoff.json")["changes"]:
+        ratio.setdefault(row["change"], []).append(row.get("time_ratio"))
+    for words, changes in (
+        ("an elastic rod", ("elastic rod",)),
+        ("oil, play in the guide, a drive whose speed gives way",
+         ("oil film", "50 µm of play in the guide", "speed that gives way")),
+    ):  # fmt: skip
+        low, high = map(float, re.search(rf"\| {words} \| (\d+) to (\d+) \|", page).groups())
+        found = [value for name in changes for value in ratio[name] if value]
+        assert low / 1.25 <= min(found) <= low * 1.25, words
+        assert high / 1.25 <= max(found) <= high * 1.25, words
 
 
 def expanded(place, word):
@@ -180,10 +233,10 @@ def write_case_files(place):
 def test_case_files_have_the_jobs_that_they_say(tmp_path):
     jobs = write_case_files(tmp_path)
     assert [*jobs] == [
-        "bearing-wear.yaml", "machines.yaml", "cylinder.yaml", "grid.yaml", "zipped.yaml",
+        "bearing-wear.yaml", "cylinder.yaml", "grid.yaml", "zipped.yaml",
         "random.yaml", "latin.yaml", "sampled.yaml", "sensitivity.yaml", "uncertain.yaml",
         "bounded.yaml",
-        "blocks.yaml", "regimes.yaml", "bearings.yaml",
+        "blocks.yaml", "regimes.yaml", "machines.yaml", "bearings.yaml",
     ]  # fmt: skip
     for name, count in jobs.items():
         (study,) = load_studies(tmp_path / name)
@@ -225,24 +278,37 @@ def test_every_feature_of_the_grammar_has_an_example():
     }  # fmt: skip
 
 
+def blocks_and_outputs(language):
+    """Each block of a language, and the lines that the `text` block behind it says it prints."""
+    found = re.findall(rf"```{language}\n(.*?)```\n(?:\n```text\n(.*?)```)?", TEXT, re.DOTALL)
+    return [(block, tuple(printed.splitlines())) for block, printed in found]
+
+
+def run_command(place, command, whole):
+    """Run a command of a page there, in short unless `whole`, and return what it prints."""
+    if not command.startswith("compsim "):
+        return ""
+    command, _, target = command.partition(" > ")
+    words = shlex.split(command, comments=True)
+    words = [w for word in words for w in expanded(place, word)]
+    more = QUICK if words[1] in ("run", "explain") and not whole else []
+    with jobs_here(), contextlib.chdir(place), CliRunner().isolation() as (out, err, _):
+        code, said = cli_main([*words[1:], *more]), err.getvalue()
+    assert code == 0, f"{command}\n{said.decode()}"
+    if target:
+        (place / target).write_bytes(out.getvalue())
+    return out.getvalue().decode()
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A folder as a reader of the pages would have it: their case files, and our configs."""
     place = tmp_path_factory.mktemp("pages")
     write_case_files(place)
     (place / "configs").symlink_to(page_tables.ROOT / "configs")
-    for command in (line for text in blocks("console") for line in text.splitlines()):
-        if not command.startswith("compsim "):
-            continue
-        command, _, target = command.partition(" > ")
-        words = shlex.split(command, comments=True)
-        words = [w for word in words for w in expanded(place, word)]
-        more = QUICK if words[1] in ("run", "explain") else []
-        with jobs_here(), contextlib.chdir(place), CliRunner().isolation() as (out, err, _):
-            code, said = cli_main([*words[1:], *more]), err.getvalue()
-        assert code == 0, f"{command}\n{said.decode()}"
-        if target:
-            (place / target).write_bytes(out.getvalue())
+    for commands, expected in blocks_and_outputs("console"):
+        printed = [run_command(place, line, bool(expected)) for line in commands.splitlines()]
+        assert not expected or tutorial.missing(expected, "".join(printed)) == "", commands
     return place
 
 
@@ -260,16 +326,20 @@ def test_console_commands_work(folder):
 @pytest.mark.slow
 def test_python_example_works(folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
-    names = {}
-    for text in blocks("python"):
+    names, printed = {}, ""
+    for text, expected in blocks_and_outputs("python"):
         exec(text, names)
+        out = capsys.readouterr().out
+        assert not expected or tutorial.missing(expected, out) == "", text
+        printed += out
     assert names["a"].attrs["units"] == "m/s2"
     assert names["run"].attrs["complete"] == 1
-    assert "clearance_mm" in capsys.readouterr().out
+    assert "clearance_mm" in printed
 
 
-def test_the_peaks_of_the_readme_are_those_of_the_program():
-    told = re.search(r"peaks at 0.1, 0.2 and 0.3 mm are (.*?)\sm/s²", PAGES["README.md"])
+def test_the_peaks_of_the_page_are_those_of_the_program():
+    page = PAGES["compressor/docs/a-run.md"]
+    told = re.search(r"peaks at 0.1, 0.2 and 0.3 mm are (.*?)\sm/s²", page, re.DOTALL)
     cases = load_cases(ROOT / "configs" / "big-end.yaml")
     assert [case.clearance_mm.big_end for case in cases] == [0.1, 0.2, 0.3]
     peaks = [f"{simulate(case)['peak_acceleration'].item():.1f}" for case in cases]

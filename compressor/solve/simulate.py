@@ -123,7 +123,7 @@ def simulate(case: Case) -> "xr.Dataset":
     `solve.settle_rev`. `<metric>_error` is how far each may be from the exact value, in its own
     unit. Time series have (time), (time, joint) or (time, joint, axis), such as `acceleration`
     (m/s2) of the crosshead and `contact_force` (N) on the rod; with `output.keep: metrics` there
-    are none. `solve/README.md` lists all of them, and tells how they are made.
+    are none. `docs/a-run.md` lists all of them.
 
     Raises CaseError for what is no Case, and nothing else: a run that fails has the `status`
     "failed", a `reason` by a stable name and the attribute `detail`, and its series are nan from

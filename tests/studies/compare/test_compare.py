@@ -11,7 +11,7 @@ import pytest
 from compsim import cli
 from conftest import store
 
-PAGE = Path(__file__).parents[3] / "compressor/README.md"
+PAGE = Path(__file__).parents[3] / "compressor/docs/diagnosis.md"
 HEARD = {"length_rev": 10, "noise_m_per_s2": 0.05}
 CASE = {
     "joint": "big_end", "clearance_mm": 0.2, "sensor": HEARD,

@@ -1,0 +1,84 @@
+"""Keep what the case file of `compsim init machine` gives (make nameplate, about two minutes).
+
+Writes a small JSON file with the numbers that compressor/docs/my-machine.md shows, and the keys of
+the jobs: another case file or model makes others, and tests/test_pages.py then asks for a new run.
+"""
+
+import json
+import sys
+from dataclasses import replace
+from math import isfinite
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from compsim import cli
+from measure_accuracy import provenance
+
+import compressor
+from compressor.cases.examples import example
+from compressor.cases.load import load_studies
+from compressor.cases.optional_groups import Lubricant
+
+CLEARANCE = 0.2  # mm
+
+SHOWN = (
+    "peak_contact_force", "impacts_per_rev", "rod_load_reversal_angle", "sensor_rms",
+    "body_velocity_rms",
+)  # fmt: skip
+
+
+def number(values):
+    """The value of the small end, or along x, of each job."""
+    for name, index in (("joint", "small_end"), ("axis", "x")):
+        values = values.sel({name: index}) if name in values.dims else values
+    return [float(f"{value:.6g}") for value in values.values.ravel()]
+
+
+def rows(study):
+    """One row a job: its key, clearance, regime, and each number with its error bar."""
+    found = {"key": study["key"].values, "clearance_mm": study["clearance_mm_small_end"].values,
+             "regime": study["regime"].values}  # fmt: skip
+    for name in SHOWN:
+        found |= {name: number(study[name]), f"{name}_error": number(study[f"{name}_error"])}
+    return [dict(zip(found, (plain(v) for v in row), strict=True))
+            for row in zip(*found.values(), strict=True)]  # fmt: skip
+
+
+def oils():
+    """The peak force on the small end at 0.2 mm: as in the file, with the default film, dry."""
+    (study,) = load_studies(example("machine"))
+    case = next(one for one in study.cases if one.clearance_mm.small_end == CLEARANCE)
+    films = {
+        "file": case.lubricant,
+        "default": replace(case.lubricant, last_share=Lubricant.last_share),
+        "dry": None,
+    }
+    return {name: peak(replace(case, lubricant=film)) for name, film in films.items()}
+
+
+def peak(case):
+    """The greatest force on the small end (N), with its error bar; what kind of motion it has."""
+    run = compressor.simulate(case)
+    (force,), (error,) = (number(run[f"peak_contact_force{end}"]) for end in ("", "_error"))
+    known = isfinite(error)
+    return {"force": force if known else None, "error": error if known else None,
+            "regime": run.attrs["regime"]}  # fmt: skip
+
+
+def plain(value):
+    return value.item() if hasattr(value, "item") else value
+
+
+def main(target, store=""):
+    """Run the case file, or read a store in which it was run, and write the file."""
+    with TemporaryDirectory() as place:
+        folder = store or place
+        if not store:
+            assert cli.main(["run", str(example("machine")), "-o", folder, "--quiet"]) == 0
+        with compressor.open_study(folder, "machine") as study:
+            kept = provenance("make nameplate") | {"rows": rows(study), "oils": oils()}
+    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
