@@ -970,6 +970,28 @@ def parameter_tables():
     return "\n".join(f"### {group}\n\n{parameter_table(of)}\n" for group, of in rows.items())
 
 
+def identify_words():
+    """How often a worn joint is named right, by a record of the study's law and of others."""
+    models = kept("identify.json")["models"]
+    own, *others = ({k: v["share"] for k, v in row.items() if isinstance(v, dict) and "share" in v}
+                    for row in models.values())  # fmt: skip
+    right, warned = (
+        [other[name] for other in others]
+        for name in ("right_where_worn", "nothing_fits_where_worn")
+    )
+    plain = kept("diagnosis.json")["levels"][0]["classifier"]["accuracy"]
+    return (
+        f"- `compsim identify` names the worn joint in {own['right_where_worn']:.0%} of the "
+        f"records of simulated machines like those of its study, and {own['covered']:.0%} of the "
+        f"clearances lie in their 90 % interval.\n"
+        f"- If the machine has another friction law, it names the worn joint in {min(right):.0%} "
+        f"to {max(right):.0%} of the records, and warns that nothing fits in {min(warned):.0%} to "
+        f"{max(warned):.0%} of them.\n"
+        f"- A plain classifier that was trained on other machines of the same model is right in "
+        f"{plain:.0%} of the windows, without added noise.\n"
+    )
+
+
 def nameplate_table():
     """What the case file of `compsim init machine` gives over the small end's clearance."""
     scaled = (("peak_contact_force", 1e3), ("impacts_per_rev", 1.0),
@@ -1140,6 +1162,7 @@ PAGES = {
     "README.md": {"numbers": numbers_list},
     "configs/README.md": {"parameters": parameter_tables},
     "compressor/docs/extremes.md": {"reasons": reason_table, "stress-words": extremes_words},
+    "compressor/docs/diagnosis.md": {"identify-words": identify_words},
     "compressor/docs/my-machine.md": {"nameplate": nameplate_table},
     "compressor/docs/speed-or-accuracy.md": {"choose": choose_table},
     "compressor/docs/the-paper.md": {"paper": paper_words},

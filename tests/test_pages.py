@@ -6,6 +6,7 @@ are files named in their first line; `python` blocks run there; `bash` and `py` 
 
 import contextlib
 import json
+import math
 import re
 import shlex
 import subprocess
@@ -196,6 +197,23 @@ def test_the_machine_of_a_nameplate_was_run_as_it_is():
     (study,) = load_studies(example("machine"))
     kept = page_tables.kept("nameplate.json")["rows"]
     assert [row["key"] for row in kept] == [case.key for case in study.cases], "make nameplate"
+
+
+def test_the_words_about_the_machine_of_a_nameplate():
+    page = " ".join(PAGES["compressor/docs/my-machine.md"].split())
+    sound, *worn = page_tables.kept("nameplate.json")["rows"]
+    assert "From 0.12 mm on it strikes twice a revolution" in page
+    assert (sound["impacts_per_rev"], worn[0]["clearance_mm"]) == (0, 0.12)
+    assert {row["impacts_per_rev"] for row in worn} == {2}
+    assert "the sensor sees that at once" in page
+    assert worn[0]["sensor_rms"] > 10 * sound["sensor_rms"]
+    assert "nearly doubles up to 0.2 mm, and grows little after that" in page
+    force = {row["clearance_mm"]: row["peak_contact_force"] for row in (sound, *worn)}
+    assert 1.6 < force[0.2] / force[0.08] < 2
+    assert 1 < force[0.4] / force[0.2] < 1.2
+    assert "for about 150° of the crank at every clearance" in page
+    angles = [math.degrees(row["rod_load_reversal_angle"]) for row in (sound, *worn)]
+    assert max(abs(angle - 150) for angle in angles) < 3
 
 
 def test_what_features_cost_is_what_was_measured():
