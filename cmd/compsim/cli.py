@@ -19,7 +19,7 @@ from typing import Any
 import click
 
 from compressor.program import PROGRAM, CompsimError, CompsimWarning, library_versions
-from compressor.studies import verbs
+from compressor.studies import verbs_by_heading
 from compsim import (
     completion,
     export,
@@ -76,21 +76,28 @@ def cli() -> None:
     """
 
 
-for verb in (
-    init.init,
-    run.run,
-    report.report,
-    plot.plot,
-    plan.plan,
-    status.status,
-    show.show,
-    export.export,
-    verify.verify,
-    schema.schema,
-    completion.completion,
-    *verbs(),
-):
-    cli.add_command(verb)
+VERBS = {  # by their headings in `compsim --help`; studies bring their own
+    "Work": (
+        init.init,
+        plan.plan,
+        run.run,
+        report.report,
+    ),
+    "Read what is stored": (
+        status.status,
+        show.show,
+        plot.plot,
+        export.export,
+        verify.verify,
+    ),
+    **verbs_by_heading(),
+    "Shell and editor": (
+        completion.completion,
+        schema.schema,
+    ),
+}
+for heading, verbs in VERBS.items():
+    cli.add_under(heading, verbs)
 
 
 @contextlib.contextmanager

@@ -22,9 +22,10 @@ INSTALL = {
 @click.argument("shell", required=False, metavar="[SHELL]", type=click.Choice([*INSTALL]))
 @click.pass_context
 def completion(context: click.Context, shell: str | None) -> int:
-    """Print what makes a shell complete commands, options, case files, studies and jobs.
+    """Print the script by which a shell completes compsim's words.
 
-    Once, and it works in every new shell; without a SHELL these lines are printed:
+    It completes commands, options, case files, studies and jobs. Enter the line of your shell once,
+    and it works in every new shell; without a SHELL these lines are printed:
 
     \b
     bash  echo 'eval "$(compsim completion bash)"' >> ~/.bashrc

@@ -26,13 +26,14 @@ if TYPE_CHECKING:
 @click.command()
 @of_results("[STUDY|JOB]...", jobs)
 @click.option("-o", "--output", required=True, metavar="FILE|FOLDER",
-              help="A file, .nc or .csv, of a record .wav, .mat, .uff; or a folder.")  # fmt: skip
+              help="Write this file: .nc or .csv, or .wav, .mat or .uff for a record; or into a "
+              "folder.")  # fmt: skip
 @click.option("--format", "form", type=click.Choice(["netcdf", "csv", "wav", "mat", "uff"]),
-              help="Of the files in a folder; netcdf by default.")  # fmt: skip
-@click.option("--series", is_flag=True, help="Also the time series of each job of the studies.")
+              help="Write the files of a folder in this format; netcdf by default.")  # fmt: skip
+@click.option("--series", is_flag=True, help="Also write the time series of the studies' jobs.")
 @click.option("--force", is_flag=True, help="Replace files that exist.")
-@click.option("--json", "as_json", is_flag=True, help="A list of the files as JSON.")
-@click.option("--quiet", is_flag=True, help="No progress; damage is still told.")
+@click.option("--json", "as_json", is_flag=True, help="Print the list of the files as JSON.")
+@click.option("--quiet", is_flag=True, help="Print no progress; damage is still reported.")
 def export(
     given: tuple[str, ...],
     folder: str | None,
@@ -43,7 +44,11 @@ def export(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Write results for other programs: a study's metrics, a job's time series, or its record.
+    """Write results as files that other programs read.
+
+    \b
+    compsim export wear -o wear.csv
+    compsim export 3fa9c2 -o job.wav
 
     A STUDY becomes one table of its jobs, failed and missing ones included; a JOB, named by its key
     or the beginning of it, a table of samples, in CSV with its sensor's record as identify reads

@@ -23,12 +23,15 @@ def names(_: click.Context, __: click.Parameter, word: str) -> Items:
 @click.command()
 @click.argument("template", required=False, shell_complete=names)
 @click.option("-o", "--output", metavar="FILE", shell_complete=files,
-              help="The file, or a folder for it; by default TEMPLATE.yaml here.")  # fmt: skip
+              help="Write this file, or into this folder; TEMPLATE.yaml by default.")  # fmt: skip
 def init(template: str | None, output: str | None) -> int:
-    """Write a commented case file to start from, such as `compsim init wear`.
+    """Write a commented case file to start from.
+
+    \b
+    compsim init machine -o pump-house-2.yaml
 
     Its first lines say what it answers, how many jobs it has and how long they take. Without
-    TEMPLATE, what there is. A file that exists is never overwritten.
+    TEMPLATE, the templates are listed. A file that exists is never overwritten.
     """
     from compressor.cases import templates
 

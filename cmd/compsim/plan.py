@@ -35,12 +35,12 @@ if TYPE_CHECKING:
 @click.command()
 @configs_argument
 @output_option
-@jobs_option("Worker processes that the time is told for.")
+@jobs_option("Estimate the time with this many worker processes.")
 @setting
 @only_option
 @limit
 @click.option("--first", type=click.IntRange(min=0), default=5, show_default=True,
-              help="How many of the missing jobs to list.")  # fmt: skip
+              help="List this many of the missing jobs.")  # fmt: skip
 @as_json
 def plan(
     configs: tuple[str, ...],
@@ -52,10 +52,15 @@ def plan(
     first: int,
     as_json: bool,
 ) -> int:
-    """Tell what a run would do: its jobs, those that are stored, time and bytes of the others.
+    """Count the jobs of a run, and estimate its time and bytes.
 
-    Times up to a dozen jobs of each study, drawn over its design, for some seconds; stores
-    nothing. Of a file with `regimes` it tells chains and values alone.
+    \b
+    compsim plan machine.yaml
+    compsim plan wear.yaml --only 'clearance_mm < 0.2'
+
+    Jobs that are stored already are not run again. Times up to a dozen jobs of each study, drawn
+    over its design, for some seconds; stores nothing. Of a file with `regimes` it tells chains and
+    values alone.
     """
     from compressor.cases import load_studies
     from compressor.sweep import cores

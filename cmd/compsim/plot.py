@@ -34,23 +34,25 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 @of_results(ONE_JOB, jobs)
 @click.option(
     "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
-    help="Of a job analyst, signals, cards, spectra, orbits, modes, impacts; of a study cycles, "
-    f"segments, waterfall, map{MORE}.",
+    help="Draw only these figures: of a job analyst, signals, cards, spectra, orbits, modes, "
+    f"impacts; of a study cycles, segments, waterfall, map{MORE}.",
 )  # fmt: skip
 @click.option("-o", "--output", default="plots", show_default=True, shell_complete=folders,
-              help="Folder of the figures.")  # fmt: skip
-@click.option("--format", "form", type=click.Choice([*KINDS]), default="png", show_default=True)
+              help="Write the figures into this folder.")  # fmt: skip
+@click.option("--format", "form", type=click.Choice([*KINDS]), default="png", show_default=True,
+              help="Write figures as PNG, as SVG, or as both.")  # fmt: skip
 @click.option(
     "--over", default="", metavar="AXIS",
-    help="The axis of a study's rows; by default a clearance, else the speed.",
+    help="Draw a study's rows over this axis; by default a clearance, else the speed.",
 )  # fmt: skip
 @click.option(
     "--at", multiple=True, metavar="KEY=VALUE",
-    help="The value of another axis; by default its first.",
+    help="Draw the jobs with this value of another axis; by default its first.",
 )  # fmt: skip
 @click.option(
     "--limit", default="", metavar="LIMIT",
-    help="Of a segment's rms: m/s², such as 20, or times the machine without clearance, as 3x.",
+    help="Mark segments whose rms is above this: m/s², such as 20, or as 3x, times the machine "
+    "without clearance.",
 )  # fmt: skip
 def plot(
     given: tuple[str, ...],
@@ -62,10 +64,10 @@ def plot(
     at: tuple[str, ...],
     limit: str,
 ) -> int:
-    """Draw one job, or a study; prints files and captions.
+    """Draw one job, or one study.
 
-    A job is named as in compsim show: by the beginning of its key, or by its study and values of
-    the study's axes. A study's name alone means the study.
+    Prints the files and their captions. A job is named as in compsim show: by the beginning of its
+    key, or by its study and values of the study's axes. A study's name alone means the study.
 
     \b
     compsim plot 3fa9c2

@@ -8,18 +8,21 @@ import click
 
 OPTIONS = (
     click.option("--channel", metavar="NAME",
-                 help="Channel of the acceleration, by name or number from 1."),
+                 help="Read the acceleration from this channel, a name or a number from 1."),
     click.option("--unit", metavar="UNIT",
-                 help="Its unit: m/s2, mm/s2, g, in/s2 or ft/s2; in place of what the file says."),
+                 help="Take the acceleration in this unit, whatever the file says: m/s2, mm/s2, g, "
+                 "in/s2 or ft/s2."),
     click.option("--full-scale", type=float,
-                 help="Of whole numbers in WAV: what the greatest is, in the unit."),
-    click.option("--rate", type=float, help="Samples a second of a file without times."),
+                 help="Scale whole numbers in WAV so that the greatest is this, in the unit."),
+    click.option("--rate", type=float,
+                 help="Take so many samples a second where a file has no times."),
     click.option("--tacho", metavar="NAME",
-                 help="Channel of the tacho, by name or number from 1."),
+                 help="Read the tacho from this channel, a name or a number from 1."),
     click.option("--tacho-deg", type=float,
-                 help="Crank angle at which the tacho rises; 0 by default."),
-    click.option("--rpm", type=float, help="Steady speed of a record without a tacho."),
-    click.option("--tdc", type=float, help="A time of top dead centre in it, s."),
+                 help="Set the crank angle at which the tacho rises, in degrees; 0 by default."),
+    click.option("--rpm", type=float, help="Take this steady speed of a record without a tacho."),
+    click.option("--tdc", type=float,
+                 help="Take this time, in s, as a top dead centre, without a tacho."),
 )  # fmt: skip
 
 

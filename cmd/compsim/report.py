@@ -17,7 +17,7 @@ def page_folders(command: Callable[..., Any]) -> Callable[..., Any]:
     """Return a command with an option for each study whose own folder adds to the page."""
     for kind in STUDIES:
         if kind.page_folder:
-            text = f"Folder of what `compsim {kind.name}` wrote, if there is one."
+            text = f"Add what `compsim {kind.name}` wrote into this folder, if it is there."
             command = click.option(
                 f"--{kind.page_folder}", default=kind.page_folder, show_default=True,
                 shell_complete=folders, help=text,
@@ -28,11 +28,11 @@ def page_folders(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.command()
 @of_results()
 @click.option("-o", "--output", default="report", show_default=True, shell_complete=folders,
-              help="Folder of the report.")  # fmt: skip
+              help="Write the report into this folder.")  # fmt: skip
 @click.option(
     "--limit", "limits", multiple=True, metavar="NAME=VALUE,...",
-    help="Up to three limits of a metric, such as body_velocity_rms_mm_per_s=2,5: tables and "
-    "curves show its zones A to D.",
+    help="Show the zones A to D of a metric in tables and curves, by up to three limits, such as "
+    "body_velocity_rms_mm_per_s=2,5.",
 )  # fmt: skip
 @page_folders
 @click.pass_context
@@ -44,7 +44,14 @@ def report(
     limits: tuple[str, ...],
     **places: str,
 ) -> int:
-    """Draw figures and tables of stored studies; prints the path of the page."""
+    """Draw stored studies as a page of figures and tables.
+
+    \b
+    compsim report
+    compsim report /data/results -o page --limit body_velocity_rms_mm_per_s=2,5
+
+    Prints the path of the page, which a browser opens without a server.
+    """
     folder, _ = results_folder(given, folder, named=False)
     from compressor.store import read_studies, writable_folder
 

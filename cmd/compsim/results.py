@@ -157,7 +157,7 @@ def of_results(metavar: str = "", complete: Complete = folders) -> Callable[...,
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         option = click.option(
             "-i", "--input", "folder", metavar="FOLDER", show_default="results",
-            shell_complete=folders, help="Folder of results; or give it as first argument.",
+            shell_complete=folders, help="Read this folder of results; it may come as first word.",
         )  # fmt: skip
         whole = f"[FOLDER] {metavar}".rstrip()
         argument = click.argument("given", nargs=-1, metavar=whole, shell_complete=complete)

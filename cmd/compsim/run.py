@@ -56,7 +56,7 @@ class ShardType(click.ParamType):
 @click.command()
 @configs_argument
 @output_option
-@jobs_option("Worker processes.")
+@jobs_option("Run in this many worker processes.")
 @setting
 @only_option
 @limit
@@ -65,17 +65,17 @@ class ShardType(click.ParamType):
               "metric that this version gives. Can be given twice.",
 )  # fmt: skip
 @click.option("--shard", "part", type=ShardType(), metavar="I/N",
-              help="Run part I of N: for machines that share the folder.")  # fmt: skip
+              help="Run part I of N, where several computers share the folder.")  # fmt: skip
 @click.option("--backend", type=click.Choice(["local", "dask"]), default="local",
-              show_default=True, help="Where jobs run: here, or on a dask cluster.")  # fmt: skip
+              show_default=True, help="Run jobs here, or on a dask cluster.")  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS",
-              help="Of the dask cluster, such as tcp://host:8786.")  # fmt: skip
+              help="Find the dask cluster at this address, such as tcp://host:8786.")  # fmt: skip
 @click.option("--watch", is_flag=True,
-              help="Keep the page of the report fresh while jobs run; opens nothing.")  # fmt: skip
+              help="Write the page of the report again and again while jobs run.")  # fmt: skip
 @click.option("--report", default="report", show_default=True, metavar="FOLDER",
-              help="Folder of the page that --watch keeps.")  # fmt: skip
+              help="Write the page of --watch into this folder.")  # fmt: skip
 @click.option("--wait", is_flag=True, help="Wait for another run on the folder to end.")
-@click.option("--quiet", is_flag=True, help="No progress; errors and failed jobs are still told.")
+@click.option("--quiet", is_flag=True, help="Print no progress, but errors and failed jobs.")
 @click.pass_context
 def run(
     context: click.Context,
@@ -94,7 +94,11 @@ def run(
     wait: bool,
     quiet: bool,
 ) -> int:
-    """Simulate what case files ask for, and store it.
+    """Simulate what case files ask for, and store the results.
+
+    \b
+    compsim run machine.yaml
+    compsim run wear.yaml --set machine.speed_rpm=300 -o results-300
 
     A file with `regimes` is followed in chains along its key, in regimes/STUDY of the folder.
 

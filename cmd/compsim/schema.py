@@ -14,8 +14,11 @@ from compsim.screen import (
 def schema() -> int:
     """Print the JSON Schema of case files, for editors.
 
-    An editor with yaml-language-server completes keys, explains them and marks mistakes after
-    `compsim schema > compsim.schema.json`, in files with the first line
+    \b
+    compsim schema > compsim.schema.json
+
+    After this command an editor with yaml-language-server completes keys, explains them and marks
+    mistakes, in files with the first line
     `# yaml-language-server: $schema=compsim.schema.json`.
     """
     from compressor.cases import case_schema

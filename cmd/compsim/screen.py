@@ -60,7 +60,8 @@ configs_argument = click.argument(
     "configs", nargs=-1, required=True, metavar="CONFIG...", type=CaseFile(), shell_complete=files
 )
 output_option = click.option("-o", "--output", default="results", show_default=True,
-                             shell_complete=folders, help="Folder of results.")  # fmt: skip
+                             shell_complete=folders,
+                             help="Use this folder of results.")  # fmt: skip
 setting = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE",
     help="Set a key in all case files, such as machine.speed_rpm=300.",
@@ -75,13 +76,13 @@ def jobs_option(words: str) -> Callable[..., Any]:
 
 only_option = click.option(
     "--only", default="", metavar="COMPARISON",
-    help="Only the jobs for which this holds, such as 'clearance_mm < 0.2'; the others stay "
+    help="Take only the jobs for which this holds, such as 'clearance_mm < 0.2'; the others stay "
     "missing.",
 )  # fmt: skip
 MAX_JOBS = 10_000
 limit = click.option(
     "--max-jobs", type=click.IntRange(min=1), default=MAX_JOBS, show_default=True,
-    help="Refuse a case file that asks for more, before it is expanded.",
+    help="Refuse a case file that asks for more jobs than this.",
 )  # fmt: skip
 
 
@@ -214,7 +215,7 @@ def stored_before(count: int) -> str:
     return f", {count} {'was' if count == 1 else 'were'} stored before" if count else ""
 
 
-as_json = click.option("--json", "as_json", is_flag=True, help="The same as JSON.")
+as_json = click.option("--json", "as_json", is_flag=True, help="Print the same as JSON.")
 
 
 def size(count: float) -> str:

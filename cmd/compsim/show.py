@@ -38,14 +38,14 @@ def reversal_limits(_: click.Context, __: click.Parameter, text: str) -> tuple[f
 @click.command()
 @of_results(ONE_JOB, jobs)
 @click.option("--case", "only_case", is_flag=True,
-              help="The case alone, as a case file with all keys.")  # fmt: skip
+              help="Print the case alone, as a case file with all keys.")  # fmt: skip
 @click.option(
     "--reversal",
     default="15,3",
     show_default=True,
     metavar="DEG,PERCENT",
     callback=reversal_limits,
-    help="Least reversal of the rod load: degrees, and its smaller side's share.",
+    help="Ask for this reversal of the rod load: degrees, and percent on its smaller side.",
 )
 @as_json
 def show(
@@ -55,7 +55,7 @@ def show(
     reversal: tuple[float, float],
     as_json: bool,
 ) -> int:
-    """Tell what is known of one job.
+    """Print all that is known of one job.
 
     A job is named by the beginning of its key, or by its study and values of the study's axes:
 
@@ -63,11 +63,11 @@ def show(
     compsim show 3fa9c2
     compsim show bearing-wear clearance_mm=0.2 machine.rod_mass_kg=3
 
-    Which studies it belongs to and where in them, how it ended and why, its numbers with their
-    error bars, how it was run, and its case as YAML, as far as it differs from the defaults. Of one
-    that stopped, where, in which state, driven by which number of it, and its last steps. Of a job
-    with signals, whether the rod load at the crosshead pin changes its side as API 618 asks: 15
-    degrees and 3 percent, or as a maker does. --json has all numbers in SI.
+    It prints which studies the job belongs to and where in them, how it ended and why, its numbers
+    with their error bars, how it was run, and its case as YAML, as far as it differs from the
+    defaults. Of one that stopped, where, in which state, driven by which number of it, and its last
+    steps. Of a job with signals, whether the rod load at the crosshead pin changes its side as API
+    618 asks: 15 degrees and 3 percent, or as a maker does. --json has all numbers in SI.
     """
     folder, words = results_folder(given, folder)
     from compressor.store import report_job

@@ -22,11 +22,15 @@ PROMISES = {"kept": "kept what accuracy promises", "none": "without a promise"}
 @of_results()
 @as_json
 def status(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
-    """Tell how many jobs of each stored study are done, failed or missing, and why they failed.
+    """Count jobs that are done, failed or missing, and say why.
 
-    Of those that are ok, also how many keep what their accuracy promises, how many move
-    periodically, predictably or chaotically, how many were not seen to repeat, whose sensor record
-    is clipped, and which keys are outside the range that the program was judged on.
+    \b
+    compsim status
+    compsim status /data/results
+
+    One line a study. Of those that are ok, also how many keep what their accuracy promises, how
+    many move periodically, predictably or chaotically, how many were not seen to repeat, whose
+    sensor record is clipped, and which keys are outside the range that the program was judged on.
     """
     folder, _ = results_folder(given, folder, named=False)
     from compressor.outcome import regime_words

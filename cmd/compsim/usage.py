@@ -1,21 +1,43 @@
 """Mistakes on the command line: each is answered by one line that says what to do."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 
 from compressor.program import did_you_mean
 
 CASE_FILES = (".yaml", ".yml")
+WHOLE = 1000  # characters, from which click would cut a summary
 HELP_OPTIONS = {"help": "compsim --help, or compsim COMMAND --help", "version": "compsim --version"}
 # what stands for the folder of results in some commands, and is asked of others in vain
 FOLDERS = {"-o": "output", "--output": "output", "-i": "folder", "--input": "folder"}
 
 
 class Commands(click.Group):
-    """The group of commands; the error of an unknown one says what was probably meant."""
+    """The commands, listed by headings; the error of an unknown one says what was meant."""
+
+    def __init__(self, *values: Any, **more: Any):
+        super().__init__(*values, **more)
+        self.headings: dict[str, list[str]] = {}
+
+    def add_under(self, heading: str, commands: Iterable[click.Command]) -> None:
+        """Add commands, which `--help` lists under a heading."""
+        for command in commands:
+            self.add_command(command)
+            self.headings.setdefault(heading, []).append(str(command.name))
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands by headings, each with the whole first sentence of its help."""
+        longest = max(map(len, self.commands))
+        for heading, names in self.headings.items():
+            with formatter.section(heading):
+                formatter.write_dl([
+                    (f"{name:<{longest}}", self.commands[name].get_short_help_str(WHOLE))
+                    for name in names
+                ])  # fmt: skip
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

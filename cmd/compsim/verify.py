@@ -24,10 +24,13 @@ if TYPE_CHECKING:
 @of_results()
 @as_json
 def verify(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
-    """Compare every stored file with its checksum; exit code 5 if any is damaged.
+    """Compare every stored file with its checksum.
+
+    \b
+    compsim verify results
 
     Damaged files are listed with the jobs that are lost with them, by study and swept values, and
-    with the command that computes them again.
+    with the command that computes them again. Exit code 5 if any is damaged.
     """
     folder, _ = results_folder(given, folder, named=False)
     from compressor.store import verify as compare

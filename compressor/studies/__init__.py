@@ -20,12 +20,15 @@ if TYPE_CHECKING:
     from compressor.report import Add
     from compressor.store import Folder
 
+RECORDS = "Work with measured records"  # a heading of `compsim --help`
+
 
 @dataclass(frozen=True, eq=False)
 class StudyKind:
     """A kind of study: where its parts are in its folder.
 
-    `verbs`: of the command line, which its module `command` has.
+    `verbs`: of the command line, which its module `command` has; `compsim --help` lists them under
+    `heading`.
     `group`: the group of keys by which a case file asks `compsim run` for it; its module `command`
     then has `check_options`, `run_studies`, `ahead` and `ahead_lines`, and its module `group` what
     `compressor.cases.StudyRequest` says.
@@ -43,6 +46,7 @@ class StudyKind:
     files: StudyFiles | None = None
     has_page: bool = False
     page_folder: str = ""
+    heading: str = "Study a machine or the model"
 
     def module(self, name: str) -> Any:
         """Return a module of its folder."""
@@ -61,20 +65,23 @@ STUDIES = (
         files=StudyFiles("wear/*.nc", "wear/*.nc",
                          "how machines have worn", "compsim wear CONFIG... tells of them"),
     ),
-    StudyKind("diagnosis", ("dataset", "identify")),
+    StudyKind("diagnosis", ("dataset", "identify"), heading=RECORDS),
     StudyKind("tradeoff", ("tradeoff", "explain"), has_page=True, files=StudyFiles("models/*.nc")),
     StudyKind("stress", ("stress",)),
     StudyKind("search", ("find",)),
-    StudyKind("compare", ("compare",)),
-    StudyKind("calibrate", ("calibrate",)),
+    StudyKind("compare", ("compare",), heading=RECORDS),
+    StudyKind("calibrate", ("calibrate",), heading=RECORDS),
 )  # fmt: skip
 STUDY_FILES[:] = [kind.files for kind in STUDIES if kind.files]
 STUDY_GROUPS.update({kind.group: partial(kind.module, "group") for kind in STUDIES if kind.group})
 
 
-def verbs() -> "list[click.Command]":
-    """Return the commands of all studies."""
-    return [getattr(kind.module("command"), verb) for kind in STUDIES for verb in kind.verbs]
+def verbs_by_heading() -> "dict[str, list[click.Command]]":
+    """Return the commands of all studies by their headings in `compsim --help`."""
+    found: dict[str, list[click.Command]] = {kind.heading: [] for kind in STUDIES if kind.verbs}
+    for kind in STUDIES:
+        found[kind.heading] += [getattr(kind.module("command"), verb) for verb in kind.verbs]
+    return found
 
 
 def kind_of(study: "Study") -> StudyKind | None:

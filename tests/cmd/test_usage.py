@@ -14,7 +14,7 @@ LAST = "see compsim --help"
     [
         (["rum"], "compsim: No such command 'rum'; did you mean run?"),
         (["Status"], "compsim: No such command 'Status'; did you mean status?"),
-        (["xyzzy"], "compsim: No such command 'xyzzy'; there are init, run, report, "),
+        (["xyzzy"], "compsim: No such command 'xyzzy'; there are init, plan, run, report, "),
         (["help"], "compsim: No such command 'help': compsim --help, or compsim COMMAND --help"),
         (["help", "show"], "compsim: No such command 'help': compsim show --help"),
         (["version"], "compsim: No such command 'version': compsim --version"),
@@ -54,7 +54,7 @@ def test_a_mistake_is_one_line(words, told, tmp_path, monkeypatch, capsys):
 def test_alone_the_program_says_what_it_can_do(capsys):
     cli.main([])
     said = "".join(capsys.readouterr())
-    assert "Commands:" in said
+    assert "Work:" in said
     assert "To begin: compsim init." in said
 
 

@@ -29,18 +29,18 @@ POOR_FIT = 1.3  # misfit from which on the machine is said not to be this one
 @click.argument("record", metavar="RECORD|JOB", shell_complete=files)
 @click.argument("config", metavar="CONFIG", shell_complete=files)
 @click.option("--fit", "ranges", multiple=True, required=True, metavar="KEY=LOW:HIGH",
-              help="A key that is not known and its range, in the case file's unit.")  # fmt: skip
+              help="Fit this key within this range, in the case file's unit.")  # fmt: skip
 @record_options
 @setting
 @output_option
-@jobs_option("Worker processes.")
+@jobs_option("Run in this many worker processes.")
 @as_json
-@click.option("--quiet", is_flag=True, help="No progress.")
+@click.option("--quiet", is_flag=True, help="Print no progress.")
 def calibrate(
     record: str, config: str, ranges: tuple[str, ...], hints: dict[str, Any],
     overrides: tuple[str, ...], output: str, jobs: int | None, as_json: bool, quiet: bool,
 ) -> int:  # fmt: skip
-    """Fit keys of a sound machine to a record of its accelerometer, and print its case file.
+    """Fit keys of a sound machine to its accelerometer's record.
 
     \b
     compsim calibrate healthy.csv machine.yaml \\

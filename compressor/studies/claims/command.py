@@ -30,15 +30,15 @@ EXAMPLES = ("claims", "assumptions")
 @click.command()
 @click.argument("configs", nargs=-1, metavar="[CONFIG...]", shell_complete=files)
 @click.option("-o", "--output", default="claims", show_default=True, shell_complete=folders,
-              help="Folder of the verdicts.")  # fmt: skip
+              help="Write the verdicts into this folder.")  # fmt: skip
 @click.option("--search", "generations", type=click.IntRange(min=0), default=0, metavar="N",
-              help="Then look for the least change that makes all claims hold: N generations of "
-              "some 50 machines, in the ranges that a CONFIG draws from.")  # fmt: skip
-@jobs_option("Worker processes.")
+              help="Search for the least change by which all claims hold: N generations of some "
+              "50 machines, in the ranges that a CONFIG draws from.")  # fmt: skip
+@jobs_option("Run in this many worker processes.")
 @setting
 @limit
 @as_json
-@click.option("--quiet", is_flag=True, help="No progress.")
+@click.option("--quiet", is_flag=True, help="Print no progress.")
 def claims(
     configs: tuple[str, ...],
     output: str,
@@ -49,14 +49,18 @@ def claims(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Judge the paper's eight claims on many machines, over assumptions that the paper leaves open.
+    """Judge the paper's eight claims on many machines.
 
-    Every point of a CONFIG is a machine: masses, friction, contact, loads. Each is judged by the
-    paper's nine worn cases, which are run in memory. NAME.nc in the folder has the margin of each
-    claim, 0 at its threshold, with its error; the same command goes on from it. Without CONFIG, the
-    map over rod and reciprocating mass (claims.nc), and all assumptions drawn for a variance-based
-    sensitivity (assumptions.nc), by the examples that come with the program. `compsim report` draws
-    them.
+    \b
+    compsim claims
+    compsim claims assumptions.yaml --search 20
+
+    The machines cover assumptions that the paper leaves open. Every point of a CONFIG is a machine:
+    masses, friction, contact, loads. Each is judged by the paper's nine worn cases, which are run
+    in memory. NAME.nc in the folder has the margin of each claim, 0 at its threshold, with its
+    error; the same command goes on from it. Without CONFIG, the map over rod and reciprocating mass
+    (claims.nc), and all assumptions drawn for a variance-based sensitivity (assumptions.nc), by the
+    examples that come with the program. `compsim report` draws them.
 
     Exit code 3 if a machine has no verdict.
     """

@@ -33,9 +33,9 @@ def record_then_jobs(context: click.Context, parameter: click.Parameter, word: s
 @of_results("RECORD JOB|STUDY...", record_then_jobs)
 @record_options
 @click.option("-o", "--output", metavar="FILE",
-              help="Also draw: .png or .svg, or .csv for the figure's numbers.")  # fmt: skip
+              help="Draw this figure, .png or .svg, or write its numbers as .csv.")  # fmt: skip
 @as_json
-@click.option("--quiet", is_flag=True, help="No progress.")
+@click.option("--quiet", is_flag=True, help="Print no progress.")
 def compare(
     given: tuple[str, ...],
     folder: str | None,
@@ -44,7 +44,11 @@ def compare(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Compare a record with the sensor's records of stored jobs: how alike, and what does not fit.
+    """Compare a record with the sensor's records of stored jobs.
+
+    \b
+    compsim compare record.csv machines -o beside.png
+    compsim compare record.csv 3fa9c2 81e6f8
 
     RECORD is a file, as of compsim identify, or a job; after it come jobs, by the beginnings of
     their keys, and studies, which stand for all their jobs. The most alike job comes first.

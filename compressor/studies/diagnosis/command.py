@@ -37,19 +37,21 @@ def levels(context: click.Context, parameter: click.Parameter, text: str) -> tup
 
 @click.command()
 @of_results("STUDY", studies)
-@click.option("-o", "--output", required=True, metavar="FOLDER", help="Folder of the data set.")
+@click.option("-o", "--output", required=True, metavar="FOLDER",
+              help="Write the data set into this folder.")  # fmt: skip
 @click.option("--revolutions", type=click.IntRange(min=2), default=5, show_default=True,
-              help="Whole revolutions of a window.")  # fmt: skip
+              help="Cut windows of so many whole revolutions.")  # fmt: skip
 @click.option("--hop", type=click.IntRange(min=1), show_default="as many",
-              help="Revolutions from the begin of a window to that of the next.")  # fmt: skip
+              help="Begin a window so many revolutions after the last one began.")  # fmt: skip
 @click.option("--noise", default="0", show_default=True, callback=levels, metavar="RMS,...",
-              help="White noise that is added, m/s2 rms; features at each level.")  # fmt: skip
+              help="Add white noise of this rms, m/s2, with features at each level.")  # fmt: skip
 @click.option("--test-share", type=click.FloatRange(0, 1, min_open=True, max_open=True),
-              default=0.3, show_default=True, help="Machines that are for testing.")  # fmt: skip
+              default=0.3, show_default=True,
+              help="Set this share of the machines aside for tests.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True,
-              help="Of noise and split.")  # fmt: skip
-@click.option("--no-signals", is_flag=True, help="Features and labels, without samples.")
-@click.option("--quiet", is_flag=True, help="No progress.")
+              help="Draw noise and split by this seed.")  # fmt: skip
+@click.option("--no-signals", is_flag=True, help="Write features and labels, without samples.")
+@click.option("--quiet", is_flag=True, help="Print no progress.")
 def dataset(
     given: tuple[str, ...],
     folder: str | None,
@@ -62,10 +64,14 @@ def dataset(
     no_signals: bool,
     quiet: bool,
 ) -> int:
-    """Make labelled windows of a study's sensor records, with features, split by machine.
+    """Make labelled windows of a study's sensor records.
 
-    Writes windows.nc, features.parquet and README.md, a card of what was simulated and what is not
-    in it, and replaces those of an earlier data set. The study needs a body and a sensor.
+    \b
+    compsim dataset diagnosis -o windows --noise 0,0.5
+
+    The windows have features, and are split by machine. Writes windows.nc, features.parquet and
+    README.md, a card of what was simulated and what is not in it, and replaces those of an earlier
+    data set. The study needs a body and a sensor.
     """
     folder, words = results_folder(given, folder)
     study = one_word(words, "STUDY")
@@ -105,10 +111,10 @@ def describe_dataset(data_set: "xr.Dataset") -> list[str]:
 @click.command()
 @of_results("RECORD|JOB", files)
 @click.option("--study", required=True, shell_complete=studies,
-              help="Stored study with sensor records, to explain it by.")  # fmt: skip
+              help="Explain the record by the jobs of this stored study.")  # fmt: skip
 @record_options
 @as_json
-@click.option("--quiet", is_flag=True, help="No progress.")
+@click.option("--quiet", is_flag=True, help="Print no progress.")
 def identify(
     given: tuple[str, ...],
     study: str,
@@ -117,7 +123,11 @@ def identify(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Tell which joint, with which clearance, explains a record of an accelerometer.
+    """Name the joint and clearance that explain a sensor's record.
+
+    \b
+    compsim identify record.csv --study machines
+    compsim identify record.wav --study machines --channel 1 --unit g --tacho 2
 
     The record is a file, .csv, .wav, .mat or .uff, of which the simplest is a CSV file with the
     columns time_s, acceleration_m_per_s2 and tacho, a signal that rises at each top dead centre;

@@ -36,25 +36,25 @@ UNBARRED = " (no error bar was made)"
 @click.command()
 @click.argument("config", metavar="CONFIG", shell_complete=files)
 @click.option("--over", required=True, metavar="KEY=LOW:HIGH",
-              help="The key to search over and its range, in the case file's unit.")  # fmt: skip
+              help="Search over this key within this range, in the case file's unit.")  # fmt: skip
 @click.option("--first", metavar="'METRIC[.JOINT] > VALUE'",
-              help="Where this first becomes true going up: > >= < <=, VALUE in SI.")  # fmt: skip
-@click.option("--greatest", metavar="METRIC[.JOINT]", help="Where the metric is greatest.")
-@click.option("--least", metavar="METRIC[.JOINT]", help="Where the metric is least.")
+              help="Find where this becomes true going up: > >= < <=, VALUE in SI.")  # fmt: skip
+@click.option("--greatest", metavar="METRIC[.JOINT]", help="Find where the metric is greatest.")
+@click.option("--least", metavar="METRIC[.JOINT]", help="Find where the metric is least.")
 @click.option("--tolerance", type=click.FloatRange(1e-9, 0.5), default=1e-3, show_default=True,
-              help="Of the answer, relative to the range.")  # fmt: skip
+              help="Narrow the answer down to this, relative to the range.")  # fmt: skip
 @click.option("--scan", type=click.IntRange(3, 1000), default=9, show_default=True,
-              help="Evenly spaced points that are looked at first.")  # fmt: skip
-@click.option("--log", "logarithmic", is_flag=True, help="Evenly in the logarithm of the key.")
+              help="Run so many evenly spaced points first.")  # fmt: skip
+@click.option("--log", "logarithmic", is_flag=True, help="Space points evenly in the logarithm.")
 @setting
 @output_option
-@jobs_option("Worker processes, and points of one step of --first.")
+@jobs_option("Run in this many worker processes, as many points in one step of --first.")
 @as_json
-@click.option("--quiet", is_flag=True, help="No progress.")
+@click.option("--quiet", is_flag=True, help="Print no progress.")
 def find(
     config: str, output: str, jobs: int | None, as_json: bool, quiet: bool, **options: Any
 ) -> int:
-    """Search one key of a case for where a metric passes a value, or is greatest or least.
+    """Find where a metric passes a value, or is greatest or least.
 
     \b
     compsim find worn.yaml --over clearance_mm=0.01:0.3 \\

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("-n", "--scenes", type=click.IntRange(min=1), default=2000, show_default=True,
-              help="How many scenes are drawn.")  # fmt: skip
+              help="Draw this many scenes.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
-              help="Of the draws.")  # fmt: skip
+              help="Draw by this seed.")  # fmt: skip
 @click.option(
     "--laws",
     "drawn",
@@ -40,23 +40,28 @@ if TYPE_CHECKING:
     flag_value="features",
     help="Draw laws, oil, guide, drive and rod as well.",
 )
-@jobs_option("Worker processes.")
+@jobs_option("Run in this many worker processes.")
 @click.option("-o", "--output", default="stress", show_default=True,
-              help="Folder of the campaign.")  # fmt: skip
+              help="Write the campaign into this folder.")  # fmt: skip
 @click.option("--scene", type=click.IntRange(min=0),
               help="Repeat this scene of the seed alone, and store nothing.")  # fmt: skip
-@click.option("--quiet", is_flag=True, help="No progress.")
+@click.option("--quiet", is_flag=True, help="Print no progress.")
 def stress(
     scenes: int, seed: int, drawn: str | None, jobs: int | None, output: str, scene: int | None,
     quiet: bool,
 ) -> int:  # fmt: skip
-    """Test numerical stability at the extremes: draw scenes, run each, and judge what it says.
+    """Test numerical stability on extreme cases drawn at random.
 
-    Half of the scenes lie in the range that is documented as supported, half go far beyond. A scene
-    ends ok, confirmed by another integrator at a hundredth of its tolerance; failed, with a named
-    reason; silent_wrong, when a number lies ten times farther off than its error bar tells; or
-    unjudged. Writes stress.nc, from which the same command goes on, and the map stress.png and
-    stress.svg; shares and worst cases go to stdout. --scene prints one as a case file, and its end.
+    \b
+    compsim stress -n 200 --seed 7
+    compsim stress --seed 7 --scene 12
+
+    Each scene is run, and what it says is judged. Half of the scenes lie in the range that is
+    documented as supported, half go far beyond. A scene ends ok, confirmed by another integrator at
+    a hundredth of its tolerance; failed, with a named reason; silent_wrong, when a number lies ten
+    times farther off than its error bar tells; or unjudged. Writes stress.nc, from which the same
+    command goes on, and the map stress.png and stress.svg; shares and worst cases go to stdout.
+    --scene prints one as a case file, and its end.
 
     Exit code 3 if any number is wrong in silence, or more than 2 % of the scenes are unjudged.
     """

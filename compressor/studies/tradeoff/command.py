@@ -79,13 +79,13 @@ def align_rows(rows: Sequence[Sequence[str]], notes: Sequence[str]) -> Iterator[
 @click.command()
 @click.argument("configs", nargs=-1, metavar="[CONFIG...]", shell_complete=files)
 @click.option("-o", "--output", default="tradeoff", show_default=True, shell_complete=folders,
-              help="Folder of the study.")  # fmt: skip
+              help="Write the study into this folder.")  # fmt: skip
 @click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True,
-              help="Rounds over all points; the best time counts.")  # fmt: skip
+              help="Time all points in so many rounds; the best time counts.")  # fmt: skip
 @click.option("--budget", type=click.FloatRange(min=0, min_open=True), default=4.0,
-              show_default=True, help="Seconds that one point may take.")  # fmt: skip
+              show_default=True, help="Allow one point so many seconds.")  # fmt: skip
 @setting
-@click.option("--quiet", is_flag=True, help="No progress.")
+@click.option("--quiet", is_flag=True, help="Print no progress.")
 def tradeoff(
     configs: tuple[str, ...],
     output: str,
@@ -94,7 +94,10 @@ def tradeoff(
     overrides: tuple[str, ...],
     quiet: bool,
 ) -> int:
-    """Measure speed against accuracy by method and tolerance, and what the model's features do.
+    """Measure speed against accuracy, and what model features do.
+
+    \b
+    compsim tradeoff machine.yaml --repeats 1 --budget 1
 
     Every job of the case files, or the paper's three faults at 0.2 mm where there is none (some
     five minutes), by every method at every tolerance. Writes tradeoff.nc and modelling.nc, which
@@ -206,14 +209,14 @@ INDENT = 12  # columns of a heading
 @click.command()
 @configs_argument
 @click.option("-j", "--jobs", type=click.IntRange(min=1), default=2, show_default=True,
-              help="Worker processes that the sweep's cost is told for.")  # fmt: skip
+              help="Estimate the sweep's cost with this many worker processes.")  # fmt: skip
 @click.option("--models", is_flag=True,
-              help="Instead: how far choices of the model move each metric.")  # fmt: skip
+              help="Measure instead how far choices of the model move each metric.")  # fmt: skip
 @click.option("-o", "--output", shell_complete=folders, show_default="results",
-              help="Folder of results that keeps what --models finds.")  # fmt: skip
+              help="Store what --models finds in this folder of results.")  # fmt: skip
 @setting
 @limit
-@click.option("--json", "as_json", is_flag=True, help="The same as JSON, a list of studies.")
+@click.option("--json", "as_json", is_flag=True, help="Print the same as JSON, a list of studies.")
 def explain(
     configs: tuple[str, ...],
     jobs: int,
@@ -223,7 +226,11 @@ def explain(
     max_jobs: int,
     as_json: bool,
 ) -> int:
-    """Tell what case files ask for: terms, natural scales, cost, and what is paid for in vain.
+    """Estimate the cost, scales and droppable features of a case.
+
+    \b
+    compsim explain machine.yaml
+    compsim explain machine.yaml --models
 
     Runs the first job of each case file, and again without each feature that it pays for. With
     --models it runs that job by other contact and friction laws, twice and half the contact

@@ -38,11 +38,11 @@ HEAD = f"{'worn out after, h':>17}  {'from more to less wear, h':>31}  at the en
 @click.command()
 @configs_argument
 @output_option
-@jobs_option("Worker processes.")
+@jobs_option("Run in this many worker processes.")
 @setting
 @click.option("--rerun", is_flag=True, help="Go on with machines whose motion failed.")
 @as_json
-@click.option("--quiet", is_flag=True, help="No progress; errors are still told.")
+@click.option("--quiet", is_flag=True, help="Print no progress; errors are still reported.")
 def wear(
     configs: tuple[str, ...],
     output: str,
@@ -52,13 +52,16 @@ def wear(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Wear the bores of case files with `wear`, until a joint is worn out.
+    """Wear bearings over operating hours, until one is worn out.
 
-    Motion and wear take turns: a motion on the bores as they are wears them by Archard's law, and
-    stands for all revolutions until the deepest place has grown by wear.step_mm. One line a machine
-    goes to stdout: the hours until a clearance reaches wear.limit_mm, with the least and the
-    greatest coefficient beside them. Profiles and the motion on them are kept in wear/ of the
-    folder, with a figure; what was interrupted goes on from there.
+    \b
+    compsim wear life.yaml
+
+    CONFIG has a group `wear`. Motion and wear take turns: a motion on the bores as they are wears
+    them by Archard's law, and stands for all revolutions until the deepest place has grown by
+    wear.step_mm. One line a machine goes to stdout: the hours until a clearance reaches
+    wear.limit_mm, with the least and the greatest coefficient beside them. Profiles and the motion
+    on them are kept in wear/ of the folder, with a figure; what was interrupted goes on from there.
     """
     one_thread_each()  # before numpy loads
     from compressor.cases import load_studies
