@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify calibrate nameplate stress chaos mutants measurements pages clean
+.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify calibrate nameplate stress chaos mutants measurements pages docs clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -133,6 +133,11 @@ pages: install  ## write the pages' generated tables, compressor/API.md, the tut
 	$(BIN)/python tests/api_page.py
 	$(BIN)/python tests/tutorial.py
 
-clean:  ## remove results, report, claims, tradeoff, stress and caches; .venv stays
-	rm -rf results report claims tradeoff stress .pytest_cache .mypy_cache .ruff_cache .hypothesis
+docs: install  ## build the pages as a site with search: site/index.html
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'compsim[docs]'
+	$(BIN)/python -m sphinx -W --keep-going --quiet -c compressor/docs -d site/.doctrees . site
+	@echo site/index.html
+
+clean:  ## remove results, report, claims, tradeoff, stress, site and caches; .venv stays
+	rm -rf results report claims tradeoff stress site .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

@@ -81,6 +81,8 @@ def read_sources() -> Sources:
     for top in ("compressor", "cmd/compsim"):
         for path in sorted((ROOT / top).rglob("*.py")):
             parts = path.relative_to(ROOT).with_suffix("").parts
+            if parts[1] == "docs":
+                continue  # the settings of the site are no part of the program
             parts = parts[parts[0] == "cmd" :]
             found[".".join(part for part in parts if part != "__init__")] = path.read_text("utf-8")
     return found
