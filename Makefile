@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify calibrate nameplate stress chaos mutants measurements pages docs clean
+.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify calibrate nameplate stress chaos mutants measurements pages docs release lock clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -138,6 +138,20 @@ docs: install  ## build the pages as a site with search: site/index.html
 	$(BIN)/python -m sphinx -W --keep-going --quiet -c compressor/docs -d site/.doctrees . site
 	@echo site/index.html
 
-clean:  ## remove results, report, claims, tradeoff, stress, site and caches; .venv stays
-	rm -rf results report claims tradeoff stress site .pytest_cache .mypy_cache .ruff_cache .hypothesis
+release: install  ## build wheel and sdist in dist/, check them, and run the paper's cases by the wheel alone
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'compsim[release]'
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist .
+	$(BIN)/python -m twine check --strict dist/*
+	$(BIN)/python tests/release.py dist
+
+lock:  ## write the versions that a fresh environment for tests and site gets: .ci/requirements.lock
+	@place=$$(mktemp -d) && trap 'rm -rf "$$place"' EXIT && $(PYTHON) -m venv "$$place" \
+	  && "$$place/bin/python" -m pip install --quiet --disable-pip-version-check --editable '.[dev,docs]' \
+	  && { echo "# make lock, $$(date +%F), $$($(PYTHON) -VV | cut -d' ' -f1-2); to install them:"; \
+	    echo "# pip install -c .ci/requirements.lock -e '.[dev,docs]'"; \
+	    "$$place/bin/python" -m pip --disable-pip-version-check freeze --exclude-editable; } > .ci/requirements.lock
+
+clean:  ## remove results, report, claims, tradeoff, stress, site, dist and caches; .venv stays
+	rm -rf results report claims tradeoff stress site dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

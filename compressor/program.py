@@ -14,7 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
-VERSION = "0.1.0"
+VERSION = "0.1.0"  # the one place; CHANGELOG.md says what has changed
 PROGRAM = f"compsim {VERSION}"  # as stored results name it
 COMPILED = Path(__file__).parent / "physics"  # the sources that are compiled
 CODE_VARIABLE = "NUMBA_CACHE_DIR"

@@ -55,17 +55,19 @@ class Interrupted(BaseException):
 
 
 def version(context: click.Context, _: click.Parameter, is_set: bool) -> None:
-    """Print the version of the program and of what it computes with, and end."""
+    """Print the versions of the program, of its model and of its libraries, and end."""
     if is_set and not context.resilient_parsing:
+        from compressor.cases import MODEL
+
         others = {"Python": platform.python_version()} | library_versions(*LIBRARIES)
         listed = ", ".join(f"{name} {number}" for name, number in others.items())
-        click.echo(f"{PROGRAM} ({listed})")
+        click.echo(f"{PROGRAM}, model {MODEL} ({listed})")
         context.exit()
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=version,
-              help="Print the versions of program and libraries.")  # fmt: skip
+              help="Print the versions of program, model and libraries.")  # fmt: skip
 def cli() -> None:
     """Sweep a reciprocating compressor over joint clearances, and draw what comes out.
 

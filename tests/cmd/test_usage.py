@@ -6,6 +6,8 @@ from importlib import metadata
 import pytest
 from compsim import cli
 
+from compressor.cases import MODEL
+
 LAST = "see compsim --help"
 
 
@@ -62,5 +64,5 @@ def test_versions_are_one_line(capsys):
     assert cli.main(["--version"]) == 0
     out = capsys.readouterr().out
     assert out.count("\n") == 1
-    assert re.match(r"compsim \d+\.\d+\.\d+ \(Python 3", out)
+    assert re.match(rf"compsim \d+\.\d+\.\d+, model {re.escape(MODEL)} \(Python 3", out)
     assert f"numba {metadata.version('numba')}" in out

@@ -1,0 +1,49 @@
+"""Versions: each has one source, the changes name it, and a lock has what CI installs."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import release
+
+from compressor.cases import MODEL, MODEL_VERSION
+from compressor.cases.case import CHANGES
+from compressor.program import VERSION
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+CHANGELOG = (ROOT / "compressor/CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_version_has_one_source():
+    assert "version" not in PROJECT["project"]
+    assert PROJECT["tool"]["setuptools"]["dynamic"] == {
+        "version": {"attr": "compressor.program.VERSION"}
+    }
+
+
+def test_the_changes_name_the_versions_of_today():
+    first = re.search(r"^## (.*)$", CHANGELOG, re.MULTILINE)
+    assert f"Program {VERSION}, model {MODEL}" in first[1]
+
+
+def test_every_revision_of_the_model_is_among_the_changes():
+    rows = dict(re.findall(r"^\| ([\d.]+) \| [^|]* \| (.*) \|$", CHANGELOG, re.MULTILINE))
+    assert {MODEL, MODEL_VERSION} <= {*rows}
+    for one in CHANGES:
+        assert one.what in rows[f"{MODEL_VERSION}.{one.revision}"]
+
+
+def test_the_lock_has_what_is_installed_for_tests_and_site():
+    text = (ROOT / ".ci/requirements.lock").read_text(encoding="utf-8")
+    locked = {name.lower().replace("_", "-") for name in re.findall(r"^([\w.-]+)==", text, re.M)}
+    more = PROJECT["project"]["optional-dependencies"]
+    asked = PROJECT["project"]["dependencies"] + more["dev"] + more["docs"]
+    assert {re.match(r"[\w.-]+", one)[0].lower() for one in asked} <= locked
+
+
+def test_data_files_that_a_wheel_must_hold():
+    found = {*release.data_files()}
+    assert "compressor/py.typed" in found
+    assert "compressor/cases/examples/paper.yaml" in found
+    assert {Path(name).parts[-3] for name in found if "templates" in name} >= {"report", "claims"}
