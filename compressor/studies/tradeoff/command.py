@@ -169,7 +169,7 @@ def fastest_lines(study: "xr.Dataset") -> Iterator[str]:
     from compressor.studies.tradeoff.work_precision import fastest
 
     width = max(len(name) for name in study["scene"].values)
-    yield f"{'scene':<{width}}  {'error below':>11}  {'method':<7} {'rtol':>7}  {'ms':>7}"
+    yield f"{'case':<{width}}  {'error below':>11}  {'method':<7} {'rtol':>7}  {'ms':>7}"
     for row in fastest(study):
         yield (
             f"{row['scene']:<{width}}  {row['error_below']:>11.0e}  {row['method']:<7} "
@@ -301,7 +301,7 @@ def lines(facts: "Explanation") -> Iterator[str]:
     yield f"{facts.study}: {plural(facts.jobs)}" + (f"; explained: {point}" if point else "")
     count = len(facts.unknowns)
     solved = f"{count} degrees of freedom" if count else "closed form, nothing integrated"
-    yield heading("scene", f"{facts.scene}: {solved}")
+    yield heading("motion", f"{facts.scene}: {solved}")
     if count:
         yield heading("", "; ".join(name.rpartition(",")[0] for name in facts.unknowns))
     for number, (term, words) in enumerate(facts.active.items()):
