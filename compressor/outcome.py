@@ -128,6 +128,24 @@ class Outcome:
         return named
 
 
+# what a job is told by in words, as attributes of its Dataset and as variables: their meaning
+WORDS = {
+    "promise": "whether what accuracy promises was kept; none given",
+    "regime": "; ".join(map(regime_words, Regime)),
+}
+
+
+def word_variables(attributes: Mapping[str, Any]) -> dict[str, "Variable"]:
+    """Return the promise and the regime in a job's attributes as variables, as a study has them.
+
+    Files of time series hold them as attributes alone.
+    """
+    return {
+        name: Variable((), np.asarray(str(attributes.get(name, ""))), {"long_name": phrase})
+        for name, phrase in WORDS.items()
+    }
+
+
 def _rebuild_outcome(status: str, reason: str, numbers: bytes, *rest: Any) -> Outcome:
     return Outcome(status, reason, row(numbers), *rest)
 

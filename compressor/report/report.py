@@ -80,7 +80,7 @@ from compressor.store import (
     Folder,
     Stored,
     StoredStudy,
-    open_study,
+    label_study,
     publish,
     read_store,
     read_studies,
@@ -246,7 +246,7 @@ def drawn_study(
     """
     anchor = second_anchor(study.name) if other else ""
     whole = other is not None and other.keys.issuperset(study.keys)
-    with open_study(stored.folder, study.name) as data:
+    with label_study(stored.folder, study.name) as data:
         plates = [
             Plate(file_name("sweep", study.name, one.name), f"{study.name}: {one.title}",
                   one.caption, one.figure)

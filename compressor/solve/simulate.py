@@ -8,7 +8,7 @@ import numpy as np
 
 from compressor.cases import MODEL, Case, back_action, require_case
 from compressor.metrics import SERIES
-from compressor.outcome import DatasetParts, Outcome, row, without_run
+from compressor.outcome import DatasetParts, Outcome, row, without_run, word_variables
 from compressor.physics import FLOWS, is_featured, state_names
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
@@ -127,8 +127,8 @@ def simulate(case: Case) -> "xr.Dataset":
 
     Raises CaseError for what is no Case, and nothing else: a run that fails has the `status`
     "failed", a `reason` by a stable name and the attribute `detail`, and its series are nan from
-    where it stopped. `attrs["promise"]` says whether the accuracy was kept, `attrs["regime"]` how
-    far the motion can be foretold.
+    where it stopped. `promise` says whether the accuracy was kept, `regime` how far the motion can
+    be foretold; both are attributes, too.
 
     The first run in a process takes a few seconds to load the machine code, or a minute to
     compile it where that was never done; the next take some milliseconds.
@@ -139,7 +139,7 @@ def simulate(case: Case) -> "xr.Dataset":
     ...     "solve": {"duration_rev": 2, "accuracy": "draft"},
     ... })
     >>> run = compressor.simulate(case)
-    >>> print(run.status.item(), run.attrs["promise"], run.attrs["regime"])
+    >>> print(run.status.item(), run.promise.item(), run.regime.item())
     ok kept predictable
     >>> force = run.peak_contact_force.sel(joint="big_end")
     >>> bar = run.peak_contact_force_error.sel(joint="big_end")
@@ -148,7 +148,8 @@ def simulate(case: Case) -> "xr.Dataset":
     >>> run.contact_force.dims, run.contact_force.attrs["units"]
     (('time', 'joint', 'axis'), 'N')
     """
-    return as_dataset(observe(require_case(case))[1])
+    table = observe(require_case(case))[1]
+    return as_dataset(DatasetParts(table.variables | word_variables(table.attrs), table.attrs))
 
 
 def as_dataset(table: DatasetParts) -> "xr.Dataset":

@@ -14,10 +14,10 @@ import xarray as xr
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from compressor.cases import points, table, value_in
+from compressor.cases import phrase_of, points, table, value_in
 from compressor.digits import is_known
 from compressor.metrics import METRICS, NUMBERS, SIZES
-from compressor.outcome import Regime, coordinates, regime_words
+from compressor.outcome import WORDS, coordinates
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
 from compressor.store.hdf5 import DamagedJob
@@ -38,9 +38,8 @@ class Layout:
 
 
 def _coordinate(dims: tuple[str, ...], key: str, values: Sequence[Any], units: str) -> xr.Variable:
-    row = table().get(key)
     attrs = {"units": units} if units else {}
-    attrs |= {"long_name": row.phrase if row else key, "case_key": key}
+    attrs |= {"long_name": phrase_of(key), "case_key": key}
     if not units:
         values = [_word(value) for value in values]
     return xr.Variable(dims, np.array(values), attrs)
@@ -127,6 +126,33 @@ def mask_untrusted(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(masked)
 
 
+def machine_constants(studies: Sequence[StoredStudy], layout: Layout) -> dict[str, xr.Variable]:
+    """Return the numbers of `machine` that a case file gives or leaves to their defaults.
+
+    Of one study those that it does not sweep, without dimensions; of several along `job`. What
+    follows from others, such as the inertia of a uniform rod, is not among them.
+    """
+    rows = [
+        row
+        for key, row in table().items()
+        if key.startswith("machine.") and row.kind == "number" and not row.optional
+    ]
+    names = coordinate_names([row.key for row in rows])
+    found = {}
+    for row in rows:
+        values = [_fixed_value(study, row.key, np.nan) for study in studies]
+        name = names[row.key]
+        if name in layout.coordinates or not all(isinstance(one, int | float) for one in values):
+            continue
+        attrs = {"units": row.unit or "1", "long_name": row.phrase, "case_key": row.key}
+        if len(studies) == 1:
+            found[name] = xr.Variable((), float(values[0]), attrs)
+        else:
+            jobs = np.repeat(np.array(values, float), [study.jobs for study in studies])
+            found[name] = xr.Variable(("job",), jobs, attrs)
+    return found
+
+
 def _with_coordinates(variables: dict[Any, Any], layout: Layout) -> xr.Dataset:
     names = ["key", "study", *SIZES, "time", *layout.coordinates]
     dataset = xr.Dataset(variables | layout.coordinates)
@@ -144,9 +170,8 @@ def _outcomes(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr
         "key": (layout.keys, "a job's identity"),
         "status": (words("status", "missing"), "ok, failed or missing"),
         "reason": (words("reason", ""), "why a run failed"),
-        "promise": (words("promise", ""), "whether what accuracy promises was kept; none given"),
-        "regime": (words("regime", ""), "; ".join(map(regime_words, Regime))),
     }
+    texts |= {name: (words(name, ""), phrase) for name, phrase in WORDS.items()}
     return {
         name: xr.Variable(layout.dims, values, {"long_name": phrase})
         for name, (values, phrase) in texts.items()

@@ -30,7 +30,7 @@ import numpy as np
 
 from compressor.cases import SUSPECT, Case, changes_since
 from compressor.metrics import BARRED
-from compressor.outcome import Outcome
+from compressor.outcome import WORDS, Outcome, word_variables
 from compressor.reasons import Reason
 from compressor.store.files import (
     HEX20,
@@ -49,7 +49,10 @@ from compressor.store.studies import find_study, read_studies
 if TYPE_CHECKING:
     import xarray as xr
 
-WORDS = ("promise", "regime")  # that rows of before November 2026 do not have
+BOTH_JOINTS = (
+    "`fault` is the swept joint, and `joint` the one that a number belongs to: select both, as in "
+    "study.sel(fault='big_end', joint='big_end')"
+)
 
 
 def _changed_by_revision(rows: Rows, position: int) -> list[str]:
@@ -79,6 +82,7 @@ def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:
         absent = np.isnan(rows.numbers[name][positions])
         missed = absent.all(axis=tuple(range(1, absent.ndim)))
         lacking[name] = missed & present.get(metric.when, False)
+    # rows of before November 2026 have no words
     return lacking | {name: is_ok & (rows.words[name][positions] == "") for name in WORDS}
 
 
@@ -366,7 +370,8 @@ def read_job(folder: Folder, key: str) -> "xr.Dataset":
     >>> run.acceleration.dims, compressor.Case.from_attribute(run.attrs["case"]).joint
     (('time',), 'big_end')
     """
-    return read_store(folder).job(key)
+    run = read_store(folder).job(key)
+    return run.assign(word_variables(run.attrs))
 
 
 def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -> "xr.Dataset":
@@ -380,7 +385,9 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     Several studies, and one that is no grid (zip, samples, exclude, blocks), have a `job` dimension
     with coordinates `study`, `fault`, `load` and each swept key. `key` names every job (see
     `read_job`), `status` is ok, failed or missing, and metrics are nan where a job did not reach
-    its end.
+    its end. Numbers of the machine that are not swept, such as `rod_mass_kg`, are variables, too,
+    so that `to_dataframe` has a column of each. Of a study that sweeps `joint` a StoreWarning says
+    that `joint` alone does not select a fault.
 
     Series have the dimension `time`. If the jobs have different output grids (a swept speed),
     they have `sample` instead, nan beyond a job's end, with `time` a coordinate of every job.
@@ -405,6 +412,14 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     >>> study.acceleration.sel(clearance_mm=0.3).dims
     ('time',)
     """
+    dataset = label_study(folder, name, trusted)
+    if "fault" in dataset.dims and "joint" in dataset.dims:
+        warnings.warn(BOTH_JOINTS, StoreWarning, stacklevel=2)
+    return dataset
+
+
+def label_study(folder: Folder, name: str | None = None, trusted: bool = False) -> "xr.Dataset":
+    """Return what `open_study` does, without a word on its two dimensions of joints."""
     from compressor.store import dataset as datasets  # loads xarray: half a second
 
     folder = os.path.abspath(folder)
@@ -417,5 +432,6 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     dataset = datasets.label_dataset(layout, stored.rows, stored.job, stored.values)
     if trusted:
         dataset = datasets.mask_untrusted(dataset)
+    dataset = dataset.assign(datasets.machine_constants(studies, layout))
     dataset.attrs = {"folder": folder, "studies": [study.name for study in studies]}
     return dataset

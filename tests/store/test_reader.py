@@ -26,7 +26,7 @@ from compressor.solve.simulate import simulate
 from compressor.store import dataset as labels
 from compressor.store import hdf5
 from compressor.store import reader as store
-from compressor.store.files import StoreError, discard_leftovers
+from compressor.store.files import StoreError, StoreWarning, discard_leftovers
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.series_file import (
     read_series,
@@ -87,6 +87,8 @@ def file_of(folder, dataset):
 
 def test_a_job_comes_back_identical(job, tmp_path):
     keep(tmp_path, job)
+    assert job.regime.item() == job.attrs["regime"]
+    assert job.promise.item() == job.attrs["promise"]
     xr.testing.assert_identical(store.read_job(tmp_path, job.attrs["key"]), job)
     if "time" in job.dims:
         path = file_of(tmp_path, job)
@@ -557,6 +559,27 @@ def test_one_study_has_its_axes_as_dimensions(grid):
         assert found[name].attrs["long_name"], name
 
 
+def test_a_table_of_a_study_has_its_machine(grid):
+    found = store.open_study(grid[0])
+    assert found.rod_mass_kg.dims == ("rod_mass_kg",)
+    table = found[["peak_acceleration", "speed_rpm", "reciprocating_mass_kg"]].to_dataframe()
+    assert table.index.names == ["load", "rod_mass_kg"]
+    assert {*table.speed_rpm} == {500.0}
+    assert {*table.reciprocating_mass_kg} == {14.0}
+    assert found.speed_rpm.attrs == {
+        "units": "rpm", "long_name": "crank speed", "case_key": "machine.speed_rpm"
+    }  # fmt: skip
+    assert "rod_inertia_kg_m2" not in found  # it follows from the mass that is swept
+    swept = study("stroke", machine={"stroke_mm": [200, 240], "speed_rpm": 300})
+    write_study(grid[0], swept, "by hand")
+    try:
+        other = store.open_study(grid[0], "stroke")
+        assert other.speed_rpm.item() == 300.0
+        assert other.crank_radius_mm.dims != ()
+    finally:
+        (grid[0] / "studies/stroke.json").unlink()
+
+
 def test_a_series_is_that_of_its_job(grid):
     folder, one = grid
     found = store.open_study(folder).sel(load="none", rod_mass_kg=4)
@@ -622,6 +645,11 @@ def test_several_studies_have_jobs_with_coordinates(grid, tmp_path):
     assert found.rod_mass_kg.values.tolist() == [4.7, 4.7, 4, 5, 4, 5]
     assert found.clearance_mm.values[:2].tolist() == [0.1, 0.1]
     assert found.acceleration.dims == ("job", "time")
+    assert found.reciprocating_mass_kg.dims == ("job",)
+    with pytest.warns(StoreWarning, match="select both"):
+        faults = store.open_study(tmp_path, "faults")
+    assert faults.peak_contact_force.sel(joint="big_end").dims == ("fault", "clearance_mm")
+    assert faults.clearance_mm.attrs["long_name"] == "radial clearance"
     assert store.open_study(tmp_path, "grid").key.shape == (2, 2)
     with pytest.raises(StoreError, match=r"'gird'; did you mean grid\?"):
         store.open_study(tmp_path, "gird")
