@@ -37,6 +37,7 @@ from compressor.store.studies import (
     find_job,
     find_study,
     find_value,
+    healthy_clearance,
     read_studies,
     swept_column,
     write_study,

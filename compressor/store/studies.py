@@ -25,7 +25,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from compressor.cases import MODEL_VERSION, Study, phrase_of, points, row_of, table
+from compressor.cases import (
+    MODEL_VERSION,
+    HealthyClearance,
+    Study,
+    phrase_of,
+    points,
+    row_of,
+    table,
+)
 from compressor.program import VERSION, did_you_mean, library_versions
 from compressor.store.files import (
     KEY,
@@ -134,6 +142,15 @@ def coordinate_names(keys: Sequence[str]) -> dict[str, str]:
         else key.replace(".", "_")
         for key, short in zip(keys, last, strict=True)
     }
+
+
+def healthy_clearance(study: StoredStudy) -> HealthyClearance:
+    """Return the clearance up to which a joint counts as sound, by the study.
+
+    Its jobs have no say: a job may have been stored by another study, which holds another
+    clearance to be healthy.
+    """
+    return HealthyClearance(**(study.fixed.get("healthy_clearance_mm") or {}))
 
 
 def owners(

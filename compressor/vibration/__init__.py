@@ -1,6 +1,6 @@
 """What a frame does with the forces on it, and how its signals are read."""
 
-from compressor.vibration.accelerometer import Record, analogue_rate
+from compressor.vibration.accelerometer import Record, analogue_rate, noisy
 from compressor.vibration.body import Forces
 from compressor.vibration.envelope import (
     energy_angle,
@@ -9,7 +9,7 @@ from compressor.vibration.envelope import (
     kurtogram,
     shape,
 )
-from compressor.vibration.monitor import Monitored, shake_body
+from compressor.vibration.monitor import Monitored, band_signal, measure_record, shake_body
 from compressor.vibration.record_files import RecordError, encode_record, record_columns
 from compressor.vibration.record_reader import (
     MIN_REVOLUTIONS,

@@ -1,5 +1,6 @@
 """What an accelerometer on the body records: mounting, filter, range, noise, sampling, tacho."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -144,3 +145,15 @@ def record_signal(
     tacho = np.interp(passes, turns, times)
     tacho = tacho[(tacho > -0.5 * step) & (tacho <= taken[-1])]
     return Record(taken, values, tacho, float(beyond.mean()), np.interp(taken, times, turns))
+
+
+def noisy(values: np.ndarray, rms: float, seed: Sequence[int]) -> np.ndarray:
+    """Return a window's samples (m/s2, (n,)) with white noise of an rms and a seed.
+
+    By numpy's default generator. In a data set the seed is [its seed, the job's key as a number,
+    the window's first pulse, the number of the noise level], so that anyone can add the same noise
+    to the stored samples.
+    """
+    if not rms:
+        return values
+    return values + np.random.default_rng(seed).normal(0.0, rms, values.size)

@@ -45,25 +45,11 @@ class Monitored:
             numbers["body_velocity_rms"] = np.sqrt(np.mean(self.velocity**2, axis=0))
         if self.revolutions[1] < 1:
             return numbers
-        peak, root = self.segments(self.record)
-        numbers |= {
-            "sensor_peak": float(np.abs(self.record).max()),
-            "sensor_rms": rms(self.record),
-            "sensor_crest_factor": crest_factor(self.record),
-            "sensor_kurtosis": kurtosis(self.record),
-            "sensor_segment_peak": peak,
-            "sensor_segment_rms": root,
-        }
-        if thresholds and thresholds[0] is not None:
-            numbers["sensor_counts_per_rev"] = self.counts(thresholds)
-        return numbers
+        return numbers | measure_record(self.record, self.turns, self.revolutions[1], thresholds)
 
     def counts(self, thresholds: Thresholds) -> np.ndarray:
         """Return the peaks of the record in a revolution over each threshold; nan of None."""
-        return np.array([
-            math.nan if one is None else count_peaks(self.record, one) / self.revolutions[1]
-            for one in thresholds
-        ])  # fmt: skip
+        return count_over(self.record, self.revolutions[1], thresholds)
 
     def segments(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the greatest magnitude and the rms in each segment, (36,) each.
@@ -125,6 +111,35 @@ def shake_body(
     inside = (passed > -1e-9) & (passed < count - 1e-9)
     record, turns = recorded.values[inside], recorded.turns[inside]
     return Monitored(motion, recorded, velocity, record, turns, first, (whole, count))
+
+
+def measure_record(
+    values: np.ndarray, turns: np.ndarray, revolutions: int, thresholds: Thresholds = ()
+) -> Numbers:
+    """Return the metrics of a record over whole revolutions, of `compressor.metrics.TABLE`.
+
+    values: m/s2, (n,); turns: of the crank there, (n,); thresholds: of any number, without which,
+    or without the first, nothing is counted.
+    """
+    peak, root = segment_levels(360.0 * turns, values)
+    numbers: Numbers = {
+        "sensor_peak": float(np.abs(values).max()),
+        "sensor_rms": rms(values),
+        "sensor_crest_factor": crest_factor(values),
+        "sensor_kurtosis": kurtosis(values),
+        "sensor_segment_peak": peak,
+        "sensor_segment_rms": root,
+    }
+    if thresholds and thresholds[0] is not None:
+        numbers["sensor_counts_per_rev"] = count_over(values, revolutions, thresholds)
+    return numbers
+
+
+def count_over(values: np.ndarray, revolutions: int, thresholds: Thresholds) -> np.ndarray:
+    """Return the peaks in a revolution over each threshold; nan of None."""
+    return np.array([
+        math.nan if one is None else count_peaks(values, one) / revolutions for one in thresholds
+    ])  # fmt: skip
 
 
 def band_signal(values: np.ndarray, rate: float, low: float, high: float) -> np.ndarray:

@@ -18,10 +18,17 @@ import numpy as np
 from compressor.cases import Case, HealthyClearance, Sensor
 from compressor.outcome import Regime, regime_words
 from compressor.program import PROGRAM, CompsimError, Progress, no_progress
-from compressor.store import DamagedJob, Folder, Stored, StoredStudy, find_study, read_store
+from compressor.store import (
+    DamagedJob,
+    Folder,
+    Stored,
+    StoredStudy,
+    find_study,
+    healthy_clearance,
+    read_store,
+)
 from compressor.studies.diagnosis.features import FEATURES, features
-from compressor.studies.diagnosis.library import healthy_clearance
-from compressor.vibration import MIN_REVOLUTIONS, RecordError
+from compressor.vibration import MIN_REVOLUTIONS, RecordError, noisy
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -141,18 +148,6 @@ def machine_of(case: Case) -> str:
     built = {name: value for name, value in case.values().items() if name not in NOT_BUILT}
     built["machine"] = {k: v for k, v in built["machine"].items() if k != "speed_rpm"}
     return hashlib.sha256(json.dumps(built, sort_keys=True).encode()).hexdigest()[:12]
-
-
-def noisy(values: np.ndarray, rms: float, seed: Sequence[int]) -> np.ndarray:
-    """Return a window's samples (m/s2, (n,)) with white noise of an rms and a seed.
-
-    By numpy's default generator. In a data set the seed is [its seed, the job's key as a number,
-    the window's first pulse, the number of the noise level], so that anyone can add the same noise
-    to the stored samples.
-    """
-    if not rms:
-        return values
-    return values + np.random.default_rng(seed).normal(0.0, rms, values.size)
 
 
 def split_by_machine(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.cases import Case, HealthyClearance, PerJoint, name_worn_joint, points
+from compressor.cases import Case, PerJoint, name_worn_joint, points
 from compressor.program import Progress, no_progress
 from compressor.store import (
     Folder,
@@ -19,6 +19,7 @@ from compressor.store import (
     StoreError,
     StoreWarning,
     find_study,
+    healthy_clearance,
     job_record,
     read_dataset,
     read_store,
@@ -93,15 +94,6 @@ def open_library(folder: Folder, name: str, progress: Progress = no_progress) ->
         name, keys, np.array(labels, "U9"), rows["clearance"].values,
         rows["feature"].values, study.jobs, _swept(study, keys),
     )  # fmt: skip
-
-
-def healthy_clearance(study: StoredStudy) -> HealthyClearance:
-    """Return the clearance up to which a joint counts as sound, by the study.
-
-    Its jobs have no say: a job may have been stored by another study, which holds another
-    clearance to be healthy.
-    """
-    return HealthyClearance(**(study.fixed.get("healthy_clearance_mm") or {}))
 
 
 def vector(record: Record) -> np.ndarray:

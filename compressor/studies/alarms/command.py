@@ -1,0 +1,129 @@
+"""`compsim alarms`: which alarm sees wear first, joint by joint."""
+
+import os
+import re
+from typing import TYPE_CHECKING
+
+import click
+from compsim.progress import ProgressReporter
+from compsim.results import of_results, one_word, results_folder, studies
+from compsim.screen import DONE, one_thread_each, print_text, say
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from compressor.studies.alarms.readings import Band
+
+FREQUENCIES = re.compile(r"([\d.]+)-([\d.]+)")
+FILES = ("alarms.csv", "alarms.nc")
+
+
+def read_bands(
+    context: click.Context, parameter: click.Parameter, texts: tuple[str, ...]
+) -> "tuple[Band, ...] | None":
+    """Return bands of texts such as 1000-3000; None without any."""
+    found = []
+    for text in texts:
+        parts = FREQUENCIES.fullmatch(text)
+        try:
+            found.append((float(parts[1]), float(parts[2])) if parts else None)
+        except ValueError:
+            found.append(None)
+        if found[-1] is None:
+            raise click.BadParameter(f"{text!r} is no band such as 1000-3000, in Hz")
+    return tuple(one for one in found if one) or None
+
+
+def read_levels(context: click.Context, parameter: click.Parameter, text: str) -> tuple[float, ...]:
+    """Return the numbers of a list with commas."""
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r} is no list such as 0,0.1,1") from error
+
+
+@click.command()
+@of_results("STUDY", studies)
+@click.option("-o", "--output", metavar="FOLDER",
+              help="Also write all rates as CSV and netCDF, and figures, here.")  # fmt: skip
+@click.option("--wear", "run", metavar="RUN",
+              help="A wear run of the machine (a file of compsim wear, or its folder of results): "
+              "how many hours before its limit each alarm trips.")  # fmt: skip
+@click.option("--false-alarms", type=click.FloatRange(0, 1, min_open=True, max_open=True),
+              default=0.01, show_default=True,
+              help="Rate of false alarms that limits are set for.")  # fmt: skip
+@click.option("--factor", type=click.FloatRange(0, min_open=True),
+              help="Set limits at so many times a sound machine's usual reading.")  # fmt: skip
+@click.option("--detected", type=click.FloatRange(0, 1, min_open=True), default=0.9,
+              show_default=True, help="Share of windows in which an alarm must trip.")  # fmt: skip
+@click.option("--band", "bands", multiple=True, metavar="LOW-HIGH", callback=read_bands,
+              show_default="2-1000, and two above it",
+              help="A band pass of the record, Hz; may be repeated.")  # fmt: skip
+@click.option("--noise", default="0", show_default=True, callback=read_levels, metavar="RMS,...",
+              help="White noise that is added, m/s2 rms; each level is judged.")  # fmt: skip
+@click.option("--revolutions", type=click.IntRange(min=1), default=5, show_default=True,
+              help="Whole revolutions of a window.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True,
+              help="Of noise, and of which draws judge by which limits.")  # fmt: skip
+@click.option("--quiet", is_flag=True, help="No progress, no remarks.")
+def alarms(
+    given: tuple[str, ...], folder: str | None, output: str | None, run: str | None,
+    false_alarms: float, factor: float | None, detected: float, bands: "tuple[Band, ...] | None",
+    noise: tuple[float, ...], revolutions: int, seed: int, quiet: bool,
+) -> int:  # fmt: skip
+    """Find which alarm sees wear first, by joint and clearance.
+
+    \b
+    compsim alarms plant --noise 0,1 -o alarms
+
+    STUDY has jobs with a sensor's record of sound machines and of worn ones, at loads and speeds
+    that are drawn, and clearances of each joint. Alarms are peak, rms, crest factor and kurtosis
+    of the record, peak and rms of segments of 10 degrees, counts of peaks, and velocity; each on
+    the record as it is and behind band passes. What is usual, and the limit, come from sound jobs;
+    others of other draws are judged by them. The table has each alarm with its best filter, the
+    first to see wear first: the clearance from which on it detects, and the false alarms that were
+    counted. A clearance in brackets may be "never": then the study has too few draws to be sure.
+    """
+    folder, words = results_folder(given, folder)
+    study = one_word(words, "STUDY")
+    one_thread_each()  # before numpy loads
+    from compressor.store import writable_folder
+    from compressor.studies.alarms.alarms import judge_alarms
+    from compressor.studies.alarms.lead import lead_times, open_run
+    from compressor.studies.alarms.windows import AlarmOptions
+    from compressor.studies.alarms.words import remarks, table
+
+    options = AlarmOptions(revolutions, bands, noise, false_alarms, factor, detected, seed)
+    worn = open_run(run) if run else None
+    if output:
+        writable_folder(output, make=False)
+    with ProgressReporter(quiet) as progress:
+        found = judge_alarms(folder, study, options, progress)
+    found = lead_times(found, worn) if worn else found
+    for line in table(found):
+        print_text(line)
+    for text in () if quiet else remarks(found):
+        say(text)
+    if output:
+        write_alarms(found, output)
+    return DONE
+
+
+def write_alarms(found: "xr.Dataset", output: str) -> None:
+    """Write a result as CSV, netCDF, and a figure with its caption for each level of noise."""
+    from pathlib import Path
+
+    from compressor.report import render
+    from compressor.store import publish, write_dataset
+    from compressor.studies.alarms.figures import caption, draw_alarms
+    from compressor.studies.alarms.words import as_rows
+
+    place = Path(output)
+    publish(place / FILES[0], as_rows(found).encode())
+    write_dataset(place / FILES[1], found)
+    for name in FILES:
+        print_text(os.path.join(output, name))
+    for level, noise in enumerate(found["noise"].values.tolist()):
+        path = place / (f"alarms-noise-{noise:g}.png" if noise else "alarms.png")
+        publish(path, render(draw_alarms(found, level), "png"))
+        print_text(f"{path}\n  {caption(found, level)}")

@@ -1,0 +1,173 @@
+"""What alarms read of a sensor's record: levels, counts and velocity of windows, by filter."""
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from compressor.vibration import (
+    Record,
+    band_signal,
+    check_record,
+    measure_record,
+    noisy,
+    turns_at,
+)
+
+RECORD = "record"  # the filter's name of a record as it is
+USABLE = 2.56  # sampling rate over the highest frequency that an anti-aliasing filter lets through
+FRAME_HZ = (2.0, 1000.0)  # ours: the band in which frames are judged by body_velocity_rms
+# m/s2, 20 a decade: the levels over which peaks are counted
+LADDER = np.geomspace(1e-2, 1e4, 121)
+COUNTED = (0.5, 1.0)  # ours: times the sound machine's peak, over which peaks are counted
+LEAST_COUNT = 1.0  # a revolution: fewer of a sound machine count as so many
+
+Band = tuple[float, float]
+Readings = dict[str, np.ndarray]  # by reading: (windows, numbers)
+Score = Callable[[Readings, np.ndarray], np.ndarray]  # of readings, by the rows of sound windows
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """An alarm: its name, its title, the readings it needs, and its score, (windows,).
+
+    A score is how many times above a sound machine a window is, by the rows that set the limits;
+    the alarm trips where it is above its limit. is_filtered: whether it reads the record of each
+    filter; else the record as it is, or the body.
+    """
+
+    name: str
+    title: str
+    reading: str
+    score: Score
+    is_filtered: bool = True
+
+
+def ratio(name: str) -> Score:
+    """Return the score of a reading: the greatest ratio of its numbers to their sound medians."""
+
+    def score(readings: Readings, sound: np.ndarray) -> np.ndarray:
+        values = readings[name]
+        usual = np.median(values[sound], axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = values / usual
+        # a number that a sound machine never shows: any of it is far above
+        ratios = np.where((usual == 0.0) & (values == 0.0), 1.0, ratios)
+        return np.where(np.isnan(ratios), -math.inf, ratios).max(axis=1)
+
+    return score
+
+
+def counts_over(times: float) -> Score:
+    """Return the score of counts over so many times the median peak of sound windows.
+
+    The level is the next one of `LADDER`; the usual count at least `LEAST_COUNT`.
+    """
+
+    def score(readings: Readings, sound: np.ndarray) -> np.ndarray:
+        level = times * float(np.median(readings["sensor_peak"][sound]))
+        place = min(int(np.searchsorted(LADDER, level)), LADDER.size - 1)
+        counts = readings["sensor_counts_per_rev"][:, place]
+        return counts / max(float(np.median(counts[sound])), LEAST_COUNT)
+
+    return score
+
+
+ALARMS = (
+    Alarm("peak", "peak", "sensor_peak", ratio("sensor_peak")),
+    Alarm("rms", "rms", "sensor_rms", ratio("sensor_rms")),
+    Alarm("crest_factor", "crest factor", "sensor_crest_factor", ratio("sensor_crest_factor")),
+    Alarm("kurtosis", "kurtosis", "sensor_kurtosis", ratio("sensor_kurtosis")),
+    Alarm("segment_peak", "segment peak", "sensor_segment_peak", ratio("sensor_segment_peak")),
+    Alarm("segment_rms", "segment rms", "sensor_segment_rms", ratio("sensor_segment_rms")),
+    *(
+        Alarm(f"count_{times:g}", f"counts over {times:g} peak", "sensor_counts_per_rev",
+              counts_over(times))
+        for times in COUNTED
+    ),
+    Alarm("velocity", "velocity of the record", "velocity", ratio("velocity"), False),
+    Alarm("body_velocity", "velocity of the body", "body_velocity_rms",
+          ratio("body_velocity_rms"), False),
+)  # fmt: skip
+
+
+def default_bands(rate: float) -> tuple[Band, ...]:
+    """Return the bands of a sampling rate, Hz: a frame's, and two above it where there is room.
+
+    The two share what a record holds above the frame's band, equally in its logarithm.
+    """
+    low, edge = FRAME_HZ
+    top = rate / USABLE
+    if top <= 2.0 * edge:
+        return ((low, min(edge, top)),)
+    middle = float(f"{math.sqrt(edge * top):.2g}")
+    return ((low, edge), (edge, middle), (middle, float(f"{top:.6g}")))
+
+
+def band_name(band: Band) -> str:
+    """Return a band as a filter's name."""
+    return f"{band[0]:g}-{band[1]:g} Hz"
+
+
+def read_windows(
+    record: Record, revolutions: int, bands: Sequence[Band], velocity_band: Band,
+    noise: float, seed: Sequence[int],
+) -> dict[str, Readings]:  # fmt: skip
+    """Return the readings of a record's windows by filter, `RECORD` first; {} of a shorter record.
+
+    Windows of so many revolutions follow each other from the first tacho pulse on. White noise of
+    `noise` m/s2 rms is added to the record by a seed before all else. A band's filter removes the
+    other lines of the spectrum of all windows. Raises RecordError as `check_record`.
+    """
+    whole = check_record(record.times, record.values, record.tacho)
+    count = whole // revolutions
+    if not count:
+        return {}
+    turns = turns_at(record.times, record.tacho)
+    edges = np.searchsorted(turns, revolutions * np.arange(count + 1) - 1e-9)
+    inside = slice(edges[0], edges[-1])
+    turns, edges = turns[inside], edges - edges[0]
+    values = noisy(record.values, noise, seed)[inside]
+    rate = 1.0 / (record.times[1] - record.times[0])
+    found = {}
+    for name, band in ((RECORD, None), *((band_name(one), one) for one in bands)):
+        signal = values if band is None else band_signal(values, rate, *band)
+        found[name] = stack_readings(
+            read_window(signal[low:high], turns[low:high], revolutions)
+            for low, high in itertools.pairwise(edges)
+        )
+    speed = band_velocity(values, rate, *velocity_band)
+    found[RECORD]["velocity"] = np.array([
+        [np.sqrt(np.mean(speed[low:high] ** 2))]
+        for low, high in itertools.pairwise(edges)
+    ])  # fmt: skip
+    return found
+
+
+def read_window(values: np.ndarray, turns: np.ndarray, revolutions: int) -> Readings:
+    """Return the readings of one window, (numbers,) each; counts at all levels of `LADDER`."""
+    below = int(np.searchsorted(LADDER, np.abs(values).max()))  # levels that a peak passes
+    numbers = measure_record(values, turns, revolutions, LADDER[:below].tolist())
+    found = {name: np.atleast_1d(np.asarray(one, float)) for name, one in numbers.items()}
+    counts = np.zeros(LADDER.size)
+    counts[:below] = found.get("sensor_counts_per_rev", np.empty(0))
+    return found | {"sensor_counts_per_rev": counts}
+
+
+def stack_readings(rows: Iterable[Readings]) -> Readings:
+    """Return readings of several windows as (windows, numbers)."""
+    listed = list(rows)
+    return {name: np.array([row[name] for row in listed]) for name in listed[0]}
+
+
+def band_velocity(values: np.ndarray, rate: float, low: float, high: float) -> np.ndarray:
+    """Return the velocity of an acceleration in a band, m/s, (m,), as if both repeated themselves.
+
+    The lines of the band over 2 pi i f; none at 0 Hz, where an acceleration tells no velocity.
+    """
+    lines = np.fft.rfft(band_signal(values, rate, low, high))
+    omega = 2.0j * np.pi * np.fft.rfftfreq(len(values), 1.0 / rate)
+    omega[0], lines[0] = 1.0, 0.0
+    return np.fft.irfft(lines / omega, len(values))

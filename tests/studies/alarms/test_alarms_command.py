@@ -1,0 +1,131 @@
+"""`compsim alarms` on made-up records that strike: its table, files, figure, and mistakes."""
+
+import contextlib
+import csv
+import re
+
+import numpy as np
+import pytest
+from compsim import cli
+from test_lead import CASE, write_run
+
+from compressor.store import read_dataset
+from compressor.studies.alarms.alarms import rank_alarms
+from compressor.studies.alarms.figures import caption, draw_alarms
+
+
+def run(folder, capsys, *words, code=0):
+    assert cli.main(["alarms", *words, "-i", str(folder), "--quiet"]) == code
+    found = capsys.readouterr()
+    return found.err if code else found.out
+
+
+@pytest.fixture(scope="module")
+def written(worn_store, tmp_path_factory):
+    """The folder of files, and stdout."""
+    place = tmp_path_factory.mktemp("alarms")
+    write_run(place / "results", CASE)
+    out = place / "out.txt"
+    with open(out, "w") as file, contextlib.redirect_stdout(file):
+        words = [
+            "alarms", "worn", "-i", str(worn_store), "--revolutions", "2", "--quiet",
+            "--band", "1000-3000", "--wear", str(place / "results"), "-o", str(place / "to"),
+        ]  # fmt: skip
+        assert cli.main(words) == 0
+    return place / "to", out.read_text()
+
+
+def test_the_table_has_the_first_alarm_of_each_joint_first(written):
+    folder, out = written
+    found = read_dataset(folder / "alarms.nc")
+    lines = out.splitlines()
+    assert lines[0] == "worn: 60 sound jobs of 60 draws, 180 worn ones; windows of 2 revolutions"
+    assert "for 2 % of false alarms (the sound draws allow no lower rate: 1 % needs" in lines[1]
+    rows = [line for line in lines if line.startswith(("big_end ", "small_end ", "both "))]
+    assert len(rows) == 3 * 9  # kinds of alarm, but the body's velocity, which no job has
+    for joint in ("big_end", "small_end", "both"):
+        first = next(row for row in rows if row.startswith(joint))
+        best = found.isel(alarm=rank_alarms(found, joint)[0], noise=0)
+        clearance, low, last = re.search(r"([\d.]+) \[([\d.]+), > ([\d.]+)\]", first).groups()
+        of_joint = best.sel(joint=joint)
+        assert best["alarm"].item() in first
+        assert float(clearance) == pytest.approx(float(of_joint["first_clearance"]), rel=5e-3)
+        assert float(low) == pytest.approx(float(of_joint["first_clearance_low"]), rel=5e-3)
+        assert np.isinf(of_joint["first_clearance_high"])  # of 10 draws a clearance
+        assert float(last) == pytest.approx(
+            best["clearance"].values[found["worn_joint"].values == joint].max(), rel=5e-3
+        )
+
+
+def test_strokes_as_high_as_the_clearance_are_heard(written):
+    """A ringing of 2 m/s2 and more on a sine of 1 m/s2 and noise of 0.05: by peaks, always."""
+    found = read_dataset(written[0] / "alarms.nc").isel(noise=0).set_index(alarm="alarm")
+    peaks = found.sel(alarm="peak, 1000-3000 Hz")
+    assert peaks["detection"].values.min() == 1.0
+    assert float(peaks["false_alarms_low"]) <= float(peaks.attrs["attainable"])
+    assert found.sel(alarm="velocity of the record")["detection"].values.min() < 0.5
+
+
+def test_all_rates_are_in_the_csv_too(written):
+    found = read_dataset(written[0] / "alarms.nc")
+    with open(written[0] / "alarms.csv", newline="", encoding="utf-8") as file:
+        rows = [*csv.DictReader(file)]
+    assert len(rows) == found.sizes["alarm"] * found.sizes["noise"] * found.sizes["state"]
+    column = [float(row["detection_low"]) for row in rows]
+    np.testing.assert_allclose(column, found["detection_low"].values.ravel(), rtol=1e-5)
+    one = found.isel(alarm=3, noise=0, state=-1)
+    row = rows[4 * found.sizes["state"] - 1]
+    assert (row["alarm"], row["filter"]) == (one["title"].item(), one["filter"].item())
+    mine = one.sel(joint=str(one["worn_joint"].item()))
+    for head, name in (("first_clearance_low_mm", "first_clearance_low"), ("draws", "draws"),
+                       ("clearance_mm", "clearance"), ("lead_hours", "lead_hours")):  # fmt: skip
+        assert float(row[head]) == pytest.approx(float(mine[name]), rel=1e-5, nan_ok=True)
+
+
+def test_the_caption_says_the_numbers_of_the_figure(written):
+    folder, out = written
+    found = read_dataset(folder / "alarms.nc")
+    text = caption(found)
+    assert text in out
+    assert (folder / "alarms.png").read_bytes()[:4] == b"\x89PNG"
+    drawing = draw_alarms(found)
+    best = found.isel(alarm=rank_alarms(found, "small_end")[0], noise=0)
+    false = [100 * float(best[f"false_alarms{end}"]) for end in ("", "_low", "_high")]
+    clearance = float(best["first_clearance"].sel(joint="small_end"))
+    said = re.search(r"small end: (.+?), which detects from ([\d.]+) \[.*? mm on, with ([\d.]+) % "
+                     r"\[([\d.]+), ([\d.]+)\]", text).groups()  # fmt: skip
+    assert said[0] == best["alarm"].item()
+    assert [*map(float, said[1:])] == pytest.approx([clearance, *false], rel=0.06)
+    above, below = drawing.panels[1], drawing.panels[4]
+    assert below.title.endswith(said[0])
+    mine = found["worn_joint"].values == "small_end"
+    (curve,) = [trace for trace in above.traces if trace.name == best["title"].item()]
+    np.testing.assert_array_equal(curve.y, best["detection"].values[mine])
+    np.testing.assert_array_equal(below.traces[0].y, best["curve_detection"].values[mine][0])
+
+
+def test_lead_times_stand_beside_the_clearances(written):
+    """The wear run's big end goes from 0.1 mm to its limit, 0.3 mm, in 1,000 h."""
+    folder, out = written
+    found = read_dataset(folder / "alarms.nc").sel(joint="big_end")
+    first, lead = (found[name].values for name in ("first_clearance", "lead_hours"))
+    expected = np.clip(1000.0 - (first - 0.1) / 0.2 * 1000.0, 0.0, 1000.0)
+    np.testing.assert_allclose(lead, expected, rtol=1e-6, atol=1e-6)
+    assert "hours before the limit" in out
+
+
+def test_mistakes_are_named(worn_store, worn, capsys, tmp_path):
+    for folder, words, told in (
+        (worn, ["deaf"], "study deaf has no sensor's record: write `body: true` and `sensor: "
+         "{length_rev: 11}` into"),
+        (worn, ["worn"], "its sound jobs are 2 draws of what it varies beside joint and"),
+        (worn, ["worn", "--revolutions", "30"], "has no record of 30 revolutions: 12 too short"),
+        (worn_store, ["worn", "--band", "500-5000"], "is sampled at 8000 Hz; give bands up to ha"),
+        (worn_store, ["worn", "--band", "high"], "'high' is no band such as 1000-3000, in Hz"),
+        (worn_store, ["worn", "--band", "9-3"], "give the lower frequency first"),
+        (worn_store, ["worn", "--noise", "1,1"], "a noise level is given twice"),
+        (worn_store, ["worn", "--wear", str(tmp_path)], "has 0 wear runs (none): compsim wear"),
+        (worn_store, [], "Missing argument 'STUDY'"),
+        (worn_store, ["wrn"], "did you mean worn?"),
+    ):  # fmt: skip
+        assert told in run(folder, capsys, *words, code=2)
