@@ -17,10 +17,12 @@ from compsim.screen import (
     print_text,
     say,
     size,
+    units_option,
 )
 
 if TYPE_CHECKING:
     from compressor.store import Exported
+    from compressor.units import Units
 
 
 @click.command()
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
               help="Write the files of a folder in this format; netcdf by default.")  # fmt: skip
 @click.option("--series", is_flag=True, help="Also write the time series of the studies' jobs.")
 @click.option("--force", is_flag=True, help="Replace files that exist.")
+@units_option("SI")
 @click.option("--json", "as_json", is_flag=True, help="Print the list of the files as JSON.")
 @click.option("--quiet", is_flag=True, help="Print no progress; damage is still reported.")
 def export(
@@ -41,6 +44,7 @@ def export(
     form: str | None,
     series: bool,
     force: bool,
+    units: "Units | None",
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -55,15 +59,16 @@ def export(
     it. As .wav, .mat or .uff a job becomes that record alone: acceleration in m/s2 and a tacho;
     a .wav has 32-bit floats, of which 1.0 is 1 m/s2. Without either, all studies. Several studies
     go into one FILE together, or into a FOLDER with a file each: a name without suffix, or with a
-    slash at its end.
+    slash at its end. --units is of CSV alone: other files are in SI, as are records.
     """
     folder, names = results_folder(given, folder)
     from compressor.store import ExportOptions, writable_folder
     from compressor.store import export as write
 
     writable_folder(os.path.dirname(output) or os.curdir, make=False)
+    options = ExportOptions(form, series, force, units or "si")
     with ProgressReporter(quiet, "files") as progress:
-        found, damaged = write(folder, names, output, ExportOptions(form, series, force), progress)
+        found, damaged = write(folder, names, output, options, progress)
     if as_json:
         print_text(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
     else:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from compressor import metrics
 from compressor.digits import UNKNOWN, by_bar
+from compressor.units import Units, unit_in
 
 if TYPE_CHECKING:
     from compressor.store import JobReport
@@ -25,20 +26,22 @@ LABELS = {"contact_loss_fraction": "time without dry contact"}  # of others than
 FACTS = ("promise", "regime", "method", "rtol", "program", "libraries")
 
 
-def sections(found: "JobReport", limits: tuple[float, float]) -> Iterator[tuple[str, list[str]]]:
+def sections(
+    found: "JobReport", limits: tuple[float, float], units: Units = "usual"
+) -> Iterator[tuple[str, list[str]]]:
     """Yield the headings and lines of a job.
 
-    limits: of the rod load's reversal, degrees and percent.
+    limits: of the rod load's reversal, degrees and percent; units: of the numbers.
     """
     yield "", align_lines(stop(found))
-    known = numbers(found, "tally", "statistics", "samples", "body")
-    lines = align_lines([*known, *reversal_verdict(found, *limits)])
+    known = numbers(found, units, "tally", "statistics", "samples", "body")
+    lines = align_lines([*known, *reversal_verdict(found, *limits), *healthy_motion(found, units)])
     yield "metrics, with their error bars", [*lines, *cautions(found), *found.caveats]
     yield (
         "relative errors of the time series",
         align_lines(series_errors(found)),
     )
-    yield "the run", align_lines([*numbers(found, "run"), *facts(found)])
+    yield "the run", align_lines([*numbers(found, units, "run"), *facts(found)])
 
 
 def align_lines(lines: list[Line]) -> list[str]:
@@ -72,7 +75,7 @@ def stop(found: "JobReport") -> list[Line]:
     return lines
 
 
-def numbers(found: "JobReport", *sources: str) -> list[Line]:
+def numbers(found: "JobReport", units: Units, *sources: str) -> list[Line]:
     """Return a line for each number of some sources, joint and axis, to its known digits."""
     lines = []
     for name, row in metrics.NUMBERS.items():
@@ -81,7 +84,7 @@ def numbers(found: "JobReport", *sources: str) -> list[Line]:
         if row.kind == "count":  # it grows with the run: the number per revolution is shown
             continue
         values, (errors, relative, kind) = found.numbers[name], bar_of(found, name)
-        unit, factor = unit_of(row)
+        unit, factor = unit_of(row, units)
         highest = max(values) if "segment" in row.dims else -math.inf
         for place, label in places(row):
             value = pick_value(values, place)
@@ -122,13 +125,16 @@ def bar_of(found: "JobReport", name: str) -> tuple[Any, bool, str]:
     return found.numbers.get(name + SPREAD), True, "(standard error)"
 
 
-def unit_of(row: metrics.Metric) -> tuple[str, float]:
+def unit_of(row: metrics.Metric, units: Units) -> tuple[str, float]:
     """Return the unit in which a number is shown, as the report does, and its factor from SI."""
-    if row.shown and row.unit != "1":
-        return row.shown.unit, row.shown.factor
     if row.name.endswith(("_fraction", "_share")):
         return "%", 100.0
-    return UNITS.get(row.unit, (row.unit, 1.0))
+    if row.shown and row.unit != "1":
+        unit, factor = row.shown.unit, row.shown.factor
+    else:
+        unit, factor = UNITS.get(row.unit, (row.unit, 1.0))
+    unit, more = unit_in(unit, units)
+    return unit, factor * more
 
 
 def places(row: metrics.Metric) -> Iterator[tuple[tuple[int, ...], str]]:
@@ -193,6 +199,41 @@ def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list
     kind = "API 618's" if (degrees, percent) == (15.0, 3.0) else "the maker's"
     verdict = f"reversal of {texts[0]} degrees and {texts[1]} %: {word} {kind} "
     return [("rod load", f"{verdict}{degrees:g} degrees and {percent:g} %")]
+
+
+TURN_SAMPLES = 3600  # of a revolution
+
+
+def healthy_motion(found: "JobReport", units: Units) -> list[Line]:
+    """Return the crosshead's acceleration without clearance, beside that of a job with clearance.
+
+    By the closed form of a rigid slider-crank at a steady speed; [] of other machines.
+    """
+    from compressor.cases import Case
+
+    if found.status != "ok":
+        return []
+    case = Case.from_attribute(found.attributes["case"])
+    if case.joint == "none" or case.drive or case.rod:
+        return []
+    import numpy as np
+
+    from compressor.physics import exact_motion
+
+    angles = np.linspace(0.0, 2.0 * np.pi, TURN_SAMPLES, endpoint=False)
+    crank, rod = case.machine.crank_radius_mm / 1e3, case.machine.rod_length_mm / 1e3
+    _, _, a = exact_motion(angles, crank, rod, case.omega)
+    unit, factor = unit_in("m/s²", units)
+    lines = []
+    for name, sound in (("peak", float(np.abs(a).max())), ("rms", float(np.sqrt(np.mean(a**2))))):
+        metric = f"{name}_acceleration"
+        bar = found.numbers.get(f"{metric}_error", math.nan)
+        times = found.numbers[metric] / sound
+        beside = "" if math.isinf(bar) else f"; this job has {times:.4g} times as much"
+        lines.append(
+            (f"{name} acceleration without clearance", f"{factor * sound:.4g} {unit}{beside}")
+        )
+    return lines
 
 
 def cautions(found: "JobReport") -> list[str]:

@@ -1,5 +1,7 @@
 """`compsim plot`: figures of one job or of a study, as files."""
 
+from typing import TYPE_CHECKING
+
 import click
 
 from compressor.program import did_you_mean
@@ -8,7 +10,11 @@ from compsim.results import ONE_JOB, folders, jobs, of_results, results_folder, 
 from compsim.screen import (
     DONE,
     print_text,
+    units_option,
 )
+
+if TYPE_CHECKING:
+    from compressor.units import Units
 
 FIGURES = (
     "analyst", "signals", "cards", "spectra", "orbits", "modes", "impacts",
@@ -54,6 +60,7 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
     help="Mark segments whose rms is above this: m/s², such as 20, or as 3x, times the machine "
     "without clearance.",
 )  # fmt: skip
+@units_option("kN, mm, µm, m/s²")
 def plot(
     given: tuple[str, ...],
     what: tuple[str, ...],
@@ -63,6 +70,7 @@ def plot(
     over: str,
     at: tuple[str, ...],
     limit: str,
+    units: "Units | None",
 ) -> int:
     """Draw one job, or one study.
 
@@ -90,7 +98,7 @@ def plot(
     writable_folder(output, make=False)
     from compressor.report import PlotChoice, write_plots
 
-    choice = PlotChoice(what, over, at, limit, KINDS[form])
+    choice = PlotChoice(what, over, at, limit, KINDS[form], units or "usual")
     kind = find_drawn(folder).get(name)
     if kind:
         if values:

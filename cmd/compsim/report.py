@@ -1,7 +1,7 @@
 """`compsim report`: the page, figures and tables of a folder of results."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -10,7 +10,11 @@ from compsim.results import folders, of_results, results_folder
 from compsim.screen import (
     DONE,
     print_text,
+    units_option,
 )
+
+if TYPE_CHECKING:
+    from compressor.units import Units
 
 
 def page_folders(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -34,6 +38,7 @@ def page_folders(command: Callable[..., Any]) -> Callable[..., Any]:
     help="Show the zones A to D of a metric in tables and curves, by up to three limits, such as "
     "body_velocity_rms_mm_per_s=2,5.",
 )  # fmt: skip
+@units_option("kN, mm, µm, m/s²")
 @page_folders
 @click.pass_context
 def report(
@@ -42,6 +47,7 @@ def report(
     folder: str | None,
     output: str,
     limits: tuple[str, ...],
+    units: "Units | None",
     **places: str,
 ) -> int:
     """Draw stored studies as a page of figures and tables.
@@ -51,6 +57,8 @@ def report(
     compsim report /data/results -o page --limit body_velocity_rms_mm_per_s=2,5
 
     Prints the path of the page, which a browser opens without a server.
+    --units is of figures and tables; captions name the unit of each number, and
+    swept keys stay in those of the case file.
     """
     folder, _ = results_folder(given, folder, named=False)
     from compressor.store import read_studies, writable_folder
@@ -60,5 +68,5 @@ def report(
     from compressor.report import write_report
 
     add = page_additions(places)
-    print_text(str(write_report(folder, output, context.obj, add, None, limits)))
+    print_text(str(write_report(folder, output, context.obj, add, None, limits, units or "usual")))
     return DONE

@@ -79,6 +79,16 @@ only_option = click.option(
     help="Take only the jobs for which this holds, such as 'clearance_mm < 0.2'; the others stay "
     "missing.",
 )  # fmt: skip
+
+
+def units_option(usual: str) -> Callable[..., Any]:
+    """Return the option --units; usual: what there is without it."""
+    return click.option(
+        "--units", type=click.Choice(["si", "plant"]), show_default=usual,
+        help="Units: SI, or those of a plant: mm, mm/s, g, kN, bar, rpm.",
+    )  # fmt: skip
+
+
 MAX_JOBS = 10_000
 limit = click.option(
     "--max-jobs", type=click.IntRange(min=1), default=MAX_JOBS, show_default=True,

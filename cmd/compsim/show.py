@@ -15,10 +15,12 @@ from compsim.screen import (
     print_text,
     run_commands,
     say,
+    units_option,
 )
 
 if TYPE_CHECKING:
     from compressor.store import JobReport
+    from compressor.units import Units
 
 KEY_DIGITS = 8  # digits of a key in a name
 MAX_NAME = 64 - 1 - KEY_DIGITS  # characters of a study's name
@@ -47,12 +49,14 @@ def reversal_limits(_: click.Context, __: click.Parameter, text: str) -> tuple[f
     callback=reversal_limits,
     help="Ask for this reversal of the rod load: degrees, and percent on its smaller side.",
 )
+@units_option("kN, mm, µm, m/s²")
 @as_json
 def show(
     given: tuple[str, ...],
     folder: str | None,
     only_case: bool,
     reversal: tuple[float, float],
+    units: "Units | None",
     as_json: bool,
 ) -> int:
     """Print all that is known of one job.
@@ -78,11 +82,13 @@ def show(
     elif only_case:
         print_text(whole_case(found, folder).removesuffix("\n"))
     else:
-        print_report(found, folder, reversal)
+        print_report(found, folder, reversal, units or "usual")
     return DONE
 
 
-def print_report(found: "JobReport", folder: str, reversal: tuple[float, float]) -> None:
+def print_report(
+    found: "JobReport", folder: str, reversal: tuple[float, float], units: "Units" = "usual"
+) -> None:
     """Print what is known of a job."""
     from compressor.cases import Case, to_yaml
     from compressor.reasons import remedy
@@ -98,7 +104,7 @@ def print_report(found: "JobReport", folder: str, reversal: tuple[float, float])
         for command in run_commands(found.again, folder):
             say(f"next: {command}")
         return
-    for heading, lines in sections(found, reversal):
+    for heading, lines in sections(found, reversal, units):
         if lines and heading:
             print_text(heading)
         for line in lines:

@@ -14,7 +14,6 @@ from compressor.analysis.runs import case_of, record_of
 from compressor.analysis.shaking import NoSeriesError, whole_revolutions
 from compressor.physics import segments
 
-GRAVITY = 9.80665  # m/s2, of vibration in g (ISO 80000-3:2019)
 # what begins at a corner of the load, by the phase that it leads to
 VALVES = ("discharge closes", "suction opens", "suction closes", "discharge opens")
 CAM = ("cam: dwell ends", "cam: dwell begins", "cam: dwell ends", "cam: dwell begins")

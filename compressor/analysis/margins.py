@@ -46,6 +46,8 @@ class Margin(NamedTuple):
     @property
     def said(self) -> str:
         """Return the margin in words, in percent of the threshold."""
+        if self.error == 0.0 and self.clear:
+            return f"{100 * self.value:+.3g} %"
         bar = "no error bar" if math.isnan(self.error) else f"± {100 * self.error:.2g} %"
         doubt = "" if self.clear or math.isnan(self.error) else ", undecided"
         return f"{100 * self.value:+.3g} % ({bar}{doubt})"

@@ -14,7 +14,7 @@ from compressor.analysis.contacts import (
     joints_with_clearance,
     mode_shares,
 )
-from compressor.analysis.cycle import GRAVITY, Cycle, read_cycle
+from compressor.analysis.cycle import Cycle, read_cycle
 from compressor.analysis.cylinder import cylinder_words, end_states
 from compressor.analysis.orbit import orbit
 from compressor.analysis.runs import SPOKEN, case_of, settled_revolutions
@@ -29,6 +29,7 @@ from compressor.analysis.shaking import (
     whole_revolutions,
 )
 from compressor.metrics import JOINTS
+from compressor.units import unit_in
 
 
 def plural(count: int, thing: str) -> str:
@@ -117,6 +118,7 @@ def rows_modes(rows: Sequence[SweptRow]) -> dict[str, np.ndarray]:
     return found
 
 
+_, G = unit_in("m/s²", "plant")  # from m/s2 to g
 Twin = xr.Dataset | None  # the same machine without clearance
 
 CHAOTIC = (
@@ -210,7 +212,7 @@ def analyst(run: xr.Dataset, twin: Twin) -> str:
     if twin is not None:
         beside = f"; without clearance it reaches {loudest(read_cycle(twin))[0]:.3g}"
     sentences = [
-        f"The last settled revolution. {kind} reaches {peak:.3g} m/s² ({peak / GRAVITY:.3g} g) at "
+        f"The last settled revolution. {kind} reaches {peak:.3g} m/s² ({G * peak:.3g} g) at "
         f"{at:.0f}°, rms {rms:.3g}{beside}.",
         f"The rod load goes from {span(1e-3 * found.rod_load)} kN and changes its side at "
         f"{angles(found.reversals)}." if found.reversals
@@ -325,7 +327,7 @@ def cycles(rows: Sequence[SweptRow], axis: str) -> str:
     text = (
         f"The greatest magnitude of the {kind} in each degree of the last settled revolution, a "
         f"row for each value of {axis}. Over the revolution it is least, {least[0]:.3g} m/s², at "
-        f"{least[2]}, and greatest, {greatest[0]:.3g} m/s² ({greatest[0] / GRAVITY:.3g} g), at "
+        f"{least[2]}, and greatest, {greatest[0]:.3g} m/s² ({G * greatest[0]:.3g} g), at "
         f"{greatest[2]}, where it comes at {greatest[1]:.0f}°."
     )
     counts = [len(row.cycle.reversals) for row in rows if row.cycle]

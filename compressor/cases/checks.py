@@ -221,9 +221,11 @@ def of_percent(name: str, group: str) -> str:
     return f"; of the cylinder, write gas.{form}; of joints, clearance_mm in mm"
 
 
-# keys of a case file that are no part of a case: how values are swept together, groups of studies
-SWEEP = ("sample", "zip", "exclude", "blocks", *STUDY_GROUPS)
-MAPPINGS = ("sample", *STUDY_GROUPS)  # of these, those with keys of their own
+# keys of a case file that are no part of a case: how values are swept together, what the page of
+# the report says of the machine, groups of studies
+SWEEP = ("sample", "zip", "exclude", "blocks", "report", *STUDY_GROUPS)
+MAPPINGS = ("sample", "report", *STUDY_GROUPS)  # of these, those with keys of their own
+REPORT = {"title": 100, "notes": 2000}  # keys of `report`, and how many letters they may have
 MAX_MEANT = 3  # keys that an unknown one may have meant
 
 
@@ -231,6 +233,8 @@ def known_keys(group: str, file: bool = True) -> list[str]:
     """Return the keys that a group (or, for "", the top) may hold; a `file` has those of sweeps."""
     if group == "sample":
         return ["n", "seed"]
+    if group == "report":
+        return [*REPORT]
     if group in STUDY_GROUPS:
         return [*STUDY_GROUPS[group]().ROWS]
     names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED
-from compressor.cases.checks import DOUBLES, PER_PART, SHORTHANDS, row_of
+from compressor.cases.checks import DOUBLES, PER_PART, REPORT, SHORTHANDS, row_of
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.parameter import NAME, TARGET, Parameter
 from compressor.cases.swept import DISTRIBUTIONS, FORMS, SAMPLED, is_number
@@ -20,7 +20,7 @@ from compressor.program import STUDY_GROUPS
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 MAX_NUMBER = 1e300  # a bound of values that need only be finite
-WHOLE_FILE = ("name", "blocks", *STUDY_GROUPS)  # what cannot stand in a block
+WHOLE_FILE = ("name", "blocks", "report", *STUDY_GROUPS)  # what cannot stand in a block
 
 Schema = dict[str, Any]
 
@@ -162,6 +162,9 @@ def _sweeps() -> Schema:
                 "items": group},
         "exclude": {"description": "comparisons; jobs for which one holds are left out",
                     "anyOf": [TEXT, texts]},
+        "report": {"description": "what the page of the report says of the machine", **_mapping({
+            name: {**TEXT, "minLength": 1, "maxLength": most} for name, most in REPORT.items()
+        })},
     }  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from typing import Any
 from compressor.cases import blocks
 from compressor.cases.bulk import examine_jobs
 from compressor.cases.case import Case
-from compressor.cases.checks import SHORTHANDS, TWICE, row_of
+from compressor.cases.checks import REPORT, SHORTHANDS, TWICE, row_of
 from compressor.cases.combinations import Block, columns
 from compressor.cases.conflicts import conditions, is_off, problem_of
 from compressor.cases.keys import (
@@ -131,6 +131,7 @@ class _Draft:
     changes: Mapping[str, Leaves]
     problems: list[FileProblem]
     request: StudyRequest | None = None
+    report: Mapping[str, str] = field(default_factory=dict)
 
 
 def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
@@ -222,10 +223,30 @@ def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProbl
     request = _read_request(whole, problems)
     if "blocks" in changes:
         file = override_leaves(file, {"blocks": changes["blocks"]})
-    excluded = ("blocks", *STUDY_GROUPS)
+    report = _read_report(whole, problems)
+    excluded = ("blocks", "report", *STUDY_GROUPS)
     rest = {key: change for key, change in changes.items() if key.partition(".")[0] not in excluded}
-    values = {k: node for k, node in file.values.items() if k.partition(".")[0] not in STUDY_GROUPS}
-    return _Draft(path, name, Leaves(values, file.places), rest, problems, request)
+    outside = ("report", *STUDY_GROUPS)
+    values = {k: node for k, node in file.values.items() if k.partition(".")[0] not in outside}
+    return _Draft(path, name, Leaves(values, file.places), rest, problems, request, report)
+
+
+def _read_report(found: Leaves, problems: list[FileProblem]) -> dict[str, str]:
+    """Return the title and the notes that a file gives for the page of the report."""
+    texts = {}
+    for name, most in REPORT.items():
+        node = found.values.get(f"report.{name}")
+        if node is None:
+            continue
+        text = node.value.strip() if isinstance(node.value, str) else ""
+        lines = text.split("\n") if name == "notes" else [text]
+        if text and len(text) <= most and all(line.isprintable() for line in lines):
+            texts[name] = text
+        else:
+            what = "lines of text" if name == "notes" else "a line of text"
+            message = f"needs {what} of up to {most} letters, not {quote_value(node.plain())}"
+            problems.append(FileProblem(node.place, f"report.{name}", message))
+    return texts
 
 
 def _read_request(found: Leaves, problems: list[FileProblem]) -> StudyRequest | None:
@@ -340,7 +361,7 @@ def _study(
     selected = range(len(cases)) if only is None else cases.where(only)
     return Study(
         draft.name, draft.path, tuple(axes), cases, keys, is_grid, selected,
-        draft.request, chains, tuple(nest_values(block.fixed) for block in found),
+        draft.request, chains, tuple(nest_values(block.fixed) for block in found), **draft.report,
     )  # fmt: skip
 
 
@@ -375,7 +396,7 @@ def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
 def _block_leaves(item: Node, draft: _Draft) -> Leaves:
     """Return the leaves of a block; keys that only a file can have are problems."""
     found = leaves(item, draft.problems)
-    whole = ("name", "blocks", *STUDY_GROUPS)
+    whole = ("name", "blocks", "report", *STUDY_GROUPS)
     for key in [key for key in found.values if key.partition(".")[0] in whole]:
         group, message = key.partition(".")[0], IN_BLOCK
         draft.problems.append(FileProblem(found.places[group], group, message))

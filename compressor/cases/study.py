@@ -59,6 +59,7 @@ class Study:
     """One case file. In a grid, jobs are in C order over the axes, in the file's order.
 
     Otherwise every axis is a column, with a value for each job, None where the job has none.
+    `title` and `notes` are what the page of the report says of the machine, "" without.
     `fixed` has the values that are not swept, group by group as each block of the file gives them.
     With a `request` the jobs are those that chains begin at, and `chains` has the cases of each, in
     the order of the jobs, by the values of the key that is followed.
@@ -74,6 +75,8 @@ class Study:
     request: StudyRequest | None = None
     chains: tuple[tuple[Case, ...], ...] = ()
     fixed: tuple[Mapping[str, Any], ...] = ()
+    title: str = ""
+    notes: str = ""
 
     @property
     def jobs(self) -> int:

@@ -21,9 +21,10 @@ from compressor.cases import MODEL, Case, CaseError
 from compressor.digits import is_known
 from compressor.metrics import BARRED, JOINTS
 from compressor.program import PROGRAM, library_versions
-from compressor.report.figures.sweep_data import Measure, measures
+from compressor.report.figures.sweep_data import Measure, measures, name_in_words
 from compressor.report.page import Section, format_measure, templates
 from compressor.store import Folder, Stored, StoredStudy
+from compressor.units import Units
 
 MASSES = {
     "rod_mass_kg": "rod {:g} kg (a steel bar of 600 × 40 × 25 mm)",
@@ -231,12 +232,16 @@ class StudyLine:
 
 @dataclass(frozen=True)
 class FirstScreen:
-    """The first screen; `pictures` are SVG of the mechanisms with their captions."""
+    """The first screen; `pictures` are SVG of the mechanisms with their captions.
+
+    `cautions`: of jobs that are chaotic or have not settled, a sentence each.
+    """
 
     lines: Sequence[StudyLine]
     findings: Sequence[tuple[str, Sequence[MetricChange]]]
     claims: Sequence[Claim]
     pictures: Sequence[tuple[str, str]]
+    cautions: Sequence[str] = ()
 
 
 def answer_section(answer: FirstScreen) -> Section:
@@ -244,18 +249,19 @@ def answer_section(answer: FirstScreen) -> Section:
     return Section("answer", "The answer", "answer.html", answer)
 
 
-def findings(jobs: Iterable[tuple[str, xr.Dataset]]) -> list[MetricChange]:
+def findings(jobs: Iterable[tuple[str, xr.Dataset]], units: Units = "usual") -> list[MetricChange]:
     """Return the metrics that change most over jobs, each job named."""
     named = [(name, job) for name, job in jobs if str(job["status"].item()) == "ok"]
-    known = list(dict.fromkeys(m for _, job in named for m in measures(job)))
+    known = list(dict.fromkeys(m for _, job in named for m in measures(job, units)))
     names = [name for name, _ in named]
     rows = [(m, *_columns(m, [job for _, job in named])) for m in known]
     return rank_findings(rows, names)
 
 
-def study_findings(data: xr.Dataset) -> list[MetricChange]:
+def study_findings(data: xr.Dataset, units: Units = "usual") -> list[MetricChange]:
     """Return the metrics that change most over a study's jobs, as `open_study` gives it."""
-    rows = [(m, m.of(data).values.ravel(), m.bar(data).values.ravel()) for m in measures(data)]
+    known = measures(data, units)
+    rows = [(m, m.of(data).values.ravel(), m.bar(data).values.ravel()) for m in known]
     return rank_findings(rows, Points(data))
 
 
@@ -285,13 +291,16 @@ class Points(Sequence[str]):
         return ", ".join(part for part in parts if part)
 
 
+NAME_DIGITS = 4  # of a swept value in the name of a job
+
+
 def word_value(name: str, value: object, unit: str) -> str:
     """Return a swept value in words: clearance 0.2 mm; "" where the job has none."""
-    words = name.removesuffix("_" + unit.replace("/", "_per_").replace(" ", "_")).replace("_", " ")
+    words = name_in_words(name, unit)
     if isinstance(value, int | float):
         if math.isnan(value):
             return ""
-        return f"{words} {value:.6g} {unit}".removesuffix(" 1").rstrip()
+        return f"{words} {value:.{NAME_DIGITS}g} {unit}".removesuffix(" 1").rstrip()
     return f"{words} {SPOKEN.get(str(value), value)}" if value != "" else ""
 
 

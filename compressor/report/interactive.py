@@ -36,8 +36,10 @@ from compressor.report.figures.drawing import (
     thin_places,
 )
 from compressor.report.figures.job import BY_JOINT
+from compressor.report.figures.plant_units import in_units
 from compressor.report.figures.style import BLACK, LineStyle
 from compressor.store import DamagedJob, Stored, publish
+from compressor.units import Units
 
 LIBRARY = "plotly.min.js"
 MAX_POINTS = 2400  # of a curve: some three for each pixel of a wide panel
@@ -141,6 +143,8 @@ def note_data(note: Note, panel: Panel) -> dict[str, Any]:
         if not math.isnan(at):
             place[way] = at
     more = {"color": note.style.color, "dash": dashes(note.style), "inside": bool(note.inside)}
+    if note.text:
+        more |= {"shift": note.shift, "side": note.side, "level": note.level}
     return {"text": " ".join(note.text.split()), **place, **more}
 
 
@@ -170,6 +174,8 @@ def trace_data(trace: Trace, panel: Panel, places: Mapping[str, int]) -> dict[st
             z, ends = np.log10(z), (math.log10(scale.low), math.log10(scale.high))
         found |= {"z": numbers(z.ravel()), "color": colors_of(scale), "limits": ends,
                   "log": scale.log, "scale": scale.title}  # fmt: skip
+    if look.is_hollow:
+        found["hollow"] = True
     if trace.errors is not None:
         found["errors"] = [numbers(ends[part]) for ends in trace.errors]
         found["across"] = trace.across
@@ -248,7 +254,9 @@ ACCELERATION, FORCE = "acceleration (m/s²)", "contact force (kN)"
 SHOWN = ("time", "crank_angle", "acceleration", "contact_force")  # of a job's series
 
 
-def job_scripts(stored: Stored, keys: Iterable[str]) -> Iterator[tuple[str, str]]:
+def job_scripts(
+    stored: Stored, keys: Iterable[str], units: Units = "usual"
+) -> Iterator[tuple[str, str]]:
     """Yield the key and script of the first jobs whose time series are kept."""
     found = 0
     for key in dict.fromkeys(keys):
@@ -258,7 +266,7 @@ def job_scripts(stored: Stored, keys: Iterable[str]) -> Iterator[tuple[str, str]
         if status is None or status.status != "ok" or not status.samples:
             continue
         try:
-            drawing = draw_job(read_shown(stored, key))
+            drawing = in_units(draw_job(read_shown(stored, key)), units)
         except (NoSeriesError, DamagedJob):
             continue  # shorter than a revolution, or its file is damaged, of which others tell
         found += 1
@@ -290,7 +298,7 @@ def draw_job(run: xr.Dataset) -> Drawing:
     drawing.width = 8.0
     above, below = grid[:, 0]
     for panel, title in ((above, ACCELERATION), (below, FORCE)):
-        panel.title = panel.y.title = title
+        panel.title, panel.y.title = title.partition(" (")[0], title
         panel.x = Scale(ANGLE_AXIS, float(angle[0]), float(angle[-1]), step=90.0)
     black = LineStyle(BLACK)
     above.plot(angle, turn["acceleration"].values, black, "acceleration")

@@ -39,13 +39,17 @@ class Zone:
 
 @dataclass(frozen=True)
 class Limits:
-    """Rising limits by metric, in the unit that the report shows it in."""
+    """Rising limits by metric, in the unit that the report shows it in without a choice."""
 
     by_metric: Mapping[str, tuple[float, ...]]
 
     def of(self, measure: Measure) -> tuple[float, ...]:
-        """Return the limits of a measure; () without any."""
-        return self.by_metric.get(measure.variable, ())
+        """Return the limits of a measure in its unit; () without any."""
+        limits = self.by_metric.get(measure.variable, ())
+        if not limits:
+            return ()
+        usual = next(one for one in MEASURES if one.variable == measure.variable)
+        return tuple(limit * measure.factor / usual.factor for limit in limits)
 
     def zone(self, measure: Measure, value: float, bar: float) -> Zone | None:
         """Return the zone of a value with its error bar, in the measure's unit.

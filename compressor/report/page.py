@@ -155,6 +155,11 @@ class Plate:
         return (key for panel in self.drawing.panels for t in panel.traces for key in t.jobs)
 
     @property
+    def opens_jobs(self) -> bool:
+        """Return whether its points are jobs, which a click opens."""
+        return any(True for _ in self.jobs)
+
+    @property
     def texts(self) -> dict[str, str]:
         """Return the files beside the page that are no pictures, by their names."""
         drawing = self.drawing
@@ -202,6 +207,7 @@ class JobsToOpen(NamedTuple):
 
 
 NO_JOBS = JobsToOpen("", (), ())
+SUBJECT = "Reciprocating compressor with joint clearance"
 
 
 def templates() -> Environment:
@@ -231,16 +237,20 @@ def template_elsewhere(name: str) -> str | None:
 
 
 def document(
-    sections: Sequence[Section], jobs: JobsToOpen = NO_JOBS, running: Running | None = None
+    sections: Sequence[Section],
+    jobs: JobsToOpen = NO_JOBS,
+    running: Running | None = None,
+    title: str = "",
 ) -> str:
     """Return the whole page: the first section, a list of contents, and the other sections.
 
-    running: how the run stands that the page is written beside.
+    running: how the run stands that the page is written beside; title: of the page, `SUBJECT` where
+    there is none.
     """
     data = jobs._asdict() | {"studies": [one._asdict() for one in jobs.studies]}
     facts = Markup(json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"))
     page = templates().get_template("page.html")
-    return page.render(sections=sections, jobs=facts, running=running)
+    return page.render(sections=sections, jobs=facts, running=running, title=title, subject=SUBJECT)
 
 
 def restate_page(page: str, before: Running, now: Running) -> str:

@@ -55,6 +55,7 @@ from compressor.report.page import (
 )
 from compressor.report.study_section import KEY_DIGITS, file_name
 from compressor.store import DamagedJob, Folder, Stored, StoredStudy, StoreWarning
+from compressor.units import Units
 
 
 @dataclass(frozen=True)
@@ -438,7 +439,11 @@ class PaperCasesContent:
 
 
 def paper_sections(
-    paper: PaperRuns, plates: Sequence[Plate], judged: Sequence[Claim], caveats: list[str]
+    paper: PaperRuns,
+    plates: Sequence[Plate],
+    judged: Sequence[Claim],
+    caveats: list[str],
+    units: Units = "usual",
 ) -> tuple[list[Section], list[Section]]:
     """Return the paper's sections: figures; and claims, cases, and the load's printed numbers.
 
@@ -448,7 +453,7 @@ def paper_sections(
     if not paper.stored:
         return figures, []
     title = "Spring and cam: what is printed, what follows"
-    cases = PaperCasesContent(caveats, cases_table(paper))
+    cases = PaperCasesContent(caveats, cases_table(paper, units))
     return figures, [
         Section("claims", "The paper's claims", "claims.html", judged),
         Section("cases", "The paper's cases", "cases.html", cases),
@@ -456,10 +461,10 @@ def paper_sections(
     ]
 
 
-def cases_table(paper: PaperRuns) -> PageTable:
+def cases_table(paper: PaperRuns, units: Units) -> PageTable:
     """Return a row for each of the paper's cases, stored or not."""
     known = [measures(run) for run in paper.stored.values()]
-    shown = [m for m in MEASURES if any(m in some for some in known)]
+    shown = [m.read_in(units) for m in MEASURES if any(m in some for some in known)]
     head = ["case", "status", *map(column_title, shown), "energy residual", "rtol", "job"]
     rows = []
     for name in paper_cases():

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import xarray as xr
 
 from compressor.analysis import (
     PLOT_CAPTIONS,
+    SPOKEN,
     NoSeriesError,
     SweptRow,
     angle_modes,
@@ -20,7 +22,8 @@ from compressor.analysis import (
     read_cycle,
     shaking,
 )
-from compressor.cases import points, with_ideal_joints
+from compressor.cases import points, row_of, with_ideal_joints
+from compressor.metrics import JOINTS
 from compressor.program import CompsimError
 from compressor.reasons import remedy
 from compressor.report.figures import Drawing
@@ -38,12 +41,15 @@ from compressor.report.figures.job import (
     draw_waterfall,
 )
 from compressor.report.figures.pictures import render_kinds
+from compressor.report.figures.plant_units import in_units
+from compressor.report.figures.sweep_data import name_in_words
 from compressor.report.study_section import file_name
 from compressor.store import (
     DamagedJob,
     Folder,
     Stored,
     StoredStudy,
+    coordinate_names,
     find_axis,
     find_job,
     find_value,
@@ -51,6 +57,7 @@ from compressor.store import (
     read_store,
     read_studies,
 )
+from compressor.units import Units
 
 
 class PlotError(CompsimError):
@@ -64,7 +71,8 @@ class PlotChoice:
     """What to draw: names of figures, all by default; of a study the axis and the other values.
 
     over: the axis by its key or the end of it; at: `key=value` of other axes, else their first;
-    limit: of a segment's rms, m/s2, or with an x behind it times the healthy machine's.
+    limit: of a segment's rms, m/s2, or with an x behind it times the healthy machine's. units: of
+    the figures, as `compressor.units` has them.
     """
 
     what: tuple[str, ...] = ()
@@ -72,6 +80,7 @@ class PlotChoice:
     at: tuple[str, ...] = ()
     limit: str = ""
     kinds: tuple[str, ...] = ("png",)
+    units: Units = "usual"
 
 
 @dataclass(frozen=True)
@@ -117,6 +126,24 @@ OVER_AXIS = {
     "waterfall": draw_waterfall,
     "map": draw_map,
 }
+TITLES = {
+    "analyst": "a revolution as an analyst reads it",
+    "signals": "acceleration, forces and torque over crank angle",
+    "cards": "indicator cards",
+    "spectra": "order spectra",
+    "orbits": "orbits of the journals",
+    "modes": "contact modes over crank angle",
+    "impacts": "impacts over crank angle",
+    "cycles": "vibration over crank angle",
+    "segments": "vibration in segments of 10°",
+    "waterfall": "order spectra of the force on the frame along the cylinder",
+    "map": "most frequent contact mode over crank angle",
+}
+JOINT_WORDS = {
+    "none": "no clearance", "both": "clearance at both joints",
+    **{joint: f"clearance at the {SPOKEN[joint]}" for joint in JOINTS},
+}  # fmt: skip
+TITLE_WIDTH = 105  # letters of a line of a figure's title
 MAX_ROWS = 200  # of a map
 KEY_DIGITS = 10  # digits of a key in the name of a file
 KEEP = "run it again with --set output.keep=series"
@@ -140,7 +167,8 @@ def write_plots(
         key = find_job(results, words, studies, stored.keys())
         drawn = job_figures(stored, studies, key, choice)
         stem = key[:KEY_DIGITS]
-    yield from publish_drawings(drawn, output, stem, choice.kinds)
+    read = ((name, words, in_units(drawing, choice.units)) for name, words, drawing in drawn)
+    yield from publish_drawings(read, output, stem, choice.kinds)
 
 
 def job_figures(
@@ -171,6 +199,7 @@ def job_figures(
                 drawing = OF_CONTACT[name](run)
             else:
                 drawing = BESIDE_TWIN[name](run, twins[name])
+            drawing.title = job_title(studies, key, name)
             yield name, JOB[name](run, twins[name]), drawing
     except NoSeriesError as error:
         raise PlotError(f"job {key}: {error}") from error
@@ -224,7 +253,45 @@ def study_figures(
             if choice.what:
                 raise PlotError(f"no joint of {study.name} has clearance: there is no mode map")
             continue
-        yield name, STUDY[name](rows, over) + where, OVER_AXIS[name](rows, over)
+        drawing = OVER_AXIS[name](rows, axis_words(over))
+        drawing.title = study_title(study, name, where)
+        yield name, STUDY[name](rows, over) + where, drawing
+
+
+def job_title(studies: Sequence[StoredStudy], key: str, name: str) -> str:
+    """Return the title of a job's figure: its study, what is drawn, its place in the sweep."""
+    for study in studies:
+        if key in study.keys:
+            point = [*points(study)][study.keys.index(key)]
+            values = [f"{axis} {format_swept_value(value)}" for axis, value in point.items()]
+            first = f"{study.title or study.name}: {TITLES[name]}"
+            return in_lines(first, [*values, f"job {key[:10]}"])
+    return in_lines(TITLES[name], [f"job {key[:10]}"])
+
+
+def study_title(study: StoredStudy, name: str, where: str) -> str:
+    """Return the title of a study's figure: what is drawn, which joints are worn, the speed."""
+    swept = {axis.key for axis in study.axes}
+    parts = []
+    if "joint" not in swept:
+        parts.append(JOINT_WORDS[study.fixed["joint"]])
+    if "machine.speed_rpm" not in swept:
+        parts.append(f"{study.fixed['machine']['speed_rpm']:g} rpm")
+    parts += [part for part in where.strip().removesuffix(".").split(". ") if part]
+    return in_lines(f"{study.title or study.name}: {TITLES[name]}", parts)
+
+
+def in_lines(first: str, parts: Sequence[str]) -> str:
+    """Return a title: a line that says what is drawn, and below it what of."""
+    return "\n".join(line for text in (first, "; ".join(parts)) for line in wrap(text, TITLE_WIDTH))
+
+
+def axis_words(key: str) -> str:
+    """Return the title of an axis of a study: its name and unit, such as clearance (mm)."""
+    row = row_of(key)
+    unit = (row.unit if row else "") or ""
+    name = name_in_words(coordinate_names([key])[key], unit)
+    return f"{name} ({unit})" if unit else name
 
 
 SENSE = "run it with body: true and sensor: true, or again with --rerun stale"
@@ -293,18 +360,21 @@ def page_figures(stored: Stored, study: StoredStudy) -> Iterator[tuple[str, str,
     if not known:
         return
     if len(known) > 1:
-        title = f"vibration over crank angle and {over}"
-        yield "cycles", title, STUDY["cycles"](rows, over) + where, draw_cycles(rows, over)
+        title = f"vibration over crank angle and {axis_words(over)}"
+        drawing = draw_cycles(rows, axis_words(over))
+        yield "cycles", title, STUDY["cycles"](rows, over) + where, drawing
     loudest = max(known, key=lambda n: np.abs(known[n].vibration).max())
     run = stored.job(jobs[loudest][1])
     case = case_of(run)
-    # of ideal joints that have a closed form: a page simulates nothing
-    has_twin = case.joint != "none" and not case.has_features
-    twin = healthy_twin(run, sensed="sensor_acceleration" in run) if has_twin else None
+    is_worn = case.joint != "none"
+    twin = healthy_twin(run, sensed="sensor_acceleration" in run) if is_worn else None
     value = f"{over} {rows[loudest].value}" if jobs[loudest][0] != "" else rows[loudest].value
     title = f"a revolution as an analyst reads it, {value}"
     note = " It is the job with the greatest vibration of these." if len(known) > 1 else ""
     yield "analyst", title, JOB["analyst"](run, twin) + note + where, draw_analyst(run, twin)
+    if case.load == "gas":
+        title = f"indicator cards, {value}"
+        yield "cards", title, JOB["cards"](run, twin) + where, draw_cards(run, twin)
 
 
 def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]) -> str:

@@ -8,11 +8,15 @@ of the same data by the same code, are not drawn again.
 import contextlib
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
+import xarray as xr
+
 from compressor.analysis import Claim, caption, case_of, claims
+from compressor.outcome import Regime
 from compressor.report.answer import (
     FirstScreen,
     MetricChange,
@@ -29,6 +33,7 @@ from compressor.report.answer import (
 )
 from compressor.report.figures import FIGURES
 from compressor.report.figures.pictures import Painter
+from compressor.report.figures.plant_units import in_units
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.interactive import (
     job_scripts,
@@ -84,8 +89,10 @@ from compressor.store import (
     publish,
     read_store,
     read_studies,
+    run_caveats,
     study_caveats,
 )
+from compressor.units import Units
 
 KINDS = ("png", "svg", "csv", "js")  # of files beside the page
 
@@ -97,20 +104,21 @@ def write_report(
     add: Sequence[Add] = (),
     running: Running | None = None,
     limits: Sequence[str] = (),
+    units: Units = "usual",
 ) -> Path:
     """Write figures and `index.html` about a folder of results; returns the page's path.
 
     add: what makes more of the page, such as `compressor.studies.page_additions` gives. running:
     how the run stands that still adds to the results; the page says so, and loads itself again.
     limits: of metrics, whose zones tables and curves show, such as
-    `body_velocity_rms_mm_per_s=2,5`.
+    `body_velocity_rms_mm_per_s=2,5`. units: of figures and tables, as `compressor.units` has them.
 
     Raises LimitError where these cannot be used, StoreError where there are no results, or the
     report's folder cannot be written.
     """
     folder, zones = Path(report), read_limits(limits)
     with Painter(folder) as painter:
-        contents = build_report(results, command, add, running, painter, zones)
+        contents = build_report(results, command, add, running, painter, zones, units)
         files = painter.finish()
     for plate in contents.plates:
         files |= {name: text.encode() for name, text in plate.texts.items()}
@@ -157,10 +165,11 @@ def build_report(
     running: Running | None,
     painter: Painter,
     limits: Limits,
+    units: Units = "usual",
 ) -> ReportContent:
     """Return the figures, series and page of a report, in memory.
 
-    painter: it gets each figure as soon as there is one; limits: see `write_report`.
+    painter: it gets each figure as soon as there is one; limits, units: see `write_report`.
     """
 
     def begin(plates: Sequence[Plate]) -> None:
@@ -173,17 +182,22 @@ def build_report(
     papers = [study for study in studies if is_of_paper(stored, study)]
     if not papers:
         paper = PaperRuns({}, {}, {})  # a few like runs in a sweep of one's own are no reproduction
-    of_paper = draw_paper(paper)
+    of_paper = plates_in(draw_paper(paper), units)
     begin(of_paper)
     others = second_sets(stored, studies, paper)
-    of_others = {n: [Plate(*parts) for parts in second_drawings(one)] for n, one in others.items()}
+    of_others = {
+        n: plates_in([Plate(*parts) for parts in second_drawings(one)], units)
+        for n, one in others.items()
+    }
     found = shakings(paper)
-    of_faults = [Plate(*parts) for parts in diagnosis_drawings(found, paper)]
+    of_faults = plates_in([Plate(*parts) for parts in diagnosis_drawings(found, paper)], units)
     shown = {run.attrs["key"] for run in paper.stored.values()}
     own = [study for study in studies if not shown.issuperset(study.keys)]
     added = [one(results, studies) for one in add]
     drawn = [
-        drawn_study(stored, study, others.get(study.name), notes_on(study.name, added), limits)
+        drawn_study(
+            stored, study, others.get(study.name), notes_on(study.name, added), limits, units
+        )
         for study in own
     ]
     sets = [
@@ -196,9 +210,9 @@ def build_report(
     begin(later)
     caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored.rows, one)]
     judged = claims(paper.usable) if paper.stored else []
-    figures, tables = paper_sections(paper, of_paper, judged, caveats)
+    figures, tables = paper_sections(paper, of_paper, judged, caveats, units)
     sections = [
-        answer_section(summarise(stored, own, paper, judged, drawn)),
+        answer_section(summarise(stored, own, paper, judged, drawn, units)),
         *(one.figures for one in drawn),
         *figures,
         *sets,
@@ -210,10 +224,17 @@ def build_report(
         *missing_sections(paper, results),
         provenance_section(studies, results, command),
     ]
-    series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs.jobs)}
+    series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs.jobs, units)}
     jobs = JobsToOpen(shlex.quote(str(results)), [one.jobs for one in drawn], [*series])
-    page = document(sections, jobs, running)
+    titles = {study.title for study in studies if study.title}
+    title = titles.pop() if len(titles) == 1 else ""  # several machines have it in their sections
+    page = document(sections, jobs, running, title)
     return ReportContent([*of_paper, *later], [study.name for study in studies], series, page)
+
+
+def plates_in(plates: Sequence[Plate], units: Units) -> list[Plate]:
+    """Return figures in chosen units."""
+    return [replace(plate, drawing=in_units(plate.drawing, units)) for plate in plates]
 
 
 def notes_on(study: str, added: Sequence[Additions]) -> list[StudyNote]:
@@ -222,7 +243,10 @@ def notes_on(study: str, added: Sequence[Additions]) -> list[StudyNote]:
 
 
 class DrawnStudy(NamedTuple):
-    """What the page has of a user's own study. jobs: what a click on a job's point tells."""
+    """What the page has of a user's own study.
+
+    jobs: what a click on a job's point tells; cautions: what to know beside what changes most.
+    """
 
     figures: Section
     table: Section
@@ -230,6 +254,7 @@ class DrawnStudy(NamedTuple):
     findings: list[MetricChange]
     line: StudyLine
     jobs: JobFacts
+    cautions: list[str]
 
 
 def drawn_study(
@@ -238,6 +263,7 @@ def drawn_study(
     other: SecondSet | None,
     notes: Sequence[StudyNote],
     limits: Limits,
+    units: Units,
 ) -> DrawnStudy:
     """Return a user's own study: its sections, and its sweep, drawn; `notes`: lines on it.
 
@@ -250,20 +276,29 @@ def drawn_study(
         plates = [
             Plate(file_name("sweep", study.name, one.name), f"{study.name}: {one.title}",
                   one.caption, one.figure)
-            for one in ([] if whole else draw_sweep(data, limits))
+            for one in ([] if whole else draw_sweep(data, limits, units))
         ]  # fmt: skip
         plates += [
-            Plate(file_name(name, study.name), f"{study.name}: {title}", words, drawing)
+            Plate(file_name(name, study.name), f"{study.name}: {title}", words,
+                  in_units(drawing, units))
             for name, title, words, drawing in ([] if whole else page_figures(stored, study))
-        ]
-        figures, table = study_sections(stored, study, data, plates, anchor, notes, limits)
+        ]  # fmt: skip
+        figures, table = study_sections(stored, study, data, plates, anchor, notes, limits, units)
         keys = [*(key for plate in plates for key in plate.jobs), *study.keys[:MAX_ROWS]]
         counts = job_counts(data)
         return DrawnStudy(
-            figures, table, plates, study_findings(data),
+            figures, table, plates, study_findings(data, units),
             StudyLine(f"Study {study.name}", figures.anchor, counts.text, bool(counts.failed)),
-            job_facts(data, keys),
+            job_facts(data, keys), motion_cautions(stored, study, data),
         )  # fmt: skip
+
+
+def motion_cautions(stored: Stored, study: StoredStudy, data: xr.Dataset) -> list[str]:
+    """Return which of a study's jobs are chaotic or have not settled, a sentence each."""
+    chaotic = int((data["regime"].values == Regime.CHAOTIC).sum())
+    texts = [f"{chaotic} of {study.jobs} jobs are chaotic, and their peaks do not count here"]
+    found = [*texts[: chaotic > 0], *run_caveats(stored.rows, study)]
+    return [f"Study {study.name}: {text}." for text in found]
 
 
 def summarise(
@@ -272,6 +307,7 @@ def summarise(
     paper: PaperRuns,
     judged: Sequence[Claim],
     drawn: Sequence[DrawnStudy],
+    units: Units = "usual",
 ) -> FirstScreen:
     """Return the page's first screen; judged: the paper's claims."""
     lines = [one.line for one in drawn]
@@ -285,7 +321,7 @@ def summarise(
         worn = (
             (label_in_words(name), run) for name, run in paper.stored.items() if name != "typical"
         )
-        each.append(("The paper's cases", findings(worn)))
+        each.append(("The paper's cases", findings(worn, units)))
     shown = [(f"The last job of {study.name}", last_case(stored, study)) for study in own[:1]]
     if paper.stored and not shown:
         name, run = [*paper.stored.items()][-1]
@@ -295,7 +331,8 @@ def summarise(
         for name, case in shown
         if case
     ]
-    return FirstScreen(lines, [*round_robin(each)], judged, pictures)
+    cautions = [text for one in drawn for text in one.cautions]
+    return FirstScreen(lines, [*round_robin(each)], judged, pictures, cautions)
 
 
 def remove_stale(report: Path, contents: ReportContent) -> None:

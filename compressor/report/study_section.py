@@ -1,7 +1,7 @@
 """The section of a report about a user's own study: its failures, its table and its figures."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -25,7 +25,9 @@ from compressor.report.page import (
     status_text,
     value_cell,
 )
+from compressor.report.side_by_side import HealthyAndWorn, compare_healthy
 from compressor.store import Stored, StoredStudy, study_caveats
+from compressor.units import Units
 
 MAX_DETAILS = 20
 MAX_ROWS = 500
@@ -55,7 +57,8 @@ class StudyContent:
     """What a page says of a study; `chaotic` counts jobs of which statistics alone hold.
 
     `second_set`: the id of the section with its own Figures 8 to 16, empty where it has none;
-    `notes`: lines that others add; `caveats`: what to know beside the numbers, a sentence each.
+    `notes`: lines that others add; `caveats`: what to know beside the numbers, a sentence each;
+    `title`, `about`: what its case file says of the machine; `beside`: it without clearance.
     """
 
     case_file: str
@@ -68,6 +71,9 @@ class StudyContent:
     jobs: str
     second_set: str = ""
     notes: Sequence[StudyNote] = ()
+    title: str = ""
+    about: str = ""
+    beside: HealthyAndWorn | None = None
 
 
 @dataclass(frozen=True)
@@ -92,6 +98,7 @@ def study_sections(
     second_set: str = "",
     notes: Sequence[StudyNote] = (),
     limits: Limits = NO_LIMITS,
+    units: Units = "usual",
 ) -> tuple[Section, Section]:
     """Return the sections of a study as `open_study` gives it: figures and failures, and table.
 
@@ -103,19 +110,22 @@ def study_sections(
         case_file=study.case_file,
         counts=job_counts(data).text,
         chaotic=int((data["regime"].values == Regime.CHAOTIC).sum()),
-        caveats=study_caveats(stored.rows, study),
+        caveats=[*study_caveats(stored.rows, study), *oil_caveats(study)],
         failures=failed_jobs(stored, data),
         remedies=[f"{reason}: {remedy(reason)}" for reason in reasons],
         plates=plates,
         jobs=anchor,
         second_set=second_set,
         notes=notes,
+        title=study.title,
+        about=study.notes,
+        beside=compare_healthy(stored, data, units),
     )
     regimes = [name for name in Regime if (data["regime"].values == name).any()]
     table = JobsContent(
         study.name,
         data["status"].size,
-        jobs_table(data, limits),
+        jobs_table(data, limits, units),
         [*map(regime_words, regimes)],
         limits.words,
     )
@@ -123,6 +133,18 @@ def study_sections(
         Section(file_name("study", study.name), f"Study {study.name}", "study.html", content),
         Section(anchor, f"Jobs of study {study.name}", "jobs.html", table),
     )
+
+
+def oil_caveats(study: StoredStudy) -> list[str]:
+    """Return what decides the peak forces of joints with oil; [] where it is swept, or without."""
+    key, oil = "lubricant.last_share", study.fixed.get("lubricant")
+    if not isinstance(oil, Mapping) or key in {axis.key for axis in study.axes}:
+        return []
+    return [
+        f"{key} is {oil['last_share']:g}: in this share of the clearance the oil film bears no "
+        "more, which decides how hard metal strikes. Peak forces may follow it closely: run "
+        "another value beside it, or compsim explain --models, before you use a peak"
+    ]
 
 
 def table_anchor(study: str) -> str:
@@ -172,9 +194,9 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
     return rows
 
 
-def jobs_table(data: xr.Dataset, limits: Limits = NO_LIMITS) -> PageTable:
+def jobs_table(data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usual") -> PageTable:
     """Return a row for every job of a study, as far as a page can hold them."""
-    swept, shown = swept_values(data), measures(data)
+    swept, shown = swept_values(data), measures(data, units)
     metrics = [(m, ravel_jobs(m.of(data)), ravel_jobs(m.bar(data))) for m in shown]
     words = ("status", "reason", "regime", "key")
     ends = zip(*(data[name].values.flat for name in words), strict=True)

@@ -28,6 +28,7 @@ from compressor.store.reader import Stored, read_store
 from compressor.store.sensor_records import NEEDS_SENSOR
 from compressor.store.series_file import image_of, read_bytes, read_series
 from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
+from compressor.units import Units, unit_in
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,12 +50,14 @@ class ExportOptions:
     """How to export.
 
     form: of the files in a folder, of `SUFFIXES`, netcdf by default; series: also the time series
-    of every job of the studies, in a folder beside each; force: replace what is there.
+    of every job of the studies, in a folder beside each; force: replace what is there; units: of
+    CSV, other files are in SI.
     """
 
     form: str | None = None
     series: bool = False
     force: bool = False
+    units: Units = "si"
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,8 @@ def export(
     for number, task in enumerate(tasks):
         progress(number, len(tasks), "")
         try:
-            found.append((_metrics if task.studies else _series)(task, stored, form))
+            write = _metrics if task.studies else _series
+            found.append(write(task, stored, form, options.units))
         except DamagedJob as error:
             if task.named:
                 raise
@@ -192,7 +196,7 @@ def _refuse_existing(tasks: Iterable[_Task]) -> None:
             raise ExportError(f"{task.path} exists: --force replaces it")
 
 
-def _metrics(task: _Task, stored: Stored, form: str) -> Exported:
+def _metrics(task: _Task, stored: Stored, form: str, units: Units) -> Exported:
     """Write the numbers of studies' jobs as one table; in netCDF a lone grid keeps its axes."""
     from compressor.store.dataset import (  # loads xarray: half a second
         grid,
@@ -203,7 +207,7 @@ def _metrics(task: _Task, stored: Stored, form: str) -> Exported:
     studies = task.studies
     if form == "csv":
         table = outcomes(table_of_jobs(studies), stored.rows)
-        size = write_csv(task.path, columns(table, "job"))
+        size = write_csv(task.path, columns(table, "job", units))
     else:
         is_grid = len(studies) == 1 and studies[0].is_grid
         layout = grid(studies[0]) if is_grid else table_of_jobs(studies)
@@ -216,7 +220,7 @@ def _metrics(task: _Task, stored: Stored, form: str) -> Exported:
     return Exported(os.fspath(task.path), "metrics", name, jobs, size)
 
 
-def _series(task: _Task, stored: Stored, form: str) -> Exported:
+def _series(task: _Task, stored: Stored, form: str, units: Units) -> Exported:
     """Write the time series of one job; in netCDF it is the stored file, to the byte."""
     position = stored.position(task.key)
     if position is None:
@@ -228,7 +232,7 @@ def _series(task: _Task, stored: Stored, form: str) -> Exported:
     kind = "series"
     if form == "csv":
         dataset = read_series(source)
-        size = write_csv(task.path, columns(dataset, "time") | _record(dataset))
+        size = write_csv(task.path, columns(dataset, "time", units) | _record(dataset))
     elif form in RECORD_SUFFIXES:
         from compressor.vibration import encode_record  # loads parts of SciPy
 
@@ -245,8 +249,11 @@ def _series(task: _Task, stored: Stored, form: str) -> Exported:
     return Exported(os.fspath(task.path), kind, task.key, samples, size)
 
 
-def columns(table: "xr.Dataset", dim: str) -> dict[str, np.ndarray]:
-    """Return the variables along a dimension by header, a column for each joint, axis and so on."""
+def columns(table: "xr.Dataset", dim: str, units: Units = "si") -> dict[str, np.ndarray]:
+    """Return the variables along a dimension by header, a column for each joint, axis and so on.
+
+    units: of the numbers; swept keys stay in those of the case file.
+    """
     found = {}
     leading = [name for name in table.coords if table[name].dims == (dim,)]
     for name in dict.fromkeys([*leading, *table.data_vars]):
@@ -254,9 +261,13 @@ def columns(table: "xr.Dataset", dim: str) -> dict[str, np.ndarray]:
         if item.dims[:1] != (dim,):
             continue
         unit = item.attrs.get("units", "1")
-        ending = "" if unit == "1" or "case_key" in item.attrs else f" [{unit}]"
+        is_key, factor = "case_key" in item.attrs, 1.0
+        if units == "plant" and not is_key:
+            unit, factor = unit_in(unit, units)
+        ending = "" if unit == "1" or is_key else f" [{unit}]"
         inner = [table[other].values.tolist() for other in item.dims[1:]]
         values = item.values.reshape(len(item), -1)
+        values = values if factor == 1.0 else factor * values
         for number, labels in enumerate(itertools.product(*inner)):
             found["_".join(map(str, (name, *labels))) + ending] = values[:, number]
     return found

@@ -82,6 +82,8 @@ class StoredStudy:
     versions: dict[str, str]
     written: str  # UTC
     is_grid: bool = True
+    title: str = ""  # what the page of the report says of the machine
+    notes: str = ""
 
     @property
     def jobs(self) -> int:
@@ -241,6 +243,8 @@ def write_study(
         | library_versions("numpy", "scipy", "numba", "h5py", "xarray"),
         datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         study.is_grid,
+        study.title,
+        study.notes,
     )
     old = _present(folder, study.name)
     if old:
@@ -260,6 +264,9 @@ def encode(study: StoredStudy) -> bytes:
     plain = vars(study) | {"axes": [vars(axis) for axis in study.axes]}
     if study.is_grid:  # as in files that are older than other studies
         del plain["is_grid"]
+    for name in ("title", "notes"):
+        if not plain[name]:
+            del plain[name]
     text = json.dumps(plain, indent=1)
     head = text.removesuffix("\n}").encode()
     return head + f',\n "digest": "{digest(head)}"\n}}\n'.encode()
@@ -339,7 +346,10 @@ def _in_present_words(study: StoredStudy) -> StoredStudy:
 def _is_sound(study: StoredStudy, path: Path) -> bool:
     """Return whether a study's entries have the types that we write, and its name is its file's."""
     swept = {key for name in table() for key in (name, name.rpartition(".")[0])}
-    texts = (study.case_file, study.command, study.written, *study.versions.values())
+    texts = (
+        study.case_file, study.command, study.written, study.title, study.notes,
+        *study.versions.values(),
+    )  # fmt: skip
     return (
         study.name == path.stem
         and bool(study.former_of) == (path.parent.name == "former")

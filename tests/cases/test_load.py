@@ -109,6 +109,16 @@ def test_a_study_is_named_by_its_file_or_itself(write):
     ]
 
 
+def test_a_title_and_notes_are_no_part_of_a_job(write):
+    titled = "report:\n  title: Unit 3\n  notes: |\n    Rod weighed.\n    Oil: VG 100.\n"
+    (plain,) = load_studies(write(BIG_END, "plain.yaml"))
+    (study,) = load_studies(write(BIG_END + titled, "titled.yaml"))
+    assert (study.title, study.notes) == ("Unit 3", "Rod weighed.\nOil: VG 100.")
+    assert (plain.title, plain.notes, plain.keys) == ("", "", study.keys)
+    (other,) = load_studies("titled.yaml", overrides=["report.title=Unit 4"])
+    assert other.title == "Unit 4"
+
+
 # Axes
 
 
@@ -274,6 +284,11 @@ def test_mistakes_of_all_files_are_told_at_once(write):
         ("contact: {materials: [[steel, steel], [steel, tin]]}\n",
          "1:39: contact.materials: needs a pair of materials, steel or copper, such as "
          "[steel, steel], not ['steel', 'tin']"),
+        ("report: {title: 5}\n", "1:17: report.title: needs a line of text of up to 100 letters, "
+         "not 5"),
+        ("report: Unit\n", "1:9: report: needs a mapping of keys, not 'Unit'"),
+        ("blocks: [{report: {title: x}}]\n", "1:11: report: cannot stand in a block: it belongs "
+         "to the whole file"),
         ("solve: {max_steps: [1, 1.0]}\n", "1:24: solve.max_steps: 1 is in the list twice"),
         ("machine: {speed_rpm: " + "9" * 5000 + "}\n", "1:22: machine.speed_rpm: must be "
          "finite: needs a number in (0, 100000] rpm, not inf"),

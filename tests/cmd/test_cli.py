@@ -304,8 +304,8 @@ def test_store_errors_name_the_place_and_the_remedy(case_file, capsys):
 def reporter(monkeypatch):
     """Stands in for compressor.report, which draws for seconds."""
 
-    def write_report(results, report, command, add, running, limits):
-        assert (running, limits) == (None, ())
+    def write_report(results, report, command, add, running, limits, units):
+        assert (running, limits, units) == (None, (), "usual")
         read_studies(results)
         (place,) = [one.keywords["place"] for one in add if one.keywords["place"]]
         return Path(report, command, place)

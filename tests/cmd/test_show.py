@@ -57,6 +57,35 @@ def test_numbers_have_labels_units_and_error_bars(paper_store, show):
     assert told["friction loss"] == f"{numbers['friction_loss']:.6g} J"
 
 
+def test_the_machine_without_clearance_stands_beside_a_worn_one(paper_store, paper_runs, show):
+    """By the closed form: the paper's design model itself."""
+    out = show(paper_store, "big-end", "clearance_mm=0.3")
+    worn, sound = paper_runs["big_end 0.3"], paper_runs["design"]
+    for name in ("peak", "rms"):
+        found = re.search(rf"{name} acceleration without clearance +(\S+) m/s²; .* (\S+) t", out)
+        ideal = float(sound[f"{name}_acceleration"])
+        assert float(found[1]) == pytest.approx(ideal, rel=1e-3)
+        times = float(worn[f"{name}_acceleration"]) / ideal
+        assert float(found[2]) == pytest.approx(times, rel=1e-3)
+    assert "without clearance" not in show(paper_store, "design")
+
+
+def test_numbers_may_be_in_plant_units_or_si(paper_store, show):
+    numbers = report_job(paper_store, *HERE).numbers
+    peak, force = numbers["peak_acceleration"], numbers["peak_contact_force"][0]
+    for units, acceleration, newtons in (("plant", "g", "kN"), ("si", "m/s²", "N")):
+        told = values(show(paper_store, *HERE, "--units", units))
+        value, unit = re.fullmatch(r"(\S+) ± \S+ (\S+)", told["peak acceleration"]).groups()
+        assert unit == acceleration
+        in_unit = peak / 9.80665 if unit == "g" else peak
+        assert float(value) == pytest.approx(in_unit, rel=1e-3)
+        value, unit = re.fullmatch(
+            r"(\S+) ± \S+ (\S+)", told["peak contact force, big end"]
+        ).groups()
+        assert unit == newtons
+        assert float(value) == pytest.approx(force / (1e3 if unit == "kN" else 1.0), rel=1e-3)
+
+
 def test_nothing_is_an_array_and_nothing_is_said_of_a_contact_that_is_none(paper_store, show):
     out = show(paper_store, *HERE)
     assert "[" not in out

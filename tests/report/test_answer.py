@@ -74,6 +74,7 @@ def test_numbers_have_the_digits_of_their_bars(value, bar, text):
     ("name", "value", "unit", "text"),
     [("clearance_mm", 0.2, "mm", "clearance 0.2 mm"), ("fault", "big_end", "", "fault big end"),
      ("damping_N_s_per_mm", 336.0, "N s/mm", "damping 336 N s/mm"),
+     ("clearance_mm_small_end", 0.128856, "mm", "clearance, small end 0.1289 mm"),
      ("static", 0.23, "1", "static 0.23"), ("clearance_mm", np.nan, "mm", ""),
      ("fault", "none", "", "fault none")],
 )  # fmt: skip

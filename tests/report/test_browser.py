@@ -188,9 +188,11 @@ def test_no_width_needs_to_scroll_sideways(page, tmp_path, width, dark):
 CUT = """
 return [...document.querySelectorAll(".plot")].flatMap(plot => {
   const room = plot.getBoundingClientRect();
-  return [...plot.querySelectorAll(".ytick text, .xtick text, .annotation-text")].filter(text => {
+  const words = ".ytick text, .xtick text, .annotation-text, .ytitle, .xtitle";
+  return [...plot.querySelectorAll(words)].filter(text => {
     const one = text.getBoundingClientRect();
-    return one.left < room.left - 1 || one.right > room.right + 1;
+    return one.left < room.left - 1 || one.right > room.right + 1 ||
+      one.top < room.top - 1 || one.bottom > room.bottom + 1;
   }).map(text => plot.closest("figure").id + ": " + text.textContent);
 });
 """

@@ -216,6 +216,7 @@ def test_a_word_beside_a_line_stands_where_the_line_does():
     (note,) = content(Drawing([panel], 3.0))["panels"][0]["notes"]
     assert (note["text"], note["inside"]) == ("order 12", True)
     assert (note["x"], note["y"]) == pytest.approx((0.06, 1.0))
+    assert (note["shift"], note["side"], note["level"]) == ((4, -4), "left", "baseline")
 
 
 @pytest.mark.parametrize("is_log", [False, True])

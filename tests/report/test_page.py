@@ -37,6 +37,7 @@ from compressor.report.paper_sections import (
     PaperCasesContent,
     SecondSetContent,
 )
+from compressor.report.side_by_side import HealthyAndWorn
 from compressor.report.study_section import JobsContent, StudyContent
 from compressor.store.studies import StoredStudy
 from compressor.studies.claims.page import MachinesFile
@@ -99,6 +100,7 @@ def contents(evil):
         [(evil(), [found]), (evil(), [found])],
         claims,
         [(evil(), evil())],
+        [evil()],
     )
     study = StoredStudy(evil(), evil(), (), (evil(), evil()), {}, evil(), {evil(): evil()}, evil())
     return {
@@ -118,7 +120,8 @@ def contents(evil):
             evil(), evil(), [evil()], [evil()], [FigurePair(first, plate(evil))], claims
         ),
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [plate(evil)],
-                                   evil(), evil(), [StudyNote(evil(), evil(), evil())]),
+                                   evil(), evil(), [StudyNote(evil(), evil(), evil())],
+                                   evil(), evil(), HealthyAndWorn(evil(), table(evil))),
     }  # fmt: skip
 
 
@@ -128,7 +131,7 @@ def test_every_template_escapes_every_text():
     words = "</script><script>alert(1)</script>"
     jobs = JobsToOpen(words, [JobFacts([words], {"key": [words]})], ["key"])
     sections = [Section(evil(), evil(), name, content) for name, content in given.items()]
-    text = document(sections, jobs)
+    text = document(sections, jobs, title=evil())
     own = {"page.html", "pieces.html", "status.html", "style.css", "report.js", "mechanism.svg"}
     assert {*templates().list_templates()} - {*given} == own
     scripts = re.findall("<script(.*?)>(.*?)</script>", text, re.DOTALL)
@@ -198,7 +201,7 @@ def test_a_verdict_has_its_class():
 
 
 def test_a_template_that_lacks_a_value_is_an_error():
-    with pytest.raises(UndefinedError, match="case_file"):
+    with pytest.raises(UndefinedError, match="title"):
         document([Section("a", "A", "study.html", object())])
 
 

@@ -192,7 +192,7 @@ def test_every_claim_has_a_verdict(full):
     rows = [c for _, c in read(full).rows if c[0].startswith("(") and len(c) == 4]
     assert [cells[0][1] for cells in rows] == list("12345678")
     verdicts = [
-        re.fullmatch(r"(held|not held)margin ([+-]\S+) % \(± \S+ %(?:, undecided)?\)", c[1])
+        re.fullmatch(r"(held|not held)margin ([+-]\S+) %(?: \(± \S+ %(?:, undecided)?\))?", c[1])
         for c in rows
     ]
     assert all((found[1] == "held") == (float(found[2]) > 0) for found in verdicts)
@@ -375,9 +375,15 @@ def test_a_sweep_has_its_table_and_plots(own, tmp_path):
 def test_a_sweep_is_drawn_over_the_crank_angle(tmp_path):
     """By the greatest of two clearances at the rod's first mass; a damaged job is left out."""
     file, own = tmp_path / "own.yaml", tmp_path / "results"
-    file.write_text("joint: big_end\nclearance_mm: [0.1, 0.2]\nmachine: {rod_mass_kg: [3, 5]}\n")
+    file.write_text("joint: big_end\nclearance_mm: [0.1, 0.2]\nmachine: {rod_mass_kg: [3, 5]}\n"
+                    "report: {title: Unit 3, notes: Rod weighed.}\n")  # fmt: skip
     store(own, file, overrides=["solve.duration_rev=2", "solve.settle_rev=1", *DRAFT])
     write_report(own, tmp_path / "out")
+    raw = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert "<h1>Unit 3</h1>" in raw
+    assert "<title>Unit 3</title>" in raw
+    assert '<p class="notes">Rod weighed.</p>' in raw
+    healthy_and_worn(read(tmp_path / "out"), own)
     drawn = {"sweep-own-ranking", "sweep-own-map", "cycles-own", "analyst-own"}
     assert {p.stem for p in (tmp_path / "out").glob("*.png")} == drawn
     text = " ".join(read(tmp_path / "out").text.split())
@@ -398,6 +404,37 @@ def test_a_sweep_is_drawn_over_the_crank_angle(tmp_path):
     text = " ".join(read(tmp_path / "out").text.split())
     assert "own: a revolution as an analyst reads it, clearance_mm 0.1" in text
     assert "vibration over crank angle and clearance_mm" not in text
+
+
+def test_tables_and_figures_may_be_in_plant_units(own, tmp_path):
+    write_report(own, tmp_path / "out", units="plant", limits=["rms_acceleration_m_per_s2=1"])
+    found = read(tmp_path / "out")
+    head = next(cells for _, cells in found.rows if cells[0] == "clearance_mm")
+    assert head[3] == "peak acceleration (g)"
+    for key in read_studies(own)[0].keys:
+        _, cells = found.jobs[key]
+        with read_job(own, key) as run:
+            peak, rms = (float(run[f"{name}_acceleration"]) for name in ("peak", "rms"))
+        assert float(cells[3].split(" ± ")[0]) == pytest.approx(peak / 9.80665, rel=1e-3)
+        assert cells[4].endswith(" B") == (rms >= 1.0)  # the limit is 1 m/s2
+    table = (tmp_path / "out" / "sweep-own-map.csv").read_text(encoding="utf-8")
+    assert "peak acceleration: g" in table
+
+
+def healthy_and_worn(found, own):
+    """The machine without clearance stands beside its worn jobs, by its closed form."""
+    head = next(cells for _, cells in found.rows if cells[1:2] == ["without clearance"])
+    assert sorted(re.search("clearance (.*) mm", text)[1] for text in head[2:]) == ["0.1", "0.2"]
+    row = next(cells for _, cells in found.rows if cells[0] == "rms acceleration (m/s²)")
+    case = load_cases(own.parent / "own.yaml")[0]
+    crank, rod = case.machine.crank_radius_mm / 1e3, case.machine.rod_length_mm / 1e3
+    turn = np.linspace(0.0, 2.0 * np.pi, 20_001)
+    x = crank * np.cos(turn) + np.sqrt(rod**2 - (crank * np.sin(turn)) ** 2)
+    a = case.omega**2 * np.gradient(np.gradient(x, turn), turn)[2:-2]
+    assert float(row[1]) == pytest.approx(np.sqrt(np.mean(a**2)), rel=2e-3)
+    for text in row[2:]:
+        value, times = re.fullmatch(r"(\S+)(?: ± \S+)? \((\S+)×\)", text).groups()
+        assert float(times) == pytest.approx(float(value) / float(row[1]), abs=0.006)
 
 
 def test_of_the_paper_nothing_stands_over_a_sweep_of_one_s_own(own, tmp_path):
@@ -472,7 +509,7 @@ def test_progress_goes_to_stderr(own, tmp_path, capfd):
     assert not out
     overview, ranking = sorted(err.splitlines())  # by two processes
     assert overview.startswith("drawing own: metrics over ")
-    assert ranking == "drawing own: which key matters for which metric"
+    assert ranking == "drawing own: what explains the spread of each metric"
 
 
 @pytest.mark.parametrize("made", [False, True])

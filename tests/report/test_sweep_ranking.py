@@ -35,7 +35,7 @@ def test_bars_and_caption_are_the_exact_shares():
         assert found["speed"][kind] == pytest.approx([share] * 2)
         assert found["clearance"][kind] == pytest.approx([100 - share] * 2)
         assert found["load"][kind] == pytest.approx([0, 0])
-    assert f"Speed matters most for peak acceleration ({share:.0f} %)" in drawn.caption
+    assert f"Speed explains {share:.0f} % of the spread of peak acceleration" in drawn.caption
     panel = drawn.figure.panels[0]
     assert panel.y.words == {0.0: "peak acceleration", 1.0: "rms acceleration"}
     assert panel.x.title == "share of variance (%)"
@@ -53,12 +53,12 @@ def test_the_caption_follows_the_numbers():
     def peak(c, n, load):
         return 10 + 5 * c + n + 0 * load
 
-    assert "Clearance matters most for" in plan(grid(AXES, peak))["ranking"].caption
+    assert plan(grid(AXES, peak))["ranking"].caption.startswith("Clearance explains 93 % of the")
     data = grid(AXES, peak)
     data["rms_acceleration"] = data["rms_acceleration"] * 0 + data["speed_rpm"]
     caption = plan(data)["ranking"].caption
-    assert "Clearance matters most for peak acceleration (93 %)." in caption  # 25 * 2/3 of 17.92
-    assert "Speed matters most for rms acceleration (100 %)." in caption
+    assert "Clearance explains 93 % of the spread of peak acceleration." in caption
+    assert "Speed explains 100 % of the spread of rms acceleration." in caption
 
 
 def test_jobs_without_a_value_are_told():
@@ -107,7 +107,7 @@ def test_both_answers_are_given_where_jobs_of_a_design_failed():
     without, with_them = (100 * one.total[1] for one in (peak, peak.with_unknown))
     assert without == pytest.approx(90, abs=8)
     assert abs(with_them - without) > 0.5
-    assert f"peak acceleration ({without:.0f} %; {with_them:.0f} % with them)" in caption
+    assert f"{without:.0f} % ({with_them:.0f} % with them) of the spread of peak" in caption
     assert "Up to 7 jobs lack a value" in caption
     assert "the 6 blocks of the design that have one are left out whole" in caption
 

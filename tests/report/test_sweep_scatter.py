@@ -7,6 +7,7 @@ import pytest
 from swept_made import listed
 
 from compressor.report.figures.sweep import draw_sweep
+from compressor.report.interactive import content
 
 RNG = np.random.default_rng(5)
 CLEARANCE, SPEED = RNG.random((2, 60)) + 1.0
@@ -64,6 +65,11 @@ def test_what_is_not_known_is_drawn_but_not_fitted():
     assert one["a job failed here"].jobs == ("k3",)
     ring = next(trace for name, trace in one.items() if name.startswith("chaotic"))
     assert (ring.y, ring.jobs) == (60.0, ("k7",))
+    size = ring.style.markersize + ring.style.edge_width
+    assert ring.style.is_hollow
+    assert size <= one["a job"].style.markersize + 1e-9  # it covers no point
+    marks = content(panel)["panels"][0]["traces"]
+    assert [mark.get("hollow", False) for mark in marks if mark["name"] == ring.name] == [True]
     assert one["trend"].y == pytest.approx(2 + one["trend"].x ** 2)
 
 

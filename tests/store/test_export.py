@@ -82,6 +82,27 @@ def test_metrics_in_csv_are_the_stored_ones_to_the_bit(results, tmp_path):
     assert sorted(row["status"] for row in rows) == ["failed", "failed", "missing", "ok"]
 
 
+def test_csv_may_have_plant_units(results, tmp_path):
+    """Swept keys stay in those of the case file, and netCDF in SI."""
+    options = ExportOptions(units="plant")
+    for name in ("grid.csv", "grid.nc"):
+        export(results, ["grid"], tmp_path / name, options)
+    row = table(tmp_path / "grid.csv")[1]
+    study = open_study(results, "grid")
+    one = study.isel(clearance_mm=0, max_steps=1)
+    assert row["clearance_mm"] == "0.1"
+    for name, header, factor in (
+        ("peak_acceleration", "peak_acceleration [g]", 1 / 9.80665),
+        ("rms_acceleration_error", "rms_acceleration_error [g]", 1 / 9.80665),
+        ("crank_work", "crank_work [J]", 1.0),
+    ):
+        assert float(row[header]) == pytest.approx(factor * float(one[name]), rel=1e-12)
+    force = float(one["peak_contact_force"].sel(joint="big_end"))
+    assert float(row["peak_contact_force_big_end [kN]"]) == pytest.approx(force / 1e3, rel=1e-12)
+    with xr.open_dataset(tmp_path / "grid.nc") as found:
+        assert found["peak_contact_force"].attrs["units"] == "N"
+
+
 def test_metrics_in_netcdf_open_as_the_study(results, tmp_path):
     export(results, ["grid"], tmp_path / "grid.nc")
     study = open_study(results, "grid")

@@ -328,6 +328,7 @@ class Drawing:
     x_title: str = ""
     y_title: str = ""
     legend: list[Trace] = field(default_factory=list)
+    title: str = ""  # above all, in lines
 
 
 def make_grid(

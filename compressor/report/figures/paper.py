@@ -113,7 +113,9 @@ def finish_figure(figure: Drawing, lowest: Sequence[Panel] | np.ndarray) -> Draw
     return figure
 
 
-PISTON = Quantity("piston_force", "", "force on the piston, towards the crank (kN)", KILONEWTON)
+PISTON = Quantity(
+    "piston_force", "force on the piston, towards the crank", "force (kN)", KILONEWTON
+)
 
 
 def draw_piston_force(runs: Runs) -> Drawing:
@@ -215,7 +217,7 @@ def draw_pressure_volume(runs: Runs) -> Drawing:
     name_phases(panel, run, volume, pressure)
     panel.x.title = "gas volume V (litres)"
     panel.x.span(0, 1.05 * volume.max())
-    panel.y.title = "cylinder pressure p (MPa, absolute)"
+    panel.y.title = "pressure p (MPa, absolute)"
     panel.y.span(0, 1.15 * pressure.max())
     return figure
 
@@ -282,11 +284,12 @@ def mark_ray(panel: Panel, degrees: float, radius: float) -> None:
     """Draw a ray from the cam's centre to its rim (m), with its cam angle beside it."""
     turn = math.radians(degrees)
     along = np.array([math.cos(turn), math.sin(turn)])
-    aside = np.abs(along[::-1])
     ends = np.array([0.0, 1e3 * radius])
     panel.plot(along[0] * ends, along[1] * ends, LineStyle(GREY, linewidth=0.8))
-    x, y = (1e3 * radius - 32) * along + 18 * aside
-    panel.notes.append(Note(f"{degrees:g}°", x, y, side="center", level="center"))
+    x, y = (1e3 * radius - 32) * along
+    upright = degrees in (90, 270)
+    shift, side, level = ((5, 0), "left", "center") if upright else ((0, 4), "center", "bottom")
+    panel.notes.append(Note(f"{degrees:g}°", x, y, shift=shift, side=side, level=level))
 
 
 def draw_follower(panel: Panel, cam: Cam, angles: np.ndarray) -> None:

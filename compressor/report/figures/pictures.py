@@ -162,11 +162,16 @@ def paint(drawing: Drawing) -> Figure:
         figure.supxlabel(drawing.x_title, fontsize="medium")
     if drawing.y_title:
         figure.supylabel(drawing.y_title, fontsize="medium")
+    if drawing.title:
+        figure.suptitle(drawing.title, x=0.02, ha="left", fontsize="medium")
     if drawing.legend:
         longest = max(len(one.name) for one in drawing.legend)
         across = min(len(drawing.legend), max(1, LEGEND_WIDTH // (longest + 9)))
         handles = [*map(legend_handle, drawing.legend)]
-        figure.legend(handles=handles, loc="outside upper center", ncols=across)
+        figure.legend(
+            handles=handles, ncols=across,
+            loc="outside lower center" if drawing.title else "outside upper center",
+        )  # fmt: skip
     return figure
 
 

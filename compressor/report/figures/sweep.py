@@ -28,6 +28,7 @@ from compressor.report.figures.sweep_panels import (
     roles_of,
 )
 from compressor.report.limits import NO_LIMITS, Limits
+from compressor.units import Units
 
 MAX_ROWS = 3  # measures that stand in a figure with rows of them
 MAX_DETAILED = 2  # measures that have a figure of their own
@@ -42,14 +43,16 @@ class SweepFigure(NamedTuple):
     figure: Drawing
 
 
-def draw_sweep(data: xr.Dataset, limits: Limits = NO_LIMITS) -> list[SweepFigure]:
+def draw_sweep(
+    data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usual"
+) -> list[SweepFigure]:
     """Return the drawings of a study, as `open_study` gives it; curves show limits of metrics.
 
     None where nothing is swept or measured.
 
     What is the same at every job is said in a caption, and not drawn.
     """
-    known = measures(data)
+    known = measures(data, units)
     sweep = sweep_of(data)
     if not known or not sweep.axes:
         return []
@@ -143,5 +146,5 @@ def draw_ranked(
     """Yield the ranking of the axes, if enough is known for one."""
     if found and len(sweep.axes) > 1:
         caption = captions.ranking(sweep, found, shown)
-        yield SweepFigure("ranking", "which key matters for which metric", caption,
+        yield SweepFigure("ranking", "what explains the spread of each metric", caption,
                           draw_ranking(sweep, found))  # fmt: skip

@@ -18,18 +18,18 @@ from compressor.report.figures.sweep_panels import (
 )
 
 MARKS = (
-    "A cross: a job failed here; an empty grey circle: a job was not run; a ring: a chaotic job, "
+    "A cross: a job failed here; a grey circle: a job was not run; a red ring: a chaotic job, "
     "whose averages hold within their bars, but whose greatest values hold for that run only."
 )
 VARIANCE = (
-    "The share of each metric's variance over the grid that an axis has by itself (main effect) "
-    "and together with its interactions with others (total effect), from the exact decomposition "
-    "of the variance (Sobol' 2001; Saltelli et al. 2008)."
+    "Spread is the variance over the grid. Bars: the share that an axis explains by itself (main "
+    "effect) and together with its interactions with others (total effect, as in these "
+    "sentences), from the exact decomposition of the variance (Sobol' 2001; Saltelli et al. 2008)."
 )
 INDICES = (
-    "The share of each metric's variance that a key has by itself (main effect) and together with "
-    "its interactions with others (total effect): Sobol's indices with 95 % bootstrap intervals "
-    "(Saltelli et al. 2010)."
+    "Spread is the variance over the jobs. Bars: the share that a key explains by itself (main "
+    "effect) and together with its interactions with others (total effect, as in these "
+    "sentences): Sobol's indices with 95 % bootstrap intervals (Saltelli et al. 2010)."
 )
 RANKS = (
     "Spearman's correlation of ranks of each metric with each key, and of words the correlation "
@@ -37,7 +37,7 @@ RANKS = (
 )
 TREND = (
     "A line: a parabola fitted by least squares, on the panel's scales; a band: the 95 % interval "
-    "of its mean (HC3)."
+    "of its mean."
 )
 
 
@@ -165,7 +165,6 @@ def ranking(sweep: PlottedSweep, found: Ranking, shown: Sequence[Measure]) -> st
     """Describe which axis matters for which of the metrics that are shown."""
     left = [measure.title for measure in shown if measure not in found]
     kind = next(iter(found.values())).kind
-    unit = "the correlation" if kind == "rank" else "its total effect"
     most = max(effects.filled for effects in found.values())
     base = max(effects.base for effects in found.values())
     stands = {
@@ -179,9 +178,9 @@ def ranking(sweep: PlottedSweep, found: Ranking, shown: Sequence[Measure]) -> st
     )
     gaps = f"Up to {most} jobs lack a value that is known within its error bar: such a job "
     return join_sentences(
+        describe_ranking(sweep, found) + " In parentheses: the correlation." * (kind == "rank"),
         {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS}[kind],
         f"They are of the first {base:,} points of the design's sequence." if base else "",
-        f"{describe_ranking(sweep, found)} In parentheses: {unit}.",
         (blocks if kind == "saltelli" else gaps + f"{stands[kind]}.") if most else "",
         f"Not ranked, since too few jobs tell of it: {'; '.join(left)}." if left else "",
     )

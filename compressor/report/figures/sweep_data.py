@@ -12,6 +12,7 @@ import xarray as xr
 from compressor.analysis import SPOKEN
 from compressor.metrics import AXES, BARRED, JOINTS
 from compressor.report.figures.style import RED, mark
+from compressor.units import Units, unit_in
 
 MARKS = {
     "failed": mark(RED, "x", 7, 4, edge_width=1.8),
@@ -31,6 +32,11 @@ class Measure:
     factor: float = 1.0
     joint: str = ""
     axis: str = ""
+
+    def read_in(self, units: Units) -> "Measure":
+        """Return the measure in chosen units."""
+        unit, factor = unit_in(self.unit, units)
+        return replace(self, unit=unit, factor=self.factor * factor)
 
     @property
     def is_relative(self) -> bool:
@@ -82,10 +88,10 @@ def shown_variables(name: str) -> Iterator[Measure]:
 MEASURES = tuple(measure for name in BARRED for measure in shown_variables(name))
 
 
-def measures(data: xr.Dataset) -> list[Measure]:
-    """Return the measures of which a dataset has any value."""
+def measures(data: xr.Dataset, units: Units = "usual") -> list[Measure]:
+    """Return the measures of which a dataset has any value, in chosen units."""
     stored = (measure for measure in MEASURES if measure.variable in data)
-    return [measure for measure in stored if measure.of(data).notnull().any()]
+    return [one.read_in(units) for one in stored if one.of(data).notnull().any()]
 
 
 def swept_axes(study: xr.Dataset) -> list[str]:
@@ -276,13 +282,18 @@ def axis_of(data: xr.Dataset, name: str, values: np.ndarray) -> PlottedAxis:
     """Return an axis of a study with its phrase and unit."""
     attrs = data[name].attrs
     unit, key = str(attrs.get("units", "")), str(attrs.get("case_key", name))
-    own = (name if unit else key.rpartition(".")[2]).removesuffix(
-        "_" + unit.replace("/", "_per_").replace(" ", "_")
-    )
     phrase = str(attrs.get("long_name", key))
     if phrase in (key, name) or len(phrase) > LONG_PHRASE or values.dtype.kind not in "fiu":
-        phrase = own.replace("_", " ")
+        phrase = name_in_words(name if unit else key.rpartition(".")[2], unit)
     return PlottedAxis(name, phrase, unit, values)
+
+
+def name_in_words(name: str, unit: str) -> str:
+    """Return a coordinate's name without its unit: `clearance, small end` of its mm."""
+    ending = "_" + unit.replace("/", "_per_").replace(" ", "_") if unit else ""
+    head, inside, part = name.partition(f"{ending}_") if ending else (name, "", "")
+    words = f"{head}, {part}" if inside and part else name.removesuffix(ending)
+    return words.replace("_", " ")
 
 
 def grid_jobs(data: xr.Dataset, columns: Sequence[PlottedAxis]) -> PlottedSweep | None:

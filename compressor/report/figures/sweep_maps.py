@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -139,7 +140,7 @@ def mark_cells(panel: Panel, cells: Cells, status: np.ndarray, chaotic: np.ndarr
     """Draw marks in the cells of jobs that failed, were not run or are chaotic."""
     x, y = cells.centres
     marks = [(status == word, mark, NAMES[word]) for word, mark in MARKS.items()]
-    for here, mark, name in (*marks, (chaotic, RING, CHAOTIC)):
+    for here, mark, name in (*marks, (chaotic, replace(RING, markersize=6.0), CHAOTIC)):
         rows, columns = np.nonzero(here)
         mark_points(panel, x[columns], y[rows], cells.keys[here], mark, name)
 
@@ -259,22 +260,29 @@ def part(effects: Effects, axis: int, name: str) -> tuple[float, float, float]:
 
 
 def describe_ranking(sweep: PlottedSweep, found: Ranking) -> str:
-    """Return the strongest axis of each measure, a sentence an axis.
+    """Return the strongest axis of each measure, a sentence an axis: how much it explains.
 
     Or axes that are not told apart.
     """
     groups: dict[tuple[int, ...], list[str]] = {}
     for measure, effects in found.items():
-        words = f"{measure.title} ({describe_strength(effects)}"
+        group = groups.setdefault(tuple(first_ones(effects)), [])
+        strength = describe_strength(effects)
+        if effects.total is None:
+            group.append(f"{measure.title} ({strength})")
+            continue
         if effects.with_unknown is not None:
-            words += f"; {share(strength_of_first(effects))} with them"
-        words += ")"
-        groups.setdefault(tuple(first_ones(effects)), []).append(words)
+            strength += f" ({share(strength_of_first(effects))} with them)"
+        what = "that" if group else "the spread"
+        group.append(f"{strength} of {what} of {measure.title}")
+    verb = "explains" if any(one.total is not None for one in found.values()) else "matters most"
     parts = []
     for axes, metrics in groups.items():
         names = " or ".join(sweep.axes[n].phrase for n in axes)
-        verb = "matters" if len(axes) == 1 else f"({UNSURE}) matters"
-        parts.append(f"{names[0].upper()}{names[1:]} {verb} most for {'; '.join(metrics)}.")
+        unsure = "" if len(axes) == 1 else f" ({UNSURE})"
+        link = " for" if verb == "matters most" else " most:" if unsure else ""
+        text = f"{names[0].upper()}{names[1:]}{unsure} {verb}{link} {'; '.join(metrics)}."
+        parts.append(text)
     return " ".join(parts)
 
 

@@ -38,7 +38,12 @@ VISIBLE = 0.004  # of a panel's height: an error bar that is seen
 MARKERS = "osD^v"
 FEET = {"failed": 0.03, "missing": 0.08}  # of a panel's height
 CHAOTIC = "chaotic: a greatest value holds for this run only"
-RING = mark("#d633a8", "o", 8, 5, is_hollow=True, edge_width=1.1)
+RING = mark("#d633a8", "o", 4.5, 5, is_hollow=True, edge_width=0.8)
+
+
+def ring_around(size: float) -> LineStyle:
+    """Return the ring of chaotic jobs, as large as their points, of a size, so that none hides."""
+    return replace(RING, markersize=size - RING.edge_width)
 
 
 def metric_panels(measures: Sequence[Measure], height: float) -> tuple[Drawing, list[Panel]]:
@@ -165,7 +170,8 @@ def draw_curves(sweep: PlottedSweep, measures: Sequence[Measure]) -> Drawing:
         scale_x(panel, axis)
         span = scale_y(panel, values)
         plot_jobs(panel, (x, values, bars), keys, measure.title, line, span)
-        mark_points(panel, x[chaotic], values[chaotic], keys[chaotic], RING, CHAOTIC)
+        ring = ring_around(line.markersize)
+        mark_points(panel, x[chaotic], values[chaotic], keys[chaotic], ring, CHAOTIC)
         mark_feet(panel, x, status, keys)
         panel.y.title = measure.unit
     figure.x_title = axis.title
@@ -336,7 +342,8 @@ def plot_part(
     if part.is_jobs:
         values, ring, keys = part.values[:, 0], part.chaotic[:, 0], part.keys[:, 0]
         plot_jobs(panel, (x, values, part.bars[:, 0]), keys, name, style, span)
-        mark_points(panel, x[ring], values[ring], keys[ring], RING, CHAOTIC)
+        look = ring_around(style.markersize)
+        mark_points(panel, x[ring], values[ring], keys[ring], look, CHAOTIC)
         return
     panel.plot(x, mean_of(part.values), style, name)
 
@@ -350,6 +357,7 @@ def mean_of(values: np.ndarray) -> np.ndarray:
 
 MAX_POINTS = 2000  # in a panel
 PLACES = 60  # of a trend
+POINT = 3.0  # size of a job
 
 
 def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]) -> Drawing:
@@ -407,13 +415,13 @@ def plot_points(panel: Panel, sweep: PlottedSweep, axis: int, measure: Measure) 
         here = shown & (group == n)
         color = CYCLE[n].color if phrase else BLUE
         alpha = 0.55 if y.size < 500 else 0.35
-        dots = mark(color, MARKERS[n], 3.0, edge_width=0.0, alpha=alpha)
+        dots = mark(color, MARKERS[n], POINT, edge_width=0.0, alpha=alpha)
         mark_points(panel, x[here], y[here], keys[here], dots, name)
         if not one.is_words:
             known = np.where(group == n, sweep.known(measure), np.nan)
             plot_trend(panel, x, known, color, name)
     ring = shown & sweep.chaotic
-    mark_points(panel, x[ring], y[ring], keys[ring], RING, CHAOTIC)
+    mark_points(panel, x[ring], y[ring], keys[ring], ring_around(POINT), CHAOTIC)
     mark_feet(panel, x[shown], sweep.status[shown], keys[shown])
 
 

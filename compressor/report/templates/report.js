@@ -172,6 +172,8 @@ const ON_DARK = {
   "#b5b5b5": "#6d737d", "#8c8c8c": "#a0a0a0", "#606060": "#b0b0b0",
 };
 const tone = (color) => (isDark() && ON_DARK[color]) || color;
+const POINT = 4 / 3; // px of a point
+const LEVELS = { top: "top", center: "middle", bottom: "bottom", baseline: "bottom" };
 const SYMBOLS = { o: "circle", ".": "circle", s: "square", D: "diamond", d: "diamond",
   "^": "triangle-up", v: "triangle-down", x: "x-thin", "+": "cross-thin", "*": "star" };
 
@@ -240,7 +242,7 @@ class Figure {
     const swatch = document.createElement("span");
     swatch.className = "swatch";
     swatch.dataset.color = trace.color;
-    swatch.dataset.kind = trace.dash.length ? "dashed" : trace.kind;
+    swatch.dataset.kind = trace.dash.length ? "dashed" : trace.hollow ? "ring" : trace.kind;
     button.append(swatch, name);
     button.addEventListener("click", () => {
       const on = this.off.has(name);
@@ -349,6 +351,9 @@ class Figure {
       annotations: [], shapes: [], bargap: 0,
     };
     const data = [];
+    // a title that is longer than its axis has smaller letters
+    const fitting = (title, [low, high], size) => Math.max(9,
+      Math.min(12, (high - low) * size / (LETTER * Math.max(1, title.length))));
     panels.forEach((panel, n) => {
       const [x, y] = [`x${n ? n + 1 : ""}`, `y${n ? n + 1 : ""}`];
       const lowest = narrow || !panels.some((other) => other !== panel &&
@@ -362,7 +367,8 @@ class Figure {
           gridcolor: faint, zeroline: false, linecolor: faint, showline: true, ticks: "outside",
           ticklen: 3, tickcolor: faint, exponentformat: "power", automargin: false,
           tickangle: 0, showticklabels: !scale.bare || narrow || way === "x" && titled,
-          title: { text: titled ? escaped(scale.title) : "", standoff: 6, font: { size: 12 } },
+          title: { text: titled ? escaped(scale.title) : "", standoff: 6,
+            font: { size: fitting(scale.title, domain, way === "x" ? width : total) } },
         };
         if (way === "x") made.unifiedhovertitle = { text: `%{x:.6~g} ${escaped(scale.unit)}` };
         if (way === "y" && scale.words) made.tickfont = { size: boxes[n].font };
@@ -459,9 +465,11 @@ class Figure {
     const dash = trace.dash.length ? trace.dash.map((d) => `${d * 1.4}px`).join(",") : "solid";
     made.mode = trace.kind === "line" ? (trace.marker ? "lines+markers" : "lines") : "markers";
     made.line = { color, width: Math.max(1, trace.width * 1.3), dash };
-    made.marker = { color, symbol: SYMBOLS[trace.marker] ?? "circle",
+    const symbol = SYMBOLS[trace.marker] ?? "circle";
+    const stroke = trace.marker === "x" || trace.marker === "+" ? 2 : trace.hollow ? 1.2 : 0;
+    made.marker = { color, symbol: trace.hollow ? `${symbol}-open` : symbol,
       size: trace.kind === "points" ? Math.max(3, trace.width * 1.4) : 6,
-      line: { color, width: trace.marker === "x" || trace.marker === "+" ? 2 : 0 } };
+      line: { color, width: stroke } };
     if (trace.errors) made[trace.across ? "error_x" : "error_y"] = error();
     if (!this.sheet.unified) {
       made.hovertemplate = made.hoverinfo ? undefined
@@ -492,7 +500,8 @@ class Figure {
       text: wrapped(note.text, (before ? at : this.width - at) - 6, size),
       xref: inside ? `${x} domain` : x, yref: inside ? `${y} domain` : y,
       x: inside ? note.x : log(note.x, panel.x), y: inside ? note.y : log(note.y, panel.y),
-      xanchor: before ? "right" : "left" });
+      xshift: POINT * note.shift[0], yshift: POINT * note.shift[1],
+      xanchor: before ? "right" : note.side, yanchor: LEVELS[note.level] });
   }
 }
 

@@ -20,12 +20,17 @@ from compsim.screen import (
     plural,
     print_text,
     setting,
+    units_option,
 )
 from compsim.show import sayable
 
+from compressor.digits import by_bar
+from compressor.units import unit_in
+
 if TYPE_CHECKING:
     from compressor.studies.search.find import SearchResult
-    from compressor.studies.search.question import Question
+    from compressor.studies.search.question import JobReading, Question
+    from compressor.units import Units
 
 KINDS = ("first", "greatest", "least")
 MAX_TOLD = 5  # points that do not decide, one by one
@@ -38,7 +43,8 @@ UNBARRED = " (no error bar was made)"
 @click.option("--over", required=True, metavar="KEY=LOW:HIGH",
               help="Search over this key within this range, in the case file's unit.")  # fmt: skip
 @click.option("--first", metavar="'METRIC[.JOINT] > VALUE'",
-              help="Find where this becomes true going up: > >= < <=, VALUE in SI.")  # fmt: skip
+              help="Find where this becomes true going up: > >= < <=. VALUE is in SI, or has its "
+              "unit, as 166 kN, or is a factor, as 1.5 * base: of the metric at LOW.")  # fmt: skip
 @click.option("--greatest", metavar="METRIC[.JOINT]", help="Find where the metric is greatest.")
 @click.option("--least", metavar="METRIC[.JOINT]", help="Find where the metric is least.")
 @click.option("--tolerance", type=click.FloatRange(1e-9, 0.5), default=1e-3, show_default=True,
@@ -46,13 +52,20 @@ UNBARRED = " (no error bar was made)"
 @click.option("--scan", type=click.IntRange(3, 1000), default=9, show_default=True,
               help="Run so many evenly spaced points first.")  # fmt: skip
 @click.option("--log", "logarithmic", is_flag=True, help="Space points evenly in the logarithm.")
+@units_option("SI")
 @setting
 @output_option
 @jobs_option("Run in this many worker processes, as many points in one step of --first.")
 @as_json
 @click.option("--quiet", is_flag=True, help="Print no progress.")
 def find(
-    config: str, output: str, jobs: int | None, as_json: bool, quiet: bool, **options: Any
+    config: str,
+    output: str,
+    jobs: int | None,
+    units: "Units | None",
+    as_json: bool,
+    quiet: bool,
+    **options: Any,
 ) -> int:
     """Find where a metric passes a value, or is greatest or least.
 
@@ -61,6 +74,8 @@ def find(
         --first 'contact_loss_fraction.small_end > 0.001'
     compsim find worn.yaml --over machine.speed_rpm=200:900 \\
         --greatest peak_acceleration
+    compsim find worn.yaml --over clearance_mm=0.08:0.3 \\
+        --first 'peak_contact_force.small_end > 1.5 * base' --units plant
 
     CONFIG makes one case once the key is given. The answer of --first is an interval: at its lower
     end the comparison does not hold, at its upper end it does. Points whose error bars do not let
@@ -82,10 +97,12 @@ def find(
 
     with ProgressReporter(quiet, "points") as progress:
         answer = search(question, output, jobs or cores(), progress)
+    if answer.base:
+        question = dataclasses.replace(question, goal=question.goal.beside(answer.base))
     if as_json:
         print_text(json.dumps(jsonable_answer(question, answer), indent=1))
     else:
-        for line in lines(question, answer, output):
+        for line in lines(question, answer, output, units or "si"):
             print_text(line)
     return SOME_FAILED if answer.failed else DONE
 
@@ -101,12 +118,15 @@ def question_of(config: str, options: dict[str, Any]) -> "Question":
     return Question.written(config, options["over"], options[kinds[0]], kinds[0], **more)
 
 
-def lines(question: "Question", answer: "SearchResult", folder: str) -> Iterator[str]:
-    """Yield an answer as it is printed."""
+def lines(
+    question: "Question", answer: "SearchResult", folder: str, units: "Units"
+) -> Iterator[str]:
+    """Yield an answer as it is printed, its numbers in chosen units."""
     kind_lines = comparison_lines if answer.best is None else extremum_lines
-    yield from kind_lines(question, answer)
+    yield from kind_lines(question, answer, units)
     for point in answer.blind[:MAX_TOLD]:
-        yield f"  {at(question, point)}: {why_undecided(question, point)}  job {point.key[:8]}"
+        why = why_undecided(question, point, units)
+        yield f"  {at(question, point)}: {why}  job {point.key[:8]}"
     if len(answer.blind) > MAX_TOLD:
         yield f"  and {len(answer.blind) - MAX_TOLD} more"
     outside = [point for point in answer.failed if point not in answer.blind]
@@ -117,10 +137,14 @@ def lines(question: "Question", answer: "SearchResult", folder: str) -> Iterator
            f"{answer.study} of {folder}")  # fmt: skip
 
 
-def comparison_lines(question: "Question", answer: "SearchResult") -> Iterator[str]:
+def comparison_lines(question: "Question", answer: "SearchResult", units: "Units") -> Iterator[str]:
     """Yield the place at which a comparison first becomes true."""
     goal = question.goal
-    text = f"{goal.name} {goal.sign} {goal.limit:g} {goal.unit}".rstrip()
+    unit, factor = unit_in(goal.unit, units)
+    text = f"{goal.name} {goal.sign} {factor * goal.limit:g} {unit}".rstrip()
+    if answer.base:
+        base = format_reading(answer.base, goal.unit, units)
+        yield f"base, at {question.key} = {question.low:g}: {base}; {goal.times:g} times it"
     low, high = answer.low, answer.high
     if high is None:
         many = f"at none of {len(answer.points)} points from {question.low:g} to {question.high:g}"
@@ -128,13 +152,13 @@ def comparison_lines(question: "Question", answer: "SearchResult") -> Iterator[s
         yield f"{text} surely holds {many}{unsure}" if unsure else f"{text} holds {many}"
     elif answer.kind == "at_low":
         yield f"{text} holds from the range's lower end on"
-        yield f"  {at(question, high)}: yes, {number(question, high)}  job {high.key[:8]}"
+        yield f"  {at(question, high)}: yes, {number(question, high, units)}  job {high.key[:8]}"
     else:
         start = f"at most {question.low:g}" if low is None else f"{low.argument:.9g}"
         yield f"{text} first holds between {question.key} = {start} and {high.argument:.9g}"
         if low is not None:
-            yield f"  {at(question, low)}: no, {number(question, low)}  job {low.key[:8]}"
-        yield f"  {at(question, high)}: yes, {number(question, high)}  job {high.key[:8]}"
+            yield f"  {at(question, low)}: no, {number(question, low, units)}  job {low.key[:8]}"
+        yield f"  {at(question, high)}: yes, {number(question, high, units)}  job {high.key[:8]}"
         if answer.blind:
             yield f"  {plural(len(answer.blind), 'point')} between {doubt(answer)}:"
 
@@ -144,12 +168,12 @@ def doubt(answer: "SearchResult") -> str:
     return "does not decide" if len(answer.blind) == 1 else "do not decide"
 
 
-def extremum_lines(question: "Question", answer: "SearchResult") -> Iterator[str]:
+def extremum_lines(question: "Question", answer: "SearchResult", units: "Units") -> Iterator[str]:
     """Yield the place at which a metric is greatest or least."""
     best = answer.best
     assert best is not None
     yield (f"{question.goal.name} is {question.goal.sign} at {at(question, best)}: "
-           f"{number(question, best)}  job {best.key[:8]}")  # fmt: skip
+           f"{number(question, best, units)}  job {best.key[:8]}")  # fmt: skip
     first, last = answer.within[0].argument, answer.within[-1].argument
     if len(answer.within) > 1:
         yield (f"  as far as error bars tell, {len(answer.within)} points from {first:.9g} to "
@@ -167,19 +191,24 @@ def at(question: "Question", point: Any) -> str:
     return f"{question.key} = {point.argument:.9g}"
 
 
-def number(question: "Question", point: Any) -> str:
+def number(question: "Question", point: Any, units: "Units") -> str:
     """Return a point's number with its error bar."""
-    from compressor.digits import by_bar
+    return format_reading(point.told, question.goal.unit, units)
 
-    reading = point.told
-    text = by_bar(reading.value, reading.bar if reading.barred else math.nan, False)
-    return (f"{text} {question.goal.unit}".rstrip() + AVERAGED * reading.averaged
+
+def format_reading(reading: "JobReading", si: str, units: "Units") -> str:
+    """Return a job's number with its error bar in chosen units; si: of the number."""
+    unit, factor = unit_in(si, units)
+    bar = factor * reading.bar if reading.barred else math.nan
+    text = by_bar(factor * reading.value, bar, False)
+    return (f"{text} {unit}".rstrip() + AVERAGED * reading.averaged
             + UNBARRED * (not reading.barred))  # fmt: skip
 
 
-def why_undecided(question: "Question", point: Any) -> str:
+def why_undecided(question: "Question", point: Any, units: "Units") -> str:
     """Return why a point does not decide."""
-    return point.told.reason or f"{number(question, point)}: within its error bar of the limit"
+    text = number(question, point, units)
+    return point.told.reason or f"{text}: within its error bar of the limit"
 
 
 def spacing(question: "Question") -> str:

@@ -51,6 +51,7 @@ class SearchResult:
     best: of an extremum, the best point; within: the points whose bars reach the best one's.
     blind: points inside the interval that do not decide.
     points: all, by argument; run_now: jobs that were not stored before; study: where they are.
+    base: the reading at the range's lower end, where the goal's limit is so many times it.
     """
 
     kind: str
@@ -62,6 +63,7 @@ class SearchResult:
     points: tuple[Point, ...] = ()
     run_now: int = 0
     study: str = ""
+    base: JobReading | None = None
 
     @property
     def failed(self) -> list[Point]:
@@ -197,11 +199,15 @@ def find(
     question.checked()
     jobs = SearchJobs(question, folder, workers, progress)
     goal, shares, tolerance = question.goal, question.shares, question.tolerance
+    base = None
+    if not math.isnan(goal.times):
+        base = jobs(shares)[0].told
+        goal = goal.beside(base)
     if goal.sign in ("greatest", "least"):
         answer = find_extremum(jobs, goal.sign == "greatest", shares, tolerance)
     else:
         answer = find_first(jobs, goal.holds, shares, tolerance, workers)
-    return replace(answer, run_now=jobs.run_now, study=jobs.name)
+    return replace(answer, run_now=jobs.run_now, study=jobs.name, base=base)
 
 
 class SearchJobs:

@@ -8,7 +8,7 @@ import math
 import operator
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,11 @@ from compressor.cases import Study, load_studies, row_of
 from compressor.metrics import AXES, BARRED, JOINTS, NUMBERS, SEGMENTS, THRESHOLDS
 from compressor.program import CompsimError, did_you_mean
 from compressor.solve import sure
+from compressor.units import read_quantity, split_number
 
 SIGNS = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
-COMPARISON = re.compile(r"\s*([\w.]+)\s*(>=|<=|>|<)\s*([^\s<>=]+)\s*")
+COMPARISON = re.compile(r"\s*([\w.]+)\s*(>=|<=|>|<)\s*([^<>=]*[^<>=\s])\s*")
+BESIDE = re.compile(r"(?:(\S+?)\s*\*\s*)?base")  # a limit beside the value at the range's lower end
 OVER = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*")
 WORDS = {
     "joint": JOINTS, "axis": AXES, "threshold": THRESHOLDS,
@@ -55,13 +57,26 @@ class Goal:
     """A metric's number, by its name and its place, such as peak_contact_force.small_end.
 
     sign, limit: of a comparison, limit in the metric's SI unit; sign is "greatest" or "least" where
-    an extremum is asked for.
+    an extremum is asked for. times: the limit is so many times the metric at the range's lower end,
+    nan where it is a number; slack: how far that limit may be off, by that point's error bar.
     """
 
     metric: str
     place: tuple[str, ...]
     sign: str
     limit: float = math.nan
+    times: float = math.nan
+    slack: float = 0.0
+
+    def beside(self, base: JobReading) -> "Goal":
+        """Return the goal with its limit, from the reading at the range's lower end.
+
+        Raises QuestionError where that says nothing.
+        """
+        if base.reason:
+            raise QuestionError(f"base, {self.name} at the range's lower end: {base.reason}")
+        slack = abs(self.times) * base.bar
+        return replace(self, limit=self.times * base.value, slack=slack)
 
     @property
     def name(self) -> str:
@@ -79,7 +94,8 @@ class Goal:
         """
         compare = SIGNS[self.sign]
         ends = {
-            bool(compare(reading.value + side, self.limit)) for side in (-reading.bar, reading.bar)
+            bool(compare(reading.value + side * (reading.bar + self.slack), self.limit))
+            for side in (-1.0, 1.0)
         }
         return ends.pop() if not reading.reason and len(ends) == 1 else None
 
@@ -120,12 +136,22 @@ class Goal:
 def comparison(text: str) -> Goal:
     """Return the goal of a comparison such as `peak_acceleration > 600`. Raises QuestionError."""
     parts = COMPARISON.fullmatch(text)
-    limit = _number(parts[3]) if parts else math.nan
-    if parts is None or math.isnan(limit):
+    beside = BESIDE.fullmatch(parts[3]) if parts else None
+    times = _number(beside[1] or "1") if beside else math.nan
+    number = split_number(parts[3])[0] if parts and not beside else None
+    if parts is None or (number is None and math.isnan(times)):
         raise QuestionError(f"{text!r} is no comparison: write METRIC[.JOINT], one of "
                             f"{' '.join(SIGNS)}, and a number in SI, such as "
-                            "'contact_loss_fraction.small_end > 0.001'")  # fmt: skip
-    return goal_of(parts[1], parts[2], limit)
+                            "'contact_loss_fraction.small_end > 0.001', a number and its unit, "
+                            "such as 166 kN, or a factor, such as 1.5 * base")  # fmt: skip
+    goal = goal_of(parts[1], parts[2])
+    if beside:
+        return replace(goal, times=times)
+    try:
+        limit = read_quantity(parts[3], goal.unit or BARRED[goal.metric].unit)
+    except ValueError as error:
+        raise QuestionError(f"{text!r}: {error}") from error
+    return replace(goal, limit=math.nan if limit is None else limit)
 
 
 def goal_of(text: str, sign: str, limit: float = math.nan) -> Goal:

@@ -55,25 +55,29 @@ def draw_wear(stages: xr.Dataset, limit_mm: float, factor: float) -> Drawing:
     plot_profiles(profiles, stages.sel(joint=deepest))
     profiles.y.title = f"worn off the {deepest.replace('_', ' ')} (µm)"
     for panel, letter in zip(grid.flat, "abc", strict=True):
-        panel.title = f"({letter})"
+        panel.title = panel.title or f"({letter})"
         panel.notes.append(Note(y=0.0, style=LineStyle(GREY, linewidth=0.5, zorder=0)))
     return figure
+
+
+def format_hours(hours: float) -> str:
+    """Return operating hours in three digits, without a power of ten."""
+    return f"{float(f'{hours:.3g}'):,.12g}"
 
 
 def plot_profiles(panel: Panel, stages: xr.Dataset) -> None:
     """Draw what is worn off one joint at some of the stages, the later the darker."""
     hours = stages["hours"].values
     shown = np.unique(np.linspace(0, hours.size - 1, MAX_PROFILES + 1).round().astype(int))[1:]
+    names = [format_hours(hours[number]) for number in shown]
     half = stages.sizes["angle"] // 2  # profiles go from -180 to 180 degrees
     angles = (np.degrees(stages["angle"].values) + 180.0) % 360.0 - 180.0
     around = np.append(np.roll(angles, half), angles.max() + angles[1])
     for place, number in enumerate(shown):
         depth = np.roll(1e6 * stages["worn_depth"].isel(stage=number).values, half)
         depth = np.append(depth, depth[0])
-        share, name = (place + 1) / shown.size, f"{hours[number]:.3g} h"
+        share, name = (place + 1) / shown.size, f"{names[place]} h"
         panel.plot(around, depth, LineStyle(BLACK, linewidth=1.0, alpha=share), name)
-        panel.notes.append(
-            Note(name, around[depth.argmax()], depth.max(), shift=(0, 2), side="center", size=7.5,
-                 style=LineStyle(BLACK, alpha=max(share, 0.5)))
-        )  # fmt: skip
+    panel.title = f"(c) after {', '.join(names)} h,\nthe later the darker"
+    panel.title_size = 9.0
     panel.x.title, panel.x.ticks = "place, from the rod's axis (deg)", range(-180, 181, 90)

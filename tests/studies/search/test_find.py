@@ -37,6 +37,19 @@ def jobs(function, bar=0.0, calls=None):
     return evaluate
 
 
+def test_a_limit_may_have_a_unit_or_be_a_factor():
+    assert comparison("peak_contact_force.small_end > 166 kN").limit == 166e3
+    assert comparison("peak_acceleration >= 2 g").limit == pytest.approx(19.6133)
+    assert comparison("contact_loss_fraction.big_end < 5 %").limit == 0.05
+    goal = comparison("peak_acceleration > 1.5 * base").beside(JobReading(10.0, 0.2))
+    assert (goal.limit, goal.slack) == (15.0, pytest.approx(0.3))
+    readings = [JobReading(value, 0.2) for value in (14.4, 14.6, 15.4, 15.6)]
+    assert [goal.holds(one) for one in readings] == [False, None, None, True]
+    assert comparison("peak_acceleration > base").times == 1.0
+    with pytest.raises(QuestionError, match=r"base, peak_acceleration at .*: the job failed"):
+        goal.beside(FAILED)
+
+
 @pytest.mark.parametrize("threshold", [0.0001, 0.2, 0.3721, 0.5, 0.99])
 @pytest.mark.parametrize("at_once", [1, 2, 5])
 def test_a_threshold_is_between_the_ends(threshold, at_once):
@@ -240,6 +253,8 @@ def test_arguments_are_even_in_the_range_or_its_logarithm():
         ("peak_acceleration == 1", "is no comparison"),
         ("peak_acceleration > nan", "is no comparison"),
         ("1 < peak_acceleration < 2", "is no comparison"),
+        ("peak_acceleration > x * base", "is no comparison"),
+        ("peak_acceleration > 2 kN", "'kN' is no unit of it; there are m/s2, m/s², g"),
     ],
 )
 def test_what_is_no_comparison_is_refused(text, told):

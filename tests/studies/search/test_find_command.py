@@ -47,12 +47,12 @@ def folder(found, tmp_path, monkeypatch, in_process):
     monkeypatch.chdir(tmp_path / "copy")
 
 
-def direct(clearance, accuracy):
-    """A run of the case alone, outside of any store."""
+def direct(clearance, accuracy, metric="contact_loss_fraction"):
+    """A metric at the small end of a run of the case alone, outside of any store."""
     text = CASE | {"clearance_mm": clearance, "solve": CASE["solve"] | {"accuracy": accuracy}}
     Path("direct.yaml").write_text(json.dumps(text))
     (case,) = load_cases("direct.yaml")
-    return float(simulate(case).contact_loss_fraction.sel(joint="small_end"))
+    return float(simulate(case)[metric].sel(joint="small_end"))
 
 
 @pytest.mark.parametrize("accuracy", ["draft", "standard"])
@@ -66,6 +66,21 @@ def test_direct_runs_on_both_sides_confirm_the_interval(accuracy, found, folder)
         difference = abs(direct(end["argument"], accuracy) - end["told"]["value"])
         # two runs of other tolerances, each with its bar, of which one in 30 does not hold
         assert difference <= end["told"]["bar"] * (3 if accuracy == "standard" else 1e-6)
+
+
+def test_a_limit_beside_the_first_point_is_said_in_plant_units(found, folder, capsys):
+    """By points that are stored, and a few more; the first one is the base."""
+    asked = [*ASKED[:-4], "--first", "peak_contact_force.small_end > 1.02 * base", "-j", "2"]
+    assert cli.main([*asked, "--quiet", "--units", "plant"]) == 0
+    first, second, *_ = capsys.readouterr().out.splitlines()
+    low = direct(0.002, "draft", "peak_contact_force") / 1e3
+    base, times = re.fullmatch(
+        r"base, at clearance_mm = 0.002: (\S+) ± \S+ kN; (\S+) times it", first
+    ).groups()
+    assert float(base) == pytest.approx(low, rel=1e-2)
+    limit = re.match(r"peak_contact_force.small_end > (\S+) kN first holds", second)[1]
+    assert float(limit) == pytest.approx(1.02 * low, rel=1e-3)
+    assert times == "1.02"
 
 
 def test_a_second_search_computes_nothing(found, folder, capsys):
