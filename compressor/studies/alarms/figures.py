@@ -112,6 +112,6 @@ def caption(found: xr.Dataset, noise: int = 0) -> str:
         f"and 95 % intervals by draws, moved aside a little; limits by sound windows of other "
         f"draws, {limit_words(found)}{disturbed}. Dashed: {attrs['detected']:.0%}. The first to "
         f"see wear, of {found.sizes['alarm']} alarms: {'; '.join(texts)}. Below: of these alarms, "
-        f"detection against false alarms as the limit rises, a line a clearance; the mark is what was "
-        f"counted at the limit above, of {attrs['sound_draws']} sound draws."
+        f"detection against false alarms as the limit rises, a line a clearance; the mark is what "
+        f"was counted at the limit above, of {attrs['sound_draws']} sound draws."
     )
