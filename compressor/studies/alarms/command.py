@@ -47,25 +47,27 @@ def read_levels(context: click.Context, parameter: click.Parameter, text: str) -
 @click.option("-o", "--output", metavar="FOLDER",
               help="Also write all rates as CSV and netCDF, and figures, here.")  # fmt: skip
 @click.option("--wear", "run", metavar="RUN",
-              help="A wear run of the machine (a file of compsim wear, or its folder of results): "
-              "how many hours before its limit each alarm trips.")  # fmt: skip
+              help="Print how many hours before its limit each alarm trips, by this wear run: a "
+              "file of compsim wear, or its folder of results.")  # fmt: skip
 @click.option("--false-alarms", type=click.FloatRange(0, 1, min_open=True, max_open=True),
               default=0.01, show_default=True,
-              help="Rate of false alarms that limits are set for.")  # fmt: skip
+              help="Set limits for this rate of false alarms.")  # fmt: skip
 @click.option("--factor", type=click.FloatRange(0, min_open=True),
               help="Set limits at so many times a sound machine's usual reading.")  # fmt: skip
 @click.option("--detected", type=click.FloatRange(0, 1, min_open=True), default=0.9,
-              show_default=True, help="Share of windows in which an alarm must trip.")  # fmt: skip
+              show_default=True,
+              help="Count a clearance as detected at this share of windows.")  # fmt: skip
 @click.option("--band", "bands", multiple=True, metavar="LOW-HIGH", callback=read_bands,
               show_default="2-1000, and two above it",
-              help="A band pass of the record, Hz; may be repeated.")  # fmt: skip
+              help="Filter the record by this band pass, Hz; repeat it for more.")  # fmt: skip
 @click.option("--noise", default="0", show_default=True, callback=read_levels, metavar="RMS,...",
-              help="White noise that is added, m/s2 rms; each level is judged.")  # fmt: skip
+              help="Add white noise of these levels, m/s2 rms, each judged by itself.")  # fmt: skip
 @click.option("--revolutions", type=click.IntRange(min=1), default=5, show_default=True,
-              help="Whole revolutions of a window.")  # fmt: skip
+              help="Cut windows of so many whole revolutions.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True,
-              help="Of noise, and of which draws judge by which limits.")  # fmt: skip
-@click.option("--quiet", is_flag=True, help="No progress, no remarks.")
+              help="Draw by this seed the noise, and which draws judge by which limits.",
+)  # fmt: skip
+@click.option("--quiet", is_flag=True, help="Print no progress and no remarks.")
 def alarms(
     given: tuple[str, ...], folder: str | None, output: str | None, run: str | None,
     false_alarms: float, factor: float | None, detected: float, bands: "tuple[Band, ...] | None",
