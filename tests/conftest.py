@@ -309,6 +309,16 @@ def jobs_here():
         yield
 
 
+@contextlib.contextmanager
+def without_pictures():
+    """Reports have all but their pictures, of which each takes a quarter of a second."""
+    from compressor.report.figures import pictures
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pictures, "render_kinds", lambda drawing, kinds: [b"drawn" for _ in kinds])
+        yield
+
+
 @pytest.fixture
 def in_process():
     """No worker starts in a test: where it matters how processes end, a test does without this."""

@@ -17,7 +17,7 @@ import tutorial
 from click.testing import CliRunner
 from compsim.cli import cli
 from compsim.cli import main as cli_main
-from conftest import jobs_here
+from conftest import jobs_here, without_pictures
 from measure_tradeoff import fingerprint
 
 import compressor
@@ -37,7 +37,7 @@ PAGES = {
         "README.md", "configs/README.md",
         *(f"compressor/docs/{name}.md" for name in (
             "the-paper", "my-machine", "a-run", "how-sure", "speed-or-accuracy", "extremes",
-            "regimes", "diagnosis", "wear", "sweeps", "commands", "glossary",
+            "regimes", "diagnosis", "wear", "sweeps", "commands", "glossary", "notebook",
         )),
         "compressor/solve/README.md", "compressor/store/README.md", "compressor/sweep/README.md",
         "compressor/physics/README.md", "compressor/README.md", "tests/README.md",
@@ -49,6 +49,7 @@ COMMANDS = "compressor/docs/commands.md"
 MAX_WORDS = 700  # of README.md: code and tables counted, addresses of links not
 TEXT = "\n".join(PAGES.values())
 QUICK = ["--set", "solve.duration_rev=1", "--set", "solve.settle_rev=0"]
+MORE = {"run": QUICK, "explain": QUICK, "stress": ["-n", "1"]}  # what else a command is run with
 
 
 def blocks(language):
@@ -292,8 +293,10 @@ def run_command(place, command, whole):
     command, _, target = command.partition(" > ")
     words = shlex.split(command, comments=True)
     words = [w for word in words for w in expanded(place, word)]
-    more = QUICK if words[1] in ("run", "explain") and not whole else []
-    with jobs_here(), contextlib.chdir(place), CliRunner().isolation() as (out, err, _):
+    more = [] if whole else MORE.get(words[1], [])
+    drawn = without_pictures() if words[1] == "report" else contextlib.nullcontext()
+    isolated = CliRunner().isolation()
+    with drawn, jobs_here(), contextlib.chdir(place), isolated as (out, err, _):
         code, said = cli_main([*words[1:], *more]), err.getvalue()
     assert code == 0, f"{command}\n{said.decode()}"
     if target:
@@ -303,7 +306,10 @@ def run_command(place, command, whole):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder as a reader of the pages would have it: their case files, and our configs."""
+    """A folder as a reader of the pages would have it: their case files, and our configs.
+
+    Pictures of reports are drawn where figures are tested, here only those of `compsim plot`.
+    """
     place = tmp_path_factory.mktemp("pages")
     write_case_files(place)
     (place / "configs").symlink_to(page_tables.ROOT / "configs")

@@ -183,7 +183,7 @@ def test_chosen_figures_in_both_formats(plot, folder):
     assert [*found] == [f"{stem}.png {stem}.svg" for stem in stems]
 
 
-def test_a_study_is_drawn_along_an_axis(plot, folder):
+def test_a_study_is_drawn_along_an_axis(plot, folder, unpainted):
     code, found, _ = plot("worn", "--over", "speed_rpm", "--at", "clearance_mm=0.3")
     assert code == 0
     cycles, waterfall, modes = found.values()

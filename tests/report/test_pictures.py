@@ -31,6 +31,7 @@ def pictures(figures, headings, folder):
         return painter.finish()
 
 
+OTHER = "COMPSIM_TESTS_PICTURES_ALONE"  # set in a process that was started for these tests
 NAMES = ["one", "two", "three", "four", "five"]
 HEADINGS = {name: f"Figure {name}" for name in NAMES}
 pytestmark = pytest.mark.skipif(not can_fork(), reason="there is one core, or no fork")
@@ -50,15 +51,23 @@ def alone(figures):
     return {f"{n}.{kind}": render(figures[n], kind) for n in NAMES for kind in ("png", "svg")}
 
 
+@pytest.fixture(scope="module")
+def other_process():
+    """What a process without threads said of these tests; None where this one has none."""
+    if threading.active_count() == 1 or OTHER in os.environ:
+        return None
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", __file__]
+    command += ["-m", "usefixtures"]  # those that need it
+    return subprocess.run(command, capture_output=True, text=True, env=os.environ | {OTHER: "1"})
+
+
 @pytest.fixture
-def threadless(request):
-    """No thread in this process; where other tests have left some, a process without runs it."""
-    if threading.active_count() == 1:
+def threadless(other_process):
+    """No thread in this process; where other tests have left some, a process without runs them."""
+    if other_process is None:
+        assert threading.active_count() == 1
         return
-    test = f"{__file__}::{request.node.name}"
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", test]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout
+    assert other_process.returncode == 0, other_process.stdout
     pytest.skip("passed in a process without threads")
 
 

@@ -76,8 +76,13 @@ def test_every_compiled_method_is_in_the_table():
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("method", [name for name in METHODS if name != "auto"])
-@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
+@pytest.mark.parametrize(
+    ("method", "joint"),
+    [
+        *((name, "both") for name in METHODS if name != "auto"),
+        *((name, joint) for name in COMPILED for joint in ("big_end", "small_end")),
+    ],
+)
 def test_energy_residual_of_every_method(method, joint):
     found = run(joint, 0.3, duration_rev=0.5, settle_rev=0, rtol=1e-5, method=method)
     assert str(found["status"].values) == "ok"

@@ -4,7 +4,6 @@ import json
 import math
 import os
 import re
-import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -217,36 +216,6 @@ def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monk
     found = store.open_study(tmp_path / "out")
     assert found.reason.values.tolist() == ["internal_error", ""]
     assert math.isnan(found.peak_acceleration.sel(load="none"))
-
-
-POISON = {  # by load: what the job does, its reason, part of the detail
-    "none": (lambda: os.kill(os.getpid(), signal.SIGSEGV), "worker_died", "SIGSEGV"),
-    "gas": (lambda: bytearray(10**15), "out_of_memory", "that a worker may add"),
-    "spring": (lambda: os.kill(os.getpid(), signal.SIGSTOP), "budget_seconds", "more than 0.5 s"),
-}
-
-
-def test_poison_jobs_are_failed_jobs(studies, tmp_path, monkeypatch):
-    """Each in its place; only the one that ran out of time is tried again."""
-
-    def poisoned(place, case, real=SWEEP.run_job):
-        if case.machine.rod_mass_kg == 5:
-            POISON[case.load][0]()
-        return real(place, case)
-
-    monkeypatch.setattr(SWEEP, "run_job", poisoned)
-    monkeypatch.setattr(SWEEP, "GRACE", 0.5)
-    masses = {"machine": {"rod_mass_kg": [4, 5]}, "solve": {"timeout_s": 0.5}}
-    made = studies(one={"load": [*POISON], **masses})
-    summary = sweep(made, tmp_path / "out", 2)
-    assert statuses(tmp_path / "out", made[0]) == ["ok", "failed"] * 3
-    assert len(summary.failed) == 3
-    for failure in summary.failed:
-        _, reason, detail = POISON[failure.coordinates["load"]]
-        assert failure.reason == reason
-        assert detail in failure.detail
-        assert store.read_job(tmp_path / "out", failure.key).attrs["detail"] == failure.detail
-    assert sweep(made, tmp_path / "out", 2).run_now == 1
 
 
 def test_a_job_that_ran_out_of_time_is_tried_again(studies, tmp_path, in_process):
