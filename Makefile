@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify calibrate nameplate stress chaos mutants measurements pages docs release lock clean
+.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify calibrate nameplate stress chaos mutants measurements pages docs release lock alarms clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -111,6 +111,9 @@ diagnosis: install  ## train on 2,000 simulated machines, and test on some it ne
 calibrate: install  ## measure what calibrate makes of known machines and of others (15 minutes)
 	$(CAMPAIGN)/measure_calibrate.py tests/results/calibrate.json
 
+alarms: install  ## measure which alarm sees wear of the nameplate machine first (ten minutes)
+	$(CAMPAIGN)/measure_alarms.py tests/results/alarms.json
+
 identify: install  ## measure what is identified of other machines, and under another friction law (15 minutes)
 	$(CAMPAIGN)/measure_identify.py tests/results/identify.json
 
@@ -126,7 +129,11 @@ nameplate: install  ## run the case file of compsim init machine, for its page (
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
+<<<<<<< HEAD
 measurements: test-oldest calibration accuracy validation wear claims page tradeoff ladders chaotic regimes diagnosis identify nameplate store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
+=======
+measurements: test-oldest calibration accuracy validation wear claims page tradeoff ladders chaotic regimes diagnosis identify alarms store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
+>>>>>>> 9c4b7e8 (alarms: measure the nameplate machine, 484 jobs)
 
 pages: install  ## write the pages' generated tables, compressor/API.md, the tutorial's notebook
 	$(BIN)/python tests/page_tables.py

@@ -697,6 +697,147 @@ def calibrate_table():
     return markdown(head, rows)
 
 
+def alarms_table():
+    found = kept("alarms.json")
+    head = ["worn joint", "alarm, with its best filter", "limits over what is usual",
+            "false alarms", "trips in, by clearance in mm", "detects from, mm",
+            f"limits for {found['looser']:.0%}",
+            *(f"with noise of {noise:g} m/s²" for noise in alarm_noise(found)[1:]),
+            "hours before the limit"]  # fmt: skip
+    rows = []
+    for row in found["rows"]:
+        if row["noise"]:
+            continue
+        trips = ", ".join(
+            f"{share:.0%} at {clearance:g}"
+            for clearance, share in zip(row["clearances"], row["detection"], strict=True)
+        )
+        others = [
+            f"{alarm_first(other)}, {other['filter']}"
+            for other in found["at_looser"] + [one for one in found["rows"] if one["noise"]]
+            if all(other[n] == row[n] for n in ("joint", "alarm"))
+        ]
+        hours = "–"
+        if row["lead_hours"] is not None:
+            hours = "{lead_hours:g} [{lead_hours_low:g}, {lead_hours_high:g}]".format_map(row)
+        limits = "{:g} to {:g}".format(*row["limits"])
+        rows.append([
+            joint_name(row["joint"]), f"{row['alarm']}, {row['filter']}", limits,
+            alarm_false(row), trips, alarm_first(row), *others, hours,
+        ])  # fmt: skip
+    return markdown(head, rows) + "\n" + " ".join(alarm_sentences(found)) + "\n"
+
+
+def alarm_noise(found):
+    """The levels of added noise, m/s2."""
+    return sorted({row["noise"] for row in found["rows"]})
+
+
+def alarm_first(row):
+    """The clearance from which on an alarm detects, with its interval."""
+    if row["first_low"] is None:
+        return "never"
+    most = row["clearances"][-1]
+    ends = [f"> {most:g}" if end is None else f"{end:g}" for end in (row["first_low"],
+                                                                  row["first_high"])]  # fmt: skip
+    first = "never" if row["first"] is None else f"{row['first']:g}"
+    return f"{first} [{', '.join(ends)}]"
+
+
+def alarm_false(row):
+    """The rate of false alarms that was counted, with its interval."""
+    shares = [f"{100 * row[f'false_alarms{end}']:.2g}" for end in ("", "_low", "_high")]
+    return "{} % [{}, {}]".format(*shares)
+
+
+def alarm_sentences(found):
+    """What follows from the rates, with the numbers that it follows from."""
+    for joint in ("small_end", "big_end"):
+        rows = [r for r in found["rows"] if r["joint"] == joint and not r["noise"]]
+        best, name = rows[0], joint_name(joint)
+        alike = [row for row in rows if row["first"] is not None and row["first"] == best["first"]]
+        never = [row["alarm"] for row in rows if row["first"] is None]
+        if best["first"] is None:
+            yield f"No alarm detects wear of the {name} within {best['clearances'][-1]:g} mm."
+            continue
+        if len(alike) > 1:
+            kinds = ", ".join(row["alarm"] for row in alike)
+            yield (f"{len(alike)} of {len(rows)} kinds of alarm detect wear of the {name} from "
+                   f"{best['first']:g} mm on: {kinds}.")  # fmt: skip
+        else:
+            yield (f"Wear of the {name} is seen first by {best['alarm']} ({best['filter']}), from "
+                   f"{alarm_first(best)} mm on.")  # fmt: skip
+        place = best["clearances"].index(best["first"]) - 1
+        if place >= 0:
+            yield alarm_below(alike, place, name)
+        yield f"Never within {best['clearances'][-1]:g} mm: {', '.join(never) or 'none'}."
+    most = max(row["false_alarms"] for row in found["rows"])
+    sure = max(row["false_alarms_high"] for row in found["rows"])
+    draws = found["sound_draws"]
+    yield (f"Of false alarms, {found['attainable']:.0%} was asked for and at most {most:.1%} were "
+           f"counted, which of {draws} draws says no more than below {sure:.1%}.")  # fmt: skip
+    peaks = found["peaks"]
+    small = peaks["clearances"]["small_end"], peaks["worn"]["small_end"]
+    worn = ", ".join(f"{peak:g} at {one:g} mm" for one, peak in zip(*small, strict=True))
+    yield (f"The median peak of the record is {peaks['sound']:g} m/s² of a sound machine, and of a "
+           f"worn small end {worn}: it knocks from one clearance to the next.")  # fmt: skip
+    first, second = peaks["greatest"]
+    yield (f"One sound draw peaks at {first:g} times that of a sound machine, the next at "
+           f"{second:g} times.")  # fmt: skip
+    low, high = next(
+        row["limits"]
+        for row in found["rows"]
+        if (row["alarm"], row["filter"], row["noise"]) == ("peak", "record", 0.0)
+    )
+    yield (f"It sets the limits for {found['attainable']:.0%} in all folds but its own: those of "
+           f"the record's peak go from {low:g} to {high:g} times what is usual. Intervals are for "
+           "limits as they were set, without this scatter.")  # fmt: skip
+    loose = [
+        next(r for r in found["at_looser"] if r["joint"] == joint)
+        for joint in ("small_end", "big_end")
+    ]
+    parts = [f"the {joint_name(r['joint'])} is seen first by {r['alarm']} ({r['filter']}), from "
+             f"{alarm_first(r)} mm on" for r in loose]  # fmt: skip
+    strict = [next(r for r in found["rows"] if r["joint"] == one["joint"]) for one in loose]
+    names = [r["alarm"] for r in loose], [r["alarm"] for r in strict]
+    verdict = "which alarm is first depends on that rate" if names[0] != names[1] else "the same"
+    yield f"With limits for {found['looser']:.0%}, {', and '.join(parts)}: {verdict}."
+    wear = found["wear"]
+    worn_out = max(wear["clearances"], key=wear["clearances"].get)
+    other = next(joint for joint in wear["clearances"] if joint != worn_out)
+    leads = [r for r in found["rows"] if not r["noise"] and r["lead_hours"]]
+    said = "; ".join(
+        "{}, {}, by {lead_hours:g} h [{lead_hours_low:g}, {lead_hours_high:g}]".format(
+            joint_name(r["joint"]), r["alarm"], **r
+        )
+        for r in leads
+    )
+    yield (f"In the wear run the {joint_name(worn_out)} reaches {wear['limit_mm']:g} mm after "
+           f"{wear['end']:g} h, when the {joint_name(other)} has {wear['clearances'][other]:g} mm. "
+           f"Alarms that trip before: {said or 'none'}.")  # fmt: skip
+
+
+def alarm_below(alike, place, name):
+    """How often the first alarms trip one clearance earlier, and whether that tells them apart."""
+    shares = [row["detection"][place] for row in alike]
+    ends = (
+        max(r["detection_low"][place] for r in alike),
+        min(r["detection_high"][place] for r in alike),
+    )
+    clearance = alike[0]["clearances"][place]
+    if len(alike) == 1:
+        low, high = alike[0]["detection_low"][place], alike[0]["detection_high"][place]
+        return (f"At {clearance:g} mm it trips in {shares[0]:.0%} [{low:.0%}, {high:.0%}] of "
+                "windows.")  # fmt: skip
+    apart = (
+        "no farther apart than their intervals: which of them is first is not known"
+        if ends[0] <= ends[1]
+        else "farther apart than their intervals"
+    )
+    return (f"At {clearance:g} mm they trip in {min(shares):.0%} to {max(shares):.0%} of windows, "
+            f"{apart}.")  # fmt: skip
+
+
 def unit(name, row):
     """A drawn parameter with its unit."""
     what = {"damping": "times the paper's", "rtol": "", "friction": "", "exponent": ""}
@@ -1144,6 +1285,7 @@ CAMPAIGNS = {
     "diagnosis": ("Does a classifier find the worn joint?",
                   {"diagnosis": diagnosis_table, "confusion": confusion_table,
                    "clearance-bins": clearance_bins_table, "clearances": clearance_table}),
+    "alarms": ("Which alarm sees wear first?", {"alarms": alarms_table}),
     "identify": ("Does `compsim identify` find the worn joint?", {"identify": identify_table}),
     "calibrate": ("Does `compsim calibrate` find a machine's parameters?",
                   {"calibrate": calibrate_table}),

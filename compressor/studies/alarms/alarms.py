@@ -26,7 +26,7 @@ from compressor.studies.alarms.windows import AlarmOptions, Windows, check_draws
 MAX_LEVELS = 12  # clearances of a joint that stay as they are; more of them are put together
 BINS = 6  # into as many groups of equal size
 # of the limit, times a sound machine's usual reading, over which the curves go
-FACTORS = np.concatenate([np.arange(0.8, 2.0, 0.02), np.geomspace(2.0, 200.0, 60)])
+FACTORS = np.concatenate([np.arange(0.8, 2.0, 0.02), np.geomspace(2.0, 1e4, 100)])
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,8 @@ def judge_alarms(
     Dimensions: `alarm` (with its filter), `noise` (m/s2), `state` (a worn joint and a clearance),
     `joint`, `factor` (of a limit over a sound machine's usual reading). Variables: `detection` and
     `false_alarms` with `_low` and `_high` ends of 95 % intervals by draws; `first_clearance` (mm)
-    with its interval, inf where there is none; `limit`; and `curve_detection` and
+    with its interval, inf where there is none; `limit_low` and `limit_high`, the ends of the folds'
+    limits; and `curve_detection` and
     `curve_false_alarms` over the factor. Raises AlarmsError, and StoreError where the store cannot
     be read.
     """
@@ -212,10 +213,12 @@ def as_dataset(
             stack(lambda one, name=of_first: [getattr(one.first[j], name) for j in joints]),
             {"units": "mm", "long_name": f"{side}least clearance from which on it detects"},
         )
-    found["limit"] = (
-        ("alarm", "noise"), stack(lambda one: np.mean(one.limits)),
-        share | {"long_name": "limit over the usual reading of a sound machine, mean of the folds"},
-    )  # fmt: skip
+    for end, pick in (("low", min), ("high", max)):
+        found[f"limit_{end}"] = (
+            ("alarm", "noise"), stack(lambda one, pick=pick: pick(one.limits)),
+            share | {"long_name": "limit over the usual reading of a sound machine, the "
+                     f"{'least' if end == 'low' else 'greatest'} of the folds"},
+        )  # fmt: skip
     found["curve_detection"] = (
         ("alarm", "noise", "state", "factor"), stack(lambda one: one.detection),
         share | {"long_name": "share of windows in which the alarm trips, by its limit"},

@@ -83,8 +83,9 @@ def alarms(
     of the record, peak and rms of segments of 10 degrees, counts of peaks, and velocity; each on
     the record as it is and behind band passes. What is usual, and the limit, come from sound jobs;
     others of other draws are judged by them. The table has each alarm with its best filter, the
-    first to see wear first: the clearance from which on it detects, and the false alarms that were
-    counted. A clearance in brackets may be "never": then the study has too few draws to be sure.
+    first to see wear first: the clearance from which on it detects, with an interval, and the false
+    alarms that were counted. An interval that ends with "> 0.4" goes beyond the study's greatest
+    clearance: its draws are too few to be sure.
     """
     folder, words = results_folder(given, folder)
     study = one_word(words, "STUDY")

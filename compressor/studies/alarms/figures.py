@@ -50,7 +50,7 @@ def draw_alarms(found: xr.Dataset, noise: int = 0) -> Drawing:
         plot_curves(below, best.isel(state=mine))
         title = joint.replace("_", " ")
         above.title = f"({'abc'[column]}) {title}, by clearance"
-        below.title = f"({'def'[column]}) {best['alarm'].item()}"
+        below.title = f"({'bcdef'[column + len(joints) - 1]}) {best['alarm'].item()}"
         above.y.title = "windows in which it trips" if not column else ""
         below.y.title = "windows in which it trips" if not column else ""
     return figure
@@ -111,7 +111,7 @@ def caption(found: xr.Dataset, noise: int = 0) -> str:
         f"Above: share of windows in which an alarm trips, by clearance, each with its best filter "
         f"and 95 % intervals by draws, moved aside a little; limits by sound windows of other "
         f"draws, {limit_words(found)}{disturbed}. Dashed: {attrs['detected']:.0%}. The first to "
-        f"see wear, of {found.sizes['alarm']} alarms: {'; '.join(texts)}. Below: of these alarms, "
+        f"see wear, of {found.sizes['alarm']} alarms: {'; '.join(texts)}. Below: of these, "
         f"detection against false alarms as the limit rises, a line a clearance; the mark is what "
         f"was counted at the limit above, of {attrs['sound_draws']} sound draws."
     )

@@ -18,7 +18,8 @@ COLUMNS = (  # of the CSV: head, and the variable
     ("clearance_high_mm", "clearance_high"), ("draws", "draws"), ("detection", "detection"),
     ("detection_low", "detection_low"), ("detection_high", "detection_high"),
     ("false_alarms", "false_alarms"), ("false_alarms_low", "false_alarms_low"),
-    ("false_alarms_high", "false_alarms_high"), ("limit_over_usual", "limit"),
+    ("false_alarms_high", "false_alarms_high"), ("limit_over_usual_low", "limit_low"),
+    ("limit_over_usual_high", "limit_high"),
 )  # fmt: skip
 OF_JOINT = (
     ("first_clearance_mm", "first_clearance"), ("first_clearance_low_mm", "first_clearance_low"),
@@ -60,6 +61,12 @@ def rate_words(one: xr.Dataset) -> str:
     return f"{value:.2g} % [{low:.2g}, {high:.2g}]"
 
 
+def limits_words(one: xr.Dataset) -> str:
+    """Return the limits of the folds, as their ends where they differ."""
+    low, high = (f"{one[f'limit_{end}'].item():.3g}" for end in ("low", "high"))
+    return low if low == high else f"{low}-{high}"
+
+
 def lead_words(first: xr.Dataset) -> str:
     """Return the hours from an alarm to the end of the wear run, with their interval."""
     value, low, high = (first[name].item() for name in LEADS)
@@ -82,7 +89,7 @@ def table(found: xr.Dataset) -> Iterator[str]:
         heads.append("hours before the limit")
     heads += [f"with noise of {one:g} m/s2" for one in noise[1:]]
     head = "".join(f"  {text:<24}" for text in heads)
-    yield f"{'joint':<9}  {'alarm':<{width}}  {'limit':>5}  {'false alarms':<20}{head}".rstrip()
+    yield f"{'joint':<9}  {'alarm':<{width}}  {'limits':<11}  {'false alarms':<20}{head}".rstrip()
     for joint in found["joint"].values.tolist():
         best = [best_of_each(found, joint, level) for level in range(noise.size)]
         for place in best[0]:
@@ -95,7 +102,7 @@ def table(found: xr.Dataset) -> Iterator[str]:
             if LEADS[0] in found:
                 cells.insert(1, lead_words(plain.sel(joint=joint)))
             texts = "".join(f"  {text:<24}" for text in cells)
-            yield (f"{joint:<9}  {plain['alarm'].item():<{width}}  {plain['limit'].item():>5.3g}  "
+            yield (f"{joint:<9}  {plain['alarm'].item():<{width}}  {limits_words(plain):<11}  "
                    f"{rate_words(plain):<20}{texts}").rstrip()  # fmt: skip
 
 

@@ -1,0 +1,190 @@
+"""Which alarm sees wear of the nameplate machine first (make alarms): sound and worn draws of it.
+
+The machine of `compsim init machine` with speed, discharge pressure, oil and the clearances of its
+sound pins drawn at random: sound draws that set limits and count false alarms, and others with the
+big or the small end worn to each of some clearances. They are simulated into a store, and judged by
+the command's own call, at several levels of noise. Beside it, one machine whose bores wear, for
+lead times. Writes a small JSON file.
+"""
+
+import argparse
+import json
+import math
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import yaml
+from measure_accuracy import provenance
+
+from compressor.cases.load import load_studies
+from compressor.metrics import JOINTS
+from compressor.program import no_progress
+from compressor.store import open_study
+from compressor.studies.alarms.alarms import best_of_each, judge_alarms
+from compressor.studies.alarms.lead import lead_times, open_run
+from compressor.studies.alarms.windows import AlarmOptions
+from compressor.studies.wear.run import run_wear
+from compressor.sweep.sweep import Options, sweep
+
+ROOT = Path(__file__).parent.parent.parent
+TEMPLATE = ROOT / "compressor/cases/examples/machine.yaml"
+SEED, SOUND, DRAWS = 3501, 124, 36
+HEALTHY = {"big_end": 0.12, "small_end": 0.1}
+SOUND_PINS = {"big_end": [0.08, 0.12], "small_end": [0.06, 0.1]}
+WORN = {
+    "big_end": [0.15, 0.2, 0.25, 0.3, 0.4],
+    "small_end": [0.11, 0.12, 0.15, 0.2, 0.4],
+}  # fmt: skip
+DRAWN = {  # about the nameplate: speed by 5 %, pressure by 10 %, oil by 20 %
+    "machine": {"speed_rpm": [703, 777]},
+    "gas": {"discharge_MPa": [0.63, 0.77]},
+    "lubricant": {"viscosity_mPa_s": [32, 48]},
+}
+LOOSER = 0.05  # rate of false alarms, beside the default one
+NOISE = (0.0, 1.0, 5.0)  # m/s2 rms, beside the sensor's own
+SOLVE = {
+    "accuracy": "draft", "error_bars": False, "settle_rev": 2, "duration_rev": 5,
+    "output_step_deg": 3.6,
+}  # fmt: skip
+WEAR = {"limit_mm": 0.5, "hours": 1e7, "step_mm": 0.04}
+
+
+def plant(template=TEMPLATE):
+    """The values of the nameplate machine, with what is drawn of it."""
+    values = yaml.safe_load(template.read_text(encoding="utf-8"))
+    for group, drawn in DRAWN.items():
+        values[group] |= {key: {"random": span} for key, span in drawn.items()}
+    return values | {
+        "name": "plant", "healthy_clearance_mm": HEALTHY, "solve": SOLVE,
+        "output": {"precision": "single"},
+    }  # fmt: skip
+
+
+def case_text(sound=SOUND, draws=DRAWS, worn=WORN):
+    """The study's case file: sound draws, and draws with either pin worn; YAML, as JSON."""
+    pins = {joint: {"random": span} for joint, span in SOUND_PINS.items()}
+    values = plant()
+    values.pop("clearance_mm")
+    blocks = [{"clearance_mm": pins, "sample": {"n": sound, "seed": SEED}}]
+    blocks += [
+        {"clearance_mm": pins | {joint: clearances}, "sample": {"n": draws, "seed": SEED + 1}}
+        for joint, clearances in worn.items()
+    ]
+    return json.dumps(values | {"blocks": blocks}, indent=1) + "\n"
+
+
+def wear_text():
+    """The case file of the machine that wears: dry, since wear is that of a dry bore."""
+    values = plant()
+    for group in ("body", "sensor", "lubricant"):
+        values.pop(group)
+    for group, drawn in DRAWN.items():
+        if group in values:
+            values[group] |= {key: sum(span) / 2 for key, span in drawn.items()}
+    clearance = {joint: max(span) for joint, span in SOUND_PINS.items()}
+    return json.dumps(values | {
+        "name": "worn", "clearance_mm": clearance, "output": {"keep": "metrics"},
+        "solve": SOLVE | {"duration_rev": 4}, "wear": WEAR,
+    }, indent=1) + "\n"  # fmt: skip
+
+
+def judge(folder, study, run=None):
+    """What the command says of a stored study: best alarms by joint and noise, with their rates."""
+    found = judge_alarms(folder, study, AlarmOptions(noise=NOISE))
+    found = lead_times(found, run) if run else found
+    looser = judge_alarms(folder, study, AlarmOptions(false_alarms=LOOSER))
+    return {
+        "looser": LOOSER, "at_looser": [
+            {name: row[name] for name in ("joint", "alarm", "filter", "limits", "clearances",
+                                          "first", "first_low", "first_high")}
+            for joint in looser["joint"].values.tolist() for row in rows_of(looser, joint)
+        ],
+        "peaks": peaks(folder, study),
+        "sound_draws": int(found.attrs["sound_draws"]), "jobs": int(found.attrs["jobs"]),
+        "worn_jobs": int(found.attrs["worn_jobs"]), "left_out": json.loads(found.attrs["left_out"]),
+        "attainable": rounded(found.attrs["attainable"]), "detected": found.attrs["detected"],
+        "alarms": found.sizes["alarm"], "clipped": int(found.attrs["clipped"]),
+        "rows": [row for joint in found["joint"].values.tolist() for row in rows_of(found, joint)],
+    }  # fmt: skip
+
+
+def peaks(folder, study):
+    """Peaks of the records, without added noise: medians, and the greatest of sound draws."""
+    dataset = open_study(folder, study)
+    with dataset:
+        peak = dataset["sensor_peak"].values
+        clearance = {joint: dataset[f"clearance_mm_{joint}"].values for joint in JOINTS}
+    worn = {joint: clearance[joint] > HEALTHY[joint] for joint in JOINTS}
+    sound = np.sort(peak[~(worn["big_end"] | worn["small_end"])])
+    medians = {
+        joint: [rounded(np.median(peak[worn[joint] & (clearance[joint] == one)]))
+                for one in clearances]
+        for joint, clearances in WORN.items()
+    }  # fmt: skip
+    usual = np.median(sound)
+    return {
+        "sound": rounded(usual), "worn": medians, "clearances": WORN,
+        "greatest": [rounded(one / usual) for one in sound[:-3:-1]],
+    }  # fmt: skip
+
+
+def rows_of(found, joint):
+    """A row for the best filter of each kind of alarm, by joint and noise."""
+    mine = found["worn_joint"].values == joint
+    for level, noise in enumerate(found["noise"].values.tolist()):
+        for place in best_of_each(found, joint, level):
+            one = found.isel(alarm=place, noise=level)
+            first = one.sel(joint=joint)
+            row = {
+                "joint": joint, "noise": noise, "alarm": one["title"].item(),
+                "filter": one["filter"].item(),
+                "limits": [rounded(one[f"limit_{end}"]) for end in ("low", "high")],
+                "clearances": one["clearance"].values[mine].tolist(),
+                "draws": found["draws"].values[mine].tolist(),
+            }  # fmt: skip
+            for end in ("", "_low", "_high"):
+                row[f"detection{end}"] = [rounded(n) for n in one[f"detection{end}"].values[mine]]
+                row[f"false_alarms{end}"] = rounded(one[f"false_alarms{end}"])
+                row[f"first{end}"] = rounded(first[f"first_clearance{end}"])
+                if "lead_hours" in found:
+                    row[f"lead_hours{end}"] = rounded(first[f"lead_hours{end}"])
+            yield row
+
+
+def rounded(value):
+    """Three digits; None of what is at no clearance, or not known."""
+    value = float(value)
+    return float(f"{value:.3g}") if math.isfinite(value) else None
+
+
+def main(target, place, jobs):
+    place.mkdir(parents=True, exist_ok=True)
+    for name, text in (("plant", case_text()), ("worn", wear_text())):
+        (place / f"{name}.yaml").write_text(text, encoding="utf-8")
+    studies = load_studies(place / "plant.yaml")
+    summary = sweep(studies, place / "plant", jobs, no_progress, Options("make alarms"))
+    run_wear(load_studies(place / "worn.yaml"), place / "worn", jobs, no_progress)
+    run = open_run(place / "worn")
+    kept = judge(place / "plant", "plant", run)
+    last = dict(zip(JOINTS, map(rounded, run.clearances[-1]), strict=True))
+    wear = {
+        "end": rounded(run.end), "limit_mm": run.limit, "factor": run.factor, "clearances": last,
+    }  # fmt: skip
+    result = {**provenance("make alarms"), "failed": len(summary.failed), **kept, "wear": wear}
+    Path(target).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    for row in kept["rows"]:
+        print({name: one for name, one in row.items() if not isinstance(one, list)})
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("target", help="file to write")
+    parser.add_argument("--results", type=Path, help="folder of the jobs, else a temporary one")
+    parser.add_argument("-j", "--jobs", type=int, default=2, help="processes")
+    given = parser.parse_args()
+    if given.results:
+        main(given.target, given.results, given.jobs)
+    else:
+        with tempfile.TemporaryDirectory() as folder:
+            main(given.target, Path(folder), given.jobs)
