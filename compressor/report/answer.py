@@ -162,8 +162,8 @@ def mechanism_words(case: Case) -> str:
     machine = case.machine
     pins = " and ".join(dict.fromkeys(f"{machine.pin_radius(joint):g}" for joint in JOINTS))
     return (
-        f"{machine.speed_rpm:g} rpm; rod {machine.rod_mass_kg:g} kg, crosshead with piston "
-        f"{machine.reciprocating_mass_kg:g} kg; pins of {pins} mm radius"
+        f"{machine.speed_rpm:.4g} rpm; rod {machine.rod_mass_kg:.4g} kg, crosshead with piston "
+        f"{machine.reciprocating_mass_kg:.4g} kg; pins of {pins} mm radius"
         + (f"; counterweight {case.counterweight:g} kg mm." if case.counterweight else ".")
     )
 

@@ -90,12 +90,12 @@ def _compare(data: xr.Dataset, case: Case, places: list[int], units: Units) -> H
         cells += [_cell(measure, float(values[n]), float(bars[n]), sound) for n in places]
         rows.append(TableRow(cells))
     heads = [names[n] or "this job" for n in places]
+    beside = "jobs that differ from it in clearances alone" if len(places) > 1 else "this job"
     words = (
-        "The machine without clearance, by the same model, beside jobs that differ from it in "
-        "clearances alone; in parentheses: how many times as much. The job on the right has the "
-        "greatest rms acceleration of the study."
+        f"The machine without clearance, by the same model, beside {beside}; in parentheses: how "
+        "many times as much. The job on the right has the greatest rms acceleration of the study."
     )
-    return HealthyAndWorn(words, PageTable(["", "without clearance", *heads], rows))
+    return HealthyAndWorn(words, PageTable(["metric", "without clearance", *heads], rows))
 
 
 def _cell(measure: Measure, value: float, bar: float, sound: float) -> Cell:

@@ -286,7 +286,7 @@ def mark_ray(panel: Panel, degrees: float, radius: float) -> None:
     along = np.array([math.cos(turn), math.sin(turn)])
     ends = np.array([0.0, 1e3 * radius])
     panel.plot(along[0] * ends, along[1] * ends, LineStyle(GREY, linewidth=0.8))
-    x, y = (1e3 * radius - 32) * along
+    x, y = (1e3 * radius - 45) * along
     upright = degrees in (90, 270)
     shift, side, level = ((5, 0), "left", "center") if upright else ((0, 4), "center", "bottom")
     panel.notes.append(Note(f"{degrees:g}°", x, y, shift=shift, side=side, level=level))

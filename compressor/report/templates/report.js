@@ -307,8 +307,9 @@ class Figure {
     const narrow = width < 190 * widths.length || width < 560;
     const columns = narrow ? Math.max(1, Math.min(widths.length, Math.floor(width / 330))) : 0;
     const rows = narrow ? Math.ceil(panels.length / columns) : 0;
+    const most = heights.length === 1 ? 380 : 240 * heights.length;
     const total = narrow ? rows * 260
-      : Math.max(130 * heights.length, Math.min(width * aspect, 240 * heights.length));
+      : Math.max(130 * heights.length, Math.min(width * aspect, most));
     const share = (sizes, [first, last]) => {
       const sum = (part) => part.reduce((a, b) => a + b, 0);
       return [sum(sizes.slice(0, first)) / sum(sizes), sum(sizes.slice(0, last)) / sum(sizes)];
@@ -494,13 +495,19 @@ class Figure {
     const [low, high] = panel.x.range.map((end) => log(end, panel.x));
     const share = inside ? note.x : (log(note.x, panel.x) - low) / (high - low);
     const at = this.width * (left + share * (right - left)); // px from the figure's left
-    const long = at + LETTER * size * note.text.length > this.width;
-    const before = inside && note.x > 0.5 || (long && at > this.width / 2);
+    const aside = POINT * note.shift[0];
+    const wide = (LETTER * size + 0.5) * note.text.length;
+    const over = note.side === "left" ? Math.max(0, at + aside + wide - this.width) : 0;
+    // what runs out of the figure moves back as far as that takes, or stands before its place
+    const moved = !inside && over > 0 && wide < this.width * (right - left) ? over : 0;
+    const before = inside && note.x > 0.5 || (over > moved && at > this.width / 2);
+    const room = (before || note.side === "right" ? at - this.width * left : this.width - at) - 6;
     layout.annotations.push({ showarrow: false, align: "left", font: { size, color },
-      text: wrapped(note.text, (before ? at : this.width - at) - 6, size),
+      text: wrapped(note.text, room + moved, size),
       xref: inside ? `${x} domain` : x, yref: inside ? `${y} domain` : y,
       x: inside ? note.x : log(note.x, panel.x), y: inside ? note.y : log(note.y, panel.y),
-      xshift: POINT * note.shift[0], yshift: POINT * note.shift[1],
+      xshift: before && note.side === "left" ? -Math.abs(aside) : aside - moved,
+      yshift: POINT * note.shift[1],
       xanchor: before ? "right" : note.side, yanchor: LEVELS[note.level] });
   }
 }

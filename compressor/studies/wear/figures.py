@@ -79,5 +79,5 @@ def plot_profiles(panel: Panel, stages: xr.Dataset) -> None:
         share, name = (place + 1) / shown.size, f"{names[place]} h"
         panel.plot(around, depth, LineStyle(BLACK, linewidth=1.0, alpha=share), name)
     panel.title = f"(c) after {', '.join(names)} h,\nthe later the darker"
-    panel.title_size = 9.0
+    panel.title_size = 8.0
     panel.x.title, panel.x.ticks = "place, from the rod's axis (deg)", range(-180, 181, 90)
