@@ -6,6 +6,7 @@ written for the site: links between files, images and formulas work on a code ho
 
 import re
 from fnmatch import fnmatch
+from importlib.resources import files
 from pathlib import Path
 
 from compressor.program import VERSION
@@ -136,6 +137,11 @@ def show_blocks(app, context, lines):
     lines[:] = text.splitlines()
 
 
+def add_font(app, config):
+    """Add a font for formulas, whose indices are placed badly without one."""
+    config.html_static_path.append(str(files("ziamath.fonts") / "STIXTwoMath-Regular.ttf"))
+
+
 def write_formula(display):
     """Return the visitor that writes a formula as MathML, which browsers draw by themselves."""
 
@@ -147,7 +153,8 @@ def write_formula(display):
         drawn = convert(node.astext().replace("{aligned}", "{split}"), display=display)
         if "\\" in drawn or "&</mi>" in drawn:
             getLogger(__name__).warning("not drawn: %s", node.astext(), location=node)
-        writer.body.append(drawn)
+        block = display == "block"  # scrolls by itself where it is wider than a phone
+        writer.body.append(f'<div class="formula">{drawn}</div>' if block else drawn)
         raise SkipNode
 
     return visit, None
@@ -162,6 +169,7 @@ def write_index(app, error):
 
 def setup(app):
     """Connect the above with Sphinx."""
+    app.connect("config-inited", add_font)
     app.connect("source-read", add_contents)
     app.connect("sphinx-click-process-description", show_blocks)
     app.connect("build-finished", write_index)

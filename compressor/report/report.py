@@ -85,7 +85,6 @@ from compressor.store import (
     Folder,
     Stored,
     StoredStudy,
-    label_study,
     publish,
     read_store,
     read_studies,
@@ -272,7 +271,7 @@ def drawn_study(
     """
     anchor = second_anchor(study.name) if other else ""
     whole = other is not None and other.keys.issuperset(study.keys)
-    with label_study(stored.folder, study.name) as data:
+    with stored.label([study]) as data:
         plates = [
             Plate(file_name("sweep", study.name, one.name), f"{study.name}: {one.title}",
                   one.caption, one.figure)

@@ -10,7 +10,7 @@ from compressor.store.files import (
     writable_folder,
 )
 from compressor.store.hdf5 import DamagedJob
-from compressor.store.reader import Stored, label_study, open_study, read_job, read_store
+from compressor.store.reader import Stored, open_study, read_job, read_store
 from compressor.store.sensor_records import find_record, job_record
 from compressor.store.series_file import (
     read_dataset,

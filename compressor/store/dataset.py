@@ -17,7 +17,7 @@ from xarray.core import indexing
 from compressor.cases import phrase_of, points, table, value_in
 from compressor.digits import is_known
 from compressor.metrics import METRICS, NUMBERS, SIZES
-from compressor.outcome import WORDS, coordinates
+from compressor.outcome import coordinates, word_variables
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
 from compressor.store.hdf5 import DamagedJob
@@ -171,7 +171,8 @@ def _outcomes(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr
         "status": (words("status", "missing"), "ok, failed or missing"),
         "reason": (words("reason", ""), "why a run failed"),
     }
-    texts |= {name: (words(name, ""), phrase) for name, phrase in WORDS.items()}
+    for name, one in word_variables({}).items():
+        texts[name] = (words(name, ""), one.attrs["long_name"])
     return {
         name: xr.Variable(layout.dims, values, {"long_name": phrase})
         for name, (values, phrase) in texts.items()

@@ -30,7 +30,7 @@ import numpy as np
 
 from compressor.cases import SUSPECT, Case, changes_since
 from compressor.metrics import BARRED
-from compressor.outcome import WORDS, Outcome, word_variables
+from compressor.outcome import Outcome, word_variables
 from compressor.reasons import Reason
 from compressor.store.files import (
     HEX20,
@@ -44,11 +44,12 @@ from compressor.store.files import (
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.rows import GIVEN, NAME, Cut, Rows, Segment, read_segment
 from compressor.store.series_file import read_series, read_values
-from compressor.store.studies import find_study, read_studies
+from compressor.store.studies import StoredStudy, find_study, read_studies
 
 if TYPE_CHECKING:
     import xarray as xr
 
+WORDS = ("promise", "regime")  # that rows of before November 2026 do not have
 BOTH_JOINTS = (
     "`fault` is the swept joint, and `joint` the one that a number belongs to: select both, as in "
     "study.sel(fault='big_end', joint='big_end')"
@@ -82,7 +83,6 @@ def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:
         absent = np.isnan(rows.numbers[name][positions])
         missed = absent.all(axis=tuple(range(1, absent.ndim)))
         lacking[name] = missed & present.get(metric.when, False)
-    # rows of before November 2026 have no words
     return lacking | {name: is_ok & (rows.words[name][positions] == "") for name in WORDS}
 
 
@@ -272,6 +272,20 @@ class Stored:
         table = found.table({})
         return xr.Dataset(table.variables, attrs=table.attrs)
 
+    def label(self, studies: Sequence[StoredStudy], trusted: bool = False) -> "xr.Dataset":
+        """Return studies of this store as one Dataset, as `open_study` does."""
+        from compressor.store import dataset as datasets  # loads xarray: half a second
+
+        is_grid = len(studies) == 1 and studies[0].is_grid
+        layout = datasets.grid(studies[0]) if is_grid else datasets.table_of_jobs(studies)
+        dataset = datasets.label_dataset(layout, self.rows, self.job, self.values)
+        if trusted:
+            dataset = datasets.mask_untrusted(dataset)
+        dataset = dataset.assign(datasets.machine_constants(studies, layout))
+        names = [study.name for study in studies]
+        dataset.attrs = {"folder": os.path.abspath(self.folder), "studies": names}
+        return dataset
+
     def values(self, key: str, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return some variables of a stored job's time series."""
         position = self.position(key)
@@ -412,26 +426,11 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     >>> study.acceleration.sel(clearance_mm=0.3).dims
     ('time',)
     """
-    dataset = label_study(folder, name, trusted)
-    if "fault" in dataset.dims and "joint" in dataset.dims:
-        warnings.warn(BOTH_JOINTS, StoreWarning, stacklevel=2)
-    return dataset
-
-
-def label_study(folder: Folder, name: str | None = None, trusted: bool = False) -> "xr.Dataset":
-    """Return what `open_study` does, without a word on its two dimensions of joints."""
-    from compressor.store import dataset as datasets  # loads xarray: half a second
-
     folder = os.path.abspath(folder)
     studies = read_studies(folder, former=name is not None)
     if name is not None:
         studies = [find_study(folder, name, studies)]
-    stored = read_store(folder).warned()
-    is_grid = len(studies) == 1 and studies[0].is_grid
-    layout = datasets.grid(studies[0]) if is_grid else datasets.table_of_jobs(studies)
-    dataset = datasets.label_dataset(layout, stored.rows, stored.job, stored.values)
-    if trusted:
-        dataset = datasets.mask_untrusted(dataset)
-    dataset = dataset.assign(datasets.machine_constants(studies, layout))
-    dataset.attrs = {"folder": folder, "studies": [study.name for study in studies]}
+    dataset = read_store(folder).warned().label(studies, trusted)
+    if "fault" in dataset.dims and "joint" in dataset.dims:
+        warnings.warn(BOTH_JOINTS, StoreWarning, stacklevel=2)
     return dataset
