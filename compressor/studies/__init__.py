@@ -71,7 +71,7 @@ STUDIES = (
     StudyKind("search", ("find",)),
     StudyKind("compare", ("compare",), heading=RECORDS),
     StudyKind("calibrate", ("calibrate",), heading=RECORDS),
-    StudyKind("alarms", ("alarms",)),
+    StudyKind("alarms", ("alarms",), has_page=True, page_folder="alarms"),
 )  # fmt: skip
 STUDY_FILES[:] = [kind.files for kind in STUDIES if kind.files]
 STUDY_GROUPS.update({kind.group: partial(kind.module, "group") for kind in STUDIES if kind.group})

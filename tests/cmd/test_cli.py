@@ -307,7 +307,8 @@ def reporter(monkeypatch):
     def write_report(results, report, command, add, running, limits, units):
         assert (running, limits, units) == (None, (), "usual")
         read_studies(results)
-        (place,) = [one.keywords["place"] for one in add if one.keywords["place"]]
+        place, other = [one.keywords["place"] for one in add if one.keywords["place"]]
+        assert other == "alarms"
         return Path(report, command, place)
 
     monkeypatch.setattr("compressor.report.write_report", write_report)

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 from typing import TYPE_CHECKING
 
 import click
@@ -109,6 +110,9 @@ def alarms(
         say(text)
     if output:
         write_alarms(found, output)
+        if not quiet:
+            beside = "" if output == "alarms" else f" --alarms {shlex.quote(output)}"
+            say(f"next: compsim report -i {shlex.quote(folder)}{beside}")
     return DONE
 
 

@@ -77,33 +77,44 @@ def lead_words(first: xr.Dataset) -> str:
 
 def table(found: xr.Dataset) -> Iterator[str]:
     """Yield the best filter of each alarm by joint, the first to see wear first."""
-    attrs, noise = found.attrs, found["noise"].values
-    windows = f"windows of {attrs['revolutions']} revolutions"
-    yield (f"{attrs['study']}: {attrs['sound_jobs']} sound jobs of {attrs['sound_draws']} draws, "
-           f"{attrs['worn_jobs']} worn ones; {windows}")  # fmt: skip
+    yield from heading(found)
+    head, rows = table_rows(found)
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    for row in (head, *rows):
+        cells = zip(row, widths, strict=True)
+        yield "  ".join(f"{text:<{width}}" for text, width in cells).rstrip()
+
+
+def heading(found: xr.Dataset) -> Iterator[str]:
+    """Yield what was judged, and how."""
+    attrs, windows = found.attrs, f"windows of {found.attrs['revolutions']} revolutions"
+    jobs = f"{attrs['sound_jobs']} sound jobs of {attrs['sound_draws']} draws"
+    yield f"study {attrs['study']}: {jobs}, {attrs['worn_jobs']} worn ones; {windows}"
     yield (f"limits {limit_words(found)}; detects: trips in {attrs['detected']:.0%} of windows; "
            "in brackets 95 % intervals by draws")  # fmt: skip
-    width = max(map(len, found["alarm"].values.tolist()))
-    heads = ["detects from, mm"]
-    if LEADS[0] in found:
-        heads.append("hours before the limit")
-    heads += [f"with noise of {one:g} m/s2" for one in noise[1:]]
-    head = "".join(f"  {text:<24}" for text in heads)
-    yield f"{'joint':<9}  {'alarm':<{width}}  {'limits':<11}  {'false alarms':<20}{head}".rstrip()
+
+
+def table_rows(found: xr.Dataset) -> tuple[list[str], list[list[str]]]:
+    """Return the head and the rows of the table, as text."""
+    noise, has_lead = found["noise"].values, LEADS[0] in found
+    head = ["joint", "alarm", "limits", "false alarms", "detects from, mm"]
+    head += ["hours before the limit"] * has_lead
+    head += [f"with noise of {one:g} m/s2" for one in noise[1:]]
+    rows = []
     for joint in found["joint"].values.tolist():
         best = [best_of_each(found, joint, level) for level in range(noise.size)]
         for place in best[0]:
             plain = found.isel(alarm=place, noise=0)
-            cells = [first_words(plain, joint)]
+            row = [joint, plain["alarm"].item(), limits_words(plain), rate_words(plain),
+                   first_words(plain, joint)]  # fmt: skip
+            if has_lead:
+                row.append(lead_words(plain.sel(joint=joint)))
             for level, places in enumerate(best[1:], 1):
                 other = found.isel(alarm=same_kind(found, place, places), noise=level)
                 moved = "" if other["filter"] == plain["filter"] else f", {other['filter'].item()}"
-                cells.append(first_words(other, joint) + moved)
-            if LEADS[0] in found:
-                cells.insert(1, lead_words(plain.sel(joint=joint)))
-            texts = "".join(f"  {text:<24}" for text in cells)
-            yield (f"{joint:<9}  {plain['alarm'].item():<{width}}  {limits_words(plain):<11}  "
-                   f"{rate_words(plain):<20}{texts}").rstrip()  # fmt: skip
+                row.append(first_words(other, joint) + moved)
+            rows.append(row)
+    return head, rows
 
 
 def same_kind(found: xr.Dataset, place: int, places: Sequence[int]) -> int:

@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import html
 import re
 
 import numpy as np
@@ -9,9 +10,12 @@ import pytest
 from compsim import cli
 from test_lead import CASE, write_run
 
-from compressor.store import read_dataset
+from compressor.report.page import document
+from compressor.store import read_dataset, read_studies
 from compressor.studies.alarms.alarms import rank_alarms
 from compressor.studies.alarms.figures import caption, draw_alarms
+from compressor.studies.alarms.page import add
+from compressor.studies.alarms.words import table_rows
 
 
 def run(folder, capsys, *words, code=0):
@@ -39,7 +43,9 @@ def test_the_table_has_the_first_alarm_of_each_joint_first(written):
     folder, out = written
     found = read_dataset(folder / "alarms.nc")
     lines = out.splitlines()
-    assert lines[0] == "worn: 60 sound jobs of 60 draws, 180 worn ones; windows of 2 revolutions"
+    assert (
+        lines[0] == "study worn: 60 sound jobs of 60 draws, 180 worn ones; windows of 2 revolutions"
+    )
     assert "for 2 % of false alarms (the sound draws allow no lower rate: 1 % needs" in lines[1]
     rows = [line for line in lines if line.startswith(("big_end ", "small_end ", "both "))]
     assert len(rows) == 3 * 9  # kinds of alarm, but the body's velocity, which no job has
@@ -102,6 +108,23 @@ def test_the_caption_says_the_numbers_of_the_figure(written):
     (curve,) = [trace for trace in above.traces if trace.name == best["title"].item()]
     np.testing.assert_array_equal(curve.y, best["detection"].values[mine])
     np.testing.assert_array_equal(below.traces[0].y, best["curve_detection"].values[mine][0])
+
+
+def test_the_report_has_a_section_of_its_study(written, worn_store):
+    studies = read_studies(worn_store)
+    made = add(worn_store, studies, written[0])
+    (chapter,) = made.chapters
+    page = document([chapter.section])
+    found = read_dataset(written[0] / "alarms.nc")
+    assert "Which alarm sees wear first in study worn" in page
+    assert page.count("<tr") == 1 + 3 * 9
+    for row in table_rows(found)[1][::9]:
+        assert all(html.escape(text) in page for text in row)
+    assert html.escape(caption(found)) in page
+    assert [plate.name for plate in chapter.plates] == ["alarms-worn"]
+    assert made.notes["worn"].anchor == chapter.section.anchor
+    assert add(worn_store, [], written[0]).chapters == []  # of a study that is not stored
+    assert add(worn_store, studies, "").chapters == []
 
 
 def test_lead_times_stand_beside_the_clearances(written):
