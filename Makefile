@@ -129,11 +129,7 @@ nameplate: install  ## run the case file of compsim init machine, for its page (
 mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-<<<<<<< HEAD
 measurements: test-oldest calibration accuracy validation wear claims page tradeoff ladders chaotic regimes diagnosis identify nameplate store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
-=======
-measurements: test-oldest calibration accuracy validation wear claims page tradeoff ladders chaotic regimes diagnosis identify alarms store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
->>>>>>> 9c4b7e8 (alarms: measure the nameplate machine, 484 jobs)
 
 pages: install  ## write the pages' generated tables, compressor/API.md, the tutorial's notebook
 	$(BIN)/python tests/page_tables.py
@@ -159,6 +155,6 @@ lock:  ## write the versions that a fresh environment for tests and site gets: .
 	    echo "# pip install -c .ci/requirements.lock -e '.[dev,docs]'"; \
 	    "$$place/bin/python" -m pip --disable-pip-version-check freeze --exclude-editable; } > .ci/requirements.lock
 
-clean:  ## remove results, report, claims, tradeoff, stress, site, dist and caches; .venv stays
-	rm -rf results report claims tradeoff stress site dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+clean:  ## remove results, report, claims, tradeoff, stress, alarms, site, dist and caches; .venv stays
+	rm -rf results report claims tradeoff stress alarms site dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
