@@ -144,17 +144,18 @@ def test_a_segment_of_an_older_version_lacks_a_number(tmp_path, monkeypatch):
 
 
 def test_small_segments_are_merged_and_nothing_else_changes(tmp_path, monkeypatch):
-    monkeypatch.setattr(writer, "MAX_AGE", 0)
+    for name, number in {"MAX_AGE": 0, "MAX_SMALL": 6, "MAX_SMALL_AT_END": 3}.items():
+        monkeypatch.setattr(writer, name, number)
     with Writer(tmp_path) as open_writer:
-        for number in range(40):
-            kept = outcome(number % 30, number, detail=f"the {number}th")
+        for number in range(16):
+            kept = outcome(number % 12, number, detail=f"the {number}th")
             assert open_writer.add(kept) == [kept.key]
-    assert len(list(tmp_path.glob("rows/*.h5"))) <= writer.MAX_SMALL_AT_END
-    assert peaks(tmp_path) == {n: n + 30 if n < 10 else n for n in range(30)}
+    assert len(list(tmp_path.glob("rows/*.h5"))) <= 3
+    assert peaks(tmp_path) == {n: n + 12 if n < 4 else n for n in range(12)}
     found = store.read_store(tmp_path)
     details = {k: found.outcome(found.position(k)).detail for k in found.keys()}  # noqa: SIM118
-    assert details[key(3)] == "the 33th"
-    assert details[key(29)] == "the 29th"
+    assert details[key(3)] == "the 15th"
+    assert details[key(11)] == "the 11th"
 
 
 def test_merging_does_not_make_an_old_row_new(tmp_path, monkeypatch):
