@@ -77,13 +77,13 @@ def test_every_compiled_method_is_in_the_table():
 
 @pytest.mark.compiled
 @pytest.mark.parametrize(
-    ("method", "joint"),
+    ("joint", "method"),
     [
-        *((name, "both") for name in METHODS if name != "auto"),
-        *((name, joint) for name in COMPILED for joint in ("big_end", "small_end")),
+        *(("both", name) for name in METHODS if name != "auto"),
+        *((joint, name) for joint in ("big_end", "small_end") for name in COMPILED),
     ],
 )
-def test_energy_residual_of_every_method(method, joint):
+def test_energy_residual_of_every_method(joint, method):
     found = run(joint, 0.3, duration_rev=0.5, settle_rev=0, rtol=1e-5, method=method)
     assert str(found["status"].values) == "ok"
     assert 0 < float(found["energy_residual"]) <= residual_bound(found, revolutions=1)
