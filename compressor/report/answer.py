@@ -22,7 +22,7 @@ from compressor.digits import is_known
 from compressor.metrics import BARRED, JOINTS
 from compressor.program import PROGRAM, library_versions
 from compressor.report.figures.sweep_data import Measure, measures, name_in_words
-from compressor.report.page import Section, format_measure, templates
+from compressor.report.page import Section, format_briefly, templates
 from compressor.store import Folder, Stored, StoredStudy
 from compressor.units import Units
 
@@ -350,7 +350,7 @@ def finding(
 
     def text(n: int) -> str:
         return (
-            f"{format_measure(measure, float(values[n]), float(bars[n]))} {measure.unit}".rstrip()
+            f"{format_briefly(measure, float(values[n]), float(bars[n]))} {measure.unit}".rstrip()
         )
 
     title = measure.title[0].upper() + measure.title[1:]

@@ -81,6 +81,15 @@ def format_measure(measure: Measure, value: float, bar: float) -> str:
     return by_bar(value, bar, BARRED[measure.variable].bar.relative)
 
 
+SHORT_BAR = 5e-4  # of a number: its error bar is below its fourth digit
+
+
+def format_briefly(measure: Measure, value: float, bar: float) -> str:
+    """Return a metric in four digits, with its error bar where these show it."""
+    is_fine = bar < SHORT_BAR * abs(value)
+    return number(value) if is_fine else format_measure(measure, value, bar)
+
+
 def measured_cell(measure: Measure, value: float, bar: float, limits: Limits = NO_LIMITS) -> Cell:
     """Return a metric and its error bar, and the zone of its limits that it lies in."""
     text, zone = format_measure(measure, value, bar), limits.zone(measure, value, bar)

@@ -105,8 +105,12 @@ def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tup
 def publish_drawings(
     drawn: Iterable[tuple[str, str, Drawing]], output: Folder, stem: str, kinds: Sequence[str]
 ) -> Iterator[Plotted]:
-    """Write drawings with their names and captions as files; yields each. Raises StoreError."""
+    """Write drawings with their names and captions as files; yields each. Raises StoreError.
+
+    One without a title has that of its file.
+    """
     for name, caption, drawing in drawn:
+        drawing.title = drawing.title or f"{stem}: {name.replace('-', ' ')}"
         paths = []
         for kind, picture in zip(kinds, render_kinds(drawing, kinds), strict=True):
             paths.append(Path(output) / f"{file_name(stem, name)}.{kind}")
@@ -277,7 +281,8 @@ def study_title(study: StoredStudy, name: str, where: str) -> str:
         parts.append(JOINT_WORDS[study.fixed["joint"]])
     if "machine.speed_rpm" not in swept:
         parts.append(f"{study.fixed['machine']['speed_rpm']:g} rpm")
-    parts += [part for part in where.strip().removesuffix(".").split(". ") if part]
+    said = where.strip().removesuffix(".").split(". ")
+    parts += [part.removeprefix("Here ") for part in said if part]
     return in_lines(f"{study.title or study.name}: {TITLES[name]}", parts)
 
 

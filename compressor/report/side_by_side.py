@@ -8,7 +8,7 @@ import xarray as xr
 from compressor.analysis import healthy_twin
 from compressor.cases import Case, CaseError
 from compressor.digits import is_known
-from compressor.metrics import BARRED
+from compressor.metrics import BARRED, JOINTS
 from compressor.report.answer import Points
 from compressor.report.figures.sweep_data import Measure, measures
 from compressor.report.page import (
@@ -16,13 +16,12 @@ from compressor.report.page import (
     PageTable,
     TableRow,
     column_title,
-    format_measure,
+    format_briefly,
     number,
 )
 from compressor.store import Stored
 from compressor.units import Units
 
-SHORT_BAR = 5e-4  # of a number: the error bar is below its fourth digit
 MAX_WORN = 4  # jobs that stand beside the machine without clearance
 MAX_TRIED = 50  # jobs among which the loudest with clearance is looked for
 FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning
@@ -56,7 +55,7 @@ def compare_healthy(
             others = [n for n in differing_in_clearance(data, place) if is_ok[n] and n != place]
             chosen = others[:: max(1, -(-len(others) // (MAX_WORN - 1)))]
             places = sorted([place, *chosen], key=lambda n: rms[n])
-            return _compare(data, case, places, units)
+            return _compare(stored, data, case, places, units)
     return None
 
 
@@ -74,7 +73,9 @@ def differing_in_clearance(data: xr.Dataset, place: int) -> list[int]:
     return np.atleast_1d(numbers[index]).ravel().tolist()
 
 
-def _compare(data: xr.Dataset, case: Case, places: list[int], units: Units) -> HealthyAndWorn:
+def _compare(
+    stored: Stored, data: xr.Dataset, case: Case, places: list[int], units: Units
+) -> HealthyAndWorn:
     """Return the table: a row a metric, a column without clearance and one a job."""
     healthy = healthy_twin(xr.Dataset(attrs=case.attributes()), sensed=True)
     names = Points(data)
@@ -89,7 +90,8 @@ def _compare(data: xr.Dataset, case: Case, places: list[int], units: Units) -> H
         cells = [Cell(column_title(measure)), Cell(number(sound), "number", sound)]
         cells += [_cell(measure, float(values[n]), float(bars[n]), sound) for n in places]
         rows.append(TableRow(cells))
-    heads = [names[n] or "this job" for n in places]
+    keys = data["key"].values.ravel()
+    heads = [(names[n] or "this job") + describe_health(stored, str(keys[n])) for n in places]
     beside = "jobs that differ from it in clearances alone" if len(places) > 1 else "this job"
     words = (
         f"The machine without clearance, by the same model, beside {beside}; in parentheses: how "
@@ -100,12 +102,19 @@ def _compare(data: xr.Dataset, case: Case, places: list[int], units: Units) -> H
 
 def _cell(measure: Measure, value: float, bar: float, sound: float) -> Cell:
     """Return a metric of a worn job, and how many times that of the healthy machine it is."""
-    is_fine = np.isnan(bar) or bar < SHORT_BAR * abs(value)
-    text = number(value) if is_fine else format_measure(measure, value, bar)
-    if (is_fine or is_known(value, bar, measure.is_relative)) and sound > 0.0 and value > 0.0:
+    text = format_briefly(measure, value, bar)
+    is_sure = np.isnan(bar) or is_known(value, bar, measure.is_relative)
+    if is_sure and sound > 0.0 and value > 0.0:
         times = value / sound
         text += f" ({times:.2f}×)" if times < 9.995 else f" ({times:.3g}×)"
     return Cell(text, "number", None if np.isnan(value) else value)
+
+
+def describe_health(stored: Stored, key: str) -> str:
+    """Return that a job counts as healthy, by its case's `healthy_clearance_mm`; else ""."""
+    case = case_at(stored, key)
+    is_given = case and any(getattr(case.healthy_clearance_mm, joint) > 0.0 for joint in JOINTS)
+    return " (counts as healthy)" if case and is_given and case.worn_joint == "none" else ""
 
 
 def case_at(stored: Stored, key: str) -> Case | None:

@@ -15,6 +15,7 @@ from compressor.analysis.plot_captions import FILM, PLOT_CAPTIONS, SweptRow
 from compressor.analysis.shaking import frame_forces
 from compressor.cases.case import Case
 from compressor.report.figures.job import draw_spectra
+from compressor.report.plots import job_title, study_title
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
@@ -328,3 +329,19 @@ def test_a_study_without_a_sensor_has_no_segments(plot, unpainted):
     code, found, err = plot("worn", "--what", "segments")
     assert (code, found) == (2, {})
     assert "no job of worn has a sensor's record in segments: run it with body: true" in err
+
+
+def test_pictures_are_titled_by_study_joint_and_place(folder):
+    studies = read_studies(folder)
+    (worn,) = (study for study in studies if study.name == "worn")
+    here = " Here machine.speed_rpm 400. Along with it vary load."
+    assert study_title(worn, "map", here) == (
+        "worn: most frequent contact mode over crank angle\n"
+        "clearance at the big end; machine.speed_rpm 400; Along with it vary load"
+    )
+    key = worn.keys[0]
+    assert job_title(studies, key, "orbits") == (
+        f"worn: orbits of the journals\nclearance_mm 0.1; machine.speed_rpm 400; job {key[:10]}"
+    )
+    (ideal,) = (study for study in studies if study.name == "ideal")
+    assert study_title(ideal, "cycles", "").endswith("\nno clearance; 500 rpm")

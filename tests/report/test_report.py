@@ -375,8 +375,9 @@ def test_a_sweep_has_its_table_and_plots(own, tmp_path):
 def test_a_sweep_is_drawn_over_the_crank_angle(tmp_path):
     """By the greatest of two clearances at the rod's first mass; a damaged job is left out."""
     file, own = tmp_path / "own.yaml", tmp_path / "results"
-    file.write_text("joint: big_end\nclearance_mm: [0.1, 0.2]\nmachine: {rod_mass_kg: [3, 5]}\n"
-                    "report: {title: Unit 3, notes: Rod weighed.}\n")  # fmt: skip
+    titled = "report: {title: Unit 3, notes: Rod weighed.}\nhealthy_clearance_mm: 0.1\n"
+    swept = "joint: big_end\nclearance_mm: [0.1, 0.2]\nmachine: {rod_mass_kg: [3, 5]}\n"
+    file.write_text(swept + titled)
     store(own, file, overrides=["solve.duration_rev=2", "solve.settle_rev=1", *DRAFT])
     write_report(own, tmp_path / "out")
     raw = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
@@ -424,7 +425,12 @@ def test_tables_and_figures_may_be_in_plant_units(own, tmp_path):
 def healthy_and_worn(found, own):
     """The machine without clearance stands beside its worn jobs, by its closed form."""
     head = next(cells for _, cells in found.rows if cells[1:2] == ["without clearance"])
-    assert sorted(re.search("clearance (.*) mm", text)[1] for text in head[2:]) == ["0.1", "0.2"]
+    sizes = {re.search("clearance (.*) mm", text)[1]: text for text in head[2:]}
+    assert sorted(sizes) == ["0.1", "0.2"]
+    assert [sizes[size].endswith(" (counts as healthy)") for size in ("0.1", "0.2")] == [
+        True,
+        False,
+    ]
     row = next(cells for _, cells in found.rows if cells[0] == "rms acceleration (m/s²)")
     case = load_cases(own.parent / "own.yaml")[0]
     crank, rod = case.machine.crank_radius_mm / 1e3, case.machine.rod_length_mm / 1e3
