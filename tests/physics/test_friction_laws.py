@@ -134,7 +134,7 @@ def test_runs_keep_their_energy_and_agree_with_other_methods(law, joint):
     """Of the explicit pair, the stiff partner and SciPy's Radau or LSODA."""
     values = {"joint": joint, "clearance_mm": 0.2, "friction": {"law": law},
               "output": {"keep": "series"}}  # fmt: skip
-    solve = {"duration_rev": 0.5, "settle_rev": 0.25, "error_bars": False, "output_step_deg": 1}
+    solve = {"duration_rev": 0.35, "settle_rev": 0.1, "error_bars": False, "output_step_deg": 1}
     runs = {
         method: simulate(Case.from_values({**values, "solve": {**solve, "rtol": rtol,
                                                                 "method": method}}))

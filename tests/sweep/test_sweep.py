@@ -48,7 +48,7 @@ def statuses(folder, study):
     return [store.read_store(folder).status(case.key).status for case in study.cases]
 
 
-def test_a_failed_job_leaves_the_others_be(studies, tmp_path):
+def test_a_failed_job_leaves_the_others_be(studies, tmp_path, in_process):
     made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}, "load": ["none", "spring"]})
     summary = sweep(made, tmp_path / "out", 2)
     assert statuses(tmp_path / "out", made[0]) == ["failed", "failed", "ok", "ok"]
@@ -392,7 +392,7 @@ def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):
         sweep(studies(one={}), tmp_path / "out", 1, lambda *event: pytest.fail("began to run"))
 
 
-def test_progress_counts_every_job_once(studies, tmp_path):
+def test_progress_counts_every_job_once(studies, tmp_path, in_process):
     made = studies(one={"load": ["none", "spring", "gas"]})
     told = []
     sweep(made, tmp_path / "out", 2, lambda *event: told.append(event))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from compsim import cli
+from conftest import jobs_here
 
 from compressor.cases.case import Case
 from compressor.report.figures.pictures import render
@@ -42,9 +43,12 @@ COUNT, SEED = 12, 1
 
 @pytest.fixture(scope="module")
 def folder(once):
-    return once(
-        "stress", lambda folder: (folder.mkdir(), campaign(folder, COUNT, SEED, 1, budget=SMALL))
-    )
+    def fill(folder):
+        folder.mkdir()
+        with jobs_here():
+            campaign(folder, COUNT, SEED, 1, budget=SMALL)
+
+    return once("stress", fill)
 
 
 @pytest.fixture(scope="module")

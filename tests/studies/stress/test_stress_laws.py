@@ -63,7 +63,7 @@ def test_scipy_judges_laws_that_remember_a_meeting():
 
 
 @pytest.mark.compiled
-def test_none_of_a_few_scenes_is_wrong_in_silence(tmp_path):
+def test_none_of_a_few_scenes_is_wrong_in_silence(tmp_path, in_process):
     study = campaign(tmp_path, COUNT, SEED, 1, budget=SMALL)
     verdicts = Counter(study["verdict"].values.tolist())
     assert verdicts["ok"] >= COUNT / 2, verdicts
