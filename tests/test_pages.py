@@ -238,7 +238,8 @@ def test_case_files_have_the_jobs_that_they_say(tmp_path):
         "bearing-wear.yaml", "cylinder.yaml", "grid.yaml", "zipped.yaml",
         "random.yaml", "latin.yaml", "sampled.yaml", "sensitivity.yaml", "uncertain.yaml",
         "bounded.yaml",
-        "blocks.yaml", "titled.yaml", "regimes.yaml", "machines.yaml", "plant.yaml", "bearings.yaml",
+        "blocks.yaml", "titled.yaml", "regimes.yaml", "machines.yaml", "plant.yaml",
+        "bearings.yaml",
     ]  # fmt: skip
     for name, count in jobs.items():
         (study,) = load_studies(tmp_path / name)
