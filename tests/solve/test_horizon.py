@@ -96,7 +96,8 @@ def test_twins_that_start_alike_stay_alike_to_the_bit():
 
 @pytest.mark.parametrize(("joint", "method", "damping"), SCENES)
 def test_rounding_does_not_part_compiled_twins(joint, method, damping):
-    asked = request(damped(joint, damping), 0.0, TWINS_RTOL, method)
+    short = {"duration_rev": 0.25} if damping > 336 else {}  # stiff, and slow
+    asked = request(damped(joint, damping, **short), 0.0, TWINS_RTOL, method)
     assert follow_twins(asked, asked.start.copy(), far=1e-5).horizon == math.inf
 
 

@@ -21,7 +21,7 @@ TEXT = """
 joint: both
 clearance_mm: 0.2
 machine: {speed_rpm: [400, 500]}
-solve: {accuracy: draft, duration_rev: 2}
+solve: {accuracy: draft, duration_rev: 1, settle_rev: 0}
 wear: {limit_mm: 0.23, step_mm: 0.01}
 """
 
@@ -152,8 +152,8 @@ def whole(worn, folder):
     ("text", "message"),
     [
         ("joint: big_end\nclearance_mm: 0.2\n", "has no wear: write wear: true"),
-        (TEXT.replace("duration_rev: 2", "duration_rev: auto"), "give numbers in place of auto"),
-        (TEXT.replace("duration_rev: 2", "duration_rev: 2.5"), "2.5 must be whole revolutions"),
+        (TEXT.replace("duration_rev: 1", "duration_rev: auto"), "give numbers in place of auto"),
+        (TEXT.replace("duration_rev: 1", "duration_rev: 2.5"), "2.5 must be whole revolutions"),
         (TEXT + "lubricant: true\n", "leave out lubricant or wear"),
         (TEXT.replace("0.23", "0.1"), "0.1 mm must be more than the clearance, 0.2 mm"),
         ("joint: [none, big_end]\nclearance_mm: 0.1\nwear: true\n", "none has no bore that wears"),
