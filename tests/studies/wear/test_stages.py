@@ -74,14 +74,14 @@ def test_the_profile_is_smooth_and_lies_where_the_load_presses(machine):
 
 
 def test_hours_converge_with_the_square_of_the_step(machine):
-    """Errors against a quarter of the finer step; half a step leaves about a quarter."""
+    """Errors against half of the finer step; half a step leaves about a fifth of them."""
     lives = []
-    for step in (0.04, 0.02, 0.005):
+    for step in (0.04, 0.02, 0.01):
         of, stages = followed({"step_mm": step, "limit_mm": 0.28})
         lives.append(life(of, stages_dataset(of, stages)).hours)
     coarse, fine = (abs(value - lives[-1]) for value in lives[:2])
     assert coarse < 0.03 * lives[-1]
-    assert fine < 0.4 * coarse
+    assert fine < 0.27 * coarse  # of first order it would be a third
 
 
 def test_profiles_converge_with_the_number_of_sectors():
