@@ -89,7 +89,7 @@ def list_states(windows: Windows) -> Iterator[State]:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class AlarmPerformance:
     """How an alarm did: rates by state, of false alarms, limits, curves, and what is seen first.
 
     limits: by fold; detection: rates by factor, (states, factors), and false_curve, (factors,);
@@ -115,7 +115,7 @@ def judge_windows(windows: Windows, options: AlarmOptions) -> xr.Dataset:
         for name in (RECORD, *map(band_name, windows.bands if alarm.is_filtered else ()))
         if is_known(alarm, windows.readings[0, name], sound)
     ]
-    verdicts = [
+    performances = [
         [
             judge_alarm(alarm, windows.readings[level, name], windows, states, folds, options)
             for level in range(len(options.noise))
@@ -123,7 +123,7 @@ def judge_windows(windows: Windows, options: AlarmOptions) -> xr.Dataset:
         for alarm, name in listed
     ]
     fewest = min(len({*windows.draws[sound & (folds != k)].tolist()}) for k in range(FOLDS))
-    found = as_dataset(listed, states, verdicts, options)
+    found = as_dataset(listed, states, performances, options)
     return found.assign_attrs(
         false_alarms=options.false_alarms, factor=options.factor or math.nan, folds=FOLDS,
         attainable=max(options.false_alarms, 1.0 / (fewest + 1)), detected=options.detected,
@@ -146,7 +146,7 @@ def judge_alarm(
     states: Sequence[State],
     folds: np.ndarray,
     options: AlarmOptions,
-) -> Verdict:
+) -> AlarmPerformance:
     """Return how an alarm does: each fold is judged by a limit that the others' windows set."""
     sound, draws = windows.is_sound, windows.draws
     trips = np.zeros(sound.size)
@@ -170,7 +170,7 @@ def judge_alarm(
         clearances, of_joint = zip(*mine, strict=True)
         first[joint] = first_clearance(clearances, of_joint, options.detected)
     false = rate_of(trips[sound], draws[sound])
-    return Verdict(rates, false, limits, curves[:-1], curves[-1], first)
+    return AlarmPerformance(rates, false, limits, curves[:-1], curves[-1], first)
 
 
 def draw_weights(rows: np.ndarray, draws: np.ndarray) -> np.ndarray:
@@ -184,14 +184,14 @@ def draw_weights(rows: np.ndarray, draws: np.ndarray) -> np.ndarray:
 def as_dataset(
     listed: Sequence[tuple[Alarm, str]],
     states: Sequence[State],
-    verdicts: Sequence[Sequence[Verdict]],
+    performances: Sequence[Sequence[AlarmPerformance]],
     options: AlarmOptions,
 ) -> xr.Dataset:
-    """Return verdicts, by alarm and noise, as a Dataset."""
+    """Return performances, by alarm and noise, as a Dataset."""
     joints = list(dict.fromkeys(one.joint for one in states))
 
     def stack(value: Any) -> np.ndarray:
-        return np.array([[value(one) for one in row] for row in verdicts], float)
+        return np.array([[value(one) for one in row] for row in performances], float)
 
     share = {"units": "1"}
     found: dict[str, Any] = {}
@@ -227,9 +227,9 @@ def as_dataset(
         ("alarm", "noise", "factor"), stack(lambda one: one.false_curve),
         share | {"long_name": "share of windows of sound machines in which it trips, by its limit"},
     )  # fmt: skip
-    draws = [rate.draws for rate in verdicts[0][0].rates]
+    draws = [rate.draws for rate in performances[0][0].rates]
     found["draws"] = ("state", np.array(draws), {"units": "1", "long_name": "draws of a state"})
-    found["sound_draws"] = verdicts[0][0].false.draws
+    found["sound_draws"] = performances[0][0].false.draws
     words = {
         "kind": ("alarm", [alarm.name for alarm, _ in listed], {"long_name": "what it reads"}),
         "title": ("alarm", [alarm.title for alarm, _ in listed], {"long_name": "in words"}),

@@ -23,7 +23,7 @@ MAX_NAMED = 4  # keys that are named of those that differ
 
 
 @dataclass(frozen=True)
-class WearRun:
+class WearHistory:
     """How a machine has worn: the greatest clearance of each joint over hours.
 
     clearances: mm, (stages, joints); limit: mm, at which a joint is worn out; factor: by which the
@@ -65,7 +65,7 @@ class Lead(NamedTuple):
     high: float
 
 
-def open_run(place: str | Path) -> WearRun:
+def open_run(place: str | Path) -> WearHistory:
     """Return the wear run of a file of `compsim wear`, or of the only one of a folder of results.
 
     Raises AlarmsError where there is none, or several, and StoreError for a foreign file.
@@ -86,13 +86,13 @@ def open_run(place: str | Path) -> WearRun:
     case = Case.from_attribute(found.attrs["case"])
     wear = case.wear or Wear()
     clearances = 1e3 * found["clearance"].transpose("stage", "joint").values
-    return WearRun(
+    return WearHistory(
         path.stem, found["hours"].values, clearances, wear.limit_mm or math.inf,
         wear.coefficient_factor, case.values(),
     )  # fmt: skip
 
 
-def lead_of(run: WearRun, joint: str, first: First) -> Lead:
+def lead_of(run: WearHistory, joint: str, first: First) -> Lead:
     """Return the hours from an alarm, which sees a joint at a clearance, to the run's limit.
 
     That is where the first joint, which may be the other one, is worn out. The interval carries the
@@ -107,7 +107,7 @@ def lead_of(run: WearRun, joint: str, first: First) -> Lead:
     return Lead(mid, high / run.factor, low * run.factor)
 
 
-def lead_times(found: xr.Dataset, run: WearRun) -> xr.Dataset:
+def lead_times(found: xr.Dataset, run: WearHistory) -> xr.Dataset:
     """Return a result of `judge_alarms` with `lead_hours` and its interval, by a wear run."""
     shape = found["first_clearance"].shape
     hours = np.full((len(Lead._fields), *shape), math.nan)
