@@ -61,15 +61,15 @@ def read_quantity(text: str, si: str) -> float | None:
     (166000.0, 20.0, 0.05)
     """
     number, unit = split_number(text)
-    if number is None or not unit:
+    if number is None or unit in ("", si):
         return number
     if unit not in READABLE or READABLE[unit][0] != si:
-        known = ", ".join(dict.fromkeys(one for one, (base, _) in READABLE.items() if base == si))
-        raise ValueError(f"{unit!r} is no unit of it; there are {known or 'none'}")
+        known = dict.fromkeys([si, *(one for one, (base, _) in READABLE.items() if base == si)])
+        raise ValueError(f"{unit!r} is no unit of it; there are {', '.join(known)}")
     return number * READABLE[unit][1]
 
 
-NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+NUMBER = re.compile(r"\s*([-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
 
 def split_number(text: str) -> tuple[float | None, str]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from compressor import metrics
-from compressor.digits import UNKNOWN, by_bar
+from compressor.digits import UNKNOWN, by_bar, is_known
 from compressor.units import Units, unit_in
 
 if TYPE_CHECKING:
@@ -227,9 +227,12 @@ def healthy_motion(found: "JobReport", units: Units) -> list[Line]:
     lines = []
     for name, sound in (("peak", float(np.abs(a).max())), ("rms", float(np.sqrt(np.mean(a**2))))):
         metric = f"{name}_acceleration"
-        bar = found.numbers.get(f"{metric}_error", math.nan)
+        bar = found.numbers.get(f"{metric}_error", math.nan) / sound
         times = found.numbers[metric] / sound
-        beside = "" if math.isinf(bar) else f"; this job has {times:.4g} times as much"
+        is_exact = math.isnan(bar) or bar < 5e-4 * times
+        text = f"{times:.4g}" if is_exact else by_bar(times, bar, bare=True)
+        is_sure = math.isnan(bar) or is_known(times, bar)
+        beside = f"; this job has {text} times as much" if is_sure else ""
         lines.append(
             (f"{name} acceleration without clearance", f"{factor * sound:.4g} {unit}{beside}")
         )

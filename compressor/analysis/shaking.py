@@ -81,8 +81,8 @@ def last_revolution(run: xr.Dataset) -> tuple[np.ndarray, xr.Dataset]:
 def healthy_twin(run: xr.Dataset, sensed: bool = False) -> xr.Dataset:
     """Return the run of the same machine with ideal joints, on the run's output grid.
 
-    From closed forms and without error bars; with body and sensor where it is to be `sensed`. Only
-    the run's case is read.
+    From closed forms, or simulated where a feature leaves none: it may then fail. Without error
+    bars; with body and sensor where it is to be `sensed`. Only the run's case is read.
     """
     ideal = with_ideal_joints(case_of(run))
     values = (ideal if sensed else replace(ideal, body=None, sensor=None)).values()

@@ -103,13 +103,15 @@ def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tup
 
 
 def publish_drawings(
-    drawn: Iterable[tuple[str, str, Drawing]], output: Folder, stem: str, kinds: Sequence[str]
+    drawn: Iterable[tuple[str, str, Drawing]], output: Folder, stem: str, choice: PlotChoice
 ) -> Iterator[Plotted]:
     """Write drawings with their names and captions as files; yields each. Raises StoreError.
 
-    One without a title has that of its file.
+    One without a title has that of its file. choice: of the kinds of files, and of units.
     """
-    for name, caption, drawing in drawn:
+    kinds = choice.kinds
+    for name, caption, usual in drawn:
+        drawing = in_units(usual, choice.units)
         drawing.title = drawing.title or f"{stem}: {name.replace('-', ' ')}"
         paths = []
         for kind, picture in zip(kinds, render_kinds(drawing, kinds), strict=True):
@@ -171,8 +173,7 @@ def write_plots(
         key = find_job(results, words, studies, stored.keys())
         drawn = job_figures(stored, studies, key, choice)
         stem = key[:KEY_DIGITS]
-    read = ((name, words, in_units(drawing, choice.units)) for name, words, drawing in drawn)
-    yield from publish_drawings(read, output, stem, choice.kinds)
+    yield from publish_drawings(drawn, output, stem, choice)
 
 
 def job_figures(
@@ -373,6 +374,7 @@ def page_figures(stored: Stored, study: StoredStudy) -> Iterator[tuple[str, str,
     case = case_of(run)
     is_worn = case.joint != "none"
     twin = healthy_twin(run, sensed="sensor_acceleration" in run) if is_worn else None
+    twin = twin if twin is not None and twin["status"].item() == "ok" else None
     value = f"{over} {rows[loudest].value}" if jobs[loudest][0] != "" else rows[loudest].value
     title = f"a revolution as an analyst reads it, {value}"
     note = " It is the job with the greatest vibration of these." if len(known) > 1 else ""

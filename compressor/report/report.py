@@ -205,7 +205,7 @@ def build_report(
     ]
     chapters = [chapter for one in added for chapter in one.chapters]
     later = [*chain(*of_others.values(), of_faults, *(one.plates for one in drawn))]
-    later += [plate for chapter in chapters for plate in chapter.plates]
+    later += [plate for chapter in chapters for plate in plates_in(chapter.plates, units)]
     begin(later)
     caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored.rows, one)]
     judged = claims(paper.usable) if paper.stored else []

@@ -41,7 +41,8 @@ def compare_healthy(
     """Return the worn job of the greatest rms acceleration beside its machine without clearance.
 
     And jobs of the study that differ from it in clearances alone. None where no job that is ok has
-    clearance, or this version knows the case of none. data: of `open_study`.
+    clearance, this version knows the case of none, or the machine without clearance fails. data: of
+    `open_study`.
     """
     if "rms_acceleration" not in data:
         return None
@@ -75,9 +76,11 @@ def differing_in_clearance(data: xr.Dataset, place: int) -> list[int]:
 
 def _compare(
     stored: Stored, data: xr.Dataset, case: Case, places: list[int], units: Units
-) -> HealthyAndWorn:
+) -> HealthyAndWorn | None:
     """Return the table: a row a metric, a column without clearance and one a job."""
     healthy = healthy_twin(xr.Dataset(attrs=case.attributes()), sensed=True)
+    if healthy["status"].item() != "ok":
+        return None
     names = Points(data)
     rows = []
     for measure in measures(data, units):
@@ -95,7 +98,8 @@ def _compare(
     beside = "jobs that differ from it in clearances alone" if len(places) > 1 else "this job"
     words = (
         f"The machine without clearance, by the same model, beside {beside}; in parentheses: how "
-        "many times as much. The job on the right has the greatest rms acceleration of the study."
+        "many times as much. The job on the right has the greatest rms acceleration of those with "
+        "clearance."
     )
     return HealthyAndWorn(words, PageTable(["metric", "without clearance", *heads], rows))
 

@@ -127,10 +127,10 @@ def mask_untrusted(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def machine_constants(studies: Sequence[StoredStudy], layout: Layout) -> dict[str, xr.Variable]:
-    """Return the numbers of `machine` that a case file gives or leaves to their defaults.
+    """Return the numbers of `machine` that have a default, as a case file gives or leaves them.
 
-    Of one study those that it does not sweep, without dimensions; of several along `job`. What
-    follows from others, such as the inertia of a uniform rod, is not among them.
+    Of one study those that it does not sweep, without dimensions; of several along `job`. Numbers
+    without a default, such as the rod's inertia or a counterweight, are not among them.
     """
     rows = [
         row

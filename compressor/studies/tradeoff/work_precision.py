@@ -70,11 +70,23 @@ def pin_span(case: Case, run: xr.Dataset) -> Case:
 
     What is compared with that run is then as long, however long it would take to settle itself.
     """
-    if "auto" not in (case.solve.duration_rev, case.solve.settle_rev) or not complete(run):
+    if "auto" not in spans_given(case) or not complete(run):
         return case
     spans = run["time"].values[-1] / case.turn, run.attrs["settle"] / case.turn
     duration, settle = (round(span, 6) for span in spans)  # whole ones, where they were `auto`
     return replace(case, solve=replace(case.solve, duration_rev=duration, settle_rev=settle))
+
+
+def settle_span(case: Case) -> Case:
+    """Return a case over the revolutions that it needs to settle, in place of `auto`."""
+    if "auto" not in spans_given(case):
+        return case
+    return pin_span(case, simulate(replace(case, output=Output())))
+
+
+def spans_given(case: Case) -> tuple[float | str | None, float | str]:
+    """Return how long a case is to run and to settle: revolutions, or `auto`."""
+    return case.solve.duration_rev, case.solve.settle_rev
 
 
 def complete(run: xr.Dataset) -> bool:
@@ -157,7 +169,7 @@ def work_precision(
         if not faulty(case):
             raise ValueError(f"{name} has no joint with clearance: nothing is integrated")
     tolerances = sorted(tolerances, reverse=True)
-    cases = {name: pin_span(case, simulate(case)) for name, case in cases.items()}
+    cases = {name: settle_span(case) for name, case in cases.items()}
     study = empty(list(cases), methods, tolerances)
     first = solve_by_method(next(iter(cases.values())), "auto", tolerances[0])
     study["seconds_compile"] = (), seconds_compile(first), {"units": "s", "long_name": COMPILE}

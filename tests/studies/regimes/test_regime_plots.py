@@ -185,7 +185,7 @@ def test_all_axes_say_what_they_are(data):
 def test_a_study_is_drawn_into_files_with_captions(data, tmp_path):
     named = data.assign_attrs(study="wear")
     figures = regime_figures(named, PlotChoice())
-    drawn = [*publish_drawings(figures, tmp_path, "wear", ("png", "svg"))]
+    drawn = [*publish_drawings(figures, tmp_path, "wear", PlotChoice(kinds=("png", "svg")))]
     names = [path.name for one in drawn for path in one.paths]
     assert names == [f"wear-{n}.{k}" for n in ("bifurcation", "sections") for k in ("png", "svg")]
     assert all(path.stat().st_size > 1000 for one in drawn for path in one.paths)

@@ -16,6 +16,7 @@ from compressor.studies.tradeoff.work_precision import (
     fastest,
     grid_values,
     reference,
+    settle_span,
     stored_values,
     work_precision,
 )
@@ -36,6 +37,15 @@ def study():
     )
     assert told[-1][:2] == (2 * 9 + 3, 2 * 9 + 3)
     return found
+
+
+def test_a_case_that_stores_no_series_settles_before_it_is_measured():
+    span = {"duration_rev": "auto", "settle_rev": "auto", "accuracy": "draft"}
+    values = {"joint": "big_end", "clearance_mm": 0.2, "solve": span}
+    case = settle_span(Case.from_values({**values, "output": {"keep": "metrics"}}))
+    assert (case.solve.duration_rev, case.solve.settle_rev) == (4.0, 1.0)
+    assert case.output.keep == "metrics"
+    assert settle_span(case) is case
 
 
 def test_errors_fall_with_the_tolerance(study):
