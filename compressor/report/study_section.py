@@ -142,8 +142,9 @@ def oil_caveats(study: StoredStudy) -> list[str]:
         return []
     return [
         f"{key} is {oil['last_share']:g}: in this share of the clearance the oil film bears no "
-        "more, which decides how hard metal strikes. Peak forces may follow it closely: run "
-        "another value beside it, or compsim explain --models, before you use a peak"
+        "more. It is an assumption, and decides at which clearance metal strikes, and how hard: "
+        "forces and vibration may change by a multiple. Run other values beside it, from 0.01 to "
+        "0.1, before you use a peak or a trend"
     ]
 
 

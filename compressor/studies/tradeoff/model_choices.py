@@ -1,8 +1,8 @@
 """Other models of the same machine, and what each of them makes of its metrics.
 
-A choice is a case: another law of contact or friction, twice and half the stiffness or damping,
-oil, an elastic rod, play in the guide. `explain_models` runs those of one case, `trade` all
-features of several; `compressor.studies.tradeoff.page` tells changes from error bars.
+A choice is a case: another law of contact or friction, twice and half the stiffness, the damping
+or the last share of an oil film, oil, an elastic rod, play in the guide. `explain_models` runs
+those of one case, `trade` all features of several; `compressor.studies.tradeoff.page` tells changes from error bars.
 """
 
 import math
@@ -64,7 +64,8 @@ def model_choices(case: Case) -> list[Choice]:
     rows = [row for row in FEATURES if row.is_choice or (row.key == "friction" and not rubs)]
     contact = [row for row in rows if row.key == "contact.law"]
     others = [row for row in rows if row.key != "contact.law"]
-    found = [*toggle_features(case, contact), *scale_contact(case), *toggle_features(case, others)]
+    scaled = [*scale_contact(case), *scale_film(case)]
+    found = [*toggle_features(case, contact), *scaled, *toggle_features(case, others)]
     return [check_choice(choice, case) for choice in found]
 
 
@@ -113,6 +114,16 @@ def scale_contact(case: Case) -> Iterator[Choice]:
             else:
                 least = 1.0 - 1.0 / factor
                 yield Choice(name, None, f"needs a restitution above {least:g}")
+
+
+def scale_film(case: Case) -> Iterator[Choice]:
+    """Yield a case with oil with twice and half the share of the clearance that bears no more."""
+    if not case.lubricant or not faulty(case):
+        return
+    for words, factor in SCALES.items():
+        share = factor * case.lubricant.last_share
+        other = with_values(case, "lubricant", last_share=share)
+        yield Choice(f"last share of the oil film {words}", other)
 
 
 def with_stiffness(case: Case, name: str, factor: float) -> Choice:

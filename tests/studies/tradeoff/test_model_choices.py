@@ -157,6 +157,17 @@ def test_a_choice_that_cannot_be_says_why():
     assert rod.note.startswith("cannot be: machine.rod_centre_mm: an elastic rod is a uniform bar")
 
 
+def test_an_oiled_joint_is_tried_with_other_last_shares_of_its_film():
+    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "lubricant": True})
+    found = {choice.name: choice.case.lubricant for choice in model_choices(case) if choice.case}
+    share = case.lubricant.last_share
+    assert found["last share of the oil film × 2"].last_share == 2 * share
+    assert found["last share of the oil film ÷ 2"].last_share == share / 2
+    assert found["dry joints"] is None
+    dry = model_choices(replace(case, lubricant=None))
+    assert not [choice.name for choice in dry if "last share" in choice.name]
+
+
 def test_the_ideal_machine_has_choices_beyond_its_contacts():
     assert [*by_name(Case.from_values({"load": "none"}))] == [
         "50 µm of play in the guide",
