@@ -2,7 +2,8 @@
 
 A choice is a case: another law of contact or friction, twice and half the stiffness, the damping
 or the last share of an oil film, oil, an elastic rod, play in the guide. `explain_models` runs
-those of one case, `trade` all features of several; `compressor.studies.tradeoff.page` tells changes from error bars.
+those of one case, `trade` all features of several; `compressor.studies.tradeoff.page` tells changes
+from error bars.
 """
 
 import math
