@@ -1133,19 +1133,56 @@ def identify_words():
     )
 
 
+def nameplate_films():
+    """Rows of the file of `compsim init machine` by the share in which the oil bears no more."""
+    found = kept("nameplate.json")
+    return {0.1: found["rows"]} | {one["last_share"]: one["rows"] for one in found["films"]}
+
+
 def nameplate_table():
     """What the case file of `compsim init machine` gives over the small end's clearance."""
-    scaled = (("peak_contact_force", 1e3), ("impacts_per_rev", 1.0),
-              ("rod_load_reversal_angle", math.pi / 180), ("sensor_rms", 1.0),
-              ("body_velocity_rms", 1e-3))  # fmt: skip
-    rows = [
-        [f"{row['clearance_mm']:g}"]
-        + [with_error(row[name] / unit, row[f"{name}_error"] / unit) for name, unit in scaled]
-        for row in kept("nameplate.json")["rows"]
-    ]
-    head = ["small end, mm", "peak force on it, kN", "impacts a revolution", "rod load reversal, °",
-            "sensor, m/s² rms", "body along x, mm/s rms"]  # fmt: skip
+    films = nameplate_films()
+    rows = []
+    for each in zip(*films.values(), strict=True):
+        row = each[0]
+        assert len({one["clearance_mm"] for one in each}) == 1
+        rows.append([
+            f"{row['clearance_mm']:g}",
+            " / ".join(peak_or_none(one["peak_contact_force"], 1e3) for one in each),
+            " / ".join(f"{one['impacts_per_rev']:.3g}" for one in each),
+            " / ".join(f"{one['sensor_rms']:.2g}" for one in each),
+            f"{math.degrees(row['rod_load_reversal_angle']):.0f}",
+            f"{1e3 * row['body_velocity_rms']:.2f}",
+        ])  # fmt: skip
+    shares = " / ".join(f"{share:g}" for share in films)
+    head = ["small end, mm", f"peak force on it, kN, at `last_share` {shares}",
+            "impacts a revolution", "sensor, m/s² rms", "rod load reversal, °",
+            "body along x, mm/s rms"]  # fmt: skip
     return markdown(head, rows)
+
+
+def peak_or_none(value, unit):
+    """A peak to three digits, – where the motion has none that means anything."""
+    return f"{value / unit:.3g}" if value is not None and math.isfinite(value) else "–"
+
+
+def film_words():
+    """What the share decides: where impacts begin, and how hard they are."""
+    films = nameplate_films()
+    first = [
+        next((f"{row['clearance_mm']:g}" for row in rows if row["impacts_per_rev"] > 0), "never")
+        for rows in films.values()
+    ]
+    worst = [max(row["peak_contact_force"] for row in rows) / 1e3 for rows in films.values()]
+    reversals = [
+        math.degrees(row["rod_load_reversal_angle"]) for rows in films.values() for row in rows
+    ]
+    shares = ", ".join(f"{share:g}" for share in films)
+    return (
+        f"With `lubricant.last_share` {shares} the pin strikes from {', '.join(first)} mm on, and "
+        f"the greatest force is {', '.join(f'{value:.3g}' for value in worst)} kN. The rod load's "
+        f"reversal lies between {min(reversals):.0f}° and {max(reversals):.0f}° whatever it is.\n"
+    )
 
 
 def oil_words():
@@ -1305,7 +1342,7 @@ PAGES = {
     "configs/README.md": {"parameters": parameter_tables},
     "compressor/docs/extremes.md": {"reasons": reason_table, "stress-words": extremes_words},
     "compressor/docs/diagnosis.md": {"identify-words": identify_words},
-    "compressor/docs/my-machine.md": {"nameplate": nameplate_table},
+    "compressor/docs/my-machine.md": {"nameplate": nameplate_table, "films": film_words},
     "compressor/docs/speed-or-accuracy.md": {"choose": choose_table},
     "compressor/docs/the-paper.md": {"paper": paper_words},
     "tests/results/README.md": {
