@@ -53,10 +53,10 @@ def judge_alarms(
 
     Dimensions: `alarm` (with its filter), `noise` (m/s2), `state` (a worn joint and a clearance),
     `joint`, `factor` (of a limit over a sound machine's usual reading). Variables: `detection` and
-    `false_alarms` with `_low` and `_high` ends of 95 % intervals by draws; `first_clearance` (mm)
-    with its interval, inf where there is none; `limit_low` and `limit_high`, the ends of the folds'
-    limits; and `curve_detection` and
-    `curve_false_alarms` over the factor. Raises AlarmsError, and StoreError where the store cannot
+    `false_alarms` with `_low` and `_high` ends of 95 % intervals by draws, for limits as they were
+    set; `first_clearance` (mm) with its interval, inf where there is none; `limit_low` and
+    `limit_high`, the ends of the limits; and `curve_detection` and `curve_false_alarms` over the
+    factor. Raises AlarmsError, and StoreError where the store cannot
     be read.
     """
     options = options or AlarmOptions()
@@ -92,8 +92,8 @@ def list_states(windows: Windows) -> Iterator[State]:
 class AlarmPerformance:
     """How an alarm did: rates by state, of false alarms, limits, curves, and what is seen first.
 
-    limits: by fold; detection: rates by factor, (states, factors), and false_curve, (factors,);
-    first: by joint.
+    limits: by fold, and of all sound windows; detection: rates by factor, (states, factors), and
+    false_curve, (factors,); first: by joint.
     """
 
     rates: list[Rate]
@@ -147,12 +147,15 @@ def judge_alarm(
     folds: np.ndarray,
     options: AlarmOptions,
 ) -> AlarmPerformance:
-    """Return how an alarm does: each fold is judged by a limit that the others' windows set."""
+    """Return how an alarm does: each fold is judged by a limit that the others' windows set.
+
+    The last fold, of draws without sound windows, is judged by the limit of all sound windows.
+    """
     sound, draws = windows.is_sound, windows.draws
     trips = np.zeros(sound.size)
     by_factor = np.zeros((sound.size, FACTORS.size))
     limits = []
-    for fold in range(FOLDS):
+    for fold in range(FOLDS + 1):
         setting, judged = sound & (folds != fold), folds == fold
         scores = alarm.score(readings, setting)
         limits.append(
@@ -196,8 +199,8 @@ def as_dataset(
     share = {"units": "1"}
     found: dict[str, Any] = {}
     for end, name in (("", "share"), ("_low", "low"), ("_high", "high")):
-        side = {"": "", "_low": "lower end of the 95 % interval of the ",
-                "_high": "upper end of the 95 % interval of the "}[end]  # fmt: skip
+        which = {"": "", "_low": "lower", "_high": "upper"}[end]
+        side = f"{which} end of the 95 % interval, for limits as they were set, of the " * bool(end)
         found[f"detection{end}"] = (
             ("alarm", "noise", "state"),
             stack(lambda one, name=name: [getattr(rate, name) for rate in one.rates]),
@@ -217,7 +220,7 @@ def as_dataset(
         found[f"limit_{end}"] = (
             ("alarm", "noise"), stack(lambda one, pick=pick: pick(one.limits)),
             share | {"long_name": "limit over the usual reading of a sound machine, the "
-                     f"{'least' if end == 'low' else 'greatest'} of the folds"},
+                     f"{'least' if end == 'low' else 'greatest'} of the folds and of all"},
         )  # fmt: skip
     found["curve_detection"] = (
         ("alarm", "noise", "state", "factor"), stack(lambda one: one.detection),

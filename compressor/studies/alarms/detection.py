@@ -1,16 +1,17 @@
 """Limits from sound windows, and how often an alarm trips: what sets a limit never judges it.
 
 Windows of one draw (a load, a speed, a machine, whatever a study varies beside joint and clearance)
-are alike, so that draws count, and not windows. Draws are shared out among folds. The limit by
-which the windows of a fold are judged comes from the sound windows of the other folds alone, and so
-does what is usual of a sound machine.
+are alike, so that draws count, and not windows. Draws with sound windows are shared out among
+folds. The limit by which the windows of a fold are judged comes from the sound windows of the other
+folds alone, and so does what is usual of a sound machine. Draws without sound windows set no limit:
+they are judged by the one that all sound windows set, which is the one to use.
 
 A limit for a rate of false alarms is that of conformal risk control (Angelopoulos et al. 2022,
 arXiv:2208.02814): with n draws and the share f_i of windows of draw i above it, the least limit for
 which (sum f_i + 1) / (n + 1) is at most the rate. A new draw then trips at most so often in the
 mean over all such n draws, whatever their distribution is. Below 1 / (n + 1) no limit says so: it
 then is the greatest score, and the rate 1 / (n + 1). What is usual comes from the same draws, so
-that this holds nearly: the count on the other folds is what tells.
+that this holds nearly: how often sound machines trip is counted on the folds.
 """
 
 import math
@@ -37,15 +38,13 @@ class Rate(NamedTuple):
 def share_out(draws: np.ndarray, is_sound: np.ndarray, folds: int, seed: int) -> np.ndarray:
     """Return the fold of each window, (n,): the same for all windows of a draw.
 
-    draws: names, (n,). Those with sound windows are shared out evenly, and so are the others.
+    draws: names, (n,). Those with sound windows are shared out evenly among folds from 0 on; the
+    others are in one more fold, number `folds`.
     """
-    rng = np.random.default_rng(seed)
     sound = sorted({*draws[is_sound].tolist()})
-    others = sorted({*draws.tolist()} - {*sound})
-    fold_of: dict[str, int] = {}
-    for names in (sound, others):
-        fold_of |= {names[i]: place % folds for place, i in enumerate(rng.permutation(len(names)))}
-    return np.array([fold_of[name] for name in draws.tolist()], int)
+    order = np.random.default_rng(seed).permutation(len(sound))
+    fold_of = {sound[i]: place % folds for place, i in enumerate(order)}
+    return np.array([fold_of.get(name, folds) for name in draws.tolist()], int)
 
 
 def limit_of(scores: np.ndarray, draws: np.ndarray, rate: float) -> float:

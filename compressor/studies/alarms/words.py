@@ -25,6 +25,7 @@ OF_JOINT = (
     ("first_clearance_mm", "first_clearance"), ("first_clearance_low_mm", "first_clearance_low"),
     ("first_clearance_high_mm", "first_clearance_high"),
 )  # fmt: skip
+SCATTER = 2.0  # ours: from so many times on between the least and the greatest, limits are named
 LEADS = ("lead_hours", "lead_hours_low", "lead_hours_high")
 
 
@@ -62,7 +63,7 @@ def rate_words(one: xr.Dataset) -> str:
 
 
 def limits_words(one: xr.Dataset) -> str:
-    """Return the limits of the folds, as their ends where they differ."""
+    """Return the limits of the folds and of all sound draws, as their ends where they differ."""
     low, high = (f"{one[f'limit_{end}'].item():.3g}" for end in ("low", "high"))
     return low if low == high else f"{low}-{high}"
 
@@ -91,7 +92,7 @@ def heading(found: xr.Dataset) -> Iterator[str]:
     jobs = f"{attrs['sound_jobs']} sound jobs of {attrs['sound_draws']} draws"
     yield f"study {attrs['study']}: {jobs}, {attrs['worn_jobs']} worn ones; {windows}"
     yield (f"limits {limit_words(found)}; detects: trips in {attrs['detected']:.0%} of windows; "
-           "in brackets 95 % intervals by draws")  # fmt: skip
+           "in brackets 95 % intervals by draws, for limits as they were set")  # fmt: skip
 
 
 def table_rows(found: xr.Dataset) -> tuple[list[str], list[list[str]]]:
@@ -130,6 +131,11 @@ def remarks(found: xr.Dataset) -> Iterator[str]:
     if found.attrs["clipped"]:
         yield (f"clipped: {found.attrs['clipped']} jobs, whose levels are those of the clipped "
                "record; raise sensor.range_m_per_s2")  # fmt: skip
+    scattered = int((found["limit_high"] > SCATTER * found["limit_low"]).any("noise").sum())
+    if scattered:
+        yield (f"limits of {scattered} alarms differ by more than {SCATTER:g} times as one draw or "
+               "another is left out, and intervals are without that: more sound draws are "
+               "needed")  # fmt: skip
     few, needed = int(found["draws"].values.min()), draws_to_be_sure(found.attrs["detected"])
     if few < needed:
         sure = f"to be sure of {found.attrs['detected']:.0%} takes {needed} that are all detected"

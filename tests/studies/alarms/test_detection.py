@@ -114,3 +114,10 @@ def test_a_draw_is_in_one_fold():
     counts = np.bincount(folds[:23], minlength=5)
     assert counts.max() - counts.min() <= 1
     assert not np.array_equal(folds, share_out(draws, sound, 5, 2))
+
+
+def test_draws_without_sound_windows_are_in_a_fold_of_their_own():
+    draws = names(12, 2)
+    folds = share_out(draws, np.arange(24) < 14, 5, 1)
+    assert (folds[14:] == 5).all()
+    assert {*folds[:14].tolist()} == {0, 1, 2, 3, 4}

@@ -25,14 +25,17 @@ from compressor.studies.alarms.windows import (
     Windows,
     check_draws,
 )
-from compressor.studies.alarms.words import table
+from compressor.studies.alarms.words import remarks, table
 from compressor.vibration import Record
 
 LEVELS = {0.2: 1.5, 0.3: 2.5, 0.4: 6.0}  # clearance, mm -> rms over the sound one
 
 
-def made_windows(sound=20, draws=10, every_second=0.3):
-    """Windows of an rms that follows from the clearance; at one, of every second draw alone."""
+def made_windows(sound=20, draws=10, every_second=0.3, worn="draw"):
+    """Windows of an rms that follows from the clearance; at one, of every second draw alone.
+
+    worn: the name of worn draws, which are those of sound windows by default.
+    """
     joints, clearances, names, values = [], [], [], []
     for number in range(sound):
         joints += ["none"] * 2
@@ -44,7 +47,7 @@ def made_windows(sound=20, draws=10, every_second=0.3):
             is_quiet = clearance == every_second and number % 2
             joints += ["small_end"] * 2
             clearances += [clearance] * 2
-            names += [f"draw {number}"] * 2
+            names += [f"{worn} {number}"] * 2
             values += [1.0 if is_quiet else level] * 2
     rms = np.array(values)[:, None]
     size = (len(values), LADDER.size)
@@ -109,6 +112,23 @@ def test_what_sets_a_limit_does_not_judge_it():
     # the worn ones of the folds that know of it are below their limit
     assert float(found["detection"].values[-1]) <= 0.3
     assert found.attrs["attainable"] == pytest.approx(1 / 17)  # 16 of 20 draws set a limit
+
+
+def test_draws_that_set_no_limit_are_judged_by_the_limit_of_all():
+    """A loud sound draw lifts the limit above all worn windows; in its fold it would not."""
+    windows = made_windows(worn="worn draw")
+    windows.readings[0, RECORD]["sensor_rms"][:2] = 50.0
+    found = judge_windows(windows, AlarmOptions())
+    one = found.isel(noise=0).sel(alarm="rms, record")
+    assert one["detection"].values.tolist() == [0.0, 0.0, 0.0]
+    usual = np.median(windows.readings[0, RECORD]["sensor_rms"][windows.is_sound])
+    steps = LEVELS[0.4] / usual > FACTORS  # all are judged by what is usual of all sound windows
+    np.testing.assert_array_equal(one["curve_detection"].values[-1], steps)
+    assert float(one["false_alarms"]) >= 1 / 20
+    assert float(one["limit_high"]) == pytest.approx(50.0, rel=0.02)
+    assert float(one["limit_low"]) < 1.1  # of the fold with the loud draw
+    said = [*remarks(found.assign_attrs(left_out="{}", clipped=0))]
+    assert any(text.startswith("limits of 1 alarms differ by more than 2 times") for text in said)
 
 
 def test_a_study_without_sound_or_worn_jobs_is_refused():
