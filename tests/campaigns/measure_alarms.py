@@ -4,10 +4,12 @@ The machine of `compsim init machine` with speed, discharge pressure, oil and th
 sound pins drawn at random: sound draws that set limits and count false alarms, and others with the
 big or the small end worn to each of some clearances. They are simulated into a store, and judged by
 the command's own call, at several levels of noise. Beside it, one machine whose bores wear, for
-lead times. Writes a small JSON file.
+lead times. Writes a small JSON file, with a digest of the jobs' keys: other cases, or another
+model, make other keys, and tests/campaigns/test_alarms_campaign.py then asks for a new run.
 """
 
 import argparse
+import hashlib
 import json
 import math
 import tempfile
@@ -25,6 +27,7 @@ from compressor.studies.alarms.alarms import best_of_each, judge_alarms
 from compressor.studies.alarms.lead import lead_times, open_run
 from compressor.studies.alarms.windows import AlarmOptions
 from compressor.studies.wear.run import run_wear
+from compressor.studies.wear.stages import Worn
 from compressor.sweep.sweep import Options, sweep
 
 ROOT = Path(__file__).parent.parent.parent
@@ -87,6 +90,13 @@ def wear_text():
         "name": "worn", "clearance_mm": clearance, "output": {"keep": "metrics"},
         "solve": SOLVE | {"duration_rev": 4}, "wear": WEAR,
     }, indent=1) + "\n"  # fmt: skip
+
+
+def digest_keys(studies, wear_studies):
+    """A digest of the keys of all jobs and of all wear runs, in the order of the case files."""
+    keys = [case.key for study in studies for case in study.cases]
+    keys += [Worn(case).key for study in wear_studies for case in study.cases]
+    return hashlib.sha256("\n".join(keys).encode()).hexdigest()[:20]
 
 
 def judge(folder, study, run=None):
@@ -162,16 +172,19 @@ def main(target, place, jobs):
     place.mkdir(parents=True, exist_ok=True)
     for name, text in (("plant", case_text()), ("worn", wear_text())):
         (place / f"{name}.yaml").write_text(text, encoding="utf-8")
-    studies = load_studies(place / "plant.yaml")
+    studies, worn = load_studies(place / "plant.yaml"), load_studies(place / "worn.yaml")
     summary = sweep(studies, place / "plant", jobs, no_progress, Options("make alarms"))
-    run_wear(load_studies(place / "worn.yaml"), place / "worn", jobs, no_progress)
+    run_wear(worn, place / "worn", jobs, no_progress)
     run = open_run(place / "worn")
     kept = judge(place / "plant", "plant", run)
     last = dict(zip(JOINTS, map(rounded, run.clearances[-1]), strict=True))
     wear = {
         "end": rounded(run.end), "limit_mm": run.limit, "factor": run.factor, "clearances": last,
     }  # fmt: skip
-    result = {**provenance("make alarms"), "failed": len(summary.failed), **kept, "wear": wear}
+    result = {
+        **provenance("make alarms"), "keys": digest_keys(studies, worn),
+        "failed": len(summary.failed), **kept, "wear": wear,
+    }  # fmt: skip
     Path(target).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     for row in kept["rows"]:
         print({name: one for name, one in row.items() if not isinstance(one, list)})
