@@ -789,8 +789,9 @@ def alarm_sentences(found):
         for row in found["rows"]
         if (row["alarm"], row["filter"], row["noise"]) == ("peak", "record", 0.0)
     )
-    yield (f"It sets the limits for {found['attainable']:.0%} in all folds but its own: those of "
-           f"the record's peak go from {low:g} to {high:g} times what is usual. Intervals are for "
+    yield (f"It sets the limits for {found['attainable']:.0%}, but for that of its own fold: those "
+           f"of the record's peak go from {low:g} to {high:g} times what is usual. Worn draws are "
+           "judged by the limit that all sound draws set, with the loud one. Intervals are for "
            "limits as they were set, without this scatter.")  # fmt: skip
     loose = [
         next(r for r in found["at_looser"] if r["joint"] == joint)
