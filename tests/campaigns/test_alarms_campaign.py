@@ -1,13 +1,20 @@
 """The kept measurement of alarms: that its numbers follow from each other, and from its cases."""
 
+import json
 import math
+from functools import partial
 
 import measure_alarms
+import numpy as np
 import page_tables
 import pytest
+import xarray as xr
 
 from compressor.cases.load import load_studies
+from compressor.studies.alarms.alarms import judge_alarms, rank_alarms
+from compressor.studies.alarms.lead import WearHistory
 from compressor.studies.alarms.readings import ALARMS
+from compressor.studies.alarms.windows import AlarmOptions
 
 KEPT = page_tables.kept("alarms.json")
 PAGE = (page_tables.ROOT / "tests/results/alarms.md").read_text(encoding="utf-8")
@@ -94,3 +101,47 @@ def test_the_cases_are_those_that_were_run(tmp_path):
     worn = [case.worn_joint for case in study.cases]
     assert worn.count("none") == KEPT["sound_draws"] == measure_alarms.SOUND
     assert len(worn) - worn.count("none") == KEPT["worn_jobs"]
+
+
+def test_rows_are_what_the_command_judges(worn_store, monkeypatch):
+    """By the made-up records of the command's own tests, at two levels of noise."""
+    monkeypatch.setattr(measure_alarms, "AlarmOptions", partial(AlarmOptions, 2))
+    monkeypatch.setattr(measure_alarms, "NOISE", (0.0, 1.0))
+    monkeypatch.setattr(measure_alarms, "peaks", lambda folder, study: {})
+    hours, clearances = np.array([0.0, 1000.0]), np.array([[0.1, 0.1], [0.3, 0.2]])
+    run = WearHistory("run", hours, clearances, limit=0.3, factor=2.0, values={})
+    found = measure_alarms.judge(worn_store, "worn", run)
+    json.dumps(found, allow_nan=False)
+    assert (found["jobs"], found["sound_draws"], found["worn_jobs"]) == (240, 60, 180)
+    whole = judge_alarms(worn_store, "worn", AlarmOptions(2, noise=(0.0, 1.0)))
+    for joint in ("big_end", "small_end", "both"):
+        for level, noise in enumerate((0.0, 1.0)):
+            row = next(r for r in found["rows"] if (r["joint"], r["noise"]) == (joint, noise))
+            best = whole.isel(alarm=rank_alarms(whole, joint, level)[0], noise=level)
+            assert (row["alarm"], row["filter"]) == (best["title"].item(), best["filter"].item())
+            mine = best["worn_joint"].values == joint
+            assert row["detection"] == pytest.approx(best["detection"].values[mine], abs=5e-3)
+            assert row["limits"][1] == pytest.approx(float(best["limit_high"]), rel=5e-3)
+            assert (row["lead_hours"] is None) == (joint == "both")  # no run wears both as one
+    first, last = found["rows"][0], found["at_looser"][0]
+    assert first["first"] == last["first"] is not None  # strokes are far above either limit
+    assert max(last["limits"]) <= max(first["limits"])
+
+
+def test_peaks_are_medians_by_clearance(monkeypatch):
+    """Sound peaks 1 to 9, and twenty times the number of a clearance that is worn."""
+    sound, worn = range(1, 10), {"big_end": [0.15, 0.4], "small_end": [0.11]}
+    rows = [(0.1, 0.08, float(peak)) for peak in sound]
+    rows += [(one, 0.08, 20.0 + k) for k, one in enumerate(worn["big_end"]) for _ in range(3)]
+    rows += [(0.1, one, 40.0 + k) for one in worn["small_end"] for k in (0, 1, 8)]
+    big, small, peak = map(np.array, zip(*rows, strict=True))
+    study = xr.Dataset({
+        "sensor_peak": ("job", peak), "clearance_mm_big_end": ("job", big),
+        "clearance_mm_small_end": ("job", small),
+    })  # fmt: skip
+    monkeypatch.setattr(measure_alarms, "open_study", lambda folder, name: study)
+    monkeypatch.setattr(measure_alarms, "WORN", worn)
+    found = measure_alarms.peaks("", "")
+    assert found["sound"] == 5.0
+    assert found["worn"] == {"big_end": [20.0, 21.0], "small_end": [41.0]}
+    assert found["greatest"] == [1.8, 1.6]
