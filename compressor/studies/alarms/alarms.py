@@ -122,6 +122,7 @@ def judge_windows(windows: Windows, options: AlarmOptions) -> xr.Dataset:
         ]
         for alarm, name in listed
     ]
+    judged = {alarm.title for alarm, _ in listed}
     fewest = min(len({*windows.draws[sound & (folds != k)].tolist()}) for k in range(FOLDS))
     found = as_dataset(listed, states, performances, options)
     return found.assign_attrs(
@@ -131,6 +132,7 @@ def judge_windows(windows: Windows, options: AlarmOptions) -> xr.Dataset:
         sound_draws=len({*windows.draws[sound].tolist()}),
         sound_jobs=len({*windows.keys[sound].tolist()}),
         worn_jobs=len({*windows.keys[~sound].tolist()}),
+        not_judged=json.dumps([one.title for one in ALARMS if one.title not in judged]),
     )  # fmt: skip
 
 

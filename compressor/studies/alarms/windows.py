@@ -27,7 +27,7 @@ from compressor.studies.alarms.readings import (
     default_bands,
     read_windows,
 )
-from compressor.vibration import RecordError
+from compressor.vibration import MIN_REVOLUTIONS, RecordError
 
 SOUND = "none"  # the joint that is worn in a sound machine
 MIN_SOUND = 10  # draws of a sound machine, with fewer of which no limit means anything
@@ -149,6 +149,10 @@ def read_job(
             raise AlarmsError(
                 f"band {low:g}-{high:g} Hz: job {key} is sampled at {rate:.6g} Hz; {remedy}"
             )
+    if len(record.tacho) - 1 < max(options.revolutions, MIN_REVOLUTIONS):
+        return "too short"
+    if not np.ptp(record.values):  # a dead sensor, which has no crest factor either
+        return "silent record"
     low, high = case.body.band_Hz if case.body else (0.0, math.inf)
     readings: dict[tuple[int, str], Readings] = {}
     try:
@@ -158,9 +162,7 @@ def read_job(
             found = read_windows(record, options.revolutions, bands, band, rms, seed)
             readings |= {(level, name): one for name, one in found.items()}
     except RecordError:
-        return "silent record"
-    if not readings:
-        return "too short"
+        return "unusable record"
     velocity = np.asarray(outcome.numbers["body_velocity_rms"], float)
     for (_, name), one in readings.items():
         if name == RECORD:  # of the body: without noise, and the same in all windows of a job
@@ -207,9 +209,12 @@ def without_windows(
         keys = f"`sensor: {{length_rev: {2 * options.revolutions + 1}}}`"
         return AlarmsError(f"{text} {keys} into {source.case_file}, keep series, and run it again")
     reasons = ", ".join(f"{count} {reason}" for reason, count in left.items())
-    text = f"study {source.name} has no record of {options.revolutions} revolutions: {reasons}"
-    more = f"sensor.length_rev: {options.revolutions + 1} or more"
-    return AlarmsError(f"{text}; run what is missing, or with {more}, or give fewer --revolutions")
+    least = max(options.revolutions, MIN_REVOLUTIONS)
+    text = f"study {source.name} has no record of {least} revolutions: {reasons}"
+    remedy = f"run what is missing, or with sensor.length_rev: {least + 1} or more"
+    if options.revolutions > MIN_REVOLUTIONS:
+        remedy += ", or give fewer --revolutions"
+    return AlarmsError(f"{text}; {remedy}")
 
 
 def check_draws(source: StoredStudy, windows: Windows) -> None:

@@ -131,6 +131,9 @@ def remarks(found: xr.Dataset) -> Iterator[str]:
     if found.attrs["clipped"]:
         yield (f"clipped: {found.attrs['clipped']} jobs, whose levels are those of the clipped "
                "record; raise sensor.range_m_per_s2")  # fmt: skip
+    missing = json.loads(found.attrs.get("not_judged", "[]"))
+    if missing:
+        yield f"not judged, since not all sound records have it: {', '.join(missing)}"
     scattered = int((found["limit_high"] > SCATTER * found["limit_low"]).any("noise").sum())
     if scattered:
         yield (f"limits of {scattered} alarms differ by more than {SCATTER:g} times as one draw or "

@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import dataclasses
 import html
 import re
 
@@ -11,11 +12,12 @@ from compsim import cli
 from test_lead import CASE, write_run
 
 from compressor.report.page import document
-from compressor.store import read_dataset, read_studies
+from compressor.store import job_record, read_dataset, read_store, read_studies
+from compressor.studies.alarms import windows
 from compressor.studies.alarms.alarms import rank_alarms
 from compressor.studies.alarms.figures import caption, draw_alarms
 from compressor.studies.alarms.page import add
-from compressor.studies.alarms.words import table_rows
+from compressor.studies.alarms.words import remarks, table_rows
 
 
 def run(folder, capsys, *words, code=0):
@@ -135,6 +137,47 @@ def test_lead_times_stand_beside_the_clearances(written):
     expected = np.clip(1000.0 - (first - 0.1) / 0.2 * 1000.0, 0.0, 1000.0)
     np.testing.assert_allclose(lead, expected, rtol=1e-6, atol=1e-6)
     assert "hours before the limit" in out
+
+
+@pytest.mark.parametrize(
+    ("revolutions", "change", "reason"),
+    [
+        (2, lambda one: {"tacho": one.tacho[:2]}, "too short"),
+        (1, lambda one: {"tacho": one.tacho[:2]}, "too short"),  # a revolution, of two at least
+        (5, lambda one: {}, "too short"),
+        (2, lambda one: {"values": 0.0 * one.values}, "silent record"),
+        (2, lambda one: {"values": one.values + np.nan}, "unusable record"),
+    ],
+)
+def test_a_record_that_cannot_be_read_says_why(
+    worn_store, monkeypatch, revolutions, change, reason
+):
+    stored = read_store(worn_store).warned()
+    key = read_studies(worn_store)[0].keys[0]
+    record = job_record(stored, key)
+    monkeypatch.setattr(
+        windows, "job_record", lambda *_: dataclasses.replace(record, **change(record))
+    )
+    options = windows.AlarmOptions(revolutions)
+    assert windows.read_job(stored, key, None, None, options) == reason
+
+
+def test_no_fewer_revolutions_are_proposed_than_a_record_needs(worn_store):
+    source = read_studies(worn_store)[0]
+    for revolutions, told in ((1, "of 2 revolutions: 6 too short; run what is missing, or with "
+                               "sensor.length_rev: 3 or more"),
+                              (5, "of 5 revolutions: 6 too short; run what is missing, or with "
+                               "sensor.length_rev: 6 or more, or give fewer --revolutions"),
+                              ):  # fmt: skip
+        options = windows.AlarmOptions(revolutions)
+        error = windows.without_windows(source, {"too short": 6}, options)
+        assert str(error).endswith(told)
+
+
+def test_alarms_that_are_not_judged_are_named(written):
+    found = read_dataset(written[0] / "alarms.nc")
+    line = "not judged, since not all sound records have it: velocity of the body"
+    assert line in [*remarks(found)]
 
 
 def test_mistakes_are_named(worn_store, worn, capsys, tmp_path):
