@@ -6,6 +6,7 @@ import shlex
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 from compsim.progress import ProgressReporter
 from compsim.results import of_results, one_word, results_folder, studies
 from compsim.screen import DONE, one_thread_each, print_text, say
@@ -90,6 +91,9 @@ def alarms(
     """
     folder, words = results_folder(given, folder)
     study = one_word(words, "STUDY")
+    source = click.get_current_context().get_parameter_source("false_alarms")
+    if factor is not None and source is ParameterSource.COMMANDLINE:
+        raise click.UsageError("--factor and --false-alarms both set limits: give one of them")
     one_thread_each()  # before numpy loads
     from compressor.store import writable_folder
     from compressor.studies.alarms.alarms import judge_alarms

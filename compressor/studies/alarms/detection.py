@@ -72,9 +72,12 @@ def wilson(share: float, count: int) -> tuple[float, float]:
     return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
-def draws_to_be_sure(share: float) -> int:
-    """Return how many draws, all detected, have a lower end of `wilson` at a share or above."""
-    return math.ceil(Z**2 * share / (1.0 - share)) if share < 1.0 else 0
+def draws_to_be_sure(share: float) -> float:
+    """Return how many draws, all detected, have a lower end of `wilson` at a share or above.
+
+    inf of a share of 1.
+    """
+    return math.ceil(Z**2 * share / (1.0 - share)) if share < 1.0 else math.inf
 
 
 def rate_of(trips: np.ndarray, draws: np.ndarray) -> Rate:

@@ -47,7 +47,7 @@ class AlarmOptions:
     revolutions: of a window; bands: of the filters, Hz, None for `default_bands`; noise: rms values
     (m/s2) of white noise that is added to records; false_alarms: the rate that limits are set for;
     factor: limits in its place, times a sound machine's usual reading; detected: the share of
-    windows from which on an alarm is said to detect; seed: of noise and folds.
+    windows from which on an alarm is said to detect; seed: of noise and folds. Raises AlarmsError.
     """
 
     revolutions: int = 5
@@ -59,6 +59,19 @@ class AlarmOptions:
     seed: int = 1
 
     def __post_init__(self) -> None:
+        if self.revolutions < 1:
+            raise AlarmsError(f"a window has at least 1 revolution, not {self.revolutions}")
+        if not 0.0 < self.false_alarms < 1.0:
+            rate = self.false_alarms
+            raise AlarmsError(f"the rate of false alarms is between 0 and 1, not {rate:g}")
+        if self.factor is not None and not 0.0 < self.factor < math.inf:
+            raise AlarmsError(f"the factor of limits is above 0, not {self.factor:g}")
+        if not 0.0 < self.detected <= 1.0:
+            raise AlarmsError(
+                f"the detected share is above 0, and 1 at most, not {self.detected:g}"
+            )
+        if len({*(self.bands or ())}) < len(self.bands or ()):
+            raise AlarmsError("a band is given twice: give each --band once")
         for low, high in self.bands or ():
             if not 0.0 <= low < high < math.inf:
                 raise AlarmsError(f"--band {low:g}-{high:g}: give the lower frequency first, in Hz")

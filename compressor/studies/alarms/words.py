@@ -141,7 +141,9 @@ def remarks(found: xr.Dataset) -> Iterator[str]:
                "needed")  # fmt: skip
     few, needed = int(found["draws"].values.min()), draws_to_be_sure(found.attrs["detected"])
     if few < needed:
-        sure = f"to be sure of {found.attrs['detected']:.0%} takes {needed} that are all detected"
+        share = f"{found.attrs['detected']:.3g} of windows"
+        sure = f"to be sure of {share} takes {needed:g} that are all detected"
+        sure = f"no number of them makes sure of {share}" if math.isinf(needed) else sure
         yield f"a clearance has {few} draws, and {sure}: ends of intervals lie beyond the study"
     yield (f"each alarm is shown with the best of its filters, of {found.sizes['alarm']} in all, "
            "which flatters it; the files hold all")  # fmt: skip

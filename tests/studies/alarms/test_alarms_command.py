@@ -189,6 +189,8 @@ def test_mistakes_are_named(worn_store, worn, capsys, tmp_path):
         (worn_store, ["worn", "--band", "500-5000"], "is sampled at 8000 Hz; give bands up to ha"),
         (worn_store, ["worn", "--band", "high"], "'high' is no band such as 1000-3000, in Hz"),
         (worn_store, ["worn", "--band", "9-3"], "give the lower frequency first"),
+        (worn_store, ["worn", "--band", "9-30", "--band", "9-30"], "a band is given twice"),
+        (worn_store, ["worn", "--factor", "2", "--false-alarms", "0.05"], "give one of them"),
         (worn_store, ["worn", "--noise", "1,1"], "a noise level is given twice"),
         (worn_store, ["worn", "--wear", str(tmp_path)], "has 0 wear runs (none): compsim wear"),
         (worn_store, [], "Missing argument 'STUDY'"),

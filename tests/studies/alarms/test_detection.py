@@ -67,6 +67,7 @@ def test_wilsons_interval_in_closed_form():
     assert low + high == pytest.approx(1.0)
     assert (high - 0.5) ** 2 * (1 + square / 40) == pytest.approx(0.25 * square / 40)
     assert draws_to_be_sure(0.9) == 35
+    assert draws_to_be_sure(1.0) == math.inf
     assert wilson(1.0, 35)[0] >= 0.9 > wilson(1.0, 34)[0]
 
 

@@ -206,6 +206,29 @@ def test_velocity_is_the_integral_in_a_band():
                                atol=1e-12)  # fmt: skip
 
 
+def test_all_windows_of_no_number_of_draws_are_sure():
+    found = judge_windows(made_windows(), AlarmOptions(factor=2.0, detected=1.0))
+    said = " ".join(remarks(found.assign_attrs(left_out="{}", clipped=0)))
+    assert "a clearance has 10 draws, and no number of them makes sure of 1 of windows" in said
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"revolutions": 0}, "at least 1 revolution, not 0"),
+        ({"false_alarms": 7.0}, "between 0 and 1, not 7"),
+        ({"false_alarms": math.nan}, "between 0 and 1, not nan"),
+        ({"factor": 0.0}, "above 0, not 0"),
+        ({"factor": math.inf}, "above 0, not inf"),
+        ({"detected": -1.0}, "1 at most, not -1"),
+        ({"bands": ((2.0, 9.0), (2.0, 9.0))}, "a band is given twice"),
+    ],
+)
+def test_options_that_mean_nothing_are_refused(wrong, told):
+    with pytest.raises(AlarmsError, match=told):
+        AlarmOptions(**wrong)
+
+
 def test_bands_fill_what_a_record_holds():
     assert default_bands(25600.0) == ((2.0, 1000.0), (1000.0, 3200.0), (3200.0, 10000.0))
     assert default_bands(4096.0) == ((2.0, 1000.0),)
