@@ -712,8 +712,9 @@ def alarms_table():
             f"{share:.0%} at {clearance:g}"
             for clearance, share in zip(row["clearances"], row["detection"], strict=True)
         )
+        is_body = row["alarm"] == "velocity of the body"  # a stored metric, without the noise
         others = [
-            f"{alarm_first(other)}, {other['filter']}"
+            "–" if is_body and other.get("noise") else f"{alarm_first(other)}, {other['filter']}"
             for other in found["at_looser"] + [one for one in found["rows"] if one["noise"]]
             if all(other[n] == row[n] for n in ("joint", "alarm"))
         ]

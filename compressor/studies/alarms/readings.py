@@ -22,6 +22,7 @@ FRAME_HZ = (2.0, 1000.0)  # ours: the band in which frames are judged by body_ve
 # m/s2, 20 a decade: the levels over which peaks are counted
 LADDER = np.geomspace(1e-2, 1e4, 121)
 COUNTED = (0.5, 1.0)  # ours: times the sound machine's peak, over which peaks are counted
+BODY_VELOCITY = "body_velocity"  # the alarm that reads a stored metric: no noise disturbs it
 LEAST_COUNT = 1.0  # a revolution: fewer of a sound machine count as so many
 
 Band = tuple[float, float]
@@ -88,7 +89,7 @@ ALARMS = (
         for times in COUNTED
     ),
     Alarm("velocity", "velocity of the record", "velocity", ratio("velocity"), False),
-    Alarm("body_velocity", "velocity of the body", "body_velocity_rms",
+    Alarm(BODY_VELOCITY, "velocity of the body", "body_velocity_rms",
           ratio("body_velocity_rms"), False),
 )  # fmt: skip
 

@@ -11,6 +11,7 @@ import xarray as xr
 
 from compressor.studies.alarms.alarms import best_of_each
 from compressor.studies.alarms.detection import draws_to_be_sure
+from compressor.studies.alarms.readings import BODY_VELOCITY
 
 COLUMNS = (  # of the CSV: head, and the variable
     ("alarm", "title"), ("filter", "filter"), ("noise_m_per_s2", "noise"), ("joint", "worn_joint"),
@@ -111,6 +112,9 @@ def table_rows(found: xr.Dataset) -> tuple[list[str], list[list[str]]]:
             if has_lead:
                 row.append(lead_words(plain.sel(joint=joint)))
             for level, places in enumerate(best[1:], 1):
+                if plain["kind"].item() == BODY_VELOCITY:  # of the body, without the noise
+                    row.append("-")
+                    continue
                 other = found.isel(alarm=same_kind(found, place, places), noise=level)
                 moved = "" if other["filter"] == plain["filter"] else f", {other['filter'].item()}"
                 row.append(first_words(other, joint) + moved)

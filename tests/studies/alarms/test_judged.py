@@ -25,7 +25,7 @@ from compressor.studies.alarms.windows import (
     Windows,
     check_draws,
 )
-from compressor.studies.alarms.words import remarks, table
+from compressor.studies.alarms.words import remarks, table, table_rows
 from compressor.vibration import Record
 
 LEVELS = {0.2: 1.5, 0.3: 2.5, 0.4: 6.0}  # clearance, mm -> rms over the sound one
@@ -90,6 +90,20 @@ def test_curves_are_rates_at_each_limit(judged):
     false = one["curve_false_alarms"].values
     assert (np.diff(false) <= 0.0).all()
     assert (false[0], false[-1]) == pytest.approx((1.0, 0.0))
+
+
+def test_noise_is_not_said_to_disturb_the_velocity_of_the_body():
+    """No noise is in it: its column with noise has no clearance."""
+    windows = made_windows()
+    plain = windows.readings[0, RECORD]
+    plain["body_velocity_rms"] = plain["sensor_rms"]
+    windows.readings[1, RECORD] = plain
+    found = judge_windows(windows, AlarmOptions(noise=(0.0, 1.0), factor=2.0))
+    head, rows = table_rows(found)
+    assert head[-1] == "with noise of 1 m/s2"
+    last = {row[1]: row[-1] for row in rows}
+    assert last["velocity of the body"] == "-"
+    assert last["rms, record"].startswith("0.4 [")
 
 
 def test_an_alarm_that_reads_nothing_new_never_detects(judged):
