@@ -109,7 +109,7 @@ def test_rows_are_what_the_command_judges(worn_store, monkeypatch):
     monkeypatch.setattr(measure_alarms, "NOISE", (0.0, 1.0))
     monkeypatch.setattr(measure_alarms, "peaks", lambda folder, study: {})
     hours, clearances = np.array([0.0, 1000.0]), np.array([[0.1, 0.1], [0.3, 0.2]])
-    run = WearHistory("run", hours, clearances, limit=0.3, factor=2.0, values={})
+    run = WearHistory("run", hours, clearances, limit=0.3, factor=2.0, span=5e4, values={})
     found = measure_alarms.judge(worn_store, "worn", run)
     json.dumps(found, allow_nan=False)
     assert (found["jobs"], found["sound_draws"], found["worn_jobs"]) == (240, 60, 180)

@@ -18,7 +18,8 @@ from compressor.studies.alarms.windows import AlarmsError
 
 REMEDY = "compsim wear the machine's case file, and name the file, or its folder of results"
 # groups of a case in which a worn machine and those of the study should agree
-SAME = ("machine", "load", "gas", "spring", "contact", "friction", "lubricant", "guide", "rod")
+SAME = ("machine", "load", "gas", "spring", "contact", "friction", "lubricant", "guide", "drive",
+        "rod")  # fmt: skip
 MAX_NAMED = 4  # keys that are named of those that differ
 
 
@@ -27,7 +28,8 @@ class WearHistory:
     """How a machine has worn: the greatest clearance of each joint over hours.
 
     clearances: mm, (stages, joints); limit: mm, at which a joint is worn out; factor: by which the
-    coefficient of wear, and so all hours, may be greater or smaller.
+    coefficient of wear, and so all hours, may be greater or smaller; span: hours to judge, beyond
+    which a run goes on by the factor, for the greatest coefficient alone.
     """
 
     name: str
@@ -35,6 +37,7 @@ class WearHistory:
     clearances: np.ndarray
     limit: float
     factor: float
+    span: float
     values: dict[str, Any]
 
     def hours_at(self, joint: str, clearance: float) -> float:
@@ -53,8 +56,12 @@ class WearHistory:
 
     @property
     def end(self) -> float:
-        """Return the hours at which the first joint is worn out; inf where none is."""
-        return min(self.hours_at(joint, self.limit) for joint in JOINTS)
+        """Return the hours at which the first joint is worn out; inf where none is within `span`.
+
+        As `compsim wear`, which says "not worn out" of a life beyond `wear.hours`.
+        """
+        found = min(self.hours_at(joint, self.limit) for joint in JOINTS)
+        return found if found <= self.span else math.inf
 
 
 class Lead(NamedTuple):
@@ -88,7 +95,7 @@ def open_run(place: str | Path) -> WearHistory:
     clearances = 1e3 * found["clearance"].transpose("stage", "joint").values
     return WearHistory(
         path.stem, found["hours"].values, clearances, wear.limit_mm or math.inf,
-        wear.coefficient_factor, case.values(),
+        wear.coefficient_factor, wear.hours, case.values(),
     )  # fmt: skip
 
 
@@ -97,7 +104,7 @@ def lead_of(run: WearHistory, joint: str, first: First) -> Lead:
 
     That is where the first joint, which may be the other one, is worn out. The interval carries the
     clearance's, and the factor of the coefficient of wear, by which all hours grow or shrink
-    together. nan where no joint is worn out in the run.
+    together. nan where no joint is worn out within the run's hours.
     """
     end = run.end
     if math.isinf(end):

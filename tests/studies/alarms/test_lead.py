@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from compressor.cases import Case
-from compressor.store import StoreError, write_dataset
+from compressor.store import StoreError, read_dataset, write_dataset
 from compressor.studies.alarms.detection import First
 from compressor.studies.alarms.lead import differences, lead_of, open_run
 from compressor.studies.alarms.windows import AlarmsError
-from compressor.studies.wear.stages import Worn, stages_dataset
+from compressor.studies.wear.stages import Worn, life, stages_dataset
 
 CASE = {
     "joint": "both", "clearance_mm": 0.1,
@@ -59,6 +59,19 @@ def test_without_a_limit_reached_no_lead_is_known(tmp_path):
     assert all(map(math.isnan, lead_of(run, "big_end", First(0.12, 0.11, 0.13))))
 
 
+def test_a_life_beyond_the_hours_to_judge_is_none_as_for_compsim_wear(tmp_path):
+    """The run goes on to twice its hours, and is worn out there: no life, and no lead."""
+    for hours, is_known in ((999.0, False), (1001.0, True)):
+        case = CASE | {"wear": CASE["wear"] | {"hours": hours}}
+        path = write_run(tmp_path / f"{hours}", case)
+        found = life(Worn(Case.from_values(case)), read_dataset(path, ""))
+        run = open_run(path)
+        assert math.isfinite(found.hours) == math.isfinite(run.end) == is_known
+        assert math.isfinite(lead_of(run, "big_end", First(0.15, 0.12, 0.2)).hours) == is_known
+        if is_known:
+            assert run.end == pytest.approx(found.hours)
+
+
 def test_a_folder_has_one_run(tmp_path):
     path = write_run(tmp_path)
     assert open_run(tmp_path).name == open_run(path.parent).name == path.stem
@@ -79,6 +92,7 @@ def test_machines_that_differ_are_named():
     one = Case.from_values({"joint": "both", "clearance_mm": 0.1, "lubricant": True}).values()
     other = Case.from_values({
         "joint": "both", "clearance_mm": 0.1, "machine": {"speed_rpm": 600, "rod_mass_kg": 5},
+        "drive": True,
     }).values()  # fmt: skip
     found = [*differences(one, ["machine.speed_rpm", "machine.rod_inertia_kg_m2"], other)]
-    assert found == ["machine.rod_mass_kg", "lubricant"]
+    assert found == ["machine.rod_mass_kg", "lubricant", "drive"]
