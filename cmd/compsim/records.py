@@ -1,4 +1,4 @@
-"""The options by which commands read a record's file: what it does not say itself."""
+"""The options by which commands read a record's file: what it does not say itself; and noise."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -27,6 +27,14 @@ OPTIONS = (
 
 
 NAMES = ("channel", "unit", "full_scale", "rate", "tacho", "tacho_deg", "rpm", "tdc")
+
+
+def read_levels(context: click.Context, parameter: click.Parameter, text: str) -> tuple[float, ...]:
+    """Return the numbers of a list with commas: levels of noise, m/s2."""
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r} is no list such as 0,0.1,1") from error
 
 
 def record_options(command: Callable[..., int]) -> Callable[..., int]:

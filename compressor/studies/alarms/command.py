@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 from compsim.progress import ProgressReporter
+from compsim.records import read_levels
 from compsim.results import of_results, one_word, results_folder, studies
 from compsim.screen import DONE, one_thread_each, print_text, say
 
@@ -34,14 +35,6 @@ def read_bands(
         if found[-1] is None:
             raise click.BadParameter(f"{text!r} is no band such as 1000-3000, in Hz")
     return tuple(one for one in found if one) or None
-
-
-def read_levels(context: click.Context, parameter: click.Parameter, text: str) -> tuple[float, ...]:
-    """Return the numbers of a list with commas."""
-    try:
-        return tuple(float(word) for word in text.split(","))
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r} is no list such as 0,0.1,1") from error
 
 
 @click.command()

@@ -27,7 +27,7 @@ from compressor.studies.alarms.readings import (
     default_bands,
     read_windows,
 )
-from compressor.vibration import MIN_REVOLUTIONS, RecordError
+from compressor.vibration import MIN_REVOLUTIONS, RecordError, find_noise_mistake
 
 SOUND = "none"  # the joint that is worn in a sound machine
 MIN_SOUND = 10  # draws of a sound machine, with fewer of which no limit means anything
@@ -75,10 +75,9 @@ class AlarmOptions:
         for low, high in self.bands or ():
             if not 0.0 <= low < high < math.inf:
                 raise AlarmsError(f"--band {low:g}-{high:g}: give the lower frequency first, in Hz")
-        if not self.noise or not all(0.0 <= rms < math.inf for rms in self.noise):
-            raise AlarmsError(f"noise is an rms in m/s2, 0 or above, not {self.noise}")
-        if len({*self.noise}) < len(self.noise):
-            raise AlarmsError(f"a noise level is given twice: {self.noise}")
+        mistake = find_noise_mistake(self.noise)
+        if mistake:
+            raise AlarmsError(mistake)
 
 
 @dataclass

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 from compsim.progress import ProgressReporter
-from compsim.records import record_options
+from compsim.records import read_levels, record_options
 from compsim.results import files, of_results, one_word, results_folder, studies
 from compsim.screen import (
     DONE,
@@ -27,14 +27,6 @@ if TYPE_CHECKING:
     from compressor.studies.diagnosis.identify import Identification, Identifier
 
 
-def levels(context: click.Context, parameter: click.Parameter, text: str) -> tuple[float, ...]:
-    """Return the numbers of a list with commas."""
-    try:
-        return tuple(float(word) for word in text.split(","))
-    except ValueError as error:
-        raise click.BadParameter(f"{text!r} is no list such as 0,0.1,1") from error
-
-
 @click.command()
 @of_results("STUDY", studies)
 @click.option("-o", "--output", required=True, metavar="FOLDER",
@@ -43,7 +35,7 @@ def levels(context: click.Context, parameter: click.Parameter, text: str) -> tup
               help="Cut windows of so many whole revolutions.")  # fmt: skip
 @click.option("--hop", type=click.IntRange(min=1), show_default="as many",
               help="Begin a window so many revolutions after the last one began.")  # fmt: skip
-@click.option("--noise", default="0", show_default=True, callback=levels, metavar="RMS,...",
+@click.option("--noise", default="0", show_default=True, callback=read_levels, metavar="RMS,...",
               help="Add white noise of this rms, m/s2, with features at each level.")  # fmt: skip
 @click.option("--test-share", type=click.FloatRange(0, 1, min_open=True, max_open=True),
               default=0.3, show_default=True,

@@ -28,7 +28,7 @@ from compressor.store import (
     read_store,
 )
 from compressor.studies.diagnosis.features import FEATURES, features
-from compressor.vibration import MIN_REVOLUTIONS, RecordError, noisy
+from compressor.vibration import MIN_REVOLUTIONS, RecordError, find_noise_mistake, noisy
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -96,10 +96,9 @@ class DataSetOptions:
             )
         if self.hop is not None and self.hop < 1:
             raise DataSetError(f"windows are at least 1 revolution apart, not {self.hop}")
-        if not self.noise or not all(0.0 <= rms < np.inf for rms in self.noise):
-            raise DataSetError(f"noise is an rms in m/s2, 0 or above, not {self.noise}")
-        if len({*self.noise}) < len(self.noise):
-            raise DataSetError(f"a noise level is given twice: {self.noise}")
+        mistake = find_noise_mistake(self.noise)
+        if mistake:
+            raise DataSetError(mistake)
         if not 0.0 < self.test_share < 1.0:
             raise DataSetError(f"the test share is between 0 and 1, not {self.test_share:g}")
 
