@@ -24,7 +24,7 @@ from compressor.metrics import JOINTS
 from compressor.program import no_progress
 from compressor.store import open_study
 from compressor.studies.alarms.alarms import best_of_each, judge_alarms
-from compressor.studies.alarms.lead import lead_times, open_run
+from compressor.studies.alarms.lead import add_lead_times, open_run
 from compressor.studies.alarms.windows import AlarmOptions
 from compressor.studies.wear.run import run_wear
 from compressor.studies.wear.stages import Worn
@@ -102,7 +102,7 @@ def digest_keys(studies, wear_studies):
 def judge(folder, study, run=None):
     """What the command says of a stored study: best alarms by joint and noise, with their rates."""
     found = judge_alarms(folder, study, AlarmOptions(noise=NOISE))
-    found = lead_times(found, run) if run else found
+    found = add_lead_times(found, run) if run else found
     looser = judge_alarms(folder, study, AlarmOptions(false_alarms=LOOSER))
     return {
         "looser": LOOSER, "at_looser": [

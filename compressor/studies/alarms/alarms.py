@@ -15,9 +15,9 @@ from compressor.studies.alarms.detection import (
     FOLDS,
     First,
     Rate,
+    compute_rate,
+    find_limit,
     first_clearance,
-    limit_of,
-    rate_of,
     share_out,
 )
 from compressor.studies.alarms.readings import ALARMS, RECORD, Alarm, Readings, band_name
@@ -161,11 +161,11 @@ def judge_alarm(
         setting, judged = sound & (folds != fold), folds == fold
         scores = alarm.score(readings, setting)
         limits.append(
-            options.factor or limit_of(scores[setting], draws[setting], options.false_alarms)
+            options.factor or find_limit(scores[setting], draws[setting], options.false_alarms)
         )
         trips[judged] = scores[judged] > limits[-1]
         by_factor[judged] = scores[judged, None] > FACTORS
-    rates = [rate_of(trips[one.rows], draws[one.rows]) for one in states]
+    rates = [compute_rate(trips[one.rows], draws[one.rows]) for one in states]
     weights = np.array([draw_weights(rows, draws) for rows in (*(s.rows for s in states), sound)])
     curves = np.minimum(weights @ by_factor, 1.0)
     first = {}
@@ -174,7 +174,7 @@ def judge_alarm(
                 if one.joint == joint]  # fmt: skip
         clearances, of_joint = zip(*mine, strict=True)
         first[joint] = first_clearance(clearances, of_joint, options.detected)
-    false = rate_of(trips[sound], draws[sound])
+    false = compute_rate(trips[sound], draws[sound])
     return AlarmPerformance(rates, false, limits, curves[:-1], curves[-1], first)
 
 

@@ -90,9 +90,9 @@ def alarms(
     one_thread_each()  # before numpy loads
     from compressor.store import writable_folder
     from compressor.studies.alarms.alarms import judge_alarms
-    from compressor.studies.alarms.lead import lead_times, open_run
+    from compressor.studies.alarms.lead import add_lead_times, open_run
     from compressor.studies.alarms.windows import AlarmOptions
-    from compressor.studies.alarms.words import remarks, table
+    from compressor.studies.alarms.words import list_lines, list_remarks
 
     options = AlarmOptions(revolutions, bands, noise, false_alarms, factor, detected, seed)
     worn = open_run(run) if run else None
@@ -100,10 +100,10 @@ def alarms(
         writable_folder(output, make=False)
     with ProgressReporter(quiet) as progress:
         found = judge_alarms(folder, study, options, progress)
-    found = lead_times(found, worn) if worn else found
-    for line in table(found):
+    found = add_lead_times(found, worn) if worn else found
+    for line in list_lines(found):
         print_text(line)
-    for text in () if quiet else remarks(found):
+    for text in () if quiet else list_remarks(found):
         say(text)
     if output:
         write_alarms(found, output)

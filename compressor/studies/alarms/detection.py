@@ -47,7 +47,7 @@ def share_out(draws: np.ndarray, is_sound: np.ndarray, folds: int, seed: int) ->
     return np.array([fold_of.get(name, folds) for name in draws.tolist()], int)
 
 
-def limit_of(scores: np.ndarray, draws: np.ndarray, rate: float) -> float:
+def find_limit(scores: np.ndarray, draws: np.ndarray, rate: float) -> float:
     """Return the least limit for a rate of false alarms, by the scores of sound windows, (n,)."""
     _, place, sizes = np.unique(draws, return_inverse=True, return_counts=True)
     weights = 1.0 / sizes[place]
@@ -58,7 +58,7 @@ def limit_of(scores: np.ndarray, draws: np.ndarray, rate: float) -> float:
     return float(levels[np.flatnonzero(above <= spare + 1e-9)[0]])
 
 
-def wilson(share: float, count: int) -> tuple[float, float]:
+def compute_interval(share: float, count: int) -> tuple[float, float]:
     """Return Wilson's interval of a share of independent draws (JASA 22, 1927); nan of none.
 
     A draw may trip in part of its windows: it then scatters less than one that trips or does not,
@@ -73,21 +73,21 @@ def wilson(share: float, count: int) -> tuple[float, float]:
 
 
 def draws_to_be_sure(share: float) -> float:
-    """Return how many draws, all detected, have a lower end of `wilson` at a share or above.
+    """Return how many draws, all detected, have an interval from a share or above on.
 
     inf of a share of 1.
     """
     return math.ceil(Z**2 * share / (1.0 - share)) if share < 1.0 else math.inf
 
 
-def rate_of(trips: np.ndarray, draws: np.ndarray) -> Rate:
+def compute_rate(trips: np.ndarray, draws: np.ndarray) -> Rate:
     """Return how often windows trip, (n,), as the mean over draws of each one's share."""
     _, place, sizes = np.unique(draws, return_inverse=True, return_counts=True)
     if not sizes.size:
         return Rate(math.nan, math.nan, math.nan, 0)
     shares = np.bincount(place, trips, sizes.size) / sizes
     share = min(max(float(shares.mean()), 0.0), 1.0)
-    return Rate(share, *wilson(share, sizes.size), sizes.size)
+    return Rate(share, *compute_interval(share, sizes.size), sizes.size)
 
 
 class First(NamedTuple):
@@ -104,13 +104,13 @@ def first_clearance(clearances: Sequence[float], rates: Sequence[Rate], least: f
     Its interval goes from where the rates' upper ends are so on, to where their lower ends are.
     """
     found = [
-        from_which_on(clearances, [getattr(one, name) >= least for one in rates])
+        find_onset(clearances, [getattr(one, name) >= least for one in rates])
         for name in ("share", "high", "low")
     ]
     return First(*found)
 
 
-def from_which_on(clearances: Sequence[float], holds: Sequence[bool]) -> float:
+def find_onset(clearances: Sequence[float], holds: Sequence[bool]) -> float:
     """Return the least of rising clearances at which, and beyond which, something holds, or inf."""
     missed = [place for place, one in enumerate(holds) if not one]
     begin = missed[-1] + 1 if missed else 0

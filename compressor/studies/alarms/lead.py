@@ -99,7 +99,7 @@ def open_run(place: str | Path) -> WearHistory:
     )  # fmt: skip
 
 
-def lead_of(run: WearHistory, joint: str, first: First) -> Lead:
+def compute_lead(run: WearHistory, joint: str, first: First) -> Lead:
     """Return the hours from an alarm, which sees a joint at a clearance, to the run's limit.
 
     That is where the first joint, which may be the other one, is worn out. The interval carries the
@@ -114,7 +114,7 @@ def lead_of(run: WearHistory, joint: str, first: First) -> Lead:
     return Lead(mid, high / run.factor, low * run.factor)
 
 
-def lead_times(found: xr.Dataset, run: WearHistory) -> xr.Dataset:
+def add_lead_times(found: xr.Dataset, run: WearHistory) -> xr.Dataset:
     """Return a result of `judge_alarms` with `lead_hours` and its interval, by a wear run."""
     shape = found["first_clearance"].shape
     hours = np.full((len(Lead._fields), *shape), math.nan)
@@ -122,7 +122,7 @@ def lead_times(found: xr.Dataset, run: WearHistory) -> xr.Dataset:
     for place in np.ndindex(shape):
         joint = str(found["joint"].values[place[-1]])
         if joint in JOINTS:
-            hours[(slice(None), *place)] = lead_of(
+            hours[(slice(None), *place)] = compute_lead(
                 run, joint, First(*(float(one[place]) for one in ends))
             )
     mine, swept = (json.loads(found.attrs[name]) for name in ("machine", "swept"))

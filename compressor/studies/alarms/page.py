@@ -17,7 +17,7 @@ from compressor.report import (
 )
 from compressor.store import Folder, StoredStudy, read_dataset
 from compressor.studies.alarms.figures import caption, draw_alarms
-from compressor.studies.alarms.words import heading, remarks, table_rows
+from compressor.studies.alarms.words import heading, list_remarks, table_rows
 
 FILE = "alarms.nc"
 REMEDY = "compsim alarms STUDY -o the folder writes it again"
@@ -53,7 +53,9 @@ def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Addit
         plates.append(Plate(words, title, caption(found, level), draw_alarms(found, level)))
     head, rows = table_rows(found)
     cells = PageTable(head, [TableRow([Cell(text) for text in row]) for row in rows])
-    before, after = ([t[0].upper() + t[1:] for t in part(found)] for part in (heading, remarks))
+    before, after = (
+        [t[0].upper() + t[1:] for t in part(found)] for part in (heading, list_remarks)
+    )
     content = AlarmsContent(before, cells, after, plates)
     anchor = file_name("alarms-of", name)
     title = f"Which alarm sees wear first in study {name}"

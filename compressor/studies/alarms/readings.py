@@ -46,7 +46,7 @@ class Alarm:
     is_filtered: bool = True
 
 
-def ratio(name: str) -> Score:
+def score_by_ratio(name: str) -> Score:
     """Return the score of a reading: the greatest ratio of its numbers to their sound medians."""
 
     def score(readings: Readings, sound: np.ndarray) -> np.ndarray:
@@ -61,7 +61,7 @@ def ratio(name: str) -> Score:
     return score
 
 
-def counts_over(times: float) -> Score:
+def score_by_counts(times: float) -> Score:
     """Return the score of counts over so many times the median peak of sound windows.
 
     The level is the next one of `LADDER`; the usual count at least `LEAST_COUNT`.
@@ -77,20 +77,22 @@ def counts_over(times: float) -> Score:
 
 
 ALARMS = (
-    Alarm("peak", "peak", "sensor_peak", ratio("sensor_peak")),
-    Alarm("rms", "rms", "sensor_rms", ratio("sensor_rms")),
-    Alarm("crest_factor", "crest factor", "sensor_crest_factor", ratio("sensor_crest_factor")),
-    Alarm("kurtosis", "kurtosis", "sensor_kurtosis", ratio("sensor_kurtosis")),
-    Alarm("segment_peak", "segment peak", "sensor_segment_peak", ratio("sensor_segment_peak")),
-    Alarm("segment_rms", "segment rms", "sensor_segment_rms", ratio("sensor_segment_rms")),
+    Alarm("peak", "peak", "sensor_peak", score_by_ratio("sensor_peak")),
+    Alarm("rms", "rms", "sensor_rms", score_by_ratio("sensor_rms")),
+    Alarm("crest_factor", "crest factor", "sensor_crest_factor",
+          score_by_ratio("sensor_crest_factor")),
+    Alarm("kurtosis", "kurtosis", "sensor_kurtosis", score_by_ratio("sensor_kurtosis")),
+    Alarm("segment_peak", "segment peak", "sensor_segment_peak",
+          score_by_ratio("sensor_segment_peak")),
+    Alarm("segment_rms", "segment rms", "sensor_segment_rms", score_by_ratio("sensor_segment_rms")),
     *(
         Alarm(f"count_{times:g}", f"counts over {times:g} peak", "sensor_counts_per_rev",
-              counts_over(times))
+              score_by_counts(times))
         for times in COUNTED
     ),
-    Alarm("velocity", "velocity of the record", "velocity", ratio("velocity"), False),
+    Alarm("velocity", "velocity of the record", "velocity", score_by_ratio("velocity"), False),
     Alarm(BODY_VELOCITY, "velocity of the body", "body_velocity_rms",
-          ratio("body_velocity_rms"), False),
+          score_by_ratio("body_velocity_rms"), False),
 )  # fmt: skip
 
 
@@ -166,7 +168,7 @@ def stack_readings(rows: Iterable[Readings]) -> Readings:
 def band_velocity(values: np.ndarray, rate: float, low: float, high: float) -> np.ndarray:
     """Return the velocity of an acceleration in a band, m/s, (m,), as if both repeated themselves.
 
-    The lines of the band over 2 pi i f; none at 0 Hz, where an acceleration tells no velocity.
+    The lines of the band over 2 pi i f; none at 0 Hz, where none follows from an acceleration.
     """
     lines = np.fft.rfft(band_signal(values, rate, low, high))
     omega = 2.0j * np.pi * np.fft.rfftfreq(len(values), 1.0 / rate)

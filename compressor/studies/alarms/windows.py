@@ -30,7 +30,7 @@ from compressor.studies.alarms.readings import (
 from compressor.vibration import MIN_REVOLUTIONS, RecordError, find_noise_mistake
 
 SOUND = "none"  # the joint that is worn in a sound machine
-MIN_SOUND = 10  # draws of a sound machine, with fewer of which no limit means anything
+MIN_SOUND = 10  # draws of a sound machine: by fewer of them no limit means anything
 NO_DRAW = ("joint", "clearance_mm", "sensor", "healthy_clearance_mm")  # groups that make no draw
 
 
@@ -125,10 +125,10 @@ def read_study(
         clipped += job.pop("clipped")
         of_case = job.pop("values")
         values = of_case if job["joint"] != SOUND else values
-        rows.append({**job, "key": key, "draw": draw_of(point)})
+        rows.append({**job, "key": key, "draw": name_draw(point)})
     progress(len(own), len(own), "")
     if not rows:
-        raise without_windows(source, left, options)
+        raise explain_no_windows(source, left, options)
     return replace(stack_windows(rows, bands or ()), left_out=left, clipped=clipped, values=values)
 
 
@@ -189,10 +189,10 @@ def read_job(
     }  # fmt: skip
 
 
-def draw_of(point: Mapping[str, Any]) -> str:
+def name_draw(point: Mapping[str, Any]) -> str:
     """Return a name for what a study varies of a job beside joint and clearance."""
-    kept = {key: one for key, one in point.items() if key.partition(".")[0] not in NO_DRAW}
-    return json.dumps(kept, sort_keys=True)
+    varied = {key: one for key, one in point.items() if key.partition(".")[0] not in NO_DRAW}
+    return json.dumps(varied, sort_keys=True)
 
 
 def stack_windows(rows: Sequence[dict[str, Any]], bands: tuple[Band, ...]) -> Windows:
@@ -212,7 +212,7 @@ def stack_windows(rows: Sequence[dict[str, Any]], bands: tuple[Band, ...]) -> Wi
     return Windows(bands, joints, clearances, draws, keys, readings)
 
 
-def without_windows(
+def explain_no_windows(
     source: StoredStudy, left: Mapping[str, int], options: AlarmOptions
 ) -> AlarmsError:
     """Return the error that says why a study has no window, and what to do."""

@@ -77,7 +77,7 @@ def lead_words(first: xr.Dataset) -> str:
     return f"{value:.4g} [{low:.4g}, {high:.4g}]"
 
 
-def table(found: xr.Dataset) -> Iterator[str]:
+def list_lines(found: xr.Dataset) -> Iterator[str]:
     """Yield the best filter of each alarm by joint, the first to see wear first."""
     yield from heading(found)
     head, rows = table_rows(found)
@@ -128,7 +128,7 @@ def same_kind(found: xr.Dataset, place: int, places: Sequence[int]) -> int:
     return next(other for other in places if kinds[other] == kinds[place])
 
 
-def remarks(found: xr.Dataset) -> Iterator[str]:
+def list_remarks(found: xr.Dataset) -> Iterator[str]:
     """Yield what a result does without, or rests on."""
     for reason, count in json.loads(found.attrs["left_out"]).items():
         yield f"left out: {count} {reason}"

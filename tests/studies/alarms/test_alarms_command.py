@@ -17,7 +17,7 @@ from compressor.studies.alarms import windows
 from compressor.studies.alarms.alarms import rank_alarms
 from compressor.studies.alarms.figures import caption, draw_alarms
 from compressor.studies.alarms.page import add
-from compressor.studies.alarms.words import remarks, table_rows
+from compressor.studies.alarms.words import list_remarks, table_rows
 
 
 def run(folder, capsys, *words, code=0):
@@ -170,14 +170,14 @@ def test_no_fewer_revolutions_are_proposed_than_a_record_needs(worn_store):
                                "sensor.length_rev: 6 or more, or give fewer --revolutions"),
                               ):  # fmt: skip
         options = windows.AlarmOptions(revolutions)
-        error = windows.without_windows(source, {"too short": 6}, options)
+        error = windows.explain_no_windows(source, {"too short": 6}, options)
         assert str(error).endswith(told)
 
 
 def test_alarms_that_are_not_judged_are_named(written):
     found = read_dataset(written[0] / "alarms.nc")
     line = "not judged, since not all sound records have it: velocity of the body"
-    assert line in [*remarks(found)]
+    assert line in [*list_remarks(found)]
 
 
 def test_mistakes_are_named(worn_store, worn, capsys, tmp_path):

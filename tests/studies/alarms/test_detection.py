@@ -7,12 +7,12 @@ import pytest
 
 from compressor.studies.alarms.detection import (
     Rate,
+    compute_interval,
+    compute_rate,
     draws_to_be_sure,
+    find_limit,
     first_clearance,
-    limit_of,
-    rate_of,
     share_out,
-    wilson,
 )
 
 
@@ -24,7 +24,7 @@ def names(count, windows=1):
 def test_a_limit_leaves_so_many_scores_above(rate, place):
     """Of 19 draws with a window each: (k + 1) / 20 at most the rate, with k above the limit."""
     scores = np.random.default_rng(1).permutation(np.arange(19.0))
-    assert limit_of(scores, names(19), rate) == 18.0 - place
+    assert find_limit(scores, names(19), rate) == 18.0 - place
 
 
 def test_a_limit_counts_draws_and_not_windows():
@@ -41,7 +41,7 @@ def test_a_limit_counts_draws_and_not_windows():
             return (sum(shares) + 1) / 25
 
         allowed = [level for level in np.unique(scores) if bound(level) <= rate + 1e-12]
-        assert limit_of(scores, draws, rate) == (min(allowed) if allowed else scores.max())
+        assert find_limit(scores, draws, rate) == (min(allowed) if allowed else scores.max())
 
 
 def test_new_draws_trip_as_often_as_was_asked():
@@ -51,7 +51,7 @@ def test_new_draws_trip_as_often_as_was_asked():
     for _ in range(400):
         level = rng.lognormal(0.0, 1.0, 60)
         scores = np.repeat(level, 3) * rng.lognormal(0.0, 0.1, 180)
-        limit = limit_of(scores, names(60, 3), 0.05)
+        limit = find_limit(scores, names(60, 3), 0.05)
         new = rng.lognormal(0.0, 1.0, 500) * rng.lognormal(0.0, 0.1, 500)
         shares.append(np.mean(new > limit))
     error = np.std(shares) / math.sqrt(len(shares))
@@ -61,14 +61,14 @@ def test_new_draws_trip_as_often_as_was_asked():
 def test_wilsons_interval_in_closed_form():
     """Of none and of all: z^2 / (n + z^2) from the end; symmetric about a half."""
     square = 1.959963984540054**2
-    assert wilson(0.0, 10) == pytest.approx((0.0, square / (10 + square)))
-    assert wilson(1.0, 10) == pytest.approx((10 / (10 + square), 1.0))
-    low, high = wilson(0.5, 40)
+    assert compute_interval(0.0, 10) == pytest.approx((0.0, square / (10 + square)))
+    assert compute_interval(1.0, 10) == pytest.approx((10 / (10 + square), 1.0))
+    low, high = compute_interval(0.5, 40)
     assert low + high == pytest.approx(1.0)
     assert (high - 0.5) ** 2 * (1 + square / 40) == pytest.approx(0.25 * square / 40)
     assert draws_to_be_sure(0.9) == 35
     assert draws_to_be_sure(1.0) == math.inf
-    assert wilson(1.0, 35)[0] >= 0.9 > wilson(1.0, 34)[0]
+    assert compute_interval(1.0, 35)[0] >= 0.9 > compute_interval(1.0, 34)[0]
 
 
 def test_intervals_hold_by_draws_and_would_not_by_windows():
@@ -77,7 +77,7 @@ def test_intervals_hold_by_draws_and_would_not_by_windows():
     for _ in range(400):
         trips = np.repeat(rng.random(30) < 0.8, 5).astype(float)  # windows of a draw are alike
         for way, draws in enumerate((names(30, 5), names(150))):
-            one = rate_of(trips, draws)
+            one = compute_rate(trips, draws)
             held[way] += one.low <= 0.8 <= one.high
     assert held[0] / 400 > 0.92
     assert held[1] / 400 < 0.75
@@ -89,7 +89,7 @@ def test_the_clearance_from_which_on_is_in_its_interval():
     clearances, truth = [0.1, 0.2, 0.3, 0.4, 0.5], [0.1, 0.75, 0.93, 0.97, 1.0]
     held = 0
     for _ in range(300):
-        rates = [rate_of((rng.random(40) < one).astype(float), names(40)) for one in truth]
+        rates = [compute_rate((rng.random(40) < one).astype(float), names(40)) for one in truth]
         found = first_clearance(clearances, rates, 0.9)
         assert found.low <= found.clearance <= found.high
         held += found.low <= 0.3 <= found.high

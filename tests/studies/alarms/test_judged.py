@@ -14,10 +14,10 @@ from compressor.studies.alarms.readings import (
     LADDER,
     RECORD,
     band_velocity,
-    counts_over,
     default_bands,
-    ratio,
     read_windows,
+    score_by_counts,
+    score_by_ratio,
 )
 from compressor.studies.alarms.windows import (
     AlarmOptions,
@@ -25,7 +25,7 @@ from compressor.studies.alarms.windows import (
     Windows,
     check_draws,
 )
-from compressor.studies.alarms.words import remarks, table, table_rows
+from compressor.studies.alarms.words import list_lines, list_remarks, table_rows
 from compressor.vibration import Record
 
 LEVELS = {0.2: 1.5, 0.3: 2.5, 0.4: 6.0}  # clearance, mm -> rms over the sound one
@@ -110,7 +110,7 @@ def test_an_alarm_that_reads_nothing_new_never_detects(judged):
     one = judged.isel(noise=0).sel(alarm="peak, record", joint="small_end")
     assert math.isinf(float(one["first_clearance_low"]))
     (line,) = [
-        line for line in table(judged.assign_attrs(study="made")) if "  peak, record" in line
+        line for line in list_lines(judged.assign_attrs(study="made")) if "  peak, record" in line
     ]
     assert line.split()[-1] == "never"
     assert "velocity of the record" not in judged["alarm"].values  # no window has it
@@ -141,7 +141,7 @@ def test_draws_that_set_no_limit_are_judged_by_the_limit_of_all():
     assert float(one["false_alarms"]) >= 1 / 20
     assert float(one["limit_high"]) == pytest.approx(50.0, rel=0.02)
     assert float(one["limit_low"]) < 1.1  # of the fold with the loud draw
-    said = [*remarks(found.assign_attrs(left_out="{}", clipped=0))]
+    said = [*list_remarks(found.assign_attrs(left_out="{}", clipped=0))]
     assert any(text.startswith("limits of 1 alarms differ by more than 2 times") for text in said)
 
 
@@ -169,22 +169,22 @@ def test_a_study_without_sound_or_worn_jobs_is_refused():
 def test_a_score_is_the_greatest_ratio_to_the_sound_median():
     values = np.array([[1.0, 10.0], [3.0, 30.0], [2.0, 20.0], [4.0, 100.0], [0.0, 0.0]])
     sound = np.array([True, True, True, False, False])
-    assert ratio("x")({"x": values}, sound).tolist() == [0.5, 1.5, 1.0, 5.0, 0.0]
+    assert score_by_ratio("x")({"x": values}, sound).tolist() == [0.5, 1.5, 1.0, 5.0, 0.0]
     silent = np.array([[0.0], [0.0], [0.0], [2.0], [0.0]])
-    assert ratio("x")({"x": silent}, sound).tolist() == [1.0, 1.0, 1.0, math.inf, 1.0]
+    assert score_by_ratio("x")({"x": silent}, sound).tolist() == [1.0, 1.0, 1.0, math.inf, 1.0]
 
 
 def test_counts_are_over_the_next_level_of_the_ladder():
     peaks = np.array([[4.0], [4.0], [9.0]])
     counts = np.tile(np.arange(LADDER.size, 0.0, -1.0), (3, 1))
     counts[2] += 1000.0
-    found = counts_over(0.5)({"sensor_peak": peaks, "sensor_counts_per_rev": counts},
+    found = score_by_counts(0.5)({"sensor_peak": peaks, "sensor_counts_per_rev": counts},
                              np.array([True, True, False]))  # fmt: skip
     usual = LADDER.size - np.flatnonzero(LADDER >= 2.0)[0]
     assert found.tolist() == pytest.approx([1.0, 1.0, 1.0 + 1000.0 / usual])
     none = {"sensor_peak": peaks, "sensor_counts_per_rev": np.array([[0.0], [0.0], [3.0]])
             * np.ones(LADDER.size)}  # fmt: skip
-    assert counts_over(1.0)(none, np.array([True, True, False])).tolist() == [0.0, 0.0, 3.0]
+    assert score_by_counts(1.0)(none, np.array([True, True, False])).tolist() == [0.0, 0.0, 3.0]
 
 
 def test_windows_of_a_sine_are_read_in_closed_form():
@@ -222,7 +222,7 @@ def test_velocity_is_the_integral_in_a_band():
 
 def test_all_windows_of_no_number_of_draws_are_sure():
     found = judge_windows(made_windows(), AlarmOptions(factor=2.0, detected=1.0))
-    said = " ".join(remarks(found.assign_attrs(left_out="{}", clipped=0)))
+    said = " ".join(list_remarks(found.assign_attrs(left_out="{}", clipped=0)))
     assert "a clearance has 10 draws, and no number of them makes sure of 1 of windows" in said
 
 

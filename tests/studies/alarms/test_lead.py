@@ -8,7 +8,7 @@ import pytest
 from compressor.cases import Case
 from compressor.store import StoreError, read_dataset, write_dataset
 from compressor.studies.alarms.detection import First
-from compressor.studies.alarms.lead import differences, lead_of, open_run
+from compressor.studies.alarms.lead import compute_lead, differences, open_run
 from compressor.studies.alarms.windows import AlarmsError
 from compressor.studies.wear.stages import Worn, life, stages_dataset
 
@@ -46,17 +46,17 @@ def test_lead_times_are_differences_of_hours(tmp_path):
     assert run.hours_at("small_end", 0.15) == pytest.approx(500.0)
     assert run.hours_at("small_end", 0.05) == 0.0
     assert math.isinf(run.hours_at("small_end", 0.25))
-    lead = lead_of(run, "big_end", First(0.15, 0.12, 0.2))
+    lead = compute_lead(run, "big_end", First(0.15, 0.12, 0.2))
     assert lead == pytest.approx((750.0, 500.0 / 2, 900.0 * 2))
     # the big end ends the run; an alarm that sees nothing of the small end until then leads by 0
-    lead = lead_of(run, "small_end", First(0.15, 0.12, math.inf))
+    lead = compute_lead(run, "small_end", First(0.15, 0.12, math.inf))
     assert lead == pytest.approx((500.0, 0.0, 800.0 * 2))
-    assert lead_of(run, "small_end", First(math.inf, math.inf, math.inf)) == (0.0, 0.0, 0.0)
+    assert compute_lead(run, "small_end", First(math.inf, math.inf, math.inf)) == (0.0, 0.0, 0.0)
 
 
 def test_without_a_limit_reached_no_lead_is_known(tmp_path):
     run = open_run(write_run(tmp_path, hours=(0.0, 400.0)))
-    assert all(map(math.isnan, lead_of(run, "big_end", First(0.12, 0.11, 0.13))))
+    assert all(map(math.isnan, compute_lead(run, "big_end", First(0.12, 0.11, 0.13))))
 
 
 def test_a_life_beyond_the_hours_to_judge_is_none_as_for_compsim_wear(tmp_path):
@@ -67,7 +67,7 @@ def test_a_life_beyond_the_hours_to_judge_is_none_as_for_compsim_wear(tmp_path):
         found = life(Worn(Case.from_values(case)), read_dataset(path, ""))
         run = open_run(path)
         assert math.isfinite(found.hours) == math.isfinite(run.end) == is_known
-        assert math.isfinite(lead_of(run, "big_end", First(0.15, 0.12, 0.2)).hours) == is_known
+        assert math.isfinite(compute_lead(run, "big_end", First(0.15, 0.12, 0.2)).hours) == is_known
         if is_known:
             assert run.end == pytest.approx(found.hours)
 
