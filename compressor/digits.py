@@ -20,11 +20,17 @@ def is_known(value: float, bar: float, relative: bool = True) -> bool:
     return not relative or bar < abs(value) or bar == 0.0
 
 
-def by_bar(value: float, bar: float, relative: bool = True, bare: bool = False) -> str:
+def by_bar(
+    value: float,
+    bar: float,
+    relative: bool = True,
+    bare: bool = False,
+    digits: int = MAX_DIGITS,
+) -> str:
     """Return a number with its error bar, such as 647.1 ± 0.3, to the digits that the bar allows.
 
     bar: nan where none was made; the number then has six digits. bare: at most six of these digits,
-    without the bar.
+    without the bar. digits: that a number with its bar has at most.
     """
     if math.isnan(value):
         return "–"
@@ -38,8 +44,8 @@ def by_bar(value: float, bar: float, relative: bool = True, bare: bool = False) 
         return f"≤ {_rounded_up(abs(value) + bar)[0]:g}"
     error, place = _rounded_up(bar)
     top = math.floor(math.log10(abs(value))) if value else place
-    place = max(place, top - (DIGITS_WITHOUT_BAR if bare else MAX_DIGITS) + 1)
-    error = max(error, 10.0**place)
+    place = max(place, top - (DIGITS_WITHOUT_BAR if bare else digits) + 1)
+    error = max(1, math.ceil(round(error / 10.0**place, 9))) * 10.0**place  # never shorter
     pair: tuple[float, ...] = (value,) if bare else (value, error)
     if MIN_DECIMAL <= abs(value) < MAX_DECIMAL or value == 0.0:
         return " ± ".join(f"{round(number, -place):.{max(0, -place)}f}" for number in pair)

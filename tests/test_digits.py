@@ -64,6 +64,8 @@ def test_the_bar_that_is_shown_is_never_shorter(exponent, bar):
 def test_no_more_digits_are_shown_than_double_precision_vouches_for():
     assert by_bar(math.pi, 1e-30) == "3.14159265359 ± 0.00000000001"
     assert by_bar(math.pi, 1e-9, bare=True) == "3.14159"
+    assert by_bar(1234.5678, 1.3, digits=4) == "1235 ± 2"  # 1.3 is not shown as 1
+    assert by_bar(82345678.9, 12340.0, digits=4) == "(8.235 ± 0.002)e+07"
 
 
 def test_what_is_known_is_larger_than_its_bar():

@@ -1,13 +1,15 @@
 """The first screen of a report: what was run, what failed, what changes most, and where from.
 
 A finding is a metric whose least and greatest value over the jobs differ by more than both error
-bars. Metrics are ranked by how many times the greatest is the least; each is told once.
+bars. Metrics are ranked by how many times the greatest is the least; each is told once. What an
+owner asks first stands there whether it changes or not: the force in a worn joint, and the reversal
+of the rod load.
 """
 
 import datetime
 import math
 import platform
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +20,7 @@ from markupsafe import Markup
 
 from compressor.analysis import SPOKEN, Claim
 from compressor.cases import MODEL, Case, CaseError
-from compressor.digits import is_known
+from compressor.digits import UNKNOWN, is_known
 from compressor.metrics import BARRED, JOINTS
 from compressor.program import PROGRAM, library_versions
 from compressor.report.figures.sweep_data import Measure, measures, name_in_words
@@ -199,8 +201,13 @@ def provenance_section(studies: Sequence[StoredStudy], results: Folder, command:
     return Section("provenance", "Where this comes from", "provenance.html", content)
 
 
-MAX_FINDINGS = 3
-FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning
+MAX_FINDINGS = 3  # besides those that always stand there
+FORCE = "peak_contact_force"
+ALWAYS = (FORCE, "rod_load_reversal_angle")
+LEFT_OUT = (
+    "rms_acceleration_deviation",  # 0 without clearance, by its meaning
+    "max_penetration",  # below 0 where a gap is left, above it where metal touches: no ratio
+)
 FROM_ZERO = 5.0  # rank of what appears: as of a value 150 times as large
 
 
@@ -208,7 +215,8 @@ FROM_ZERO = 5.0  # rank of what appears: as of a value 150 times as large
 class MetricChange:
     """What a metric does over jobs; `low` and `high` are numbers with bars and unit, or one is "".
 
-    `at_low`, `at_high`: of which jobs; `change`: the ratio in words.
+    `at_low`, `at_high`: of which jobs; `change`: the ratio in words; `always`: it stands on the
+    first screen whatever its rank is.
     """
 
     title: str
@@ -218,6 +226,7 @@ class MetricChange:
     at_high: str
     change: str
     rank: float
+    always: bool = False
 
 
 @dataclass(frozen=True)
@@ -255,14 +264,22 @@ def findings(jobs: Iterable[tuple[str, xr.Dataset]], units: Units = "usual") -> 
     known = list(dict.fromkeys(m for _, job in named for m in measures(job, units)))
     names = [name for name, _ in named]
     rows = [(m, *_columns(m, [job for _, job in named])) for m in known]
-    return rank_findings(rows, names)
+    return rank_findings(rows, names, {joint for _, job in named for joint in worn_joints(job)})
 
 
 def study_findings(data: xr.Dataset, units: Units = "usual") -> list[MetricChange]:
     """Return the metrics that change most over a study's jobs, as `open_study` gives it."""
     known = measures(data, units)
     rows = [(m, m.of(data).values.ravel(), m.bar(data).values.ravel()) for m in known]
-    return rank_findings(rows, Points(data))
+    return rank_findings(rows, Points(data), worn_joints(data))
+
+
+def worn_joints(data: xr.Dataset) -> set[str]:
+    """Return the joints that have clearance in any of the jobs."""
+    if "max_penetration" not in data:
+        return set()
+    depth = data["max_penetration"]  # exactly 0 in an ideal joint, nan of a job that failed
+    return {joint for joint in JOINTS if (abs(depth.sel(joint=joint)) > 0.0).any()}
 
 
 class Points(Sequence[str]):
@@ -317,17 +334,31 @@ def _columns(measure: Measure, jobs: Sequence[xr.Dataset]) -> tuple[np.ndarray, 
 
 
 def rank_findings(
-    rows: Iterable[tuple[Measure, np.ndarray, np.ndarray]], names: Sequence[str]
+    rows: Iterable[tuple[Measure, np.ndarray, np.ndarray]],
+    names: Sequence[str],
+    worn: Collection[str] = (),
 ) -> list[MetricChange]:
-    """Return the findings of measures over jobs, the greatest change first, one a metric."""
+    """Return the findings of measures over jobs, the greatest change first, one a metric.
+
+    worn: joints whose contact force is meant; where there is none, that of any.
+    """
     best: dict[str, MetricChange] = {}
     for measure, values, bars in rows:
-        if BARRED[measure.variable].counted or measure.variable in FROM_IDEAL:
+        if BARRED[measure.variable].counted or measure.variable in LEFT_OUT:
+            continue
+        if measure.variable == FORCE and worn and measure.joint not in worn:
             continue
         found = finding(measure, values, bars, names)
         if found and (measure.variable not in best or found.rank > best[measure.variable].rank):
             best[measure.variable] = found
-    return sorted(best.values(), key=lambda found: -found.rank)[:MAX_FINDINGS]
+    return choose_findings(sorted(best.values(), key=lambda found: -found.rank), MAX_FINDINGS)
+
+
+def choose_findings(ranked: Sequence[MetricChange], count: int) -> list[MetricChange]:
+    """Return the first findings, and beside this number those that always stand there, by rank."""
+    first = [found for found in ranked if not found.always][:count]
+    always = [found for found in ranked if found.always]
+    return sorted([*first, *always], key=lambda found: -found.rank)
 
 
 def finding(
@@ -336,16 +367,22 @@ def finding(
     """Return the change of a measure over jobs, where it is beyond its error bars.
 
     Jobs whose value is not known within its bar, such as a chaotic motion's peak, do not count.
+    What always stands on the first screen is returned also where it does not change. No ratio is
+    formed of a number that is below 0 in any job.
     """
+    always = measure.variable in ALWAYS
+    title = measure.title[0].upper() + measure.title[1:]
     relative = BARRED[measure.variable].bar.relative
     unbarred = np.isnan(bars)
     sure = [
         n
         for n, (value, bar) in enumerate(zip(values.tolist(), bars.tolist(), strict=True))
-        if value >= 0.0 and (unbarred[n] or is_known(value, bar, relative))
+        if not math.isnan(value) and (unbarred[n] or is_known(value, bar, relative))
     ]
     if not sure:
-        return None
+        if not always or np.isnan(values).all():
+            return None
+        return MetricChange(title, "", "", UNKNOWN, "", "within its error bar", 0.0, always)
     low, high = (pick(sure, key=lambda n: values[n]) for pick in (min, max))
 
     def text(n: int) -> str:
@@ -353,15 +390,17 @@ def finding(
             f"{format_briefly(measure, float(values[n]), float(bars[n]))} {measure.unit}".rstrip()
         )
 
-    title = measure.title[0].upper() + measure.title[1:]
     if len(values) == 1:
-        return MetricChange(title, "", "", text(high), "", "", 0.0)
-    if values[high] - values[low] <= np.nansum([bars[high], bars[low]]):
-        return None
-    ratio = values[high] / values[low] if values[low] > 0.0 else math.inf
-    rank = min(math.log(ratio), FROM_ZERO) if values[low] > 0.0 else FROM_ZERO
+        return MetricChange(title, "", "", text(high), "", "", 0.0, always)
+    least, most = float(values[low]), float(values[high])
+    if most - least <= np.nansum([bars[high], bars[low]]):
+        same = "the same in all jobs within its error bars"
+        return MetricChange(title, "", "", text(high), "", same, 0.0, always) if always else None
+    ratio = most / least if least * most > 0.0 else math.inf
+    rank = min(abs(math.log(ratio)), FROM_ZERO)
     change = f"{ratio:.3g} times" if ratio < 1e3 else "from nearly nothing"
-    return MetricChange(title, text(low), names[low], text(high), names[high], change, rank)
+    change = change if least >= 0.0 else ""
+    return MetricChange(title, text(low), names[low], text(high), names[high], change, rank, always)
 
 
 def round_robin(
@@ -369,15 +408,17 @@ def round_robin(
 ) -> Iterator[tuple[str, Sequence[MetricChange]]]:
     """Yield each name with its first findings, at most MAX_FINDINGS in all.
 
-    One finding of each is chosen in turn, so that no name crowds out another.
+    One finding of each is chosen in turn, so that no name crowds out another. What always stands
+    there does not count.
     """
     room = MAX_FINDINGS
     counts = [0] * len(each)
-    while room and any(n < len(found) for n, (_, found) in zip(counts, each, strict=True)):
-        for place, (_, found) in enumerate(each):
-            if room and counts[place] < len(found):
+    sizes = [sum(not one.always for one in found) for _, found in each]
+    while room and any(n < size for n, size in zip(counts, sizes, strict=True)):
+        for place, size in enumerate(sizes):
+            if room and counts[place] < size:
                 counts[place] += 1
                 room -= 1
     for count, (name, found) in zip(counts, each, strict=True):
-        if count:
-            yield name, found[:count]
+        if chosen := choose_findings(found, count):
+            yield name, chosen

@@ -82,12 +82,14 @@ def format_measure(measure: Measure, value: float, bar: float) -> str:
 
 
 SHORT_BAR = 5e-4  # of a number: its error bar is below its fourth digit
+BRIEF = 4  # digits
 
 
 def format_briefly(measure: Measure, value: float, bar: float) -> str:
     """Return a metric in four digits, with its error bar where these show it."""
-    is_fine = bar < SHORT_BAR * abs(value)
-    return number(value) if is_fine else format_measure(measure, value, bar)
+    if math.isnan(bar) or bar < SHORT_BAR * abs(value):
+        return number(float(f"{value:.{BRIEF}g}") if abs(value) >= 10.0**BRIEF else value)
+    return by_bar(value, bar, BARRED[measure.variable].bar.relative, digits=BRIEF)
 
 
 def measured_cell(measure: Measure, value: float, bar: float, limits: Limits = NO_LIMITS) -> Cell:

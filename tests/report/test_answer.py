@@ -12,13 +12,18 @@ from compressor.report.answer import (
     round_robin,
     study_findings,
     word_value,
+    worn_joints,
 )
 from compressor.report.figures.sweep_data import MEASURES
-from compressor.report.page import format_measure
+from compressor.report.page import format_briefly, format_measure
 
 PEAK = next(m for m in MEASURES if m.variable == "peak_acceleration")
 FORCE = next(m for m in MEASURES if m.variable == "peak_contact_force")
 LOSS = next(m for m in MEASURES if m.variable == "contact_loss_fraction")
+DEPTH = next(m for m in MEASURES if m.variable == "max_penetration")
+REVERSAL = next(m for m in MEASURES if m.variable == "rod_load_reversal_angle")
+TENSION = next(m for m in MEASURES if m.variable == "peak_rod_load_tension")
+SMALL_END = [m for m in MEASURES if m.variable == "peak_contact_force"][1]
 RATE = next(m for m in MEASURES if m.variable == "impacts_per_rev")
 NAMES = ["a", "b", "c"]
 
@@ -127,3 +132,71 @@ def test_three_findings_are_shared_among_studies():
     ]  # fmt: skip
     assert [(n, len(f)) for n, f in round_robin([("a", [one] * 5)])] == [("a", 3)]
     assert [*round_robin([("a", [])])] == []
+
+
+def test_what_always_stands_there_does_not_count_among_the_three():
+    def one(title, rank, always=False):
+        return MetricChange(title, "", "", "", "", "", rank, always)
+
+    grows = [one("p", 4), one("q", 3), one("r", 2), one("s", 1)]
+    always = [one("x", 2.5, True), one("y", 0, True)]
+    ((_, found),) = round_robin([("a", grows + always)])
+    assert "".join(one.title for one in found) == "pqxry"
+    both = [*round_robin([("a", grows + always), ("b", grows + always)])]
+    assert ["".join(one.title for one in found) for _, found in both] == ["pqxy", "pxy"]
+
+
+def test_the_worn_joint_s_force_and_the_reversal_stand_there_though_they_do_not_change():
+    steady, none = np.full(3, 150.0), np.zeros(3)
+    rows = [
+        (PEAK, np.array([100.0, 200.0, 300.0]), none),
+        (LOSS, np.array([0.0, 0.0, 5.0]), none),
+        (TENSION, np.array([1.0, 2.0, 9.0]), none),
+        (next(m for m in MEASURES if m.variable == "rms_acceleration"), np.array([1, 2, 9]), none),
+        (FORCE, np.array([1.0, 500.0, 900.0]), none),
+        (SMALL_END, np.array([80.0, 82.2, 81.0]), none),
+        (REVERSAL, steady, np.full(3, 0.1)),
+    ]
+    found = rank_findings(rows, NAMES, {"small_end"})
+    assert [one.title for one in found] == [
+        "Time without dry contact, big end", "Peak rod load, tension", "Rms acceleration",
+        "Peak contact force, small end", "Rod load reversal",
+    ]  # fmt: skip
+    assert found[-2].change == "1.03 times"
+    assert (found[-1].low, found[-1].high) == ("", "150.0 ± 0.1 °")
+    assert found[-1].change == "the same in all jobs within its error bars"
+    unknown = told(REVERSAL, steady, [np.inf] * 3)
+    assert (unknown.high, unknown.change) == ("unknown", "within its error bar")
+    assert told(REVERSAL, [np.nan] * 3, [np.nan] * 3) is None
+
+
+def test_joints_with_clearance_are_found_in_any_job(study):
+    assert worn_joints(study) == set()
+    depth = np.zeros((2, 3, 2))
+    depth[0, 0] = np.nan  # a job that failed
+    depth[1, 2, 1] = -3e-6  # a film bears: metal never touches
+    dims = (*study["status"].dims, "joint")
+    data = study.assign(max_penetration=(dims, depth)).assign_coords(joint=["big_end", "small_end"])
+    assert worn_joints(data) == {"small_end"}
+
+
+def test_no_ratio_is_formed_across_zero():
+    """Values below 0 were dropped without a word; a gap's penetration is one."""
+    found = told(TENSION, [-2.0, 4.0, 1.0], [0.1] * 3)
+    assert (found.low, found.at_low, found.high, found.at_high) == (
+        "-2.0 ± 0.1 kN", "a", "4.0 ± 0.1 kN", "b",
+    )  # fmt: skip
+    assert found.change == ""
+    below = told(TENSION, [-2.0, -4.0, -2.0], [0.1] * 3)
+    assert (below.at_low, below.at_high, below.change) == ("b", "a", "")
+    assert below.rank == pytest.approx(np.log(2.0))
+    assert rank_findings([(DEPTH, np.array([-30.0, 2.0, 8.0]), np.zeros(3))], NAMES) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "bar", "text"),
+    [(784.7, 1.3, "784.7 ± 1.3"), (1234.5678, 1.3, "1235 ± 2"), (12345.6, 0.1, "12350"),
+     (12345.6, 14.0, "12350 ± 20"), (82.2083, np.nan, "82.21"), (394.784, 0.0, "394.8")],
+)  # fmt: skip
+def test_the_first_screen_has_four_digits(value, bar, text):
+    assert format_briefly(PEAK, value, bar) == text
