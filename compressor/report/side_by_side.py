@@ -1,5 +1,6 @@
 """A study's machine without clearance beside its worn jobs, as numbers."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +10,8 @@ from compressor.analysis import healthy_twin
 from compressor.cases import Case, CaseError
 from compressor.digits import is_known
 from compressor.metrics import BARRED, JOINTS
-from compressor.report.answer import Points
-from compressor.report.figures.sweep_data import Measure, measures
+from compressor.report.answer import FORCE, Points
+from compressor.report.figures.sweep_data import MEASURES, Measure, measures, swept_values
 from compressor.report.page import (
     Cell,
     PageTable,
@@ -22,8 +23,9 @@ from compressor.report.page import (
 from compressor.store import Stored
 from compressor.units import Units
 
-MAX_WORN = 4  # jobs that stand beside the machine without clearance
-MAX_TRIED = 50  # jobs among which the loudest with clearance is looked for
+MAX_WORN = 5  # jobs that stand beside the machine without clearance
+MAX_TRIED = 50  # jobs among which the worst with clearance is looked for
+SENSOR = "sensor_peak"
 FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning
 
 
@@ -38,46 +40,79 @@ class HealthyAndWorn:
 def compare_healthy(
     stored: Stored, data: xr.Dataset, units: Units = "usual"
 ) -> HealthyAndWorn | None:
-    """Return the worn job of the greatest rms acceleration beside its machine without clearance.
+    """Return the worn job of the greatest contact force beside its machine without clearance.
 
-    And jobs of the study that differ from it in clearances alone. None where no job that is ok has
-    clearance, this version knows the case of none, or the machine without clearance fails. data: of
-    `open_study`.
+    And jobs of the study that differ from it in clearances alone, by clearance. None where no job
+    that is ok has clearance, this version knows the case of none, or the machine without clearance
+    fails. data: of `open_study`.
     """
-    if "rms_acceleration" not in data:
+    if "max_penetration" not in data:
         return None
-    rms = data["rms_acceleration"].values.ravel()
-    is_ok = (data["status"].values.ravel() == "ok") & np.isfinite(rms)
-    ranked = np.argsort(np.where(is_ok, -rms, np.inf), kind="stable")[: min(is_ok.sum(), MAX_TRIED)]
+    is_worn = abs(data["max_penetration"]) > 0.0  # exactly 0 in an ideal joint
+    has_clearance = (is_worn.any("joint") & (data["status"] == "ok")).values.ravel()
+    force = np.full(has_clearance.size, np.nan)
+    for measure in MEASURES:
+        if measure.variable == FORCE and FORCE in data:
+            worn = is_worn.sel(joint=measure.joint).values.ravel()
+            force = np.fmax(force, np.where(worn, known_values(measure, data), np.nan))
+    jobs = np.flatnonzero(has_clearance)
+    ranked = jobs[np.argsort(-force[jobs], kind="stable")]  # what is not known comes last
     keys = data["key"].values.ravel()
-    for place in ranked.tolist():
-        case = case_at(stored, str(keys[place]))
-        if case and case.joint != "none":
-            others = [n for n in differing_in_clearance(data, place) if is_ok[n] and n != place]
-            chosen = others[:: max(1, -(-len(others) // (MAX_WORN - 1)))]
-            places = sorted([place, *chosen], key=lambda n: rms[n])
-            return _compare(stored, data, case, places, units)
+    for place in ranked[:MAX_TRIED].tolist():
+        if case := case_at(stored, str(keys[place])):
+            alike = [n for n in differing_in_clearance(data, place) if has_clearance[n]]
+            greatest = {"contact force in a worn joint": place} if force[place] > 0.0 else {}
+            for measure in MEASURES:
+                if measure.variable == SENSOR and SENSOR in data:
+                    peaks = known_values(measure, data)[alike]
+                    if np.isfinite(peaks).any():
+                        greatest["sensor peak"] = alike[int(np.nanargmax(peaks))]
+            places = choose_jobs(alike, [place, *greatest.values()])
+            return _compare(stored, data, case, places, greatest, units)
     return None
 
 
+def known_values(measure: Measure, data: xr.Dataset) -> np.ndarray:
+    """Return a measure of a study's jobs in a row, nan where its error bar is as long as it."""
+    values, bars = measure.of(data), measure.bar(data)
+    return values.where(bars.isnull() | (bars < values)).values.ravel()
+
+
 def differing_in_clearance(data: xr.Dataset, place: int) -> list[int]:
-    """Return the jobs of a grid that differ from one in their clearances alone, by number."""
-    status = data["status"]
-    at = np.unravel_index(place, status.shape)
-    numbers = np.arange(status.size).reshape(status.shape)
-    free = [str(data[dim].attrs.get("case_key", "")) if dim in data.coords else ""
-            for dim in status.dims]  # fmt: skip
-    index = tuple(
-        slice(None) if key.startswith("clearance_mm") else n
-        for key, n in zip(free, at, strict=True)
-    )
-    return np.atleast_1d(numbers[index]).ravel().tolist()
+    """Return the jobs of a study that differ from one in clearances alone, from the least on."""
+    alike = np.ones(data["status"].size, bool)
+    clearances = []
+    for name, values in swept_values(data).items():
+        if str(data[name].attrs.get("case_key", name)).startswith("clearance_mm"):
+            clearances.append(np.nan_to_num(values))
+        else:
+            is_none = values != values  # nan
+            alike &= (values == values[place]) | (is_none & is_none[place])
+    jobs = np.flatnonzero(alike).tolist()
+    return sorted(jobs, key=lambda n: [values[n] for values in clearances])
+
+
+def choose_jobs(jobs: Sequence[int], needed: Sequence[int]) -> list[int]:
+    """Return the first, the last and the needed jobs, and others between, MAX_WORN in all."""
+    chosen = {jobs[0], jobs[-1], *needed}
+    rest = [job for job in jobs if job not in chosen]
+    if room := max(0, MAX_WORN - len(chosen)):
+        chosen.update(rest[len(rest) // (2 * room) :: max(1, len(rest) // room)][:room])
+    return [job for job in jobs if job in chosen]
 
 
 def _compare(
-    stored: Stored, data: xr.Dataset, case: Case, places: list[int], units: Units
+    stored: Stored,
+    data: xr.Dataset,
+    case: Case,
+    places: list[int],
+    greatest: Mapping[str, int],
+    units: Units,
 ) -> HealthyAndWorn | None:
-    """Return the table: a row a metric, a column without clearance and one a job."""
+    """Return the table: a row a metric, a column without clearance and one a job.
+
+    greatest: jobs by what is greatest in them, in words.
+    """
     healthy = healthy_twin(xr.Dataset(attrs=case.attributes()), sensed=True)
     if healthy["status"].item() != "ok":
         return None
@@ -95,11 +130,19 @@ def _compare(
         rows.append(TableRow(cells))
     keys = data["key"].values.ravel()
     heads = [(names[n] or "this job") + describe_health(stored, str(keys[n])) for n in places]
-    beside = "jobs that differ from it in clearances alone" if len(places) > 1 else "this job"
+    beside = "this job"
+    if len(places) > 1:
+        worst = "".join(f", of the greatest {what} ({names[n]})" for what, n in greatest.items())
+        beside = (
+            "jobs that differ in clearances alone, in their order: that of the least and of the "
+            f"greatest clearance{worst}"
+        )
+        if {*places} - {places[0], places[-1], *greatest.values()}:
+            beside += ", and others between"
     words = (
-        f"The machine without clearance, by the same model, beside {beside}; in parentheses: how "
-        "many times as much. The job on the right has the greatest rms acceleration of those with "
-        "clearance."
+        "The machine without clearance, by the same model: its joints are ideal, also without oil "
+        "film. A sound bearing has some clearance; jobs that count as healthy are marked so. "
+        f"Beside it {beside}. In parentheses: how many times as much as without clearance."
     )
     return HealthyAndWorn(words, PageTable(["metric", "without clearance", *heads], rows))
 

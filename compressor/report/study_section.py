@@ -10,7 +10,7 @@ import xarray as xr
 
 from compressor.outcome import Regime, regime_words
 from compressor.reasons import remedy
-from compressor.report.figures.sweep_data import measures
+from compressor.report.figures.sweep_data import measures, swept_values
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.report.page import (
     Cell,
@@ -216,13 +216,3 @@ def jobs_table(data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usu
 def ravel_jobs(values: xr.DataArray) -> np.ndarray:
     """Return a study's values in a row, a job after the other."""
     return values.values.ravel()
-
-
-def swept_values(data: xr.Dataset) -> dict[str, np.ndarray]:
-    """Return the swept values of a study's jobs, in the order of its `status`, by coordinate."""
-    status = data["status"]
-    names = [str(n) for n, c in data.coords.items() if {*c.dims} <= {*status.dims} and n != "key"]
-    return {
-        name: data[name].broadcast_like(status).transpose(*status.dims).values.ravel()
-        for name in names
-    }

@@ -105,6 +105,16 @@ def swept_axes(study: xr.Dataset) -> list[str]:
     return [name for name in columns if len({*study[name].dropna("job").values.tolist()}) > 1]
 
 
+def swept_values(data: xr.Dataset) -> dict[str, np.ndarray]:
+    """Return the swept values of a study's jobs, in the order of its `status`, by coordinate."""
+    status = data["status"]
+    names = [str(n) for n, c in data.coords.items() if {*c.dims} <= {*status.dims} and n != "key"]
+    return {
+        name: data[name].broadcast_like(status).transpose(*status.dims).values.ravel()
+        for name in names
+    }
+
+
 def positions(data: xr.Dataset, axis: str) -> np.ndarray:
     """Return the positions of an axis' values along it.
 

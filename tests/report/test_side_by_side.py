@@ -1,0 +1,151 @@
+"""A machine without clearance beside its worn jobs: which jobs stand there, and their numbers."""
+
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import store
+
+from compressor.cases.load import load_cases
+from compressor.physics import exact_motion
+from compressor.report import plots, side_by_side
+from compressor.report.figures.job import NAMES
+from compressor.report.plots import page_figures
+from compressor.report.side_by_side import (
+    MAX_WORN,
+    choose_jobs,
+    compare_healthy,
+    differing_in_clearance,
+)
+from compressor.store.reader import open_study, read_store
+from compressor.store.studies import read_studies
+
+CLEARANCES = (0.3, 0.05, 0.1, 0.2, 0.4, 0.15, 0.25, 0.35)  # as the case file has them
+
+
+@pytest.fixture(scope="module")
+def swept(once):
+    """A folder with a small study of clearances, none in order, with a sensor."""
+
+    def make(folder):
+        folder.mkdir(exist_ok=True)
+        file = folder / "own.yaml"
+        file.write_text(
+            f"joint: big_end\nclearance_mm: {[*CLEARANCES]}\nhealthy_clearance_mm: 0.1\n"
+            "body: true\nsensor: true\nsolve: {duration_rev: 1.5, settle_rev: 0.5, "
+            "accuracy: draft, error_bars: false}\n"
+        )
+        store(folder, file)
+
+    return once("side-by-side", make)
+
+
+@pytest.fixture
+def study(swept):
+    return read_store(swept), open_study(swept).load()
+
+
+def shown(found):
+    """The clearances at the head of the columns."""
+    head = found.table.head
+    assert head[:2] == ["metric", "without clearance"]
+    return [float(re.match(r"clearance (\S+) mm", text)[1]) for text in head[2:]]
+
+
+def test_the_column_without_clearance_is_the_closed_form(swept, study):
+    found = compare_healthy(*study)
+    numbers = {row.cells[0].text: row.cells for row in found.table.rows}
+    case = load_cases(swept / "own.yaml")[0]
+    lengths = (case.machine.crank_radius_mm / 1e3, case.machine.rod_length_mm / 1e3)
+    _, _, a = exact_motion(np.linspace(0.0, 2.0 * np.pi, 36_001), *lengths, case.omega)
+    for name, value in (("peak", np.abs(a).max()), ("rms", np.sqrt(np.mean(a[1:] ** 2)))):
+        sound, *worn = numbers[f"{name} acceleration (m/s²)"][1:]
+        assert sound.value == pytest.approx(value, rel=1e-4)
+        for clearance, cell in zip(shown(found), worn, strict=True):
+            own = float(study[1][f"{name}_acceleration"].sel(clearance_mm=clearance))
+            assert cell.value == pytest.approx(own)
+            assert float(re.search(r"\((\S+)×\)", cell.text)[1]) == pytest.approx(
+                own / value, abs=0.006
+            )
+
+
+@pytest.mark.parametrize("worst", CLEARANCES)
+def test_the_worst_jobs_stand_there_in_the_order_of_clearance(study, worst):
+    """Columns stood by rms acceleration, and every third job was taken."""
+    stored, data = study
+    loudest = 0.45 - worst
+    loudest = min(CLEARANCES, key=lambda c: abs(c - loudest))
+    for name, at in (("peak_contact_force", worst), ("sensor_peak", loudest)):
+        factor = np.where(data["clearance_mm"] == at, 1e3, 1.0)
+        data[name] = data[name] * factor.reshape(-1, *[1] * (data[name].ndim - 1))
+    found = compare_healthy(stored, data)
+    columns = shown(found)
+    assert columns == sorted(columns)
+    assert len(columns) == MAX_WORN
+    assert {min(CLEARANCES), max(CLEARANCES), worst, loudest} <= {*columns}
+    assert f"of the greatest contact force in a worn joint (clearance {worst:g} mm)" in found.words
+    assert f"of the greatest sensor peak (clearance {loudest:g} mm)" in found.words
+    healthy = [text.endswith("(counts as healthy)") for text in found.table.head[2:]]
+    assert healthy == [size <= 0.1 for size in columns]
+
+
+def test_a_peak_that_is_not_known_makes_no_job_the_worst(study):
+    stored, data = study
+    for name in ("peak_contact_force", "sensor_peak"):
+        data[f"{name}_error"] = data[name] * 0.0
+    data["peak_contact_force_error"][{"clearance_mm": slice(None)}] = np.inf
+    found = compare_healthy(stored, data)
+    assert "contact force" not in found.words
+    assert "sensor peak" in found.words
+    assert len(shown(found)) == MAX_WORN
+
+
+@pytest.mark.parametrize(
+    ("count", "needed", "chosen"),
+    [(1, [0], [0]), (3, [1], [0, 1, 2]), (9, [8], [0, 2, 4, 6, 8]), (9, [3, 7], [0, 3, 4, 7, 8]),
+     (20, [19], [0, 4, 10, 16, 19])],
+)  # fmt: skip
+def test_jobs_between_are_spread(count, needed, chosen):
+    assert choose_jobs(range(count), needed) == chosen
+
+
+def test_jobs_of_a_list_differ_in_clearances_alone(study):
+    """As of two clearances that advance together; a job may lack a key that others have."""
+    _, data = study
+    listed = data.reset_index("clearance_mm").rename_dims(clearance_mm="job")
+    assert differing_in_clearance(listed, 0) == list(np.argsort(CLEARANCES))
+    mass = [3.0, 3.0, 5.0, 3.0, np.nan, np.nan, 3.0, 3.0]
+    listed = listed.assign_coords(rod_mass_kg=("job", mass))
+    assert differing_in_clearance(listed, 0) == [1, 3, 6, 0, 7]
+    assert differing_in_clearance(listed, 4) == [5, 4]
+
+
+def test_a_job_by_itself_and_one_without_clearance(study):
+    stored, data = study
+    one = compare_healthy(stored, data.isel(clearance_mm=[0]))
+    assert one.table.head == ["metric", "without clearance", "this job"]
+    assert "Beside it this job." in one.words
+    assert compare_healthy(stored, data.assign(max_penetration=data["max_penetration"] * 0)) is None
+
+
+def failing_twin(run, sensed=False):
+    """A `healthy_twin` whose run fails, as one that is simulated may: it has no series."""
+    return xr.Dataset({"status": "failed", "reason": "non_finite"}, attrs=run.attrs)
+
+
+def test_a_twin_that_fails_stands_nowhere(swept, study, monkeypatch):
+    """The job is drawn alone."""
+    (stored, data), (own,) = study, read_studies(swept)
+    drawn = {name: drawing for name, _, _, drawing in page_figures(stored, own)}
+    monkeypatch.setattr(side_by_side, "healthy_twin", failing_twin)
+    monkeypatch.setattr(plots, "healthy_twin", failing_twin)
+    assert compare_healthy(stored, data) is None
+    alone = {name: drawing for name, _, _, drawing in page_figures(stored, own)}
+    assert [*alone] == [*drawn]
+    names = [
+        {trace.name for panel in figures["analyst"].panels for trace in panel.traces}
+        for figures in (drawn, alone)
+    ]
+    assert names[0] - names[1] == {NAMES["twin"]}
+    assert NAMES["this"] in names[1]
