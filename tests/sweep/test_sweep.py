@@ -1,9 +1,9 @@
 """Sweeps: only what is missing runs, and no failure of a job, or of us, costs another job."""
 
 import json
-import math
 import os
 import re
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -199,23 +199,38 @@ def test_a_run_that_keeps_less_takes_no_series_away(studies, tmp_path, monkeypat
     assert sweep(shared, tmp_path / "out", 1).run_now == 0
 
 
-def test_an_exception_is_a_failed_job_with_its_traceback(studies, tmp_path, monkeypatch):
-    def breaking(place, case, real=SWEEP.run_job):
-        return real(place, case) if case.load != "none" else {}["the bug"]
+HARM = {  # by load and rod mass: what the job does, its reason, its detail
+    ("none", 4): (lambda: {}["the bug"], "internal_error", "KeyError: 'the bug'"),
+    ("none", 5): (lambda: os.kill(os.getpid(), signal.SIGSEGV), "worker_died", ".*SIGSEGV.*"),
+    ("spring", 4): (lambda: bytearray(10**15), "out_of_memory", "needs more .* ran again alone"),
+}
 
-    monkeypatch.setattr(SWEEP, "run_job", breaking)
-    made = studies(one={"load": ["none", "spring"]})
+
+def test_jobs_that_do_harm_are_failed_jobs(studies, tmp_path, monkeypatch):
+    """Each in its place, an exception with its traceback; none is tried again."""
+
+    def harmful(place, case, real=SWEEP.run_job):
+        if harm := HARM.get((case.load, case.machine.rod_mass_kg)):
+            harm[0]()
+        return real(place, case)
+
+    monkeypatch.setattr(SWEEP, "run_job", harmful)
+    made = studies(one={"load": ["none", "spring"], "machine": {"rod_mass_kg": [4, 5]}})
     summary = sweep(made, tmp_path / "out", 1)
-    assert statuses(tmp_path / "out", made[0]) == ["failed", "ok"]
-    (failure,) = summary.failed
-    assert (failure.reason, failure.detail) == ("internal_error", "KeyError: 'the bug'")
-    job = store.read_job(tmp_path / "out", failure.key)
-    assert "in breaking" in job.attrs["traceback"]
-    assert Case.from_attribute(job.attrs["case"]).key == failure.key
+    assert statuses(tmp_path / "out", made[0]) == ["failed"] * 3 + ["ok"]
+    assert [tuple(failure.coordinates.values()) for failure in summary.failed] == [*HARM]
+    for failure, (_, reason, detail) in zip(summary.failed, HARM.values(), strict=True):
+        assert failure.reason == reason
+        assert re.fullmatch(detail, failure.detail)
+        job = store.read_job(tmp_path / "out", failure.key)
+        assert job.attrs["detail"] == failure.detail
+        assert ("in harmful" in job.attrs.get("traceback", "")) == (reason == "internal_error")
+        assert Case.from_attribute(job.attrs["case"]).key == failure.key
     assert sweep(made, tmp_path / "out", 1).run_now == 0
     found = store.open_study(tmp_path / "out")
-    assert found.reason.values.tolist() == ["internal_error", ""]
-    assert math.isnan(found.peak_acceleration.sel(load="none"))
+    reasons = [reason for _, reason, _ in HARM.values()]
+    assert found.reason.values.ravel().tolist() == [*reasons, ""]
+    assert np.isnan(found.peak_acceleration).values.ravel().tolist() == [True] * 3 + [False]
 
 
 def test_a_job_that_ran_out_of_time_is_tried_again(studies, tmp_path, in_process):
