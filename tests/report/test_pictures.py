@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import threading
+from functools import cache
 
 import numpy as np
 import pytest
@@ -51,24 +52,23 @@ def alone(figures):
     return {f"{n}.{kind}": render(figures[n], kind) for n in NAMES for kind in ("png", "svg")}
 
 
-@pytest.fixture(scope="module")
-def other_process():
-    """What a process without threads said of these tests; None where this one has none."""
-    if threading.active_count() == 1 or OTHER in os.environ:
-        return None
+@cache
+def run_alone():
+    """How the tests that need a process without threads end in one, which is started once."""
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", __file__]
-    command += ["-m", "usefixtures"]  # those that need it
+    command += ["-m", "usefixtures"]
     return subprocess.run(command, capture_output=True, text=True, env=os.environ | {OTHER: "1"})
 
 
 @pytest.fixture
-def threadless(other_process):
-    """No thread in this process; where other tests have left some, a process without runs them."""
-    if other_process is None:
+def threadless():
+    """No thread in this process; where another test has left one, a process without runs them."""
+    if OTHER in os.environ:
         assert threading.active_count() == 1
-        return
-    assert other_process.returncode == 0, other_process.stdout
-    pytest.skip("passed in a process without threads")
+    elif threading.active_count() > 1:
+        done = run_alone()
+        assert done.returncode == 0, done.stdout
+        pytest.skip("passed in a process without threads")
 
 
 @pytest.mark.usefixtures("threadless")
