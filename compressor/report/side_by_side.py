@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import healthy_twin
-from compressor.cases import Case, CaseError
+from compressor.cases import Case, CaseError, stands_for
 from compressor.digits import is_known
 from compressor.metrics import BARRED, JOINTS
 from compressor.report.answer import FORCE, Points
@@ -24,6 +24,7 @@ from compressor.store import Stored
 from compressor.units import Units
 
 MAX_WORN = 5  # jobs that stand beside the machine without clearance
+CLEARANCES = {"clearance_mm", *stands_for("clearance_mm")}
 MAX_TRIED = 50  # jobs among which the worst with clearance is looked for
 SENSOR = "sensor_peak"
 FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning
@@ -83,7 +84,7 @@ def differing_in_clearance(data: xr.Dataset, place: int) -> list[int]:
     alike = np.ones(data["status"].size, bool)
     clearances = []
     for name, values in swept_values(data).items():
-        if str(data[name].attrs.get("case_key", name)).startswith("clearance_mm"):
+        if data[name].attrs.get("case_key", name) in CLEARANCES:
             clearances.append(np.nan_to_num(values))
         else:
             is_none = values != values  # nan

@@ -371,7 +371,7 @@ def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, capsys):
     )
     assert cli.main(["explain", "two.yaml", "-j", "1"]) == 0
     out, err = capsys.readouterr()
-    assert out.startswith("two: 2 jobs; explained: clearance_mm = 0.2\n  scene       clearance at ")
+    assert out.startswith("two: 2 jobs; explained: clearance_mm = 0.2\n  motion      clearance at ")
     for word in ("active", "absent", "scales", "tolerance", "cost", "without"):
         assert re.search(rf"^  {word} ", out, re.MULTILINE), word
     assert "2 degrees of freedom\n" in out
