@@ -781,19 +781,11 @@ def alarm_sentences(found):
     small = peaks["clearances"]["small_end"], peaks["worn"]["small_end"]
     worn = ", ".join(f"{peak:g} at {one:g} mm" for one, peak in zip(*small, strict=True))
     yield (f"The median peak of the record is {peaks['sound']:g} m/s² of a sound machine, and of a "
-           f"worn small end {worn}: it knocks from one clearance to the next.")  # fmt: skip
+           f"worn small end {worn}.")  # fmt: skip
     first, second = peaks["greatest"]
-    yield (f"One sound draw peaks at {first:g} times that of a sound machine, the next at "
-           f"{second:g} times.")  # fmt: skip
-    low, high = next(
-        row["limits"]
-        for row in found["rows"]
-        if (row["alarm"], row["filter"], row["noise"]) == ("peak", "record", 0.0)
-    )
-    yield (f"It sets the limits for {found['attainable']:.0%}, but for that of its own fold: those "
-           f"of the record's peak go from {low:g} to {high:g} times what is usual. Worn draws are "
-           "judged by the limit that all sound draws set, with the loud one. Intervals are for "
-           "limits as they were set, without this scatter.")  # fmt: skip
+    yield (f"The two loudest sound draws peak at {first:g} and {second:g} times that of a sound "
+           "machine. Worn draws are judged by the limit that all sound draws set. Intervals are "
+           "for limits as they were set, without their scatter.")  # fmt: skip
     loose = [
         next(r for r in found["at_looser"] if r["joint"] == joint)
         for joint in ("small_end", "big_end")
@@ -1136,9 +1128,9 @@ def identify_words():
 
 
 def nameplate_films():
-    """Rows of the file of `compsim init machine` by the share in which the oil bears no more."""
+    """Rows of the file of `compsim init machine` by the share in which the film gets no thinner."""
     found = kept("nameplate.json")
-    return {0.1: found["rows"]} | {one["last_share"]: one["rows"] for one in found["films"]}
+    return {0.02: found["rows"]} | {one["last_share"]: one["rows"] for one in found["films"]}
 
 
 def nameplate_table():
@@ -1169,21 +1161,17 @@ def peak_or_none(value, unit):
 
 
 def film_words():
-    """What the share decides: where impacts begin, and how hard they are."""
-    films = nameplate_films()
-    first = [
-        next((f"{row['clearance_mm']:g}" for row in rows if row["impacts_per_rev"] > 0), "never")
-        for rows in films.values()
-    ]
-    worst = [max(row["peak_contact_force"] for row in rows) / 1e3 for rows in films.values()]
-    reversals = [
-        math.degrees(row["rod_load_reversal_angle"]) for rows in films.values() for row in rows
-    ]
-    shares = ", ".join(f"{share:g}" for share in films)
+    """How far the assumed share moves the answer: the spread of forces and of the sensor."""
+    every = [*zip(*nameplate_films().values(), strict=True)]
+
+    def spread(name):
+        ratios = [max(one[name] for one in each) / min(one[name] for one in each) for each in every]
+        return max(ratios), every[ratios.index(max(ratios))][0]["clearance_mm"]
+
+    (force, at), (sensor, loudest) = spread("peak_contact_force"), spread("sensor_rms")
     return (
-        f"With `lubricant.last_share` {shares} the pin strikes from {', '.join(first)} mm on, and "
-        f"the greatest force is {', '.join(f'{value:.3g}' for value in worst)} kN. The rod load's "
-        f"reversal lies between {min(reversals):.0f}° and {max(reversals):.0f}° whatever it is.\n"
+        f"Between the three shares the peak force differs by {100 * (force - 1):.2g} % at most (at "
+        f"{at:g} mm), and the sensor's rms by a factor of {sensor:.2g} (at {loudest:g} mm).\n"
     )
 
 
@@ -1196,9 +1184,8 @@ def oil_words():
         for name, row in oils.items()
     }  # fmt: skip
     return (
-        f"With a clearance of 0.2 mm at the small end, the peak force on it is {forces['file']} "
-        f"with the `last_share` of the file, 0.1, and {forces['default']} with the default of "
-        f"0.02. Without oil it is {forces['dry']}.\n"
+        f"With a clearance of 0.2 mm at the small end, the peak force on it is {forces['file']}. "
+        f"Without oil it is {forces['dry']}.\n"
     )
 
 

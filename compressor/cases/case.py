@@ -44,7 +44,7 @@ from compressor.cases.yaml_reader import resolve_scalar
 from compressor.metrics import JOINTS
 
 MODEL_VERSION = "2"  # part of a job's key: see `compressor.cases.case`
-REVISION = 2
+REVISION = 3
 MODEL = f"{MODEL_VERSION}.{REVISION}"  # which results are stored with
 # what the text of a case holds if it may be one of `CHANGES`: quick to search a store for
 SUSPECT = re.compile(rb'"(drive|lubricant|rod|guide|body)\\?": |lugre|"signals\\?": true')
@@ -99,6 +99,7 @@ CHANGES = (
         and _rubs_on_the_pin(values),
     ),
     Revision(2, "tacho of a sensor's record", _records_between_dead_centres),
+    Revision(3, "oil film", lambda values: "lubricant" in values and values["joint"] != "none"),
 )  # fmt: skip
 
 
@@ -109,7 +110,8 @@ def changes_since(model: str, values: Mapping[str, Any]) -> list[str]:
     nested as by `Case.values`.
     """
     revision = int(model.partition(".")[2] or 0)
-    return [one.what for one in CHANGES if revision < one.revision and one.affects(values)]
+    found = [one.what for one in CHANGES if revision < one.revision and one.affects(values)]
+    return list(dict.fromkeys(found))
 
 
 def model_of(values: Mapping[str, Any]) -> str:

@@ -56,7 +56,7 @@ class Lubricant:
         "",
         (0.001, 0.5),
         "ours",
-        "of the clearance, in which the film bears no more",
+        "of the clearance, in which the film gets no thinner",
         judged=(0.01, 0.1),
     )
     small_end_bearing_length_mm: float | None = parameter(

@@ -25,10 +25,12 @@ only turns, or is only squeezed, the numbers are exact.
 
 Below `CENTRE_ECCENTRICITY` the numbers go to those that make the centre smooth: a force against
 the velocity.
-In the film's last share the numbers stay what they are where it begins: the film bears no more.
-Beyond the wall, as deep as that share is wide, it fades, and the dry contact is left alone: the
-transition of Flores, Ambrosio, Claro and Lankarani (Proc. IMechE K 218, 2004), whose dry force also
-grows over it.
+In the film's last share the numbers stay what they are where it begins, as if the film could get
+no thinner than half of it, the height of the surfaces' asperities. Beyond the wall dry contact adds
+to it (mixed lubrication), so that the force never falls with depth, and as the share goes to 0 the
+motion goes to that of Reynolds' film. Where the film faded beyond the wall instead (Flores,
+Ambrosio, Claro and Lankarani, Proc. IMechE K 218, 2004), a journal fell through before dry contact
+bore its load, and struck: how hard, followed from the share.
 """
 
 import math
@@ -159,16 +161,13 @@ def film(joint, eccentricity, spins, p):
     ex, ey, ex_rate, ey_rate = eccentricity
     pin, clearance, constants = p.pin_radius[joint], p.clearance[joint], p.film_constants[joint]
     distance = math.sqrt(ex * ex + ey * ey)
-    fade = 1.0 - rise((distance / clearance - 1.0) / p.film_share)
-    if fade == 0.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
     nx, ny = (ex / distance, ey / distance) if distance > 0.0 else (1.0, 0.0)
     radial, across = ex_rate * nx + ey_rate * ny, ey_rate * nx - ex_rate * ny
     eps = bounded_eccentricity(distance / clearance, p.film_share)
     length = p.film_length[joint]
     ratio = 0.5 * length / pin
     relative = clearance / pin
-    size = fade * 2.0 * length * pin * p.viscosity / (relative * relative)
+    size = 2.0 * length * pin * p.viscosity / (relative * relative)
     journal_spin, bore_spin = spins
     per_distance = eps / distance if distance > 0.0 else 1.0 / clearance
     wedge = eps * (journal_spin + bore_spin) - 2.0 * across * per_distance  # eps w
@@ -187,7 +186,7 @@ def film(joint, eccentricity, spins, p):
     normal -= 0.5 * (pressed + pulled) * closing + 0.5 * (pressed - pulled) * pressing
     side = rotation * wedge * math.sin(beta)
     fx, fy = normal * nx - side * ny, normal * ny + side * nx
-    shear = fade * 2.0 * math.pi * p.viscosity * length * pin**3
+    shear = 2.0 * math.pi * p.viscosity * length * pin**3
     shear *= (journal_spin - bore_spin) / (clearance * math.sqrt(1.0 - eps * eps))
     half = 0.5 * distance * side
     lost = shear * (journal_spin - bore_spin) + half * (journal_spin + bore_spin)

@@ -1,7 +1,7 @@
 """The section of a report about a user's own study: its failures, its table and its figures."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -110,7 +110,7 @@ def study_sections(
         case_file=study.case_file,
         counts=job_counts(data).text,
         chaotic=int((data["regime"].values == Regime.CHAOTIC).sum()),
-        caveats=[*study_caveats(stored.rows, study), *oil_caveats(study)],
+        caveats=study_caveats(stored.rows, study),
         failures=failed_jobs(stored, data),
         remedies=[f"{reason}: {remedy(reason)}" for reason in reasons],
         plates=plates,
@@ -133,19 +133,6 @@ def study_sections(
         Section(file_name("study", study.name), f"Study {study.name}", "study.html", content),
         Section(anchor, f"Jobs of study {study.name}", "jobs.html", table),
     )
-
-
-def oil_caveats(study: StoredStudy) -> list[str]:
-    """Return what decides the peak forces of joints with oil; [] where it is swept, or without."""
-    key, oil = "lubricant.last_share", study.fixed.get("lubricant")
-    if not isinstance(oil, Mapping) or key in {axis.key for axis in study.axes}:
-        return []
-    return [
-        f"{key} is {oil['last_share']:g}: in this share of the clearance the oil film bears no "
-        "more. It is an assumption, and decides at which clearance metal strikes, and how hard: "
-        "forces and vibration may change by a multiple. Run other values beside it, from 0.01 to "
-        "0.1, before you use a peak or a trend"
-    ]
 
 
 def table_anchor(study: str) -> str:

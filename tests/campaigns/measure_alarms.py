@@ -37,7 +37,7 @@ HEALTHY = {"big_end": 0.12, "small_end": 0.1}
 SOUND_PINS = {"big_end": [0.08, 0.12], "small_end": [0.06, 0.1]}
 WORN = {
     "big_end": [0.15, 0.2, 0.25, 0.3, 0.4],
-    "small_end": [0.11, 0.12, 0.15, 0.2, 0.4],
+    "small_end": [0.15, 0.2, 0.25, 0.3, 0.4],
 }  # fmt: skip
 DRAWN = {  # about the nameplate: speed by 5 %, pressure by 10 %, oil by 20 %
     "machine": {"speed_rpm": [703, 777]},

@@ -13,7 +13,6 @@ FLORES = {"law": "flores", "restitution": 0.5}
     ("values", "what"),
     [
         ({"drive": True}, "times, torques and forces of a drive"),
-        (RUBS | {"lubricant": True}, "oil film"),
         ({"rod": True}, "losses of an elastic rod"),
         ({"guide": {"clearance_mm": 0.1}, **RUBS, "contact": FLORES},
          "damping of the crosshead in its guide"),
@@ -32,12 +31,20 @@ def test_results_of_model_2_are_other_ones_now(values, what):
     assert SUSPECT.search(case.attributes()["case"].encode())
 
 
+def test_oil_films_are_other_ones_since_2_and_since_2_2():
+    case = Case.from_values(RUBS | {"lubricant": True})
+    assert [changes_since(model, case.values()) for model in ("2", "2.2")] == [["oil film"]] * 2
+    assert changes_since(MODEL, case.values()) == []
+    assert model_of(case.values()) == MODEL
+    assert SUSPECT.search(case.attributes()["case"].encode())
+
+
 def test_the_tacho_between_dead_centres_is_another_one_since_2_1():
     solve = {"duration_rev": 6.5, "settle_rev": 1.5}
     case = Case.from_values({"body": True, "sensor": True, "solve": solve})
     assert changes_since("2.1", case.values()) == ["tacho of a sensor's record"]
     assert changes_since(MODEL, case.values()) == []
-    assert model_of(case.values()) == MODEL
+    assert model_of(case.values()) == "2.2"
     assert SUSPECT.search(case.attributes()["case"].encode())
 
 

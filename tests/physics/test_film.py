@@ -147,36 +147,36 @@ def test_forces_are_smooth_in_the_place(begin, end):
     assert worst < 0.02 * np.abs(slopes).max()
 
 
-def test_in_its_last_share_the_film_bears_no_more():
+def test_in_its_last_share_the_film_gets_no_thinner():
     """Its force on the wall is that of the middle of the share."""
     at_wall = force((CLEARANCE, 0.0))
     exact = unit_force() * SPEED * 0.99 * math.hypot(*reynolds(0.99, 1.0))
     assert math.hypot(*at_wall[:2]) == pytest.approx(exact, rel=5e-3)
 
 
-def test_beyond_the_wall_the_film_fades():
-    """As deep as its last share is wide; steadily, with the slope of dry contact at both ends."""
-    depths = 0.02 * CLEARANCE * np.array([0.0, 1e-6, 0.3, 0.6, 1.0 - 1e-6, 1.0, 10.0])
+def test_beyond_the_wall_the_film_stays_what_it_is_there():
+    """So that film and dry contact together never bear less for being pressed deeper."""
+    depths = CLEARANCE * np.array([0.0, 1e-6, 0.01, 0.02, 0.1])
     for rate in ((0.0, 0.0), (0.01, 0.0), (-0.01, 0.02)):
-        found = np.array([force((CLEARANCE + depth, 0.0), rate) for depth in depths])
-        size = np.hypot(found[:, 0], found[:, 1])
-        assert (np.diff(size) <= 0.0).all()
-        assert size[1] == pytest.approx(size[0], rel=1e-5)
-        assert size[4] < 1e-10 * size[0]
-        assert not found[5:].any()
+        found = np.array([force((CLEARANCE + depth, 0.0), rate)[:2] for depth in depths])
+        np.testing.assert_allclose(found, found[:1].repeat(len(depths), axis=0), rtol=0.25)
+        assert found[1] == pytest.approx(found[0], rel=1e-5)
 
 
-def test_thin_oil_is_nearly_dry():
-    """At 0.1 mPa s the first revolution is a hundredth from a dry one; it was a twentieth."""
+def test_a_joint_with_ever_thinner_oil_becomes_dry():
+    """In the first revolution, by as much as the viscosity falls."""
     values = {
         "joint": "big_end",
         "clearance_mm": 0.1,
         "solve": {"duration_rev": 1, "settle_rev": 0},
     }
     dry = simulate(Case.from_values(values))["acceleration"].values
-    thin = simulate(Case.from_values(values | {"lubricant": {"viscosity_mPa_s": 0.1}}))
-    away = np.linalg.norm(thin["acceleration"].values - dry) / np.linalg.norm(dry)
-    assert away < 0.01
+    away = []
+    for viscosity in (0.01, 0.001):
+        thin = simulate(Case.from_values(values | {"lubricant": {"viscosity_mPa_s": viscosity}}))
+        away.append(np.linalg.norm(thin["acceleration"].values - dry) / np.linalg.norm(dry))
+    assert away[0] < 0.01
+    assert away[0] / away[1] == pytest.approx(10.0, rel=0.1)
 
 
 def both_at_once(p, eps, angle):

@@ -2,9 +2,9 @@
 
 `tests/results/model-2.json` holds, for each case, its values, its key, and all metrics with their
 error bars as commits 525cd65 (2026-11-22; plain cases), 8291277 (2026-11-24; laws) and 42fae7e
-(2026-11-25, revision 2.1; features) computed them. Keys are the same, and numbers agree within the
-sum of both error bars. They are written once for a version of the model, and again only where a
-revision says that it has changed them.
+(2026-11-25, revision 2.1; features) computed them, that with oil as revision 2.3 did. Keys are the
+same, and numbers agree within the sum of both error bars. They are written once for a version of
+the model, and again only where a revision says that it has changed them.
 """
 
 import json
