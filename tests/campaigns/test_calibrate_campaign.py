@@ -40,3 +40,18 @@ def test_a_machine_is_fitted_again(monkeypatch, in_process):
         assert row["high"] - row["low"] < 0.9 * np.ptp(ranges[key])  # which could miss it
     assert misfit < 1.3
     assert jobs < 200
+
+
+def test_the_words_about_fitted_machines_follow_from_the_table():
+    page = (page_tables.ROOT / "tests/results/calibrate.md").read_text(encoding="utf-8")
+    words = " ".join(page.split())
+    right, gas = KEPT["others"]["nothing"], KEPT["others"]["a gas with exponent 1.25"]
+    keys = {key: one for key, one in right["keys"].items() if key != "body.damping_ratio"}
+    inside, machines = sum(one["inside"] for one in keys.values()), right["machines"]
+    assert f"in {inside} of {len(keys) * machines} cases, of four keys of {machines}" in words
+    assert right["keys"]["body.damping_ratio"]["width"] > 0.98
+    counts = [gas["keys"][key]["inside"] for key in keys]
+    assert f"contain it in {min(counts)} to {max(counts)} of {gas['machines']}" in words
+    assert f"reported for {gas['said_not_to_fit']} of {gas['machines']} machines" in words
+    for key in ("machine.rod_mass_kg", "body.frequency_y_Hz"):
+        assert abs(right["keys"][key]["width"] - 0.75) < 0.03
