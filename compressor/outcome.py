@@ -128,7 +128,7 @@ class Outcome:
         return named
 
 
-# what a job is told by in words, as attributes of its Dataset and as variables: their meaning
+# words on a job, as attributes of its Dataset and as variables, with what they mean
 WORDS = {
     "promise": "whether what accuracy promises was kept; none given",
     "regime": "; ".join(map(regime_words, Regime)),

@@ -157,7 +157,7 @@ FIELDS: list[tuple] = [
 FILM: list[tuple] = [
     ("viscosity", "f8"),  # of the oil, Pa s; 0 of dry joints
     ("film_length", "f8", (2,)),  # of each joint's bearing, m
-    ("film_share", "f8"),  # of the clearance: the film's last, in which the contact takes over
+    ("film_share", "f8"),  # of the clearance: the film's last, in which it gets no thinner
     ("film_constants", "f8", (2, 51)),  # of each joint, `film.film_constants`
 ]
 MAX_SECTORS = 180

@@ -190,9 +190,9 @@ def job_figures(
         worn = {}
     for name in (one for one in figures if one in OF_CONTACT and choice.what and not worn):
         raise PlotError(f"job {key} has ideal joints, so that there is no figure {name!r} of it")
-    twins = dict.fromkeys(figures, healthy_twin(run) if worn else None)
+    twins: dict[str, xr.Dataset | None] = dict.fromkeys(figures, whole_twin(run) if worn else None)
     if worn and "analyst" in figures and "sensor_acceleration" in run:
-        twins["analyst"] = healthy_twin(run, sensed=True)
+        twins["analyst"] = whole_twin(run, sensed=True)
     has_gas = case_of(run).load == "gas"
     if "cards" in choice.what and not has_gas:
         raise PlotError(f"job {key} has no gas in its cylinder: cards are of load: gas")
@@ -263,6 +263,12 @@ def study_figures(
         yield name, STUDY[name](rows, over) + where, drawing
 
 
+def whole_twin(run: xr.Dataset, sensed: bool = False) -> xr.Dataset | None:
+    """Return the machine of a run with ideal joints; None where its own run fails."""
+    twin = healthy_twin(run, sensed=sensed)
+    return twin if twin["status"].item() == "ok" else None
+
+
 def job_title(studies: Sequence[StoredStudy], key: str, name: str) -> str:
     """Return the title of a job's figure: its study, what is drawn, its place in the sweep."""
     for study in studies:
@@ -326,9 +332,9 @@ def with_segments(
     rows: Sequence[SweptRow],
     limit: tuple[float, bool] | None,
 ) -> list[SweptRow]:
-    """Return rows of jobs with the segments of those that have a sensor; limit: see `PlotChoice`.
+    """Return rows of jobs with the segments of those that have a sensor; raises PlotError.
 
-    Machines that differ in clearance alone have one healthy machine.
+    limit: see `PlotChoice`. Machines that differ in clearance alone have one healthy machine.
     """
     healthy: dict[str, np.ndarray] = {}
     found = []
@@ -340,7 +346,10 @@ def with_segments(
         case = case_of(run)
         one = with_ideal_joints(case).key
         if one not in healthy:
-            twin = healthy_twin(run, sensed=True)
+            twin = whole_twin(run, sensed=True)
+            if twin is None:
+                raise PlotError("the same machine without clearance, whose levels limits are times "
+                                "of, does not run to its end")  # fmt: skip
             healthy[one] = twin["sensor_segment_rms"].values
         found.append(row.with_segments(run, healthy[one], limit))
     return found
@@ -373,8 +382,7 @@ def page_figures(stored: Stored, study: StoredStudy) -> Iterator[tuple[str, str,
     run = stored.job(jobs[loudest][1])
     case = case_of(run)
     is_worn = case.joint != "none"
-    twin = healthy_twin(run, sensed="sensor_acceleration" in run) if is_worn else None
-    twin = twin if twin is not None and twin["status"].item() == "ok" else None
+    twin = whole_twin(run, sensed="sensor_acceleration" in run) if is_worn else None
     value = f"{over} {rows[loudest].value}" if jobs[loudest][0] != "" else rows[loudest].value
     title = f"a revolution as an analyst reads it, {value}"
     note = " It is the job with the greatest vibration of these." if len(known) > 1 else ""

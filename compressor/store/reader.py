@@ -30,7 +30,7 @@ import numpy as np
 
 from compressor.cases import SUSPECT, Case, changes_since
 from compressor.metrics import BARRED
-from compressor.outcome import Outcome, word_variables
+from compressor.outcome import WORDS, Outcome, word_variables
 from compressor.reasons import Reason
 from compressor.store.files import (
     HEX20,
@@ -49,7 +49,6 @@ from compressor.store.studies import StoredStudy, find_study, read_studies
 if TYPE_CHECKING:
     import xarray as xr
 
-WORDS = ("promise", "regime")  # that rows of before November 2026 do not have
 BOTH_JOINTS = (
     "`fault` is the swept joint, and `joint` the one that a number belongs to: select both, as in "
     "study.sel(fault='big_end', joint='big_end')"

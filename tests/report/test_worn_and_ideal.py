@@ -149,3 +149,6 @@ def test_a_twin_that_fails_stands_nowhere(swept, study, monkeypatch):
     ]
     assert names[0] - names[1] == {NAMES["twin"]}
     assert NAMES["this"] in names[1]
+    choice = plots.PlotChoice(what=("analyst", "signals"))
+    of_job = plots.job_figures(stored, [own], own.keys[0], choice)
+    assert [name for name, _, _ in of_job] == ["analyst", "signals"]

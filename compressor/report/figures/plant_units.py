@@ -107,12 +107,13 @@ def convert_colors(scale: ColorScale, units: Units) -> tuple[ColorScale, float]:
     title, factor = new_title(scale.title, units)
     bar, _ = new_title(scale.bar_title, units)
 
-    def scaled(values: Sequence[float]) -> tuple[float, ...]:
+    def multiply(values: Sequence[float]) -> tuple[float, ...]:
         return tuple(factor * value for value in values)
 
     return replace(
         scale, title=title, bar_title=bar, low=factor * scale.low, high=factor * scale.high,
-        levels=scaled(scale.levels), ticks=None if scale.ticks is None else scaled(scale.ticks),
+        levels=multiply(scale.levels),
+        ticks=None if scale.ticks is None else multiply(scale.ticks),
     ), factor  # fmt: skip
 
 

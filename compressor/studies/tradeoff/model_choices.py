@@ -118,7 +118,7 @@ def scale_contact(case: Case) -> Iterator[Choice]:
 
 
 def scale_film(case: Case) -> Iterator[Choice]:
-    """Yield a case with oil with twice and half the share of the clearance that bears no more."""
+    """Yield a case with oil whose film gets no thinner than twice and half its last share."""
     if not case.lubricant or not faulty(case):
         return
     for words, factor in SCALES.items():
