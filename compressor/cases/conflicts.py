@@ -136,7 +136,7 @@ def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
     """Return the keys of a case whose values are outside the judged range, each with a sentence.
 
     values: nested, of one case (`Case.values`). A sentence continues the key: "62 kg is outside
-    the range that the program was judged on, 0.1 to 50 kg". Clearances of both joints are one key.
+    the range that the program was judged on, 0.1 to 200 kg". Clearances of both joints are one key.
     """
     found = {}
     for key, value, (low, high) in _judged_values(values):

@@ -150,7 +150,7 @@ class Machine:
         "assumed: a 600 x 40 x 25 mm steel bar",
         "rod mass",
         above=True,
-        judged=(0.1, 50),
+        judged=(0.1, 200),
     )
     rod_centre_mm: float | None = parameter(
         None, "mm", (0, 1e6), "assumed: half the rod", "rod's mass centre, from the big end",
@@ -167,7 +167,7 @@ class Machine:
         "assumed",
         "crosshead, piston rod and piston",
         above=True,
-        judged=(0.1, 50),
+        judged=(0.1, 200),
     )
     pin_radius_mm: float = parameter(
         10.0, "mm", (0, 1e4), "inferred from Eq. 15 and Table 3",

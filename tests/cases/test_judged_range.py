@@ -24,11 +24,11 @@ def test_the_defaults_are_inside(joint):
 
 
 def test_the_sentence_names_value_and_bounds():
-    found = outside(machine={"rod_mass_kg": 62, "reciprocating_mass_kg": 85, "speed_rpm": 740})
-    end = "is outside the range that the program was judged on, 0.1 to 50 kg"
+    found = outside(machine={"rod_mass_kg": 262, "reciprocating_mass_kg": 285, "speed_rpm": 740})
+    end = "is outside the range that the program was judged on, 0.1 to 200 kg"
     assert found == {
-        "machine.rod_mass_kg": f"62 kg {end}",
-        "machine.reciprocating_mass_kg": f"85 kg {end}",
+        "machine.rod_mass_kg": f"262 kg {end}",
+        "machine.reciprocating_mass_kg": f"285 kg {end}",
     }
 
 
@@ -72,4 +72,4 @@ def test_scenes_are_drawn_from_the_judged_ranges():
 
 def test_the_table_shows_the_judged_range():
     row = next(r for r in parameter_table(table().values()).splitlines() if "rod_mass_kg" in r)
-    assert "| 0.1 to 50 |" in row
+    assert "| 0.1 to 200 |" in row

@@ -40,7 +40,7 @@ def test_nothing_is_odd_about_the_paper_s_cases(study):
          ("friction.stiction_velocity_mm_per_s", "stiction")),
         ({"machine": {"crank_radius_mm": 180, "rod_length_mm": 450}},
          ("machine.crank_radius_mm", "proportion")),
-        ({"machine": {"rod_mass_kg": 62}}, ("machine.rod_mass_kg", "judged")),
+        ({"machine": {"rod_mass_kg": 262}}, ("machine.rod_mass_kg", "judged")),
         (BIG_END | {"clearance_mm": 1.5}, ("clearance_mm", "judged")),
         (BIG_END | {"solve": {"max_steps": 200}}, ("solve.max_steps", "steps")),
         (BIG_END | {"solve": {"timeout_s": 1e-4}}, ("solve.timeout_s", "seconds")),
@@ -63,12 +63,12 @@ def test_commands_say_what_is_outside_the_judged_range(
     tmp_path, monkeypatch, capsys, in_process, command
 ):
     monkeypatch.chdir(tmp_path)
-    text = "load: none\nmachine: {rod_mass_kg: [62, 5]}\nsolve: {duration_rev: 1, settle_rev: 0}\n"
+    text = "load: none\nmachine: {rod_mass_kg: [262, 5]}\nsolve: {duration_rev: 1, settle_rev: 0}\n"
     (tmp_path / "k1.yaml").write_text(text, encoding="utf-8")
     assert cli.main([command, "k1.yaml", "-j", "1"]) == 0
     expected = (
-        "k1.yaml: warning: machine.rod_mass_kg: 62 kg is outside the range that the program was "
-        "judged on, 0.1 to 50 kg (1 of 2 jobs)"
+        "k1.yaml: warning: machine.rod_mass_kg: 262 kg is outside the range that the program was "
+        "judged on, 0.1 to 200 kg (1 of 2 jobs)"
     )
     assert expected in capsys.readouterr().err
 

@@ -24,13 +24,13 @@ SOLVE = {"duration_rev": 3, "settle_rev": 0, "accuracy": "draft", "output_step_d
 STUDY = {
     "joint": "big_end",
     "clearance_mm": 0.2,
-    "machine": {"rod_mass_kg": [4.7, 62]},
+    "machine": {"rod_mass_kg": [4.7, 262]},
     "body": {"mass_kg": 5000, "casing_mass_kg": 20},
     "sensor": {"range_m_per_s2": 0.05, "length_rev": 11},
     "solve": SOLVE,
 }
 OUTSIDE = (
-    "machine.rod_mass_kg: 62 kg is outside the range that the program was judged on, 0.1 to 50 kg"
+    "machine.rod_mass_kg: 262 kg is outside the range that the program was judged on, 0.1 to 200 kg"
 )
 
 
@@ -65,7 +65,7 @@ def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder
         assert ("solve.settle_rev: auto leaves it out" in text) == bool(late)
         assert clipped in text
     assert OUTSIDE in out
-    assert "warning: machine.rod_mass_kg: 62 kg is outside" in err  # before it runs
+    assert "warning: machine.rod_mass_kg: 262 kg is outside" in err  # before it runs
     assert standings(folder)[0].caveats[-1] == OUTSIDE
 
 

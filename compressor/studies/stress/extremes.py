@@ -8,7 +8,8 @@ the one whose force at 0.1 mm, the law's full damping, is the same.
 
 With laws, the same scenes have laws of contact and friction that are drawn as well, each as often
 as any other, with the numbers that they read; with features also each of oil, guide, drive, rod and
-friction of ideal joints in three of ten (`extreme_features`).
+friction of ideal joints in three of ten, and half of the gas loads are a cylinder's: single or
+double acting, with clearance, valve losses and pressures of its own.
 """
 
 import math
@@ -43,8 +44,8 @@ SPANS: dict[str, tuple[str, Span, Span | None, bool]] = {
     "stiction_velocity": (
         "m/s", (1e-6, 0.1), _supported("friction.stiction_velocity_mm_per_s", 1e-3), True,
     ),
-    "rod_mass": ("kg", (1e-3, 100.0), _supported("machine.rod_mass_kg"), True),
-    "reciprocating_mass": ("kg", (1e-3, 100.0), _supported("machine.reciprocating_mass_kg"), True),
+    "rod_mass": ("kg", (1e-3, 400.0), _supported("machine.rod_mass_kg"), True),
+    "reciprocating_mass": ("kg", (1e-3, 400.0), _supported("machine.reciprocating_mass_kg"), True),
     "speed": ("rpm", (1.0, 20_000.0), _supported("machine.speed_rpm"), True),
     "pin_radius": ("m", _supported("machine.pin_radius_mm", 1e-3), None, True),
     "rtol": ("1", (1e-10, 1e-2), None, True),
@@ -273,6 +274,17 @@ RANGES = {
         "damping_ratio": ((1e-4, 0.3), judged_range("rod.damping_ratio")),
     },
 }
+CYLINDER_SHARE = 0.5  # of the scenes with a gas load
+# drawn evenly, alike in all scenes: a gas load is smooth but where a valve opens or closes
+CYLINDERS = {
+    "piston_radius_mm": (30.0, 100.0),
+    "suction_MPa": (0.1, 1.0),
+    "pressure_ratio": (1.3, 5.0),
+    "exponent": (1.05, 1.67),
+    "clearance_percent": (4.0, 40.0),
+    "valve_loss_percent": (0.0, 10.0),
+    "rod_diameter_mm": (10.0, 50.0),
+}
 LENGTHS = ((0.15, 0.99), (0.4, 0.99))  # of a bearing over its diameter
 LUGRE = "lugre"
 
@@ -293,6 +305,20 @@ def features(scene: dict[str, Any], draw: random.Random, inside: bool) -> dict[s
         found["lubricant"]["bearing_length_mm"] = length
     if draw.random() < FEATURE_SHARE and scene["friction"]["law"] != LUGRE:
         found["friction"] = scene["friction"] | {"ideal_joints": True}
+    if scene["load"] == "gas" and draw.random() < CYLINDER_SHARE:
+        found["gas"] = choose_cylinder(draw)
+    return found
+
+
+def choose_cylinder(draw: random.Random) -> dict[str, Any]:
+    """Return a gas load with ends, clearance, valve losses and pressures of its own."""
+    found: dict[str, Any] = {
+        key: draw.uniform(*span) for key, span in CYLINDERS.items() if key != "pressure_ratio"
+    }
+    found["discharge_MPa"] = found["suction_MPa"] * draw.uniform(*CYLINDERS["pressure_ratio"])
+    found["action"] = draw.choice(table()["gas.action"].choices)
+    if found["action"] == "single":
+        del found["rod_diameter_mm"]
     return found
 
 

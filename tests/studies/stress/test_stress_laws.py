@@ -41,10 +41,13 @@ def test_scenes_have_every_law_and_else_the_numbers_of_old():
                 low, high = spans[number % 2 == 0]
                 value = found[key]
                 assert 0.999 * low <= value <= 1.001 * high or (group, value) == ("guide", 0.0)
+        cylinder = made.pop("gas", None)
+        seen["gas"] += cylinder is not None
         assert made == plain
         friction |= {"ideal_joints": True} if rubbing else {}
+        had |= {"gas": cylinder} if cylinder else {}
         Case.resolve({**made, **had, "contact": contact, "friction": friction})
-    assert {*seen} == {*CONTACT_LAWS, *FRICTION_LAWS, *RANGES, "ideal_joints"}
+    assert {*seen} == {*CONTACT_LAWS, *FRICTION_LAWS, *RANGES, "ideal_joints", "gas"}
     assert min(seen.values()) > 20
     assert {law for law, count in elastic.items() if count} == {*ELASTIC}
 
