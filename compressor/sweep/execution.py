@@ -351,22 +351,32 @@ class Local(Batches):
         return []
 
     def watch(self, now: float, news: bool) -> None:
-        """Kill workers whose jobs take too long, and all of them where nothing moves any more."""
-        self.processes = self.processes | {child.pid: child for child in children()}
+        """Kill workers whose jobs take too long, and all of them where nothing moves any more.
+
+        Where all have died and loky does not say so, its thread has died, too (joblib/loky#663):
+        its batches would never end.
+        """
+        alive = {child.pid: child for child in children()}
+        self.processes = self.processes | alive
         if news:
             self.last_news, self.fruitless, self.most = now, 0, MAX_BATCH
         latest, at_work = self.last_news, False
         for number, file in [*self.files.items()]:
             pid, position, since = file.note()
-            latest, at_work = max(latest, abs(since)), at_work or since > 0
+            latest, at_work = max(latest, abs(since)), at_work or (since > 0 and pid in alive)
             # compiled code looks at the clock itself: this is for jobs that hang outside of it
             if since > 0 and now - since > self.out[number][position].timeout + self.rules.grace:
                 self.late.add(pid)
                 kill([pid])
         self.begun = self.begun or latest > self.last_news
-        patience = STALL_SECONDS if self.begun else MAX_START_SECONDS
+        dead = bool(self.processes) and not alive
+        patience = STALL_SECONDS if self.begun or dead else MAX_START_SECONDS
         if self.out and not at_work and now - latest > patience:
-            kill(self.processes)
+            kill(alive)
+            if dead:
+                broken: Future[Any] = Future()
+                broken.set_exception(BrokenProcessPool())
+                self.arrived.put((max(self.out), broken))
 
     def fail(self, number: int, error: BaseException) -> Iterator[JobLost]:
         """Yield the jobs that are lost with a broken pool; the others wait to run again.
@@ -412,9 +422,11 @@ class Local(Batches):
     def end_pool(self) -> None:
         """End all processes, if there are any; what had arrived stays."""
         if self.executor:
-            with contextlib.suppress(BrokenPipeError):
-                self.executor.shutdown(kill_workers=True)
+            # not `kill_workers`: loky 3.6 forgets batches that its thread then looks for, which
+            # dies of a KeyError and leaves threads and files open
             kill(child.pid for child in children())
+            with contextlib.suppress(BrokenPipeError):
+                self.executor.shutdown()
         self.executor = None
 
     def discard(self) -> None:

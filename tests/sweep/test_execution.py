@@ -18,6 +18,7 @@ from pathlib import Path
 
 import pytest
 from bad_jobs import LEAST, POISON, SECONDS, Many, named, sleep, work
+from joblib.externals.loky import process_executor
 from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
 from compressor.sweep import execution
@@ -333,6 +334,27 @@ def test_a_worker_that_ends_amid_its_results_costs_nothing(number, tmp_path, mon
     assert (tmp_path / "tried").exists()
 
 
+def test_a_death_that_loky_does_not_report_is_seen(tmp_path, monkeypatch):
+    """Its thread may die, too (joblib/loky#663): its futures would never end."""
+    monkeypatch.setattr(execution, "STALL_SECONDS", 0.5)
+    monkeypatch.setattr(
+        process_executor._ExecutorManagerThread, "terminate_broken", lambda *_: None
+    )
+    deadline = time.monotonic() + 60
+
+    def crash_once(payload):
+        if payload == 3 and not (tmp_path / "tried").exists():
+            (tmp_path / "tried").touch()
+            os._exit(3)
+        return payload
+
+    def pulse():
+        assert time.monotonic() < deadline
+
+    ends = list(run_batches(crash_once, named(range(6)), Workers(1), pulse))
+    assert results(ends) == {n: n for n in range(6)}
+
+
 def test_workers_that_cannot_begin_end_the_call(monkeypatch):
     monkeypatch.setattr(execution, "MAX_FRUITLESS", 2)
     with pytest.raises(WorkersFailed, match="jobs could not even begin: exit code 7"):
@@ -408,6 +430,24 @@ def test_a_daemonic_process_is_told_that_it_may_start_no_workers(monkeypatch):
 
 
 # ---- ends ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
+def test_batches_that_loky_has_not_seen_yet_are_ended(monkeypatch):
+    """Its `kill_workers` forgets them, looks for them, and ends with a KeyError."""
+    manager = process_executor._ExecutorManagerThread
+    see = manager.add_call_item_to_queue
+
+    def see_late(self):
+        if self.executor_flags.shutdown:
+            see(self)
+
+    def pulse():
+        raise InterruptedError
+
+    monkeypatch.setattr(manager, "add_call_item_to_queue", see_late)
+    with pytest.raises(InterruptedError):
+        list(run_batches(work, named(range(6)), Workers(1), pulse))
 
 
 def test_closing_ends_the_workers():
