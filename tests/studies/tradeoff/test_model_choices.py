@@ -188,7 +188,8 @@ def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
     seen = []
     data = explain_models(load_studies(path)[0], lambda done, total, _: seen.append((done, total)))
     assert data["choice"].values.tolist() == [ITSELF, *sorted(THREE)]
-    assert seen == [(n, 4) for n in (0, 1, 2, 3, 4)]
+    assert seen == sorted(seen)  # each several times where equations are compiled meanwhile
+    assert [*dict.fromkeys(seen)] == [(n, 4) for n in (0, 1, 2, 3, 4)]
     assert data.attrs["study"] == "worn"
     by_hand = {
         ITSELF: {},
