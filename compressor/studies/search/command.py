@@ -25,7 +25,6 @@ from compsim.screen import (
 from compsim.show import sayable
 
 from compressor.digits import by_bar
-from compressor.units import unit_in
 
 if TYPE_CHECKING:
     from compressor.studies.search.find import SearchResult
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
 
 KINDS = ("first", "greatest", "least")
 MAX_TOLD = 5  # points that do not decide, one by one
+Shown = tuple[str, float]  # a unit, and the factor to it from SI
 AVERAGED = " (mean over revolutions: chaotic)"
 UNBARRED = " (no error bar was made)"
 
@@ -52,7 +52,7 @@ UNBARRED = " (no error bar was made)"
 @click.option("--scan", type=click.IntRange(3, 1000), default=9, show_default=True,
               help="Run so many evenly spaced points first.")  # fmt: skip
 @click.option("--log", "logarithmic", is_flag=True, help="Space points evenly in the logarithm.")
-@units_option("SI")
+@units_option("that of VALUE, else SI")
 @setting
 @output_option
 @jobs_option("Run in this many worker processes, as many points in one step of --first.")
@@ -79,7 +79,8 @@ def find(
 
     CONFIG makes one case once the key is given. The answer of --first is an interval: at its lower
     end the comparison does not hold, at its upper end it does. Points whose error bars do not let
-    that be told, or whose job failed, stay inside the interval and are named. Of --greatest and
+    that be told, or whose job failed, stay inside the interval and are named. Later crossings are
+    named as wide as the scan shows them; a narrower --over narrows one down. Of --greatest and
     --least it is the best point, and the points whose error bars reach its own. Structure that is
     finer than the scan may be missed. In a chaotic motion a peak stands for its mean over
     revolutions.
@@ -102,7 +103,7 @@ def find(
     if as_json:
         print_text(json.dumps(jsonable_answer(question, answer), indent=1))
     else:
-        for line in lines(question, answer, output, units or "si"):
+        for line in lines(question, answer, output, units):
             print_text(line)
     return SOME_FAILED if answer.failed else DONE
 
@@ -119,16 +120,18 @@ def question_of(config: str, options: dict[str, Any]) -> "Question":
 
 
 def lines(
-    question: "Question", answer: "SearchResult", folder: str, units: "Units"
+    question: "Question", answer: "SearchResult", folder: str, units: "Units | None"
 ) -> Iterator[str]:
     """Yield an answer as it is printed, its numbers in chosen units."""
+    shown = question.goal.unit_shown(units)
     kind_lines = comparison_lines if answer.best is None else extremum_lines
-    yield from kind_lines(question, answer, units)
+    yield from kind_lines(question, answer, shown)
     for point in answer.blind[:MAX_TOLD]:
-        why = why_undecided(question, point, units)
+        why = why_undecided(point, shown)
         yield f"  {at(question, point)}: {why}  job {point.key[:8]}"
     if len(answer.blind) > MAX_TOLD:
         yield f"  and {len(answer.blind) - MAX_TOLD} more"
+    yield from crossing_lines(question, answer)
     outside = [point for point in answer.failed if point not in answer.blind]
     for point in outside[:MAX_TOLD]:
         yield f"  {at(question, point)}, outside: {point.told.reason}  job {point.key[:8]}"
@@ -137,13 +140,13 @@ def lines(
            f"{answer.study} of {folder}")  # fmt: skip
 
 
-def comparison_lines(question: "Question", answer: "SearchResult", units: "Units") -> Iterator[str]:
+def comparison_lines(question: "Question", answer: "SearchResult", shown: Shown) -> Iterator[str]:
     """Yield the place at which a comparison first becomes true."""
     goal = question.goal
-    unit, factor = unit_in(goal.unit, units)
+    unit, factor = shown
     text = f"{goal.name} {goal.sign} {factor * goal.limit:g} {unit}".rstrip()
     if answer.base:
-        base = format_reading(answer.base, goal.unit, units)
+        base = format_reading(answer.base, shown)
         yield f"base, at {question.key} = {question.low:g}: {base}; {goal.times:g} times it"
     low, high = answer.low, answer.high
     if high is None:
@@ -152,13 +155,13 @@ def comparison_lines(question: "Question", answer: "SearchResult", units: "Units
         yield f"{text} surely holds {many}{unsure}" if unsure else f"{text} holds {many}"
     elif answer.kind == "at_low":
         yield f"{text} holds from the range's lower end on"
-        yield f"  {at(question, high)}: yes, {number(question, high, units)}  job {high.key[:8]}"
+        yield f"  {at(question, high)}: yes, {format_reading(high.told, shown)}  job {high.key[:8]}"
     else:
         start = f"at most {question.low:g}" if low is None else f"{low.argument:.9g}"
         yield f"{text} first holds between {question.key} = {start} and {high.argument:.9g}"
         if low is not None:
-            yield f"  {at(question, low)}: no, {number(question, low, units)}  job {low.key[:8]}"
-        yield f"  {at(question, high)}: yes, {number(question, high, units)}  job {high.key[:8]}"
+            yield f"  {at(question, low)}: no, {format_reading(low.told, shown)}  job {low.key[:8]}"
+        yield f"  {at(question, high)}: yes, {format_reading(high.told, shown)}  job {high.key[:8]}"
         if answer.blind:
             yield f"  {plural(len(answer.blind), 'point')} between {doubt(answer)}:"
 
@@ -168,12 +171,22 @@ def doubt(answer: "SearchResult") -> str:
     return "does not decide" if len(answer.blind) == 1 else "do not decide"
 
 
-def extremum_lines(question: "Question", answer: "SearchResult", units: "Units") -> Iterator[str]:
+def crossing_lines(question: "Question", answer: "SearchResult") -> Iterator[str]:
+    """Yield the crossings beside the first, each between two neighbouring points."""
+    others = [one for one in answer.crossings if one.high is not answer.high]
+    if others:
+        yield f"{plural(len(others), 'more crossing')} seen, not narrowed down:"
+    for one in others:
+        verb = "holds again" if one.holds else "stops holding"
+        yield f"  {verb} between {at(question, one.low)} and {one.high.argument:.9g}"
+
+
+def extremum_lines(question: "Question", answer: "SearchResult", shown: Shown) -> Iterator[str]:
     """Yield the place at which a metric is greatest or least."""
     best = answer.best
     assert best is not None
     yield (f"{question.goal.name} is {question.goal.sign} at {at(question, best)}: "
-           f"{number(question, best, units)}  job {best.key[:8]}")  # fmt: skip
+           f"{format_reading(best.told, shown)}  job {best.key[:8]}")  # fmt: skip
     first, last = answer.within[0].argument, answer.within[-1].argument
     if len(answer.within) > 1:
         yield (f"  as far as error bars tell, {len(answer.within)} points from {first:.9g} to "
@@ -191,23 +204,18 @@ def at(question: "Question", point: Any) -> str:
     return f"{question.key} = {point.argument:.9g}"
 
 
-def number(question: "Question", point: Any, units: "Units") -> str:
-    """Return a point's number with its error bar."""
-    return format_reading(point.told, question.goal.unit, units)
-
-
-def format_reading(reading: "JobReading", si: str, units: "Units") -> str:
-    """Return a job's number with its error bar in chosen units; si: of the number."""
-    unit, factor = unit_in(si, units)
+def format_reading(reading: "JobReading", shown: Shown) -> str:
+    """Return a job's number with its error bar in a unit."""
+    unit, factor = shown
     bar = factor * reading.bar if reading.barred else math.nan
     text = by_bar(factor * reading.value, bar, False)
     return (f"{text} {unit}".rstrip() + AVERAGED * reading.averaged
             + UNBARRED * (not reading.barred))  # fmt: skip
 
 
-def why_undecided(question: "Question", point: Any, units: "Units") -> str:
+def why_undecided(point: Any, shown: Shown) -> str:
     """Return why a point does not decide."""
-    text = number(question, point, units)
+    text = format_reading(point.told, shown)
     return point.told.reason or f"{text}: within its error bar of the limit"
 
 

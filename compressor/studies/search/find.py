@@ -39,6 +39,18 @@ Holds = Callable[[JobReading], bool | None]
 
 
 @dataclass(frozen=True)
+class Crossing:
+    """Neighbours, of the points that decide a comparison, between which it changes.
+
+    holds: whether it holds at `high`, and so not at `low`, or the other way round.
+    """
+
+    low: Point
+    high: Point
+    holds: bool
+
+
+@dataclass(frozen=True)
 class SearchResult:
     """What a search found.
 
@@ -50,6 +62,8 @@ class SearchResult:
     surely worse, None where the range ends before.
     best: of an extremum, the best point; within: the points whose bars reach the best one's.
     blind: points inside the interval that do not decide.
+    crossings: of a comparison, all that the points show, in their order; only the first that makes
+    it hold, between low and high, is narrowed down.
     points: all, by argument; run_now: jobs that were not stored before; study: where they are.
     base: the reading at the range's lower end, where the goal's limit is so many times it.
     """
@@ -60,6 +74,7 @@ class SearchResult:
     best: Point | None = None
     within: tuple[Point, ...] = ()
     blind: tuple[Point, ...] = ()
+    crossings: tuple[Crossing, ...] = ()
     points: tuple[Point, ...] = ()
     run_now: int = 0
     study: str = ""
@@ -89,20 +104,23 @@ def find_first(
 
 def interval(points: Sequence[Point], holds: Holds) -> SearchResult:
     """Return the interval in which a comparison first becomes true, by points in their order."""
-    low: Point | None = None
-    blind: list[Point] = []
-    for point in points:
-        verdict = holds(point.told)
-        if verdict:
-            kind = "undecided" if blind else "found" if low else "at_low"
-            return SearchResult(kind, low, point, blind=tuple(blind), points=tuple(points))
-        if verdict is None:
-            blind.append(point)
-        else:
-            low, blind = point, []
-    silent = tuple(point for point in points if holds(point.told) is None)
-    return SearchResult("unclear" if silent else "nowhere", None, None, blind=silent,
-                  points=tuple(points))  # fmt: skip
+    verdicts = [(point, holds(point.told)) for point in points]
+    decided = [(point, verdict) for point, verdict in verdicts if verdict is not None]
+    crossings = tuple(
+        Crossing(low, high, after)
+        for (low, before), (high, after) in pairwise(decided)
+        if before != after
+    )
+    blind = tuple(point for point, verdict in verdicts if verdict is None)
+    high = next((point for point, verdict in decided if verdict), None)
+    if high is None:
+        kind, low = "unclear" if blind else "nowhere", None
+    else:
+        low = next((one.low for one in crossings if one.high is high), None)
+        left = -math.inf if low is None else low.share
+        blind = tuple(point for point in blind if left < point.share < high.share)
+        kind = "undecided" if blind else "found" if low else "at_low"
+    return SearchResult(kind, low, high, blind=blind, crossings=crossings, points=tuple(points))
 
 
 def sections(answer: SearchResult, tolerance: float, at_once: int) -> list[float]:
@@ -176,7 +194,7 @@ def bracket_best(known: Iterable[Point], factor: float) -> SearchResult:
     right = math.inf if high is None else high.share
     blind = tuple(p for p in points if p.told.reason and left < p.share < right)
     return SearchResult("undecided" if blind else "found", low, high, best, tuple(within), blind,
-                  tuple(points))  # fmt: skip
+                        points=tuple(points))  # fmt: skip
 
 
 def place(point: Point) -> float:

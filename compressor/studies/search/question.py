@@ -17,7 +17,7 @@ from compressor.cases import Study, load_studies, row_of
 from compressor.metrics import AXES, BARRED, JOINTS, NUMBERS, SEGMENTS, THRESHOLDS
 from compressor.program import CompsimError, did_you_mean
 from compressor.solve import sure
-from compressor.units import read_quantity, split_number
+from compressor.units import READABLE, Units, read_quantity, split_number, unit_in
 
 SIGNS = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
 COMPARISON = re.compile(r"\s*([\w.]+)\s*(>=|<=|>|<)\s*([^<>=]*[^<>=\s])\s*")
@@ -59,6 +59,7 @@ class Goal:
     sign, limit: of a comparison, limit in the metric's SI unit; sign is "greatest" or "least" where
     an extremum is asked for. times: the limit is so many times the metric at the range's lower end,
     nan where it is a number; slack: how far that limit may be off, by that point's error bar.
+    limit_unit: in which the limit was written, "" where it was without a unit.
     """
 
     metric: str
@@ -67,6 +68,7 @@ class Goal:
     limit: float = math.nan
     times: float = math.nan
     slack: float = 0.0
+    limit_unit: str = ""
 
     def beside(self, base: JobReading) -> "Goal":
         """Return the goal with its limit, from the reading at the range's lower end.
@@ -86,6 +88,15 @@ class Goal:
     def unit(self) -> str:
         """Return the SI unit, "" for a share or a count."""
         return "" if BARRED[self.metric].unit == "1" else BARRED[self.metric].unit
+
+    def unit_shown(self, units: Units | None) -> tuple[str, float]:
+        """Return the unit in which numbers are shown, and the factor to it from SI.
+
+        units: the choice; None: that of the limit as it was written.
+        """
+        if units is None and self.limit_unit in READABLE:
+            return self.limit_unit, 1.0 / READABLE[self.limit_unit][1]
+        return unit_in(self.unit, units or "si")
 
     def holds(self, reading: JobReading) -> bool | None:
         """Return whether the comparison holds.
@@ -151,7 +162,8 @@ def comparison(text: str) -> Goal:
         limit = read_quantity(parts[3], goal.unit or BARRED[goal.metric].unit)
     except ValueError as error:
         raise QuestionError(f"{text!r}: {error}") from error
-    return replace(goal, limit=math.nan if limit is None else limit)
+    unit = split_number(parts[3])[1]
+    return replace(goal, limit=math.nan if limit is None else limit, limit_unit=unit)
 
 
 def goal_of(text: str, sign: str, limit: float = math.nan) -> Goal:

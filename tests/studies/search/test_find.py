@@ -41,6 +41,9 @@ def test_a_limit_may_have_a_unit_or_be_a_factor():
     assert comparison("peak_contact_force.small_end > 166 kN").limit == 166e3
     assert comparison("peak_acceleration >= 2 g").limit == pytest.approx(19.6133)
     assert comparison("contact_loss_fraction.big_end < 5 %").limit == 0.05
+    shown = comparison("peak_contact_force.small_end > 166 kN").unit_shown
+    assert [shown(None), shown("si")] == [("kN", pytest.approx(1e-3)), ("N", 1.0)]
+    assert comparison("peak_acceleration > 5").unit_shown(None) == ("m/s2", 1.0)
     goal = comparison("peak_acceleration > 1.5 * base").beside(JobReading(10.0, 0.2))
     assert (goal.limit, goal.slack) == (15.0, pytest.approx(0.3))
     readings = [JobReading(value, 0.2) for value in (14.4, 14.6, 15.4, 15.6)]
@@ -83,6 +86,17 @@ def test_the_first_of_several_changes_counts():
         jobs(lambda x: 1.0 + math.sin(4 * math.pi * (x - 0.05))), ABOVE.holds, SCAN, 1e-3
     )
     assert found.low.share <= 0.05 < found.high.share
+    places = [(one.low.share, one.high.share, one.holds) for one in found.crossings]
+    first = (found.low.share, found.high.share, True)
+    assert places == [first, (0.25, 0.375, False), (0.5, 0.625, True), (0.75, 0.875, False)]
+
+
+def test_a_point_that_does_not_decide_is_no_crossing():
+    """It lies at 0.25 between points where it holds, and at 0.75 between two that differ."""
+    values = {0.25: None, 0.75: None}
+    found = find_first(jobs(lambda x: values.get(x, 2.0 - 1.5 * x)), ABOVE.holds, SCAN, 1e-3)
+    assert found.kind == "at_low"
+    assert [(one.low.share, one.high.share) for one in found.crossings] == [(0.625, 0.875)]
 
 
 def test_a_comparison_that_becomes_false_is_found_by_its_opposite():

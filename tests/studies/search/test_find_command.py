@@ -15,6 +15,9 @@ from compressor.cases.load import load_cases, load_studies
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
+from compressor.studies.search.command import jsonable_answer, lines
+from compressor.studies.search.find import Point, interval
+from compressor.studies.search.question import JobReading, Question, comparison
 
 LIMIT = 0.006
 ASKED = [
@@ -187,3 +190,27 @@ def test_mistakes_of_the_file_keep_their_place(tmp_path, monkeypatch, capsys):
     Path("worn.yaml").write_text("joint: small_end\nlod: none\n")
     assert cli.main(["find", "worn.yaml", *OVER, *FIRST]) == 2
     assert "worn.yaml:2:1: lod: unknown key; did you mean load?" in capsys.readouterr().err
+
+
+def test_later_crossings_are_named_in_the_unit_of_the_limit():
+    """Six points without jobs, every second one above the limit."""
+    goal = comparison("peak_contact_force.small_end > 1 kN")
+    question = Question("worn.yaml", "clearance_mm", 0.0, 5.0, goal, scan=6)
+    points = [
+        Point(n / 5, float(n), JobReading(1200.0 if n in (0, 2, 4) else 800.0, 1.0), "k" * 20)
+        for n in range(6)
+    ]
+    answer = interval(points, goal.holds)
+    assert [*lines(question, answer, "results", None)][:-2] == [
+        "peak_contact_force.small_end > 1 kN holds from the range's lower end on",
+        "  clearance_mm = 0: yes, 1.200 ± 0.001 kN  job kkkkkkkk",
+        "5 more crossings seen, not narrowed down:",
+        "  stops holding between clearance_mm = 0 and 1",
+        "  holds again between clearance_mm = 1 and 2",
+        "  stops holding between clearance_mm = 2 and 3",
+        "  holds again between clearance_mm = 3 and 4",
+        "  stops holding between clearance_mm = 4 and 5",
+    ]
+    found = jsonable_answer(question, answer)
+    assert [one["holds"] for one in found["crossings"]] == [False, True, False, True, False]
+    assert (found["unit"], found["goal"]["limit"]) == ("N", 1000.0)
