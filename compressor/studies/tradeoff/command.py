@@ -1,6 +1,7 @@
 """How far choices of the model move a case's metrics, as a table of text."""
 
 import dataclasses
+import itertools
 import json
 import os
 import textwrap
@@ -35,45 +36,102 @@ if TYPE_CHECKING:
     from compressor.studies.tradeoff.explain import Explanation
     from compressor.studies.tradeoff.page import ModelTable
 
-WIDEST = 12  # columns of a word of a head
+WIDTH = 80  # of what is printed
+WIDEST = 12  # characters of a line of a head
 CHOICE_HEAD = "choice of the model"
+Column = tuple[list[str], list[str], list[str]]  # lines of its head, its cells, lines of its span
 
 
 def model_lines(place: str, table: "ModelTable", times: bool = False) -> Iterator[str]:
-    """Yield a table of choices: a head, the case itself, each choice, the span, and a summary.
+    """Yield a table of choices in blocks of columns, what each assumes, and a summary.
+
+    A block has the case itself, the choices that move its metrics, and the span. A line names the
+    metrics that no choice moves.
 
     place: which job it is of; times: with a column of wall times over the case's own, and no
     summary, since not only choices of the model are there.
     """
-    from compressor.studies.tradeoff.page import headline
+    from compressor.studies.tradeoff.page import NO_VALUE, NONE_SEEN, headline
 
-    yield f"{place}:"
-    titles = [f"{m.title}" + (f" ({m.unit})" if m.unit else "") for m in table.measures]
-    heads = [textwrap.wrap(title, WIDEST) for title in titles] + [["time"]] * times
-    numbers = zip(table.measures, table.values, table.bars, strict=True)
-    values = [by_bar(value, bar, m.is_relative, bare=True) for m, value, bar in numbers]
-    rows = [["the case itself", *values, *["× 1"] * times]]
-    for row in table.rows:
-        time = [f"× {row.time_ratio:.2g}" if row.time_ratio == row.time_ratio else "–"] * times
-        rows.append([row.name, *row.cells, *time])
-    rows.append(["all of them", *table.span_texts, *[""] * times])
-    depth = max(map(len, heads), default=1)
-    stacked = [[""] * (depth - len(head)) + head for head in heads]
-    above = [[CHOICE_HEAD * (n == depth - 1), *(head[n] for head in stacked)] for n in range(depth)]
-    notes = [""] * (depth - 1) + ["assumed", "", *(row.note for row in table.rows), ""]
-    yield from align_rows([*above, *rows], notes)
+    yield from wrap_line(f"{place}:", 0)
+    rows = [row for row in table.rows if {*row.cells} != {NO_VALUE}]
+    columns, still = [], []
+    numbers = zip(table.measures, table.values, table.bars, table.span_texts, strict=True)
+    for n, (m, value, bar, span) in enumerate(numbers):
+        cells = [row.cells[n] for row in rows]
+        if {*cells} <= {NONE_SEEN, NO_VALUE}:
+            still.append(m.title)
+            continue
+        head = textwrap.wrap(m.title + (f" ({m.unit})" if m.unit else ""), WIDEST)
+        body = [by_bar(value, bar, m.is_relative, bare=True), *cells]
+        columns.append((head, body, span.replace(" to ", " to\n").splitlines()))
+    if times:
+        ratios = [f"× {row.time_ratio:.2g}" if row.time_ratio > 0.0 else NO_VALUE for row in rows]
+        columns.append((["time"], ["× 1", *ratios], []))
+    names = ["the case itself", *(row.name for row in rows), "all of them"]
+    yield from block_lines(names, columns)
+    if still:
+        yield from wrap_line(f"no choice is seen to move: {'; '.join(still)}", 2)
     if table.unknown:
-        yield f"  not known of the case itself: {', '.join(table.unknown)}"
+        yield from wrap_line(f"not known of the case itself: {'; '.join(table.unknown)}", 2)
+    notes = [f"{row.name}: {row.note}" for row in table.rows if row.note]
+    if notes:
+        yield "  assumed, or why there is no number:"
+    for note in notes:
+        yield from wrap_line(note, 4)
     if not times:
-        yield headline(table)
+        yield from wrap_line(headline(table), 0)
 
 
-def align_rows(rows: Sequence[Sequence[str]], notes: Sequence[str]) -> Iterator[str]:
-    """Yield rows with their first cell to the left, the others to the right, a note behind."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for (first, *cells), note in zip(rows, notes, strict=True):
-        aligned = (f"{cell:>{width}}" for cell, width in zip(cells, widths[1:], strict=True))
-        yield "  ".join([f"  {first:<{widths[0]}}", *aligned, note]).rstrip()
+def block_lines(names: Sequence[str], columns: Sequence[Column]) -> Iterator[str]:
+    """Yield columns beside the names of their rows, as many side by side as the width allows.
+
+    Rows in which no change is seen are counted.
+    """
+    from compressor.studies.tradeoff.page import NONE_SEEN
+
+    left = max(map(len, [CHOICE_HEAD, *names]))
+    blocks: list[list[Column]] = []
+    room = 0
+    for column in columns:
+        width = 2 + column_width(column)
+        if width > room:
+            blocks.append([])
+            room = WIDTH - 2 - left
+        blocks[-1].append(column)
+        room -= width
+    for block in blocks:
+        above = max(len(head) for head, _, _ in block)
+        below = max(1, *(len(foot) for _, _, foot in block))
+        stacked = [
+            [*[""] * (above - len(head)), *head, *body, *foot, *[""] * (below - len(foot))]
+            for head, body, foot in block
+        ]
+        firsts = [*[""] * (above - 1), CHOICE_HEAD, *names, *[""] * (below - 1)]
+        others = 0
+        for first, *cells in zip(firsts, *stacked, strict=True):
+            if {*cells} == {NONE_SEEN}:
+                others += 1
+                continue
+            aligned = (f"{c:>{column_width(one)}}" for c, one in zip(cells, block, strict=True))
+            yield "  ".join([f"  {first:<{left}}", *aligned]).rstrip()
+        if others:
+            yield f"  {plural(others, 'other choice')}: {NONE_SEEN}"
+        yield ""
+
+
+def column_width(column: Column) -> int:
+    """Return the width of a column's widest cell."""
+    return max(map(len, itertools.chain(*column)))
+
+
+def wrap_line(text: str, indent: int) -> list[str]:
+    """Return a line as lines of the width, the later ones indented by two more."""
+    start, later = " " * indent, " " * (indent + 2)
+    wrapper = textwrap.TextWrapper(WIDTH, start, later, break_long_words=False,
+                                   break_on_hyphens=False)  # fmt: skip
+    lines = wrapper.wrap(text.replace(" %", "\u00a0%"))  # no line begins with a unit
+    return [line.replace("\u00a0", " ") for line in lines]
 
 
 @click.command()
@@ -236,8 +294,8 @@ def explain(
     --models it runs that job by other contact and friction laws, twice and half the contact
     stiffness and damping, with an oil film, an elastic rod and play in the guide, or without where
     the case has them. The table says how far each choice moves each metric; it is stored in models/
-    of the folder -o, and the report of that folder shows it. --set chooses another job than the
-    first, as in --set clearance_mm=0.3. Exit code 3 where such a job fails.
+    of the folder -o, a file for each job, and the report of that folder shows it. --set chooses
+    another job than the first, as in --set clearance_mm=0.3. Exit code 3 where such a job fails.
     """
     if output is not None and not models:
         raise click.UsageError("-o keeps what --models finds: add --models, or leave -o out")
@@ -246,13 +304,12 @@ def explain(
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, follow=False)
     caution(studies)
     if models:
-        return explain_models(studies, output or "results", as_json)
+        return explain_models(studies, output or "results", overrides, as_json)
     from compressor.studies.tradeoff.explain import explain as explained
 
     found = []
     for study in studies:
-        first = "the job" if study.jobs == 1 else f"the first of {plural(study.jobs)}"
-        say(f"running {first} of {study.name}, with and without each of its features")
+        say_job(study, "with and without each of its features")
         with ProgressReporter(False, "features", alike=False) as progress:
             found.append(explained(study, jobs, progress=progress))
         if not as_json:
@@ -263,7 +320,21 @@ def explain(
     return SOME_FAILED if any(one.reason for one in found) else DONE
 
 
-def explain_models(studies: "list[Study]", folder: str, as_json: bool) -> int:
+def say_job(study: "Study", how: str) -> None:
+    """Report which job of a study is run, and how to choose another."""
+    from compressor.cases import points
+
+    first, another = "the job", ""
+    if study.jobs > 1:
+        first = f"the first of {plural(study.jobs)}"
+        point = ", ".join(f"{key} = {value}" for key, value in next(points(study)).items())
+        another = f"; it has {point}: --set KEY=VALUE takes another" if point else ""
+    say(f"running {first} of {study.name}, {how}{another}")
+
+
+def explain_models(
+    studies: "list[Study]", folder: str, overrides: Sequence[str], as_json: bool
+) -> int:
     """Print and store how far choices of the model move the metrics of each study's first job."""
     from compressor.store import writable_folder, write_dataset
     from compressor.studies.tradeoff.model_choices import explain_models as run_models
@@ -272,18 +343,20 @@ def explain_models(studies: "list[Study]", folder: str, as_json: bool) -> int:
     writable_folder(folder)
     failed, found = False, []
     for study in studies:
+        say_job(study, "by other choices of the model")
         with ProgressReporter(False, "choices of the model", alike=False) as progress:
             data = run_models(study, progress=progress)
         if data["status"].values[0] != "ok":
             failed = True
             say(f"{study.name}: the job failed, {data['reason'].values[0]}: {data.attrs['detail']}")
             continue
-        path = models_file(folder, study.name)
+        path = models_file(folder, study.name, data.attrs["key"])
         write_dataset(path, data)
         table = model_table(data)
         found.append({"study": study.name, "file": str(path), **dataclasses.asdict(table)})
         if not as_json:
-            print_text("\n".join(model_lines(place_text(study, data.attrs["key"]), table)))
+            place = place_text(study, data.attrs["key"]) + "".join(f" --set {s}" for s in overrides)
+            print_text("\n".join(model_lines(place, table)))
             say(str(path))
     if as_json:
         print_text(json.dumps(without_nan(found), indent=1, ensure_ascii=False))
@@ -291,14 +364,16 @@ def explain_models(studies: "list[Study]", folder: str, as_json: bool) -> int:
 
 
 def heading(word: str, text: str) -> str:
-    """Return a line under a heading."""
-    return f"  {word:<{INDENT}}{text}"
+    """Return a text under a heading, in lines of the width."""
+    return f"  {word:<{INDENT}}" + "\n".join(wrap_line(text, 2 + INDENT)).lstrip()
 
 
 def lines(facts: "Explanation") -> Iterator[str]:
     """Yield an explanation as it is printed."""
     point = ", ".join(f"{key} = {value}" for key, value in facts.point.items())
-    yield f"{facts.study}: {plural(facts.jobs)}" + (f"; explained: {point}" if point else "")
+    yield from wrap_line(
+        f"{facts.study}: {plural(facts.jobs)}" + (f"; explained: {point}" if point else ""), 0
+    )
     count = len(facts.unknowns)
     solved = f"{count} degrees of freedom" if count else "closed form, nothing integrated"
     yield heading("motion", f"{facts.scene}: {solved}")

@@ -5,6 +5,7 @@ with error bars. A change is what lies beyond both bars.
 """
 
 import math
+import re
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -43,6 +44,8 @@ NONE_SEEN = "none seen"  # less than both error bars
 NO_VALUE = "–"
 MIN_SHOWN_CHANGE = 1e-5  # relative: a smaller change or error is not written out
 MIN_ERROR = 1e-4
+KEY_DIGITS = 8  # of a job's key in a file's name
+KEY_IN_NAME = re.compile(rf"(-[0-9a-f]{{{KEY_DIGITS}}})?")
 
 
 @dataclass(frozen=True)
@@ -229,42 +232,47 @@ class ModelsContent:
     table: PageTable
 
 
-def models_file(folder: Folder, study: str) -> Path:
+def models_file(folder: Folder, study: str, key: str) -> Path:
     """Return the path at which the choices of the model of a study's job are stored."""
-    return Path(folder) / "models" / f"{study}.nc"
+    return Path(folder) / "models" / f"{study}-{key[:KEY_DIGITS]}.nc"
 
 
-def read_models(folder: Folder, study: StoredStudy) -> xr.Dataset | None:
-    """Read what `compsim explain --models` stored of a job of a study; None where nothing.
+def read_models(folder: Folder, study: StoredStudy) -> list[xr.Dataset]:
+    """Read what `compsim explain --models` stored of jobs of a study.
 
-    Numbers of a job that the study no longer has, or that are damaged, are left out with a warning.
+    Numbers of a job that the study has not, or that are damaged, are left out with a warning. Older
+    files have no key in their names.
     """
-    path = models_file(folder, study.name)
     again = f"compsim explain --models {study.case_file} -o {folder} makes it anew"
-    if not path.exists():
-        return None
-    try:
-        data = read_dataset(path, again)
-        if data.attrs["key"] in study.keys:
-            return data
-        problem = f"{path}: is of a job that {study.name} no longer has: {again}"
-    except StoreError as error:
-        problem = str(error)
-    except KeyError:
-        problem = f"{path}: holds no choices of the model: {again}"
-    warnings.warn(problem, StoreWarning, stacklevel=2)
-    return None
+    found = []
+    for path in sorted(Path(folder, "models").glob(f"{study.name}*.nc")):
+        if not KEY_IN_NAME.fullmatch(path.stem.removeprefix(study.name)):
+            continue
+        try:
+            data = read_dataset(path, again)
+            if data.attrs["study"] != study.name:
+                continue
+            if data.attrs["key"] in study.keys:
+                found.append(data)
+                continue
+            problem = f"{path}: is not shown, as {study.name} has no such job: delete it"
+        except StoreError as error:
+            problem = str(error)
+        except KeyError:
+            problem = f"{path}: holds no choices of the model: {again}"
+        warnings.warn(problem, StoreWarning, stacklevel=2)
+    return found
 
 
 def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:
-    """Return a line on each study with stored choices of the model, and a section on them."""
-    notes, chapters = {}, []
+    """Return a line on each study with stored choices of the model, and a section on each job's."""
+    notes: dict[str, StudyNote] = {}
+    chapters = []
     for study in studies:
-        data = read_models(results, study)
-        if data is not None:
-            anchor = file_name("models", study.name)
-            line = headline(model_table(data))
-            notes[study.name] = StudyNote(line, anchor, "Table of the choices")
+        for number, data in enumerate(read_models(results, study)):
+            anchor = file_name("models", study.name) + (f"-{number + 1}" if number else "")
+            note = StudyNote(headline(model_table(data)), anchor, "Table of the choices")
+            notes.setdefault(study.name, note)
             chapters.append(Chapter(models_section(anchor, study, data)))
     return Additions(notes, chapters)
 
@@ -272,13 +280,14 @@ def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Addit
 def models_section(anchor: str, study: StoredStudy, data: xr.Dataset) -> Section:
     """Return the section with the choices of the model of a study's job."""
     table = model_table(data)
+    place = place_text(study, data.attrs["key"])
     content = ModelsContent(
-        place_text(study, data.attrs["key"]),
+        place,
         headline(table),
         ", ".join(table.unknown),
         page_table(table),
     )
-    title = f"Choices of the model in study {study.name}"
+    title = f"Choices of the model in study {place.rpartition(', ')[0]}"
     return Section(anchor, title, "compressor.studies.tradeoff:models.html", content)
 
 

@@ -211,7 +211,9 @@ def test_a_damaged_table_is_named(few, tmp_path):
     few(())
     path = Path(tmp_path / "worn.yaml")
     path.write_text(json.dumps({"joint": "big_end", "clearance_mm": 0.1, "solve": SHORT}))
-    kept = write_dataset(models_file(tmp_path, "worn"), explain_models(load_studies(path)[0]))
+    kept = write_dataset(
+        models_file(tmp_path, "worn", "0" * 20), explain_models(load_studies(path)[0])
+    )
     assert verify(tmp_path) == []
     kept.write_bytes(kept.read_bytes()[:-1])
     (damage,) = verify(tmp_path)

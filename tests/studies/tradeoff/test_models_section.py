@@ -12,7 +12,9 @@ from compressor.report.page import document
 from compressor.store.files import StoreWarning
 from compressor.store.series_file import write_dataset
 from compressor.store.studies import StoredAxis, StoredStudy
+from compressor.studies.tradeoff.command import model_lines
 from compressor.studies.tradeoff.page import (
+    add,
     headline,
     model_table,
     models_file,
@@ -134,14 +136,41 @@ def test_the_page_shows_line_table_and_what_is_assumed():
 
 def test_choices_are_read_where_they_are_of_a_job_of_the_study(tmp_path):
     study = STUDY
-    assert read_models(tmp_path, study) is None
-    path = write_dataset(models_file(tmp_path, "worn"), made())
-    assert read_models(tmp_path, study).attrs["key"] == study.keys[2]
-    with pytest.warns(StoreWarning, match="no longer has: compsim explain --models worn.yaml -o"):
-        assert read_models(tmp_path, replace(study, keys=("3" * 20,))) is None
+    assert read_models(tmp_path, study) == []
+    first, second = made().assign_attrs(key=study.keys[0]), made()
+    path = write_dataset(models_file(tmp_path, "worn", study.keys[0]), first)
+    write_dataset(tmp_path / "models" / "worn.nc", second)  # as older versions named it
+    write_dataset(tmp_path / "models" / "worn-out.nc", second)  # of another study
+    found = [one.attrs["key"] for one in read_models(tmp_path, study)]
+    assert sorted(found) == [study.keys[0], study.keys[2]]
+    chapters = add(tmp_path, [study], "").chapters
+    assert [chapter.section.title for chapter in chapters] == [
+        f"Choices of the model in study worn at clearance_mm = {value}" for value in (0.1, 0.3)
+    ]
+    with pytest.warns(StoreWarning, match=r"worn\.nc: is not shown, as worn has no such job"):
+        assert len(read_models(tmp_path, replace(study, keys=study.keys[:2]))) == 1
     path.write_bytes(path.read_bytes()[:-9])
-    with pytest.warns(StoreWarning, match=r"worn\.nc.*compsim explain --models"):
-        assert read_models(tmp_path, study) is None
+    with pytest.warns(StoreWarning, match=r"worn-0{8}\.nc.*compsim explain --models"):
+        assert len(read_models(tmp_path, study)) == 1
     write_dataset(path, xr.Dataset({"a": 1.0}))
     with pytest.warns(StoreWarning, match="holds no choices of the model"):
-        assert read_models(tmp_path, study) is None
+        assert len(read_models(tmp_path, study)) == 1
+
+
+def test_the_table_in_text_fits_a_terminal():
+    """The case itself and the choices that move a block's metrics; the others are counted."""
+    flat = made(max_penetration=([20e-6] * 7, [1e-9] * 7), rms_acceleration=(PEAK, PEAK_BAR))
+    idle = flat.isel(choice=0).assign_coords(choice="idle")
+    table = model_table(xr.concat([flat.isel(choice=[0, 2, 5]), idle], "choice"))
+    lines = [*model_lines("worn, the only job", table)]
+    assert max(map(len, lines)) <= 80
+    assert [line.split("  ")[1] for line in lines[3:7]] == [
+        "choice of the model", "the case itself", "oil", "all of them",
+    ]  # fmt: skip
+    assert lines[7].split() == ["0", "%", "0", "%", "+99", "points"]
+    assert lines[8:11] == [
+        "  1 other choice: none seen",
+        "",
+        "  no choice is seen to move: greatest penetration, big end",
+    ]
+    assert "    impossible: needs more" in lines
