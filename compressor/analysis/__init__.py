@@ -53,3 +53,4 @@ from compressor.analysis.shaking import (
     sensor_envelope,
     shaking,
 )
+from compressor.analysis.wear import interpolate_hours

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.cases import SUSPECT, Case, changes_since
+from compressor.cases import SUSPECT, Case, HealthyClearance, changes_since
 from compressor.metrics import BARRED
 from compressor.outcome import WORDS, Outcome, word_variables
 from compressor.reasons import Reason
@@ -254,6 +254,20 @@ class Stored:
         attributes = self.rows.attributes(position)
         numbers = self.rows.number_row(position)
         return Outcome(words["status"], words["reason"], numbers, attributes)
+
+    def find_ok(self, key: str, healthy: HealthyClearance) -> tuple[Case, Outcome] | str:
+        """Return the case and outcome of a job that is ok, else why there are none, in a word.
+
+        healthy: the clearance up to which a joint of the case counts as sound.
+        """
+        position = self.position(key)
+        if position is None:
+            return "missing"
+        outcome = self.outcome(position)
+        if outcome.status != "ok":
+            return outcome.reason
+        case = Case.from_attribute(outcome.attributes["case"])
+        return replace(case, healthy_clearance_mm=healthy), outcome
 
     def job(self, key: str) -> "xr.Dataset":
         """Return a stored job's Dataset. Raises StoreError where it is missing or damaged."""

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from compressor.analysis import interpolate_hours
 from compressor.cases import Case, Wear
 from compressor.metrics import JOINTS
 from compressor.store import StoreError, read_dataset
@@ -41,18 +42,9 @@ class WearHistory:
     values: dict[str, Any]
 
     def hours_at(self, joint: str, clearance: float) -> float:
-        """Return the hours at which a joint has a clearance, by lines between stages.
-
-        0 of one that it begins with; inf of one that it does not reach.
-        """
+        """Return the hours at which a joint has a clearance; inf of one that it does not reach."""
         opened = self.clearances[:, JOINTS.index(joint)]
-        if clearance <= opened[0]:
-            return 0.0
-        beyond = np.flatnonzero(opened >= clearance)
-        if not beyond.size:
-            return math.inf
-        pair = slice(beyond[0] - 1, beyond[0] + 1)
-        return float(np.interp(clearance, opened[pair], self.hours[pair]))
+        return interpolate_hours(self.hours, opened, clearance)
 
     @property
     def end(self) -> float:

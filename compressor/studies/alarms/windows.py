@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case, HealthyClearance, Sensor, points
+from compressor.cases import HealthyClearance, Sensor, points
 from compressor.program import CompsimError, Progress
 from compressor.store import (
     DamagedJob,
@@ -140,19 +140,16 @@ def read_job(
     options: AlarmOptions,
 ) -> dict[str, Any] | str:
     """Return what is read of a job's windows, or why there are none."""
-    position = stored.position(key)
-    if position is None:
-        return "missing"
-    outcome = stored.outcome(position)
-    if outcome.status != "ok":
-        return outcome.reason
+    found = stored.find_ok(key, healthy)
+    if isinstance(found, str):
+        return found
+    case, outcome = found
     try:
         record = job_record(stored, key)
     except DamagedJob:
         return "damaged"
     if record is None:
         return "without record"
-    case = replace(Case.from_attribute(outcome.attributes["case"]), healthy_clearance_mm=healthy)
     rate = 1.0 / (record.times[1] - record.times[0])
     bands = default_bands(rate) if bands is None else bands
     for low, high in bands:
@@ -171,8 +168,8 @@ def read_job(
         for level, rms in enumerate(options.noise):
             seed = [options.seed, int(key, 16), level]
             band = low, min(high, rate / 2.0)
-            found = read_windows(record, options.revolutions, bands, band, rms, seed)
-            readings |= {(level, name): one for name, one in found.items()}
+            read = read_windows(record, options.revolutions, bands, band, rms, seed)
+            readings |= {(level, name): one for name, one in read.items()}
     except RecordError:
         return "unusable record"
     velocity = np.asarray(outcome.numbers["body_velocity_rms"], float)

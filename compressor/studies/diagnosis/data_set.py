@@ -10,7 +10,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -245,14 +245,10 @@ def job_rows(
 
     healthy: the clearance up to which a joint counts as sound.
     """
-    position = stored.position(key)
-    if position is None:
-        return "missing"
-    status = stored.status_at(position)
-    if status.status != "ok":
-        return status.reason
-    attributes = stored.outcome(position).attributes
-    case = replace(Case.from_attribute(attributes["case"]), healthy_clearance_mm=healthy)
+    found = stored.find_ok(key, healthy)
+    if isinstance(found, str):
+        return found
+    case, outcome = found
     try:
         record = _record(stored, key)
     except DamagedJob:
@@ -261,7 +257,7 @@ def job_rows(
         return "without_record"
     base = {
         "key": key, "machine": machine_of(case), "joint": case.worn_joint, "load": case.load,
-        "regime": str(attributes.get("regime", "")), **labels_of(case),
+        "regime": str(outcome.attributes.get("regime", "")), **labels_of(case),
         "models": models_of(case),
         "clipped": float(record.get(CLIPPED, np.nan)),
     }  # fmt: skip
@@ -269,8 +265,8 @@ def job_rows(
     hop = options.hop or options.revolutions
     try:
         for window in windows(record, options.revolutions, hop):
-            found = features_by_noise(window, int(key, 16), options)
-            rows.append({**base, "window": window.slim(options.signals), "features": found})
+            numbers = features_by_noise(window, int(key, 16), options)
+            rows.append({**base, "window": window.slim(options.signals), "features": numbers})
     except RecordError:
         return "silent_record"
     return rows or "too_short"

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from compressor.analysis import interpolate_hours
 from compressor.cases import MODEL, Case, Wear, model_of, to_si
 from compressor.metrics import JOINTS, METRICS
 from compressor.program import PROGRAM
@@ -278,8 +279,8 @@ def life(machine: Worn, stages: xr.Dataset) -> Life:
     """Return the life of a machine, by straight lines between its stages."""
     opened = stages["clearance"].transpose("stage", "joint").values
     hours = stages["hours"].values
-    reached = [hours_at_limit(hours, clearance, machine.limit) for clearance in opened.T]
-    worst = int(np.nanargmin(reached)) if np.isfinite(reached).any() else int(opened[-1].argmax())
+    reached = [interpolate_hours(hours, clearance, machine.limit) for clearance in opened.T]
+    worst = int(np.argmin(reached)) if np.isfinite(reached).any() else int(opened[-1].argmax())
     found, factor, most = reached[worst], machine.wear.coefficient_factor, machine.wear.hours
     deepest = stages["worn_depth"].isel(stage=-1, joint=worst)
     return Life(
@@ -290,15 +291,3 @@ def life(machine: Worn, stages: xr.Dataset) -> Life:
         float(opened[-1, worst]),
         float(stages["angle"].values[int(deepest.values.argmax())]),
     )
-
-
-def hours_at_limit(hours: np.ndarray, opened: np.ndarray, limit: float) -> float:
-    """Return the hours at which a clearance reaches a limit; nan where it does not.
-
-    opened: a clearance that never shrinks.
-    """
-    beyond = np.flatnonzero(opened >= limit)
-    if not beyond.size:
-        return math.nan
-    last = int(beyond[0])
-    return float(np.interp(limit, opened[last - 1 : last + 1], hours[last - 1 : last + 1]))

@@ -10,7 +10,6 @@ from compressor.cases.case import Case
 from compressor.studies.wear.stages import (
     Worn,
     first_stage,
-    hours_at_limit,
     life,
     next_stage,
     stages_dataset,
@@ -120,11 +119,6 @@ def test_a_life_beyond_the_hours_is_not_told(machine):
     assert found.low == pytest.approx(whole.low, rel=1e-3)
     assert math.isnan(found.hours)
     assert math.isnan(found.high)
-
-
-def test_a_limit_is_met_by_a_straight_line():
-    assert hours_at_limit(np.array([0.0, 2.0, 3.0]), np.array([1.0, 2.0, 4.0]), 3.0) == 2.5
-    assert math.isnan(hours_at_limit(np.array([0.0, 2.0]), np.array([1.0, 2.0]), 3.0))
 
 
 def test_a_motion_that_fails_ends_its_machine():
