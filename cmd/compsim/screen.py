@@ -17,6 +17,7 @@ from compsim.results import files, folders
 if TYPE_CHECKING:
     from compressor.cases import Study
     from compressor.store import Again
+    from compressor.units import Units
 
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
 MAX_CAUTIONS = 5  # reported of one case file
@@ -87,6 +88,12 @@ def units_option(usual: str) -> Callable[..., Any]:
         "--units", type=click.Choice(["si", "plant"]), show_default=usual,
         help="Units: SI, or those of a plant: mm, mm/s, g, kN, bar, rpm.",
     )  # fmt: skip
+
+
+def check_json_units(as_json: bool, units: "Units | None") -> None:
+    """Raise UsageError where other units than SI are asked for in JSON."""
+    if as_json and units == "plant":
+        raise click.UsageError("--json has all numbers in SI: leave out --units plant")
 
 
 MAX_JOBS = 10_000

@@ -12,6 +12,7 @@ from compsim.results import ONE_JOB, jobs, of_results, results_folder, some_word
 from compsim.screen import (
     DONE,
     as_json,
+    check_json_units,
     print_text,
     run_commands,
     say,
@@ -73,6 +74,7 @@ def show(
     steps. Of a job with signals, whether the rod load at the crosshead pin changes its side as API
     618 asks: 15 degrees and 3 percent, or as a maker does. --json has all numbers in SI.
     """
+    check_json_units(as_json, units)
     folder, words = results_folder(given, folder)
     from compressor.store import report_job
 

@@ -106,6 +106,7 @@ MISTAKES = [
     ("show wear 0.1", "'0.1' is no AXIS=VALUE of wear; its axes are clearance_mm"),
     ("show ffffffff", "no job's key begins with 'ffffffff'"),
     ("show ''", "9 jobs' keys begin with ''", "give more of the key"),
+    ("show wear --json --units plant", "--json has all numbers in SI", "leave out --units plant"),
     ("show", "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
     ("export gird -o x.csv", "holds no study 'gird'; it holds big-end, wear"),
     ("export wear -o x.csv --format netcdf", "x.csv is no name for netcdf: end it in .nc"),
@@ -120,6 +121,7 @@ MISTAKES = [
     ("find good.yaml --over clearance_mm=0.1:0.3 --greatest peak_aceleration",
      "unknown metric 'peak_aceleration'; did you mean peak_acceleration"),
     ("find good.yaml --over clearance_mm=0.1:0.3 --first peak_acceleration=600", "> "),
+    ("find good.yaml --over clearance_mm=0.1:0.3 --json --units plant", "--json has all numbers"),
     ("find good.yaml --over clearance_mm=0.1:0.3", "give one of --first, --greatest and --least"),
 ]  # fmt: skip
 

@@ -14,6 +14,7 @@ from compsim.screen import (
     SOME_FAILED,
     as_json,
     caution,
+    check_json_units,
     jobs_option,
     one_thread_each,
     output_option,
@@ -86,8 +87,9 @@ def find(
     revolutions.
 
     Every point is a job of the study CONFIG-find-KEY in the folder of results: it is stored, and
-    not run again. Exit code 3 if any point's job failed.
+    not run again. --json has all numbers in SI. Exit code 3 if any point's job failed.
     """
+    check_json_units(as_json, units)
     one_thread_each()  # before numpy loads
     question = question_of(config, options)
     study = question.checked()
