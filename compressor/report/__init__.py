@@ -60,6 +60,7 @@ from compressor.report.plots import (
     Plotted,
     choose_figures,
     publish_drawings,
+    title_figure,
     write_plots,
 )
 from compressor.report.report import restate, write_report

@@ -103,16 +103,21 @@ def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tup
 
 
 def publish_drawings(
-    drawn: Iterable[tuple[str, str, Drawing]], output: Folder, stem: str, choice: PlotChoice
+    drawn: Iterable[tuple[str, str, Drawing]],
+    output: Folder,
+    stem: str,
+    choice: PlotChoice,
+    title: str = "",
 ) -> Iterator[Plotted]:
     """Write drawings with their names and captions as files; yields each. Raises StoreError.
 
-    One without a title has that of its file. choice: of the kinds of files, and of units.
+    One without a title has that of its file, or of its machine. choice: of the kinds of files, and
+    of units; title: of the machine.
     """
     kinds = choice.kinds
     for name, caption, usual in drawn:
         drawing = in_units(usual, choice.units)
-        drawing.title = drawing.title or f"{stem}: {name.replace('-', ' ')}"
+        drawing.title = drawing.title or title_figure(title or stem, name.replace("-", " "))
         paths = []
         for kind, picture in zip(kinds, render_kinds(drawing, kinds), strict=True):
             paths.append(Path(output) / f"{file_name(stem, name)}.{kind}")
@@ -275,8 +280,9 @@ def job_title(studies: Sequence[StoredStudy], key: str, name: str) -> str:
         if key in study.keys:
             point = [*points(study)][study.keys.index(key)]
             values = [f"{axis} {format_swept_value(value)}" for axis, value in point.items()]
-            first = f"{study.title or study.name}: {TITLES[name]}"
-            return in_lines(first, [*values, f"job {key[:10]}"])
+            return title_figure(
+                study.title or study.name, TITLES[name], [*values, f"job {key[:10]}"]
+            )
     return in_lines(TITLES[name], [f"job {key[:10]}"])
 
 
@@ -290,7 +296,12 @@ def study_title(study: StoredStudy, name: str, where: str) -> str:
         parts.append(f"{study.fixed['machine']['speed_rpm']:g} rpm")
     said = where.strip().removesuffix(".").split(". ")
     parts += [part.removeprefix("Here ") for part in said if part]
-    return in_lines(f"{study.title or study.name}: {TITLES[name]}", parts)
+    return title_figure(study.title or study.name, TITLES[name], parts)
+
+
+def title_figure(machine: str, what: str, parts: Sequence[str] = ()) -> str:
+    """Return a figure's title: the machine by its title or study, what is drawn, and where."""
+    return in_lines(f"{machine}: {what}", parts)
 
 
 def in_lines(first: str, parts: Sequence[str]) -> str:

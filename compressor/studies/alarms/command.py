@@ -106,18 +106,28 @@ def alarms(
     for text in () if quiet else list_remarks(found):
         say(text)
     if output:
-        write_alarms(found, output)
+        write_alarms(found, output, machine_title(folder, study))
         if not quiet:
             beside = "" if output == "alarms" else f" --alarms {shlex.quote(output)}"
             say(f"next: compsim report -i {shlex.quote(folder)}{beside}")
     return DONE
 
 
-def write_alarms(found: "xr.Dataset", output: str) -> None:
-    """Write a result as CSV, netCDF, and a figure with its caption for each level of noise."""
+def machine_title(folder: str, study: str) -> str:
+    """Return the title that a stored study's case file gives its machine, else the study's name."""
+    from compressor.store import read_studies
+
+    return next((one.title for one in read_studies(folder) if one.name == study), "") or study
+
+
+def write_alarms(found: "xr.Dataset", output: str, title: str) -> None:
+    """Write a result as CSV, netCDF, and a figure with its caption for each level of noise.
+
+    title: of the machine.
+    """
     from pathlib import Path
 
-    from compressor.report import render
+    from compressor.report import render, title_figure
     from compressor.store import publish, write_dataset
     from compressor.studies.alarms.figures import caption, draw_alarms
     from compressor.studies.alarms.words import as_rows
@@ -129,5 +139,8 @@ def write_alarms(found: "xr.Dataset", output: str) -> None:
         print_text(os.path.join(output, name))
     for level, noise in enumerate(found["noise"].values.tolist()):
         path = place / (f"alarms-noise-{noise:g}.png" if noise else "alarms.png")
-        publish(path, render(draw_alarms(found, level), "png"))
+        drawing = draw_alarms(found, level)
+        noisy = [f"noise of {noise:g} m/s²"] if noise else []
+        drawing.title = title_figure(title, "alarms by clearance", noisy)
+        publish(path, render(drawing, "png"))
         print_text(f"{path}\n  {caption(found, level)}")

@@ -25,12 +25,17 @@ REMEDY = "compsim alarms STUDY -o the folder writes it again"
 
 @dataclass(frozen=True)
 class AlarmsContent:
-    """What the section shows: sentences before the table, and below it, and figures."""
+    """What the section shows: sentences before the table, and below it, and figures.
+
+    `title`, `notes`: what the study's case file says of the machine.
+    """
 
     sentences: list[str]
     table: PageTable
     remarks: list[str]
     plates: list[Plate]
+    title: str
+    notes: str
 
 
 def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:
@@ -44,7 +49,8 @@ def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Addit
         return Additions({}, [])
     found = read_dataset(path, REMEDY)
     name = str(found.attrs.get("study"))
-    if name not in {study.name for study in studies}:
+    study = next((study for study in studies if study.name == name), None)
+    if study is None:
         return Additions({}, [])
     plates = []
     for level, noise in enumerate(found["noise"].values.tolist()):
@@ -56,7 +62,7 @@ def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Addit
     before, after = (
         [t[0].upper() + t[1:] for t in part(found)] for part in (heading, list_remarks)
     )
-    content = AlarmsContent(before, cells, after, plates)
+    content = AlarmsContent(before, cells, after, plates, study.title, study.notes)
     anchor = file_name("alarms-of", name)
     title = f"Which alarm sees wear first in study {name}"
     section = Section(anchor, title, "compressor.studies.alarms:alarms.html", content)

@@ -21,7 +21,7 @@ from compressor.studies.claims.findings import (
     sensitivity,
     summary,
 )
-from compressor.studies.claims.study import read_machines
+from compressor.studies.claims.study import about_machine, read_machines
 
 MAP = (
     "Blue holds, red does not, by how far the claim is from its threshold; lines are where the "
@@ -37,11 +37,16 @@ NO_FIGURE = ("", "", None)
 
 @dataclass(frozen=True)
 class MachinesFile:
-    """One file of judged machines: what is said of it, and its figure."""
+    """One file of judged machines: what is said of it, and its figure.
+
+    `title`, `notes`: what its case file says of the machine.
+    """
 
     name: str
     sentences: list[str]
     plate: Plate | None
+    title: str = ""
+    notes: str = ""
 
 
 def machine_files(folder: Folder) -> dict[str, xr.Dataset]:
@@ -106,7 +111,7 @@ def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Addit
     parts, found = [], machine_files(place) if place else {}
     for name, sentences, heading, caption, drawing in machine_drawings(found):
         plate = Plate(file_name("machines", name), heading, caption, drawing) if drawing else None
-        parts.append(MachinesFile(name, sentences, plate))
+        parts.append(MachinesFile(name, sentences, plate, *about_machine(found[name])))
     if not parts:
         return Additions({}, [])
     title = "In which machines the paper's claims hold"

@@ -114,6 +114,7 @@ OTHER_MACHINES = "holds machines of another case file, or of another version of 
 ELSEWHERE = "choose another folder by -o, or delete it"
 ROLES = ("joint", "load", "clearance_mm", "initial_offset_mm", "body", "sensor")
 UNIT = {"units": "1"}
+ABOUT = ("machine_title", "machine_notes")  # attributes: what a case file says of its machine
 
 
 class ClaimsError(CompsimError, ValueError):
@@ -179,6 +180,8 @@ def judge_machines(
         if missing:
             write_dataset(path, machines_dataset(study, keys, known))
     found = machines_dataset(study, keys, known)
+    if not missing and about_machine(read_machines(path)) != about_machine(found):
+        write_dataset(path, found)
     found.encoding["source"] = str(path)
     return found
 
@@ -253,7 +256,14 @@ def machines_dataset(study: Study, keys: Sequence[str], rows: Mapping[str, Judge
         "thresholds": "; ".join(f"{n}. {r.threshold}" for n, r in enumerate(RULES, 1)),
         "program": PROGRAM,
     }
+    said = zip(ABOUT, (study.title, study.notes), strict=True)
+    attrs |= {name: text for name, text in said if text}
     return xr.Dataset(variables, coordinates, attrs)
+
+
+def about_machine(found: xr.Dataset) -> list[str]:
+    """Return the title and the notes that a case file gives of its machines, "" without."""
+    return [str(found.attrs.get(name, "")) for name in ABOUT]
 
 
 def read_kept_machines(path: Path) -> dict[str, Judged]:

@@ -64,6 +64,7 @@ def open_regimes(results: Folder, study: str) -> xr.Dataset:
     number = {"long_name": "Poincaré point, one a revolution", "units": "1"}
     coordinates["revolution"] = "revolution", np.arange(1, turns + 1), number
     attrs = {"study": study, "over": over, "over_key": request.over, "log": int(request.log)}
+    attrs |= {"title": manifest["title"]} if "title" in manifest else {}
     attrs |= {name: getattr(request, name) for name in ("section_deg", "settle_rev", "measure_rev")}
     return xr.Dataset(variables, coordinates, attrs)
 

@@ -30,7 +30,8 @@ def write(results: Folder, name: str, output: Folder, choice: PlotChoice) -> Ite
     Raises PlotError where there is nothing to draw; StoreError where files cannot be written.
     """
     named = open_regimes(results, name).assign_attrs(study=name)
-    yield from publish_drawings(regime_figures(named, choice), output, name, choice)
+    title = named.attrs.get("title", "")
+    yield from publish_drawings(regime_figures(named, choice), output, name, choice, title)
 
 
 def regime_figures(dataset: xr.Dataset, choice: PlotChoice) -> Iterator[tuple[str, str, Drawing]]:

@@ -145,6 +145,8 @@ def write_manifest(folder: Path, study: Study) -> None:
         "model_version": MODEL,
         "program": PROGRAM,
     }
+    if study.title:
+        plain["title"] = study.title
     text = json.dumps(plain, indent=1) + "\n"
     publish(folder / FOLDER / study.name / FILE, text.encode())
 

@@ -78,7 +78,7 @@ def wear(
     else:
         for line in table(summary.machines):
             print_text(line)
-    drawn = [*draw(summary, output)]
+    drawn = [*draw(summary, output, {study.name: study.title for study in studies})]
     if not quiet:
         report_wear(summary, output, drawn)
     for one in summary.failed:
@@ -165,9 +165,9 @@ def report_wear(summary: "WearSummary", folder: str, drawn: list[str]) -> None:
         say(path)
 
 
-def draw(summary: "WearSummary", folder: str) -> Iterator[str]:
-    """Draw the first machines that have a life."""
-    from compressor.report import render
+def draw(summary: "WearSummary", folder: str, titles: dict[str, str]) -> Iterator[str]:
+    """Draw the first machines that have a life; titles: of the studies' machines, "" without."""
+    from compressor.report import render, title_figure
     from compressor.store import publish
     from compressor.studies.wear.figures import draw_wear
     from compressor.studies.wear.stages import open_wear, wear_file
@@ -177,7 +177,10 @@ def draw(summary: "WearSummary", folder: str) -> Iterator[str]:
         wear_keys = one.case.wear
         assert wear_keys
         bounds = wear_keys.limit_mm or math.nan, wear_keys.coefficient_factor
-        publish(path, render(draw_wear(open_wear(folder, one.case), *bounds), "png"))
+        drawing = draw_wear(open_wear(folder, one.case), *bounds)
+        point = [f"{key} {value}" for key, value in one.point.items()]
+        drawing.title = title_figure(titles[one.study] or one.study, "wear of the bores", point)
+        publish(path, render(drawing, "png"))
         yield os.fspath(path)
 
 

@@ -113,13 +113,17 @@ def test_the_caption_says_the_numbers_of_the_figure(written):
 
 
 def test_the_report_has_a_section_of_its_study(written, worn_store):
-    studies = read_studies(worn_store)
+    studies = [
+        dataclasses.replace(one, title="Unit 3", notes="A.") for one in read_studies(worn_store)
+    ]
     made = add(worn_store, studies, written[0])
     (chapter,) = made.chapters
     page = document([chapter.section])
     found = read_dataset(written[0] / "alarms.nc")
     assert "Which alarm sees wear first in study worn" in page
     assert page.count("<tr") == 1 + 3 * 9
+    assert "<strong>Unit 3</strong>" in page
+    assert '<p class="notes">A.</p>' in page
     for row in table_rows(found)[1][::9]:
         assert all(html.escape(text) in page for text in row)
     assert html.escape(caption(found)) in page

@@ -1,5 +1,7 @@
 """Studies of machines: what is stored, what goes on, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -11,6 +13,7 @@ from compressor.studies.claims import study as machine_study
 from compressor.studies.claims.study import (
     ClaimsError,
     Judged,
+    about_machine,
     cases_judged,
     judge_end,
     judge_machines,
@@ -118,8 +121,9 @@ def test_a_study_goes_on_where_it_ended(plan, tmp_path, monkeypatch, in_process)
     again = judge_machines(study, tmp_path / "out", 2)
     xr.testing.assert_identical(again, first)
     xr.testing.assert_identical(read_machines(path), whole)
-    judge_machines(study, tmp_path / "out", 2)
+    judge_machines(replace(study, title="Unit 3"), tmp_path / "out", 2)
     assert tasks == [[1], []]
+    assert about_machine(read_machines(path)) == ["Unit 3", ""]
 
 
 def test_other_files_are_not_overwritten(plan, tmp_path):

@@ -37,7 +37,8 @@ def folder(tmp_path):
     """A map, a design for a sensitivity, and a search that found something."""
     few = ["machine.rod_mass_kg={linspace: [2, 8, 7]}",
            "machine.reciprocating_mass_kg={linspace: [6, 26, 5]}"]  # fmt: skip
-    judged(tmp_path, example("claims"), few)
+    titled = ["report.title=Unit 3", "report.notes=Rod weighed."]
+    judged(tmp_path, example("claims"), [*few, *titled])
     found = judged(tmp_path, example("assumptions"), ["sample.n=4"])
     write_dataset(tmp_path / "assumptions-search.nc", found)
     found.attrs |= {"distance": 0.5, "looked": 99, "least": 0}
@@ -98,6 +99,7 @@ def test_the_section_of_the_page_has_words_and_figures(folder, capsys):
     text = document([chapter.section])
     assert "In which machines the paper&#39;s claims hold" in text
     assert "machines-claims.svg" in text
+    assert text.count("<strong>Unit 3</strong>") == text.count('class="notes">Rod weighed.') == 1
 
 
 @pytest.mark.parametrize("place", ["", "none"])

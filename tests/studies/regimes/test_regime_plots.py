@@ -184,8 +184,10 @@ def test_all_axes_say_what_they_are(data):
 
 def test_a_study_is_drawn_into_files_with_captions(data, tmp_path):
     named = data.assign_attrs(study="wear")
-    figures = regime_figures(named, PlotChoice())
-    drawn = [*publish_drawings(figures, tmp_path, "wear", PlotChoice(kinds=("png", "svg")))]
+    figures = [*regime_figures(named, PlotChoice())]
+    choice = PlotChoice(kinds=("png", "svg"))
+    drawn = [*publish_drawings(figures, tmp_path, "wear", choice, "Unit 3")]
+    assert [one.title for *_, one in figures] == ["Unit 3: bifurcation", "Unit 3: sections"]
     names = [path.name for one in drawn for path in one.paths]
     assert names == [f"wear-{n}.{k}" for n in ("bifurcation", "sections") for k in ("png", "svg")]
     assert all(path.stat().st_size > 1000 for one in drawn for path in one.paths)

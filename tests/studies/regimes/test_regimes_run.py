@@ -22,6 +22,7 @@ machine: {rod_mass_kg: [3, 4.7]}
 solve: {accuracy: draft, max_steps: %s}
 regimes: {over: clearance_mm, from: 0.1, to: 0.3, n: 3, direction: both, measure_rev: 8,
           exponent: false}
+report: {title: Unit 3}
 """
 
 
@@ -59,7 +60,7 @@ def test_the_dataset_has_the_study_s_axes_and_both_ways(place):
     assert (found["period"] == 1).all()
     assert found["differs"].dims == ("rod_mass_kg", "clearance_mm")
     assert not found["differs"].any()
-    assert found.attrs["over"] == "clearance_mm"
+    assert (found.attrs["over"], found.attrs["title"]) == ("clearance_mm", "Unit 3")
     assert (found.attrs["log"], found.attrs["section_deg"]) == (0, 0)
     for name in found.data_vars:
         assert found[name].attrs["long_name"], name
