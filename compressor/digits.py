@@ -7,6 +7,7 @@ import math
 
 UNKNOWN = "unknown"  # a number whose error bar is as long as itself
 DIGITS_WITHOUT_BAR, MAX_DIGITS = 6, 12  # digits without an error bar, and with one
+PAGE_DIGITS = 4  # of a number on a page
 MIN_DECIMAL, MAX_DECIMAL = 1e-3, 1e7  # sizes of numbers written without a power of ten
 
 
@@ -30,7 +31,7 @@ def by_bar(
     """Return a number with its error bar, such as 647.1 ± 0.3, to the digits that the bar allows.
 
     bar: nan where none was made; the number then has six digits. bare: at most six of these digits,
-    without the bar. digits: that a number with its bar has at most.
+    without the bar. digits: that a number has at most.
     """
     if math.isnan(value):
         return "–"
@@ -44,13 +45,23 @@ def by_bar(
         return f"≤ {_rounded_up(abs(value) + bar)[0]:g}"
     error, place = _rounded_up(bar)
     top = math.floor(math.log10(abs(value))) if value else place
-    place = max(place, top - (DIGITS_WITHOUT_BAR if bare else digits) + 1)
+    place = max(place, top - (min(digits, DIGITS_WITHOUT_BAR) if bare else digits) + 1)
     error = max(1, math.ceil(round(error / 10.0**place, 9))) * 10.0**place  # never shorter
     pair: tuple[float, ...] = (value,) if bare else (value, error)
     if MIN_DECIMAL <= abs(value) < MAX_DECIMAL or value == 0.0:
         return " ± ".join(f"{round(number, -place):.{max(0, -place)}f}" for number in pair)
     text = " ± ".join(f"{number / 10.0**top:.{max(0, top - place)}f}" for number in pair)
     return f"{text if bare else f'({text})'}e{top:+03d}"
+
+
+def setting(value: float) -> str:
+    """Return a number that was given, in four digits as a case file may have it; whole ones whole.
+
+    >>> setting(0.2), setting(1480.0), setting(12345), setting(0.123456789)
+    ('0.2', '1480', '12345', '0.1235')
+    """
+    is_whole = abs(value) < MAX_DECIMAL and value == int(value)
+    return f"{value if is_whole else float(f'{value:.{PAGE_DIGITS}g}'):.10g}"
 
 
 def _rounded_up(bar: float) -> tuple[float, int]:

@@ -20,11 +20,11 @@ from markupsafe import Markup
 
 from compressor.analysis import SPOKEN, Claim
 from compressor.cases import MODEL, Case, CaseError
-from compressor.digits import UNKNOWN, is_known
+from compressor.digits import UNKNOWN, is_known, setting
 from compressor.metrics import BARRED, JOINTS
 from compressor.program import PROGRAM, library_versions
 from compressor.report.figures.sweep_data import Measure, measures, name_in_words
-from compressor.report.page import Section, format_briefly, templates
+from compressor.report.page import Section, format_measure, templates
 from compressor.store import Folder, Stored, StoredStudy
 from compressor.units import Units
 
@@ -308,16 +308,13 @@ class Points(Sequence[str]):
         return ", ".join(part for part in parts if part)
 
 
-NAME_DIGITS = 4  # of a swept value in the name of a job
-
-
 def word_value(name: str, value: object, unit: str) -> str:
     """Return a swept value in words: clearance 0.2 mm; "" where the job has none."""
     words = name_in_words(name, unit)
     if isinstance(value, int | float):
         if math.isnan(value):
             return ""
-        return f"{words} {value:.{NAME_DIGITS}g} {unit}".removesuffix(" 1").rstrip()
+        return f"{words} {setting(value)} {unit}".removesuffix(" 1").rstrip()
     return f"{words} {SPOKEN.get(str(value), value)}" if value != "" else ""
 
 
@@ -387,7 +384,7 @@ def finding(
 
     def text(n: int) -> str:
         return (
-            f"{format_briefly(measure, float(values[n]), float(bars[n]))} {measure.unit}".rstrip()
+            f"{format_measure(measure, float(values[n]), float(bars[n]))} {measure.unit}".rstrip()
         )
 
     if len(values) == 1:

@@ -15,8 +15,7 @@ import numpy as np
 from jinja2 import ChoiceLoader, Environment, FunctionLoader, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from compressor.digits import by_bar
-from compressor.metrics import BARRED
+from compressor.digits import PAGE_DIGITS, by_bar, setting
 from compressor.outcome import Regime
 from compressor.report.figures.drawing import Drawing, as_csv
 from compressor.report.figures.pictures import DPI
@@ -58,14 +57,16 @@ class PageTable:
 
 
 def number(value: float) -> str:
-    """Return a measured number to four significant digits; a dash for nan."""
-    size = abs(value)
+    """Return a measured number to four significant digits, whole ones whole; a dash for nan."""
     if math.isnan(value):
         return "–"
+    if not value.is_integer():
+        value = float(f"{value:.{PAGE_DIGITS}g}")
+    size = abs(value)
     if size < 1e7 and size == int(size):
         return f"{value:.0f}"
     if not 1e-3 <= size < 1e7:
-        return f"{value:.2e}"
+        return f"{value:.{PAGE_DIGITS - 1}e}"
     return f"{value:.{max(0, 3 - math.floor(math.log10(size)))}f}"
 
 
@@ -74,22 +75,14 @@ def number_cell(value: float) -> Cell:
     return Cell(number(value), "number", None if math.isnan(value) else value)
 
 
-def format_measure(measure: Measure, value: float, bar: float) -> str:
-    """Return a metric and its error bar, both in its unit, to the digits that the bar allows."""
-    if math.isnan(bar):
-        return number(value)
-    return by_bar(value, bar, BARRED[measure.variable].bar.relative)
-
-
 SHORT_BAR = 5e-4  # of a number: its error bar is below its fourth digit
-BRIEF = 4  # digits
 
 
-def format_briefly(measure: Measure, value: float, bar: float) -> str:
+def format_measure(measure: Measure, value: float, bar: float) -> str:
     """Return a metric in four digits, with its error bar where these show it."""
     if math.isnan(bar) or bar < SHORT_BAR * abs(value):
-        return number(float(f"{value:.{BRIEF}g}") if abs(value) >= 10.0**BRIEF else value)
-    return by_bar(value, bar, BARRED[measure.variable].bar.relative, digits=BRIEF)
+        return number(value)
+    return by_bar(value, bar, measure.is_relative, digits=PAGE_DIGITS)
 
 
 def measured_cell(measure: Measure, value: float, bar: float, limits: Limits = NO_LIMITS) -> Cell:
@@ -102,9 +95,9 @@ def measured_cell(measure: Measure, value: float, bar: float, limits: Limits = N
 
 
 def value_cell(value: Any) -> Cell:
-    """Return a setting of a job: a number as the case file may give it, or a word."""
+    """Return a setting of a job: a number in four digits, or a word."""
     if isinstance(value, int | float | np.number):
-        return Cell(f"{value:.10g}", "number")
+        return Cell(setting(float(value)), "number", None if math.isnan(value) else float(value))
     return Cell(str(value))
 
 

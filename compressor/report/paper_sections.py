@@ -31,6 +31,7 @@ from compressor.analysis import (
     shaking,
 )
 from compressor.cases import Case, CaseError, points, table, value_in
+from compressor.digits import setting
 from compressor.report.figures import FIGURES, Drawing
 from compressor.report.figures import Figure as PaperFigure
 from compressor.report.figures.diagnosis import (
@@ -212,7 +213,7 @@ def follows(case: Case, values: Mapping[str, Any], key: str) -> bool:
 
 
 def spelt(value: Any, unit: str) -> str:
-    """Return a value as a case file has it, with its unit."""
+    """Return a value as a case file has it, in four digits, with its unit."""
     if value is None:
         return "none"
     if isinstance(value, bool):
@@ -222,7 +223,7 @@ def spelt(value: Any, unit: str) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(map(str, value))
     if isinstance(value, int | float):
-        return f"{value:.10g}" + (f" {unit}" if unit else "")
+        return setting(value) + (f" {unit}" if unit else "")
     return str(value)
 
 

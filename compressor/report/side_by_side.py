@@ -17,7 +17,7 @@ from compressor.report.page import (
     PageTable,
     TableRow,
     column_title,
-    format_briefly,
+    format_measure,
     number,
 )
 from compressor.store import Stored
@@ -150,7 +150,7 @@ def _compare(
 
 def _cell(measure: Measure, value: float, bar: float, sound: float) -> Cell:
     """Return a metric of a worn job, and how many times that of the healthy machine it is."""
-    text = format_briefly(measure, value, bar)
+    text = format_measure(measure, value, bar)
     is_sure = np.isnan(bar) or is_known(value, bar, measure.is_relative)
     if is_sure and sound > 0.0 and value > 0.0:
         times = value / sound

@@ -371,7 +371,7 @@ class Figure {
           title: { text: titled ? escaped(scale.title) : "", standoff: 6,
             font: { size: fitting(scale.title, domain, way === "x" ? width : total) } },
         };
-        if (way === "x") made.unifiedhovertitle = { text: `%{x:.6~g} ${escaped(scale.unit)}` };
+        if (way === "x") made.unifiedhovertitle = { text: `%{x:.4~r} ${escaped(scale.unit)}` };
         if (way === "y" && scale.words) made.tickfont = { size: boxes[n].font };
         if (scale.words) {
           made.tickmode = "array";
@@ -418,8 +418,8 @@ class Figure {
       meta: trace.name, visible: !this.off.has(trace.name), opacity: trace.opacity };
     const jobs = trace.jobs && Array.from(numbers(trace.jobs), (n) => this.sheet.jobs[n]);
     if (jobs) made.customdata = jobs;
-    const inX = `%{x:.6~g} ${xu}`;
-    made.hovertemplate = `%{y:.5~g} ${yu}<extra>${name}</extra>`;
+    const inX = `%{x:.4~r} ${xu}`;
+    made.hovertemplate = `%{y:.4~r} ${yu}<extra>${name}</extra>`;
     if (!trace.name && trace.kind !== "map" && trace.kind !== "bars") made.hoverinfo = "skip";
     if (made.hoverinfo) delete made.hovertemplate;
     const error = (way) => (trace.errors && { type: "data", symmetric: false, color,
@@ -440,10 +440,9 @@ class Figure {
           len: box.y[1] - box.y[0], tickfont: { size: 10 }, outlinewidth: 0,
           title: { text: escaped(trace.scale), side: "right", font: { size: 11 } } } });
       if (trace.log) made.colorbar.tickprefix = "10^";
-      const shown = trace.log ? rows.map((row) => Array.from(row, (v) => (10 ** v).toPrecision(5)))
-        : rows.map((row) => Array.from(row, (v) => String(Number(v.toPrecision(5)))));
-      made.text = shown;
-      made.hovertemplate = `${inX}, %{y:.6~g} ${yu}<br>%{text}` +
+      const shown = (v) => String(Number((trace.log ? 10 ** v : v).toPrecision(4)));
+      made.text = rows.map((row) => Array.from(row, shown));
+      made.hovertemplate = `${inX}, %{y:.4~r} ${yu}<br>%{text}` +
         `<extra>${escaped(trace.scale || panel.title)}</extra>`;
       if (jobs) {
         made.customdata = rows.map((row, n) => jobs.slice(n * columns, (n + 1) * columns));
@@ -456,7 +455,7 @@ class Figure {
       Object.assign(made, { type: "bar", orientation: lying ? "h" : "v",
         width: trace.width, marker: { color } });
       if (trace.errors) made[lying ? "error_x" : "error_y"] = error();
-      made.hovertemplate = lying ? `%{x:.4~g} ${xu}<extra>${name}</extra>` : made.hovertemplate;
+      made.hovertemplate = lying ? `%{x:.4~r} ${xu}<extra>${name}</extra>` : made.hovertemplate;
       return made;
     }
     if (trace.kind === "band") {
@@ -474,7 +473,7 @@ class Figure {
     if (trace.errors) made[trace.across ? "error_x" : "error_y"] = error();
     if (!this.sheet.unified) {
       made.hovertemplate = made.hoverinfo ? undefined
-        : `${inX}, %{y:.5~g} ${yu}<extra>${name}</extra>`;
+        : `${inX}, %{y:.4~r} ${yu}<extra>${name}</extra>`;
     }
     return made;
   }

@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.cases import Study, points
-from compressor.digits import by_bar, is_known
+from compressor.digits import PAGE_DIGITS, by_bar, is_known
 from compressor.metrics import METRICS
 from compressor.outcome import Regime
 from compressor.report import (
@@ -193,7 +193,7 @@ def headline(table: ModelTable) -> str:
     peaks = [n for n in places if table.measures[n].variable.startswith("peak")]
     n = max(peaks or places, key=lambda n: table.spans[n][1] - table.spans[n][0])
     measure, value, bar = table.measures[n], table.values[n], table.bars[n]
-    number = f"{by_bar(value, bar, measure.is_relative, bare=True)} {measure.unit}"
+    number = f"{by_bar(value, bar, measure.is_relative, True, PAGE_DIGITS)} {measure.unit}"
     share = bar / value
     error = f"below {100 * MIN_ERROR:g}" if share < MIN_ERROR else f"{100 * share:.1g}"
     word = "peak" if peaks else "number"
@@ -294,7 +294,10 @@ def models_section(anchor: str, study: StoredStudy, data: xr.Dataset) -> Section
 def page_table(table: ModelTable) -> PageTable:
     """Return the cells of a table: the case itself, each choice, and the span."""
     numbers = zip(table.measures, table.values, table.bars, strict=True)
-    values = [number_cell(by_bar(value, bar, m.is_relative)) for m, value, bar in numbers]
+    values = [
+        number_cell(by_bar(value, bar, m.is_relative, digits=PAGE_DIGITS))
+        for m, value, bar in numbers
+    ]
     itself = [Cell("the case itself"), *values, Cell("")]
     span = [Cell("all of them"), *map(number_cell, table.span_texts), Cell("")]
     rows = [TableRow(itself), *(TableRow([*row_cells(row)]) for row in table.rows), TableRow(span)]

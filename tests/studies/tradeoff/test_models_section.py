@@ -93,7 +93,7 @@ def test_a_change_is_what_lies_beyond_both_bars():
 def test_the_line_has_the_numbers_of_the_table():
     table = model_table(made())
     assert headline(table) == (
-        "Peak acceleration: 100.00 m/s²; numerical error 0.01 %; choices of the model move this "
+        "Peak acceleration: 100.0 m/s²; numerical error 0.01 %; choices of the model move this "
         "peak by -66 to +93 %; 3 of 5 choices give no number (chaotic, failed, impossible)"
     )
     (down,) = model_table(made().isel(choice=[0, 2])).span_texts[:1]
