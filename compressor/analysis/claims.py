@@ -118,13 +118,13 @@ def growing_peaks(runs: Runs) -> Verdict:
     rows, margins = [], []
     for fault in FAULTS:
         line = [runs[label(fault, c)] for c in CLEARANCES]
-        peaks = {"a, m/s²": [peak(run, "peak_acceleration") for run in line]}
+        peaks = {("a", "m/s²"): [peak(run, "peak_acceleration") for run in line]}
         for joint in faulty_joints(fault):
             forces = [peak(run, "peak_contact_force", joint=joint) for run in line]
-            peaks[f"F {SPOKEN[joint]}, N"] = forces
-        for quantity, values in peaks.items():
+            peaks[f"F {SPOKEN[joint]}", "N"] = forces
+        for (quantity, unit), values in peaks.items():
             margins += [at_least(b.over(a), 1.01) for a, b in itertools.pairwise(values)]
-            text = " → ".join(f"{one.value:.0f}" for one in values)
+            text = " → ".join(f"{one.value:.0f}" for one in values) + f" {unit}"
             rows.append((f"{SPOKEN[fault]}, {quantity}", text))
     return margins, rows
 
@@ -259,7 +259,8 @@ def two_are_worse(runs: Runs) -> Verdict:
             measure = peak if unit == "peak" else metric
             big, small, both = (measure(runs[label(fault, c)], name) for fault in FAULTS)
             margins += [above(both.over(one), 1.0) for one in (big, small)]
-            text = f"big {big.value:.0f}, small {small.value:.0f}, both {both.value:.0f} m/s²"
+            joints = zip(("big", "small", "both"), (big, small, both), strict=True)
+            text = ", ".join(f"{name} {one.value:.0f} m/s²" for name, one in joints)
             rows.append((f"{c:g} mm, {unit}", text))
     return margins, rows
 

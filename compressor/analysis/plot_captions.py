@@ -151,7 +151,7 @@ def signals(run: xr.Dataset, twin: Twin) -> str:
     if twin is not None:
         ideal_joints = ""
         _, ideal = last_revolution(twin)
-        beside = f" ({np.abs(ideal['acceleration'].values).max():.0f} without clearance)"
+        beside = f" ({np.abs(ideal['acceleration'].values).max():.0f} m/s² without clearance)"
     return (
         f"The last of {plural(count, 'settled revolution')} over crank angle, at stored samples. "
         f"Acceleration reaches {peak:.0f} m/s²{beside}, X {span(x)} kN, Y {span(y)} kN, the "
@@ -210,10 +210,10 @@ def analyst(run: xr.Dataset, twin: Twin) -> str:
     rms = float(np.sqrt(np.mean(found.vibration**2)))
     beside = ""
     if twin is not None:
-        beside = f"; without clearance it reaches {loudest(read_cycle(twin))[0]:.3g}"
+        beside = f"; without clearance it reaches {loudest(read_cycle(twin))[0]:.3g} m/s²"
     sentences = [
         f"The last settled revolution. {kind} reaches {peak:.3g} m/s² ({G * peak:.3g} g) at "
-        f"{at:.0f}°, rms {rms:.3g}{beside}.",
+        f"{at:.0f}°, rms {rms:.3g} m/s²{beside}.",
         f"The rod load goes from {span(1e-3 * found.rod_load)} kN and changes its side at "
         f"{angles(found.reversals)}." if found.reversals
         else f"The rod load, {span(1e-3 * found.rod_load)} kN, does not change its side.",

@@ -52,7 +52,6 @@ from compressor.report.page import (
     Section,
     StudyNote,
     TableRow,
-    column_title,
 )
 from compressor.report.plots import (
     PlotChoice,

@@ -136,8 +136,8 @@ def mechanism(case: Case, angle: float = ANGLE) -> Mechanism:
     most = max(worn.values(), default=1.0)
     insets = tuple(
         Inset(
-            SPOKEN[joint], 140.0 + 430.0 * number, height + INSET + 16.0,
-            INSET - GAP * size / most, GAP * size / most, f"{size:.3g}",
+            SPOKEN[joint], 130.0 + 450.0 * number, height + INSET + 16.0,
+            INSET - GAP * size / most, GAP * size / most, f"{size:.3g} mm",
         )
         for number, (joint, size) in enumerate(worn.items())
     )  # fmt: skip
@@ -153,9 +153,9 @@ def mechanism(case: Case, angle: float = ANGLE) -> Mechanism:
     )  # fmt: skip
 
 
-def mechanism_svg(case: Case, angle: float = ANGLE) -> Markup:
+def mechanism_svg(case: Case, units: Units = "usual") -> Markup:
     """Return the picture as SVG that stands in a page; its colours are those of the page."""
-    text = templates().get_template("mechanism.svg").render(it=mechanism(case, angle))
+    text = templates(units).get_template("mechanism.svg").render(it=mechanism(case))
     return Markup(text)
 
 

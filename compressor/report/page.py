@@ -23,6 +23,7 @@ from compressor.report.figures.sweep_data import Measure
 from compressor.report.interactive import describe_figure, script
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.store import Folder, StoredStudy
+from compressor.units import Units, convert_text
 
 
 @dataclass(frozen=True)
@@ -70,9 +71,11 @@ def number(value: float) -> str:
     return f"{value:.{max(0, 3 - math.floor(math.log10(size)))}f}"
 
 
-def number_cell(value: float) -> Cell:
-    """Return one measured number."""
-    return Cell(number(value), "number", None if math.isnan(value) else value)
+def number_cell(value: float, unit: str = "") -> Cell:
+    """Return one measured number, with its unit where the column has several."""
+    if math.isnan(value):
+        return Cell(number(value), "number")
+    return Cell(f"{number(value)} {unit}".rstrip(), "number", value)
 
 
 SHORT_BAR = 5e-4  # of a number: its error bar is below its fourth digit
@@ -214,11 +217,21 @@ NO_JOBS = JobsToOpen("", (), ())
 SUBJECT = "Reciprocating compressor with joint clearance"
 
 
-def templates() -> Environment:
-    """Return the page's templates: they escape what they print, and what they lack is an error."""
+def templates(units: Units = "usual") -> Environment:
+    """Return the page's templates: they escape what they print, and what they lack is an error.
+
+    units: of numbers in what they print, but for markup and what a template escapes itself: code,
+    and words of a case file.
+    """
+
+    def in_chosen_units(value: object) -> object:
+        is_text = isinstance(value, str) and not isinstance(value, Markup)
+        return convert_text(str(value), units) if is_text else value
+
     return Environment(
         loader=ChoiceLoader([PackageLoader(__package__), Elsewhere(template_elsewhere)]),
         autoescape=True,
+        finalize=None if units == "usual" else in_chosen_units,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -245,15 +258,16 @@ def document(
     jobs: JobsToOpen = NO_JOBS,
     running: Running | None = None,
     title: str = "",
+    units: Units = "usual",
 ) -> str:
     """Return the whole page: the first section, a list of contents, and the other sections.
 
     running: how the run stands that the page is written beside; title: of the page, `SUBJECT` where
-    there is none.
+    there is none; units: of its texts.
     """
     data = jobs._asdict() | {"studies": [one._asdict() for one in jobs.studies]}
     facts = Markup(json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"))
-    page = templates().get_template("page.html")
+    page = templates(units).get_template("page.html")
     return page.render(sections=sections, jobs=facts, running=running, title=title, subject=SUBJECT)
 
 

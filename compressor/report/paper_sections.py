@@ -505,9 +505,9 @@ def printed_table() -> PageTable:
     """Return the paper's numbers of the spring load beside those that follow from its equations."""
     rows = [
         TableRow([
-            Cell(f"{c.quantity} ({c.unit})"),
-            number_cell(math.nan if c.printed is None else c.printed),
-            number_cell(c.follows),
+            Cell(c.quantity),
+            number_cell(math.nan if c.printed is None else c.printed, c.unit),
+            number_cell(c.follows, c.unit),
             Cell(c.source),
         ])
         for c in comparisons()
@@ -583,19 +583,18 @@ def diagnosis_sections(found: Shakings, plates: list[Plate]) -> Iterator[Section
 
 def force_table(found: Shakings) -> PageTable:
     """Return the rms of X above `ORDER` and its two shares, N, by fault and clearance."""
-    head = ["clearance at", "mm", "rms (N)", "near changes of direction (N)", "elsewhere (N)"]
+    head = ["clearance at", "clearance", "rms", "near changes of direction", "elsewhere"]
     healthy = found["design"]
-    rows = [TableRow([Cell("none"), Cell("0", "number"), *forces(healthy)])]
+    rows = [TableRow([Cell("none"), number_cell(0.0, "mm"), *forces(healthy)])]
     for fault in FAULTS:
         for clearance in CLEARANCES:
             one = found[label(fault, clearance)]
-            rows.append(
-                TableRow([Cell(SPOKEN[fault]), Cell(f"{clearance:g}", "number"), *forces(one)])
-            )
+            size = Cell(f"{clearance:g} mm", "number", clearance)
+            rows.append(TableRow([Cell(SPOKEN[fault]), size, *forces(one)]))
     return PageTable(head, rows)
 
 
 def forces(one: Shaking) -> list[Cell]:
     """Return the whole and its shares, to 0.1 N."""
     values = one.spectrum.above, one.near_turns, one.elsewhere
-    return [Cell(f"{value:.1f}", "number") for value in values]
+    return [Cell(f"{value:.1f} N", "number", value) for value in values]

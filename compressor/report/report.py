@@ -110,7 +110,7 @@ def write_report(
     add: what makes more of the page, such as `compressor.studies.page_additions` gives. running:
     how the run stands that still adds to the results; the page says so, and loads itself again.
     limits: of metrics, whose zones tables and curves show, such as
-    `body_velocity_rms_mm_per_s=2,5`. units: of figures and tables, as `compressor.units` has them.
+    `body_velocity_rms_mm_per_s=2,5`. units: of figures, tables and texts, of `compressor.units`.
 
     Raises LimitError where these cannot be used, StoreError where there are no results, or the
     report's folder cannot be written.
@@ -227,7 +227,7 @@ def build_report(
     jobs = JobsToOpen(shlex.quote(str(results)), [one.jobs for one in drawn], [*series])
     titles = {study.title for study in studies if study.title}
     title = titles.pop() if len(titles) == 1 else ""  # several machines have it in their sections
-    page = document(sections, jobs, running, title)
+    page = document(sections, jobs, running, title, units)
     return ReportContent([*of_paper, *later], [study.name for study in studies], series, page)
 
 
@@ -326,7 +326,7 @@ def summarise(
         name, run = [*paper.stored.items()][-1]
         shown = [(label_in_words(name), case_of(run))]
     pictures = [
-        (mechanism_svg(case), f"{name[0].upper()}{name[1:]}: {mechanism_words(case)}")
+        (mechanism_svg(case, units), f"{name[0].upper()}{name[1:]}: {mechanism_words(case)}")
         for name, case in shown
         if case
     ]

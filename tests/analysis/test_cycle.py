@@ -134,7 +134,7 @@ def test_the_caption_has_the_numbers(sensed):
     rms = math.sqrt(np.mean(record**2))
     assert (
         f"(guide, along y) reaches {peak:.3g} m/s² ({peak / 9.80665:.3g} g) at {at:.0f}°, rms "
-        f"{rms:.3g}; without clearance it reaches {ideal:.3g}."
+        f"{rms:.3g} m/s²; without clearance it reaches {ideal:.3g} m/s²."
     ) in told
     load = frame_forces(sensed)["rod_load"][2400:3601] / 1e3
     assert f"goes from {load.min():.2f} to {load.max():.2f} kN and changes its side at " in told

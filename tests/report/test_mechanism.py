@@ -55,7 +55,7 @@ def test_worn_joints_are_marked_and_enlarged(joint, worn):
 def test_the_wider_clearance_has_the_wider_gap():
     sizes = {"big_end": 0.3, "small_end": 0.1}
     big, small = mechanism(case(clearance_mm=sizes)).insets
-    assert (big.clearance, small.clearance) == ("0.3", "0.1")
+    assert (big.clearance, small.clearance) == ("0.3 mm", "0.1 mm")
     assert big.gap == pytest.approx(3 * small.gap)
     assert big.journal + big.gap == pytest.approx(small.journal + small.gap)
 

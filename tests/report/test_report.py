@@ -418,6 +418,7 @@ def test_tables_and_figures_may_be_in_plant_units(own, tmp_path):
             peak, rms = (float(run[f"{name}_acceleration"]) for name in ("peak", "rms"))
         assert float(cells[3].split(" ± ")[0]) == pytest.approx(peak / 9.80665, rel=1e-3)
         assert cells[4].endswith(" B") == (rms >= 1.0)  # the limit is 1 m/s2
+    assert "Zones of rms acceleration, by limits that were given: A below 0.102 g" in found.text
     table = (tmp_path / "out" / "sweep-own-map.csv").read_text(encoding="utf-8")
     assert "peak acceleration: g" in table
 
@@ -556,5 +557,5 @@ def test_configs_are_the_papers_cases():
 
 def test_printed_numbers_stand_beside_what_follows(full):
     page = (full / "index.html").read_text(encoding="utf-8")
-    found = re.search(r"fall, gas corners \(mm\)</td>(.*?)</tr>", page, re.DOTALL)
-    assert re.findall(r">([\d.]+)<", found[1])[:2] == ["120", "81.28"]
+    found = re.search(r"fall, gas corners</td>(.*?)</tr>", page, re.DOTALL)
+    assert re.findall(r">([\d.]+) mm<", found[1])[:2] == ["120", "81.28"]

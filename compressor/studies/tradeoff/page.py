@@ -28,7 +28,6 @@ from compressor.report import (
     Section,
     StudyNote,
     TableRow,
-    column_title,
     file_name,
     measures,
 )
@@ -295,13 +294,13 @@ def page_table(table: ModelTable) -> PageTable:
     """Return the cells of a table: the case itself, each choice, and the span."""
     numbers = zip(table.measures, table.values, table.bars, strict=True)
     values = [
-        number_cell(by_bar(value, bar, m.is_relative, digits=PAGE_DIGITS))
+        number_cell(f"{by_bar(value, bar, m.is_relative, digits=PAGE_DIGITS)} {m.unit}".rstrip())
         for m, value, bar in numbers
     ]
     itself = [Cell("the case itself"), *values, Cell("")]
     span = [Cell("all of them"), *map(number_cell, table.span_texts), Cell("")]
     rows = [TableRow(itself), *(TableRow([*row_cells(row)]) for row in table.rows), TableRow(span)]
-    return PageTable(["choice of the model", *map(column_title, table.measures), "assumed"], rows)
+    return PageTable(["choice of the model", *(m.title for m in table.measures), "assumed"], rows)
 
 
 def row_cells(row: ModelRow) -> Iterator[Cell]:
