@@ -13,7 +13,7 @@ from compressor.analysis.runs import record_of
 from compressor.analysis.shaking import NoSeriesError, frame_forces, healthy_twin
 from compressor.cases.case import Case
 from compressor.report.figures.drawing import as_csv
-from compressor.report.figures.job import draw_analyst, draw_segments
+from compressor.report.figures.job import draw_analyst, draw_segments, split_events
 from compressor.solve.simulate import simulate
 
 SOLVE = {"duration_rev": 3, "settle_rev": 1, "accuracy": "draft", "error_bars": False}
@@ -108,6 +108,11 @@ def test_events_of_two_ends_are_told_apart(sensed, monkeypatch):
         (180, "crank discharge closes"), (180, "head suction closes"),
         (288, "crank suction opens"), (288, "head discharge opens"),
     ]  # fmt: skip
+    spans = split_events(read_cycle(sensed).events)
+    assert {lane: np.round(own).tolist() for lane, own in spans.items()} == {
+        "suction, head end": [[36, 180]], "suction, crank end": [[288, 360]],
+        "discharge, head end": [[288, 360]], "discharge, crank end": [[0, 180]],
+    }  # fmt: skip
 
 
 def test_impacts_are_those_of_the_revolution(sensed):
@@ -148,7 +153,14 @@ def test_all_that_is_marked_is_in_the_table(sensed):
     drawing = draw_analyst(sensed, healthy_twin(sensed, sensed=True))
     found = read_cycle(sensed)
     strip, vibration, load = drawing.panels
-    assert [*strip.y.words.values()] == ["load", "impacts, big end", "reversals"]
+    lanes = ["suction", "discharge", "impacts, big end", "reversals"]
+    assert [*strip.y.words.values()] == lanes
+    angles = {name: angle for angle, name in found.events}
+    open_at = {trace.name: trace.x.tolist() for trace in strip.traces[:2]}
+    assert open_at == {
+        "suction": [angles["suction opens"], angles["suction closes"]],
+        "discharge": [angles["discharge opens"], 360.0],
+    }
     lines = [note.x for note in load.notes if note.is_line and not math.isnan(note.x)]
     assert sorted(lines) == sorted([*found.reversals, *(angle for angle, _ in found.events)])
     assert vibration.title == "record of the sensor: guide, along y"

@@ -182,7 +182,8 @@ THIS = LineStyle(BLUE, "-", 1.1, 2.3)
 TWIN = LineStyle(GOLD, "-", 2.2, 2.1)  # broader and lighter, below
 MARK = LineStyle(RED, (0, (4, 1.5)), 1.0, 2.2)
 EVENT = LineStyle(GREY, ":", 1.0, 2.0)
-LAST_LABEL = 270.0  # degrees: the names of later events stand before them
+OPEN = LineStyle(BLACK, "-", 4.0)
+BEGINS = ("opens", "begins")  # words of events; the others end what has begun
 NAMES = {"this": "this job", "twin": "the same machine without clearance"}
 MAX_ORDERS = 200  # that are drawn
 MAX_ENVELOPE = 60  # of an envelope
@@ -240,7 +241,8 @@ def draw_analyst(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
     twin: the ideal machine, with the same sensor where the run has one.
     """
     found = read_cycle(run)
-    lanes = 1 + len(split_by_end(found.events)) + len(found.struck)
+    spans = split_events(found.events)
+    lanes = 1 + len(spans) + len(found.struck)
     figure, panels = make_grid(3, 1, 6.4 + 0.2 * lanes, heights=(0.34 * lanes, 3.4, 2.0))
     strip, vibration, load = panels[:, 0]
     for one, line, name in ((twin, TWIN, NAMES["twin"]), (run, THIS, NAMES["this"])):
@@ -249,7 +251,7 @@ def draw_analyst(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
         cycle = read_cycle(one)
         vibration.plot(cycle.angle, cycle.vibration, line, name)
         load.plot(cycle.load_angle, cycle.rod_load * KILONEWTON, line, name)
-    plot_events(strip, found.events, found.struck, found.reversals)
+    plot_events(strip, spans, found.struck, found.reversals)
     for panel in (strip, vibration, load):
         panel.notes += [Note(x=angle, style=EVENT) for angle, _ in found.events]
         panel.notes += [Note(x=angle, style=MARK) for angle in found.reversals]
@@ -267,46 +269,48 @@ def draw_analyst(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
     return figure
 
 
-def split_by_end(events: Sequence[tuple[float, str]]) -> dict[str, list[tuple[float, str]]]:
-    """Return the load's corners by lane: `load`, or those of a cylinder's two ends apart."""
-    found: dict[str, list[tuple[float, str]]] = {}
+def split_events(events: Sequence[tuple[float, str]]) -> dict[str, list[tuple[float, float]]]:
+    """Return the spans (degrees) in which a valve is open, or the cam dwells, by lane.
+
+    A cylinder's two ends have lanes of their own. Spans lie within a revolution from 0 to 360.
+    """
+    found: dict[str, list[tuple[float, float]]] = {}
+    begun: dict[str, float] = {}
     for angle, name in events:
-        end, _, rest = name.partition(" ")
-        lane, text = (f"gas, {end} end", rest) if end in BY_END else ("load", name)
-        found.setdefault(lane, []).append((angle, text))
-    return dict(sorted(found.items(), reverse=True)) or {"load": []}
+        what, _, word = name.rpartition(" ")
+        end, _, valve = what.partition(" ")
+        lane = f"{valve}, {end} end" if end in BY_END else what
+        spans = found.setdefault(lane, [])
+        if word in BEGINS:
+            begun[lane] = angle
+        elif angle:
+            spans.append((begun.pop(lane, 0.0), angle))
+    for lane, angle in begun.items():
+        found[lane].append((angle, 360.0))
+    return dict(sorted(found.items(), reverse=True))
 
 
 def plot_events(
     panel: Panel,
-    events: Sequence[tuple[float, str]],
+    spans: dict[str, list[tuple[float, float]]],
     struck: dict[str, np.ndarray],
     reversals: Sequence[float],
 ) -> None:
-    """Draw a lane each for the load's corners, the impacts of each joint, and the reversals.
+    """Draw a lane each for every valve or the cam, the impacts of each joint, and the reversals.
 
-    Crank angles in degrees; the corners have names, those of a cylinder's two ends a lane each; the
-    impacts are by joint.
+    Crank angles in degrees; spans: of `split_events`.
     """
-    by_end = split_by_end(events)
-    lanes: list[tuple[str, np.ndarray, LineStyle]] = [
-        (lane, np.array([angle for angle, _ in own]), mark(BLACK, "v", 6))
-        for lane, own in by_end.items()
-    ]
-    for joint, at in struck.items():
-        color, shape = BY_JOINT[joint]
-        lanes.append((f"impacts, {SPOKEN[joint]}", at, mark(color, shape, 5)))
-    lanes.append(("reversals", np.array(reversals), mark(RED, "s", 5)))
-    for number, (name, angles, style) in enumerate(lanes):
-        panel.plot(angles, np.full(angles.size, -float(number)), style, name)
-    for lane, own in enumerate(by_end.values()):
-        for number, (angle, name) in enumerate(own):
-            side = "right" if angle > LAST_LABEL else "left"
-            shift = (-6.0 if side == "right" else 6.0, -5.0 if number % 2 else 5.0)
-            panel.notes.append(
-                Note(name, angle, -float(lane), shift=shift, side=side, level="center", size=8.0)
-            )
-    panel.y.words = {-float(number): name for number, (name, *_) in enumerate(lanes)}
+    lanes = [*spans]
+    for number, own in enumerate(spans.values()):
+        x, y = join_with_gaps(np.array([(at, -number) for at in span]) for span in sorted(own))
+        panel.plot(x, y, OPEN, lanes[number])
+    marks = [(f"impacts, {SPOKEN[joint]}", at, *BY_JOINT[joint]) for joint, at in struck.items()]
+    for name, angles, color, shape in [*marks, ("reversals", np.array(reversals), RED, "s")]:
+        panel.plot(angles, np.full(angles.size, -float(len(lanes))), mark(color, shape, 5), name)
+        lanes.append(name)
+    if spans:
+        panel.title = f"bars: {'the cam dwells' if 'cam: dwell' in spans else 'a valve is open'}"
+    panel.y.words = {-float(number): name for number, name in enumerate(lanes)}
     panel.y.span(0.6 - len(lanes), 0.8)
     panel.grid = ""
 
