@@ -1150,7 +1150,7 @@ def nameplate_table():
         ])  # fmt: skip
     shares = " / ".join(f"{share:g}" for share in films)
     head = ["small end, mm", f"peak force on it, kN, at `last_share` {shares}",
-            "impacts a revolution", "sensor, m/s² rms", "rod load reversal, °",
+            "dry contacts a revolution", "sensor, m/s² rms", "rod load reversal, °",
             "body along x, mm/s rms"]  # fmt: skip
     return markdown(head, rows)
 

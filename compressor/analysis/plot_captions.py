@@ -221,9 +221,10 @@ def analyst(run: xr.Dataset, twin: Twin) -> str:
     if found.events:
         names = [f"{name} at {angle:.0f}°" for angle, name in found.events]
         sentences.append(f"Load: {', '.join(names)}.")
+    kind = "Dry contact that begins" if case.lubricant else "Impacts after flight"
     for joint, struck in found.struck.items():
         text = f"at {angles(struck)}" if len(struck) else "none"
-        sentences.append(f"Impacts after flight at the {SPOKEN[joint]}: {text}.")
+        sentences.append(f"{kind} at the {SPOKEN[joint]}: {text}.")
     return " ".join(sentences) + film(run) + caution(run)
 
 

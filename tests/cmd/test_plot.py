@@ -14,7 +14,7 @@ from compressor.analysis.contacts import angle_modes
 from compressor.analysis.plot_captions import FILM, PLOT_CAPTIONS, SweptRow
 from compressor.analysis.shaking import frame_forces
 from compressor.cases.case import Case
-from compressor.report.figures.job import draw_spectra
+from compressor.report.figures.job import draw_analyst, draw_spectra
 from compressor.report.plots import job_title, study_title
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
@@ -145,6 +145,9 @@ def test_captions_of_oiled_joints_speak_of_dry_contact():
         assert "film" not in PLOT_CAPTIONS["job"][name](dry, None)
     assert "At the big end: flight 100 %" in told["modes"]
     assert told["impacts"].startswith("No impacts")
+    analyst = PLOT_CAPTIONS["job"]["analyst"](full, None)
+    assert "Dry contact that begins at the big end: none." in analyst
+    assert "dry contact, big end" in draw_analyst(full, None).panels[0].y.words.values()
     nearest = -1e6 * float(full["penetration"].sel(joint="big_end").values[2 * 720 :].max())
     assert "is off its wall for 100 % of the time" in told["orbits"]
     near = re.search(r"comes as near to it as ([\d.]+) µm", told["orbits"])[1]

@@ -251,7 +251,10 @@ def draw_analyst(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
         cycle = read_cycle(one)
         vibration.plot(cycle.angle, cycle.vibration, line, name)
         load.plot(cycle.load_angle, cycle.rod_load * KILONEWTON, line, name)
-    plot_events(strip, spans, found.struck, found.reversals)
+    # a film takes the blow itself: contact that begins later is none
+    word = "dry contact" if case_of(run).lubricant else "impacts"
+    struck = {f"{word}, {SPOKEN[joint]}": (at, joint) for joint, at in found.struck.items()}
+    plot_events(strip, spans, struck, found.reversals)
     for panel in (strip, vibration, load):
         panel.notes += [Note(x=angle, style=EVENT) for angle, _ in found.events]
         panel.notes += [Note(x=angle, style=MARK) for angle in found.reversals]
@@ -293,18 +296,18 @@ def split_events(events: Sequence[tuple[float, str]]) -> dict[str, list[tuple[fl
 def plot_events(
     panel: Panel,
     spans: dict[str, list[tuple[float, float]]],
-    struck: dict[str, np.ndarray],
+    struck: dict[str, tuple[np.ndarray, str]],
     reversals: Sequence[float],
 ) -> None:
     """Draw a lane each for every valve or the cam, the impacts of each joint, and the reversals.
 
-    Crank angles in degrees; spans: of `split_events`.
+    Crank angles in degrees; spans: of `split_events`; struck: angles and joint of a lane.
     """
     lanes = [*spans]
     for number, own in enumerate(spans.values()):
         x, y = join_with_gaps(np.array([(at, -number) for at in span]) for span in sorted(own))
         panel.plot(x, y, OPEN, lanes[number])
-    marks = [(f"impacts, {SPOKEN[joint]}", at, *BY_JOINT[joint]) for joint, at in struck.items()]
+    marks = [(name, at, *BY_JOINT[joint]) for name, (at, joint) in struck.items()]
     for name, angles, color, shape in [*marks, ("reversals", np.array(reversals), RED, "s")]:
         panel.plot(angles, np.full(angles.size, -float(len(lanes))), mark(color, shape, 5), name)
         lanes.append(name)
