@@ -9,7 +9,7 @@ from click.shell_completion import CompletionItem
 
 from compressor.program import did_you_mean
 from compsim.results import Items, files
-from compsim.screen import DONE, print_text, say
+from compsim.screen import DONE, print_text, say, wrap_line
 from compsim.usage import CASE_FILES
 
 
@@ -37,9 +37,10 @@ def init(template: str | None, output: str | None) -> int:
 
     known = templates()
     if template is None:
+        indent = max(map(len, known)) + 2
         for one in known.values():
-            print_text(f"{one.name:<{max(map(len, known))}}  {one.question}")
-            print_text(f"{'':<{max(map(len, known))}}  {one.jobs}")
+            first, *more = [*wrap_line(one.question, indent), *wrap_line(one.jobs, indent)]
+            print_text("\n".join([f"{one.name:<{indent}}{first.lstrip()}", *more]))
         say("next: compsim init wear")
         return DONE
     if template not in known:

@@ -98,7 +98,7 @@ def plan(
         print_text(cost(found.with_times(workers, say)))
     for job in found.counts.first:
         point = "".join(f" {key}={value}" for key, value in job.coordinates.items())
-        print_text(f"next: {job.study}{point}")
+        print_text(f"missing: {job.study}{point}")
     return DONE
 
 

@@ -18,8 +18,10 @@ def schema() -> int:
     compsim schema > compsim.schema.json
 
     After this command an editor with yaml-language-server completes keys, explains them and marks
-    mistakes, in files with the first line
-    `# yaml-language-server: $schema=compsim.schema.json`.
+    mistakes, in files with this first line:
+
+    \b
+    # yaml-language-server: $schema=compsim.schema.json
     """
     from compressor.cases import case_schema
 

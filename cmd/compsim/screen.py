@@ -5,6 +5,7 @@ import os
 import re
 import shlex
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from compressor.units import Units
 
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
+WIDTH = 80  # columns of what is printed
 MAX_CAUTIONS = 5  # reported of one case file
 
 KEYS = "|".join(("joint", "clearance_mm", "load", "machine", "blocks", *STUDY_GROUPS))
@@ -150,6 +152,18 @@ def open_streams() -> None:
                 os.close(place)
             os.set_inheritable(number, True)  # by workers
             setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))
+
+
+def wrap_line(text: str, indent: int, more: int = 2) -> list[str]:
+    """Return a line as lines of the width, the later ones indented by more.
+
+    No word is broken, and none of `12 %`, `12 ± 3` and `key = 12`.
+    """
+    wrapper = textwrap.TextWrapper(
+        WIDTH, " " * indent, " " * (indent + more), break_long_words=False, break_on_hyphens=False
+    )
+    lines = wrapper.wrap(re.sub(r" (?=[%±=])|(?<=[±=]) ", "\u00a0", text))
+    return [line.replace("\u00a0", " ") for line in lines]
 
 
 def say(text: str, end: str = "\n") -> None:

@@ -17,6 +17,7 @@ from compsim.screen import (
     run_commands,
     say,
     units_option,
+    wrap_line,
 )
 
 if TYPE_CHECKING:
@@ -110,12 +111,21 @@ def print_report(
         if lines and heading:
             print_text(heading)
         for line in lines:
-            print_text(f"  {printable(line)}")
+            print_text("\n".join(wrap_value(printable(line))))
     if "case" in found.attributes:
         print_text("the case, as far as it differs from the defaults (--case prints it whole)")
         case = Case.from_attribute(found.attributes["case"])
         for line in to_yaml(case, brief=True).splitlines():
             print_text(f"  {line}")
+
+
+def wrap_value(line: str) -> list[str]:
+    """Return a sentence, or a label and its value, as lines of the width."""
+    _, _, text = line.partition("  ")
+    text = text.lstrip()
+    if text and " " not in text:  # a path
+        return [f"  {line}"]
+    return wrap_line(line, 2, len(line) - len(text) if text else 2)
 
 
 def whole_case(found: "JobReport", folder: str) -> str:

@@ -13,6 +13,7 @@ from compsim.screen import (
     print_text,
     run_commands,
     say,
+    wrap_line,
 )
 
 PROMISES = {"kept": "kept what accuracy promises", "none": "without a promise"}
@@ -45,18 +46,18 @@ def status(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
     for one in found:
         print_text(f"{one.study:<{width}}  {plural(one.jobs):>9}  {one.ok:>4} ok  "
                    f"{one.failed:>4} failed  {one.missing:>4} missing")  # fmt: skip
+        remarks = []
         if one.former_of:
-            print_text(f"{'':<{width}}  {one.former_of} as it was run on {one.written[:10]}, with "
-                       "finished jobs that it has no longer; opens by this name")  # fmt: skip
+            remarks.append(f"{one.former_of} as it was run on {one.written[:10]}, with finished "
+                           "jobs that it has no longer; opens by this name")  # fmt: skip
         promises = [f"{n} {PROMISES[word]}" for word, n in one.promises.items() if word in PROMISES]
-        remarks = [", ".join(promises)] if promises else []
-        remarks += [f"{n} {regime_words(word)}" for word, n in one.regimes.items() if word]
+        trusted = [", ".join(promises)] if promises else []
+        trusted += [f"{n} {regime_words(word)}" for word, n in one.regimes.items() if word]
+        remarks += [f"of those ok: {text}" for text in trusted]
+        remarks += one.caveats
+        remarks += [f"{n} {reason}: {remedy(reason)}" for reason, n in one.reasons.items()]
         for text in remarks:
-            print_text(f"{'':<{width}}  of those ok: {text}")
-        for text in one.caveats:
-            print_text(f"{'':<{width}}  {text}")
-        for reason, number in one.reasons.items():
-            print_text(f"{'':<{width}}  {number:>4} {reason}: {remedy(reason)}")
+            print_text("\n".join(wrap_line(text, 4)))
     wanting = [one.again for one in found if one.missing and not one.former_of]
     for command in run_commands(wanting, folder):
         say(f"next: {command}")

@@ -173,11 +173,11 @@ def test_plan_tells_what_a_run_will_do_and_stores_nothing(case_file, capsys):
     out = capsys.readouterr().out.splitlines()
     assert out[0].split() == ["many", "10", "jobs", "6", "done", "4", "missing"]
     assert out[1].startswith("about ")
-    assert out[2] == "next: many clearance_mm=0.1 load=none joint=big_end"
+    assert out[2] == "missing: many clearance_mm=0.1 load=none joint=big_end"
     ideal = ["--only", "joint == none", "--set", "machine.rod_mass_kg=3"]
     assert cli.main(["plan", "many.yaml", *ideal]) == 0
     out = capsys.readouterr().out.splitlines()
-    assert [out[0].split()[1], *out[2:]] == ["1", "next: many joint=none"]
+    assert [out[0].split()[1], *out[2:]] == ["1", "missing: many joint=none"]
     assert cli.main(["plan", "two.yaml"]) == 0
     assert capsys.readouterr().out.split() == ["two", "2", "jobs", "2", "done", "0", "missing"]
 

@@ -19,7 +19,8 @@ def test_the_list_has_questions_jobs_and_times(capsys):
     assert cli.main(["init"]) == 0
     out, err = capsys.readouterr()
     lines = out.splitlines()
-    assert [line.split()[0] for line in lines[::2]] == [*templates()]
+    assert [line.split()[0] for line in lines if line[0] != " "] == [*templates()]
+    assert max(map(len, lines)) <= 80
     assert "wear         How much wear may a joint have?" in out
     assert "14 jobs" in out
     assert err == "next: compsim init wear\n"

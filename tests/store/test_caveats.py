@@ -45,8 +45,10 @@ def folder(tmp_path_factory):
 
 
 def said(capsys, *words):
+    """What a command says, its lines joined."""
     assert cli.main([*map(str, words)]) == 0
-    return capsys.readouterr()
+    found = capsys.readouterr()
+    return found._replace(out=" ".join(found.out.split()))
 
 
 def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder, capsys):

@@ -22,6 +22,7 @@ from compsim.screen import (
     print_text,
     setting,
     units_option,
+    wrap_line,
 )
 from compsim.show import sayable
 
@@ -106,7 +107,8 @@ def find(
         print_text(json.dumps(jsonable_answer(question, answer), indent=1))
     else:
         for line in lines(question, answer, output, units):
-            print_text(line)
+            indent = len(line) - len(line.lstrip())
+            print_text("\n".join(wrap_line(line.lstrip(), indent)))
     return SOME_FAILED if answer.failed else DONE
 
 

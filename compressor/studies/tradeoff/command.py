@@ -15,6 +15,7 @@ from compsim.results import files, folders
 from compsim.screen import (
     DONE,
     SOME_FAILED,
+    WIDTH,
     caution,
     configs_argument,
     duration,
@@ -24,6 +25,7 @@ from compsim.screen import (
     say,
     setting,
     without_nan,
+    wrap_line,
 )
 
 from compressor.digits import by_bar
@@ -36,7 +38,6 @@ if TYPE_CHECKING:
     from compressor.studies.tradeoff.explain import Explanation
     from compressor.studies.tradeoff.page import ModelTable
 
-WIDTH = 80  # of what is printed
 WIDEST = 12  # characters of a line of a head
 CHOICE_HEAD = "choice of the model"
 Column = tuple[list[str], list[str], list[str]]  # lines of its head, its cells, lines of its span
@@ -123,15 +124,6 @@ def block_lines(names: Sequence[str], columns: Sequence[Column]) -> Iterator[str
 def column_width(column: Column) -> int:
     """Return the width of a column's widest cell."""
     return max(map(len, itertools.chain(*column)))
-
-
-def wrap_line(text: str, indent: int) -> list[str]:
-    """Return a line as lines of the width, the later ones indented by two more."""
-    start, later = " " * indent, " " * (indent + 2)
-    wrapper = textwrap.TextWrapper(WIDTH, start, later, break_long_words=False,
-                                   break_on_hyphens=False)  # fmt: skip
-    lines = wrapper.wrap(text.replace(" %", "\u00a0%"))  # no line begins with a unit
-    return [line.replace("\u00a0", " ") for line in lines]
 
 
 @click.command()

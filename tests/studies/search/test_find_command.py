@@ -92,9 +92,12 @@ def test_a_second_search_computes_nothing(found, folder, capsys):
     assert cli.main([*ASKED, "--quiet"]) == 0
     out, err = capsys.readouterr()
     low, high = (f"{found[1][end]['argument']:.9g}" for end in ("low", "high"))
-    first, no, yes, finer, last = out.splitlines()
-    assert first == (f"contact_loss_fraction.small_end > {LIMIT} first holds between "
-                     f"clearance_mm = {low} and {high}")  # fmt: skip
+    assert max(map(len, out.splitlines())) <= 80
+    *first, no, yes, finer, last = out.splitlines()
+    assert " ".join(" ".join(first).split()) == (
+        f"contact_loss_fraction.small_end > {LIMIT} first holds between "
+        f"clearance_mm = {low} and {high}"
+    )
     assert re.match(rf"  clearance_mm = {low}: no, 0\.0\d+ ± [\d.]+  job [0-9a-f]{{8}}$", no)
     assert re.match(rf"  clearance_mm = {high}: yes, 0\.0\d+ ± [\d.]+  job [0-9a-f]{{8}}$", yes)
     assert finer == "what is finer than the scan, 5 points a factor 3.162 apart, may be missed"
