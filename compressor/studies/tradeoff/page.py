@@ -147,10 +147,10 @@ def change(
 
 
 def change_text(measure: Measure, size: float) -> str:
-    """Return a change with its unit: +12 %, or +3.1 points of a share in percent."""
+    """Return a change in percent; of a share +3.1 points, of a count a revolution +3.1."""
     if measure.is_relative:
         return percent(size)
-    return f"{size:+z.2g} points"
+    return f"{size:+z.2g} points" if measure.unit == "%" else f"{size:+z.2g}"
 
 
 def percent(size: float) -> str:
@@ -164,14 +164,12 @@ def span_text(measure: Measure, low: float, high: float) -> str:
     """Return the span of a measure over the choices, as `-66 to +93 %`."""
     if low == high == 0.0:
         return NONE_SEEN
-    unit = "%" if measure.is_relative else "points"
     texts = [
-        change_text(measure, size).removesuffix(f" {unit}")
-        if abs(size) >= MIN_SHOWN_CHANGE
-        else "0"
+        change_text(measure, size).partition(" ")[0] if abs(size) >= MIN_SHOWN_CHANGE else "0"
         for size in (low, high)
     ]
-    return f"{' to '.join(texts)} {unit}"
+    unit = "%" if measure.is_relative else "points" if measure.unit == "%" else ""
+    return f"{' to '.join(texts)} {unit}".rstrip()
 
 
 def note_of(choice: xr.Dataset) -> str:

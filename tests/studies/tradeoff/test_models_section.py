@@ -90,6 +90,15 @@ def test_a_change_is_what_lies_beyond_both_bars():
     assert table.rows[1].time_ratio == 3.0
 
 
+def test_impacts_of_a_revolution_change_by_a_number_and_no_points():
+    data = made(impacts_per_rev=([0.0, 2.0, 33.0, 0.0, math.nan, math.nan, math.nan], [0.0] * 7))
+    table = model_table(data)
+    row = cells(table)["oil"]
+    (title,) = (name for name in row if name.startswith("impacts"))
+    assert row[title] == "+33"
+    assert table.span_texts[[*row].index(title)] == "0 to +33"
+
+
 def test_the_line_has_the_numbers_of_the_table():
     table = model_table(made())
     assert headline(table) == (
