@@ -347,7 +347,8 @@ def explain_models(
         table = model_table(data)
         found.append({"study": study.name, "file": str(path), **dataclasses.asdict(table)})
         if not as_json:
-            place = place_text(study, data.attrs["key"]) + "".join(f" --set {s}" for s in overrides)
+            place = place_text(study, data.attrs["key"]) + ", by" * bool(overrides)
+            place += "".join(f" --set {text}" for text in overrides)
             print_text("\n".join(model_lines(place, table)))
             say(str(path))
     if as_json:
