@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -261,6 +262,22 @@ def test_the_page_on_studies_is_right(tmp_path, paper_store):
     (tmp_path / "results").symlink_to(paper_store)
     assert run_in(tmp_path, "-m", "compsim", "count", "big-end", cwd=tmp_path) == "3\n"
     assert "Print how many jobs" in run_in(tmp_path, "-m", "compsim", "--help", cwd=tmp_path)
+
+
+def test_the_page_on_alarms_is_right(tmp_path):
+    shutil.copyfile(ROOT / "compressor/studies/alarms/readings.py", tmp_path / "readings.py")
+    reading, row = blocks("## How to add an alarm", "## How to release")
+    changed(
+        tmp_path, "readings.py",
+        (indented(reading), "    counts = np.zeros(LADDER.size)\n", False),
+        (indented(row), "ALARMS = (\n", True),
+    )  # fmt: skip
+    module = runpy.run_path(str(tmp_path / "readings.py"))
+    record = np.tile([1.0, -1.0, 3.0, -1.0], 360)
+    found = module["read_window"](record, np.arange(record.size) / record.size, 1)["impulse"]
+    (alarm,) = (one for one in module["ALARMS"] if one.title == "impulse factor")
+    assert found.tolist() == [2.0]
+    assert alarm.score({"impulse": np.array([found, 3 * found])}, np.array([0])).tolist() == [1, 3]
 
 
 def test_the_page_on_contact_laws_is_right(tmp_path):
