@@ -94,10 +94,11 @@ TABLE = (
     ),
     Metric(
         "rms_acceleration_deviation", (), "m/s2", "rms of acceleration less the ideal machine's",
-        "acceleration", Bar(3.5, 0.17), Shown("rms deviation from ideal", "m/s²"), kind="root",
+        "acceleration", Bar(3.5, 0.17), Shown("rms acceleration deviation", "m/s²"), kind="root",
     ),
     Metric(
-        "peak_contact_force", ("joint",), "N", "greatest joint force on the rod", "contact_force",
+        "peak_contact_force", ("joint",), "N",
+        "greatest joint force on the rod, with that of an oil film", "contact_force",
         Bar(4.0, 0.1), Shown("peak contact force", "kN", 1e-3), kind="greatest",
     ),
     Metric(
@@ -106,7 +107,7 @@ TABLE = (
     ),
     Metric(
         "max_penetration", ("joint",), "m", "greatest penetration; negative: never touched",
-        "penetration", Bar(4.0, 0.04), Shown("greatest penetration", "µm", 1e6), True, "greatest",
+        "penetration", Bar(4.0, 0.04), Shown("max penetration", "µm", 1e6), True, "greatest",
     ),
     Metric(
         # an oil film bears without it: a share of 1 is a full film, and no disaster
@@ -137,7 +138,7 @@ TABLE = (
     Metric(
         "releases_per_rev", ("joint",), "1/rev",
         "contacts in a revolution that began again without flight", "penetration",
-        Bar(1.0, 0.0, False), Shown("contacts renewed without flight", "per rev"), True, "rate",
+        Bar(1.0, 0.0, False), Shown("releases", "per rev"), True, "rate",
     ),
     Metric(
         "rod_load_reversal_angle", (), "rad",
@@ -237,7 +238,11 @@ SERIES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "acceleration": ((), "m/s2", "crosshead acceleration"),
     "rod_angle": ((), "rad", "rod angle phi"),
     "piston_force": ((), "N", "piston force, positive towards the crank"),
-    "contact_force": (("joint", "axis"), "N", "joint force on the rod"),
+    "contact_force": (
+        ("joint", "axis"),
+        "N",
+        "joint force on the rod, with that of an oil film",
+    ),
     "eccentricity": (("joint", "axis"), "m", "journal centre less bearing centre"),
     "penetration": (("joint",), "m", "contact penetration, negative where there is a gap"),
 }

@@ -36,7 +36,8 @@ def sections(
     yield "", align_lines(stop(found))
     known = numbers(found, units, "tally", "statistics", "samples", "body")
     lines = align_lines([*known, *reversal_verdict(found, *limits), *healthy_motion(found, units)])
-    yield "metrics, with their error bars", [*lines, *cautions(found), *found.caveats]
+    told = [*film(found), *cautions(found), *found.caveats]
+    yield "metrics, with their error bars", [*lines, *told]
     yield (
         "relative errors of the time series",
         align_lines(series_errors(found)),
@@ -237,6 +238,14 @@ def healthy_motion(found: "JobReport", units: Units) -> list[Line]:
             (f"{name} acceleration without clearance", f"{factor * sound:.4g} {unit}{beside}")
         )
     return lines
+
+
+def film(found: "JobReport") -> list[str]:
+    """Return that contact forces include an oil film's, of a job that has oil."""
+    from compressor.cases import Case
+
+    has_oil = Case.from_attribute(found.attributes["case"]).lubricant is not None
+    return ["contact forces include the force of the oil film"] if has_oil else []
 
 
 def cautions(found: "JobReport") -> list[str]:

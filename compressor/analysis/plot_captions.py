@@ -125,7 +125,10 @@ CHAOTIC = (
     " The motion is chaotic: another correct solution has other peaks and lines; more settled "
     "revolutions (solve.duration_rev) make averages that hold."
 )
-FILM = " The joints have oil: contact is dry contact, and without it the film bears the journal."
+FILM = (
+    " The joints have oil: forces include its film's, contact is dry contact, and without it the "
+    "film bears the journal."
+)
 MIN_FORCE = 0.05  # N: below it a force is told as less than 0.1
 
 

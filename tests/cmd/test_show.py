@@ -2,11 +2,14 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import pytest
 from compsim import cli
+from compsim.job_text import film
 from conftest import CHAOTIC, store
 
+from compressor.cases.case import Case
 from compressor.cases.load import load_cases
 from compressor.digits import by_bar
 from compressor.store.status import report_job
@@ -145,3 +148,10 @@ def test_of_a_chaotic_job_averages_are_told_and_peaks_are_not(show, tmp_path):
 def test_a_reversal_needs_two_numbers(text, capsys):
     assert cli.main(["show", "ab", "--reversal", text]) == 2
     assert "give degrees and percent, such as 30,25" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("oil", [{"lubricant": True}, {}])
+def test_a_contact_force_with_oil_says_so(oil):
+    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2} | oil)
+    found = SimpleNamespace(attributes=case.attributes())
+    assert film(found) == ["contact forces include the force of the oil film"] * len(oil)

@@ -75,7 +75,7 @@ def test_a_change_is_what_lies_beyond_both_bars():
     table = model_table(made())
     found = cells(table)
     peak, rms = "peak acceleration", "rms acceleration"
-    depth, loss = "greatest penetration, big end", "time without dry contact, big end"
+    depth, loss = "max penetration, big end", "time without dry contact, big end"
     assert [*found["softer"]] == [peak, rms, depth, loss]
     assert found["softer"] == {peak: "+93 %", rms: "none seen", depth: "+50 %",
                                loss: "+4 points"}  # fmt: skip
@@ -116,7 +116,7 @@ def test_a_chaotic_case_has_no_peak_to_be_moved():
     chaotic = made(peak_acceleration=(PEAK, [math.inf, *PEAK_BAR[1:]]))
     table = model_table(chaotic)
     assert table.unknown == ("peak acceleration",)
-    assert headline(table).startswith("No peak of the case is known; greatest penetration, big end")
+    assert headline(table).startswith("No peak of the case is known; max penetration, big end")
     nothing = model_table(chaotic[["status", "reason", "note", "regime", "seconds"]])
     assert (nothing.measures, nothing.rows[0].cells) == ((), ())
     assert headline(nothing).startswith("No metric of the case is known")
