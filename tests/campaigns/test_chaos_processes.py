@@ -4,28 +4,18 @@ import os
 import signal
 import time
 
-import pytest
-from chaos import concurrent, kill, poison
+from chaos import concurrent, kill
 from chaos.processes import Run, members
 
-# seeds by what they do, so that a sample has something of everything; the first: the real command
-KILLS = {"parent amid metrics": 18, "both, series over metrics": 20}
-MIX = 22  # jobs that crash, leave and hang
+KILLED = 18  # the seed of a real command that is killed amid its jobs
 AT_ONCE = 6  # shards and a whole run
 
 
-@pytest.mark.parametrize("seed", KILLS.values(), ids=KILLS)
-def test_killed_sweeps_resume(seed, tmp_path):
-    found = kill.campaign(1, seed, tmp_path)
+def test_killed_sweeps_resume(tmp_path):
+    found = kill.campaign(1, KILLED, tmp_path)
     assert found["failures"] == []
     assert sum(n for name, n in found["counts"].items() if name.startswith("killed")) == 1
-    assert found["counts"]["real commands"] == (seed == KILLS["parent amid metrics"])
-
-
-def test_mixes_of_good_and_bad_jobs(tmp_path):
-    found = poison.campaign(1, MIX, tmp_path)
-    assert found["failures"] == []
-    assert sum(found["counts"].values()) > found["counts"]["good jobs"] > 0
+    assert found["counts"]["real commands"] == 1
 
 
 def test_runs_on_one_store_at_once(tmp_path):

@@ -5,7 +5,6 @@ import fcntl
 import itertools
 import multiprocessing
 import os
-import random
 import re
 import signal
 import subprocess
@@ -17,7 +16,7 @@ from multiprocessing import resource_tracker
 from pathlib import Path
 
 import pytest
-from bad_jobs import LEAST, POISON, SECONDS, Many, named, sleep, work
+from bad_jobs import LEAST, POISON, Many, named, sleep, work
 from joblib.externals.loky import process_executor
 from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
@@ -230,20 +229,6 @@ def test_a_poison_job_costs_itself_only(names):
         assert POISON[name][2] in end.detail
         assert (end.reason == "internal_error") == ("Traceback" in end.traceback)
         assert len(end.traceback) <= MAX_TEXT
-
-
-def test_a_mix_of_poison():
-    draw = random.Random(4)
-    bad = [(f"{n}", draw.choice(list(POISON))) for n in range(draw.randint(1, 5))]
-    good = [(n, n) for n in range(draw.randint(1, 200))]
-    mixed = draw.sample(bad + good, len(bad) + len(good))
-    jobs = [(name, kind, SECONDS.get(kind, 1e9)) for name, kind in mixed]
-    ends = list(run_batches(work, jobs, Workers(draw.randint(1, 3), **RULES)))
-    assert len(ends) == len(jobs)
-    assert results(ends) == dict(good)
-    assert {name: end.reason for name, end in lost(ends).items()} == {
-        name: POISON[kind][1] for name, kind in bad
-    }
 
 
 def test_a_job_may_succeed_when_it_is_tried_again(tmp_path):
