@@ -2,7 +2,6 @@
 
 import itertools
 import os
-import pickle
 import subprocess
 import sys
 import time
@@ -455,7 +454,6 @@ def hostile(unit: str, before: str = "", after: str = "") -> str:
         (hostile("{"), "nested deeper than 20 levels"),
         (hostile("- "), "nested deeper than 20 levels"),
         (hostile("1,", "machine: {rod_mass_kg: [", "]}"), "is too long to be a case file"),
-        (hostile("k,", "machine: {", "}"), "is too long to be a case file"),
         (hostile("9", "machine: {speed_rpm: ", "}"), "rpm, not inf"),
         (hostile("x", "name: "), "no leading dot"),
         ("#" * (MAX_BYTES + 1), "is larger than 1 MiB: no case file"),
@@ -502,13 +500,6 @@ def test_long_keys_and_values_are_cut(write):
 def test_what_is_no_file_is_a_located_problem(path, message):
     (found,) = mistakes(path)
     assert message in found
-
-
-def test_an_error_survives_the_way_between_processes(write):
-    with pytest.raises(CaseFileError) as caught:
-        load_cases(write("load: x"))
-    copied = pickle.loads(pickle.dumps(caught.value))
-    assert (str(copied), copied.problems) == (str(caught.value), caught.value.problems)
 
 
 WORDS = "joint load none both clearance_mm machine rod_mass_kg friction false contact materials"

@@ -144,7 +144,7 @@ def test_a_groove_of_the_journals_own_shape_holds_it_on_both_sides():
 
 
 @pytest.mark.parametrize("features", [
-    {}, {"rod": True, "drive": True}, {"contact": {"law": "flores", "restitution": 0.8}},
+    {"rod": True, "drive": True}, {"contact": {"law": "flores", "restitution": 0.8}},
 ])  # fmt: skip
 def test_runs_on_worn_bores_keep_their_energy_and_agree(features):
     """With an elastic rod, too, whose end turns the bore; explicit, stiff and SciPy's."""

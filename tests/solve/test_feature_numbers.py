@@ -128,7 +128,6 @@ def test_lugre_with_one_coefficient_of_0_is_refused(key):
     [
         ({"guide": {"clearance_mm": 0.1, "friction": 3}}, "guide_implausible", "4 mm deep", "auto"),
         ({"rod": {"youngs_modulus_GPa": 0.001}}, "rod_implausible", "60 mm", "auto"),
-        ({"rod": {"youngs_modulus_GPa": 0.001}}, "rod_implausible", "60 mm", "DOP853"),
         ({"rod": {"depth_mm": 4}}, "rod_implausible", "60 mm", "auto"),
     ],
 )

@@ -63,13 +63,12 @@ def coupled(case, revolutions):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mass", [300.0, 1000.0])
-def test_a_body_coupled_both_ways_lies_within_the_stated_bound(mass):
+def test_a_body_coupled_both_ways_lies_within_the_stated_bound():
     """The bound is not idle, either: a tenth of it is reached."""
     solve = {"duration_rev": 2, "settle_rev": 0, "output_step_deg": 0.6}
     case = Case.from_values({
         "joint": "both", "clearance_mm": 0.1, "load": "none", "solve": solve,
-        "body": {"mass_kg": mass, "frequency_x_Hz": 12.0, "frequency_y_Hz": 12.0, "start": "rest"},
+        "body": {"mass_kg": 300.0, "frequency_x_Hz": 12.0, "frequency_y_Hz": 12.0, "start": "rest"},
     })  # fmt: skip
     found = simulate(case)
     other = coupled(case, 2)

@@ -84,7 +84,8 @@ def test_every_compiled_method_is_in_the_table():
     ],
 )
 def test_energy_residual_of_every_method(joint, method):
-    found = run(joint, 0.3, duration_rev=0.5, settle_rev=0, rtol=1e-5, method=method)
+    span = 0.5 if method in COMPILED else 0.2  # SciPy's methods step in Python
+    found = run(joint, 0.3, duration_rev=span, settle_rev=0, rtol=1e-5, method=method)
     assert str(found["status"].values) == "ok"
     assert 0 < float(found["energy_residual"]) <= residual_bound(found, revolutions=1)
 
@@ -196,7 +197,7 @@ LOOKS = 6  # at the clock, a second each, the first before anything is done
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("method", ["auto", "DOPRI5", "RODAS", "LSODA", "Radau", "DOP853"])
+@pytest.mark.parametrize("method", ["auto", "RODAS", "LSODA"])
 @pytest.mark.parametrize("extreme", EXTREMES)
 def test_the_clock_is_looked_at_however_hard_the_case(extreme, method, monkeypatch):
     """Every method stops at the first look past its time, with little done between two looks."""

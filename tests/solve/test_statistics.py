@@ -48,7 +48,7 @@ def record():
     return p
 
 
-@pytest.mark.parametrize(("count", "pull"), [(30, 0.0), (90, 0.0), (90, 0.3)])
+@pytest.mark.parametrize(("count", "pull"), [(30, 0.0), (90, 0.3)])
 def test_bars_hold_the_true_average_in_95_of_100_runs(record, count, pull):
     rng = np.random.default_rng(1)
     exact = {"rms_acceleration": 10.0, "contact_loss_fraction": 0.3, "impact_count": 20.0 * count,

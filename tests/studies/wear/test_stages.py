@@ -72,29 +72,6 @@ def test_the_profile_is_smooth_and_lies_where_the_load_presses(machine):
     assert curvature.max() < 0.06 * worn.max()
 
 
-def test_hours_converge_with_the_square_of_the_step(machine):
-    """Errors against half of the finer step; half a step leaves about a fifth of them."""
-    lives = []
-    for step in (0.04, 0.02, 0.01):
-        of, stages = followed({"step_mm": step, "limit_mm": 0.28})
-        lives.append(life(of, stages_dataset(of, stages)).hours)
-    coarse, fine = (abs(value - lives[-1]) for value in lives[:2])
-    assert coarse < 0.03 * lives[-1]
-    assert fine < 0.27 * coarse  # of first order it would be a third
-
-
-def test_profiles_converge_with_the_number_of_sectors():
-    profiles = {}
-    for sectors in (24, 48, 144):
-        _, stages = followed({"sectors": sectors, "step_mm": 0.02, "limit_mm": 0.239})
-        profiles[sectors] = stages[-1]["worn_depth"][0], stages[-1]["hours"]
-    exact, hours = profiles[144]
-    errors = [np.abs(profiles[n][0] - exact[:: 144 // n]).max() / exact.max() for n in (24, 48)]
-    assert errors[1] < 0.03
-    assert errors[1] < 0.5 * errors[0]
-    assert profiles[48][1] == pytest.approx(hours, rel=0.02)
-
-
 def test_a_coefficient_is_a_scale_of_hours(machine):
     """The same profiles, a tenth of the hours: what the interval of a life rests on."""
     of, stages = machine
