@@ -260,50 +260,14 @@ def test_the_house_keeps_its_rules(rule):
     ("rule", "module", "planted"),
     [
         (forbidden_imports, "compressor.physics.contact", "from compressor.cases import Case"),
-        (forbidden_imports, "compressor.store.rows", "from compressor.solve import simulate"),
-        (
-            forbidden_imports,
-            "compressor.outcome",
-            "if TYPE_CHECKING:\n    from compressor.cases import Case",
-        ),
-        (
-            forbidden_imports,
-            "compressor.cases.study",
-            "def late():\n    from compressor.store import open_study",
-        ),
-        (
-            imports_past_doors,
-            "compressor.sweep.sweep",
-            "from compressor.store.hdf5 import digest",
-        ),
+        (forbidden_imports, "compressor.cases.study", "def late():\n    import compressor.store"),
         (imports_past_doors, "compressor.sweep.sweep", "from compressor.store import hdf5"),
-        (imports_past_doors, "compsim.run", "import compressor.cases.load"),
         (imports_of_own_door, "compressor.cases.case", "from compressor.cases import table"),
-        (
-            circles,
-            "compressor.physics.kinematics",
-            "from compressor.physics.motion import derivative",
-        ),
+        (circles, "compressor.physics.kinematics", "import compressor.physics.motion"),
         (faults_of_doors, "compressor.store", "HANDY = 1"),
-        (faults_of_doors, "compressor.store", "from compressor.store.hdf5 import digest"),
         (libraries_without_door, "compressor.solve.simulate", "import h5py"),
-        (libraries_without_door, "compressor.report.page", "def late():\n    import matplotlib"),
-        (libraries_without_door, "compressor.studies.wear.stages", "import click"),
-        (
-            studies_that_know_others,
-            "compressor.studies.wear.stages",
-            "from compressor.studies.claims.study import read_machines",
-        ),
-        (
-            studies_that_know_others,
-            "compsim.run",
-            "from compressor.studies.regimes.run import run_regimes",
-        ),
-        (
-            commands_outside_of_commands,
-            "compressor.studies.wear.stages",
-            "from compsim.screen import say",
-        ),
+        (studies_that_know_others, "compsim.run", "import compressor.studies.regimes.run"),
+        (commands_outside_of_commands, "compressor.studies.wear.stages", "import compsim.screen"),
     ],
 )
 def test_a_planted_fault_breaks_its_rule(rule, module, planted):

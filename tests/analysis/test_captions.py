@@ -152,16 +152,6 @@ def courses(*turns, rings=(600.0, 500.0, 400.0)):
             for one, ring in zip(turns, rings, strict=True)]  # fmt: skip
 
 
-def test_angles_that_are_not_alike_are_told_of_each_run():
-    text = captions.motion(courses((70.0,), (71.0, 300.0), ()))
-    assert "its sign near 70° at 0.1 mm, 71°, 300° at 0.2 mm, no angle at 0.3 mm." in text
-    assert "near 70° at 0.1 mm, 80° at 0.2 mm, 91° at 0.3 mm." in captions.motion(
-        courses((70.0,), (80.0,), (91.0,))
-    )
-    assert "near 70–90°." in captions.motion(courses((70.0,), (80.0,), (90.0,)))
-    assert "does not change its sign" in captions.motion(courses((), (), ()))
-
-
 def test_ringing_is_told_where_all_ring_after_the_same_change():
     same = courses((70.0, 300.0), (75.0, 300.0), (80.0, 300.0))
     assert captions.rings(same) == [
@@ -170,44 +160,3 @@ def test_ringing_is_told_where_all_ring_after_the_same_change():
     assert captions.rings(courses((359.0,), (1.0,), (2.0,)))
     assert not captions.rings(courses((2.0, 150.0), (150.0, 359.0), (1.0, 150.0)))
     assert not captions.rings(courses((70.0,), (70.0,), (70.0,), rings=(600.0, np.nan, 400.0)))
-
-
-@pytest.mark.parametrize(
-    ("value", "told"),
-    [(12.34, "12"), (5.04, "5"), (0.123, "0.12"), (99.6, "100"), (1234.0, "1234"),
-     (0.0000123, "0.000012"), (0.0, "0")],
-)  # fmt: skip
-def test_two_digits_are_told_without_a_power_of_ten(value, told):
-    assert captions.two_digits(value) == told
-
-
-def test_small_numbers_keep_two_digits():
-    assert captions.list_by_clearance([8.714, 15.95, 0.4], 2) == "8.71, 15.95, 0.40"
-    assert captions.list_by_clearance([-0.01234, 0.5], 2) == "-0.012, 0.500"
-    assert captions.list_by_clearance([0.0, 3.0], 1) == "0.0, 3.0"
-    assert captions.list_by_clearance([533.2, 1181.4], 0) == "533, 1181"
-
-
-@pytest.mark.parametrize("number", range(8, 17))
-def test_captions_of_a_small_fast_machine_say_its_numbers(small, number):
-    text = caption(number, small)
-    assert text.endswith(".")
-    assert not re.search(r"[{}]|nan|inf|e[+-]\d|  | 0\.00[ ,]", text)
-
-
-@pytest.fixture(scope="module")
-def small():
-    """Runs of a machine of a hundredth of the masses at six times the speed."""
-    base = {
-        "machine": {"speed_rpm": 3000, "rod_mass_kg": 0.03, "reciprocating_mass_kg": 0.1,
-                    "crank_radius_mm": 20, "rod_length_mm": 80},
-        "spring": {"stiffness_N_per_mm": 0.1, "preload_N": 2, "stroke_mm": 20,
-                   "damping_N_s_per_mm": 0},
-        "solve": {"accuracy": "draft"},
-    }  # fmt: skip
-    runs = {"design": simulate(Case.from_values(base))}
-    for fault in FAULTS:
-        for c in CLEARANCES:
-            values = {**base, "joint": fault, "clearance_mm": c}
-            runs[label(fault, c)] = simulate(Case.from_values(values))
-    return runs

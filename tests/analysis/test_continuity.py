@@ -6,8 +6,6 @@ import xarray as xr
 
 from compressor.analysis.margins import (
     SLOWEST,
-    Continuity,
-    compare_continuity,
     continuity,
     evidence,
     hit_error,
@@ -109,13 +107,6 @@ def test_a_chaotic_run_s_shares_have_the_scatter_of_its_revolutions(paper_runs):
     error = measured_shares(run, "big_end").energy_angle.error
     # shares of about 1, 2 and 3 quarters of 0.6: deviation 0.15, times 4.303 over sqrt(3)
     assert error == pytest.approx(0.15 * 4.303 / np.sqrt(3), rel=0.1)
-
-
-def test_what_is_said_of_two_joints():
-    big, small = Continuity(0.2, 0.3, 0.5, 0.4), Continuity(0.1, 0.2, 0.4, 0.6)
-    assert compare_continuity(big, small).startswith(
-        "flight and impact 20.0% and 10.0% of the angle; 10°"
-    )
 
 
 def test_the_paper_s_default_machine_is_not_more_continuous_at_the_big_end(paper_runs):

@@ -86,14 +86,6 @@ def test_a_worn_machine_takes_nearly_the_ideal_work():
     assert float(run.energy_residual) < 1e-5
 
 
-def test_words_say_power_and_flow():
-    case = cylinder(LOSSES)
-    work = [cycle.indicated_work for cycle in ideal_cycles(case).values()]
-    assert f"{sum(work) * 740 / 60e3:.4g} kW indicated" in cylinder_words(case)
-    assert "430 m³/h at suction conditions" in cylinder_words(case)
-    assert cylinder_words(cylinder(CYLINDERS["all idle"])) == "no gas is compressed"
-
-
 def test_the_work_of_a_card(tmp_path):
     """A disc of pressure over volume: p = p0 + q sin(theta) in x = R cos(theta) of a long rod."""
     degrees = np.arange(0, 360, 2)

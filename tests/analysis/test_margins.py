@@ -41,13 +41,6 @@ def test_the_least_margin_reaches_as_low_as_any_may_be():
     assert math.isnan(unknown.error)
 
 
-def test_what_is_said_of_a_margin():
-    assert Margin(0.0783, 0.00024).said == "+7.83 % (± 0.024 %)"
-    assert Margin(-0.01, 0.02).said == "-1 % (± 2 %, undecided)"
-    assert Margin(1.0, 0.0).said == "+100 %"
-    assert Margin(-0.01, math.nan).said == "-1 % (no error bar)"
-
-
 def test_a_claim_holds_where_its_margin_is_not_negative(paper_runs):
     for claim in claims(paper_runs):
         assert claim.held is (claim.margin.value >= 0.0), claim.number

@@ -1,14 +1,12 @@
 """The comparison with other tools: they solve our problem, and the contest is fair."""
 
-import importlib
 import json
-import sys
 
 import measure_peers
 import numpy as np
 import page_tables
 import pytest
-from measure_peers import Contest, Peer, first_call
+from measure_peers import Contest, Peer
 from peers import mechanism, multibody, notebook, soda, sweeps
 from peers.mechanism import loosest
 
@@ -105,13 +103,6 @@ def test_rows_of_sweeps_have_medians_and_ratios():
     assert "ratio" not in theirs
 
 
-def test_sweeps_without_numbalsoda_give_a_reason(monkeypatch):
-    monkeypatch.setitem(sys.modules, "numbalsoda", None)
-    monkeypatch.delitem(sys.modules, "peers.script", raising=False)
-    (row,) = sweeps.compare(jobs=20)
-    assert "numbalsoda" in row["reason"]
-
-
 def test_pieces_share_out_the_grid():
     taken = mechanism.pieces(mechanism.DURATION)
     samples = np.concatenate([piece[0] for piece in taken])
@@ -128,20 +119,6 @@ def test_loosest_tolerance_that_is_no_worse():
     assert loosest(errors, 1e-5) is None
 
 
-def test_a_peer_that_is_missing_or_fails_gives_a_reason():
-    def missing(scene):
-        return importlib.import_module("no_such_solver")
-
-    def failing(scene):
-        raise RuntimeError(f"{scene}: step underflow")
-
-    assert "no_such_solver" in first_call(Peer("a", "", missing), "both", np.ones(3))
-    reason = first_call(Peer("b", "", failing), "both", np.ones(3))
-    assert reason == "RuntimeError: both: step underflow"
-    found = first_call(Peer("c", "", lambda scene: np.full(3, 1.1)), "both", np.ones(3))
-    assert found[0] == pytest.approx(0.1)
-
-
 def test_row_of_a_contest_has_medians_and_ratios():
     peer = Peer("a", "", None)
     contest = Contest(peer, "both", 1e-3, 9.0, 1e-4)
@@ -151,17 +128,6 @@ def test_row_of_a_contest_has_medians_and_ratios():
     assert (row["seconds"], row["setup_seconds"], row["our_seconds"]) == (2.0, 7.0, 0.2)
     assert (row["ratio"], row["wall_ratio"], row["kernel_wall_ratio"]) == (10.0, 10.0, 30.0)
     assert (row["error"], row["our_error"]) == (1e-3, 5e-4)
-
-
-def test_round_of_a_contest_takes_short_calls_again(monkeypatch):
-    monkeypatch.setattr(measure_peers, "LEAST_CPU", 0.02)
-    calls = []
-    monkeypatch.setattr(measure_peers, "ours", lambda scene, rtol: calls.append("ours") or ran)
-    ran = {"seconds": 1e-3}
-    contest = Contest(Peer("a", "", lambda scene: calls.append("peer")), "both", 1e-3, 9.0, 1e-4)
-    contest.round()
-    assert len(contest.theirs) == len(contest.ours) == len(contest.kernel) > 2
-    assert calls[:4] == ["peer", "ours", "ours", "peer"]
 
 
 def test_kept_contests_are_at_equal_or_better_error():

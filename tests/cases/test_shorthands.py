@@ -90,16 +90,3 @@ def test_only_one_module_knows_of_the_shorthand():
     paths = [*ROOT.glob("compressor/**/*.py"), *ROOT.glob("cmd/**/*.py")]
     found = {str(p): special_cases(p.read_text(encoding="utf-8")) for p in paths}
     assert {name: lines for name, lines in found.items() if lines} == {}
-
-
-@pytest.mark.parametrize(
-    "planted",
-    [
-        'x = key == "clearance_mm"',
-        'x = key in ("friction", "clearance_mm")',
-        'x = key.startswith("clearance_mm.")',
-        'row = f"clearance_mm.{JOINTS[0]}"',
-    ],
-)
-def test_a_special_case_elsewhere_would_be_found(planted):
-    assert special_cases(planted) == [1]

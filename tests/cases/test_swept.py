@@ -157,24 +157,6 @@ def test_a_bomb_is_counted_not_made(plan, text, where, count):
     assert peak < 4e6
 
 
-def test_a_count_of_any_size_can_be_told(plan):
-    keys = ("rod_mass_kg", "speed_rpm", "rod_length_mm")
-    text = "machine:\n" + "".join(f"  {key}: {{range: [1, 2, 1e-300]}}\n" for key in keys)
-    (message,) = refused(plan, text)
-    assert "over 10^899 jobs are more than 10000" in message
-
-
-def test_the_most_jobs_are_a_choice(plan):
-    text = ONE + "clearance_mm: [0.1, 0.2, 0.3]\n"
-    assert "3 jobs are more than 2: clearance_mm (3)" in refused(plan, text, max_jobs=2)[0]
-    assert len(plan(text, max_jobs=3).cases) == 3
-
-
-def test_many_blocks_are_refused_too(plan):
-    (message,) = refused(plan, f"blocks: [{', '.join(['{load: none}'] * 11)}]", max_jobs=10)
-    assert message == "case.yaml:1:9: blocks: 11 blocks are more jobs than 10; raise --max-jobs"
-
-
 def test_cases_are_built_when_they_are_asked_for(plan):
     study = plan(ONE + "clearance_mm: {linspace: [0.1, 1, 100]}\n")
     assert len(study.cases) == 100
@@ -362,13 +344,6 @@ def test_saltelli_exchanges_one_key_after_another(plan):
     assert (first == np.stack([b[:, 0], a[:, 1]], axis=1)).all()
     assert (second == np.stack([a[:, 0], b[:, 1]], axis=1)).all()
     assert design_size("saltelli", 8, 2) == 32 == len(design("saltelli", 8, 2, 1))
-
-
-def test_too_large_a_saltelli_design_is_refused_by_all_of_its_points(plan):
-    text = SAMPLED % ("saltelli", "saltelli")
-    with pytest.raises(CaseFileError, match="64 jobs are more than 63"):
-        plan(text, max_jobs=63)
-    assert plan(text, max_jobs=64).jobs == 64
 
 
 @pytest.mark.parametrize("kind", ["lhs", "sobol"])

@@ -11,7 +11,6 @@ from compressor.report.answer import (
     rank_findings,
     round_robin,
     study_findings,
-    word_value,
     worn_joints,
 )
 from compressor.report.figures.sweep_data import MEASURES
@@ -64,18 +63,6 @@ def test_what_appears_ranks_before_what_grows():
         "Time without dry contact", "Peak acceleration", "Peak contact force",
     ]  # fmt: skip
     assert found[0].change == "from nearly nothing"
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "unit", "text"),
-    [("clearance_mm", 0.2, "mm", "clearance 0.2 mm"), ("fault", "big_end", "", "fault big end"),
-     ("damping_N_s_per_mm", 336.0, "N s/mm", "damping 336 N s/mm"),
-     ("clearance_mm_small_end", 0.128856, "mm", "clearance, small end 0.1289 mm"),
-     ("static", 0.23, "1", "static 0.23"), ("clearance_mm", np.nan, "mm", ""),
-     ("fault", "none", "", "fault none")],
-)  # fmt: skip
-def test_swept_values_in_words(name, value, unit, text):
-    assert word_value(name, value, unit) == text
 
 
 @pytest.fixture

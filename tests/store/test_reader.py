@@ -104,26 +104,6 @@ def test_numbers_keep_their_kind_and_every_bit(ideal, tmp_path):
             assert back[name].values.tobytes() == item.values.tobytes(), name
 
 
-@pytest.mark.parametrize("values", [{}, {"precision": "single", "compress": True}])
-def test_ncdump_reads_a_job_and_a_segment(values, job, ncdump, tmp_path):
-    kept = job
-    if "time" in job.dims:
-        write_named(tmp_path, kept, Output(**values))
-        name = file_of(tmp_path, job)
-        text = ncdump("-v", "acceleration", name)
-        assert "joint = 2 ;" in text
-        assert "string joint(joint) ;" in text
-        assert '\tpeak_contact_force:units = "N" ;' in text
-        assert "double peak_contact_force_axis(joint, axis) ;" in text
-        kind = "float" if values else "double"
-        assert f"{kind} contact_force(time, joint, axis) ;" in text
-    keep(tmp_path, job)
-    (rows,) = tmp_path.glob("rows/*.h5")
-    header = ncdump("-h", rows)
-    assert "row = 1 ;" in header
-    assert "double peak_contact_force(row, joint) ;" in header
-
-
 def test_ten_lines_of_h5py_read_a_job(ideal, tmp_path):
     keep(tmp_path, ideal)
     with h5py.File(file_of(tmp_path, ideal)) as file:

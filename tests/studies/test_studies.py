@@ -105,30 +105,6 @@ except CaseFileError as error:
 """
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_the_program_does_without_each_study(name, tmp_path, monkeypatch):
-    copy = copy_without(tmp_path, [name])
-    monkeypatch.setattr(test_layers, "ROOT", copy)
-    sources = test_layers.read_sources()
-    assert len(sources) < len(test_layers.SOURCES)
-    missing = [
-        f"{module} imports {source}"
-        for module in sources
-        for source, _ in test_layers.ours(sources, module)
-        if test_layers.study(source) == name
-    ]
-    assert missing == []
-    for rule in test_layers.RULES:
-        if rule is not test_layers.faults_of_doors:  # some names are given to this study alone
-            assert rule(sources) == []
-    group = STUDIES[NAMES.index(name)].group
-    if group:
-        (copy / "one.yaml").write_text(f"load: none\n{group}: {{over: clearance_mm}}\n")
-        error = run_in(copy, ERROR)
-        assert error.startswith(f"one.yaml:2:1: {group}: unknown key; a case file has name, ")
-        assert group not in error.partition(";")[2]
-
-
 ADDED = """
 from compsim import cli
 from compressor.cases import case_schema, load_studies
@@ -179,3 +155,8 @@ def test_the_program_does_without_all_of_them(tmp_path):
     left = run_in(copy, MAIN_JOB + EVERY_MODULE).partition("all modules:")[2].split()
     assert sorted(left) == ["completion", "export", "init", "plan", "plot", "report", "run",
                             "schema", "show", "status", "verify"]  # fmt: skip
+    for group in {kind.group for kind in STUDIES if kind.group}:
+        (copy / "one.yaml").write_text(f"load: none\n{group}: {{over: clearance_mm}}\n")
+        error = run_in(copy, ERROR)
+        assert error.startswith(f"one.yaml:2:1: {group}: unknown key; a case file has name, ")
+        assert group not in error.partition(";")[2]

@@ -6,7 +6,6 @@ import xarray as xr
 
 from compressor.studies.claims.findings import (
     consistency,
-    coordinate_in_words,
     count_claims,
     flips,
     is_mass_plane,
@@ -99,14 +98,6 @@ def test_the_most_consistent_machine_has_consistent_neighbours(plane):
     assert consistency(plane).startswith("Nowhere claims 3, 4, 5, 6, 8 hold at a machine and all")
 
 
-def test_all_eight_are_said_where_they_hold(plane):
-    plane["margin"][..., 6] = 0.1
-    plane["held"][..., 6] = 1
-    said = [*summary(plane)]
-    assert said[1] == "All eight claims hold in 16 of them."
-    assert said[2].startswith("All eight hold in 16, with rod mass from 4 to 7 kg")
-
-
 def test_who_decides_is_said_with_rivals():
     names = [ROD, "static", "damping_N_s_per_mm"]
     values = np.array([[0.6, 0.5, 0.1], [np.nan] * 3])
@@ -122,9 +113,3 @@ def test_who_decides_is_said_with_rivals():
         "Claim 4: most by rod mass, 0.60 [0.45, 0.75]; not told from static friction.",
         "Claim 1: its margin is the same at all machines.",
     ]
-
-
-def test_names_in_words():
-    assert coordinate_in_words("friction_velocity_mm_per_s") == "friction velocity"
-    assert coordinate_in_words("stiffness_N_per_mm15") == "contact stiffness"
-    assert coordinate_in_words("back_pressure_MPa") == "back pressure"

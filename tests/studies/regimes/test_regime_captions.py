@@ -10,8 +10,6 @@ from compressor.studies.regimes.captions import (
     bifurcation,
     periods,
     regime_of,
-    sections,
-    seen_values,
 )
 
 VALUES = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
@@ -38,16 +36,6 @@ def test_the_captions_of_regimes_are_those_of_compsim_plot():
     assert (*CAPTIONS,) == kind.figures
 
 
-def test_a_chain_is_read_the_way_it_went():
-    data = study([1, 1, 2, 4, "chaotic", "chaotic"], [1, 2, 2, 4, "chaotic", "undecided"])
-    assert [one.regime for one in seen_values(data.sel(direction="up"))][:3] == ["period 1"] * 2 + [
-        "period 2"
-    ]
-    down = seen_values(data.sel(direction="down"))
-    assert [one.value for one in down] == VALUES[::-1]
-    assert [one.regime for one in down][:2] == ["undecided", "chaotic"]
-
-
 def test_a_period_that_is_not_known_is_no_period():
     data = study([1] * 6)
     data["period"][0, 0] = np.nan
@@ -72,12 +60,6 @@ def test_where_period_1_is_lost(up, words):
     assert words in bifurcation(study(up))
 
 
-def test_down_loses_period_1_at_another_value():
-    said = bifurcation(study([1, 1, 1, 1, 2, 2], [1, 1, 2, 2, 1, 1]))
-    assert "Up: period 1 is lost at 0.5 mm, to period 2 and not found again" in said
-    assert "Down: period 1 is lost at 0.4 mm, to period 2, found again at 0.2 mm" in said
-
-
 def test_the_first_exponent_above_0_by_more_than_its_error():
     exponents = [[-1.0, -0.5, 0.2, 0.3, 0.8, 1.0], [-1.0, -0.5, -0.6, -0.7, -2.0, 0.126]]
     up, down = bifurcation(study([1] * 6, [1] * 6, exponents)).split(" Down: ")
@@ -86,14 +68,6 @@ def test_the_first_exponent_above_0_by_more_than_its_error():
         "Its exponent is nowhere above 0 by more than its error: at most 0.13 ± 0.25 a "
         "revolution, at 0.6 mm." in down
     )
-
-
-def test_exponents_may_be_unknown_or_without_error():
-    data = study([1] * 6, exponents=np.full((1, 6), -3.25))
-    data["lyapunov_exponent_error"][:] = np.inf
-    assert "at most -3.25 a revolution" in bifurcation(data)
-    data["lyapunov_exponent"][:] = np.nan
-    assert "No Lyapunov exponent is known." in bifurcation(data)
 
 
 def test_where_up_and_down_differ_and_what_was_confirmed():
@@ -120,19 +94,6 @@ def test_failures_are_counted_by_their_reason():
     assert "3 runs failed: step_underflow (2), non_finite (1)." in said
     assert "period 1 at all 3 values" in said
     assert "no value has a result" in bifurcation(failed(data, "up", [*range(6)]))
-
-
-def test_the_head_says_what_was_followed():
-    head = "Poincaré points at 90° of the crank over radial clearance of the big end, 6 values "
-    assert bifurcation(study([1] * 6)).startswith(head + "from 0.1 to 0.6 mm.")
-
-
-def test_sections_name_the_regime_at_each_value():
-    data = study([1, 1, 2, 4, "chaotic", "chaotic"], [1, 2, 2, 4, "chaotic", "undecided"])
-    said = sections(data.isel(clearance_mm_big_end=[0, 1, 4]), 6)
-    assert "at 90° of the crank" in said
-    assert "at 3 of 6 values of radial clearance of the big end" in said
-    assert said.endswith("0.1 mm period 1; 0.2 mm period 1 up, period 2 down; 0.5 mm chaotic.")
 
 
 def test_a_map_counts_its_regimes():

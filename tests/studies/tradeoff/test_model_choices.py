@@ -113,18 +113,6 @@ def test_equations_are_compiled_before_a_choice_has_its_time(few, monkeypatch):
     assert runs == ["run"] * (1 + len(others))
 
 
-def test_a_choice_says_what_it_assumes():
-    found = by_name(case(machine={"pin_radius_mm": 30}))
-    assert found["oil film"].note == "viscosity_mPa_s 30, bearing_length_mm 60, last_share 0.02"
-    assert found["contact law: Liu"].note == (
-        "materials steel on steel, restitution 0.9, least_approach_mm_per_s 10, length_mm 60"
-    )
-    assert found["friction law: Threlfall"].note == ""  # with the case's coefficient and velocity
-    assert found["elastic rod"].note.startswith("youngs_modulus_GPa 207, depth_mm 40, width_mm 25")
-    back = by_name(case(contact={"law": "hertz"}))["contact law: IMPACT (ADAMS)"]
-    assert back.note == "damping_N_s_per_mm 336, full_damping_mm 0.1"
-
-
 def test_stiffness_and_damping_are_doubled_and_halved_where_the_law_reads_them():
     found = by_name(case())
     contact = found["contact stiffness × 2"].case.contact

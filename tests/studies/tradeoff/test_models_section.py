@@ -20,7 +20,6 @@ from compressor.studies.tradeoff.page import (
     models_file,
     models_section,
     page_table,
-    percent,
     place_text,
     read_models,
 )
@@ -120,14 +119,6 @@ def test_a_chaotic_case_has_no_peak_to_be_moved():
     nothing = model_table(chaotic[["status", "reason", "note", "regime", "seconds"]])
     assert (nothing.measures, nothing.rows[0].cells) == ((), ())
     assert headline(nothing).startswith("No metric of the case is known")
-
-
-@pytest.mark.parametrize(
-    ("size", "text"),
-    [(0.126, "+13 %"), (-0.0004, "-0.04 %"), (9.953, "+995 %"), (-1e-7, "below 0.001 %")],
-)
-def test_relative_changes_in_words(size, text):
-    assert percent(size) == text
 
 
 def test_the_page_shows_line_table_and_what_is_assumed():
