@@ -54,14 +54,17 @@ def by_bar(
     return f"{text if bare else f'({text})'}e{top:+03d}"
 
 
-def setting(value: float) -> str:
-    """Return a number that was given, in four digits as a case file may have it; whole ones whole.
+SETTING_DIGITS = 6  # enough to tell points of a search apart
 
-    >>> setting(0.2), setting(1480.0), setting(12345), setting(0.123456789)
-    ('0.2', '1480', '12345', '0.1235')
+
+def setting(value: float) -> str:
+    """Return a number that was given, in six digits; whole ones whole.
+
+    >>> setting(0.2), setting(740.05), setting(1234567), setting(0.123456789)
+    ('0.2', '740.05', '1234567', '0.123457')
     """
-    is_whole = abs(value) < MAX_DECIMAL and value == int(value)
-    return f"{value if is_whole else float(f'{value:.{PAGE_DIGITS}g}'):.10g}"
+    is_whole = abs(value) < 1e10 and value == int(value)
+    return f"{value:.10g}" if is_whole else f"{value:.{SETTING_DIGITS}g}"
 
 
 def _rounded_up(bar: float) -> tuple[float, int]:

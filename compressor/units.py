@@ -81,9 +81,11 @@ IN_G_TOO = re.compile(rf"(?<= m/s²) \({_NUMBER} g\)")
 
 
 def convert_text(text: str, units: Units) -> str:
-    """Return a text whose numbers with units are in the chosen ones, to as many digits.
+    """Return a text whose numbers with units are in the chosen ones.
 
-    An acceleration that is given in g beside m/s² is in the chosen unit alone.
+    A list of numbers before a unit is all in that unit. Digits are as many, without zeros at the
+    end; three at least by a factor that is no power of ten. An acceleration that is given in g
+    beside m/s² is in the chosen unit alone.
 
     >>> convert_text("from -52.91 to 108.8 kN at 0.1 mm, 5 N m", "si")
     'from -52910 to 108800 N at 0.0001 m, 5 N m'
@@ -101,7 +103,7 @@ def convert_text(text: str, units: Units) -> str:
 
 
 def _multiply(number: str, factor: float) -> str:
-    """Return a number times a factor, with its sign and digits; three at least by an odd factor."""
+    """Return a number times a factor, with its sign and digits."""
     digits = len(re.sub(r"[eE].*|\D", "", number).lstrip("0")) or 1
     is_shift = math.log10(factor).is_integer()
     value = float(f"{float(number) * factor:.{digits if is_shift else max(3, digits)}g}")

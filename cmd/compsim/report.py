@@ -57,8 +57,8 @@ def report(
     compsim report /data/results -o page --limit body_velocity_rms_mm_per_s=2,5
 
     Prints the path of the page, which a browser opens without a server.
-    --units is of figures, tables and captions; swept keys and notes stay as in
-    the case file.
+    --units is of figures, tables and texts. Columns and axes with the name of a
+    key keep its unit, and your own words stay as they are.
     """
     folder, _ = results_folder(given, folder, named=False)
     from compressor.store import read_studies, writable_folder

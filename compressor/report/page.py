@@ -61,7 +61,7 @@ def number(value: float) -> str:
     """Return a measured number to four significant digits, whole ones whole; a dash for nan."""
     if math.isnan(value):
         return "–"
-    if not value.is_integer():
+    if not float(value).is_integer():
         value = float(f"{value:.{PAGE_DIGITS}g}")
     size = abs(value)
     if size < 1e7 and size == int(size):

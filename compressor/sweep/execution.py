@@ -422,11 +422,23 @@ class Local(Batches):
     def end_pool(self) -> None:
         """End all processes, if there are any; what had arrived stays."""
         if self.executor:
+            ended = threading.Event()
+
+            def kill_all() -> None:  # loky may start others in place of those that end
+                while not ended.is_set():
+                    kill(child.pid for child in children())
+                    ended.wait(TICK)
+
             # not `kill_workers`: loky 3.6 forgets batches that its thread then looks for, which
             # dies of a KeyError and leaves threads and files open
-            kill(child.pid for child in children())
-            with contextlib.suppress(BrokenPipeError):
-                self.executor.shutdown()
+            killer = threading.Thread(target=kill_all, daemon=True)
+            killer.start()
+            try:
+                with contextlib.suppress(BrokenPipeError):
+                    self.executor.shutdown()
+            finally:
+                ended.set()
+                killer.join()
         self.executor = None
 
     def discard(self) -> None:

@@ -104,6 +104,23 @@ def test_numbers_keep_their_kind_and_every_bit(ideal, tmp_path):
             assert back[name].values.tobytes() == item.values.tobytes(), name
 
 
+def test_ncdump_reads_a_job_and_a_segment(job, ncdump, tmp_path):
+    if "time" in job.dims:
+        write_named(tmp_path, job, Output(precision="single", compress=True))
+        name = file_of(tmp_path, job)
+        text = ncdump("-v", "acceleration", name)
+        assert "joint = 2 ;" in text
+        assert "string joint(joint) ;" in text
+        assert '\tpeak_contact_force:units = "N" ;' in text
+        assert "double peak_contact_force_axis(joint, axis) ;" in text
+        assert "float contact_force(time, joint, axis) ;" in text
+    keep(tmp_path, job)
+    (rows,) = tmp_path.glob("rows/*.h5")
+    header = ncdump("-h", rows)
+    assert "row = 1 ;" in header
+    assert "double peak_contact_force(row, joint) ;" in header
+
+
 def test_ten_lines_of_h5py_read_a_job(ideal, tmp_path):
     keep(tmp_path, ideal)
     with h5py.File(file_of(tmp_path, ideal)) as file:

@@ -435,6 +435,21 @@ def test_batches_that_loky_has_not_seen_yet_are_ended(monkeypatch):
         list(run_batches(work, named(range(6)), Workers(1), pulse))
 
 
+def test_workers_that_loky_starts_while_we_close_are_ended_too():
+    """It replaces one whose memory grew; what waited would be done first."""
+
+    def grow(seconds):
+        process_executor._MAX_MEMORY_LEAK_SIZE = -(10**12)
+        process_executor._MEMORY_LEAK_CHECK_DELAY = -1
+        time.sleep(seconds)
+
+    ends = run_batches(grow, named([0.05, 0.05, 60.0, 60.0, 60.0]), Workers(1))
+    next(ends), next(ends)
+    began = time.monotonic()
+    ends.close()
+    assert time.monotonic() - began < 50  # not one of the long jobs was waited for
+
+
 def test_closing_ends_the_workers():
     ends = run_batches(work, named([1, "hang", "stop"]), Workers(3, grace=60))
     assert next(ends).id == 1

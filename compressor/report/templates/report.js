@@ -371,7 +371,7 @@ class Figure {
           title: { text: titled ? escaped(scale.title) : "", standoff: 6,
             font: { size: fitting(scale.title, domain, way === "x" ? width : total) } },
         };
-        if (way === "x") made.unifiedhovertitle = { text: `%{x:.4~r} ${escaped(scale.unit)}` };
+        if (way === "x") made.unifiedhovertitle = { text: `%{x:.6~g} ${escaped(scale.unit)}` };
         if (way === "y" && scale.words) made.tickfont = { size: boxes[n].font };
         if (scale.words) {
           made.tickmode = "array";
@@ -418,7 +418,7 @@ class Figure {
       meta: trace.name, visible: !this.off.has(trace.name), opacity: trace.opacity };
     const jobs = trace.jobs && Array.from(numbers(trace.jobs), (n) => this.sheet.jobs[n]);
     if (jobs) made.customdata = jobs;
-    const inX = `%{x:.4~r} ${xu}`;
+    const inX = `%{x:.6~g} ${xu}`;
     made.hovertemplate = `%{y:.4~r} ${yu}<extra>${name}</extra>`;
     if (!trace.name && trace.kind !== "map" && trace.kind !== "bars") made.hoverinfo = "skip";
     if (made.hoverinfo) delete made.hovertemplate;

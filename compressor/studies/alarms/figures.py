@@ -100,7 +100,7 @@ def caption(found: xr.Dataset, noise: int = 0) -> str:
     for joint in found["joint"].values.tolist():
         one = found.isel(alarm=rank_alarms(found, joint, noise)[0], noise=noise)
         first = first_words(one, joint)
-        detects = "never detects" if first == "never" else f"detects from {first} mm on"
+        detects = "never detects" if first == "never" else f"detects from {first} on"
         texts.append(
             f"{joint.replace('_', ' ')}: {one['alarm'].item()}, which {detects}, with "
             f"{rate_words(one)} of false alarms"

@@ -44,7 +44,7 @@ def limit_words(found: xr.Dataset) -> str:
 
 
 def first_words(one: xr.Dataset, joint: str) -> str:
-    """Return the clearance (mm) from which on an alarm detects, with its interval.
+    """Return the clearance from which on an alarm detects, with its interval.
 
     An end beyond the greatest clearance of the study is said so.
     """
@@ -53,8 +53,8 @@ def first_words(one: xr.Dataset, joint: str) -> str:
     if math.isinf(low):
         return "never"
     most = float(one["clearance"].values[one["worn_joint"].values == joint].max())
-    last = f"> {most:.3g}" if math.isinf(high) else f"{high:.3g}"
-    return f"{'never' if math.isinf(value) else f'{value:.3g}'} [{low:.3g}, {last}]"
+    last = f"> {most:.3g} mm" if math.isinf(high) else f"{high:.3g} mm"
+    return f"{'never' if math.isinf(value) else f'{value:.3g} mm'} [{low:.3g} mm, {last}]"
 
 
 def rate_words(one: xr.Dataset) -> str:
@@ -99,7 +99,7 @@ def heading(found: xr.Dataset) -> Iterator[str]:
 def table_rows(found: xr.Dataset) -> tuple[list[str], list[list[str]]]:
     """Return the head and the rows of the table, as text."""
     noise, has_lead = found["noise"].values, LEADS[0] in found
-    head = ["joint", "alarm", "limits", "false alarms", "detects from, mm"]
+    head = ["joint", "alarm", "limits", "false alarms", "detects from"]
     head += ["hours before the limit"] * has_lead
     head += [f"with noise of {one:g} m/s2" for one in noise[1:]]
     rows = []

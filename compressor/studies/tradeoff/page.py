@@ -241,7 +241,7 @@ def read_models(folder: Folder, study: StoredStudy) -> list[xr.Dataset]:
     files have no key in their names.
     """
     again = f"compsim explain --models {study.case_file} -o {folder} makes it anew"
-    found = []
+    found: dict[str, xr.Dataset] = {}  # by key: files with it in their names come first
     for path in sorted(Path(folder, "models").glob(f"{study.name}*.nc")):
         if not KEY_IN_NAME.fullmatch(path.stem.removeprefix(study.name)):
             continue
@@ -250,7 +250,7 @@ def read_models(folder: Folder, study: StoredStudy) -> list[xr.Dataset]:
             if data.attrs["study"] != study.name:
                 continue
             if data.attrs["key"] in study.keys:
-                found.append(data)
+                found.setdefault(data.attrs["key"], data)
                 continue
             problem = f"{path}: is not shown, as {study.name} has no such job: delete it"
         except StoreError as error:
@@ -258,7 +258,7 @@ def read_models(folder: Folder, study: StoredStudy) -> list[xr.Dataset]:
         except KeyError:
             problem = f"{path}: holds no choices of the model: {again}"
         warnings.warn(problem, StoreWarning, stacklevel=2)
-    return found
+    return [*found.values()]
 
 
 def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:

@@ -100,8 +100,8 @@ def test_the_caption_says_the_numbers_of_the_figure(written):
     best = found.isel(alarm=rank_alarms(found, "small_end")[0], noise=0)
     false = [100 * float(best[f"false_alarms{end}"]) for end in ("", "_low", "_high")]
     clearance = float(best["first_clearance"].sel(joint="small_end"))
-    said = re.search(r"small end: (.+?), which detects from ([\d.]+) \[.*? mm on, with ([\d.]+) % "
-                     r"\[([\d.]+), ([\d.]+)\]", text).groups()  # fmt: skip
+    said = re.search(r"small end: (.+?), which detects from ([\d.]+) mm \[.*?\] on, "
+                     r"with ([\d.]+) % \[([\d.]+), ([\d.]+)\]", text).groups()  # fmt: skip
     assert said[0] == best["alarm"].item()
     assert [*map(float, said[1:])] == pytest.approx([clearance, *false], rel=0.06)
     above, below = drawing.panels[1], drawing.panels[4]
