@@ -869,10 +869,9 @@ def stress_table():
     return text + (
         f"\n{found['scenes']:,} cases of seed {found['seed']} took "
         f"{found['work_s'] / 60:.0f} minutes of workers' time, {found['workers']} at a time. "
-        f"Of their results "
-        f"{found['silent_wrong']} were wrong without a warning"
+        f"Results that were wrong without a warning: {found['silent_wrong']}"
         + (
-            f": with 95 % confidence at most {found['at_most']:.2%} of such cases are"
+            f", with 95 % confidence at most {found['at_most']:.2%} of such cases"
             if not found["silent_wrong"]
             else ""
         )
