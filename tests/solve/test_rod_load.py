@@ -135,7 +135,7 @@ def test_show_judges_the_reversal(tmp_path, capsys, monkeypatch):
     def told(*words):
         capsys.readouterr()
         assert cli.main(["show", key, *words]) == 0
-        return capsys.readouterr().out
+        return " ".join(capsys.readouterr().out.split())
 
     assert "%: passes API 618's 15 degrees and 3 %" in told()
     assert "%: passes the maker's 30 degrees and 25 %" in told("--reversal", "30,25")

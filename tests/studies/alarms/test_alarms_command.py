@@ -54,7 +54,8 @@ def test_the_table_has_the_first_alarm_of_each_joint_first(written):
     for joint in ("big_end", "small_end", "both"):
         first = next(row for row in rows if row.startswith(joint))
         best = found.isel(alarm=rank_alarms(found, joint)[0], noise=0)
-        clearance, low, last = re.search(r"([\d.]+) \[([\d.]+), > ([\d.]+)\]", first).groups()
+        of_clearance = r"([\d.]+) mm \[([\d.]+) mm, > ([\d.]+) mm\]"
+        clearance, low, last = re.search(of_clearance, first).groups()
         of_joint = best.sel(joint=joint)
         assert best["alarm"].item() in first
         assert float(clearance) == pytest.approx(float(of_joint["first_clearance"]), rel=5e-3)

@@ -103,7 +103,7 @@ def test_noise_is_not_said_to_disturb_the_velocity_of_the_body():
     assert head[-1] == "with noise of 1 m/s2"
     last = {row[1]: row[-1] for row in rows}
     assert last["velocity of the body"] == "-"
-    assert last["rms, record"].startswith("0.4 [")
+    assert last["rms, record"].startswith("0.4 mm [")
 
 
 def test_an_alarm_that_reads_nothing_new_never_detects(judged):

@@ -171,6 +171,6 @@ def test_the_table_in_text_fits_a_terminal():
     assert lines[8:11] == [
         "  1 other choice: none seen",
         "",
-        "  no choice is seen to move: greatest penetration, big end",
+        "  no choice is seen to move: max penetration, big end",
     ]
     assert "    impossible: needs more" in lines
