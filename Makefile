@@ -77,7 +77,7 @@ scale: install  ## measure 100,000 jobs beside their physics: time and memory (a
 throughput: install  ## measure starting up, 10,000 jobs, and all beside an earlier commit (six minutes)
 	$(CAMPAIGN)/measure_throughput.py tests/results/throughput.json
 
-sweep-bench: install  ## measure 100,000 jobs, killed three times and resumed (ten minutes)
+sweep-bench: install  ## measure 100,000 jobs, killed three times and resumed (three minutes)
 	$(CAMPAIGN)/measure_sweep.py tests/results/sweep.json
 
 validation: install  ## compare with what others have published (a minute)
@@ -102,7 +102,7 @@ ladders: install  ## measure error against tolerance, and the limit of no cleara
 chaotic: install  ## compare chaotic motions' statistics by two integrators (a quarter of an hour)
 	$(CAMPAIGN)/measure_chaotic.py tests/results/chaotic.json
 
-regimes: install  ## follow a machine over its clearance, up and down (ten minutes)
+regimes: install  ## follow a machine over its clearance, up and down (three minutes)
 	$(CAMPAIGN)/measure_regimes.py tests/results/regimes.json
 
 diagnosis: install  ## train on 2,000 simulated machines, and test on some it never saw (half an hour)

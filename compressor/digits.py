@@ -54,17 +54,16 @@ def by_bar(
     return f"{text if bare else f'({text})'}e{top:+03d}"
 
 
-SETTING_DIGITS = 6  # enough to tell points of a search apart
-
-
 def setting(value: float) -> str:
     """Return a number that was given, in six digits; whole ones whole.
+
+    Fewer would not tell the points of a search apart.
 
     >>> setting(0.2), setting(740.05), setting(1234567), setting(0.123456789)
     ('0.2', '740.05', '1234567', '0.123457')
     """
     is_whole = abs(value) < 1e10 and value == int(value)
-    return f"{value:.10g}" if is_whole else f"{value:.{SETTING_DIGITS}g}"
+    return f"{value:.10g}" if is_whole else f"{value:.{DIGITS_WITHOUT_BAR}g}"
 
 
 def _rounded_up(bar: float) -> tuple[float, int]:

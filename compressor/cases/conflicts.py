@@ -135,7 +135,7 @@ def judged_range(key: str) -> tuple[float, float]:
 def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
     """Return the keys of a case whose values are outside the judged range, each with a sentence.
 
-    values: nested, of one case (`Case.values`). A sentence continues the key: "62 kg is outside
+    values: nested, of one case (`Case.values`). A sentence continues the key: "262 kg is outside
     the range that the program was judged on, 0.1 to 200 kg". Clearances of both joints are one key.
     """
     found = {}

@@ -98,7 +98,7 @@ def measured_cell(measure: Measure, value: float, bar: float, limits: Limits = N
 
 
 def value_cell(value: Any) -> Cell:
-    """Return a setting of a job: a number in four digits, or a word."""
+    """Return a setting of a job: a number, or a word."""
     if isinstance(value, int | float | np.number):
         return Cell(setting(float(value)), "number", None if math.isnan(value) else float(value))
     return Cell(str(value))

@@ -213,7 +213,7 @@ def follows(case: Case, values: Mapping[str, Any], key: str) -> bool:
 
 
 def spelt(value: Any, unit: str) -> str:
-    """Return a value as a case file has it, in four digits, with its unit."""
+    """Return a value as a case file has it, with its unit."""
     if value is None:
         return "none"
     if isinstance(value, bool):
