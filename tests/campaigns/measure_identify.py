@@ -96,13 +96,20 @@ def case_file(drawn):
     return values | {"output": {"precision": "single"}}
 
 
+def case_of(machine, other):
+    """A machine's case; `other`: what of the model is changed."""
+    values = {**copy.deepcopy(FIXED), **copy.deepcopy(machine)}
+    values["sensor"] = FIXED["sensor"] | machine["sensor"]
+    if values["clearance_mm"]:  # ideal joints have no friction to change
+        values |= other
+    else:
+        del values["clearance_mm"]
+    return Case.from_values(values)
+
+
 def row_of(machine, other):
     """The features of a machine's record; `other`: what of the model is changed."""
-    values = {**copy.deepcopy(FIXED), **copy.deepcopy(machine), **other}
-    values["sensor"] = FIXED["sensor"] | machine["sensor"]
-    if not values["clearance_mm"]:
-        del values["clearance_mm"]
-    run = simulate(Case.from_values(values))
+    run = simulate(case_of(machine, other))
     times, heard, tacho = (
         run[name].values for name in ("sensor_time", "sensor_acceleration", "tacho_time")
     )

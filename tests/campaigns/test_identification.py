@@ -9,6 +9,7 @@ from measure_identify import (
     JOINTS,
     OTHERS,
     case_file,
+    case_of,
     judged,
     machines,
     row_of,
@@ -45,6 +46,12 @@ def test_a_study_runs_the_machines_that_are_judged(tmp_path):
         assert case.sensor.seed == one["sensor"]["seed"]
         told = {side: getattr(case.clearance_mm, side) for side in ("big_end", "small_end")}
         assert {side: value for side, value in told.items() if value} == one["clearance_mm"]
+
+
+@pytest.mark.parametrize("other", OTHERS.values(), ids=OTHERS)
+def test_each_machine_is_a_case_under_each_law(other):
+    for machine in machines(40, 7):
+        assert case_of(machine, other).joint == machine["joint"]
 
 
 def test_friction_changes_a_record_and_nothing_else():
