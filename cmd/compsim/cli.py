@@ -36,6 +36,8 @@ from compsim import (
 from compsim.screen import DONE, INTERNAL, STORE, discard_output, open_streams, say
 from compsim.usage import Commands, one_line
 
+# of paths, that a program makes; any other error of a path is the file system's
+MISTAKES = (FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError)
 SIGNALS = [signal.SIGINT, signal.SIGTERM]
 if hasattr(signal, "SIGHUP"):  # not on Windows
     SIGNALS.append(signal.SIGHUP)
@@ -189,6 +191,10 @@ def report_error(error: Exception) -> int:
     if isinstance(error, MemoryError) or any(words in str(error) for words in NO_ROOM):
         say("compsim: not enough memory: allow more (ulimit -v), or use fewer workers (-j)")
         return INTERNAL
+    if isinstance(error, OSError) and error.filename and not isinstance(error, MISTAKES):
+        from compressor.store import system_error
+
+        return report_error(system_error(error.filename, error))
     # raised by click's echo: stdout does not take it, such as a full disk
     if isinstance(error, OSError) and traceback.extract_tb(error.__traceback__)[-1].name == "echo":
         say(f"compsim: stdout: {error.strerror}; the same command prints it again")

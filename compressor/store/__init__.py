@@ -7,6 +7,7 @@ from compressor.store.files import (
     StoreWarning,
     publish,
     sync_later,
+    system_error,
     writable_folder,
 )
 from compressor.store.hdf5 import DamagedJob

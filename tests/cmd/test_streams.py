@@ -1,5 +1,6 @@
 """Streams that are closed, full or no longer read, and names that would steer a terminal."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -82,6 +83,18 @@ def test_output_that_does_not_fit_is_told_in_one_line(words, compsim):
 def test_a_lack_of_memory_is_told_in_one_line(error, capsys):
     assert cli.report_error(error) == 1
     assert capsys.readouterr().err.startswith("compsim: not enough memory: allow more (ulimit -v)")
+
+
+def test_a_path_that_cannot_be_read_is_named_in_one_line(capsys, monkeypatch):
+    monkeypatch.setenv("COMPSIM_DEBUG", "1")
+    for number in (errno.EACCES, errno.EIO, errno.ESTALE):
+        assert cli.report_error(OSError(number, os.strerror(number), "/store/jobs")) == 5
+        said = capsys.readouterr().err
+        assert said.startswith(f"compsim: /store/jobs: {os.strerror(number)}; "), said
+    with pytest.raises(OSError) as caught:
+        open("/no/such/file")  # such a path is a mistake of the program
+    assert cli.report_error(caught.value) == 1
+    assert "Traceback" in capsys.readouterr().err
 
 
 def test_ctrl_c_amid_an_import_leaves_no_traceback(tmp_path):
