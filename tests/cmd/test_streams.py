@@ -91,7 +91,7 @@ def test_a_path_that_cannot_be_read_is_named_in_one_line(capsys, monkeypatch):
         assert cli.report_error(OSError(number, os.strerror(number), "/store/jobs")) == 5
         said = capsys.readouterr().err
         assert said.startswith(f"compsim: /store/jobs: {os.strerror(number)}; "), said
-    with pytest.raises(OSError) as caught:
+    with pytest.raises(FileNotFoundError) as caught:
         open("/no/such/file")  # such a path is a mistake of the program
     assert cli.report_error(caught.value) == 1
     assert "Traceback" in capsys.readouterr().err
