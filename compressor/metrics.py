@@ -133,7 +133,8 @@ TABLE = (
     ),
     Metric(
         "impacts_per_rev", ("joint",), "1/rev", "contacts in a revolution that began after flight",
-        "penetration", Bar(1.0, 0.0, False), Shown("impacts after flight", "per rev"), True, "rate",
+        "penetration", Bar(1.0, 0.0, False), Shown("contacts after flight", "per rev"), True,
+        "rate",
     ),
     Metric(
         "releases_per_rev", ("joint",), "1/rev",

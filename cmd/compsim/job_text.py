@@ -22,7 +22,10 @@ UNITS = {
     "m/s2": ("m/s²", 1.0), "N": ("kN", 1e-3), "m": ("mm", 1e3), "rad": ("deg", math.degrees(1.0)),
     "1": ("", 1.0),
 }  # fmt: skip
-LABELS = {"contact_loss_fraction": "time without dry contact"}  # of others than their names
+LABELS = {  # of others than their names
+    "contact_loss_fraction": "time without dry contact",
+    "impacts_per_rev": "contacts after flight",
+}
 FACTS = ("promise", "regime", "method", "rtol", "program", "libraries")
 
 

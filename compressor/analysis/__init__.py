@@ -5,6 +5,7 @@ from compressor.analysis.captions import caption, diagnosis_caption
 from compressor.analysis.claims import RULES, Claim, claim_margins, claims
 from compressor.analysis.contacts import (
     MODES,
+    OILED_MODES,
     angle_modes,
     contact_modes,
     impacts,
@@ -24,6 +25,7 @@ from compressor.analysis.plot_captions import (
     PLOT_CAPTIONS,
     SweptRow,
     plural,
+    row_modes_words,
     rows_modes,
 )
 from compressor.analysis.runs import (

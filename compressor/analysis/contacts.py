@@ -330,6 +330,8 @@ def impulse_and_loss(
 
 
 MODES = ("flight", "impact", "following")
+# what a reader is shown of a joint with oil: its film takes the blow, and metal touches later
+OILED_MODES = ("film alone", "dry contact begins", "dry contact")
 FLIGHT, IMPACT, FOLLOWING = range(len(MODES))
 UNKNOWN = -1  # of a bin without samples
 

@@ -8,6 +8,7 @@ import xarray as xr
 
 from compressor.analysis.contacts import (
     MODES,
+    OILED_MODES,
     UNKNOWN,
     contact_modes,
     impacts,
@@ -100,6 +101,11 @@ class SweptRow:
             limits = limit[0] * (healthy if limit[1] else np.ones(rms.size))
         found = Segments(rms, np.zeros(rms.size) if bar is None else bar, healthy, limits)
         return replace(self, segments=found)
+
+
+def row_modes_words(rows: Sequence[SweptRow]) -> tuple[str, ...]:
+    """Return what the contact modes of rows are called: of oiled joints where all have oil."""
+    return OILED_MODES if all(row.lubricated for row in rows if row.modes) else MODES
 
 
 def rows_modes(rows: Sequence[SweptRow]) -> dict[str, np.ndarray]:
@@ -273,24 +279,27 @@ def modes(run: xr.Dataset, twin: Twin) -> str:
     """Describe the contact modes: their shares of the time."""
     shares = mode_shares(contact_modes(run))["share"]
     sentences = []
+    words, all_contact = MODES, "following contact throughout, no flight and no impact"
+    if case_of(run).lubricant:
+        words, all_contact = OILED_MODES, "dry contact throughout"
     for joint in joints_with_clearance(run):
         each = [100.0 * float(shares.sel(joint=joint, mode=mode)) for mode in MODES]
         if each[MODES.index("following")] == 100.0:
-            text = "following contact throughout, no flight and no impact"
+            text = all_contact
         else:
-            text = ", ".join(f"{mode} {x:.3g} %" for mode, x in zip(MODES, each, strict=True))
+            text = ", ".join(f"{word} {x:.3g} %" for word, x in zip(words, each, strict=True))
         sentences.append(f"At the {SPOKEN[joint]}: {text}.")
     return " ".join(["Shares of the settled time.", *sentences]) + film(run) + caution(run)
 
 
 def struck(run: xr.Dataset, twin: Twin) -> str:
-    """Describe the impacts: how many, the hardest, and what they lost."""
-    found = impacts(run)
+    """Describe the impacts: how many, the hardest, and what they lost; with oil: dry contacts."""
+    found, oil = impacts(run), film(run)
     if not found.sizes["impact"]:
-        return (
-            f"No impacts: after settling no journal came back from flight.{film(run)}{caution(run)}"
-        )
+        none = "No impacts: after settling no journal came back from flight."
+        return f"{'No dry contact begins after settling.' if oil else none}{oil}{caution(run)}"
     sentences, turns = [], settled_revolutions(run)
+    kind, one = ("dry contacts", "fastest") if oil else ("impacts", "hardest")
     for joint in joints_with_clearance(run):
         mine = found.isel(impact=found["joint"].values == joint)
         if not mine.sizes["impact"]:
@@ -299,14 +308,14 @@ def struck(run: xr.Dataset, twin: Twin) -> str:
         lost = float(mine["lost_energy"].sum())
         hardest = mine.isel(impact=int(np.argmax(mine["approach_speed"].values)))
         sentences.append(
-            f"At the {SPOKEN[joint]} {mine.sizes['impact'] / turns:.3g} impacts a revolution; the "
-            f"hardest at "
-            f"{float(hardest['approach_speed']):.3g} m/s and {float(hardest['crank_angle']):.0f}°"
+            f"At the {SPOKEN[joint]} {mine.sizes['impact'] / turns:.3g} {kind} a revolution; the "
+            f"{one} at {float(hardest['approach_speed']):.3g} m/s and "
+            f"{float(hardest['crank_angle']):.0f}°"
             + (f"; together they lost {lost:.3g} J." if lost > 0.0 else ".")
         )
     return (
         " ".join([f"Contacts after flight, over {turns:.3g} rev after settling.", *sentences])
-        + film(run)
+        + oil
         + caution(run)
     )
 
@@ -383,14 +392,15 @@ def segment_words(place: int) -> str:
 def mode_rows(rows: Sequence[SweptRow], axis: str) -> str:
     """Describe the mode map: the share of angles whose most frequent mode is flight."""
     sentences = [f"The most frequent contact mode in each degree, a row for each value of {axis}."]
+    away = row_modes_words(rows)[0]
     for joint, table in rows_modes(rows).items():
         flight = 100.0 * (table == MODES.index("flight")).mean(axis=1)
         if flight.max() == 0.0:
-            sentences.append(f"At the {SPOKEN[joint]} it is nowhere flight.")
+            sentences.append(f"At the {SPOKEN[joint]} it is nowhere {away}.")
         else:
             at = rows[int(np.argmax(flight))].value
             sentences.append(
-                f"At the {SPOKEN[joint]} it is flight over at most {flight.max():.2g} % of the "
+                f"At the {SPOKEN[joint]} it is {away} over at most {flight.max():.3g} % of the "
                 f"revolution, at {at}."
             )
     oil = FILM if any(row.lubricated for row in rows) else ""

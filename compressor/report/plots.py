@@ -144,7 +144,7 @@ TITLES = {
     "spectra": "order spectra",
     "orbits": "orbits of the journals",
     "modes": "contact modes over crank angle",
-    "impacts": "impacts over crank angle",
+    "impacts": "contacts after flight over crank angle",
     "cycles": "vibration over crank angle",
     "segments": "vibration in segments of 10°",
     "waterfall": "order spectra of the force on the frame along the cylinder",

@@ -10,11 +10,11 @@ import pytest
 from compsim import cli
 from conftest import store
 
-from compressor.analysis.contacts import angle_modes
+from compressor.analysis.contacts import OILED_MODES, angle_modes
 from compressor.analysis.plot_captions import FILM, PLOT_CAPTIONS, SweptRow
 from compressor.analysis.shaking import frame_forces
 from compressor.cases.case import Case
-from compressor.report.figures.job import draw_analyst, draw_spectra
+from compressor.report.figures.job import draw_analyst, draw_map, draw_modes, draw_spectra
 from compressor.report.plots import job_title, study_title
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
@@ -143,8 +143,8 @@ def test_captions_of_oiled_joints_speak_of_dry_contact():
     for name, text in told.items():
         assert text.endswith("contact is dry contact, and without it the film bears the journal.")
         assert "film" not in PLOT_CAPTIONS["job"][name](dry, None)
-    assert "At the big end: flight 100 %" in told["modes"]
-    assert told["impacts"].startswith("No impacts")
+    assert "At the big end: film alone 100 %" in told["modes"]
+    assert told["impacts"].startswith("No dry contact begins after settling. The joints have oil")
     analyst = PLOT_CAPTIONS["job"]["analyst"](full, None)
     assert "Dry contact that begins at the big end: none." in analyst
     assert "dry contact, big end" in draw_analyst(full, None).panels[0].y.words.values()
@@ -153,7 +153,11 @@ def test_captions_of_oiled_joints_speak_of_dry_contact():
     near = re.search(r"comes as near to it as ([\d.]+) µm", told["orbits"])[1]
     assert float(near) == pytest.approx(nearest, rel=0.06)
     rows = [SweptRow("0.05", modes=angle_modes(full), lubricated=True)]
-    assert FILM in PLOT_CAPTIONS["study"]["map"](rows, "clearance")
+    told = PLOT_CAPTIONS["study"]["map"](rows, "clearance")
+    assert FILM in told
+    assert "At the big end it is film alone over at most 100 %" in told
+    for drawing in (draw_modes(full), draw_map(rows, "clearance")):
+        assert [one.name for one in drawing.legend] == [*OILED_MODES]
 
 
 def test_a_job_is_named_as_in_show(plot, folder, capsys, unpainted):

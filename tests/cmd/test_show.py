@@ -54,7 +54,7 @@ def test_numbers_have_labels_units_and_error_bars(paper_store, show):
     share = numbers["contact_loss_fraction"][0]
     bar = numbers["contact_loss_fraction_error"][0]
     assert told["time without dry contact, big end"] == f"{by_bar(100 * share, 100 * bar, False)} %"
-    assert told["impacts, big end"] == f"{numbers['impacts_per_rev'][0]:.3g} per rev"
+    assert told["contacts after flight, big end"] == f"{numbers['impacts_per_rev'][0]:.3g} per rev"
     assert not any("count" in label for label in told)  # counts grow with the run
     assert float(told["acceleration"]) == pytest.approx(numbers["acceleration_error"], rel=0.05)
     assert told["friction loss"] == f"{numbers['friction_loss']:.6g} J"

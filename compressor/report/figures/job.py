@@ -8,6 +8,7 @@ import xarray as xr
 
 from compressor.analysis import (
     MODES,
+    OILED_MODES,
     ORDER,
     SPOKEN,
     SweptRow,
@@ -20,6 +21,7 @@ from compressor.analysis import (
     joints_with_clearance,
     last_revolution,
     read_cycle,
+    row_modes_words,
     rows_modes,
     sensor_envelope,
     settled_revolutions,
@@ -99,11 +101,11 @@ def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
 def draw_modes(run: xr.Dataset) -> Drawing:
     """Return contact modes over the crank angle, as shares of the revolutions, and penetration."""
     joints = joints_with_clearance(run)
-    shares = angle_modes(run)
+    shares, words = angle_modes(run), OILED_MODES if case_of(run).lubricant else MODES
     rows = 2 * len(joints)
     figure, panels = make_grid(rows, 1, 1.45 * rows + 0.9, heights=(1.0, 2.2) * len(joints))
     for joint, strip, depth in zip(joints, panels[::2, 0], panels[1::2, 0], strict=True):
-        plot_strip(strip, shares, joint)
+        plot_strip(strip, shares, joint, words)
         degrees, revolution = last_revolution(run)
         values = revolution["penetration"].sel(joint=joint).values * MICROMETRE
         order = np.argsort(degrees % 360.0, kind="stable")
@@ -113,7 +115,7 @@ def draw_modes(run: xr.Dataset) -> Drawing:
         depth.y.title = "δ (µm)"
     panels[-1, 0].x.title = ANGLE_AXIS
     share_turn(figure.panels)
-    figure.legend = mode_entries()
+    figure.legend = mode_entries(words)
     return figure
 
 
@@ -124,35 +126,45 @@ def share_turn(panels: Sequence[Panel], step: float = 45.0) -> None:
     share_scales(panels, "x")
 
 
-def plot_strip(panel: Panel, shares: xr.Dataset, joint: str) -> None:
+def plot_strip(panel: Panel, shares: xr.Dataset, joint: str, words: Sequence[str]) -> None:
     """Draw the share of revolutions in each mode, stacked, over bins of the crank angle."""
     share = shares["share"].sel(joint=joint)
     heights = [share.sel(mode=mode).fillna(0.0).values for mode in MODE_COLORS]
-    stack_modes(panel, shares["angle"].values, 360.0 / shares.sizes["angle"], heights)
+    stack_modes(panel, shares["angle"].values, 360.0 / shares.sizes["angle"], heights, words)
     panel.title = f"share of revolutions in each contact mode, {SPOKEN[joint]}"
 
 
 def stack_modes(
-    panel: Panel, x: np.ndarray, width: float | np.ndarray, heights: Sequence[np.ndarray]
+    panel: Panel,
+    x: np.ndarray,
+    width: float | np.ndarray,
+    heights: Sequence[np.ndarray],
+    words: Sequence[str] = MODES,
 ) -> None:
     """Draw the shares of the contact modes one above the other, over the middles of bins."""
     foot = np.zeros(x.size)
-    for (mode, color), height in zip(MODE_COLORS.items(), heights, strict=True):
-        panel.plot(x, foot + height, fill(color), mode, kind="columns", thick=width, foot=foot)
+    for word, color, height in zip(words, MODE_COLORS.values(), heights, strict=True):
+        panel.plot(x, foot + height, fill(color), word, kind="columns", thick=width, foot=foot)
         foot = foot + np.nan_to_num(height)
     panel.y.title, panel.y.ticks, panel.grid = "share", (0, 1), ""
     panel.y.span(0, 1)
 
 
-def mode_entries() -> list[Trace]:
+def mode_entries(words: Sequence[str] = MODES) -> list[Trace]:
     """Return the modes' colours, for a legend."""
-    looks = {mode: fill(c, edge=BLACK, edge_width=0.4) for mode, c in MODE_COLORS.items()}
-    return [entry(mode, look, "band") for mode, look in looks.items()]
+    looks = [fill(color, edge=BLACK, edge_width=0.4) for color in MODE_COLORS.values()]
+    return [entry(word, look, "band") for word, look in zip(words, looks, strict=True)]
 
 
 def draw_impacts(run: xr.Dataset) -> Drawing:
-    """Return the approach speed of the impacts of all settled revolutions over the crank angle."""
+    """Return the approach speed of the impacts of all settled revolutions over the crank angle.
+
+    Of oiled joints, whose film takes the blow, it is that of dry contacts that begin.
+    """
     found = impacts(run)
+    kind, none = "impacts", "no impact: no journal came back from flight"
+    if case_of(run).lubricant:
+        kind, none = "dry contacts", "no dry contact begins"
     figure, panels = make_grid(1, 1, 3.6)
     (panel,) = panels.flat
     turns = settled_revolutions(run)
@@ -160,12 +172,11 @@ def draw_impacts(run: xr.Dataset) -> Drawing:
         color, shape = BY_JOINT[joint]
         mine = found.isel(impact=found["joint"].values == joint)
         angle, speed = mine["crank_angle"].values, mine["approach_speed"].values
-        name = f"{SPOKEN[joint]}: {angle.size / turns:.3g} impacts a revolution"
+        name = f"{SPOKEN[joint]}: {angle.size / turns:.3g} {kind} a revolution"
         panel.traces.append(strokes(angle, 0.0, speed, LineStyle(color, linewidth=0.8)))
         panel.plot(angle, speed, mark(color, shape, 5), name)
     if not found.sizes["impact"]:
-        text = "no impact: no journal came back from flight"
-        panel.notes.append(Note(text, 180, 0.5, side="center"))
+        panel.notes.append(Note(none, 180, 0.5, side="center"))
         panel.y.span(0, 1)
         panel.y.ticks = ()
     else:
@@ -531,7 +542,7 @@ def draw_map(rows: Sequence[SweptRow], title: str) -> Drawing:
         panel.x.title = ANGLE_AXIS
     label_rows(panels[0, 0], rows, title)
     share_scales(figure.panels, "y")
-    figure.legend = mode_entries()
+    figure.legend = mode_entries(row_modes_words(rows))
     if any((table < 0).any() for table in modes.values()):
         figure.legend += [entry("no series, or no clearance", UNSEEN, "band")]
     return figure
