@@ -149,7 +149,7 @@ def read_job(
     except DamagedJob:
         return "damaged"
     if record is None:
-        return "without record"
+        return "without_record"
     rate = 1.0 / (record.times[1] - record.times[0])
     bands = default_bands(rate) if bands is None else bands
     for low, high in bands:
@@ -159,9 +159,9 @@ def read_job(
                 f"band {low:g}-{high:g} Hz: job {key} is sampled at {rate:.6g} Hz; {remedy}"
             )
     if len(record.tacho) - 1 < max(options.revolutions, MIN_REVOLUTIONS):
-        return "too short"
+        return "too_short"
     if not np.ptp(record.values):  # a dead sensor, which has no crest factor either
-        return "silent record"
+        return "silent_record"
     low, high = case.body.band_Hz if case.body else (0.0, math.inf)
     readings: dict[tuple[int, str], Readings] = {}
     try:
@@ -171,7 +171,7 @@ def read_job(
             read = read_windows(record, options.revolutions, bands, band, rms, seed)
             readings |= {(level, name): one for name, one in read.items()}
     except RecordError:
-        return "unusable record"
+        return "silent_record"
     velocity = np.asarray(outcome.numbers["body_velocity_rms"], float)
     for (_, name), one in readings.items():
         if name == RECORD:  # of the body: without noise, and the same in all windows of a job
@@ -213,7 +213,7 @@ def explain_no_windows(
     source: StoredStudy, left: Mapping[str, int], options: AlarmOptions
 ) -> AlarmsError:
     """Return the error that says why a study has no window, and what to do."""
-    if {*left} <= {"without record"}:
+    if {*left} <= {"without_record"}:
         text = f"study {source.name} has no sensor's record: write `body: true` and"
         keys = f"`sensor: {{length_rev: {2 * options.revolutions + 1}}}`"
         return AlarmsError(f"{text} {keys} into {source.case_file}, keep series, and run it again")

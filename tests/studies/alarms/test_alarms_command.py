@@ -147,11 +147,11 @@ def test_lead_times_stand_beside_the_clearances(written):
 @pytest.mark.parametrize(
     ("revolutions", "change", "reason"),
     [
-        (2, lambda one: {"tacho": one.tacho[:2]}, "too short"),
-        (1, lambda one: {"tacho": one.tacho[:2]}, "too short"),  # a revolution, of two at least
-        (5, lambda one: {}, "too short"),
-        (2, lambda one: {"values": 0.0 * one.values}, "silent record"),
-        (2, lambda one: {"values": one.values + np.nan}, "unusable record"),
+        (2, lambda one: {"tacho": one.tacho[:2]}, "too_short"),
+        (1, lambda one: {"tacho": one.tacho[:2]}, "too_short"),  # a revolution, of two at least
+        (5, lambda one: {}, "too_short"),
+        (2, lambda one: {"values": 0.0 * one.values}, "silent_record"),
+        (2, lambda one: {"values": one.values + np.nan}, "silent_record"),
     ],
 )
 def test_a_record_that_cannot_be_read_says_why(
@@ -169,13 +169,13 @@ def test_a_record_that_cannot_be_read_says_why(
 
 def test_no_fewer_revolutions_are_proposed_than_a_record_needs(worn_store):
     source = read_studies(worn_store)[0]
-    for revolutions, told in ((1, "of 2 revolutions: 6 too short; run what is missing, or with "
+    for revolutions, told in ((1, "of 2 revolutions: 6 too_short; run what is missing, or with "
                                "sensor.length_rev: 3 or more"),
-                              (5, "of 5 revolutions: 6 too short; run what is missing, or with "
+                              (5, "of 5 revolutions: 6 too_short; run what is missing, or with "
                                "sensor.length_rev: 6 or more, or give fewer --revolutions"),
                               ):  # fmt: skip
         options = windows.AlarmOptions(revolutions)
-        error = windows.explain_no_windows(source, {"too short": 6}, options)
+        error = windows.explain_no_windows(source, {"too_short": 6}, options)
         assert str(error).endswith(told)
 
 
@@ -190,7 +190,7 @@ def test_mistakes_are_named(worn_store, worn, capsys, tmp_path):
         (worn, ["deaf"], "study deaf has no sensor's record: write `body: true` and `sensor: "
          "{length_rev: 11}` into"),
         (worn, ["worn"], "its sound jobs are 2 draws of what it varies beside joint and"),
-        (worn, ["worn", "--revolutions", "30"], "has no record of 30 revolutions: 12 too short"),
+        (worn, ["worn", "--revolutions", "30"], "has no record of 30 revolutions: 12 too_short"),
         (worn_store, ["worn", "--band", "500-5000"], "is sampled at 8000 Hz; give bands up to ha"),
         (worn_store, ["worn", "--band", "high"], "'high' is no band such as 1000-3000, in Hz"),
         (worn_store, ["worn", "--band", "9-3"], "give the lower frequency first"),
