@@ -33,7 +33,7 @@ from compsim import (
     status,
     verify,
 )
-from compsim.screen import DONE, INTERNAL, STORE, discard_output, open_streams, say
+from compsim.screen import DONE, INTERNAL, STORE, discard_output, open_streams, say, say_wrapped
 from compsim.usage import Commands, one_line
 
 # of paths, that a program makes; any other error of a path is the file system's
@@ -150,7 +150,7 @@ def report_warnings() -> Iterator[None]:
             show(message, category, *where, **more)
         elif str(message) not in reported:
             reported.add(str(message))
-            say(f"compsim: {message}")
+            say_wrapped(f"compsim: {message}")
 
     with warnings.catch_warnings():
         warnings.showwarning = report_once

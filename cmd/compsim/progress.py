@@ -6,7 +6,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from compsim.screen import duration, plural, say
+from compsim.screen import duration, plural, say, say_wrapped
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -74,7 +74,7 @@ class ProgressReporter:
         if self.quiet:
             return
         if remark:
-            say(remark)
+            say_wrapped(remark)
         if self.live:
             self.draw()
         else:

@@ -27,6 +27,7 @@ from compsim.screen import (
     print_text,
     report_changes,
     say,
+    say_wrapped,
     setting,
     stored_before,
     unread,
@@ -225,7 +226,7 @@ def report_caveats(names: list[str], folder: str) -> None:
     rows = read_store(folder).rows
     for study in read_studies(folder):
         for text in run_caveats(rows, study) if study.name in names else ():
-            say(f"{study.name}: {text}")
+            say_wrapped(f"{study.name}: {text}")
 
 
 def report_stale(summary: "Summary") -> None:
@@ -234,8 +235,10 @@ def report_stale(summary: "Summary") -> None:
         return
     lacks = summary.stale.items()
     what = ", ".join(f"{number} lack{'s' * (number == 1)} {name}" for name, number in lacks)
-    say(f"{plural(summary.gaining)} of another version would gain by running again ({what}): "
-        "--rerun stale")  # fmt: skip
+    say_wrapped(
+        f"{plural(summary.gaining)} of another version would gain by running again ({what}): "
+        "--rerun stale"
+    )
 
 
 def report_failures(summary: "Summary") -> None:
@@ -248,13 +251,11 @@ def report_failures(summary: "Summary") -> None:
     say(f"{plural(len({failure.key for failure in failures}))} failed:")
     for failure in failures[:MAX_FAILURES]:
         point = "".join(f" {key}={value}" for key, value in failure.coordinates.items())
-        say(
-            f"  {failure.study}{point}: {failure.reason}: {printable(failure.detail)}\n"
-            f"    job {failure.key}"
-        )
+        say_wrapped(f"{failure.study}{point}: {failure.reason}: {printable(failure.detail)}", 2)
+        say(f"    job {failure.key}")
     if len(failures) > MAX_FAILURES:
         say(f"  and {len(failures) - MAX_FAILURES} more")
     say("what to do:")
     for reason, number in Counter(failure.reason for failure in failures).items():
-        say(f"  {reason} ({number}): {remedy(reason)}")
-    say("A changed case file runs as a new job; --rerun failed runs failed ones again unchanged.")
+        say_wrapped(f"{reason} ({number}): {remedy(reason)}", 2)
+    say("--rerun failed runs failed jobs again; a changed case file makes new jobs.")

@@ -172,6 +172,11 @@ def say(text: str, end: str = "\n") -> None:
         print(harmless(text), end=end, file=sys.stderr, flush=True)
 
 
+def say_wrapped(text: str, indent: int = 0) -> None:
+    """Write a remark to stderr in lines of the width; what is copied or parsed goes to `say`."""
+    say("\n".join(wrap_line(text, indent)))
+
+
 def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
     """Return the commands that run the missing jobs of studies, one for each set of overrides."""
     found: dict[tuple[str, ...], list[Again]] = {}
@@ -196,10 +201,12 @@ def caution(studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS) -> None
         for one in found[:most]:
             looked = "" if one.of == len(study.selected) else " that were looked at"
             share = "" if one.of == 1 else f" ({one.jobs} of {one.of} jobs{looked})"
-            say(f"{study.path}: warning: {one.key}: {one.message}{share}")
+            say_wrapped(f"{study.path}: warning: {one.key}: {one.message}{share}")
         if most is not None and len(found) > most:
             more = plural(len(found) - most, "more warning")
-            say(f"{study.path}: and {more}, which compsim plan {shlex.quote(study.path)} lists")
+            say_wrapped(
+                f"{study.path}: and {more}, which compsim plan {shlex.quote(study.path)} lists"
+            )
 
 
 def report_changes(studies: "Sequence[Study]", folder: str) -> None:
@@ -216,10 +223,11 @@ def report_changes(studies: "Sequence[Study]", folder: str) -> None:
         if one.former:
             text += (
                 f"; {one.finished} finished before stay{'s' * (one.finished == 1)} stored, in the "
-                f"study {one.former}: "
-                f"compsim export {one.former} -i {shlex.quote(folder)} -o {one.former}.csv"
+                f"study {one.former}:"
             )
-        say(text)
+        say_wrapped(text)
+        if one.former:
+            say(f"  compsim export {one.former} -i {shlex.quote(folder)} -o {one.former}.csv")
 
 
 def duration(seconds: float) -> str:

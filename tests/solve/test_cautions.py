@@ -70,7 +70,9 @@ def test_commands_say_what_is_outside_the_judged_range(
         "k1.yaml: warning: machine.rod_mass_kg: 262 kg is outside the range that the program was "
         "judged on, 0.1 to 200 kg (1 of 2 jobs)"
     )
-    assert expected in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert expected in unwrapped(err)
+    assert all(len(line) <= screen.WIDTH for line in err.splitlines())
 
 
 def study(tmp_path, text):
@@ -115,6 +117,11 @@ def test_only_selected_jobs_are_told_of(tmp_path):
     assert cautions(one) == []
 
 
+def unwrapped(text):
+    """The messages of a text whose later lines are indented."""
+    return text.replace("\n  ", " ").splitlines()
+
+
 def test_the_command_line_warns_in_a_few_lines(tmp_path, capsys):
     path = tmp_path / "odd.yaml"
     path.write_text(
@@ -125,7 +132,7 @@ def test_the_command_line_warns_in_a_few_lines(tmp_path, capsys):
         encoding="utf-8",
     )
     screen.caution(load_studies(path))
-    told = [line for line in capsys.readouterr().err.splitlines() if str(path) in line]
+    told = unwrapped(capsys.readouterr().err)
     assert len(told) == 6
     assert told[0] == (
         f"{path}: warning: machine.crank_radius_mm: 1 mm is unusual (5 to 1000 is usual); read as "
@@ -133,7 +140,7 @@ def test_the_command_line_warns_in_a_few_lines(tmp_path, capsys):
     )
     assert told[-1] == f"{path}: and 3 more warnings, which compsim plan {path} lists"
     cli.main(["plan", str(path), "-o", str(tmp_path / "results")])
-    whole = [line for line in capsys.readouterr().err.splitlines() if str(path) in line]
+    whole = [line for line in unwrapped(capsys.readouterr().err) if str(path) in line]
     assert whole[:5] == told[:5]
     assert len(whole) == 8
 

@@ -48,7 +48,9 @@ def said(capsys, *words):
     """What a command says, its lines joined."""
     assert cli.main([*map(str, words)]) == 0
     found = capsys.readouterr()
-    return found._replace(out=" ".join(found.out.split()))
+    return found._replace(
+        **{name: " ".join(text.split()) for name, text in found._asdict().items()}
+    )
 
 
 def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder, capsys):

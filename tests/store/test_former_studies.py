@@ -156,8 +156,9 @@ def test_run_and_plan_say_so_first(command, wear, capsys, in_process):
     assert cli.main([command, "wear.yaml"]) in (0, 3)
     err = capsys.readouterr().err
     assert err.startswith(
-        "wear: had 3 jobs, this file asks for 2, 2 of them as before; 1 finished before stays "
-        "stored, in the study wear~1: compsim export wear~1 -i results -o wear~1.csv\n"
+        "wear: had 3 jobs, this file asks for 2, 2 of them as before; 1 finished before\n"
+        "  stays stored, in the study wear~1:\n"
+        "  compsim export wear~1 -i results -o wear~1.csv\n"
     )
     assert names() == (["wear", "wear~1"] if command == "run" else ["wear"])
 

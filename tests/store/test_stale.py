@@ -171,8 +171,8 @@ def test_run_says_how_many_would_gain_and_by_what(wear, monkeypatch, capsys):
     made_older(monkeypatch, NEW)
     assert cli.main(["run", "wear.yaml", "-j", "1"]) == 0
     assert (
-        f"3 jobs of another version would gain by running again (3 lack {NEW[0]}): --rerun stale\n"
-    ) in capsys.readouterr().err
+        f"3 jobs of another version would gain by running again (3 lack {NEW[0]}): --rerun stale"
+    ) in " ".join(capsys.readouterr().err.split())
     assert cli.main(["run", "wear.yaml", "-j", "1", "--rerun", "stale", "--rerun", "failed"]) == 0
     err = capsys.readouterr().err
     assert "3 jobs run in" in err

@@ -10,7 +10,7 @@ from click.core import ParameterSource
 from compsim.progress import ProgressReporter
 from compsim.records import read_levels
 from compsim.results import of_results, one_word, results_folder, studies
-from compsim.screen import DONE, one_thread_each, print_text, say
+from compsim.screen import DONE, one_thread_each, print_text, say, say_wrapped
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,13 +73,13 @@ def alarms(
     \b
     compsim alarms plant --noise 0,1 -o alarms
 
-    STUDY has jobs with a sensor's record of sound machines and of worn ones, at loads and speeds
-    that are drawn, and clearances of each joint. Alarms are peak, rms, crest factor and kurtosis
-    of the record, peak and rms of segments of 10 degrees, counts of peaks, and velocity; each on
-    the record as it is and behind band passes. What is usual, and the limit, come from sound jobs;
-    others of other draws are judged by them. The table has each alarm with its best filter, the
-    first to see wear first: the clearance from which on it detects, with an interval, and the false
-    alarms that were counted. An interval that ends with "> 0.4" goes beyond the study's greatest
+    STUDY has jobs with a sensor's record, of sound machines and of worn ones. What it varies beside
+    joint and clearance, such as load and speed, is a draw. Alarms are peak, rms, crest factor and
+    kurtosis of the record, peak and rms of segments of 10 degrees, counts of peaks, and velocity;
+    each on the record as it is and behind band passes. Sound jobs set what is usual, and the limit,
+    and never judge their own draws. The table lists alarms, the first to see wear on top, each with
+    its best filter: the clearance from which on it detects, with an interval, and the false alarms
+    that were counted. An interval that ends with "> 0.4" goes beyond the study's greatest
     clearance: its draws are too few to be sure.
     """
     folder, words = results_folder(given, folder)
@@ -104,7 +104,7 @@ def alarms(
     for line in list_lines(found):
         print_text(line)
     for text in () if quiet else list_remarks(found):
-        say(text)
+        say_wrapped(text)
     if output:
         write_alarms(found, output, machine_title(folder, study))
         if not quiet:

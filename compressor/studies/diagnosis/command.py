@@ -17,6 +17,7 @@ from compsim.screen import (
     plural,
     print_text,
     say,
+    say_wrapped,
     size,
 )
 
@@ -78,7 +79,7 @@ def dataset(
     for name, count in written.files.items():
         print_text(f"{os.path.join(output, name)}  {size(count)}")
     if written.remark:
-        say(written.remark)
+        say_wrapped(written.remark)
     if not quiet:
         say(f"next: read {os.path.join(output, 'README.md')}, then open windows.nc in xarray")
     return DONE

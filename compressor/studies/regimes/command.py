@@ -15,6 +15,7 @@ from compsim.screen import (
     plural,
     print_text,
     say,
+    say_wrapped,
     stored_before,
     unread,
 )
@@ -99,9 +100,12 @@ def report_chains(summary: "RegimesSummary", folder: str, quiet: bool) -> None:
 
     for one in summary.failed[:MAX_FAILURES]:
         point = "".join(f" {key}={value}" for key, value in one.point.items())
-        say(f"  {one.study}{point} {one.direction} at {one.value:g}: {one.reason}: "
-            f"{printable(one.detail)}")  # fmt: skip
+        say_wrapped(
+            f"{one.study}{point} {one.direction} at {one.value:g}: {one.reason}: "
+            f"{printable(one.detail)}",
+            2,
+        )
     if len(summary.failed) > MAX_FAILURES:
         say(f"  and {len(summary.failed) - MAX_FAILURES} more")
     for reason in dict.fromkeys(one.reason for one in summary.failed):
-        say(f"  {reason}: {remedy(reason)}")
+        say_wrapped(f"{reason}: {remedy(reason)}", 2)

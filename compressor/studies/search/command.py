@@ -80,8 +80,8 @@ def find(
         --first 'peak_contact_force.small_end > 1.5 * base' --units plant
 
     CONFIG makes one case once the key is given. The answer of --first is an interval: at its lower
-    end the comparison does not hold, at its upper end it does. Points whose error bars do not let
-    that be told, or whose job failed, stay inside the interval and are named. Later crossings are
+    end the comparison does not hold, at its upper end it does. Points that their error bars leave
+    open, or whose job failed, stay inside the interval and are named. Later crossings are
     named as wide as the scan shows them; a narrower --over narrows one down. Of --greatest and
     --least it is the best point, and the points whose error bars reach its own. Structure that is
     finer than the scan may be missed. In a chaotic motion a peak stands for its mean over

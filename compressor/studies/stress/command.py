@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("-n", "--scenes", type=click.IntRange(min=1), default=2000, show_default=True,
-              help="Draw this many scenes.")  # fmt: skip
+              help="Draw this many cases.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
               help="Draw by this seed.")  # fmt: skip
 @click.option(
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", default="stress", show_default=True,
               help="Write the campaign into this folder.")  # fmt: skip
 @click.option("--scene", type=click.IntRange(min=0),
-              help="Repeat this scene of the seed alone, and store nothing.")  # fmt: skip
+              help="Repeat this case of the seed alone, and store nothing.")  # fmt: skip
 @click.option("--quiet", is_flag=True, help="Print no progress.")
 def stress(
     scenes: int, seed: int, drawn: str | None, jobs: int | None, output: str, scene: int | None,
@@ -56,14 +56,14 @@ def stress(
     compsim stress -n 200 --seed 7
     compsim stress --seed 7 --scene 12
 
-    Each scene is run, and what it says is judged. Half of the scenes lie in the range that is
-    documented as supported, half go far beyond. A scene ends ok, confirmed by another integrator at
-    a hundredth of its tolerance; failed, with a named reason; silent_wrong, when a number lies ten
-    times farther off than its error bar tells; or unjudged. Writes stress.nc, from which the same
-    command goes on, and the map stress.png and stress.svg; shares and worst cases go to stdout.
-    --scene prints one as a case file, and its end.
+    Each case (a scene) is run, and its numbers are judged. Half of the cases lie in the supported
+    range, half go far beyond. A case ends ok, confirmed by another integrator at a hundredth of its
+    tolerance; failed, with a named reason; silent_wrong, when a number is off by more than ten
+    error bars; or unjudged. Writes stress.nc, from which the same command goes on, and the map
+    stress.png and stress.svg; shares and worst cases go to stdout. --scene prints one as a case
+    file, and how it ended.
 
-    Exit code 3 if any number is wrong in silence, or more than 2 % of the scenes are unjudged.
+    Exit code 3 if a number is wrong without a warning, or more than 2 % of the cases are unjudged.
     """
     one_thread_each()  # before numpy loads
     from compressor.sweep import cores

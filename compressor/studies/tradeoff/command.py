@@ -19,10 +19,12 @@ from compsim.screen import (
     caution,
     configs_argument,
     duration,
+    jobs_option,
     limit,
     plural,
     print_text,
     say,
+    say_wrapped,
     setting,
     without_nan,
     wrap_line,
@@ -227,10 +229,11 @@ def fastest_lines(study: "xr.Dataset") -> Iterator[str]:
         )
     for name in study["scene"].values:
         one = study.sel(scene=name)
-        yield (
+        yield from wrap_line(
             f"{name}: the paper's BDF at 1e-5 takes {one['paper_seconds'].item():.2g} s; error of "
             f"acceleration {one['paper_error_acceleration'].item():.1e}, of its peak on the output "
-            f"grid {one['paper_error_peak_acceleration'].item():.1e}"
+            f"grid {one['paper_error_peak_acceleration'].item():.1e}",
+            0,
         )
 
 
@@ -246,10 +249,11 @@ def trade_lines(trade: "xr.Dataset") -> Iterator[str]:
         yield ""
     for scene in trade["scene"].values:
         one = trade.sel(scene=scene)
-        yield (
+        yield from wrap_line(
             f"{scene}: the series of Eq. 3-4 would misplace the crosshead by "
             f"{one['place_error'].item():.0%} of the clearance, and change the ideal acceleration "
-            f"by {one['acceleration_error'].item():.2%}"
+            f"by {one['acceleration_error'].item():.2%}",
+            0,
         )
 
 
@@ -258,8 +262,7 @@ INDENT = 12  # columns of a heading
 
 @click.command()
 @configs_argument
-@click.option("-j", "--jobs", type=click.IntRange(min=1), default=2, show_default=True,
-              help="Estimate the sweep's cost with this many worker processes.")  # fmt: skip
+@jobs_option("Estimate the sweep's cost with this many worker processes.")
 @click.option("--models", is_flag=True,
               help="Measure instead how far choices of the model move each metric.")  # fmt: skip
 @click.option("-o", "--output", shell_complete=folders, show_default="results",
@@ -269,7 +272,7 @@ INDENT = 12  # columns of a heading
 @click.option("--json", "as_json", is_flag=True, help="Print the same as JSON, a list of studies.")
 def explain(
     configs: tuple[str, ...],
-    jobs: int,
+    jobs: int | None,
     models: bool,
     output: str | None,
     overrides: tuple[str, ...],
@@ -282,7 +285,7 @@ def explain(
     compsim explain machine.yaml
     compsim explain machine.yaml --models
 
-    Runs the first job of each case file, and again without each feature that it pays for. With
+    Runs the first job of each case file, and again without each feature that costs time. With
     --models it runs that job by other contact and friction laws, twice and half the contact
     stiffness and damping, with an oil film, an elastic rod and play in the guide, or without where
     the case has them. The table says how far each choice moves each metric; it is stored in models/
@@ -298,12 +301,13 @@ def explain(
     if models:
         return explain_models(studies, output or "results", overrides, as_json)
     from compressor.studies.tradeoff.explain import explain as explained
+    from compressor.sweep import cores
 
     found = []
     for study in studies:
         say_job(study, "with and without each of its features")
         with ProgressReporter(False, "features", alike=False) as progress:
-            found.append(explained(study, jobs, progress=progress))
+            found.append(explained(study, jobs or cores(), progress=progress))
         if not as_json:
             print_text("\n".join(lines(found[-1])))
     if as_json:
@@ -321,7 +325,7 @@ def say_job(study: "Study", how: str) -> None:
         first = f"the first of {plural(study.jobs)}"
         point = ", ".join(f"{key} = {value}" for key, value in next(points(study)).items())
         another = f"; it has {point}: --set KEY=VALUE takes another" if point else ""
-    say(f"running {first} of {study.name}, {how}{another}")
+    say_wrapped(f"running {first} of {study.name}, {how}{another}")
 
 
 def explain_models(
@@ -340,7 +344,9 @@ def explain_models(
             data = run_models(study, progress=progress)
         if data["status"].values[0] != "ok":
             failed = True
-            say(f"{study.name}: the job failed, {data['reason'].values[0]}: {data.attrs['detail']}")
+            say_wrapped(
+                f"{study.name}: the job failed, {data['reason'].values[0]}: {data.attrs['detail']}"
+            )
             continue
         path = models_file(folder, study.name, data.attrs["key"])
         write_dataset(path, data)

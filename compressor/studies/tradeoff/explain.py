@@ -99,7 +99,7 @@ class Explanation:
 
 def explain(
     study: Study,
-    workers: int = 2,
+    workers: int,
     repeats: int = 5,
     progress: Progress = no_progress,
 ) -> Explanation:

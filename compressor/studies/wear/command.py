@@ -21,6 +21,7 @@ from compsim.screen import (
     plural,
     print_text,
     say,
+    say_wrapped,
     setting,
     stored_before,
 )
@@ -189,5 +190,5 @@ def fail(one: "WornMachine") -> None:
     from compressor.reasons import remedy
 
     point = "".join(f" {key}={value}" for key, value in one.point.items())
-    say(f"{one.study}{point}: {one.reason}: {printable(one.detail)}")
-    say(f"  {remedy(one.reason)}; then: compsim wear --rerun")
+    say_wrapped(f"{one.study}{point}: {one.reason}: {printable(one.detail)}")
+    say_wrapped(f"{remedy(one.reason)}; then: compsim wear --rerun", 2)
