@@ -1178,13 +1178,13 @@ def oil_words():
     """What the film of oil makes of the force on a worn pin."""
     oils = kept("nameplate.json")["oils"]
     forces = {
-        name: f"{row['force'] / 1e3:.3g} kN" if row["force"] else
-        "a motion that is chaotic, without a peak that means anything"
+        name: f"the peak force on it is {row['force'] / 1e3:.3g} kN" if row["force"] else
+        "the motion is chaotic, and its peaks mean nothing"
         for name, row in oils.items()
     }  # fmt: skip
     return (
-        f"With a clearance of 0.2 mm at the small end, the peak force on it is {forces['file']}. "
-        f"Without oil it is {forces['dry']}.\n"
+        f"With a clearance of 0.2 mm at the small end {forces['file']}. "
+        f"Without oil {forces['dry']}.\n"
     )
 
 

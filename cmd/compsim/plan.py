@@ -59,8 +59,8 @@ def plan(
     compsim plan wear.yaml --only 'clearance_mm < 0.2'
 
     Jobs that are stored already are not run again. Times up to a dozen jobs of each study, drawn
-    over its design, for some seconds; stores nothing. Of a file with `regimes` it tells chains and
-    values alone.
+    over its design, for some seconds; stores nothing. Of a file with `regimes` it only counts
+    chains and values.
     """
     from compressor.cases import load_studies
     from compressor.sweep import cores

@@ -71,9 +71,10 @@ def show(
 
     It prints which studies the job belongs to and where in them, how it ended and why, its numbers
     with their error bars, how it was run, and its case as YAML, as far as it differs from the
-    defaults. Of one that stopped, where, in which state, driven by which number of it, and its last
-    steps. Of a job with signals, whether the rod load at the crosshead pin changes its side as API
-    618 asks: 15 degrees and 3 percent, or as a maker does. --json has all numbers in SI.
+    defaults. Of a job that stopped, it prints where, the state, the state variable that stopped it,
+    and its last steps. Of a job with signals, it says whether the rod load at the crosshead pin
+    changes its side as API 618 asks, by 15 degrees and 3 percent, or as a maker does. --json has
+    all numbers in SI.
     """
     check_json_units(as_json, units)
     folder, words = results_folder(given, folder)
