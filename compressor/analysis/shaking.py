@@ -179,7 +179,7 @@ def shaking(run: xr.Dataset) -> Shaking:
     turns = directions_change(settled)
     is_near = near_a_turn(angle, turns)
     rest = np.where(np.tile(is_near, high.size // a_turn), 0.0, high)
-    lines = line_amplitudes(rest, a_turn, "rectangular", True)
+    lines = line_amplitudes(rest, a_turn, True)
     lines[: ORDER + 1] = 0.0
     rings = lines.max() > SILENT_SHARE * np.abs(force).max()
     return Shaking(
@@ -213,8 +213,8 @@ def order_lines(even: np.ndarray, a_turn: int) -> Spectrum:
     """
     from compressor.vibration import line_amplitudes, rms_above
 
-    amplitudes = line_amplitudes(even, a_turn, "rectangular", False)
-    roots = line_amplitudes(even, even.size, "rectangular", True)
+    amplitudes = line_amplitudes(even, a_turn, False)
+    roots = line_amplitudes(even, even.size, True)
     fine = np.arange(roots.size) * (a_turn / even.size)
     return Spectrum(np.arange(amplitudes.size), amplitudes, rms_above(fine, roots, ORDER))
 
@@ -283,7 +283,7 @@ def sensor_envelope(run: xr.Dataset) -> SensorEnvelope | None:
     rate = (time.size - 1) / (time[-1] - time[0])
     levels = min(LEVELS, int(math.log2(values.size // MIN_LINES)))
     found = kurtogram(values, rate, levels)
-    power = line_amplitudes(values, values.size, "rectangular", True) ** 2
+    power = line_amplitudes(values, values.size, True) ** 2
     lines = np.arange(power.size) * rate / values.size
     edges = found.frequency - found.bandwidth / 2, found.frequency + found.bandwidth / 2
     cumulative = np.append(0.0, np.cumsum(power))

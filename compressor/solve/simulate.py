@@ -101,7 +101,7 @@ def one_way_errors(case: Case, velocities: tuple, step: float) -> list[float]:
         if not values.any():
             bounds.append(0.0)
             continue
-        amplitudes = line_amplitudes(values, values.size, "rectangular", True)
+        amplitudes = line_amplitudes(values, values.size, True)
         frequencies = np.arange(amplitudes.size) / (values.size * step)
         back = np.abs(back_action(case, axis, frequencies))
         error = np.where(back < 1.0, back / np.maximum(1.0 - back, 1e-12), np.inf)

@@ -75,25 +75,20 @@ def envelope_spectrum(
     values: np.ndarray,
     rate: float,
     band: tuple[float, float],
-    squared: bool = False,
     speed: float | None = None,
-    window: str = "rectangular",
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the amplitude spectrum of the envelope in a band: (frequencies, amplitudes).
 
     values: (m,) at a rate of samples a second, band in Hz (`band_envelope`). Frequencies are in Hz,
     or orders if a speed in revolutions a second is given; with a rate of samples a revolution, band
     and frequencies are in orders anyway. Amplitudes are single-sided peak values in the unit of the
-    signal, or its square if squared; the line at zero is the mean envelope.
+    signal; the line at zero is the mean envelope.
 
-    A carrier A (1 + d cos(2 pi f t)) has lines A at 0 and A d at f; squared, A^2 (1 + d^2/2) at 0,
-    2 A^2 d at f and A^2 d^2/2 at 2 f. Raises SignalError as `band_envelope` does, or for a speed
-    that is not positive or an unknown window.
+    A carrier A (1 + d cos(2 pi f t)) has lines A at 0 and A d at f. Raises SignalError as
+    `band_envelope` does, or for a speed that is not positive.
     """
     envelope = band_envelope(values, rate, band)
-    if squared:
-        envelope = envelope**2
-    amplitudes = line_amplitudes(envelope, envelope.size, window, rms=False)
+    amplitudes = line_amplitudes(envelope, envelope.size, rms=False)
     unit = 1.0 if speed is None else checked_positive(speed, "the speed")
     return np.arange(amplitudes.size) * (rate / envelope.size / unit), amplitudes
 

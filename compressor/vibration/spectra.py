@@ -9,18 +9,17 @@ displacement for shafts (ISO 7919). Peak-to-peak is 2 A for a single line only.
 Orders: vibration against crank angle instead of time. An order is a number of cycles in a
 revolution of the crank. Samples at equal angles (computed order tracking: Fyfe and Munck,
 Mechanical Systems and Signal Processing 11, 1997) keep an order in one line where the speed varies.
-Crank angles are in rad and increase without wrapping; windows are in degrees. Signals may have any
-unit, which their amplitudes share.
+Crank angles are in rad and increase without wrapping. Signals may have any unit, which their
+amplitudes share.
 """
 
 import math
 import operator
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
-from scipy.signal import get_window, welch
+from scipy.signal import welch
 
 from compressor.program import CompsimError
 
@@ -94,41 +93,17 @@ def whole_revolutions(count: int, a_turn: int) -> int:
     return count // a_turn
 
 
-WINDOWS = {"rectangular": "boxcar", "hann": "hann", "flattop": "flattop"}  # ours -> SciPy's
-WINDOW_SAMPLES = 4096  # samples, by which a noise bandwidth no longer depends on their number
-
-
-def scipy_window(window: str) -> str:
-    """Return SciPy's name of one of the `WINDOWS`; raises SignalError."""
-    if window not in WINDOWS:
-        raise SignalError(f"no window is called {window!r}: choose one of {', '.join(WINDOWS)}")
-    return WINDOWS[window]
-
-
-def noise_bandwidth(window: str) -> float:
-    """Return the equivalent noise bandwidth of a window, in lines; raises SignalError.
-
-    n sum(w^2) / sum(w)^2: 1 for rectangular, 1.5 for hann, 3.77 for flattop (Harris, Proceedings
-    of the IEEE 66, 1978, Eq. 11). White noise raises each line of a mean square by as much.
-    """
-    taper = get_window(scipy_window(window), WINDOW_SAMPLES)
-    return float(taper.size * np.sum(taper**2) / np.sum(taper) ** 2)
-
-
-def line_amplitudes(values: np.ndarray, block: int, window: str, rms: bool) -> np.ndarray:
+def line_amplitudes(values: np.ndarray, block: int, rms: bool) -> np.ndarray:
     """Return the single-sided amplitudes of the lines 0, 1, ... block // 2 cycles a block.
 
     values: (m,), m >= block. Welch's method (IEEE Transactions on Audio and Electroacoustics 15,
     1967): the mean squares of blocks of `block` samples are averaged, so that a line is the rms
-    over blocks. Blocks overlap by half but for the rectangular window; samples after the last whole
-    block are left. No mean is taken off. Amplitudes are divided by the window's coherent gain, so
-    that a sine of a whole number of cycles a block has its own amplitude with any window. Each is a
-    peak value, or with `rms` a root mean square. Raises SignalError for an unknown window.
+    over blocks. Blocks do not overlap, and their samples weigh alike, so that a sine of a whole
+    number of cycles a block has its own amplitude; samples after the last whole block are left. No
+    mean is taken off. Each amplitude is a peak value, or with `rms` a root mean square.
     """
-    kind = scipy_window(window)
-    overlap = 0 if kind == "boxcar" else block // 2
     _, squares = welch(
-        values, window=kind, nperseg=block, noverlap=overlap, detrend=False, scaling="spectrum"
+        values, window="boxcar", nperseg=block, noverlap=0, detrend=False, scaling="spectrum"
     )
     found = np.sqrt(squares)
     if not rms:  # zero and, of an even block, the highest line have no partner that is folded in
@@ -138,28 +113,6 @@ def line_amplitudes(values: np.ndarray, block: int, window: str, rms: bool) -> n
 
 TURN = 2.0 * math.pi
 SAME_ANGLE = 1e-9  # share of an interval of angle, or of an order: nearer ones are the same
-
-
-@dataclass(frozen=True)
-class AngleWindow:
-    """What falls into a window of crank angle, for each of the n windows that are whole.
-
-    `rms` (n,): root mean square over crank angle; `peak` (n,): greatest magnitude of the samples;
-    both in the unit of the signal. `inside` (m,): the window that a sample lies in, 0 to n - 1,
-    or -1.
-    """
-
-    rms: np.ndarray
-    peak: np.ndarray
-    inside: np.ndarray
-
-
-def samples_a_turn(angle: np.ndarray) -> int:
-    """Return the even number of samples a revolution at the median step of angles.
-
-    angle: rad, (m,). The number is rounded up.
-    """
-    return 2 * math.ceil(round(TURN / float(np.median(np.diff(angle)))) / 2)
 
 
 def resample_angle(angle: np.ndarray, values: np.ndarray, a_turn: int) -> np.ndarray:
@@ -185,107 +138,18 @@ def resample_angle(angle: np.ndarray, values: np.ndarray, a_turn: int) -> np.nda
     return CubicSpline(at, found)(at[0] + TURN * (points / a_turn))
 
 
-def order_spectrum(
-    angle: np.ndarray,
-    values: np.ndarray,
-    turns: int | None = None,
-    window: str = "rectangular",
-    a_turn: int | None = None,
-    rms: bool = False,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return orders of the crank speed and their single-sided amplitudes.
-
-    angle (rad) and values: (m,). turns: revolutions a block, over which mean squares are averaged;
-    all of them if None. Orders are 0, 1/turns, ... up to a_turn / 2; a_turn: samples a revolution
-    of the resampling, by default `samples_a_turn`. Amplitudes are peak values, with `rms` root
-    mean squares (`line_amplitudes`). window: rectangular (noise bandwidth 1 line), which suits
-    what repeats after each block; hann (1.5) or flattop (3.77) for what does not.
-
-    With a rectangular window and one block, the squares of rms amplitudes add up to the mean square
-    of the resampled signal (Parseval). Raises SignalError as `resample_angle` does, or for a block
-    of more revolutions than there are, or an unknown window.
-    """
-    at, found = checked_angle(angle, values)
-    a_turn = samples_a_turn(at) if a_turn is None else a_turn
-    even = resample_angle(at, found, a_turn)
-    revolutions = even.size // a_turn
-    turns = checked_count(revolutions if turns is None else turns, 1, "the block of revolutions")
-    if turns > revolutions:
-        problem = f"a block of {turns} revolutions, and the samples have {revolutions}"
-        raise SignalError(f"{problem}: choose fewer turns")
-    amplitudes = line_amplitudes(even, turns * a_turn, window, rms)
-    return np.arange(amplitudes.size) / turns, amplitudes
-
-
-def rms_above(
-    orders: np.ndarray, rms_amplitudes: np.ndarray, order: float, window: str = "rectangular"
-) -> float:
+def rms_above(orders: np.ndarray, rms_amplitudes: np.ndarray, order: float) -> float:
     """Return the root mean square of what lies above an order (Parseval).
 
-    The order itself is left out. orders and rms_amplitudes: (k,), of a spectrum with `rms` set and
-    this window, whose noise bandwidth the sum of squares is divided by. That is exact without
-    leakage for the rectangular window, and for others where lines are not cut by the order. 0 if
-    nothing lies above. Raises SignalError if the shapes differ or values are not finite.
+    The order itself is left out. orders and rms_amplitudes: (k,), of `line_amplitudes` with `rms`
+    set. Exact but for lines that the order cuts. 0 if nothing lies above. Raises SignalError if the
+    shapes differ or values are not finite.
     """
     at, found = checked_signal(orders, "the order"), checked_signal(rms_amplitudes, "the spectrum")
     if at.size != found.size:
         raise SignalError(f"{at.size} orders and {found.size} amplitudes: pass one for each")
     above = at > order + SAME_ANGLE * abs(order)
-    return math.sqrt(float(np.sum(found[above] ** 2)) / noise_bandwidth(window))
-
-
-def synchronous_average(
-    angle: np.ndarray, values: np.ndarray, a_turn: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean revolution, (a_turn,), and what is left: (revolutions * a_turn,).
-
-    angle (rad) and values: (m,). Both are at the points of `resample_angle`, so that sample 0 of
-    the mean revolution is at angle[0]. What is left is the resampled signal less the mean
-    revolution. Orders that are whole numbers are kept; white noise falls by sqrt(revolutions); half
-    an order vanishes for an even number of revolutions (McFadden, Mechanical Systems and Signal
-    Processing 1, 1987). Raises SignalError as `resample_angle` does.
-    """
-    each = resample_angle(angle, values, a_turn).reshape(-1, a_turn)
-    mean = each.mean(axis=0)
-    return mean, (each - mean).ravel()
-
-
-def angle_window(angle: np.ndarray, values: np.ndarray, begin: float, end: float) -> AngleWindow:
-    """Return rms and peak in a window of crank angle in each revolution.
-
-    angle (rad) and values: (m,). begin, end: degrees, begin included and end not; a window whose
-    end is not above its begin goes across 360. Only windows that the samples wholly reach over
-    count. Samples weigh by the angle they stand for, half of the way to each neighbour, so that a
-    window is known to half an interval at either end.
-
-    Raises SignalError if the window is empty or wider than a revolution, no whole one is sampled,
-    or one has no samples.
-    """
-    at, found = checked_angle(angle, values)
-    width = end - begin
-    if not math.isfinite(width) or width == 0.0 or abs(width) > 360.0:
-        text = f"a window from {begin} to {end} degrees"
-        raise SignalError(f"{text} is none: choose two different angles within a revolution")
-    if width < 0.0:
-        width += 360.0
-    weight = np.gradient(at)
-    turn, place = np.divmod((at - math.radians(begin)) / TURN + SAME_ANGLE, 1.0)
-    first = math.ceil((at[0] - math.radians(begin)) / TURN - SAME_ANGLE)
-    # a window may end where the sample after the last one would be
-    last = math.floor((at[-1] + weight[-1] - math.radians(begin + width)) / TURN + SAME_ANGLE)
-    count = last - first + 1
-    if count < 1:
-        text = f"no window from {begin} to {end} degrees is wholly sampled"
-        raise SignalError(f"{text}: pass more revolutions, or a narrower window")
-    numbers = np.where((place < width / 360.0) & (turn >= first) & (turn <= last), turn - first, -1)
-    numbers = numbers.astype(int)
-    inside = numbers >= 0
-    window, squares, peak = numbers[inside], found[inside] ** 2, np.zeros(count)
-    if np.unique(window).size < count:
-        raise SignalError(f"{width:g} degrees hold no sample: choose a wider window")
-    mean = np.bincount(window, weight[inside] * squares) / np.bincount(window, weight[inside])
-    np.maximum.at(peak, window, np.abs(found[inside]))
-    return AngleWindow(np.sqrt(mean), peak, numbers)
+    return math.sqrt(float(np.sum(found[above] ** 2)))
 
 
 MIN_PULSES = 3  # with two, there is one revolution time and no change of it

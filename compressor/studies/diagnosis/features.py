@@ -113,7 +113,7 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
 
 def bands(values: np.ndarray, rate: float) -> dict[str, float]:
     """Return the log10 of each band's share of the energy."""
-    amplitudes = line_amplitudes(values - values.mean(), values.size, "rectangular", True)
+    amplitudes = line_amplitudes(values - values.mean(), values.size, True)
     frequency = np.arange(amplitudes.size) * rate / values.size
     power = amplitudes**2
     place = np.searchsorted(BANDS, frequency, side="right") - 1
