@@ -169,15 +169,7 @@ def pick_value(values: Any, place: tuple[int, ...]) -> float:
 
 def tells_nothing(found: "JobReport", row: metrics.Metric, place: tuple[int, ...]) -> bool:
     """Return whether a number is that of the contact in a joint that has no clearance."""
-    return row.contact and metrics.JOINTS[place[0]] not in joints_with_clearance(found)
-
-
-def joints_with_clearance(found: "JobReport") -> tuple[str, ...]:
-    """Return the joints of a job's case that have clearance."""
-    from compressor.cases import Case
-
-    joint = Case.from_attribute(found.attributes["case"]).joint
-    return tuple(name for name in metrics.JOINTS if joint in (name, "both"))
+    return row.contact and found.case.joint not in (metrics.JOINTS[place[0]], "both")
 
 
 def format_measured(value: float, error: float, relative: bool) -> str:
@@ -213,11 +205,9 @@ def healthy_motion(found: "JobReport", units: Units) -> list[Line]:
 
     By the closed form of a rigid slider-crank at a steady speed; [] of other machines.
     """
-    from compressor.cases import Case
-
     if found.status != "ok":
         return []
-    case = Case.from_attribute(found.attributes["case"])
+    case = found.case
     if case.joint == "none" or case.drive or case.rod:
         return []
     import numpy as np
@@ -245,10 +235,7 @@ def healthy_motion(found: "JobReport", units: Units) -> list[Line]:
 
 def film(found: "JobReport") -> list[str]:
     """Return that contact forces include an oil film's, of a job that has oil."""
-    from compressor.cases import Case
-
-    has_oil = Case.from_attribute(found.attributes["case"]).lubricant is not None
-    return ["contact forces include the force of the oil film"] if has_oil else []
+    return ["contact forces include the force of the oil film"] if found.case.lubricant else []
 
 
 def cautions(found: "JobReport") -> list[str]:
@@ -279,9 +266,7 @@ def facts(found: "JobReport") -> list[Line]:
 
 def worn_joints(found: "JobReport") -> list[Line]:
     """Return which joints count as worn; [] where the case names no healthy clearance."""
-    from compressor.cases import Case
-
-    case = Case.from_attribute(found.attributes["case"])
+    case = found.case
     sizes = [
         f"{joint.replace('_', ' ')} {getattr(case.clearance_mm, joint):g} of up to {healthy:g} mm"
         for joint in metrics.JOINTS

@@ -16,6 +16,7 @@ from compsim.screen import (
     configs_argument,
     duration,
     jobs_option,
+    jsonable,
     limit,
     only_option,
     output_option,
@@ -25,7 +26,6 @@ from compsim.screen import (
     say,
     setting,
     size,
-    without_nan,
 )  # fmt: skip
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def plan(
     found = forecast(studies, output, first)
     workers = jobs or cores()
     if as_json:
-        whole = without_nan(dataclasses.asdict(found.with_times(workers, say)) | more)
+        whole = jsonable(dataclasses.asdict(found.with_times(workers, say)) | more)
         print_text(json.dumps(whole, indent=1))
         return DONE
     width = max(len(part.study) for part in found.counts.studies)

@@ -59,12 +59,12 @@ def is_study(name: str, folder: str) -> bool:
     return name in find_drawn(folder) or any(path.exists() for path in paths)
 
 
-def one_word(words: Sequence[str], name: str, context: Any = None) -> str:
+def one_word(words: Sequence[str], name: str) -> str:
     """Return the one word that is left beside the folder of results. Raises UsageError."""
     if not words:
-        raise click.UsageError(f"Missing argument '{name}'", context)
+        raise click.UsageError(f"Missing argument '{name}'")
     if len(words) > 1:
-        raise click.UsageError(f"takes one {name}, not {len(words)}: {', '.join(words)}", context)
+        raise click.UsageError(f"takes one {name}, not {len(words)}: {', '.join(words)}")
     return words[0]
 
 

@@ -1,9 +1,9 @@
 """`compsim run`: simulate what case files ask for, and store it."""
 
-import contextlib
 import os
 import shlex
 from collections import Counter
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -36,7 +36,6 @@ from compsim.screen import (
 if TYPE_CHECKING:
     from compressor.cases import Study
     from compressor.sweep import Summary, SweepProgress
-    from compsim.watch import PageWatch
 
 MAX_FAILURES = 20  # listed one by one
 
@@ -141,13 +140,13 @@ def run_jobs(
     """Run studies of jobs, and return the exit code."""
     rerun, part, wait, scheduler, page, quiet = options
     report_changes(studies, output)
-    from compressor.sweep import Options, sweep
+    from compressor.sweep import Cluster, Options, sweep
+    from compsim.watch import PageWatch
 
-    with watching(output, page, context.obj, quiet) as watch:
-        with (
-            ProgressReporter(quiet, folder=output) as progress,
-            cluster(scheduler) as elsewhere,
-        ):
+    watching: Any = PageWatch(output, page, context.obj, quiet) if page else nullcontext()
+    with watching as watch:
+        cluster: Any = Cluster(scheduler) if scheduler else nullcontext()
+        with ProgressReporter(quiet, folder=output) as progress, cluster as elsewhere:
 
             def show(now: "SweepProgress") -> None:
                 progress.show_sweep(now)
@@ -161,17 +160,6 @@ def run_jobs(
     return SOME_FAILED if summary.failed else DONE
 
 
-def watching(
-    results: str, page: str, command: str, quiet: bool
-) -> "contextlib.AbstractContextManager[PageWatch | None]":
-    """Return what keeps a page fresh in a folder; nothing where the folder is ""."""
-    if not page:
-        return contextlib.nullcontext()
-    from compsim.watch import PageWatch
-
-    return PageWatch(results, page, command, quiet)
-
-
 def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None:
     """Raise UsageError for options that do not go together."""
     if backend == "dask" and not scheduler:
@@ -183,15 +171,6 @@ def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None
         raise click.UsageError("-j counts processes here; a dask cluster uses all its workers")
     if backend == "local" and scheduler:
         raise click.UsageError("--scheduler goes with --backend dask")
-
-
-def cluster(scheduler: str | None) -> contextlib.AbstractContextManager[Any]:
-    """Return the cluster of a scheduler; none where jobs run here."""
-    if scheduler is None:
-        return contextlib.nullcontext()
-    from compressor.sweep import Cluster
-
-    return Cluster(scheduler)
 
 
 def report_run(summary: "Summary", folder: str, page: str, quiet: bool) -> None:

@@ -1,6 +1,7 @@
 """What the commands share: exit codes, options, and how they speak on stderr."""
 
 import contextlib
+import math
 import os
 import re
 import shlex
@@ -266,10 +267,12 @@ def size(count: float) -> str:
     return f"{count:.4g} GB"
 
 
-def without_nan(value):
-    """Return a value as JSON can hold it: null for nan."""
+def jsonable(value: Any) -> Any:
+    """Return a value as JSON can hold it: null for nan, "inf" for an unknown error."""
     if isinstance(value, dict):
-        return {key: without_nan(item) for key, item in value.items()}
+        return {key: jsonable(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [without_nan(item) for item in value]
-    return None if value != value else value
+        return [*map(jsonable, value)]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return value

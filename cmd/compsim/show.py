@@ -3,7 +3,7 @@
 import dataclasses
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,6 +13,7 @@ from compsim.screen import (
     DONE,
     as_json,
     check_json_units,
+    jsonable,
     print_text,
     run_commands,
     say,
@@ -82,7 +83,7 @@ def show(
 
     found = report_job(folder, *some_words(words))
     if as_json:
-        print_text(json.dumps(sayable(dataclasses.asdict(found)), indent=1))
+        print_text(json.dumps(jsonable(dataclasses.asdict(found)), indent=1))
     elif only_case:
         print_text(whole_case(found, folder).removesuffix("\n"))
     else:
@@ -94,11 +95,12 @@ def print_report(
     found: "JobReport", folder: str, reversal: tuple[float, float], units: "Units" = "usual"
 ) -> None:
     """Print what is known of a job."""
-    from compressor.cases import Case, to_yaml
+    from compressor.cases import to_yaml
     from compressor.reasons import remedy
     from compsim.job_text import sections
 
-    print_text(f"job {found.key}: {printable(stop_text(found))}")
+    ended = {"missing": "not run yet", "failed": f"failed: {found.reason}: {found.detail}"}
+    print_text(f"job {found.key}: {printable(ended.get(found.status, found.status))}")
     for study, point in found.studies.items():
         values = "".join(f" {key}={value}" for key, value in point.items())
         print_text(f"  in {study}{printable(values)}")
@@ -115,8 +117,7 @@ def print_report(
             print_text("\n".join(wrap_value(printable(line))))
     if "case" in found.attributes:
         print_text("the case, as far as it differs from the defaults (--case prints it whole)")
-        case = Case.from_attribute(found.attributes["case"])
-        for line in to_yaml(case, brief=True).splitlines():
+        for line in to_yaml(found.case, brief=True).splitlines():
             print_text(f"  {line}")
 
 
@@ -131,29 +132,10 @@ def wrap_value(line: str) -> list[str]:
 
 def whole_case(found: "JobReport", folder: str) -> str:
     """Return a job's case as a case file, under a name of its own: its study's may be taken."""
-    from compressor.cases import Case, to_yaml
+    from compressor.cases import to_yaml
 
     if "case" not in found.attributes:
         run = "; ".join(run_commands(found.again, folder)) or "run its case file"
         raise click.UsageError(f"job {found.key} was not run yet: {run}")
-    case = Case.from_attribute(found.attributes["case"])
-    name = f"{case.name[:MAX_NAME]}-{found.key[:KEY_DIGITS]}"
-    return to_yaml(dataclasses.replace(case, name=name))
-
-
-def stop_text(found: "JobReport") -> str:
-    """Return how a job ended, in a line."""
-    if found.status == "missing":
-        return "not run yet"
-    return "ok" if found.status == "ok" else f"failed: {found.reason}: {found.detail}"
-
-
-def sayable(value: Any) -> Any:
-    """Return a value as JSON can hold it: null for nan, "inf" for an unknown error."""
-    if isinstance(value, dict):
-        return {key: sayable(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [*map(sayable, value)]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else str(value)
-    return value
+    name = f"{found.case.name[:MAX_NAME]}-{found.key[:KEY_DIGITS]}"
+    return to_yaml(dataclasses.replace(found.case, name=name))

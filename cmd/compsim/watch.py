@@ -118,9 +118,10 @@ class PageWatch:
         self.idle = True
         if "ended" in answer:
             self.process = None
-            if answer["ended"]:
+            if code := answer["ended"]:
                 self.deaths += 1
-                self.report_problem(f"what writes it ended with {exit_text(answer['ended'])}")
+                end = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+                self.report_problem(f"what writes it ended with {end}")
         self.due = time.monotonic() + SECONDS
         if answer.get("drawn", True):
             self.draw_due = time.monotonic() + REDRAW_FACTOR * answer.get("seconds", 0.0)
@@ -155,11 +156,6 @@ def start_process(settings: dict[str, str]) -> "subprocess.Popen[str]":
         start_new_session=True,
         env=os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
     )  # fmt: skip
-
-
-def exit_text(code: int) -> str:
-    """Return the end of a process in words."""
-    return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
 
 # ---- the process --------------------------------------------------------------------------------

@@ -376,6 +376,11 @@ class JobReport:
     attributes: dict[str, Any]
     caveats: list[str]  # of one that is ok: what to know beside its numbers, a sentence each
 
+    @property
+    def case(self) -> Case:
+        """Return the case of a job that was run."""
+        return Case.from_attribute(self.attributes["case"])
+
 
 def standings(folder: Folder) -> list[StudyProgress]:
     """Return the progress of each study of a folder. Raises WrongName where there is none.

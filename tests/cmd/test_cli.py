@@ -406,12 +406,12 @@ def test_explain_of_a_failed_job_says_so(case_file, capsys):
 
 
 def test_explain_of_an_effect_that_failed():
-    from compressor.studies.tradeoff.command import describe_advice, without_nan
+    from compressor.studies.tradeoff.command import describe_advice, jsonable
 
     effect = types.SimpleNamespace(reason="non_finite")
     told = types.SimpleNamespace(advice=[types.SimpleNamespace(name="load", effect=effect)])
     assert describe_advice(told, 0).endswith("non_finite")
-    assert without_nan({"a": [float("nan"), 1.0]}) == {"a": [None, 1.0]}
+    assert jsonable({"a": [float("nan"), 1.0]}) == {"a": [None, 1.0]}
 
 
 def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):

@@ -153,5 +153,5 @@ def test_a_reversal_needs_two_numbers(text, capsys):
 @pytest.mark.parametrize("oil", [{"lubricant": True}, {}])
 def test_a_contact_force_with_oil_says_so(oil):
     case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2} | oil)
-    found = SimpleNamespace(attributes=case.attributes())
+    found = SimpleNamespace(case=case)
     assert film(found) == ["contact forces include the force of the oil film"] * len(oil)

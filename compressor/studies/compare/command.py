@@ -10,7 +10,7 @@ import click
 from compsim.progress import ProgressReporter
 from compsim.records import record_options
 from compsim.results import Items, files, jobs, of_results, results_folder
-from compsim.screen import DONE, as_json, plural, print_text, say, without_nan
+from compsim.screen import DONE, as_json, jsonable, plural, print_text, say
 
 if TYPE_CHECKING:
     from compressor.report import Drawing
@@ -142,7 +142,7 @@ def number(found: "Measured") -> str:
 def jsonable_comparison(found: "Comparison") -> dict[str, Any]:
     """Return a comparison as JSON says it."""
     mine = found.turned
-    return without_nan({
+    return jsonable({
         "record": found.name, "revolutions": len(mine.spectra), "rpm": mine.rpm,
         "rate_Hz": mine.rate, "orders": found.orders, "left_out": found.left_out,
         "envelope_inside": found.inside, "misfits": list(found.misfits),

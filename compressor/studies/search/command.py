@@ -16,6 +16,7 @@ from compsim.screen import (
     caution,
     check_json_units,
     jobs_option,
+    jsonable,
     one_thread_each,
     output_option,
     plural,
@@ -24,7 +25,6 @@ from compsim.screen import (
     units_option,
     wrap_line,
 )
-from compsim.show import sayable
 
 from compressor.digits import by_bar
 
@@ -131,8 +131,8 @@ def lines(
     kind_lines = comparison_lines if answer.best is None else extremum_lines
     yield from kind_lines(question, answer, shown)
     for point in answer.blind[:MAX_TOLD]:
-        why = why_undecided(point, shown)
-        yield f"  {at(question, point)}: {why}  job {point.key[:8]}"
+        within = f"{format_reading(point.told, shown)}: within its error bar of the limit"
+        yield f"  {at(question, point)}: {point.told.reason or within}  job {point.key[:8]}"
     if len(answer.blind) > MAX_TOLD:
         yield f"  and {len(answer.blind) - MAX_TOLD} more"
     yield from crossing_lines(question, answer)
@@ -217,12 +217,6 @@ def format_reading(reading: "JobReading", shown: Shown) -> str:
             + UNBARRED * (not reading.barred))  # fmt: skip
 
 
-def why_undecided(point: Any, shown: Shown) -> str:
-    """Return why a point does not decide."""
-    text = format_reading(point.told, shown)
-    return point.told.reason or f"{text}: within its error bar of the limit"
-
-
 def spacing(question: "Question") -> str:
     """Describe the distance of the points of a scan."""
     steps = question.scan - 1
@@ -235,4 +229,4 @@ def spacing(question: "Question") -> str:
 def jsonable_answer(question: "Question", answer: "SearchResult") -> dict[str, Any]:
     """Return a question and its answer as JSON says them."""
     fields = dataclasses.asdict(question)
-    return sayable(fields | {"unit": question.goal.unit} | dataclasses.asdict(answer))
+    return jsonable(fields | {"unit": question.goal.unit} | dataclasses.asdict(answer))

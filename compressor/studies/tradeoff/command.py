@@ -20,13 +20,13 @@ from compsim.screen import (
     configs_argument,
     duration,
     jobs_option,
+    jsonable,
     limit,
     plural,
     print_text,
     say,
     say_wrapped,
     setting,
-    without_nan,
     wrap_line,
 )
 
@@ -311,7 +311,7 @@ def explain(
         if not as_json:
             print_text("\n".join(lines(found[-1])))
     if as_json:
-        plain = [without_nan(dataclasses.asdict(one)) for one in found]
+        plain = [jsonable(dataclasses.asdict(one)) for one in found]
         print_text(json.dumps(plain, indent=1, ensure_ascii=False))
     return SOME_FAILED if any(one.reason for one in found) else DONE
 
@@ -358,7 +358,7 @@ def explain_models(
             print_text("\n".join(model_lines(place, table)))
             say(str(path))
     if as_json:
-        print_text(json.dumps(without_nan(found), indent=1, ensure_ascii=False))
+        print_text(json.dumps(jsonable(found), indent=1, ensure_ascii=False))
     return SOME_FAILED if failed else DONE
 
 
