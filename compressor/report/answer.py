@@ -19,7 +19,7 @@ import xarray as xr
 from markupsafe import Markup
 
 from compressor.analysis import SPOKEN, Claim
-from compressor.cases import MODEL, Case, CaseError
+from compressor.cases import MODEL, Case
 from compressor.digits import UNKNOWN, is_known, setting
 from compressor.metrics import BARRED, JOINTS
 from compressor.program import PROGRAM, library_versions
@@ -71,13 +71,8 @@ def last_case(stored: Stored, study: StoredStudy) -> Case | None:
 
     None where there is none that this version knows.
     """
-    for position in stored.rows.find([*study.keys])[::-1]:
-        if position >= 0:
-            try:
-                return Case.from_attribute(stored.rows.attributes(int(position))["case"])
-            except CaseError:
-                return None
-    return None
+    places = [place for place in stored.rows.find([*study.keys]).tolist() if place >= 0]
+    return stored.case_at(places[-1]) if places else None
 
 
 WIDTH = 1000.0  # units of the drawing
@@ -263,7 +258,8 @@ def findings(jobs: Iterable[tuple[str, xr.Dataset]], units: Units = "usual") -> 
     named = [(name, job) for name, job in jobs if str(job["status"].item()) == "ok"]
     known = list(dict.fromkeys(m for _, job in named for m in measures(job, units)))
     names = [name for name, _ in named]
-    rows = [(m, *_columns(m, [job for _, job in named])) for m in known]
+    columns = ((m, np.array([m.read(job) for _, job in named]).T) for m in known)
+    rows = [(m, values, bars) for m, (values, bars) in columns]
     return rank_findings(rows, names, {joint for _, job in named for joint in worn_joints(job)})
 
 
@@ -316,18 +312,6 @@ def word_value(name: str, value: object, unit: str) -> str:
             return ""
         return f"{words} {setting(value)} {unit}".removesuffix(" 1").rstrip()
     return f"{words} {SPOKEN.get(str(value), value)}" if value != "" else ""
-
-
-def _columns(measure: Measure, jobs: Sequence[xr.Dataset]) -> tuple[np.ndarray, np.ndarray]:
-    """Return a measure and its bar of each job, nan where it has none."""
-    pairs = [
-        (float(measure.of(job)), float(measure.bar(job)))
-        if measure.variable in job
-        else (math.nan, math.nan)
-        for job in jobs
-    ]
-    values, bars = np.array(pairs, float).reshape(-1, 2).T
-    return values, bars
 
 
 def rank_findings(

@@ -229,7 +229,7 @@ def templates(units: Units = "usual") -> Environment:
         return convert_text(str(value), units) if is_text else value
 
     return Environment(
-        loader=ChoiceLoader([PackageLoader(__package__), Elsewhere(template_elsewhere)]),
+        loader=ChoiceLoader([PackageLoader(__package__), FunctionLoader(template_elsewhere)]),
         autoescape=True,
         finalize=None if units == "usual" else in_chosen_units,
         undefined=StrictUndefined,
@@ -237,14 +237,6 @@ def templates(units: Units = "usual") -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-
-
-class Elsewhere(FunctionLoader):
-    """Loads templates by a function, and lists none of them."""
-
-    def list_templates(self) -> list[str]:
-        """Return no name."""
-        return []
 
 
 def template_elsewhere(name: str) -> str | None:

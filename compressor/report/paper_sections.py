@@ -4,7 +4,7 @@ import itertools
 import math
 import shlex
 import warnings
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -40,7 +40,7 @@ from compressor.report.figures.diagnosis import (
     draw_diagnosis_orbits,
     draw_diagnosis_spectra,
 )
-from compressor.report.figures.sweep_data import MEASURES, Measure, measures
+from compressor.report.figures.sweep_data import MEASURES, measures
 from compressor.report.page import (
     Cell,
     PageTable,
@@ -144,11 +144,6 @@ def case_files(labels: Collection[str]) -> dict[str, str]:
     return files
 
 
-def run_command(files: Iterable[str], results: Folder) -> str:
-    """Return the command that runs case files into a store, for a shell."""
-    return f"compsim run {' '.join(files)} -o {shlex.quote(str(results))}"
-
-
 @dataclass(frozen=True)
 class Difference:
     """A key of a case file whose value is not the default; both values with their unit."""
@@ -234,8 +229,8 @@ MACHINE = ("machine", "spring", "contact", "friction")
 REVOLUTION_ROUNDING = 1e-6  # revolutions: rounding of a whole one
 SET = tuple(figure for figure in FIGURES if {*WORN_LABELS} & {*figure.needs})
 NO_IDEAL = (
-    "{} are not drawn: no run without clearance of a machine with this motion is stored on the "
-    "same output grid. A block with joint: none in the case file gives it."
+    "Figures {} are not drawn: no run without clearance of a machine with this motion is stored on "
+    "the same output grid. A block with joint: none in the case file gives it."
 )
 
 
@@ -321,10 +316,9 @@ def other_machines(stored: Stored, study: StoredStudy) -> Iterator[dict[str, Cas
         # the first of the nine stands for all
         if position < 0 or not {FAULTS[0], CLEARANCES[0]} <= {*point.values()}:
             continue
-        try:
-            case = Case.from_attribute(stored.rows.attributes(position)["case"])
-        except CaseError:
-            continue  # of another version of compsim
+        case = stored.case_at(position)
+        if case is None:
+            continue
         cases = cases_of(case)
         ideal = cases["design"].physics_key
         if ideal in ideals or not is_other(case):
@@ -363,9 +357,7 @@ def default_machine_runs(case: Case, paper: PaperRuns, loads: bool) -> dict[str,
     """
     default = Case()
     lengths = ("crank_radius_mm", "rod_length_mm", "speed_rpm")
-    machine = replace(
-        default.machine, **{name: getattr(case.machine, name) for name in lengths}
-    )  # fmt: skip
+    machine = replace(default.machine, **{name: getattr(case.machine, name) for name in lengths})
     unread = ["contact", "friction", "initial_offset_mm", "body", "sensor"]
     unread += [] if loads else ["gas", "spring"]
     same = replace(case, machine=machine, **{name: getattr(default, name) for name in unread})
@@ -410,16 +402,12 @@ def second_section(
         for plate in plates
     ]
     lacking = [item for name, item in names.items() if name not in {p.name for p in plates}]
-    notes = [NO_IDEAL.format(number_figures(lacking))] if lacking else []
+    numbers = ", ".join(str(item.number) for item in lacking)
+    notes = [NO_IDEAL.format(numbers)] if lacking else []
     texts = [one.said for one in differences(found.case, ("name", "load", "joint", "clearance_mm"))]
     content = SecondSetContent(found.study, table, texts, notes, pairs, claims(found.judged))
     title = f"{found.study}: Figures 8 to 16 of another machine"
     return Section(second_anchor(found.study), title, "second_set.html", content)
-
-
-def number_figures(figures: Sequence[PaperFigure]) -> str:
-    """Return the figures by their numbers, such as `Figures 8, 11, 14`."""
-    return f"Figures {', '.join(str(figure.number) for figure in figures)}"
 
 
 @dataclass(frozen=True)
@@ -480,19 +468,12 @@ def cases_table(paper: PaperRuns, units: Units) -> PageTable:
             Cell(label_in_words(name)),
             Cell(status_text(status, run["reason"].item(), regime)),
         ]
-        metrics = [measured_cell(m, *value_of(m, run)) for m in shown]
+        metrics = [measured_cell(m, *m.read(run)) for m in shown]
         residual = number_cell(float(run.get("energy_residual", math.nan)))
         tolerance = value_cell(run.attrs.get("rtol", ""))
         trust = [residual, tolerance, Cell(key[:KEY_DIGITS], "code")]
         rows.append(job_row([*start, *metrics, *trust], status, regime, key))
     return PageTable(head, rows)
-
-
-def value_of(measure: Measure, run: xr.Dataset) -> tuple[float, float]:
-    """Return a measure of one run and its error bar; nan where it has none."""
-    if measure.variable not in run:
-        return math.nan, math.nan
-    return float(measure.of(run)), float(measure.bar(run))
 
 
 def label_in_words(name: str) -> str:
@@ -530,7 +511,8 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
         return
     files = case_files(paper.absent)
     texts = [f"# {name}\n{text}" for name, text in files.items()]
-    content = MissingFigures(figures, texts, run_command(files, results))
+    command = f"compsim run {' '.join(files)} -o {shlex.quote(str(results))}"
+    content = MissingFigures(figures, texts, command)
     yield Section("missing", "Figures that could not be drawn", "missing.html", content)
 
 

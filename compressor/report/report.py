@@ -43,7 +43,6 @@ from compressor.report.interactive import (
 from compressor.report.limits import Limits, read_limits
 from compressor.report.page import (
     Add,
-    Additions,
     JobFacts,
     JobsToOpen,
     Plate,
@@ -195,10 +194,11 @@ def build_report(
     added = [one(results, studies) for one in add]
     drawn = [
         drawn_study(
-            stored, study, others.get(study.name), notes_on(study.name, added), limits, units
+            stored, study, others.get(study.name),
+            [one.notes[study.name] for one in added if study.name in one.notes], limits, units,
         )
         for study in own
-    ]
+    ]  # fmt: skip
     sets = [
         second_section(one, of_others[name], of_paper, table_anchor(name))
         for name, one in others.items()
@@ -234,11 +234,6 @@ def build_report(
 def plates_in(plates: Sequence[Plate], units: Units) -> list[Plate]:
     """Return figures in chosen units."""
     return [replace(plate, drawing=in_units(plate.drawing, units)) for plate in plates]
-
-
-def notes_on(study: str, added: Sequence[Additions]) -> list[StudyNote]:
-    """Return the notes that studies add to the section of one."""
-    return [one.notes[study] for one in added if study in one.notes]
 
 
 class DrawnStudy(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import healthy_twin
-from compressor.cases import Case, CaseError, stands_for
+from compressor.cases import Case, stands_for
 from compressor.digits import is_known
 from compressor.metrics import BARRED, JOINTS
 from compressor.report.answer import FORCE, Points
@@ -58,9 +58,9 @@ def compare_healthy(
             force = np.fmax(force, np.where(worn, known_values(measure, data), np.nan))
     jobs = np.flatnonzero(has_clearance)
     ranked = jobs[np.argsort(-force[jobs], kind="stable")]  # what is not known comes last
-    keys = data["key"].values.ravel()
+    rows = stored.rows.find([*map(str, data["key"].values.ravel())]).tolist()
     for place in ranked[:MAX_TRIED].tolist():
-        if case := case_at(stored, str(keys[place])):
+        if case := stored.case_at(rows[place]):
             alike = [n for n in differing_in_clearance(data, place) if has_clearance[n]]
             greatest = {"contact force in a worn joint": place} if force[place] > 0.0 else {}
             for measure in MEASURES:
@@ -160,17 +160,7 @@ def _cell(measure: Measure, value: float, bar: float, sound: float) -> Cell:
 
 def describe_health(stored: Stored, key: str) -> str:
     """Return that a job counts as healthy, by its case's `healthy_clearance_mm`; else ""."""
-    case = case_at(stored, key)
+    position = stored.position(key)
+    case = None if position is None else stored.case_at(position)
     is_given = case and any(getattr(case.healthy_clearance_mm, joint) > 0.0 for joint in JOINTS)
     return " (counts as healthy)" if case and is_given and case.worn_joint == "none" else ""
-
-
-def case_at(stored: Stored, key: str) -> Case | None:
-    """Return the case of a stored job; None where this version does not know it."""
-    position = stored.position(key)
-    if position is None:
-        return None
-    try:
-        return Case.from_attribute(stored.rows.attributes(position)["case"])
-    except CaseError:
-        return None

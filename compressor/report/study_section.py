@@ -185,7 +185,7 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
 def jobs_table(data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usual") -> PageTable:
     """Return a row for every job of a study, as far as a page can hold them."""
     swept, shown = swept_values(data), measures(data, units)
-    metrics = [(m, ravel_jobs(m.of(data)), ravel_jobs(m.bar(data))) for m in shown]
+    metrics = [(m, m.of(data).values.ravel(), m.bar(data).values.ravel()) for m in shown]
     words = ("status", "reason", "regime", "key")
     ends = zip(*(data[name].values.flat for name in words), strict=True)
     rows = []
@@ -198,8 +198,3 @@ def jobs_table(data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usu
         cells.append(Cell(str(key)[:KEY_DIGITS], "code"))
         rows.append(job_row(cells, str(status), str(regime), str(key)))
     return PageTable([*swept, "status", *map(column_title, shown), "job"], rows)
-
-
-def ravel_jobs(values: xr.DataArray) -> np.ndarray:
-    """Return a study's values in a row, a job after the other."""
-    return values.values.ravel()

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.cases import SUSPECT, Case, HealthyClearance, changes_since
+from compressor.cases import SUSPECT, Case, CaseError, HealthyClearance, changes_since
 from compressor.metrics import BARRED
 from compressor.outcome import WORDS, Outcome, word_variables
 from compressor.reasons import Reason
@@ -224,6 +224,13 @@ class Stored:
             rows,
             position,
         )
+
+    def case_at(self, position: int) -> Case | None:
+        """Return the case at a position of `rows`; None where this version does not know it."""
+        try:
+            return Case.from_attribute(self.rows.attributes(position)["case"])
+        except CaseError:
+            return None
 
     def serving(self, positions: np.ndarray, case: Case) -> np.ndarray:
         """Return whether each of the jobs at some positions needs no new run for a case, boolean.

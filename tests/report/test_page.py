@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from jinja2 import UndefinedError
+from jinja2 import PackageLoader, UndefinedError
 
 from compressor.analysis.claims import Claim
 from compressor.report import page
@@ -28,7 +28,6 @@ from compressor.report.page import (
     StudyNote,
     TableRow,
     document,
-    templates,
 )
 from compressor.report.paper_sections import (
     DiagnosisContent,
@@ -133,7 +132,7 @@ def test_every_template_escapes_every_text():
     sections = [Section(evil(), evil(), name, content) for name, content in given.items()]
     text = document(sections, jobs, title=evil())
     own = {"page.html", "pieces.html", "status.html", "style.css", "report.js", "mechanism.svg"}
-    assert {*templates().list_templates()} - {*given} == own
+    assert {*PackageLoader("compressor.report").list_templates()} - {*given} == own
     scripts = re.findall("<script(.*?)>(.*?)</script>", text, re.DOTALL)
     assert [kind for kind, _ in scripts] == ["", ' type="application/json" id="jobs"']
     assert json.loads(scripts[1][1]) == {
@@ -209,7 +208,7 @@ def test_templates_are_installed_with_their_package():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     patterns = project["tool"]["setuptools"]["package-data"][page.__name__.rpartition(".")[0]]
     files = [f"templates/{path.name}" for path in (HOME / "templates").iterdir()]
-    assert len(files) == len(templates().list_templates())
+    assert len(files) == len(PackageLoader("compressor.report").list_templates())
     assert not [f for f in files if not any(fnmatch.fnmatch(f, p) for p in patterns)]
 
 

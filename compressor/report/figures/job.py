@@ -425,10 +425,37 @@ CYCLE_DECADES = 2  # below the greatest vibration
 ROW, LEAST = 0.24, 3.4  # inches: of a row, and of all
 
 
+def start_map(
+    rows: Sequence[SweptRow], title: str, x: np.ndarray, table: np.ndarray,
+    ends: tuple[float, float], name: str,
+) -> tuple[Drawing, Panel]:  # fmt: skip
+    """Return a figure with a table in colour, a row a value, and the panel of that.
+
+    title: of the rows; x: edges of the table's columns; ends: of the colours, which `name` titles.
+    """
+    figure, panels = make_grid(1, 2, height(len(rows)) + 0.9, widths=(3, 1))
+    image = panels[0, 0]
+    colors = ColorScale(palette("cividis"), *ends, True, name, "top", 50, pointed=True)
+    edges = np.arange(len(rows) + 1) - 0.5
+    image.traces.append(map_cells(x, edges, np.maximum(table, ends[0]), colors))
+    label_rows(image, rows, title)
+    return figure, image
+
+
+def finish_map(figure: Drawing, values: np.ndarray, title: str, top: float) -> Drawing:
+    """Return a figure of `start_map` with a number a row beside the map, and a legend of marks."""
+    image, beside = figure.panels
+    dots = LineStyle(BLUE, linewidth=1.5, marker="o", markersize=3.5)
+    beside.plot(values, np.arange(values.size, dtype=float), dots)
+    beside.x.title = title
+    beside.x.span(0, top)
+    share_scales(figure.panels, "y")
+    figure.legend = [one for one in image.traces if one.is_points]
+    return figure
+
+
 def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Drawing:
     """Return order spectra of X, a row a value, in colour; beside them the rms above `ORDER`."""
-    figure, panels = make_grid(1, 2, height(len(rows)) + 0.9, widths=(3, 1))
-    image, beside = panels.flat
     found = [row.shaking for row in rows]
     size = min(MAX_MAP_ORDERS, *(one.spectrum.orders.size - 1 for one in found if one))
     table = np.full((len(rows), size), np.nan)
@@ -438,21 +465,14 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Drawing:
     top = np.nanmax(table[:, ORDER:])  # the first orders are beyond the scale
     if top < 1e-9 * np.nanmax(table):  # ideal joints: rounding
         top = np.nanmax(table)
-    edges = np.arange(size + 1) + 0.5, np.arange(len(rows) + 1) - 0.5
-    least = top * 10.0**-MAP_DECADES
-    colors = ColorScale(palette("cividis"), least, top, True, "amplitude of X (N)", "top", 50,
-                        pointed=True)  # fmt: skip
-    image.traces.append(map_cells(*edges, np.maximum(table, least), colors))
+    ends = top * 10.0**-MAP_DECADES, top
+    figure, image = start_map(rows, title, np.arange(size + 1) + 0.5, table, ends,
+                              "amplitude of X (N)")  # fmt: skip
     image.notes.append(Note(x=ORDER + 0.5, style=LineStyle(RED, (0, (4, 1.5)))))
     image.x.title = ORDERS_AXIS + f"; dashed: order {ORDER}"
-    label_rows(image, rows, title)
     above = np.array([one.spectrum.above if one else np.nan for one in found])
-    dots = LineStyle(BLUE, linewidth=1.5, marker="o", markersize=3.5)
-    beside.plot(above, np.arange(len(rows), dtype=float), dots)
-    beside.x.title = f"rms of X above\norder {ORDER} (N)"
-    beside.x.span(0, max(1.0, 1.08 * np.nanmax(above)))
-    share_scales(figure.panels, "y")
-    return figure
+    words = f"rms of X above\norder {ORDER} (N)"
+    return finish_map(figure, above, words, max(1.0, 1.08 * np.nanmax(above)))
 
 
 def draw_cycles(rows: Sequence[SweptRow], title: str) -> Drawing:
@@ -460,15 +480,11 @@ def draw_cycles(rows: Sequence[SweptRow], title: str) -> Drawing:
 
     Marks: the rod load changes its side; valves open and close, or the cam's follower stops.
     """
-    figure, panels = make_grid(1, 2, height(len(rows)) + 0.9, widths=(3, 1))
-    image, beside = panels.flat
     found = [row.cycle for row in rows]
     table = np.array([one.degree_peaks if one else np.full(360, np.nan) for one in found])
     top = np.nanmax(table)
-    least = top * 10.0**-CYCLE_DECADES
-    colors = ColorScale(palette("cividis"), least, top, True, "|a| (m/s²)", "top", 50, pointed=True)
-    edges = np.arange(361.0), np.arange(len(rows) + 1) - 0.5
-    image.traces.append(map_cells(*edges, np.maximum(table, least), colors))
+    ends = top * 10.0**-CYCLE_DECADES, top
+    figure, image = start_map(rows, title, np.arange(361.0), table, ends, "|a| (m/s²)")
     corners = [[at for at, _ in one.events] if one else [] for one in found]
     reversals = [one.reversals if one else () for one in found]
     for name, shape, color, angles in (
@@ -479,16 +495,9 @@ def draw_cycles(rows: Sequence[SweptRow], title: str) -> Drawing:
         y = np.array([float(n) for n, some in enumerate(angles) for _ in some])
         image.plot(x, y, mark(color, shape, 4, edge=BLACK), name)
     image.x.title = ANGLE_AXIS
-    label_rows(image, rows, title)
     share_turn([image], 90.0)
     peaks = np.nanmax(np.where(np.isnan(table), -1.0, table), axis=1)
-    dots = LineStyle(BLUE, linewidth=1.5, marker="o", markersize=3.5)
-    beside.plot(np.where(peaks < 0, np.nan, peaks), np.arange(len(rows), dtype=float), dots)
-    beside.x.title = "peak (m/s²)"
-    beside.x.span(0, 1.08 * top)
-    share_scales(figure.panels, "y")
-    figure.legend = [one for one in image.traces if one.is_points]
-    return figure
+    return finish_map(figure, np.where(peaks < 0, np.nan, peaks), "peak (m/s²)", 1.08 * top)
 
 
 def draw_segments(rows: Sequence[SweptRow], title: str) -> Drawing:
@@ -496,23 +505,14 @@ def draw_segments(rows: Sequence[SweptRow], title: str) -> Drawing:
 
     In colour, with marks where a segment is over its limit; beside them the greatest rms.
     """
-    figure, panels = make_grid(1, 2, height(len(rows)) + 0.9, widths=(3, 1))
-    image, beside = panels.flat
     found = [row.segments for row in rows]
     table = np.array([one.ratio if one else np.full(36, np.nan) for one in found])
     top = max(float(np.nanmax(table)), 1.1)
-    name = "rms over that without clearance"
-    colors = ColorScale(palette("cividis"), 1.0, top, True, name, "top", 50, pointed=True)
-    edges = 10.0 * np.arange(37), np.arange(len(rows) + 1) - 0.5
-    image.traces.append(map_cells(*edges, np.maximum(table, 1.0), colors))
+    figure, image = start_map(rows, title, 10.0 * np.arange(37), table, (1.0, top),
+                              "rms over that without clearance")  # fmt: skip
     for name, shape, color, over in (
-        ("over its limit", "s", RED, [one.over_limit if one else None for one in found]),
-        (
-            "over it within the error bar",
-            "o",
-            GOLD,
-            [one.doubtful if one else None for one in found],
-        ),
+        ("over its limit", "s", RED, [o.over_limit if o else None for o in found]),
+        ("over it within the error bar", "o", GOLD, [o.doubtful if o else None for o in found]),
     ):
         marks = [(10.0 * at + 5.0, float(n)) for n, some in enumerate(over) if some is not None
                  for at in np.flatnonzero(some)]  # fmt: skip
@@ -520,16 +520,10 @@ def draw_segments(rows: Sequence[SweptRow], title: str) -> Drawing:
             x, y = np.array(marks).T
             image.plot(x, y, mark(color, shape, 4, edge=BLACK), name)
     image.x.title = ANGLE_AXIS
-    label_rows(image, rows, title)
     share_turn([image], 90.0)
     greatest = np.array([np.nanmax(one.rms) if one else np.nan for one in found])
-    dots = LineStyle(BLUE, linewidth=1.5, marker="o", markersize=3.5)
-    beside.plot(greatest, np.arange(len(rows), dtype=float), dots)
-    beside.x.title = "greatest rms of a\nsegment (m/s²)"
-    beside.x.span(0, 1.08 * float(np.nanmax(greatest)))
-    share_scales(figure.panels, "y")
-    figure.legend = [one for one in image.traces if one.is_points]
-    return figure
+    words = "greatest rms of a\nsegment (m/s²)"
+    return finish_map(figure, greatest, words, 1.08 * float(np.nanmax(greatest)))
 
 
 def draw_map(rows: Sequence[SweptRow], title: str) -> Drawing:

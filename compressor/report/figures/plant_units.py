@@ -46,7 +46,8 @@ def convert_panel(drawing: Drawing, panel: Panel, units: Units) -> Panel:
     for way in WAYS:
         scale: Scale = getattr(panel, way)
         title, factor = new_title(scale.title, units)
-        if not scale.title and not is_of_figure(drawing, way):
+        is_of_figure = drawing.x_title if way == "x" else drawing.y_title
+        if not scale.title and not is_of_figure:
             _, factor = new_title(neighbour_title(drawing, panel, way), units)
         if scale.words:
             title, factor = scale.title, 1.0
@@ -60,11 +61,6 @@ def convert_panel(drawing: Drawing, panel: Panel, units: Units) -> Panel:
         title=convert_text(panel.title, units),
         legend=[rename_trace(trace, units) for trace in panel.legend],
     )  # fmt: skip
-
-
-def is_of_figure(drawing: Drawing, way: Way) -> bool:
-    """Return whether an axis is titled for all panels, by what is swept."""
-    return bool(drawing.x_title if way == "x" else drawing.y_title)
 
 
 def neighbour_title(drawing: Drawing, panel: Panel, way: Way) -> str:

@@ -61,6 +61,12 @@ class Measure:
             return self.of(data) * math.nan
         return self.in_unit(data, f"{self.variable}_error")
 
+    def read(self, job: xr.Dataset) -> tuple[float, float]:
+        """Return the metric of a job and its error bar; nan where it has none."""
+        if self.variable not in job:
+            return math.nan, math.nan
+        return float(self.of(job)), float(self.bar(job))
+
     def in_unit(self, data: xr.Dataset, name: str) -> xr.DataArray:
         """Return a variable of the metric in the measure's unit."""
         values = data[name]
@@ -116,15 +122,8 @@ def swept_values(data: xr.Dataset) -> dict[str, np.ndarray]:
 
 
 def positions(data: xr.Dataset, axis: str) -> np.ndarray:
-    """Return the positions of an axis' values along it.
-
-    Numbers stand at themselves, different words one after the other.
-    """
-    values = data[axis].values
-    if values.dtype.kind in "fiu":
-        return values.astype(float)
-    places = {word: float(n) for n, word in enumerate(dict.fromkeys(values))}
-    return np.array([places[word] for word in values])
+    """Return the positions of an axis' values along it, as `PlottedAxis.places`."""
+    return PlottedAxis(axis, "", "", data[axis].values).places
 
 
 def shown_value(value: Any) -> str:
@@ -371,6 +370,4 @@ def name_value(phrase: str, word: str) -> str:
 
 def format_swept(value: object) -> str:
     """Return a swept value in few characters."""
-    return SPOKEN.get(value, shown_value(value).replace("_", " ")) if isinstance(value, str) else (
-        shown_value(value)
-    )  # fmt: skip
+    return SPOKEN.get(str(value), shown_value(value).replace("_", " "))

@@ -235,19 +235,11 @@ def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure])
     sweep = coarse(sweep, role.x, MAX_PLACES)
     figure, panels = metric_panels(measures, 2.35)
     for panel, measure in zip(panels, measures, strict=True):
-        colors = chosen_of(sweep.axes[role.color], MAX_LINES)
-        whole = whole_part(sweep, measure, role)
-        parts = [line_part(whole, role, {role.color: int(n)}) for n in colors]
-        plot_parts(panel, sweep, role, parts, whole)
+        plot_parts(panel, sweep, role, {}, whole_part(sweep, measure, role))
         panel.y.title = measure.unit
     figure.x_title = sweep.axes[role.x].title
     figure.legend = named_lines(figure)
     return figure
-
-
-def is_averaged(sweep: PlottedSweep, role: Roles) -> bool:
-    """Return whether lines are means over some axes."""
-    return any(n not in role for n in range(len(sweep.axes)))
 
 
 def named_lines(figure: Drawing) -> list[Trace]:
@@ -269,9 +261,7 @@ def draw_multiples(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]
         whole = whole_part(sweep, measure, role)
         for panel, column in zip(line, columns, strict=True):
             at = {role.column: int(column)} | ({role.row: row} if has_rows else {})
-            colors = chosen_of(sweep.axes[role.color], MAX_LINES)
-            parts = [line_part(whole, role, at | {role.color: int(n)}) for n in colors]
-            plot_parts(panel, sweep, role, parts, whole)
+            plot_parts(panel, sweep, role, at, whole)
             words = [] if has_rows else [measure.title]
             words += [sweep.axes[axis].value_text(n) for axis, n in at.items()]
             panel.title, panel.title_size = "\n".join(words), 9.0
@@ -289,7 +279,8 @@ def whole_part(sweep: PlottedSweep, measure: Measure, role: Roles) -> MeasuredPo
 
     Where lines are means, what is known of it within its error bar.
     """
-    values = sweep.known(measure) if is_averaged(sweep, role) else sweep.values(measure)
+    is_averaged = any(n not in role for n in range(len(sweep.axes)))
+    values = sweep.known(measure) if is_averaged else sweep.values(measure)
     return MeasuredPoints(values, sweep.bars(measure), sweep.status, sweep.chaotic, sweep.keys)
 
 
@@ -308,15 +299,12 @@ def line_part(whole: MeasuredPoints, role: Roles, at: dict[int, int]) -> Measure
 
 
 def plot_parts(
-    panel: Panel,
-    sweep: PlottedSweep,
-    role: Roles,
-    parts: Sequence[MeasuredPoints],
-    whole: MeasuredPoints,
+    panel: Panel, sweep: PlottedSweep, role: Roles, at: dict[int, int], whole: MeasuredPoints
 ) -> None:
-    """Draw a panel's lines and marks."""
+    """Draw a panel's lines and marks, at a value of some axes, numbers by number."""
     axis, color = sweep.axes[role.x], sweep.axes[role.color]
     x, chosen = axis.places, chosen_of(color, MAX_LINES)
+    parts = [line_part(whole, role, at | {role.color: int(n)}) for n in chosen]
     scale_x(panel, axis)
     values = whole.values  # so that all panels of a measure have one scale
     if role.column < 0 and not parts[0].is_jobs:
