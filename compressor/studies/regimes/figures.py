@@ -40,6 +40,7 @@ from compressor.report import (
     share_scales,
     stack_modes,
 )
+from compressor.studies.regimes.captions import unit_of
 
 # the second is smaller and lies on the first, so that both are seen where they agree
 BY_DIRECTION = {"up": (BLUE, 4.0, 2.2), "down": (RED, 2.1, 2.4)}
@@ -74,7 +75,8 @@ def draw_bifurcation(pair: xr.Dataset) -> Drawing:
     for panel in panels:
         mark_failed(panel, pair)
     panels[-1].x.title = axis_words(pair, pair.attrs["over"])
-    figure.legend = [*direction_entries(pair), *failed_entries(pair), *mode_entries()]
+    failed = [entry(FAILED_NAME, FAILED)] if (pair["status"] == "failed").any() else []
+    figure.legend = [*direction_entries(pair), *failed, *mode_entries()]
     return figure
 
 
@@ -255,11 +257,6 @@ def mark_failed(panel: Panel, pair: xr.Dataset) -> None:
         panel.plot(x, foot, FAILED, FAILED_NAME)
 
 
-def failed_entries(pair: xr.Dataset) -> list[Trace]:
-    """Return the mark of failed runs, if there are any."""
-    return [entry(FAILED_NAME, FAILED)] if (pair["status"] == "failed").any() else []
-
-
 def direction_entries(data: xr.Dataset) -> list[Trace]:
     """Return the directions' colours, for a legend."""
     return [entry(name, look) for name, look in direction_styles(data, 1.6).items()]
@@ -271,12 +268,6 @@ def axis_words(data: xr.Dataset, name: str) -> str:
     unit = attrs.get("units", "")
     phrase = attrs.get("long_name") or attrs.get("case_key", name)
     return f"{phrase} ({unit})" if unit not in ("", "1") else str(phrase)
-
-
-def unit_of(data: xr.Dataset) -> str:
-    """Return the unit of the followed parameter with a space before it, "" where it has none."""
-    unit = data[data.attrs["over"]].attrs.get("units", "")
-    return f" {unit}" if unit not in ("", "1") else ""
 
 
 MAX_TICKS = 12

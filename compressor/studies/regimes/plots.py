@@ -61,11 +61,8 @@ def regime_figures(dataset: xr.Dataset, choice: PlotChoice) -> Iterator[tuple[st
         elif name == "sections":
             check_any(pair, study)
             shown = pair.isel({over: chosen_values(pair)})
-            yield (
-                name,
-                CAPTIONS[name](shown, pair.sizes[over]) + describe_fixed_axes(fixed),
-                draw_sections(shown),
-            )
+            caption = CAPTIONS[name](shown, pair.sizes[over])
+            yield name, caption + describe_fixed_axes(fixed), draw_sections(shown)
         else:
             check_any(pair, study)
             yield name, CAPTIONS[name](pair) + describe_fixed_axes(fixed), draw_bifurcation(pair)

@@ -8,6 +8,7 @@ scan may be missed.
 
 import contextlib
 import math
+import operator
 import shlex
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ from compressor.studies.search.question import JobReading, Question
 from compressor.sweep import Options, sweep
 
 MAX_POINTS = 200  # that one search may ask for beyond its scan
+place = operator.attrgetter("share")  # of a point
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ def find_first(
     points: list[Point] = []
     next_shares: Sequence[float] = shares
     while next_shares and len(points) < len(shares) + MAX_POINTS:
-        points = sorted([*points, *evaluate(next_shares)], key=lambda point: point.share)
+        points = sorted([*points, *evaluate(next_shares)], key=place)
         answer = interval(points, holds)
         next_shares = sections(answer, tolerance, at_once)
     return answer
@@ -153,7 +155,7 @@ def find_extremum(
     minimize_scalar(method="bounded") goes on until its argument is known to `tolerance`, a share.
     Points that say nothing count as the worst one that is known.
     """
-    points = sorted(evaluate(shares), key=lambda point: point.share)
+    points = sorted(evaluate(shares), key=place)
     usable = [point for point in points if not point.told.reason]
     if not usable:
         return SearchResult("unclear", None, None, blind=tuple(points), points=tuple(points))
@@ -180,7 +182,7 @@ def bracket_best(known: Iterable[Point], factor: float) -> SearchResult:
 
     factor: 1 where the least is best, -1 where the greatest is.
     """
-    points = sorted(known, key=lambda point: point.share)
+    points = sorted(known, key=place)
     usable = [point for point in points if not point.told.reason]
     best = min(usable, key=lambda point: factor * point.told.value)
     within: list[Point] = []
@@ -197,16 +199,8 @@ def bracket_best(known: Iterable[Point], factor: float) -> SearchResult:
                         points=tuple(points))  # fmt: skip
 
 
-def place(point: Point) -> float:
-    """Return the share of the range at which a point lies."""
-    return point.share
-
-
 def find(
-    question: Question,
-    folder: Folder,
-    workers: int = 2,
-    progress: Progress = no_progress,
+    question: Question, folder: Folder, workers: int = 2, progress: Progress = no_progress
 ) -> SearchResult:
     """Return the answer to a question, by jobs in a folder's store.
 

@@ -166,7 +166,7 @@ def comparison(text: str) -> Goal:
     return replace(goal, limit=math.nan if limit is None else limit, limit_unit=unit)
 
 
-def goal_of(text: str, sign: str, limit: float = math.nan) -> Goal:
+def goal_of(text: str, sign: str) -> Goal:
     """Return the goal of a metric's name, METRIC or METRIC.JOINT. Raises QuestionError."""
     metric, *place = text.strip().split(".")
     if metric not in BARRED:
@@ -177,7 +177,7 @@ def goal_of(text: str, sign: str, limit: float = math.nan) -> Goal:
     if not good:
         words = "".join(f".{'|'.join(WORDS[dim])}" for dim in dims)
         raise QuestionError(f"{text!r}: write {metric}{words}")
-    return Goal(metric, tuple(place), sign, limit)
+    return Goal(metric, tuple(place), sign)
 
 
 @dataclass(frozen=True)
@@ -246,9 +246,7 @@ class Question:
             raise QuestionError(f"{self.key} cannot be searched over: it is no continuous number")
         ends = []
         for value in (self.low, self.high):
-            texts = [*self.overrides, f"{self.key}={value!r}"]
-            (study,) = load_studies(self.path, overrides=texts, follow=False)
-            ends.append(study)
+            ends.append(self._load(f"{self.key}={value!r}"))
         if row is None:
             raise QuestionError(f"{self.key} is no single number")
         if ends[0].jobs > 1:
@@ -264,22 +262,19 @@ class Question:
 
         The caller sorts them.
         """
-        listed = ", ".join(map(repr, values))
-        return [*self.overrides, f"name={self._name()}", f"{self.key}=[{listed}]"]
+        listed, end = ", ".join(map(repr, values)), f"-find-{self.key}"
+        name = self._load(f"{self.key}={self.low!r}").name[: NAME - len(end)]
+        return [*self.overrides, f"name={name}{end}", f"{self.key}=[{listed}]"]
 
     def study(self, values: Sequence[float]) -> Study:
         """Return the study of some values of the key, its one axis."""
         (found,) = load_studies(self.path, overrides=self.settings(values), follow=False)
         return found
 
-    def _name(self) -> str:
-        (study,) = load_studies(
-            self.path,
-            overrides=[*self.overrides, f"{self.key}={self.low!r}"],
-            follow=False,
-        )
-        end = f"-find-{self.key}"
-        return study.name[: NAME - len(end)] + end
+    def _load(self, setting: str) -> Study:
+        """Return the study of the file with one more key set."""
+        (study,) = load_studies(self.path, overrides=[*self.overrides, setting], follow=False)
+        return study
 
 
 def _number(text: str) -> float:

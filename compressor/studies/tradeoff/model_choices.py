@@ -9,7 +9,6 @@ from error bars.
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -129,25 +128,17 @@ def scale_film(case: Case) -> Iterator[Choice]:
 
 def with_stiffness(case: Case, name: str, factor: float) -> Choice:
     """Return a case with its contact stiffness, or the modulus that it follows from, scaled."""
-    contact, machine = case.contact, case.machine
+    values: dict[str, Any] = {"materials": None, "small_end_materials": None}
+    contact, worn = case.contact, faulty(case)
     if contact.law in ("johnson", "liu"):
-        each = [composite_modulus_of(contact.at(joint)) for joint in faulty(case)]
-        modulus = math.prod(each) ** (1.0 / len(each))
-        values: dict[str, Any] = {"materials": None, "small_end_materials": None}
-        values["modulus_GPa"] = factor * modulus
-        alike = max(each) <= SAME_STIFFNESS * min(each)
-        note = "" if alike else "of both joints"
-        return Choice(name, with_values(case, "contact", **values), note)
-    each = [
-        joint_stiffness(
-            contact.at(joint), machine.pin_radius(joint), getattr(case.clearance_mm, joint)
-        )
-        for joint in faulty(case)
-    ]
+        key, unit = "modulus_GPa", 1.0
+        each = [composite_modulus_of(contact.at(joint)) for joint in worn]
+    else:
+        key, unit, values["geometry"] = "stiffness_N_per_mm15", 1000.0**contact.exponent, None
+        sizes = [(case.machine.pin_radius(j), getattr(case.clearance_mm, j)) for j in worn]
+        each = [joint_stiffness(contact.at(j), *at) for j, at in zip(worn, sizes, strict=True)]
     # one key serves both joints: materials may give each a stiffness of its own
-    middle = math.prod(each) ** (1.0 / len(each)) / 1000.0**contact.exponent
-    values = {"stiffness_N_per_mm15": factor * middle, "materials": None, "geometry": None,
-              "small_end_materials": None}  # fmt: skip
+    values[key] = factor * (math.prod(each) ** (1.0 / len(each)) / unit)
     alike = max(each) <= SAME_STIFFNESS * min(each)
     return Choice(name, with_values(case, "contact", **values), "" if alike else "of both joints")
 
@@ -285,15 +276,8 @@ def tabulate(every: Sequence[Choice], runs: Sequence[xr.Dataset]) -> xr.Dataset:
     return table.assign_attrs(attrs | {"detail": runs[0].attrs.get("detail", "")})
 
 
-def tell_part(progress: Progress, before: int, total: int, done: int, of: int, remark: str) -> None:
-    """Report progress of a part as progress of the whole: `before` were done of `total`."""
-    progress(before + done, total, remark)
-
-
 def trade(
-    cases: Mapping[str, Case],
-    repeats: int = 3,
-    progress: Progress = no_progress,
+    cases: Mapping[str, Case], repeats: int = 3, progress: Progress = no_progress
 ) -> xr.Dataset:
     """Return the metrics of cases under every change of the model; dims (scene, choice).
 
@@ -308,7 +292,10 @@ def trade(
     tables = []
     for scene, case in cases.items():
         choices = found[scene]
-        own = partial(tell_part, progress, before, total)
+
+        def own(done: int, of: int, remark: str, before: int = before) -> None:
+            progress(before + done, total, remark)
+
         runs = run_choices(case, choices, repeats, own)
         before += 2 + len(choices)
         if complete(runs[0]):

@@ -7,7 +7,7 @@ with error bars. A change is what lies beyond both bars.
 import math
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -278,12 +278,7 @@ def models_section(anchor: str, study: StoredStudy, data: xr.Dataset) -> Section
     """Return the section with the choices of the model of a study's job."""
     table = model_table(data)
     place = place_text(study, data.attrs["key"])
-    content = ModelsContent(
-        place,
-        headline(table),
-        ", ".join(table.unknown),
-        page_table(table),
-    )
+    content = ModelsContent(place, headline(table), ", ".join(table.unknown), page_table(table))
     title = f"Choices of the model in study {place.rpartition(', ')[0]}"
     return Section(anchor, title, "compressor.studies.tradeoff:models.html", content)
 
@@ -297,16 +292,12 @@ def page_table(table: ModelTable) -> PageTable:
     ]
     itself = [Cell("the case itself"), *values, Cell("")]
     span = [Cell("all of them"), *map(number_cell, table.span_texts), Cell("")]
-    rows = [TableRow(itself), *(TableRow([*row_cells(row)]) for row in table.rows), TableRow(span)]
+    choices = (
+        [Cell(row.name), *map(number_cell, row.cells, row.changes), Cell(row.note)]
+        for row in table.rows
+    )
+    rows = [*map(TableRow, [itself, *choices, span])]
     return PageTable(["choice of the model", *(m.title for m in table.measures), "assumed"], rows)
-
-
-def row_cells(row: ModelRow) -> Iterator[Cell]:
-    """Yield the cells of a choice."""
-    yield Cell(row.name)
-    for text, size in zip(row.cells, row.changes, strict=True):
-        yield number_cell(text, size)
-    yield Cell(row.note)
 
 
 def number_cell(text: str, value: float = math.nan) -> Cell:

@@ -180,7 +180,8 @@ def work_precision(
         for method in REFERENCES:
             truths[name][method] = reference(name, case, method)
             progress(next(done), total, f"{name}, reference by {method}")
-        compare_references(study, name, truths[name])
+        apart = errors(truths[name][REFERENCES[1]], truths[name][REFERENCES[0]])
+        study["reference_uncertainty"].loc[name] = [apart[quantity] for quantity in ERRORS]
         judge_paper(study, name, case, truths[name])
         progress(next(done), total, f"{name}, the paper's numerics")
     jobs = list(cases.items())
@@ -245,12 +246,6 @@ def empty(scenes: list[str], methods: Sequence[str], tolerances: Sequence[float]
         "quantity": ("quantity", np.array(list(ERRORS), object), {"long_name": "what differs"}),
     }
     return xr.Dataset(variables, coordinates)
-
-
-def compare_references(study: xr.Dataset, name: str, truth: Mapping[str, Mapping]) -> None:
-    """Write into a study how far the references of a case lie apart, by quantity."""
-    distances = errors(truth[REFERENCES[1]], truth[REFERENCES[0]])
-    study["reference_uncertainty"].loc[name] = [distances[quantity] for quantity in ERRORS]
 
 
 def judge_paper(study: xr.Dataset, name: str, case: Case, truth: Mapping[str, Mapping]) -> None:
