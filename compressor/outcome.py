@@ -12,15 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compressor.metrics import (
-    AXES,
-    JOINTS,
-    NUMBERS,
-    QUANTILES,
-    SEGMENTS,
-    SIZES,
-    THRESHOLDS,
-)
+from compressor.metrics import AXES, JOINTS, NUMBERS, QUANTILES, SEGMENTS, SIZES, THRESHOLDS
 from compressor.program import PROGRAM
 
 # a job's numbers as one structured scalar: what workers send home and segments hold

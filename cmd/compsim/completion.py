@@ -5,11 +5,7 @@ import sys
 import click
 from click.shell_completion import get_completion_class
 
-from compsim.screen import (
-    DONE,
-    print_text,
-    say,
-)
+from compsim.screen import DONE, print_text, say
 
 INSTALL = {
     "bash": """echo 'eval "$(compsim completion bash)"' >> ~/.bashrc""",

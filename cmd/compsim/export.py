@@ -10,15 +10,7 @@ import click
 
 from compsim.progress import ProgressReporter
 from compsim.results import jobs, of_results, results_folder
-from compsim.screen import (
-    DONE,
-    STORE,
-    plural,
-    print_text,
-    say,
-    size,
-    units_option,
-)
+from compsim.screen import DONE, STORE, plural, print_text, say, size, units_option
 
 if TYPE_CHECKING:
     from compressor.store import Exported

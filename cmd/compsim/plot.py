@@ -7,11 +7,7 @@ import click
 from compressor.program import did_you_mean
 from compressor.studies import STUDIES, find_drawn
 from compsim.results import ONE_JOB, folders, jobs, of_results, results_folder, some_words
-from compsim.screen import (
-    DONE,
-    print_text,
-    units_option,
-)
+from compsim.screen import DONE, print_text, units_option
 
 if TYPE_CHECKING:
     from compressor.units import Units

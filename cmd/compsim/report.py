@@ -7,11 +7,7 @@ import click
 
 from compressor.studies import STUDIES, page_additions
 from compsim.results import folders, of_results, results_folder
-from compsim.screen import (
-    DONE,
-    print_text,
-    units_option,
-)
+from compsim.screen import DONE, print_text, units_option
 
 if TYPE_CHECKING:
     from compressor.units import Units

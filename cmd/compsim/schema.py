@@ -4,10 +4,7 @@ import json
 
 import click
 
-from compsim.screen import (
-    DONE,
-    print_text,
-)
+from compsim.screen import DONE, print_text
 
 
 @click.command()

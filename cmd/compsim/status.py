@@ -6,15 +6,7 @@ import json
 import click
 
 from compsim.results import of_results, results_folder
-from compsim.screen import (
-    DONE,
-    as_json,
-    plural,
-    print_text,
-    run_commands,
-    say,
-    wrap_line,
-)
+from compsim.screen import DONE, as_json, plural, print_text, run_commands, say, wrap_line
 
 PROMISES = {"kept": "kept what accuracy promises", "none": "without a promise"}
 

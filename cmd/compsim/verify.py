@@ -6,15 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from compsim.results import of_results, results_folder
-from compsim.screen import (
-    DONE,
-    STORE,
-    as_json,
-    plural,
-    print_text,
-    run_commands,
-    say,
-)
+from compsim.screen import DONE, STORE, as_json, plural, print_text, run_commands, say
 
 if TYPE_CHECKING:
     from compressor.store import Damage

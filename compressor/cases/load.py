@@ -33,14 +33,7 @@ from compressor.cases.parameter import CaseError, Problem, quote_value
 from compressor.cases.study import Axis, Cases, Study, StudyRequest
 from compressor.cases.swept import SAMPLED, NoComparison, Test, comparison, format_count
 from compressor.cases.table import WORDS, table
-from compressor.cases.yaml_reader import (
-    CaseFileError,
-    FileProblem,
-    Node,
-    Place,
-    read_file,
-    shorten,
-)
+from compressor.cases.yaml_reader import CaseFileError, FileProblem, Node, Place, read_file, shorten
 from compressor.program import STUDY_GROUPS, Progress, no_progress
 
 Variants = Callable[[Any], Iterable[Any]]  # of a case: the cases that are run for it

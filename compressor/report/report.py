@@ -35,11 +35,7 @@ from compressor.report.figures import FIGURES
 from compressor.report.figures.pictures import Painter
 from compressor.report.figures.plant_units import in_units
 from compressor.report.figures.sweep import draw_sweep
-from compressor.report.interactive import (
-    job_scripts,
-    publish_library,
-    series_name,
-)
+from compressor.report.interactive import job_scripts, publish_library, series_name
 from compressor.report.limits import Limits, read_limits
 from compressor.report.page import (
     Add,

@@ -12,14 +12,7 @@ from compressor.digits import is_known
 from compressor.metrics import BARRED, JOINTS
 from compressor.report.answer import FORCE, Points
 from compressor.report.figures.sweep_data import MEASURES, Measure, measures, swept_values
-from compressor.report.page import (
-    Cell,
-    PageTable,
-    TableRow,
-    column_title,
-    format_measure,
-    number,
-)
+from compressor.report.page import Cell, PageTable, TableRow, column_title, format_measure, number
 from compressor.store import Stored
 from compressor.units import Units
 

@@ -45,13 +45,7 @@ from compressor.solve.march_driver import COMPILED, LANE_METHODS, march_through
 from compressor.solve.request import Cuts, Request, Stop, Trajectory, Turns, merge_turns, overdue
 from compressor.solve.run_metrics import metrics, sampled_bars, sampled_metrics, sampled_times
 from compressor.solve.scipy_driver import step_through
-from compressor.solve.series import (
-    compared_times,
-    distances,
-    finer,
-    journal_distance,
-    take_samples,
-)
+from compressor.solve.series import compared_times, distances, finer, journal_distance, take_samples
 from compressor.solve.si_record import initial_state, is_ideal, length_and_speed, record
 
 NODES, WEIGHTS = lobatto(9)

@@ -21,14 +21,7 @@ from compressor.cases import Output
 from compressor.metrics import NUMBERS
 from compressor.outcome import DatasetParts, SeriesFile
 from compressor.store import hdf5
-from compressor.store.files import (
-    HEX20,
-    KEY,
-    StoreError,
-    final_path,
-    publish,
-    system_error,
-)
+from compressor.store.files import HEX20, KEY, StoreError, final_path, publish, system_error
 from compressor.store.hdf5 import REMEDY, DamagedJob, digest, open_file, seal, unseal
 
 if TYPE_CHECKING:

@@ -34,15 +34,7 @@ from compressor.report.figures.job import (
     plot_orbit,
     share_turn,
 )
-from compressor.report.figures.style import (
-    BLUE,
-    BY_CLEARANCE,
-    GOLD,
-    IDEAL,
-    RED,
-    LineStyle,
-    fill,
-)
+from compressor.report.figures.style import BLUE, BY_CLEARANCE, GOLD, IDEAL, RED, LineStyle, fill
 
 Shakings = Mapping[str, Shaking]  # by label of the paper's cases
 

@@ -7,14 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from compressor.vibration import (
-    Record,
-    band_signal,
-    check_record,
-    measure_record,
-    noisy,
-    turns_at,
-)
+from compressor.vibration import Record, band_signal, check_record, measure_record, noisy, turns_at
 
 RECORD = "record"  # the filter's name of a record as it is
 USABLE = 2.56  # sampling rate over the highest frequency that an anti-aliasing filter lets through

@@ -20,13 +20,7 @@ from compressor.store import (
     job_record,
     read_store,
 )
-from compressor.studies.alarms.readings import (
-    RECORD,
-    Band,
-    Readings,
-    default_bands,
-    read_windows,
-)
+from compressor.studies.alarms.readings import RECORD, Band, Readings, default_bands, read_windows
 from compressor.vibration import MIN_REVOLUTIONS, RecordError, find_noise_mistake
 
 SOUND = "none"  # the joint that is worn in a sound machine

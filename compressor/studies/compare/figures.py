@@ -5,16 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from compressor.report import (
-    BLACK,
-    CYCLE,
-    GREY,
-    Drawing,
-    LineStyle,
-    Panel,
-    fill,
-    make_grid,
-)
+from compressor.report import BLACK, CYCLE, GREY, Drawing, LineStyle, Panel, fill, make_grid
 from compressor.studies.compare.comparison import Comparison
 from compressor.studies.compare.likeness import SEGMENTS, SWING, Curves
 

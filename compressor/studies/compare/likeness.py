@@ -9,13 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compressor.vibration import (
-    Record,
-    check_record,
-    resample_angle,
-    segment_levels,
-    turns_at,
-)
+from compressor.vibration import Record, check_record, resample_angle, segment_levels, turns_at
 
 USABLE = 2.56  # sampling rate over the highest usable frequency, as analysers have it
 SEGMENTS = 36

@@ -22,12 +22,7 @@ from compressor.studies.diagnosis.approximate import (
     Strangeness,
 )
 from compressor.studies.diagnosis.features import FEATURES
-from compressor.studies.diagnosis.library import (
-    SIDES,
-    Library,
-    open_library,
-    vector,
-)
+from compressor.studies.diagnosis.library import SIDES, Library, open_library, vector
 from compressor.vibration import Record
 
 MIN_JOBS = 30  # of one joint, for it to be told

@@ -31,13 +31,7 @@ from compressor.report import (
     file_name,
     measures,
 )
-from compressor.store import (
-    Folder,
-    StoredStudy,
-    StoreError,
-    StoreWarning,
-    read_dataset,
-)
+from compressor.store import Folder, StoredStudy, StoreError, StoreWarning, read_dataset
 
 NONE_SEEN = "none seen"  # less than both error bars
 NO_VALUE = "–"

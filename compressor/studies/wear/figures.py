@@ -6,17 +6,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.metrics import JOINTS
-from compressor.report import (
-    BLACK,
-    CYCLE,
-    GREY,
-    Drawing,
-    LineStyle,
-    Note,
-    Panel,
-    fill,
-    make_grid,
-)
+from compressor.report import BLACK, CYCLE, GREY, Drawing, LineStyle, Note, Panel, fill, make_grid
 
 MAX_PROFILES = 5
 
