@@ -74,11 +74,6 @@ def joints_with_clearance(run: xr.Dataset) -> dict[str, float]:
     return found
 
 
-def clearance_of(run: xr.Dataset, joint: str) -> float:
-    """Return the radial clearance (m) of a joint of a run."""
-    return float(record_of(run)["clearance"][JOINTS.index(joint)])
-
-
 def contact_series(run: xr.Dataset, joint: str) -> ContactSeries:
     """Return a joint's samples, up to where the run stopped."""
     # arrays one by one: cutting the whole Dataset takes ten times as long
@@ -95,7 +90,7 @@ def contact_series(run: xr.Dataset, joint: str) -> ContactSeries:
     normal[depth[valid] < 0] = 0.0  # what acts across a gap is a film of oil
     return ContactSeries(
         joint,
-        clearance_of(run, joint),
+        float(record_of(run)["clearance"][JOINTS.index(joint)]),
         run["time"].values[valid],
         run["crank_angle"].values[valid],
         place,

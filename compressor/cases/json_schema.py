@@ -4,7 +4,6 @@ It comes from the table of parameters. What it cannot tell, such as whether valu
 reading the file does (`compressor.cases.load`).
 """
 
-from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -27,7 +26,8 @@ Schema = dict[str, Any]
 
 def case_schema() -> Schema:
     """Return the JSON Schema of a whole case file, in the dialect 2020-12."""
-    found = {key: _group(key) if key in GROUPS else _value(table()[key]) for key in _top_keys()}
+    keys = dict.fromkeys(key.partition(".")[0] for key in table())
+    found = {key: _group(key) if key in GROUPS else _value(table()[key]) for key in keys}
     found |= _sweeps() | {name: _study_group(load()) for name, load in STUDY_GROUPS.items()}
     in_block = {key: item for key, item in found.items() if key not in WHOLE_FILE}
     blocks = {"type": "array", "minItems": 1, "items": _mapping(in_block)}
@@ -35,11 +35,6 @@ def case_schema() -> Schema:
     top = _mapping(found | {"blocks": blocks})
     made = {"made": _forms(), "distribution": _distributions()}
     return {"$schema": DIALECT, "title": "compsim case file", **top, "$defs": made}
-
-
-def _top_keys() -> list[str]:
-    """Return the keys at the top of a case file that are of a case, in its order."""
-    return list(dict.fromkeys(key.partition(".")[0] for key in table()))
 
 
 def _mapping(properties: Schema) -> Schema:
@@ -153,7 +148,7 @@ def _sweeps() -> Schema:
     """Return the schemas of the keys that say how values are swept together."""
     whole = {"type": "integer", "minimum": 1}
     sample = _mapping({"n": whole, "seed": {"type": "integer", "minimum": 0, "maximum": MAX_SEED}})
-    keys = {"enum": [*_sweepable()]}
+    keys = {"enum": [key for key in (*SHORTHANDS, *table()) if key not in outside_identity()]}
     group = {"type": "array", "items": keys, "minItems": 2, "uniqueItems": True}
     texts = {"type": "array", "items": TEXT, "maxItems": MAX_EXCLUSIONS}
     return {
@@ -175,8 +170,3 @@ def _study_group(module: Any) -> Schema:
         default = {} if row.default is None else {"default": row.default}
         keys[name] = {"description": row.phrase, **default, **_single_value(row)}
     return {"description": module.ABOUT, **_mapping(keys), "required": [*module.NEEDED]}
-
-
-def _sweepable() -> Iterable[str]:
-    """Yield the keys that can be swept, shorthands among them."""
-    yield from (key for key in (*SHORTHANDS, *table()) if key not in outside_identity())

@@ -303,7 +303,8 @@ def remarks(case: Case) -> Iterator[Remark]:
     joints = list(contact_scales(case))
     yield from _inertias(case)
     yield from _proportions(case)
-    yield from _beyond_judged(case)
+    for key, text in outside_judged(case.values()).items():
+        yield Remark(key, text, "judged")
     if note := paper_stiffness_note(case):
         yield Remark("contact.stiffness_N_per_mm15", note, "default stiffness")
     for joint in joints:
@@ -342,12 +343,6 @@ def _proportions(case: Case) -> Iterator[Remark]:
             f"{LONGEST_CRANK:g}: the crank radius is half the stroke"
         )
         yield Remark("machine.crank_radius_mm", text, "proportion")
-
-
-def _beyond_judged(case: Case) -> Iterator[Remark]:
-    """Yield the values outside the range that the program was judged on."""
-    for key, text in outside_judged(case.values()).items():
-        yield Remark(key, text, "judged")
 
 
 def _depths(case: Case, joint: JointScales) -> Iterator[Remark]:

@@ -277,9 +277,8 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
             return fail_accuracy(case, now, other.detail or "no run is tighter")
         reference = third or other
         before = tightest(case, now, other, reference)
-        rtol = max(
-            round_rtol(before.rtol / tighten_factor(excess, reference.rtol / now.rtol)), TIGHTEST
-        )
+        tighter = before.rtol / tighten_factor(excess, reference.rtol / now.rtol)
+        rtol = max(float(f"{tighter:.1e}"), TIGHTEST)
 
 
 def tightest(case: Case, now: Solution, *others: Solution) -> Solution:
@@ -339,11 +338,6 @@ def tighten_factor(excess: float, ratio: float) -> float:
     """
     error = excess * max(ratio, 1.0 / ratio) ** -ORDER / closeness(ratio)
     return min(max(ratio_of(ERROR_AIM / error), MIN_TIGHTENING), MAX_TIGHTENING)
-
-
-def round_rtol(rtol: float) -> float:
-    """Return a tolerance rounded to two digits."""
-    return float(f"{rtol:.1e}")
 
 
 def energy_balances(case: Case, solution: Solution) -> bool:

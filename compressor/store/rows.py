@@ -120,25 +120,19 @@ def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
         "digest": [item.digest for item in series],
         "promise": [str(outcome.attributes.get("promise", "")) for outcome in outcomes],
         "regime": [str(outcome.attributes.get("regime", "")) for outcome in outcomes],
-        "signals": ["yes" if has_signals(outcome) else "" for outcome in outcomes],
+        "signals": ["yes" if o.series and o.attributes.get("signals") else "" for o in outcomes],
         "given": [GIVEN for _ in outcomes],
     }
-    columns = {name: _text_column(name, values) for name, values in words.items()}
+    columns = {
+        name: np.array([storable(value).encode() for value in values], COLUMNS[name][0])
+        for name, values in words.items()
+    }
     columns["serial"] = np.full(len(outcomes), serial)
     columns["samples"] = np.array([item.samples for item in series], int)
     columns["end"] = np.array([item.end for item in series], float)
     numbers = np.array([outcome.numbers for outcome in outcomes], ROW)
     texts = pack_lines(_line(outcome.attributes) for outcome in outcomes)
     return Segment(Path(), columns, numbers, texts, pack_lines(_line(o.detail) for o in outcomes))
-
-
-def has_signals(outcome: Outcome) -> bool:
-    """Return whether signals are kept of a job."""
-    return outcome.series is not None and bool(outcome.attributes.get("signals"))
-
-
-def _text_column(name: str, values: Sequence[str]) -> np.ndarray:
-    return np.array([storable(value).encode() for value in values], COLUMNS[name][0])
 
 
 def _line(value: Any) -> bytes:

@@ -506,17 +506,12 @@ def find_value(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]
     axis = find_axis(folder, study, name)
     row = row_of(axis.key)
     text = row.choice_of(text) if row else text
-    for is_same in (_has_words, _is_close, _is_rounded):
+    for is_same in (lambda text, value: text == in_words(value), _is_close, _is_rounded):
         same = [value for value in axis.values if is_same(text, value)]
         if same and (len({*same}) == 1 or is_same is not _is_rounded):
             return axis.key, same[0]
     problem = f"no job of {study.name} has {axis.key}={text}"
     raise WrongName(folder, problem, f"there are {_some(axis.values, text)}")
-
-
-def _has_words(text: str, value: Any) -> bool:
-    """Return whether a text is a value as it is written."""
-    return text == in_words(value)
 
 
 def _is_close(text: str, value: Any) -> bool:

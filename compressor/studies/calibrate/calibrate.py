@@ -15,7 +15,7 @@ from compressor.cases import Case, CaseFileError, Study, design, load_studies, r
 from compressor.program import Progress, no_progress
 from compressor.store import Folder, job_record, read_store
 from compressor.studies.calibrate.fit import Fit, fit_orders
-from compressor.studies.calibrate.orders import LIMIT, CalibrationError, Orders, orders_of
+from compressor.studies.calibrate.orders import LIMIT, CalibrationError, orders_of
 from compressor.sweep import Options, in_this_process, sweep
 from compressor.vibration import Record
 
@@ -211,7 +211,10 @@ def calibrate(
     jobs = FitJobs(path, unknowns, overrides, folder, workers, progress)
     rpm_given = jobs.middle.machine.speed_rpm
     jobs.run_at(60.0 * measured.speed)
-    jobs.highest = comparable_orders(measured, jobs.middle)
+    sensor = jobs.middle.sensor
+    assert sensor is not None
+    corner = sensor.low_pass_Hz or sensor.rate_Hz / LIMIT  # the highest order that both hold
+    jobs.highest = min(len(measured.amplitudes), int(corner / measured.speed))
     measured = measured.up_to(jobs.highest)
     starts = np.array(design("lhs", POINTS_A_KEY * len(unknowns), len(unknowns), SEED))
     fit = fit_orders(jobs, measured.amplitudes, measured.errors, starts)
@@ -225,10 +228,3 @@ def calibrate(
         case, tuple(unknowns), fit, jobs.highest, measured.revolutions, measured.speed, rpm_given,
         len(jobs.points), jobs.run_now, jobs.name,
     )  # fmt: skip
-
-
-def comparable_orders(measured: Orders, case: Case) -> int:
-    """Return the highest order that both the record and the case's sensor hold."""
-    assert case.sensor is not None
-    corner = case.sensor.low_pass_Hz or case.sensor.rate_Hz / LIMIT
-    return min(len(measured.amplitudes), int(corner / measured.speed))

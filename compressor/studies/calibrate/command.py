@@ -88,9 +88,9 @@ def describe(record: str, config: str, found: "Calibration") -> Iterator[str]:
     for place, one in enumerate(found.unknowns):
         low, high = found.interval(place)
         best = one.value(fit.shares[place])
-        yield f"{one.key}: {best:.4g}, 95 % interval {low:.4g} to {high:.4g}" + (
-            "; at an end of its range: widen it" if is_at_end(fit.shares[place]) else ""
-        )
+        is_at_end = min(fit.shares[place], 1.0 - fit.shares[place]) < 1e-3
+        more = "; at an end of its range: widen it" if is_at_end else ""
+        yield f"{one.key}: {best:.4g}, 95 % interval {low:.4g} to {high:.4g}{more}"
     yield (f"the machine explains {fit.explained:.2%} of the mean revolution's mean square; "
            f"noise is {fit.noise:.2g} of it")  # fmt: skip
     if fit.misfit >= POOR_FIT:
@@ -100,11 +100,6 @@ def describe(record: str, config: str, found: "Calibration") -> Iterator[str]:
         keys = " and ".join(found.unknowns[place].key for place in group)
         how = "are not told apart" if len(group) > 1 else "is not told"
         yield f"{keys} {how}: the record narrows their range by less than half"
-
-
-def is_at_end(share: float) -> bool:
-    """Return whether a share of a range is at one of its ends."""
-    return min(share, 1.0 - share) < 1e-3
 
 
 def jsonable(record: str, found: "Calibration") -> dict[str, Any]:

@@ -166,12 +166,6 @@ def _sensor(stored: Stored, key: str) -> str:
     return f"{sensor.place} along {sensor.direction}"
 
 
-def is_shifted(likeness: Likeness) -> bool:
-    """Return whether a record is clearly more alike at another crank angle."""
-    gain = likeness.shifted - likeness.correlation.value
-    return abs(likeness.shift_deg) >= MIN_SHIFT and gain >= MIN_GAIN
-
-
 def find_misfits(record: Turned, jobs: Sequence[Compared], is_file: bool) -> Iterator[str]:
     """Yield a sentence for what does not fit between a record and jobs, the most alike first."""
     best = jobs[0]
@@ -195,7 +189,8 @@ def find_misfits(record: Turned, jobs: Sequence[Compared], is_file: bool) -> Ite
     elif not 1.0 / FAR <= ratio <= FAR:
         yield (f"level: the rms is {ratio:.3g} times the job's: check unit and full scale, then "
                "masses, foundation and the sensor's place")  # fmt: skip
-    if is_shifted(likeness):
+    gain = likeness.shifted - likeness.correlation.value
+    if abs(likeness.shift_deg) >= MIN_SHIFT and gain >= MIN_GAIN:
         yield (
             f"crank angle: most alike ({likeness.shifted:.2f}) where the record comes "
             f"{likeness.shift_deg:+.1f} degrees later: check the tacho (--tacho-deg)"

@@ -51,7 +51,8 @@ def data_card(dataset: "xr.Dataset", parquet: bool) -> str:
         "The model of these jobs, by part:",
         table(("part", "kind, and how many jobs have it"), model_rows(models)),
         "## Windows, noise and split", describe_cuts(dataset),
-        table(("joint", "split", "machines", "windows"), count_rows(dataset)),
+        table(("joint", "split", "machines", "windows"),
+              [(a, b, f"{m:,}", f"{w:,}") for a, b, m, w in counts(dataset)]),
         "## The body and its sensor", groups(fixed),
         "## Labels", labels(dataset),
         "## Features", feature_table(dataset),
@@ -104,7 +105,8 @@ def describe_simulation(dataset: "xr.Dataset", fixed: dict[str, Any]) -> str:
         f"{count:,} {regime_words(name) or 'not told'}" for name, count in regimes.most_common()
     )
     left = json.loads(dataset.attrs["left_out"])
-    lines = [f"- {n:,} {reason}{_meaning(reason)}" for reason, n in left.items()]
+    failed = "failed (`compsim status`)"
+    lines = [f"- {n:,} {reason}: {LEFT_OUT.get(reason, failed)}" for reason, n in left.items()]
     out = "\n".join(["Left out, for these reasons:", "", *lines]) if left else "No job is left out."
     clipped, most = dataset.attrs["clipped_records"], 100 * dataset.attrs["clipped_most"]
     record = f"No record has {100 * Sensor.REPORTED:g} % or more of its samples clipped."
@@ -124,10 +126,6 @@ def describe_simulation(dataset: "xr.Dataset", fixed: dict[str, Any]) -> str:
     ])  # fmt: skip
 
 
-def _meaning(reason: str) -> str:
-    return f": {LEFT_OUT[reason]}" if reason in LEFT_OUT else ": failed (`compsim status`)"
-
-
 def describe_cuts(dataset: "xr.Dataset") -> str:
     """Describe how records were cut, disturbed and split."""
     attrs = dataset.attrs
@@ -145,11 +143,6 @@ def describe_cuts(dataset: "xr.Dataset") -> str:
         f"The split is by machine, {attrs['test_share']:.0%} of those of each joint for testing: "
         "all windows of a machine stand on one side, at whatever load and speed."
     )
-
-
-def count_rows(dataset: "xr.Dataset") -> list[tuple[str, str, str, str]]:
-    """Return the rows of machines and windows by joint and split."""
-    return [(a, b, f"{m:,}", f"{w:,}") for a, b, m, w in counts(dataset)]
 
 
 def counts(dataset: "xr.Dataset") -> list[tuple[str, str, int, int]]:

@@ -8,6 +8,7 @@ same numbers to the bit.
 """
 
 import hashlib
+import itertools
 import json
 import time
 from collections.abc import Sequence
@@ -91,7 +92,7 @@ def run_chain(task: ChainTask) -> ChainEnd | StoreError:
     try:
         rows = read_kept_rows(chain, path)
         if task.rerun:
-            rows = rows[: first_failed(rows)]
+            rows = [*itertools.takewhile(lambda row: row["status"] == "ok", rows)]
         written, stored = time.monotonic(), len(rows)
         for case in chain.cases[len(rows) :]:
             rows.append(run_value(case, last_state(rows), chain.request))
@@ -103,11 +104,6 @@ def run_chain(task: ChainTask) -> ChainEnd | StoreError:
     except StoreError as error:
         return error
     return chain_end(chain, rows)
-
-
-def first_failed(rows: Sequence[Row]) -> int:
-    """Return the number of the first failed row; how many there are where none failed."""
-    return next((n for n, row in enumerate(rows) if row["status"] != "ok"), len(rows))
 
 
 def chain_end(chain: Chain, rows: Sequence[Row]) -> ChainEnd:

@@ -17,7 +17,6 @@ from compressor.report import (
     Drawing,
     LineStyle,
     Panel,
-    Trace,
     box,
     entry,
     make_grid,
@@ -56,11 +55,17 @@ def draw_outcomes(study: xr.Dataset) -> Drawing:
             some = ends == name
             panel.plot(x[some], y[some], LOOKS[name], name.replace("_", " "))
         for scale, parameter in zip((panel.x, panel.y), names, strict=True):
-            scale.log = bool(describe_draw(study, parameter)["logarithmic"])
-            scale.title = axis_label(study, parameter)
+            draw = describe_draw(study, parameter)
+            unit = "times the paper's" if parameter == "damping" else draw["units"]
+            scale.log = bool(draw["logarithmic"])
+            scale.title = parameter.replace("_", " ") + ("" if unit == "1" else f" ({unit})")
             scale.margin = 0.03
         frame(panel, *(describe_draw(study, name) for name in names))
-    figure.legend = [legend_entry(name, int((ends == name).sum())) for name in present]
+    for name in present:
+        size = max(LOOKS[name].markersize, 4.0)
+        look = replace(LOOKS[name], markersize=size, edge_width=1.0)
+        text = f"{name.replace('_', ' ')} ({int((ends == name).sum())})"
+        figure.legend.append(entry(text, look))
     return figure
 
 
@@ -86,21 +91,9 @@ def describe_draw(study: xr.Dataset, name: str) -> Mapping[str, Any]:
     return study["clearance_big_end" if name == "clearance" else name].attrs
 
 
-def axis_label(study: xr.Dataset, name: str) -> str:
-    """Return a parameter's name and unit on an axis."""
-    unit = {"damping": "times the paper's"}.get(name, describe_draw(study, name)["units"])
-    return name.replace("_", " ") + ("" if unit == "1" else f" ({unit})")
-
-
 def frame(panel: Panel, first: Mapping[str, Any], second: Mapping[str, Any]) -> None:
     """Draw a rectangle around the supported range, where a plane has one."""
     if all(list(one["range"]) == list(one["supported_range"]) for one in (first, second)):
         return
     ends = first["supported_range"], second["supported_range"]
     panel.traces.append(box(*ends, LineStyle(BLACK, linewidth=1.0, zorder=3), "line"))
-
-
-def legend_entry(name: str, count: int) -> Trace:
-    """Return the legend's entry of a mark, with its count."""
-    look = replace(LOOKS[name], markersize=max(LOOKS[name].markersize, 4.0), edge_width=1.0)
-    return entry(f"{name.replace('_', ' ')} ({count})", look)

@@ -50,16 +50,11 @@ def draw_wear(stages: xr.Dataset, limit_mm: float, factor: float) -> Drawing:
     return figure
 
 
-def format_hours(hours: float) -> str:
-    """Return operating hours in three digits, without a power of ten."""
-    return f"{float(f'{hours:.3g}'):,.12g}"
-
-
 def plot_profiles(panel: Panel, stages: xr.Dataset) -> None:
     """Draw what is worn off one joint at some of the stages, the later the darker."""
     hours = stages["hours"].values
     shown = np.unique(np.linspace(0, hours.size - 1, MAX_PROFILES + 1).round().astype(int))[1:]
-    names = [format_hours(hours[number]) for number in shown]
+    names = [f"{float(f'{hours[number]:.3g}'):,.12g}" for number in shown]  # no power of ten
     half = stages.sizes["angle"] // 2  # profiles go from -180 to 180 degrees
     angles = (np.degrees(stages["angle"].values) + 180.0) % 360.0 - 180.0
     around = np.append(np.roll(angles, half), angles.max() + angles[1])
