@@ -56,21 +56,3 @@ def test_nothing_is_overwritten(capsys):
         assert "-o OTHER.yaml" in err
     assert Path("wear.yaml").read_text() == "mine"
     assert not Path("absent").exists()
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["waer"], "there is no template 'waer'; did you mean wear or"),
-        (["xyzzy"], "there is no template 'xyzzy'; there are paper, machine, "),
-        (["mine.yaml"], "a template comes first: compsim init wear -o mine.yaml"),
-        (["wear", "-o", "my wear.yaml"], "'my wear.yaml' gives the study no name"),
-        (["wear", "-o", "file/wear.yaml"], "file: is a file, where a folder is needed"),
-    ],
-)
-def test_what_cannot_be_written(words, told, capsys):
-    Path("file").touch()
-    assert cli.main(["init", *words]) == 2
-    out, err = capsys.readouterr()
-    assert told in err
-    assert (out, err.count("\n")) == ("", 1)

@@ -257,18 +257,3 @@ def test_a_run_is_watched_from_its_first_page_to_its_last(case_file, capsys, mon
     assert "refresh" not in page
     assert "Still running" not in page
     assert "2 jobs: 2 ok" in page
-
-
-def test_the_folder_of_the_page_is_tried_first(case_file, capsys):
-    Path("file").touch()
-    assert cli.main(["run", case_file, "-j", "1", "--watch", "--report", "file"]) == 2
-    assert "file: is a file, where a folder is needed; choose another" in capsys.readouterr().err
-    assert not Path("results").exists()
-
-
-def test_chains_are_not_watched(case_file, capsys):
-    Path("chain.yaml").write_text(
-        "joint: both\nregimes: {over: clearance_mm, from: 0.1, to: 0.2, n: 2}\n"
-    )
-    assert cli.main(["run", "chain.yaml", "--watch"]) == 2
-    assert "--watch shows jobs, and regimes have none" in capsys.readouterr().err

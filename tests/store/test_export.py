@@ -186,19 +186,6 @@ def test_a_folder_gets_a_file_each(results, tmp_path, capsys):
     assert len(table(out / "list.csv")) == 2
 
 
-@pytest.mark.parametrize("name", ["k.xlsx", "k.h5", "k.CSV"])
-def test_an_unknown_suffix_is_refused_and_makes_no_folder(results, name, tmp_path, capsys):
-    out = str(tmp_path / name)
-    assert cli.main(["export", "grid", "-i", str(results), "-o", out]) == 2
-    suffix = name.partition(".")[2]
-    problem = (
-        f"no files of the type .{suffix} are written: end the name in .nc or .csv, for a job's"
-    )
-    rest = "record in .wav or .mat or .uff, or, for a folder, in /\n"
-    assert f"compsim: {out}: {problem} {rest}" == capsys.readouterr().err
-    assert not any(tmp_path.iterdir())
-
-
 @pytest.mark.parametrize("name", ["plain", "with.dot/", "is.there"])
 def test_a_folder_is_a_name_without_suffix_with_a_slash_or_of_a_folder(results, name, tmp_path):
     (tmp_path / "is.there").mkdir()

@@ -177,11 +177,3 @@ def test_run_says_how_many_would_gain_and_by_what(wear, monkeypatch, capsys):
     err = capsys.readouterr().err
     assert "3 jobs run in" in err
     assert "--rerun stale" not in err
-
-
-def test_chains_have_no_stale_jobs(wear, capsys):
-    Path("chain.yaml").write_text(
-        "joint: both\nregimes: {over: clearance_mm, from: 0.1, to: 0.2, n: 2}\n"
-    )
-    assert cli.main(["run", "chain.yaml", "--rerun", "stale"]) == 2
-    assert "--rerun stale is for jobs" in capsys.readouterr().err

@@ -9,7 +9,6 @@ from compsim import cli
 
 from compressor.cases.load import load_studies
 from compressor.digits import by_bar
-from compressor.store.files import StoreError
 from compressor.store.status import report_job, standings
 from compressor.sweep.sweep import sweep
 
@@ -81,19 +80,6 @@ def test_show_json_is_json(mix, capsys):
         assert cli.main(["show", key, "--json"]) == 0
         found = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
         assert (found["key"], [*found["studies"]]) == (key, ["mix"])
-
-
-@pytest.mark.parametrize(("beginning", "problem"), [("x", "no job's key"), ("", "4 jobs' keys")])
-def test_a_job_must_be_told_apart(mix, beginning, problem, capsys):
-    with pytest.raises(StoreError, match=problem):
-        report_job("results", beginning)
-    assert cli.main(["show", beginning]) == 2
-    assert problem in capsys.readouterr().err
-
-
-def test_a_folder_without_results_is_an_error(tmp_path, capsys):
-    assert cli.main(["status", "-i", str(tmp_path)]) == 2
-    assert str(tmp_path) in capsys.readouterr().err
 
 
 def test_the_next_run_has_the_same_jobs(tmp_path, monkeypatch, capsys, in_process):

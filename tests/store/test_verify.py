@@ -6,7 +6,6 @@ import pytest
 import xarray as xr
 from compsim import cli
 
-from compressor.store.files import StoreError
 from compressor.store.hdf5 import SEAL, DamagedJob
 from compressor.store.series_file import image_of, read_dataset, write_dataset
 from compressor.store.status import verify
@@ -74,8 +73,3 @@ def test_a_folder_of_worn_machines_alone_is_told(tmp_path, capsys):
     told = capsys.readouterr().err
     assert "only how machines have worn" in told
     assert "compsim wear" in told
-
-
-def test_nothing_followed_and_nothing_stored_is_no_folder_of_results(tmp_path):
-    with pytest.raises(StoreError, match="holds no study"):
-        verify(tmp_path)

@@ -71,17 +71,3 @@ def test_a_search_follows_in_the_ranges_of_what_is_drawn(here, capsys):
 def test_without_files_the_examples_are_taken(here):
     assert cli.main(["claims", "--quiet"]) == 0
     assert here == [("claims", "claims", 1600), ("assumptions", "claims", 640)]
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["map.yaml", "--search", "2"], "--search needs a CONFIG whose keys are drawn"),
-        (["worn.yaml"], "worn.yaml: joint: the paper's cases decide it"),
-        (["map.yaml", "--set", "machine.rod_mas_kg=3"], "did you mean"),
-    ],
-)
-def test_mistakes_are_named(here, capsys, words, message):
-    Path("worn.yaml").write_text("joint: both\nclearance_mm: 0.2\n")
-    assert cli.main(["claims", *words]) == 2
-    assert message in capsys.readouterr().err

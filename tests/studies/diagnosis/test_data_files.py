@@ -189,22 +189,3 @@ def test_the_command(worn, tmp_path, capsys):
     assert f"next: read {place}/README.md" in err
     with xr.open_dataset(place / "windows.nc", engine="h5netcdf") as found:
         assert found["noise"].values.tolist() == [0.0, 0.5]
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["worm"], "did you mean worn?"),
-        (["deaf"], "write `body: true` and `sensor: {length_rev: 11}` into"),
-        (["worn", "--noise", "0,loud"], "'0,loud' is no list such as 0,0.1,1"),
-        (["worn", "--noise", "0,-1"], "noise is an rms"),
-        (["worn", "--revolutions", "1"], "1 is not in the range"),
-        (["worn", "--revolutions", "20"], "windows of: 12 too_short, 2 budget_steps"),
-        (["worn", "--test-share", "1"], "1.0 is not in the range"),
-        ([], "Missing argument 'STUDY'"),
-    ],
-)
-def test_usage_errors(worn, tmp_path, words, told, capsys):
-    call = ["dataset", *words, "-i", str(worn), "-o", str(tmp_path / "faults")]
-    assert cli.main(call) == 2
-    assert told in " ".join(capsys.readouterr().err.split())

@@ -140,21 +140,6 @@ def test_failed_values_end_with_3_and_say_why(in_process, capsys, tmp_path):
     assert (found["reason"] == "budget_steps").all()
 
 
-@pytest.mark.parametrize("verb", ["explain", "tradeoff"])
-def test_other_commands_refuse(place, capsys, verb, tmp_path):
-    assert cli.main([verb, str(place / "wear.yaml")]) == 2
-    assert "wear.yaml:5:1: regimes: only `compsim run`" in capsys.readouterr().err
-
-
-def test_find_and_a_cluster_refuse(place, capsys):
-    path = str(place / "wear.yaml")
-    words = ["find", path, "--over", "machine.speed_rpm=300:400", "--greatest", "rms_acceleration"]
-    assert cli.main(words) == 2
-    assert "regimes: only `compsim run`" in capsys.readouterr().err
-    assert cli.main(["run", path, "--backend", "dask", "--scheduler", "tcp://x:1"]) == 2
-    assert "regimes run in processes here" in capsys.readouterr().err
-
-
 def test_a_study_that_is_not_there_is_told(tmp_path):
     with pytest.raises(StoreError, match="there is no regimes study of this name"):
         open_regimes(tmp_path, "wear")

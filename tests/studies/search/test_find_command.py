@@ -154,47 +154,6 @@ def test_failed_jobs_are_no_answer(folder, capsys):
     assert out.count("the job failed, budget_steps: more than 5 steps") == 3
 
 
-OVER = ["--over", "clearance_mm=0.01:0.3"]
-FIRST = ["--first", "peak_acceleration > 1"]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        ([*OVER, "--first", "peak_accelleration > 1"], "did you mean peak_acceleration"),
-        ([*OVER, "--greatest", "contact_loss_fraction"], "big_end|small_end"),
-        ([*OVER, "--first", "peak_acceleration"], "is no comparison: write METRIC[.JOINT]"),
-        ([*OVER], "give one of --first, --greatest and --least"),
-        ([*OVER, *FIRST, "--least", "peak_acceleration"], "give one of"),
-        (["--over", "clearance_mm=0.3:0.1", *FIRST], "write the lower end first"),
-        (["--over", "clearance_mm", *FIRST], "write KEY=LOW:HIGH"),
-        (["--over", "clearance_mm=0:0.3", "--log", *FIRST], "needs ends above 0"),
-        (["--over", "clearence_mm=0.1:0.3", *FIRST], "unknown key; did you mean clearance_mm?"),
-        (["--over", "load=1:2", *FIRST], "load cannot be searched over"),
-        (["--over", "solve.max_steps=10:20", *FIRST], "solve.max_steps cannot be searched over"),
-        (["--over", "machine.speed_rpm=-5:20", *FIRST], "-5 is outside (0, 100000] rpm"),
-        (["--over", "solve.timeout_s=10:20", *FIRST], "solve.timeout_s changes nothing"),
-        ([*OVER, *FIRST, "--set", "load=[none, spring]"], "makes 2 jobs for one clearance_mm"),
-        ([*OVER, *FIRST, "--set", "joint=knee"], "joint: needs none, big_end, small_end"),
-    ],
-)  # fmt: skip
-def test_bad_questions(arguments, told, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    Path("worn.yaml").write_text(json.dumps(CASE))
-    assert cli.main(["find", "worn.yaml", *arguments]) == 2
-    out, err = capsys.readouterr()
-    assert told in err
-    assert out == ""
-    assert not Path("results").exists()
-
-
-def test_mistakes_of_the_file_keep_their_place(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    Path("worn.yaml").write_text("joint: small_end\nlod: none\n")
-    assert cli.main(["find", "worn.yaml", *OVER, *FIRST]) == 2
-    assert "worn.yaml:2:1: lod: unknown key; did you mean load?" in capsys.readouterr().err
-
-
 def test_later_crossings_are_named_in_the_unit_of_the_limit():
     """Six points without jobs, every second one above the limit."""
     goal = comparison("peak_contact_force.small_end > 1 kN")
