@@ -3,15 +3,13 @@
 import copy
 import json
 import pickle
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from compressor.cases.case import Case
-from compressor.cases.groups import CARD_KEYS, CYLINDER_KEYS, Machine
-from compressor.cases.laws import USUAL
+from compressor.cases.groups import Machine
 from compressor.cases.load import load_cases
 from compressor.cases.parameter import ACCURACY, CaseError, Problem, quote_value, to_si
 from compressor.cases.table import table
@@ -21,7 +19,6 @@ from compressor.solve.simulate import simulate
 
 BIG_END = {"joint": "big_end", "clearance_mm": 0.1}
 EXACT_GAS = {"switching": "exact"}
-DOUBLE = {"action": "double", "rod_diameter_mm": 30}
 
 
 def problems_of(values) -> list[tuple[str, str]]:
@@ -335,110 +332,6 @@ def test_keys_stay_as_they_are_stored(values, key, physics):
     """A key changes only with the model's version: stores hold results under it."""
     case = Case.from_values(values)
     assert (case.key, case.physics_key) == (key, physics)
-
-
-OTHER = {  # valid values beside the defaults, which cannot be scaled
-    "name": "other",
-    "joint": "big_end",
-    "load": "none",
-    "gas.switching": "paper",
-    "gas.back_pressure_MPa": 0.1,
-    "gas.action": "crank_end",
-    "gas.rod_diameter_mm": 40.0,
-    "gas.clearance_percent": 12.0,
-    "gas.crank_clearance_percent": 12.0,
-    "gas.unloaded": "head",
-    "gas.indicator": str(Path(__file__).parent / "card.csv"),
-    "gas.crank_indicator": str(Path(__file__).parent / "card.csv"),
-    "machine.gravity_m_per_s2": 9.81,
-    "machine.rod_centre_mm": 200.0,
-    "machine.rod_inertia_kg_m2": 0.1,
-    "contact.materials": ["steel", "copper"],
-    "contact.geometry": "internal",
-    "contact.law": "hertz",
-    "friction.law": "threlfall",
-    "wear.limit_mm": 0.9,
-    "wear.sectors": 36,
-    "solve.accuracy": "fine",
-    "solve.duration_rev": 5,
-    "solve.duration_s": 0.6,
-    "solve.output_step_deg": 0.6,
-    "solve.output_step_s": 2e-4,
-    "solve.rtol": 1e-9,
-    "solve.method": "BDF",
-    "output.keep": "metrics",
-    "output.precision": "single",
-    "body.freedoms": "y",
-    "body.start": "rest",
-    "sensor.place": "bearing",
-    "sensor.direction": "x",
-    "sensor.low_pass_Hz": 5000.0,
-    "sensor.length_rev": 7,
-    "sensor.seed": 2,
-    "body.band_high_Hz": 500.0,
-    "guide.exponent": 1.4,
-    "machine.small_end_pin_radius_mm": 12.0,
-    "contact.small_end_materials": ["steel", "copper"],
-    "contact.small_end_length_mm": 12.0,
-    "lubricant.small_end_bearing_length_mm": 12.0,
-}
-CLEARANCES = {"big_end": 0.1, "small_end": 0.1}
-OF_PINS = {"length_mm": 20, "modulus_GPa": 110}
-OF_LAWS = {
-    *USUAL,
-    "restitution",
-    *OF_PINS,
-    "small_end_length_mm",
-}  # keys that the default laws do not read
-
-
-def other_value(key):
-    row = table()[key]
-    if key in OTHER:
-        return OTHER[key]
-    if row.kind == "boolean":
-        return not row.default
-    return 0.9 * row.default if row.default else 0.01
-
-
-@pytest.mark.parametrize("key", sorted(table()))
-def test_the_table_says_which_values_make_another_job(key):
-    base = {"joint": "both", "clearance_mm": CLEARANCES}
-    group, _, name = key.rpartition(".")
-    if key in ("contact.geometry", "contact.small_end_materials"):
-        base |= {"contact": {"materials": ["steel", "steel"]}}
-    if key == "joint":
-        base |= {"clearance_mm": 0.1}
-    if group == "gas":
-        base |= {"load": "gas", "gas": DOUBLE if name in CYLINDER_KEYS else EXACT_GAS}
-    if name in CARD_KEYS:
-        action = "single" if name == "indicator" else "crank_end"
-        rod = {} if action == "single" else {"rod_diameter_mm": 30}
-        base |= {"gas": {"action": action, **rod}}
-    if group in ("body", "sensor"):
-        base |= {"body": {"freedoms": "xy_rocking"}, "sensor": True}
-    if key == "sensor.second_threshold_m_per_s2":
-        base |= {"sensor": {"threshold_m_per_s2": 1}}
-    if key == "friction.ideal_joints":
-        base |= BIG_END
-    if group in ("lubricant", "guide", "drive", "rod", "wear"):
-        base |= {group: {"clearance_mm": 0.1} if group == "guide" else True}
-    if key == "sensor.second_threshold_m_per_s2":
-        base |= {"sensor": {"threshold_m_per_s2": 5.0}}
-    if key == "machine.balance_reciprocating":
-        base |= {"machine": {"balance": 1.0}}
-    if key == "guide.restitution":
-        base |= {"contact": {"law": "flores", "restitution": 0.5}}
-    elif name in OF_LAWS:
-        law = {"law": "flores", "restitution": 0.5} if group == "contact" else {"law": "lugre"}
-        law = {"law": "johnson", **OF_PINS} if name.removeprefix("small_end_") in OF_PINS else law
-        base |= {group: law}
-    there = base.get(group, {})
-    there = {} if there is True else there
-    values = {group: there | {name: other_value(key)}} if group else {}
-    other = base | (values or {name: other_value(key)})
-    same = Case.from_values(other).key == Case.from_values(base).key
-    assert same is not table()[key].identity
 
 
 def test_a_case_tells_what_is_stored_of_it():

@@ -273,6 +273,13 @@ def test_a_key_changes_what_is_stored(key):
     assert stored(json.dumps(with_value(where, key, value))) != stored(json.dumps(where))
 
 
+@pytest.mark.parametrize("key", ENTRIES)
+def test_the_table_says_which_values_make_another_job(key):
+    value, where, _ = ENTRIES[key]
+    keys = {Case.from_values(values).key for values in (where, with_value(where, key, value))}
+    assert (len(keys) == 2) is table()[key].identity
+
+
 @pytest.mark.parametrize(
     ("key", "where"), UNREAD, ids=lambda part: part if isinstance(part, str) else ""
 )
