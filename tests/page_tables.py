@@ -1188,13 +1188,6 @@ def oil_words():
     )
 
 
-def with_error(value, error):
-    """A number to three digits, or with its error bar where that is longer."""
-    digits = f"{value:#.3g}".rstrip(".") if error else f"{value:g}"
-    last = 10.0 ** (math.floor(math.log10(abs(value))) - 2) if value else 1.0
-    return f"{digits} ± {error:.1g}" if error > last / 2 else digits
-
-
 def held_by_default():
     return sum(margin >= 0.0 for margin in kept("claims.json")["default"]["margin"])
 

@@ -66,15 +66,6 @@ def test_a_field_is_told_as_it_is_checked():
     assert line in TEXTS["compressor.Machine"].splitlines()
 
 
-def test_links_of_the_page_lead_somewhere():
-    found = re.findall(r"\]\(([^)\s]+)\)", api_page.page())
-    heads = {head.lower() for head in re.findall(r"^#+ (\w+)$", api_page.page(), re.M)}
-    assert [link for link in found if link.startswith("#") and link[1:] not in heads] == []
-    paths = {link.partition("#")[0] for link in found if not link.startswith("#")}
-    assert "../configs/README.md" in paths
-    assert [path for path in paths if not (api_page.PAGE.parent / path).exists()] == []
-
-
 # Examples
 
 

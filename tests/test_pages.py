@@ -20,7 +20,6 @@ from compsim.cli import main as cli_main
 from conftest import jobs_here, without_pictures
 from measure_tradeoff import fingerprint
 
-import compressor
 from compressor.cases.checks import DOUBLES, stands_for
 from compressor.cases.examples import example
 from compressor.cases.json_schema import case_schema
@@ -360,7 +359,3 @@ def test_the_peaks_of_the_page_are_those_of_the_program():
     assert [case.clearance_mm.big_end for case in cases] == [0.1, 0.2, 0.3]
     peaks = [f"{simulate(case)['peak_acceleration'].item():.1f}" for case in cases]
     assert re.findall(r"[\d.]+\d", told[1]) == peaks
-
-
-def test_the_table_of_contents_of_the_package():
-    assert {"load_cases", "simulate", "open_study"} <= set(compressor.__all__)

@@ -4,7 +4,6 @@ import ast
 import os
 import subprocess
 import sys
-import tomllib
 from importlib import import_module
 from pathlib import Path
 
@@ -88,12 +87,6 @@ def test_type_checkers_see_every_name():
 def test_other_names_are_refused():
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
         compressor.simulat  # noqa: B018
-
-
-def test_the_marker_of_types_is_installed():
-    data = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
-    assert data["package-data"]["compressor"] == ["py.typed"]
-    assert (ROOT / "compressor" / "py.typed").read_bytes() == b""
 
 
 @pytest.fixture(scope="module")

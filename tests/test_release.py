@@ -1,5 +1,6 @@
 """Versions: each has one source, the changes name it, and a lock has what CI installs."""
 
+import fnmatch
 import re
 import tomllib
 from pathlib import Path
@@ -43,7 +44,11 @@ def test_the_lock_has_what_is_installed_for_tests_and_site():
 
 
 def test_data_files_that_a_wheel_must_hold():
-    found = {*release.data_files()}
+    """Each matches a pattern of its package in pyproject.toml, from the package's folder on."""
+    found, patterns = {*release.data_files()}, PROJECT["tool"]["setuptools"]["package-data"]
     assert "compressor/py.typed" in found
     assert "compressor/cases/examples/paper.yaml" in found
     assert {Path(name).parts[-3] for name in found if "templates" in name} >= {"report", "claims"}
+    installed = [f"{of.replace('.', '/')}/{name}" for of in patterns for name in patterns[of]]
+    beside = [name for name in found if not name.endswith(".py")]
+    assert [n for n in beside if not any(fnmatch.fnmatch(n, one) for one in installed)] == []

@@ -17,13 +17,18 @@ from compressor.solve.simulate import simulate
 DRAFT = {"accuracy": "draft", "duration_rev": 2.5, "error_bars": False}
 
 
-@pytest.mark.parametrize("joint", ["none", "big_end", "small_end", "both"])
-def test_forces_are_the_signals_of_the_run(joint):
+@pytest.mark.parametrize(
+    ("joint", "weight", "more"),
+    [("none", 0, {}), ("big_end", 900, {}), ("small_end", 0, {}), ("both", 0, {}),
+     ("big_end", 900, {"guide": True})],
+)  # fmt: skip
+def test_forces_are_the_signals_of_the_run(joint, weight, more):
+    """Those of the series alone: what is stored is taken as it is."""
     clearance = {} if joint == "none" else {"clearance_mm": 0.2}
-    machine = {"gravity_m_per_s2": 9.81}
-    case = {"joint": joint, **clearance, "machine": machine, "output": {"signals": True}}
+    machine = {"gravity_m_per_s2": 9.81, "counterweight_kg_mm": weight}
+    case = {"joint": joint, **clearance, **more, "machine": machine, "output": {"signals": True}}
     run = simulate(Case.from_values({**case, "solve": DRAFT}))
-    found = frame_forces(run)
+    found = frame_forces(run.drop_vars([*SIGNALS]))
     assert found.keys() == SIGNALS.keys()
     for name, values in found.items():
         size = np.abs(run[name].values).max()

@@ -363,12 +363,6 @@ def accelerations(scene, q, qd, t, phase, params, backend="mpmath"):
         return list(_evaluate(scene, q, qd, t, phase, params, backend)[0])
 
 
-def applied_actions(scene, q, qd, t, phase, params, backend="mpmath"):
-    """(piston force, big fx, fy, moment, small fx, fy, moment): contact's share, on the rod."""
-    with mpmath.workdps(DIGITS):
-        return list(_evaluate(scene, q, qd, t, phase, params, backend)[1])
-
-
 def joint_forces(scene, q, qd, t, phase, params, backend="mpmath"):
     """{joint: (fx, fy)} [N] on the rod: contact, or the constraint of an ideal joint."""
     with mpmath.workdps(DIGITS):

@@ -1,8 +1,6 @@
 """The examples that are installed with the program."""
 
-import fnmatch
 import re
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -76,15 +74,6 @@ def test_the_list_has_all_of_them():
     page = (FOLDER / "README.md").read_text(encoding="utf-8")
     assert NAMES
     assert [name for name in NAMES if f"| `{name}.yaml` |" not in page] == []
-
-
-def test_they_are_installed():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    tools = project["tool"]["setuptools"]
-    assert "compressor.cases.examples" in tools["packages"]
-    patterns = tools["package-data"]["compressor.cases.examples"]
-    files = [path.name for path in FOLDER.iterdir() if path.suffix in (".yaml", ".md")]
-    assert not [f for f in files if not any(fnmatch.fnmatch(f, p) for p in patterns)]
 
 
 def test_the_consistent_machine_has_the_paper_s_faults():

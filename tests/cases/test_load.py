@@ -272,10 +272,6 @@ def test_mistakes_of_all_files_are_told_at_once(write):
         ("load: []\n", "1:7: load: is an empty list"),
         ("load: [none, [none]]\n", "1:14: load: needs spring, gas or none, not ['none']"),
         ("name: [a, b]\n", "1:7: name: cannot be swept: it does not change what a job computes"),
-        ("machine: 5\n", "1:10: machine: needs a mapping of keys, such as "
-         "{crank_radius_mm: 120}, not 5"),
-        ("friction: true\n", "1:11: friction: needs false or a mapping of keys, such as "
-         "{static: 0.23}, not true"),
         ("friction: [false]\n", "1:11: friction: needs false or a mapping of keys, such as "
          "{static: 0.23}, not [False]"),
         ("contact: {materials: steel}\n", "1:22: contact.materials: needs a pair of materials, "
@@ -300,9 +296,7 @@ def test_one_mistake_is_one_message(write, text, expected):
 @pytest.mark.parametrize(
     ("text", "hint"),
     [
-        ("laod: none", "; did you mean load?"),
         ("clearance: 1", "; did you mean clearance_mm?"),
-        ("machine: {rod_mass: 1}", "; did you mean machine.rod_mass_kg?"),
         ("machine: {rod_mass_g: 1}", "; did you mean machine.rod_mass_kg?"),
         ("machine: {speed_hz: 1}", "; did you mean machine.speed_rpm?"),
         ("contact: {stiffness: 1}", "; did you mean contact.stiffness_N_per_mm15?"),
@@ -313,13 +307,7 @@ def test_one_mistake_is_one_message(write, text, expected):
         ("exponent: 1", "; did you mean gas.exponent or contact.exponent or guide.exponent?"),
         ("solve.accuracy: fine", "; write accuracy inside solve"),
         ("machine: {speed_rpm:500: 1}", "; put a space after the colon"),
-        ("qqq: 1", f"; a case file has {', '.join(known_keys(''))}"),
         ("JOINT: both", "; did you mean joint?"),
-        ("rpm: 700", "; did you mean machine.speed_rpm?"),
-        (
-            "machine: {mass: 1}",
-            "; did you mean machine.rod_mass_kg or machine.reciprocating_mass_kg?",
-        ),
         ("body: {qqq: 1}", f"; body has {', '.join(known_keys('body'))}"),
     ],
 )
@@ -491,15 +479,6 @@ def test_a_hostile_file_name_cannot_either(write):
 def test_long_keys_and_values_are_cut(write):
     found = mistakes(write(f"{'k' * 500}: 1\nload: {'v' * 500}\n"))
     assert all(len(line) < 350 for line in found)
-
-
-@pytest.mark.parametrize(
-    ("path", "message"),
-    [(".", "Is a directory"), ("nul\0", "embedded null byte"), ("/dev/zero", "larger than 1 MiB")],
-)
-def test_what_is_no_file_is_a_located_problem(path, message):
-    (found,) = mistakes(path)
-    assert message in found
 
 
 WORDS = "joint load none both clearance_mm machine rod_mass_kg friction false contact materials"

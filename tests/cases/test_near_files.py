@@ -38,6 +38,7 @@ def place(tmp_path, monkeypatch):
         ("job.nc", "is a file of results (netCDF or HDF5); a case file is YAML text"),
         ("photo.jpg", "is not UTF-8 text"),
         ("a\0b", "embedded null byte"),
+        ("/dev/zero", "larger than 1 MiB"),
     ],
 )
 def test_what_is_said_of_a_path(path, told, place):

@@ -1,12 +1,10 @@
 """The page's templates: they escape every text, lack nothing, and are where all markup stands."""
 
 import ast
-import fnmatch
 import html
 import html.parser
 import json
 import re
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -202,14 +200,6 @@ def test_a_verdict_has_its_class():
 def test_a_template_that_lacks_a_value_is_an_error():
     with pytest.raises(UndefinedError, match="title"):
         document([Section("a", "A", "study.html", object())])
-
-
-def test_templates_are_installed_with_their_package():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    patterns = project["tool"]["setuptools"]["package-data"][page.__name__.rpartition(".")[0]]
-    files = [f"templates/{path.name}" for path in (HOME / "templates").iterdir()]
-    assert len(files) == len(PackageLoader("compressor.report").list_templates())
-    assert not [f for f in files if not any(fnmatch.fnmatch(f, p) for p in patterns)]
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)

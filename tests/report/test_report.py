@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import CONFIGS, keep, part_of, store
+from conftest import keep, part_of, store
 
 from compressor.analysis.runs import paper_cases
 from compressor.analysis.shaking import last_revolution
@@ -521,16 +521,6 @@ def test_progress_goes_to_stderr(own, tmp_path, capfd):
     assert ranking == "drawing own: what explains the spread of each metric"
 
 
-@pytest.mark.parametrize("made", [False, True])
-def test_no_results_is_an_error_with_a_remedy(tmp_path, made):
-    folder = tmp_path / "results"
-    if made:
-        folder.mkdir()
-    with pytest.raises(StoreError, match="compsim run"):
-        write_report(folder, tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_report_that_cannot_be_written_is_an_error(own, tmp_path):
     (tmp_path / "out").write_text("a file")
     with pytest.raises(StoreError, match="out"):
@@ -548,11 +538,6 @@ def test_a_report_that_cannot_be_written_is_an_error(own, tmp_path):
 )  # fmt: skip
 def test_numbers(value, shown):
     assert page.number(value) == shown
-
-
-def test_configs_are_the_papers_cases():
-    ours = {case.physics_key for case in load_cases(*CONFIGS)}
-    assert ours == {case.physics_key for case in paper_cases().values()}
 
 
 def test_printed_numbers_stand_beside_what_follows(full):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import keep, store
+from conftest import part_of, store
 from test_report import forget, read
 
 from compressor.analysis.captions import caption
@@ -53,9 +53,6 @@ def add(folder, name, solve=SHORT, **values):
 def sets(folder):
     stored, studies = read_store(folder), read_studies(folder)
     return paper_sections.second_sets(stored, studies, find_paper_runs(stored, studies))
-
-
-EMPTY = Drawing([], 1.0)
 
 
 @pytest.fixture(scope="module")
@@ -176,17 +173,6 @@ def test_runs_on_other_grids_cannot_be_drawn_together(heavy_store):
 # ---- runs without clearance -------------------------------------------------------------------
 
 
-def with_paper(paper_store, folder, *names):
-    """Add some of the paper's studies to a store."""
-    (folder / "studies").mkdir(parents=True, exist_ok=True)
-    stored = read_store(paper_store)
-    for study in read_studies(paper_store):
-        if study.name in names:
-            shutil.copy(paper_store / "studies" / f"{study.name}.json", folder / "studies")
-            keep(folder, *map(stored.job, study.keys))
-    return folder
-
-
 LENT = PaperRuns({}, {load: xr.Dataset() for load in ("design", "typical")}, {})
 
 
@@ -209,7 +195,7 @@ def test_the_default_machine_lends_the_same_motion_and_no_other(values, drawn, j
 
 
 def test_the_study_s_own_ideal_run_goes_first(paper_store, heavy):
-    with_paper(paper_store, heavy, "design", "typical")
+    part_of(paper_store, heavy, "design", "typical")
     found = sets(heavy)["heavy"]
     assert mass(found.drawn["design"]) == 3
     assert "typical" in found.judged
@@ -264,7 +250,7 @@ def test_a_second_set_has_its_section(heavy, tmp_path, undrawn):
 
 
 def test_each_figure_has_a_link_to_its_counterpart(paper_store, heavy, tmp_path, undrawn):
-    with_paper(paper_store, heavy, "design", "big-end")
+    part_of(paper_store, heavy, "design", "big-end")
     write_report(heavy, tmp_path / "out")
     found = read(tmp_path / "out")
     assert found.links.count("#figure-09") == 2  # from the head of the first set, too

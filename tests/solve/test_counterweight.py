@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 
-from compressor.analysis.shaking import frame_forces
 from compressor.cases.case import Case, CaseError, with_ideal_joints
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
@@ -83,15 +82,6 @@ def test_the_body_shakes_less():
         lines.append(abs(orders(one, "x", "body_velocity")[1]) ** 2 / 2)
     assert squares[1] < 0.7 * squares[0]
     assert squares[0] - squares[1] == pytest.approx(lines[0] - lines[1], rel=1e-6)
-
-
-@pytest.mark.parametrize("features", [{}, {"guide": True}])
-def test_series_give_the_forces_that_signals_store(features):
-    stored = run(900.0, **WORN, **features, machine={"gravity_m_per_s2": 9.81})
-    bare = stored.drop_vars([*frame_forces(stored)])
-    for name, values in frame_forces(bare).items():
-        size = np.abs(stored[name].values).max()
-        np.testing.assert_allclose(values, stored[name].values, rtol=0, atol=1e-9 * size)
 
 
 def test_a_drive_s_unbalance_and_the_counterweight_are_one_number():

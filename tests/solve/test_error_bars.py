@@ -286,11 +286,6 @@ def test_a_long_ideal_run_is_cut_by_revolutions():
     assert long["peak_contact_force"] == pytest.approx(short["peak_contact_force"], rel=1e-4)
 
 
-def test_bars_are_no_part_of_a_job_s_identity():
-    keys = {Case.from_values({**BOTH, "solve": {"error_bars": bars}}).key for bars in (True, False)}
-    assert len(keys) == 1
-
-
 def test_a_stored_job_without_bars_does_not_serve_a_case_that_wants_them(tmp_path):
     solve = SHORT | {"duration_rev": 0.25, "settle_rev": 0}
     plain, barred, by_number = (

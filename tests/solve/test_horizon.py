@@ -8,7 +8,6 @@ import sys
 
 import numpy as np
 import pytest
-from compsim import cli
 from conftest import CHAOTIC, keep
 
 from compressor.cases.case import Case
@@ -188,31 +187,6 @@ def test_a_horizon_is_kept_and_asked_for_beside_a_job_s_identity(tmp_path):
     assert stored.satisfies(asked)
     assert stored.satisfies(plain)
     assert 0 < stored.numbers["predictability_horizon"] < asked.duration
-
-
-def test_show_and_report_tell_of_chaos(tmp_path, capsys, monkeypatch, in_process):
-    monkeypatch.chdir(tmp_path)
-    # The third revolution: beyond what double precision follows, so on no processor foretold
-    third = BRIEF | {"duration_rev": 3.2, "settle_rev": 2.2}
-    both = {**CHAOTIC, "contact": {"damping_N_s_per_mm": [0, 336]}, "solve": third}
-    (tmp_path / "ring.yaml").write_text(json.dumps({**both, "output": {"keep": "metrics"}}))
-    assert cli.main(["run", "ring.yaml", "-j", "1"]) == 0
-    keys = json.loads((tmp_path / "results/studies/ring.json").read_text())["keys"]
-    told = []
-    for key in keys:
-        capsys.readouterr()
-        assert cli.main(["show", key]) == 0
-        told.append(capsys.readouterr().out)
-    assert "unknown" in told[0]
-    assert "the motion is chaotic" in told[0]
-    assert "unknown" not in told[1]
-    assert "the motion is chaotic" not in told[1]
-    assert cli.main(["status"]) == 0
-    assert "1 chaotic" in capsys.readouterr().out
-    assert cli.main(["report"]) == 0
-    page = (tmp_path / "report/index.html").read_text()
-    assert "1 of the jobs are chaotic" in page
-    assert 'class="chaotic"' in page
 
 
 def test_twins_go_by_the_march_that_is_compiled_already():

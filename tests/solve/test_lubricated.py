@@ -57,11 +57,3 @@ def test_without_viscosity_the_joint_is_dry():
         far.append(np.linalg.norm(found - dry) / np.linalg.norm(dry))
     assert far[0] / far[1] == pytest.approx(10.0, rel=0.3)
     assert far[1] < 5e-3
-
-
-def test_a_dry_case_has_no_film():
-    dry = Case.from_values({"joint": "big_end", "clearance_mm": 0.05})
-    assert "lubricant" not in dry.values()
-    assert dry.is_plain
-    oiled = Case.from_values({"joint": "big_end", "clearance_mm": 0.05, "lubricant": True})
-    assert oiled.key != dry.key

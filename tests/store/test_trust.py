@@ -13,6 +13,7 @@ from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.metrics import METRICS, NUMBERS, QUANTILES
 from compressor.outcome import REGIME_WORDS, Regime
+from compressor.report import write_report
 from compressor.solve.simulate import measure, simulate
 from compressor.store.export import export
 from compressor.store.hdf5 import DamagedJob
@@ -139,6 +140,12 @@ def test_status_counts_by_promise_and_by_regime(ring, capsys):
     assert "of those ok: 1 without a promise, 1 kept what accuracy promises of those ok" in out
     for regime in ("chaotic", "periodic"):
         assert f"of those ok: 1 {regime} ({REGIME_WORDS[Regime(regime)]})" in out
+
+
+def test_the_report_counts_and_marks_what_is_chaotic(ring, tmp_path):
+    page = write_report(ring, tmp_path).read_text()
+    assert "1 of the jobs are chaotic" in page
+    assert 'class="chaotic"' in page
 
 
 def test_a_table_for_others_has_all_digits(ring, tmp_path):

@@ -430,18 +430,10 @@ def test_without_distributed_the_extra_is_named(monkeypatch):
 # ---- the command line ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["--backend", "dask"], "needs --scheduler ADDRESS, such as tcp://host:8786"),
-        (["--backend", "dask", "--scheduler", "tcp://a:1", "-j", "2"], "-j counts processes here"),
-        (["--scheduler", "tcp://a:1"], "--scheduler goes with --backend dask"),
-        (["--backend", "dask", "--scheduler", "tcp://127.0.0.1:1"], "no scheduler answers"),
-    ],
-)
-def test_options_of_the_cluster(options, message, studies, tmp_path, capsys, impatient):
+def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, impatient):
+    options = ["--backend", "dask", "--scheduler", "tcp://127.0.0.1:1"]
     assert main(["run", studies[0].path, "-o", str(tmp_path / "out"), *options]) == 2
-    assert message in capsys.readouterr().err
+    assert "no scheduler answers" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 

@@ -135,13 +135,6 @@ def test_damage_is_mended_by_the_same_run(kind, damage, studies, tmp_path, in_pr
     assert any(str(victims[0]) in remark for remark in told) == (kind == "rows")
 
 
-def test_failed_jobs_run_again_on_request(studies, tmp_path, in_process):
-    made = studies(budget={**BOTH, "solve": {"max_steps": [5, 10**6]}})
-    sweep(made, tmp_path / "out", 1)
-    again = sweep(made, tmp_path / "out", 1, options=Options(rerun_failed=True))
-    assert (again.done_before, again.run_now, len(again.failed)) == (1, 1, 1)
-
-
 def test_shards_are_one_study_together(studies, tmp_path, in_process):
     axes = {"load": ["none", "spring"], "machine": {"rod_mass_kg": [3, 4, 5, 6]}}
     made = studies(one=axes, same={"load": "none"})

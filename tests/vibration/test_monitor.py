@@ -5,19 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from compressor.vibration.body import oscillate
-from compressor.vibration.envelope import crest_factor, kurtosis, rms
+from compressor.vibration.envelope import rms
 from compressor.vibration.monitor import band_signal, count_peaks
 from compressor.vibration.segments import segment_levels
 
 
 def test_of_a_sine():
-    """Amplitude A: rms A / sqrt 2, crest factor sqrt 2, kurtosis 3/2; two peaks a turn."""
+    """Amplitude A: two peaks a turn, and levels of its segments in closed form."""
     turns = np.arange(36000) / 3600
     wave = 7.0 * np.sin(2 * math.pi * turns)
-    assert rms(wave) == pytest.approx(7 / math.sqrt(2), rel=1e-12)
-    assert crest_factor(wave) == pytest.approx(math.sqrt(2), rel=1e-6)
-    assert kurtosis(wave) == pytest.approx(1.5, rel=1e-9)
     assert count_peaks(wave, 3.5) == 20
     assert count_peaks(wave, 7.1) == 0
     peak, root = segment_levels(360.0 * turns, wave)
@@ -69,14 +65,3 @@ def test_a_band_holds_its_lines_alone():
     ):
         found = rms(band_signal(values + 100.0 * (low > 0), 4000.0, low, high))
         assert found == pytest.approx(math.sqrt(square / 2), abs=1e-9)
-
-
-def test_the_velocity_of_an_oscillator_under_a_harmonic_force():
-    """f cos wt a unit of mass: velocity amplitude f w / |w0^2 - w^2 + 2 i zeta w w0|."""
-    step, cycles, f, w0, zeta = 1e-4, 10, 3.0, 2 * math.pi * 20.0, 0.03
-    w = 2 * math.pi * 12.5
-    force = f * np.cos(w * step * np.arange(round(cycles / 12.5 / step) + 1))
-    velocity = oscillate(force, step, 20.0, zeta, steady=True).velocity[:-1]
-    expected = f * w / abs(w0**2 - w**2 + 2j * zeta * w * w0) / math.sqrt(2)
-    assert rms(band_signal(velocity, 1 / step, 2, 1000)) == pytest.approx(expected, rel=1e-9)
-    assert rms(band_signal(velocity, 1 / step, 13, 1000)) < 1e-9 * expected

@@ -166,7 +166,6 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path):
 
 
 COLUMNS = record_columns(TIMES, VALUES, PULSES)
-HEADER = "time_s,acceleration_m_per_s2"  # without tacho
 STEADY = {"rpm": 60 / TURN, "tdc": PULSES[2]}
 
 
