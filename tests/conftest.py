@@ -20,7 +20,7 @@ import pytest
 
 from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
-from compressor.cases.load import load_studies
+from compressor.cases.load import CaseFileError, load_studies
 from compressor.metrics import NUMBERS
 from compressor.outcome import ROW, Outcome
 from compressor.solve.simulate import simulate
@@ -141,6 +141,26 @@ def ncdump():
             ["ncdump", *map(str, words)], capture_output=True, text=True, check=True
         ).stdout
     )
+
+
+@pytest.fixture
+def read(tmp_path, monkeypatch):
+    """Read the text of a case file, whose name in messages is case.yaml, as a study."""
+    monkeypatch.chdir(tmp_path)
+
+    def read(text, *overrides, **more):
+        (tmp_path / "case.yaml").write_text(text, encoding="utf-8")
+        (study,) = load_studies("case.yaml", **{"overrides": overrides, **more})
+        return study
+
+    return read
+
+
+def refused(read, text, *overrides, **more):
+    """What is said of the text of a case file that cannot be read, a line each."""
+    with pytest.raises(CaseFileError) as caught:
+        read(text, *overrides, **more)
+    return str(caught.value).split("\n")
 
 
 def write_named(place, dataset, output):
@@ -292,6 +312,15 @@ def store_worn(folder):
 def worn_store(once):
     """A results folder with the study `worn`, which `identify` can read."""
     return once("struck", store_worn)
+
+
+def assert_same_bits(one, other):
+    """Assert that two Datasets are equal, floats to the bit."""
+    assert one.identical(other)
+    for name in one.variables:
+        a, b = one[name].values, other[name].values
+        assert a.dtype == b.dtype, name
+        assert a.dtype.kind != "f" or a.tobytes() == b.tobytes(), name
 
 
 @contextlib.contextmanager

@@ -3,12 +3,10 @@
 import html
 from dataclasses import replace
 
-import pytest
 from compsim import cli
+from conftest import refused
 
-from compressor.cases import Solve
 from compressor.cases.case import Case
-from compressor.cases.load import CaseFileError, load_cases
 from compressor.cases.materials import contact_stiffness, paper_stiffness_note
 
 # single throw, stroke 180 mm, rod 450 mm, 740 rpm, bore 220 mm, 2 to 7 bar
@@ -30,34 +28,17 @@ gas:
 """
 
 
-@pytest.fixture
-def read(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-    def read(text):
-        (tmp_path / "nl.yaml").write_text(text)
-        return load_cases("nl.yaml")
-
-    return read
-
-
-def refused(read, text):
-    with pytest.raises(CaseFileError) as caught:
-        read(text)
-    return [str(problem) for problem in caught.value.problems]
-
-
 def test_its_gas_without_the_load_is_refused_with_the_remedy(read):
     assert refused(read, MACHINE) == [
-        "nl.yaml:11:1: gas: nothing reads this group: it needs load: gas; set that, or leave "
+        "case.yaml:11:1: gas: nothing reads this group: it needs load: gas; set that, or leave "
         "the group out"
     ]
 
 
 def test_with_the_load_it_is_the_machine_that_was_meant(read):
-    (case,) = read("load: gas" + MACHINE)
+    (case,) = read("load: gas" + MACHINE).cases
     assert case == Case.from_values({
-        "name": "nl", "load": "gas", "joint": "small_end", "clearance_mm": 0.2,
+        "name": "case", "load": "gas", "joint": "small_end", "clearance_mm": 0.2,
         "machine": {"crank_radius_mm": 90, "rod_length_mm": 450, "speed_rpm": 740,
                     "reciprocating_mass_kg": 85, "rod_mass_kg": 62, "pin_radius_mm": 60,
                     "small_end_pin_radius_mm": 35},
@@ -70,14 +51,14 @@ def test_other_units_of_it_are_answered_with_the_numbers(read):
     text = MACHINE.replace("suction_MPa: 0.2", "suction_bar: 2").replace("_mm: 0.2", "_um: 200")
     text = text.replace("discharge_MPa: 0.7", "discharge_bar: 7")
     assert refused(read, "load: gas" + text) == [
-        "nl.yaml:3:1: clearance_um: unknown key; write clearance_mm: 0.2",
-        "nl.yaml:13:3: gas.suction_bar: unknown key; write suction_MPa: 0.2",
-        "nl.yaml:14:3: gas.discharge_bar: unknown key; write discharge_MPa: 0.7",
+        "case.yaml:3:1: clearance_um: unknown key; write clearance_mm: 0.2",
+        "case.yaml:13:3: gas.suction_bar: unknown key; write suction_MPa: 0.2",
+        "case.yaml:14:3: gas.discharge_bar: unknown key; write discharge_MPa: 0.7",
     ]
 
 
 def test_its_contact_is_told_to_be_of_another_pin(read):
-    (case,) = read("load: gas" + MACHINE)
+    (case,) = read("load: gas" + MACHINE).cases
     note = paper_stiffness_note(case)
     inside = contact_stiffness("steel", "steel", 0.035, 0.0352, internal=True) / 1000**1.5
     assert note.startswith("336000 N/mm^1.5 is the paper's, of a pin of 10 mm radius; of steel on")
@@ -88,7 +69,7 @@ def test_its_contact_is_told_to_be_of_another_pin(read):
 
 
 def test_its_page_and_its_status_tell_that_too(read, tmp_path, capsys, in_process):
-    case = replace(read("load: gas" + MACHINE)[0], solve=Solve(duration_rev=2, accuracy="draft"))
+    (case,) = read("load: gas" + MACHINE).cases
     (tmp_path / "nl.yaml").write_text("load: gas" + MACHINE + "solve: {duration_rev: 2}\n")
     for words in (["run", "nl.yaml", "-j", "1"], ["report"], ["status"]):
         assert cli.main(words) == 0

@@ -3,30 +3,13 @@
 from dataclasses import replace
 
 import pytest
+from conftest import refused
 
 from compressor.cases.case import Case
 from compressor.cases.checks import DOUBLES, probable_keys
-from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.parameter import CaseError
 from compressor.cases.study import Axis
 from compressor.cases.table import GROUPS, table
-
-
-@pytest.fixture
-def read(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-    def read(text, *overrides):
-        (tmp_path / "case.yaml").write_text(text)
-        return load_studies("case.yaml", overrides=overrides)[0]
-
-    return read
-
-
-def refused(read, text, *overrides):
-    with pytest.raises(CaseFileError) as caught:
-        read(text, *overrides)
-    return [str(problem) for problem in caught.value.problems]
 
 
 @pytest.mark.parametrize("word", DOUBLES)

@@ -1,17 +1,14 @@
 """A store read by several threads at once: each gets its own job's numbers, to the bit."""
 
-import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from test_reader import fill, study
 
-from compressor.report import write_report
-from compressor.report.figures import pictures
 from compressor.store.export import ExportOptions, export
 from compressor.store.hdf5 import image, open_file
-from compressor.store.reader import open_study, read_job
+from compressor.store.reader import open_study
 from compressor.store.series_file import read_bytes, read_values
 
 TIMES = 5  # each that three threads read three jobs: images of one name clash at once
@@ -49,18 +46,6 @@ def test_dask_threads_read_the_series_of_their_own_jobs(folder, alone):
         np.testing.assert_array_equal(chunked.compute(scheduler="threads"), alone)
 
 
-def test_threads_read_their_own_jobs(folder):
-    keys = open_study(folder, "small").key.values
-    expected = [read_job(folder, key) for key in keys]
-
-    def wrong(number):
-        runs = (read_job(folder, keys[number]) for _ in range(TIMES))
-        return sum(not run.identical(expected[number]) for run in runs)
-
-    with ThreadPoolExecutor(3) as pool:
-        assert [*pool.map(wrong, range(3))] == [0, 0, 0]
-
-
 def test_an_image_opened_within_another_is_its_own(folder, alone):
     paths = sorted(folder.glob("jobs/*.h5"))
     apart = [read_values(path, ["acceleration"])["acceleration"] for path in paths]
@@ -87,28 +72,3 @@ def test_threads_export_the_same_as_one(folder, tmp_path):
     with ThreadPoolExecutor(3) as pool:
         assert all(found == expected for found in pool.map(written, "abc"))
     assert len(expected) == 7
-
-
-def test_a_report_is_the_same_while_threads_read(folder, tmp_path, monkeypatch):
-    monkeypatch.setattr(pictures, "render_kinds", lambda drawing, kinds: [bytes(24)] * 2)
-
-    def curves(name):
-        write_report(folder, tmp_path / name)
-        return {path.name: path.read_bytes() for path in (tmp_path / name).rglob("*.csv")}
-
-    expected, ended = curves("alone"), threading.Event()
-
-    def read_on():
-        while not ended.is_set():
-            open_study(folder, "small").acceleration.load()
-
-    with ThreadPoolExecutor(2) as pool:
-        readers = [pool.submit(read_on) for _ in range(2)]
-        try:
-            found = curves("beside")
-        finally:
-            ended.set()
-        for reader in readers:
-            reader.result()
-    assert found == expected
-    assert found

@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from conftest import assert_same_bits
 
 from compressor.cases.load import load_studies
 from compressor.store.files import StoreError
@@ -45,19 +46,6 @@ def whole(study, tmp_path_factory):
     chain = chains_of(study, 0)[1]
     assert run_chain(ChainTask(str(folder), chain)).values == 6
     return chain, chain.path(folder)
-
-
-def same(one, other):
-    """Whether two datasets are equal to the bit."""
-    assert one.attrs == other.attrs
-    assert {*one.variables} == {*other.variables}
-    for name in one.variables:
-        a, b = one[name].values, other[name].values
-        assert a.dtype == b.dtype
-        if a.dtype.kind == "f":
-            a, b = a.view("i8"), b.view("i8")
-        np.testing.assert_array_equal(a, b, str(name))
-    return True
 
 
 def test_a_chain_has_its_values_in_the_order_of_running(whole):
@@ -100,7 +88,7 @@ def test_a_killed_chain_goes_on_and_ends_in_the_same_bits(whole, tmp_path, monke
             break
     assert process.exitcode == 0
     assert len({*stops}) > 2
-    assert same(read_chain(chain.path(tmp_path)), read_chain(path))
+    assert_same_bits(read_chain(chain.path(tmp_path)), read_chain(path))
 
 
 def test_each_value_begins_where_the_last_one_ended(whole, monkeypatch, tmp_path):
@@ -118,7 +106,7 @@ def test_each_value_begins_where_the_last_one_ended(whole, monkeypatch, tmp_path
     assert begun[0][1] is None
     for (_, state), row in zip(begun[1:], rows, strict=False):
         np.testing.assert_array_equal(state, row["end_state"])
-    assert same(read_chain(chain.path(tmp_path)), read_chain(path))
+    assert_same_bits(read_chain(chain.path(tmp_path)), read_chain(path))
 
 
 def test_a_chain_goes_on_past_a_failed_value_and_is_run_again_from_there(

@@ -9,7 +9,7 @@ import jsonschema
 import pytest
 
 from compressor.cases import case_schema
-from compressor.cases.load import CaseFileError, load_studies
+from compressor.cases.load import CaseFileError
 from compressor.studies.regimes.group import FOLLOWED, NEEDED, ROWS
 
 REGIMES = "regimes: {over: clearance_mm, from: 0.01, to: 1, n: 3, log: true, direction: both}\n"
@@ -17,19 +17,6 @@ WORN = "joint: big_end\n"
 WHOLE = WORN + REGIMES
 SPEED = "regimes: {over: machine.speed_rpm, from: 300, to: 700, n: 5}\n"
 LEAVE = "has no meaning beside regimes: leave it out"
-
-
-@pytest.fixture
-def read(tmp_path, monkeypatch):
-    """Read the text of a case file, whose name in messages is case.yaml."""
-    monkeypatch.chdir(tmp_path)
-
-    def read(text, *overrides, **more):
-        (tmp_path / "case.yaml").write_text(text, encoding="utf-8")
-        (study,) = load_studies("case.yaml", overrides=overrides, **more)
-        return study
-
-    return read
 
 
 def test_cases_are_those_that_chains_begin_at(read):

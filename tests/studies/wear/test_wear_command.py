@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 from compsim.cli import main
-from conftest import jobs_here
+from conftest import assert_same_bits, jobs_here
 
 from compressor.cases.load import load_cases
 from compressor.store.files import StoreError
@@ -41,15 +41,6 @@ def told(place):
     with jobs_here():
         assert main(["wear", str(here), "-o", str(out), "-j", "2", "--quiet"]) == 0
     return load_cases(here), out
-
-
-def same(one, other):
-    """Whether two Datasets are equal to the bit."""
-    assert one.identical(other)
-    for name in one.variables:
-        a, b = one[name].values, other[name].values
-        assert a.dtype.kind != "f" or a.tobytes() == b.tobytes()
-    return True
 
 
 def test_a_line_for_each_machine_says_when_it_is_worn_out(told, place, capsys):
@@ -110,7 +101,7 @@ def test_a_killed_machine_goes_on_and_ends_in_the_same_bits(told, tmp_path):
         if process.exitcode == 0:
             break
     assert process.exitcode == 0
-    assert same(open_wear(tmp_path, cases[0]), open_wear(out, cases[0]))
+    assert_same_bits(open_wear(tmp_path, cases[0]), open_wear(out, cases[0]))
     assert len({*stops}) > 1
 
 
@@ -139,7 +130,7 @@ def test_a_failed_machine_is_told_and_goes_on_when_asked(
     assert "--rerun" in said.err
     assert "failed: budget_seconds" in said.out
     assert main(["wear", str(file), "-o", str(tmp_path), "--rerun"]) == 0
-    assert same(open_wear(tmp_path, case), whole(worn, tmp_path / "undisturbed"))
+    assert_same_bits(open_wear(tmp_path, case), whole(worn, tmp_path / "undisturbed"))
 
 
 def whole(worn, folder):
