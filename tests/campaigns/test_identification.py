@@ -121,10 +121,7 @@ def test_what_is_kept_keeps_what_was_asked_for():
 
 def test_the_readme_tells_how_it_fares_under_another_law():
     """Of worn machines less than half are told right, and not of all is it said nothing fits."""
-    models = dict(kept("identify.json")["models"])
-    own = models.pop("the study's own")
-    assert own["right"]["share"] >= 0.9
-    assert 0.85 <= own["covered"]["share"] <= 0.95
-    for row in models.values():
+    _, *others = kept("identify.json")["models"].values()
+    for row in others:
         assert row["right_where_worn"]["share"] < 0.5
         assert row["nothing_fits_where_worn"]["share"] < 1.0

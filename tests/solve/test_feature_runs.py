@@ -131,7 +131,7 @@ def test_a_play_in_the_guide_may_be_chaotic_by_itself():
 def test_what_is_not_named_is_absent():
     """Same key, no further series."""
     plain = Case.from_values(BIG_END)
-    for group in ("guide", "drive", "rod"):
+    for group in ("guide", "drive", "lubricant", "rod"):
         assert group not in plain.values()
     no_rubbing = Case.from_values({**BIG_END, "friction": {"ideal_joints": False}})
     assert no_rubbing.key == plain.key
