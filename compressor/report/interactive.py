@@ -278,12 +278,18 @@ def read_shown(stored: Stored, key: str) -> xr.Dataset:
 
     A tenth of the time that all of the job takes.
     """
-    settle = stored.rows.attributes(stored.rows.find([key])[0])["settle"]
+    position = stored.rows.find([key])[0]
     variables = {
         name: (("time", *SERIES.get(name, ((),))[0]), values)
         for name, values in stored.values(key, SHOWN).items()
     }
-    return xr.Dataset(variables, attrs={"settle": settle})
+    try:
+        settle = stored.rows.attributes(position)["settle"]
+        return xr.Dataset(variables, attrs={"settle": settle})
+    except (KeyError, ValueError) as error:
+        path = stored.rows.path(position) or stored.folder
+        problem = "holds time series of different lengths, or no end of settling"
+        raise DamagedJob(path, problem, "run its study again") from error
 
 
 def series_name(key: str) -> str:

@@ -229,7 +229,7 @@ class Stored:
         """Return the case at a position of `rows`; None where this version does not know it."""
         try:
             return Case.from_attribute(self.rows.attributes(position)["case"])
-        except CaseError:
+        except (KeyError, CaseError):
             return None
 
     def serving(self, positions: np.ndarray, case: Case) -> np.ndarray:
