@@ -230,7 +230,8 @@ def report_failures(summary: "Summary") -> None:
     say(f"{plural(len({failure.key for failure in failures}))} failed:")
     for failure in failures[:MAX_FAILURES]:
         point = "".join(f" {key}={value}" for key, value in failure.coordinates.items())
-        say_wrapped(f"{failure.study}{point}: {failure.reason}: {printable(failure.detail)}", 2)
+        # one line each, for who searches a log
+        say(f"  {failure.study}{point}: {failure.reason}: {printable(failure.detail)}")
         say(f"    job {failure.key}")
     if len(failures) > MAX_FAILURES:
         say(f"  and {len(failures) - MAX_FAILURES} more")

@@ -44,7 +44,7 @@ def test_a_joint_is_worn_beyond_its_healthy_clearance(healthy, worn):
 
 def test_a_job_says_which_of_its_joints_are_worn():
     case = Case.from_values(BOTH | {"healthy_clearance_mm": 0.1})
-    assert job_text.worn_joints(SimpleNamespace(attributes=case.attributes())) == [
+    assert job_text.worn_joints(SimpleNamespace(case=case)) == [
         (
             "worn",
             "small end (healthy: big end 0.08 of up to 0.1 mm, small end 0.25 of up to 0.1 mm)",
@@ -52,7 +52,7 @@ def test_a_job_says_which_of_its_joints_are_worn():
     ]
     assert terms(case)[0]["clearance"].endswith("; worn: small end")
     plain = Case.from_values(BOTH)
-    assert job_text.worn_joints(SimpleNamespace(attributes=plain.attributes())) == []
+    assert job_text.worn_joints(SimpleNamespace(case=plain)) == []
     assert "worn" not in terms(plain)[0]["clearance"]
 
 
