@@ -226,7 +226,12 @@ class Stored:
         )
 
     def case_at(self, position: int) -> Case | None:
-        """Return the case at a position of `rows`; None where this version does not know it."""
+        """Return the case at a position of `rows`; None at -1, or of another version's.
+
+        A position of -1 is how `Rows.find` says that there is no such job.
+        """
+        if position < 0:
+            return None
         try:
             return Case.from_attribute(self.rows.attributes(position)["case"])
         except (KeyError, CaseError):

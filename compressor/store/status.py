@@ -19,6 +19,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +42,7 @@ from compressor.store.failures import describe_failures
 from compressor.store.files import Folder, StoreError, final_path, is_locked, no_results
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import places, read_store, unowned_series
-from compressor.store.rows import Cut, Rows
+from compressor.store.rows import FOREIGN_LINES, REMEDY, Cut, Rows
 from compressor.store.series_file import read_dataset
 from compressor.store.studies import (
     Again,
@@ -376,9 +377,9 @@ class JobReport:
     attributes: dict[str, Any]
     caveats: list[str]  # of one that is ok: what to know beside its numbers, a sentence each
 
-    @property
+    @cached_property
     def case(self) -> Case:
-        """Return the case of a job that was run."""
+        """Return the case of a job that was run. Raises CaseError where this version has none."""
         return Case.from_attribute(self.attributes["case"])
 
 
@@ -420,7 +421,8 @@ def report_job(folder: Folder, *words: str) -> JobReport:
     """Return what is known of one job.
 
     words: the beginning of its key; or its study, and values of axes such as `clearance_mm=0.2`
-    until one job is left. Raises WrongName where they name none or several.
+    until one job is left. Raises WrongName where they name none or several, DamagedJob where its
+    row holds no case.
     """
     studies = read_studies(folder, former=True)
     store = read_store(folder).warned()
@@ -438,6 +440,9 @@ def report_job(folder: Folder, *words: str) -> JobReport:
         name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in store.rows.attributes(position).items()
     }
+    if "case" not in attributes:
+        segment = store.rows.segments[store.rows.source[position]]
+        raise DamagedJob(segment.path, FOREIGN_LINES, REMEDY)
     if path is not None and _hides_clipping(numbers, attributes):
         with contextlib.suppress(DamagedJob):
             numbers["clipped_fraction"] = float(

@@ -9,6 +9,8 @@ from compsim import cli
 
 from compressor.cases.load import load_studies
 from compressor.digits import by_bar
+from compressor.store.reader import read_store
+from compressor.store.rows import Rows
 from compressor.store.status import report_job, standings
 from compressor.sweep.sweep import sweep
 
@@ -108,3 +110,17 @@ def test_damage_is_told_where_its_jobs_count_as_missing(mix, capsys):
         said = " ".join(err.split())
         assert all(said.count(f"{path.name}: is damaged") == 1 for path in paths)
         assert "Warning" not in err  # said as other messages are, without a place in the source
+
+
+def test_a_foreign_row_without_a_case_is_refused(mix, capsys, monkeypatch):
+    """By `show`, which needs the case; what counts jobs goes on."""
+    own = Rows.attributes
+    monkeypatch.setattr(
+        Rows, "attributes", lambda rows, at: {k: v for k, v in own(rows, at).items() if k != "case"}
+    )
+    key = min(read_store("results").keys())
+    assert cli.main(["show", key]) == 5
+    assert "is no file of compsim's" in capsys.readouterr().err
+    assert cli.main(["status"]) == 0
+    stored = read_store("results")
+    assert stored.case_at(0) is None is stored.case_at(-1)

@@ -293,10 +293,10 @@ def trade(
     for scene, case in cases.items():
         choices = found[scene]
 
-        def own(done: int, of: int, remark: str, before: int = before) -> None:
+        def report_part(done: int, of: int, remark: str, before: int = before) -> None:
             progress(before + done, total, remark)
 
-        runs = run_choices(case, choices, repeats, own)
+        runs = run_choices(case, choices, repeats, report_part)
         before += 2 + len(choices)
         if complete(runs[0]):
             runs.append(read_from_grid(runs[0], simulate(replace(bare(case), output=Output()))))
