@@ -173,11 +173,6 @@ class Settings:
         return 0.0 if isinstance(given, str) else given * self.turn
 
     @property
-    def settles_itself(self) -> bool:
-        """Return whether a run finds out by itself where it settles, or how long it is."""
-        return "auto" in (self.solve.duration_rev, self.solve.settle_rev)
-
-    @property
     def steps(self) -> float:
         """Return the output steps in the duration, a whole number in a valid case."""
         if self.solve.output_step_s is not None:

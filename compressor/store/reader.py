@@ -278,7 +278,9 @@ class Stored:
         outcome = self.outcome(position)
         if outcome.status != "ok":
             return outcome.reason
-        case = Case.from_attribute(outcome.attributes["case"])
+        case = self.case_at(position)
+        if case is None:
+            return "damaged"
         return replace(case, healthy_clearance_mm=healthy), outcome
 
     def job(self, key: str) -> "xr.Dataset":

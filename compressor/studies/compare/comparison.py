@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case
+from compressor.cases import Sensor
 from compressor.program import CompsimError, Progress, no_progress
 from compressor.store import (
     Folder,
-    Stored,
     find_record,
     find_study,
     job_record,
@@ -109,10 +108,10 @@ def compare_record(
     jobs = []
     for number, one in enumerate(wanted):
         progress(number, len(wanted), "")
-        other = job_record(stored, one)
-        if other is not None:
+        other, case = job_record(stored, one), stored.case_at(int(stored.rows.find([one])[0]))
+        if other is not None and case is not None and case.sensor:
             with contextlib.suppress(RecordError):  # too short, or all zero
-                jobs.append(_compare_job(mine, own, turn_record(other), one, stored))
+                jobs.append(_compare_job(mine, own, turn_record(other), one, case.sensor))
     if not jobs:
         text = f"none of the {len(wanted)} jobs has a sensor's record of two revolutions"
         raise CompareError(f"{text}: run them with body: true, sensor: true and series kept")
@@ -127,7 +126,7 @@ def compare_record(
 
 
 def _compare_job(
-    mine: Turned, own: dict[int, Curves], turned: Turned, key: str, stored: Stored
+    mine: Turned, own: dict[int, Curves], turned: Turned, key: str, sensor: Sensor
 ) -> Compared:
     """Return a job beside the record; own: the record's curves by the highest order."""
     orders = min(mine.highest, turned.highest)
@@ -137,7 +136,8 @@ def _compare_job(
         own[orders] = curves(lines)
     drawn = curves(others)
     likeness = compare_lines(lines, others, own[orders], drawn)
-    return Compared(key, turned.rpm, turned.rate, _sensor(stored, key), orders, likeness, drawn)
+    place = f"{sensor.place} along {sensor.direction}"
+    return Compared(key, turned.rpm, turned.rate, place, orders, likeness, drawn)
 
 
 def _check_orders(orders: int, what: str) -> None:
@@ -155,15 +155,6 @@ def _keys(words: Sequence[str], folder: Folder, own: str) -> Iterator[str]:
             yield from (key for key in find_study(folder, word).keys if key != own)
         else:
             yield report_job(folder, word).key
-
-
-def _sensor(stored: Stored, key: str) -> str:
-    """Return where the sensor of a stored job sits, and what it measures along."""
-    position = stored.position(key)
-    assert position is not None
-    sensor = Case.from_attribute(str(stored.rows.attributes(position)["case"])).sensor
-    assert sensor
-    return f"{sensor.place} along {sensor.direction}"
 
 
 def find_misfits(record: Turned, jobs: Sequence[Compared], is_file: bool) -> Iterator[str]:

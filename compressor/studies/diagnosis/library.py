@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.cases import Case, PerJoint, name_worn_joint, points
+from compressor.cases import PerJoint, name_worn_joint, points
 from compressor.program import Progress, no_progress
 from compressor.store import (
     Folder,
@@ -136,9 +136,9 @@ def _compute_features(stored: Stored, positions: dict[str, int], progress: Progr
     for number, (key, place) in enumerate(positions.items()):
         progress(number, len(positions), "")
         record = job_record(stored, key)
-        if record is None:
+        case = stored.case_at(place)
+        if record is None or case is None:
             continue
-        case = Case.from_attribute(str(stored.rows.attributes(place)["case"]))
         clearances = [getattr(case.clearance_mm, side) for side in SIDES]
         try:
             rows.append((key, case.joint, clearances, vector(record)))

@@ -9,8 +9,11 @@ from conftest import WORN_JOBS, struck
 
 from compressor.store.files import StoreError
 from compressor.store.reader import read_store
+from compressor.store.rows import Rows
 from compressor.store.sensor_records import stored_record
+from compressor.studies.compare import comparison
 from compressor.studies.diagnosis import library as module
+from compressor.studies.diagnosis.data_set import DataSetError, make_data_set
 from compressor.studies.diagnosis.features import FEATURES, features
 from compressor.studies.diagnosis.library import open_library, vector
 from compressor.vibration.accelerometer import Record
@@ -111,3 +114,21 @@ def test_jobs_without_a_sensor_are_told(paper_store):
     key = sorted(read_store(paper_store).keys())[0]
     with pytest.raises(StoreError, match=f"job {key} has no sensor's record"):
         stored_record(paper_store, key)
+
+
+def test_rows_of_another_version_are_left_out(worn_store, tmp_path, monkeypatch):
+    """By identify, dataset, alarms and compare: of what was simulated nothing is known."""
+    shutil.copytree(worn_store, tmp_path / "worn")
+    _, record = stored_record(worn_store, min(read_store(worn_store).keys()))
+    own = Rows.attributes
+    monkeypatch.setattr(
+        Rows, "attributes", lambda rows, at: {k: v for k, v in own(rows, at).items() if k != "case"}
+    )
+    shutil.rmtree(tmp_path / "worn" / "features", ignore_errors=True)
+    with pytest.raises(StoreError, match="has no sensor's record"):
+        open_library(tmp_path / "worn", "worn")
+    with pytest.raises(DataSetError, match=f"{WORN_JOBS} damaged"):
+        make_data_set(tmp_path / "worn", "worn")
+    monkeypatch.setattr(comparison, "find_record", lambda *names: ("", record))
+    with pytest.raises(comparison.CompareError, match=f"none of the {WORN_JOBS} jobs"):
+        comparison.compare_record("record.csv", ["worn"], tmp_path / "worn", {})
