@@ -1117,7 +1117,7 @@ def identify_words():
     return (
         f"- `compsim identify` names the worn joint in {own['right_where_worn']:.0%} of the "
         f"records of simulated machines like those of its study, and {own['covered']:.0%} of the "
-        f"clearances lie in their 90 % interval.\n"
+        f"clearances lie in their 90% interval.\n"
         f"- If the machine has another friction law, it names the worn joint in {min(right):.0%} "
         f"to {max(right):.0%} of the records, and warns that nothing fits in {min(warned):.0%} to "
         f"{max(warned):.0%} of them.\n"
