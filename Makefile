@@ -120,13 +120,13 @@ identify: install  ## measure what is identified of other machines, and under an
 stress: install  ## run and judge 2,000 extreme scenes (within the hour on two cores)
 	$(CAMPAIGN)/measure_stress.py tests/results/stress.json
 
-chaos: install  ## inject faults, thousands, and count what did not survive (an hour)
+chaos: install  ## inject faults, thousands, and count what did not survive (two hours)
 	$(CAMPAIGN)/measure_chaos.py tests/results/chaos.json
 
 nameplate: install  ## run the case file of compsim init machine, for its page (two minutes)
 	$(CAMPAIGN)/measure_nameplate.py tests/results/nameplate.json
 
-mutants: install  ## plant bugs and see whether the fast tests catch them (25 minutes)
+mutants: install  ## plant bugs and see whether the fast tests catch them (half an hour)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
 measurements: test-oldest calibration accuracy validation wear claims page tradeoff ladders chaotic regimes diagnosis identify nameplate store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
