@@ -134,7 +134,8 @@ def trial(scene, folder, draw, counts):
         run.watch(draw.uniform(0, scene.starting))
     else:
         scene.wait_for_files(run, folder, draw.randint(1, scene.files))
-    listed, before = rows(folder / "out"), scene.served(folder)
+    with run.held():
+        listed, before = rows(folder / "out"), scene.served(folder)
     if amid and not early:
         while run.watch(0.0) and not unfinished(folder):
             pass

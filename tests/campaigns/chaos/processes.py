@@ -73,10 +73,23 @@ class Run:
         """Its child processes that run."""
         return [pid for pid, parent in members(self.pid).items() if parent == self.pid]
 
+    @contextlib.contextmanager
+    def held(self):
+        """Stop all its processes for a while, so that it does not end while one looks at it."""
+        self.send(signal.SIGSTOP, whole=True)
+        try:
+            yield
+        finally:
+            self.send(signal.SIGCONT, whole=True)
+
     def kill(self, whole=False):
         """SIGKILL, of itself alone or of the whole session at once."""
+        self.send(signal.SIGKILL, whole)
+
+    def send(self, number, whole):
+        """Send a signal to itself alone, or to the whole session at once."""
         with contextlib.suppress(ProcessLookupError):  # it may have ended
-            (os.killpg if whole else os.kill)(self.pid, signal.SIGKILL)
+            (os.killpg if whole else os.kill)(self.pid, number)
 
     def kill_one(self, pid):
         """SIGKILL of one of its processes."""
