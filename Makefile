@@ -120,7 +120,7 @@ identify: install  ## measure what is identified of other machines, and under an
 stress: install  ## run and judge 2,000 extreme scenes (within the hour on two cores)
 	$(CAMPAIGN)/measure_stress.py tests/results/stress.json
 
-chaos: install  ## inject faults, thousands, and count what did not survive (two hours)
+chaos: install  ## inject faults, thousands, and count what did not survive (two to three hours)
 	$(CAMPAIGN)/measure_chaos.py tests/results/chaos.json
 
 nameplate: install  ## run the case file of compsim init machine, for its page (two minutes)

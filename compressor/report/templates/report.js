@@ -383,7 +383,7 @@ class Figure {
           made.tick0 = 0;
         } else {
           const [low, high] = boxes[n][way];
-          made.nticks = Math.max(2, Math.floor((high - low) * (way === "x" ? width / 48 : total / 26)));
+          made.nticks = Math.max(2, Math.floor((high - low) * (way === "x" ? width / 48 : total / 21)));
         }
         if (scale.link !== n) made.matches = `${way}${scale.link ? scale.link + 1 : ""}`;
         return made;
@@ -439,19 +439,20 @@ class Figure {
         colorbar: { x: box.x[1], xpad: 6, y: (box.y[0] + box.y[1]) / 2, thickness: 10,
           len: box.y[1] - box.y[0], tickfont: { size: 10 }, outlinewidth: 0,
           title: { text: escaped(trace.scale), side: "right", font: { size: 11 } } } });
+      const shown = (v) => String(Number((trace.log ? 10 ** v : v).toPrecision(4)));
       if (trace.log) {
         const [low, high] = trace.limits;
-        const [ends, step] = [high - low < 3 ? [1, 3] : [1], Math.ceil((high - low) / 7) || 1];
+        const ends = high - low < 3 ? [0, Math.log10(3)] : [0];
+        const step = Math.ceil((high - low) / 7) || 1;
         let ticks = [];
         for (let ten = Math.floor(low); ten <= high; ten += step) {
-          ticks.push(...ends.map((end) => end * 10 ** ten));
+          ticks.push(...ends.map((end) => ten + end));
         }
-        ticks = ticks.filter((tick) => low <= Math.log10(tick) && Math.log10(tick) <= high);
-        if (ticks.length < 2) ticks = [10 ** low, 10 ** high];
-        Object.assign(made.colorbar, { tickmode: "array", tickvals: ticks.map(Math.log10),
-          ticktext: ticks.map((tick) => String(Number(tick.toPrecision(3)))) });
+        ticks = ticks.filter((tick) => low <= tick && tick <= high);
+        if (ticks.length < 2) ticks = [low, high];
+        Object.assign(made.colorbar, { tickmode: "array", tickvals: ticks,
+          ticktext: ticks.map(shown) });
       }
-      const shown = (v) => String(Number((trace.log ? 10 ** v : v).toPrecision(4)));
       made.text = rows.map((row) => Array.from(row, shown));
       made.hovertemplate = `${inX}, %{y:.4~r} ${yu}<br>%{text}` +
         `<extra>${escaped(trace.scale || panel.title)}</extra>`;

@@ -133,17 +133,24 @@ def _compute_features(stored: Stored, positions: dict[str, int], progress: Progr
     Those whose record tells nothing are left out.
     """
     rows: list[tuple[str, str, list[float], np.ndarray]] = []
+    unknown = 0  # jobs whose case this version cannot read
     for number, (key, place) in enumerate(positions.items()):
         progress(number, len(positions), "")
         record = job_record(stored, key)
+        if record is None:
+            continue
         case = stored.case_at(place)
-        if record is None or case is None:
+        if case is None:
+            unknown += 1
             continue
         clearances = [getattr(case.clearance_mm, side) for side in SIDES]
         try:
             rows.append((key, case.joint, clearances, vector(record)))
         except RecordError as error:
             warnings.warn(f"job {key} is left out: {error}", StoreWarning, stacklevel=2)
+    if unknown:
+        text = f"{unknown} of {len(positions)} jobs are left out: this version knows no such case"
+        warnings.warn(text, StoreWarning, stacklevel=2)
     clearance = np.array([row[2] for row in rows], float).reshape(-1, len(SIDES))
     found = np.array([row[3] for row in rows], float).reshape(-1, len(FEATURES))
     return xr.Dataset(
