@@ -147,7 +147,11 @@ def labels() -> dict[str, tuple]:
     """Return the coordinates of the dimensions that every chain has."""
     return {
         "joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"}),
-        "coordinate": ("coordinate", list(COORDINATES), {"long_name": "of a Poincaré point"}),
+        "coordinate": (
+            "coordinate",
+            list(COORDINATES),
+            {"long_name": "coordinate of a Poincaré point"},
+        ),
         "mode": ("mode", list(MODES), {"long_name": "contact mode"}),
     }
 

@@ -64,6 +64,7 @@ def open_regimes(results: Folder, study: str) -> xr.Dataset:
     number = {"long_name": "Poincaré point, one a revolution", "units": "1"}
     coordinates["revolution"] = "revolution", np.arange(1, turns + 1), number
     attrs = {"study": study, "over": over, "over_key": request.over, "log": int(request.log)}
+    attrs["oiled"] = int(is_oiled(chains))
     attrs |= {"title": manifest["title"]} if "title" in manifest else {}
     attrs |= {name: getattr(request, name) for name in ("section_deg", "settle_rev", "measure_rev")}
     return xr.Dataset(variables, coordinates, attrs)
@@ -71,12 +72,22 @@ def open_regimes(results: Folder, study: str) -> xr.Dataset:
 
 def of_joint(over: str, chains: Sequence[Sequence[xr.Dataset | None]]) -> str:
     """Return whose clearance is followed, " of the small end"; "" of another key or of several."""
-    cases = {str(chain.attrs["case"]) for pair in chains for chain in pair if chain is not None}
-    joints = {Case.from_attribute(case).joint for case in cases if over in OF_JOINTS}
+    joints = {case.joint for case in cases_of(chains) if over in OF_JOINTS}
     if len(joints) != 1:
         return ""
     joint = joints.pop()
     return f" of {'' if joint == 'both' else 'the '}{SPOKEN[joint]}" if joint in SPOKEN else ""
+
+
+def is_oiled(chains: Sequence[Sequence[xr.Dataset | None]]) -> bool:
+    """Return whether the joints of some chain have oil."""
+    return any(case.lubricant for case in cases_of(chains))
+
+
+def cases_of(chains: Sequence[Sequence[xr.Dataset | None]]) -> list[Case]:
+    """Return the different cases that chains began with."""
+    texts = {str(chain.attrs["case"]) for pair in chains for chain in pair if chain is not None}
+    return [Case.from_attribute(text) for text in texts]
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:

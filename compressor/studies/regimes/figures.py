@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import SPOKEN
+from compressor.analysis import MODES, OILED_MODES, SPOKEN
 from compressor.report import (
     BLACK,
     BLUE,
@@ -76,7 +76,7 @@ def draw_bifurcation(pair: xr.Dataset) -> Drawing:
         mark_failed(panel, pair)
     panels[-1].x.title = axis_words(pair, pair.attrs["over"])
     failed = [entry(FAILED_NAME, FAILED)] if (pair["status"] == "failed").any() else []
-    figure.legend = [*direction_entries(pair), *failed, *mode_entries()]
+    figure.legend = [*direction_entries(pair), *failed, *mode_entries(mode_words(pair))]
     return figure
 
 
@@ -138,9 +138,15 @@ def plot_shares(panel: Panel, pair: xr.Dataset, joint: str) -> None:
     shares = pair["mode_share"].sel(direction=direction, joint=joint).transpose(over, "mode")
     edges = midway(np.sort(positions(pair, over)), pair.attrs["log"])
     heights = [shares.sel(mode=mode).values for mode in MODE_COLORS]
-    stack_modes(panel, 0.5 * (edges[1:] + edges[:-1]), np.diff(edges), heights)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    stack_modes(panel, middles, np.diff(edges), heights, mode_words(pair))
     panel.ground = UNSEEN
     panel.title = f"share of time in each contact mode, {SPOKEN[joint]}, {direction}"
+
+
+def mode_words(pair: xr.Dataset) -> tuple[str, ...]:
+    """Return the names of the contact modes: an oiled joint's film bears where a dry one flies."""
+    return OILED_MODES if pair.attrs.get("oiled") else MODES
 
 
 def draw_sections(shown: xr.Dataset) -> Drawing:

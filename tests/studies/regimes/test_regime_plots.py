@@ -62,6 +62,11 @@ def test_each_worn_joint_has_its_panels():
     stored = pair["section"].sel(joint="small_end", coordinate="x").values
     np.testing.assert_allclose(points(small)[0][:, 1], 1e3 * stored[np.isfinite(stored)])
     assert words(drawing) == ["up", "flight", "impact", "following"]
+    pair.attrs["oiled"] = 1
+    drawing = draw_bifurcation(pair)
+    assert words(drawing) == ["up", "film alone", "dry contact begins", "dry contact"]
+    names = {trace.name for trace in drawing.panels[-1].traces}
+    assert names == {"film alone", "dry contact begins", "dry contact"}
 
 
 def test_periods_stand_in_their_rows(data):

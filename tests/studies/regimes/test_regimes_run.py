@@ -13,7 +13,7 @@ from compressor.cases.load import load_studies
 from compressor.store.files import StoreError
 from compressor.store.studies import swept_column
 from compressor.studies.regimes.chains import FOLDER
-from compressor.studies.regimes.dataset import of_joint, open_regimes
+from compressor.studies.regimes.dataset import is_oiled, of_joint, open_regimes
 from compressor.studies.regimes.values import NUMBERS, TEXTS
 
 TEXT = """
@@ -85,6 +85,15 @@ def test_what_is_followed_names_the_joint_of_the_study(joints, told):
     assert swept_column("clearance_mm", [0.1])[1]["long_name"] == "radial clearance"
     assert of_joint("clearance_mm", chains) == told
     assert of_joint("machine.speed_rpm", chains) == ""
+    assert not is_oiled(chains)
+
+
+def test_a_study_says_whether_its_joints_have_oil(place):
+    worn = {"joint": "big_end", "clearance_mm": 0.2}
+    cases = Case.from_values(worn), Case.from_values(worn | {"lubricant": True})
+    chains = [[None, xr.Dataset(attrs=case.attributes())] for case in cases]
+    assert is_oiled(chains)
+    assert open_regimes(place / "r", "wear").attrs["oiled"] == 0
 
 
 def test_values_belong_to_the_parameter_whichever_way_it_goes(place):
