@@ -175,12 +175,12 @@ TABLE = (
             ("friction_loss", "J", "energy lost to joint friction over the run"),
             ("energy_residual", "1", "worst energy imbalance relative to the contact's losses"),
             ("steps", "1", "accepted integration steps"),
-            ("rejected", "1", "rejected steps; SciPy's methods do not tell"),
+            ("rejected", "1", "rejected steps; SciPy's methods do not count them"),
             ("evaluations", "1", "evaluations of the right-hand side"),
             ("seconds", "s", "wall time of the solution, without that of its error bars"),
-            (HORIZON, "s", "time up to which close twins stay together; inf: to the end"),
+            (HORIZON, "s", "time for which neighbouring motions stay together; inf: to the end"),
             ("period_rev", "rev", "period of a motion that repeats itself within its errors"),
-            ("settled_rev", "rev", "revolutions after which it does, or metrics no longer change"),
+            ("settled_rev", "rev", "revolutions until a motion repeats itself, or metrics settle"),
         )
     ),
     Metric(

@@ -22,7 +22,7 @@ class Reason(StrEnum):
         "invalid_input",
         "a `Case` made in Python holds values that a case file would be refused for; nothing is "
         "simulated",
-        "mend what the detail lists; Case.from_values raises it at once",
+        "correct what the detail lists; Case.from_values raises it at once",
     )
     NON_FINITE = (
         "non_finite",
@@ -89,7 +89,7 @@ class Reason(StrEnum):
         "no run's estimated errors are as small as solve.accuracy promises; numbers and errors are "
         "kept",
         "ask for less in solve.accuracy, or raise solve.max_steps where the detail names steps; "
-        "solve.horizon tells whether the motion is chaotic",
+        "solve.horizon shows whether the motion is chaotic",
     )
     NOT_SETTLED = (
         "not_settled",
@@ -120,7 +120,7 @@ class Reason(StrEnum):
 def remedy(name: str) -> str:
     """Return what to do about a stored reason, also one of another version's."""
     known = Reason.__members__.get(name.upper())
-    return known.remedy if known else "compsim show JOB tells its detail"
+    return known.remedy if known else "compsim show JOB prints its detail"
 
 
 def reason_table() -> str:

@@ -27,8 +27,8 @@ SECTIONS = {
 INTRODUCTION = {
     "Groups of a case": "A field has the name of its key in a case file. Tables, equations and "
     "sections (§) are those of Xiao et al. 2021, *Dynamic Analysis for a Reciprocating Compressor "
-    "System with Clearance Fault*; [keys](../configs/README.md#keys) tells what *assumed*, "
-    "*inferred* and *ours* mean."
+    "System with Clearance Fault*; [keys](../configs/README.md#keys) says what *assumed*, "
+    "*inferred* and *program* mean."
 }
 
 

@@ -62,7 +62,7 @@ def row_of(key: str) -> Parameter | None:
 def phrase_of(key: str) -> str:
     """Return the phrase of a key's values, such as "crank radius"; an unknown key as it is."""
     row = row_of(key)
-    return SHORTHANDS[key].each if key in SHORTHANDS else row.phrase if row else key
+    return SHORTHANDS[key].each if key in SHORTHANDS else row.label if row else key
 
 
 def expand_shorthands(values: Mapping[str, Any]) -> dict[str, Any]:

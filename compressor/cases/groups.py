@@ -54,23 +54,13 @@ class PerJoint:
     """
 
     big_end: float = parameter(
-        0.0,
-        "mm",
-        (0, 1000),
-        "§3.2",
-        "radial clearance of the big end",
-        read=BIG_END,
+        0.0, "mm", (0, 1000), "§3.2", "radial clearance of the big end", read=BIG_END,
         judged=(1e-3, 1.0),
-    )
+    )  # fmt: skip
     small_end: float = parameter(
-        0.0,
-        "mm",
-        (0, 1000),
-        "§3.2",
-        "radial clearance of the small end",
-        read=SMALL_END,
+        0.0, "mm", (0, 1000), "§3.2", "radial clearance of the small end", read=SMALL_END,
         judged=(1e-3, 1.0),
-    )
+    )  # fmt: skip
 
 
 @document_fields
@@ -88,11 +78,13 @@ class HealthyClearance:
     """
 
     big_end: float = parameter(
-        0.0, "mm", (0, 1000), "ours", "clearance up to which the big end is sound", identity=False
-    )
+        0.0, "mm", (0, 1000), "program", "clearance up to which the big end is sound",
+        identity=False,
+    )  # fmt: skip
     small_end: float = parameter(
-        0.0, "mm", (0, 1000), "ours", "clearance up to which the small end is sound", identity=False
-    )
+        0.0, "mm", (0, 1000), "program", "clearance up to which the small end is sound",
+        identity=False,
+    )  # fmt: skip
 
 
 @document_fields
@@ -109,17 +101,21 @@ class Offset:
     """
 
     big_end_x: float = parameter(
-        0.0, "mm", (-1000, 1000), "ours", "big end's journal, along x", read=BIG_CLEARANCE
-    )
+        0.0, "mm", (-1000, 1000), "program", "start of the big end's journal along x",
+        read=BIG_CLEARANCE,
+    )  # fmt: skip
     big_end_y: float = parameter(
-        0.0, "mm", (-1000, 1000), "ours", "big end's journal, along y", read=BIG_CLEARANCE
-    )
+        0.0, "mm", (-1000, 1000), "program", "start of the big end's journal along y",
+        read=BIG_CLEARANCE,
+    )  # fmt: skip
     small_end_x: float = parameter(
-        0.0, "mm", (-1000, 1000), "ours", "small end's journal, along x", read=SMALL_CLEARANCE
-    )
+        0.0, "mm", (-1000, 1000), "program", "start of the small end's journal along x",
+        read=SMALL_CLEARANCE,
+    )  # fmt: skip
     small_end_y: float = parameter(
-        0.0, "mm", (-1000, 1000), "ours", "small end's journal, along y", read=SMALL_CLEARANCE
-    )
+        0.0, "mm", (-1000, 1000), "program", "start of the small end's journal along y",
+        read=SMALL_CLEARANCE,
+    )  # fmt: skip
 
 
 @document_fields
@@ -144,14 +140,9 @@ class Machine:
         500.0, "rpm", (0, 1e5), "Table 1", "crank speed", above=True, judged=(50, 6000)
     )
     rod_mass_kg: float = parameter(
-        4.7,
-        "kg",
-        (0, 1e6),
-        "assumed: a 600 x 40 x 25 mm steel bar",
-        "rod mass",
-        above=True,
+        4.7, "kg", (0, 1e6), "assumed: a 600 x 40 x 25 mm steel bar", "rod mass", above=True,
         judged=(0.1, 200),
-    )
+    )  # fmt: skip
     rod_centre_mm: float | None = parameter(
         None, "mm", (0, 1e6), "assumed: half the rod", "rod's mass centre, from the big end",
         optional=True,
@@ -161,14 +152,9 @@ class Machine:
         above=True, optional=True,
     )  # fmt: skip
     reciprocating_mass_kg: float = parameter(
-        14.0,
-        "kg",
-        (0, 1e6),
-        "assumed",
-        "crosshead, piston rod and piston",
-        above=True,
+        14.0, "kg", (0, 1e6), "assumed", "crosshead, piston rod and piston", above=True,
         judged=(0.1, 200),
-    )
+    )  # fmt: skip
     pin_radius_mm: float = parameter(
         10.0, "mm", (0, 1e4), "inferred from Eq. 15 and Table 3",
         "journal radius R_j of both joints, or of the big end", above=True,
@@ -184,8 +170,9 @@ class Machine:
         "times its centre's distance from the axis", optional=True,
     )  # fmt: skip
     balance: float | None = parameter(
-        None, "", (0, 1), "none", "share of what turns with the crank pin, or also of what "
-        "reciprocates, that a counterweight balances; in place of counterweight_kg_mm",
+        None, "", (0, 1), "none", "share of what turns with the crank pin that a "
+        "counterweight balances; one number is also that of what reciprocates; in place of "
+        "counterweight_kg_mm",
         optional=True,
     )  # fmt: skip
     balance_reciprocating: float | None = parameter(
@@ -270,20 +257,22 @@ class Gas:
     )  # fmt: skip
     switching: str | None = choice(
         None, ("paper", "exact"), "Eq. 13",
-        "corners as printed, or where the pressures meet (the default with any of the keys below)",
+        "corners of the cycle: as the paper prints them, or where the pressures meet (the default "
+        "with any of the keys below)",
         optional=True, read=CYCLE,
     )  # fmt: skip
     action: str | None = choice(
-        None, ("single", "double", "crank_end"), "ours",
+        None, ("single", "double", "crank_end"), "program",
         "ends in which the gas has a cycle: the head's (the default), both, the crank's",
         optional=True,
     )  # fmt: skip
     rod_diameter_mm: float | None = parameter(
-        None, "mm", (0, 1e4), "ours", "piston rod, which takes its section off the crank end",
+        None, "mm", (0, 1e4), "program",
+        "diameter of the piston rod, whose section the crank end lacks",
         above=True, optional=True, read=CRANK_END,
     )  # fmt: skip
     clearance_percent: float | None = parameter(
-        None, "%", (0, 1000), "ours",
+        None, "%", (0, 1000), "program",
         "clearance volume over swept volume of each end, or of the head's; in place of "
         "head_clearance_mm", above=True, optional=True, read=(CYCLE, HEAD_CLEARANCE),
     )  # fmt: skip
@@ -292,7 +281,7 @@ class Gas:
         above=True, optional=True, read=(CYCLE, CRANK_END),
     )  # fmt: skip
     valve_loss_percent: float | None = parameter(
-        None, "%", (0, 90), "ours",
+        None, "%", (0, 90), "program",
         "loss of absolute pressure while a valve is open, of both or of the suction's; 0 without",
         optional=True, read=CYCLE,
     )  # fmt: skip
@@ -301,8 +290,9 @@ class Gas:
         "loss of absolute pressure while the discharge valve is open", optional=True, read=CYCLE,
     )  # fmt: skip
     unloaded: str | None = choice(
-        None, ("none", "head", "crank"), "ours",
-        "end whose gas stays at suction pressure, its valves held open; none by default",
+        None, ("none", "head", "crank"), "program",
+        "unloaded end, whose valves are held open: its gas stays at suction pressure; none by "
+        "default",
         optional=True, read=CYCLE,
     )  # fmt: skip
     indicator: str | None = choice(
@@ -436,19 +426,14 @@ class Contact:
     )  # fmt: skip
     geometry: str | None = choice(
         None, ("external", "internal"), "Eq. 15",
-        "of the materials' stiffness: radii as of two discs (the paper's, and the default for its "
+        "radii in the materials' stiffness: of two discs (the paper's, and the default for its "
         "pin), or of a pin in a bore (the default with a pin radius of a file's own)",
         optional=True, read=(CLEARANCE, by_law("contact", "geometry"), MATERIALS),
     )  # fmt: skip
     exponent: float = parameter(
-        1.5,
-        "",
-        (1, 3),
-        "Table 3",
-        "force exponent p",
-        read=(by_law("contact", "exponent"), or_own("exponent")),
-        judged=(1.0, 2.2),
-    )
+        1.5, "", (1, 3), "Table 3", "force exponent p",
+        read=(by_law("contact", "exponent"), or_own("exponent")), judged=(1.0, 2.2),
+    )  # fmt: skip
     damping_N_s_per_mm: float = parameter(
         336.0, "N s/mm", (0, 1e9), "Table 3", "greatest contact damping C_max",
         read=(by_law("contact", "damping_N_s_per_mm"), or_own("damping_N_s_per_mm")),
@@ -459,26 +444,26 @@ class Contact:
         read=(by_law("contact", "full_damping_mm"), or_own("full_damping_mm")),
     )  # fmt: skip
     restitution: float | None = parameter(
-        None, "", (0, 1), "ours", "coefficient of restitution, of the laws that damp by it",
+        None, "", (0, 1), "program", "coefficient of restitution, in laws that damp by it",
         above=True, optional=True,
         read=by_law("contact", "restitution"),
         judged=(0.3, 0.95),
     )  # fmt: skip
     least_approach_mm_per_s: float | None = parameter(
-        None, "mm/s", (0, 1e6), "ours",
-        "speed of meeting below which such a law damps as at this one; 10 by default",
+        None, "mm/s", (0, 1e6), "program",
+        "approach speed below which the damping stays that of this speed; 10 by default",
         above=True, optional=True,
         read=(by_law("contact", "least_approach_mm_per_s"), DAMPED),
         judged=(1.0, 100.0),
     )  # fmt: skip
     length_mm: float | None = parameter(
-        None, "mm", (0, 1e4), "ours", "length of both joints, or of the big end (johnson, liu)",
+        None, "mm", (0, 1e4), "program", "length of both joints, or of the big end (johnson, liu)",
         above=True, optional=True,
         read=(CLEARANCE, by_law("contact", "length_mm")),
         judged=(10.0, 100.0),
     )  # fmt: skip
     modulus_GPa: float | None = parameter(
-        None, "GPa", (0, 1e6), "ours", "composite modulus (johnson, liu)", above=True,
+        None, "GPa", (0, 1e6), "program", "composite modulus (johnson, liu)", above=True,
         optional=True, read=(CLEARANCE, by_law("contact", "modulus_GPa")),
         judged=(10.0, 250.0),
     )  # fmt: skip
@@ -535,24 +520,14 @@ class Friction:
     """
 
     static: float = parameter(
-        0.23,
-        "",
-        (0, 10),
-        "Table 3",
-        "static coefficient",
-        read=by_law("friction", "static"),
+        0.23, "", (0, 10), "Table 3", "static coefficient", read=by_law("friction", "static"),
         judged=(0, 0.5),
-    )
+    )  # fmt: skip
     dynamic: float = parameter(0.15, "", (0, 10), "Table 3", "dynamic coefficient", judged=(0, 0.5))
     stiction_velocity_mm_per_s: float = parameter(
-        10.0,
-        "mm/s",
-        (0, 1e6),
-        "Table 3",
-        "stiction transition velocity",
-        above=True,
+        10.0, "mm/s", (0, 1e6), "Table 3", "stiction transition velocity", above=True,
         judged=(0.1, 100),
-    )
+    )  # fmt: skip
     friction_velocity_mm_per_s: float = parameter(
         100.0, "mm/s", (0, 1e6), "Table 3", "friction transition velocity", above=True,
         read=by_law("friction", "friction_velocity_mm_per_s"),
@@ -561,21 +536,21 @@ class Friction:
         None, FRICTION_LAWS, "Eq. 16", "friction law (adams where none is named)", optional=True
     )
     bristle_stiffness_per_mm: float | None = parameter(
-        None, "1/mm", (0, 1e9), "ours", "LuGre's sigma_0 over the normal force; 100 by default",
+        None, "1/mm", (0, 1e9), "program", "LuGre's sigma_0 over the normal force; 100 by default",
         above=True, optional=True, read=by_law("friction", "bristle_stiffness_per_mm"),
         judged=(10.0, 1e4),
     )  # fmt: skip
     bristle_damping_s_per_mm: float | None = parameter(
-        None, "s/mm", (0, 1e6), "ours", "LuGre's sigma_1 over the normal force; 0.03 by default",
+        None, "s/mm", (0, 1e6), "program", "LuGre's sigma_1 over the normal force; 0.03 by default",
         optional=True, read=by_law("friction", "bristle_damping_s_per_mm"),
         judged=(1e-3, 0.1),
     )  # fmt: skip
     viscous_s_per_mm: float | None = parameter(
-        None, "s/mm", (0, 1e6), "ours", "LuGre's sigma_2 over the normal force; 0 by default",
+        None, "s/mm", (0, 1e6), "program", "LuGre's sigma_2 over the normal force; 0 by default",
         optional=True, read=by_law("friction", "viscous_s_per_mm"),
     )  # fmt: skip
     ideal_joints: bool | None = choice(
-        None, (), "ours", "whether joints without clearance rub as well", kind="boolean",
+        None, (), "program", "friction in joints without clearance, too", kind="boolean",
         optional=True, read=IDEAL_JOINT,
     )  # fmt: skip
 
@@ -615,7 +590,7 @@ class Solve:
         above=True, optional=True,
     )  # fmt: skip
     settle_rev: float | str = parameter(
-        1.0, "rev", (0, 1e5), "ours",
+        1.0, "rev", (0, 1e5), "program",
         "start-up left out of metrics and figures; auto: until revolutions agree",
         choices=("auto",),
     )  # fmt: skip
@@ -633,25 +608,25 @@ class Solve:
         kind="accuracy",
     )  # fmt: skip
     rtol: float | None = parameter(
-        None, "", (1e-13, 0.1), "ours", "relative tolerance, in place of accuracy", optional=True
+        None, "", (1e-13, 0.1), "program", "relative tolerance, in place of accuracy", optional=True
     )
     error_bars: bool = choice(
-        True, (), "ours", "an error beside each metric, by a second run; not part of a "
+        True, (), "program", "errors of metrics, from a second run; not part of a "
         "job's identity", kind="boolean", identity=False,
     )  # fmt: skip
     horizon: bool | str = choice(
-        "auto", ("auto",), "ours", "how long the motion can be foretold: auto looks where errors "
-        "are large, true by a twin at rtol 1e-12; not part of a job's identity",
+        "auto", ("auto",), "program", "time for which the motion can be predicted: auto measures "
+        "it where errors are large, true always; not part of a job's identity",
         kind="boolean", identity=False,
     )  # fmt: skip
     method: str = choice(
-        "auto", METHODS, "ours", "integrator: compiled (auto is TSIT5 and RODAS), or SciPy's"
+        "auto", METHODS, "program", "integrator: compiled (auto is TSIT5 and RODAS), or SciPy's"
     )
     max_steps: int = parameter(
-        5_000_000, "", (1, 10**12), "ours", "budget of integration steps", kind="integer"
+        5_000_000, "", (1, 10**12), "program", "budget of integration steps", kind="integer"
     )
     timeout_s: float = parameter(
-        600.0, "s", (0, 1e7), "ours", "budget of wall time; not part of a job's identity",
+        600.0, "s", (0, 1e7), "program", "budget of wall time; not part of a job's identity",
         above=True, identity=False,
     )  # fmt: skip
 
@@ -677,20 +652,21 @@ class Output:
     """
 
     keep: str = choice(
-        "series", ("series", "metrics"), "ours", "time series too, or metrics only", identity=False
-    )
+        "series", ("series", "metrics"), "program",
+        "stored results: time series too, or metrics only", identity=False,
+    )  # fmt: skip
     precision: str = choice(
         "double",
         ("double", "single"),
-        "ours",
-        "of the time series; time and crank angle are double",
+        "program",
+        "precision of the time series; time and crank angle are double",
         identity=False, read=SERIES,
     )  # fmt: skip
     signals: bool = choice(
-        False, (), "ours", "forces on frame, bearing and guide, torque and rod load beside the "
-        "time series", kind="boolean", identity=False, read=SERIES,
+        False, (), "program", "more time series: forces on frame, bearing and guide, torque and "
+        "rod load", kind="boolean", identity=False, read=SERIES,
     )  # fmt: skip
     compress: bool = choice(
-        False, (), "ours", "time series shuffled and gzipped", kind="boolean", identity=False,
-        read=SERIES,
+        False, (), "program", "compression of the time series: shuffled and gzipped",
+        kind="boolean", identity=False, read=SERIES,
     )  # fmt: skip

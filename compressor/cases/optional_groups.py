@@ -52,13 +52,9 @@ class Lubricant:
         "end's", above=True,
     )  # fmt: skip
     last_share: float = parameter(
-        0.02,
-        "",
-        (0.001, 0.5),
-        "ours",
-        "of the clearance, in which the film gets no thinner",
-        judged=(0.01, 0.1),
-    )
+        0.02, "", (0.001, 0.5), "program",
+        "share of the clearance below which the film gets no thinner", judged=(0.01, 0.1),
+    )  # fmt: skip
     small_end_bearing_length_mm: float | None = parameter(
         None, "mm", (0, 1e4), "as the big end's", "length of the small end's bearing",
         above=True, optional=True, read=SMALL_CLEARANCE,
@@ -75,7 +71,7 @@ class Lubricant:
         return self.bearing_length_mm if own is None else own
 
 
-OURS = "ours"
+PROGRAM = "program"
 
 
 @document_fields
@@ -94,36 +90,27 @@ class Guide:
     """
 
     clearance_mm: float = parameter(
-        0.0, "mm", (0, 100), OURS, "between crosshead and guide, on each side", judged=(0.01, 0.2)
-    )
+        0.0, "mm", (0, 100), PROGRAM, "clearance of the guide, on each side of the crosshead",
+        judged=(0.01, 0.2),
+    )  # fmt: skip
     friction: float = parameter(
-        0.05, "", (0, 10), OURS, "coefficient of friction, oiled", judged=(0.01, 0.2)
+        0.05, "", (0, 10), PROGRAM, "friction coefficient of the oiled guide", judged=(0.01, 0.2)
     )
     stiction_velocity_mm_per_s: float = parameter(
         10.0, "mm/s", (0, 1e6), "Table 3, of the joints", "speed at which friction is three "
         "quarters of its greatest", above=True, read=GUIDE_FRICTION,
     )  # fmt: skip
     crosshead_length_mm: float = parameter(
-        120.0,
-        "mm",
-        (0.001, 1e4),
-        OURS,
-        "the crosshead's length",
-        read=PLAY,
+        120.0, "mm", (0.001, 1e4), PROGRAM, "length of the crosshead", read=PLAY,
         judged=(60.0, 250.0),
-    )
+    )  # fmt: skip
     crosshead_height_mm: float = parameter(
-        80.0,
-        "mm",
-        (0.001, 1e4),
-        OURS,
-        "the crosshead's height",
-        read=PLAY,
+        80.0, "mm", (0.001, 1e4), PROGRAM, "height of the crosshead", read=PLAY,
         judged=(40.0, 150.0),
-    )
+    )  # fmt: skip
     crosshead_inertia_kg_m2: float | None = parameter(
         None, "kg m2", (0, 1e9), "assumed: of a uniform block, m (l^2 + h^2) / 12",
-        "the crosshead's inertia about its pin", above=True, optional=True, read=PLAY,
+        "inertia of the crosshead about its pin", above=True, optional=True, read=PLAY,
     )  # fmt: skip
     stiffness_N_per_mm15: float = parameter(
         3.36e5, "N/mm^p", (0, 1e15), "Table 3, of the joints",
@@ -163,27 +150,18 @@ class Drive:
     """
 
     flywheel_kg_m2: float = parameter(
-        5.0,
-        "kg m2",
-        (0, 1e9),
-        OURS,
-        "inertia of crank, flywheel and motor",
-        above=True,
+        5.0, "kg m2", (0, 1e9), PROGRAM, "inertia of crank, flywheel and motor", above=True,
         judged=(1.0, 100.0),
-    )
-    torque_N_m: float = parameter(0.0, "N m", (-1e9, 1e9), OURS, "torque at machine.speed_rpm")
+    )  # fmt: skip
+    torque_N_m: float = parameter(0.0, "N m", (-1e9, 1e9), PROGRAM, "torque at machine.speed_rpm")
     slope_N_m_s: float = parameter(
-        100.0,
-        "N m s",
-        (0, 1e9),
-        OURS,
-        "by which the torque grows for each rad/s that speed falls",
+        100.0, "N m s", (0, 1e9), PROGRAM, "torque added for each rad/s that the speed falls",
         judged=(10.0, 1e4),
-    )
+    )  # fmt: skip
     unbalance_kg_mm: float = parameter(
-        0.0, "kg mm", (0, 1e9), OURS,
-        "the crank's mass times its centre's distance from the axis, towards its pin, on which "
-        "gravity acts; machine.counterweight_kg_mm is opposite",
+        0.0, "kg mm", (0, 1e9), PROGRAM,
+        "unbalance of the crank towards its pin: mass times its centre's distance from the axis. "
+        "Gravity acts on it; machine.counterweight_kg_mm is opposite",
     )  # fmt: skip
 
 
@@ -201,35 +179,21 @@ class Rod:
     """
 
     youngs_modulus_GPa: float = parameter(
-        207.0,
-        "GPa",
-        (0, 1e6),
-        "Table 2, steel",
-        "modulus of elasticity",
-        above=True,
+        207.0, "GPa", (0, 1e6), "Table 2, steel", "modulus of elasticity", above=True,
         judged=(70.0, 250.0),
-    )
+    )  # fmt: skip
     depth_mm: float = parameter(
-        40.0, "mm", (0, 1e4), "assumed: a 600 x 40 x 25 mm bar", "section, in the plane of motion",
-        above=True, judged=(20.0, 80.0),
+        40.0, "mm", (0, 1e4), "assumed: a 600 x 40 x 25 mm bar",
+        "depth of the rod, in the plane of motion", above=True, judged=(20.0, 80.0),
     )  # fmt: skip
     width_mm: float = parameter(
-        25.0,
-        "mm",
-        (0, 1e4),
-        "assumed: a 600 x 40 x 25 mm bar",
-        "section, across it",
-        above=True,
-        judged=(10.0, 50.0),
-    )
+        25.0, "mm", (0, 1e4), "assumed: a 600 x 40 x 25 mm bar",
+        "width of the rod, across that plane", above=True, judged=(10.0, 50.0),
+    )  # fmt: skip
     damping_ratio: float = parameter(
-        0.005,
-        "",
-        (0, 1),
-        OURS,
-        "of the first bending mode, in proportion to stiffness",
+        0.005, "", (0, 1), PROGRAM, "damping ratio of the first bending mode; others by stiffness",
         judged=(2e-3, 0.1),
-    )
+    )  # fmt: skip
 
 
 def fill_guide(guide: Guide, mass: float) -> Guide:
@@ -259,18 +223,21 @@ class Body:
     """
 
     freedoms: str = choice(
-        "xy", ("x", "y", "xy", "xy_rocking"), OURS, "how the rigid body may move"
+        "xy", ("x", "y", "xy", "xy_rocking"), PROGRAM, "directions in which the rigid body may move"
     )
-    mass_kg: float = parameter(500.0, "kg", (0, 1e7), OURS, "mass of the body", above=True)
+    mass_kg: float = parameter(500.0, "kg", (0, 1e7), PROGRAM, "mass of the body", above=True)
     inertia_kg_m2: float = parameter(
-        40.0, "kg m2", (0, 1e9), OURS, "its inertia about its mass centre", above=True, read=ROCKING
-    )
+        40.0, "kg m2", (0, 1e9), PROGRAM, "inertia of the body about its mass centre", above=True,
+        read=ROCKING,
+    )  # fmt: skip
     centre_x_mm: float = parameter(
-        300.0, "mm", (-1e5, 1e5), OURS, "mass centre from the crank's", read=ROCKING
-    )
+        300.0, "mm", (-1e5, 1e5), PROGRAM, "x of the body's mass centre, from the crank's",
+        read=ROCKING,
+    )  # fmt: skip
     centre_y_mm: float = parameter(
-        -200.0, "mm", (-1e5, 1e5), OURS, "mass centre from the crank's", read=ROCKING
-    )
+        -200.0, "mm", (-1e5, 1e5), PROGRAM, "y of the body's mass centre, from the crank's",
+        read=ROCKING,
+    )  # fmt: skip
     frequency_x_Hz: float = parameter(
         60.0, "Hz", (0, 1e5), BOLTED, "natural frequency along x", above=True, read=ALONG_X
     )
@@ -278,32 +245,36 @@ class Body:
         60.0, "Hz", (0, 1e5), BOLTED, "natural frequency along y", above=True, read=ALONG_Y
     )
     frequency_rocking_Hz: float = parameter(
-        20.0, "Hz", (0, 1e5), OURS, "natural frequency of rocking", above=True, read=ROCKING
+        20.0, "Hz", (0, 1e5), PROGRAM, "natural frequency of rocking", above=True, read=ROCKING
     )
-    damping_ratio: float = parameter(0.03, "", (0, 0.99), OURS, "of the foundation", above=True)
+    damping_ratio: float = parameter(
+        0.03, "", (0, 0.99), PROGRAM, "damping ratio of the foundation", above=True
+    )
     casing: bool = choice(
-        True, (), OURS, "a casing mode at the guide and one at the main bearing, heard by sensors",
-        kind="boolean", read=CASING_SENSED,
+        True, (), PROGRAM, "casing modes, one at the guide and one at the main bearing, "
+        "which sensors feel", kind="boolean", read=CASING_SENSED,
     )  # fmt: skip
     casing_mass_kg: float | None = parameter(
-        None, "kg", (0, 1e6), "ours: a 25th of the body's mass", "modal mass of a casing mode",
+        None, "kg", (0, 1e6), "program: a 25th of the body's mass", "modal mass of a casing mode",
         above=True, optional=True, read=CASING,
     )  # fmt: skip
     casing_frequency_Hz: float = parameter(
-        2000.0, "Hz", (0, 1e5), OURS, "natural frequency of a casing mode", above=True, read=CASING
-    )
+        2000.0, "Hz", (0, 1e5), PROGRAM, "natural frequency of a casing mode", above=True,
+        read=CASING,
+    )  # fmt: skip
     casing_damping_ratio: float = parameter(
-        0.02, "", (0, 0.99), OURS, "damping ratio of a casing mode", above=True, read=CASING
+        0.02, "", (0, 0.99), PROGRAM, "damping ratio of a casing mode", above=True, read=CASING
     )
     start: str = choice(
-        "steady", ("steady", "rest"), OURS,
-        "steady: as if the settled revolutions had always repeated; rest: at rest at time 0",
+        "steady", ("steady", "rest"), PROGRAM,
+        "start of the body; steady: as if the settled revolutions had always repeated; rest: at "
+        "rest at time 0",
     )  # fmt: skip
     band_low_Hz: float | None = parameter(
-        None, "Hz", (0, 1e5), "ours: 2", "lowest frequency of body_velocity_rms", optional=True
+        None, "Hz", (0, 1e5), "program: 2", "lowest frequency of body_velocity_rms", optional=True
     )
     band_high_Hz: float | None = parameter(
-        None, "Hz", (0, 1e5), "ours: 1000", "highest frequency of body_velocity_rms", above=True,
+        None, "Hz", (0, 1e5), "program: 1000", "highest frequency of body_velocity_rms", above=True,
         optional=True,
     )  # fmt: skip
 
@@ -336,11 +307,12 @@ class Sensor:
     REPORTED: ClassVar[float] = 1e-3  # of a record's samples: clipping is reported from here on
 
     place: str = choice(
-        "guide", ("guide", "bearing", "body"), OURS,
-        "crosshead guide at mid-stroke, main bearing, or the body's mass centre",
+        "guide", ("guide", "bearing", "body"), PROGRAM,
+        "place of the sensor: crosshead guide at mid-stroke, main bearing, or the body's mass "
+        "centre",
     )  # fmt: skip
-    direction: str = choice("y", ("x", "y"), OURS, "what it measures along")
-    rate_Hz: float = parameter(25600.0, "Hz", (0, 1e6), OURS, "sampling rate", above=True)
+    direction: str = choice("y", ("x", "y"), PROGRAM, "direction of the sensor")
+    rate_Hz: float = parameter(25600.0, "Hz", (0, 1e6), PROGRAM, "sampling rate", above=True)
     low_pass_Hz: float | None = parameter(
         None, "Hz", (0, 1e6), "usual: rate_Hz / 2.56", "anti-aliasing filter's corner",
         above=True, optional=True,
@@ -349,33 +321,34 @@ class Sensor:
         25000.0, "Hz", (0, 1e6), "usual: on a stud", "mounting resonance", above=True
     )
     mounting_damping_ratio: float = parameter(
-        0.03, "", (0, 0.99), OURS, "damping ratio of the mounting", above=True
+        0.03, "", (0, 0.99), PROGRAM, "damping ratio of the mounting", above=True
     )
     range_m_per_s2: float = parameter(
-        490.0, "m/s2", (0, 1e6), "usual: 50 g", "beyond it the signal is clipped", above=True
-    )
+        490.0, "m/s2", (0, 1e6), "usual: 50 g",
+        "range of the sensor; the signal is clipped beyond it", above=True,
+    )  # fmt: skip
     noise_m_per_s2: float = parameter(
         0.0015, "m/s2", (0, 1e6), "usual: piezoelectric", "rms of white noise up to half the rate"
     )
     speed_jitter: float = parameter(
-        0.0, "", (0, 0.1), OURS,
-        "rms of the speed's relative deviation, drawn once a revolution and smooth between: 0.93 "
+        0.0, "", (0, 0.1), PROGRAM,
+        "rms of the speed's relative deviation; drawn once a revolution and smooth between: 0.93 "
         "of it at all times, 0.81 of it in a revolution's mean speed", read=STEADY,
     )  # fmt: skip
     seed: int = parameter(
-        1, "", (0, 2**31), OURS, "of noise and jitter", kind="integer", read=RANDOM
+        1, "", (0, 2**31), PROGRAM, "seed of noise and jitter", kind="integer", read=RANDOM
     )
     length_rev: int | None = parameter(
         None, "", (1, 10_000), "the settled ones", "revolutions of the record; more of them repeat",
         kind="integer", optional=True, read=STEADY,
     )  # fmt: skip
     threshold_m_per_s2: float | None = parameter(
-        None, "m/s2", (0, 1e6), "none: no peaks are counted", "over which a peak of the record "
-        "counts (sensor_counts_per_rev)", above=True, optional=True,
+        None, "m/s2", (0, 1e6), "none: no peaks are counted", "level over which a peak of the "
+        "record counts (sensor_counts_per_rev)", above=True, optional=True,
     )  # fmt: skip
     second_threshold_m_per_s2: float | None = parameter(
-        None, "m/s2", (0, 1e6), "none", "a second threshold", above=True, optional=True,
-        read=THRESHOLD,
+        None, "m/s2", (0, 1e6), "none", "second level over which a peak counts", above=True,
+        optional=True, read=THRESHOLD,
     )  # fmt: skip
 
     @property
@@ -415,10 +388,10 @@ class Wear:
         1e-8, "mm3/(N m)", (0, 1.0),
         "assumed: of oiled metals, for which tables give 1e-9 to 1e-6 (Archard, J. Appl. Phys. 24, "
         "1953, defines it)",
-        "volume that is worn off for each N m of pressing and sliding", above=True,
+        "wear coefficient: volume lost for each N m of normal force times sliding", above=True,
     )  # fmt: skip
     coefficient_factor: float = value(
-        2.0, "", (1, 1e6), "assumed", "how many times smaller or greater the coefficient may be"
+        2.0, "", (1, 1e6), "assumed", "factor by which the coefficient may be smaller or greater"
     )
     limit_mm: float | None = value(
         None, "mm", (0, 1e4), "assumed: twice the greater clearance",
@@ -426,19 +399,19 @@ class Wear:
         optional=True,
     )  # fmt: skip
     hours: float = value(
-        50000.0, "h", (0, 1e9), "ours", "operating hours after which it ends at the latest",
+        50000.0, "h", (0, 1e9), "program", "operating hours after which the study ends",
         above=True,
     )  # fmt: skip
     step_mm: float = value(
-        0.01, "mm", (0, 1e4), "ours: tests/results/wear.md",
-        "wear at the deepest place for which one motion stands", above=True,
+        0.01, "mm", (0, 1e4), "program: tests/results/wear.md",
+        "wear at the deepest place after which the motion is computed again", above=True,
     )  # fmt: skip
     bore_length_mm: float = value(
         20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of the bores", above=True
     )
     sectors: int = value(
-        72, "", (24, 180), "ours: tests/results/wear.md",
-        "that a bore is divided into by angle", kind="integer",
+        72, "", (24, 180), "program: tests/results/wear.md",
+        "sectors of a bore, by angle", kind="integer",
     )  # fmt: skip
 
 

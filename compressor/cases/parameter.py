@@ -305,6 +305,11 @@ class Parameter:
     read: tuple[Reader, ...] = ()  # conditions that all hold where a case reads it
 
     @property
+    def label(self) -> str:
+        """Return the phrase without its remarks, such as a coordinate's `long_name`."""
+        return re.split(r"[:;]| \(", self.phrase)[0]
+
+    @property
     def range(self) -> str:
         """Return the allowed values, for a table or an error."""
         if self.kind == "choice":
@@ -492,7 +497,7 @@ def parameter_table(rows: Iterable[Parameter]) -> str:
     lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
     for row in rows:
         default = "" if row.default is None or row.kind == "text" else str(row.default)
-        default = quote_value(row.default) if row.kind == "boolean" else default.removesuffix(".0")
+        default = default.lower() if row.kind == "boolean" else default.removesuffix(".0")
         cells = (
             f"`{row.key}`", row.unit, default, row.range, row.judged_on, row.source, row.phrase,
             row.readers,

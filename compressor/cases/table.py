@@ -82,7 +82,7 @@ class Settings:
     """
 
     name: str = choice(
-        "case", (), "ours", "name of the study; default: the file's", kind="text", identity=False
+        "case", (), "program", "name of the study; default: the file's", kind="text", identity=False
     )
     load: str = choice(
         "spring", ("spring", "gas", "none"), "§2.2-2.4", "load on the piston",

@@ -144,7 +144,7 @@ def machine_constants(studies: Sequence[StoredStudy], layout: Layout) -> dict[st
         name = names[row.key]
         if name in layout.coordinates or not all(isinstance(one, int | float) for one in values):
             continue
-        attrs = {"units": row.unit or "1", "long_name": row.phrase, "case_key": row.key}
+        attrs = {"units": row.unit or "1", "long_name": row.label, "case_key": row.key}
         if len(studies) == 1:
             found[name] = xr.Variable((), float(values[0]), attrs)
         else:
