@@ -40,7 +40,7 @@ def test_a_reason_is_its_name_wherever_it_goes():
 
 
 def test_a_reason_of_another_version_has_a_remedy():
-    assert remedy("flooded") == "compsim show JOB tells its detail"
+    assert remedy("flooded") == "compsim show JOB prints its detail"
 
 
 @pytest.mark.parametrize("module", PROGRAM)

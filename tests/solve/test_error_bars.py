@@ -271,9 +271,12 @@ def test_bars_of_the_ideal_machine_cover_its_quadrature(load):
     truth = attempts.run_at_tolerance(
         Case.from_values({"load": load, "solve": SHORT}), 1e-12, 60.0, True
     ).metrics
+    # means of both signs may come to nothing: sums of the forces are rounded as the BLAS likes
+    rounding = 1e-15 * found.numbers["peak_contact_force"].max()
     for name in METRICS:
         error = np.abs(found.numbers[name] - truth[name])
-        assert (error <= found.numbers[f"{name}_error"]).all(), name
+        slack = rounding if name.startswith("mean_") else 0.0
+        assert (error <= found.numbers[f"{name}_error"] + slack).all(), name
     assert found.numbers["peak_acceleration_error"] < 1e-5 * found.numbers["peak_acceleration"]
 
 

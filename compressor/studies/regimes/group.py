@@ -59,7 +59,7 @@ def _row(
     name: str, default: Any, kind: str, span: tuple[float, float], phrase: str,
     words: tuple[str, ...] = (),
 ) -> Parameter:  # fmt: skip
-    return Parameter(f"{GROUP}.{name}", "", default, *span, False, "ours", phrase, kind, words)
+    return Parameter(f"{GROUP}.{name}", "", default, *span, False, "program", phrase, kind, words)
 
 
 FOLLOWED = tuple(key for key in (*SHORTHANDS, *table()) if _not_followed(key) is None)
