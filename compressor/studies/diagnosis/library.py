@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.cases import PerJoint, name_worn_joint, points
-from compressor.program import Progress, no_progress
+from compressor.program import PROGRAM, Progress, no_progress
 from compressor.store import (
     Folder,
     Stored,
@@ -66,8 +66,9 @@ class Library:
 def open_library(folder: Folder, name: str, progress: Progress = no_progress) -> Library:
     """Return the library of a stored study.
 
-    Features are kept in `<folder>/features/<study>.nc` and made again when jobs, or how features
-    are made, have changed. Raises StoreError where there is no such study or no record in it.
+    Features are stored in `<folder>/features/<study>.nc` and computed again when jobs, the version
+    or the code of features has changed. Raises StoreError where there is no such study or no
+    record in it.
     """
     study, stored = find_study(folder, name), read_store(folder).warned()
     positions = {key: place for key in study.keys if (place := _place(stored, key)) is not None}
@@ -111,11 +112,13 @@ def _place(stored: Stored, key: str) -> int | None:
 
 
 def _digest(stored: Stored, positions: dict[str, int]) -> str:
-    """Return the hash of the files from which features are made, and of their code."""
+    """Return the hash of the files from which features are made, of their code and the version."""
     parts = (stored.rows.columns[name] for name in ("key", "digest"))
     keys, digests = (column[[*positions.values()]].tolist() for column in parts)
     names = [f"{k.decode()}-{d.decode()}.h5" for k, d in zip(keys, digests, strict=True)]
-    return hashlib.sha256("\n".join([inspect.getsource(table), *names]).encode()).hexdigest()
+    return hashlib.sha256(
+        "\n".join([PROGRAM, inspect.getsource(table), *names]).encode()
+    ).hexdigest()
 
 
 def _read_features(path: Path, made_of: str) -> xr.Dataset | None:

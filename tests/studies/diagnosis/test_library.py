@@ -54,7 +54,7 @@ def test_kept_features_are_read_again(library, folder, monkeypatch):
     assert again.keys.tolist() == library.keys.tolist()
 
 
-@pytest.mark.parametrize("harm", ["stale", "damaged", "other code"])
+@pytest.mark.parametrize("harm", ["stale", "damaged", "other code", "another version"])
 def test_features_that_cannot_be_trusted_are_made_again(harm, library, folder, monkeypatch):
     (path,) = (folder / "features").iterdir()
     kept = path.read_bytes()
@@ -62,6 +62,8 @@ def test_features_that_cannot_be_trusted_are_made_again(harm, library, folder, m
         path.write_bytes(kept[:-100])
     elif harm == "other code":
         monkeypatch.setattr(module.inspect, "getsource", lambda one: "changed")
+    elif harm == "another version":
+        monkeypatch.setattr(module, "PROGRAM", "compsim 99")
     else:
         monkeypatch.setattr(module, "_place", lambda stored, key: None)
         with pytest.raises(StoreError, match="has no sensor's record"):
