@@ -46,6 +46,28 @@ def test_lines_of_equal_value_lie_where_the_plane_has_them():
     assert all(np.ptp(one[np.isfinite(one)]) < 1e-9 for one in np.split(y, ends) if one.size > 1)
 
 
+def test_a_caption_speaks_of_lines_where_there_are_some():
+    drawn, _, found = traces(grid(AXES, lambda c, n: n + 0 * c))
+    assert "line:" in found
+    assert drawn.caption.startswith("A cell a job; white: lines of equal value")
+    few = {"clearance_mm": [0.1, 0.2, 0.4], "speed_rpm": [300.0, 400.0]}
+    drawn, _, found = traces(grid(few, lambda c, n: n + 0 * c))
+    assert "line:" not in found
+    assert drawn.caption.startswith("A cell a job.")
+
+
+def test_a_few_values_stand_at_their_cells():
+    _, panel, _ = traces(grid(AXES, lambda c, n: n + c))
+    assert panel.x.words == {0.1: "0.1", 0.2: "0.2", 0.4: "0.4", 0.5: "0.5"}
+    assert panel.y.words == {300.0: "300", 400.0: "400", 500.0: "500"}
+    close = AXES | {"clearance_mm": [0.1, 0.11, 0.4]}  # their texts would overlap
+    _, panel, _ = traces(grid(close, lambda c, n: n + c))
+    assert not panel.x.words
+    many = AXES | {"clearance_mm": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]}
+    _, panel, _ = traces(grid(many, lambda c, n: n + c))
+    assert not panel.x.words
+
+
 def test_failed_and_missing_cells_are_marked():
     status = np.full((4, 3), "ok", dtype="U7")
     status[1, 2], status[3, 0] = "failed", "missing"

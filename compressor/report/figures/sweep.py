@@ -93,8 +93,11 @@ def draw_grid(
     first, second = (sweep.axes[n] for n in order[:2])
     if len(sweep.axes) == 2 and first.is_words == second.is_words:
         title = f"metrics over {first.phrase} and {second.phrase}"
-        caption = captions.join_sentences(captions.maps(sweep), *marks, *zone_words(shown, limits))
-        yield SweepFigure("map", title, caption, draw_maps(sweep, shown, limits))
+        figure = draw_maps(sweep, shown, limits)
+        traces = (trace for panel in figure.panels for trace in panel.traces)
+        words = captions.maps(sweep, any(one.scale and one.scale.levels for one in traces))
+        caption = captions.join_sentences(words, *marks, *zone_words(shown, limits))
+        yield SweepFigure("map", title, caption, figure)
         return
     role = roles_of(sweep, order, False)
     title = f"metrics over {sweep.axes[role.x].phrase} and {sweep.axes[role.color].phrase}"

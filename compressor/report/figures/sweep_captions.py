@@ -81,10 +81,11 @@ def curves(sweep: PlottedSweep) -> str:
     )
 
 
-def maps(sweep: PlottedSweep) -> str:
-    """Describe a sweep along two axes."""
+def maps(sweep: PlottedSweep, has_lines: bool) -> str:
+    """Describe a sweep along two axes. has_lines: of equal value, in some panel."""
+    lines = "; white: lines of equal value, which stand in the scale of colours, too"
     return join_sentences(
-        "A cell a job; white: lines of equal value, which stand in the scale of colours, too.",
+        f"A cell a job{lines if has_lines else ''}.",
         *(describe_thinning(axis, MAX_CELLS) for axis in sweep.axes),
     )
 

@@ -48,6 +48,7 @@ COLORS = "cividis"
 LIMIT = LineStyle(RED, (0, (4, 1.5)), 1.4, 2.4)  # of a metric
 MAX_CELLS = 64  # along an axis
 MAX_CONTOURS = 5
+MAX_NAMED_VALUES, MIN_NAMED_GAP = 6, 0.15  # of an axis; share of what it spans
 MIN_RISEN = 0.2  # of the cells, above the least value
 NOTHING = fill("#f2f2f2", edge=GREY, is_hatched=True)
 
@@ -92,8 +93,8 @@ def draw_maps(
         plot_map(panel, cells, values, measure)
         plot_limits(panel, cells, values, limits.of(measure))
         mark_cells(panel, cells, status, chaotic)
-        scale_map(panel.x, x, in_lines(x.words) if x.is_words else [])
-        scale_map(panel.y, y, y.words if y.is_words else [])
+        scale_map(panel.x, x, in_lines(x.words))
+        scale_map(panel.y, y, y.words)
     figure.x_title, figure.y_title = x.title, y.title
     figure.legend = marks_shown(status, chaotic)
     if any((np.isnan(values) & (status == "ok")).any() for values in tables):
@@ -146,9 +147,14 @@ def mark_cells(panel: Panel, cells: Cells, status: np.ndarray, chaotic: np.ndarr
 
 
 def scale_map(scale: Scale, axis: PlottedAxis, words: Sequence[str]) -> None:
-    """Set words at ticks, or a log scale, of the x or the y axis of a map."""
-    scale.name(words)
+    """Set the x or the y axis of a map: words or a few values in its cells, or a log scale."""
     scale.log = axis.is_log
+    if axis.is_words:
+        scale.name(words)
+    elif not axis.is_log and 1 < len(words) <= MAX_NAMED_VALUES:
+        gaps = np.diff(np.sort(axis.places))
+        if gaps.min() >= MIN_NAMED_GAP * gaps.sum():  # else their texts overlap
+            scale.words = dict(zip(axis.places.tolist(), words, strict=True))
 
 
 COLUMNS = 4
