@@ -126,10 +126,12 @@ def wear_ending(one: "WornMachine") -> str:
     found, wear_keys = one.life, one.case.wear
     if not found or not wear_keys:
         return f"failed: {one.reason}"
-    most = hours(wear_keys.hours, "> ")
+    factor = wear_keys.coefficient_factor
     low, mid, high = (
-        most if math.isnan(value) else hours(value)
-        for value in (found.low, found.hours, found.high)
+        hours(min(times * found.followed, wear_keys.hours), "> ")
+        if math.isnan(value)
+        else hours(value)
+        for value, times in ((found.low, 1.0 / factor), (found.hours, 1.0), (found.high, factor))
     )
     where = f"{1e3 * found.clearance:.3f} mm at {found.joint}, {math.degrees(found.angle):.0f} deg"
     return f"{mid:>17}  {f'{low} to {high}':>31}  {where}" + f"; failed: {one.reason}" * bool(

@@ -63,6 +63,7 @@ def plot_profiles(panel: Panel, stages: xr.Dataset) -> None:
         depth = np.append(depth, depth[0])
         share, name = (place + 1) / shown.size, f"{names[place]} h"
         panel.plot(around, depth, LineStyle(BLACK, linewidth=1.0, alpha=share), name)
-    panel.title = f"(c) after {', '.join(names)} h,\nthe later the darker"
+    after = f"after {', '.join(names)} h" if names else "no wear yet"
+    panel.title = f"(c) {after}" + ",\nthe later the darker" * (len(names) > 1)
     panel.title_size = 8.0
     panel.x.title, panel.x.ticks = "place, from the rod's axis (deg)", range(-180, 181, 90)

@@ -264,7 +264,8 @@ class Life(NamedTuple):
     """Hours until the first joint is worn out, nan where that is after the last stage.
 
     low, high: with the greatest and the least coefficient; `joint`: that is worn out, or is the
-    nearest to it; `clearance`, `angle`: there at the end (m), and of the deepest place (rad).
+    nearest to it; `clearance`, `angle`: there at the end (m), and of the deepest place (rad);
+    `followed`: the hours of the last stage.
     """
 
     hours: float
@@ -273,6 +274,7 @@ class Life(NamedTuple):
     joint: str
     clearance: float
     angle: float
+    followed: float
 
 
 def life(machine: Worn, stages: xr.Dataset) -> Life:
@@ -290,4 +292,5 @@ def life(machine: Worn, stages: xr.Dataset) -> Life:
         str(stages["joint"].values[worst]),
         float(opened[-1, worst]),
         float(stages["angle"].values[int(deepest.values.argmax())]),
+        float(hours[-1]),
     )

@@ -3,6 +3,7 @@
 import json
 import multiprocessing
 import os
+import re
 import signal
 import time
 
@@ -14,6 +15,7 @@ from conftest import assert_same_bits, jobs_here
 from compressor.cases.load import load_cases
 from compressor.store.files import StoreError
 from compressor.studies.wear import stages
+from compressor.studies.wear.command import hours
 from compressor.studies.wear.run import WearTask, follow_wear, run_wear
 from compressor.studies.wear.stages import Worn, open_wear, wear_file
 
@@ -129,6 +131,11 @@ def test_a_failed_machine_is_told_and_goes_on_when_asked(
     assert "failing: budget_seconds: slow" in said.err
     assert "--rerun" in said.err
     assert "failed: budget_seconds" in said.out
+    last = float(open_wear(tmp_path, case)["hours"][-1])  # no machine outlives what was not run
+    factor = case.wear.coefficient_factor
+    bounds = (hours(times * last, "> ") for times in (1.0, 1.0 / factor, factor))
+    mid, low, high = (re.escape(bound) for bound in bounds)
+    assert re.search(rf"  {mid} +{low} to {high}  ", said.out)
     assert main(["wear", str(file), "-o", str(tmp_path), "--rerun"]) == 0
     assert_same_bits(open_wear(tmp_path, case), whole(worn, tmp_path / "undisturbed"))
 
