@@ -143,8 +143,9 @@ class Effects:
     main, total: (k,); *_ends: the ends of the 95 % intervals, (2, k), None where the values are
     exact. filled: points without a value of their own. base: how many points of each part
     of a `saltelli` design were taken, where not all were; else 0. dropped: blocks of it with a
-    point without a value, which are left out; with_unknown: the effects with these blocks, their
-    unknown points having the median, None where there are none.
+    point without a value, which are left out, or points of a grid at values of an axis at which
+    nothing is known; with_unknown: the effects with these blocks, their unknown points having the
+    median, None where there are none.
     """
 
     kind: str
@@ -174,12 +175,14 @@ def grid_effects(values: np.ndarray) -> Effects | None:
     out. Other unknown points, at most MAX_GAPS of all, take the sum of their axes' main effects
     (Healy and Westmacott, Applied Statistics 5, 1956, 203-206).
     """
+    whole_grid = values.size
     for axis in range(values.ndim):
         rest = tuple(n for n in range(values.ndim) if n != axis)
         values = np.compress(np.isfinite(values).any(axis=rest), values, axis=axis)
     unknown = ~np.isfinite(values)
     if not values.size or unknown.mean() > MAX_GAPS:
         return None
+    filled, dropped = int(unknown.sum()), whole_grid - values.size
     values = fill_unknown(values, unknown)
     axes = range(values.ndim)
     other_axes = [tuple(n for n in axes if n != axis) for axis in axes]
@@ -187,10 +190,10 @@ def grid_effects(values: np.ndarray) -> Effects | None:
     whole = scaled.var()
     if not whole:
         nothing = np.full(values.ndim, math.nan)
-        return Effects("grid", nothing, nothing, filled=int(unknown.sum()))
+        return Effects("grid", nothing, nothing, filled=filled, dropped=dropped)
     main = np.array([scaled.mean(axis=others).var() for others in other_axes]) / whole
     total = np.array([scaled.var(axis=axis).mean() for axis in axes]) / whole
-    return Effects("grid", main, total, filled=int(unknown.sum()))
+    return Effects("grid", main, total, filled=filled, dropped=dropped)
 
 
 def fill_unknown(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:

@@ -375,7 +375,13 @@ def finding(
         return MetricChange(title, "", "", text(high), "", "", 0.0, always)
     least, most = float(values[low]), float(values[high])
     if most - least <= np.nansum([bars[high], bars[low]]):
-        same = "the same in all jobs within its error bars"
+        same = (
+            "the same in all jobs within its error bars"
+            if len(sure) == len(values)
+            else f"known of {len(sure)} of {len(values)} jobs, the same within its error bars"
+            if len(sure) > 1
+            else f"known of 1 of {len(values)} jobs"
+        )
         return MetricChange(title, "", "", text(high), "", same, 0.0, always) if always else None
     ratio = most / least if least * most > 0.0 else math.inf
     rank = min(abs(math.log(ratio)), FROM_ZERO)

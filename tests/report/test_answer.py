@@ -143,6 +143,10 @@ def test_the_worn_joint_s_force_and_the_reversal_stand_there_though_they_do_not_
     assert found[-2].change == "1.03 times"
     assert (found[-1].low, found[-1].high) == ("", "150.0 ± 0.1 °")
     assert found[-1].change == "the same in all jobs within its error bars"
+    few = told(REVERSAL, [150.0, np.nan, np.nan], [0.1] * 3)
+    assert (few.high, few.change) == ("150.0 ± 0.1 °", "known of 1 of 3 jobs")
+    few = told(REVERSAL, [150.0, np.nan, 150.0], [0.1] * 3)
+    assert few.change == "known of 2 of 3 jobs, the same within its error bars"
     unknown = told(REVERSAL, steady, [np.inf] * 3)
     assert (unknown.high, unknown.change) == ("unknown", "within its error bar")
     assert told(REVERSAL, [np.nan] * 3, [np.nan] * 3) is None

@@ -56,6 +56,31 @@ def test_a_caption_speaks_of_lines_where_there_are_some():
     assert drawn.caption.startswith("A cell a job.")
 
 
+def test_a_caption_names_the_marks_that_are_drawn():
+    status = np.full((4, 3), "ok", dtype="U7")
+    drawn, _, _ = traces(grid(AXES, lambda c, n: n + c, status=status))
+    assert "job failed" not in drawn.caption
+    status[1, 2] = "failed"
+    drawn, _, _ = traces(grid(AXES, lambda c, n: n + c, status=status))
+    assert "A cross: a job failed here. " in f"{drawn.caption} "
+    regime = np.full((4, 3), "predictable")
+    regime[0, 0] = "chaotic"
+    drawn, _, _ = traces(grid(AXES, lambda c, n: n + c, status=status, regime=regime))
+    assert "A cross: a job failed here; a pink ring: a chaotic job, whose" in drawn.caption
+
+
+def test_a_metric_that_a_job_lacks_is_drawn():
+    """It was said to be the same at every job."""
+    data = grid(AXES, lambda c, n: n + c)
+    data["rms_acceleration"] = data["rms_acceleration"] * 0 + 5.0
+    drawn, _, _ = traces(data)
+    assert "The same at every job, and not drawn: rms acceleration (5 m/s²)" in drawn.caption
+    data["rms_acceleration"][0, 0] = np.nan
+    drawn, _, _ = traces(data)
+    assert "The same at every job" not in drawn.caption
+    assert [one.name for one in drawn.figure.legend] == ["the job lacks this metric"]
+
+
 def test_a_few_values_stand_at_their_cells():
     _, panel, _ = traces(grid(AXES, lambda c, n: n + c))
     assert panel.x.words == {0.1: "0.1", 0.2: "0.2", 0.4: "0.4", 0.5: "0.5"}

@@ -66,7 +66,7 @@ def test_jobs_without_a_value_are_told():
     status[1, 1, 0] = "failed"
     drawn = plan(grid(AXES, lambda c, n, load: 10 + c + 2 * n + 0 * load, status=status))
     assert bars(drawn["ranking"])["load"]["total effect"] == pytest.approx([0, 0], abs=1e-6)
-    assert "Up to 1 jobs lack a value" in drawn["ranking"].caption
+    assert "up to 1 of a metric, count with the sum" in drawn["ranking"].caption
 
 
 def test_keys_that_overlap_are_not_told_apart():
@@ -108,7 +108,7 @@ def test_both_answers_are_given_where_jobs_of_a_design_failed():
     assert without == pytest.approx(90, abs=8)
     assert abs(with_them - without) > 0.5
     assert f"{without:.0f} % ({with_them:.0f} % with them) of the spread of peak" in caption
-    assert "Up to 7 jobs lack a value" in caption
+    assert "up to 7 of a metric: the" in caption
     assert "the 6 blocks of the design that have one are left out whole" in caption
 
 

@@ -55,6 +55,18 @@ def test_words_are_colours_with_trends_of_their_own():
     assert "95 % interval of the trend, load gas" in one
 
 
+def test_a_caption_speaks_of_what_is_drawn():
+    """Of four jobs there is no ranking and no trend; of words none is on an axis."""
+    few = plan(listed({name: values[:4] for name, values in COLUMNS.items()}, SPEED[:4]))["points"]
+    assert few.caption == "Every metric over a key, a point a job."
+    assert [one.name for one in few.figure.legend] == ["a job"]
+    assert few.title == "metrics over a key"
+    load = np.array(["spring", "gas"] * 30)
+    found = plan(listed(COLUMNS | {"load": load}, np.where(load == "spring", SPEED, 9 - SPEED)))
+    assert found["points"].caption.startswith("Every metric over the number that matters most for")
+    assert "over each number, a point a job" in found["scatter"].caption
+
+
 def test_what_is_not_known_is_drawn_but_not_fitted():
     status, regime = (np.full(60, word, dtype="U11") for word in ("ok", "predictable"))
     status[3], regime[7] = "failed", "chaotic"

@@ -101,7 +101,8 @@ def draw_grid(
         return
     role = roles_of(sweep, order, False)
     title = f"metrics over {sweep.axes[role.x].phrase} and {sweep.axes[role.color].phrase}"
-    caption = captions.join_sentences(captions.overview(sweep, role), marks[1])
+    are_first = len(sweep.axes) > 2 and bool(found) and {role.x, role.color} == {*order[:2]}
+    caption = captions.join_sentences(captions.overview(sweep, role, are_first), marks[1])
     yield SweepFigure("overview", title, caption, draw_overview(sweep, role, shown))
     if len(sweep.axes) == 2:
         return
@@ -131,16 +132,19 @@ def draw_sampled(
     for measure in shown:
         own = order_of(found[measure]) if measure in found else order
         strongest.append(next(n for n in own if n in numbers))
-    caption = captions.join_sentences(captions.points(sweep, bool(found)), *marks)
-    yield SweepFigure("points", "metrics over the key that matters most for each", caption,
-                      draw_points(sweep, strongest, shown))  # fmt: skip
+    kind, is_ranked = captions.axis_kind(sweep), bool(found)
+    figure = draw_points(sweep, strongest, shown)
+    caption = captions.join_sentences(captions.points(sweep, is_ranked, figure), *marks)
+    which = f"the {kind} that matters most for each" if is_ranked else f"a {kind}"
+    yield SweepFigure("points", f"metrics over {which}", caption, figure)
     if len(numbers) < 2:
         return
     columns = numbers[:MAX_COLUMNS]
     group = leading(sweep, shown, MAX_ROWS)
-    caption = captions.join_sentences(captions.scatter(sweep, columns, len(numbers)), marks[0])
-    title = f"{', '.join(one.title for one in group)} over each key"
-    yield SweepFigure("scatter", title, caption, draw_scatter(sweep, columns, group))
+    figure = draw_scatter(sweep, columns, group)
+    words = captions.scatter(sweep, len(columns), len(numbers), is_ranked, figure)
+    title = f"{', '.join(one.title for one in group)} over each {kind}"
+    yield SweepFigure("scatter", title, captions.join_sentences(words, marks[0]), figure)
 
 
 def draw_ranked(

@@ -4,9 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from compressor.report.figures.drawing import Drawing
 from compressor.report.figures.sweep_data import Measure, PlottedAxis, PlottedSweep, shown_value
 from compressor.report.figures.sweep_maps import MAX_CELLS, Ranking, describe_ranking
 from compressor.report.figures.sweep_panels import (
+    CHAOTIC,
     MAX_COLUMNS,
     MAX_JOBS,
     MAX_LINES,
@@ -15,12 +17,15 @@ from compressor.report.figures.sweep_panels import (
     MAX_ROWS,
     Roles,
     grouping,
+    has_trends,
 )
 
-MARKS = (
-    "A cross: a job failed here; a grey circle: a job was not run; a red ring: a chaotic job, "
-    "whose averages hold within their bars, but whose greatest values hold for that run only."
-)
+MARKS = {
+    "failed": "a cross: a job failed here",
+    "missing": "a grey circle: a job was not run",
+    CHAOTIC: "a pink ring: a chaotic job, whose averages hold within their bars, but whose "
+    "greatest values hold for that run only",
+}
 VARIANCE = (
     "Spread is the variance over the grid. Bars: the share that an axis explains by itself (main "
     "effect) and together with its interactions with others (total effect, as in these "
@@ -49,16 +54,18 @@ def join_sentences(*parts: str) -> str:
 def split_measures(
     sweep: PlottedSweep, known: Sequence[Measure]
 ) -> tuple[list[Measure], list[Measure]]:
-    """Return the measures that differ between jobs, and those that do not."""
-    varied = [bool(np.ptp(v[np.isfinite(v)])) for v in (sweep.values(m) for m in known)]
+    """Return the measures that differ between jobs, or that some lack, and the others."""
+    values = [sweep.values(measure)[sweep.status == "ok"] for measure in known]
+    varied = [bool(np.isnan(v).any() or np.ptp(v)) for v in values]
     both = [*zip(known, varied, strict=True)]
     return [m for m, varies in both if varies], [m for m, varies in both if not varies]
 
 
 def describe_marks(sweep: PlottedSweep) -> str:
     """Describe the marks that are drawn, if any."""
-    status, chaotic = sweep.status, sweep.chaotic
-    return MARKS if chaotic.any() or np.isin(status, ("failed", "missing")).any() else ""
+    there = {*sweep.status.ravel().tolist()} | ({CHAOTIC} if sweep.chaotic.any() else set())
+    text = "; ".join(words for mark, words in MARKS.items() if mark in there)
+    return f"{text[0].upper()}{text[1:]}." if text else ""
 
 
 def describe_unchanged(sweep: PlottedSweep, same: Sequence[Measure]) -> str:
@@ -109,14 +116,13 @@ def describe_points(sweep: PlottedSweep, role: Roles) -> str:
     return join_sentences(f"Each point is the mean over {' and '.join(others)}.", left)
 
 
-def overview(sweep: PlottedSweep, role: Roles) -> str:
-    """Describe every metric over two of the axes."""
+def overview(sweep: PlottedSweep, role: Roles, are_first: bool) -> str:
+    """Describe every metric over two of the axes. are_first: of a ranking of more axes."""
     color = sweep.axes[role.color]
+    rank = ": the axes that matter most on the mean of all metrics" if are_first else ""
     return join_sentences(
         f"Every metric over {sweep.axes[role.x].phrase}, a colour for each value of "
-        f"{color.phrase}: the axes that matter most on the mean of all metrics."
-        if len(sweep.axes) > 2
-        else f"Every metric over {sweep.axes[role.x].phrase}, a colour for each {color.phrase}.",
+        f"{color.phrase}{rank}.",
         describe_points(sweep, role),
         describe_thinning(sweep.axes[role.x], MAX_PLACES),
         describe_thinning(color, MAX_LINES),
@@ -135,23 +141,35 @@ def multiples(sweep: PlottedSweep, role: Roles) -> str:
     )
 
 
-def points(sweep: PlottedSweep, is_ranked: bool) -> str:
+def axis_kind(sweep: PlottedSweep) -> str:
+    """Return what a list of jobs is drawn over: a key, or a number where some keys are words."""
+    return "number" if any(axis.is_words for axis in sweep.axes) else "key"
+
+
+def points(sweep: PlottedSweep, is_ranked: bool, drawn: Drawing) -> str:
     """Describe each metric of a list of jobs over a key."""
-    which = "the key that matters most for it" if is_ranked else "a key"
-    return join_sentences(f"Every metric over {which}, a point a job.", *describe_trends(sweep))
-
-
-def scatter(sweep: PlottedSweep, columns: Sequence[int], keys: int) -> str:
-    """Describe some metrics of a list of jobs over several keys."""
-    some = f"the {len(columns)} strongest of {keys} keys" if keys > len(columns) else "each key"
+    kind = axis_kind(sweep)
+    which = f"the {kind} that matters most for it" if is_ranked else f"a {kind}"
     return join_sentences(
-        f"The metrics that change most over {some}, a point a job.", *describe_trends(sweep)
+        f"Every metric over {which}, a point a job.", *describe_trends(sweep, drawn)
     )
 
 
-def describe_trends(sweep: PlottedSweep) -> Iterator[str]:
+def scatter(sweep: PlottedSweep, shown: int, keys: int, is_ranked: bool, drawn: Drawing) -> str:
+    """Describe some metrics of a list of jobs over several keys. shown: so many of the keys."""
+    kind = axis_kind(sweep)
+    most = f"the {shown} strongest" if is_ranked else f"{shown}"
+    some = f"{most} of {keys} {kind}s" if keys > shown else f"each {kind}"
+    return join_sentences(
+        f"The metrics that change most over {some}, a point a job.",
+        *describe_trends(sweep, drawn),
+    )
+
+
+def describe_trends(sweep: PlottedSweep, drawn: Drawing) -> Iterator[str]:
     """Yield the sentences on trends, on colours, and on how many points are drawn."""
-    yield TREND
+    if has_trends(drawn):
+        yield TREND
     phrase, _, _ = grouping(sweep)
     if phrase:
         yield f"A colour for each {phrase}."
@@ -169,19 +187,28 @@ def ranking(sweep: PlottedSweep, found: Ranking, shown: Sequence[Measure]) -> st
     most = max(effects.filled for effects in found.values())
     base = max(effects.base for effects in found.values())
     stands = {
-        "grid": "counts with the sum of its axes' main effects",
-        "rank": "is left out",
+        "grid": "count with the sum of their axes' main effects",
+        "rank": "are left out",
     }
     dropped = max(effects.dropped for effects in found.values())
     blocks = (
-        f"Up to {most} jobs lack a value that is known within its error bar: the {dropped} blocks "
-        "of the design that have one are left out whole; “with them” such jobs have the median."
+        f"Jobs without a value that is known within its error bar, up to {most} of a metric: the "
+        f"{dropped} blocks of the design that have one are left out whole; “with them” such jobs "
+        "have the median."
     )
-    gaps = f"Up to {most} jobs lack a value that is known within its error bar: such a job "
+    gaps = f"Points without a value that is known within its error bar, up to {most} of a metric, "
+    rows = (
+        f"Values of an axis at which nothing is known, up to {dropped} points of the grid, are "
+        "left out."
+    )
     return join_sentences(
         describe_ranking(sweep, found) + " In parentheses: the correlation." * (kind == "rank"),
         {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS}[kind],
         f"They are of the first {base:,} points of the design's sequence." if base else "",
         (blocks if kind == "saltelli" else gaps + f"{stands[kind]}.") if most else "",
-        f"Not ranked, since too few jobs tell of it: {'; '.join(left)}." if left else "",
+        rows if kind == "grid" and dropped else "",
+        "Not ranked, since too few values are known or all known ones are the same: "
+        f"{'; '.join(left)}."
+        if left
+        else "",
     )

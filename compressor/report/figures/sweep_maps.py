@@ -28,6 +28,7 @@ from compressor.report.figures.style import BLUE, GOLD, GREY, RED, LineStyle, fi
 from compressor.report.figures.sweep_data import (
     MARKS,
     NAMES,
+    OUTSIDE,
     Measure,
     PlottedAxis,
     PlottedSweep,
@@ -98,7 +99,9 @@ def draw_maps(
     figure.x_title, figure.y_title = x.title, y.title
     figure.legend = marks_shown(status, chaotic)
     if any((np.isnan(values) & (status == "ok")).any() for values in tables):
-        figure.legend.append(entry("no value: this joint has no clearance", NOTHING, "band"))
+        figure.legend.append(entry("the job lacks this metric", NOTHING, "band"))
+    if (status == OUTSIDE).any():
+        figure.legend.append(entry("no job of the study", NOTHING, "band"))
     return figure
 
 

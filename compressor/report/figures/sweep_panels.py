@@ -358,7 +358,7 @@ def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Mea
         plot_points(panel, sweep, axis, measure)
         panel.x.title = sweep.axes[axis].title
         panel.y.title = measure.unit
-    figure.legend = scatter_entries(sweep)
+    figure.legend = scatter_entries(sweep, figure)
     return figure
 
 
@@ -374,7 +374,7 @@ def draw_scatter(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Me
     for column, axis in zip(grid.T, axes, strict=True):
         column[-1].x.title = sweep.axes[axis].title
         share_scales(column, "x")
-    figure.legend = scatter_entries(sweep)
+    figure.legend = scatter_entries(sweep, figure)
     return figure
 
 
@@ -433,8 +433,13 @@ def plot_trend(panel: Panel, x: np.ndarray, y: np.ndarray, color: str, name: str
     panel.plot(at, middle, LineStyle(color, "-", 1.8, 3), f"trend{name}")
 
 
-def scatter_entries(sweep: PlottedSweep) -> list[Trace]:
-    """Return the legend of a scatter diagram."""
+def has_trends(figure: Drawing) -> bool:
+    """Return whether a trend is drawn in some panel, as it is from a few points on."""
+    return any(one.name.startswith("trend") for panel in figure.panels for one in panel.traces)
+
+
+def scatter_entries(sweep: PlottedSweep, figure: Drawing) -> list[Trace]:
+    """Return the legend of a scatter diagram, whose panels are drawn."""
     phrase, words, _ = grouping(sweep)
     found = []
     for n, word in enumerate(words):
@@ -443,6 +448,7 @@ def scatter_entries(sweep: PlottedSweep) -> list[Trace]:
             entry(name_value(phrase, word) if phrase else "a job", mark(color, MARKERS[n], 4.5))
         )
     color = BLUE if not phrase else "#606060"
-    found.append(entry("trend", LineStyle(color, "-", 1.8)))
-    found.append(entry("its 95 % interval", fill(color, 0.3), "band"))
+    if has_trends(figure):
+        found.append(entry("trend", LineStyle(color, "-", 1.8)))
+        found.append(entry("its 95 % interval", fill(color, 0.3), "band"))
     return found + marks_shown(sweep.status, sweep.chaotic)
