@@ -18,7 +18,7 @@ from compressor.analysis.contacts import (
 from compressor.analysis.cycle import Cycle, read_cycle
 from compressor.analysis.cylinder import cylinder_words, end_states
 from compressor.analysis.orbit import orbit
-from compressor.analysis.runs import SPOKEN, case_of, settled_revolutions
+from compressor.analysis.runs import SPOKEN, case_of, record_of, settled_revolutions
 from compressor.analysis.shaking import (
     ORDER,
     Shaking,
@@ -157,8 +157,8 @@ def signals(run: xr.Dataset, twin: Twin) -> str:
     torque, rod = forces["crank_torque"], 1e-3 * forces["rod_load"]
     peak = np.abs(revolution["acceleration"].values).max()
     beside, ideal_joints = "", " No joint has clearance: there is no contact to draw."
+    ideal_joints = "" if record_of(run)["clearance"].any() else ideal_joints
     if twin is not None:
-        ideal_joints = ""
         _, ideal = last_revolution(twin)
         beside = f" ({np.abs(ideal['acceleration'].values).max():.0f} m/s² without clearance)"
     return (
@@ -205,7 +205,12 @@ def spectra(run: xr.Dataset, twin: Twin) -> str:
         text = sensor.report_clipping(clipped) if sensor else ""
         sentences += [f"{text}."] if text else []
     else:
-        sentences.append("No sensor record: a case with body and sensor has one.")
+        has_record = "sensor_acceleration" in run
+        sentences.append(
+            "The sensor's record is too short, or silent, for an envelope."
+            if has_record
+            else "No sensor record: a case with body and sensor has one."
+        )
     return " ".join(sentences) + caution(run)
 
 
@@ -313,10 +318,9 @@ def struck(run: xr.Dataset, twin: Twin) -> str:
             f"{float(hardest['crank_angle']):.0f}°"
             + (f"; together they lost {lost:.3g} J." if lost > 0.0 else ".")
         )
+    what = "Dry contacts that begin" if oil else "Contacts after flight"
     return (
-        " ".join([f"Contacts after flight, over {turns:.3g} rev after settling.", *sentences])
-        + oil
-        + caution(run)
+        " ".join([f"{what}, over {turns:.3g} rev after settling.", *sentences]) + oil + caution(run)
     )
 
 
@@ -324,11 +328,22 @@ def waterfall(rows: Sequence[SweptRow], axis: str) -> str:
     """Describe order spectra along an axis: where the rms above `ORDER` is least and greatest."""
     known = [(row.shaking.spectrum.above, row.value) for row in rows if row.shaking]
     least, greatest = min(known), max(known)
-    return (
-        f"Order spectra of X, a row for each value of {axis}. The rms of X above order {ORDER} is "
+    span = (
         f"least, {newtons(least[0])}, at {least[1]}, and greatest, {newtons(greatest[0])}, at "
-        f"{greatest[1]}.{left_out(rows)}"
+        f"{greatest[1]}"
     )
+    return (
+        f"Order spectra of X, {describe_rows(rows, axis)}. The rms of X above order {ORDER} is "
+        f"{span if len(known) > 1 else newtons(least[0])}.{left_out(rows)}"
+    )
+
+
+def describe_rows(rows: Sequence[SweptRow], axis: str) -> str:
+    """Describe what a row of a map is: a value of the axis, or a job where values repeat."""
+    values = [row.value for row in rows]
+    if len({*values}) < len(values):
+        return f"a row for each job, in the order of {axis}"
+    return f"a row for each value of {axis}"
 
 
 def cycles(rows: Sequence[SweptRow], axis: str) -> str:
@@ -338,10 +353,12 @@ def cycles(rows: Sequence[SweptRow], axis: str) -> str:
     sensed = any(row.cycle.is_sensed for row in rows if row.cycle)
     kind = "sensor's record" if sensed else "acceleration of the crosshead"
     text = (
-        f"The greatest magnitude of the {kind} in each degree of the last settled revolution, a "
-        f"row for each value of {axis}. Over the revolution it is least, {least[0]:.3g} m/s², at "
-        f"{least[2]}, and greatest, {greatest[0]:.3g} m/s² ({G * greatest[0]:.3g} g), at "
-        f"{greatest[2]}, where it comes at {greatest[1]:.0f}°."
+        f"The greatest magnitude of the {kind} in each degree of the last settled revolution, "
+        f"{describe_rows(rows, axis)}. Over the revolution it is "
+        + f"least, {least[0]:.3g} m/s², at {least[2]}, and "
+        * (len(known) > 1)
+        + f"greatest, {greatest[0]:.3g} m/s² ({G * greatest[0]:.3g} g), at {greatest[2]}, where it "
+        f"comes at {greatest[1]:.0f}°."
     )
     counts = [len(row.cycle.reversals) for row in rows if row.cycle]
     few, most = min(counts), max(counts)
@@ -356,10 +373,10 @@ def segment_rows(rows: Sequence[SweptRow], axis: str) -> str:
     place = int(np.nanargmax(found.rms))
     sentences = [
         f"The rms of the sensor's record in 36 segments of 10°, over that of the same machine "
-        f"without clearance, a row for each value of {axis}. The greatest rms is "
+        f"without clearance, {describe_rows(rows, axis)}. The greatest rms is "
         f"{found.rms[place]:.3g} m/s², {segment_words(place)} at {value}, "
-        f"{found.ratio[place]:.3g} times that without clearance. Valves make no noise of their own "
-        f"in the model, so that a sound machine is quieter than a real one."
+        f"{found.ratio[place]:.3g} times that without clearance. The model has no noise of valves, "
+        f"so that a sound machine is quieter than a real one."
     ]
     if not np.isnan(known[0][0].limit).all():
         sentences.append(describe_first_over(known))
@@ -391,7 +408,7 @@ def segment_words(place: int) -> str:
 
 def mode_rows(rows: Sequence[SweptRow], axis: str) -> str:
     """Describe the mode map: the share of angles whose most frequent mode is flight."""
-    sentences = [f"The most frequent contact mode in each degree, a row for each value of {axis}."]
+    sentences = [f"The most frequent contact mode in each degree, {describe_rows(rows, axis)}."]
     away = row_modes_words(rows)[0]
     for joint, table in rows_modes(rows).items():
         flight = 100.0 * (table == MODES.index("flight")).mean(axis=1)
@@ -409,8 +426,10 @@ def mode_rows(rows: Sequence[SweptRow], axis: str) -> str:
 
 def left_out(rows: Sequence[SweptRow]) -> str:
     """Describe the rows that could not be drawn, and those of chaotic motion."""
-    gone, wild = sum(bool(row.problem) for row in rows), sum(row.chaotic for row in rows)
-    text = f" {plural(gone, 'job')} of {len(rows)} without series to draw." if gone else ""
+    problems = [row.problem for row in rows if row.problem]
+    wild = sum(row.chaotic for row in rows)
+    text = f" Not drawn: {plural(len(problems), 'job')} of {len(rows)} "
+    text = f"{text}({', '.join(sorted({*problems}))})." if problems else ""
     return text + (f" {plural(wild, 'job')} chaotic: their lines change." if wild else "")
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -144,7 +144,7 @@ TITLES = {
     "spectra": "order spectra",
     "orbits": "orbits of the journals",
     "modes": "contact modes over crank angle",
-    "impacts": "contacts after flight over crank angle",
+    "impacts": "contacts that begin, over crank angle",
     "cycles": "vibration over crank angle",
     "segments": "vibration in segments of 10°",
     "waterfall": "order spectra of the force on the frame along the cylinder",
@@ -263,9 +263,10 @@ def study_figures(
             if choice.what:
                 raise PlotError(f"no joint of {study.name} has clearance: there is no mode map")
             continue
-        drawing = OVER_AXIS[name](rows, axis_words(over))
+        shown = keep_sensed(rows) if name == "cycles" else rows
+        drawing = OVER_AXIS[name](shown, axis_words(over))
         drawing.title = study_title(study, name, where)
-        yield name, STUDY[name](rows, over) + where, drawing
+        yield name, STUDY[name](shown, over) + where, drawing
 
 
 def whole_twin(run: xr.Dataset, sensed: bool = False) -> xr.Dataset | None:
@@ -381,7 +382,7 @@ def page_figures(stored: Stored, study: StoredStudy) -> Iterator[tuple[str, str,
     if count < number:
         where += f" {count} of {number} jobs, evenly chosen."
         jobs = [jobs[round(n * (number - 1) / (count - 1))] for n in range(count)]
-    rows = [swept_row(stored, value, key, brief=True) for value, key in jobs]
+    rows = keep_sensed([swept_row(stored, value, key, brief=True) for value, key in jobs])
     known = {n: row.cycle for n, row in enumerate(rows) if row.cycle}
     if not known:
         return
@@ -401,6 +402,20 @@ def page_figures(stored: Stored, study: StoredStudy) -> Iterator[tuple[str, str,
     if case.load == "gas":
         title = f"indicator cards, {value}"
         yield "cards", title, JOB["cards"](run, twin) + where, draw_cards(run, twin)
+
+
+def keep_sensed(rows: Sequence[SweptRow]) -> list[SweptRow]:
+    """Return rows without the revolutions of jobs that have no sensor, where others have one.
+
+    A sensor's record and the crosshead's acceleration are not to be compared.
+    """
+    if len({row.cycle.is_sensed for row in rows if row.cycle}) < 2:
+        return [*rows]
+    return [
+        row if row.cycle is None or row.cycle.is_sensed
+        else replace(row, cycle=None, problem="no sensor")
+        for row in rows
+    ]  # fmt: skip
 
 
 def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]) -> str:
