@@ -44,7 +44,7 @@ from compressor.cases.yaml_reader import resolve_scalar
 from compressor.metrics import JOINTS
 
 MODEL_VERSION = "2"  # part of a job's key: see `compressor.cases.case`
-REVISION = 3
+REVISION = 4
 MODEL = f"{MODEL_VERSION}.{REVISION}"  # which results are stored with
 # what the text of a case holds if it may be one of `CHANGES`: quick to search a store for
 SUSPECT = re.compile(rb'"(drive|lubricant|rod|guide|body)\\?": |lugre|"signals\\?": true')
@@ -100,6 +100,7 @@ CHANGES = (
     ),
     Revision(2, "tacho of a sensor's record", _records_between_dead_centres),
     Revision(3, "oil film", lambda values: "lubricant" in values and values["joint"] != "none"),
+    Revision(4, "peaks of the rod load", lambda values: bool(values["output"].get("signals"))),
 )  # fmt: skip
 
 

@@ -336,7 +336,8 @@ def solution_of_trajectory(
         rows = take_samples(p, trajectory, times.sampled, remaining, WIDE)
     samples = take_samples(p, trajectory, times.compared, times.output)
     reason, detail = trajectory.reason, trajectory.detail
-    numbers = {} if reason else metrics(p, trajectory.tally) | sampled_metrics(rows)
+    numbers = {} if reason else metrics(p, trajectory.tally)
+    numbers |= sampled_metrics(rows, numbers) if numbers else {}
     return Solution(
         p, trajectory, rtol, times.settle, numbers, samples, reason, detail, rows=rows
     )  # fmt: skip
@@ -400,8 +401,9 @@ def estimate_errors(solution: Solution, *others: Solution) -> None:
     residual = energy_residual(solution.trajectory.tally)
     companions = [compare_with_run(solution, one) for one in others if not one.reason]
     runs: list[Companion | None] = [*companions] or [None]
+    found, rows = solution.metrics, solution.rows
     solution.bars = longest_bars(
-        [bars(solution.metrics, one, residual) | sampled_bars(solution.rows, one) for one in runs]
+        [bars(found, one, residual) | sampled_bars(rows, found, one) for one in runs]
     )
     solution.series_errors = longest_bars([series_errors(one) for one in runs])
 

@@ -12,7 +12,8 @@ Glynn, Stochastic Simulation, 2007, III.5).
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +101,7 @@ def sampled_times(case: Case) -> np.ndarray:
     return case.settle + span / max(count, 1) * (np.arange(count) + 0.5)
 
 
-def reversal_angle(rows: np.ndarray) -> float:
+def reversal_angle(rows: np.ndarray, peak: float) -> float:
     """Return the crank angle (rad) of the rod load's smaller side, straight between samples."""
     load = rows[:, SMALL_END]
     before, after = load[:-1], load[1:]
@@ -114,25 +115,36 @@ def reversal_angle(rows: np.ndarray) -> float:
     return 2.0 * math.pi * min(tension, 1.0 - tension)
 
 
-def greatest_pull(rows: np.ndarray) -> float:
-    """Return the greatest tension (N) of the rod load by samples; 0 without any."""
-    return max(float(rows[:, SMALL_END].max()), 0.0)
+def greatest_sides(rows: np.ndarray, peak: float) -> tuple[float, float]:
+    """Return the greatest tension and compression (N) of the rod load; 0 without any.
+
+    Samples say which is greater, and `peak` how great: the one that they found may lie between two.
+    """
+    load = rows[:, SMALL_END]
+    pull, push = max(float(load.max()), 0.0), max(float(-load.min()), 0.0)
+    return (max(pull, peak), push) if pull >= push else (pull, max(push, peak))
 
 
-def greatest_push(rows: np.ndarray) -> float:
-    """Return the greatest compression (N) of the rod load by samples; 0 without any."""
-    return max(float(-rows[:, SMALL_END].min()), 0.0)
+def greatest_pull(rows: np.ndarray, peak: float) -> float:
+    """Return the greatest tension (N) of the rod load; 0 without any."""
+    return greatest_sides(rows, peak)[0]
 
 
-def reversal_share(rows: np.ndarray) -> float:
-    """Return the peak of the rod load's smaller side over that of the greater one, by samples."""
-    pull, push = greatest_pull(rows), greatest_push(rows)
+def greatest_push(rows: np.ndarray, peak: float) -> float:
+    """Return the greatest compression (N) of the rod load; 0 without any."""
+    return greatest_sides(rows, peak)[1]
+
+
+def reversal_share(rows: np.ndarray, peak: float) -> float:
+    """Return the peak of the rod load's smaller side over that of the greater one."""
+    pull, push = greatest_sides(rows, peak)
     greater = max(pull, push)
     return min(pull, push) / greater if greater else 0.0
 
 
-# metrics of samples: from observed rows, (m, WIDE), each in the middle of one of m equal steps
-SAMPLED: dict[str, Callable[[np.ndarray], float]] = {
+# metrics of samples: from observed rows, (m, WIDE), each in the middle of one of m equal steps, and
+# the greatest rod load (N) of the whole solution
+SAMPLED: dict[str, Callable[[np.ndarray, float], float]] = {
     "rod_load_reversal_angle": reversal_angle,
     "rod_load_reversal_share": reversal_share,
     "peak_rod_load_tension": greatest_pull,
@@ -140,26 +152,29 @@ SAMPLED: dict[str, Callable[[np.ndarray], float]] = {
 }
 
 
-def sampled_metrics(rows: np.ndarray) -> Metrics:
-    """Return the `SAMPLED` metrics by name; none without rows."""
-    return {name: measure(rows) for name, measure in SAMPLED.items()} if len(rows) else {}
+def sampled_metrics(rows: np.ndarray, found: Mapping[str, Any]) -> Metrics:
+    """Return the `SAMPLED` metrics by name; none without rows. found: the run's `metrics`."""
+    peak = float(found["peak_contact_force_axis"][1][0])  # of the small end along x
+    return {name: measure(rows, peak) for name, measure in SAMPLED.items()} if len(rows) else {}
 
 
-def sampled_bars(rows: np.ndarray, other: Companion | None) -> Metrics:
+def sampled_bars(rows: np.ndarray, found: Mapping[str, Any], other: Companion | None) -> Metrics:
     """Return the error bar of each `SAMPLED` metric, by another run; none without one.
 
-    What half as many samples would change stands for what is lost between samples. The bars are as
-    careful as those of the metrics that were calibrated (`compressor.metrics.Bar`).
+    Half of what a third of the samples changes, whichever third, stands for what is lost between
+    them: it bounds what a peak with a kink loses, and is at least 4 times what a parabola's top
+    does, wherever they lie between two samples. The bars are as careful as those of the metrics
+    that were calibrated (`compressor.metrics.Bar`).
     """
     if other is None:
         return {}
-    coarse, bars = sampled_metrics(rows[::2]), {}
-    for name, value in sampled_metrics(rows).items():
+    thirds, bars = [sampled_metrics(rows[k::3], found) for k in range(3)], {}
+    for name, value in sampled_metrics(rows, found).items():
         row = NUMBERS[name]
         distance = float(np.ravel(other.apart[row.series])[row.joint])
         path = row.bar.path * distance * abs(value)
         by_run = other.closeness * math.hypot(row.bar.own * (value - other.metrics[name]), path)
-        bars[name] = by_run + abs(value - coarse[name])
+        bars[name] = by_run + 0.5 * max(abs(value - third[name]) for third in thirds if third)
     return bars
 
 
