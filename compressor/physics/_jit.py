@@ -63,7 +63,7 @@ class Deferred:
     def __call__(self, *arguments: Any) -> Any:
         return self.target(*arguments)
 
-    def __getattr__(self, name: str) -> Any:  # what numba asks of a function that another calls
+    def __getattr__(self, name: str) -> Any:  # what numba reads of a function that another calls
         if name.startswith("__"):
             raise AttributeError(name)
         return getattr(self.target, name)
@@ -110,7 +110,7 @@ def load_numba() -> None:
 def collect_seldom() -> Any:
     """Return numba's listener that lets Python look for garbage seldom while numba compiles.
 
-    It took a tenth of the time: numba makes millions of objects, of which hardly any is garbage.
+    It took a tenth of the time: numba makes millions of objects, and hardly any is garbage.
     """
     from numba.core import event
 
@@ -175,7 +175,7 @@ def inline_numba(function: Function) -> Function:
 
 
 def is_for_lanes(call: Any, caller: Any, callee: Any) -> bool:
-    """Return whether a call stands in a loop over lanes: numba asks with its own forms of each."""
+    """Return whether a call stands in a loop over lanes: numba passes its own forms of each."""
     return str(caller.func_id.modname).startswith("compressor.physics.lane_")
 
 
@@ -196,7 +196,7 @@ class ByKind:
     code, and is not compiled with it.
     """
 
-    is_compiling = False  # numba asks: whether it calls itself
+    is_compiling = False  # numba reads this: whether it calls itself
 
     def __init__(self, least: int, special: Any, usual: Any):
         self.least, self.special, self.usual = least, special, usual
@@ -220,7 +220,7 @@ class ByKind:
         return self.of(arguments).get_call_template(arguments, keywords)
 
     def get_overload(self, arguments: Any) -> Any:
-        """Return what numba asks for when it writes the call."""
+        """Return what numba needs when it writes the call."""
         return self.of(arguments).get_overload(arguments)
 
 

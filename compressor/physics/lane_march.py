@@ -74,7 +74,7 @@ class Runs(NamedTuple):
     """Runs of one scene, m of them, in arrays.
 
     Edges and phases of the segments, times and states of the output samples stand one run after
-    the other; `places` tells where each one's begin.
+    the other; `places` holds where each one's begin.
     """
 
     steppers: np.ndarray  # (m,) of STEPPER
@@ -157,7 +157,7 @@ def load_lane(W, j, runs, job, work, limit):
     for i in range(n + FLOWS):
         W[Z + i * LANES + j] = runs.z[job, i]
         W[K + i * LANES + j] = work.k[0, i]
-        for s in range(1, STAGE_COUNT):  # a weight of zero does not mend a nan
+        for s in range(1, STAGE_COUNT):  # zero times nan is nan
             W[K + (s * STATE + i) * LANES + j] = 0.0
     for i in range(CRANK_POWER - ACCELERATION):
         W[R0 + i * LANES + j] = work.row[ACCELERATION + i]

@@ -258,7 +258,7 @@ def _phase_at(angle, corners):
 def _segments_between(corners, cycle, omega, duration):
     """Return `segments` of a load's corners (rad, as bytes) at a speed (rad/s).
 
-    cycle: the phases of a revolution, the first of which begins at 0 and the others at corners.
+    cycle: the phases of a revolution; the first begins at 0 and the others at corners.
     """
     turn = 2.0 * math.pi / omega
     starts = np.zeros(len(cycle))

@@ -407,7 +407,7 @@ def stop_beyond(w, z, tally, p):
 
 @jit
 def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit):
-    """Advance by at most `limit` step attempts; w.status tells how the stepper stands then.
+    """Advance by at most `limit` step attempts; w.status then holds the stepper's state.
 
     w: stepper; p: record; z: motion and flows, (n + 4,); work: scratch, carried between calls;
     atol, size: absolute tolerance and natural size of each number of the motion, (n,); edges,

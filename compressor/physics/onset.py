@@ -15,7 +15,7 @@ from compressor.physics.runge_kutta import interpolate
 from compressor.physics.systems import contact_at, derivative
 
 INTERVALS = 12  # of a step, at whose ends the nearness is sampled
-STEP_EDGE = 1e-4  # of a step: looks beside both ends tell a maximum in the first or last interval
+STEP_EDGE = 1e-4  # of a step: samples beside both ends show a maximum in the first or last interval
 MAX_SAMPLE = INTERVALS + 2  # number of the last sample; the first is 0
 MAX_HALVINGS = 40
 CHANGE_TOLERANCE = 1e-5  # of a step: as well as a change of contact is placed for the metrics

@@ -202,7 +202,7 @@ FEATURES: list[tuple] = [
     ("rod_damping", "f8"),  # of the rod's material, over its stiffness, s
     ("rod_loss", "i8"),  # place in a state of what that has taken; -1 of a rigid rod
 ]
-# The last field's length tells compiled functions, by its type alone, which kind a record is of:
+# The last field's length shows compiled functions, by its type alone, the kind of a record:
 # those for the default one hold nothing of the others (`_jit.dispatch_on_record`).
 CHOICE, MECHANISM = 2, 3
 RECORD = np.dtype([*FIELDS, ("laws", "f8", (1,))], align=True)

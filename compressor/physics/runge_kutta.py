@@ -1,6 +1,6 @@
 """Explicit Runge-Kutta pairs as tables, one step that serves them all, and its dense output.
 
-Both pairs have seven stages of which the last is the next step's first, order 5 with an embedded
+Both pairs have seven stages, the last being the next step's first, order 5 with an embedded
 error estimate of order 4, and a continuous extension of order 4 without further stages.
 Sources: Dormand & Prince, J. Comput. Appl. Math. 6 (1980), with Shampine's interpolant, Math.
 Comp. 46 (1986); Tsitouras, Comput. Math. Appl. 62 (2011).
@@ -135,7 +135,7 @@ def take_step(pair, base, h, z, k, phase, p, new, row):
 def error_share(error, before, after, rtol, atol):
     """Return a number's estimated error over its tolerance.
 
-    before, after: the number at both ends of the step, of which the larger one sets the tolerance.
+    before, after: the number at both ends of the step; the larger one sets the tolerance.
     """
     return error / fma(rtol, max(abs(before), abs(after)), atol)
 

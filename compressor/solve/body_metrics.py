@@ -1,7 +1,7 @@
 """Metrics of the body's motion and of its sensor's record, with error bars by another run.
 
 They are of whole settled revolutions. Noise and jitter of the sensor are drawn by its seed, the
-same ones for both runs: a bar tells of numerics, not of noise. The other run's body is moved by
+same ones for both runs: a bar measures numerics, not noise. The other run's body is moved by
 every second sample of its forces, so that what is lost between samples is in the bar, too.
 """
 

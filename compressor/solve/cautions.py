@@ -41,7 +41,7 @@ from compressor.solve.si_record import record, scene
 
 # Attempts of a step for each radian of the contact's ringing at rtol 1; measured on random cases.
 PER_RADIAN = {"big_end": 0.3, "small_end": 0.5, "both": 0.7}
-# of the steps that stability asks for: joints are not in contact, or deep, always
+# of the steps that stability requires: joints are not in contact, or deep, always
 STABILITY_SHARE = 0.5
 ORDER = 5
 STEP_SECONDS = {"big_end": 3.5e-6, "small_end": 3.5e-6, "both": 4.5e-6}  # of compiled methods
@@ -135,7 +135,7 @@ def expected_cost(case: Case, joints: Sequence[JointScales]) -> tuple[float, flo
 def expected_steps(case: Case, joints: Sequence[JointScales]) -> float:
     """Return about how many steps a run of a case attempts.
 
-    Good to a factor of four in random cases. As many as accuracy asks for while the contact rings,
+    Good to a factor of four in random cases. As many as accuracy requires while the contact rings,
     or as stability does where that is not more than the stiff partner's: a few a radian. 0 where
     nothing is integrated. Far from the defaults only its order of magnitude holds.
     """
@@ -275,7 +275,7 @@ LONGEST_CRANK = 0.35  # of the rod's length; 0.15 to 0.3 is usual
 MIN_STICTION = 0.1  # mm/s: below it, friction all but sticks
 MAX_JOBS = 500  # of a study that are looked at
 SHORT_BUDGET = 4.0  # a budget this many times below what is expected; so far is that to be trusted
-NEAR_BUCKLING = 0.5  # of Euler's load, beyond which a rod bends by more than its own inertia asks
+NEAR_BUCKLING = 0.5  # of Euler's load; beyond it a rod bends by more than its inertia requires
 TURN_PIECES = 8  # of the quadrature over a revolution of the ideal machine
 DENSITIES = 1000.0, 20_000.0  # kg/m3, of what rods are made of
 

@@ -1,6 +1,6 @@
 """How long a motion can be foretold: the time in which close twins part.
 
-Beyond it two correct solutions differ by more than any error bar tells, so that a number that
+Beyond it two correct solutions differ by more than any error bar, so that a number that
 depends on the course of the motion has none; statistics still have a meaning. Twins go in step
 (`compressor.physics.march`), at a tolerance of their own: each step adds an error of about rtol,
 which must be small beside the shift that is followed. Looser ones were measured to mislead: at
@@ -34,7 +34,7 @@ from compressor.solve.si_record import initial_state, is_ideal, natural_sizes, r
 
 TWIN_DISTANCE = 1e-9  # of the clearance: how far from the motion its twin starts
 PARTED_DISTANCE = 1e-2  # of the clearance: how far apart they are no longer one motion
-TWINS_RTOL = 1e-12  # of the twins, whatever the case asks for
+TWINS_RTOL = 1e-12  # of the twins, whatever the case has
 
 
 def predictability_horizon(

@@ -2,7 +2,7 @@
 
 A run that keeps a promise is predictable: two runs at different tolerances, each a motion started a
 little elsewhere, stayed together to its end. Where errors stay as large as the numbers, twins in
-step tell a motion that cannot be foretold from one that needs a tighter run.
+step distinguish an unpredictable motion from one that needs a tighter run.
 
 From which revolution on metrics count, where a case leaves that to the program. A run is followed
 revolution by revolution until the metrics of several in a row agree within what accuracy promises:
@@ -119,8 +119,8 @@ class HorizonSearch:
     def twins_part(self, whole: bool) -> bool:
         """Return whether twins part, as far as is known.
 
-        A short span is tried first, of which most chaotic motions need no more, and the whole one
-        only where `whole` says so.
+        A short span is tried first, which suffices for most chaotic motions, and the whole one only
+        where `whole` says so.
         """
         end = self.case.duration
         if self.case.solve.horizon != "auto":
@@ -179,7 +179,7 @@ def load_twins(case: Case) -> float:
 
 
 def has_doubtful_bars(metrics: Metrics, bars: Metrics) -> bool:
-    """Return whether a metric's error bar reaches a tenth of it; shares and counts do not tell."""
+    """Return whether a metric's error bar reaches a tenth of it; shares and counts are left out."""
     return any(
         relative_bar(metrics[name], bars[name]) >= DOUBTFUL
         for name, row in METRICS.items()
@@ -210,7 +210,7 @@ def repeats(
 
     samples: observed rows at the times of `compressor.solve.series.compared_times`. Revolutions
     are the same if no series is farther apart than both its errors. None and nan where the settled
-    part is too short to tell, or does not repeat itself.
+    part is too short, or does not repeat itself.
     """
     per_rev = compared_per_rev(case)
     count = len(samples) // per_rev if per_rev else 0
@@ -280,7 +280,7 @@ def with_span(case: Case, search: HorizonSearch) -> Settling:
 def with_settle_rev(case: Case, settle: float, period: int, duration: float | None = None) -> Case:
     """Return a case that settles at a number (rev), with a number also for `duration_rev: auto`.
 
-    period (rev): of which whole ones are measured; duration (rev): in place of the case's.
+    period (rev): whole ones are measured; duration (rev): in place of the case's.
     """
     if duration is None and case.solve.duration_rev == "auto":
         duration = settle + period * math.ceil(MEASURED_REV / period)

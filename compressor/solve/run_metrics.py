@@ -179,7 +179,7 @@ def sampled_bars(rows: np.ndarray, found: Mapping[str, Any], other: Companion | 
 
 
 MAX_BATCHES = 30
-MIN_SECTION = 5  # revolutions of which a quantile is taken
+MIN_SECTION = 5  # revolutions for a quantile
 T_QUANTILE = 0.975  # quantile of Student's t: a bar holds in 95 % of cases
 RMS_ERROR_AIM = 0.01  # of rms_acceleration: its standard error that revolutions are counted for
 
@@ -187,7 +187,7 @@ RMS_ERROR_AIM = 0.01  # of rms_acceleration: its standard error that revolutions
 def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
     """Return `compressor.metrics.statistics_of` all metrics by name, from the revolutions' tallies.
 
-    A standard error is inf where there are too few revolutions to tell.
+    A standard error is inf where there are too few revolutions.
     """
     estimates: Metrics = {"revolutions": float(len(turns))}
     whole = metrics(p, merge_turns(turns))

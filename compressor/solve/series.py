@@ -16,7 +16,7 @@ towards the crank, and g gravity against y:
 - the gas, or the spring, pushes the cylinder as it pushes the piston: F_load along x;
 - so the frame feels X = -F_bx + F_load and Y = -F_by - F_sy - m_p g, and what is out of balance.
   Both are the loss of momentum of all moving parts a second, less their weight;
-- the crank is driven by the torque that the rod asks for, R (cos theta F_by - sin theta F_bx) -
+- the crank is driven by the torque that the rod needs, R (cos theta F_by - sin theta F_bx) -
   (R_j - delta) F_t. A drive's motor gives another: what is between them turns the flywheel.
 
 Contacts last less than a crank angle of 0.3 degrees, and so do the couples of their friction:
@@ -55,7 +55,7 @@ COLUMN = {
     "rod_load": Column.FORCE + 2,
 }
 COMPARED_PER_REV = 150  # times a revolution at which two runs are compared
-SAMPLES_PER_BAND = 2.56  # samples of the forces in a period of the highest frequency asked for
+SAMPLES_PER_BAND = 2.56  # samples of the forces in a period of the highest frequency requested
 SAMPLES_PER_PERIOD = 24  # samples of the forces in one of the body's fastest motion
 MIN_COMPARED, MAX_COMPARED = 64, 20_000  # of these times over a settled part
 

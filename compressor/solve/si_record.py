@@ -246,7 +246,7 @@ MODES = {  # of the rod: stiffness over E I / L^3 or E A / L, share of its mass 
 }
 
 # J: of an energy that is integrated beside the motion and moves nothing, so that it neither holds
-# steps back nor tells two motions apart
+# steps back nor distinguishes two motions
 UNCONTROLLED = 1e12
 
 

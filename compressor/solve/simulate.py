@@ -155,7 +155,7 @@ def simulate(case: Case) -> "xr.Dataset":
 def as_dataset(table: DatasetParts) -> "xr.Dataset":
     """Return the Dataset of a table.
 
-    Where the last one had the same shapes, it is copied with other values: to make one anew takes
+    Where the last one had the same shapes, it is copied with other values: to make a new one takes
     xarray three times as long, since it compares each variable with all others.
     """
     import xarray as xr

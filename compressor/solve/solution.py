@@ -232,7 +232,7 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
     A first run is compared with one a little tighter, and with a looser one, too, where the motion
     enlarges errors. Each further one is as much tighter as its errors are expected to need. It is
     compared with the one before and, where it seems to keep the promise, with one a little tighter
-    as well. Where errors are as large as the numbers, twins tell whether the motion is chaotic;
+    as well. Where errors are as large as the numbers, twins show whether the motion is chaotic;
     that ends the search, and so does its budget.
     """
     rtol = case.rtol
@@ -341,7 +341,7 @@ def tighten_factor(excess: float, ratio: float) -> float:
 
 
 def energy_balances(case: Case, solution: Solution) -> bool:
-    """Return whether the energy of a whole run balances as well as the case asks for."""
+    """Return whether the energy of a whole run balances as well as the case requires."""
     return energy_residual(solution.trajectory.tally) <= allowed_residual(
         case.rtol, case.duration / case.turn
     )
@@ -417,7 +417,7 @@ def solve(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Solution:
 
 
 def find_horizon(case: Case, solution: Solution, search: HorizonSearch) -> None:
-    """Find a motion's horizon, where it is asked for, or where errors are as large as numbers."""
+    """Find a motion's horizon, where it is requested, or where errors are as large as numbers."""
     if case.solve.horizon is True:
         search.horizon = predictability_horizon(case, search.left)
     elif case.wants_bars and is_in_doubt(case, solution):
