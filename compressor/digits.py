@@ -57,7 +57,7 @@ def by_bar(
 def setting(value: float) -> str:
     """Return a number that was given, in six digits; whole ones whole.
 
-    Fewer would not tell the points of a search apart.
+    With fewer, points of a search would look equal.
 
     >>> setting(0.2), setting(740.05), setting(1234567), setting(0.123456789)
     ('0.2', '740.05', '1234567', '0.123457')

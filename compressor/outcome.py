@@ -31,7 +31,7 @@ def row(data: bytes = NOTHING) -> np.void:
 
 
 class Regime(StrEnum):
-    """How far a motion can be foretold, in `REGIME_WORDS`; a run that was not asked has none."""
+    """How far a motion is predictable, in `REGIME_WORDS`; a run that was not examined has none."""
 
     PREDICTABLE = "predictable"
     PERIODIC = "periodic"

@@ -53,7 +53,7 @@ class CompsimError(Exception):
 
 
 class CompsimWarning(UserWarning):
-    """What was asked for and is not there; the program goes on without it.
+    """What was requested and is missing; the program goes on without it.
 
     The base of StoreWarning and all others. To stop at any of them:
 
@@ -69,17 +69,17 @@ class StudyFiles(NamedTuple):
 
     checked: netCDF files that `compsim verify` reads. result: files that are a result each, with
     the study's name for the `*`; "" where there are none. A folder that has no others is said to
-    hold `told`, with these names for its `{}`; remedy: the command that reads them.
+    hold `content`, with these names for its `{}`; remedy: the command that reads them.
     """
 
     checked: str
     result: str = ""
-    told: str = ""
+    content: str = ""
     remedy: str = ""
 
 
 STUDY_FILES: list[StudyFiles] = []  # those of the table in `compressor.studies`, which adds them
-# group of keys by which a case file asks for a study -> function that imports the study's module
+# group of keys by which a case file requests a study -> function that imports the study's module
 # `group`; of the same table
 STUDY_GROUPS: dict[str, Callable[[], Any]] = {}
 
@@ -106,10 +106,10 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
-def did_you_mean(word: str, known: Iterable[str], told: Mapping[str, object] | None = None) -> str:
+def did_you_mean(word: str, known: Iterable[str], texts: Mapping[str, object] | None = None) -> str:
     """Return what an unknown word probably meant, as `did you mean A or B?`; "" without a guess.
 
-    told: what to print for each known word, itself by default. A path or a file's name stands for
+    texts: what to print for each known word, itself by default. A path or a file's name stands for
     its stem, too; upper and lower case are the same.
     """
     names = {name.casefold(): name for name in known}
@@ -118,7 +118,7 @@ def did_you_mean(word: str, known: Iterable[str], told: Mapping[str, object] | N
     matches = (get_close_matches(spelling, names, MAX_MEANT) for spelling in spellings)
     similar = next(filter(None, matches), [])
     exact = next(([spelling] for spelling in spellings if spelling in names), [])
-    guesses = [str((told or {}).get(names[name], names[name])) for name in exact or similar]
+    guesses = [str((texts or {}).get(names[name], names[name])) for name in exact or similar]
     return f"did you mean {' or '.join(guesses)}?" if guesses else ""
 
 

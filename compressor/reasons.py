@@ -1,7 +1,7 @@
 """Why a job fails: the stable names that are stored, what each means, and what to do about it.
 
 The one list of them: the physics stops with these, workers report with these, and `compsim run`,
-`status`, `show`, the report and the README tell of them from here.
+`status`, `show`, the report and the README take their texts from here.
 """
 
 from enum import StrEnum

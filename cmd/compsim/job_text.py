@@ -39,8 +39,8 @@ def sections(
     yield "", align_lines(stop(found))
     known = numbers(found, units, "tally", "statistics", "samples", "body")
     lines = align_lines([*known, *reversal_verdict(found, *limits), *healthy_motion(found, units)])
-    told = [*film(found), *cautions(found), *found.caveats]
-    yield "metrics, with their error bars", [*lines, *told]
+    notes = [*film(found), *cautions(found), *found.caveats]
+    yield "metrics, with their error bars", [*lines, *notes]
     yield (
         "relative errors of the time series",
         align_lines(series_errors(found)),
@@ -191,7 +191,7 @@ def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list
         texts.append(format_measured(value, bar, True) if bar else f"{value:.4g}")
         clear = value - least
         worst = min(worst, clear / abs(clear) if abs(clear) >= bar and clear else 0.0)
-    word = {1.0: "passes", 0.0: "cannot be told apart from", -1.0: "fails"}[worst]
+    word = {1.0: "passes", 0.0: "cannot be distinguished from", -1.0: "fails"}[worst]
     kind = "API 618's" if (degrees, percent) == (15.0, 3.0) else "the maker's"
     verdict = f"reversal of {texts[0]} degrees and {texts[1]} %: {word} {kind} "
     return [("rod load", f"{verdict}{degrees:g} degrees and {percent:g} %")]

@@ -74,8 +74,8 @@ def show(
     with their error bars, how it was run, and its case as YAML, as far as it differs from the
     defaults. Of a job that stopped, it prints where, the state, the state variable that stopped it,
     and its last steps. Of a job with signals, it says whether the rod load at the crosshead pin
-    changes its side as API 618 asks, by 15 degrees and 3 percent, or as a maker does. --json has
-    all numbers in SI.
+    changes its side as API 618 requires, by 15 degrees and 3 percent, or as a maker does. --json
+    has all numbers in SI.
     """
     check_json_units(as_json, units)
     folder, words = results_folder(given, folder)

@@ -46,7 +46,7 @@ LOOP = {
 }
 SERIES = ("displacement", "velocity", "acceleration")
 SAME_CURVE = 1e-9  # of a curve's range: what cannot be seen, and is rounding
-MIN_ANGLE, MIN_GAP = 0.005, 1e-6  # degrees, m: what the captions can tell
+MIN_ANGLE, MIN_GAP = 0.005, 1e-6  # degrees, m: the least that captions show
 
 
 def pressure_volume(runs: Runs) -> str:
@@ -119,7 +119,7 @@ def response(runs: Runs, fault: str) -> str:
     for joint in faulty_joints(fault):
         courses = [course(run, joint) for run in worn_runs]
         sentences.append(motion(courses))
-        if fault != "both":  # of two joints the acceleration does not tell which one rings
+        if fault != "both":  # of two joints, acceleration does not show which rings
             sentences += rings(courses)
     sentences.append(peaks(worn_runs))
     return " ".join(sentences)

@@ -219,7 +219,7 @@ def fill_unknown(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
 
 
 def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effects | None:
-    """Return the effects of keys of which a design drew values; None where too little is known.
+    """Return the effects of keys whose values a design drew; None where too little is known.
 
     columns: a key's value at each point, or words; values: (points,), nan where unknown. Of a
     `saltelli` design Sobol's indices, of a large one of its first MAX_BASE points, without the

@@ -70,7 +70,7 @@ def at_most(measure: BarredNumber, threshold: float) -> Margin:
 
 
 def least(margins: Sequence[Margin]) -> Margin:
-    """Return the smallest margin: of a claim that asks for all of them.
+    """Return the smallest margin: of a claim that requires all of them.
 
     Its error reaches to the lowest that any of them may be, so that a larger margin with a long
     error bar counts, too. nan where any error is not known.
@@ -148,7 +148,7 @@ def series_error(run: xr.Dataset, name: str, values: np.ndarray, **where: str) -
 
 WINDOW = 10.0  # degrees of crank angle that count as hit by one impact or more
 SLOWEST = 0.01  # m/s: approach speed from which on a contact after flight counts as an impact
-ENERGY = 0.9  # share of the energy whose angle is told
+ENERGY = 0.9  # share of the energy whose angle is reported
 
 
 @dataclass(frozen=True)

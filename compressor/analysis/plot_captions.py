@@ -69,7 +69,7 @@ class Segments:
 
 @dataclass(frozen=True)
 class SweptRow:
-    """One job: its value on the axis in words, and what its series tell.
+    """One job: its value on the axis in words, and what its series show.
 
     `shaking` is None, and `problem` says why, where the job has none. `modes`: as `angle_modes`
     gives them, None of ideal joints. `cycle`: its last revolution; `segments`: of its sensor's
@@ -135,7 +135,7 @@ FILM = (
     " The joints have oil: forces include its film's, contact is dry contact, and without it the "
     "film bears the journal."
 )
-MIN_FORCE = 0.05  # N: below it a force is told as less than 0.1
+MIN_FORCE = 0.05  # N: below it a force is given as less than 0.1
 
 
 def caution(run: xr.Dataset) -> str:

@@ -20,7 +20,7 @@ from compressor.solve import SIGNALS, signals_of_scene, simulate
 
 
 class NoSeriesError(ValueError):
-    """A run of which no series are kept, or too few to be read."""
+    """A run without stored series, or with too few to be read."""
 
 
 def frame_forces(run: xr.Dataset) -> dict[str, np.ndarray]:

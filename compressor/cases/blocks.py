@@ -2,7 +2,7 @@
 
 A factor is one key, or several whose values advance together: a `zip` group, or the keys of a
 sampling design. Counts are known first (`draft`); values are made when the counts are bearable
-(`Draft.block`), and a combination of them when it is asked for (`Block.chosen`).
+(`Draft.block`), and a combination of them on access (`Block.chosen`).
 """
 
 import itertools

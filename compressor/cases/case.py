@@ -1,7 +1,7 @@
 """The case: one fully resolved simulation, its identity, and the numbers that follow from it.
 
 A job's key holds the version of the model, which stays while most results do. Where the equations
-of a feature are mended, a line in `CHANGES` says whose numbers have changed within that version.
+of a feature are corrected, a line in `CHANGES` says whose numbers have changed within that version.
 """
 
 import contextlib
@@ -167,7 +167,7 @@ class Case(Settings):
     >>> fast = replace(case, machine=replace(case.machine, speed_rpm=700))
     >>> fast.key == case.key
     False
-    >>> fast.problems  # what is made without from_values is checked when it is asked for
+    >>> fast.problems  # what is made without from_values is checked on first access
     ()
     """
 
@@ -177,10 +177,10 @@ class Case(Settings):
 
         values: words, numbers (also those of numpy) and, by group, mappings, in the units that
         stand in the keys. What is left out has its default; `help(compressor.Machine)` and the like
-        tell defaults, ranges and sources.
+        show defaults, ranges and sources.
 
         Raises CaseError with everything that is wrong at once: unknown keys, wrong types, ranges,
-        and values that do not fit each other, in the words that a case file would be told.
+        and values that do not fit each other, in the same words as for a case file.
 
         >>> import compressor
         >>> case = compressor.Case.from_values({
@@ -529,7 +529,7 @@ def _everything_wrong(
 ) -> Iterator[Problem]:
     """Yield what is wrong with values one by one, and what does not fit together in the others.
 
-    A value that would be swept in a case file is told that one case has no sweep.
+    The error of a value that would be swept in a case file says that one case has no sweep.
     """
     wrong = set()
     for problem in problems:

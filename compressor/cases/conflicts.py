@@ -1,6 +1,6 @@
 """What does not fit together in a case whose values are each in range, and keys nobody reads.
 
-Keys that a case does not read: the one rule, of which `keys_read` has the jobs of files. Who reads
+Keys that a case does not read: the one rule, which `keys_read` applies to jobs of files. Who reads
 a key stands in the table of parameters (`read`). Where a file gives a key and none of the jobs it
 is given for reads it, the file's author believes in what does not count.
 

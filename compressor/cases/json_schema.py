@@ -1,6 +1,6 @@
 """The JSON Schema of case files, so that editors complete their keys and mark mistakes.
 
-It comes from the table of parameters. What it cannot tell, such as whether values fit each other,
+It comes from the table of parameters. What it cannot check, such as whether values fit each other,
 reading the file does (`compressor.cases.load`).
 """
 
@@ -164,7 +164,7 @@ def _sweeps() -> Schema:
 
 
 def _study_group(module: Any) -> Schema:
-    """Return the schema of a group that asks for a study; module: the one that reads it."""
+    """Return the schema of a group that requests a study; module: the one that reads it."""
     keys = {}
     for name, row in module.ROWS.items():
         default = {} if row.default is None else {"default": row.default}

@@ -1,6 +1,6 @@
 """Values by dotted key: of a case file's tree, of `key=value` texts, of blocks, one over another.
 
-An unknown key is told what was probably meant (`describe_unknown`).
+The error of an unknown key says what was probably meant (`describe_unknown`).
 """
 
 import os

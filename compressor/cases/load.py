@@ -3,7 +3,7 @@
 A file becomes values by dotted key (`yaml_reader`, `keys`), blocks and overrides take their places,
 and each value is checked alone against the table of parameters. The jobs are counted (`blocks`)
 before any is made. What does not fit together, and the keys, come from `bulk`; a job's case is
-built when it is asked for.
+built on first access.
 """
 
 import contextlib
@@ -159,12 +159,12 @@ def load_studies(
 ) -> list[Study]:
     """Return the studies of YAML case files.
 
-    Each override, `key=value`, replaces a value in all of them. A file that asks for more than
-    `max_jobs` jobs is refused before any is made; `only`, a comparison, selects the jobs to be run.
-    A file with the group of a study is refused where the caller cannot `follow` it. `progress` is
-    told how many of many cases are read. `variants` gives the cases that the caller runs for one; a
-    key that none of them reads is refused. Raises CaseFileError with everything that is wrong in
-    all files, overrides and the comparison.
+    Each override, `key=value`, replaces a value in all of them. A file with more than `max_jobs`
+    jobs is refused before any is made; `only`, a comparison, selects the jobs to be run. A file
+    with the group of a study is refused where the caller cannot `follow` it. `progress` is called
+    with how many of how many cases are read. `variants` gives the cases that the caller runs for
+    one; a key that none of them reads is refused. Raises CaseFileError with everything that is
+    wrong in all files, overrides and the comparison.
     """
     problems: list[FileProblem] = []
     changes = read_overrides(overrides, problems)
@@ -243,7 +243,7 @@ def _read_report(found: Leaves, problems: list[FileProblem]) -> dict[str, str]:
 
 
 def _read_request(found: Leaves, problems: list[FileProblem]) -> StudyRequest | None:
-    """Return what the group of a study asks for; None without, or where it is a problem."""
+    """Return what the group of a study requests; None without, or where it is a problem."""
     names = [name for name in STUDY_GROUPS if name in found.places]
     for name in names[1:]:
         problems.append(FileProblem(found.places[name], name, TWICE.format(names[0])))

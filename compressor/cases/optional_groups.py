@@ -77,7 +77,7 @@ PROGRAM = "program"
 @document_fields
 @dataclass(frozen=True)
 class Guide:
-    """The crosshead's guide; a case's `guide`, None unless a case asks: ideal, without friction.
+    """The crosshead's guide; a case's `guide`, by default None: ideal, without friction.
 
     With a clearance the crosshead moves across and tilts, and its four corners meet the guide as
     journals meet their bores: by `contact.law` where that has a restitution, else by ADAMS's
@@ -137,7 +137,7 @@ class Guide:
 @document_fields
 @dataclass(frozen=True)
 class Drive:
-    """A motor whose speed gives way; a case's `drive`, None unless a case asks: steady speed.
+    """A motor whose speed gives way; a case's `drive`, by default None: steady speed.
 
     The motor's torque is a line by the speed: `torque_N_m` at `machine.speed_rpm`, and more by
     `slope_N_m_s` for each rad/s that the crank is slower. `True` stands for the defaults; a
@@ -168,7 +168,7 @@ class Drive:
 @document_fields
 @dataclass(frozen=True)
 class Rod:
-    """An elastic rod; a case's `rod`, None unless a case asks: rigid.
+    """An elastic rod; a case's `rod`, by default None: rigid.
 
     A bar of rectangular section: two bending modes, and two shapes of stretch. `True` stands for
     the defaults:
@@ -211,7 +211,7 @@ BODIES_PER_CASING = 25.0  # mass of the body over the modal mass of a casing mod
 @document_fields
 @dataclass(frozen=True)
 class Body:
-    """The compressor's rigid body on its foundation; a case's `body`, None unless a case asks.
+    """The compressor's rigid body on its foundation; a case's `body`, None by default.
 
     It is driven one way: the machine's forces move it, and it does not move the machine back. A
     body for which that would be wrong, since its motion would change the force by more than 30 %
@@ -293,7 +293,7 @@ class Body:
 @document_fields
 @dataclass(frozen=True)
 class Sensor:
-    """An accelerometer on the body, with a tacho; a case's `sensor`, None unless a case asks.
+    """An accelerometer on the body, with a tacho; a case's `sensor`, None by default.
 
     `True` stands for the defaults:
 

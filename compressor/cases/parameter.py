@@ -7,7 +7,7 @@ reader is read by every job. `compressor.cases.conflicts` refuses what no job re
 `compressor.cases.table` builds the whole table from these; units are those of the case file, and
 `to_si` turns a value into SI.
 
-Accuracy as it may be asked for: in words that promise, or in numbers by metric. Tolerances come
+Accuracy as it may be requested: in words that promise, or in numbers by metric. Tolerances come
 from the measured trade of tests/results/accuracy.json (make accuracy), for `method: auto`.
 """
 
@@ -397,7 +397,7 @@ class Parameter:
         if not self.holds(value):
             return f"{value:g} is outside {self.range}" + (f" {self.unit}" if self.unit else "")
         if value and abs(to_si(value, self.unit)) < sys.float_info.min:
-            return f"{value:g} is too small to be told from 0: write 0, or a larger number"
+            return f"{value:g} is too small to differ from 0: write 0, or a larger number"
         return None
 
     def _refused(self, value: Any, word: Any = None) -> str:
@@ -525,7 +525,7 @@ ACCURACY = {
     "reference": Tier(5e-11, 1e-6),
 }
 LOOSEST, TIGHTEST = 2e-4, 1e-12  # of first runs for accuracy by number, and of any run for it
-# of the error asked for: the first tolerance. Bars are some 26 rtol in the median
+# of the error requested: the first tolerance. Bars are some 26 rtol in the median
 FIRST_TOLERANCE_FACTOR = 0.01
 
 TARGET = Parameter("", "", None, 1e-9, 0.5, True, "", "", "number")

@@ -27,7 +27,7 @@ class Axis:
 
 
 class StudyRequest(Protocol):
-    """What a file's group of a study asks for: each case is followed along a key, in chains.
+    """What a file's group of a study requests: each case is followed along a key, in chains.
 
     The study's module `group` is imported when a file has the group. It has `ROWS`, a `Parameter`
     of each key; `NEEDED`, the keys that a file must give; `ABOUT`, their description in the JSON

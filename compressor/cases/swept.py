@@ -49,7 +49,7 @@ PAIRS = frozenset(row.key for row in table().values() if row.kind == "materials"
 
 Make = Callable[[], list[float]]
 Spread = Callable[[float], float]  # of a coordinate in [0, 1)
-LEAST_SHARE = 2.0**-54  # that a normal distribution is asked for: its quantile of 0 is infinite
+LEAST_SHARE = 2.0**-54  # argument of a normal distribution's quantile: that of 0 is infinite
 
 
 @dataclass(frozen=True)

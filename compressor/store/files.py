@@ -53,7 +53,7 @@ REMEDIES = {
 class StoreError(CompsimError):
     """What is wrong with a store: `path`, `problem`, and `remedy`, what to do about it.
 
-    Raised where a folder has no study, or not the one asked for, where files are damaged or of
+    Raised where a folder has no study, or not the one requested, where files are damaged or of
     another version, and where the disk refuses to read or write.
 
     >>> import compressor
@@ -81,7 +81,7 @@ class WrongName(StoreError):
 
 
 class StoreWarning(CompsimWarning):
-    """What a store lacks that was asked for, such as a damaged file; who reads it goes on without.
+    """What a store lacks that was requested, such as a damaged file; its reader goes on without.
 
     Its jobs count as missing, and the next run computes them again. To stop instead:
 
@@ -308,7 +308,7 @@ def no_results(folder: Folder) -> WrongName:
         return WrongName(folder, "there is no such folder of results", remedy_for(place))
     for files in STUDY_FILES:
         if files.result and (found := sorted(place.glob(files.result))):
-            content = files.told.format(list_few([path.parent.name for path in found]))
+            content = files.content.format(list_few([path.parent.name for path in found]))
             return WrongName(folder, f"holds no study of jobs, only {content}", files.remedy)
     return WrongName(folder, "holds no study", remedy_for(place))
 

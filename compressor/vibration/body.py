@@ -37,7 +37,7 @@ def oscillate(
 
     force: f, per unit of modal mass, at n >= 4 equal steps, (n,); step: s; frequency: w / 2 pi, Hz;
     damping_ratio: zeta, between 0 and 1. From rest at the first sample; `steady`: instead the
-    motion that repeats itself with the samples, the last of which stands for the first of the next
+    motion that repeats itself with the samples; the last one stands for the first of the next
     period. Raises ValueError for other damping, or fewer samples.
 
     One complex unknown, z = q' - conj(s) q with z' = s z + f and s = w (-zeta + i sqrt(1-zeta^2)),

@@ -5,7 +5,7 @@ of the envelope shows the latter (Randall and Antoni, Mechanical Systems and Sig
 2011). Both functions take the signal as periodic: best are whole revolutions of a settled motion,
 at equal times or equal crank angles.
 
-Single numbers that tell how large and how impulsive a vibration is. A signal may have any unit.
+Single numbers that measure how large and how impulsive a vibration is. A signal may have any unit.
 None of the functions takes its mean off, but for the kurtosis, which is about the mean. Where a
 number is not defined, as of silence, it is nan.
 """

@@ -61,7 +61,7 @@ class Monitored:
     def cut(self) -> list["Monitored"]:
         """Return each revolution: of the velocity, and of the record where there is one.
 
-        A record may repeat the settled revolutions, which tells nothing more of them: no more
+        A record may repeat the settled revolutions, which adds no information: no more
         revolutions of it are taken than there are of the velocity.
         """
         whole, recorded = self.revolutions

@@ -34,7 +34,7 @@ NO_UFF = "pyuff is not installed; get it by pip install 'compsim[records]'"
 
 
 class RecordError(CompsimError):
-    """A record that tells nothing or cannot be read: too short, without tacho, not finite."""
+    """A record that cannot be read or used: too short, without tacho, not finite."""
 
     exit_code = 2
 

@@ -202,7 +202,7 @@ def _even(file: RecordFile, clock: int, times: np.ndarray) -> np.ndarray:
 
 
 def _scale(file: RecordFile, hints: RecordHints, value: int) -> float:
-    """Return what a sample of 1 is in m/s2. Raises RecordError where nothing tells it."""
+    """Return what a sample of 1 is in m/s2. Raises RecordError where it is not known."""
     channel, listed = file.channels[value], ", ".join(UNITS)
     unit = unit_name(hints.unit or channel.unit)
     if not unit:
@@ -266,7 +266,7 @@ def _shift(pulses: np.ndarray, degrees: float, times: np.ndarray) -> np.ndarray:
 
 
 def check_record(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> int:
-    """Return the whole revolutions of a record. Raises RecordError for one that tells nothing."""
+    """Return the whole revolutions of a record. Raises RecordError if it cannot be used."""
     whole = len(tacho) - 1
     if whole < MIN_REVOLUTIONS:
         text = f"{len(tacho)} tacho pulses are too few: at least {MIN_REVOLUTIONS + 1}"

@@ -1,4 +1,4 @@
-"""Amplitude spectra over frequencies and orders, and the pulses that orders are told by.
+"""Amplitude spectra over frequencies and orders, and the pulses that orders are counted by.
 
 Amplitudes are single-sided. A line of a sine A sin(...) has the peak amplitude A, or the rms
 amplitude A/sqrt(2), in the unit of the signal. The line at zero is the magnitude of the mean in

@@ -409,5 +409,5 @@ def test_values_of_another_kind_are_told(call, value):
 @pytest.mark.parametrize("text", ["5e-324", "1e-400", "1e-310"])
 def test_a_clearance_that_no_float_can_hold_in_metres_is_refused(text, tmp_path):
     (tmp_path / "tiny.yaml").write_text(f"joint: big_end\nclearance_mm: {text}\n")
-    with pytest.raises(CompsimError, match="is too small to be told from 0: write 0, or a larger"):
+    with pytest.raises(CompsimError, match="is too small to differ from 0: write 0, or a larger"):
         load_cases(tmp_path / "tiny.yaml")

@@ -153,7 +153,7 @@ def test_a_reversal_that_is_not_known_is_not_judged():
             "rod_load_reversal_angle_error": math.radians(0.5),
             "rod_load_reversal_share_error": 0.01}  # fmt: skip
     ((_, line),) = reversal_verdict(SimpleNamespace(numbers=near), 15.0, 3.0)
-    assert "cannot be told apart from API 618's 15 degrees and 3 %" in line
+    assert "cannot be distinguished from API 618's 15 degrees and 3 %" in line
 
 
 def test_show_judges_the_reversal(tmp_path, capsys, monkeypatch):
