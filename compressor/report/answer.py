@@ -1,9 +1,8 @@
 """The first screen of a report: what was run, what failed, what changes most, and where from.
 
 A finding is a metric whose least and greatest value over the jobs differ by more than both error
-bars. Metrics are ranked by how many times the greatest is the least; each is told once. What an
-owner asks first stands there whether it changes or not: the force in a worn joint, and the reversal
-of the rod load.
+bars. Metrics are ranked by how many times the greatest is the least; each is listed once. What an
+owner needs first is always listed: the force in a worn joint, and the reversal of the rod load.
 """
 
 import datetime
@@ -210,8 +209,8 @@ FROM_ZERO = 5.0  # rank of what appears: as of a value 150 times as large
 class MetricChange:
     """What a metric does over jobs; `low` and `high` are numbers with bars and unit, or one is "".
 
-    `at_low`, `at_high`: of which jobs; `change`: the ratio in words; `always`: it stands on the
-    first screen whatever its rank is.
+    `at_low`, `at_high`: their jobs; `change`: the ratio in words; `always`: it stands on the first
+    screen whatever its rank is.
     """
 
     title: str
@@ -279,7 +278,7 @@ def worn_joints(data: xr.Dataset) -> set[str]:
 
 
 class Points(Sequence[str]):
-    """What is swept at each job of a study, in words, made when it is asked for."""
+    """What is swept at each job of a study, in words, made on access."""
 
     def __init__(self, data: xr.Dataset):
         status = data["status"]

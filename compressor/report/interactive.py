@@ -70,7 +70,7 @@ def content(drawing: Drawing) -> dict[str, Any]:
 
     `jobs`: the keys of all jobs, among which a trace's points have places.
 
-    `unified`: all curves go from left to right, so that the values at one x are told together.
+    `unified`: all curves go from left to right, so that the values at one x are shown together.
     """
     panels = drawing.panels
     links = {way: link_scales(drawing, way) for way in WAYS}
@@ -268,7 +268,7 @@ def job_scripts(
         try:
             drawing = in_units(draw_job(read_shown(stored, key)), units)
         except (NoSeriesError, DamagedJob):
-            continue  # shorter than a revolution, or its file is damaged, of which others tell
+            continue  # shorter than a revolution, or its file is damaged: others report it
         found += 1
         yield key, script(series_name(key), drawing)
 

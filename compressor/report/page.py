@@ -196,14 +196,14 @@ class Running(NamedTuple):
 
 
 class JobFacts(NamedTuple):
-    """What a click on a point tells of a study's jobs: by key, in the order of the names."""
+    """What a click on a point shows of a study's jobs: by key, in the order of the names."""
 
     names: Sequence[str]
     jobs: Mapping[str, Sequence[str]]
 
 
 class JobsToOpen(NamedTuple):
-    """What clicks on points tell: the results' folder in a shell's words, and jobs by study.
+    """What clicks on points show: the results' folder in a shell's words, and jobs by study.
 
     series: keys of the jobs whose last revolution lies beside the page.
     """

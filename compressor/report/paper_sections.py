@@ -337,7 +337,7 @@ def comparable(runs: Collection[xr.Dataset]) -> bool:
     """Return whether runs can be drawn and judged together.
 
     They settle at one crank angle and have samples at the same ones, for a revolution or more, and
-    so close that the lines above `ORDER`, which claim 7 reads, can be told.
+    so close that the lines above `ORDER`, which claim 7 reads, are resolved.
     """
     grids = [settled_part(run)["crank_angle"].values for run in runs]
     turns = (grids[0][-1] - grids[0][0]) / (2.0 * np.pi)

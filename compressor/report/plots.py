@@ -92,7 +92,7 @@ class Plotted:
 
 
 def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tuple[str, ...]:
-    """Return the figures to draw: those that are asked for, by default all.
+    """Return the figures to draw: those requested, by default all.
 
     known: the names that `thing` has. Raises PlotError for another one.
     """
@@ -422,7 +422,7 @@ def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]
     """Return why no job of a study can be drawn, and what to do about it."""
     problems = {row.problem for row in rows}
     cures = {
-        "failed": f"compsim status -i {stored.folder} tells why",
+        "failed": f"compsim status -i {stored.folder} shows why",
         "not run": f"compsim run {study.case_file} -o {stored.folder}",
         "no series": KEEP,
         "too short": "run it with a longer solve.duration_rev",

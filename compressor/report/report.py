@@ -134,7 +134,7 @@ def publish_changed(path: Path, content: bytes) -> None:
 
 
 def restate(report: Folder, before: Running, now: Running) -> None:
-    """Write on a report's page how the run stands now, without drawing anew.
+    """Write on a report's page how the run stands now, without drawing again.
 
     Raises OSError where the page cannot be read, StoreError where it cannot be written.
     """
@@ -235,7 +235,7 @@ def plates_in(plates: Sequence[Plate], units: Units) -> list[Plate]:
 class DrawnStudy(NamedTuple):
     """What the page has of a user's own study.
 
-    jobs: what a click on a job's point tells; cautions: what to know beside what changes most.
+    jobs: what a click on a job's point shows; cautions: what to know beside what changes most.
     """
 
     figures: Section

@@ -31,7 +31,7 @@ from compressor.units import Units
 
 MAX_DETAILS = 20
 MAX_ROWS = 500
-MAX_FACTS = 2000  # jobs whose points tell where they are
+MAX_FACTS = 2000  # jobs whose points show where they are
 KEY_DIGITS = 10  # digits of a job's key
 
 
@@ -54,7 +54,7 @@ class Counts(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyContent:
-    """What a page says of a study; `chaotic` counts jobs of which statistics alone hold.
+    """What a page says of a study; `chaotic` counts jobs whose statistics alone hold.
 
     `second_set`: the id of the section with its own Figures 8 to 16, empty where it has none;
     `notes`: lines that others add; `caveats`: what to know beside the numbers, a sentence each;
@@ -155,7 +155,7 @@ def job_counts(data: xr.Dataset) -> Counts:
 def job_facts(data: xr.Dataset, keys: Sequence[str]) -> JobFacts:
     """Return what a click on a job's point shows: its place in the sweep, and how it ended.
 
-    keys: of the jobs, of which the first MAX_FACTS are told of.
+    keys: of the jobs; only the first MAX_FACTS are shown.
     """
     swept = swept_values(data)
     place = {str(key): n for n, key in enumerate(data["key"].values.flat)}

@@ -54,7 +54,7 @@ HEAD = 2000  # bytes of a picture, in which its identifier is
 STYLE: dict[str, Any] = {
     "font.size": 9.5,
     "axes.titlelocation": "left",
-    "axes.titley": 1.0,  # found anew for each drawing it takes a tenth of the time
+    "axes.titley": 1.0,  # found again for each drawing it takes a tenth of the time
     "axes.labelsize": 9.5,
     "axes.linewidth": 0.7,
     "axes.spines.top": False,
@@ -100,7 +100,7 @@ def render_kinds(drawing: Drawing, kinds: Iterable[str]) -> list[bytes]:
 def digest_drawing(drawing: Drawing) -> str:
     """Return a digest of all that the pictures of a drawing follow from: its data and the code.
 
-    It stands in the pictures themselves, so that each tells whether it is still that of a drawing.
+    It stands in the pictures themselves, which thus show whether they are still those of a drawing.
     """
     return hashlib.sha256(code_digest() + pickle.dumps(drawing)).hexdigest()
 
@@ -268,7 +268,7 @@ def legend_handle(trace: Trace) -> Artist:
 
 
 def outline(trace: Trace) -> Path:
-    """Return the outlines of a band, of which those inside another are holes."""
+    """Return the outlines of a band; those inside another one are holes."""
     ends = np.flatnonzero(np.isnan(trace.x))
     rings = np.split(np.column_stack([trace.x, trace.y]), ends)
     rings = [ring[np.isfinite(ring).all(axis=1)] for ring in rings]
@@ -334,7 +334,7 @@ class Painter:
 
     A copy takes drawings from the first on as soon as they are added; `finish` takes them from the
     last on until both meet. Where threads run, whose locks a fork may copy, or the system has no
-    fork, all is done here. What is drawn is told on stderr.
+    fork, all is done here. What is drawn is reported on stderr.
     """
 
     def __init__(self, folder: pathlib.Path):

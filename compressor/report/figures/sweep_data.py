@@ -95,7 +95,7 @@ MEASURES = tuple(measure for name in BARRED for measure in shown_variables(name)
 
 
 def measures(data: xr.Dataset, units: Units = "usual") -> list[Measure]:
-    """Return the measures of which a dataset has any value, in chosen units."""
+    """Return the measures that have any value in a dataset, in chosen units."""
     stored = (measure for measure in MEASURES if measure.variable in data)
     return [one.read_in(units) for one in stored if one.of(data).notnull().any()]
 

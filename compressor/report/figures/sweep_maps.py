@@ -169,7 +169,7 @@ Ranking = dict[Measure, Effects]
 
 
 def ranking(sweep: PlottedSweep, measures: Sequence[Measure]) -> Ranking:
-    """Return the effects of a sweep's axes on each measure of which enough is known.
+    """Return the effects of a sweep's axes on each measure that is known well enough.
 
     All of one kind.
     """
@@ -271,7 +271,7 @@ def part(effects: Effects, axis: int, name: str) -> tuple[float, float, float]:
 def describe_ranking(sweep: PlottedSweep, found: Ranking) -> str:
     """Return the strongest axis of each measure, a sentence an axis: how much it explains.
 
-    Or axes that are not told apart.
+    Or the axes that may be strongest.
     """
     groups: dict[tuple[int, ...], list[str]] = {}
     for measure, effects in found.items():

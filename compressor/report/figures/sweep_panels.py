@@ -32,7 +32,7 @@ from compressor.report.figures.sweep_data import (
 
 COLUMNS = 3
 MAX_LINES = 12  # in a panel
-MAX_KEYS = 2000  # jobs of a study of which a click tells
+MAX_KEYS = 2000  # jobs of a study that clicks show
 PANEL_MARGIN = 0.18  # of a panel's height, below and above its values
 VISIBLE = 0.004  # of a panel's height: an error bar that is seen
 MARKERS = "osD^v"
@@ -57,7 +57,7 @@ def metric_panels(measures: Sequence[Measure], height: float) -> tuple[Drawing, 
 
 
 def job_keys(keys: np.ndarray) -> tuple[str, ...]:
-    """Return the keys of the jobs at points; none where these are too many to tell of."""
+    """Return the keys of the jobs at points; none where these are too many to show."""
     return tuple(map(str, keys.ravel())) if keys.size <= MAX_KEYS else ()
 
 
