@@ -49,7 +49,7 @@ def export(
     A STUDY becomes one table of its jobs, failed and missing ones included; a JOB, named by its key
     or the beginning of it, a table of samples, in CSV with its sensor's record as identify reads
     it. As .wav, .mat or .uff a job becomes that record alone: acceleration in m/s2 and a tacho;
-    a .wav has 32-bit floats, of which 1.0 is 1 m/s2. Without either, all studies. Several studies
+    a .wav has 32-bit floats; 1.0 is 1 m/s2. Without either, all studies. Several studies
     go into one FILE together, or into a FOLDER with a file each: a name without suffix, or with a
     slash at its end. --units is of CSV alone: other files are in SI, as are records.
     """

@@ -1,4 +1,4 @@
-"""Progress on stderr: a line that rich draws anew on a terminal, elsewhere one now and then."""
+"""Progress on stderr: a line that rich redraws on a terminal, elsewhere one now and then."""
 
 import os
 import sys

@@ -94,7 +94,7 @@ def units_option(usual: str) -> Callable[..., Any]:
 
 
 def check_json_units(as_json: bool, units: "Units | None") -> None:
-    """Raise UsageError where other units than SI are asked for in JSON."""
+    """Raise UsageError where other units than SI are requested in JSON."""
     if as_json and units == "plant":
         raise click.UsageError("--json has all numbers in SI: leave out --units plant")
 
@@ -102,7 +102,7 @@ def check_json_units(as_json: bool, units: "Units | None") -> None:
 MAX_JOBS = 10_000
 limit = click.option(
     "--max-jobs", type=click.IntRange(min=1), default=MAX_JOBS, show_default=True,
-    help="Refuse a case file that asks for more jobs than this.",
+    help="Refuse a case file with more jobs than this.",
 )  # fmt: skip
 
 
@@ -211,12 +211,12 @@ def caution(studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS) -> None
 
 
 def report_changes(studies: "Sequence[Study]", folder: str) -> None:
-    """Report which stored studies have jobs that their case files no longer ask for."""
+    """Report which stored studies have jobs that their case files no longer have."""
     from compressor.store import changes
 
     for one in changes(folder, studies):
         text = (
-            f"{one.study}: had {plural(one.before)}, this file asks for {one.now}, {one.shared} of "
+            f"{one.study}: had {plural(one.before)}, this file has {one.now}, {one.shared} of "
             "them as before"
         )
         if one.older_model:

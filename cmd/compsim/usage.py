@@ -12,7 +12,7 @@ from compressor.program import did_you_mean
 CASE_FILES = (".yaml", ".yml")
 WHOLE = 1000  # characters, from which click would cut a summary
 HELP_OPTIONS = {"help": "compsim --help, or compsim COMMAND --help", "version": "compsim --version"}
-# what stands for the folder of results in some commands, and is asked of others in vain
+# what stands for the folder of results in some commands, and is missing from others
 FOLDERS = {"-o": "output", "--output": "output", "-i": "folder", "--input": "folder"}
 
 

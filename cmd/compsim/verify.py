@@ -1,4 +1,4 @@
-"""`compsim verify`: which stored files are damaged, which jobs that costs, and how to mend it."""
+"""`compsim verify`: which stored files are damaged, which jobs that costs, and how to repair it."""
 
 import json
 from typing import TYPE_CHECKING, Any
@@ -43,7 +43,7 @@ def verify(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
     lost = len({key for damage in damages for key in damage.keys})
     say(f"{plural(len(damages), 'damaged file')}, {plural(lost)} lost")
     for command in run_commands((one for damage in damages for one in damage.again), folder):
-        say(f"to mend: {command}")
+        say(f"to repair: {command}")
     return STORE
 
 

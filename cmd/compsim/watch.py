@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from compressor.sweep import SweepProgress
 
 SECONDS = 5.0  # between two pages, and before the first
-REDRAW_FACTOR = 20.0  # times what drawing takes: how long until figures are drawn anew
+REDRAW_FACTOR = 20.0  # times what drawing takes: how long until figures are drawn again
 NICENESS = 5  # of the process: jobs go first
 MAX_DEATHS = 3  # of the process, before it is given up
 
@@ -33,7 +33,7 @@ MAX_DEATHS = 3  # of the process, before it is given up
 class PageWatch:
     """A watch that keeps the page of a run fresh; a context manager around the sweep.
 
-    How the run stands is written anew every few seconds, and figures are drawn as often as costs
+    How the run stands is written again every few seconds, and figures are drawn as often as costs
     jobs little: drawing has a twentieth of one core.
 
     Raises WrongName or StoreError at once where the report's folder cannot be made or written.

@@ -1,4 +1,4 @@
-"""Where in a sweep jobs fail: the keys and thresholds that tell failed jobs from fine ones best.
+"""Where in a sweep jobs fail: keys and thresholds that best separate failed jobs from fine ones.
 
 A decision tree of two levels by Gini's impurity (Breiman et al., Classification and Regression
 Trees, 1984), whose first split must be better than chance makes it: it is compared with the best

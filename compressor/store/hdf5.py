@@ -2,7 +2,7 @@
 
 HDF5 can crash the process when a disk fills up while it writes, or when it follows what a damaged
 file says; so that it never touches a disk here: `compressor.store.files` writes the bytes, and who
-reads them compares their digest first. A digest tells of damage, not of malice: what is opened is
+reads them compares their digest first. A digest shows damage, not malice: what is opened is
 also checked before HDF5 follows it. Only this module imports h5py.
 
 HDF5 knows open files by their names, also those that are in memory: opening a name twice gives the

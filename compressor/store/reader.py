@@ -6,14 +6,14 @@
     <folder>/former/<name>~<n>.json      the same of a study that another of its name has replaced
     <folder>/shards/<shard>/{rows,jobs}  the same of a run that is one of several
 
-A job is stored when it has a row and, if the row tells of time series, their file. Every file
+A job is stored when it has a row and, if the row names time series, their file. Every file
 appears under its name only when all of it is on disk, and carries a digest of its bytes. There is
 no index: what is stored is read from the rows. `compressor.store.writer` writes them.
 
-A stored job is stale where this version of the program would tell more of it, or other numbers. A
+A stored job is stale where this version of the program would give it more numbers, or others. A
 key holds the version of the model, and results of one version agree within their error bars but for
-what a revision has mended (`compressor.cases.case`): a job that another version of the program has
-made is not stale for that alone.
+what a revision has corrected (`compressor.cases.case`): a job that another version of the program
+has made is not stale for that alone.
 """
 
 import json
@@ -240,7 +240,7 @@ class Stored:
     def serving(self, positions: np.ndarray, case: Case) -> np.ndarray:
         """Return whether each of the jobs at some positions needs no new run for a case, boolean.
 
-        Jobs of one kind, in all that `JobStatus.satisfies` reads, are asked once.
+        Jobs of one kind, in all that `JobStatus.satisfies` reads, are checked once.
         """
         first, kinds = self._kinds
         satisfied = np.array([self.status_at(at).satisfies(case) for at in first.tolist()], bool)

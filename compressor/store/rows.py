@@ -31,7 +31,7 @@ NAME = re.compile(rf"([0-9]{{9}})-({HEX20})\.h5")
 GIVEN = digest(" ".join([PROGRAM, MODEL, *BARRED]).encode())[:8]  # by this version
 ANY_KEY = re.compile(rb"(?=([0-9a-f]{20}))")  # every 20 hexadecimal digits in a row
 REMEDY = "move it away, then run its studies again"
-FOREIGN_LINES = "is no file of compsim's: what it tells of its jobs cannot be read"
+FOREIGN_LINES = "is no file of compsim's: what it holds of its jobs cannot be read"
 MAX_LINE = 1 << 20  # bytes that are known of one job, on average over a segment
 
 # columns that are no numbers of ROW: (type, phrase, pattern of its texts)
@@ -169,7 +169,7 @@ def read_line(line: bytes, kind: type, segment: Segment) -> Any:
 def encode(segment: Segment) -> bytes:
     """Return the bytes of a segment's file.
 
-    The keys stand in it twice, first and last, so that damage can be told by the job's name.
+    The keys stand in it twice, first and last, so that damage can be reported by the job's name.
     """
     columns = segment.columns
     numbers = segment.numbers()

@@ -163,7 +163,7 @@ def _of_repetition(unrepeated: int, late: int, jobs: int) -> Iterator[str]:
 
 
 def _of_clipping(fractions: np.ndarray) -> Iterator[str]:
-    """Yield a sentence about sensor records of which a thousandth or more is clipped."""
+    """Yield a sentence about sensor records clipped in a thousandth of their samples or more."""
     known = fractions[~np.isnan(fractions)]
     clipped = known[known >= Sensor.REPORTED]
     if clipped.size:
@@ -221,7 +221,7 @@ def _outside_of_study(study: StoredStudy) -> dict[str, str]:
 
 FORMER_REMEDY = "delete it: its jobs stay stored"
 ROWS_REMEDY = "bring the missing files of rows, or run their case files, which computes them again"
-STUDY_REMEDY = "run its case file again, which computes nothing anew"
+STUDY_REMEDY = "run its case file again, which recomputes no job"
 STUDY_FILE_REMEDY = "delete it: the command that made it makes it again"
 
 
@@ -230,7 +230,7 @@ class Damage:
     """A file of a store that is gone or not what was written, and the jobs that are lost with it.
 
     keys: of the lost jobs; studies: for each of them its swept values by study. A run of `again`
-    computes them anew; `remedy` is what else is to be done, or "".
+    computes them again; `remedy` is what else is to be done, or "".
     """
 
     path: Path
@@ -247,8 +247,8 @@ def verify(
     """Return all damage to a store: to segments, files of time series, studies and their files.
 
     Jobs that a study has and no row knows are damage, too, unless a run is at work there: they have
-    not run, or their row is gone. `progress` is told how many files of time series were read, of
-    how many. Raises StoreError for a folder that cannot be read.
+    not run, or their row is gone. `progress` is called with how many files of time series, of how
+    many, were read. Raises StoreError for a folder that cannot be read.
     """
     busy = {place for place in places(folder) if is_locked(place)}
     stored = read_store(folder, DamagedJob)

@@ -1,6 +1,6 @@
 """The studies of a store: one JSON file each, with its axes and the keys of its jobs in C order.
 
-A study whose case file asks for other jobs than before is replaced. Where finished jobs are no
+A study whose case file has other jobs than before is replaced. Where finished jobs are no
 longer in it, the former one stays as `former/NAME~1.json`, and opens under that name; the next is
 NAME~2.
 
@@ -437,7 +437,7 @@ def whole_key(
         beginning, known
     )
     problem = f"no job's key begins with {beginning!r}, and no study is called so"
-    remedy = hint or "compsim status tells the studies, and a job is named by STUDY AXIS=VALUE, too"
+    remedy = hint or "compsim status lists the studies, and a job is named by STUDY AXIS=VALUE, too"
     raise WrongName(folder, problem, remedy)
 
 

@@ -91,7 +91,7 @@ IDLE_POOLS: dict[bytes, Local] = {}  # the pool that is kept for the next batch,
 class Batch(NamedTuple):
     """What a worker of the cluster does in one go; jobs are named by their places in it."""
 
-    versions: dict[str, str]  # that are asked for
+    versions: dict[str, str]  # that the worker must have
     work: Callable[[Any], Any]
     rules: Workers
     timeouts: list[float]  # of its jobs
@@ -282,7 +282,7 @@ class Cluster:
         try:
             self.client = within(CONNECT_SECONDS + 1, dial)
         except Exception as error:
-            remedy = "is one running there? `dask scheduler` starts one, and tells its address"
+            remedy = "is one running there? `dask scheduler` starts one, and prints its address"
             raise ClusterError(f"{self.address}: no scheduler answers; {remedy}") from error
         try:
             self.check()

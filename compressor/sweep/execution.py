@@ -293,7 +293,7 @@ def drain(ends: Generator[End, None, None], error: BaseException) -> Iterator[En
 class Local(Batches):
     """Jobs in processes of this machine, on a pool that ends with any of its processes.
 
-    Each batch has a file in memory that its worker shares. A note in it tells which process is at
+    Each batch has a file in memory that its worker shares. A note in it says which process is at
     which job, and since when: nothing else names the job in which a process died, hung in compiled
     code or stood still. Results come in it, too: through loky's pipe a worker that died amid a long
     message would leave loky reading the rest for ever.
@@ -496,7 +496,7 @@ def children() -> list[Any]:
 
 
 def kill(pids: Iterable[int]) -> None:
-    """Send SIGKILL to processes, some of which may be gone."""
+    """Send SIGKILL to processes; some may be gone."""
     for pid in pids:
         with contextlib.suppress(ProcessLookupError):
             os.kill(pid, signal.SIGKILL)

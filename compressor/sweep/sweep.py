@@ -38,7 +38,7 @@ GRACE = 5.0  # s beyond its time in which a job may end by itself, before its wo
 class Backend(Protocol):
     """Where jobs run: runs cases whose time series belong in a place, yields how each one ended.
 
-    `remark` is told what takes its time, `pulse` called several times a second. An exception that
+    `remark` is called with what takes time, `pulse` several times a second. An exception that
     is thrown in ends the jobs, and is raised again after the results that had arrived.
     """
 
@@ -56,10 +56,10 @@ class Options:
     """How to sweep.
 
     command: what the store says that it was made by; rerun_failed: failed jobs count as missing;
-    rerun_stale: so do those of which this version would tell more (`Stored.stale`); part: (i, n)
+    rerun_stale: so do those that this version gives more numbers (`Stored.stale`); part: (i, n)
     for shard i of n, which other processes may run at the same time, each its own; wait: until
-    another run that writes there has ended; backend: where jobs run, if not here; pulse: told how
-    the sweep stands, several times a second while jobs run.
+    another run that writes there has ended; backend: where jobs run, if not here; pulse: called
+    with the sweep's progress several times a second while jobs run.
     """
 
     command: str = ""
@@ -138,7 +138,7 @@ def sweep(
             files = (
                 f"{writer.place / 'jobs'}: no row knows the jobs of {writer.unowned} of its files"
             )
-            progress(0, len(cases), f"{files}; they stay, and compsim verify tells more")
+            progress(0, len(cases), f"{files}; they stay, and compsim verify shows what to do")
         ends = stored_ends(writer.found, cases)
         if options.rerun_failed:
             ends = {key: end for key, end in ends.items() if end.status == "ok"}
@@ -174,7 +174,7 @@ def run_missing(
 ) -> None:
     """Run and store cases; `ends` gains how each ended.
 
-    watchers: progress, told of what is on disk, and the pulse.
+    watchers: progress, called with what is on disk, and the pulse.
     """
     progress, pulse = watchers
     done, total, work = len(ends), len(ends) + len(missing), SweepWork(missing)

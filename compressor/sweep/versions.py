@@ -9,7 +9,7 @@ from compressor.cases import MODEL
 from compressor.program import COMPILED, VERSION, CompsimError, library_versions, sources_hash
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
-REMEDY = "have the same programs on all machines, then start the cluster's workers anew"
+REMEDY = "have the same programs on all machines, then start the cluster's workers again"
 
 
 class ClusterError(CompsimError):

@@ -1,7 +1,7 @@
 """Have the equations compiled once on a machine, and loaded before anything is timed.
 
 Machine code is kept by a hash of the sources of the physics and the versions of the libraries: a
-change of either compiles anew, once. It has several parts, of which a run compiles those that it
+change of either compiles it again, once. It has several parts; a run compiles those that it
 needs. Within a part numba stores each function as soon as it is compiled, so that what was compiled
 before a Ctrl-C is not compiled again.
 """
@@ -22,7 +22,7 @@ COMPILING = (
     "compiling the equations, part {number} of {count}: {what}, about {seconds} s; "
     "each part once for each version of the program, and a stop loses nothing"
 )
-METHOD = "one method"  # a part of which nothing but a few functions is its own
+METHOD = "one method"  # a part that adds only a few functions
 WHAT = {
     "auto": ("dry joints", 20),
     METHOD: ("solve.method {}", 2),
@@ -35,7 +35,7 @@ WHAT = {
     "features": ("mechanisms with features, such as oil or an elastic rod", 40),
     "features-horizon": ("the horizon of mechanisms with features", 6),
 }  # by part: what it is, and the seconds that it takes an idle core
-LANES = {1: "big_end", 2: "small_end", 3: "both"}  # scenes of which runs march side by side
+LANES = {1: "big_end", 2: "small_end", 3: "both"}  # scenes whose runs march side by side
 MIN_JOBS_TO_LOAD, MIN_JOBS_TO_COMPILE = 16, 4000  # of a scene, for its lanes
 MAX_JOBS_SEEN = 1000  # jobs that are looked at for it
 LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
@@ -84,10 +84,10 @@ class Needs(NamedTuple):
         return {part: alone for part, alone in self.parts.items() if not marker(part).exists()}
 
     def with_lanes(self, cases: Sequence[Case]) -> "Needs":
-        """Return the needs with the scenes of which enough jobs can march side by side.
+        """Return the needs with the scenes that have enough jobs to march side by side.
 
-        Results are the same to the bit without: where no lanes have been compiled yet, many more
-        jobs are asked for than where they need but be loaded.
+        Results are the same to the bit without: lanes that are not compiled yet need many
+        more jobs than those that are only to be loaded.
         """
         step = max(1, len(cases) // MAX_JOBS_SEEN)
         sample = (cases[i] for i in range(0, len(cases), step))

@@ -228,14 +228,14 @@ def test_verify_finds_damage_that_a_run_mends(case_file, capsys):
     key = file.name[:20]
     (load,) = (case.load for case in load_cases("two.yaml") if case.key == key)
     assert out == f"{file}: is damaged\n  job {key}\n    in two load={load}\n"
-    mend = f"compsim run {os.path.abspath('two.yaml')} -o results"
-    assert err == f"1 damaged file, 1 job lost\nto mend: {mend}\n"
+    repair = f"compsim run {os.path.abspath('two.yaml')} -o results"
+    assert err == f"1 damaged file, 1 job lost\nto repair: {repair}\n"
     assert cli.main(["verify", "--json"]) == 5
     out, _ = capsys.readouterr()
     (found,) = json.loads(out)
     assert (found["path"], found["problem"], found["jobs"]) == (str(file), "is damaged", [key])
     assert found["studies"] == {key: {"two": {"load": load}}}
-    assert cli.main([*shlex.split(mend)[1:], "-j", "1", "--quiet"]) == 0
+    assert cli.main([*shlex.split(repair)[1:], "-j", "1", "--quiet"]) == 0
     assert cli.main(["verify"]) == 0
 
 

@@ -39,7 +39,7 @@ def plain(text):
     return re.sub(r"\x1b\[[0-9;]*m|[━╸╺]", "", text)
 
 
-def test_a_terminal_gets_one_line_that_is_drawn_anew(terminal, capsys):
+def test_a_terminal_gets_one_line_that_is_redrawn(terminal, capsys):
     terminal()
     progress = ProgressReporter(quiet=False)
     for event in [(2, 11, ""), (3, 11, ""), (11, 11, "")]:

@@ -1,4 +1,4 @@
-"""A case file that asks for other jobs than before: said before the run, and nothing is lost."""
+"""A case file with other jobs than before: said before the run, and nothing is lost."""
 
 import json
 from pathlib import Path
@@ -156,8 +156,8 @@ def test_run_and_plan_say_so_first(command, wear, capsys, in_process):
     assert cli.main([command, "wear.yaml"]) in (0, 3)
     err = capsys.readouterr().err
     assert err.startswith(
-        "wear: had 3 jobs, this file asks for 2, 2 of them as before; 1 finished before\n"
-        "  stays stored, in the study wear~1:\n"
+        "wear: had 3 jobs, this file has 2, 2 of them as before; 1 finished before stays\n"
+        "  stored, in the study wear~1:\n"
         "  compsim export wear~1 -i results -o wear~1.csv\n"
     )
     assert names() == (["wear", "wear~1"] if command == "run" else ["wear"])

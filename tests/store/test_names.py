@@ -57,7 +57,7 @@ def test_a_job_by_its_key_or_its_place_in_a_study(words, key):
         (["aa13"], "no job's key begins with 'aa13', and no study is called so; the nearest is aa"),
         (["waer"], "and no study is called so; did you mean wear?"),
         (["WEAR.yaml"], "did you mean wear?"),
-        (["zz"], "compsim status tells the studies"),
+        (["zz"], "compsim status lists the studies"),
         (["waer", "clearance_mm=0.1"], "holds no study 'waer'; did you mean wear?"),
         (["other", "clearance_mm=0.1"], "holds no study 'other'; it holds wear, drawn, words, one"),
         (["wear"], "wear is a study of 6 jobs; choose one by clearance_mm=… of 0.1, 0.2, 0.001; "

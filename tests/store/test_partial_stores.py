@@ -55,7 +55,7 @@ def test_a_run_amid_a_copy_leaves_the_series_that_came_first(run, tmp_path):
     (remark,) = run(tmp_path / "copy", "other", speed=600)
     assert remark == (
         f"{tmp_path / 'copy/jobs'}: no row knows the jobs of 2 of its files; they stay, and "
-        "compsim verify tells more"
+        "compsim verify shows what to do"
     )
     shutil.copytree(tmp_path / "whole", tmp_path / "copy", dirs_exist_ok=True)
     assert verify(tmp_path / "copy") == []
@@ -123,7 +123,7 @@ def test_a_study_that_is_gone_is_told_by_rows(run, tmp_path):
     (damage,) = verify(tmp_path / "out")
     assert damage.path == path
     assert damage.problem == "is gone, and 2 stored jobs were run for it"
-    assert damage.remedy == "run its case file again, which computes nothing anew"
+    assert damage.remedy == "run its case file again, which recomputes no job"
     assert run(tmp_path / "out") == []
     assert verify(tmp_path / "out") == []
 

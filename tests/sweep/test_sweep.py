@@ -375,7 +375,7 @@ def test_laws_are_an_axis_of_a_sweep(studies, tmp_path, in_process):
     assert np.unique(peaks.values).size == 3
 
 
-def test_a_copied_folder_compiles_anew(tmp_path, monkeypatch):
+def test_a_copied_folder_compiles_again(tmp_path, monkeypatch):
     """Numba keeps machine code by path: the mark that came with a copy made each worker compile."""
     loaded = []
     monkeypatch.setattr(warm_up, "load", loaded.append)
