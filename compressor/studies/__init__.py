@@ -29,8 +29,8 @@ class StudyKind:
 
     `verbs`: of the command line, which its module `command` has; `compsim --help` lists them under
     `heading`.
-    `group`: the group of keys by which a case file asks `compsim run` for it; its module `command`
-    then has `check_options`, `run_studies`, `ahead` and `ahead_lines`, and its module `group` what
+    `group`: the group of keys by which a case file requests it; its module `command` then has
+    `check_options`, `run_studies`, `ahead` and `ahead_lines`, and its module `group` what
     `compressor.cases.StudyRequest` says.
     `figures`: what `compsim plot` draws of it; its module `plots` has `write`.
     `files`: what it keeps beside the jobs; of a kind with figures, a `result` has a study's folder.
@@ -63,7 +63,7 @@ STUDIES = (
     StudyKind(
         "wear", ("wear",),
         files=StudyFiles("wear/*.nc", "wear/*.nc",
-                         "how machines have worn", "compsim wear CONFIG... tells of them"),
+                         "how machines have worn", "compsim wear CONFIG... reports them"),
     ),
     StudyKind("diagnosis", ("dataset", "identify"), heading=RECORDS),
     StudyKind("tradeoff", ("tradeoff", "explain"), has_page=True, files=StudyFiles("models/*.nc")),

@@ -188,7 +188,7 @@ class FitJobs:
         for text in self.settings(every, QUIET):
             words += ["--set", text]
         few = in_this_process if len(new) < FEW else None
-        # so that `status` tells how to go on
+        # so that `status` shows how to go on
         options = Options(shlex.join(words), backend=few)
         done = sweep([study], self.folder, self.workers, self.progress, options)
         self.run_now += done.run_now
@@ -221,7 +221,7 @@ def calibrate(
     if not jobs.points:
         raise next(iter(jobs.refused.values()))  # no point of the ranges makes a case
     if fit is None:
-        raise CalibrationError(f"each job of study {jobs.name} failed: compsim status tells why")
+        raise CalibrationError(f"each job of study {jobs.name} failed: compsim status shows why")
     best = tuple(one.value(share) for one, share in zip(unknowns, fit.shares, strict=True))
     case = jobs.study([best], ()).cases[0]
     return Calibration(

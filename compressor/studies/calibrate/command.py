@@ -50,7 +50,7 @@ def calibrate(
     CONFIG makes one case, with body and sensor, and joints as they are in the sound machine. It
     runs at the record's mean speed. Compared are the orders of the mean revolution, amplitude and
     phase, each relative to its size. What is printed is the case file with the values that fit
-    best; comments say their 95 % intervals, and what the record cannot tell apart. Copies of this
+    best; comments say their 95 % intervals, and what the record cannot separate. Copies of this
     file with worn joints make a study for `compsim identify`.
 
     Every point is a job of the study CONFIG-calibrate in the folder of results: it is stored, and
@@ -80,7 +80,7 @@ def calibrate(
 
 
 def describe(record: str, config: str, found: "Calibration") -> Iterator[str]:
-    """Yield what was fitted, how well, and what the record does not tell."""
+    """Yield what was fitted, how well, and what the record does not determine."""
     fit = found.fit
     yield (f"{config}, fitted to {record}: {found.revolutions} revolutions at "
            f"{60 * found.speed:.6g} rpm, in place of the file's {found.rpm_given:g}; "
@@ -98,7 +98,7 @@ def describe(record: str, config: str, found: "Calibration") -> Iterator[str]:
                "may err; intervals are widened by as much")  # fmt: skip
     for group in fit.open_directions:
         keys = " and ".join(found.unknowns[place].key for place in group)
-        how = "are not told apart" if len(group) > 1 else "is not told"
+        how = "are not separated" if len(group) > 1 else "is not determined"
         yield f"{keys} {how}: the record narrows their range by less than half"
 
 

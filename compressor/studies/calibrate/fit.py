@@ -1,4 +1,4 @@
-"""Bounded least squares on complex orders, with intervals, and what cannot be told apart.
+"""Bounded least squares on complex orders, with intervals, and what cannot be separated.
 
 Each order counts relative to its own size, down to its noise: a model of a machine is wrong by some
 per cent everywhere (`MODEL_ERROR`), and an unweighted fit would hear the strongest order alone. So
@@ -22,7 +22,7 @@ STARTS = 2  # best points of the design from which the fit begins
 MAX_ROUNDS = 30  # of a fit from one start
 SURE = 1.96  # standard deviations of a 95 % interval
 UNIFORM = math.sqrt(1.0 / 12.0)  # standard deviation of what is known of a share beforehand
-OPEN = 0.5  # of that: a direction whose deviation is above it was not told by the record
+OPEN = 0.5  # of that: the record does not determine a direction whose deviation is above
 NAMED = 0.3  # share of a direction from which on a key is named in it
 
 # model: (n, k) shares of the ranges -> complex orders, (n, orders); nan where a job failed
@@ -34,7 +34,7 @@ class Fit:
     """What a record says of k unknowns, each a share of its range.
 
     shares: the best, (k,); deviations: standard deviations, (k,), at most that of the range;
-    open_directions: groups of unknowns, by their place, of which the record tells one number less;
+    open_directions: groups of unknowns, by their place; the record determines one number less;
     misfit: root of the mean squared residual where the unknowns matter: at most about 1 where the
     model is right to `MODEL_ERROR`; explained: share of the mean square of the orders; noise: share
     of it that is the record's own scatter.
@@ -120,7 +120,7 @@ def fit_orders(
     """Return the `Fit` of a record's orders; None where the model fails at every start.
 
     amplitudes, errors: of the record, (orders,), m/s2; starts: design of shares, (n, k). The
-    middle of the ranges is weakly preferred, as it was before the record: what that does not tell
+    middle of the ranges is weakly preferred, as it was before the record: what that leaves open
     stays there, and not at an end.
     """
     unknowns = starts.shape[1]

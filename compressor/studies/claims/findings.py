@@ -22,7 +22,7 @@ MASSES = ("machine.rod_mass_kg", "machine.reciprocating_mass_kg")
 
 
 class Flips(NamedTuple):
-    """Pairs of neighbours of a grid at one of which a claim holds.
+    """Pairs of neighbours of a grid where a claim holds at one alone.
 
     `pairs`: all neighbours that were judged; `flips`: of these; `within`: of those, pairs with a
     margin within its error; `jump`: the median change of the margin between all neighbours.
@@ -170,7 +170,7 @@ def rank_assumptions(table: xr.Dataset) -> Iterator[str]:
             names[n] for n in order[1:].tolist()
             if one["total_order_high"].values[n] >= one["total_order_low"].values[top]
         ]  # fmt: skip
-        tail = f"; not told from {', '.join(rivals)}" if rivals else ""
+        tail = f"; not distinguishable from {', '.join(rivals)}" if rivals else ""
         yield f"Claim {claim}: most by {strongest}{tail}."
 
 
@@ -250,7 +250,7 @@ def sensitivity(found: xr.Dataset) -> xr.Dataset | None:
     (claim, assumption), with `_low` and `_high`, the ends of the 95 % bootstrap interval, by
     SciPy's sobol_indices (Saltelli et al., Computer Physics Communications 181, 2010). nan where a
     margin is the same at all machines. Margins are cut at ± 1. A machine without margins counts as
-    the median one; `machines` and `unknown` tell how many there are. Raises ClaimsError where
+    the median one; `machines` and `unknown` are how many there are. Raises ClaimsError where
     machines are missing.
     """
     names = [

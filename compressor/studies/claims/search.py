@@ -35,7 +35,7 @@ POPULATION = 48  # machines of a generation
 DIGITS = 6  # of an assumption's value
 UNJUDGED_COST = 10.0  # the cost of a machine that was not judged
 STEP, MIN_STEP = 0.05, 0.003  # of a compass search, as shares of the ranges
-LONGER, LONGEST = 5, 20  # times: runs by which a machine is told to be consistent
+LONGER, LONGEST = 5, 20  # times: runs that show whether a machine is consistent
 NAMES = {1: "", LONGER: "-longer", LONGEST: "-longest"}
 HALVINGS = 4  # of each change, on the way back to the default
 

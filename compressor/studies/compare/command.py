@@ -63,8 +63,8 @@ def compare(
                  level, in dB: 0 is the same, 3 a factor of two in the
                  power of a band, 60 at most
 
-    A number's error, behind +-, is the standard error by the record's revolutions, of which at
-    least three are needed. What does not fit (speed, sampling rate, length, unit, crank angle) is
+    A number's error, behind +-, is the standard error by the record's revolutions; it
+    needs at least three. What does not fit (speed, sampling rate, length, unit, crank angle) is
     said below the table; a file does not say where its sensor was.
     """
     folder, words = results_folder(given, folder)

@@ -44,7 +44,7 @@ class Turned:
 
 
 def turn_record(record: Record) -> Turned:
-    """Return a record by whole revolutions. Raises RecordError for one that tells nothing."""
+    """Return a record by whole revolutions. Raises RecordError if it cannot be used."""
     whole = check_record(record.times, record.values, record.tacho)
     turns = turns_at(record.times, record.tacho)
     # from the last sample that is not after the first pulse: the rest then reach over all turns

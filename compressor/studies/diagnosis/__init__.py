@@ -1,1 +1,1 @@
-"""Which joint is worn, as a sensor's record tells it."""
+"""Which joint is worn, by a sensor's record."""

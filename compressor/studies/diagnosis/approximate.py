@@ -1,4 +1,4 @@
-"""Regression by kernels, with what each point would be told had it been left out.
+"""Regression by kernels, with each point's prediction when it is left out.
 
 Ridge regression with a Gaussian kernel k(x, y) = exp(-|x - y|^2 / (2 F s^2)) on F scaled features:
 with G = K + r I and centred targets Y, predictions are k(x) G^-1 Y. The error of point i left out

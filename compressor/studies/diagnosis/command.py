@@ -122,7 +122,7 @@ def identify(
     compsim identify record.csv --study machines
     compsim identify record.wav --study machines --channel 1 --unit g --tacho 2
 
-    The record is a file, .csv, .wav, .mat or .uff, of which the simplest is a CSV file with the
+    The record is a file, .csv, .wav, .mat or .uff. The simplest is a CSV file with the
     columns time_s, acceleration_m_per_s2 and tacho, a signal that rises at each top dead centre;
     or without tacho, with --rpm and --tdc. What a file does not say, options do. Or it is a stored
     job with a sensor's record, named by its key or the beginning of it; it is then left out of the
@@ -144,9 +144,9 @@ def identify(
         print_text(json.dumps(jsonable_record(record, fitted, answer), indent=1))
         return DONE
     pulses = found.tacho
-    rpm_told = 60.0 * (len(pulses) - 1) / (pulses[-1] - pulses[0])
+    mean_rpm = 60.0 * (len(pulses) - 1) / (pulses[-1] - pulses[0])
     rate = 1.0 / (found.times[1] - found.times[0])
-    print_text(f"{record}: {len(pulses) - 1} revolutions at {rpm_told:.4g} rpm, {rate:.6g} Hz")
+    print_text(f"{record}: {len(pulses) - 1} revolutions at {mean_rpm:.4g} rpm, {rate:.6g} Hz")
     for line in (*verdict(answer), *ranking(answer), *grounds(fitted, answer, folder)):
         print_text(line)
     return DONE
@@ -196,9 +196,9 @@ def grounds(fitted: "Identifier", answer: "Identification", folder: str) -> Iter
         joint for joint in ("none", "big_end", "small_end", "both") if joint not in fitted.joints
     ]
     if left:
-        yield f"not told, since the study has too few jobs of it: {', '.join(left)}"
+        yield f"not identified, since the study has too few jobs of it: {', '.join(left)}"
     if fitted.equal and "both" in fitted.joints:
-        yield "the study has equal clearances at both joints, so it tells of equal ones only"
+        yield "the study has equal clearances at both joints, so it covers equal ones only"
     yield "caution: beside the joints, the study varies these alone; all else, such as the laws of"
     yield "contact and friction, the foundation, the sensor and its noise, is as in its case file:"
     for key, values in library.swept.items():

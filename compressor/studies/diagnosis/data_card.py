@@ -23,7 +23,7 @@ LEFT_OUT = {  # reasons that are the data set's; others are those of `compsim st
 }
 SOUND = (
     "**Sound joints with a clearance.** A joint that `joint` does not name is ideal, while a sound "
-    "bearing has a working clearance: to tell faults from sound joints is easier here."
+    "bearing has a working clearance: to distinguish faults is easier here."
 )
 ABSENT = (
     "**Measured data.** Everything is simulated. Scores on this data say nothing of a real machine "
@@ -102,7 +102,7 @@ def describe_simulation(dataset: "xr.Dataset", fixed: dict[str, Any]) -> str:
         dict(zip(dataset["key"].values, dataset["regime"].values, strict=True)).values()
     )
     kinds = "; ".join(
-        f"{count:,} {regime_words(name) or 'not told'}" for name, count in regimes.most_common()
+        f"{count:,} {regime_words(name) or 'not known'}" for name, count in regimes.most_common()
     )
     left = json.loads(dataset.attrs["left_out"])
     failed = "failed (`compsim status`)"

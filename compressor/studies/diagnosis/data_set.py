@@ -3,7 +3,7 @@
 A window is a whole number of revolutions of one record. A machine is what is built: all of a case
 but its load, speed, sensor and numerics (`machine_of`). All windows of a machine are for training,
 or all are for testing: windows of one machine are much alike, and a score over windows that were
-split at random would tell how well a machine is known again.
+split at random would measure how well a machine is recognised.
 """
 
 import hashlib

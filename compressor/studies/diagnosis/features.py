@@ -1,4 +1,4 @@
-"""What is told of a record by numbers: the one table of features for data sets and diagnosis.
+"""What describes a record by numbers: the one table of features for data sets and diagnosis.
 
 A record is an accelerometer's samples with the times at which the crank passes top dead centre. The
 level is one feature; all others are shares and shapes, which say nothing of the machine's size.
@@ -89,7 +89,7 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
     first = max(int(np.searchsorted(turns, 0.0, side="right")) - 1, 0)
     inside = slice(first, int(np.searchsorted(turns, whole)) + 1)
     if not np.any(values[inside]):
-        raise RecordError("the record's values are all zero: nothing can be told by them")
+        raise RecordError("the record's values are all zero: they hold no signal")
     rate = 1.0 / (times[1] - times[0])
     speed = whole / (tacho[-1] - tacho[0])
     a_turn = SECTORS * math.ceil(rate / speed / SECTORS)

@@ -25,8 +25,8 @@ from compressor.studies.diagnosis.features import FEATURES
 from compressor.studies.diagnosis.library import SIDES, Library, open_library, vector
 from compressor.vibration import Record
 
-MIN_JOBS = 30  # of one joint, for it to be told
-MIN_IN_ALL = 200  # jobs: with fewer, no record can lie as far off as LIMIT asks
+MIN_JOBS = 30  # of one joint, for it to be identified
+MIN_IN_ALL = 200  # jobs: with fewer, no record can lie as far off as LIMIT requires
 LIMIT = 0.01  # share of the study's own jobs that lie as far off as what does not fit
 SHARES = {"none": (), "big_end": (0,), "small_end": (1,), "both": (0, 1)}  # columns of clearances
 ODD = 4  # features that are named where nothing fits
@@ -74,7 +74,7 @@ class Identification:
 class Identifier:
     """A study made ready to explain records.
 
-    joints: those that are told; right: the share of the study's own jobs, left out in turn, whose
+    joints: those that it knows; right: the share of the study's own jobs, left out in turn, whose
     joint is the most probable; covered: of whose clearances lie in their intervals, by joint and
     end; equal: whether clearances at both ends were always the same.
     """
@@ -152,7 +152,7 @@ class Identifier:
 
 
 def _ends(joint: str, equal: bool) -> list[int]:
-    """Return the columns of clearances that are told of a joint.
+    """Return the columns of clearances that are estimated at a joint.
 
     One where both are always equal.
     """
@@ -170,7 +170,7 @@ def explain_record(
 
     key: a job left out.
 
-    Raises RecordError, StoreError, and StudyError where the study cannot tell.
+    Raises RecordError, StoreError, and StudyError where the study has too little.
     """
     row = vector(record)
     fitted = Identifier.fit(open_library(folder, study, progress).without(key))

@@ -31,7 +31,7 @@ from compressor.vibration import Record, RecordError
 
 SIDES = ("big_end", "small_end")
 
-IDENTIFIED_KEYS = ("joint", "clearance_mm")  # keys of what is asked for; all others are cautions
+IDENTIFIED_KEYS = ("joint", "clearance_mm")  # keys of what is identified; all others are cautions
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def _read_features(path: Path, made_of: str) -> xr.Dataset | None:
 def _compute_features(stored: Stored, positions: dict[str, int], progress: Progress) -> xr.Dataset:
     """Return the features of all jobs with a record.
 
-    Those whose record tells nothing are left out.
+    Those whose record cannot be used are left out.
     """
     rows: list[tuple[str, str, list[float], np.ndarray]] = []
     unknown = 0  # jobs whose case this version cannot read

@@ -1,4 +1,4 @@
-"""A data set on disk: windows as netCDF-4, features as Parquet, and a card that tells what it is.
+"""A data set on disk: windows as netCDF-4, features as Parquet, and a card that describes it.
 
 Parquet needs pyarrow, which `pip install 'compsim[dataset]'` brings; without it the same features
 are in the netCDF file alone.
@@ -45,7 +45,7 @@ def build_data_set(
 ) -> tuple["xr.Dataset", Written]:
     """Make the data set of a stored study in a folder, that is made where it is missing.
 
-    Raises StoreError and DataSetError, what can be told beforehand before records are read.
+    Raises StoreError and DataSetError, before records are read where that can be known.
     """
     refuse_foreign(folder)
     writable_folder(folder, make=False)

@@ -2,7 +2,7 @@
 
     RESULTS/regimes/STUDY/CHAIN.nc    the values that are finished, in the order of their running
 
-CHAIN is a hash of all that decides the numbers. The file is written anew every few seconds and is
+CHAIN is a hash of all that decides the numbers. The file is rewritten every few seconds and is
 whole or absent; a chain that was interrupted goes on from the last value in it, and ends in the
 same numbers to the bit.
 """
@@ -31,7 +31,7 @@ from compressor.studies.regimes.values import COORDINATES, NUMBERS, TEXTS, Row, 
 FOLDER = "regimes"
 SECONDS_BETWEEN_WRITES = 2.0  # s between two writings of what is finished
 REMEDY = "delete it: the same command makes it again"
-SCHEMA = 2  # of a chain's numbers: a change of what they mean makes chains anew
+SCHEMA = 2  # of a chain's numbers: a change of what they mean makes chains again
 
 
 @dataclass(frozen=True)

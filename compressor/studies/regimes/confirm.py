@@ -55,7 +55,7 @@ VERDICTS = {
 
 
 class MotionSignature(NamedTuple):
-    """What tells motions apart: regime, period (rev, nan: none), Poincaré places, rms, its error.
+    """What distinguishes motions: regime, period (rev, nan: none), Poincaré places, rms, its error.
 
     places: (k, joint, 2), in clearances; rms of acceleration and its standard error, m/s2.
     """

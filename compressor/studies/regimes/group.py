@@ -30,10 +30,10 @@ from compressor.metrics import JOINTS
 
 GROUP = "regimes"
 DIRECTIONS = {"up": ("up",), "down": ("down",), "both": ("up", "down")}
-# groups of which no value is followed: of the run and its start, or of what the machine shakes
+# groups whose values are not followed: of the run and its start, or of what the machine shakes
 NOT_FOLLOWED = ("solve", "output", "body", "sensor", "initial_offset_mm")
 # keys that have no meaning where runs follow on each other, and why
-IN_VAIN = {
+WITHOUT_MEANING = {
     "solve.duration_rev": "settle_rev and measure_rev of regimes say how long a value runs",
     "solve.duration_s": "settle_rev and measure_rev of regimes say how long a value runs",
     "solve.settle_rev": "settle_rev of regimes says how much is dropped at each value",
@@ -130,14 +130,14 @@ class Regimes:
     def at_first(self, leaves: Leaves, problems: list[FileProblem]) -> Leaves:
         """Return a block's leaves with the key that is followed at its first value.
 
-        A key that is given in vain, or sets what is followed, is a problem.
+        A key that has no meaning here, or sets what is followed, is a problem.
         """
         for key, node in leaves.values.items():
             if covers(self.over, key) or covers(key, self.over):
                 start = f"{self.over} goes from {self.first:g} on"
                 message = f"is what regimes follows: leave it out, {start}"
                 problems.append(FileProblem(node.key_place, key, message))
-            for other, why in IN_VAIN.items():
+            for other, why in WITHOUT_MEANING.items():
                 if covers(other, key):
                     message = f"has no meaning beside regimes: leave it out; {why}"
                     problems.append(FileProblem(node.key_place, key, message))

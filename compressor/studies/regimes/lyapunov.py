@@ -32,7 +32,7 @@ from compressor.solve import (
     sure,
 )
 
-METHOD = "RODAS"  # of the twins, whatever the case asks for
+METHOD = "RODAS"  # of the twins, whatever the case has
 RTOLS = (1e-8, 1e-7, 1e-6)  # the next one where steps shrink to nothing, on a contact's edge
 TWIN_DISTANCE = 1e-7  # natural sizes: how far from the motion its twin starts
 LOST_DISTANCE = 1e-12  # natural sizes: a distance that rounding alone makes, and below

@@ -158,7 +158,7 @@ def done(chain: Chain, folder: Path) -> int:
 
 
 class ChainWatch:
-    """Tells how many values are stored, from the chains' files."""
+    """Reports how many values are stored, from the chains' files."""
 
     def __init__(self, chains: Sequence[Chain], folder: Path, total: int, progress: Progress):
         self.paths = {chain.path(folder): chain for chain in chains}

@@ -32,7 +32,7 @@ def exponent(
 ) -> tuple[float, float]:
     """Return the largest Lyapunov exponent and its error (1/rev) from a state on; nan: not known.
 
-    Over up to `most` revolutions, few of which tell where the motion repeats itself. The error is
+    Over up to `most` revolutions; a few suffice where the motion repeats itself. The error is
     nan where the motion contracts so fast that the exponent is at most this. timeout: wall time (s)
     that it may take.
     """
@@ -70,8 +70,8 @@ def places(points: np.ndarray, clearance: np.ndarray) -> np.ndarray:
 def period_of(found: np.ndarray, within: float) -> int | None:
     """Return the period (rev) of the last of some places, (k, joint, 2); None where there is none.
 
-    The shortest one, up to 16, of which the last two periods and four revolutions are the same,
-    each to the last place of its phase.
+    The shortest one, up to 16, whose last two periods and four revolutions are the same, each to
+    the last place of its phase.
     """
     end = len(found) - 1
 
@@ -96,7 +96,7 @@ def hausdorff_distance(one: np.ndarray, other: np.ndarray) -> float:
 
 
 COORDINATES = (*AXES, *(f"{axis}_rate" for axis in AXES))
-SAMPLED = 16  # rev, at most, of which contact modes and impacts are told
+SAMPLED = 16  # rev, at most, whose contact modes and impacts are stored
 
 Row = dict[str, Any]
 SECTION = ("revolution", "joint", "coordinate")
@@ -135,8 +135,8 @@ class SettledMotion:
     """What a motion settles to.
 
     `regime`: of `Regime`; `period` (rev): nan where it does not repeat itself; `points`: of the
-    section, (k, joint, 4), of one period or all; `run`: the revolutions that were measured, the
-    last `count` of which are meant; `exponent`: the largest Lyapunov exponent and its error, 1/rev.
+    section, (k, joint, 4), of one period or all; `run`: the revolutions that were measured;
+    the last `count` are meant; `exponent`: the largest Lyapunov exponent and its error, 1/rev.
     """
 
     regime: str
@@ -174,7 +174,7 @@ def sizes(request: Regimes, case: Case) -> dict[str, int]:
 
 
 def empty(request: Regimes, case: Case) -> Row:
-    """Return a row of which nothing is known."""
+    """Return a row without any known value."""
     lengths = sizes(request, case)
     row: Row = dict.fromkeys(TEXTS, "")
     for name, (dims, _, _) in NUMBERS.items():

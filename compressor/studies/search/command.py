@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from compressor.units import Units
 
 KINDS = ("first", "greatest", "least")
-MAX_TOLD = 5  # points that do not decide, one by one
+MAX_LISTED = 5  # points that do not decide, one by one
 Shown = tuple[str, float]  # a unit, and the factor to it from SI
 AVERAGED = " (mean over revolutions: chaotic)"
 UNBARRED = " (no error bar was made)"
@@ -130,15 +130,15 @@ def lines(
     shown = question.goal.unit_shown(units)
     kind_lines = comparison_lines if answer.best is None else extremum_lines
     yield from kind_lines(question, answer, shown)
-    for point in answer.blind[:MAX_TOLD]:
-        within = f"{format_reading(point.told, shown)}: within its error bar of the limit"
-        yield f"  {at(question, point)}: {point.told.reason or within}  job {point.key[:8]}"
-    if len(answer.blind) > MAX_TOLD:
-        yield f"  and {len(answer.blind) - MAX_TOLD} more"
+    for point in answer.blind[:MAX_LISTED]:
+        within = f"{format_reading(point.reading, shown)}: within its error bar of the limit"
+        yield f"  {at(question, point)}: {point.reading.reason or within}  job {point.key[:8]}"
+    if len(answer.blind) > MAX_LISTED:
+        yield f"  and {len(answer.blind) - MAX_LISTED} more"
     yield from crossing_lines(question, answer)
     outside = [point for point in answer.failed if point not in answer.blind]
-    for point in outside[:MAX_TOLD]:
-        yield f"  {at(question, point)}, outside: {point.told.reason}  job {point.key[:8]}"
+    for point in outside[:MAX_LISTED]:
+        yield f"  {at(question, point)}, outside: {point.reading.reason}  job {point.key[:8]}"
     yield f"what is finer than the scan, {spacing(question)}, may be missed"
     yield (f"{plural(len(answer.points))}, {answer.run_now} of them run now, in study "
            f"{answer.study} of {folder}")  # fmt: skip
@@ -153,19 +153,24 @@ def comparison_lines(question: "Question", answer: "SearchResult", shown: Shown)
         base = format_reading(answer.base, shown)
         yield f"base, at {question.key} = {question.low:g}: {base}; {goal.times:g} times it"
     low, high = answer.low, answer.high
+
+    def line(point: Any, verdict: str) -> str:
+        reading = format_reading(point.reading, shown)
+        return f"  {at(question, point)}: {verdict}, {reading}  job {point.key[:8]}"
+
     if high is None:
         many = f"at none of {len(answer.points)} points from {question.low:g} to {question.high:g}"
         unsure = f", and {len(answer.blind)} of them {doubt(answer)}:" if answer.blind else ""
         yield f"{text} surely holds {many}{unsure}" if unsure else f"{text} holds {many}"
     elif answer.kind == "at_low":
         yield f"{text} holds from the range's lower end on"
-        yield f"  {at(question, high)}: yes, {format_reading(high.told, shown)}  job {high.key[:8]}"
+        yield line(high, "yes")
     else:
         start = f"at most {question.low:g}" if low is None else f"{low.argument:.9g}"
         yield f"{text} first holds between {question.key} = {start} and {high.argument:.9g}"
         if low is not None:
-            yield f"  {at(question, low)}: no, {format_reading(low.told, shown)}  job {low.key[:8]}"
-        yield f"  {at(question, high)}: yes, {format_reading(high.told, shown)}  job {high.key[:8]}"
+            yield line(low, "no")
+        yield line(high, "yes")
         if answer.blind:
             yield f"  {plural(len(answer.blind), 'point')} between {doubt(answer)}:"
 
@@ -190,17 +195,16 @@ def extremum_lines(question: "Question", answer: "SearchResult", shown: Shown) -
     best = answer.best
     assert best is not None
     yield (f"{question.goal.name} is {question.goal.sign} at {at(question, best)}: "
-           f"{format_reading(best.told, shown)}  job {best.key[:8]}")  # fmt: skip
+           f"{format_reading(best.reading, shown)}  job {best.key[:8]}")  # fmt: skip
     first, last = answer.within[0].argument, answer.within[-1].argument
     if len(answer.within) > 1:
-        yield (f"  as far as error bars tell, {len(answer.within)} points from {first:.9g} to "
+        yield (f"  as far as error bars show, {len(answer.within)} points from {first:.9g} to "
                f"{last:.9g} may be as good")  # fmt: skip
     low = "none" if answer.low is None else f"{answer.low.argument:.9g}"
     high = "none" if answer.high is None else f"{answer.high.argument:.9g}"
     yield f"  nearest points that are surely worse: below {low}, above {high}"
     if answer.blind:
-        verb = "tells" if len(answer.blind) == 1 else "tell"
-        yield f"  {plural(len(answer.blind), 'point')} between {verb} nothing:"
+        yield f"  {plural(len(answer.blind), 'point')} between without a value:"
 
 
 def at(question: "Question", point: Any) -> str:
@@ -228,5 +232,10 @@ def spacing(question: "Question") -> str:
 
 def jsonable_answer(question: "Question", answer: "SearchResult") -> dict[str, Any]:
     """Return a question and its answer as JSON says them."""
-    fields = dataclasses.asdict(question)
-    return jsonable(fields | {"unit": question.goal.unit} | dataclasses.asdict(answer))
+    fields = dataclasses.asdict(question) | {"unit": question.goal.unit}
+    return jsonable(fields | dataclasses.asdict(answer, dict_factory=by_json_key))
+
+
+def by_json_key(fields: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return fields by their JSON keys, which stay: that of a point's reading is `told`."""
+    return {"told" if name == "reading" else name: value for name, value in fields}

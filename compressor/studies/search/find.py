@@ -27,11 +27,11 @@ place = operator.attrgetter("share")  # of a point
 
 @dataclass(frozen=True)
 class Point:
-    """A share of the range from 0 to 1, the key's value there, and what its job says."""
+    """A share of the range from 0 to 1, the key's value there, and the reading of its job."""
 
     share: float
     argument: float
-    told: JobReading
+    reading: JobReading
     key: str = ""  # of the job
     failed: bool = False
 
@@ -106,7 +106,7 @@ def find_first(
 
 def interval(points: Sequence[Point], holds: Holds) -> SearchResult:
     """Return the interval in which a comparison first becomes true, by points in their order."""
-    verdicts = [(point, holds(point.told)) for point in points]
+    verdicts = [(point, holds(point.reading)) for point in points]
     decided = [(point, verdict) for point, verdict in verdicts if verdict is not None]
     crossings = tuple(
         Crossing(low, high, after)
@@ -156,21 +156,21 @@ def find_extremum(
     Points that say nothing count as the worst one that is known.
     """
     points = sorted(evaluate(shares), key=place)
-    usable = [point for point in points if not point.told.reason]
+    usable = [point for point in points if not point.reading.reason]
     if not usable:
         return SearchResult("unclear", None, None, blind=tuple(points), points=tuple(points))
     factor = -1.0 if greatest else 1.0
     known = {point.share: point for point in points}
-    worst = max(factor * point.told.value for point in usable)
+    worst = max(factor * point.reading.value for point in usable)
 
     def cost(share: float) -> float:
         share = float(share)
         if share not in known:
             (known[share],) = evaluate([share])
-        reading = known[share].told
+        reading = known[share].reading
         return worst if reading.reason else factor * reading.value
 
-    at = points.index(min(usable, key=lambda point: factor * point.told.value))
+    at = points.index(min(usable, key=lambda point: factor * point.reading.value))
     bounds = (points[max(at - 1, 0)].share, points[min(at + 1, len(points) - 1)].share)
     minimize_scalar(cost, bounds=bounds, method="bounded",
                     options={"xatol": tolerance, "maxiter": MAX_POINTS})  # fmt: skip
@@ -183,18 +183,18 @@ def bracket_best(known: Iterable[Point], factor: float) -> SearchResult:
     factor: 1 where the least is best, -1 where the greatest is.
     """
     points = sorted(known, key=place)
-    usable = [point for point in points if not point.told.reason]
-    best = min(usable, key=lambda point: factor * point.told.value)
+    usable = [point for point in points if not point.reading.reason]
+    best = min(usable, key=lambda point: factor * point.reading.value)
     within: list[Point] = []
     worse: list[Point] = []
     for point in usable:
-        behind = factor * (point.told.value - best.told.value)
-        (within if behind <= point.told.bar + best.told.bar else worse).append(point)
+        behind = factor * (point.reading.value - best.reading.value)
+        (within if behind <= point.reading.bar + best.reading.bar else worse).append(point)
     low = max((p for p in worse if p.share < within[0].share), key=place, default=None)
     high = min((p for p in worse if p.share > within[-1].share), key=place, default=None)
     left = -math.inf if low is None else low.share
     right = math.inf if high is None else high.share
-    blind = tuple(p for p in points if p.told.reason and left < p.share < right)
+    blind = tuple(p for p in points if p.reading.reason and left < p.share < right)
     return SearchResult("undecided" if blind else "found", low, high, best, tuple(within), blind,
                         points=tuple(points))  # fmt: skip
 
@@ -213,7 +213,7 @@ def find(
     goal, shares, tolerance = question.goal, question.shares, question.tolerance
     base = None
     if not math.isnan(goal.times):
-        base = jobs(shares)[0].told
+        base = jobs(shares)[0].reading
         goal = goal.beside(base)
     if goal.sign in ("greatest", "least"):
         answer = find_extremum(jobs, goal.sign == "greatest", shares, tolerance)
@@ -254,7 +254,7 @@ class SearchJobs:
         words = ["compsim", "run", question.path, "-o", str(self.folder)]
         for text in question.settings(values):
             words += ["--set", text]
-        options = Options(shlex.join(words))  # so that `status` tells how to go on
+        options = Options(shlex.join(words))  # so that `status` shows how to go on
         self.run_now += sweep([study], self.folder, self.workers, self.progress, options).run_now
         keys = dict(zip(values, study.keys, strict=True))
         store = read_store(self.folder)

@@ -32,7 +32,7 @@ NAME = 64  # characters that a study's name may have
 
 
 class QuestionError(CompsimError, ValueError):
-    """A question that cannot be asked."""
+    """A question that cannot be answered."""
 
     exit_code = 2
 
@@ -57,7 +57,7 @@ class Goal:
     """A metric's number, by its name and its place, such as peak_contact_force.small_end.
 
     sign, limit: of a comparison, limit in the metric's SI unit; sign is "greatest" or "least" where
-    an extremum is asked for. times: the limit is so many times the metric at the range's lower end,
+    an extremum is sought. times: the limit is so many times the metric at the range's lower end,
     nan where it is a number; slack: how far that limit may be off, by that point's error bar.
     limit_unit: in which the limit was written, "" where it was without a unit.
     """
@@ -101,7 +101,7 @@ class Goal:
     def holds(self, reading: JobReading) -> bool | None:
         """Return whether the comparison holds.
 
-        None where the error bar does not let that be told.
+        None where the error bar does not decide.
         """
         compare = SIGNS[self.sign]
         ends = {

@@ -4,7 +4,7 @@ A run states its error by its error bars; it has passed its energy audit, or it 
 say ok (`compressor.solve.error_bars`). A number is wrong in silence where it lies farther from a
 judge's than ten times its bar and than what the tolerance lets one expect: a thousand times rtol,
 but 5 % at most, and of the time without contact 1e-4 of the span at least. The judge is another
-integrator at a hundredth of the tolerance, not below 1e-12. Judges are asked until two say the
+integrator at a hundredth of the tolerance, not below 1e-12. Judges are run until two give the
 same: one that agrees settles a scene, two that do not make it wrong, and so does one alone where no
 other reaches the end; two that contradict each other leave it unjudged.
 
@@ -44,7 +44,7 @@ PARTS = 16  # of a span, in which horizons are counted
 LENGTHS = (PARTS, PARTS // 4, 1)  # parts that are judged where the whole is too much
 JUDGED = tuple(name for name, row in METRICS.items() if not row.counted)
 ABSOLUTE = ("contact_loss_fraction",)  # is a share: errors are not relative
-RESOLVED = 1e-4  # of the span: steps tell the time without contact no better
+RESOLVED = 1e-4  # of the span: steps resolve the time without contact no better
 STATISTICS = {
     "rms_acceleration": 0.5,
     "rms_acceleration_deviation": 0.5,
@@ -78,7 +78,7 @@ class StressFinding:
     """What is found of one scene.
 
     `verdict`: ok, failed, silent_wrong or unjudged; `reason`: why a run failed, or no judge could
-    tell; `by`: the judges asked, those that did not reach the end in parentheses; `horizon`: parts
+    decide; `by`: the judges run, those that did not reach the end in parentheses; `horizon`: parts
     of the span that can be foretold, and `judged` those that were judged by number, of PARTS;
     `apart`: how far the journals came apart from the judge's (`compressor.solve.error_bars`).
     """

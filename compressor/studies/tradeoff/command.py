@@ -443,12 +443,12 @@ def describe_advice(facts: "Explanation", number: int) -> str:
     if effect.reason:
         return f"{advice.name}: the run failed, {effect.reason}"
     saved = 1 - effect.time_ratio
-    told_time = (
+    time_text = (
         f"{'saves' if saved >= 0 else 'costs'} {100 * abs(saved):.0f} % of the solution's time"
     )
     text = (
         f"{advice.name}: peak acceleration {percent(effect.change_peak_acceleration, '+')}, "
-        f"contact force {percent(effect.change_peak_contact_force, '+')}, {told_time}"
+        f"contact force {percent(effect.change_peak_contact_force, '+')}, {time_text}"
     )
     if advice.removable:
         return f"{text}; less than {percent(facts.promise)}: leave it out ({advice.neutral})"

@@ -1,6 +1,6 @@
-"""What a case asks for: its terms, its natural scales, its cost, and what it pays for in vain.
+"""What a case models: its terms, its natural scales, its cost, and features without effect.
 
-A feature is paid for in vain where leaving it out changes peaks by less than the accuracy that the
+A feature has no effect where leaving it out changes peaks by less than the accuracy that the
 case promises: model only what a scene requires.
 """
 
@@ -79,7 +79,7 @@ class Explanation:
     active: dict[str, str]  # term -> in words
     absent: tuple[str, ...]  # terms left out, at no cost
     scales: tuple[JointScales, ...]
-    expected_steps: float  # by the scales alone, before the run; 0 where they tell too little
+    expected_steps: float  # by the scales alone, before the run; 0 where these do not suffice
     expected_seconds: float
     accuracy: str  # the word, or "" where rtol is given
     rtol: float
@@ -105,8 +105,8 @@ def explain(
 ) -> Explanation:
     """Return the explanation of a study's first job, by running it without each feature.
 
-    Times are medians of `repeats`; a job above `bench.SLOW_SECONDS` is timed once. progress: is
-    told how many features have been tried, of how many.
+    Times are medians of `repeats`; a job above `bench.SLOW_SECONDS` is timed once. progress:
+    called with how many features have been tried, of how many.
     """
     case = study.cases[0]
     run, seconds, solution_seconds = time_case(case, repeats)
@@ -129,7 +129,7 @@ def explain(
         scales=joints,
         expected_steps=steps,
         expected_seconds=expected,
-        accuracy=asked_accuracy(case),
+        accuracy=requested_accuracy(case),
         rtol=case.rtol,
         promise=promise(case),
         method=case.solve.method,
@@ -183,15 +183,15 @@ def other_work(case: Case) -> tuple[str, ...]:
     return (*found, "the record of its sensor") if case.sensor else (*found,)
 
 
-def asked_accuracy(case: Case) -> str:
-    """Return the accuracy as the case file asks for it; "" where it gives a tolerance."""
+def requested_accuracy(case: Case) -> str:
+    """Return the accuracy as the case file gives it; "" where it gives a tolerance."""
     if case.targets:
         return ", ".join(f"{name} to {target:g}" for name, target in case.targets)
     return "" if case.solve.rtol is not None else str(case.solve.accuracy)
 
 
 def promise(case: Case) -> float:
-    """Return the relative error that a case may have: asked for by number, or of its word.
+    """Return the relative error that a case may have: given by number, or of its word.
 
     With an rtol in place of a word it is that of the word it is as tight as, and no less than
     draft's.

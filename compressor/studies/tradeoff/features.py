@@ -346,7 +346,7 @@ class Effect:
 
 
 def comparable(case: Case) -> Case:
-    """Return a case solved so exactly that only its model tells in its answer."""
+    """Return a case solved so exactly that only its model decides its answer."""
     return solve_by_method(case, "auto", min(case.rtol, ACCURACY[EXACT].rtol))
 
 

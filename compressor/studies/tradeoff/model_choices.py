@@ -2,8 +2,8 @@
 
 A choice is a case: another law of contact or friction, twice and half the stiffness, the damping
 or the last share of an oil film, oil, an elastic rod, play in the guide. `explain_models` runs
-those of one case, `trade` all features of several; `compressor.studies.tradeoff.page` tells changes
-from error bars.
+those of one case, `trade` all features of several; `compressor.studies.tradeoff.page` compares
+changes with error bars.
 """
 
 import math
@@ -256,7 +256,7 @@ def tabulate(every: Sequence[Choice], runs: Sequence[xr.Dataset]) -> xr.Dataset:
     """Return the metrics of runs of choices with their error bars, dim `choice`, all in SI.
 
     The first is the case itself. Metrics and bars are nan where a run failed, which `status` and
-    `reason` tell; `status` is missing where there is no such case, and `note` says why. `regime` is
+    `reason` show; `status` is missing where there is no such case, and `note` says why. `regime` is
     as in a run, `seconds` is the wall time.
     """
     every = every[: len(runs)]

@@ -215,7 +215,7 @@ def place_text(study: Study | StoredStudy, key: str) -> str:
 
 @dataclass(frozen=True)
 class ModelsContent:
-    """What a page says of choices of the model: of which job, a line, and a table."""
+    """What a page says of choices of the model: the job, a line, and a table."""
 
     place: str
     headline: str
@@ -234,7 +234,7 @@ def read_models(folder: Folder, study: StoredStudy) -> list[xr.Dataset]:
     Numbers of a job that the study has not, or that are damaged, are left out with a warning. Older
     files have no key in their names.
     """
-    again = f"compsim explain --models {study.case_file} -o {folder} makes it anew"
+    again = f"compsim explain --models {study.case_file} -o {folder} makes it again"
     found: dict[str, xr.Dataset] = {}  # by key: files with it in their names come first
     for path in sorted(Path(folder, "models").glob(f"{study.name}*.nc")):
         if not KEY_IN_NAME.fullmatch(path.stem.removeprefix(study.name)):

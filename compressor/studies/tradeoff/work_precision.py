@@ -100,7 +100,7 @@ def faulty(case: Case) -> list[str]:
 
 
 def stored_values(run: xr.Dataset, joints: Sequence[str]) -> dict[str, np.ndarray]:
-    """Return the values of which errors are taken, as the run has stored them.
+    """Return the values whose errors are taken, as the run has stored them.
 
     The acceleration, (m,), and metrics of the dense solution.
     """

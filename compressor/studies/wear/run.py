@@ -22,7 +22,7 @@ from compressor.studies.wear.stages import (
 )
 from compressor.sweep import JobLost, JobResult, Needs, run_here
 
-AT_MOST = 100_000  # motions, the wall time of which a machine may take
+AT_MOST = 100_000  # motions, whose wall time a machine may take
 
 
 @dataclass(frozen=True)

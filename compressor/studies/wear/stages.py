@@ -32,7 +32,7 @@ from compressor.store import Folder, StoreError, read_dataset, write_dataset
 
 FOLDER = "wear"
 REMEDY = "delete it: the same command makes it again"
-SCHEMA = 1  # of a stage's numbers: a change of what they mean makes them anew
+SCHEMA = 1  # of a stage's numbers: a change of what they mean makes them again
 SHOWN = (
     "rms_acceleration", "peak_acceleration", "peak_contact_force", "max_penetration",
     "contact_loss_fraction", "impact_count",

@@ -110,6 +110,6 @@ def test_who_decides_is_said_with_rivals():
         {"claim": [4, 1], "assumption": names},
     )
     assert [*rank_assumptions(table)] == [
-        "Claim 4: most by rod mass, 0.60 [0.45, 0.75]; not told from static friction.",
+        "Claim 4: most by rod mass, 0.60 [0.45, 0.75]; not distinguishable from static friction.",
         "Claim 1: its margin is the same at all machines.",
     ]

@@ -1,4 +1,4 @@
-"""What a case asks for, and what it pays for in vain."""
+"""What a case models, and which of its features have no effect."""
 
 import json
 from pathlib import Path
