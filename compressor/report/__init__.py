@@ -52,6 +52,7 @@ from compressor.report.page import (
     Section,
     StudyNote,
     TableRow,
+    format_measure,
 )
 from compressor.report.plots import (
     PlotChoice,

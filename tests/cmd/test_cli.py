@@ -469,7 +469,7 @@ def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch
     capsys.readouterr()
     assert cli.main(["report", "kept", "-o", "page"]) == 0
     err = " ".join(capsys.readouterr().err.split())
-    assert "nc: is not shown, as worn has no such job: delete it" in err
+    assert "nc: is not shown, as worn has no such job: run the case file with the same" in err
     assert "models-worn" not in Path("page/index.html").read_text(encoding="utf-8")
 
 

@@ -76,7 +76,11 @@ def model_lines(place: str, table: "ModelTable", times: bool = False) -> Iterato
     if still:
         yield from wrap_line(f"no choice is seen to move: {'; '.join(still)}", 2)
     if table.unknown:
-        yield from wrap_line(f"not known of the case itself: {'; '.join(table.unknown)}", 2)
+        yield from wrap_line(
+            "no change is given of what is not known, or not above 0, of the case itself: "
+            + "; ".join(table.unknown),
+            2,
+        )
     notes = [f"{row.name}: {row.note}" for row in table.rows if row.note]
     if notes:
         yield "  assumed, or why there is no number:"

@@ -196,7 +196,8 @@ def with_play(case: Case) -> Case:
     """Return a case with play of the crosshead in its guide."""
     if case.guide:
         return with_values(case, "guide", clearance_mm=PLAY)
-    return with_group(case, "guide", group_of_value("guide", {"clearance_mm": PLAY}))
+    guide = group_of_value("guide", {"clearance_mm": PLAY})  # filled in for the default machine
+    return with_group(case, "guide", replace(guide, crosshead_inertia_kg_m2=None))
 
 
 def group_of_value(key: str, value: Any) -> Any:

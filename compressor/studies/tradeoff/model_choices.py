@@ -9,6 +9,7 @@ changes with error bars.
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,13 +118,13 @@ def scale_contact(case: Case) -> Iterator[Choice]:
 
 
 def scale_film(case: Case) -> Iterator[Choice]:
-    """Yield a case with oil whose film gets no thinner than twice and half its last share."""
+    """Yield a case with oil of twice and half its viscosity, and with such last shares."""
     if not case.lubricant or not faulty(case):
         return
-    for words, factor in SCALES.items():
-        share = factor * case.lubricant.last_share
-        other = with_values(case, "lubricant", last_share=share)
-        yield Choice(f"last share of the oil film {words}", other)
+    names = {"viscosity_mPa_s": "viscosity", "last_share": "last share of the oil film"}
+    for (key, name), (words, factor) in product(names.items(), SCALES.items()):
+        value = factor * getattr(case.lubricant, key)
+        yield Choice(f"{name} {words}", with_values(case, "lubricant", **{key: value}))
 
 
 def with_stiffness(case: Case, name: str, factor: float) -> Choice:

@@ -29,6 +29,7 @@ from compressor.report import (
     StudyNote,
     TableRow,
     file_name,
+    format_measure,
     measures,
 )
 from compressor.store import Folder, StoredStudy, StoreError, StoreWarning, read_dataset
@@ -246,7 +247,8 @@ def read_models(folder: Folder, study: StoredStudy) -> list[xr.Dataset]:
             if data.attrs["key"] in study.keys:
                 found.setdefault(data.attrs["key"], data)
                 continue
-            problem = f"{path}: is not shown, as {study.name} has no such job: delete it"
+            problem = f"{path}: is not shown, as {study.name} has no such job: run the case file "
+            problem += "with the same --set, or delete it"
         except StoreError as error:
             problem = str(error)
         except KeyError:
@@ -281,7 +283,7 @@ def page_table(table: ModelTable) -> PageTable:
     """Return the cells of a table: the case itself, each choice, and the span."""
     numbers = zip(table.measures, table.values, table.bars, strict=True)
     values = [
-        number_cell(f"{by_bar(value, bar, m.is_relative, digits=PAGE_DIGITS)} {m.unit}".rstrip())
+        number_cell(f"{format_measure(m, value, bar)} {m.unit}".rstrip())
         for m, value, bar in numbers
     ]
     itself = [Cell("the case itself"), *values, Cell("")]

@@ -145,15 +145,25 @@ def test_a_choice_that_cannot_be_says_why():
     assert rod.note.startswith("cannot be: machine.rod_centre_mm: an elastic rod is a uniform bar")
 
 
-def test_an_oiled_joint_is_tried_with_other_last_shares_of_its_film():
+def test_an_oiled_joint_is_tried_with_other_films():
     case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "lubricant": True})
     found = {choice.name: choice.case.lubricant for choice in model_choices(case) if choice.case}
     share = case.lubricant.last_share
     assert found["last share of the oil film × 2"].last_share == 2 * share
     assert found["last share of the oil film ÷ 2"].last_share == share / 2
+    assert found["viscosity ÷ 2"].viscosity_mPa_s == case.lubricant.viscosity_mPa_s / 2
     assert found["dry joints"] is None
     dry = model_choices(replace(case, lubricant=None))
-    assert not [choice.name for choice in dry if "last share" in choice.name]
+    assert not [choice.name for choice in dry if "share" in choice.name or "visc" in choice.name]
+
+
+def test_play_in_the_guide_is_that_of_the_machine_s_own_crosshead():
+    """Its inertia was that of the default machine's 14 kg."""
+    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2,
+                             "machine": {"reciprocating_mass_kg": 150}})  # fmt: skip
+    (own,) = (one.case for one in model_choices(case) if "play" in one.name and one.case)
+    given = Case.from_values(case.values() | {"guide": {"clearance_mm": own.guide.clearance_mm}})
+    assert own.guide.crosshead_inertia_kg_m2 == given.guide.crosshead_inertia_kg_m2 > 0.2
 
 
 def test_the_ideal_machine_has_choices_beyond_its_contacts():
