@@ -231,6 +231,7 @@ class StudyLine:
     anchor: str
     counts: str
     problem: bool
+    has_result: bool = True
 
 
 @dataclass(frozen=True)
@@ -245,6 +246,19 @@ class FirstScreen:
     claims: Sequence[Claim]
     pictures: Sequence[tuple[str, str]]
     cautions: Sequence[str] = ()
+
+    @property
+    def heading(self) -> str:
+        """Return what the findings are called: of single jobs nothing changes."""
+        changes = any(one.low for _, found in self.findings for one in found)
+        return "What changes most" if changes or not self.findings else "What was found"
+
+    @property
+    def no_finding(self) -> str:
+        """Return the sentence that stands in place of findings."""
+        if not any(line.has_result for line in self.lines):
+            return "No job has a result."
+        return "No metric changes by more than its error bars."
 
 
 def answer_section(answer: FirstScreen) -> Section:

@@ -278,7 +278,10 @@ def drawn_study(
         counts = job_counts(data)
         return DrawnStudy(
             figures, table, plates, study_findings(data, units),
-            StudyLine(f"Study {study.name}", figures.anchor, counts.text, bool(counts.failed)),
+            StudyLine(
+                f"Study {study.name}", figures.anchor, counts.text, bool(counts.failed),
+                bool(counts.ok),
+            ),
             job_facts(data, keys), motion_cautions(stored, study, data),
         )  # fmt: skip
 
@@ -307,7 +310,8 @@ def summarise(
     if paper.stored:
         failed = [n for n, run in paper.stored.items() if str(run["status"].item()) != "ok"]
         counts = f"{len(paper.stored)} of 11 stored" + (f", {len(failed)} failed" if failed else "")
-        lines.append(StudyLine("The paper's cases", "cases", counts, bool(failed)))
+        has_result = len(failed) < len(paper.stored)
+        lines.append(StudyLine("The paper's cases", "cases", counts, bool(failed), has_result))
         worn = (
             (label_in_words(name), run) for name, run in paper.stored.items() if name != "typical"
         )

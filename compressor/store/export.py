@@ -103,6 +103,8 @@ def export(
     target = Path(output)
     options = options or ExportOptions()
     form, is_file = _form(output, options.form)
+    if options.units == "plant" and form != "csv":
+        raise ExportError(f"{target}: plant units are of CSV alone: leave out --units")
     if studies and form in RECORD_SUFFIXES:
         problem = f"a file of the type {SUFFIXES[form]} is the sensor's record of one job"
         raise ExportError(f"{target}: {problem}: name jobs by their keys, not studies")

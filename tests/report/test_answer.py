@@ -5,8 +5,10 @@ import pytest
 import xarray as xr
 
 from compressor.report.answer import (
+    FirstScreen,
     MetricChange,
     Points,
+    StudyLine,
     finding,
     rank_findings,
     round_robin,
@@ -183,3 +185,17 @@ def test_no_ratio_is_formed_across_zero():
 )  # fmt: skip
 def test_a_page_has_four_digits(value, bar, text):
     assert format_measure(PEAK, value, bar) == text
+
+
+def test_the_first_screen_speaks_of_changes_where_something_can_change():
+    """Two failed jobs had no metric that "changes by more than its error bars"."""
+
+    def screen(has_result, *low):
+        found = [MetricChange("Peak", one, "", "5 kN", "", "", 0.0) for one in low]
+        line = StudyLine("Study wear", "wear", "", False, has_result)
+        return FirstScreen([line], [("wear", found)] * bool(found), [], [])
+
+    assert screen(False).no_finding == "No job has a result."
+    assert screen(True).no_finding == "No metric changes by more than its error bars."
+    assert screen(True, "").heading == "What was found"
+    assert screen(True, "", "4 kN").heading == "What changes most"

@@ -19,7 +19,7 @@ from compressor.report import (
     palette,
 )
 from compressor.studies.alarms.alarms import best_of_each, rank_alarms
-from compressor.studies.alarms.words import first_words, limit_words, rate_words
+from compressor.studies.alarms.words import detects_words, limit_words, rate_words
 
 SHOWN = 0.3  # rate of false alarms up to which a curve is drawn
 ASIDE = 0.008  # of the clearances' range: between two alarms' points
@@ -99,19 +99,20 @@ def caption(found: xr.Dataset, noise: int = 0) -> str:
     texts = []
     for joint in found["joint"].values.tolist():
         one = found.isel(alarm=rank_alarms(found, joint, noise)[0], noise=noise)
-        first = first_words(one, joint)
-        detects = "never detects" if first == "never" else f"detects from {first} on"
         texts.append(
-            f"{joint.replace('_', ' ')}: {one['alarm'].item()}, which {detects}, with "
-            f"{rate_words(one)} of false alarms"
+            f"{joint.replace('_', ' ')}: {one['alarm'].item()}, which {detects_words(one, joint)}, "
+            f"with {rate_words(one)} of false alarms"
         )
+    has_aim = math.isnan(float(attrs["factor"]))
+    aim = ", and below the rate of false alarms that limits aim at" if has_aim else ""
     level = float(found["noise"].values[noise])
     disturbed = f", {level:g} m/s² of noise added" if level else ""
     return (
         f"Above: share of windows in which an alarm trips, by clearance, each with its best filter "
         f"and 95 % intervals by draws, moved aside a little; limits by sound windows of other "
-        f"draws, {limit_words(found)}{disturbed}. Dashed: {attrs['detected']:.0%}. The first to "
-        f"see wear, of {found.sizes['alarm']} alarms: {'; '.join(texts)}. Below: of these, "
+        f"draws, {limit_words(found)}{disturbed}. Dashed: {attrs['detected']:.0%}{aim}. "
+        f"Best of {found.sizes['alarm']} alarms: "
+        f"{'; '.join(texts)}. Below: of these, "
         f"detection against false alarms as the limit rises, a line a clearance; the mark is what "
         f"was counted at the limit above, of {attrs['sound_draws']} sound draws."
     )

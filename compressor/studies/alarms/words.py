@@ -57,6 +57,14 @@ def first_words(one: xr.Dataset, joint: str) -> str:
     return f"{'never' if math.isinf(value) else f'{value:.3g} mm'} [{low:.3g} mm, {last}]"
 
 
+def detects_words(one: xr.Dataset, joint: str) -> str:
+    """Return whether, and from which clearance on, an alarm detects, in a sentence's words."""
+    first = first_words(one, joint)
+    if first.startswith("never"):
+        return f"never detects{first.removeprefix('never')}"
+    return f"detects from {first} on"
+
+
 def rate_words(one: xr.Dataset) -> str:
     """Return the rate of false alarms with its interval."""
     value, low, high = (100 * one[f"false_alarms{end}"].item() for end in ("", "_low", "_high"))

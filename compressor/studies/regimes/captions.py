@@ -65,7 +65,7 @@ def bifurcation(pair: xr.Dataset) -> str:
     values, unit = pair[over].values, unit_of(pair)
     sentences = [
         f"Poincaré points at {pair.attrs['section_deg']:g}° of the crank over "
-        f"{phrase_of(pair, over)}, {values.size} values from {number(values.min())} to "
+        f"{phrase_of(pair, over)}, {plural(values.size, 'value')} from {number(values.min())} to "
         f"{number(values.max())}{unit}."
     ]
     for direction in pair["direction"].values:
@@ -123,6 +123,8 @@ def directions(pair: xr.Dataset) -> list[str]:
     over, unit = pair.attrs["over"], unit_of(pair)
     both = (pair["status"] == "ok").all("direction").values
     differs, confirmed = ((pair[name].values == 1) & both for name in ("differs", "confirmed"))
+    if not both.any():
+        return ["No value was reached by both."]
     if not differs.any():
         return [f"Up and down agree at all {plural(int(both.sum()), 'value')} that both reached."]
     sure, unsure = differs & confirmed, differs & ~confirmed

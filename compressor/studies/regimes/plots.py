@@ -138,9 +138,10 @@ def check_any(part: xr.Dataset, study: str) -> None:
 def chosen_values(pair: xr.Dataset) -> list[int]:
     """Return up to `MAX_SECTIONS` values with Poincaré points, evenly among the regimes."""
     over = pair.attrs["over"]
-    chain = pair.isel(direction=0)
-    others = [dim for dim in chain["section"].dims if dim != over]
-    has_points = chain["section"].notnull().any(others).values & (chain["status"].values == "ok")
+    others = [dim for dim in pair["section"].dims if dim not in (over, "direction")]
+    known = pair["section"].notnull().any(others) & (pair["status"] == "ok")
+    way = int(known.any(over).values.argmax())  # the first that has points
+    chain, has_points = pair.isel(direction=way), known.isel(direction=way).values
     by_regime: dict[tuple[str, float], list[int]] = {}
     for i in np.flatnonzero(has_points):
         word, period = str(chain["regime"].values[i]), float(chain["period"].values[i])

@@ -103,7 +103,7 @@ def check(studies: "list[Study]") -> None:
             if isinstance(case.solve.settle_rev, str) or isinstance(case.solve.duration_rev, str):
                 raise click.UsageError(
                     f"{study.path}: solve.settle_rev and solve.duration_rev: give numbers in place "
-                    "of auto: each profile has a motion of that length"
+                    "of auto, such as 2 and 4: each profile has a motion of that length"
                 )
             if abs(turns - round(turns)) > 1e-9 or turns - case.settle / case.turn < 1.0 - 1e-9:
                 raise click.UsageError(

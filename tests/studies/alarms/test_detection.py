@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from compressor.studies.alarms.detection import (
     Rate,
@@ -14,6 +15,7 @@ from compressor.studies.alarms.detection import (
     first_clearance,
     share_out,
 )
+from compressor.studies.alarms.words import detects_words
 
 
 def names(count, windows=1):
@@ -105,6 +107,22 @@ def test_a_clearance_counts_from_which_on_it_holds():
     assert first_clearance([1, 2, 3, 4], rates(0.95, 0.7, 0.92, 1.0), 0.9) == (3, 3, 4)
     assert first_clearance([1, 2, 3], rates(0.1, 0.2, 0.85), 0.9) == (math.inf, 3, math.inf)
     assert first_clearance([1, 2], rates(0.1, 0.2), 0.9) == (math.inf,) * 3
+
+
+@pytest.mark.parametrize(
+    ("ends", "words"),
+    [
+        ((3.0, 2.0, 4.0), "detects from 3 mm [2 mm, 4 mm] on"),
+        ((math.inf, 3.0, math.inf), "never detects [3 mm, > 5 mm]"),
+        ((math.inf,) * 3, "never detects"),
+    ],
+)
+def test_a_sentence_says_from_where_an_alarm_detects(ends, words):
+    names = ("first_clearance", "first_clearance_low", "first_clearance_high")
+    found = {name: ("joint", [end]) for name, end in zip(names, ends, strict=True)}
+    found |= {"clearance": ("state", [1.0, 5.0]), "worn_joint": ("state", ["small_end"] * 2)}
+    one = xr.Dataset(found, {"joint": ["small_end"]})
+    assert detects_words(one, "small_end") == words
 
 
 def test_a_draw_is_in_one_fold():

@@ -88,6 +88,12 @@ def test_where_up_and_down_differ_and_what_was_confirmed():
     assert "Up and down" not in bifurcation(data.isel(direction=[0]))
 
 
+def test_directions_that_share_no_value_are_not_compared():
+    data = failed(study([1] * 6, [1] * 6), "down", [*range(6)])
+    assert "No value was reached by both." in bifurcation(data)
+    assert "agree" not in bifurcation(data)
+
+
 def test_failures_are_counted_by_their_reason():
     data = failed(failed(study([1] * 6), "up", [0, 5]), "up", [2], "non_finite")
     said = bifurcation(data)

@@ -147,6 +147,8 @@ def test_sections_are_chosen_evenly_among_the_regimes(data):
     assert len(chosen) == MAX_SECTIONS
     assert sum(place >= 37 for place in chosen) == 3
     assert chosen_values(failed(one, "up", [*range(1, 40)])) == [0]
+    gone = failed(data, "up", [*range(40)])  # then the other direction is looked at
+    assert chosen_values(gone) == chosen_values(gone.isel(direction=[1])) != []
     many = one.copy(deep=True)
     many["regime"][0], many["period"][0] = "periodic", 1.0 + np.arange(40) // 4
     periods = many["period"].values[0, chosen_values(many)]
