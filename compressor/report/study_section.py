@@ -58,7 +58,8 @@ class StudyContent:
 
     `second_set`: the id of the section with its own Figures 8 to 16, empty where it has none;
     `notes`: lines that others add; `caveats`: what to know beside the numbers, a sentence each;
-    `title`, `about`: what its case file says of the machine; `beside`: it without clearance.
+    `title`, `about`: what its case file says of the machine; `settings`: what `--set` changed;
+    `beside`: the machine without clearance.
     """
 
     case_file: str
@@ -73,6 +74,7 @@ class StudyContent:
     notes: Sequence[StudyNote] = ()
     title: str = ""
     about: str = ""
+    settings: Sequence[str] = ()
     beside: HealthyAndWorn | None = None
 
 
@@ -119,6 +121,7 @@ def study_sections(
         notes=notes,
         title=study.title,
         about=study.notes,
+        settings=study.again.overrides,
         beside=compare_healthy(stored, data, units),
     )
     regimes = [name for name in Regime if (data["regime"].values == name).any()]

@@ -118,7 +118,7 @@ def contents(evil):
         ),
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [plate(evil)],
                                    evil(), evil(), [StudyNote(evil(), evil(), evil())],
-                                   evil(), evil(), HealthyAndWorn(evil(), table(evil))),
+                                   evil(), evil(), [evil()], HealthyAndWorn(evil(), table(evil))),
     }  # fmt: skip
 
 

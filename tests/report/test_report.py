@@ -3,6 +3,7 @@
 import html.parser
 import json
 import re
+import shlex
 import shutil
 import sys
 from dataclasses import replace
@@ -15,7 +16,7 @@ from conftest import keep, part_of, store
 from compressor.analysis.runs import paper_cases
 from compressor.analysis.shaking import last_revolution
 from compressor.cases.case import Case
-from compressor.cases.load import load_cases
+from compressor.cases.load import load_cases, load_studies
 from compressor.reasons import Reason
 from compressor.report import page
 from compressor.report.figures import FIGURES, pictures
@@ -24,7 +25,7 @@ from compressor.report.report import KINDS, write_report
 from compressor.store.files import StoreError, StoreWarning
 from compressor.store.reader import read_job, read_store
 from compressor.store.status import study_caveats
-from compressor.store.studies import encode, read_studies
+from compressor.store.studies import encode, read_studies, write_study
 
 SHORT = ["solve.duration_rev=0.1", "solve.settle_rev=0", "solve.output_step_deg=1"]
 DRAFT = ["solve.accuracy=draft"]
@@ -378,12 +379,16 @@ def test_a_sweep_is_drawn_over_the_crank_angle(tmp_path):
     titled = "report: {title: Unit 3, notes: Rod weighed.}\nhealthy_clearance_mm: 0.1\n"
     swept = "joint: big_end\nclearance_mm: [0.1, 0.2]\nmachine: {rod_mass_kg: [3, 5]}\n"
     file.write_text(swept + titled)
-    store(own, file, overrides=["solve.duration_rev=2", "solve.settle_rev=1", *DRAFT])
+    settings = ["solve.duration_rev=2", "solve.settle_rev=1", *DRAFT]
+    (whole,) = load_studies(file, overrides=settings)
+    write_study(own, whole, shlex.join(["compsim", "run", *(f"--set={one}" for one in settings)]))
+    store(own, file, overrides=settings)
     write_report(own, tmp_path / "out")
     raw = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     assert "<h1>Unit 3</h1>" in raw
     assert "<title>Unit 3</title>" in raw
     assert '<p class="notes">Rod weighed.</p>' in raw
+    assert f", with <code>{'</code>, <code>'.join(settings)}</code>.</p>" in raw
     healthy_and_worn(read(tmp_path / "out"), own)
     drawn = {"sweep-own-ranking", "sweep-own-map", "cycles-own", "analyst-own"}
     assert {p.stem for p in (tmp_path / "out").glob("*.png")} == drawn
