@@ -278,6 +278,10 @@ def _example(group: str) -> str:
 
 def suggestion(name: str, group: str) -> str:
     """Return the end of an error about an unknown key: what was probably meant, if anything."""
+    whole, _, part = ".".join(filter(None, (group, name))).rpartition(".")
+    if part in PER_PART.get(whole, ()):
+        parts = ", ".join(f"{one}: ..." for one in PER_PART[whole])
+        return f"; write {whole} with {{{parts}}}, in --set too"
     if name in table() and "." in name:
         outer, _, inner = name.partition(".")
         return f"; write {inner} inside {outer}"

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from compressor.cases.case import Case, CaseError
-from compressor.cases.load import load_studies
+from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.materials import composite_modulus, contact_stiffness
 from compressor.physics.film import film
 from compressor.solve.cautions import remarks
@@ -51,6 +51,21 @@ def test_what_is_wrong_with_two_radii_is_told_of_the_one_it_is(pin, key, words):
     with pytest.raises(CaseError) as error:
         case(machine={"pin_radius_mm": pin})
     assert any(one.key == key and words in one.message for one in error.value.problems)
+
+
+def test_a_part_of_a_key_says_how_to_set_it(tmp_path):
+    """The hint named the key itself, which would have set both pins."""
+    path = tmp_path / "worn.yaml"
+    path.write_text("joint: both\nclearance_mm: 0.1\n", encoding="utf-8")
+    with pytest.raises(CaseFileError) as error:
+        load_studies(path, overrides=["machine.pin_radius_mm.small_end=90"])
+    remedy = (
+        "unknown key; write machine.pin_radius_mm with {big_end: ..., small_end: ...}, in --set"
+    )
+    assert remedy in str(error.value)
+    pins = "machine.pin_radius_mm={big_end: 60, small_end: 90}"
+    (study,) = load_studies(path, overrides=[pins])
+    assert study.cases[0].machine.pin_radius("small_end") == 90
 
 
 def test_a_pin_of_a_file_s_own_lies_in_its_bore():

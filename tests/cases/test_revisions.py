@@ -18,7 +18,6 @@ FLORES = {"law": "flores", "restitution": 0.5}
          "damping of the crosshead in its guide"),
         (RUBS | {"friction": {"law": "lugre", "static": 0, "dynamic": 0}},
          "LuGre friction without a coefficient"),
-        (RUBS | {"output": {"signals": True}}, "moment on the guide"),
         (RUBS | BODY, "moment on the guide"),
         (BODY | {"friction": {"ideal_joints": True}}, "moment on the guide"),
     ],
@@ -35,7 +34,7 @@ def test_oil_films_are_other_ones_since_2_and_since_2_2():
     case = Case.from_values(RUBS | {"lubricant": True})
     assert [changes_since(model, case.values()) for model in ("2", "2.2")] == [["oil film"]] * 2
     assert changes_since(MODEL, case.values()) == []
-    assert model_of(case.values()) == MODEL
+    assert model_of(case.values()) == "2.3"
     assert SUSPECT.search(case.attributes()["case"].encode())
 
 
@@ -48,12 +47,22 @@ def test_the_tacho_between_dead_centres_is_another_one_since_2_1():
     assert SUSPECT.search(case.attributes()["case"].encode())
 
 
+@pytest.mark.parametrize("values", [{}, RUBS])
+def test_the_rod_load_s_peaks_are_other_ones_since_2_3(values):
+    case = Case.from_values(values | {"output": {"signals": True}})
+    rod_load, guide = "peaks of the rod load", "moment on the guide"
+    assert changes_since("2.3", case.values()) == [rod_load]
+    assert changes_since("2", case.values()) == [guide, rod_load][values == {} :]
+    assert changes_since(MODEL, case.values()) == []
+    assert model_of(case.values()) == MODEL
+    assert SUSPECT.search(case.attributes()["case"].encode())
+
+
 @pytest.mark.parametrize(
     "values",
     [
         {},
         RUBS,
-        {"joint": "big_end", "clearance_mm": 0.2, "output": {"signals": True}},
         RUBS | {"contact": FLORES},
         {"guide": {"clearance_mm": 0.1}},
         RUBS | {"friction": {"law": "lugre"}},
