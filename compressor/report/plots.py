@@ -378,9 +378,9 @@ def page_figures(stored: Stored, study: StoredStudy) -> Iterator[tuple[str, str,
     """
     over = choose_axis(stored.folder, study, "")
     jobs, where = select_jobs(stored.folder, study, over, ())
-    number, count = len(jobs), min(len(jobs), MAX_PAGE_ROWS)
+    number, count, drawn = len(jobs), min(len(jobs), MAX_PAGE_ROWS), where
     if count < number:
-        where += f" {count} of {number} jobs, evenly chosen."
+        drawn += f" {count} of {number} jobs, evenly chosen."
         jobs = [jobs[round(n * (number - 1) / (count - 1))] for n in range(count)]
     rows = keep_sensed([swept_row(stored, value, key, brief=True) for value, key in jobs])
     known = {n: row.cycle for n, row in enumerate(rows) if row.cycle}
@@ -389,7 +389,7 @@ def page_figures(stored: Stored, study: StoredStudy) -> Iterator[tuple[str, str,
     if len(known) > 1:
         title = f"vibration over crank angle and {axis_words(over)}"
         drawing = draw_cycles(rows, axis_words(over))
-        yield "cycles", title, STUDY["cycles"](rows, over) + where, drawing
+        yield "cycles", title, STUDY["cycles"](rows, over) + drawn, drawing
     loudest = max(known, key=lambda n: np.abs(known[n].vibration).max())
     run = stored.job(jobs[loudest][1])
     case = case_of(run)
@@ -398,7 +398,7 @@ def page_figures(stored: Stored, study: StoredStudy) -> Iterator[tuple[str, str,
     value = f"{over} {rows[loudest].value}" if jobs[loudest][0] != "" else rows[loudest].value
     title = f"a revolution as an analyst reads it, {value}"
     note = " It is the job with the greatest vibration of these." if len(known) > 1 else ""
-    yield "analyst", title, JOB["analyst"](run, twin) + note + where, draw_analyst(run, twin)
+    yield "analyst", title, JOB["analyst"](run, twin) + note + drawn, draw_analyst(run, twin)
     if case.load == "gas":
         title = f"indicator cards, {value}"
         yield "cards", title, JOB["cards"](run, twin) + where, draw_cards(run, twin)
