@@ -234,7 +234,8 @@ def analyst(run: xr.Dataset, twin: Twin) -> str:
     ]  # fmt: skip
     if found.events:
         names = [f"{name} at {angle:.0f}°" for angle, name in found.events]
-        sentences.append(f"Load: {', '.join(names)}.")
+        kind = "Valves" if case.load == "gas" else "Load"
+        sentences.append(f"{kind}: {', '.join(names)}.")
     kind = "Dry contact that begins" if case.lubricant else "Impacts after flight"
     for joint, struck in found.struck.items():
         text = f"at {angles(struck)}" if len(struck) else "none"

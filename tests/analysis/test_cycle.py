@@ -143,7 +143,7 @@ def test_the_caption_has_the_numbers(sensed):
     ) in told
     load = frame_forces(sensed)["rod_load"][2400:3601] / 1e3
     assert f"goes from {load.min():.2f} to {load.max():.2f} kN and changes its side at " in told
-    assert "Load: discharge closes at 0°, suction opens at 39°, suction closes at 180°, " in told
+    assert "Valves: discharge closes at 0°, suction opens at 39°, suction closes at 180°, " in told
     assert f"at the big end: at {read_cycle(sensed).struck['big_end'][0]:.0f}°" in told
     quiet = run(joint="none", clearance_mm=0, load="none", contact={}, machine={"speed_rpm": 60})
     assert "Impacts" not in PLOT_CAPTIONS["job"]["analyst"](quiet, None)

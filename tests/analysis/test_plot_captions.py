@@ -4,6 +4,7 @@ import numpy as np
 
 from compressor.analysis.cycle import Cycle
 from compressor.analysis.plot_captions import PLOT_CAPTIONS, SweptRow
+from compressor.report.figures.job import draw_cycles
 from compressor.report.plots import keep_sensed
 
 CYCLES = PLOT_CAPTIONS["study"]["cycles"]
@@ -27,6 +28,19 @@ def test_a_sensor_and_a_crosshead_are_not_compared():
     alone = [row("0.1", 40.0, is_sensed=False), row("0.2", 642.0, is_sensed=False)]
     assert keep_sensed(alone) == alone
     assert "greatest magnitude of the acceleration of the crosshead" in CYCLES(alone, "joint")
+
+
+def test_a_map_names_the_marks_that_it_has():
+    def names(events, reversals):
+        vibration = np.ones(360)
+        cycle = Cycle(ANGLES, vibration, True, ANGLES, vibration, reversals, events, {})
+        panel = draw_cycles([SweptRow("0.1", cycle=cycle)], "clearance").panels[0]
+        return [trace.name for trace in panel.traces if trace.style.marker]
+
+    assert names(((9.0, "suction opens"),), ()) == ["a valve opens or closes"]
+    cam = names(((9.0, "cam: dwell ends"),), (40.0,))
+    assert cam == ["corner of the load", "rod load changes its side"]
+    assert names((), ()) == []
 
 
 def test_one_row_has_no_least():

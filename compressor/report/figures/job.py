@@ -487,10 +487,14 @@ def draw_cycles(rows: Sequence[SweptRow], title: str) -> Drawing:
     figure, image = start_map(rows, title, np.arange(361.0), table, ends, "|a| (m/s²)")
     corners = [[at for at, _ in one.events] if one else [] for one in found]
     reversals = [one.reversals if one else () for one in found]
+    has_cam = any(event.startswith("cam") for one in found if one for _, event in one.events)
+    corner = "corner of the load" if has_cam else "a valve opens or closes"
     for name, shape, color, angles in (
-        ("corner of the load", "v", "#ffffff", corners),
+        (corner, "v", "#ffffff", corners),
         ("rod load changes its side", "s", RED, reversals),
     ):
+        if not any(len(some) for some in angles):
+            continue
         x = np.array([at for some in angles for at in some])
         y = np.array([float(n) for n, some in enumerate(angles) for _ in some])
         image.plot(x, y, mark(color, shape, 4, edge=BLACK), name)
