@@ -393,7 +393,7 @@ class Figure {
       if (panel.square) layout[`yaxis${n ? n + 1 : ""}`].scaleanchor = x;
       if (panel.title) {
         const room = width * (boxes[n].x[1] - boxes[n].x[0]);
-        const size = Math.max(9.5, Math.min(13, 1.75 * room / panel.title.length));
+        const size = Math.max(9.2, Math.min(13, 1.75 * room / panel.title.length));
         layout.annotations.push({ text: `<b>${wrapped(panel.title, room + 12, size)}</b>`,
           xref: "paper", yref: "paper", x: boxes[n].x[0], y: boxes[n].y[1], xanchor: "left",
           yanchor: "bottom", yshift: 4, align: "left", showarrow: false, font: { size } });
