@@ -81,6 +81,13 @@ def test_a_metric_that_a_job_lacks_is_drawn():
     assert [one.name for one in drawn.figure.legend] == ["the job lacks this metric"]
 
 
+def test_jobs_that_failed_with_numbers_are_drawn():
+    """Such as those whose accuracy was not reached, though no job is ok."""
+    data = grid(AXES, lambda c, n: n + c)
+    data["status"][:] = "failed"
+    assert draw_sweep(data)[-1].name == "map"
+
+
 def test_a_few_values_stand_at_their_cells():
     _, panel, _ = traces(grid(AXES, lambda c, n: n + c))
     assert panel.x.words == {0.1: "0.1", 0.2: "0.2", 0.4: "0.4", 0.5: "0.5"}

@@ -55,8 +55,8 @@ def split_measures(
     sweep: PlottedSweep, known: Sequence[Measure]
 ) -> tuple[list[Measure], list[Measure]]:
     """Return the measures that differ between jobs, or that some lack, and the others."""
-    values = [sweep.values(measure)[sweep.status == "ok"] for measure in known]
-    varied = [bool(np.isnan(v).any() or np.ptp(v)) for v in values]
+    values, is_ok = [sweep.values(measure) for measure in known], sweep.status == "ok"
+    varied = [bool(np.isnan(v[is_ok]).any() or np.ptp(v[np.isfinite(v)])) for v in values]
     both = [*zip(known, varied, strict=True)]
     return [m for m, varies in both if varies], [m for m, varies in both if not varies]
 
@@ -143,7 +143,7 @@ def multiples(sweep: PlottedSweep, role: Roles) -> str:
 
 def axis_kind(sweep: PlottedSweep) -> str:
     """Return what a list of jobs is drawn over: a key, or a number where some keys are words."""
-    return "number" if any(axis.is_words for axis in sweep.axes) else "key"
+    return "number" if {axis.is_words for axis in sweep.axes} == {True, False} else "key"
 
 
 def points(sweep: PlottedSweep, is_ranked: bool, drawn: Drawing) -> str:
