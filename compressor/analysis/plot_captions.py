@@ -353,13 +353,12 @@ def cycles(rows: Sequence[SweptRow], axis: str) -> str:
     least, greatest = min(known), max(known)
     sensed = any(row.cycle.is_sensed for row in rows if row.cycle)
     kind = "sensor's record" if sensed else "acceleration of the crosshead"
+    lowest = f"least, {least[0]:.3g} m/s², at {least[2]}, and " if len(known) > 1 else ""
     text = (
         f"The greatest magnitude of the {kind} in each degree of the last settled revolution, "
-        f"{describe_rows(rows, axis)}. Over the revolution it is "
-        + f"least, {least[0]:.3g} m/s², at {least[2]}, and "
-        * (len(known) > 1)
-        + f"greatest, {greatest[0]:.3g} m/s² ({G * greatest[0]:.3g} g), at {greatest[2]}, where it "
-        f"comes at {greatest[1]:.0f}°."
+        f"{describe_rows(rows, axis)}. Over the revolution it is {lowest}greatest, "
+        f"{greatest[0]:.3g} m/s² ({G * greatest[0]:.3g} g), at {greatest[2]}, where it comes at "
+        f"{greatest[1]:.0f}°."
     )
     counts = [len(row.cycle.reversals) for row in rows if row.cycle]
     few, most = min(counts), max(counts)

@@ -153,8 +153,11 @@ SAMPLED: dict[str, Callable[[np.ndarray, float], float]] = {
 
 
 def sampled_metrics(rows: np.ndarray, found: Mapping[str, Any]) -> Metrics:
-    """Return the `SAMPLED` metrics by name; none without rows. found: the run's `metrics`."""
-    peak = float(found["peak_contact_force_axis"][1][0])  # of the small end along x
+    """Return the `SAMPLED` metrics by name; none without rows.
+
+    found: the run's `metrics`; without them by samples alone.
+    """
+    peak = float(found["peak_contact_force_axis"][1][0]) if found else 0.0  # small end, along x
     return {name: measure(rows, peak) for name, measure in SAMPLED.items()} if len(rows) else {}
 
 
@@ -163,18 +166,27 @@ def sampled_bars(rows: np.ndarray, found: Mapping[str, Any], other: Companion | 
 
     Half of what a third of the samples changes, whichever third, stands for what is lost between
     them: it bounds what a peak with a kink loses, and is at least 4 times what a parabola's top
-    does, wherever they lie between two samples. The bars are as careful as those of the metrics
-    that were calibrated (`compressor.metrics.Bar`).
+    does, wherever they lie between two samples. Where the smaller side may have lost so much that
+    the greatest load is its own, both sides' bars reach what samples say. The bars are as careful
+    as those of the metrics that were calibrated (`compressor.metrics.Bar`).
     """
-    if other is None:
+    if other is None or not len(rows):
         return {}
-    thirds, bars = [sampled_metrics(rows[k::3], found) for k in range(3)], {}
-    for name, value in sampled_metrics(rows, found).items():
+    numbers, plain = sampled_metrics(rows, found), sampled_metrics(rows, {})
+    thirds = [third for k in range(3) if (third := sampled_metrics(rows[k::3], found))]
+    lost = {
+        name: 0.5 * max(abs(value - third[name]) for third in thirds)
+        for name, value in numbers.items()
+    }
+    sides = "peak_rod_load_tension", "peak_rod_load_compression"
+    smaller, greater = sorted(sides, key=lambda side: plain[side])
+    is_sure, bars = plain[smaller] + lost[smaller] < numbers[greater], {}
+    for name, value in numbers.items():
         row = NUMBERS[name]
         distance = float(np.ravel(other.apart[row.series])[row.joint])
         path = row.bar.path * distance * abs(value)
         by_run = other.closeness * math.hypot(row.bar.own * (value - other.metrics[name]), path)
-        bars[name] = by_run + 0.5 * max(abs(value - third[name]) for third in thirds if third)
+        bars[name] = by_run + lost[name] + (0.0 if is_sure else abs(value - plain[name]))
     return bars
 
 

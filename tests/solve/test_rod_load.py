@@ -65,6 +65,21 @@ def test_bars_hold_what_is_lost_between_samples(place, power):
     assert (numbers["peak_rod_load_compression"], bars["peak_rod_load_compression"]) == (3000, 0)
 
 
+def test_a_peak_that_may_be_of_either_side_is_known_by_samples_alone():
+    """The greatest load, 1005, is a push between two samples, whose greatest is a pull."""
+    push = -1005.0 + 30.0 * abs(np.arange(-20.0, 21.0) - 0.5)
+    rows = loads(np.concatenate([np.full(41, 1000.0), np.minimum(push, 0.0)]))
+    found = {"peak_contact_force_axis": np.array([[0.0, 0.0], [1005.0, 0.0]])}
+    numbers = sampled_metrics(rows, found)
+    same = Companion(found | numbers, 0.5, {"contact_force": np.zeros(2)})
+    bars = sampled_bars(rows, found, same)
+    for name, true in (("tension", 1000.0), ("compression", 1005.0)):
+        name = f"peak_rod_load_{name}"
+        assert abs(numbers[name] - true) <= bars[name] < 20.0
+    share = "rod_load_reversal_share"
+    assert abs(numbers[share] - 1000.0 / 1005.0) <= bars[share]
+
+
 def test_the_greatest_load_is_that_of_the_whole_solution():
     """It was the greatest of 1,440 samples a revolution, whose bar missed a peak between them."""
     values = {"joint": "small_end", "clearance_mm": 0.3, "load": "gas", "solve": TURN, **SIGNALLED}

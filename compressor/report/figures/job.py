@@ -516,12 +516,7 @@ def draw_segments(rows: Sequence[SweptRow], title: str) -> Drawing:
                               "rms over that without clearance")  # fmt: skip
     for name, shape, color, over in (
         ("over its limit", "s", RED, [o.over_limit if o else None for o in found]),
-        (
-            "perhaps over it, by the error bar",
-            "o",
-            GOLD,
-            [o.doubtful if o else None for o in found],
-        ),
+        ("perhaps over it, by the bar", "o", GOLD, [o.doubtful if o else None for o in found]),
     ):
         marks = [(10.0 * at + 5.0, float(n)) for n, some in enumerate(over) if some is not None
                  for at in np.flatnonzero(some)]  # fmt: skip
