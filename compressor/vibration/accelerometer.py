@@ -11,8 +11,9 @@ from compressor.cases import Body, Sensor
 from compressor.vibration.body import (
     BodyMotion,
     Forces,
+    OscillatorMotion,
     body_motion,
-    casing_acceleration,
+    casing_motion,
     centre,
     oscillate,
 )
@@ -22,7 +23,7 @@ POLES = 8  # of the anti-aliasing filter, Butterworth
 # times the sampling rate, and the highest resonance, at which the analogue side runs
 ANALOGUE_RATE_FACTOR = 8.0
 USUAL = 2.56  # sampling rate over the highest frequency of interest
-LEAD_IN = 1  # revolutions before the record, in which filters forget their start
+LEAD_IN = 1  # revolutions before the record, in which the low-pass filter forgets its start
 
 
 @dataclass(frozen=True)
@@ -86,12 +87,39 @@ def listen(
     pace = paces(sensor, rng, times, turn)
     rigid = motion or body_motion(body, forces, steady)
     acceleration = rigid.acceleration(sensor.direction, point_of(body, sensor, guide))
-    acceleration = interpolate_periodic(acceleration, forces.step, pace) if steady else acceleration
+    force = None
     if body.casing and sensor.place != "body":
         force = getattr(forces, sensor.place)[:, AXES.index(sensor.direction)]
-        force = interpolate_periodic(force, forces.step, pace) if steady else force
-        acceleration = acceleration + casing_acceleration(body, force, forces.step)
-    return record_signal(sensor, acceleration, times, pace / turn + phase, rng)
+    if not steady:
+        if force is not None:
+            acceleration = acceleration + casing_motion(body, force, forces.step).acceleration
+        return record_signal(sensor, acceleration, times, pace / turn + phase, rng)
+    # casing and mounting have always repeated themselves, too: a mode of low damping would take
+    # many revolutions to forget a start at rest
+    repeated, acceleration = acceleration, interpolate_periodic(acceleration, forces.step, pace)
+    if force is not None:
+        casing = casing_motion(body, force, forces.step, steady=True)
+        repeated = repeated + casing.acceleration
+        start = state_at(casing, forces.step, pace[0])
+        force = interpolate_periodic(force, forces.step, pace)
+        moved = casing_motion(body, force, forces.step, start=start)
+        acceleration = acceleration + moved.acceleration
+    mounting = oscillate(repeated, forces.step, *mode_of(sensor), steady=True)
+    start = state_at(mounting, forces.step, pace[0])
+    return record_signal(sensor, acceleration, times, pace / turn + phase, rng, start)
+
+
+def mode_of(sensor: Sensor) -> tuple[float, float]:
+    """Return frequency (Hz) and damping ratio of a sensor on its mounting."""
+    return sensor.mounting_Hz, sensor.mounting_damping_ratio
+
+
+def state_at(motion: OscillatorMotion, step: float, time: float) -> tuple[float, float]:
+    """Return displacement and velocity of a motion that repeats itself, at a time (s)."""
+    place, speed = (
+        float(interpolate_periodic(values, step, np.array([time]))[0]) for values in motion[:2]
+    )
+    return place, speed
 
 
 def interpolate_periodic(values: np.ndarray, step: float, times: np.ndarray) -> np.ndarray:
@@ -123,17 +151,18 @@ def record_signal(
     times: np.ndarray,
     turns: np.ndarray,
     rng: np.random.Generator,
+    start: tuple[float, float] = (0.0, 0.0),
 ) -> Record:
     """Return the record of the acceleration at a sensor's foot.
 
     The chain is the mounting's resonance, a low-pass filter, sampling, noise and clipping.
     acceleration: m/s2 at `times`, s, (n,), the record being what is not before 0; turns:
-    revolutions.
+    revolutions; start: displacement and velocity of the sensor on its mounting, by default at rest.
     """
     step = times[1] - times[0]
     omega = 2.0 * np.pi * sensor.mounting_Hz
-    mounting = sensor.mounting_Hz, sensor.mounting_damping_ratio
-    mounted = omega**2 * oscillate(acceleration, step, *mounting).displacement
+    mounted = oscillate(acceleration, step, *mode_of(sensor), start=start).displacement
+    mounted = omega**2 * mounted
     corner = sensor.low_pass_Hz or sensor.rate_Hz / USUAL
     filtered = sosfilt(butter(POLES, corner, fs=1.0 / step, output="sos"), mounted)
     taken = np.arange(int(times[-1] * sensor.rate_Hz * (1 + 1e-12))) / sensor.rate_Hz

@@ -31,14 +31,19 @@ class OscillatorMotion(NamedTuple):
 
 
 def oscillate(
-    force: np.ndarray, step: float, frequency: float, damping_ratio: float, steady: bool = False
+    force: np.ndarray,
+    step: float,
+    frequency: float,
+    damping_ratio: float,
+    steady: bool = False,
+    start: tuple[float, float] = (0.0, 0.0),
 ) -> OscillatorMotion:
     """Return the motion q'' + 2 zeta w q' + w^2 q = f of an oscillator.
 
     force: f, per unit of modal mass, at n >= 4 equal steps, (n,); step: s; frequency: w / 2 pi, Hz;
-    damping_ratio: zeta, between 0 and 1. From rest at the first sample; `steady`: instead the
-    motion that repeats itself with the samples; the last one stands for the first of the next
-    period. Raises ValueError for other damping, or fewer samples.
+    damping_ratio: zeta, between 0 and 1; start: q and q' at the first sample, by default at rest;
+    steady: instead the motion that repeats itself with the samples; the last one stands for the
+    first of the next period. Raises ValueError for other damping, or fewer samples.
 
     One complex unknown, z = q' - conj(s) q with z' = s z + f and s = w (-zeta + i sqrt(1-zeta^2)),
     carries both q = Im z / Im s and q'. Over a step, z' = s z + cubic has a closed form, taken from
@@ -54,12 +59,12 @@ def oscillate(
     whole, shares = one_step(root, step)
     # products of real matrices: the cubics have no imaginary part
     driven = shares.real @ cubics + 1j * (shares.imag @ cubics)
-    start = 0.0j
+    first = start[1] - root.conjugate() * start[0]
     if steady:  # z0 = final + exp(s T) z0: the motion ends a period as it began it
-        start = final(whole, driven) / (1.0 - np.exp(root * step * (len(force) - 1)))
+        first = final(whole, driven) / (1.0 - np.exp(root * step * (len(force) - 1)))
     z = np.empty(len(force), complex)
-    z[0] = start
-    z[1:], _ = lfilter([1.0], [1.0, -whole], driven, zi=np.array([whole * start]))
+    z[0] = first
+    z[1:], _ = lfilter([1.0], [1.0, -whole], driven, zi=np.array([whole * first]))
     displacement = z.imag / root.imag
     velocity = z.real + root.real * displacement
     acceleration = force + 2.0 * root.real * velocity - omega**2 * displacement
@@ -152,12 +157,17 @@ def body_motion(body: Body, forces: Forces, steady: bool) -> BodyMotion:
     return BodyMotion(**motions)
 
 
-def casing_acceleration(body: Body, force: np.ndarray, step: float) -> np.ndarray:
-    """Return a casing mode's acceleration (m/s2, (n,)) against the body.
+def casing_motion(
+    body: Body,
+    force: np.ndarray,
+    step: float,
+    steady: bool = False,
+    start: tuple[float, float] = (0.0, 0.0),
+) -> OscillatorMotion:
+    """Return a casing mode's motion against the body.
 
-    force: at its place, in N, (n,), `step` s apart. A mode of some hundred Hz and more forgets its
-    start within a revolution; it starts at rest.
+    force: at its place, in N, (n,), `step` s apart; steady, start: see `oscillate`.
     """
     mode = body.casing_frequency_Hz, body.casing_damping_ratio
     assert body.casing_mass_kg is not None  # as of a Case, which fills it in
-    return oscillate(force / body.casing_mass_kg, step, *mode).acceleration
+    return oscillate(force / body.casing_mass_kg, step, *mode, steady, start)

@@ -57,6 +57,28 @@ def test_the_mounting_resonance_amplifies_and_the_filter_cuts():
     assert np.abs(cut.values).max() < 2e-5 * np.abs(whole.values).max()
 
 
+@pytest.mark.parametrize("jitter", [0.0, 1e-9])
+def test_what_repeats_itself_rings_from_the_first_revolution_on(jitter):
+    """A casing mode and a mounting that would take a hundred revolutions to forget a start.
+
+    |q''| of a mode under F sin(w t) is F / M w^2 / |w0^2 - w^2 + 2 i zeta w w0|, and the mounting
+    enlarges it by w1^2 / |w1^2 - w^2 + 2 i zeta w w1|.
+    """
+    body = Body(mass_kg=1e9, casing_mass_kg=10.0, casing_frequency_Hz=400.0,
+                casing_damping_ratio=1e-3, centre_x_mm=0.0, centre_y_mm=0.0)  # fmt: skip
+    mounting = {"mounting_Hz": 900.0, "mounting_damping_ratio": 1e-3, "place": "guide"}
+    record = shaken(45, 20.0, body=body, length_rev=5, speed_jitter=jitter, **mounting)
+    w = 2 * np.pi * 45 / TURN
+    expected = 2.0
+    for frequency, scale in ((400.0, w**2), (900.0, (2 * np.pi * 900.0) ** 2)):
+        w0 = 2 * np.pi * frequency
+        expected *= scale / abs(w0**2 - w**2 + 2j * 1e-3 * w * w0)
+    for turn in range(5):
+        inside = (record.turns >= turn) & (record.turns < turn + 1)
+        rms = np.sqrt(np.mean(record.values[inside] ** 2))
+        assert rms == pytest.approx(expected / np.sqrt(2), rel=1e-3), turn
+
+
 def test_noise_is_white_of_its_size_and_by_seed():
     noisy = {"noise_m_per_s2": 0.5, "length_rev": 60}
     record, again, other = (shaken(1, 0.0, seed=seed, **noisy) for seed in (7, 7, 8))
