@@ -7,8 +7,7 @@ from pathlib import Path
 
 import release
 
-from compressor.cases import MODEL, MODEL_VERSION
-from compressor.cases.case import CHANGES
+from compressor.cases import MODEL_VERSION
 from compressor.program import VERSION
 
 ROOT = Path(__file__).parents[1]
@@ -25,14 +24,11 @@ def test_the_version_has_one_source():
 
 def test_the_changes_name_the_versions_of_today():
     first = re.search(r"^## (.*)$", CHANGELOG, re.MULTILINE)
-    assert f"Program {VERSION}, model {MODEL}" in first[1]
+    assert f"Program {VERSION}, model {MODEL_VERSION}" in first[1]
 
 
-def test_every_revision_of_the_model_is_among_the_changes():
-    rows = dict(re.findall(r"^\| ([\d.]+) \| [^|]* \| (.*) \|$", CHANGELOG, re.MULTILINE))
-    assert {MODEL, MODEL_VERSION} <= {*rows}
-    for one in CHANGES:
-        assert one.what in rows[f"{MODEL_VERSION}.{one.revision}"]
+def test_the_model_is_among_the_changes():
+    assert re.search(rf"^\| {MODEL_VERSION} \| [^|]* \| .+ \|$", CHANGELOG, re.MULTILINE)
 
 
 def test_the_lock_has_what_is_installed_for_tests_and_site():

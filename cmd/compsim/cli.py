@@ -59,11 +59,11 @@ class Interrupted(BaseException):
 def version(context: click.Context, _: click.Parameter, is_set: bool) -> None:
     """Print the versions of the program, of its model and of its libraries, and end."""
     if is_set and not context.resilient_parsing:
-        from compressor.cases import MODEL
+        from compressor.cases import MODEL_VERSION
 
         others = {"Python": platform.python_version()} | library_versions(*LIBRARIES)
         listed = ", ".join(f"{name} {number}" for name, number in others.items())
-        click.echo(f"{PROGRAM}, model {MODEL} ({listed})")
+        click.echo(f"{PROGRAM}, model {MODEL_VERSION} ({listed})")
         context.exit()
 
 

@@ -60,10 +60,7 @@ class ShardType(click.ParamType):
 @setting
 @only_option
 @limit
-@click.option("--rerun", type=click.Choice(["failed", "stale"]), multiple=True,
-              help="Run stored jobs again, too: those that failed, or stale ones, which lack a "
-              "metric that this version gives. Can be given twice.",
-)  # fmt: skip
+@click.option("--rerun", type=click.Choice(["failed"]), help="Run stored jobs that failed again.")
 @click.option("--shard", "part", type=ShardType(), metavar="I/N",
               help="Run part I of N, where several computers share the folder.")  # fmt: skip
 @click.option("--backend", type=click.Choice(["local", "dask"]), default="local",
@@ -85,7 +82,7 @@ def run(
     overrides: tuple[str, ...],
     only: str,
     max_jobs: int,
-    rerun: tuple[str, ...],
+    rerun: str | None,
     part: tuple[int, int] | None,
     backend: str,
     scheduler: str | None,
@@ -122,14 +119,14 @@ def run(
     of_jobs = kinds.pop(None, [])
     others = [(kind.module("command"), its) for kind, its in kinds.items() if kind]
     for command, _ in others:
-        command.check_options(not of_jobs, scheduler, rerun, watch)
+        command.check_options(not of_jobs, scheduler, watch)
     code = DONE
     if of_jobs:
         code = run_jobs(context, of_jobs, output, jobs or cores(),
                         (rerun, part, wait, scheduler, report if watch else "", quiet))  # fmt: skip
     for command, its in others:
         shards = [study.shard(*part) if part else study for study in its]
-        ended = command.run_studies(shards, output, jobs or cores(), "failed" in rerun, quiet)
+        ended = command.run_studies(shards, output, jobs or cores(), bool(rerun), quiet)
         code = max(code, ended)
     return code
 
@@ -153,7 +150,7 @@ def run_jobs(
                 if watch:
                     watch.update(now)
 
-            how = Options(context.obj, "failed" in rerun, "stale" in rerun, part, wait=wait,
+            how = Options(context.obj, bool(rerun), part, wait=wait,
                           backend=elsewhere, pulse=show)  # fmt: skip
             summary = sweep(studies, output, jobs, progress, how)
         report_run(summary, output, page, quiet)
@@ -193,7 +190,6 @@ def report_run(summary: "Summary", folder: str, page: str, quiet: bool) -> None:
     report_failures(summary)
     if not quiet:
         report_caveats([count.study for count in summary.counts], folder)
-        report_stale(summary)
         say(f"page: {os.path.join(page, 'index.html')}" if page
             else f"next: compsim report -i {shlex.quote(folder)}")  # fmt: skip
 
@@ -206,18 +202,6 @@ def report_caveats(names: list[str], folder: str) -> None:
     for study in read_studies(folder):
         for text in run_caveats(rows, study) if study.name in names else ():
             say_wrapped(f"{study.name}: {text}")
-
-
-def report_stale(summary: "Summary") -> None:
-    """Report what stored jobs of another version lack, and how they are brought up to date."""
-    if not summary.gaining:
-        return
-    lacks = summary.stale.items()
-    what = ", ".join(f"{number} lack{'s' * (number == 1)} {name}" for name, number in lacks)
-    say_wrapped(
-        f"{plural(summary.gaining)} of another version would gain by running again ({what}): "
-        "--rerun stale"
-    )
 
 
 def report_failures(summary: "Summary") -> None:

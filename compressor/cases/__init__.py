@@ -2,12 +2,8 @@
 
 from compressor.cases.card import open_card
 from compressor.cases.case import (
-    MODEL,
     MODEL_VERSION,
-    SUSPECT,
     Case,
-    changes_since,
-    model_of,
     require_case,
     to_yaml,
     with_ideal_joints,

@@ -1,7 +1,7 @@
 """The case: one fully resolved simulation, its identity, and the numbers that follow from it.
 
-A job's key holds the version of the model, which stays while most results do. Where the equations
-of a feature are corrected, a line in `CHANGES` says whose numbers have changed within that version.
+A job's key holds the version of the model: results of one version agree within the sum of their
+error bars, and a change that moves numbers further is a new version, and so makes other jobs.
 """
 
 import contextlib
@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 from compressor.cases.card import CardError, open_card
 from compressor.cases.checks import (
@@ -43,93 +43,7 @@ from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, outside_i
 from compressor.cases.yaml_reader import resolve_scalar
 from compressor.metrics import JOINTS
 
-MODEL_VERSION = "2"  # part of a job's key: see `compressor.cases.case`
-REVISION = 4
-MODEL = f"{MODEL_VERSION}.{REVISION}"  # which results are stored with
-# what the text of a case holds if it may be one of `CHANGES`: quick to search a store for
-SUSPECT = re.compile(rb'"(drive|lubricant|rod|guide|body)\\?": |lugre|"signals\\?": true')
-
-
-class Revision(NamedTuple):
-    """What a revision has changed, and for which cases, by their nested values."""
-
-    revision: int
-    what: str
-    affects: Callable[[Mapping[str, Any]], bool]
-
-
-def _rubs_on_the_pin(values: Mapping[str, Any]) -> bool:
-    """Return whether friction puts a couple on the crosshead pin that an ideal guide bears."""
-    friction = values.get("friction")
-    if not friction or (values.get("guide") or {}).get("clearance_mm"):
-        return False
-    return values["joint"] in ("small_end", "both") or bool(friction.get("ideal_joints"))
-
-
-def _restitutes(values: Mapping[str, Any]) -> bool:
-    play = (values.get("guide") or {}).get("clearance_mm")
-    return bool(play and values["contact"].get("restitution"))
-
-
-def _has_no_lugre_friction(values: Mapping[str, Any]) -> bool:
-    friction = values.get("friction") or {}
-    return friction.get("law") == "lugre" and not (friction["static"] and friction["dynamic"])
-
-
-def _records_between_dead_centres(values: Mapping[str, Any]) -> bool:
-    """Return whether a sensor's record begins where the crank is not at top dead centre."""
-    settled = values["solve"]["settle_rev"]
-    return (
-        "sensor" in values
-        and values["body"]["start"] == "steady"
-        and isinstance(settled, int | float)
-        and settled != int(settled)
-    )
-
-
-CHANGES = (
-    Revision(1, "times, torques and forces of a drive", lambda values: "drive" in values),
-    Revision(1, "oil film", lambda values: "lubricant" in values and values["joint"] != "none"),
-    Revision(1, "losses of an elastic rod", lambda values: "rod" in values),
-    Revision(1, "damping of the crosshead in its guide", _restitutes),
-    Revision(1, "LuGre friction without a coefficient", _has_no_lugre_friction),
-    Revision(
-        1, "moment on the guide",
-        lambda values: ("body" in values or bool(values["output"].get("signals")))
-        and _rubs_on_the_pin(values),
-    ),
-    Revision(2, "tacho of a sensor's record", _records_between_dead_centres),
-    Revision(3, "oil film", lambda values: "lubricant" in values and values["joint"] != "none"),
-    Revision(4, "peaks of the rod load", lambda values: bool(values["output"].get("signals"))),
-)  # fmt: skip
-
-
-def changes_since(model: str, values: Mapping[str, Any]) -> list[str]:
-    """Return what has changed for a case since a model that computed it.
-
-    model: the attribute `model_version` of a result, such as "2" or "2.1"; values: of the case,
-    nested as by `Case.values`.
-    """
-    revision = int(model.partition(".")[2] or 0)
-    found = [one.what for one in CHANGES if revision < one.revision and one.affects(values)]
-    return list(dict.fromkeys(found))
-
-
-def model_of(values: Mapping[str, Any]) -> str:
-    """Return the version and the last revision of the model that changed the numbers of a case.
-
-    The version alone where none did.
-    """
-    last = max((one.revision for one in CHANGES if one.affects(values)), default=0)
-    return f"{MODEL_VERSION}.{last}" if last else MODEL_VERSION
-
-
-# MODEL_VERSION is that of equations and of the meaning of what is stored; part of a job's identity.
-# Results of one key agree within the sum of their error bars, whichever version of the program made
-# them, unless a revision has changed them (`CHANGES`); to the bit they are equal only for one
-# version of program and libraries on one kind of processor
-# keys of stored jobs were made with the loads' older names, and stay
-LOADS_IN_KEYS = {"spring": "design", "gas": "typical", "none": "none"}
+MODEL_VERSION = "3"  # of equations and of the meaning of what is stored; part of a key
 MAX_TEXTS = 4096  # groups whose texts are remembered
 SOUND = HealthyClearance()  # that no case need name
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
@@ -267,10 +181,6 @@ class Case(Settings):
                 f"needs JSON text, such as the attribute `case` of a run, not {quote_value(text)}"
             )
             raise CaseError([Problem("", message)]) from error
-        contact = values.get("contact") if isinstance(values, Mapping) else None
-        cylinder = isinstance(contact, dict) and contact.get("law") in CYLINDRICAL
-        if isinstance(contact, dict) and contact.get("materials") and not cylinder:
-            contact.setdefault("geometry", "external")  # the default when older texts were stored
         return cls.resolve(values)
 
     def values(self) -> dict[str, Any]:
@@ -429,7 +339,7 @@ def identity_parts(case: Case, names: Container[str] = IDENTITY) -> dict[str, st
     if "joint" in names:
         texts["joint"] = f'"{case.joint}"'
     if "load" in names:
-        texts["load"] = f'"{LOADS_IN_KEYS[case.load]}"'
+        texts["load"] = f'"{case.load}"'
     if "model" in names:
         texts["model"] = f'"{MODEL_VERSION}"'
     if "span" in names:  # what is integrated and from where on it counts, however it is written

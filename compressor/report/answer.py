@@ -18,7 +18,7 @@ import xarray as xr
 from markupsafe import Markup
 
 from compressor.analysis import SPOKEN, Claim
-from compressor.cases import MODEL, Case
+from compressor.cases import MODEL_VERSION, Case
 from compressor.digits import UNKNOWN, is_known, setting
 from compressor.metrics import BARRED, JOINTS
 from compressor.program import PROGRAM, library_versions
@@ -184,7 +184,7 @@ def provenance_section(studies: Sequence[StoredStudy], results: Folder, command:
     """Return the section on program and command that made a page, and its studies."""
     versions = library_versions(*LIBRARIES)
     content = Provenance(
-        program=f"{PROGRAM}, model {MODEL}",
+        program=f"{PROGRAM}, model {MODEL_VERSION}",
         libraries=", ".join(f"{name} {version}" for name, version in versions.items()),
         platform=f"Python {platform.python_version()}, {platform.platform()}",
         results=Path(results).absolute(),

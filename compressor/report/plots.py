@@ -318,7 +318,7 @@ def axis_words(key: str) -> str:
     return f"{name} ({unit})" if unit else name
 
 
-SENSE = "run it with body: true and sensor: true, or again with --rerun stale"
+SENSE = "run it with body: true and sensor: true"
 
 
 def read_limit(text: str) -> tuple[float, bool] | None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.cases import MODEL, Case, back_action, require_case
+from compressor.cases import MODEL_VERSION, Case, back_action, require_case
 from compressor.metrics import SERIES
 from compressor.outcome import DatasetParts, Outcome, row, without_run, word_variables
 from compressor.physics import FLOWS, is_featured, state_names
@@ -277,7 +277,7 @@ def attributes(case: Case, solution: Solution) -> dict[str, object]:
         "promise": solution.promise,
         "regime": solution.regime,
         "method": case.solve.method,
-        "model_version": MODEL,
+        "model_version": MODEL_VERSION,
         "program": PROGRAM,
         "libraries": libraries(),
     }

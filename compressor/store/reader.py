@@ -9,18 +9,12 @@
 A job is stored when it has a row and, if the row names time series, their file. Every file
 appears under its name only when all of it is on disk, and carries a digest of its bytes. There is
 no index: what is stored is read from the rows. `compressor.store.writer` writes them.
-
-A stored job is stale where this version of the program would give it more numbers, or others. A
-key holds the version of the model, and results of one version agree within their error bars but for
-what a revision has corrected (`compressor.cases.case`): a job that another version of the program
-has made is not stale for that alone.
 """
 
-import json
 import os
 import re
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -28,9 +22,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.cases import SUSPECT, Case, CaseError, HealthyClearance, changes_since
-from compressor.metrics import BARRED
-from compressor.outcome import WORDS, Outcome, word_variables
+from compressor.cases import Case, CaseError, HealthyClearance
+from compressor.outcome import Outcome, word_variables
 from compressor.reasons import Reason
 from compressor.store.files import (
     HEX20,
@@ -42,7 +35,7 @@ from compressor.store.files import (
     system_error,
 )
 from compressor.store.hdf5 import DamagedJob
-from compressor.store.rows import GIVEN, NAME, Cut, Rows, Segment, read_segment
+from compressor.store.rows import NAME, Cut, Rows, Segment, read_segment
 from compressor.store.series_file import read_series, read_values
 from compressor.store.studies import StoredStudy, find_study, read_studies
 
@@ -55,36 +48,6 @@ BOTH_JOINTS = (
 )
 
 
-def _changed_by_revision(rows: Rows, position: int) -> list[str]:
-    """Return what a revision of the model has changed since a job was stored."""
-    if not SUSPECT.search(rows.text(position)):
-        return []
-    attributes = rows.attributes(position)
-    try:
-        values = json.loads(str(attributes.get("case", "")))
-        return changes_since(str(attributes.get("model_version", "")), values)
-    except (ValueError, KeyError, TypeError, AttributeError):  # of a case that no version has
-        return []
-
-
-def _lacking(rows: Rows, positions: np.ndarray) -> dict[str, np.ndarray]:
-    """Return which rows lack what any run of this version gives that ends well, by name."""
-    is_ok = rows.words["status"][positions] == "ok"
-    signals = rows.words["signals"][positions] == "yes"
-    lacking = {}
-    present = {"": is_ok, "signals": is_ok & signals}  # whether another job has one is not known
-    if CLIPPED in (rows.numbers.dtype.names or ()):  # which every job with a sensor has
-        present["sensor"] = is_ok & ~np.isnan(rows.numbers[CLIPPED][positions])
-    for name, metric in BARRED.items():
-        if name not in (rows.numbers.dtype.names or ()):
-            lacking[name] = present.get(metric.when, np.zeros(len(positions), bool))
-            continue
-        absent = np.isnan(rows.numbers[name][positions])
-        missed = absent.all(axis=tuple(range(1, absent.ndim)))
-        lacking[name] = missed & present.get(metric.when, False)
-    return lacking | {name: is_ok & (rows.words[name][positions] == "") for name in WORDS}
-
-
 # reasons that leave no time series
 RERUN_REASONS = {
     Reason.INTERNAL_ERROR,
@@ -92,7 +55,6 @@ RERUN_REASONS = {
     Reason.OUT_OF_MEMORY,
     Reason.INVALID_INPUT,
 }
-CLIPPED = "clipped_fraction"
 NAMED = re.compile(rf"{HEX20}-{HEX20}\.h5")  # a file of time series that waits no longer
 ATTEMPTS = 100  # at reading segments that a writer replaces meanwhile
 
@@ -169,25 +131,6 @@ class Stored:
             text = f"{damage}: its jobs count as missing"
             warnings.warn(text, StoreWarning, stacklevel=3)
         return self
-
-    def stale(self, keys: Iterable[str]) -> dict[str, set[str]]:
-        """Return which jobs of some keys are stale, by what a run of this version would give.
-
-        A job may stand under several metrics. Jobs that this version has made are none of them,
-        whatever metric has no value there.
-        """
-        found: dict[str, set[str]] = {}
-        rows, positions = self.rows, self.rows.find(list(keys))
-        old = positions[positions >= 0]
-        old = old[rows.columns["given"][old] != GIVEN.encode()]
-        names = rows.columns["key"][old].astype(str)
-        for what, lack in _lacking(rows, old).items() if len(old) else ():
-            if lack.any():
-                found[what] = {*names[lack].tolist()}
-        for key, position in zip(names.tolist(), old.tolist(), strict=True):
-            for what in _changed_by_revision(rows, position):
-                found.setdefault(f"this version's {what}", set()).add(key)
-        return found
 
     def keys(self) -> set[str]:
         """Return the keys of all stored jobs, failed ones included."""

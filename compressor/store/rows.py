@@ -19,16 +19,13 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import MODEL
-from compressor.metrics import BARRED, HORIZON, NUMBERS
+from compressor.metrics import HORIZON, NUMBERS
 from compressor.outcome import ROW, Outcome, Regime, SeriesFile, coordinates, row
-from compressor.program import PROGRAM
 from compressor.store.files import HEX20, pending_path
 from compressor.store.hdf5 import DamagedJob, digest, image, open_file, read_variable, storable
 from compressor.store.series_file import intact, series_path
 
 NAME = re.compile(rf"([0-9]{{9}})-({HEX20})\.h5")
-GIVEN = digest(" ".join([PROGRAM, MODEL, *BARRED]).encode())[:8]  # by this version
 ANY_KEY = re.compile(rb"(?=([0-9a-f]{20}))")  # every 20 hexadecimal digits in a row
 REMEDY = "move it away, then run its studies again"
 FOREIGN_LINES = "is no file of compsim's: what it holds of its jobs cannot be read"
@@ -49,10 +46,8 @@ COLUMNS = {
     "regime": ("S", "how far the motion can be foretold; empty where that is not known",
                "|".join(["", *Regime])),
     "signals": ("S", "yes where signals are kept beside the time series", "(yes)?"),
-    "given": ("S8", "hash of the program, its model and the names of its metrics",
-              "([0-9a-f]{8})?"),
 }  # fmt: skip
-LATER_COLUMNS = ("promise", "regime", "signals", "given")  # columns that older files do not have
+LATER_COLUMNS = ("promise", "regime", "signals")  # columns that older files do not have
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +116,6 @@ def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
         "promise": [str(outcome.attributes.get("promise", "")) for outcome in outcomes],
         "regime": [str(outcome.attributes.get("regime", "")) for outcome in outcomes],
         "signals": ["yes" if o.series and o.attributes.get("signals") else "" for o in outcomes],
-        "given": [GIVEN for _ in outcomes],
     }
     columns = {
         name: np.array([storable(value).encode() for value in values], COLUMNS[name][0])
@@ -369,14 +363,10 @@ class Rows:
         segment = self.segments[self.source[position]]
         return read_line(segment.details[self.row[position]], str, segment)
 
-    def text(self, position: int) -> bytes:
-        """Return a job's attributes as JSON; quick for jobs of one segment after the other."""
-        return _lines(self.segments[self.source[position]])[self.row[position]]
-
     def attributes(self, position: int) -> dict[str, Any]:
         """Return a job's attributes; quick for jobs of the same segment one after the other."""
         segment = self.segments[self.source[position]]
-        found = read_line(self.text(position), dict, segment)
+        found = read_line(_lines(segment)[self.row[position]], dict, segment)
         try:
             return {n: np.array(v) if isinstance(v, list) else v for n, v in found.items()}
         except ValueError as error:

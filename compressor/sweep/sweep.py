@@ -56,15 +56,13 @@ class Options:
     """How to sweep.
 
     command: what the store says that it was made by; rerun_failed: failed jobs count as missing;
-    rerun_stale: so do those that this version gives more numbers (`Stored.stale`); part: (i, n)
-    for shard i of n, which other processes may run at the same time, each its own; wait: until
-    another run that writes there has ended; backend: where jobs run, if not here; pulse: called
-    with the sweep's progress several times a second while jobs run.
+    part: (i, n) for shard i of n, which other processes may run at the same time, each its own;
+    wait: until another run that writes there has ended; backend: where jobs run, if not here;
+    pulse: called with the sweep's progress several times a second while jobs run.
     """
 
     command: str = ""
     rerun_failed: bool = False
-    rerun_stale: bool = False
     part: tuple[int, int] | None = None
     wait: bool = False
     backend: Backend | None = None
@@ -93,11 +91,7 @@ class JobCount:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a sweep did; `total`, `done_before` and `run_now` count a shared job once.
-
-    `stale`: how many of the stored jobs another version has made, by what they lack; `gaining`:
-    how many they are together.
-    """
+    """What a sweep did; `total`, `done_before` and `run_now` count a shared job once."""
 
     total: int
     done_before: int
@@ -105,8 +99,6 @@ class Summary:
     counts: tuple[JobCount, ...]
     failed: tuple[JobFailure, ...]
     seconds: float
-    stale: dict[str, int]
-    gaining: int
 
 
 def sweep(
@@ -142,14 +134,6 @@ def sweep(
         ends = stored_ends(writer.found, cases)
         if options.rerun_failed:
             ends = {key: end for key, end in ends.items() if end.status == "ok"}
-        stale = writer.found.stale(ends)
-        gaining = set().union(*stale.values())
-        if options.rerun_stale:
-            for key in gaining:
-                del ends[key]
-                position = int(writer.found.rows.find([key])[0])
-                cases[key] = writer.found.status_at(position).with_stored_outputs(cases[key])
-            stale, gaining = {}, set()
         missing = PendingCases(cases, [key for key in cases if key not in ends])
         for study in studies:
             write_study(folder, study, options.command, writer.found.keys)
@@ -161,7 +145,7 @@ def sweep(
     counts, failed = endings(studies, ends)
     return Summary(
         len(cases), len(cases) - len(missing), len(missing), counts, failed,
-        time.monotonic() - began, {what: len(keys) for what, keys in stale.items()}, len(gaining),
+        time.monotonic() - began,
     )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ import os
 import platform
 import sys
 
-from compressor.cases import MODEL
+from compressor.cases import MODEL_VERSION
 from compressor.program import COMPILED, VERSION, CompsimError, library_versions, sources_hash
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
@@ -27,7 +27,7 @@ def versions() -> dict[str, str]:
     """Return what decides the bits of a result: the programs here, and their versions."""
     return {
         "compsim": VERSION,
-        "model": MODEL,
+        "model": MODEL_VERSION,
         "sources of compsim": sources_hash(COMPILED.parent),
         "Python": f"{sys.version_info[0]}.{sys.version_info[1]}",
         "machine": platform.machine(),

@@ -33,11 +33,6 @@ def test_a_file_gives_one_radius_or_one_for_each_joint():
     assert two.key != one.key
 
 
-def test_keys_of_one_radius_are_those_of_before():
-    """Stored by commit c541348, which knew one radius only."""
-    assert case(machine={"pin_radius_mm": 35}).key == "c5d914d72d3156b5c7fa"
-
-
 @pytest.mark.parametrize(
     ("pin", "key", "words"),
     [
@@ -79,14 +74,6 @@ def test_a_pin_of_a_file_s_own_lies_in_its_bore():
     assert (record(discs)["stiffness"] < record(own)["stiffness"] / 9).all()
     for one in (own, paper, discs):
         assert Case.from_values(one.values()) == one
-
-
-def test_a_stored_case_of_before_keeps_its_discs():
-    values = case(contact=MATERIALS, machine={"pin_radius_mm": 35}).values()
-    del values["contact"]["geometry"]  # which texts of before do not have
-    old = Case.from_attribute(json.dumps(values))
-    discs = case(contact=MATERIALS | {"geometry": "external"}, machine={"pin_radius_mm": 35})
-    assert old.key == discs.key
 
 
 LENGTHS = {"big_end": 60, "small_end": 40}

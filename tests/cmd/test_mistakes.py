@@ -150,7 +150,6 @@ MISTAKES = [
     ("find typo.yaml --over clearance_mm=0.01:0.3 --first 'peak_acceleration > 1'",
      "typo.yaml:1:11: machine.sped_rpm: unknown key; did you mean machine.speed_rpm?"),
     ("run chain.yaml --watch", "--watch shows jobs, and regimes have none"),
-    ("run chain.yaml --rerun stale", "--rerun stale is for jobs"),
     ("find good.yaml --over clearance_mm=0.1:0.3 --first peak_acceleration=600", "> "),
     ("find good.yaml --over clearance_mm=0.1:0.3 --json --units plant", "--json has all numbers"),
 ]  # fmt: skip

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from compsim import cli
 
+from compressor.cases import MODEL_VERSION
 from compressor.cases.load import load_studies
 from compressor.outcome import without_run
 from compressor.store import studies as stored_studies
@@ -166,7 +167,7 @@ def test_run_and_plan_say_so_first(command, wear, capsys, in_process):
 def test_jobs_of_an_older_model_are_told_as_such(wear, monkeypatch):
     study = wear(**MORE)
     run(study)
-    monkeypatch.setattr("compressor.cases.case.MODEL_VERSION", "3")
-    monkeypatch.setattr(stored_studies, "MODEL_VERSION", "3")
+    monkeypatch.setattr("compressor.cases.case.MODEL_VERSION", "next")
+    monkeypatch.setattr(stored_studies, "MODEL_VERSION", "next")
     again = wear(**MORE)
-    assert changes("results", [again]) == [StudyChange("wear", 3, 3, 0, 3, "wear~1", "2")]
+    assert changes("results", [again]) == [StudyChange("wear", 3, 3, 0, 3, "wear~1", MODEL_VERSION)]

@@ -22,7 +22,7 @@ from bad_jobs import work as poisoned
 from compsim.cli import main
 from test_execution import is_running, lost, results, wait_for
 
-from compressor.cases.case import MODEL
+from compressor.cases.case import MODEL_VERSION
 from compressor.cases.load import load_studies
 from compressor.store import reader as store
 from compressor.store.files import StoreError
@@ -372,7 +372,7 @@ def test_workers_with_other_versions_are_refused(dask, monkeypatch):
 
 
 def test_a_worker_with_other_versions_that_came_later_is_refused(client, monkeypatch):
-    wrong = rf"worker tcp://.*: has model {MODEL} in place of none, numpy"
+    wrong = rf"worker tcp://.*: has model {MODEL_VERSION} in place of none, numpy"
     with pytest.raises(ClusterError, match=wrong):
         list(remote(client, abs, named(range(10)), versions=other_versions()))
 

@@ -21,7 +21,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import MODES
-from compressor.cases import MODEL, Case, model_of
+from compressor.cases import MODEL_VERSION, Case
 from compressor.metrics import JOINTS
 from compressor.program import PROGRAM
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
@@ -57,10 +57,9 @@ class Chain:
 
     @cached_property
     def key(self) -> str:
-        """Return the hash of what decides the numbers: cases, start, request, model."""
+        """Return the hash of what decides the numbers: cases, start, request."""
         identity = [case.key for case in self.cases], self.request.plain(), self.direction
-        model = model_of(self.cases[0].values())
-        text = json.dumps([identity, model, SCHEMA], sort_keys=True)
+        text = json.dumps([identity, SCHEMA], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
     def path(self, folder: Folder) -> Path:
@@ -138,7 +137,7 @@ def chain_dataset(chain: Chain, rows: Sequence[Row]) -> xr.Dataset:
         "regimes": json.dumps(chain.request.plain()),
         "case": chain.cases[0].attributes()["case"],
         "program": PROGRAM,
-        "model_version": MODEL,
+        "model_version": MODEL_VERSION,
     }
     return xr.Dataset(found, {"value": ("value", value, units), **labels()}, attrs)
 

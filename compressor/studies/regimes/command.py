@@ -39,12 +39,10 @@ def run_studies(studies: "list[Study]", folder: str, workers: int, rerun: bool, 
     return SOME_FAILED if summary.failed else DONE
 
 
-def check_options(alone: bool, scheduler: str | None, rerun: tuple[str, ...], watch: bool) -> None:
+def check_options(alone: bool, scheduler: str | None, watch: bool) -> None:
     """Raise UsageError for options that chains of regimes, `alone` or beside jobs, do not know."""
     if scheduler:
         raise click.UsageError("regimes run in processes here: leave --backend dask out")
-    if alone and "stale" in rerun:
-        raise click.UsageError("--rerun stale is for jobs, and regimes have none: leave it out")
     if alone and watch:
         raise click.UsageError("--watch shows jobs, and regimes have none: compsim plot draws them")
 

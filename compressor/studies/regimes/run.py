@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from compressor.cases import MODEL, Study, points
+from compressor.cases import MODEL_VERSION, Study, points
 from compressor.program import PROGRAM, Progress
 from compressor.store import Folder, StoreError, publish
 from compressor.studies.regimes.chains import (
@@ -142,7 +142,7 @@ def write_manifest(folder: Path, study: Study) -> None:
         "is_grid": study.is_grid,
         "chains": [[chain.key for chain in chains] for chains in every],
         "pairs": [ChainPair(*chains).key for chains in every if len(chains) == 2],
-        "model_version": MODEL,
+        "model_version": MODEL_VERSION,
         "program": PROGRAM,
     }
     if study.title:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.cases import MODEL, Case, CaseError
+from compressor.cases import MODEL_VERSION, Case, CaseError
 from compressor.program import PROGRAM, Progress, no_progress
 from compressor.reasons import Reason
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
@@ -218,7 +218,7 @@ def drawn_ranges() -> dict[str, dict[str, Any]]:
 def settings(budget: Budget) -> str:
     """Return the settings on which scenes and verdicts depend beside the seed."""
     return (
-        f"model {MODEL}; {budget.revolutions:g} revolutions, "
+        f"model {MODEL_VERSION}; {budget.revolutions:g} revolutions, "
         f"{budget.max_steps} steps or {budget.seconds:g} s{DRAWN[budget.drawn]}"
     )
 

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import interpolate_hours
-from compressor.cases import MODEL, Case, Wear, model_of, to_si
+from compressor.cases import MODEL_VERSION, Case, Wear, to_si
 from compressor.metrics import JOINTS, METRICS
 from compressor.program import PROGRAM
 from compressor.solve import (
@@ -66,8 +66,7 @@ class Worn:
     @cached_property
     def key(self) -> str:
         """Return the hash of what decides the numbers."""
-        values = self.case.values()
-        identity = [self.case.key, values["wear"], model_of(values), SCHEMA]
+        identity = [self.case.key, self.case.values()["wear"], SCHEMA]
         return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:20]
 
     @property
@@ -216,7 +215,7 @@ def stages_dataset(machine: Worn, stages: list[Stage]) -> xr.Dataset:
         "angle": ("angle", angles, about),
         "joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"}),
     }
-    attrs = {"key": machine.key, "program": PROGRAM, "model_version": MODEL}
+    attrs = {"key": machine.key, "program": PROGRAM, "model_version": MODEL_VERSION}
     attrs["case"] = machine.case.attributes()["case"]
     return xr.Dataset(found, where, attrs)
 
