@@ -28,7 +28,7 @@ from compressor.cases.json_schema import case_schema
 from compressor.cases.keys import Leaves, covers
 from compressor.cases.laws import CYLINDRICAL, READ_BY, law_of
 from compressor.cases.load import load_cases, load_studies
-from compressor.cases.materials import joint_stiffness, paper_stiffness_note
+from compressor.cases.materials import joint_stiffness, paper_notes, paper_stiffness_note
 from compressor.cases.optional_groups import Body, Drive, Guide, Lubricant, Rod, Sensor, Wear
 from compressor.cases.parameter import (
     ACCURACY,

@@ -1,6 +1,10 @@
-"""Materials of the paper, and the contact stiffness that follows from them; needs no compiler."""
+"""Materials of the paper, the contact stiffness that follows from them, and its pin's numbers.
+
+Needs no compiler.
+"""
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from compressor.cases.laws import CYLINDRICAL
@@ -98,3 +102,36 @@ def paper_stiffness_note(case: "Case") -> str:
         f"Eq. 15 gives {' and '.join(texts)}: give contact.materials, such as [steel, steel], or "
         "the stiffness"
     )
+
+
+def paper_notes(case: "Case") -> dict[str, str]:
+    """Return what to know of the numbers of the paper's pin that a case has at other pins, by key.
+
+    They are defaults: the contact stiffness, the length of an oiled bearing, that of a bore that
+    wears.
+    """
+    found = {"contact.stiffness_N_per_mm15": paper_stiffness_note(case)}
+    if film := case.lubricant:
+        why = "a film bears about as the cube of it"
+        found |= _paper_length("lubricant.bearing_length_mm", case, film.bearing_length, why)
+    if wear := case.wear:
+        why = "the same wear is half as deep in a bore of twice the length"
+        found |= _paper_length("wear.bore_length_mm", case, lambda joint: wear.bore_length_mm, why)
+    return {key: note for key, note in found.items() if note}
+
+
+def _paper_length(
+    key: str, case: "Case", length: Callable[[str], float], why: str
+) -> dict[str, str]:
+    """Return what to know of a default length (mm) of joints with clearance, by its key."""
+    usual, radius = table()[key].default, table()["machine.pin_radius_mm"].default
+    worn = [joint for joint in JOINTS if getattr(case.clearance_mm, joint) > 0]
+    pins = {case.machine.pin_radius(joint) for joint in worn if length(joint) == usual}
+    pins.discard(radius)
+    if not pins:
+        return {}
+    given = " and ".join(f"{pin:g}" for pin in sorted(pins, reverse=True))
+    return {
+        key: f"{usual:g} mm is the default, for the paper's pin of {radius:g} mm radius, and yours "
+        f"has {given} mm: {why}; give the length that bears, without grooves and holes"
+    }

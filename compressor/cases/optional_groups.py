@@ -255,8 +255,8 @@ class Body:
         "which sensors feel", kind="boolean", read=CASING_SENSED,
     )  # fmt: skip
     casing_mass_kg: float | None = parameter(
-        None, "kg", (0, 1e6), "program: a 25th of the body's mass", "modal mass of a casing mode",
-        above=True, optional=True, read=CASING,
+        None, "kg", (0, 1e6), "program: a 25th of the body's mass", "modal mass of a casing mode; "
+        "the sensor's level goes as its inverse", above=True, optional=True, read=CASING,
     )  # fmt: skip
     casing_frequency_Hz: float = parameter(
         2000.0, "Hz", (0, 1e5), PROGRAM, "natural frequency of a casing mode", above=True,

@@ -23,11 +23,12 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.cases import (
+    Body,
     Case,
     Study,
     open_card,
     outside_judged,
-    paper_stiffness_note,
+    paper_notes,
     reads,
     row_of,
     with_ideal_joints,
@@ -305,8 +306,9 @@ def remarks(case: Case) -> Iterator[Remark]:
     yield from _proportions(case)
     for key, text in outside_judged(case.values()).items():
         yield Remark(key, text, "judged")
-    if note := paper_stiffness_note(case):
-        yield Remark("contact.stiffness_N_per_mm15", note, "default stiffness")
+    for key, note in paper_notes(case).items():
+        yield Remark(key, note, "default")
+    yield from _casing(case)
     for joint in joints:
         yield from _depths(case, joint)
     yield from _rod(case)
@@ -332,6 +334,20 @@ def _inertias(case: Case) -> Iterator[Remark]:
     if (machine.rod_inertia_kg_m2 or 0.0) > most:
         text = f"{machine.rod_inertia_kg_m2:g} kg m2 is more than all mass a rod apart, {most:.3g}"
         yield Remark("machine.rod_inertia_kg_m2", text, "unit")
+
+
+def _casing(case: Case) -> Iterator[Remark]:
+    """Yield that the level of a sensor goes as the inverse of a mass that nobody gave."""
+    body, usual, key = case.body, Body(), "body.casing_mass_kg"
+    if body is None or not reads(case, key) or body.mass_kg == usual.mass_kg:
+        return
+    if body.casing_mass_kg == replace(body, casing_mass_kg=None).casing_mass_kg:
+        text = (
+            f"{body.casing_mass_kg:g} kg is the default, a 25th of the body: levels of the sensor "
+            "go as its inverse, so that they compare states of one machine, and set no alarm in "
+            "m/s²; compsim calibrate finds it by a record"
+        )
+        yield Remark(key, text, "default")
 
 
 def _proportions(case: Case) -> Iterator[Remark]:

@@ -30,7 +30,7 @@ from compressor.cases import (
     CaseError,
     Sensor,
     outside_judged,
-    paper_stiffness_note,
+    paper_notes,
     points,
     stands_for,
     value_in,
@@ -69,7 +69,8 @@ def study_caveats(rows: Rows, study: StoredStudy) -> list[str]:
     """Return what to know of a study's finished jobs beside their numbers, a sentence each."""
     outside = (f"{key}: {text}" for key, text in _outside_of_study(study).items())
     return [
-        *run_caveats(rows, study), *_of_stiffness(rows, study), *outside, *_of_failures(rows, study)
+        *run_caveats(rows, study), *_of_paper_numbers(rows, study), *outside,
+        *_of_failures(rows, study),
     ]  # fmt: skip
 
 
@@ -144,8 +145,7 @@ def job_caveats(numbers: Mapping[str, Any], attributes: Mapping[str, Any]) -> li
         )
     if case.sensor and (text := case.sensor.report_clipping(clipped)):
         found.append(text)
-    if note := paper_stiffness_note(case):
-        found.append(f"contact.stiffness_N_per_mm15: {note}")
+    found += [f"{key}: {note}" for key, note in paper_notes(case).items()]
     return [*found, *(f"{key}: {text}" for key, text in outside_judged(case.values()).items())]
 
 
@@ -173,8 +173,8 @@ def _of_clipping(fractions: np.ndarray) -> Iterator[str]:
         )
 
 
-def _of_stiffness(rows: Rows, study: StoredStudy) -> list[str]:
-    """Return a sentence about the paper's contact stiffness at other pins, by a stored job's case.
+def _of_paper_numbers(rows: Rows, study: StoredStudy) -> list[str]:
+    """Return a sentence about each number of the paper's at other pins, by a stored job's case.
 
     Of the stored jobs a few are looked at, evenly over the study: a case takes a millisecond to
     read.
@@ -185,8 +185,8 @@ def _of_stiffness(rows: Rows, study: StoredStudy) -> list[str]:
     for position in positions[some].tolist():
         with contextlib.suppress(KeyError, CaseError):  # of another version of the program
             case = Case.from_attribute(rows.attributes(position)["case"])
-            if note := paper_stiffness_note(case):
-                return [f"contact.stiffness_N_per_mm15: {note}"]
+            if notes := paper_notes(case):
+                return [f"{key}: {note}" for key, note in notes.items()]
     return []
 
 

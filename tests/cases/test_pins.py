@@ -145,12 +145,12 @@ def test_what_is_wrong_with_one_bearing_is_told_of_it():
 
 @pytest.mark.parametrize("more", [{"contact": MATERIALS}, {"machine": {"speed_rpm": 400}}])
 def test_the_paper_s_pin_with_the_paper_s_stiffness_is_no_odd_one(more):
-    assert not [one for one in remarks(case(**more)) if one.kind == "default stiffness"]
+    assert not [one for one in remarks(case(**more)) if one.kind == "default"]
 
 
 def test_the_paper_s_stiffness_at_another_pin_is_told_with_that_of_the_pin():
     odd = case(machine={"pin_radius_mm": {"big_end": 10, "small_end": 35}})
-    (found,) = (one for one in remarks(odd) if one.kind == "default stiffness")
+    (found,) = (one for one in remarks(odd) if one.kind == "default")
     inside, discs = (
         contact_stiffness("steel", "steel", 0.035, 0.0352, internal) / 1000**1.5
         for internal in (True, False)
@@ -162,7 +162,7 @@ def test_the_paper_s_stiffness_at_another_pin_is_told_with_that_of_the_pin():
 
 def test_pins_that_differ_have_a_stiffness_each():
     odd = case(joint="both", machine={"pin_radius_mm": {"big_end": 60, "small_end": 35}})
-    (found,) = (one for one in remarks(odd) if one.kind == "default stiffness")
+    (found,) = (one for one in remarks(odd) if one.kind == "default")
     assert "for one of 60 mm in its bore" in found.message
     assert "for one of 35 mm in its bore" in found.message
 

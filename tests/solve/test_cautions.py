@@ -50,6 +50,48 @@ def test_what_is_odd(values, expected):
     assert expected in odd(**values)
 
 
+OILED = {"joint": "both", "clearance_mm": 0.1, "contact": {"materials": ["steel", "steel"]}}
+TWO_PINS = {"pin_radius_mm": {"big_end": 60, "small_end": 35}}
+LENGTHS = {"big_end": 70, "small_end": 20}
+
+
+@pytest.mark.parametrize(
+    ("values", "key", "words"),
+    [
+        (OILED | {"lubricant": {"viscosity_mPa_s": 48}, "machine": TWO_PINS},
+         "lubricant.bearing_length_mm", "20 mm is the default, for the paper's pin of 10 mm "
+         "radius, and yours has 60 and 35 mm: a film bears about as the cube of it"),
+        (OILED | {"lubricant": {"bearing_length_mm": LENGTHS}, "machine": TWO_PINS},
+         "lubricant.bearing_length_mm", "and yours has 35 mm"),
+        (OILED | {"wear": True, "machine": TWO_PINS}, "wear.bore_length_mm", "60 and 35 mm"),
+        ({"body": {"mass_kg": 9000}, "sensor": True}, "body.casing_mass_kg",
+         "360 kg is the default, a 25th of the body: levels of the sensor go as its inverse"),
+    ],
+)  # fmt: skip
+def test_a_default_that_decides_is_told_of_beside_what_is_given(values, key, words):
+    (told,) = (one for one in remarks(Case.from_values(values)) if one.key == key)
+    assert words in told.message
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        OILED | {"lubricant": True},
+        OILED | {"lubricant": {"bearing_length_mm": {"big_end": 70, "small_end": 50}},
+                 "machine": TWO_PINS},
+        {"machine": {"rod_mass_kg": 54, "rod_length_mm": 343}},
+        {"machine": {"rod_mass_kg": 54, "rod_length_mm": 343, "rod_centre_mm": 114,
+                     "rod_inertia_kg_m2": 0.9}},
+        {"body": True, "sensor": True},
+        {"body": {"mass_kg": 9000, "casing_mass_kg": 60}, "sensor": True},
+        {"body": {"mass_kg": 9000}},
+    ],
+)  # fmt: skip
+def test_what_is_given_or_goes_with_the_defaults_is_not_told_of(values):
+    keys = {"lubricant.bearing_length_mm", "machine.rod_inertia_kg_m2", "body.casing_mass_kg"}
+    assert not keys & {key for key, _ in odd(**values)}
+
+
 def test_what_is_not_run_is_not_odd():
     assert odd(solve={"max_steps": 1}) == []  # nothing is integrated
 
