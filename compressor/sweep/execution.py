@@ -6,6 +6,7 @@ a batch, which job was at work in a process that died or took too long, and what
 """
 
 import contextlib
+import copy
 import itertools
 import multiprocessing
 import operator
@@ -29,6 +30,7 @@ from typing import Any, NamedTuple
 
 from joblib import cpu_count
 from joblib.externals.loky import ProcessPoolExecutor
+from joblib.externals.loky.backend import get_context
 
 from compressor.program import THREAD_VARIABLES, CompsimError
 from compressor.reasons import Reason
@@ -300,11 +302,13 @@ class Local(Batches):
     """
 
     def __init__(self, work: Callable[[Any], Any], jobs: Iterable[Input], rules: Workers):
-        super().__init__(jobs, rules.target_seconds, rules.count)
-        self.rules = replace(rules, memory=rules.memory or memory_share(rules.count))
+        count = min(rules.count, operator.length_hint(jobs, 0) or rules.count)
+        super().__init__(jobs, rules.target_seconds, count)
+        self.rules = replace(rules, memory=rules.memory or memory_share(count))
         self.work = work
         self.files: dict[int, SharedFile] = {}  # of the batches that are out
         self.executor: ProcessPoolExecutor | None = None
+        self.sender = 0  # the thread that sends batches
         self.processes: dict[int, Any] = {}
         self.late: set[int] = set()  # processes that were killed for taking too long
         self.fruitless, self.last_news = 0, 0.0  # last_news: when a batch was last sent, or ended
@@ -329,14 +333,31 @@ class Local(Batches):
         environment["PYTHONFAULTHANDLER"] = ""  # or loky has a crash print where it was
         return ProcessPoolExecutor(
             1 if self.alone else self.width, timeout=IDLE_SECONDS, initializer=init_worker,
-            initargs=(self.work, self.rules, os.getpid()), env=environment,
+            initargs=(self.work, self.rules, os.getpid()), env=environment, context=self.context(),
         )  # fmt: skip
+
+    def context(self) -> Any:
+        """Return loky's context, which starts no process any more once the run is stopped.
+
+        loky starts all processes of a pool in one call, which a signal would have to wait for. Its
+        own thread, which replaces some, must not meet the exception.
+        """
+        context: Any = copy.copy(get_context("loky"))
+        make_process = context.Process
+
+        def make_unless_stopped(*arguments: Any, **named: Any) -> Any:
+            if self.stopped and threading.get_ident() == self.sender:
+                raise CancelledError
+            return make_process(*arguments, **named)
+
+        context.Process = make_unless_stopped
+        return context
 
     def submit(self, number: int, batch: list[Job]) -> "Future[Any]":
         self.executor = self.executor or self.start()
         data = pack_payloads(batch)
         self.files[number] = file = SharedFile()
-        self.last_news = time.monotonic()
+        self.last_news, self.sender = time.monotonic(), threading.get_ident()
         return self.executor.submit(do_batch, file.path, data, len(batch))
 
     def ends_of(self, number: int, problem: str) -> list[End]:
@@ -439,6 +460,9 @@ class Local(Batches):
             finally:
                 ended.set()
                 killer.join()
+            for child in children():  # those of a start that was cut short, for which loky cares not
+                kill([child.pid])
+                child.join()
         self.executor = None
 
     def discard(self) -> None:

@@ -19,6 +19,7 @@ import pytest
 from bad_jobs import LEAST, POISON, Many, named, sleep, work
 from joblib.externals.loky import process_executor
 from joblib.externals.loky.backend import resource_tracker as loky_tracker
+from joblib.externals.loky.backend.process import LokyProcess
 
 from compressor.sweep import execution
 from compressor.sweep.execution import WorkersFailed, drain, run_batches
@@ -95,6 +96,40 @@ def test_as_many_processes_as_were_asked_for():
     ends = results(run_batches(lambda _: (time.sleep(0.01), os.getpid())[1], jobs, Workers(2)))
     assert len({*ends.values()}) == 2
     assert os.getpid() not in ends.values()
+
+
+def test_no_more_processes_start_than_there_are_jobs():
+    started = []
+    ends = run_batches(work, named(range(2)), Workers(12), lambda: started.append(children()))
+    assert results(ends) == {0: 0, 1: 1}
+    loky_processes = {pid for pids in started for pid in pids}
+    assert len(loky_processes) <= 2 + 2  # with the trackers of Python and of loky
+
+
+def test_workers_share_the_memory_by_how_many_start(monkeypatch):
+    monkeypatch.setattr(execution, "memory_share", lambda count: 600 // count)
+    assert execution.Local(work, named(range(2)), Workers(300)).rules.memory == 300
+    assert execution.Local(work, named(range(9)), Workers(3)).rules.memory == 200
+    assert execution.Local(work, iter(range(9)), Workers(3)).width == 3
+    assert execution.Local(work, (n for n in range(9)), Workers(3)).width == 3  # no length
+
+
+def test_a_stop_does_not_wait_until_all_workers_have_started(monkeypatch):
+    """loky starts all processes of a pool in one call."""
+    local = execution.Local(sleep, named(range(100)), Workers(40, memory=LEAST))
+    started, start = [], LokyProcess.start
+
+    def start_and_stop(process):
+        start(process)
+        started.append(process)
+        local.stopped = len(started) >= 3  # as a signal would, meanwhile
+
+    monkeypatch.setattr(LokyProcess, "start", start_and_stop)
+    local.thread.submit(local.send).result()  # which blocks signals in its thread
+    local.stop()
+    local.discard()
+    assert len(started) == 3
+    assert not any(process.is_alive() for process in started)
 
 
 def test_no_jobs_need_no_workers():
