@@ -41,7 +41,8 @@ class Regime(StrEnum):
 
 # the one source of what a regime means, wherever one is shown
 REGIME_WORDS = {
-    Regime.PERIODIC: "repeats itself within its error bars",
+    Regime.PERIODIC: "repeats itself within its error bars, or within what accuracy promises where "
+    "auto waited for that",
     Regime.PREDICTABLE: "errors do not grow up to the run's end; not seen to repeat",
     Regime.CHAOTIC: "close motions part: averages hold, single peaks do not",
     Regime.UNDECIDED: "errors are large, and the search for chaos came to its limit",

@@ -240,11 +240,13 @@ AGREEMENTS = 2  # revolutions in a row, at least, that are to agree with earlier
 class Settling:
     """A case with numbers for its span, and what is known of where it settles.
 
-    `settled` (rev): nan where it was not looked for, or not found; `detail`: why it was not found.
+    `settled` (rev): nan where it was not looked for, or not found; `period` (rev): after which
+    metrics agree, nan where that is not known; `detail`: why it was not found.
     """
 
     case: Case
     settled: float = math.nan
+    period: float = math.nan
     detail: str = ""
 
 
@@ -254,9 +256,10 @@ def with_span(case: Case, search: HorizonSearch) -> Settling:
     Within the case's wall time.
     """
     if case.solve.settle_rev != "auto":
-        return Settling(with_settle_rev(case, float(case.solve.settle_rev), 1))
-    if is_ideal(case):
-        return Settling(with_settle_rev(case, 0.0, 1), 0.0)
+        given = with_settle_rev(case, float(case.solve.settle_rev), 1)
+        return Settling(given, period=1.0 if is_ideal(case) else math.nan)
+    if is_ideal(case):  # a function of the crank angle
+        return Settling(with_settle_rev(case, 0.0, 1), 0.0, 1.0)
     max_revolutions = int(case.duration / case.turn * (1 + 1e-12))
     p, within = record(case), least_promise(case)
 
@@ -272,9 +275,10 @@ def with_span(case: Case, search: HorizonSearch) -> Settling:
     if repetition is None:
         half = float(max_revolutions // 2)
         text = f"in {max_revolutions} revolutions no {AGREEMENTS + 1} agree within {within:.2g}"
-        return Settling(with_settle_rev(case, half, 1, float(max_revolutions)), math.nan, text)
+        longest = with_settle_rev(case, half, 1, float(max_revolutions))
+        return Settling(longest, detail=text)
     first, period = repetition
-    return Settling(with_settle_rev(case, float(first), period), float(first))
+    return Settling(with_settle_rev(case, float(first), period), float(first), float(period))
 
 
 def with_settle_rev(case: Case, settle: float, period: int, duration: float | None = None) -> Case:

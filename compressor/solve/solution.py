@@ -410,7 +410,7 @@ def solve(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Solution:
     if solution.horizon < case.duration:
         return chaotic_solution(case, solution, search)
     if case.wants_bars:
-        name_regime(case, solution, search)
+        name_regime(case, solution, search, settling.period)
     if settling.detail and not solution.reason:
         solution.reason, solution.detail = Reason.NOT_SETTLED, settling.detail
     return solution
@@ -441,18 +441,22 @@ def is_in_doubt(case: Case, solution: Solution) -> bool:
     )
 
 
-def name_regime(case: Case, solution: Solution, search: HorizonSearch) -> None:
-    """Set the regime of a motion that is not chaotic: predictable, periodic or undecided."""
-    if is_in_doubt(case, solution):
-        whole = search.horizon == math.inf
-        solution.regime = Regime.PREDICTABLE if whole else Regime.UNDECIDED
+def name_regime(case: Case, solution: Solution, search: HorizonSearch, period: float) -> None:
+    """Set the regime of a motion that is not chaotic: predictable, periodic or undecided.
+
+    period (rev): after which the metrics agree, where that is known; else nan.
+    """
+    in_doubt = is_in_doubt(case, solution)
+    if in_doubt and search.horizon != math.inf:
+        solution.regime = Regime.UNDECIDED
         return
-    solution.regime = Regime.PREDICTABLE
-    period, since = repeats(case, solution.samples, solution.series_errors)
-    if period:
-        solution.regime, solution.period = Regime.PERIODIC, float(period)
-        if math.isnan(solution.settled):
-            solution.settled = since
+    shortest, since = repeats(case, solution.samples, solution.series_errors)
+    if shortest and not in_doubt:
+        period = float(shortest)
+    solution.period = period
+    solution.regime = Regime.PREDICTABLE if math.isnan(period) else Regime.PERIODIC
+    if solution.regime == Regime.PERIODIC and math.isnan(solution.settled):
+        solution.settled = since if shortest else case.settle / case.turn
 
 
 def chaotic_solution(case: Case, solution: Solution, search: HorizonSearch) -> Solution:

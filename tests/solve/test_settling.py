@@ -9,8 +9,10 @@ from conftest import CHAOTIC
 from compressor.cases.case import Case, CaseError
 from compressor.cases.table import MAX_REV
 from compressor.metrics import METRICS
+from compressor.solve import solution
 from compressor.solve.regime import MEASURED_REV, agree, least_promise, steady
 from compressor.solve.simulate import measure, simulate
+from compressor.store.status import job_caveats
 
 PAPER = {"joint": "big_end", "clearance_mm": 0.2}
 AUTO = {"settle_rev": "auto", "duration_rev": "auto"}
@@ -66,6 +68,25 @@ def test_the_time_series_end_with_the_run():
 def test_the_ideal_machine_is_settled_at_once():
     found = measure(case({"joint": "none"}, **AUTO))
     assert found.status == "ok"
+    assert found.numbers["settled_rev"] == 0
+
+
+def test_what_has_settled_repeats_however_short_its_bars_are(monkeypatch):
+    """Bars may be much shorter than what settling waits for: no revolution agrees within them."""
+    monkeypatch.setattr(solution, "repeats", lambda *_: (None, math.nan))
+    found = measure(case(**AUTO))
+    assert (found.attributes["regime"], found.numbers["period_rev"]) == ("periodic", 1)
+    numbers = {name: found.numbers[name] for name in ("settled_rev", "clipped_fraction")}
+    assert numbers["settled_rev"] in (0, 1)
+    assert not job_caveats(numbers, found.attributes)
+    given = measure(case(settle_rev=1, duration_rev=4))
+    assert (given.status, given.attributes["regime"]) == ("ok", "predictable")
+
+
+@pytest.mark.parametrize("turns", [1, 2.5])
+def test_ideal_joints_repeat_in_a_run_of_any_length(turns):
+    found = measure(case({"joint": "none", "load": "gas"}, settle_rev=0, duration_rev=turns))
+    assert (found.attributes["regime"], found.numbers["period_rev"]) == ("periodic", 1)
     assert found.numbers["settled_rev"] == 0
 
 
