@@ -1,27 +1,23 @@
 """The oil film of a journal bearing under a load that moves: its forces, moments and loss.
 
-Holland's superposition: a part of the rotation and one of the squeeze, each by a Sommerfeld number
-of a bearing of finite length,
+The journal's motion enters Reynolds' equation by one velocity: with the eccentricity eps over the
+clearance, eps' along the line of centres and eps w / 2 across it, w = w_J + w_B - 2 delta', delta
+the angle of the line of centres. The film bears on the half of the bearing that this velocity
+presses on. Of a short bearing that force has a closed form (`short_film`). Of a bearing of finite
+length it is known in three directions,
 
-    F_D = So_D(eps) B D eta |w| / psi^2     at the angle beta behind the line of centres
-    F_V = So_V(eps) B D eta eps' / psi^2    along it
+    F_D = So_D(eps) B D eta |w| / psi^2   of rotation, at the angle beta behind the line of centres
+    F_V = So_V(eps) B D eta eps' / psi^2  of squeeze, along it; pulled apart: as of -eps
 
-with the eccentricity eps over the clearance, w = w_J + w_B - 2 delta', delta the angle of the line
-of centres, B and D length and diameter, psi the clearance over the radius. The film that is pulled
-apart is the other half, as of -eps.
+B and D length and diameter, psi the clearance over the radius. Between them it follows from the
+short bearing's direction (`film_numbers_at`), to some per cent of one Reynolds field
+(physics/README.md, Oil film). Holland's sum of F_D and F_V is no such thing: where a journal leaves
+the wall slowly it keeps the force of rotation, most of which the opening takes away.
 
 The numbers are Butenschoen's approximations (Das hydrodynamische, zylindrische Gleitlager
 endlicher Breite unter instationaerer Belastung, Karlsruhe 1976), which are some per cent off his
 tables, times polynomials that make them those of Reynolds' equation (`solve.bearing`), which his
-tables are.
-
-Where both parts act, |w| and |eps'| of the formulas along the line of centres are made smooth:
-
-    |w eps|  becomes  (w eps)^2 / sqrt((w eps)^2 + eps'^2)
-    |eps'|   becomes  eps'^2 / sqrt(eps'^2 + ((1 - eps) w eps)^2)
-
-which is nearer to one Reynolds field than the sum is (physics/README.md, Oil film); of a film that
-only turns, or is only squeezed, the numbers are exact.
+tables are. They are the short bearing's times what its open ends take away.
 
 Below `CENTRE_ECCENTRICITY` the numbers go to those that make the centre smooth: a force against
 the velocity.
@@ -67,20 +63,31 @@ def end_factor(eps, b):
 
 
 @jit
+def short_rotation(eps):
+    """Return `rotation_shape` of a short bearing, over (B / D)^2."""
+    room = 1.0 - eps * eps
+    return math.sqrt(math.pi * math.pi * room + 16.0 * eps * eps) / (2.0 * room * room)
+
+
+@jit
+def short_squeeze(eps):
+    """Return `squeeze_shape` of a short bearing, over (B / D)^2."""
+    room = 1.0 - eps * eps
+    half = (0.5 * math.pi - 0.5 * math.acos(eps)) * (1.0 + 2.0 * eps * eps)
+    shape = half + 1.5 * eps * math.sqrt(room)
+    return 4.0 * shape / (room * room * math.sqrt(room))
+
+
+@jit
 def rotation_shape(eps, b):
     """Return the Sommerfeld number of the rotation over eps, which stays finite at the centre."""
-    room = 1.0 - eps * eps
-    size = math.sqrt(math.pi * math.pi * room + 16.0 * eps * eps)
-    return size / (2.0 * room * room) * end_factor(eps, b)
+    return short_rotation(eps) * end_factor(eps, b)
 
 
 @jit
 def squeeze_shape(eps, b):
     """Return the Sommerfeld number of the squeeze; eps negative: of a film that is pulled apart."""
-    room = 1.0 - eps * eps
-    half = (0.5 * math.pi - 0.5 * math.acos(eps)) * (1.0 + 2.0 * eps * eps)
-    shape = half + 1.5 * eps * math.sqrt(room)
-    return 4.0 * shape / (room * room * math.sqrt(room)) * end_factor(eps, b)
+    return short_squeeze(eps) * end_factor(eps, b)
 
 
 @jit
@@ -151,6 +158,65 @@ def bounded_eccentricity(eps, share):
 
 
 @jit
+def short_film(eps, wedge, closing):
+    """Return the force of a short bearing along the line of centres and across, over (B / D)^2.
+
+    Away from the wall and along the rotation, as `solve.bearing.Reynolds`; wedge: eps w, closing:
+    eps', over one speed. Half of the bearing bears, from an angle `begin` on, from the widest
+    gap: there the integrals of sin^2, sin cos and cos^2 over h^3 have a closed form (Booker 1965),
+    written so that nothing cancels at the centre.
+    """
+    speed = math.sqrt(closing * closing + 0.25 * wedge * wedge)
+    if not speed > 0.0:
+        return 0.0, 0.0
+    sin_begin, cos_begin = closing / speed, 0.5 * wedge / speed
+    x = eps * cos_begin
+    room, ends = 1.0 - eps * eps, 1.0 - x * x
+    root = math.sqrt(room)
+    angle = math.pi + math.atan2(2.0 * eps * root * sin_begin, 1.0 - 2.0 * eps * eps + x * x)
+    first = angle / root  # integral of 1 / h
+    second = (first + 2.0 * eps * sin_begin / ends) / room  # of 1 / h^2
+    third = 3.0 * second - first + 2.0 * eps * sin_begin * (1.0 + x * x) / (ends * ends)
+    third *= 0.5 / room  # of 1 / h^3
+    sines = 0.5 * second - 2.0 * eps * cos_begin * cos_begin * sin_begin / (ends * ends)
+    mixed = -2.0 * eps * cos_begin**3 / (ends * ends)
+    cosines = third - sines
+    return 2.0 * closing * cosines - wedge * mixed, wedge * sines - 2.0 * closing * mixed
+
+
+@jit
+def film_numbers_at(eps, wedge, closing, b, constants):
+    """Return the numbers of `short_film` of a bearing of finite length, with the factor (B / D)^2.
+
+    The short bearing's force at the angle psi from the line of centres is turned to beta, with
+    tan(beta / 2) in proportion to tan(psi / 2), and enlarged by a factor that is a line in cos(psi)
+    between the pressed film's and that of the one pulled apart; what the film that only turns has
+    more is added about its own direction. In these three directions the numbers are exact.
+    """
+    normal, across = short_film(eps, wedge, closing)
+    size = math.sqrt(normal * normal + across * across)
+    if not size > 0.0:
+        return 0.0, 0.0
+    cosine, sine = normal / size, across / size
+    pressed = squeeze_number(eps, b, constants) / short_squeeze(eps)
+    pulled = squeeze_number(-eps, b, constants) / short_squeeze(-eps)
+    turned = rotation_number(eps, b, constants) / short_rotation(eps)
+    middle, slope = 0.5 * (pressed + pulled), 0.5 * (pressed - pulled)
+    # the direction of a short bearing that turns: Ocvirk's attitude
+    wide, far = math.pi * math.sqrt(1.0 - eps * eps), 4.0 * eps
+    length = math.sqrt(wide * wide + far * far)
+    ocvirk = far / length
+    from_pressed = (1.0 - cosine) / (1.0 - ocvirk)
+    near = 2.0 * from_pressed / (1.0 + from_pressed * from_pressed)
+    near *= (1.0 + cosine) / (1.0 + ocvirk)
+    size *= middle + slope * cosine + (turned - middle - slope * ocvirk) * near
+    further = math.tan(0.5 * attitude(eps, b, constants)) * (length + far) / wide
+    towards, away = 1.0 + cosine, further * further * (1.0 - cosine)
+    size /= towards + away
+    return size * (towards - away), size * 2.0 * further * sine
+
+
+@jit
 def film(joint, eccentricity, spins, p):
     """Return the force on the journal x, y (N), both moments (N m), and the power lost (W).
 
@@ -171,20 +237,8 @@ def film(joint, eccentricity, spins, p):
     journal_spin, bore_spin = spins
     per_distance = eps / distance if distance > 0.0 else 1.0 / clearance
     wedge = eps * (journal_spin + bore_spin) - 2.0 * across * per_distance  # eps w
-    rotation = size * rotation_number(eps, ratio, constants)
-    beta = attitude(eps, ratio, constants)
-    # speeds along and across the line of centres, each smooth where the other one is not zero
-    closing = radial / clearance
-    speed = math.sqrt(wedge * wedge + closing * closing)
-    turning = wedge * wedge / speed if speed > 0.0 else 0.0
-    # sharper near the wall, where a film that is pulled apart has next to nothing of a pressed one
-    sharp = math.sqrt(closing * closing + ((1.0 - eps) * wedge) ** 2)
-    pressing = closing * closing / sharp if sharp > 0.0 else 0.0
-    pressed = size * squeeze_number(eps, ratio, constants)
-    pulled = size * squeeze_number(-eps, ratio, constants)
-    normal = -rotation * turning * math.cos(beta)
-    normal -= 0.5 * (pressed + pulled) * closing + 0.5 * (pressed - pulled) * pressing
-    side = rotation * wedge * math.sin(beta)
+    away, along = film_numbers_at(eps, wedge, radial / clearance, ratio, constants)
+    normal, side = -size * away, size * along
     fx, fy = normal * nx - side * ny, normal * ny + side * nx
     shear = 2.0 * math.pi * p.viscosity * length * pin**3
     shear *= (journal_spin - bore_spin) / (clearance * math.sqrt(1.0 - eps * eps))
