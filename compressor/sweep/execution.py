@@ -460,7 +460,7 @@ class Local(Batches):
             finally:
                 ended.set()
                 killer.join()
-            for child in children():  # those of a start that was cut short, for which loky cares not
+            for child in children():  # of a start that was cut short, which loky forgets
                 kill([child.pid])
                 child.join()
         self.executor = None
