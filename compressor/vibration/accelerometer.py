@@ -32,7 +32,7 @@ class Record:
 
     `tacho`: times (s) at which the crank passes top dead centre, within the record; `clipped`: the
     share of samples beyond the range; `turns`: revolutions of the crank at the samples,
-    (n,), empty where they are not known.
+    (n,), empty where they are not known; `remarks`: how a file was read.
     """
 
     times: np.ndarray
@@ -40,6 +40,12 @@ class Record:
     tacho: np.ndarray
     clipped: float
     turns: np.ndarray = field(default_factory=lambda: np.empty(0))
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def rate(self) -> float:
+        """Return the samples a second, Hz, of the whole record: two stamps alone lose digits."""
+        return float((len(self.times) - 1) / (self.times[-1] - self.times[0]))
 
 
 def analogue_rate(body: Body, sensor: Sensor) -> float:

@@ -5,21 +5,21 @@ channels is read; what it does not say, such as the unit of a WAV file, is never
 UFF needs pyuff, which `pip install 'compsim[records]'` brings.
 """
 
-import contextlib
-import csv
 import io
 import math
 import re
 import tempfile
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from compressor.cases import open_text_table
 from compressor.program import PROGRAM, CompsimError
+from compressor.vibration.wav_file import WavError, read_wav
 
 TIME, VALUE, TACHO = RECORD_HEADER = ("time_s", "acceleration_m_per_s2", "tacho")
 HEADER = ",".join(RECORD_HEADER)
@@ -28,7 +28,11 @@ UNITS = {  # in m/s2; g is the standard acceleration (SI brochure), the inch and
     "m/s2": 1.0, "mm/s2": 1e-3, "g": 9.80665, "in/s2": 0.0254, "ft/s2": 0.3048,
 }  # fmt: skip
 SPELLINGS = (("_per_", "/"), ("²", "2"), ("^", ""), ("**", ""), ("sec", "s"), (" ", ""))
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}  # in s
 ACCELERATION = re.compile(r"acceleration_(\w+)")  # a column's name, with its unit
+TITLE = re.compile(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*|time_(m?s|us)", re.IGNORECASE)  # and its unit
+TIME_WORDS, TACHO_WORDS = {"time", "t", "zeit"}, {"tacho", "tach", "keyphasor", "keyphaser"}
+LAYOUT = "--separator, --decimal and --skip-lines say otherwise"
 TIME_RESPONSE, IS_ACCELERATION, IS_TIME = 1, 12, 17  # numbers of the universal file format 58
 NO_UFF = "pyuff is not installed; get it by pip install 'compsim[records]'"
 
@@ -57,7 +61,9 @@ class RecordFile:
 
     read: returns the samples of channels by their numbers, from 0, (m,) each; clocks: first time
     and step (s) of each channel, () where the file has times as a channel, or none; first_line: of
-    the samples in a file of text, else 0; is_integer: whether samples are shares of a full scale.
+    the samples in a file of text, else 0; is_integer: whether samples are shares of a full scale;
+    rate: Hz, which the file says beside its times, nan where it does not; layout: how a text was
+    read; unused: what else the file has, and why it is no signal.
     """
 
     path: Path
@@ -66,6 +72,17 @@ class RecordFile:
     clocks: tuple[tuple[float, float], ...] = ()
     first_line: int = 0
     is_integer: bool = False
+    rate: float = math.nan
+    layout: str = ""
+    unused: tuple[str, ...] = ()
+
+    @property
+    def content(self) -> str:
+        """Return what the file has, for an error that something is missing."""
+        found = ", ".join(one.name for one in self.channels)
+        found = f"only {found}" if found else "no signals"
+        left = f"; beside them {'; '.join(self.unused)}" if self.unused else ""
+        return f"{found}{left}" + (f" ({self.layout}; {LAYOUT})" if self.layout else "")
 
     def place(self, number: int, sample: int) -> str:
         """Return where a sample of a channel stands, for an error; both from 0."""
@@ -82,15 +99,42 @@ def unit_name(text: str) -> str:
     return found if found in UNITS else ""
 
 
+def time_unit_name(text: str) -> str:
+    """Return the name in `TIME_UNITS` of a unit as it is written; "" of an unknown one."""
+    found = text.strip().lower().replace("µ", "u").replace("μ", "u")
+    found = {"sec": "s", "seconds": "s", "msec": "ms"}.get(found, found)
+    return found if found in TIME_UNITS else ""
+
+
 def named_channel(name: str) -> Channel:
-    """Return a channel whose name alone says what it is, as in CSV and MAT files."""
+    """Return a channel whose name alone says what it is: our names, in CSV and MAT files."""
     if found := ACCELERATION.fullmatch(name):
         return Channel(name, "acceleration", found[1])
-    return Channel(name, {TIME: "time", TACHO: "tacho"}.get(name, ""))
+    return Channel(name, {TIME: "time", TACHO: "tacho"}.get(name, ""), "s" if name == TIME else "")
 
 
-def open_record_file(path: Path) -> RecordFile:
-    """Return what the file of a record has. Raises RecordError where it cannot be read."""
+def titled_channel(name: str) -> Channel:
+    """Return a channel by the title of a column, such as `Time [ms]`, `Acc (g)`, `Keyphasor`."""
+    ours = named_channel(name)
+    if ours.kind:
+        return ours
+    found = TITLE.fullmatch(name)
+    word, unit = name.strip().lower(), ""
+    if found:
+        word, unit = ("time", found[3]) if found[3] else (found[1].strip().lower(), found[2])
+    if word in TIME_WORDS:
+        return Channel(name, "time", unit)
+    if word in TACHO_WORDS:
+        return Channel(name, "tacho", unit)
+    is_acceleration = unit_name(unit) or word in ("acc", "accel", "acceleration")
+    return Channel(name, "acceleration" if is_acceleration else "", unit)
+
+
+def open_record_file(path: Path, **layout: Any) -> RecordFile:
+    """Return what the file of a record has. Raises RecordError where it cannot be read.
+
+    layout: separator, decimal and skip_lines of a file of text, where they are told.
+    """
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         known = ", ".join(dict.fromkeys(filter(None, READERS)))
@@ -98,77 +142,51 @@ def open_record_file(path: Path) -> RecordFile:
     try:
         with path.open("rb"):
             pass
+        if reader is _open_csv:
+            return _open_csv(path, **layout)
+        if layout:
+            options = ", ".join(f"--{name.replace('_', '-')}" for name in layout)
+            raise RecordError(f"{path}: is no file of text: leave {options} out")
         return reader(path)
     except OSError as error:
         remedy = f"give a CSV file with the columns {HEADER}, or a job's key"
         raise RecordError(f"{path}: cannot be read: {error.strerror or error}; {remedy}") from error
 
 
-@contextlib.contextmanager
-def naming_no_csv(path: Path) -> Any:
-    """Raise RecordError where the text of a file is no CSV."""
+def _open_csv(path: Path, **layout: Any) -> RecordFile:
+    """Return what a text has: columns by their titles, or by numbers from 1 without a header."""
     try:
-        yield
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise RecordError(f"{path}: is no CSV file in UTF-8: {error}") from error
+        table = open_text_table(path, **layout)
+    except CompsimError as error:
+        raise RecordError(f"{error} ({LAYOUT})") from error
 
+    def read(numbers: Sequence[int]) -> list[np.ndarray]:
+        try:
+            return [np.array(column) for column in table.read_columns(numbers)[1]]
+        except CompsimError as error:
+            raise RecordError(str(error)) from error
 
-def _open_csv(path: Path) -> RecordFile:
-    with naming_no_csv(path), path.open(encoding="utf-8-sig", newline="") as file:
-        names = [name.strip() for name in next(csv.reader(file), [])]
-    channels = tuple(map(named_channel, names))
-    return RecordFile(path, channels, lambda numbers: _csv_columns(path, names, numbers), (), 2)
-
-
-def _csv_columns(path: Path, names: list[str], numbers: Sequence[int]) -> list[np.ndarray]:
-    """Return columns of a CSV file by their numbers; lines at the end may lack them."""
-    found: dict[int, list[float]] = {number: [] for number in numbers}
-    with naming_no_csv(path), path.open(encoding="utf-8-sig", newline="") as file:
-        lines = csv.reader(file)
-        next(lines, None)
-        blank = 0  # the first line without these cells: beyond the end of the record
-        for cells in lines:
-            texts = {at: "".join(cells[at : at + 1]) for at in found}
-            if not "".join(texts.values()).strip():
-                blank = blank or lines.line_num
-                continue
-            if blank:
-                problem = "the cells are empty, and the record goes on below"
-                raise RecordError(f"{path}:{blank}: {problem}; cut it, or fill the gap")
-            for at, text in texts.items():
-                found[at].append(_number(text, f"{path}:{lines.line_num}:{at + 1}: {names[at]}"))
-    return [np.array(found[number]) for number in numbers]
-
-
-def _number(text: str, where: str) -> float:
-    """Return a cell as a finite number. Raises RecordError."""
-    try:
-        value = float(text)
-    except ValueError:
-        remedy = "write numbers with a decimal point, and leave no cell empty"
-        raise RecordError(f"{where}: {text!r} is no number; {remedy}") from None
-    if not math.isfinite(value):
-        raise RecordError(f"{where}: {text!r} is not finite; cut the record, or fill the gap")
-    return value
+    pairs = list(zip(table.names, table.numeric, strict=True))
+    ours = {named_channel(name).kind for name in table.names}  # before other titles
+    channels = []
+    for name, is_number in pairs:
+        one = titled_channel(name) if is_number else Channel(name)
+        if one.kind in ours and not named_channel(name).kind:
+            one = Channel(name, "", one.unit)
+        channels.append(one)
+    words = tuple(f"{name} (no numbers)" for name, is_number in pairs if not is_number)
+    first = table.rows[0][0]
+    return RecordFile(
+        path, tuple(channels), read, (), first, layout=table.layout, unused=words
+    )  # fmt: skip
 
 
 def _open_wav(path: Path) -> RecordFile:
     """Return what a WAV file has: channels by number, integers as shares of the full scale."""
-    from scipy.io import wavfile
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", wavfile.WavFileWarning)  # of chunks that SciPy leaves out
-        warnings.filterwarnings("error", "Reached EOF", wavfile.WavFileWarning)
-        try:
-            rate, samples = wavfile.read(path)
-        except Exception as error:  # of many kinds, where a file is cut or of something else
-            raise RecordError(f"{path}: is no WAV file that can be read: {error}") from error
-    columns = samples.reshape(len(samples), -1).T
-    is_integer = samples.dtype.kind != "f"
-    if samples.dtype == np.uint8:  # the one format without a sign
-        columns = (columns - 128.0) / 128.0
-    elif is_integer:
-        columns = columns / -float(np.iinfo(samples.dtype).min)
+    try:
+        rate, columns, is_integer = read_wav(path.read_bytes())
+    except WavError as error:
+        raise RecordError(f"{path}: is no WAV file that can be read: {error}") from error
     # of several channels nothing says which is the accelerometer
     only = "acceleration" if len(columns) == 1 else ""
     channels = tuple(Channel(str(number), only) for number in range(1, len(columns) + 1))
@@ -190,22 +208,52 @@ def _open_mat(path: Path) -> RecordFile:
     except Exception as error:  # of many kinds, where a file is cut or of something else
         raise RecordError(f"{path}: is no MAT file that can be read: {error}") from error
     found: dict[str, np.ndarray] = {}
-    step = math.nan
+    unused, rate = [], math.nan
     for name, array in whole.items():
-        if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiub" or array.ndim != 2:
+        if name.startswith("__"):
             continue
-        if name == RATE and array.size == 1 and float(array.item()) > 0.0:
-            step = 1.0 / float(array.item())
-        elif 1 in array.shape and array.size > 1:
+        if why := _why_no_signal(array):
+            unused.append(f"{name} ({why})")
+        elif name == RATE and array.size == 1:
+            rate = float(array.item())
+            if not (math.isfinite(rate) and rate > 0.0):
+                raise RecordError(f"{path}: {RATE} is {rate:g}: save a finite rate above 0")
+        elif array.size <= 1:
+            unused.append(f"{name} ({array.size} numbers)")
+        elif 1 in array.shape:
             found[name] = array.ravel().astype(float)
-        elif array.size > 1:
+        else:
             found |= {
                 f"{name}(:,{k + 1})": column.astype(float) for k, column in enumerate(array.T)
             }
-    arrays = list(found.values())
-    clocks = () if math.isnan(step) else ((0.0, step),) * len(arrays)
-    channels = tuple(map(named_channel, found))
-    return RecordFile(path, channels, lambda numbers: [arrays[at] for at in numbers], clocks)
+    arrays, channels = list(found.values()), tuple(map(named_channel, found))
+    has_times = any(one.kind == "time" for one in channels)
+    is_clock = not (math.isnan(rate) or has_times)
+    return RecordFile(
+        path, channels, lambda numbers: [arrays[at] for at in numbers],
+        ((0.0, 1.0 / rate),) * len(arrays) if is_clock else (), rate=rate, unused=tuple(unused),
+    )  # fmt: skip
+
+
+def _why_no_signal(array: Any) -> str:
+    """Return why a variable of a MAT file is no signal; "" of arrays of real numbers."""
+    kind = array.dtype.kind if isinstance(array, np.ndarray) else "?"
+    if kind in "fiub":
+        return "" if array.ndim == 2 else f"{array.ndim} dimensions"
+    if kind == "V":
+        return f"a struct with {', '.join(array.dtype.names or ('no fields',))}: save its arrays"
+    words = {"O": "a cell array or table: save its arrays", "c": "complex numbers", "U": "text"}
+    return words.get(kind, "no array of numbers")
+
+
+FUNCTIONS = {  # of data sets 58
+    0: "general or unknown", 1: "time response", 2: "auto spectrum", 3: "cross spectrum",
+    4: "frequency response", 5: "transmissibility", 6: "coherence", 7: "auto correlation",
+    8: "cross correlation", 9: "power spectral density", 10: "energy spectral density",
+    12: "spectrum",
+}  # fmt: skip
+END = re.compile(rb"    -1[ \t]*(?=[\r\n]|\Z)")  # of a data set, and its begin
+FORTRAN = re.compile(rb"(?<=\d)[dD](?=[+-]\d\d)")  # an exponent of double precision
 
 
 def _open_uff(path: Path) -> RecordFile:
@@ -214,20 +262,56 @@ def _open_uff(path: Path) -> RecordFile:
         import pyuff
     except ImportError as error:
         raise RecordError(f"{path}: {NO_UFF}") from error
+    data = path.read_bytes()
+    if len(END.findall(data)) % 2:
+        raise RecordError(
+            f"{path}: is no universal file that can be read: its last data set has no end, a line "
+            "with -1 in columns 5 and 6: the file is cut"
+        )
+    data = END.sub(b"    -1", data)  # pyuff does not see a mark with blanks behind it
+    if b"    58b" not in data:
+        data = FORTRAN.sub(b"e", data)
+    found, unused = [], []
     try:
-        file = pyuff.UFF(str(path))
-        numbers = [n for n, kind in enumerate(file.get_set_types()) if kind == 58]
-        sets = [file.read_sets(number) for number in numbers]
+        with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+            warnings.simplefilter("ignore", np.exceptions.ComplexWarning)
+            plain = Path(folder) / "record.uff"
+            plain.write_bytes(data)
+            file = pyuff.UFF(str(plain))
+            kinds = file.get_set_types()
+            for number, kind in enumerate(kinds):
+                if kind != 58:
+                    unused.append(f"data set {number + 1} (type {kind:g}, not 58)")
+                    continue
+                one = file.read_sets(number)
+                why = _why_no_response(one)
+                if why:
+                    unused.append(f"data set {number + 1} ({why})")
+                else:
+                    found.append(one)
     except Exception as error:  # pyuff raises no other
         raise RecordError(f"{path}: is no universal file that can be read: {error}") from error
-    sets = [one for one in sets if one["func_type"] == TIME_RESPONSE and one["abscissa_spacing"]]
-    channels = tuple(_uff_channel(one, number) for number, one in enumerate(sets, 1))
-    clocks = tuple((float(one["abscissa_min"]), float(one["abscissa_inc"])) for one in sets)
+    channels = tuple(_uff_channel(one, number) for number, one in enumerate(found, 1))
+    clocks = tuple((float(one["abscissa_min"]), float(one["abscissa_inc"])) for one in found)
 
     def read(numbers: Sequence[int]) -> list[np.ndarray]:
-        return [np.asarray(sets[at]["data"], float) for at in numbers]
+        return [np.asarray(found[at]["data"], float) for at in numbers]
 
-    return RecordFile(path, channels, read, clocks)
+    return RecordFile(path, channels, read, clocks, unused=tuple(unused))
+
+
+def _why_no_response(one: dict[str, Any]) -> str:
+    """Return why a data set 58 is no time response with even steps; "" where it is."""
+    kind = int(one["func_type"])
+    if kind != TIME_RESPONSE:
+        return f"function type {kind}, {FUNCTIONS.get(kind, 'unknown')}, not a time response"
+    if not one["abscissa_spacing"]:
+        return "uneven steps: write it with even ones"
+    if int(one["ord_data_type"]) > 4:
+        return "complex numbers, not a real time response"
+    if len(one["data"]) < one["num_pts"]:
+        return f"cut: {len(one['data'])} of {one['num_pts']} samples"
+    return ""
 
 
 def _uff_channel(one: dict[str, Any], number: int) -> Channel:
@@ -241,7 +325,7 @@ def _uff_channel(one: dict[str, Any], number: int) -> Channel:
     return Channel(name or str(number), kind, unit)
 
 
-READERS: dict[str, Callable[[Path], RecordFile]] = {
+READERS: dict[str, Callable[..., RecordFile]] = {
     "": _open_csv, ".csv": _open_csv, ".txt": _open_csv, ".wav": _open_wav, ".mat": _open_mat,
     ".uff": _open_uff, ".unv": _open_uff,
 }  # fmt: skip
@@ -331,8 +415,3 @@ def _step(columns: Columns) -> float:
 ENCODERS: dict[str, Callable[[Columns], bytes]] = {
     ".wav": _encode_wav, ".mat": _encode_mat, ".uff": _encode_uff,
 }  # fmt: skip
-
-
-def channel_names(channels: Iterable[Channel]) -> str:
-    """Return the names of channels for an error."""
-    return ", ".join(one.name for one in channels) or "nothing"

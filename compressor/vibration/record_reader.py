@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from compressor.program import did_you_mean
 from compressor.vibration.accelerometer import Record
@@ -13,18 +14,21 @@ from compressor.vibration.record_files import (
     HEADER,
     TACHO,
     TIME,
+    TIME_UNITS,
     UNITS,
     VALUE,
     RecordError,
     RecordFile,
-    channel_names,
     open_record_file,
+    time_unit_name,
     unit_name,
 )
 from compressor.vibration.spectra import smooth_pulses
 
 MIN_REVOLUTIONS = 2  # whole revolutions of a record
 UNEVEN = 0.1  # of a time step, by which a step may differ from the mean one
+PLAIN = "separator comma, decimal point, header in line 1,"  # as our own files are
+SAME_RATE = 1e-4  # share by which times and a rate beside them may differ
 LOW, MIDDLE, HIGH = 0.25, 0.5, 0.75  # of a tacho's range: what lies between is no new level
 MAX_PULSE_RATIO = 1.5  # longest over shortest time between pulses, beyond which one was missed
 SAME_STEP = 1e-9  # share by which two channels' time steps may differ
@@ -34,30 +38,47 @@ SAME_STEP = 1e-9  # share by which two channels' time steps may differ
 class RecordHints:
     """What a file does not say of its record, or says wrong.
 
-    channel, tacho: names or numbers (from 1) of channels; unit: one of `UNITS`, in place of what
-    the file says; rate: Hz, of a file without times; full_scale: of whole numbers, in the unit;
-    tacho_deg: crank angle at which the tacho rises. rpm, tdc: a steady speed and a time (s) of top
-    dead centre, both in place of a tacho.
+    channel, tacho, time: names or numbers (from 1) of channels; unit: one of `UNITS`, in place of
+    what the file says, and time_unit one of `TIME_UNITS`; separator, decimal, skip_lines: of a file
+    of text, as `open_text_table` has them; rate: Hz, of a file without times; full_scale: of whole
+    numbers, in the unit; tacho_deg: crank angle at which the tacho rises. rpm, tdc: a steady speed
+    and a time (s) of top dead centre, both in place of a tacho.
     """
 
     channel: str = ""
     tacho: str = ""
+    time: str = ""
     unit: str = ""
+    time_unit: str = ""
+    separator: str = ""
+    decimal: str = ""
+    skip_lines: int | None = None
     rate: float | None = None
     full_scale: float | None = None
     tacho_deg: float = 0.0
     rpm: float | None = None
     tdc: float | None = None
 
-    def pulses(self, times: np.ndarray) -> np.ndarray:
-        """Return the times of top dead centre within a record at the steady speed, (k,)."""
+    @property
+    def layout(self) -> dict[str, Any]:
+        """Return what is told of a file of text, by the names of `open_text_table`."""
+        found = {"separator": self.separator, "decimal": self.decimal}
+        told: dict[str, Any] = {name: value for name, value in found.items() if value}
+        return told | ({} if self.skip_lines is None else {"skip_lines": self.skip_lines})
+
+    def pulses(self, start: float, length: float) -> np.ndarray:
+        """Return the times of top dead centre in a record at the steady speed, s, from its begin.
+
+        start: the first sample's time, by which `tdc` counts; length: of the record.
+        """
         rpm, tdc = (math.nan if one is None else one for one in (self.rpm, self.tdc))
         if not (math.isfinite(rpm) and rpm > 0.0 and math.isfinite(tdc)):
             text = f"a speed of {rpm:g} rpm with top dead centre at {tdc:g} s"
             raise RecordError(f"{text}: give a finite speed above 0, and a finite time")
         turn = 60.0 / rpm
-        first, last = (times[[0, -1]] - tdc) / turn
-        return tdc + turn * np.arange(math.ceil(first), math.floor(last) + 1)
+        first = math.ceil((start - tdc) / turn)
+        last = math.floor((start - tdc + length) / turn)
+        return tdc - start + turn * np.arange(first, last + 1)
 
 
 def read_record(path: str | Path, **known: Any) -> Record:
@@ -75,28 +96,48 @@ def read_record(path: str | Path, **known: Any) -> Record:
     or irregular.
     """
     path, hints = Path(path), RecordHints(**known)
-    file = open_record_file(path)
+    file = open_record_file(path, **hints.layout)
     value, clock = _value_channel(file, hints), _time_channel(file, hints)
     tacho = _tacho_channel(file, hints)
     wanted = [number for number in dict.fromkeys((value, tacho, clock)) if number is not None]
     columns = dict(zip(wanted, file.read(wanted), strict=True))
     _check_columns(file, columns)
-    size = columns[value].size
-    times = (
-        _times(file, hints, value, size) if clock is None else _even(file, clock, columns[clock])
-    )
+    remarks = []
+    if file.layout and not file.layout.startswith(PLAIN):
+        parts = {"times": clock, "acceleration": value, "tacho": tacho}
+        named = [f"{what} {file.channels[n].name}" for what, n in parts.items() if n is not None]
+        remarks.append(f"{path}: {file.layout}; {', '.join(named)}")
+    start, times, stamps = _times(file, hints, value, columns, clock)
     values = columns[value] * _scale(file, hints, value)
+    if stamps is not None:
+        values = CubicSpline(stamps, values)(times)
+        steps, step = np.diff(stamps), times[1]
+        remarks.append(
+            f"{file.channels[clock or 0].name}: steps of {steps.min() / step:.3g} to "
+            f"{steps.max() / step:.3g} times the mean one, up to {np.abs(stamps - times).max():.2g}"
+            " s off equal ones: samples are put on equal steps by their own times"
+        )
     if tacho is None:
-        pulses = hints.pulses(times)
+        pulses = hints.pulses(start, times[-1])
     else:
         what = f"{path}: {file.channels[tacho].name}"
-        pulses, within = _pulses(what, times, columns[tacho])
+        pulses, within = _pulses(what, times if stamps is None else stamps, columns[tacho])
         if len(pulses) > MIN_REVOLUTIONS:
             pulses = _shift(smooth_pulses(pulses, within), hints.tacho_deg, times)
+            pulses = pulses[pulses > times[0] - times[1]]
+        if not hints.tacho_deg and (name := file.channels[tacho].name).lower() != TACHO:
+            remarks.append(
+                f"{name}: its rise counts as top dead centre; --tacho-deg says its angle"
+            )
     if len(pulses) <= MIN_REVOLUTIONS:
         found = f"{len(pulses)} passes of top dead centre in {times[-1] - times[0]:g} s"
         raise RecordError(f"{path}: {found}: at least {MIN_REVOLUTIONS + 1}; record for longer")
-    return Record(times, values, pulses, math.nan)
+    return Record(times, values, pulses, math.nan, remarks=tuple(remarks))
+
+
+def names_of(file: RecordFile) -> str:
+    """Return the names of a file's channels."""
+    return ", ".join(one.name for one in file.channels) or "no signals"
 
 
 def _pick(file: RecordFile, word: str, option: str) -> int:
@@ -107,7 +148,7 @@ def _pick(file: RecordFile, word: str, option: str) -> int:
     if word.isascii() and word.isdigit() and 1 <= int(word) <= len(names):
         return int(word) - 1
     problem = f"{names.count(word)} channels" if word in names else "no channel"
-    near = did_you_mean(word, names) or f"there are {channel_names(file.channels)}"
+    near = did_you_mean(word, names) or f"there are {names_of(file)}"
     text = f"{file.path}: {option} {word}: {problem} of this name"
     raise RecordError(f"{text}; {near}; or give its number, 1 to {len(names)}")
 
@@ -119,25 +160,28 @@ def _value_channel(file: RecordFile, hints: RecordHints) -> int:
     found = [n for n, one in enumerate(file.channels) if one.kind == "acceleration"]
     if len(found) == 1:
         return found[0]
-    has = channel_names(file.channels)
-    where = f"{file.path}:1" if file.first_line else f"{file.path}"
+    has = file.content
     if not found:
         remedy = "name the channel by --channel and --unit"
         if file.first_line:
-            remedy = f"begin the file with the line {HEADER}, or {remedy}"
-        raise RecordError(f"{where}: no column {VALUE}, only {has}; {remedy}")
-    raise RecordError(f"{where}: {len(found)} accelerations among {has}; choose one by --channel")
+            remedy = f"write {HEADER} as titles of columns, or {remedy}"
+        raise RecordError(f"{file.path}: no column {VALUE}, {has}; {remedy}")
+    names = ", ".join(file.channels[n].name for n in found)
+    raise RecordError(f"{file.path}: {len(found)} accelerations, {names}; choose one by --channel")
 
 
 def _time_channel(file: RecordFile, hints: RecordHints) -> int | None:
     """Return the channel of times, None where the step is known. Raises RecordError."""
     found = [n for n, one in enumerate(file.channels) if one.kind == "time"]
+    if hints.time:
+        found = [_pick(file, hints.time, "--time")]
+    if len(found) > 1:
+        raise RecordError(f"{file.path}: {len(found)} channels are times; choose one by --time")
     if hints.rate is not None and (found or file.clocks):
         raise RecordError(f"{file.path}: says its times: leave --rate out")
     if not found and not file.clocks and hints.rate is None:
-        where = f"{file.path}:1" if file.first_line else f"{file.path}"
-        text = f"{where}: no column {TIME}, only {channel_names(file.channels)}"
-        raise RecordError(f"{text}; begin the file with the line {HEADER}, or give --rate")
+        text = f"{file.path}: no column {TIME}, {file.content}"
+        raise RecordError(f"{text}; name the times by --time and --time-unit, or give --rate")
     return found[0] if found else None
 
 
@@ -178,27 +222,63 @@ def _check_columns(file: RecordFile, columns: dict[int, np.ndarray]) -> None:
         raise RecordError(f"{file.path}: channels begin at different times or steps: {steps}")
 
 
-def _times(file: RecordFile, hints: RecordHints, value: int, size: int) -> np.ndarray:
-    """Return the times of the samples by the file's step, or the chosen rate, (m,)."""
-    start, step = file.clocks[value] if file.clocks else (0.0, math.nan)
-    if hints.rate is not None and hints.rate > 0.0:
-        step = 1.0 / hints.rate
-    if not (math.isfinite(step) and step > 0.0):
-        raise RecordError(f"{file.path}: has no time step above 0: give --rate above 0")
-    return start + step * np.arange(size)
+def _times(
+    file: RecordFile, hints: RecordHints, value: int, columns: dict[int, np.ndarray],
+    clock: int | None,
+) -> tuple[float, np.ndarray, np.ndarray | None]:  # fmt: skip
+    """Return the first sample's time (s), equal steps from it on (s, (m,)), and uneven times.
 
-
-def _even(file: RecordFile, clock: int, times: np.ndarray) -> np.ndarray:
-    """Return the equally spaced times, as nearly equal ones that were rounded mean them."""
-    step = (times[-1] - times[0]) / (times.size - 1)
-    steps = np.diff(times)
+    Equal steps are the file's, the chosen rate's, or the times' where these were only rounded;
+    otherwise the file's own times from the first one on come with them, else None.
+    """
+    size = columns[value].size
+    if clock is None:
+        start, step = file.clocks[value] if file.clocks else (0.0, math.nan)
+        if hints.rate is not None and hints.rate > 0.0:
+            step = 1.0 / hints.rate
+        if not (math.isfinite(step) and step > 0.0):
+            raise RecordError(f"{file.path}: has no time step above 0: give --rate above 0")
+        return start, step * np.arange(size), None
+    unit = _time_unit(file, hints, clock)
+    written = columns[clock]
+    # from the first one on: the steps of large times would lose digits
+    times = (written - written[0]) * unit
+    step, steps = times[-1] / (size - 1), np.diff(times)
     bad = np.flatnonzero(~(np.abs(steps - step) <= UNEVEN * abs(step)) | (steps <= 0.0))
     if bad.size:
         where = file.place(clock, int(bad[0]) + 1)  # the second sample of the step
         text = f"a step of {steps[bad[0]]:g} s, where the mean one is {step:g} s"
         remedy = "resample to equal steps, or write times with more digits"
         raise RecordError(f"{where}: {text}; {remedy}")
-    return times[0] + step * np.arange(times.size)
+    grain = unit * _grain(written)
+    if abs(file.rate * step - 1.0) > SAME_RATE + grain / times[-1]:
+        name = file.channels[clock].name
+        text = f"{name} has {1.0 / step:.6g} samples a second, and rate_Hz says {file.rate:.6g}"
+        raise RecordError(f"{file.path}: {text}: save one of them")
+    even = step * np.arange(size)
+    is_rounded = np.abs(times - even).max() <= grain
+    return float(written[0]) * unit, even, None if is_rounded else times
+
+
+def _time_unit(file: RecordFile, hints: RecordHints, clock: int) -> float:
+    """Return what a time of 1 is in s. Raises RecordError where it is not known."""
+    channel = file.channels[clock]
+    says = hints.time_unit or channel.unit
+    if unit := time_unit_name(says):
+        return TIME_UNITS[unit]
+    text = f"{file.path}: {channel.name} has {f'the unit {says!r}' if says else 'no unit'} of time"
+    raise RecordError(f"{text}: give --time-unit, one of {', '.join(TIME_UNITS)}")
+
+
+def _grain(written: np.ndarray) -> float:
+    """Return the step by which numbers were rounded: a power of ten, or the floats' own."""
+    large = np.abs(written[np.abs(written) >= 0.1 * np.abs(written).max()])
+    own = 4.0 * float(np.spacing(large.max()))
+    for power in range(16):
+        whole = large * 10.0**power
+        if np.abs(whole - np.round(whole)).max() <= 1e-6 + 4.0 * np.spacing(whole.max()):
+            return max(10.0**-power, own) * (1.0 + 1e-6)
+    return own
 
 
 def _scale(file: RecordFile, hints: RecordHints, value: int) -> float:
@@ -222,31 +302,59 @@ def _pulses(what: str, times: np.ndarray, tacho: np.ndarray) -> tuple[np.ndarray
     """Return the times at which a tacho rises through its middle, and their uncertainty, s.
 
     A rise comes from low and goes high, or goes high from the first sample on. A level that jumps
-    between two samples jumps anywhere between them; one that rises slowly is known better.
+    between two samples jumps anywhere between them; one that rises slowly is known better, and one
+    that rises by steps of several samples, as a coarse converter has it, to half of a step.
     """
     low, high = tacho.min(), tacho.max()
     if low == high:
         raise RecordError(f"{what}: is {low:g} all the time; it must rise once a turn")
     share = (tacho - low) / (high - low)
     level = np.where(share > HIGH, 1, np.where(share < LOW, -1, 0))
-    level[0] = level[0] or -1  # the record may begin within a rise
+    is_within = level[0] == 0  # the record begins within a rise
+    level[0] = level[0] or -1
     certain = np.flatnonzero(level)
     is_high = level[certain] > 0
     rises = np.flatnonzero(~is_high[:-1] & is_high[1:])
-    step = times[1] - times[0]
-    found, within = [], []
+    places, within = [], []  # in samples
     for before, after in zip(certain[rises], certain[rises + 1], strict=True):
-        k = max(1, before + int(np.argmax(share[before : after + 1] >= MIDDLE)))
-        jump = share[k] - share[k - 1]
-        part = (MIDDLE - share[k - 1]) / jump if jump > 0.0 else -math.inf
-        if part > -1.0:  # otherwise the record begins more than a sample behind the middle
-            found.append(times[k - 1] + part * step)
-            within.append(jump * step / 2.0)
+        place, half = _crossing(share[before : after + 1], is_within and not before)
+        if before + place > -1.0:  # else the record begins more than a sample behind the middle
+            places.append(before + place)
+            within.append(half)
+    step = times[-1] / (times.size - 1)
+    found = np.interp(places, np.arange(times.size), times) + np.minimum(places, 0.0) * step
     gaps = np.diff(found)
     if gaps.size and gaps.max() > MAX_PULSE_RATIO * gaps.min():
         text = f"pulses {gaps.min():g} to {gaps.max():g} s apart"
         raise RecordError(f"{what}: {text}; one a revolution, none missed, none doubled")
-    return np.array(found), np.array(within)
+    return found, np.array(within) * step
+
+
+def _crossing(rise: np.ndarray, is_cut: bool) -> tuple[float, float]:
+    """Return where a rise passes `MIDDLE`, in samples from its first, and how far that may be off.
+
+    rise: shares of the range from the last low sample to the first high one; is_cut: the rise began
+    before its first sample. Samples that are alike count at their middle: the straight line between
+    the middles of two levels is where a slow signal was before it was made coarse.
+    """
+    begins = np.flatnonzero(np.diff(rise, prepend=-1.0))  # of levels
+    lengths = np.diff(begins, append=rise.size)
+    middles, levels = begins + (lengths - 1) / 2.0, rise[begins]
+    if is_cut and lengths[0] > 1 and lengths.size < 3:  # nothing says where it began
+        return -math.inf, 0.0
+    if is_cut and lengths.size > 1:  # as long as the next level, as far as it was recorded
+        lengths[0] = max(lengths[:2])
+        middles[0] = begins[1] - (lengths[0] + 1) / 2.0
+    k = max(1, int(np.argmax(levels > MIDDLE)))
+    above = levels[k] > MIDDLE
+    below = np.flatnonzero(levels[:k] < MIDDLE)
+    j = int(below[-1]) if below.size and above else k - 1
+    jump = levels[k] - levels[j]
+    if jump <= 0.0:
+        return -math.inf, 0.0
+    place = middles[j] + (MIDDLE - levels[j]) / jump * (middles[k] - middles[j])
+    longest = lengths[j : k + 1].max()
+    return float(place), longest / 2.0 if longest > 1 else jump / 2.0
 
 
 def _shift(pulses: np.ndarray, degrees: float, times: np.ndarray) -> np.ndarray:
@@ -261,7 +369,7 @@ def _shift(pulses: np.ndarray, degrees: float, times: np.ndarray) -> np.ndarray:
     found = np.interp(turns, numbers, pulses)
     found += np.minimum(turns, 0.0) * (pulses[1] - pulses[0])
     found += np.maximum(turns - numbers[-1], 0.0) * (pulses[-1] - pulses[-2])
-    half = 0.5 * (times[1] - times[0])  # a record may begin at top dead centre
+    half = 0.5 * (times[-1] - times[0]) / (times.size - 1)  # a record may begin at top dead centre
     return found[(found >= times[0] - half) & (found <= times[-1])]
 
 
@@ -275,7 +383,7 @@ def check_record(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> in
         raise RecordError(f"{len(times)} times and {len(values)} values: pass one for each")
     if not (np.diff(tacho) > 0.0).all():
         raise RecordError("the tacho pulses do not increase: sort them, and drop double ones")
-    step = times[1] - times[0] if len(times) > 1 else math.nan
+    step = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else math.nan
     if not (tacho[0] > times[0] - step and tacho[-1] < times[-1] + step):
         text = f"tacho pulses lie beyond the samples, {times[0]:g} to {times[-1]:g} s"
         raise RecordError(f"{text}: pass those within")

@@ -1,7 +1,9 @@
 """Files of records: what was written is read, and what is wrong is named with its place."""
 
 import math
+import struct
 import sys
+import warnings
 import wave
 
 import numpy as np
@@ -10,17 +12,21 @@ from scipy.io import loadmat, savemat, wavfile
 
 from compressor.vibration.record_files import (
     UNITS,
+    Channel,
     RecordError,
     encode_record,
     record_columns,
+    titled_channel,
     unit_name,
 )
-from compressor.vibration.record_reader import read_record
+from compressor.vibration.record_reader import _crossing, read_record
 
 RATE, TURN = 1000.0, 0.1
 TIMES = np.arange(450) / RATE
 VALUES = np.sin(50 * TIMES)
 PULSES = np.array([0.0375, 0.1375, 0.2375, 0.3375, 0.4375])
+COLUMNS = record_columns(TIMES, VALUES, PULSES)
+STEADY = {"rpm": 60 / TURN, "tdc": PULSES[2]}
 
 
 def voltage(times=TIMES):
@@ -89,7 +95,7 @@ def test_lines_at_the_end_without_a_record_are_left_out(written):
     rest = dict.fromkeys(range(TIMES.size - 8, TIMES.size + 2), ",,")
     found = read_record(written([TIMES, VALUES, voltage()], change=rest))
     assert found.times.size == TIMES.size - 10
-    with pytest.raises(RecordError, match=r"record\.csv:9: the cells are empty, and the record"):
+    with pytest.raises(RecordError, match=r"record\.csv:9: the cells are empty, and the table"):
         read_record(written([TIMES, VALUES, voltage()], change={9: ",,"}))
 
 
@@ -135,7 +141,9 @@ def test_mistakes_name_line_and_column(change, told, written):
 @pytest.mark.parametrize(
     ("columns", "header", "hints", "told"),
     [
-        ([TIMES, VALUES], "t,acceleration_m_per_s2", {}, ".csv:1: no column time_s, only t"),
+        ([TIMES, VALUES], "x,acceleration_m_per_s2", {}, ".csv: no column time_s, only x, acceler"),
+        ([TIMES, VALUES], "t,acceleration_m_per_s2", STEADY, "t has no unit of time: give --time-"),
+        ([TIMES, VALUES], "t [h],acceleration_m_per_s2", STEADY, "t [h] has the unit 'h' of time"),
         ([TIMES], "time_s", {}, "no column acceleration_m_per_s2"),
         ([TIMES, VALUES], "time_s,acceleration_m_per_s2", {}, "no column tacho: add it, or give"),
         ([TIMES, VALUES, VALUES], "time_s,acceleration_m_per_s2,tacho", {"rpm": 500, "tdc": 0},
@@ -161,12 +169,8 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path):
     with pytest.raises(RecordError, match=r"absent\.csv: cannot be read: No such file"):
         read_record(tmp_path / "absent.csv")
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(RecordError, match="is no CSV file in UTF-8"):
+    with pytest.raises(RecordError, match="is no text in UTF-16"):
         read_record(tmp_path / "binary.csv")
-
-
-COLUMNS = record_columns(TIMES, VALUES, PULSES)
-STEADY = {"rpm": 60 / TURN, "tdc": PULSES[2]}
 
 
 def encoded(folder, suffix):
@@ -247,7 +251,7 @@ def test_a_universal_file_of_the_published_layout_is_read(tmp_path):
     with pytest.raises(RecordError, match="channels begin at different times or steps"):
         read_record(path)
     path.write_text("nothing of the kind")
-    with pytest.raises(RecordError, match="no column acceleration_m_per_s2, only nothing"):
+    with pytest.raises(RecordError, match="no column acceleration_m_per_s2, no signals"):
         read_record(path, **STEADY)
 
 
@@ -269,8 +273,8 @@ def test_universal_files_of_others_are_read(binary, tmp_path):
     pyuff.UFF(str(path)).write_sets([spectrum], mode="add")
     found = read_record(path)
     np.testing.assert_allclose(found.values, VALUES, rtol=0 if binary else 5e-12)
-    np.testing.assert_allclose(found.times, 2.0 + TIMES, atol=1e-9)
-    np.testing.assert_allclose(found.tacho, 2.0 + PULSES, atol=1e-5)
+    np.testing.assert_allclose(found.times, TIMES, atol=1e-9)  # from the record's begin
+    np.testing.assert_allclose(found.tacho, PULSES, atol=1e-5)
 
 
 def test_without_pyuff_the_remedy_is_named(monkeypatch, tmp_path):
@@ -346,7 +350,7 @@ def test_a_matlab_file_may_hold_a_matrix_and_a_rate(tmp_path):
 
 @pytest.mark.parametrize("suffix", [".wav", ".mat", ".uff"])
 def test_a_file_that_is_cut_or_of_something_else_is_named(suffix, tmp_path):
-    """A cut of whole lines of a text leaves a shorter record; nothing else is read."""
+    """Also a text that is cut between two lines, or between two data sets."""
     whole = encoded(tmp_path, suffix).read_bytes()
     path = tmp_path / f"cut{suffix}"
     hints = {"channel": "1", "tacho": "2", "unit": "m/s2"} if suffix == ".wav" else {}
@@ -357,13 +361,9 @@ def test_a_file_that_is_cut_or_of_something_else_is_named(suffix, tmp_path):
         *(whole[:n] for n in range(1, len(whole) - 9, 371)),
     ):
         path.write_bytes(data)
-        try:
-            found = read_record(path, **hints)
-        except RecordError as error:
-            assert str(path) in str(error)  # noqa: PT017
-        else:
-            assert suffix == ".uff"
-            assert found.values.size < TIMES.size
+        with pytest.raises(RecordError) as found:
+            read_record(path, **hints)
+        assert str(path) in str(found.value)
     with pytest.raises(RecordError, match=r"absent\.\w+: cannot be read: No such file"):
         read_record(tmp_path / f"absent{suffix}")
 
@@ -412,5 +412,220 @@ def test_columns_of_other_names_are_chosen(written):
         read_record(path, channel="3", unit="g", tacho="key fase")
     two = written([TIMES, VALUES, VALUES, voltage()],
                   "time_s,acceleration_g,acceleration_m_per_s2,tacho")  # fmt: skip
-    with pytest.raises(RecordError, match=r"csv:1: 2 accelerations among time_s, .*by --channel"):
+    with pytest.raises(RecordError, match=r"csv: 2 accelerations, acceleration_g, .*by --channel"):
         read_record(two)
+
+
+GERMAN = "Analyser: PRO-4000\nSerial;12\n\nTime [ms];Acc [g];Keyphasor [V]\n"
+
+
+def analyser_text():
+    rows = zip(1e3 * TIMES, VALUES / 9.80665, voltage(), strict=True)
+    return GERMAN + "".join(f"{t:.6f};{a:.9f};{v:.6f}\n".replace(".", ",") for t, a, v in rows)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+def test_a_record_as_analysers_write_it_is_read(encoding, tmp_path):
+    """Semicolons, decimal commas, lines above the header, ms, g, and a keyphasor."""
+    path = tmp_path / "plant.csv"
+    path.write_text(analyser_text(), encoding=encoding)
+    found = read_record(path)
+    np.testing.assert_allclose(found.times, TIMES, atol=1e-12)
+    np.testing.assert_allclose(found.values, VALUES, atol=1e-7)
+    np.testing.assert_allclose(found.tacho, PULSES, atol=1e-5)
+    layout, tacho = found.remarks
+    assert "separator semicolon, decimal comma, header in line 4, 3 columns; times Time" in layout
+    assert "Keyphasor [V]: its rise counts as top dead centre; --tacho-deg says its angle" in tacho
+    assert len(read_record(path, tacho_deg=30.0).remarks) == 1
+
+
+def test_what_a_text_does_not_say_is_told(tmp_path):
+    path = tmp_path / "plain.txt"
+    path.write_text(analyser_text().removeprefix(GERMAN))
+    with pytest.raises(
+        RecordError, match=r"only 1, 2, 3 \(separator semicolon, decimal comma, no "
+    ):
+        read_record(path)
+    told = {"time": "1", "time_unit": "ms", "channel": "2", "unit": "g", "tacho": "3"}
+    layout = {"separator": ";", "decimal": ",", "skip_lines": 0}
+    np.testing.assert_allclose(read_record(path, **told, **layout).values, VALUES, atol=1e-7)
+    with pytest.raises(
+        RecordError, match=r"separators tried: tab; .*--separator, --decimal and --"
+    ):
+        read_record(path, **told, separator="\t")
+    path = encoded(tmp_path, ".mat")
+    with pytest.raises(RecordError, match="is no file of text: leave --skip-lines out"):
+        read_record(path, skip_lines=3)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "unit"),
+    [
+        ("Time [ms]", "time", "ms"), ("time_us", "time", "us"), ("t (s)", "time", "s"),
+        ("Acc [g]", "acceleration", "g"), ("Ch 1 (m/s²)", "acceleration", "m/s²"),
+        ("Accel", "acceleration", ""), ("Keyphasor [V]", "tacho", "V"), ("Tacho", "tacho", ""),
+        ("Temp [°C]", "", "°C"), ("T_oil", "", ""), ("acceleration_mm_per_s2", "acceleration",
+        "mm_per_s2"),
+    ],
+)  # fmt: skip
+def test_titles_say_what_a_column_is(name, kind, unit):
+    assert titled_channel(name) == Channel(name, kind, unit)
+
+
+def uneven_times(share, drift):
+    """Times whose steps differ by a share, at random, and slowly."""
+    count = TIMES.size
+    steps = 1.0 + share * np.random.default_rng(2).uniform(-1, 1, count)
+    steps += drift * np.sin(np.linspace(0, 2 * np.pi, count))
+    return np.cumsum(steps / RATE)
+
+
+@pytest.mark.parametrize(("share", "drift"), [(0.05, 0.0), (0.002, 0.0), (0.0, 0.08)])
+def test_samples_at_uneven_times_are_put_on_equal_ones(share, drift, written):
+    """As the sine is at those times; as if steps were equal, it is wrong by up to its size."""
+    times = uneven_times(share, drift)
+    found = read_record(written([times, np.sin(50 * times), voltage(times)]))
+    assert np.ptp(np.diff(found.times)) < 1e-12
+    np.testing.assert_allclose(found.values, np.sin(50 * (times[0] + found.times)), atol=1e-5)
+    np.testing.assert_allclose(found.tacho[:4], PULSES[:4] - times[0], atol=2e-5)
+    (remark,) = found.remarks
+    assert "samples are put on equal steps by their own times" in remark
+
+
+def test_rounded_times_are_no_uneven_ones(written):
+    """To 1e-4 of a step of 1e-3 s, or by the 2.4e-7 s that a float of 1.7e9 s has."""
+    for times in (np.round(TIMES * 1.00037, 4), 1.7e9 + TIMES):
+        found = read_record(written([times, VALUES, voltage()]))
+        np.testing.assert_array_equal(found.values, VALUES)
+        assert found.remarks == ()
+        assert found.rate == pytest.approx((times.size - 1) / (times[-1] - times[0]), rel=1e-9)
+
+
+@pytest.mark.parametrize("levels", [256, 163, 82, 20])
+@pytest.mark.parametrize("phase", [0.0, 0.3])
+def test_a_coarse_tacho_is_as_early_as_late(levels, phase, tmp_path):
+    """A sine of few levels, 4 to 50 samples a level, from its middle on: no pulse is lost."""
+    rate, turn = 25600, 0.12 + phase * 1e-3
+    times = np.arange(round(5.2 * turn * rate)) / rate
+    sine = np.sin(2 * np.pi * (times - phase / rate) / turn)
+    coarse = np.round(sine * (levels - 1) / 2).astype(np.int16)
+    wavfile.write(tmp_path / "x.wav", rate, np.column_stack([coarse, coarse]))
+    hints = {"channel": "1", "tacho": "2", "unit": "g", "full_scale": 1.0}
+    found = read_record(tmp_path / "x.wav", **hints).tacho
+    expected = phase / rate + turn * np.arange(6)
+    assert len(found) == len(expected)
+    a_level = turn * rate / np.pi / levels  # samples
+    assert np.abs(found - expected).max() * rate < max(0.25, 0.12 * a_level)
+
+
+def test_the_crossing_of_a_coarse_rise_has_an_honest_bar():
+    """By hand: levels 0.4 and 0.55 of four samples each, the middle two thirds of the way."""
+    rise = np.array([0.1, 0.4, 0.4, 0.4, 0.4, 0.55, 0.55, 0.55, 0.55, 0.8])
+    assert _crossing(rise, False) == (pytest.approx(2.5 + 4 * 2 / 3), 2.0)
+    assert _crossing(np.array([0.0, 0.5, 0.5, 0.5, 1.0]), False) == (2.0, 1.5)
+    assert _crossing(np.array([0.0, 1.0]), False) == (0.5, 0.5)  # a jump
+    assert _crossing(np.array([0.2, 0.4, 0.6, 0.9]), False) == (1.5, pytest.approx(0.1))
+
+
+def wav_bytes(before=b"", size=None, whole=None, parts=1, channels=2, rate=1000, form=b"RIFF"):
+    """A WAV file of 16 bits that another program wrote, whole or broken."""
+    samples = np.column_stack([VALUES, voltage() / 5]) * 20000
+    data = samples.astype("<i2").tobytes()
+    head = struct.pack("<HHIIHH", 1, channels, rate, 4 * rate, 4, 16)
+    count = len(data) // parts
+    pieces = [data[k * count : (k + 1) * count] for k in range(parts)]
+    body = b"WAVE" + before + b"fmt " + struct.pack("<I", 16) + head
+    for piece in pieces:
+        body += b"data" + struct.pack("<I", len(piece) if size is None else size) + piece
+    return form + struct.pack("<I", len(body) if whole is None else whole) + body
+
+
+WAV = {"channel": "1", "tacho": "2", "unit": "m/s2", "full_scale": 1.0}
+ODD = b"LIST" + struct.pack("<I", 5) + b"abcde"
+DS64 = b"ds64" + struct.pack("<IQQQI", 28, 0, 4 * TIMES.size, 0, 0)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        wav_bytes(), wav_bytes(before=ODD), wav_bytes(before=ODD + b"\0"),
+        wav_bytes(size=2**32 - 1, whole=2**32 - 1),  # ffmpeg to a pipe
+        wav_bytes(size=0, whole=0),  # others to a pipe
+        wav_bytes(before=DS64, size=2**32 - 1, whole=2**32 - 1, form=b"RF64") + b"LIST\0\0\0\0",
+    ],
+)  # fmt: skip
+def test_whole_wav_files_of_others_are_read(data, tmp_path):
+    path = tmp_path / "x.wav"
+    path.write_bytes(data)
+    found = read_record(path, **WAV)
+    np.testing.assert_allclose(found.values, VALUES * 20000 / 2**15, atol=1 / 2**15)
+    np.testing.assert_allclose(found.tacho, PULSES, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        (wav_bytes(size=3600), "it is cut: its chunk 'data' has 3600 bytes by its size, and 1800 "),
+        (wav_bytes(parts=2), "it has 2 chunks of data: write it again with one"),
+        (wav_bytes(channels=0), "its header says 0 channels and 1000 samples a second"),
+        (wav_bytes(rate=0), "its header says 2 channels and 0 samples a second"),
+        (wav_bytes()[:30], "it is cut: its chunk 'fmt ' has 16 bytes by its size, and 10 are "),
+        (wav_bytes()[:36], "it has 0 chunks of data"),
+        (wav_bytes(size=0)[:44], "it has no samples"),
+        (b"ID3\x03" + bytes(40), "it begins with b'ID3"),
+    ],
+)  # fmt: skip
+def test_broken_wav_files_are_refused_in_words(data, told, tmp_path):
+    path = tmp_path / "x.wav"
+    path.write_bytes(data)
+    with pytest.raises(RecordError) as found:
+        read_record(path, **WAV)
+    assert f"{path}: is no WAV file that can be read: {told}" in str(found.value)
+
+
+def test_a_matlab_file_says_what_is_no_signal(tmp_path):
+    path = tmp_path / "x.mat"
+    savemat(path, {"data": {"t": TIMES}, "z": VALUES + 1j, "c": np.array([1, "a"], dtype=object)})
+    with pytest.raises(RecordError) as found:
+        read_record(path)
+    for told in ("no signals; beside them", "data (a struct with t: save its arrays)",
+                 "z (complex numbers)", "c (a cell array or table"):  # fmt: skip
+        assert told in str(found.value)
+
+
+def test_a_rate_beside_times_has_to_be_theirs(tmp_path):
+    path, record = tmp_path / "x.mat", {**COLUMNS}
+    savemat(path, record | {"rate_Hz": 1.00002 * RATE})
+    np.testing.assert_array_equal(read_record(path).values, VALUES)
+    savemat(path, record | {"rate_Hz": 2 * RATE})
+    with pytest.raises(
+        RecordError, match="time_s has 1000 samples a second, and rate_Hz says 2000"
+    ):
+        read_record(path)
+
+
+def test_a_universal_file_says_what_is_no_signal(tmp_path):
+    pyuff = pytest.importorskip("pyuff")
+    path = tmp_path / "x.uff"
+    common = {"binary": 0, "rsp_node": 1, "rsp_dir": 2, "ref_node": 0, "ref_dir": 0, "x": TIMES,
+              "orddenom_spec_data_type": 0, "ordinate_spec_data_type": 12}  # fmt: skip
+    for kind, spacing, data in ((0, 1, VALUES), (4, 1, VALUES + 1j), (9, 1, VALUES),
+                                (1, 0, VALUES), (1, 1, VALUES + 1j)):  # fmt: skip
+        one = pyuff.prepare_58(**common, func_type=kind, abscissa_spacing=spacing, data=data)
+        pyuff.UFF(str(path)).write_sets([one], mode="add")
+    warnings.simplefilter("error")  # within this test
+    with pytest.raises(RecordError) as found:
+        read_record(path)
+    for told in ("1 (function type 0, general", "2 (function type 4, frequency response, not a t",
+                 "3 (function type 9, power", "4 (uneven steps", "5 (complex numbers"):  # fmt: skip
+        assert told in str(found.value)
+
+
+def test_a_universal_file_may_have_blanks_and_fortran_s_exponents(tmp_path):
+    path = encoded(tmp_path, ".uff")
+    text = path.read_text()
+    path.write_text(text.replace("    -1\n", "    -1   \n").replace("e-0", "D-0"))
+    np.testing.assert_allclose(read_record(path).values, VALUES, atol=1e-11)
+    path.write_text(text.rstrip().removesuffix("-1"))
+    with pytest.raises(RecordError, match=r"its last data set has no end, .* the file is cut"):
+        read_record(path)

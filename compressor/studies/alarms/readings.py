@@ -126,7 +126,7 @@ def read_windows(
     inside = slice(edges[0], edges[-1])
     turns, edges = turns[inside], edges - edges[0]
     values = noisy(record.values, noise, seed)[inside]
-    rate = 1.0 / (record.times[1] - record.times[0])
+    rate = record.rate
     found = {}
     for name, band in ((RECORD, None), *((band_name(one), one) for one in bands)):
         signal = values if band is None else band_signal(values, rate, *band)

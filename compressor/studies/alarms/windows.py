@@ -144,7 +144,7 @@ def read_job(
         return "damaged"
     if record is None:
         return "without_record"
-    rate = 1.0 / (record.times[1] - record.times[0])
+    rate = record.rate
     bands = default_bands(rate) if bands is None else bands
     for low, high in bands:
         if high > rate / 2.0 * (1.0 + 1e-9):

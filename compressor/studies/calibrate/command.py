@@ -71,6 +71,8 @@ def calibrate(
         return DONE
     from compressor.cases import to_yaml
 
+    for text in measured.remarks:
+        print_text(f"# read: {text}")
     for line in describe(record, config, found):
         print_text(f"# {line}".rstrip())
     print_text(to_yaml(found.case, brief=True).rstrip("\n"))

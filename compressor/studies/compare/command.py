@@ -110,6 +110,7 @@ def list_comparison(found: "Comparison") -> Iterator[str]:
     rms = (found.curves.spectrum**2).sum() ** 0.5
     yield (f"{found.name}: {plural(len(mine.spectra), 'revolution')} at {mine.rpm:.4g} rpm, "
            f"{mine.rate:.6g} Hz, {rms:.4g} m/s2 rms up to order {found.orders}")  # fmt: skip
+    yield from (f"read: {text}" for text in found.remarks)
     yield HEAD
     for job in found.jobs[:MOST]:
         yield job_line(job)
@@ -145,6 +146,7 @@ def jsonable_comparison(found: "Comparison") -> dict[str, Any]:
     return jsonable({
         "record": found.name, "revolutions": len(mine.spectra), "rpm": mine.rpm,
         "rate_Hz": mine.rate, "orders": found.orders, "left_out": found.left_out,
+        "remarks": list(found.remarks),
         "envelope_inside": found.inside, "misfits": list(found.misfits),
         "peak_m_per_s2": found.curves.peak.tolist(), "rms_m_per_s2": found.curves.rms.tolist(),
         "jobs": [

@@ -32,6 +32,7 @@ from compressor.studies.compare.likeness import (
 from compressor.vibration import RecordError
 
 SAME_SPEED = 0.01  # share by which speeds may differ, beyond which forces do by 2 %
+SAME_RATE = 1e-3  # share by which sampling rates may differ: an order of a thousand stays
 FEW = 5  # revolutions, below which the mean revolution is noisy
 MIN_SHIFT, MIN_GAIN = 2.0, 0.1  # degrees and correlation from which a shift is named
 FAR = 3.0  # ratio of rms beyond which the level is named
@@ -69,14 +70,15 @@ class Compared:
 class Comparison:
     """A record beside jobs, the most alike first.
 
-    key: of a record that is a stored job's, else ""; orders: the highest that the record holds;
-    left_out: jobs without a record that can be used; inside: share of crank angle at which the
-    record's envelope lies in the range of the jobs', nan of a single job; misfits: sentences on
-    what does not fit.
+    remarks: how a file was read; key: of a record that is a stored job's, else ""; orders: the
+    highest that the record holds; left_out: jobs without a record that can be used; inside: share
+    of crank angle at which the record's envelope lies in the range of the jobs', nan of a single
+    job; misfits: sentences on what does not fit.
     """
 
     name: str
     key: str
+    remarks: tuple[str, ...]
     turned: Turned
     curves: Curves
     orders: int
@@ -120,7 +122,8 @@ def compare_record(
     several = np.array([job.curves.envelope for job in jobs])
     inside = share_inside(curve.envelope, several) if len(jobs) > 1 else math.nan
     return Comparison(
-        name, key, mine, curve, mine.highest, tuple(jobs), len(wanted) - len(jobs), inside,
+        name, key, record.remarks, mine, curve, mine.highest, tuple(jobs),
+        len(wanted) - len(jobs), inside,
         tuple(find_misfits(mine, jobs, is_file=not key)),
     )  # fmt: skip
 
@@ -167,7 +170,7 @@ def find_misfits(record: Turned, jobs: Sequence[Compared], is_file: bool) -> Ite
             f"speed: {record.rpm:.4g} rpm, and the job has {best.rpm:.4g}: forces of inertia "
             f"are {more:.3g} times as large; run it at machine.speed_rpm: {record.rpm:.4g}"
         )
-    if abs(record.rate / best.rate - 1.0) > 1e-6:
+    if abs(record.rate / best.rate - 1.0) > SAME_RATE:
         yield (f"sampling rate: {record.rate:.6g} Hz, and the job has {best.rate:.6g}: what only "
                "the faster one holds is left out")  # fmt: skip
     if len(record.spectra) < FEW:

@@ -50,7 +50,7 @@ def turn_record(record: Record) -> Turned:
     # from the last sample that is not after the first pulse: the rest then reach over all turns
     first = max(int(np.searchsorted(turns, 0.0, side="right")) - 1, 0)
     inside = slice(first, int(np.searchsorted(turns, whole)) + 2)
-    rate = 1.0 / (record.times[1] - record.times[0])
+    rate = record.rate
     speed = whole / (record.tacho[-1] - record.tacho[0])
     a_turn = SEGMENTS * math.ceil(rate / speed / SEGMENTS)
     angle = 2.0 * math.pi * turns[inside]

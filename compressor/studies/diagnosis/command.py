@@ -145,8 +145,10 @@ def identify(
         return DONE
     pulses = found.tacho
     mean_rpm = 60.0 * (len(pulses) - 1) / (pulses[-1] - pulses[0])
-    rate = 1.0 / (found.times[1] - found.times[0])
+    rate = found.rate
     print_text(f"{record}: {len(pulses) - 1} revolutions at {mean_rpm:.4g} rpm, {rate:.6g} Hz")
+    for text in found.remarks:
+        print_text(f"read: {text}")
     for line in (*verdict(answer), *ranking(answer), *grounds(fitted, answer, folder)):
         print_text(line)
     return DONE

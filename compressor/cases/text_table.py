@@ -1,0 +1,279 @@
+"""Tables of numbers in text files, as instruments and spreadsheets write them.
+
+Encoding, separator, decimal sign and the lines above the header are found; a caller may give the
+last three. Records and indicator cards are read by it.
+"""
+
+import codecs
+import contextlib
+import csv
+import itertools
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from compressor.program import CompsimError, printable
+
+SEPARATORS = {";": "semicolon", "\t": "tab", ",": "comma", " ": "blanks"}
+DECIMALS = {".": "point", ",": "comma"}
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+PLAIN = re.compile(r"[0-9.eE+\-\n]*")  # cells in which float() reads what `NUMBER` does
+NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
+MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"),
+         (codecs.BOM_UTF16_BE, "utf-16"))  # fmt: skip
+SAMPLED_LINES = 1000  # from which separator and decimal sign are found
+UNIT_WORDS = {  # of a line of units below the header
+    "s", "ms", "us", "µs", "v", "mv", "g", "m/s2", "m/s²", "m/s^2", "mm/s2", "in/s2", "ft/s2",
+    "deg", "degree", "degrees", "°", "mpa", "kpa", "pa", "bar", "barg", "bara", "psi", "psig",
+    "psia", "-",
+}  # fmt: skip
+
+
+class TextTableError(CompsimError):
+    """A text that is no table of numbers; its message names file, line and column."""
+
+    exit_code = 2
+
+
+Row = tuple[int, list[str]]  # the number of its last line, and its cells
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A table of a text file.
+
+    names: of the columns, by number from 1 where there is no header; header_line: its number, 0
+    without a header; numeric: whether a column holds numbers; rows: those below the header.
+    """
+
+    path: str
+    encoding: str
+    separator: str
+    decimal: str
+    names: tuple[str, ...]
+    header_line: int
+    numeric: tuple[bool, ...]
+    rows: Sequence[Row]
+
+    @property
+    def layout(self) -> str:
+        """Return how the file was read, in words."""
+        header = f"header in line {self.header_line}" if self.header_line else "no header"
+        signs = f"separator {SEPARATORS[self.separator]}, decimal {DECIMALS[self.decimal]}"
+        return f"{signs}, {header}, {len(self.names)} columns"
+
+    def place(self, line: int, column: int) -> str:
+        """Return where a cell is, for an error; column from 0."""
+        return f"{self.path}:{line}:{column + 1}: {self.names[column]}"
+
+    def read_columns(self, numbers: Sequence[int]) -> tuple[list[int], list[list[float]]]:
+        """Return the lines of the rows, and columns by their numbers from 0.
+
+        Rows at the end without any of these cells are left out. Raises TextTableError for a cell
+        that is no finite number, and for a gap.
+        """
+        lines: list[int] = []
+        cells_of: list[list[str]] = [[] for _ in numbers]
+        blank = 0  # the first row without these cells: beyond the end of the table
+        for line, cells in self.rows:
+            texts = [cells[at].strip() if at < len(cells) else "" for at in numbers]
+            if not any(texts):
+                blank = blank or line
+                continue
+            if blank:
+                problem = "the cells are empty, and the table goes on below"
+                raise TextTableError(f"{self.path}:{blank}: {problem}; cut it, or fill the gap")
+            lines.append(line)
+            for text, column in zip(texts, cells_of, strict=True):
+                column.append(text)
+        columns = zip(numbers, cells_of, strict=True)
+        return lines, [self._column(texts, lines, at) for at, texts in columns]
+
+    def _column(self, texts: list[str], lines: Sequence[int], column: int) -> list[float]:
+        """Return cells as numbers: all at once where they are plain, else one by one."""
+        whole = "\n".join(texts)
+        if self.decimal == "," and "." not in whole:
+            whole = whole.replace(",", ".")
+        if PLAIN.fullmatch(whole):
+            with contextlib.suppress(ValueError):
+                values = [float(text) for text in whole.split("\n")] if texts else []
+                if all(map(math.isfinite, values)):
+                    return values
+        rows = zip(texts, lines, strict=True)
+        return [self._number(text, line, column) for text, line in rows]
+
+    def _number(self, text: str, line: int, column: int) -> float:
+        """Return a cell as a finite number. Raises TextTableError."""
+        if (value := parse_number(text, self.decimal)) is not None and math.isfinite(value):
+            return value
+        where, shown = self.place(line, column), repr(printable(text[:40]))
+        if value is not None or NOT_FINITE.fullmatch(text):
+            remedy = "cut the table, or fill the gap"
+            raise TextTableError(f"{where}: {shown} is not finite; {remedy}")
+        remedy = f"write numbers with a decimal {DECIMALS[self.decimal]}, and leave no cell empty"
+        raise TextTableError(f"{where}: {shown} is no number; {remedy}")
+
+
+def parse_number(text: str, decimal: str = ".") -> float | None:
+    """Return a cell as a number, None where it is none: no `_`, no sign of thousands."""
+    text = text.strip()
+    if decimal == ",":
+        text = text.replace(".", "_").replace(",", ".")
+    return float(text) if NUMBER.fullmatch(text) else None
+
+
+def open_text_table(
+    path: str | Path, separator: str = "", decimal: str = "", skip_lines: int | None = None
+) -> TextTable:
+    """Return the table of a text file. Raises TextTableError, and OSError for an unreadable file.
+
+    separator: one of `SEPARATORS`, found where it is ""; decimal: one of `DECIMALS`, likewise;
+    skip_lines: the number of lines above the header, found where it is None.
+    """
+    text, encoding = decode_text(path, Path(path).read_bytes())
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    found = None
+    for mark in [separator] if separator else SEPARATORS:
+        try:
+            rows = list(_split(lines[:SAMPLED_LINES], mark))
+        except csv.Error as error:
+            if separator:
+                raise TextTableError(f"{path}: is no table: {error}") from error
+            continue
+        for sign in [decimal] if decimal else DECIMALS:
+            block = _find_block(rows, sign, skip_lines)
+            if block and mark == " " and not all(block.numeric):
+                continue  # words that are apart by blanks are text
+            if block and (found is None or block.merit > found[0].merit):
+                found = block, mark, sign
+    if found is None:
+        first = next((line for line in lines if line.strip()), "")
+        tried = ", ".join([SEPARATORS[separator]] if separator else SEPARATORS.values())
+        raise TextTableError(
+            f"{path}: holds no rows of numbers (its first line: {printable(first[:60])!r}; "
+            f"separators tried: {tried}; decimal point and comma)"
+        )
+    block, mark, sign = found
+    if mark == "," and 2 * len(block.header) == block.width and sign == ".":
+        raise TextTableError(
+            f"{path}:{block.first_line}: {block.width} cells below a header of "
+            f"{len(block.header)}: commas separate cells and decimals; "
+            "write the file with another separator"
+        )
+    try:
+        rows = [row for row in _split(lines, mark) if row[0] >= block.first_line]
+    except csv.Error as error:
+        raise TextTableError(f"{path}: is no table: {error}") from error
+    names, header_line = tuple(str(k + 1) for k in range(block.width)), 0
+    if len(block.header) >= block.width:
+        names, header_line = tuple(block.header), block.header_line
+        while len(names) > block.width and not names[-1]:
+            names = names[:-1]
+    numeric = (*block.numeric, *[False] * (len(names) - block.width))
+    return TextTable(str(path), encoding, mark, sign, names, header_line, numeric, rows)
+
+
+def decode_text(path: str | Path, data: bytes) -> tuple[str, str]:
+    """Return a text and its encoding: UTF-8, UTF-16, or else Latin 1. Raises TextTableError."""
+    encoding = next((name for mark, name in MARKS if data.startswith(mark)), "")
+    if not encoding and b"\0" in data[:200]:
+        encoding = "utf-16-le" if data[1:2] == b"\0" else "utf-16-be"
+    try:
+        text, encoding = data.decode(encoding or "utf-8"), encoding or "utf-8"
+    except UnicodeDecodeError as error:
+        if encoding:
+            raise TextTableError(f"{path}: is no text in {encoding.upper()}: {error}") from error
+        text, encoding = data.decode("latin-1"), "latin-1"
+    if re.search("[\x00-\x08\x0e-\x1f]", text[:10000]):
+        raise TextTableError(f"{path}: is no text file: it has bytes that no text has")
+    return text, encoding
+
+
+def _split(lines: Sequence[str], separator: str) -> Iterator[Row]:
+    """Yield the rows of lines, blank ones too."""
+    if separator == " ":
+        rows = ((number, line.lstrip("#% ").split()) for number, line in enumerate(lines, 1))
+    else:
+        reader = csv.reader(lines, delimiter=separator)
+        rows = ((reader.line_num, cells) for cells in reader)
+    yield from rows
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Where the rows of numbers begin by one separator and decimal sign.
+
+    merit: the greater, the more likely; width: columns up to the last that holds numbers.
+    """
+
+    merit: tuple[bool, int]
+    header: list[str]
+    header_line: int
+    first_line: int
+    width: int
+    numeric: tuple[bool, ...]
+
+
+def _find_block(rows: list[Row], decimal: str, skip_lines: int | None) -> _Block | None:
+    """Return where the rows of numbers begin; None where there are none.
+
+    Rows have a shape: which of their cells are numbers. The shape that holds most numbers is the
+    table's. Rows above its first one that have a number in one of its columns belong to it, and are
+    damaged; the row of words above is the header.
+    """
+    rows = [row for row in rows if row[0] > (skip_lines or 0) and any(map(str.strip, row[1]))]
+    kinds = [[_kind(cell, decimal) for cell in cells] for _, cells in rows]
+    shapes = Counter("".join(one).rstrip(EMPTY) for one in kinds[skip_lines is not None :])
+    merits = {one: shapes[one] * (one.count(DIGITS) - one.count(WORDS)) for one in shapes}
+    shape = max(merits, key=lambda one: merits[one], default="")
+    if DIGITS not in shape:
+        return None
+    first = next(k for k, one in enumerate(kinds) if "".join(one).rstrip(EMPTY) == shape)
+    if skip_lines is not None:
+        first = min(first, 1)
+    while first > 0 and skip_lines is None and _is_damaged(kinds[first - 1], shape):
+        first -= 1
+    columns = list(itertools.zip_longest(*kinds[first:], fillvalue=EMPTY))
+    numeric = tuple(one.count(DIGITS) > one.count(WORDS) for one in columns)
+    width = max((k + 1 for k, is_number in enumerate(numeric) if is_number), default=0)
+    if not width:
+        return None
+    numeric = numeric[:width]
+    header_line, header = 0, []
+    if first:
+        header_line, header = rows[first - 1][0], _names(rows[:first])
+    fits = sum(map(bool, header)) == width and WORDS not in shape
+    return _Block((fits, merits[shape]), header, header_line, rows[first][0], width, numeric)
+
+
+DIGITS, WORDS, EMPTY = "0", "w", " "  # what a cell is
+
+
+def _kind(cell: str, decimal: str) -> str:
+    if not cell.strip():
+        return EMPTY
+    return WORDS if parse_number(cell, decimal) is None else DIGITS
+
+
+def _is_damaged(kinds: Sequence[str], shape: str) -> bool:
+    """Return whether a row of other shape has a number in a column of numbers."""
+    return len(kinds) >= len(shape) and any(
+        one == other == DIGITS for one, other in zip(kinds, shape, strict=False)
+    )
+
+
+def _names(rows: Sequence[Row]) -> list[str]:
+    """Return the names of columns of the last row; one of units is joined to the row above."""
+    names = [cell.strip() for cell in rows[-1][1]]
+    names[0] = names[0].lstrip("#% ")
+    bare = [name.strip("[]()") for name in names]
+    are_units = UNIT_WORDS.issuperset({unit.lower() for unit in bare} - {""})
+    if are_units and len(rows) > 1 and len(rows[-2][1]) == len(names):
+        above = _names(rows[-2:-1])
+        names = [
+            f"{name} [{unit}]" if unit else name for name, unit in zip(above, bare, strict=True)
+        ]
+    return names
