@@ -23,6 +23,7 @@ from compsim.screen import (
     plural,
     print_text,
     report_changes,
+    report_machines,
     say,
     setting,
     size,
@@ -70,6 +71,7 @@ def plan(
             *configs, overrides=overrides, max_jobs=max_jobs, only=only, progress=progress
         )
     caution(studies, None)
+    report_machines(studies)
     kinds = by_kind(studies)
     studies = kinds.pop(None, [])
     ahead = {kind: kind.module("command").ahead(its, output) for kind, its in kinds.items() if kind}
@@ -82,12 +84,15 @@ def plan(
     if not studies:
         return DONE
     report_changes(studies, output)
+    from compressor.analysis import describe_machine
     from compressor.sweep import forecast
 
     found = forecast(studies, output, first)
     workers = jobs or cores()
     if as_json:
-        whole = jsonable(dataclasses.asdict(found.with_times(workers, say)) | more)
+        machines = {one.name: dataclasses.asdict(describe_machine(one)) for one in studies}
+        whole = dataclasses.asdict(found.with_times(workers, say)) | more | {"machines": machines}
+        whole = jsonable(whole)
         print_text(json.dumps(whole, indent=1))
         return DONE
     width = max(len(part.study) for part in found.counts.studies)

@@ -3,6 +3,7 @@
 import os
 import sys
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -23,14 +24,21 @@ class ProgressReporter:
     """A reporter of how many things are done, until the end of its `with`.
 
     things: what is counted; alike: each takes about as long; folder: where those done are stored,
-    which is said if this ends early. A terminal that cannot draw (TERM=dumb), or shall
-    not (NO_COLOR), is taken for a log.
+    which is said if this ends early; open: called once, before the first is done. A
+    terminal that cannot draw (TERM=dumb), or shall not (NO_COLOR), is taken for a log.
     """
 
-    def __init__(self, quiet: bool, things: str = "jobs", alike: bool = True, folder: str = ""):
+    def __init__(
+        self,
+        quiet: bool,
+        things: str = "jobs",
+        alike: bool = True,
+        folder: str = "",
+        open: Callable[[], object] | None = None,
+    ):
         drawing = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
         self.quiet, self.live = quiet, sys.stderr.isatty() and drawing
-        self.things, self.alike, self.folder = things, alike, folder
+        self.things, self.alike, self.folder, self.open = things, alike, folder, open
         self.done = self.total = self.failed = 0
         self.began = self.logged = time.monotonic()  # logged: when a line was last written
         self.logged_done = -1
@@ -75,6 +83,9 @@ class ProgressReporter:
             return
         if remark:
             say_wrapped(remark)
+        elif self.open:
+            self.open()
+            self.open = None
         if self.live:
             self.draw()
         else:

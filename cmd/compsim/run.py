@@ -4,6 +4,7 @@ import os
 import shlex
 from collections import Counter
 from contextlib import nullcontext
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -26,6 +27,7 @@ from compsim.screen import (
     plural,
     print_text,
     report_changes,
+    report_machines,
     say,
     say_wrapped,
     setting,
@@ -125,6 +127,8 @@ def run(
         code = run_jobs(context, of_jobs, output, jobs or cores(),
                         (rerun, part, wait, scheduler, report if watch else "", quiet))  # fmt: skip
     for command, its in others:
+        if not quiet:
+            report_machines(its)
         shards = [study.shard(*part) if part else study for study in its]
         ended = command.run_studies(shards, output, jobs or cores(), bool(rerun), quiet)
         code = max(code, ended)
@@ -143,7 +147,11 @@ def run_jobs(
     watching: Any = PageWatch(output, page, context.obj, quiet) if page else nullcontext()
     with watching as watch:
         cluster: Any = Cluster(scheduler) if scheduler else nullcontext()
-        with ProgressReporter(quiet, folder=output) as progress, cluster as elsewhere:
+        opening = partial(report_machines, studies)  # where there are jobs to run
+        with (
+            ProgressReporter(quiet, "jobs", True, output, opening) as progress,
+            cluster as elsewhere,
+        ):
 
             def show(now: "SweepProgress") -> None:
                 progress.show_sweep(now)

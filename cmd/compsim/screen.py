@@ -194,20 +194,43 @@ def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
 
 
 def caution(studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS) -> None:
-    """Report once what is odd about case files, in at most `most` lines a file."""
+    """Report once what is odd about case files, in at most `most` warnings a file."""
+    from compressor.analysis import describe_machine
     from compressor.solve import cautions
 
     for study in studies:
-        found = cautions(study)
-        for one in found[:most]:
+        found, texts = cautions(study), []
+        for one in found:
             looked = "" if one.of == len(study.selected) else " that were looked at"
             share = "" if one.of == 1 else f" ({one.jobs} of {one.of} jobs{looked})"
-            say_wrapped(f"{study.path}: warning: {one.key}: {one.message}{share}")
-        if most is not None and len(found) > most:
-            more = plural(len(found) - most, "more warning")
+            texts.append(f"{one.key}: {one.message}{share}")
+        implausible = describe_machine(study).remarks({one.key for one in found})
+        texts = [f"{key}: {text}" for key, text in implausible.items()] + texts
+        for text in texts[:most]:
+            say_wrapped(f"{study.path}: warning: {text}")
+        if most is not None and len(texts) > most:
+            more = plural(len(texts) - most, "more warning")
             say_wrapped(
                 f"{study.path}: and {more}, which compsim plan {shlex.quote(study.path)} lists"
             )
+
+
+def report_machines(studies: "Sequence[Study]") -> None:
+    """Report what case files say of their machines: loads, power, pressures, pins."""
+    from compressor.analysis import describe_machine
+
+    for study in studies:
+        say(f"{study.name}: its machine, without clearance")
+        say("\n".join(machine_lines(describe_machine(study).lines)))
+
+
+def machine_lines(things: Sequence[tuple[str, str]], indent: int = 2) -> Iterator[str]:
+    """Yield the names of things and what is said of each, a name in its column, wrapped."""
+    width = max((len(thing) for thing, _ in things), default=0)
+    for thing, words in things:
+        first, *more = wrap_line(words, indent + width + 2, 0)
+        yield f"{'':{indent}}{thing:<{width}}  {first.lstrip()}"
+        yield from more
 
 
 def report_changes(studies: "Sequence[Study]", folder: str) -> None:

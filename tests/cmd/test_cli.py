@@ -336,7 +336,8 @@ def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, capsys):
     )
     assert cli.main(["explain", "two.yaml", "-j", "1"]) == 0
     out, err = capsys.readouterr()
-    assert out.startswith("two: 2 jobs; explained: clearance_mm = 0.2\n  motion      clearance at ")
+    assert out.startswith("two: 2 jobs; explained: clearance_mm = 0.2\n  machine     piston  ")
+    assert "\n  motion      clearance at " in out
     for word in ("active", "absent", "scales", "tolerance", "cost", "without"):
         assert re.search(rf"^  {word} ", out, re.MULTILINE), word
     assert max(map(len, out.splitlines())) <= 80
@@ -629,4 +630,24 @@ def test_a_run_that_is_told_to_end(started, tmp_path):
     assert {store.read_store(tmp_path / "results").status(key).status for key in kept} == {"ok"}
     goes_on = f"of {JOBS} jobs are stored in results; the same command goes on from there"
     slow = rf"(compil.+\n(  .+\n)*|\d+ of {JOBS} jobs, .+\n)*"  # told where it takes long
-    assert re.fullmatch(rf"{slow}\d+ {goes_on}\ninterrupted by SIGINT\n", err)
+    machine = r"many: its machine, .+\n(  .+\n)+"
+    assert re.fullmatch(rf"{machine}{slow}\d+ {goes_on}\ninterrupted by SIGINT\n", err)
+
+
+def test_a_run_says_what_the_file_means_and_what_is_odd_about_it(case_file, capsys):
+    """In plan and explain, too; --quiet leaves out the numbers, and no warning."""
+    halved = {"stroke_mm": 120, "rod_length_mm": 600}  # R / L = 0.1
+    case_file("m.yaml", load="gas", machine=halved, gas={"switching": "exact"})
+    warning = "m.yaml: warning: machine.stroke_mm: rod: crank ratio 0.1, where at least 0.12 is"
+    for words in (["plan"], ["run", "-o", "a"], ["run", "-o", "b", "--quiet"], ["explain"]):
+        assert cli.main([words[0], "m.yaml", *words[1:]]) == 0
+        out, err = capsys.readouterr()
+        assert err.startswith(warning), words
+        printed = out if words[0] == "explain" else err
+        assert ("piston     mean speed 2 m/s" in printed) == ("--quiet" not in words)
+    assert cli.main(["run", "m.yaml", "-o", "a"]) == 0  # nothing to do
+    assert "mean speed" not in capsys.readouterr().err
+    assert cli.main(["plan", "m.yaml", "-o", "a", "--json"]) == 0
+    numbers = json.loads(capsys.readouterr().out)["machines"]["m"]["numbers"]
+    (speed,) = (one for one in numbers if one["name"] == "piston, mean speed")
+    assert (speed["low"], speed["unit"], speed["usual_low"]) == (2.0, "m/s", 0.5)

@@ -22,6 +22,7 @@ from compsim.screen import (
     jobs_option,
     jsonable,
     limit,
+    machine_lines,
     plural,
     print_text,
     say,
@@ -377,6 +378,8 @@ def lines(facts: "Explanation") -> Iterator[str]:
     yield from wrap_line(
         f"{facts.study}: {plural(facts.jobs)}" + (f"; explained: {point}" if point else ""), 0
     )
+    for number, text in enumerate(machine_lines(facts.machine.lines, 2 + INDENT)):
+        yield text if number else f"  {'machine':<{INDENT}}{text.lstrip()}"
     count = len(facts.unknowns)
     solved = f"{count} degrees of freedom" if count else "closed form, nothing integrated"
     yield heading("motion", f"{facts.scene}: {solved}")

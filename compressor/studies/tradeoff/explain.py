@@ -16,6 +16,7 @@ from compressor.analysis import (
     NoSeriesError,
     body_velocity_rms,
     cylinder_words,
+    describe_machine,
     healthy_body_velocity_rms,
 )
 from compressor.cases import (
@@ -74,6 +75,7 @@ class Explanation:
     path: str
     jobs: int
     point: dict[str, Any]  # of the sweep's axes, at the job explained
+    machine: Any  # what `compressor.analysis.describe_machine` returns
     scene: str
     unknowns: tuple[str, ...]
     active: dict[str, str]  # term -> in words
@@ -122,6 +124,7 @@ def explain(
         path=study.path,
         jobs=len(study.cases),
         point=next(points(study)),
+        machine=describe_machine(replace(study, selected=[0])),
         scene=SCENES[tuple(faulty(case))],
         unknowns=unknown_names(case),
         active=active,

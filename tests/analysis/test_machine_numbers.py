@@ -1,0 +1,184 @@
+"""What a file means, before it runs: hand numbers of a nameplate, and mistakes that they show."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_layers import ROOT
+
+from compressor.analysis.machine_numbers import (
+    USUAL,
+    describe_machine,
+    machine_numbers,
+    revolution_loads,
+    sound_machine,
+)
+from compressor.cases.case import Case
+from compressor.cases.load import load_studies
+from compressor.physics import exact_motion
+from compressor.solve.cautions import cautions
+from compressor.solve.simulate import simulate
+
+EXAMPLES = ROOT / "compressor" / "cases" / "examples"
+# a machine of another nameplate, and what a hand calculation has for it
+NAMEPLATE = """
+joint: both
+clearance_mm: {big_end: 0.07, small_end: 0.175}
+machine:
+  stroke_mm: 127
+  rod_length_mm: 343
+  speed_rpm: 985
+  rod_mass_kg: 54
+  rod_centre_mm: 114
+  reciprocating_mass_kg: 118
+  pin_radius_mm: {big_end: 95, small_end: 51}
+load: gas
+gas:
+  action: double
+  bore_mm: 267
+  rod_diameter_mm: 50.8
+  clearance_percent: {head: 17, crank: 21}
+  suction_MPa: 0.4113
+  discharge_MPa: 1.0413
+  valve_loss_percent: {suction: 4, discharge: 5}
+  back_pressure_MPa: 0.101
+  exponent: 1.27
+contact: {materials: [steel, copper]}
+lubricant: {viscosity_mPa_s: 48, bearing_length_mm: 100}
+"""
+BY_HAND = {
+    "cylinder, indicated power": 78.93,  # kW
+    "cylinder, flow at suction": 607.6,  # m3/h
+    "gas load, tension": 37.1,  # kN
+    "gas load, compression": 39.7,
+    "rod load, tension": 62.18,
+    "rod load, compression": 51.55,
+    "rod load, reversal": 164.03,  # degrees
+    "rod, crank ratio": 63.5 / 343,
+    "cylinder, pressure ratio": 2.5317,
+    "suction, gauge": 3.1,  # bar
+    "piston, mean speed": 2 * 0.127 * 985 / 60,
+    "piston, inertia": 118 * 0.0635 * (985 * math.pi / 30) ** 2 * (1 + 63.5 / 343) / 1e3,
+    "small end, pressure": 62.85e3 / (102 * 100),
+}
+MISTAKES = {  # what was written in place of what, with the key that the remark names
+    "the bore as a radius": ("bore_mm: 267", "bore_mm: 133.5", "gas.bore_mm"),
+    "the crank radius as the stroke": ("stroke_mm: 127", "stroke_mm: 63.5", "machine.stroke_mm"),
+    "a rod ten times too long": ("length_mm: 343", "length_mm: 3430", "machine.rod_length_mm"),
+    "bar as MPa": (
+        "0.4113\n  discharge_MPa: 1.0413", "4.113\n  discharge_MPa: 10.413", "gas.discharge_MPa",
+    ),
+    "a fraction as per cent": (
+        "joint: both\nclearance_mm: {big_end: 0.07, small_end: 0.175}", "joint: both\n"
+        "clearance_mm: {big_end: 0.01, small_end: 0.02}", "gas.clearance_percent",
+    ),
+    "ISO VG as mPa s": ("mPa_s: 48", "mPa_s: 150", "lubricant.viscosity_mPa_s"),
+    "diametral as radial": ("small_end: 0.175", "small_end: 0.35", "clearance_mm"),
+    "the centre from the other end": ("centre_mm: 114", "centre_mm: 229", "machine.rod_centre_mm"),
+    "pins' diameters as radii": (
+        "{big_end: 95, small_end: 51}", "{big_end: 190, small_end: 102}", "machine.pin_radius_mm",
+    ),
+    "a piston rod's radius": ("rod_diameter_mm: 50.8", "rod_diameter_mm: 5.08",
+                              "gas.rod_diameter_mm"),
+    "gauge pressures near the atmosphere": (
+        "0.4113\n  discharge_MPa: 1.0413", "0.05\n  discharge_MPa: 0.25", "gas.suction_MPa",
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture
+def read(tmp_path):
+    def study(text):
+        path = tmp_path / "machine.yaml"
+        path.write_text(text, encoding="utf-8")
+        return load_studies(path)[0]
+
+    return study
+
+
+def by_name(numbers):
+    return {number.name: number for number in numbers}
+
+
+def test_a_nameplate_s_numbers_are_those_by_hand(read):
+    machine = describe_machine(read(NAMEPLATE))
+    found = by_name(machine.numbers)
+    for name, value in BY_HAND.items():
+        assert found[name].low == found[name].high == pytest.approx(value, rel=1e-3), name
+    assert machine.remarks() == {}
+    lines = dict(machine.lines)
+    assert lines["rod load"] == "tension 62.18 kN, compression 51.55 kN, reversal 164 degrees"
+    assert lines["suction"] == "absolute 0.4113 MPa, gauge 3.1 bar"
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_is_remarked_on_with_its_key(name, read):
+    before, after, key = MISTAKES[name]
+    assert before in NAMEPLATE
+    text = NAMEPLATE.replace(before, after)
+    if key == "gas.clearance_percent":
+        text = text.replace("{head: 17, crank: 21}", "{head: 0.17, crank: 0.21}")
+    assert list(describe_machine(read(text)).remarks()) == [key]
+
+
+def test_what_a_plausible_machine_could_have_shows_in_its_numbers(read):
+    """Gauge pressures as absolute ones, and 180 mm pins for 90 mm: no remark, but the number."""
+    gauge = NAMEPLATE.replace("0.4113", "0.31").replace("1.0413", "0.94")
+    found = by_name(describe_machine(read(gauge)).numbers)
+    assert found["suction, gauge"].value == "2.087 bar"  # where 3.1 is on the plate
+    pins = NAMEPLATE.replace("{big_end: 95, small_end: 51}", "{big_end: 90, small_end: 60}")
+    found = by_name(describe_machine(read(pins)).numbers)
+    assert found["big end, pin"].value == "180 mm"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in [*EXAMPLES.glob("*.yaml"), *(ROOT / "configs").glob("*.yaml")]
+     if path.name != "assumptions.yaml"],  # of `compsim claims` alone
+    ids=lambda path: path.stem,
+)  # fmt: skip
+def test_no_example_is_remarked_on(path):
+    for study in load_studies(path):
+        assert describe_machine(study).remarks() == {}
+
+
+def test_a_sweep_that_reaches_into_what_is_usual_is_meant(read):
+    swept = NAMEPLATE.replace("small_end: 0.175", "small_end: [0.1, 0.35]")
+    machine = describe_machine(read(swept))
+    assert machine.remarks() == {}
+    assert by_name(machine.numbers)["small end, diametral clearance"].value == "0.2 to 0.7 mm"
+
+
+def test_a_caution_about_the_speed_explains_the_piston_s(read):
+    study = read(NAMEPLATE.replace("speed_rpm: 985", "speed_rpm: 16.4"))
+    warned = {one.key for one in cautions(study)}
+    assert "machine.speed_rpm" in warned
+    assert describe_machine(study).remarks(warned) == {}
+
+
+@pytest.mark.parametrize("load", ["none", "spring", "gas"])
+def test_loads_are_those_of_a_run_without_clearance(load):
+    """And m a + F: the gas load less what the reciprocating mass takes."""
+    case = Case.from_values({"load": load, "machine": {"gravity_m_per_s2": 9.81}})
+    loads, run = revolution_loads(sound_machine(case)), simulate(case)
+    _, _, a = exact_motion(loads.angle, 0.12, 0.6, case.omega)
+    assert np.allclose(loads.inertia, -14.0 * a, atol=1e-6)
+    peak = float(run["peak_contact_force_axis"].sel(joint="small_end", axis="x"))
+    assert np.abs(loads.rod).max() == pytest.approx(peak, rel=1e-5)
+    found = by_name(machine_numbers([case]))
+    assert (f"{load} load, compression" in found) == (load != "none")
+
+
+def test_features_and_clearance_leave_the_sound_machine_as_it_is():
+    plain = Case.from_values({"load": "gas"})
+    worn = {"joint": "both", "clearance_mm": 0.1, "rod": True, "drive": True, "guide": True}
+    case = Case.from_values({"load": "gas", **worn})
+    assert sound_machine(case).physics_key == replace(plain, friction=None).physics_key
+    two = by_name(machine_numbers([plain, case]))
+    assert two["rod load, tension"].low == two["rod load, tension"].high
+
+
+def test_every_limit_is_of_a_number_that_there_is(read):
+    found = by_name(describe_machine(read(NAMEPLATE)).numbers)
+    assert {*USUAL} == {name for name, one in found.items() if not math.isnan(one.usual_low)}
