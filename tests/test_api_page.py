@@ -54,7 +54,9 @@ def test_a_group_tells_each_field_with_unit_range_default_and_source(name):
     for field in inspect.signature(getattr(compressor, name)).parameters:
         (line,) = re.findall(rf"^- `{field}`: .*$", TEXTS[f"compressor.{name}"], re.M)
         assert re.search(
-            r"\. Needs .+; default .+ \(.+\)\.( Judged on .+\.)?( Read with .+\.)?$", line
+            r"\. Needs .+; default .+ \(.+\)\.( Judged on .+\.)?( Read with .+\.)?"
+            r"( Plausible: .+ \(.+\)\.)?$",
+            line,
         ), line
 
 

@@ -8,7 +8,18 @@ from compressor.cases.case import (
     to_yaml,
     with_ideal_joints,
 )
-from compressor.cases.checks import SHORTHANDS, phrase_of, row_of, stands_for, suggestion, value_in
+from compressor.cases.checks import (
+    PER_PART,
+    SHORTHANDS,
+    phrase_of,
+    row_of,
+    stands_for,
+    suggestion,
+    value_in,
+    value_of,
+    values_given,
+    written_key,
+)
 from compressor.cases.conflicts import back_action, judged_range, outside_judged, reads
 from compressor.cases.examples import templates
 from compressor.cases.groups import (
@@ -28,7 +39,7 @@ from compressor.cases.json_schema import case_schema
 from compressor.cases.keys import Leaves, covers
 from compressor.cases.laws import CYLINDRICAL, READ_BY, law_of
 from compressor.cases.load import load_cases, load_studies
-from compressor.cases.materials import joint_stiffness, paper_notes, paper_stiffness_note
+from compressor.cases.materials import joint_stiffness, paper_notes
 from compressor.cases.optional_groups import Body, Drive, Guide, Lubricant, Rod, Sensor, Wear
 from compressor.cases.parameter import (
     ACCURACY,

@@ -14,7 +14,7 @@ an unknown key names what was probably meant, or else what there is.
 
 import dataclasses
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -154,6 +154,14 @@ def by_part(key: str, value: Any) -> Mapping[str, str]:
     """Return the keys that a value for each part is of, by part; none of any other value."""
     keys = PER_PART.get(key, {})
     return keys if isinstance(value, Mapping) and {*value} & {*keys} else {}
+
+
+def written_key(key: str, known: Container[str]) -> str:
+    """Return a key as a case file has it: that of a part where each part's key is known."""
+    for whole, parts in PER_PART.items():
+        if key in parts.values() and all(one in known for one in parts.values()):
+            return f"{whole}.{next(part for part, one in parts.items() if one == key)}"
+    return key
 
 
 def lacking_part(key: str, value: Mapping[str, Any]) -> str:

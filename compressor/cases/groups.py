@@ -28,16 +28,35 @@ from compressor.cases.parameter import (
     SMALL_END,
     SMALL_RUBBING,
     STIFFNESS,
+    Plausible,
     by_law,
     choice,
     document_fields,
+    from_to,
     or_own,
     parameter,
+    times,
 )
 
 COMPILED = ("auto", "DOPRI5", "TSIT5", "RODAS")  # by `compressor.solve`; the others are SciPy's
 JUDGED_STIFFNESS = (1e8 / 1000**1.5, 1e12 / 1000**1.5)  # N/mm^1.5: judged on, 1e8 to 1e12 N/m^1.5
 METHODS = (*COMPILED, "LSODA", "Radau", "BDF", "DOP853", "RK45")
+
+
+# how far plants' machines are from what a case has: see `Plausible`
+NO_MASS = Plausible("the paper prints no masses", times(0.5, 2))
+PRESSURE = Plausible("gauges, lines and the day", times(0.95, 1.05), times(0.95, 1.05))
+CYLINDER_CLEARANCE = Plausible(
+    "data sheets round it, pockets and worn valves change it", times(0.8, 1.25), times(0.8, 1.25)
+)  # fmt: skip
+VALVE_LOSS = Plausible(
+    "no nameplate has it; valves lose up to a tenth", from_to(0, 8), from_to(0, 8)
+)  # fmt: skip
+CONTACT_GUESS = Plausible("no joint's contact is known better", times(0.5, 2), times(0.5, 2))
+SMOOTHING = Plausible("a smoothing of the law, which nobody measures", times(0.3, 3))
+BEARING_LENGTH = Plausible(
+    "grooves and holes shorten what bears", times(0.5, 1.25), times(0.5, 1.25)
+)  # fmt: skip
 
 
 @document_fields
@@ -142,25 +161,35 @@ class Machine:
     rod_mass_kg: float = parameter(
         4.7, "kg", (0, 1e6), "assumed: a 600 x 40 x 25 mm steel bar", "rod mass", above=True,
         judged=(0.1, 200),
+        plausible=NO_MASS,
     )  # fmt: skip
     rod_centre_mm: float | None = parameter(
         None, "mm", (0, 1e6), "assumed: half the rod", "rod's mass centre, from the big end",
         optional=True,
+        plausible=Plausible("a rod is heavier at its big end", times(0.6, 1), times(0.9, 1.1)),
     )  # fmt: skip
     rod_inertia_kg_m2: float | None = parameter(
         None, "kg m2", (0, 1e9), "assumed: m L^2 / 12", "rod's inertia about its mass centre",
         above=True, optional=True,
+        plausible=Plausible(
+            "drawn rods have 1.2 to 2 times that of a uniform bar", times(1, 2.5), times(0.8, 1.25)
+        ),
     )  # fmt: skip
     reciprocating_mass_kg: float = parameter(
         14.0, "kg", (0, 1e6), "assumed", "crosshead, piston rod and piston", above=True,
         judged=(0.1, 200),
+        plausible=NO_MASS,
     )  # fmt: skip
     pin_radius_mm: float = parameter(
         10.0, "mm", (0, 1e4), "inferred from Eq. 15 and Table 3",
         "journal radius R_j of both joints, or of the big end", above=True,
         read=RUBBING, judged=(10, 100),
+        plausible=Plausible("the paper does not print it", times(0.7, 1.5)),
     )  # fmt: skip
-    gravity_m_per_s2: float = parameter(0.0, "m/s2", (0, 1000), "assumed", "gravity, along -y")
+    gravity_m_per_s2: float = parameter(
+        0.0, "m/s2", (0, 1000), "assumed", "gravity, along -y",
+        plausible=Plausible("it acts on a horizontal machine", from_to(0, 9.81)),
+    )  # fmt: skip
     small_end_pin_radius_mm: float | None = parameter(
         None, "mm", (0, 1e4), "as the big end's", "journal radius of the small end",
         above=True, optional=True, read=SMALL_RUBBING,
@@ -242,18 +271,27 @@ class Gas:
     head_clearance_mm: float | None = parameter(
         20.0, "mm", (0, 1e5), "Eq. 13", "clearance of the cylinder head s0", above=True,
         optional=True, read=(CYCLE, HEAD_CLEARANCE),
+        plausible=CYLINDER_CLEARANCE,
     )  # fmt: skip
     suction_MPa: float = parameter(
-        0.105, "MPa", (0, 1e3), "Table 1", "suction pressure (absolute)", above=True, read=CYCLE
-    )
+        0.105, "MPa", (0, 1e3), "Table 1", "suction pressure (absolute)", above=True, read=CYCLE,
+        plausible=PRESSURE,
+    )  # fmt: skip
     discharge_MPa: float = parameter(
-        0.393, "MPa", (0, 1e3), "Table 1", "discharge pressure (absolute)", above=True, read=CYCLE
-    )
-    exponent: float = parameter(1.4, "", (1, 5), "Eq. 13", "isentropic exponent", read=CYCLE)
+        0.393, "MPa", (0, 1e3), "Table 1", "discharge pressure (absolute)", above=True, read=CYCLE,
+        plausible=PRESSURE,
+    )  # fmt: skip
+    exponent: float = parameter(
+        1.4, "", (1, 5), "Eq. 13", "isentropic exponent", read=CYCLE,
+        plausible=Plausible("moist gas and cooled walls lower it", from_to(1.15, 1.4)),
+    )  # fmt: skip
     back_pressure_MPa: float = parameter(
         0.0, "MPa", (0, 1e3), "assumed",
         "pressure on what no gas cycle presses: the piston's other face, or the rod's "
         "cross-section in a double-acting cylinder",
+        plausible=Plausible(
+            "a crankcase has the atmosphere's, or a little more", from_to(0.09, 0.15)
+        ),
     )  # fmt: skip
     switching: str | None = choice(
         None, ("paper", "exact"), "Eq. 13",
@@ -275,19 +313,23 @@ class Gas:
         None, "%", (0, 1000), "program",
         "clearance volume over swept volume of each end, or of the head's; in place of "
         "head_clearance_mm", above=True, optional=True, read=(CYCLE, HEAD_CLEARANCE),
+        plausible=CYLINDER_CLEARANCE,
     )  # fmt: skip
     crank_clearance_percent: float | None = parameter(
         None, "%", (0, 1000), "as the head's", "clearance volume over swept volume, crank end",
         above=True, optional=True, read=(CYCLE, CRANK_END),
+        plausible=CYLINDER_CLEARANCE,
     )  # fmt: skip
     valve_loss_percent: float | None = parameter(
         None, "%", (0, 90), "program",
         "loss of absolute pressure while a valve is open, of both or of the suction's; 0 without",
         optional=True, read=CYCLE,
+        plausible=VALVE_LOSS,
     )  # fmt: skip
     discharge_loss_percent: float | None = parameter(
         None, "%", (0, 90), "as the suction's",
         "loss of absolute pressure while the discharge valve is open", optional=True, read=CYCLE,
+        plausible=VALVE_LOSS,
     )  # fmt: skip
     unloaded: str | None = choice(
         None, ("none", "head", "crank"), "program",
@@ -418,6 +460,7 @@ class Contact:
         3.36e5, "N/mm^p", (0, 1e15), "Table 3", "contact stiffness K, in N/mm^exponent",
         above=True, optional=True, read=STIFFNESS,
         judged=JUDGED_STIFFNESS,
+        plausible=CONTACT_GUESS,
     )  # fmt: skip
     materials: tuple[str, str] | None = choice(
         None, ("steel", "copper"), "Table 2, Eq. 15", "two materials in place of a stiffness, of "
@@ -438,10 +481,12 @@ class Contact:
         336.0, "N s/mm", (0, 1e9), "Table 3", "greatest contact damping C_max",
         read=(by_law("contact", "damping_N_s_per_mm"), or_own("damping_N_s_per_mm")),
         judged=(0, 33600),
+        plausible=CONTACT_GUESS,
     )  # fmt: skip
     full_damping_mm: float = parameter(
         0.1, "mm", (0, 1e3), "Table 3", "penetration of full damping d_max", above=True,
         read=(by_law("contact", "full_damping_mm"), or_own("full_damping_mm")),
+        plausible=CONTACT_GUESS._replace(given=None),
     )  # fmt: skip
     restitution: float | None = parameter(
         None, "", (0, 1), "program", "coefficient of restitution, in laws that damp by it",
@@ -455,12 +500,14 @@ class Contact:
         above=True, optional=True,
         read=(by_law("contact", "least_approach_mm_per_s"), DAMPED),
         judged=(1.0, 100.0),
+        plausible=SMOOTHING,
     )  # fmt: skip
     length_mm: float | None = parameter(
         None, "mm", (0, 1e4), "program", "length of both joints, or of the big end (johnson, liu)",
         above=True, optional=True,
         read=(CLEARANCE, by_law("contact", "length_mm")),
         judged=(10.0, 100.0),
+        plausible=BEARING_LENGTH,
     )  # fmt: skip
     modulus_GPa: float | None = parameter(
         None, "GPa", (0, 1e6), "program", "composite modulus (johnson, liu)", above=True,
@@ -475,6 +522,7 @@ class Contact:
         None, "mm", (0, 1e4), "as the big end's", "length of the small end (johnson, liu)",
         above=True, optional=True,
         read=(SMALL_CLEARANCE, by_law("contact", "small_end_length_mm")),
+        plausible=BEARING_LENGTH,
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -522,15 +570,21 @@ class Friction:
     static: float = parameter(
         0.23, "", (0, 10), "Table 3", "static coefficient", read=by_law("friction", "static"),
         judged=(0, 0.5),
+        plausible=Plausible("metals scatter, and oil lowers it", times(0.7, 1.5), times(0.7, 1.5)),
     )  # fmt: skip
-    dynamic: float = parameter(0.15, "", (0, 10), "Table 3", "dynamic coefficient", judged=(0, 0.5))
+    dynamic: float = parameter(
+        0.15, "", (0, 10), "Table 3", "dynamic coefficient", judged=(0, 0.5),
+        plausible=Plausible("metals scatter, and oil lowers it", times(0.5, 1.5), times(0.5, 1.5)),
+    )  # fmt: skip
     stiction_velocity_mm_per_s: float = parameter(
         10.0, "mm/s", (0, 1e6), "Table 3", "stiction transition velocity", above=True,
         judged=(0.1, 100),
+        plausible=SMOOTHING,
     )  # fmt: skip
     friction_velocity_mm_per_s: float = parameter(
         100.0, "mm/s", (0, 1e6), "Table 3", "friction transition velocity", above=True,
         read=by_law("friction", "friction_velocity_mm_per_s"),
+        plausible=SMOOTHING._replace(left_out=times(0.5, 2)),
     )  # fmt: skip
     law: str | None = choice(
         None, FRICTION_LAWS, "Eq. 16", "friction law (adams where none is named)", optional=True
@@ -539,11 +593,13 @@ class Friction:
         None, "1/mm", (0, 1e9), "program", "LuGre's sigma_0 over the normal force; 100 by default",
         above=True, optional=True, read=by_law("friction", "bristle_stiffness_per_mm"),
         judged=(10.0, 1e4),
+        plausible=SMOOTHING,
     )  # fmt: skip
     bristle_damping_s_per_mm: float | None = parameter(
         None, "s/mm", (0, 1e6), "program", "LuGre's sigma_1 over the normal force; 0.03 by default",
         optional=True, read=by_law("friction", "bristle_damping_s_per_mm"),
         judged=(1e-3, 0.1),
+        plausible=SMOOTHING,
     )  # fmt: skip
     viscous_s_per_mm: float | None = parameter(
         None, "s/mm", (0, 1e6), "program", "LuGre's sigma_2 over the normal force; 0 by default",

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar
 
-from compressor.cases.groups import PerJoint
+from compressor.cases.groups import BEARING_LENGTH, SMOOTHING, PerJoint
 from compressor.cases.parameter import (
     ALONG_X,
     ALONG_Y,
@@ -19,9 +19,12 @@ from compressor.cases.parameter import (
     SMALL_CLEARANCE,
     STEADY,
     THRESHOLD,
+    Plausible,
     choice,
     document_fields,
+    from_to,
     parameter,
+    times,
 )
 
 MIN_RATIO, MAX_RATIO = 0.125, 1.0  # of a bearing's length and diameter
@@ -46,18 +49,25 @@ class Lubricant:
     viscosity_mPa_s: float = parameter(
         30.0, "mPa s", (0, 1e6), "ISO VG 100 at about 65 °C (ISO 3448)", "dynamic viscosity",
         above=True, judged=(3.0, 300.0),
+        plausible=Plausible(
+            "it halves in 15 degrees, and a bearing's temperature is a guess",
+            times(0.5, 2), times(0.5, 2),
+        ),
     )  # fmt: skip
     bearing_length_mm: float = parameter(
         20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of both bearings, or of the big "
         "end's", above=True,
+        plausible=BEARING_LENGTH,
     )  # fmt: skip
     last_share: float = parameter(
         0.02, "", (0.001, 0.5), "program",
         "share of the clearance below which the film gets no thinner", judged=(0.01, 0.1),
+        plausible=Plausible("nobody knows the roughness", times(0.5, 2), times(0.5, 2)),
     )  # fmt: skip
     small_end_bearing_length_mm: float | None = parameter(
         None, "mm", (0, 1e4), "as the big end's", "length of the small end's bearing",
         above=True, optional=True, read=SMALL_CLEARANCE,
+        plausible=BEARING_LENGTH,
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -94,28 +104,34 @@ class Guide:
         judged=(0.01, 0.2),
     )  # fmt: skip
     friction: float = parameter(
-        0.05, "", (0, 10), PROGRAM, "friction coefficient of the oiled guide", judged=(0.01, 0.2)
-    )
+        0.05, "", (0, 10), PROGRAM, "friction coefficient of the oiled guide", judged=(0.01, 0.2),
+        plausible=Plausible("well oiled, or nearly dry", times(0.5, 3)),
+    )  # fmt: skip
     stiction_velocity_mm_per_s: float = parameter(
         10.0, "mm/s", (0, 1e6), "Table 3, of the joints", "speed at which friction is three "
         "quarters of its greatest", above=True, read=GUIDE_FRICTION,
+        plausible=SMOOTHING,
     )  # fmt: skip
     crosshead_length_mm: float = parameter(
         120.0, "mm", (0.001, 1e4), PROGRAM, "length of the crosshead", read=PLAY,
         judged=(60.0, 250.0),
+        plausible=Plausible("the default's is of no machine", times(0.7, 1.5)),
     )  # fmt: skip
     crosshead_height_mm: float = parameter(
         80.0, "mm", (0.001, 1e4), PROGRAM, "height of the crosshead", read=PLAY,
         judged=(40.0, 150.0),
+        plausible=Plausible("the default's is of no machine", times(0.7, 1.5)),
     )  # fmt: skip
     crosshead_inertia_kg_m2: float | None = parameter(
         None, "kg m2", (0, 1e9), "assumed: of a uniform block, m (l^2 + h^2) / 12",
         "inertia of the crosshead about its pin", above=True, optional=True, read=PLAY,
+        plausible=Plausible("a crosshead is no block", times(0.5, 2)),
     )  # fmt: skip
     stiffness_N_per_mm15: float = parameter(
         3.36e5, "N/mm^p", (0, 1e15), "Table 3, of the joints",
         "contact stiffness of a corner, in N/mm^exponent", above=True, read=PLAY,
         judged=(3e4, 3e6),
+        plausible=Plausible("no contact of a guide is known better", times(0.3, 3)),
     )  # fmt: skip
     exponent: float | None = parameter(
         None, "", (1, 3), "as the joints'", "force exponent of a corner", optional=True, read=PLAY
@@ -152,11 +168,13 @@ class Drive:
     flywheel_kg_m2: float = parameter(
         5.0, "kg m2", (0, 1e9), PROGRAM, "inertia of crank, flywheel and motor", above=True,
         judged=(1.0, 100.0),
+        plausible=Plausible("the default's is of no machine", times(0.5, 2)),
     )  # fmt: skip
     torque_N_m: float = parameter(0.0, "N m", (-1e9, 1e9), PROGRAM, "torque at machine.speed_rpm")
     slope_N_m_s: float = parameter(
         100.0, "N m s", (0, 1e9), PROGRAM, "torque added for each rad/s that the speed falls",
         judged=(10.0, 1e4),
+        plausible=Plausible("motors differ by their size", times(0.3, 3)),
     )  # fmt: skip
     unbalance_kg_mm: float = parameter(
         0.0, "kg mm", (0, 1e9), PROGRAM,
@@ -185,14 +203,17 @@ class Rod:
     depth_mm: float = parameter(
         40.0, "mm", (0, 1e4), "assumed: a 600 x 40 x 25 mm bar",
         "depth of the rod, in the plane of motion", above=True, judged=(20.0, 80.0),
+        plausible=Plausible("a rod is no bar", times(0.8, 1.25)),
     )  # fmt: skip
     width_mm: float = parameter(
         25.0, "mm", (0, 1e4), "assumed: a 600 x 40 x 25 mm bar",
         "width of the rod, across that plane", above=True, judged=(10.0, 50.0),
+        plausible=Plausible("a rod is no bar", times(0.8, 1.25)),
     )  # fmt: skip
     damping_ratio: float = parameter(
         0.005, "", (0, 1), PROGRAM, "damping ratio of the first bending mode; others by stiffness",
         judged=(2e-3, 0.1),
+        plausible=Plausible("bolts and bushes damp more than steel", times(0.4, 4)),
     )  # fmt: skip
 
 
@@ -225,31 +246,41 @@ class Body:
     freedoms: str = choice(
         "xy", ("x", "y", "xy", "xy_rocking"), PROGRAM, "directions in which the rigid body may move"
     )
-    mass_kg: float = parameter(500.0, "kg", (0, 1e7), PROGRAM, "mass of the body", above=True)
+    mass_kg: float = parameter(
+        500.0, "kg", (0, 1e7), PROGRAM, "mass of the body", above=True,
+        plausible=Plausible("the default's is of no machine", times(0.5, 2)),
+    )  # fmt: skip
     inertia_kg_m2: float = parameter(
         40.0, "kg m2", (0, 1e9), PROGRAM, "inertia of the body about its mass centre", above=True,
         read=ROCKING,
+        plausible=Plausible("the default's is of no machine", times(0.5, 2)),
     )  # fmt: skip
     centre_x_mm: float = parameter(
         300.0, "mm", (-1e5, 1e5), PROGRAM, "x of the body's mass centre, from the crank's",
         read=ROCKING,
+        plausible=Plausible("the default's is of no machine", times(0.5, 1.5)),
     )  # fmt: skip
     centre_y_mm: float = parameter(
         -200.0, "mm", (-1e5, 1e5), PROGRAM, "y of the body's mass centre, from the crank's",
         read=ROCKING,
+        plausible=Plausible("the default's is of no machine", times(0.5, 1.5)),
     )  # fmt: skip
     frequency_x_Hz: float = parameter(
-        60.0, "Hz", (0, 1e5), BOLTED, "natural frequency along x", above=True, read=ALONG_X
-    )
+        60.0, "Hz", (0, 1e5), BOLTED, "natural frequency along x", above=True, read=ALONG_X,
+        plausible=Plausible("30 on a skid to 80 on rock", from_to(30, 80), times(0.7, 1.4)),
+    )  # fmt: skip
     frequency_y_Hz: float = parameter(
-        60.0, "Hz", (0, 1e5), BOLTED, "natural frequency along y", above=True, read=ALONG_Y
-    )
+        60.0, "Hz", (0, 1e5), BOLTED, "natural frequency along y", above=True, read=ALONG_Y,
+        plausible=Plausible("30 on a skid to 80 on rock", from_to(30, 80), times(0.7, 1.4)),
+    )  # fmt: skip
     frequency_rocking_Hz: float = parameter(
-        20.0, "Hz", (0, 1e5), PROGRAM, "natural frequency of rocking", above=True, read=ROCKING
-    )
+        20.0, "Hz", (0, 1e5), PROGRAM, "natural frequency of rocking", above=True, read=ROCKING,
+        plausible=Plausible("nobody computes it well", times(0.7, 1.4), times(0.7, 1.4)),
+    )  # fmt: skip
     damping_ratio: float = parameter(
-        0.03, "", (0, 0.99), PROGRAM, "damping ratio of the foundation", above=True
-    )
+        0.03, "", (0, 0.99), PROGRAM, "damping ratio of the foundation", above=True,
+        plausible=Plausible("soil damps more than steel", times(0.3, 3)),
+    )  # fmt: skip
     casing: bool = choice(
         True, (), PROGRAM, "casing modes, one at the guide and one at the main bearing, "
         "which sensors feel", kind="boolean", read=CASING_SENSED,
@@ -257,14 +288,17 @@ class Body:
     casing_mass_kg: float | None = parameter(
         None, "kg", (0, 1e6), "program: a 25th of the body's mass", "modal mass of a casing mode; "
         "the sensor's level goes as its inverse", above=True, optional=True, read=CASING,
+        plausible=Plausible("nobody weighs what a mode moves", times(0.2, 2), times(0.5, 2)),
     )  # fmt: skip
     casing_frequency_Hz: float = parameter(
         2000.0, "Hz", (0, 1e5), PROGRAM, "natural frequency of a casing mode", above=True,
         read=CASING,
+        plausible=Plausible("a hammer finds it", times(0.5, 2)),
     )  # fmt: skip
     casing_damping_ratio: float = parameter(
-        0.02, "", (0, 0.99), PROGRAM, "damping ratio of a casing mode", above=True, read=CASING
-    )
+        0.02, "", (0, 0.99), PROGRAM, "damping ratio of a casing mode", above=True, read=CASING,
+        plausible=Plausible("a hammer finds it", times(0.5, 2)),
+    )  # fmt: skip
     start: str = choice(
         "steady", ("steady", "rest"), PROGRAM,
         "start of the body; steady: as if the settled revolutions had always repeated; rest: at "
@@ -318,8 +352,9 @@ class Sensor:
         above=True, optional=True,
     )  # fmt: skip
     mounting_Hz: float = parameter(
-        25000.0, "Hz", (0, 1e6), "usual: on a stud", "mounting resonance", above=True
-    )
+        25000.0, "Hz", (0, 1e6), "usual: on a stud", "mounting resonance", above=True,
+        plausible=Plausible("a magnet, or a hand, in place of a stud", times(0.2, 1)),
+    )  # fmt: skip
     mounting_damping_ratio: float = parameter(
         0.03, "", (0, 0.99), PROGRAM, "damping ratio of the mounting", above=True
     )
@@ -328,8 +363,9 @@ class Sensor:
         "range of the sensor; the signal is clipped beyond it", above=True,
     )  # fmt: skip
     noise_m_per_s2: float = parameter(
-        0.0015, "m/s2", (0, 1e6), "usual: piezoelectric", "rms of white noise up to half the rate"
-    )
+        0.0015, "m/s2", (0, 1e6), "usual: piezoelectric", "rms of white noise up to half the rate",
+        plausible=Plausible("cables, and a plant's own noise", times(1, 30)),
+    )  # fmt: skip
     speed_jitter: float = parameter(
         0.0, "", (0, 0.1), PROGRAM,
         "rms of the speed's relative deviation; drawn once a revolution and smooth between: 0.93 "

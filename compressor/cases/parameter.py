@@ -20,7 +20,7 @@ from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from functools import lru_cache
 from inspect import cleandoc
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from compressor.cases.card import COLUMNS, CardError, mark_card
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, READ_BY, law_of
@@ -284,6 +284,48 @@ def to_si(value: float, unit: str) -> float:
     return value * numerator / denominator
 
 
+class Span(NamedTuple):
+    """Two numbers that a value may well be: factors of it, or values in the case file's unit."""
+
+    low: float
+    high: float
+    are_factors: bool = True
+
+    def ends(self, value: float) -> list[float]:
+        """Return the two values around one, those that are not the value itself."""
+        each = [self.low * value, self.high * value] if self.are_factors else [self.low, self.high]
+        return [end for end in each if abs(end - value) > 1e-9 * abs(value)]
+
+    def __str__(self) -> str:
+        return f"{self.low:g} to {self.high:g}" + " times" * self.are_factors
+
+
+def times(low: float, high: float) -> Span:
+    """Return a span of factors."""
+    return Span(low, high)
+
+
+def from_to(low: float, high: float) -> Span:
+    """Return a span of values in the case file's unit."""
+    return Span(low, high, are_factors=False)
+
+
+class Plausible(NamedTuple):
+    """How far a number of a plant's machine may be from what a case has, and why.
+
+    `left_out`: where the file does not give it. `given`: where it does, of what a plant can only
+    guess; None of what is known where it is given. `compsim explain --models` varies both.
+    """
+
+    why: str
+    left_out: Span
+    given: Span | None = None
+
+    def __str__(self) -> str:
+        also = f"; given, {self.given}" if self.given else ""
+        return f"{self.left_out}{', given or not' if self.given == self.left_out else also}"
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One row of the table of parameters; `low` and `high` are in the case file's unit."""
@@ -303,6 +345,7 @@ class Parameter:
     aliases: tuple[tuple[str, str], ...] = ()  # other words, each with the choice it stands for
     judged: tuple[float, float] | None = None  # range that extreme scenes are drawn from
     read: tuple[Reader, ...] = ()  # conditions that all hold where a case reads it
+    plausible: Plausible | None = None  # where there is a doubt about it
 
     @property
     def label(self) -> str:
@@ -484,6 +527,7 @@ def document_fields(group: type[Group]) -> type[Group]:
         needed = row.needed.replace("true or false", "True or False")
         notes = f" Judged on {row.judged_on}." if row.judged else ""
         notes += f" Read with {row.readers}." if row.read else ""
+        notes += f" Plausible: {row.plausible} ({row.plausible.why})." if row.plausible else ""
         needs = f"Needs {needed}; default {default} ({row.source})."
         lines.append(f"- `{row.key}`: {row.phrase}. {needs}{notes}")
     text = cleandoc(group.__doc__ or "")
@@ -493,14 +537,17 @@ def document_fields(group: type[Group]) -> type[Group]:
 
 def parameter_table(rows: Iterable[Parameter]) -> str:
     """Return the table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
-    heads = ("key", "unit", "default", "range", "judged on", "source", "what it is", "read with")
+    heads = (
+        "key", "unit", "default", "range", "judged on", "source", "what it is", "read with",
+        "plausible",
+    )  # fmt: skip
     lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
     for row in rows:
         default = "" if row.default is None or row.kind == "text" else str(row.default)
         default = default.lower() if row.kind == "boolean" else default.removesuffix(".0")
         cells = (
             f"`{row.key}`", row.unit, default, row.range, row.judged_on, row.source, row.phrase,
-            row.readers,
+            row.readers, f"{row.plausible}: {row.plausible.why}" if row.plausible else "",
         )  # fmt: skip
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines) + "\n"

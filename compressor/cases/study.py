@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, overload
 
 from compressor.cases.case import Case
+from compressor.cases.checks import expand_shorthands
 from compressor.cases.combinations import Block
-from compressor.cases.keys import Leaves
+from compressor.cases.keys import Leaves, nest_values
 from compressor.cases.swept import Test
 from compressor.cases.yaml_reader import FileProblem, Node
 
@@ -82,6 +83,11 @@ class Study:
     def jobs(self) -> int:
         return len(self.keys)
 
+    def given(self, number: int) -> dict[str, Any]:
+        """Return what the file gives of a job, nested as a case file has it."""
+        assert isinstance(self.cases, Cases)
+        return self.cases.given(number)
+
     def solver_of(self, number: int) -> Hashable:
         """Return what jobs share only if their cases have equal groups `solve` and `output`."""
         return self.cases.solver_of(number) if isinstance(self.cases, Cases) else number
@@ -135,6 +141,12 @@ class Cases(Sequence[Case]):
         block = bisect.bisect_right(self.ends, number)
         numbers = self.parts[block].numbers
         return block, numbers[number - self.ends[block] + len(numbers)]
+
+    def given(self, number: int) -> dict[str, Any]:
+        """Return what the file gives of a case, nested as a case file has it."""
+        block, place = self._locate(number)
+        part = self.parts[block]
+        return expand_shorthands(nest_values(part.chosen(place))) | {"name": part.name}
 
     def solver_of(self, number: int) -> Hashable:
         """Return what cases share only if their groups `solve` and `output` are equal."""

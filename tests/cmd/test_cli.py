@@ -416,11 +416,11 @@ def without_laws(monkeypatch):
     """Leave out laws and mechanisms, which take a minute to compile: tests/measure has them."""
     from compressor.studies.tradeoff import model_choices as module
 
-    for name in ("model_variants", "model_choices"):
+    for name in ("model_variants", "model_choices", "vary_numbers"):
         whole = getattr(module, name)
 
-        def plain(case, whole=whole):
-            return [one for one in whole(case) if one.case and one.case.is_plain]
+        def plain(*of, whole=whole):
+            return [one for one in whole(*of) if one.case and one.case.is_plain]
 
         monkeypatch.setattr(module, name, plain)
 
@@ -430,48 +430,66 @@ def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch
 
     without_laws(monkeypatch)
     case_file("worn.yaml", joint="big_end", clearance_mm=[0.2, 0.3], machine={"rod_mass_kg": 3})
+    assert cli.main(["run", "worn.yaml", "-o", "kept", "-j", "1"]) == 0
+    with open_study("kept", "worn") as study:
+        forces = study["peak_contact_force"].max("joint")
+        greatest = forces.idxmax("clearance_mm").item()
+        peak = study["peak_acceleration"].sel(clearance_mm=greatest).item()
+    capsys.readouterr()
     assert cli.main(["explain", "--models", "worn.yaml", "-o", "kept"]) == 0
     out, err = capsys.readouterr()
     lines = out.splitlines()
-    assert lines[0] == "worn at clearance_mm = 0.2, one of 2 jobs:"
-    told = "running the first of 2 jobs of worn, by other choices of the model; it has clear"
+    assert lines[0] == f"worn at clearance_mm = {greatest}, one of 2 jobs:"
+    told = (
+        "running the one of 2 jobs with the greatest stored contact force of worn, with one thing "
+        f"otherwise at a time; it has clearance_mm = {greatest}: --set KEY=VALUE takes another"
+    )
     assert told in " ".join(err.split())
     assert re.search(r"kept/models/worn-[0-9a-f]{8}\.nc\n$", err)
-    rows = {}
-    for line in lines:  # of all blocks
-        name = line[2:30].split("  ")[0]
-        rows[name] = rows.get(name, "") + line
-    scaled = [f"contact {what} {sign} 2" for what in ("stiffness", "damping") for sign in "×÷"]
-    assert [name for name in rows if name in scaled] == scaled
-    assert "    contact stiffness × 2: stiffness_N_per_mm15 6.72e+05" in lines
-    said = " ".join(" ".join(lines[-4:]).split()).rpartition("e+05 ")[2]
-    last = re.search(
-        r"(Peak [^.]*: [\d.]+ (kN|m/s²); numerical error (below )?[\d.]+ %; choices of the model "
-        r"move this peak by (\S+) to (\S+) %)$", said,
-    )  # fmt: skip
-    assert last
-    assert f" {last[4]} to" in rows["all of them"]
-    for end in {last[4], last[5]} - {"0"}:  # the span is that of a row
-        assert any(f" {end} %" in rows[name] for name in scaled)
+    start = next(n for n, line in enumerate(lines) if line.startswith("  peak acceleration: "))
+    assert float(lines[start].split()[2]) == pytest.approx(peak, rel=1e-2)  # at draft
+    shown = lines[start + 1 : start + 6]
+    assert lines[start + 6].split()[1:] == ["more", "move", "it", "less"]
+    sizes = [max(abs(float(n)) for n in re.findall(r"([+-]\S+) %", line)) for line in shown]
+    assert sizes == sorted(sizes, reverse=True)
+    found = re.search(
+        r"\n(Peak (.*): [\d.]+ (?:kN|m/s²); numerical error (?:below )?[\d.]+ %\. (\d+) numbers in "
+        r"doubt, each alone, move this peak by \S+ to \S+ %, most by (.*)\. Not in this: .*)$",
+        re.sub(r"\n  (?=\S)", " ", out.rstrip()),
+    )
+    assert found
+    start = next(n for n, line in enumerate(lines) if line.startswith(f"  peak {found[2]}: "))
+    varied, _, end = found[4].rpartition(" ")
+    assert lines[start + 1].strip().startswith(varied.removesuffix(" ×").removesuffix(" ÷"))
+    assert end in lines[start + 1]
 
-    assert cli.main(["run", "worn.yaml", "-o", "kept", "-j", "1"]) == 0
     assert cli.main(["report", "kept", "-o", "page"]) == 0
     page = Path("page/index.html").read_text(encoding="utf-8")
-    assert f'<p>{last[1]}. <a href="#models-worn">' in page
+    assert f'<p>{found[1]}. <a href="#models-worn">' in page
     assert '<section id="models-worn">' in page
-    assert "The table is of worn at clearance_mm = 0.2, one of 2 jobs: its metrics" in page
-    with open_study("kept", "worn") as study:
-        peak = study["peak_acceleration"].sel(clearance_mm=0.2).item()
-    itself = next(line for line in lines if line.startswith("  the case itself"))
-    assert float(itself.split()[3]) == pytest.approx(peak, rel=1e-2)  # at draft
+    assert f"The table is of worn at clearance_mm = {greatest}, one of 2 jobs: its metrics" in page
 
-    case_file("worn.yaml", joint="big_end", clearance_mm=[0.25, 0.3], machine={"rod_mass_kg": 3})
+    case_file("worn.yaml", joint="big_end", clearance_mm=[0.25, 0.35], machine={"rod_mass_kg": 3})
     assert cli.main(["run", "worn.yaml", "-o", "kept", "-j", "1"]) == 0
     capsys.readouterr()
     assert cli.main(["report", "kept", "-o", "page"]) == 0
     err = " ".join(capsys.readouterr().err.split())
     assert "nc: is not shown, as worn has no such job: run the case file with the same" in err
     assert "models-worn" not in Path("page/index.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--vary", "machine.rod_mass_kg"], "--vary names what --models varies: add --models"),
+        (["--models", "--vary", "machine.rod_mas_kg"], "did you mean machine.rod_mass_kg?"),
+        (["--models", "--vary", "solve.max_steps"], "has no plausible range of it: sweep it"),
+    ],
+)
+def test_what_explain_cannot_vary_is_told(case_file, capsys, words, said):
+    case_file("a.yaml", joint="both", clearance_mm=0.1)
+    assert cli.main(["explain", "a.yaml", *words]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
 
 
 def test_explain_models_as_json_and_of_a_job_that_fails(case_file, capsys, monkeypatch):

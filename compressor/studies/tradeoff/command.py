@@ -1,4 +1,4 @@
-"""How far choices of the model move a case's metrics, as a table of text."""
+"""How far numbers in doubt and other models move a case's metrics, as text."""
 
 import dataclasses
 import itertools
@@ -39,23 +39,86 @@ if TYPE_CHECKING:
     from compressor.cases import Case, Study
     from compressor.solve import JointScales
     from compressor.studies.tradeoff.explain import Explanation
-    from compressor.studies.tradeoff.page import ModelTable
+    from compressor.studies.tradeoff.page import ModelRow, ModelTable
 
 WIDEST = 12  # characters of a line of a head
 CHOICE_HEAD = "choice of the model"
 Column = tuple[list[str], list[str], list[str]]  # lines of its head, its cells, lines of its span
 
 
-def model_lines(place: str, table: "ModelTable", times: bool = False) -> Iterator[str]:
-    """Yield a table of choices in blocks of columns, what each assumes, and a summary.
+MOST_SHOWN = 5  # of what moves a metric
+CELL = 12  # columns of a change
 
-    A block has the case itself, the choices that move its metrics, and the span. A line names the
-    metrics that no choice moves.
 
-    place: which job it is of; times: with a column of wall times over the case's own, and no
-    summary, since not only choices of the model are there.
+def model_lines(place: str, table: "ModelTable") -> Iterator[str]:
+    """Yield for each metric what moves it most, what has no number, and a summary.
+
+    Both ends of a number stand in one line. place: which job it is of.
     """
-    from compressor.studies.tradeoff.page import NO_VALUE, NONE_SEEN, headline
+    from compressor.studies.tradeoff.page import headline
+
+    yield from wrap_line(f"{place}:", 0)
+    still = []
+    numbers = zip(table.measures, table.values, table.bars, strict=True)
+    for n, (m, value, bar) in enumerate(numbers):
+        moving = table.most(n)
+        if not moving:
+            still.append(m.title)
+            continue
+        yield ""
+        value_text = by_bar(value, bar, m.is_relative, bare=True)
+        yield f"  {m.title}: {value_text} {m.unit}".rstrip()
+        lines = [*change_lines(moving, n)]
+        yield from lines[:MOST_SHOWN]
+        if rest := len(lines) - MOST_SHOWN:
+            yield from [f"    {rest} more move it less"] * (rest > 0)
+    yield ""
+    if still:
+        yield from wrap_line(f"nothing is seen to move: {'; '.join(still)}", 2)
+    yield from unknown_lines(table)
+    yield from wrap_line(headline(table), 0)
+
+
+def change_lines(rows: "Sequence[ModelRow]", n: int) -> Iterator[str]:
+    """Yield a line on each thing that moves a measure: both ends of a number, or another model."""
+    for _, group in itertools.groupby(rows, key=lambda row: row.varied or row.name):
+        each = [*group]
+        first, varied = each[0].name, each[0].varied
+        rest = [row.name.removeprefix(varied).strip() for row in each[1:]]
+        cells = "".join(f"{row.cells[n]:>{CELL}}" for row in each)
+        yield f"    {', '.join([first, *rest]):<{WIDTH - 4 - 2 * CELL}}{cells}"
+
+
+def unknown_lines(table: "ModelTable") -> Iterator[str]:
+    """Yield what the case itself has no number of, and what runs assume or have no number of."""
+    from compressor.studies.tradeoff.page import NO_CHANGE
+
+    if table.unknown:
+        yield from wrap_line(
+            "no change is given of what is not known, or not above 0, of the case itself: "
+            + "; ".join(table.unknown),
+            2,
+        )
+    blank = []
+    for row in table.rows:
+        words = [cell for cell in row.cells if cell in NO_CHANGE]
+        note = row.note if not row.varied or words == [*row.cells] else ""
+        texts = [*dict.fromkeys(words)] * (bool(words) and not note) + [note] * bool(note)
+        if texts:
+            blank.append(f"{row.name}: {', '.join(texts)}")
+    if blank:
+        yield "  assumed, or why there is no number of something:"
+    for text in blank:
+        yield from wrap_line(text, 4)
+
+
+def feature_lines(place: str, table: "ModelTable") -> Iterator[str]:
+    """Yield a table of changes of the model in blocks of columns, and what each assumes.
+
+    A block has the case itself, the changes that move its metrics, and the span; the last one wall
+    times over the case's own. A line names the metrics that nothing moves.
+    """
+    from compressor.studies.tradeoff.page import NO_VALUE, NONE_SEEN
 
     yield from wrap_line(f"{place}:", 0)
     rows = [row for row in table.rows if {*row.cells} != {NO_VALUE}]
@@ -69,26 +132,13 @@ def model_lines(place: str, table: "ModelTable", times: bool = False) -> Iterato
         head = textwrap.wrap(m.title + (f" ({m.unit})" if m.unit else ""), WIDEST)
         body = [by_bar(value, bar, m.is_relative, bare=True), *cells]
         columns.append((head, body, span.replace(" to ", " to\n").splitlines()))
-    if times:
-        ratios = [f"× {row.time_ratio:.2g}" if row.time_ratio > 0.0 else NO_VALUE for row in rows]
-        columns.append((["time"], ["× 1", *ratios], []))
+    ratios = [f"× {row.time_ratio:.2g}" if row.time_ratio > 0.0 else NO_VALUE for row in rows]
+    columns.append((["time"], ["× 1", *ratios], []))
     names = ["the case itself", *(row.name for row in rows), "all of them"]
     yield from block_lines(names, columns)
     if still:
         yield from wrap_line(f"no choice is seen to move: {'; '.join(still)}", 2)
-    if table.unknown:
-        yield from wrap_line(
-            "no change is given of what is not known, or not above 0, of the case itself: "
-            + "; ".join(table.unknown),
-            2,
-        )
-    notes = [f"{row.name}: {row.note}" for row in table.rows if row.note]
-    if notes:
-        yield "  assumed, or why there is no number:"
-    for note in notes:
-        yield from wrap_line(note, 4)
-    if not times:
-        yield from wrap_line(headline(table), 0)
+    yield from unknown_lines(table)
 
 
 def block_lines(names: Sequence[str], columns: Sequence[Column]) -> Iterator[str]:
@@ -250,7 +300,7 @@ def trade_lines(trade: "xr.Dataset") -> Iterator[str]:
     from compressor.studies.tradeoff.page import model_table
 
     for scene in trade["scene"].values:
-        yield from model_lines(scene, model_table(trade.sel(scene=scene)), times=True)
+        yield from feature_lines(scene, model_table(trade.sel(scene=scene)))
         yield ""
     for scene in trade["scene"].values:
         one = trade.sel(scene=scene)
@@ -269,9 +319,11 @@ INDENT = 12  # columns of a heading
 @configs_argument
 @jobs_option("Estimate the sweep's cost with this many worker processes.")
 @click.option("--models", is_flag=True,
-              help="Measure instead how far choices of the model move each metric.")  # fmt: skip
+              help="Measure instead what moves each metric, numbers or models.")  # fmt: skip
+@click.option("--vary", "named", multiple=True, metavar="KEY",
+              help="With --models: also this number, though the file gives it.")  # fmt: skip
 @click.option("-o", "--output", shell_complete=folders, show_default="results",
-              help="Store what --models finds in this folder of results.")  # fmt: skip
+              help="With --models: folder of the job and of the answer.")  # fmt: skip
 @setting
 @limit
 @click.option("--json", "as_json", is_flag=True, help="Print the same as JSON, a list of studies.")
@@ -279,6 +331,7 @@ def explain(
     configs: tuple[str, ...],
     jobs: int | None,
     models: bool,
+    named: tuple[str, ...],
     output: str | None,
     overrides: tuple[str, ...],
     max_jobs: int,
@@ -291,12 +344,18 @@ def explain(
     compsim explain machine.yaml --models
 
     Runs the first job of each case file, and again without each feature that costs time. With
-    --models it runs that job by other contact and friction laws, twice and half the contact
-    stiffness and damping, with an oil film, an elastic rod and play in the guide, or without where
-    the case has them. The table says how far each choice moves each metric; it is stored in models/
-    of the folder -o, a file for each job, and the report of that folder shows it. --set chooses
-    another job than the first, as in --set clearance_mm=0.3. Exit code 3 where such a job fails.
+    --models it runs the job with the greatest contact force that the folder -o has stored, or the
+    one with the greatest clearance where it has none, and again with one thing otherwise at a time:
+    each number that the file does not give, or that a plant can only guess, at both ends of its
+    plausible range (the table of keys has them), other laws of contact and friction, oil, an
+    elastic rod and play in the guide, or without where the case has them. It says what moves each
+    metric most; all is stored in models/ of the folder -o, a file for each job, and the report of
+    that folder shows it. --set clearance_mm=0.3 chooses another job. Exit code 3 where such a job
+    fails.
     """
+    if named and not models:
+        raise click.UsageError("--vary names what --models varies: add --models")
+    check_named(named)
     if output is not None and not models:
         raise click.UsageError("-o keeps what --models finds: add --models, or leave -o out")
     from compressor.cases import load_studies
@@ -304,13 +363,14 @@ def explain(
     studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, follow=False)
     caution(studies)
     if models:
-        return explain_models(studies, output or "results", overrides, as_json)
+        return explain_models(studies, output or "results", named, overrides, as_json)
     from compressor.studies.tradeoff.explain import explain as explained
     from compressor.sweep import cores
 
     found = []
     for study in studies:
-        say_job(study, "with and without each of its features")
+        which = f"the first of {study.jobs} jobs" if study.jobs > 1 else "the job"
+        say_job(study, 0, which, "with and without each of its features")
         with ProgressReporter(False, "features", alike=False) as progress:
             found.append(explained(study, jobs or cores(), progress=progress))
         if not as_json:
@@ -321,32 +381,52 @@ def explain(
     return SOME_FAILED if any(one.reason for one in found) else DONE
 
 
-def say_job(study: "Study", how: str) -> None:
-    """Report which job of a study is run, and how to choose another."""
+def check_named(keys: Sequence[str]) -> None:
+    """Raise UsageError for a key that has no plausible range."""
+    from compressor.cases import PER_PART, suggestion, table
+
+    for key in keys:
+        whole, _, part = key.rpartition(".")
+        row = table().get(PER_PART.get(whole, {}).get(part, key))
+        if row is None:
+            hint = suggestion(part, whole)
+            raise click.UsageError(f"--vary {key}: unknown key{hint}")
+        if row.plausible is None:
+            raise click.UsageError(
+                f"--vary {key}: the table of keys has no plausible range of it: sweep it, as in "
+                f"--set {key}=[...]"
+            )
+
+
+def say_job(study: "Study", job: int, which: str, how: str) -> None:
+    """Report which job of a study is run and why, and how to choose another."""
     from compressor.cases import points
 
-    first, another = "the job", ""
+    point = ""
     if study.jobs > 1:
-        first = f"the first of {plural(study.jobs)}"
-        point = ", ".join(f"{key} = {value}" for key, value in next(points(study)).items())
-        another = f"; it has {point}: --set KEY=VALUE takes another" if point else ""
-    say_wrapped(f"running {first} of {study.name}, {how}{another}")
+        at = next(itertools.islice(points(study), job, None))
+        point = ", ".join(f"{key} = {value}" for key, value in at.items())
+    another = f"; it has {point}: --set KEY=VALUE takes another" if point else ""
+    say_wrapped(f"running {which} of {study.name}, {how}{another}")
 
 
 def explain_models(
-    studies: "list[Study]", folder: str, overrides: Sequence[str], as_json: bool
-) -> int:
-    """Print and store how far choices of the model move the metrics of each study's first job."""
+    studies: "list[Study]", folder: str, named: Sequence[str], overrides: Sequence[str],
+    as_json: bool,
+) -> int:  # fmt: skip
+    """Print and store how far numbers in doubt and other models move a job of each study."""
     from compressor.store import writable_folder, write_dataset
+    from compressor.studies.tradeoff.model_choices import choose_job
     from compressor.studies.tradeoff.model_choices import explain_models as run_models
     from compressor.studies.tradeoff.page import model_table, models_file, place_text
 
     writable_folder(folder)
     failed, found = False, []
     for study in studies:
-        say_job(study, "by other choices of the model")
-        with ProgressReporter(False, "choices of the model", alike=False) as progress:
-            data = run_models(study, progress=progress)
+        job, which = choose_job(study, folder)
+        say_job(study, job, which, "with one thing otherwise at a time")
+        with ProgressReporter(False, "variations", alike=False) as progress:
+            data = run_models(study, job, named, progress=progress)
         if data["status"].values[0] != "ok":
             failed = True
             say_wrapped(

@@ -1,15 +1,15 @@
-"""Other models of the same machine, and what each of them makes of its metrics.
+"""What else the machine of a case may be, and what each of that makes of its metrics.
 
-A choice is a case: another law of contact or friction, twice and half the stiffness, the damping
-or the last share of an oil film, oil, an elastic rod, play in the guide. `explain_models` runs
-those of one case, `trade` all features of several; `compressor.studies.tradeoff.page` compares
-changes with error bars.
+A choice is a case: another law of contact or friction, twice and half the contact's stiffness and
+damping, oil, an elastic rod, play in the guide; or another value of a number that the file does not
+give, or that a plant can only guess (`Plausible` in the table of keys), at both ends of its range.
+`explain_models` runs those of one job of a study, one at a time, `trade` all features of several
+cases; `compressor.studies.tradeoff.page` compares changes with error bars.
 """
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,16 +18,24 @@ import xarray as xr
 from compressor.cases import (
     READ_BY,
     Case,
+    CaseError,
     Contact,
     Output,
     Study,
     joint_stiffness,
     law_of,
-    paper_stiffness_note,
+    paper_notes,
+    reads,
+    table,
+    value_in,
+    value_of,
+    values_given,
+    written_key,
 )
-from compressor.metrics import METRICS
+from compressor.metrics import BARRED, JOINTS, METRICS
 from compressor.program import PROGRAM, Progress, no_progress
 from compressor.solve import simulate
+from compressor.store import Folder, read_store
 from compressor.studies.tradeoff.features import (
     FEATURES,
     SERIES_ERRORS,
@@ -42,21 +50,58 @@ from compressor.sweep import Needs, compile_once
 ITSELF = "the case itself"
 MAX_SECONDS = 30.0  # of a choice
 GRID = "peaks from the output grid"
-SCALES = {"× 2": 2.0, "÷ 2": 0.5}  # of stiffness and damping
+SCALES = {"÷ 2": 0.5, "× 2": 2.0}  # of the contact's stiffness and damping
+SCALED = ("contact.stiffness_N_per_mm15", "contact.damping_N_s_per_mm")  # by `scale_contact`
 SAME_STIFFNESS = 1.01  # stiffnesses of two joints
 GROUPS = ("contact", "friction", "lubricant", "guide", "rod")  # that a choice may fill in
-NAMES = ("status", "reason", "seconds", *(n + end for n in METRICS for end in ("", "_error")))
+WORDS = ("status", "reason", "seconds")
+# of every run, and what else is shown of it: rod load, body and sensor
+COMPARED = (*METRICS, *(name for name, row in BARRED.items() if row.shown and name not in METRICS))
 
 
 class Choice(NamedTuple):
-    """Another model: its name, its case, and the values that it has and the case file has not.
+    """Another machine that it may be: its name, its case, and what else that assumes.
 
-    Where there can be no such case, `case` is None and `note` says why.
+    Where there can be no such case, `case` is None and `note` says why. varied: the number that is
+    another one, with which the name begins; "" of another model.
     """
 
     name: str
     case: Case | None
     note: str = ""
+    varied: str = ""
+
+
+def vary_numbers(study: Study, job: int, named: Sequence[str] = ()) -> Iterator[Choice]:
+    """Yield a job with each number in doubt at both ends of its plausible range.
+
+    In doubt is what the file does not give, and what a plant can only guess; named: other keys that
+    are, though the file gives them. A key that the file sweeps is not varied.
+    """
+    case, nested = study.cases[job], study.given(job)
+    given, swept = values_given(nested), {axis.key for axis in study.axes}
+    known = {key for key in table() if key in given or value_of(case, key) is not None}
+    for key, row in table().items():
+        doubt, written = row.plausible, written_key(key, known)
+        if doubt is None or key in SCALED or not reads(case, key):
+            continue
+        is_named = bool({key, written} & {*named})
+        value = value_in(nested, key) if key in given else value_of(case, key)
+        span = doubt.given if key in given else doubt.left_out
+        span = span or (doubt.left_out if is_named else None)
+        if span is None or value is None or (key in swept and not is_named):
+            continue
+        group, _, name = key.partition(".")
+        for end in span.ends(value):
+            within = nested.get(group)
+            changed = {**(within if isinstance(within, Mapping) else {}), name: end}
+            label = f"{written} {end:.4g}"
+            try:
+                other = Case.resolve(nested | {group: changed})
+            except CaseError as error:
+                yield Choice(label, None, f"cannot be: {error.problems[0]}", written)
+            else:
+                yield Choice(label, other, doubt.why, written)
 
 
 def model_choices(case: Case) -> list[Choice]:
@@ -65,7 +110,7 @@ def model_choices(case: Case) -> list[Choice]:
     rows = [row for row in FEATURES if row.is_choice or (row.key == "friction" and not rubs)]
     contact = [row for row in rows if row.key == "contact.law"]
     others = [row for row in rows if row.key != "contact.law"]
-    scaled = [*scale_contact(case), *scale_film(case)]
+    scaled = [*scale_contact(case), *widen_bearings(case)]
     found = [*toggle_features(case, contact), *scaled, *toggle_features(case, others)]
     return [check_choice(choice, case) for choice in found]
 
@@ -98,7 +143,7 @@ def scale_contact(case: Case) -> Iterator[Choice]:
     for words, factor in SCALES.items():
         yield with_stiffness(case, f"contact stiffness {words}", factor)
     contact = case.contact
-    if paper_stiffness_note(case):
+    if SCALED[0] in paper_notes(case):
         values: dict[str, Any] = {"stiffness_N_per_mm15": None, "materials": ("steel", "steel")}
         other = with_values(case, "contact", **values, geometry="internal")
         yield Choice("contact stiffness of its pins (Eq. 15)", other, "steel on steel, in a bore")
@@ -106,25 +151,26 @@ def scale_contact(case: Case) -> Iterator[Choice]:
         name = f"contact damping {words}"
         if contact.law == "impact" and contact.damping_N_s_per_mm > 0.0:
             damping = factor * contact.damping_N_s_per_mm
-            yield Choice(name, with_values(case, "contact", damping_N_s_per_mm=damping))
+            other = with_values(case, "contact", damping_N_s_per_mm=damping)
+            yield Choice(name, other, varied="contact damping")
         elif contact.restitution is not None and contact.restitution < 1.0:
             # such laws damp by 1 - e, to the first order
             restitution = 1.0 - factor * (1.0 - contact.restitution)
             if restitution > 0.0:
-                yield Choice(name, with_values(case, "contact", restitution=restitution))
+                other = with_values(case, "contact", restitution=restitution)
+                yield Choice(name, other, varied="contact damping")
             else:
                 least = 1.0 - 1.0 / factor
-                yield Choice(name, None, f"needs a restitution above {least:g}")
+                why = f"needs a restitution above {least:g}"
+                yield Choice(name, None, why, "contact damping")
 
 
-def scale_film(case: Case) -> Iterator[Choice]:
-    """Yield a case with oil of twice and half its viscosity, and with such last shares."""
-    if not case.lubricant or not faulty(case):
-        return
-    names = {"viscosity_mPa_s": "viscosity", "last_share": "last share of the oil film"}
-    for (key, name), (words, factor) in product(names.items(), SCALES.items()):
-        value = factor * getattr(case.lubricant, key)
-        yield Choice(f"{name} {words}", with_values(case, "lubricant", **{key: value}))
+def widen_bearings(case: Case) -> Iterator[Choice]:
+    """Yield a case with bearings as long as wide, where theirs are as long as the paper's pin."""
+    if case.lubricant and "lubricant.bearing_length_mm" in paper_notes(case):
+        big, small = (2.0 * case.machine.pin_radius(joint) for joint in JOINTS)
+        lengths = {"bearing_length_mm": big, "small_end_bearing_length_mm": small}
+        yield Choice("bearings as long as wide", with_values(case, "lubricant", **lengths))
 
 
 def with_stiffness(case: Case, name: str, factor: float) -> Choice:
@@ -141,7 +187,8 @@ def with_stiffness(case: Case, name: str, factor: float) -> Choice:
     # one key serves both joints: materials may give each a stiffness of its own
     values[key] = factor * (math.prod(each) ** (1.0 / len(each)) / unit)
     alike = max(each) <= SAME_STIFFNESS * min(each)
-    return Choice(name, with_values(case, "contact", **values), "" if alike else "of both joints")
+    note = "" if alike else "of both joints"
+    return Choice(name, with_values(case, "contact", **values), note, "contact stiffness")
 
 
 def composite_modulus_of(contact: Contact) -> float:
@@ -159,7 +206,7 @@ def check_choice(choice: Choice, case: Case) -> Choice:
         return choice
     problems = bare(choice.case).problems
     if problems:
-        return Choice(choice.name, None, f"cannot be: {problems[0]}")
+        return choice._replace(case=None, note=f"cannot be: {problems[0]}")
     notes = [*filter(None, [choice.note]), *assumed_values(case, choice.case)]
     return choice._replace(note=", ".join(notes))
 
@@ -194,23 +241,50 @@ def shown_words(value: Any) -> str:
 
 
 def bare(case: Case, limit: float = math.inf) -> Case:
-    """Return a case that gives the same metrics with their error bars, and keeps no series.
+    """Return a case that gives the same metrics with their error bars.
 
-    limit: seconds that its run may take.
+    Time series are made where metrics are taken from them. limit: seconds that its run may take.
     """
     seconds = min(case.solve.timeout_s, limit)
     solve = replace(case.solve, error_bars=True, timeout_s=seconds)
-    return replace(case, body=None, sensor=None, wear=None, output=Output("metrics"), solve=solve)
+    signals = case.output.signals
+    keep = "series" if case.body or signals else "metrics"
+    return replace(case, wear=None, output=Output(keep, signals=signals), solve=solve)
 
 
-def explain_models(study: Study, progress: Progress = no_progress) -> xr.Dataset:
-    """Run the first job of a study, and every other model of its machine.
+def choose_job(study: Study, folder: Folder) -> tuple[int, str]:
+    """Return the number of the job of a study that is varied, and why that one.
 
-    Returns the Dataset of `tabulate` with the attributes `study` and `key` (of the job). If the job
-    itself fails, it is the only row.
+    It is the one with the greatest known force on a joint of those stored in a folder of results;
+    where there is none, the one with the greatest clearances.
     """
-    case = study.cases[0]
-    choices = model_choices(case)
+    if study.jobs == 1:
+        return 0, "the job"
+    rows = read_store(folder).rows
+    positions = rows.find(study.keys)
+    stored = np.flatnonzero(positions >= 0)
+    if stored.size:
+        numbers = rows.numbers[positions[stored]]
+        known = np.isfinite(numbers["peak_contact_force_error"])
+        forces = np.where(known, numbers["peak_contact_force"], -1.0).max(axis=1)
+        if forces.max() > 0.0:
+            place = int(stored[forces.argmax()])
+            return place, f"the one of {study.jobs} jobs with the greatest stored contact force"
+    gaps = [sum(getattr(case.clearance_mm, j) for j in JOINTS) for case in study.cases]
+    why = f"the one of {study.jobs} jobs with the greatest clearance, as none with a known force "
+    return int(np.argmax(gaps)), f"{why}is stored"
+
+
+def explain_models(
+    study: Study, job: int = 0, named: Sequence[str] = (), progress: Progress = no_progress
+) -> xr.Dataset:
+    """Run a job of a study, with every number in doubt, and by every other model of its machine.
+
+    named: as of `vary_numbers`. Returns the Dataset of `tabulate` with the attributes `study` and
+    `key` (of the job). If the job itself fails, it is the only row.
+    """
+    case = study.cases[job]
+    choices = [*vary_numbers(study, job, named), *model_choices(case)]
     data = tabulate([Choice(ITSELF, case), *choices], run_choices(case, choices, 1, progress))
     return data.assign_attrs({"study": study.name, "key": case.key})
 
@@ -228,13 +302,14 @@ def run_choices(
     needs = Needs.of(every)._replace(horizon=True)
     compile_once(needs, lambda remark: progress(0, total, remark))
     progress(0, total, "")
-    runs = [fastest_run(bare(case), max(2, repeats))]  # the first one may load compiled code
+    # the first one may load compiled code
+    runs = [compared(fastest_run(bare(case), max(2, repeats)))]
     if not complete(runs[0]):
         return runs
     for done, one in enumerate(choices, 1):
         progress(done, total, "")
         other = one.case and bare(one.case, MAX_SECONDS)
-        runs.append(fastest_run(other, repeats) if other else empty_run(runs[0]))
+        runs.append(compared(fastest_run(other, repeats)) if other else empty_run(runs[0]))
     progress(total, total, "")
     return runs
 
@@ -247,9 +322,15 @@ def fastest_run(case: Case, repeats: int) -> xr.Dataset:
     return min(every, key=lambda one: float(one["seconds"]))
 
 
+def compared(run: xr.Dataset) -> xr.Dataset:
+    """Return what is compared of a run, with its attributes; its time series are dropped."""
+    names = (name + end for name in COMPARED for end in ("", "_error"))
+    return run[[*WORDS, *(name for name in names if name in run)]]
+
+
 def empty_run(run: xr.Dataset) -> xr.Dataset:
     """Return a run without numbers, as of a case that cannot be."""
-    lacking = {name: run[name] * math.nan for name in NAMES if run[name].dtype.kind == "f"}
+    lacking = {name: values * math.nan for name, values in run.items() if name not in WORDS[:2]}
     return run.assign(lacking | {"status": "missing", "reason": ""}).assign_attrs(regime="")
 
 
@@ -260,19 +341,22 @@ def tabulate(every: Sequence[Choice], runs: Sequence[xr.Dataset]) -> xr.Dataset:
     `reason` show; `status` is missing where there is no such case, and `note` says why. `regime` is
     as in a run, `seconds` is the wall time.
     """
-    every = every[: len(runs)]
-    table = xr.concat([run[[*NAMES]].drop_attrs() for run in runs], "choice")
-    for name in NAMES:
+    every, names = every[: len(runs)], [*runs[0]]
+    unknown = empty_run(runs[0])  # where a failed run has nothing of body and sensor
+    whole = [run.assign({n: unknown[n] for n in names if n not in run}) for run in runs]
+    table = xr.concat([run[names].drop_attrs() for run in whole], "choice")
+    for name in names:
         table[name].attrs = runs[0][name].attrs
     regimes = [str(run.attrs.get("regime", "")) for run in runs]
     words = {
         "regime": (regimes, "how far the motion can be foretold"),
         "note": ([one.note for one in every], "assumed values, or why it cannot be"),
+        "varied": ([one.varied for one in every], "the number that is another one"),
     }
     for name, (values, phrase) in words.items():
         table[name] = "choice", np.array(values, object), {"long_name": phrase}
-    names = np.array([one.name for one in every], object)
-    table = table.assign_coords(choice=("choice", names, {"long_name": "choice of the model"}))
+    titles = np.array([one.name for one in every], object)
+    table = table.assign_coords(choice=("choice", titles, {"long_name": "choice of the model"}))
     attrs = {"title": "metrics by choices of the model", "program": PROGRAM}
     return table.assign_attrs(attrs | {"detail": runs[0].attrs.get("detail", "")})
 
@@ -303,7 +387,7 @@ def trade(
             runs.append(read_from_grid(runs[0], simulate(replace(bare(case), output=Output()))))
         tables.append(tabulate([Choice(ITSELF, case), *choices, Choice(GRID, case)], runs))
     names = [*dict.fromkeys(str(name) for data in tables for name in data["choice"].values)]
-    lacking = {"status": "missing", "reason": "", "regime": "", "note": ""}
+    lacking = {"status": "missing", "reason": "", "regime": "", "note": "", "varied": ""}
     whole = [data.reindex(choice=names, fill_value=lacking) for data in tables]
     scenes = xr.DataArray(list(cases), dims="scene", name="scene", attrs={"long_name": "case"})
     joined = xr.concat(whole, scenes, combine_attrs="override")

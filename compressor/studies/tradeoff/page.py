@@ -1,4 +1,4 @@
-"""How far choices of the model move a case's metrics: the table, its line, and its section.
+"""How far numbers in doubt and other models move a case's metrics: table, line and section.
 
 The numbers are those of `compsim explain --models`: metrics of the case itself and of each choice,
 with error bars. A change is what lies beyond both bars.
@@ -17,7 +17,7 @@ import xarray as xr
 
 from compressor.cases import Study, points
 from compressor.digits import PAGE_DIGITS, by_bar, is_known
-from compressor.metrics import METRICS
+from compressor.metrics import BARRED
 from compressor.outcome import Regime
 from compressor.report import (
     Additions,
@@ -36,18 +36,25 @@ from compressor.store import Folder, StoredStudy, StoreError, StoreWarning, read
 
 NONE_SEEN = "none seen"  # less than both error bars
 NO_VALUE = "–"
+NO_CHANGE = ("failed", "chaotic", "unknown", "no contact", NO_VALUE)  # cells without a number
 MIN_SHOWN_CHANGE = 1e-5  # relative: a smaller change or error is not written out
 MIN_ERROR = 1e-4
+LEVELS = ("sensor_peak", "sensor_rms")
+NOT_COVERED = (
+    "Not in this: several of them at once, numbers that the file gives as known, and all that the "
+    "equations leave out"
+)
 KEY_DIGITS = 8  # of a job's key in a file's name
 KEY_IN_NAME = re.compile(rf"(-[0-9a-f]{{{KEY_DIGITS}}})?")
 
 
 @dataclass(frozen=True)
 class ModelRow:
-    """A choice of the model: its cell for each measure, how long it runs, and what it assumes.
+    """A choice: its cell for each measure, how long it runs, and what it assumes.
 
     `changes`: relative, or in the unit of a share; nan where none is known. `time_ratio`: wall time
-    over that of the case itself.
+    over that of the case itself. `varied`: the number that is another one, with which the name
+    begins; "" of another model.
     """
 
     name: str
@@ -55,6 +62,7 @@ class ModelRow:
     changes: tuple[float, ...]
     time_ratio: float
     note: str
+    varied: str = ""
 
 
 @dataclass(frozen=True)
@@ -77,6 +85,30 @@ class ModelTable:
         """Return the spans in words, `-66 to +93 %`."""
         return tuple(span_text(m, *span) for m, span in zip(self.measures, self.spans, strict=True))
 
+    @property
+    def main(self) -> int | None:
+        """Return the number of the peak that moves most, of a force or the piston.
+
+        Of a case without known peaks, as a chaotic one, of another measure with a relative error;
+        None where there is none.
+        """
+        places = [n for n, m in enumerate(self.measures) if m.is_relative]
+        peaks = [n for n in places if self.measures[n].variable.startswith("peak")]
+        return max(peaks or places, key=lambda n: self.spans[n][1] - self.spans[n][0], default=None)
+
+    def most(self, n: int) -> list[ModelRow]:
+        """Return the rows that are seen to move a measure, what moves it most first.
+
+        Both ends of a number stand beside each other.
+        """
+        size: dict[str, float] = {}
+        for row in self.rows:
+            if abs(row.changes[n]) > 0.0:  # which nan is not
+                about = row.varied or row.name
+                size[about] = max(size.get(about, 0.0), abs(row.changes[n]))
+        rows = [row for row in self.rows if (row.varied or row.name) in size]
+        return sorted(rows, key=lambda row: (-size[row.varied or row.name], row.varied))
+
 
 def model_table(data: xr.Dataset) -> ModelTable:
     """Return the changes of a table of choices, dim `choice`, the case itself first.
@@ -84,7 +116,7 @@ def model_table(data: xr.Dataset) -> ModelTable:
     Counts, which depend on how long a run is, are left out, and choices without run and note.
     """
     first = data.isel(choice=0)
-    shown = [m for m in measures(first) if METRICS[m.variable].kind != "count"]
+    shown = [m for m in measures(first) if BARRED[m.variable].kind != "count"]
     known = [m for m in shown if has_number(m, float(m.of(first)), float(m.bar(first)))]
     listed = data.isel(choice=(data["status"] != "missing") | (data["note"] != ""))
     columns = [(m, m.of(listed).values, m.bar(listed).values) for m in known]
@@ -96,7 +128,7 @@ def model_table(data: xr.Dataset) -> ModelTable:
         rows.append(
             ModelRow(
                 str(one["choice"].item()), tuple(text for text, _ in found),
-                tuple(size for _, size in found), ratio, note_of(one),
+                tuple(size for _, size in found), ratio, note_of(one), str(one["varied"].item()),
             )
         )  # fmt: skip
     spans = []
@@ -175,32 +207,57 @@ def note_of(choice: xr.Dataset) -> str:
 
 
 def headline(table: ModelTable) -> str:
-    """Return a line on the peak that choices of the model move most, beside its numerical error.
+    """Return what numbers in doubt and other models make of the peak that they move most.
 
-    Of a case without known peaks, as a chaotic one, on another measure with a relative error.
+    Beside its numerical error; the same of the sensor's number that they move most. It says what
+    was varied, and what was not.
     """
-    places = [n for n, m in enumerate(table.measures) if m.is_relative]
-    if not places:
+    n = table.main
+    if n is None:
         return "No metric of the case is known well enough to see a change of it"
-    peaks = [n for n in places if table.measures[n].variable.startswith("peak")]
-    n = max(peaks or places, key=lambda n: table.spans[n][1] - table.spans[n][0])
     measure, value, bar = table.measures[n], table.values[n], table.bars[n]
     number = f"{by_bar(value, bar, measure.is_relative, True, PAGE_DIGITS)} {measure.unit}"
     share = bar / value
     error = f"below {100 * MIN_ERROR:g}" if share < MIN_ERROR else f"{100 * share:.1g}"
-    word = "peak" if peaks else "number"
-    span = table.span_texts[n]
-    text = f"choices of the model move this {word} by {span}"
-    if span == NONE_SEEN:
-        text = f"no choice of the model is seen to move this {word}"
+    start = "" if measure.variable.startswith("peak") else "no peak of the case is known; "
+    title = f"{start}{measure.title}"
+    text = f"{title[0].upper()}{title[1:]}: {number.rstrip()}; numerical error {error} %. "
+    if not table.rows:
+        return f"{text}Nothing else was run"
+    text += f"{scope_text(table)} {moved_text(table, n)}"
+    sensed = [k for k, m in enumerate(table.measures) if m.variable in LEVELS]
+    if sensed:
+        loudest = max(sensed, key=lambda k: table.spans[k][1] - table.spans[k][0])
+        text += f"; they {moved_text(table, loudest, f'the {table.measures[loudest].title}')}"
     blank = [row.cells[n] for row in table.rows if math.isnan(row.changes[n])]
     if blank:
         words = ", ".join(dict.fromkeys("impossible" if b == NO_VALUE else b for b in blank))
         verb = "gives" if len(blank) == 1 else "give"
-        text += f"; {len(blank)} of {len(table.rows)} choices {verb} no number ({words})"
-    start = "" if peaks else "no peak of the case is known; "
-    title = f"{start}{measure.title}"
-    return f"{title[0].upper()}{title[1:]}: {number.rstrip()}; numerical error {error} %; {text}"
+        text += f"; {len(blank)} of {len(table.rows)} runs {verb} no number ({words})"
+    return f"{text}. {NOT_COVERED}"
+
+
+def scope_text(table: ModelTable) -> str:
+    """Return what was varied, as the subject of a sentence."""
+    numbers = len({row.varied for row in table.rows if row.varied})
+    models = sum(not row.varied for row in table.rows)
+    parts = []
+    if numbers:
+        parts.append(f"{numbers} number{'s' * (numbers > 1)} in doubt")
+    if models:
+        parts.append(f"{models} other model{'s' * (models > 1)}")
+    return f"{' and '.join(parts)}, each alone,"
+
+
+def moved_text(table: ModelTable, n: int, what: str = "") -> str:
+    """Return how far a measure is moved, and by what most."""
+    what = what or ("this peak" if table.measures[n].variable.startswith("peak") else "this number")
+    span = table.span_texts[n]
+    if span == NONE_SEEN:
+        return f"are not seen to move {what}"
+    known = [row for row in table.rows if not math.isnan(row.changes[n])]
+    most = max(known, key=lambda row: abs(row.changes[n]))
+    return f"move {what} by {span}, most by {most.name}"
 
 
 def place_text(study: Study | StoredStudy, key: str) -> str:
@@ -216,7 +273,7 @@ def place_text(study: Study | StoredStudy, key: str) -> str:
 
 @dataclass(frozen=True)
 class ModelsContent:
-    """What a page says of choices of the model: the job, a line, and a table."""
+    """What a page says of what was varied of a job: the job, a line, and a table."""
 
     place: str
     headline: str
@@ -258,29 +315,32 @@ def read_models(folder: Folder, study: StoredStudy) -> list[xr.Dataset]:
 
 
 def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:
-    """Return a line on each study with stored choices of the model, and a section on each job's."""
+    """Return a line on each study of which something was varied, and a section on each job."""
     notes: dict[str, StudyNote] = {}
     chapters = []
     for study in studies:
         for number, data in enumerate(read_models(results, study)):
             anchor = file_name("models", study.name) + (f"-{number + 1}" if number else "")
-            note = StudyNote(headline(model_table(data)), anchor, "Table of the choices")
+            note = StudyNote(headline(model_table(data)), anchor, "Table of what was varied")
             notes.setdefault(study.name, note)
             chapters.append(Chapter(models_section(anchor, study, data)))
     return Additions(notes, chapters)
 
 
 def models_section(anchor: str, study: StoredStudy, data: xr.Dataset) -> Section:
-    """Return the section with the choices of the model of a study's job."""
+    """Return the section on what was varied of a study's job."""
     table = model_table(data)
     place = place_text(study, data.attrs["key"])
     content = ModelsContent(place, headline(table), ", ".join(table.unknown), page_table(table))
-    title = f"Choices of the model in study {place.rpartition(', ')[0]}"
+    title = f"What moves the numbers of study {place.rpartition(', ')[0]}"
     return Section(anchor, title, "compressor.studies.tradeoff:models.html", content)
 
 
 def page_table(table: ModelTable) -> PageTable:
-    """Return the cells of a table: the case itself, each choice, and the span."""
+    """Return the cells of a table: the case itself, each choice, and the span.
+
+    What moves the main measure most comes first.
+    """
     numbers = zip(table.measures, table.values, table.bars, strict=True)
     values = [
         number_cell(f"{format_measure(m, value, bar)} {m.unit}".rstrip())
@@ -290,10 +350,16 @@ def page_table(table: ModelTable) -> PageTable:
     span = [Cell("all of them"), *map(number_cell, table.span_texts), Cell("")]
     choices = (
         [Cell(row.name), *map(number_cell, row.cells, row.changes), Cell(row.note)]
-        for row in table.rows
+        for row in ranked_rows(table)
     )
     rows = [*map(TableRow, [itself, *choices, span])]
-    return PageTable(["choice of the model", *(m.title for m in table.measures), "assumed"], rows)
+    return PageTable(["what is otherwise", *(m.title for m in table.measures), "assumed"], rows)
+
+
+def ranked_rows(table: ModelTable) -> list[ModelRow]:
+    """Return the rows of a table, what moves the main measure most first."""
+    first = [] if table.main is None else table.most(table.main)
+    return [*first, *(row for row in table.rows if row not in first)]
 
 
 def number_cell(text: str, value: float = math.nan) -> Cell:

@@ -12,9 +12,11 @@ from compressor.cases import Lubricant
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.cases.materials import contact_stiffness
+from compressor.cases.table import table
 from compressor.metrics import JOINTS, METRICS
 from compressor.solve.si_record import stiffness_of
 from compressor.solve.simulate import simulate
+from compressor.store.reader import read_job
 from compressor.store.series_file import write_dataset
 from compressor.store.status import verify
 from compressor.studies.tradeoff import model_choices as module
@@ -22,14 +24,17 @@ from compressor.studies.tradeoff.model_choices import (
     GRID,
     ITSELF,
     Choice,
+    choose_job,
     explain_models,
     model_choices,
     model_variants,
     run_choices,
     tabulate,
     trade,
+    vary_numbers,
 )
 from compressor.studies.tradeoff.page import models_file
+from compressor.sweep.sweep import sweep
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0}
 THREE = ("contact stiffness × 2", "friction law: Threlfall", "contact law: Flores")
@@ -58,6 +63,10 @@ def few(monkeypatch):
         monkeypatch.setattr(
             module, "model_choices", lambda case: [one for one in whole(case) if one.name in names]
         )
+        numbers = module.vary_numbers
+        monkeypatch.setattr(
+            module, "vary_numbers", lambda *of: [one for one in numbers(*of) if one.name in names]
+        )
 
     return kept
 
@@ -65,8 +74,8 @@ def few(monkeypatch):
 def test_the_choices_of_a_plain_case():
     assert [*by_name(case())] == [
         "contact law: Hertz", "contact law: Lankarani-Nikravesh", "contact law: Flores",
-        "contact law: Johnson", "contact law: Liu", "contact stiffness × 2",
-        "contact stiffness ÷ 2", "contact damping × 2", "contact damping ÷ 2",
+        "contact law: Johnson", "contact law: Liu", "contact stiffness ÷ 2",
+        "contact stiffness × 2", "contact damping ÷ 2", "contact damping × 2",
         "friction law: Coulomb (tanh)", "friction law: Threlfall", "friction law: Ambrósio",
         "friction law: LuGre", "50 µm of play in the guide", "oil film", "elastic rod",
     ]  # fmt: skip
@@ -121,7 +130,7 @@ def test_stiffness_and_damping_are_doubled_and_halved_where_the_law_reads_them()
     restituting = by_name(case(contact={"law": "flores", "restitution": 0.8}))
     assert restituting["contact damping × 2"].case.contact.restitution == pytest.approx(0.6)
     plastic = by_name(case(contact={"law": "flores", "restitution": 0.4}))["contact damping × 2"]
-    assert plastic == Choice("contact damping × 2", None, "needs a restitution above 0.5")
+    assert plastic[:3] == ("contact damping × 2", None, "needs a restitution above 0.5")
     assert "contact damping × 2" not in by_name(case(contact={"law": "hertz"}))
     liu = {"law": "liu", "length_mm": 20, "materials": ["steel", "steel"]}
     line = by_name(case(contact=liu))["contact stiffness × 2"].case.contact
@@ -145,16 +154,117 @@ def test_a_choice_that_cannot_be_says_why():
     assert rod.note.startswith("cannot be: machine.rod_centre_mm: an elastic rod is a uniform bar")
 
 
-def test_an_oiled_joint_is_tried_with_other_films():
-    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "lubricant": True})
-    found = {choice.name: choice.case.lubricant for choice in model_choices(case) if choice.case}
-    share = case.lubricant.last_share
-    assert found["last share of the oil film × 2"].last_share == 2 * share
-    assert found["last share of the oil film ÷ 2"].last_share == share / 2
-    assert found["viscosity ÷ 2"].viscosity_mPa_s == case.lubricant.viscosity_mPa_s / 2
-    assert found["dry joints"] is None
-    dry = model_choices(replace(case, lubricant=None))
-    assert not [choice.name for choice in dry if "share" in choice.name or "visc" in choice.name]
+def test_bearings_of_the_default_length_are_tried_as_long_as_wide():
+    pins = {"big_end": 60, "small_end": 35}
+    oiled = {"joint": "both", "clearance_mm": 0.1, "lubricant": True}
+    assert "bearings as long as wide" not in by_name(case(**oiled))
+    one = by_name(case(**oiled, machine={"pin_radius_mm": pins}))["bearings as long as wide"]
+    assert [one.case.lubricant.bearing_length(joint) for joint in JOINTS] == [120, 70]
+
+
+# ---- numbers in doubt ---------------------------------------------------------------------------
+
+PLANT = """
+joint: both
+clearance_mm: {big_end: 0.1, small_end: [0.1, 0.3, 0.2]}
+load: gas
+machine: {rod_mass_kg: 40, rod_centre_mm: 200, pin_radius_mm: {big_end: 60, small_end: 35}}
+gas: {action: double, rod_diameter_mm: 20, valve_loss_percent: {suction: 4, discharge: 5}}
+lubricant: {viscosity_mPa_s: 40, bearing_length_mm: {big_end: 70, small_end: 50}}
+body: {mass_kg: 6000, casing_mass_kg: 60}
+sensor: true
+output: {signals: true}
+"""
+
+
+def read_study(tmp_path, text=PLANT):
+    path = Path(tmp_path / "plant.yaml")
+    path.write_text(text, encoding="utf-8")
+    return load_studies(path)[0]
+
+
+def ends(study, **more):
+    """The values at which each number in doubt is run, by its key."""
+    found = {}
+    for one in vary_numbers(study, 1, **more):
+        assert one.name.startswith(f"{one.varied} ")
+        found.setdefault(one.varied, []).append(float(one.name.removeprefix(one.varied)))
+    return found
+
+
+def test_what_the_file_leaves_out_or_can_only_guess_is_varied(tmp_path):
+    found = ends(read_study(tmp_path))
+    assert found["lubricant.viscosity_mPa_s"] == [20, 80]  # given: a guess all the same
+    assert found["lubricant.bearing_length_mm.big_end"] == [35, 87.5]
+    assert found["lubricant.bearing_length_mm.small_end"] == [25, 62.5]
+    assert found["gas.valve_loss_percent.discharge"] == [0, 8]
+    assert found["body.casing_mass_kg"] == [30, 120]
+    assert found["machine.rod_centre_mm"] == [180, 220]
+    assert found["machine.rod_inertia_kg_m2"] == [3]  # 2.5 times m L^2 / 12, and not less
+    assert found["gas.suction_MPa"] == pytest.approx([0.09975, 0.11025], rel=1e-3)
+    assert {"gas.exponent", "body.damping_ratio", "sensor.mounting_Hz"} < {*found}
+    lacking = {
+        "machine.rod_mass_kg", "body.mass_kg", "contact.stiffness_N_per_mm15",
+        "guide.friction", "friction.bristle_stiffness_per_mm", "clearance_mm.small_end",
+    }  # fmt: skip  # given as known, scaled elsewhere, not read, or swept
+    assert not lacking & {*found}
+
+
+def test_what_follows_from_a_number_follows_when_it_is_varied(tmp_path):
+    """A casing's mass that is not given is a 25th of the body's, a rod's inertia by its mass."""
+    study = read_study(tmp_path, "load: none\nbody: true\nsensor: true\n")
+    found = {one.name: one.case for one in vary_numbers(study, 0)}
+    assert found["body.mass_kg 250"].body.casing_mass_kg == 10
+    assert found["machine.rod_mass_kg 9.4"].machine.rod_inertia_kg_m2 == pytest.approx(0.282)
+    assert found["body.casing_mass_kg 4"].body.mass_kg == 500
+
+
+def test_a_number_that_the_command_names_is_varied_though_it_is_given(tmp_path):
+    study = read_study(tmp_path)
+    named = ends(study, named=["machine.rod_mass_kg", "body.mass_kg"])
+    assert (named["machine.rod_mass_kg"], named["body.mass_kg"]) == ([20, 80], [3000, 12000])
+
+
+def test_an_end_that_cannot_be_says_why(tmp_path):
+    study = read_study(tmp_path, PLANT.replace("big_end: 70", "big_end: 110"))
+    (one,) = (x for x in vary_numbers(study, 1) if x.name.endswith(".big_end 137.5"))
+    assert one.case is None
+    assert one.note.startswith("cannot be: lubricant.bearing_length_mm: is 1.15 times the diameter")
+
+
+def test_every_plausible_range_lies_within_what_its_key_allows():
+    doubted = [row for row in table().values() if row.plausible]
+    assert len(doubted) > 40
+    for row in doubted:
+        for span in filter(None, row.plausible[1:]):
+            values = span.ends(row.default) if row.default and span.are_factors else span[:2]
+            assert all(row.holds(value) for value in values), row.key
+            assert span.low < span.high
+
+
+def test_the_job_with_the_greatest_stored_force_is_varied(tmp_path, in_process):
+    text = (
+        "joint: big_end\nclearance_mm: [0.1, 0.3, 0.2]\nsolve: {duration_rev: 0.25, settle_rev: 0}"
+    )
+    study = read_study(tmp_path, text)
+    assert choose_job(study, tmp_path / "kept")[0] == 1
+    sweep([study], tmp_path / "kept")
+    forces = [read_job(tmp_path / "kept", key)["peak_contact_force"].max() for key in study.keys]
+    job, why = choose_job(study, tmp_path / "kept")
+    assert job == int(np.argmax(forces))
+    assert why == "the one of 3 jobs with the greatest stored contact force"
+
+
+def test_rod_load_body_and_sensor_are_compared(few, tmp_path):
+    few(("body.casing_mass_kg 240",))
+    text = "joint: big_end\nclearance_mm: 0.2\noutput: {signals: true}\nbody: {mass_kg: 3000}\n"
+    text += "sensor: {noise_m_per_s2: 0}\nsolve: {duration_rev: 2, accuracy: draft}\n"
+    data = explain_models(read_study(tmp_path, text))
+    level = data["sensor_rms"].values
+    # all that it hears but the body's own motion, which is little, goes as the mode's inverse mass
+    assert level[1] / level[0] == pytest.approx(0.5, rel=0.02)
+    assert {"peak_rod_load_tension", "body_velocity_rms", "sensor_peak_error"} < {*data}
+    assert "time" not in data.dims
 
 
 def test_play_in_the_guide_is_that_of_the_machine_s_own_crosshead():
@@ -184,7 +294,9 @@ def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
     }
     path.write_text(json.dumps(values))
     seen = []
-    data = explain_models(load_studies(path)[0], lambda done, total, _: seen.append((done, total)))
+    data = explain_models(
+        load_studies(path)[0], progress=lambda done, total, _: seen.append((done, total))
+    )
     assert data["choice"].values.tolist() == [ITSELF, *sorted(THREE)]
     assert seen == sorted(seen)  # each several times where equations are compiled meanwhile
     assert [*dict.fromkeys(seen)] == [(n, 4) for n in (0, 1, 2, 3, 4)]

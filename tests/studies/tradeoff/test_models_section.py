@@ -12,7 +12,7 @@ from compressor.report.page import document
 from compressor.store.files import StoreWarning
 from compressor.store.series_file import write_dataset
 from compressor.store.studies import StoredAxis, StoredStudy
-from compressor.studies.tradeoff.command import model_lines
+from compressor.studies.tradeoff.command import feature_lines, model_lines
 from compressor.studies.tradeoff.page import (
     add,
     headline,
@@ -57,12 +57,17 @@ def made(**more):
         "reason": ["", "", "", "", "budget_steps", "", ""],
         "regime": ["periodic", "periodic", "periodic", "chaotic", "", "", ""],
         "note": ["", "K 1", "", "", "", "needs more", ""],
+        "varied": ["", "", "", "", "", "", ""],
     }
     variables |= {name: ("choice", np.array(values, object)) for name, values in words.items()}
     variables["seconds"] = "choice", np.array([1, 2, 3, 4, 5, math.nan, math.nan], float)
     coordinates = {"choice": np.array(NAMES, object), "joint": list(JOINTS)}
     attrs = {"study": "worn", "key": STUDY.keys[2]}
     return xr.Dataset(variables, coordinates, attrs)
+
+
+def place_of(lines, words):
+    return next(n for n, line in enumerate(lines) if line.startswith(f"  {words}"))
 
 
 def cells(table):
@@ -101,14 +106,39 @@ def test_impacts_of_a_revolution_change_by_a_number_and_no_points():
 def test_the_line_has_the_numbers_of_the_table():
     table = model_table(made())
     assert headline(table) == (
-        "Peak acceleration: 100.0 m/s²; numerical error 0.01 %; choices of the model move this "
-        "peak by -66 to +93 %; 3 of 5 choices give no number (chaotic, failed, impossible)"
+        "Peak acceleration: 100.0 m/s²; numerical error 0.01 %. 5 other models, each alone, move "
+        "this peak by -66 to +93 %, most by softer; 3 of 5 runs give no number (chaotic, failed, "
+        "impossible). Not in this: several of them at once, numbers that the file gives as known, "
+        "and all that the equations leave out"
     )
     (down,) = model_table(made().isel(choice=[0, 2])).span_texts[:1]
     assert down == "-66 to 0 %"
-    still = replace(table, rows=(), spans=((0.0, 0.0),) * 4)
-    assert headline(still).endswith("0.01 %; no choice of the model is seen to move this peak")
+    idle = replace(table.rows[0], cells=("none seen",) * 4, changes=(0.0,) * 4)
+    still = replace(table, rows=(idle,), spans=((0.0, 0.0),) * 4)
+    assert ". 1 other model, each alone, are not seen to move this peak. Not" in headline(still)
     assert headline(replace(still, bars=(1e-7, *table.bars[1:]))).count("below 0.01 %") == 1
+    assert headline(replace(still, rows=())).endswith("0.01 %. Nothing else was run")
+
+
+def test_the_line_says_how_many_numbers_are_in_doubt_and_what_moves_the_sensor():
+    data = made().assign_coords(choice=["the case itself", "oil 1", "oil 4", *NAMES[3:]])
+    data["varied"] = "choice", np.array(["", "oil", "oil", "", "", "", ""], object)
+    level = [2.0, 2.5, 1.0, 10.0, math.nan, math.nan, math.nan]
+    data["sensor_rms"] = "choice", level
+    data["sensor_rms_error"] = "choice", [0.01] * 7
+    table = model_table(data)
+    assert ". 1 number in doubt and 3 other models, each alone, move this peak by" in headline(
+        table
+    )
+    assert "; they move the sensor rms by -50 to +400 %, most by other law;" in headline(table)
+    text = [*model_lines("worn, the only job", table)]
+    start = place_of(text, "peak acceleration: ")
+    assert text[start + 1].split() == ["oil", "1,", "4", "+93", "%", "-66", "%"]
+    start = place_of(text, "sensor rms: ")
+    assert [line.split()[0] for line in text[start + 1 : start + 3]] == ["other", "oil"]
+    assert max(map(len, text)) <= 80
+    rows = page_table(table).rows
+    assert [row.cells[0].text for row in rows][1:3] == ["oil 1", "oil 4"]
 
 
 def test_a_chaotic_case_has_no_peak_to_be_moved():
@@ -116,7 +146,7 @@ def test_a_chaotic_case_has_no_peak_to_be_moved():
     table = model_table(chaotic)
     assert table.unknown == ("peak acceleration",)
     assert headline(table).startswith("No peak of the case is known; max penetration, big end")
-    nothing = model_table(chaotic[["status", "reason", "note", "regime", "seconds"]])
+    nothing = model_table(chaotic[["status", "reason", "note", "varied", "regime", "seconds"]])
     assert (nothing.measures, nothing.rows[0].cells) == ((), ())
     assert headline(nothing).startswith("No metric of the case is known")
 
@@ -145,7 +175,7 @@ def test_choices_are_read_where_they_are_of_a_job_of_the_study(tmp_path):
     assert sorted(found) == [study.keys[0], study.keys[2]]
     chapters = add(tmp_path, [study], "").chapters
     assert [chapter.section.title for chapter in chapters] == [
-        f"Choices of the model in study worn at clearance_mm = {value}" for value in (0.1, 0.3)
+        f"What moves the numbers of study worn at clearance_mm = {value}" for value in (0.1, 0.3)
     ]
     with pytest.warns(StoreWarning, match=r"worn\.nc: is not shown, as worn has no such job"):
         assert len(read_models(tmp_path, replace(study, keys=study.keys[:2]))) == 1
@@ -157,20 +187,30 @@ def test_choices_are_read_where_they_are_of_a_job_of_the_study(tmp_path):
         assert len(read_models(tmp_path, study)) == 1
 
 
-def test_the_table_in_text_fits_a_terminal():
-    """The case itself and the choices that move a block's metrics; the others are counted."""
+def test_the_table_of_features_fits_a_terminal():
+    """The case itself, the changes that move a block's metrics or cost time, and the span."""
     flat = made(max_penetration=([20e-6] * 7, [1e-9] * 7), rms_acceleration=(PEAK, PEAK_BAR))
     idle = flat.isel(choice=0).assign_coords(choice="idle")
     table = model_table(xr.concat([flat.isel(choice=[0, 2, 5]), idle], "choice"))
+    lines = [*feature_lines("worn, the only job", table)]
+    assert max(map(len, lines)) <= 80
+    assert [line.split("  ")[1] for line in lines[3:8]] == [
+        "choice of the model", "the case itself", "oil", "idle", "all of them",
+    ]  # fmt: skip
+    assert lines[8].split() == ["0", "%", "0", "%", "+99", "points"]
+    assert "  no choice is seen to move: max penetration, big end" in lines
+    assert "    impossible: needs more" in lines
+
+
+def test_what_moves_each_metric_fits_a_terminal():
+    flat = made(max_penetration=([20e-6] * 7, [1e-9] * 7), rms_acceleration=(PEAK, PEAK_BAR))
+    table = model_table(flat.isel(choice=[0, 1, 2, 5]))
     lines = [*model_lines("worn, the only job", table)]
     assert max(map(len, lines)) <= 80
-    assert [line.split("  ")[1] for line in lines[3:7]] == [
-        "choice of the model", "the case itself", "oil", "all of them",
+    start = place_of(lines, "time without dry contact, big end: ")
+    assert [" ".join(line.split()) for line in lines[start + 1 : start + 4]] == [
+        "oil +99 points", "softer +4 points", "",
     ]  # fmt: skip
-    assert lines[7].split() == ["0", "%", "0", "%", "+99", "points"]
-    assert lines[8:11] == [
-        "  1 other choice: none seen",
-        "",
-        "  no choice is seen to move: max penetration, big end",
-    ]
+    assert "  nothing is seen to move: max penetration, big end" in lines
     assert "    impossible: needs more" in lines
+    assert "    softer: K 1" in lines
