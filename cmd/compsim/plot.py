@@ -53,8 +53,8 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 )  # fmt: skip
 @click.option(
     "--limit", default="", metavar="LIMIT",
-    help="Mark segments whose rms is above this: m/s², such as 20, or as 3x, times the machine "
-    "without clearance.",
+    help="Mark segments whose rms is above this: a number and its unit, such as 2g, or as 3x, "
+    "times the machine without clearance.",
 )  # fmt: skip
 @units_option("kN, mm, µm, m/s²")
 def plot(

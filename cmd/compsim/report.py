@@ -30,9 +30,9 @@ def page_folders(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("-o", "--output", default="report", show_default=True, shell_complete=folders,
               help="Write the report into this folder.")  # fmt: skip
 @click.option(
-    "--limit", "limits", multiple=True, metavar="NAME=VALUE,...",
-    help="Show the zones A to D of a metric in tables and curves, by up to three limits, such as "
-    "body_velocity_rms_mm_per_s=2,5.",
+    "--limit", "limits", multiple=True, metavar="'METRIC=VALUE,... UNIT'",
+    help="Show the zones A to D of a metric in tables and curves, by up to three limits with their "
+    "unit, such as 'sensor_peak=0.5,2 g'.",
 )  # fmt: skip
 @units_option("kN, mm, µm, m/s²")
 @page_folders
@@ -50,7 +50,7 @@ def report(
 
     \b
     compsim report
-    compsim report /data/results -o page --limit body_velocity_rms_mm_per_s=2,5
+    compsim report /data/results -o page --limit 'body_velocity_rms=2,5 mm/s'
 
     Prints the path of the page, which a browser opens without a server.
     --units is of figures, tables and texts. Columns and axes with the name of a

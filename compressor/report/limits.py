@@ -1,7 +1,7 @@
 """Limits of metrics that a user gives: zones A, B and so on, as evaluation standards have them.
 
-No limit is ours: those of a standard, a maker or a contract are the user's to give. A value whose
-error bar holds a limit is in either of both zones.
+No limit is ours: those of a standard, a maker or a contract are the user's to give, with a unit. A
+value whose error bar holds a limit is in either of both zones.
 """
 
 import itertools
@@ -10,17 +10,15 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from compressor.metrics import BARRED
 from compressor.program import CompsimError, did_you_mean
 from compressor.report.figures.sweep_data import MEASURES, Measure
+from compressor.units import Units, read_quantity, split_number
 
 MAX_LIMITS = 3  # of a metric: zones A to D, as of ISO 20816-1
 ZONES = "ABCD"
-# units as the report shows metrics -> how they end the name of a limit
-ENDINGS = {
-    "m/s²": "_m_per_s2", "mm/s": "_mm_per_s", "kN": "_kN", "µm": "_um", "%": "_percent",
-    "ms": "_ms", "°": "_deg", "per rev": "", "": "",
-}  # fmt: skip
-TEXT = re.compile(r"\s*(\w+)\s*=\s*([^=]+)")
+TEXT = re.compile(r"\s*(\w+)\s*=\s*([^=]*[^=\s])\s*")
+WITHOUT_UNIT = ("", "per rev")
 
 
 class LimitError(CompsimError, ValueError):
@@ -39,17 +37,14 @@ class Zone:
 
 @dataclass(frozen=True)
 class Limits:
-    """Rising limits by metric, in the unit that the report shows it in without a choice."""
+    """Rising limits by metric, in SI; units: of the page that shows them."""
 
     by_metric: Mapping[str, tuple[float, ...]]
+    units: Units = "usual"
 
     def of(self, measure: Measure) -> tuple[float, ...]:
         """Return the limits of a measure in its unit; () without any."""
-        limits = self.by_metric.get(measure.variable, ())
-        if not limits:
-            return ()
-        usual = next(one for one in MEASURES if one.variable == measure.variable)
-        return tuple(limit * measure.factor / usual.factor for limit in limits)
+        return tuple(measure.factor * one for one in self.by_metric.get(measure.variable, ()))
 
     def zone(self, measure: Measure, value: float, bar: float) -> Zone | None:
         """Return the zone of a value with its error bar, in the measure's unit.
@@ -68,11 +63,12 @@ class Limits:
     def words(self) -> list[str]:
         """Return a sentence on each metric's zones."""
         sentences = []
-        for name, limits in self.by_metric.items():
-            one = next(measure for measure in MEASURES if measure.variable == name)
+        for name in self.by_metric:
+            one = shown_measure(name, self.units)
             title, unit = one.title.partition(",")[0], f" {one.unit}" if one.unit else ""
-            ends = [f"{ZONES[0]} below {limits[0]:g}{unit}"]
-            ends += [f"{ZONES[n]} from {limit:g}{unit} on" for n, limit in enumerate(limits, 1)]
+            texts = [f"{limit:g}{unit}" for limit in self.of(one)]
+            ends = [f"{ZONES[0]} below {texts[0]}"]
+            ends += [f"{ZONES[n]} from {text} on" for n, text in enumerate(texts, 1)]
             sentences.append(f"Zones of {title}, by limits that were given: {', '.join(ends)}.")
         return sentences
 
@@ -80,29 +76,47 @@ class Limits:
 NO_LIMITS = Limits({})
 
 
-def limit_names() -> dict[str, str]:
-    """Return the metrics that the report shows, by the names of their limits."""
-    return {one.variable + ENDINGS[one.unit]: one.variable for one in MEASURES}
+def shown_measure(metric: str, units: Units) -> Measure:
+    """Return a metric as a page in these units shows it; of joints or axes the first."""
+    return next(one.read_in(units) for one in MEASURES if one.variable == metric)
 
 
-def read_limits(texts: Iterable[str]) -> Limits:
-    """Return limits of texts such as `body_velocity_rms_mm_per_s=2.8,4.5`. Raises LimitError."""
+def read_limits(texts: Iterable[str], units: Units = "usual") -> Limits:
+    """Return limits of texts such as `sensor_peak=0.2,0.5 g`, whose unit stands behind the last.
+
+    units: of the page. Raises LimitError with what to write, in the unit that the page shows.
+    """
     found: dict[str, tuple[float, ...]] = {}
-    names = limit_names()
+    known = dict.fromkeys(one.variable for one in MEASURES)
     for text in texts:
         parts = TEXT.fullmatch(text)
-        if parts is None or parts[1] not in names:
-            hint = did_you_mean(parts[1], names) if parts else ""
-            listed = f"there are {', '.join(names)}"
-            raise LimitError(f"{text!r} is no limit: write NAME=VALUE,...; {hint or listed}")
-        try:
-            limits = tuple(float(one) for one in parts[2].split(","))
-        except ValueError:
-            raise LimitError(f"{text!r}: limits are numbers, with commas between them") from None
-        rising = all(low < high for low, high in itertools.pairwise(limits))
-        if len(limits) > MAX_LIMITS or not rising or not all(map(math.isfinite, limits)):
-            raise LimitError(f"{text!r}: give one to {MAX_LIMITS} numbers, each above the last")
-        if names[parts[1]] in found:
+        if parts is None or parts[1] not in known:
+            hint = did_you_mean(parts[1], known) if parts else ""
+            near = hint or f"there are {', '.join(known)}"
+            raise LimitError(f"{text!r} is no limit: write METRIC=VALUE,... and the unit, such as "
+                             f"'sensor_peak=20,50 m/s²'; {near}")  # fmt: skip
+        if parts[1] in found:
             raise LimitError(f"{text!r}: {parts[1]} has limits already")
-        found[names[parts[1]]] = limits
-    return Limits(found)
+        found[parts[1]] = read_values(parts[2], shown_measure(parts[1], units), text)
+    return Limits(found, units)
+
+
+def read_values(values: str, measure: Measure, text: str) -> tuple[float, ...]:
+    """Return the limits of a measure in SI from their part of a text. Raises LimitError."""
+    parts = [split_number(one) for one in values.split(",")]
+    unit = parts[-1][1]
+    if any(number is None for number, _ in parts):
+        raise LimitError(f"{text!r}: limits are numbers with commas between them, and a unit")
+    if not unit and measure.unit not in WITHOUT_UNIT:
+        raise LimitError(f"{text!r} has no unit: write '{measure.variable}={values} "
+                         f"{measure.unit}', as the page shows it")  # fmt: skip
+    found = []
+    for number, own in parts:
+        try:
+            value = read_quantity(f"{number} {own or unit}", BARRED[measure.variable].unit)
+        except ValueError as error:
+            raise LimitError(f"{text!r}: {error}") from None
+        found += [] if value is None else [value]
+    if len(found) > MAX_LIMITS or any(low >= high for low, high in itertools.pairwise(found)):
+        raise LimitError(f"{text!r}: give one to {MAX_LIMITS} numbers, each above the last")
+    return tuple(found)

@@ -1,6 +1,5 @@
 """`compsim plot`: figures of one job, or of a study along one of its axes, as files."""
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -57,7 +56,7 @@ from compressor.store import (
     read_store,
     read_studies,
 )
-from compressor.units import Units, convert_text
+from compressor.units import Units, convert_text, read_quantity, split_number
 
 
 class PlotError(CompsimError):
@@ -71,7 +70,7 @@ class PlotChoice:
     """What to draw: names of figures, all by default; of a study the axis and the other values.
 
     over: the axis by its key or the end of it; at: `key=value` of other axes, else their first;
-    limit: of a segment's rms, m/s2, or with an x behind it times the healthy machine's. units: of
+    limit: of a segment's rms with its unit, or with an x times the healthy machine's. units: of
     the figures, as `compressor.units` has them.
     """
 
@@ -165,13 +164,15 @@ def write_plots(
 ) -> Iterator[Plotted]:
     """Draw a study by its name, or a job by the words that `show` takes; yields what was written.
 
-    words: the beginning of a job's key, or a study, and `axis=value` until one job is left. Raises
-    WrongName where they name none or several, PlotError where it cannot be drawn; StoreError where
-    the store cannot be read or the files not be written.
+    A study of one job has a job's figures, too. words: the beginning of a job's key, or a study,
+    and `axis=value` until one job is left. Raises WrongName where they name none or several,
+    PlotError where it cannot be drawn; StoreError where the store cannot be read or the files not
+    be written.
     """
     stored, studies = read_store(results).warned(), read_studies(results, former=True)
     named = {study.name: study for study in studies}
-    if len(words) == 1 and words[0] in named:
+    of_job = bool(choice.what) and {*choice.what} <= {*JOB}
+    if len(words) == 1 and words[0] in named and not (of_job and named[words[0]].jobs == 1):
         drawn = study_figures(stored, named[words[0]], choice)
         stem = words[0]
     else:
@@ -322,20 +323,21 @@ SENSE = "run it with body: true and sensor: true"
 
 
 def read_limit(text: str) -> tuple[float, bool] | None:
-    """Return a segment's limit, and whether it is times the healthy machine's; None for "".
+    """Return a segment's limit, m/s2 or times the healthy machine's, and whether it is that.
 
-    Raises PlotError.
+    None for "". Raises PlotError.
     """
     if not text:
         return None
+    number, unit = split_number(text)
     try:
-        value = float(text.removesuffix("x"))
+        value = number if unit == "x" else read_quantity(text, "m/s2") if unit else None
     except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and value > 0.0):
-        raise PlotError(f"--limit {text}: give m/s², such as 20, or times the machine without "
-                        "clearance, such as 3x")  # fmt: skip
-    return value, text.endswith("x")
+        value = None
+    if value is None or value <= 0.0:
+        raise PlotError(f"--limit {text}: give a number and its unit, such as '20 m/s²' or 2g, or "
+                        "times the machine without clearance, such as 3x")  # fmt: skip
+    return value, unit == "x"
 
 
 def with_segments(

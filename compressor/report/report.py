@@ -105,12 +105,12 @@ def write_report(
     add: what makes more of the page, such as `compressor.studies.page_additions` gives. running:
     how the run stands that still adds to the results; the page says so, and loads itself again.
     limits: of metrics, whose zones tables and curves show, such as
-    `body_velocity_rms_mm_per_s=2,5`. units: of figures, tables and texts, of `compressor.units`.
+    `sensor_peak=20,50 m/s²`. units: of figures, tables and texts, of `compressor.units`.
 
     Raises LimitError where these cannot be used, StoreError where there are no results, or the
     report's folder cannot be written.
     """
-    folder, zones = Path(report), read_limits(limits)
+    folder, zones = Path(report), read_limits(limits, units)
     with Painter(folder) as painter:
         contents = build_report(results, command, add, running, painter, zones, units)
         files = painter.finish()

@@ -91,6 +91,7 @@ def test_cards_are_of_the_gas(plot, folder, unpainted):
     code, found, err = plot(mine, "--what", "cards")
     assert (code, err) == (0, "")
     (caption,) = found.values()
+    assert plot("ideal", "--what", "cards")[:2] == (code, found)  # its one job is named by it
     power = -float(job(folder, "ideal")["load_work"]) / 0.36e3
     said = float(re.search(r"Indicated power ([\d.]+) kW", caption)[1])
     assert said == pytest.approx(power, rel=5e-3)
@@ -321,8 +322,14 @@ def test_segments_of_a_study_are_drawn_beside_the_healthy_machine(tmp_path, caps
     assert re.search(rf"over theirs are {over[0]} segments? there and {over[1]} at 0\.2\.", told)
     place = int(np.argmax(runs[0] / healthy))
     assert f"is {10 * place} to {10 * place + 10}° at 0.05, by {runs[0][place]:.3g} m/s²" in told
-    assert cli.main([*words, "--limit", "5g"]) == 2
-    assert "give m/s², such as 20, or times" in capsys.readouterr().err
+    level = healthy.max() / 9.80665
+    assert cli.main([*words, "--limit", f"{level}g"]) == 0
+    over = [(rms > healthy.max()).sum() for rms in runs]
+    told = capsys.readouterr().out
+    assert re.search(rf"are {over[0]} segments? there and {over[1]} at 0\.2\.", told)
+    for wrong in ("5", "5 mm/s", "-1x"):
+        assert cli.main([*words, "--limit", wrong]) == 2
+        assert "give a number and its unit, such as '20 m/s²'" in capsys.readouterr().err
     other = [word if word != "segments" else "map" for word in words]
     assert cli.main([*other, "--limit", "5x"]) == 2
     assert "--limit 5x is of segments: add --what segments" in capsys.readouterr().err

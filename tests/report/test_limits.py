@@ -13,7 +13,7 @@ from conftest import store
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.sweep_data import MEASURES
 from compressor.report.figures.sweep_maps import LIMIT
-from compressor.report.limits import LimitError, limit_names, read_limits
+from compressor.report.limits import LimitError, read_limits
 from compressor.report.page import measured_cell
 from compressor.store.reader import open_study
 
@@ -33,12 +33,12 @@ VELOCITY = [one for one in MEASURES if one.variable == "body_velocity_rms"]
     ],
 )
 def test_a_value_and_its_bar_lie_in_a_zone(value, bar, name, number):
-    zone = read_limits(["sensor_peak_m_per_s2=2, 5"]).zone(PEAK, value, bar)
+    zone = read_limits(["sensor_peak=2, 5 m/s2"]).zone(PEAK, value, bar)
     assert (zone.name, zone.number) == (name, number)
 
 
 def test_what_is_not_known_has_no_zone():
-    limits = read_limits(["sensor_peak_m_per_s2=2"])
+    limits = read_limits(["sensor_peak=2 m/s²"])
     assert limits.zone(PEAK, math.nan, 0.1) is None
     assert limits.zone(PEAK, 3.0, math.inf) is None
     assert limits.zone(VELOCITY[0], 3.0, 0.1) is None
@@ -47,38 +47,57 @@ def test_what_is_not_known_has_no_zone():
 
 
 def test_limits_are_in_the_unit_of_the_page():
-    """Both axes of the velocity have them, in mm/s."""
-    limits = read_limits(["body_velocity_rms_mm_per_s=2.8,4.5,7.1"])
+    """Both axes of the velocity have them, in mm/s; a sensor's in g stand in g where it does."""
+    limits = read_limits(["body_velocity_rms=2.8,4.5,7.1 mm/s"])
     assert [one.unit for one in VELOCITY] == ["mm/s", "mm/s"]
-    assert [limits.of(one) for one in VELOCITY] == [(2.8, 4.5, 7.1)] * 2
+    for one in VELOCITY:
+        assert limits.of(one) == pytest.approx((2.8, 4.5, 7.1))
     assert limits.words == [
         "Zones of body velocity rms, by limits that were given: A below 2.8 mm/s, B from 2.8 mm/s "
         "on, C from 4.5 mm/s on, D from 7.1 mm/s on."
     ]
 
 
-def test_every_metric_of_the_report_has_a_name_for_its_limits():
-    assert {*limit_names().values()} == {one.variable for one in MEASURES}
-    assert limit_names()["peak_contact_force_kN"] == "peak_contact_force"
-    assert limit_names()["impacts_per_rev"] == "impacts_per_rev"
+def test_limits_in_g_are_limits_in_m_per_s2():
+    """They were refused on a page in g, which its own documentation said to write."""
+    for units, words in (("plant", "A below 0.5 g, B from 0.5 g on, C from 2 g on."),
+                         ("usual", "A below 4.90332 m/s², B from 4.90332 m/s² on")):  # fmt: skip
+        limits = read_limits(["sensor_peak=0.5,2g"], units)
+        assert limits.of(PEAK) == pytest.approx((4.903325, 19.6133))
+        assert limits.of(PEAK.read_in("plant")) == pytest.approx((0.5, 2.0))
+        assert words in limits.words[0]
+
+
+@pytest.mark.parametrize("units", ["usual", "plant", "si"])
+@pytest.mark.parametrize("metric", [*dict.fromkeys(one.variable for one in MEASURES)])
+def test_every_metric_of_the_page_takes_a_limit_in_its_unit(metric, units):
+    """What is refused without a unit is told with it, and that is taken."""
+    one = next(one for one in MEASURES if one.variable == metric).read_in(units)
+    text = f"{metric}=3,7"
+    if one.unit not in ("", "per rev"):
+        with pytest.raises(LimitError, match=f"write '{metric}=3,7 {re.escape(one.unit)}'"):
+            read_limits([text], units)
+        text += f" {one.unit}"
+    assert read_limits([text], units).of(one) == pytest.approx((3.0, 7.0))
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("body_velocity_rms=2", "did you mean body_velocity_rms_mm_per_s"),
-        ("sensor_peak_m_per_s2", "write NAME=VALUE"),
-        ("sensor_peak_m_per_s2=2,x", "limits are numbers"),
-        ("sensor_peak_m_per_s2=3,2", "each above the last"),
-        ("sensor_peak_m_per_s2=1,2,3,4", "one to 3 numbers"),
-        ("sensor_peak_m_per_s2=nan", "each above the last"),
+        ("body_velocity_rms_mm_per_s=2", "did you mean body_velocity_rms"),
+        ("sensor_peak", "write METRIC=VALUE"),
+        ("sensor_peak=2 mm/s", "'mm/s' is no unit of it; there are m/s2, m/s², g"),
+        ("sensor_peak=2,x g", "limits are numbers"),
+        ("sensor_peak=3,2 g", "each above the last"),
+        ("sensor_peak=1,2,3,4 g", "one to 3 numbers"),
+        ("sensor_peak=nan g", "limits are numbers"),
     ],
 )
 def test_what_is_no_limit_is_refused(text, message):
     with pytest.raises(LimitError, match=re.escape(message)):
         read_limits([text])
     with pytest.raises(LimitError, match="has limits already"):
-        read_limits(["sensor_peak_m_per_s2=1", "sensor_peak_m_per_s2=2"])
+        read_limits(["sensor_peak=1g", "sensor_peak=2g"])
 
 
 def test_the_page_and_the_curves_show_the_zones(tmp_path, capsys):
@@ -94,19 +113,19 @@ def test_the_page_and_the_curves_show_the_zones(tmp_path, capsys):
     assert high > 1.2 * low
     middle = f"{(low + high) / 2:.6g}"
     report = ["report", "-i", str(tmp_path / "results"), "-o", str(tmp_path / "out")]
-    assert cli.main([*report, "--limit", f"sensor_peak_m_per_s2={middle}"]) == 0
+    assert cli.main([*report, "--limit", f"sensor_peak={middle} m/s2"]) == 0
     page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     assert re.findall(r'class="zone-(\d)">[^<]* ([A-D/]+)<', page) == [("1", "A"), ("2", "B")]
     sentence = f"A below {middle} m/s², B from {middle} m/s² on."
     assert page.count(sentence) == 2  # of the table, and in the caption of the curves
-    (figure,) = draw_sweep(study, read_limits([f"sensor_peak_m_per_s2={middle}"]))
+    (figure,) = draw_sweep(study, read_limits([f"sensor_peak={middle} m/s2"]))
     lines = {one.title: [note.y for note in one.notes if note.is_line] for one in
              figure.figure.panels}  # fmt: skip
     assert lines["sensor peak"] == [float(middle)]
     assert not lines["sensor rms"]
     capsys.readouterr()
     assert cli.main([*report, "--limit", "sensor_peak=3"]) == 2
-    assert "did you mean sensor_peak_m_per_s2" in capsys.readouterr().err
+    assert "write 'sensor_peak=3 m/s²'" in capsys.readouterr().err
     assert cli.main(report) == 0
     assert "zone-" not in re.sub("<style>.*?</style>", "", (
         tmp_path / "out" / "index.html").read_text(encoding="utf-8"), flags=re.DOTALL)  # fmt: skip
@@ -126,7 +145,7 @@ def test_limits_are_lines_in_maps_of_two_numbers():
         },
         {"speed_rpm": x, "clearance_mm": y},
     )
-    (figure,) = [one for one in draw_sweep(data, read_limits(["sensor_peak_m_per_s2=3.5,99"]))
+    (figure,) = [one for one in draw_sweep(data, read_limits(["sensor_peak=3.5,99 m/s2"]))
                  if one.name == "map"]  # fmt: skip
     (line,) = [one for one in figure.figure.panels[0].traces if one.style == LIMIT]
     known = np.isfinite(line.x)

@@ -1,6 +1,7 @@
 """The report: what is on the page, what is not, and that nothing on it escapes or reaches out."""
 
 import html.parser
+import itertools
 import json
 import re
 import shlex
@@ -29,17 +30,21 @@ from compressor.store.studies import encode, read_studies, write_study
 
 SHORT = ["solve.duration_rev=0.1", "solve.settle_rev=0", "solve.output_step_deg=1"]
 DRAFT = ["solve.accuracy=draft"]
-VOID = {"meta", "img", "br"}
+VOID = {"meta", "img", "br", "wbr"}
 EVIL = "<script>alert('1')</script>&amp;"
 
 
 class Reader(html.parser.HTMLParser):
-    """What a page is made of; asserts that its elements are closed in order."""
+    """What a page is made of; asserts that its elements are closed in order.
+
+    Of a table in blocks a row has the cells of all blocks, those that they share once.
+    """
 
     def __init__(self, text):
         super().__init__()
         self.open, self.links, self.sources, self.ids, self.words = [], [], [], [], []
         self.rows, self.tags, self.jobs = [], set(), {}
+        self.tables, self.depth = [], None  # rows of each block of a table, and where it stands
         self.feed(text)
         assert not self.open
 
@@ -51,19 +56,31 @@ class Reader(html.parser.HTMLParser):
         self.ids += [attrs["id"]] if "id" in attrs else []
         if tag not in VOID:
             self.open.append(tag)
+        if attrs.get("class") == "blocks":
+            self.tables, self.depth = [], len(self.open) - 1
+        if tag == "table":
+            self.tables = [*(self.tables if self.depth is not None else []), []]
         if tag == "tr":
             self.rows.append((attrs.get("class"), []))
-            self.jobs[attrs.get("data-job", "")] = self.rows[-1]
+            self.tables[-1].append(self.rows[-1][1])
+            self.jobs.setdefault(attrs.get("data-job", ""), self.rows[-1])
         if tag in ("td", "th"):
             self.rows[-1][1].append("")
         assert tag != "img" or attrs.get("alt")
 
     def handle_endtag(self, tag):
         assert self.open.pop() == tag
+        if len(self.open) == self.depth:
+            self.depth = None
+        if tag == "tr" and len(self.tables) > 1:
+            _, cells = self.rows.pop()
+            heads = zip(self.tables[0][0], self.tables[-1][0], strict=False)
+            shared = [*itertools.takewhile(lambda pair: pair[0] == pair[1], heads)]
+            self.tables[0][len(self.tables[-1]) - 1] += cells[len(shared) :]
 
     def handle_data(self, data):
         if {"td", "th"} & {*self.open}:
-            self.rows[-1][1][-1] += data
+            self.rows[-1][1][-1] += data.replace("\N{NO-BREAK SPACE}", " ")
         if not {"style", "script"} & {*self.open}:
             self.words.append(data)
 
@@ -413,7 +430,7 @@ def test_a_sweep_is_drawn_over_the_crank_angle(tmp_path):
 
 
 def test_tables_and_figures_may_be_in_plant_units(own, tmp_path):
-    write_report(own, tmp_path / "out", units="plant", limits=["rms_acceleration_m_per_s2=1"])
+    write_report(own, tmp_path / "out", units="plant", limits=["rms_acceleration=1 m/s2"])
     found = read(tmp_path / "out")
     head = next(cells for _, cells in found.rows if cells[0] == "clearance_mm")
     assert head[3] == "peak acceleration (g)"
@@ -423,7 +440,7 @@ def test_tables_and_figures_may_be_in_plant_units(own, tmp_path):
             peak, rms = (float(run[f"{name}_acceleration"]) for name in ("peak", "rms"))
         assert float(cells[3].split(" ± ")[0]) == pytest.approx(peak / 9.80665, rel=1e-3)
         assert cells[4].endswith(" B") == (rms >= 1.0)  # the limit is 1 m/s2
-    assert "Zones of rms acceleration, by limits that were given: A below 0.102 g" in found.text
+    assert "Zones of rms acceleration, by limits that were given: A below 0.101972 g" in found.text
     table = (tmp_path / "out" / "sweep-own-map.csv").read_text(encoding="utf-8")
     assert "peak acceleration: g" in table
 
