@@ -8,6 +8,7 @@ import math
 UNKNOWN = "unknown"  # a number whose error bar is as long as itself
 DIGITS_WITHOUT_BAR, MAX_DIGITS = 6, 12  # digits without an error bar, and with one
 PAGE_DIGITS = 4  # of a number on a page
+ROUNDING = 1e-10  # of the greatest number of a kind: below it a number is told as 0
 MIN_DECIMAL, MAX_DECIMAL = 1e-3, 1e7  # sizes of numbers written without a power of ten
 
 

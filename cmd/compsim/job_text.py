@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from compressor import metrics
-from compressor.digits import UNKNOWN, by_bar, is_known
+from compressor.digits import ROUNDING, UNKNOWN, by_bar, is_known
 from compressor.units import Units, unit_in
 
 if TYPE_CHECKING:
@@ -90,6 +90,8 @@ def numbers(found: "JobReport", units: Units, *sources: str) -> list[Line]:
         values, (errors, relative, kind) = found.numbers[name], bar_of(found, name)
         unit, factor = unit_of(row, units)
         highest = max(values) if "segment" in row.dims else -math.inf
+        every = [abs(pick_value(values, place)) for place, _ in places(row)]
+        rounding = ROUNDING * max((one for one in every if not math.isnan(one)), default=0.0)
         for place, label in places(row):
             value = pick_value(values, place)
             if math.isnan(value) or tells_nothing(found, row, place):
@@ -97,6 +99,8 @@ def numbers(found: "JobReport", units: Units, *sources: str) -> list[Line]:
             if value < highest:
                 continue  # of the segments of a revolution the one that is highest
             error = math.nan if errors is None else pick_value(errors, place)
+            if abs(value) < rounding:  # beside the other joint or axis
+                value = error = 0.0
             text = format_measured(value * factor, error * factor, relative)
             if error == 0.0 and name.endswith("_per_rev"):
                 text = f"{value:.3g}"  # a mean of few whole numbers: exact of this run alone

@@ -23,7 +23,7 @@ from compressor.digits import UNKNOWN, is_known, setting
 from compressor.metrics import BARRED, JOINTS
 from compressor.program import PROGRAM, library_versions
 from compressor.report.figures.sweep_data import Measure, measures, name_in_words
-from compressor.report.page import Section, format_measure, templates
+from compressor.report.page import Section, format_measure, number, templates
 from compressor.store import Folder, Stored, StoredStudy
 from compressor.units import Units
 
@@ -41,6 +41,7 @@ class Assumptions:
     worn: bool
     spring: bool
     claims: bool
+    start_up: Sequence[str]  # how long it is left out, in words
 
 
 def assumptions_section(stored: Stored, studies: Sequence[StoredStudy], claims: bool) -> Section:
@@ -61,8 +62,17 @@ def assumptions_section(stored: Stored, studies: Sequence[StoredStudy], claims: 
         any(case.joint != "none" for _, case in cases),
         any(case.load == "spring" for _, case in cases),
         claims,
+        [*dict.fromkeys(start_up(case) for _, case in cases)],
     )
     return Section("assumptions", "What to keep in mind", "assumptions.html", content)
+
+
+def start_up(case: Case) -> str:
+    """Return in words how long a case's metrics leave out the start-up."""
+    settle = case.solve.settle_rev
+    if isinstance(settle, str):
+        return "until revolutions agree"
+    return f"for {settle:g} revolution" + "s" * (settle != 1)
 
 
 def last_case(stored: Stored, study: StoredStudy) -> Case | None:
@@ -202,6 +212,7 @@ LEFT_OUT = (
     "rms_acceleration_deviation",  # 0 without clearance, by its meaning
     "max_penetration",  # below 0 where a gap is left, above it where metal touches: no ratio
 )
+MIN_RATIO = 1.05  # of a change that is told as one
 FROM_ZERO = 5.0  # rank of what appears: as of a value 150 times as large
 
 
@@ -248,17 +259,24 @@ class FirstScreen:
     cautions: Sequence[str] = ()
 
     @property
-    def heading(self) -> str:
-        """Return what the findings are called: of single jobs nothing changes."""
-        changes = any(one.low for _, found in self.findings for one in found)
-        return "What changes most" if changes or not self.findings else "What was found"
+    def lists(self) -> list[tuple[str, Sequence[tuple[str, Sequence[MetricChange]]]]]:
+        """Return the findings under what they are called: of single jobs nothing changes."""
+        changes, others = (
+            [(name, some) for name, found in self.findings
+             if (some := [one for one in found if bool(one.low) == is_change])]
+            for is_change in (True, False)
+        )  # fmt: skip
+        if not changes:
+            return [("What was found" if others else "What changes most", others)]
+        more = [("What else was found", others)] if others else []
+        return [("What changes most", changes), *more]
 
     @property
     def no_finding(self) -> str:
         """Return the sentence that stands in place of findings."""
         if not any(line.has_result for line in self.lines):
             return "No job has a result."
-        return "No metric changes by more than its error bars."
+        return f"No metric changes by more than {100 * (MIN_RATIO - 1):.0f} % and its error bars."
 
 
 def answer_section(answer: FirstScreen) -> Section:
@@ -397,6 +415,10 @@ def finding(
         )
         return MetricChange(title, "", "", text(high), "", same, 0.0, always) if always else None
     ratio = most / least if least * most > 0.0 else math.inf
+    if max(ratio, 1.0 / ratio) < MIN_RATIO:
+        span = f"{number(least)} to {number(most)} {measure.unit}".rstrip()
+        same = "nearly the same in all jobs"
+        return MetricChange(title, "", "", span, "", same, 0.0, always) if always else None
     rank = min(abs(math.log(ratio)), FROM_ZERO)
     change = f"{ratio:.3g} times" if ratio < 1e3 else "from nearly nothing"
     change = change if least >= 0.0 else ""

@@ -4,10 +4,11 @@ Python gives sections of plain data; the files in `templates` make markup of the
 text that they print.
 """
 
+import itertools
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from typing import Any, Literal, NamedTuple
 
@@ -49,12 +50,38 @@ class TableRow:
     key: str = ""
 
 
+MAX_COLUMNS = 8  # of a table that a sheet of paper holds
+MIN_BESIDE = 3  # columns beside those that say what a row is
+
+
 @dataclass(frozen=True)
 class PageTable:
-    """A table; `head` has a title for each column."""
+    """A table; `head` has a title for each column, and the first `lead` say what a row is."""
 
     head: Sequence[str]
     rows: Sequence[TableRow]
+    lead: int = 1
+
+    @property
+    def blocks(self) -> "list[PageTable]":
+        """Return the table in blocks of columns that a sheet of paper holds.
+
+        They are as wide as each other, and each begins with what a row is.
+        """
+        columns = len(self.head) - self.lead
+        count = math.ceil(columns / max(MIN_BESIDE, MAX_COLUMNS - self.lead)) or 1
+        ends = [self.lead + n * columns // count for n in range(count + 1)]
+        return [
+            PageTable(
+                [*self.head[: self.lead], *self.head[low:high]],
+                [
+                    replace(row, cells=[*row.cells[: self.lead], *row.cells[low:high]])
+                    for row in self.rows
+                ],
+                self.lead,
+            )
+            for low, high in itertools.pairwise(ends)
+        ]
 
 
 def number(value: float) -> str:
@@ -88,9 +115,15 @@ def format_measure(measure: Measure, value: float, bar: float) -> str:
     return by_bar(value, bar, measure.is_relative, digits=PAGE_DIGITS)
 
 
+def unbroken(text: str) -> str:
+    """Return a text that stays in one line: a number and its error bar."""
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
 def measured_cell(measure: Measure, value: float, bar: float, limits: Limits = NO_LIMITS) -> Cell:
     """Return a metric and its error bar, and the zone of its limits that it lies in."""
-    text, zone = format_measure(measure, value, bar), limits.zone(measure, value, bar)
+    text = unbroken(format_measure(measure, value, bar))
+    zone = limits.zone(measure, value, bar)
     known = None if math.isnan(value) else value
     if zone is None:
         return Cell(text, "number", known)

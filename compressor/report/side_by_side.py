@@ -12,11 +12,19 @@ from compressor.digits import is_known
 from compressor.metrics import BARRED, JOINTS
 from compressor.report.answer import FORCE, Points
 from compressor.report.figures.sweep_data import MEASURES, Measure, measures, swept_values
-from compressor.report.page import Cell, PageTable, TableRow, column_title, format_measure, number
+from compressor.report.page import (
+    Cell,
+    PageTable,
+    TableRow,
+    column_title,
+    format_measure,
+    number,
+    unbroken,
+)
 from compressor.store import Stored
 from compressor.units import Units
 
-MAX_WORN = 5  # jobs that stand beside the machine without clearance
+MAX_WORN = 10  # jobs that stand beside the machine without clearance
 CLEARANCES = {"clearance_mm", *stands_for("clearance_mm")}
 MAX_TRIED = 50  # jobs among which the worst with clearance is looked for
 SENSOR = "sensor_peak"
@@ -62,7 +70,8 @@ def compare_healthy(
                     if np.isfinite(peaks).any():
                         greatest["sensor peak"] = alike[int(np.nanargmax(peaks))]
             places = choose_jobs(alike, [place, *greatest.values()])
-            return _compare(stored, data, case, places, greatest, units)
+            are_all = len(places) == len(alike)
+            return _compare(stored, data, case, places, greatest, are_all, units)
     return None
 
 
@@ -101,11 +110,12 @@ def _compare(
     case: Case,
     places: list[int],
     greatest: Mapping[str, int],
+    are_all: bool,
     units: Units,
 ) -> HealthyAndWorn | None:
     """Return the table: a row a metric, a column without clearance and one a job.
 
-    greatest: jobs by what is greatest in them, in words.
+    greatest: jobs by what is greatest in them, in words; are_all: no job like these is left out.
     """
     healthy = healthy_twin(xr.Dataset(attrs=case.attributes()), sensed=True)
     if healthy["status"].item() != "ok":
@@ -126,24 +136,25 @@ def _compare(
     heads = [(names[n] or "this job") + describe_health(stored, str(keys[n])) for n in places]
     beside = "this job"
     if len(places) > 1:
-        worst = "".join(f", of the greatest {what} ({names[n]})" for what, n in greatest.items())
+        peaks = "".join(f"; the greatest {what} is at {names[n]}" for what, n in greatest.items())
         beside = (
-            "jobs that differ in clearances alone, in their order: that of the least and of the "
-            f"greatest clearance{worst}"
+            f"all jobs that differ in clearances alone, from the least on{peaks}"
+            if are_all
+            else f"{len(places)} jobs that differ in clearances alone, from the least on: those of "
+            f"the least and the greatest clearance and of the greatest {' and '.join(greatest)}, "
+            f"and others between{peaks}; the table of all jobs has the rest"
         )
-        if {*places} - {places[0], places[-1], *greatest.values()}:
-            beside += ", and others between"
     words = (
         "The machine without clearance, by the same model: its joints are ideal, also without oil "
         "film. A sound bearing has some clearance; jobs that count as healthy are marked so. "
         f"Beside it {beside}. In parentheses: how many times as much as without clearance."
     )
-    return HealthyAndWorn(words, PageTable(["metric", "without clearance", *heads], rows))
+    return HealthyAndWorn(words, PageTable(["metric", "without clearance", *heads], rows, 2))
 
 
 def _cell(measure: Measure, value: float, bar: float, sound: float) -> Cell:
     """Return a metric of a worn job, and how many times that of the healthy machine it is."""
-    text = format_measure(measure, value, bar)
+    text = unbroken(format_measure(measure, value, bar))
     is_sure = np.isnan(bar) or is_known(value, bar, measure.is_relative)
     if is_sure and sound > 0.0 and value > 0.0:
         times = value / sound

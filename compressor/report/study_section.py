@@ -200,4 +200,5 @@ def jobs_table(data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usu
         ]
         cells.append(Cell(str(key)[:KEY_DIGITS], "code"))
         rows.append(job_row(cells, str(status), str(regime), str(key)))
-    return PageTable([*swept, "status", *map(column_title, shown), "job"], rows)
+    head = [*swept, "status", *map(column_title, shown), "job"]
+    return PageTable(head, rows, len(swept))

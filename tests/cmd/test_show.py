@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 from compsim import cli
-from compsim.job_text import film
+from compsim.job_text import film, numbers
 from conftest import CHAOTIC, store
 
 from compressor.cases.case import Case
@@ -44,20 +44,31 @@ def test_a_job_is_named_by_its_key_or_by_its_study_and_values(paper_store, show)
 
 
 def test_numbers_have_labels_units_and_error_bars(paper_store, show):
-    numbers, told = report_job(paper_store, *HERE).numbers, values(show(paper_store, *HERE))
-    force, bar = (numbers[name] for name in ("peak_contact_force", "peak_contact_force_error"))
+    stored, told = report_job(paper_store, *HERE).numbers, values(show(paper_store, *HERE))
+    force, bar = (stored[name] for name in ("peak_contact_force", "peak_contact_force_error"))
     for place, joint in enumerate(("big end", "small end")):
         said = by_bar(force[place] / 1e3, bar[place] / 1e3)
         assert told[f"peak contact force, {joint}"] == f"{said} kN"
-    depth, bar = (numbers[name][0] for name in ("max_penetration", "max_penetration_error"))
+    depth, bar = (stored[name][0] for name in ("max_penetration", "max_penetration_error"))
     assert told["max penetration, big end"] == f"{by_bar(depth * 1e6, bar * 1e6)} µm"
-    share = numbers["contact_loss_fraction"][0]
-    bar = numbers["contact_loss_fraction_error"][0]
+    share = stored["contact_loss_fraction"][0]
+    bar = stored["contact_loss_fraction_error"][0]
     assert told["time without dry contact, big end"] == f"{by_bar(100 * share, 100 * bar, False)} %"
-    assert told["contacts after flight, big end"] == f"{numbers['impacts_per_rev'][0]:.3g} per rev"
+    assert told["contacts after flight, big end"] == f"{stored['impacts_per_rev'][0]:.3g} per rev"
     assert not any("count" in label for label in told)  # counts grow with the run
-    assert float(told["acceleration"]) == pytest.approx(numbers["acceleration_error"], rel=0.05)
-    assert told["friction loss"] == f"{numbers['friction_loss']:.6g} J"
+    assert float(told["acceleration"]) == pytest.approx(stored["acceleration_error"], rel=0.05)
+    assert told["friction loss"] == f"{stored['friction_loss']:.6g} J"
+
+
+def test_what_is_rounding_beside_the_other_axis_is_told_as_0():
+    """It was told as (10 ± 8)e-14 mm/s."""
+    found = SimpleNamespace(
+        case=Case(),
+        numbers={"body_velocity_rms": [9.79e-3, 1e-16], "body_velocity_rms_error": [1e-5, 8e-17]},
+    )
+    assert numbers(found, "usual", "body") == [
+        ("body velocity rms, x", "9.79 ± 0.01 mm/s"), ("body velocity rms, y", "0 mm/s"),
+    ]  # fmt: skip
 
 
 def test_the_machine_without_clearance_stands_beside_a_worn_one(paper_store, paper_runs, show):

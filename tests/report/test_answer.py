@@ -43,7 +43,22 @@ def test_a_change_is_told_by_its_ends():
 
 def test_a_change_within_the_bars_is_none():
     assert told(PEAK, [200.0, 202.0, 203.0], [2.0, 2.0, 2.0]) is None
-    assert told(PEAK, [200.0, 202.0, 205.0], [2.0, 2.0, 2.0]) is not None
+    assert told(PEAK, [200.0, 202.0, 215.0], [2.0, 2.0, 2.0]) is not None
+
+
+def test_a_change_of_some_percent_is_none():
+    """It was told under what changes most as 1.01 times, and as 1 times."""
+    assert told(PEAK, [200.0, 201.0, 202.0], [0.01] * 3) is None
+    assert told(TENSION, [-200.0, -202.0, -201.0], [0.01] * 3) is None
+    assert told(PEAK, [200.0, 201.0, 211.0], [0.01] * 3).change == "1.05 times"
+    found = told(REVERSAL, [163.4, 164.0, 163.6], [0.01] * 3)
+    assert (found.low, found.high) == ("", "163.4 to 164 °")
+    assert found.change == "nearly the same in all jobs"
+    screen = FirstScreen([], [("a", [told(PEAK, [1.0, 2.0, 4.0], [0.1] * 3), found])], [], [])
+    (most, changes), (else_found, others) = screen.lists
+    assert (most, else_found) == ("What changes most", "What else was found")
+    assert [one.title for _, ones in changes for one in ones] == ["Peak acceleration"]
+    assert others == [("a", [found])]
 
 
 def test_a_value_that_is_not_known_does_not_count():
@@ -142,7 +157,7 @@ def test_the_worn_joint_s_force_and_the_reversal_stand_there_though_they_do_not_
         "Time without dry contact, big end", "Peak rod load, tension", "Rms acceleration",
         "Peak contact force, small end", "Rod load reversal",
     ]  # fmt: skip
-    assert found[-2].change == "1.03 times"
+    assert (found[-2].high, found[-2].change) == ("80 to 82.20 kN", "nearly the same in all jobs")
     assert (found[-1].low, found[-1].high) == ("", "150.0 ± 0.1 °")
     assert found[-1].change == "the same in all jobs within its error bars"
     few = told(REVERSAL, [150.0, np.nan, np.nan], [0.1] * 3)
@@ -196,6 +211,9 @@ def test_the_first_screen_speaks_of_changes_where_something_can_change():
         return FirstScreen([line], [("wear", found)] * bool(found), [], [])
 
     assert screen(False).no_finding == "No job has a result."
-    assert screen(True).no_finding == "No metric changes by more than its error bars."
-    assert screen(True, "").heading == "What was found"
-    assert screen(True, "", "4 kN").heading == "What changes most"
+    assert screen(True).no_finding == "No metric changes by more than 5 % and its error bars."
+    assert [heading for heading, _ in screen(True).lists] == ["What changes most"]
+    assert [heading for heading, _ in screen(True, "").lists] == ["What was found"]
+    assert [heading for heading, _ in screen(True, "", "4 kN").lists] == [
+        "What changes most", "What else was found",
+    ]  # fmt: skip

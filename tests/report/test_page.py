@@ -83,7 +83,7 @@ def plate(evil):
 def table(evil):
     marks = ("", "failed", "missing")
     rows = [TableRow([Cell(evil(), kind, 1.0) for kind in KINDS], mark, evil()) for mark in marks]
-    return PageTable([evil(), evil()], rows)
+    return PageTable([evil() for _ in KINDS], rows)
 
 
 def contents(evil):
@@ -102,7 +102,7 @@ def contents(evil):
     study = StoredStudy(evil(), evil(), (), (evil(), evil()), {}, evil(), {evil(): evil()}, evil())
     return {
         "answer.html": answer,
-        "assumptions.html": Assumptions([evil()], True, True, True),
+        "assumptions.html": Assumptions([evil()], True, True, True, [evil()]),
         "cases.html": PaperCasesContent([evil], table(evil)),
         "claims.html": claims,
         "diagnosis.html": DiagnosisContent(12, table(evil), [plate(evil)]),
@@ -178,7 +178,7 @@ def test_rows_are_marked_and_cells_have_their_class():
     long = "x" * 37
     cells = [Cell("1 ± 2", "number", 1.25), Cell(long[1:]), Cell(long), Cell(long, "code")]
     rows = [TableRow(cells, "failed", "k1"), TableRow([Cell("", "word"), Cell("k", "code")])]
-    text = document([Section("a", "A", "printed.html", PageTable(["head"], rows))])
+    text = document([Section("a", "A", "printed.html", PageTable(["head"] * 4, rows))])
     assert re.findall("<tr.*?</tr>", text, re.DOTALL)[1:] == [
         '<tr class="failed" data-job="k1"><td data-value="1.25">1 ± 2</td>'
         f"<td>{long[1:]}</td>"

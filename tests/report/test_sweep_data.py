@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+import xarray as xr
 from swept_made import grid, listed
 
 from compressor.report.figures.sweep_data import MEASURES, OUTSIDE, sweep_of
@@ -51,6 +52,19 @@ def test_samples_are_no_grid():
     assert sweep.place.tolist() == [*range(20)]
     gaps = listed({"clearance_mm": [0.1, np.nan, 0.1, 0.2], "speed_rpm": [1.0, 1, 2, 2]}, range(4))
     assert not sweep_of(gaps).is_grid
+
+
+def test_what_is_rounding_beside_the_other_axis_is_0():
+    """It was told as 9.764e-14 mm/s, and a worn machine's as 1.6e+11 times that."""
+    values = xr.DataArray([[9.79e-3, 9.764e-17], [9.79e-3, 1.6e-5]], dims=("job", "axis"))
+    data = xr.Dataset(
+        {"body_velocity_rms": values, "body_velocity_rms_error": 0.8 * values},
+        {"axis": ["x", "y"]},
+    )
+    x, y = (m for m in MEASURES if m.variable == "body_velocity_rms")
+    assert y.of(data).values == pytest.approx([0.0, 0.016])
+    assert y.of(data).values[0] == y.bar(data).values[0] == 0.0
+    assert x.of(data).values == pytest.approx([9.79, 9.79])
 
 
 def test_what_a_bar_does_not_vouch_for_is_not_known():

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import SPOKEN
+from compressor.digits import ROUNDING
 from compressor.metrics import AXES, BARRED, JOINTS
 from compressor.report.figures.style import RED, mark
 from compressor.units import Units, unit_in
@@ -68,11 +69,17 @@ class Measure:
         return float(self.of(job)), float(self.bar(job))
 
     def in_unit(self, data: xr.Dataset, name: str) -> xr.DataArray:
-        """Return a variable of the metric in the measure's unit."""
+        """Return a variable of the metric in the measure's unit.
+
+        0 of a number that is rounding beside that of the other joint or axis.
+        """
         values = data[name]
+        place = {"joint": self.joint} if self.joint else {"axis": self.axis} if self.axis else {}
+        if place:
+            sizes = abs(data[self.variable])
+            values = values.where(~(sizes < ROUNDING * sizes.max([*place])), 0.0)
         if BARRED[self.variable].contact:
             values = values.where(data["max_penetration"] != 0)
-        place = {"joint": self.joint} if self.joint else {"axis": self.axis} if self.axis else {}
         return values.sel(place, drop=True) * self.factor
 
 

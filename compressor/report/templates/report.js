@@ -39,7 +39,8 @@ function compare(a, b) {
   return collator.compare(a, b);
 }
 
-function sortable(table) {
+// Blocks of a table, each with other columns: rows that stand at one place belong together.
+function sortable(table, rows) {
   const heads = [...table.tHead.rows[0].cells];
   heads.forEach((head, column) => {
     const button = document.createElement("button");
@@ -48,34 +49,34 @@ function sortable(table) {
     head.append(button);
     button.addEventListener("click", () => {
       const down = head.getAttribute("aria-sort") === "ascending";
-      heads.forEach((other) => other.removeAttribute("aria-sort"));
+      each("th[aria-sort]", (other) => other.removeAttribute("aria-sort"),
+        table.closest(".blocks") ?? table);
       head.setAttribute("aria-sort", down ? "descending" : "ascending");
-      const rows = [...table.tBodies[0].rows];
-      const empty = (row) => value(row, column) === "";
-      rows.sort((a, b) => {
-        const order = compare(value(a, column), value(b, column));
-        return down && !empty(a) && !empty(b) ? -order : order;
+      const at = (parts) => value(parts.find((row) => table.contains(row)), column);
+      rows.sort((one, other) => {
+        const [a, b] = [at(one), at(other)];
+        return down && a !== "" && b !== "" ? -compare(a, b) : compare(a, b);
       });
-      table.tBodies[0].append(...rows);
+      rows.flat().forEach((row) => row.parentElement.append(row));
     });
   });
 }
 
-function filterable(table, tools) {
+function filterable(rows, tools) {
   const label = document.createElement("label");
   const field = document.createElement("input");
   const count = document.createElement("output");
   field.type = "search";
   label.append("Show rows with ", field);
-  const rows = [...table.tBodies[0].rows];
+  const marked = ([row], mark) => row.classList.contains(mark);
   const marks = ["failed", "chaotic", "missing"].filter((mark) =>
-    rows.some((row) => row.classList.contains(mark)));
+    rows.some((row) => marked(row, mark)));
   const boxes = marks.map((mark) => {
     const box = document.createElement("label");
     const input = document.createElement("input");
     input.type = "checkbox";
     input.value = mark;
-    const found = rows.filter((row) => row.classList.contains(mark)).length;
+    const found = rows.filter((row) => marked(row, mark)).length;
     box.append(input, ` ${mark === "missing" ? "not run" : mark} (${found})`);
     return [box, input];
   });
@@ -84,10 +85,10 @@ function filterable(table, tools) {
     const only = boxes.filter(([, input]) => input.checked).map(([, input]) => input.value);
     let shown = 0;
     rows.forEach((row) => {
-      const text = row.textContent.toLowerCase();
+      const text = row.map((part) => part.textContent).join(" ").toLowerCase();
       const fits = words.every((word) => text.includes(word)) &&
-        (!only.length || only.some((mark) => row.classList.contains(mark)));
-      row.hidden = !fits;
+        (!only.length || only.some((mark) => marked(row, mark)));
+      row.forEach((part) => { part.hidden = !fits; });
       shown += fits;
     });
     count.textContent = shown === rows.length ? "" : `${shown} of ${rows.length} rows`;
@@ -110,15 +111,18 @@ function openJobs(table) {
   }, table);
 }
 
-function openTable(table) {
-  openJobs(table);
-  if (!table.tHead || table.tBodies[0].rows.length < 2) return;
-  sortable(table);
-  if (table.tBodies[0].rows.length < 12) return;
+function openTable(frame) {
+  const tables = [...frame.querySelectorAll("table")];
+  const rows = [...tables[0].tBodies[0].rows].map((_, n) =>
+    tables.map((table) => table.tBodies[0].rows[n]));
+  tables.forEach(openJobs);
+  if (rows.length < 2) return;
+  tables.forEach((table) => sortable(table, rows));
+  if (rows.length < 12) return;
   const tools = document.createElement("div");
   tools.className = "tools";
-  table.parentElement.before(tools);
-  filterable(table, tools);
+  frame.before(tools);
+  filterable(rows, tools);
 }
 
 // ---- figures --------------------------------------------------------------------------------
@@ -526,7 +530,8 @@ class Figure {
 // ---- jobs behind points ---------------------------------------------------------------------
 function showJob(key) {
   const box = document.getElementById("job");
-  const row = [...document.querySelectorAll("tr[data-job]")].find((one) => one.dataset.job === key);
+  const rows = [...document.querySelectorAll("tr[data-job]")]
+    .filter((one) => one.dataset.job === key);
   const study = told.studies.find((one) => key in one.jobs);
   box.querySelector("h2").textContent = `Job ${key.slice(0, 10)}`;
   const list = box.querySelector("dl");
@@ -540,13 +545,13 @@ function showJob(key) {
   const command = box.querySelector("code");
   command.textContent = `compsim show ${key.slice(0, 10)} -i ${told.results}`;
   const link = box.querySelector("a");
-  link.hidden = !row;
+  link.hidden = !rows.length;
   link.onclick = (event) => {
     event.preventDefault();
     box.close();
     each("tr.chosen", (other) => other.classList.remove("chosen"));
-    row.classList.add("chosen");
-    row.scrollIntoView({ block: "center" });
+    rows.forEach((row) => row.classList.add("chosen"));
+    rows[0].scrollIntoView({ block: "center" });
   };
   box.querySelector("figure")?.remove();
   box.showModal();
@@ -580,7 +585,7 @@ document.addEventListener("DOMContentLoaded", () => {
     each(".theme", nameTheme);
     drawn.forEach((figure) => figure.redraw());
   });
-  each("table.sorts", openTable);
+  each(".blocks, .scroll:not(.blocks *)", openTable);
   each("dialog button", (button) => button.addEventListener("click", () => {
     if (button.dataset.copy !== undefined) {
       navigator.clipboard?.writeText(button.closest("dialog").querySelector("code").textContent);
