@@ -400,8 +400,6 @@ def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
     body, sensor = case.body, case.sensor
     if body is None:
         return
-    if case.output.keep != "series":
-        yield Problem("body", "moves in time series: it needs output.keep: series")
     share = moving_mass(case) / body.mass_kg
     if share > MAX_MOVING_SHARE:
         yield Problem(

@@ -719,8 +719,8 @@ class Output:
         identity=False, read=SERIES,
     )  # fmt: skip
     signals: bool = choice(
-        False, (), "program", "more time series: forces on frame, bearing and guide, torque and "
-        "rod load", kind="boolean", identity=False, read=SERIES,
+        False, (), "program", "metrics of the rod load, and more time series: forces on frame, "
+        "bearing and guide, torque and rod load", kind="boolean", identity=False,
     )  # fmt: skip
     compress: bool = choice(
         False, (), "program", "compression of the time series: shuffled and gzipped",

@@ -204,7 +204,12 @@ class RunsAhead(dict[float, Solution]):
 
 def moves_body(case: Case) -> bool:
     """Return whether a case's runs move a body, for which they are sampled."""
-    return case.body is not None and case.output.keep == "series"
+    return case.body is not None
+
+
+def is_sampled(case: Case) -> bool:
+    """Return whether a case's result needs samples of its run: for time series, or for a body."""
+    return case.output.keep == "series" or moves_body(case)
 
 
 def take_run(

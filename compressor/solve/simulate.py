@@ -195,9 +195,11 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, DatasetParts]:
 
     Time series are part of it with `output.keep: series`.
     """
-    has_series = case.output.keep == "series"
+    if case.output.keep == "metrics":
+        result = whole_outcome(case, solution)
+        return result, result.table({})
     result = outcome(case, solution)
-    variables, numbers = series(case, solution) if has_series else ({}, {})
+    variables, numbers = series(case, solution)
     for name, value in numbers.items():
         result.numbers[name] = value
     return result, result.table(variables)
@@ -205,7 +207,17 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, DatasetParts]:
 
 def measure(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Outcome:
     """Simulate one case; return its `Outcome` alone: what `simulate` gives less the time series."""
-    return refused_outcome(case) or outcome(case, solve(case, ahead))
+    return refused_outcome(case) or whole_outcome(case, solve(case, ahead))
+
+
+def whole_outcome(case: Case, solution: Solution) -> Outcome:
+    """Return the `outcome` of a solution with the metrics of the case's body and sensor."""
+    result = outcome(case, solution)
+    if case.body:
+        rows = rows_of(solution.p, solution.trajectory)
+        for name, value in foundation(case, solution, rows)[1].items():
+            result.numbers[name] = value
+    return result
 
 
 def refused_outcome(case: Case) -> Outcome | None:
@@ -246,7 +258,7 @@ def series(case: Case, solution: Solution) -> tuple[Variables, Metrics]:
 
 
 def outcome(case: Case, solution: Solution) -> Outcome:
-    """Return what is kept of a solution without its series."""
+    """Return what is kept of a solution without its series, and without a body's metrics."""
     numbers = row()
     values = solution.metrics | ledger(solution.p, solution.trajectory)
     errors = solution.bars | solution.series_errors

@@ -27,6 +27,7 @@ from compressor.solve.attempts import (
     companion_rtol,
     comparison_run,
     estimate_errors,
+    is_sampled,
     looser_comparison_run,
     moves_body,
     prepare_run,
@@ -176,7 +177,7 @@ def may_run_in_lanes(case: Case) -> bool:
 def attempts_of(number: int, case: Case) -> list[LaneRequest]:
     """Return what a case's first attempt needs, and its companion's."""
     case = with_settle_rev(case, float(case.solve.settle_rev), 1)
-    p, sampled = record(case), case.output.keep == "series"
+    p, sampled = record(case), is_sampled(case)
     requests = [lane_request(number, case, case.rtol, p, times_of(case, sampled))]
     if case.wants_bars and (tighter := companion_rtol(p, case.rtol)):
         if sampled:
@@ -241,9 +242,7 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
     before: Solution | None = None
     unsound = 0  # runs that did not balance
     while True:
-        now = take_run(
-            ahead, search.within_budget(case), rtol, search.left, case.output.keep == "series"
-        )
+        now = take_run(ahead, search.within_budget(case), rtol, search.left, is_sampled(case))
         if now.reason:
             return end_early(case, best, now, search)
         search.count(now.trajectory)
@@ -467,7 +466,7 @@ def chaotic_solution(case: Case, solution: Solution, search: HorizonSearch) -> S
     horizon, ends = search.horizon, revolutions(case.settle, case.duration, case.turn)
     loosest = min(CHAOTIC_RTOL, case.rtol)
     for rtol in sorted({loosest, min(loosest, solution.rtol)}, reverse=True):
-        now = run_at_tolerance(case, rtol, search.left, case.output.keep == "series", Cuts(ends))
+        now = run_at_tolerance(case, rtol, search.left, is_sampled(case), Cuts(ends))
         now.horizon, now.settled, now.regime = horizon, solution.settled, Regime.CHAOTIC
         if now.reason or energy_balances(case, now):
             break

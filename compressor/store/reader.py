@@ -69,7 +69,7 @@ class JobStatus:
     detail: str
     samples: int  # of the time series; 0 where only metrics are kept
     precision: str  # of the time series: double | single
-    signals: bool  # whether they are kept beside the time series
+    signals: bool  # whether there are metrics of them, and they are among any time series
     bars: bool  # whether metrics have error bars
     has_horizon: bool  # whether it is known how long the motion can be foretold
     rows: Rows
@@ -95,10 +95,12 @@ class JobStatus:
             return False
         if case.solve.horizon is True and self.status == "ok" and not self.has_horizon:
             return False
-        if case.output.keep == "metrics":
-            return True
-        if case.output.signals and not self.signals:
+        metrics_alone = case.output.keep == "metrics"
+        has_metrics = self.status == "ok" or not metrics_alone
+        if case.output.signals and has_metrics and not self.signals:
             return False
+        if metrics_alone:
+            return True
         return self.samples > 0 and (self.precision, case.output.precision) != ("single", "double")
 
     def with_stored_outputs(self, case: Case) -> Case:
@@ -106,15 +108,15 @@ class JobStatus:
 
         Where the job is ok, it has its error bars and its horizon as well.
         """
-        solve, output = case.solve, case.output
+        solve = case.solve
+        output = replace(case.output, signals=case.output.signals or self.signals)
         if self.status == "ok":
             horizon = True if self.has_horizon and not solve.horizon else solve.horizon
             solve = replace(solve, error_bars=solve.error_bars or self.bars, horizon=horizon)
         if self.samples:
             exact = {self.precision} | ({output.precision} if output.keep == "series" else set())
             precision = "double" if "double" in exact else "single"
-            signals = output.signals or self.signals
-            output = replace(output, keep="series", precision=precision, signals=signals)
+            output = replace(output, keep="series", precision=precision)
         return replace(case, solve=solve, output=output)
 
 

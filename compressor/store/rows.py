@@ -45,7 +45,8 @@ COLUMNS = {
     "promise": ("S", "kept, or none given; empty in files of before 2026-11-22", "(kept|none)?"),
     "regime": ("S", "how far the motion can be foretold; empty where that is not known",
                "|".join(["", *Regime])),
-    "signals": ("S", "yes where signals are kept beside the time series", "(yes)?"),
+    "signals": ("S", "yes where there are metrics of signals, and signals beside any time series",
+                "(yes)?"),
 }  # fmt: skip
 LATER_COLUMNS = ("promise", "regime", "signals")  # columns that older files do not have
 
@@ -115,7 +116,7 @@ def of_outcomes(outcomes: Iterable[Outcome], serial: int) -> Segment:
         "digest": [item.digest for item in series],
         "promise": [str(outcome.attributes.get("promise", "")) for outcome in outcomes],
         "regime": [str(outcome.attributes.get("regime", "")) for outcome in outcomes],
-        "signals": ["yes" if o.series and o.attributes.get("signals") else "" for o in outcomes],
+        "signals": ["yes" if o.attributes.get("signals") else "" for o in outcomes],
     }
     columns = {
         name: np.array([storable(value).encode() for value in values], COLUMNS[name][0])
@@ -259,10 +260,10 @@ def _lines(segment: Segment) -> list[bytes]:
 def completeness(columns: dict[str, np.ndarray]) -> np.ndarray:
     """Return how complete rows are, integers (rows,): failed 0, ok 1, with time series 3.
 
-    Double precision adds 2 to that, signals add 1.
+    Double precision adds 2, signals add 1.
     """
     series, double = columns["samples"] > 0, columns["precision"] == b"double"
-    score = 1 + series * (2 + 2 * double + (columns["signals"] == b"yes"))
+    score = 1 + (columns["signals"] == b"yes") + series * (2 + 2 * double)
     return (columns["status"] == b"ok") * score
 
 

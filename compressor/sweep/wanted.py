@@ -96,13 +96,11 @@ class PendingCases(Sequence[Case]):
 def serving_both(first: Case, second: Case) -> Case:
     """Return a case with all that two cases of one key ask for beside it."""
     keeping = [case.output for case in (first, second) if case.output.keep == "series"]
-    output = first.output
+    output = replace(first.output, signals=first.output.signals or second.output.signals)
     if keeping:
         precision = max("single", *(o.precision for o in keeping), key=("single", "double").index)
-        compress, signals = all(o.compress for o in keeping), any(o.signals for o in keeping)
-        output = replace(
-            output, keep="series", precision=precision, compress=compress, signals=signals
-        )
+        compress = all(o.compress for o in keeping)
+        output = replace(output, keep="series", precision=precision, compress=compress)
     solve = replace(
         first.solve,
         error_bars=first.solve.error_bars or second.solve.error_bars,

@@ -202,14 +202,14 @@ ENTRIES = {
     ),
     "output.keep": Entry("metrics", IDEAL | {"output": {}}),
     **entries(IDEAL, SMALL_FILES, output__precision="single", output__compress=True),
-    "output.signals": Entry(True, IDEAL | {"output": {"keep": "series"}}, (SMALL_FILES,)),
+    "output.signals": Entry(True, SMALL_FILES),
 }  # fmt: skip
 RIVALS = {"solve.duration_s": "duration_rev", "solve.output_step_s": "output_step_deg",
           "solve.rtol": "accuracy"}  # fmt: skip
 # refused where they cannot do what they say, though they would change numbers or last bits
 CONTRADICTING = {
     "contact.least_approach_mm_per_s", "friction.ideal_joints", "guide.restitution",
-    "body.frequency_x_Hz", "body.frequency_y_Hz", "sensor.speed_jitter", "output.signals",
+    "body.frequency_x_Hz", "body.frequency_y_Hz", "sensor.speed_jitter",
     "sensor.second_threshold_m_per_s2",
 }  # fmt: skip
 UNREAD = [(key, where) for key, entry in ENTRIES.items() for where in entry.unread]

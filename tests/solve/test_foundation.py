@@ -208,7 +208,6 @@ def test_a_study_of_bodies_opens(tmp_path, monkeypatch, in_process):
         ({"sensor": True}, "sensor: nothing reads this group: it needs body: true"),
         ({"body": {"mass_kg": 100}}, "moving parts have 19 % of the body's mass"),
         ({"body": {"frequency_x_Hz": 16.5}}, r"order 2 of the speed, 16\.7 Hz, is so near"),
-        ({"body": True, "output": {"keep": "metrics"}}, "it needs output.keep: series"),
         ({"body": True, "solve": {"duration_rev": 2.5}}, "whole settled revolutions"),
         (
             {"body": True, "solve": {"settle_rev": "auto", "duration_rev": 5.5}},

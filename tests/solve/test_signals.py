@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from conftest import keep
 
-from compressor.cases.case import Case, CaseError
+from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.metrics import NUMBERS, SERIES
 from compressor.solve.series import SIGNALS
@@ -137,9 +137,43 @@ def test_signals_are_absent_unless_asked_for_and_change_nothing():
         assert more[name].attrs["units"] == unit
 
 
-def test_signals_need_time_series():
-    with pytest.raises(CaseError, match=r"it needs output\.keep: series"):
-        Case.from_values({"output": {"signals": True, "keep": "metrics"}})
+BODY = {"body": True, "sensor": {"noise_m_per_s2": 0.05}}
+
+
+@pytest.mark.parametrize("values", [{"joint": "big_end", "clearance_mm": 0.2}, {"joint": "none"}])
+def test_metrics_of_signals_body_and_sensor_need_no_time_series(values):
+    values = {**values, **BODY, "solve": {"duration_rev": 2, "accuracy": "draft"}}
+    whole = simulate(Case.from_values({**values, "output": {"signals": True}}))
+    alone = simulate(Case.from_values({**values, "output": {"signals": True, "keep": "metrics"}}))
+    assert "time" not in alone.dims
+    assert "sensor_acceleration" not in alone
+    kinds = {"signals", "body", "sensor"}
+    of_samples = {name for name, row in NUMBERS.items() if row.when in kinds}
+    assert of_samples & {*alone.variables} == of_samples & {*whole.variables}
+    assert {"peak_rod_load_tension", "sensor_rms", "body_velocity_rms"} <= {*alone.variables}
+    for name in {*NUMBERS} & {*whole.variables} - {"seconds"}:
+        np.testing.assert_array_equal(alone[name], whole[name], err_msg=name)
+
+
+def test_a_sweep_of_metrics_keeps_no_series_of_body_and_signals(tmp_path, monkeypatch, in_process):
+    monkeypatch.chdir(tmp_path)
+    brief = {"duration_rev": 2, "accuracy": "draft"}
+    values = {"joint": "none", "machine": {"speed_rpm": [490, 500]}, **BODY, "solve": brief}
+
+    def counted(**output):
+        (tmp_path / "s.yaml").write_text(json.dumps({**values, "output": output}))
+        return sweep(load_studies(tmp_path / "s.yaml"), tmp_path / "results").run_now
+
+    assert counted(keep="metrics") == 2
+    assert not (tmp_path / "results/jobs").exists()
+    study = open_study(tmp_path / "results")
+    assert np.isfinite(study["sensor_rms"].values).all()
+    assert "peak_rod_load_tension" not in study
+    assert counted(keep="metrics", signals=True) == 2
+    assert counted(keep="metrics", signals=True) == counted(keep="metrics") == 0
+    assert np.isfinite(open_study(tmp_path / "results")["peak_rod_load_tension"].values).all()
+    assert counted() == 2  # the series; signals stay
+    assert counted(signals=True) == 0
 
 
 def test_a_stored_job_without_signals_runs_again_for_them(tmp_path, monkeypatch, in_process):
