@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 MOST = 20  # jobs that are listed
 KINDS = (".png", ".svg", ".csv")
-HEAD = (f"{'job':<12}{'correlation':>18}{'envelope':>18}{'rms ratio':>18}{'distance, dB':>18}"
-        "  most different peak")  # fmt: skip
+COLUMNS = ("difference, dB", "correlation", "envelope", "rms ratio", "distance, dB")
 
 
 def record_then_jobs(context: click.Context, parameter: click.Parameter, word: str) -> Items:
@@ -51,9 +50,13 @@ def compare(
     compsim compare record.csv 3fa9c2 81e6f8
 
     RECORD is a file, as of compsim identify, or a job; after it come jobs, by the beginnings of
-    their keys, and studies, which stand for all their jobs. The most alike job comes first.
+    their keys, and studies, which stand for all their jobs. The most alike job comes first: the one
+    of the least difference.
 
     \b
+    difference   of all numbers together, without white noise: orders of
+                 all revolutions and of the mean one, both correlations
+                 where they fit best within 5 degrees, and the level
     correlation  of the mean revolutions: 1 is the same shape at the same
                  crank angles, whatever the size; -1 the opposite sign
     envelope     correlation of the envelopes above order 12: 1 is the
@@ -111,9 +114,10 @@ def list_comparison(found: "Comparison") -> Iterator[str]:
     yield (f"{found.name}: {plural(len(mine.spectra), 'revolution')} at {mine.rpm:.4g} rpm, "
            f"{mine.rate:.6g} Hz, {rms:.4g} m/s2 rms up to order {found.orders}")  # fmt: skip
     yield from (f"read: {text}" for text in found.remarks)
-    yield HEAD
+    width = max(len("what it is"), *(len(job.what) for job in found.jobs[:MOST]))
+    yield f"{'job':<12}{'what it is':<{width}}" + "".join(f"{one:>18}" for one in COLUMNS)
     for job in found.jobs[:MOST]:
-        yield job_line(job)
+        yield job_line(job, width)
     if len(found.jobs) > MOST:
         yield f"and {len(found.jobs) - MOST} less alike, which --json lists"
     if found.left_out:
@@ -125,13 +129,14 @@ def list_comparison(found: "Comparison") -> Iterator[str]:
         yield f"does not fit: {text}"
 
 
-def job_line(job: "Compared") -> str:
-    """Return a job's numbers in a line."""
+def job_line(job: "Compared", width: int) -> str:
+    """Return a job's joint, clearance and swept values, padded to a width, and its numbers."""
     like = job.likeness
-    numbers = like.correlation, like.envelope, like.rms_ratio, like.spectral_distance
+    numbers = (
+        like.difference, like.correlation, like.envelope, like.rms_ratio, like.spectral_distance,
+    )  # fmt: skip
     columns = "".join(f"{number(one):>18}" for one in numbers)
-    where = f"{like.segment_ratio:.2f} times at {like.segment} to {like.segment + 10} deg"
-    return f"{job.key[:10]:<12}{columns}  {where}"
+    return f"{job.key[:10]:<12}{job.what:<{width}}{columns}"
 
 
 def number(found: "Measured") -> str:
@@ -151,7 +156,8 @@ def jsonable_comparison(found: "Comparison") -> dict[str, Any]:
         "peak_m_per_s2": found.curves.peak.tolist(), "rms_m_per_s2": found.curves.rms.tolist(),
         "jobs": [
             {
-                "key": job.key, "rpm": job.rpm, "orders": job.orders, "sensor": job.sensor,
+                "key": job.key, "what": job.what, "rpm": job.rpm, "orders": job.orders,
+                "sensor": job.sensor,
                 **dataclasses.asdict(job.likeness),
                 "peak_m_per_s2": job.curves.peak.tolist(),
                 "rms_m_per_s2": job.curves.rms.tolist(),

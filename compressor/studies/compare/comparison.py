@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import Sensor
+from compressor.cases import Case, points
 from compressor.program import CompsimError, Progress, no_progress
 from compressor.store import (
     Folder,
@@ -31,6 +31,7 @@ from compressor.studies.compare.likeness import (
 )
 from compressor.vibration import RecordError
 
+UNSAID = {"joint", "clearance_mm", "sensor"}  # swept groups that are told otherwise, or not
 SAME_SPEED = 0.01  # share by which speeds may differ, beyond which forces do by 2 %
 SAME_RATE = 1e-3  # share by which sampling rates may differ: an order of a thousand stays
 FEW = 5  # revolutions, below which the mean revolution is noisy
@@ -53,11 +54,13 @@ class CompareError(CompsimError):
 class Compared:
     """A job beside the record.
 
-    rpm, rate: of its record, rate in Hz; sensor: where it sits and what it measures along, in
-    words; orders: the highest order that both hold, up to which they are compared.
+    what: its joint, clearance and swept values, in words; rpm, rate: of its record, rate in Hz;
+    sensor: where it sits and what it measures along, in words; orders: the highest order that both
+    hold, up to which they are compared.
     """
 
     key: str
+    what: str
     rpm: float
     rate: float
     sensor: str
@@ -106,18 +109,18 @@ def compare_record(
     _check_orders(mine.highest, name)
     own = {mine.highest: curves(mine.lines(mine.highest))}  # by the highest order
     stored = read_store(folder).warned()
-    wanted = [*dict.fromkeys(_keys(words, folder, key))]
+    wanted = dict(_wanted_jobs(words, folder, key))
     jobs = []
-    for number, one in enumerate(wanted):
+    for number, (one, swept) in enumerate(wanted.items()):
         progress(number, len(wanted), "")
         other, case = job_record(stored, one), stored.case_at(int(stored.rows.find([one])[0]))
         if other is not None and case is not None and case.sensor:
             with contextlib.suppress(RecordError):  # too short, or all zero
-                jobs.append(_compare_job(mine, own, turn_record(other), one, case.sensor))
+                jobs.append(_compare_job(mine, own, turn_record(other), one, case, swept))
     if not jobs:
         text = f"none of the {len(wanted)} jobs has a sensor's record of two revolutions"
         raise CompareError(f"{text}: run them with body: true, sensor: true and series kept")
-    jobs.sort(key=lambda job: -np.nan_to_num(job.likeness.correlation.value, nan=-2.0))
+    jobs.sort(key=lambda job: np.nan_to_num(job.likeness.difference.value, nan=math.inf))
     curve = own[mine.highest]
     several = np.array([job.curves.envelope for job in jobs])
     inside = share_inside(curve.envelope, several) if len(jobs) > 1 else math.nan
@@ -129,9 +132,17 @@ def compare_record(
 
 
 def _compare_job(
-    mine: Turned, own: dict[int, Curves], turned: Turned, key: str, sensor: Sensor
+    mine: Turned,
+    own: dict[int, Curves],
+    turned: Turned,
+    key: str,
+    case: Case,
+    swept: Mapping[str, Any],
 ) -> Compared:
-    """Return a job beside the record; own: the record's curves by the highest order."""
+    """Return a job beside the record.
+
+    own: the record's curves by the highest order; swept: values of its study, by key.
+    """
     orders = min(mine.highest, turned.highest)
     _check_orders(orders, f"job {key}")
     lines, others = mine.lines(orders), turned.lines(orders)
@@ -139,8 +150,9 @@ def _compare_job(
         own[orders] = curves(lines)
     drawn = curves(others)
     likeness = compare_lines(lines, others, own[orders], drawn)
-    place = f"{sensor.place} along {sensor.direction}"
-    return Compared(key, turned.rpm, turned.rate, place, orders, likeness, drawn)
+    place = f"{case.sensor.place} along {case.sensor.direction}" if case.sensor else ""
+    what = describe_job(case, swept)
+    return Compared(key, what, turned.rpm, turned.rate, place, orders, likeness, drawn)
 
 
 def _check_orders(orders: int, what: str) -> None:
@@ -150,14 +162,26 @@ def _check_orders(orders: int, what: str) -> None:
         raise CompareError(f"{text}: record with more than {SWING + 1} times 2.56 samples a turn")
 
 
-def _keys(words: Sequence[str], folder: Folder, own: str) -> Iterator[str]:
-    """Yield the keys of the jobs that words name, of studies without the record's own one."""
+def describe_job(case: Case, swept: Mapping[str, Any]) -> str:
+    """Return a job's joint and clearance, and other values that its study sweeps, in words."""
+    ends = {"none": (), "both": ("big_end", "small_end")}.get(case.joint, (case.joint,))
+    words = [f"{end} {getattr(case.clearance_mm, end):g} mm" for end in ends] or ["no clearance"]
+    others = {key: value for key, value in swept.items() if key.split(".")[0] not in UNSAID}
+    return ", ".join([*words, *(f"{key} {value}" for key, value in others.items())])
+
+
+def _wanted_jobs(
+    words: Sequence[str], folder: Folder, own: str
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield keys and swept values of the jobs that words name, of studies without the own one."""
     names = {study.name for study in read_studies(folder)}
     for word in words:
         if word in names:
-            yield from (key for key in find_study(folder, word).keys if key != own)
+            study = find_study(folder, word)
+            pairs = zip(study.keys, points(study), strict=True)
+            yield from ((key, swept) for key, swept in pairs if key != own)
         else:
-            yield report_job(folder, word).key
+            yield report_job(folder, word).key, {}
 
 
 def find_misfits(record: Turned, jobs: Sequence[Compared], is_file: bool) -> Iterator[str]:
@@ -187,7 +211,8 @@ def find_misfits(record: Turned, jobs: Sequence[Compared], is_file: bool) -> Ite
     if abs(likeness.shift_deg) >= MIN_SHIFT and gain >= MIN_GAIN:
         yield (
             f"crank angle: most alike ({likeness.shifted:.2f}) where the record comes "
-            f"{likeness.shift_deg:+.1f} degrees later: check the tacho (--tacho-deg)"
+            f"{likeness.shift_deg:+.1f} degrees later: a hint to check the tacho (--tacho-deg), "
+            "no measurement of its angle"
         )
     if is_file:
         places = " or ".join(dict.fromkeys(job.sensor for job in jobs))

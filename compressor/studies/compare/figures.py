@@ -18,7 +18,7 @@ def draw_comparison(found: Comparison) -> Drawing:
     """Return the four panels of a comparison, the record's curves in black."""
     figure, grid = make_grid(2, 2, 7.4)
     shown = [(found.name, found.curves, RECORD), *(
-        (f"job {job.key[:KEY]}", job.curves, line)
+        (f"{job.key[:KEY]}: {job.what}", job.curves, line)
         for job, line in zip(found.jobs[:MOST], CYCLE, strict=False)
     )]  # fmt: skip
     (mean, segments), (orders, envelope) = grid
@@ -71,8 +71,8 @@ def caption(found: Comparison) -> str:
     text = (
         f"(a) Mean revolution of {found.name} ({len(found.turned.spectra)} revolutions) and of the "
         f"jobs most alike, orders 1 to {best.orders}: correlation {like.correlation.value:.3f} "
-        f"with job {best.key[:KEY]}. (b) Peak and, paler, rms of each 10 degrees, on average over "
-        f"revolutions: peaks most different at "
+        f"with job {best.key[:KEY]}, {best.what}. (b) Peak and, paler, rms of each 10 "
+        f"degrees, on average over revolutions: peaks most different at "
         f"{like.segment} to {like.segment + 10} degrees, {like.segment_ratio:.2f} times the job's. "
         f"(c) Orders: {like.spectral_distance.value:.1f} dB apart, rms {like.rms_ratio.value:.3g} "
         f"times the job's. (d) Envelope above order {SWING}"

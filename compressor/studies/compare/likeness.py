@@ -6,6 +6,7 @@ to the highest order that both records hold. The mean is left out, since acceler
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,6 +19,13 @@ FINE = 4  # points on a curve for each cycle of its highest order
 SMALLEST = 1e-6  # share of the mean square that a band counts with at least: -60 dB
 MIN_FOR_ERRORS = 3  # revolutions
 STEPS = 3600  # angles at which a shift of one record against the other is tried
+# weights in `difference`, dB, of the mean revolution's orders, of one less both correlations and of
+# the logarithm of the ratio of rms: calibrated, and judged by other records (docs/diagnosis.md)
+MEAN_ORDERS, MEAN_SHAPE, BURSTS, LEVEL = 0.5, 3.0, 10.0, 3.0
+NEAR_DEG = 5  # by which a tacho may be off: shapes and bursts count where they fit best so far off
+MIN_LINES = 8  # of a third octave, by which noise is known
+QUIET = 1e-4  # share of the loudest third octave below which none is compared
+SAME_BAND = 0.5  # dB, to which a third octave of a job is taken as known
 LOUD = 0.1  # share of the greatest peak from which a segment is compared
 
 
@@ -115,6 +123,7 @@ class Measured:
 class Likeness:
     """How alike a record and a job are.
 
+    difference: dB, from 0: all of the numbers together, by which jobs are ordered (`_difference`).
     correlation: of the mean revolutions, -1 to 1: 1 is the same shape at the same angles, whatever
     the size; shift_deg: by how many degrees the record comes later where it is most alike, and
     shifted: the correlation there. envelope: correlation of the envelopes over crank angle, -1 to
@@ -125,6 +134,7 @@ class Likeness:
     segment_ratio: the record's peak there over the job's.
     """
 
+    difference: Measured
     correlation: Measured
     shift_deg: float
     shifted: float
@@ -142,27 +152,27 @@ def compare_lines(record: np.ndarray, job: np.ndarray, mine: Curves, other: Curv
     Annals of Statistics 9, 1981), from three on.
     """
     shift, shifted = _best_shift(record.mean(axis=0), job.mean(axis=0))
-    found, errors = np.array(_numbers(record, mine, job, other)), np.full(4, math.nan)
+    found, errors = np.array(_numbers(record, mine, job, other)), np.full(5, math.nan)
     if (count := len(record)) >= MIN_FOR_ERRORS:
         rests = (np.arange(count) != k for k in range(count))
         left = np.array([_numbers(record[rest], mine.part(rest), job, other) for rest in rests])
         errors = np.sqrt((count - 1) / count * ((left - left.mean(axis=0)) ** 2).sum(axis=0))
-    alike, bursts, ratio, distance = map(Measured, found.tolist(), errors.tolist())
+    apart, alike, bursts, ratio, distance = map(Measured, found.tolist(), errors.tolist())
     loud = np.maximum(mine.peak / mine.peak.max(), other.peak / other.peak.max()) >= LOUD
     ratios = mine.peak / np.maximum(other.peak, np.finfo(float).tiny)
     # the level is another number: the segment is that whose share of the peaks is most another one
     odd = np.where(loud, np.abs(np.log(np.maximum(ratios, 1e-300) / np.median(ratios))), -1.0)
     worst = int(odd.argmax())
     return Likeness(
-        alike, shift, shifted, bursts, ratio, distance, worst * 360 // SEGMENTS,
+        apart, alike, shift, shifted, bursts, ratio, distance, worst * 360 // SEGMENTS,
         float(ratios[worst]),
     )  # fmt: skip
 
 
 def _numbers(
     record: np.ndarray, mine: Curves, job: np.ndarray, other: Curves
-) -> tuple[float, float, float, float]:
-    """Return both correlations, ratio of rms and spectral distance of lines, (n, orders) each."""
+) -> tuple[float, float, float, float, float]:
+    """Return difference, both correlations, ratio of rms and distance of lines, (n, orders)."""
     one, two = record.mean(axis=0), job.mean(axis=0)
     size = math.sqrt(float((np.abs(one) ** 2).sum() * (np.abs(two) ** 2).sum()))
     correlation = float((one * two.conj()).real.sum()) / size if size else math.nan
@@ -171,7 +181,80 @@ def _numbers(
     bursts = [one - one.mean() for one in (mine.envelope, other.envelope)]
     sizes = math.sqrt(float((bursts[0] ** 2).sum() * (bursts[1] ** 2).sum()))
     envelope = float((bursts[0] * bursts[1]).sum()) / sizes if sizes else math.nan
-    return correlation, envelope, ratio, spectral_distance(power, others)
+    apart = _difference(record, job, *bursts)
+    return apart, correlation, envelope, ratio, spectral_distance(power, others)
+
+
+def _difference(
+    record: np.ndarray, job: np.ndarray, bursts: np.ndarray, others: np.ndarray
+) -> float:
+    """Return how far a record is from a job by all numbers together, dB; nan of a silent one.
+
+    record, job: lines, (n, orders); bursts, others: their envelopes less the mean, (360,). It is
+    the distance of the third octaves of orders with their level, of all revolutions and of the mean
+    one; one less the correlation of the mean revolutions and one less that of the envelopes, where
+    they are greatest within `NEAR_DEG`; and the ratio of the mean revolutions' rms. White noise is
+    taken out of all powers.
+    """
+    sides = [_band_powers(lines) for lines in (record, job)]
+    means = [lines.mean(axis=0) for lines in (record, job)]
+    shape = math.sqrt(math.prod(float((np.abs(one) ** 2).sum()) for one in means))
+    size = math.sqrt(float((bursts**2).sum() * (others**2).sum()))
+    if not shape or not size:
+        return math.nan
+    alike = float((_near_turns(record.shape[1]) @ (means[0] * means[1].conj())).real.max()) / shape
+    near = range(-NEAR_DEG, NEAR_DEG + 1)
+    same = max(float(bursts @ np.roll(others, degree)) for degree in near) / size
+    whole, mean = (_bands_apart(*(side[k] for side in sides)) for k in (0, 1))
+    powers = [float(np.maximum(side[1][0], 0.0).sum()) for side in sides]
+    level = 0.5 * abs(math.log(powers[0] / powers[1])) if min(powers) > 0.0 else 0.0
+    return (whole + MEAN_ORDERS * mean + MEAN_SHAPE * (1.0 - alike) + BURSTS * (1.0 - same)
+            + LEVEL * level)  # fmt: skip
+
+
+@lru_cache(maxsize=4)
+def _near_turns(orders: int) -> np.ndarray:
+    """Return what turns lines by each tenth of a degree within `NEAR_DEG`, (angles, orders)."""
+    shifts = np.radians(np.linspace(-NEAR_DEG, NEAR_DEG, 20 * NEAR_DEG + 1))
+    return np.exp(1j * np.outer(shifts, np.arange(1, orders + 1)))
+
+
+Powers = tuple[np.ndarray, np.ndarray]  # of third octaves, and their standard deviations by noise
+
+
+def _band_powers(lines: np.ndarray) -> tuple[Powers, Powers]:
+    """Return the mean squares of third octaves without noise: of all revolutions, of the mean one.
+
+    lines: (n, orders). White noise makes all lines alike: it is the mean of the third octaves that
+    are as quiet as the quietest one, within their scatter.
+    """
+    count, orders = lines.shape
+    band = third_octaves(orders)
+    wide = np.bincount(band)
+    whole = np.bincount(band, np.mean(np.abs(lines) ** 2, axis=0))
+    mean = np.bincount(band, np.abs(lines.mean(axis=0)) ** 2)
+    scatter = 1.0 / np.sqrt(count * wide)
+    a_line = whole / wide
+    known = wide >= min(MIN_LINES, wide.max())
+    least = int(np.argmin(np.where(known, a_line * (1.0 + 2.0 * scatter), math.inf)))
+    alike = known & (a_line <= a_line[least] * (1.0 + 3.0 * (scatter + scatter[least])))
+    noise = float(whole[alike].sum() / wide[alike].sum())
+    one = whole - noise * wide, noise * np.sqrt(wide / count)
+    return one, (mean - noise / count * wide, noise / count * np.sqrt(wide))
+
+
+def _bands_apart(record: Powers, job: Powers) -> float:
+    """Return the rms difference of third octaves in dB, each weighted by how well it is known."""
+    (one, noise), (other, others) = record, job
+    low = 2.0 * (noise + others) + QUIET * max(one.max(), other.max())
+    heard = (one > low) | (other > low)
+    if not heard.any():
+        return 0.0
+    first, second = np.maximum(one, low)[heard], np.maximum(other, low)[heard]
+    scale = 10.0 / math.log(10.0)
+    unsure = (scale * noise[heard] / first) ** 2 + (scale * others[heard] / second) ** 2
+    weight = 1.0 / (unsure + SAME_BAND**2)
+    return math.sqrt(float(weight @ (scale * np.log(first / second)) ** 2 / weight.sum()))
 
 
 def _best_shift(record: np.ndarray, job: np.ndarray) -> tuple[float, float]:

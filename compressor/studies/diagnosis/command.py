@@ -162,8 +162,10 @@ def verdict(answer: "Identification") -> Iterator[str]:
            "(see the distances below)")  # fmt: skip
     odd = ", ".join(f"{name} ({value:+.1f} sd)" for name, value in answer.odd.items())
     yield f"farthest from what other features foretell: {odd}"
-    yield ("what to do: check units, tacho and sensor against the study's; widen what it varies "
-           "(masses, speed, loads, friction, foundation, noise) and run it again")  # fmt: skip
+    yield ("what to do: first compare noise with the study's sensor.noise_m_per_s2, and "
+           "the unit (g read as m/s2 is a factor of 9.8); then check tacho and sensor; then widen "
+           "what the study varies (noise, masses, speed, loads, friction, foundation), and run it "
+           "again")  # fmt: skip
     yield "the ranking below is what is least far, and is not to be trusted"
 
 

@@ -135,7 +135,8 @@ def test_what_does_not_fit_is_said_first(tmp_path, folder, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert lines[1].startswith("NOTHING IN THIS STUDY FITS: ")
     assert lines[2].startswith("farthest from what other features foretell: ")
-    assert lines[3].startswith("what to do: check units, tacho")
+    assert lines[3].startswith("what to do: first compare noise with the study's sensor.noise_m")
+    assert "g read as m/s2 is a factor of 9.8" in lines[3]
 
 
 @pytest.mark.parametrize(
