@@ -13,11 +13,15 @@ from typing import Any, NamedTuple
 from compressor.cases.case import IDENTITY, Case, digest, identity_parts, join_parts
 from compressor.cases.checks import value_of
 from compressor.cases.combinations import Block
-from compressor.cases.conflicts import RULES, Rule, Watched
+from compressor.cases.conflicts import DECIDES_READING, IN_KEY_IF_READ, RULES, Rule, Watched
 from compressor.cases.parameter import Problem
 
 # parts of an identity that are not one group, and what they are made from
-MADE_FROM = {"span": ("solve", "machine.speed_rpm"), "solver": ("solve",)}
+MADE_FROM = {
+    "span": ("solve", "machine.speed_rpm"),
+    "solver": ("solve",),
+    "facts": (*IN_KEY_IF_READ, *DECIDES_READING),
+}
 Rows = Callable[[Sequence[int]], Any]  # of a combination's places: those that decide an answer
 
 

@@ -24,9 +24,10 @@ from compressor.cases.checks import (
     expand_synonyms,
     probable_keys,
     stands_for,
+    value_of,
     values_given,
 )
-from compressor.cases.conflicts import conflicts, values_read
+from compressor.cases.conflicts import IN_KEY_IF_READ, conflicts, reads, values_read
 from compressor.cases.groups import CARD_KEYS, Contact, HealthyClearance, Solve
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
 from compressor.cases.optional_groups import fill_guide, fill_wear
@@ -55,7 +56,7 @@ IDENTITY_GROUPS = tuple(
     if name != "solve"
     and any(key.partition(".")[0] == name for key in table().keys() - outside_identity())
 )
-IDENTITY = frozenset({"joint", "load", "model", "span", "solver", *IDENTITY_GROUPS})
+IDENTITY = frozenset({"joint", "load", "model", "span", "solver", "facts", *IDENTITY_GROUPS})
 NO_SWEEP = (
     "would be swept, and a case has one value of each key: build a case for each, or write a case "
     "file for load_cases"
@@ -350,30 +351,33 @@ def identity_parts(case: Case, names: Container[str] = IDENTITY) -> dict[str, st
         targets = {} if isinstance(solve.accuracy, str) else dict(solve.accuracy)
         accuracy = solve.rtol or targets or solve.accuracy
         texts["solver"] = KEY_TEXT.encode((accuracy, solve.method, solve.max_steps))
+    if "facts" in names:
+        facts = {key: value_of(case, key) for key in IN_KEY_IF_READ if reads(case, key)}
+        texts["facts"] = KEY_TEXT.encode({k: v for k, v in facts.items() if v is not None})
     for name in IDENTITY_GROUPS:
         if name not in names or (case.joint == "none" and name in OF_JOINTS):
             continue
         group = getattr(case, name)
         if group is not None:
-            texts[name] = _identity_text(group)
+            texts[name] = _identity_text(group, name)
         elif not WORDS[name]:
             texts[name] = "false"
     return texts
 
 
-def _remember_texts(make_text: Callable[[Any], str]) -> Callable[[Any], str]:
+def _remember_texts(make_text: Callable[..., str]) -> Callable[..., str]:
     """Return `make_text` that makes the text of each group once, since many cases share a group.
 
     By the object and not by its value: 1 and 1.0 are equal, and their texts are not.
     """
     known: dict[int, tuple[Any, str]] = {}  # with the object, whose number is its own meanwhile
 
-    def find_text(group: Any) -> str:
+    def find_text(group: Any, *name: str) -> str:
         found = known.get(id(group))
         if found is None:
             if len(known) >= MAX_TEXTS:
                 known.clear()
-            found = known[id(group)] = group, make_text(group)
+            found = known[id(group)] = group, make_text(group, *name)
         return found[1]
 
     return find_text
@@ -407,11 +411,16 @@ def _value_text(group: Any) -> str:
 
 
 @_remember_texts
-def _identity_text(group: Any) -> str:
-    """Return what a group gives as JSON, as `KEY_TEXT` writes it, but faster."""
+def _identity_text(group: Any, name: str) -> str:
+    """Return what a group gives as JSON, as `KEY_TEXT` writes it, but faster.
+
+    Without facts, of which those that are read are a part of their own. name: the group's.
+    """
     values, texts = vars(group), []
     for key in sorted(values):
         value = values[key]
+        if f"{name}.{key}" in IN_KEY_IF_READ:
+            continue
         if type(value) is float and math.isfinite(value):
             texts.append(f'"{key}":{value!r}')
         elif value is not None:

@@ -9,9 +9,9 @@ Where a case leaves the range that the program was judged on. Extreme scenes are
 """
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from types import FunctionType
 from typing import Any, cast
 
@@ -19,7 +19,7 @@ from compressor.cases.checks import SHORTHANDS, row_of, value_in
 from compressor.cases.groups import CYLINDER_KEYS, ENDS
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
-from compressor.cases.parameter import IMPLAUSIBLE, Problem, Reader
+from compressor.cases.parameter import CRANK_END, GAS, IMPLAUSIBLE, MATERIALS, Problem, Reader
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, group_readers, table
 from compressor.metrics import AXES, JOINTS
 
@@ -47,6 +47,38 @@ def moving_mass(case: Settings) -> float:
     return case.machine.rod_mass_kg + case.machine.reciprocating_mass_kg
 
 
+# Facts of a machine, which a file may give though no job of it reads them, so that one file serves
+# the machine with clearance and without. Of the gas those of a cylinder that is there.
+FACTS = (
+    "machine.pin_radius_mm", "machine.small_end_pin_radius_mm",
+    "contact.materials", "contact.small_end_materials",
+    "contact.length_mm", "contact.small_end_length_mm",
+    "lubricant.viscosity_mPa_s", "lubricant.bearing_length_mm",
+    "lubricant.small_end_bearing_length_mm",
+    "gas.suction_MPa", "gas.discharge_MPa", "gas.exponent", "gas.head_clearance_mm",
+    "gas.clearance_percent", "gas.crank_clearance_percent", "gas.rod_diameter_mm",
+    "gas.valve_loss_percent", "gas.discharge_loss_percent",
+)  # fmt: skip
+# what is part of a job's key only where the job reads it: facts, and what follows from them
+IN_KEY_IF_READ = (*FACTS, "contact.modulus_GPa", "contact.stiffness_N_per_mm15", "contact.geometry")
+# what decides whether a job reads any of them
+DECIDES_READING = (
+    "joint", "clearance_mm", "load", "friction.ideal_joints", "contact.law", "contact.restitution",
+    "lubricant", "guide.clearance_mm", "gas.action", "gas.indicator", "gas.crank_indicator",
+)  # fmt: skip
+
+
+def needs_of_given(key: str, given: Container[str]) -> list[tuple[str, Reader]]:
+    """Return which of the `conditions` must hold where a file gives one value of a key.
+
+    Of a fact none but that there is gas, that a rod's single action is meant, and that the big end
+    has materials where the small end has some. given: the dotted keys of the file.
+    """
+    strict = [GAS, MATERIALS] if "gas.action" in given else [GAS, MATERIALS, CRANK_END]
+    return [one for one in conditions(key) if key not in FACTS or one[1] in strict]
+
+
+@cache
 def conditions(key: str) -> list[tuple[str, Reader]]:
     """Return what holds where a case reads a key, each with what is unread where it does not."""
     group = key.partition(".")[0]
@@ -74,15 +106,17 @@ def problem_of(key: str, reader: Reader) -> Problem:
     return Problem(key, f"nothing reads this {what}: it needs {reader.words}; {remedy}")
 
 
-def unread_values(case: Settings, values: Mapping[str, Any]) -> Iterator[Problem]:
+def unread_values(
+    case: Settings, values: Mapping[str, Any], given: Container[str]
+) -> Iterator[Problem]:
     """Yield a problem for each key of one case that it does not read.
 
-    values: those given, by dotted key. A value that the case would have without it passes, so that
-    `Case.values` reads back; a group that a case has only if it is named does not, whatever its
-    values.
+    values: those that the case has to read, of all `given`, by dotted key. A value that the case
+    would have without it passes, so that `Case.values` reads back; a group that a case has only if
+    it is named does not, whatever its values.
     """
     for key, value in values.items():
-        for unread, reader in conditions(key):
+        for unread, reader in needs_of_given(key, given):
             if reader.reads(case):
                 continue
             named = unread in WORDS and WORDS[unread]
@@ -347,7 +381,7 @@ def conflicts(
     """
     if not wrong:
         yield from find_misfits(case, given)
-        yield from unread_values(case, values)
+        yield from unread_values(case, values, given)
         return
     undecided = _undecided_keys(wrong)
 
@@ -362,7 +396,7 @@ def conflicts(
     for key, value in values.items():
         if not undecided & {str(key), str(key).partition(".")[0]}:
             with contextlib.suppress(_Unknown):
-                yield from unread_values(known, {key: value})
+                yield from unread_values(known, {key: value}, given)
 
 
 def _undecided_keys(wrong: frozenset[str]) -> frozenset[str]:

@@ -237,6 +237,10 @@ CYLINDER_KEYS = (
     "action", "rod_diameter_mm", "clearance_percent", "crank_clearance_percent",
     "valve_loss_percent", "discharge_loss_percent", "unloaded", "indicator", "crank_indicator",
 )  # fmt: skip
+OF_CRANK_END = (
+    "rod_diameter_mm",
+    "crank_clearance_percent",
+)  # facts of a single-acting machine, too
 CARD_KEYS = ("indicator", "crank_indicator")  # paths of files, with digests of what they hold
 # key of its own -> the key whose value it has without
 AS_THE_OTHER = {
@@ -363,8 +367,9 @@ class Gas:
 
     @property
     def is_cylinder(self) -> bool:
-        """Return whether any key beyond the paper's gas load is given."""
-        return any(getattr(self, key) is not None for key in CYLINDER_KEYS)
+        """Return whether any key beyond the paper's gas load is given, of an end that presses."""
+        unread = () if self.presses("crank") else OF_CRANK_END
+        return any(getattr(self, key) is not None for key in CYLINDER_KEYS if key not in unread)
 
     @property
     def is_measured(self) -> bool:

@@ -20,7 +20,7 @@ from compressor.cases.bulk import examine_jobs
 from compressor.cases.case import Case
 from compressor.cases.checks import REPORT, SHORTHANDS, TWICE, row_of
 from compressor.cases.combinations import Block, columns
-from compressor.cases.conflicts import conditions, is_off, problem_of
+from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
 from compressor.cases.keys import (
     Leaves,
     leaves,
@@ -29,9 +29,16 @@ from compressor.cases.keys import (
     override_leaves,
     read_overrides,
 )
-from compressor.cases.parameter import CaseError, Problem, quote_value
+from compressor.cases.parameter import CaseError, Problem, Reader, quote_value
 from compressor.cases.study import Axis, Cases, Study, StudyRequest
-from compressor.cases.swept import SAMPLED, NoComparison, Test, comparison, format_count
+from compressor.cases.swept import (
+    SAMPLED,
+    NoComparison,
+    Test,
+    comparison,
+    format_count,
+    is_swept,
+)
 from compressor.cases.table import WORDS, table
 from compressor.cases.yaml_reader import CaseFileError, FileProblem, Node, Place, read_file, shorten
 from compressor.program import STUDY_GROUPS, Progress, no_progress
@@ -69,7 +76,9 @@ class KeysRead:
             where = node.key_place, group if group in SHORTHANDS else key
             known = row_of(key) or key in WORDS
             if where not in self.read and known and not is_off(key, node.value):
-                unread.append(UnreadKey(where, key, node))
+                swept = is_swept(key, node)
+                needed = conditions(key) if swept else needs_of_given(key, block.leaves.values)
+                unread.append(UnreadKey(where, key, node, needed))
         for number in block.numbers:
             if not unread:  # cases are built only until each key has a reader
                 break
@@ -85,8 +94,10 @@ class KeysRead:
 class UnreadKey:
     """A key that no case is known to read, and which of its conditions no case fulfils."""
 
-    def __init__(self, where: tuple[Place, str], key: str, node: Node):
-        self.where, self.node, self.needed = where, node, conditions(key)
+    def __init__(
+        self, where: tuple[Place, str], key: str, node: Node, needed: list[tuple[str, Reader]]
+    ):
+        self.where, self.node, self.needed = where, node, needed
         self.lacking = [*self.needed]
 
     def is_read(self, case: Case) -> bool:

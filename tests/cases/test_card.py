@@ -130,14 +130,17 @@ def test_a_file_that_has_changed_is_not_run(tmp_path, card):
     assert measured(write(tmp_path / "head.csv", [(a, 0.2) for a in ANGLES])).key != case.key
 
 
+def test_pressures_and_clearances_beside_a_card_make_no_other_job(card):
+    """They are facts of the cylinder, which a file may have for the machine without a card."""
+    nameplate = {"suction_MPa": 0.2, "discharge_MPa": 0.7, "exponent": 1.3, "clearance_percent": 12}
+    values = {"load": "gas", "gas": {"indicator": card}}
+    both = {"load": "gas", "gas": nameplate | {"indicator": card}}
+    assert Case.from_values(both).key == Case.from_values(values).key
+
+
 @pytest.mark.parametrize(
     ("gas", "words"),
     [
-        (
-            {"suction_MPa": 0.2},
-            "gas.suction_MPa: nothing reads this key: it needs no gas",
-        ),
-        ({"clearance_percent": 12}, "gas.clearance_percent: nothing reads this key"),
         ({"switching": "paper"}, "gas.switching: nothing reads this key"),
         ({"action": "double", "rod_diameter_mm": 30}, "gas.crank_indicator: is needed with action"),
         ({"action": "crank_end", "rod_diameter_mm": 30}, "gas.indicator: nothing reads"),

@@ -59,10 +59,8 @@ def test_clearances_are_of_the_stroke():
         ({"action": "double"}, "gas.rod_diameter_mm: is needed with action: double; give it in mm, "
          "such as 25"),
         (DOUBLE | {"rod_diameter_mm": 100}, "100 mm must be less than the bore, 100 mm"),
-        ({"rod_diameter_mm": 20, "action": "single"}, "gas.rod_diameter_mm: nothing reads this"),
+        ({"rod_diameter_mm": 20}, "gas.rod_diameter_mm: nothing reads this"),
         ({"clearance_percent": {"head": 10, "crank": 12}}, "gas.crank_clearance_percent: nothing"),
-        ({"action": "crank_end", "rod_diameter_mm": 20,
-          "clearance_percent": {"head": 10, "crank": 12}}, "gas.clearance_percent: nothing reads"),
         ({"clearance_percent": {"head": 10}}, "needs both, head and crank, not head; or one"),
         ({"clearance_percent": 10, "head_clearance_mm": 20}, "gas.clearance_percent: stands in "
          "place of gas.head_clearance_mm"),

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import pytest
 
 from compressor.cases.case import Case
+from compressor.cases.conflicts import FACTS
 from compressor.cases.load import CaseFileError, load_cases, load_studies
 from compressor.cases.parameter import CaseError
 from compressor.cases.table import table
@@ -108,7 +109,7 @@ ENTRIES = {
     "gas.clearance_percent": Entry(10, DOUBLE, (WORN, CRANK_END)),
     "gas.indicator": Entry(CARD, SINGLE, (WORN, FREE)),
     "gas.crank_indicator": Entry(CARD, CRANK_ALONE, (WORN, GAS)),
-    **entries(DOUBLE, GAS, WORN, gas__rod_diameter_mm=40, gas__crank_clearance_percent=12),
+    **entries(DOUBLE, GAS, SINGLE, WORN, gas__rod_diameter_mm=40, gas__crank_clearance_percent=12),
     "gas.switching": Entry("exact", WORN | {"load": "gas"}, (WORN, FREE)),
     **entries(
         WORN, GAS, FREE, spring__stiffness_N_per_mm=30, spring__damping_N_s_per_mm=0.1,
@@ -213,6 +214,14 @@ CONTRADICTING = {
     "sensor.second_threshold_m_per_s2",
 }  # fmt: skip
 UNREAD = [(key, where) for key, entry in ENTRIES.items() for where in entry.unread]
+# of the gas those of a cylinder that is there, and of the small end those beside the big end's
+OF_ACTION = ("gas.rod_diameter_mm", "gas.crank_clearance_percent")  # which a file has named
+UNREAD_FACTS = [
+    (key, where) for key, where in UNREAD
+    if key in FACTS and (where.get("load") == "gas" or not key.startswith("gas."))
+    and (key not in OF_ACTION or "action" in where["gas"])
+    and (key != "contact.small_end_materials" or "materials" in where.get("contact", {}))
+]  # fmt: skip
 
 
 def with_value(where: dict, key: str, value: object) -> dict:
@@ -281,7 +290,9 @@ def test_the_table_says_which_values_make_another_job(key):
 
 
 @pytest.mark.parametrize(
-    ("key", "where"), UNREAD, ids=lambda part: part if isinstance(part, str) else ""
+    ("key", "where"),
+    [one for one in UNREAD if one not in UNREAD_FACTS],
+    ids=lambda part: part if isinstance(part, str) else "",
 )
 def test_a_key_that_nothing_reads_is_refused(key, where, tmp_path):
     values = with_value(where, key, ENTRIES[key].value)
@@ -307,6 +318,45 @@ def test_a_key_that_nothing_reads_is_refused(key, where, tmp_path):
 def test_a_key_that_is_refused_would_have_changed_nothing(key, where):
     changed = with_value(where, key, ENTRIES[key].value)
     assert stored(json.dumps(changed)) == stored(json.dumps(where))
+
+
+@pytest.mark.parametrize(
+    ("key", "where"), UNREAD_FACTS, ids=lambda part: part if isinstance(part, str) else ""
+)
+def test_a_fact_of_the_machine_may_be_given_and_makes_no_other_job(key, where, tmp_path):
+    value = ENTRIES[key].value
+    values = with_value(where, key, value)
+    plain = Case.from_values(where)
+    assert Case.from_values(values).key == plain.key
+    path = tmp_path / "case.yaml"
+    path.write_text(json.dumps(values))
+    assert [case.key for case in load_cases(path)] == [plain.key]
+    two = [["steel", "steel"], ["copper", "copper"]]
+    two = two if isinstance(value, list) else [value, 0.9 * value]
+    path.write_text(json.dumps(with_value(where, key, two)))
+    with pytest.raises(CaseFileError, match="nothing reads this"):  # swept in vain
+        load_cases(path)
+
+
+def test_one_file_serves_the_machine_with_clearance_and_without(tmp_path):
+    machine = {
+        "machine": {"pin_radius_mm": {"big_end": 60, "small_end": 35}},
+        "contact": {"materials": {"big_end": ["steel", "steel"], "small_end": ["steel", "copper"]}},
+        "lubricant": {"viscosity_mPa_s": 40, "bearing_length_mm": {"big_end": 70, "small_end": 50}},
+        "healthy_clearance_mm": 0.1, "load": "gas",
+        "gas": {"bore_mm": 220, "rod_diameter_mm": 60, "action": "single"},
+    }  # fmt: skip
+    keys = {}
+    for joint in ("none", "big_end", "small_end", "both"):
+        worn = {} if joint == "none" else {"clearance_mm": 0.1}
+        path = tmp_path / "case.yaml"
+        path.write_text(json.dumps(machine | worn | {"joint": joint}))
+        (case,) = load_cases(path)
+        keys[joint] = case.key
+        assert case.machine.pin_radius("small_end") == 35
+    assert len({*keys.values()}) == 4
+    plain = {"load": "gas", "gas": {"bore_mm": 220, "action": "single"}}
+    assert keys["none"] == Case.from_values(plain).key
 
 
 GONE = "set that, or leave the {} out"
