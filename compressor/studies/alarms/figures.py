@@ -1,6 +1,5 @@
-"""Alarms by clearance, and detection against false alarms, with a caption of their numbers."""
+"""How far wear is over the limits, and what trips as a limit rises, with a caption."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -15,43 +14,40 @@ from compressor.report import (
     Note,
     Panel,
     make_grid,
-    mark,
     palette,
 )
 from compressor.studies.alarms.alarms import best_of_each, rank_alarms
 from compressor.studies.alarms.words import detects_words, limit_words, rate_words
 
-SHOWN = 0.3  # rate of false alarms up to which a curve is drawn
-ASIDE = 0.008  # of the clearances' range: between two alarms' points
+MAX_KINDS = 6  # kinds of alarm that have a line: the first to see wear
+BEYOND = 3.0  # times the greatest level that half of the windows reach, to which limits are drawn
 THRESHOLD = LineStyle(GREY, linewidth=0.8, linestyle="--")
 
 
 def draw_alarms(found: xr.Dataset, noise: int = 0) -> Drawing:
-    """Return two panels a joint: detection by clearance, and against false alarms by the limit.
+    """Return two panels a joint: levels over the limit by clearance, and shares by the limit.
 
     found: of `judge_alarms`; noise: number of its level. Above, the kinds of alarm that see wear
-    first over all joints, each with its best filter and 95 % intervals; below, the curve of the
-    best alarm at each clearance.
+    first over all joints, each with its best filter; below, the best alarm: the share of windows
+    that trip as its limit rises, of sound machines and at each clearance.
     """
     joints = found["joint"].values.tolist()
     figure, grid = make_grid(2, len(joints), 7.4)
-    lines = dict(zip(first_kinds(found, noise), CYCLE, strict=False))
+    lines = dict(zip(first_kinds(found, noise)[:MAX_KINDS], CYCLE, strict=False))
     for column, joint in enumerate(joints):
         above, below = grid[:, column]
         mine = np.flatnonzero(found["worn_joint"].values == joint)
         best_of = {str(found["kind"].values[n]): n for n in best_of_each(found, joint, noise)}
-        span = np.ptp(found["clearance"].values[mine])
-        for place, (kind, line) in enumerate(lines.items()):
-            one = found.isel(alarm=best_of[kind], noise=noise, state=mine)
-            plot_rates(above, one, line, ASIDE * span * (place - len(lines) // 2))
+        for kind, line in lines.items():
+            plot_levels(above, found.isel(alarm=best_of[kind], noise=noise, state=mine), line)
         figure.legend = above.traces
-        above.notes.append(Note(y=float(found.attrs["detected"]), style=THRESHOLD))
+        above.notes.append(Note(y=1.0, style=THRESHOLD))
         best = found.isel(alarm=rank_alarms(found, joint, noise)[0], noise=noise)
         plot_curves(below, best.isel(state=mine))
         title = joint.replace("_", " ")
         above.title = f"({'abc'[column]}) {title}, by clearance"
         below.title = f"({'bcdef'[column + len(joints) - 1]}) {best['alarm'].item()}"
-        above.y.title = "windows in which it trips" if not column else ""
+        above.y.title = "level over the limit" if not column else ""
         below.y.title = "windows in which it trips" if not column else ""
     return figure
 
@@ -66,30 +62,44 @@ def first_kinds(found: xr.Dataset, noise: int) -> list[str]:
     return sorted(places, key=lambda kind: places[kind])
 
 
-def plot_rates(panel: Panel, one: xr.Dataset, line: LineStyle, aside: float) -> None:
-    """Draw an alarm's detection by clearance, with its intervals; aside: so that none is hidden."""
-    x, y = one["clearance"].values + aside, one["detection"].values
-    low, high = (one[f"detection_{end}"].values for end in ("low", "high"))
-    errors = np.array([np.maximum(y - low, 0.0), np.maximum(high - y, 0.0)])
-    panel.plot(x, y, replace(line, marker="o", markersize=3.5), one["title"].item(), errors=errors)
+def plot_levels(panel: Panel, one: xr.Dataset, line: LineStyle) -> None:
+    """Draw by clearance the level that the share to be detected reaches, over an alarm's limit."""
+    name = one["title"].item()
+    panel.plot(
+        one["clearance"].values, detected_levels(one), replace(line, marker="o", markersize=3.5),
+        name,
+    )  # fmt: skip
     panel.x.title, panel.x.margin = "clearance (mm)", 0.04
-    panel.y.span(-0.02, 1.04)
+    panel.y.log = True
+
+
+def detected_levels(one: xr.Dataset) -> np.ndarray:
+    """Return the level that `detected` of the windows reach, over the limit, (states,).
+
+    Above 1 the alarm detects; nan where it lies below all limits that were tried. A limit below
+    these, as of peaks that no sound machine has, counts as the least of them.
+    """
+    reached = one["curve_detection"].values >= float(one.attrs["detected"])
+    last = reached.sum(axis=1) - 1  # shares fall as the limit rises
+    levels = np.where(last < 0, np.nan, one["factor"].values[last])
+    return levels / max(float(one["limit_high"]), float(one["factor"][0]))
 
 
 def plot_curves(panel: Panel, one: xr.Dataset) -> None:
-    """Draw detection against false alarms over the limit of one alarm, a line a clearance."""
-    false = one["curve_false_alarms"].values
+    """Draw what trips over the limit of one alarm: sound machines, and a line a clearance."""
+    limits, shares = one["factor"].values, one["curve_detection"].values
     count = one.sizes["state"]
     for state, colour in enumerate(palette("viridis", count + 1)[:count]):
         line = LineStyle(colour, linewidth=1.4)
-        name = f"{one['clearance'].values[state]:.3g} mm"
-        panel.plot(false, one["curve_detection"].values[state], line, name)
+        panel.plot(limits, shares[state], line, f"{one['clearance'].values[state]:.3g} mm")
+    false = one["curve_false_alarms"].values
+    panel.plot(limits, false, LineStyle(BLACK, linewidth=1.4, linestyle="--"), "sound")
     panel.legend = list(panel.traces)
-    if math.isnan(float(one.attrs["factor"])):
-        panel.notes.append(Note(x=float(one.attrs["attainable"]), style=THRESHOLD))
-    panel.plot(one["false_alarms"].values, 0.0, mark(BLACK, "^", 5.0), "measured at the limit")
-    panel.x.title = "false alarms"
-    panel.x.span(-0.005, SHOWN)
+    panel.notes.append(Note(x=max(float(one["limit_high"]), limits[0]), style=THRESHOLD))
+    half = max(int((curve >= 0.5).sum()) for curve in (*shares, false))
+    top = max(limits[max(half - 1, 0)], float(one["limit_high"]))
+    panel.x.title, panel.x.log = "limit / usual reading", True
+    panel.x.span(float(limits[0]), float(top) * BEYOND)
     panel.y.span(-0.02, 1.04)
 
 
@@ -103,16 +113,13 @@ def caption(found: xr.Dataset, noise: int = 0) -> str:
             f"{joint.replace('_', ' ')}: {one['alarm'].item()}, which {detects_words(one, joint)}, "
             f"with {rate_words(one)} of false alarms"
         )
-    has_aim = math.isnan(float(attrs["factor"]))
-    aim = ", and below the rate of false alarms that limits aim at" if has_aim else ""
     level = float(found["noise"].values[noise])
     disturbed = f", {level:g} m/s² of noise added" if level else ""
     return (
-        f"Above: share of windows in which an alarm trips, by clearance, each with its best filter "
-        f"and 95 % intervals by draws, moved aside a little; limits by sound windows of other "
-        f"draws, {limit_words(found)}{disturbed}. Dashed: {attrs['detected']:.0%}{aim}. "
+        f"Above: level that {attrs['detected']:.0%} of windows reach, over the limit, by "
+        f"clearance, each alarm with its best filter: above 1 (dashed) it detects; limits by sound "
+        f"windows of other draws, {limit_words(found)}{disturbed}. "
         f"Best of {found.sizes['alarm']} alarms: "
-        f"{'; '.join(texts)}. Below: of these, "
-        f"detection against false alarms as the limit rises, a line a clearance; the mark is what "
-        f"was counted at the limit above, of {attrs['sound_draws']} sound draws."
+        f"{'; '.join(texts)}. Below: of these, share of windows that trip as the limit rises, of "
+        f"{attrs['sound_draws']} sound draws (black) and at each clearance; the line is the limit."
     )

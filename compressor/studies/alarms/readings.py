@@ -89,13 +89,14 @@ ALARMS = (
 )  # fmt: skip
 
 
-def default_bands(rate: float) -> tuple[Band, ...]:
+def default_bands(rate: float, passes: float = math.inf) -> tuple[Band, ...]:
     """Return the bands of a sampling rate, Hz: a frame's, and two above it where there is room.
 
-    The two share what a record holds above the frame's band, equally in its logarithm.
+    passes: the highest frequency that the sensor's chain lets through, Hz. The two share what a
+    record holds above the frame's band, equally in its logarithm.
     """
     low, edge = FRAME_HZ
-    top = rate / USABLE
+    top = min(rate / USABLE, passes)
     if top <= 2.0 * edge:
         return ((low, min(edge, top)),)
     middle = float(f"{math.sqrt(edge * top):.2g}")

@@ -145,8 +145,14 @@ def read_job(
     if record is None:
         return "without_record"
     rate = record.rate
-    bands = default_bands(rate) if bands is None else bands
+    passes = highest_passed(case.sensor)
+    bands = default_bands(rate, passes) if bands is None else bands
     for low, high in bands:
+        if high > passes * (1.0 + 1e-9):
+            raise AlarmsError(
+                f"band {low:g}-{high:g} Hz: the sensor of job {key} passes up to {passes:g} Hz "
+                "(sensor.low_pass_Hz, or the resonance sensor.mounting_Hz): give bands up to that"
+            )
         if high > rate / 2.0 * (1.0 + 1e-9):
             remedy = f"give bands up to half of that, {rate / 2:g} Hz, or a higher sensor.rate_Hz"
             raise AlarmsError(
@@ -178,6 +184,16 @@ def read_job(
         "joint": joint, "clearance": clearance, "readings": readings, "bands": bands,
         "clipped": is_clipped, "values": case.values(),
     }  # fmt: skip
+
+
+def highest_passed(sensor: Sensor | None) -> float:
+    """Return the frequency (Hz) above which a sensor's low pass or mounting lets nothing through.
+
+    Without a low pass of its own a sensor has one by its sampling rate, which bands mind anyway.
+    """
+    if sensor is None:
+        return math.inf
+    return min(sensor.low_pass_Hz or math.inf, sensor.mounting_Hz)
 
 
 def name_draw(point: Mapping[str, Any]) -> str:

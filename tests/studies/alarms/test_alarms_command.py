@@ -49,6 +49,7 @@ def test_the_table_has_the_first_alarm_of_each_joint_first(written):
         lines[0] == "study worn: 60 sound jobs of 60 draws, 180 worn ones; windows of 2 revolutions"
     )
     assert "for 2 % of false alarms (the sound draws allow no lower rate: 1 % needs" in lines[1]
+    assert "valves and gas make no noise in this model" in lines[2]
     rows = [line for line in lines if line.startswith(("big_end ", "small_end ", "both "))]
     assert len(rows) == 3 * 9  # kinds of alarm, but the body's velocity, which no job has
     for joint in ("big_end", "small_end", "both"):
@@ -109,7 +110,12 @@ def test_the_caption_says_the_numbers_of_the_figure(written):
     assert below.title.endswith(said[0])
     mine = found["worn_joint"].values == "small_end"
     (curve,) = [trace for trace in above.traces if trace.name == best["title"].item()]
-    np.testing.assert_array_equal(curve.y, best["detection"].values[mine])
+    shares = best["curve_detection"].values[mine]
+    reached = [best["factor"].values[share >= 0.9].max() for share in shares]  # by 90 % of windows
+    np.testing.assert_allclose(curve.y, np.array(reached) / max(best["limit_high"].item(), 0.8))
+    assert all(np.isfinite(trace.y).any() for trace in above.traces)
+    assert np.ptp(np.log(curve.y)) > 0.3  # a figure that says something where all is detected
+    assert "above 1 (dashed) it detects" in text
     np.testing.assert_array_equal(below.traces[0].y, best["curve_detection"].values[mine][0])
 
 
@@ -202,3 +208,10 @@ def test_mistakes_are_named(worn_store, worn, capsys, tmp_path):
         (worn_store, ["wrn"], "did you mean worn?"),
     ):  # fmt: skip
         assert told in run(folder, capsys, *words, code=2)
+
+
+def test_no_band_is_above_what_the_sensor_passes(worn_store, capsys, monkeypatch):
+    """As with sensor.low_pass_Hz: 2000; the study's own sensor has none."""
+    monkeypatch.setattr(windows, "highest_passed", lambda sensor: 2000.0)
+    told = run(worn_store, capsys, "worn", "--revolutions", "2", "--band", "500-2500", code=2)
+    assert re.search(r"band 500-2500 Hz: the sensor of job \w+ passes up to 2000 Hz", told)

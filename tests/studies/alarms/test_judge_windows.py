@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from compressor.cases import Sensor
 from compressor.studies.alarms.alarms import (
     FACTORS,
     judge_windows,
@@ -24,6 +25,7 @@ from compressor.studies.alarms.windows import (
     AlarmsError,
     Windows,
     check_draws,
+    highest_passed,
 )
 from compressor.studies.alarms.words import list_lines, list_remarks, table_rows
 from compressor.vibration import Record
@@ -245,6 +247,9 @@ def test_options_that_mean_nothing_are_refused(wrong, told):
 
 def test_bands_fill_what_a_record_holds():
     assert default_bands(25600.0) == ((2.0, 1000.0), (1000.0, 3200.0), (3200.0, 10000.0))
+    assert default_bands(25600.0, 5000.0) == ((2.0, 1000.0), (1000.0, 2200.0), (2200.0, 5000.0))
+    assert highest_passed(Sensor(low_pass_Hz=5000.0)) == 5000.0
+    assert highest_passed(Sensor(mounting_Hz=8000.0)) == 8000.0
     assert default_bands(4096.0) == ((2.0, 1000.0),)
     assert default_bands(1024.0) == ((2.0, 400.0),)
     with pytest.raises(AlarmsError, match="--band 3000-1000: give the lower frequency first"):
