@@ -62,6 +62,7 @@ class Metric(NamedTuple):
     ] = "tally"
     when: str = ""  # what few jobs have, others are nan: a flag of the record, or another word
     joint: int = 0  # whose part of its series counts for samples, in JOINTS
+    limit: float = math.nan  # above which it is a fault
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -80,6 +81,9 @@ class Metric(NamedTuple):
 
 
 HORIZON = "predictability_horizon"
+# of `knock`: up to it a guide's sensor reads what it does on a sound machine, to 30 %; from 0.3 on
+# twice that and more (docs/a-run.md, Knock)
+KNOCKS = 0.25
 # of the body and its sensor; rounding in spectra and splines leaves some 1e-12
 OF_BODY, OF_SEGMENT = Bar(5.0, 0.5, least=1e-9), Bar(5.0, 1.0, least=1e-9)
 TABLE = (
@@ -95,6 +99,14 @@ TABLE = (
     Metric(
         "rms_acceleration_deviation", (), "m/s2", "rms of acceleration less the ideal machine's",
         "acceleration", Bar(3.5, 0.17), Shown("rms acceleration deviation", "m/s²"), kind="root",
+    ),
+    Metric(
+        # journal and bore move alike in a machine without clearance, so that it is 0 there
+        "knock", ("joint",), "1",
+        "force of the hardest blow of a journal on its bore over the greatest joint force; above "
+        f"{KNOCKS:g} the joint knocks", "contact_force",
+        shown=Shown(f"knock (above {KNOCKS:g} it knocks)", ""), contact=True, kind="greatest",
+        limit=KNOCKS,
     ),
     Metric(
         "peak_contact_force", ("joint",), "N",
@@ -124,7 +136,7 @@ TABLE = (
         "acceleration", Bar(4.0, 0.15, False, 1e-12),
     ),
     Metric(
-        "impact_count", ("joint",), "1", "contacts that began after flight",
+        "impact_count", ("joint",), "1", "dry contacts that began after flight",
         "penetration", Bar(1.0, 0.0, False), None, True, "count",
     ),
     Metric(
@@ -132,9 +144,9 @@ TABLE = (
         "penetration", Bar(1.0, 0.0, False), None, True, "count",
     ),
     Metric(
-        "impacts_per_rev", ("joint",), "1/rev", "contacts in a revolution that began after flight",
-        "penetration", Bar(1.0, 0.0, False), Shown("contacts after flight", "per rev"), True,
-        "rate",
+        "impacts_per_rev", ("joint",), "1/rev",
+        "dry contacts in a revolution that began after flight", "penetration",
+        Bar(1.0, 0.0, False), Shown("dry contacts after flight", "per rev"), True, "rate",
     ),
     Metric(
         "releases_per_rev", ("joint",), "1/rev",

@@ -24,7 +24,7 @@ UNITS = {
 }  # fmt: skip
 LABELS = {  # of others than their names
     "contact_loss_fraction": "time without dry contact",
-    "impacts_per_rev": "contacts after flight",
+    "impacts_per_rev": "dry contacts after flight",
 }
 FACTS = ("promise", "regime", "method", "rtol", "program", "libraries")
 
@@ -106,10 +106,20 @@ def numbers(found: "JobReport", units: Units, *sources: str) -> list[Line]:
                 text = f"{value:.3g}"  # a mean of few whole numbers: exact of this run alone
             if text != UNKNOWN:
                 text = " ".join(filter(None, (text, unit, "" if math.isnan(error) else kind)))
+                if name == "knock":
+                    text += f", {knock_verdict(value, error)}"
             elif kind:
                 continue  # of the statistics of a chaotic motion only those that are known
             lines.append((label, text))
     return lines
+
+
+def knock_verdict(value: float, error: float) -> str:
+    """Return whether a joint with a `knock` knocks, by its limit and the error bar."""
+    limit = metrics.BARRED["knock"].limit
+    sure = math.isnan(error) or abs(value - limit) > error
+    word = "may knock" if not sure else "knocks" if value > limit else "does not knock"
+    return f"{word} (limit {limit:g})"
 
 
 def series_errors(found: "JobReport") -> list[Line]:
@@ -238,8 +248,13 @@ def healthy_motion(found: "JobReport", units: Units) -> list[Line]:
 
 
 def film(found: "JobReport") -> list[str]:
-    """Return that contact forces include an oil film's, of a job that has oil."""
-    return ["contact forces include the force of the oil film"] if found.case.lubricant else []
+    """Return how contact forces and counts are meant of a job that has oil."""
+    if not found.case.lubricant:
+        return []
+    return [
+        "contact forces include the force of the oil film",
+        "where the film takes a blow there is no dry contact: knock tells whether a joint knocks",
+    ]
 
 
 def cautions(found: "JobReport") -> list[str]:

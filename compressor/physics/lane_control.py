@@ -199,6 +199,7 @@ def advance_lanes(scene, W, k):
         copy_if_plain(W, j, plain, R0 + 4 * LANES, R4 + 4 * LANES)
         copy_if_plain(W, j, plain, R0 + 8 * LANES, R4 + 8 * LANES)
         copy_if_plain(W, j, plain, R0 + 12 * LANES, R4 + 12 * LANES)
+        copy_if_plain(W, j, plain, R0 + 16 * LANES, R4 + 16 * LANES)
         W[COS + j], W[SIN + j] = direction(W[FIRST_FIELD + j] * W[T + j])
 
 
@@ -208,9 +209,9 @@ G0, _, G2, _, G4 = (float(weight) for weight in COARSE_WEIGHTS)
 # widths of the step's parts, added as `march.measure_gap_fractions` does
 FINE_WHOLE = sum(float(width) for width in np.diff(NODES))
 COARSE_WHOLE = sum(float(width) for width in np.diff(NODES[::2]))
-DEVIATION, PENETRATION, NORMAL, NEARNESS = 7 * LANES, 8 * LANES, 10 * LANES, 12 * LANES
-TORQUE, MOMENT = 14 * LANES, 15 * LANES
-KINETIC, POTENTIAL = 16 * LANES, 17 * LANES
+DEVIATION, PENETRATION, NORMAL, NEARNESS = 9 * LANES, 10 * LANES, 12 * LANES, 14 * LANES
+TORQUE, MOMENT = 16 * LANES, 17 * LANES
+KINETIC, POTENTIAL = 18 * LANES, 19 * LANES
 
 
 @inline_numba
@@ -256,7 +257,8 @@ def select_plain_steps(scene, W, k):
     for j in range(k):
         near = may_beat_peak(W, j, 0) | may_beat_peak(W, j, 1) | may_beat_peak(W, j, 2)
         near = near | may_beat_peak(W, j, 3) | may_beat_peak(W, j, 4) | may_beat_peak(W, j, 5)
-        near = near | may_beat_peak(W, j, 6) | may_beat_depth(W, j, 0) | may_beat_depth(W, j, 1)
+        near = near | may_beat_peak(W, j, 6) | may_beat_peak(W, j, 7) | may_beat_peak(W, j, 8)
+        near = near | may_beat_depth(W, j, 0) | may_beat_depth(W, j, 1)
         change = False
         if has_clearance(scene, 0):
             change = may_change_at(W, j, 0)

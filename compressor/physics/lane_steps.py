@@ -26,7 +26,7 @@ LANES = 16
 MAX_STATES = 8  # numbers of a motion
 STATE = MAX_STATES + 4  # and energy flows
 STAGE_COUNT = 7
-OBSERVED_COUNT = 18  # columns from ACCELERATION to GUIDE_MOMENT, kinetic and potential energy
+OBSERVED_COUNT = 20  # columns from ACCELERATION to GUIDE_MOMENT, kinetic and potential energy
 NODE_COUNT = 5
 
 SPRING = int(Load.SPRING)
@@ -234,6 +234,7 @@ def write_columns(W, o, g):
     write_four(W, o + 4 * LANES, (g[4], g[5], g[6], g[7]))
     write_four(W, o + 8 * LANES, (g[8], g[9], g[10], g[11]))
     write_four(W, o + 12 * LANES, (g[12], g[13], g[14], g[15]))
+    W[o + 16 * LANES], W[o + 17 * LANES] = g[16], g[17]
 
 
 @jit
@@ -260,7 +261,7 @@ def last_stage(scene, W, k):
         flows = powers(now, y, forces, p)
         write_rates(scene, W, LAST_STAGE + j, y, deviation_accelerations(now, p), flows)
         write_columns(W, R4 + j, observed_columns(now, y, forces, p))
-        W[R4 + 16 * LANES + j], W[R4 + 17 * LANES + j] = energies(now, y, p)
+        W[R4 + 18 * LANES + j], W[R4 + 19 * LANES + j] = energies(now, y, p)
 
 
 @jit

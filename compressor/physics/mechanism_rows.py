@@ -34,6 +34,7 @@ from compressor.physics.observe import (
     FORCE,
     FORCE_SIZE,
     GUIDE_MOMENT,
+    JOURNAL_ACCELERATION,
     KINETIC,
     NEARNESS,
     NORMAL,
@@ -173,6 +174,8 @@ def write_contact_columns(now, p, row):
     row[FORCE + 2], row[FORCE + 3] = forces.small_x, forces.small_y
     row[FORCE_SIZE] = square_root(forces.big_x**2 + forces.big_y**2)
     row[FORCE_SIZE + 1] = square_root(forces.small_x**2 + forces.small_y**2)
+    row[JOURNAL_ACCELERATION] = now.accelerations[1]
+    row[JOURNAL_ACCELERATION + 1] = now.accelerations[3]
     row[DEVIATION] = now.body[8] - ideal_acceleration(now, p)
     big, small = now.joints.big, now.joints.small
     row[PENETRATION], row[PENETRATION + 1] = big.penetration, small.penetration

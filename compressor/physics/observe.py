@@ -12,6 +12,7 @@ from compressor.physics.contact import nearness
 from compressor.physics.contact_laws import elastic_energy
 from compressor.physics.kinematics import ideal
 from compressor.physics.motion import (
+    deviation_accelerations,
     eccentricities_both,
     eccentricity_big_end,
     eccentricity_small_end,
@@ -38,25 +39,26 @@ class Column(IntEnum):
     ACCELERATION = 8  # from here on: what `observe_with_energy` writes
     FORCE = 9  # four: (joint, axis)
     FORCE_SIZE = 13  # two
-    DEVIATION = 15  # of the acceleration from the ideal motion
-    PENETRATION = 16  # two
-    NORMAL = 18  # two
-    NEARNESS = 20  # two: of contact
-    CRANK_TORQUE = 22  # that drives the crank against the rod, along its rotation
-    GUIDE_MOMENT = 23  # of the crosshead on its guide, about the crank's centre
-    CRANK_POWER = 24  # put into the mechanism by the crank, or by the motor that drives it
-    LOAD_POWER = 25  # put into the mechanism by the piston force
-    DAMPING_POWER = 26  # lost in the contacts' normal direction and in an elastic rod
-    FRICTION_POWER = 27  # lost to friction
-    KINETIC = 28
-    POTENTIAL = 29  # contacts' springs and gravity
-    PACE = 30  # time that passes over that of a steady crank
-    SHAKING_FORCE = 31  # two: of the machine on its frame; from here on: not in a march
-    BEARING_FORCE = 33  # two: on the main bearing
-    GUIDE_FORCE = 35  # of the crosshead on its guide, upwards
-    GUIDE_GAP = 36  # least one of its corners, negative where one presses; from here on: features
-    CRANK_SPEED = 37  # rad/s
-    MOTOR_TORQUE = 38
+    JOURNAL_ACCELERATION = 15  # two: along x, of a journal against its bore; 0 of an ideal joint
+    DEVIATION = 17  # of the acceleration from the ideal motion
+    PENETRATION = 18  # two
+    NORMAL = 20  # two
+    NEARNESS = 22  # two: of contact
+    CRANK_TORQUE = 24  # that drives the crank against the rod, along its rotation
+    GUIDE_MOMENT = 25  # of the crosshead on its guide, about the crank's centre
+    CRANK_POWER = 26  # put into the mechanism by the crank, or by the motor that drives it
+    LOAD_POWER = 27  # put into the mechanism by the piston force
+    DAMPING_POWER = 28  # lost in the contacts' normal direction and in an elastic rod
+    FRICTION_POWER = 29  # lost to friction
+    KINETIC = 30
+    POTENTIAL = 31  # contacts' springs and gravity
+    PACE = 32  # time that passes over that of a steady crank
+    SHAKING_FORCE = 33  # two: of the machine on its frame; from here on: not in a march
+    BEARING_FORCE = 35  # two: on the main bearing
+    GUIDE_FORCE = 37  # of the crosshead on its guide, upwards
+    GUIDE_GAP = 38  # least one of its corners, negative where one presses; from here on: features
+    CRANK_SPEED = 39  # rad/s
+    MOTOR_TORQUE = 40
 
 
 COLUMNS = int(Column.PACE) + 1  # that a march reads
@@ -68,6 +70,7 @@ FORCE, ECCENTRICITY = int(Column.FORCE), int(Column.ECCENTRICITY)
 PENETRATION, NORMAL = int(Column.PENETRATION), int(Column.NORMAL)
 NEARNESS = int(Column.NEARNESS)
 FORCE_SIZE, DEVIATION = int(Column.FORCE_SIZE), int(Column.DEVIATION)
+JOURNAL_ACCELERATION = int(Column.JOURNAL_ACCELERATION)
 CRANK_TORQUE, GUIDE_MOMENT = int(Column.CRANK_TORQUE), int(Column.GUIDE_MOMENT)
 CRANK_POWER, LOAD_POWER = int(Column.CRANK_POWER), int(Column.LOAD_POWER)
 DAMPING_POWER, FRICTION_POWER = int(Column.DAMPING_POWER), int(Column.FRICTION_POWER)
@@ -264,9 +267,34 @@ def energies(now, y, p):
 
 
 @inline_once
+def journal_accelerations(now, y, p):
+    """Return the accelerations (m/s^2) along x of both journals against their bores.
+
+    0 of an ideal joint. Second derivatives of `eccentricity_row`, from deviations as well.
+    """
+    motion, turn = now.motion, now.turn
+    eta_rate = y[2 * p.freedoms - 1]
+    rate = motion.rate + eta_rate
+    # of cos(phi) less that of the ideal angle, with the other sign
+    bent = turn.dc * rate * rate + motion.cos_phi * eta_rate * (motion.rate + rate)
+    bent += turn.ds * now.spin_up + motion.sin_phi * (now.spin_up - motion.spin_up)
+    away = now.a - motion.a
+    if p.scene == BIG_END:
+        return -away - p.rod_length * bent, 0.0
+    if p.scene == SMALL_END:
+        return 0.0, away + p.rod_length * bent
+    if p.scene == BOTH:
+        centre = deviation_accelerations(now, p)[1]
+        ahead = p.rod_length - p.rod_centre
+        return -centre - p.rod_centre * bent, away - centre + ahead * bent
+    return 0.0, 0.0
+
+
+@inline_once
 def observed_columns(now, y, forces, p):
     """Return the columns from ACCELERATION to GUIDE_MOMENT."""
     big, small = now.big, now.small
+    at_big, at_small = journal_accelerations(now, y, p)
     motion, friction = now.motion, (big.friction, small.friction)
     torque, moment = torque_and_moment(
         (motion.cos_theta, motion.sin_theta), motion.x + y[0], forces, friction,
@@ -276,7 +304,8 @@ def observed_columns(now, y, forces, p):
         now.a, forces[0], forces[1], forces[2], forces[3],
         square_root(forces[0] * forces[0] + forces[1] * forces[1]),
         square_root(forces[2] * forces[2] + forces[3] * forces[3]),
-        now.a - now.motion.a, big.penetration, small.penetration, big.normal, small.normal,
+        at_big, at_small, now.a - now.motion.a, big.penetration, small.penetration,
+        big.normal, small.normal,
         nearness(big, p.stiffness[0], p.clearance[0], p),
         nearness(small, p.stiffness[1], p.clearance[1], p), torque, moment,
     )  # fmt: skip

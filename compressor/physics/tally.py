@@ -52,7 +52,7 @@ TALLY = np.dtype(
         ("square_deviation", "f8"),
         ("crank_torque", "f8"),  # integrals over time, N m s
         ("guide_moment", "f8"),
-        ("peak", "f8", (PEAKED,)),  # of acceleration, of FORCE (joint, axis) and of FORCE_SIZE
+        ("peak", "f8", (PEAKED,)),  # of the columns from ACCELERATION to JOURNAL_ACCELERATION
         ("top", "f8", (PEAKED,)),  # the same at the present step's nodes
         ("max_penetration", "f8", (2,)),
         ("loss_seconds", "f8", (2,)),

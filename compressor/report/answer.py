@@ -2,14 +2,15 @@
 
 A finding is a metric whose least and greatest value over the jobs differ by more than both error
 bars. Metrics are ranked by how many times the greatest is the least; each is listed once. What an
-owner needs first is always listed: the force in a worn joint, and the reversal of the rod load.
+owner needs first is always listed: whether a joint knocks, the force in a worn joint, and the
+reversal of the rod load.
 """
 
 import datetime
 import math
 import platform
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -207,7 +208,8 @@ def provenance_section(studies: Sequence[StoredStudy], results: Folder, command:
 
 MAX_FINDINGS = 3  # besides those that always stand there
 FORCE = "peak_contact_force"
-ALWAYS = (FORCE, "rod_load_reversal_angle")
+KNOCK = "knock"
+ALWAYS = (KNOCK, FORCE, "rod_load_reversal_angle")
 LEFT_OUT = (
     "rms_acceleration_deviation",  # 0 without clearance, by its meaning
     "max_penetration",  # below 0 where a gap is left, above it where metal touches: no ratio
@@ -221,7 +223,7 @@ class MetricChange:
     """What a metric does over jobs; `low` and `high` are numbers with bars and unit, or one is "".
 
     `at_low`, `at_high`: their jobs; `change`: the ratio in words; `always`: it stands on the first
-    screen whatever its rank is.
+    screen whatever its rank is; `first`: at its head.
     """
 
     title: str
@@ -232,6 +234,7 @@ class MetricChange:
     change: str
     rank: float
     always: bool = False
+    first: bool = False
 
 
 @dataclass(frozen=True)
@@ -352,7 +355,7 @@ def rank_findings(
 ) -> list[MetricChange]:
     """Return the findings of measures over jobs, the greatest change first, one a metric.
 
-    worn: joints whose contact force is meant; where there is none, that of any.
+    worn: joints whose contact force is meant; where there is none, that of any. Knock comes first.
     """
     best: dict[str, MetricChange] = {}
     for measure, values, bars in rows:
@@ -361,16 +364,28 @@ def rank_findings(
         if measure.variable == FORCE and worn and measure.joint not in worn:
             continue
         found = finding(measure, values, bars, names)
+        if found and measure.variable == KNOCK:
+            found = judge_knock(found, values)
         if found and (measure.variable not in best or found.rank > best[measure.variable].rank):
             best[measure.variable] = found
     return choose_findings(sorted(best.values(), key=lambda found: -found.rank), MAX_FINDINGS)
+
+
+def judge_knock(found: MetricChange, values: np.ndarray) -> MetricChange:
+    """Return the finding of a joint's knock with how many jobs knock, ranked by the hardest."""
+    known = values[~np.isnan(values)]
+    count = int(np.sum(known > BARRED[KNOCK].limit))
+    words = f"{count or 'none'} of {len(known)} jobs knock" + "s" * (count < 2)
+    if len(known) == 1:
+        words = "it knocks" if count else "it does not knock"
+    return replace(found, change=words, rank=float(known.max()), first=True)
 
 
 def choose_findings(ranked: Sequence[MetricChange], count: int) -> list[MetricChange]:
     """Return the first findings, and beside this number those that always stand there, by rank."""
     first = [found for found in ranked if not found.always][:count]
     always = [found for found in ranked if found.always]
-    return sorted([*first, *always], key=lambda found: -found.rank)
+    return sorted([*first, *always], key=lambda found: (not found.first, -found.rank))
 
 
 def finding(

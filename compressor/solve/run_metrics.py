@@ -34,11 +34,16 @@ def metrics(p: np.record, tallied: np.record) -> Metrics:
     tally = read_fields(tallied)
     seconds = tally["seconds"] or math.nan
     axes, sizes = Column.FORCE - Column.ACCELERATION, Column.FORCE_SIZE - Column.ACCELERATION
+    journals = Column.JOURNAL_ACCELERATION - Column.ACCELERATION
+    moved = np.array([p["reciprocating_mass"] + p["rod_mass"], p["reciprocating_mass"]])
+    force = tally["peak"][sizes:journals]
+    blow = moved * tally["peak"][journals:]
     # the spans of steps add up to within rounding: whole revolutions are to stay whole
     name = "steady_seconds" if is_featured(p) else "seconds"
     steady = tally[name] or math.nan
     revolutions = round(float(steady * p["omega"]) / math.tau, 9)
     of_joints = {
+        "knock": np.divide(blow, force, out=np.zeros(2), where=force > 0.0),
         "max_penetration": tally["max_penetration"],
         "contact_loss_fraction": tally["loss_seconds"] / seconds,
         "impact_count": tally["impacts"],
@@ -51,7 +56,7 @@ def metrics(p: np.record, tallied: np.record) -> Metrics:
         "peak_acceleration": tally["peak"][0],
         "rms_acceleration": math.sqrt(tally["square_acceleration"] / seconds),
         "rms_acceleration_deviation": math.sqrt(tally["square_deviation"] / seconds),
-        "peak_contact_force": tally["peak"][sizes:],
+        "peak_contact_force": force,
         "peak_contact_force_axis": tally["peak"][axes:sizes].reshape(2, 2),
         "mean_crank_torque": tally["crank_torque"] / seconds,
         "mean_guide_moment": tally["guide_moment"] / seconds,

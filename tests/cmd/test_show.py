@@ -1,12 +1,13 @@
 """`compsim show`: how a job is named, and its numbers, units and case."""
 
 import json
+import math
 import re
 from types import SimpleNamespace
 
 import pytest
 from compsim import cli
-from compsim.job_text import film, numbers
+from compsim.job_text import film, knock_verdict, numbers
 from conftest import CHAOTIC, store
 
 from compressor.cases.case import Case
@@ -54,7 +55,8 @@ def test_numbers_have_labels_units_and_error_bars(paper_store, show):
     share = stored["contact_loss_fraction"][0]
     bar = stored["contact_loss_fraction_error"][0]
     assert told["time without dry contact, big end"] == f"{by_bar(100 * share, 100 * bar, False)} %"
-    assert told["contacts after flight, big end"] == f"{stored['impacts_per_rev'][0]:.3g} per rev"
+    rate = f"{stored['impacts_per_rev'][0]:.3g} per rev"
+    assert told["dry contacts after flight, big end"] == rate
     assert not any("count" in label for label in told)  # counts grow with the run
     assert float(told["acceleration"]) == pytest.approx(stored["acceleration_error"], rel=0.05)
     assert told["friction loss"] == f"{stored['friction_loss']:.6g} J"
@@ -165,4 +167,24 @@ def test_a_reversal_needs_two_numbers(text, capsys):
 def test_a_contact_force_with_oil_says_so(oil):
     case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2} | oil)
     found = SimpleNamespace(case=case)
-    assert film(found) == ["contact forces include the force of the oil film"] * len(oil)
+    lines = film(found)
+    assert lines[:1] == ["contact forces include the force of the oil film"] * len(oil)
+    assert (lines[1:] != []) == bool(oil)
+    assert all("knock tells" in line for line in lines[1:])
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [(0.3, 0.01, "knocks (limit 0.25)"), (0.2, 0.01, "does not knock (limit 0.25)"),
+     (0.26, 0.02, "may knock (limit 0.25)"), (0.3, math.nan, "knocks (limit 0.25)")],
+)  # fmt: skip
+def test_a_knock_is_judged_by_its_limit_and_its_bar(value, error, text):
+    assert knock_verdict(value, error) == text
+
+
+def test_a_knock_stands_beside_its_verdict(paper_store, show):
+    stored, told = report_job(paper_store, *HERE).numbers, values(show(paper_store, *HERE))
+    value, error = stored["knock"][0], stored["knock_error"][0]
+    said = f"{by_bar(value, error)}, {knock_verdict(value, error)}"
+    assert told["knock, big end"] == said
+    assert "knock, small end" not in told  # it is ideal

@@ -25,6 +25,7 @@ DEPTH = next(m for m in MEASURES if m.variable == "max_penetration")
 REVERSAL = next(m for m in MEASURES if m.variable == "rod_load_reversal_angle")
 TENSION = next(m for m in MEASURES if m.variable == "peak_rod_load_tension")
 SMALL_END = [m for m in MEASURES if m.variable == "peak_contact_force"][1]
+KNOCKS = {m.joint: m for m in MEASURES if m.variable == "knock"}
 RATE = next(m for m in MEASURES if m.variable == "impacts_per_rev")
 NAMES = ["a", "b", "c"]
 
@@ -167,6 +168,20 @@ def test_the_worn_joint_s_force_and_the_reversal_stand_there_though_they_do_not_
     unknown = told(REVERSAL, steady, [np.inf] * 3)
     assert (unknown.high, unknown.change) == ("unknown", "within its error bar")
     assert told(REVERSAL, [np.nan] * 3, [np.nan] * 3) is None
+
+
+def test_the_hardest_knock_heads_the_first_screen_with_how_many_jobs_knock():
+    none = np.zeros(3)
+    rows = [
+        (LOSS, np.array([0.0, 0.0, 5.0]), none),
+        (KNOCKS["big_end"], np.array([0.001, 0.02, 0.03]), none),
+        (KNOCKS["small_end"], np.array([0.1, 0.2, 0.7]), none),
+    ]
+    first = rank_findings(rows, NAMES, {"big_end", "small_end"})[0]
+    assert first.title == "Knock (above 0.25 it knocks), small end"
+    assert (first.low, first.high, first.change) == ("0.1000", "0.7000", "1 of 3 jobs knocks")
+    quiet = rank_findings([(KNOCKS["small_end"], np.full(3, 0.1), none)], NAMES)[0]
+    assert (quiet.high, quiet.change) == ("0.1000", "none of 3 jobs knocks")
 
 
 def test_joints_with_clearance_are_found_in_any_job(study):

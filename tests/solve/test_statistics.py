@@ -45,6 +45,7 @@ def record():
     p = new_record()
     p["clearance"][:] = 1e-4
     p["omega"] = 2.0 * math.pi / TURN
+    p["reciprocating_mass"] = p["rod_mass"] = 1.0
     return p
 
 
