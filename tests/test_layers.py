@@ -72,7 +72,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "pyuff": {"compressor.vibration.record_files"},
     "sklearn": set(),  # of campaigns alone
 }  # fmt: skip
-MAX_NAMES = 29  # on average, of those that other rooms import
+MAX_NAMES = 30  # on average, of those that other rooms import
 
 Sources = dict[str, str]  # module -> text; a package's door has the package's name
 

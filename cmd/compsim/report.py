@@ -1,13 +1,14 @@
 """`compsim report`: the page, figures and tables of a folder of results."""
 
+import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from compressor.studies import STUDIES, page_additions
-from compsim.results import folders, of_results, results_folder
-from compsim.screen import DONE, print_text, units_option
+from compsim.results import folders, of_results, results_folder, studies
+from compsim.screen import DONE, print_text, say, units_option
 
 if TYPE_CHECKING:
     from compressor.units import Units
@@ -26,9 +27,10 @@ def page_folders(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @click.command()
-@of_results()
+@of_results("[STUDY]...", studies)
 @click.option("-o", "--output", default="report", show_default=True, shell_complete=folders,
               help="Write the report into this folder.")  # fmt: skip
+@click.option("--single", is_flag=True, help="Write one file that can be mailed: OUTPUT.html.")
 @click.option(
     "--limit", "limits", multiple=True, metavar="'METRIC=VALUE,... UNIT'",
     help="Show the zones A to D of a metric in tables and curves, by up to three limits with their "
@@ -42,6 +44,7 @@ def report(
     given: tuple[str, ...],
     folder: str | None,
     output: str,
+    single: bool,
     limits: tuple[str, ...],
     units: "Units | None",
     **places: str,
@@ -50,19 +53,29 @@ def report(
 
     \b
     compsim report
+    compsim report bearing-wear --single -o for-the-plant
     compsim report /data/results -o page --limit 'body_velocity_rms=2,5 mm/s'
 
-    Prints the path of the page, which a browser opens without a server.
+    Prints the path of the page, which a browser opens without a server. Named
+    studies stand on it in this order; without names all do, those of compsim
+    find and calibrate last.
     --units is of figures, tables and texts. Columns and axes with the name of a
     key keep its unit, and your own words stay as they are.
     """
-    folder, _ = results_folder(given, folder, named=False)
+    folder, names = results_folder(given, folder)
     from compressor.store import read_studies, writable_folder
 
     read_studies(folder)  # errors come before libraries load and figures are drawn
-    writable_folder(output, make=False)
+    if single and not output.endswith(".html"):
+        output += ".html"
+    writable_folder((os.path.dirname(output) or ".") if single else output, make=False)
     from compressor.report import write_report
 
     add = page_additions(places)
-    print_text(str(write_report(folder, output, context.obj, add, None, limits, units or "usual")))
+    path = write_report(
+        folder, output, context.obj, add, None, limits, units or "usual", names, single
+    )
+    print_text(str(path))
+    if single:
+        say(f"{path.stat().st_size / 1e6:.1f} MB, all in one file")
     return DONE

@@ -21,7 +21,7 @@ from compressor.analysis.effects import (
     sampled_effects,
     trend,
 )
-from compressor.analysis.machine_numbers import describe_machine
+from compressor.analysis.machine_numbers import describe_cases, describe_machine
 from compressor.analysis.plot_captions import (
     PLOT_CAPTIONS,
     SweptRow,

@@ -206,7 +206,12 @@ def describe_machine(study: Study) -> MachineDescription:
     numbers: Sequence[int] = study.selected
     if len(numbers) > MAX_CASES:
         numbers = sorted(random.Random(0).sample(numbers, MAX_CASES))
-    return MachineDescription(machine_numbers([study.cases[number] for number in numbers]))
+    return describe_cases([study.cases[number] for number in numbers])
+
+
+def describe_cases(cases: Sequence[Case]) -> MachineDescription:
+    """Return what cases say of their machine."""
+    return MachineDescription(machine_numbers(cases))
 
 
 def machine_numbers(cases: Sequence[Case]) -> tuple[MachineNumber, ...]:

@@ -9,6 +9,7 @@ from compressor.cases.case import (
     with_ideal_joints,
 )
 from compressor.cases.checks import (
+    DOUBLES,
     PER_PART,
     SHORTHANDS,
     phrase_of,

@@ -48,12 +48,16 @@ COLORS = 33  # of a continuous scale
 EVEN = 1e-6  # of a step: how far evenly spaced numbers may be off
 
 
-def publish_library(folder: Path) -> None:
-    """Write plotly.js beside the page, unless it is there. Raises StoreError."""
-    path = folder / LIBRARY
+def library_path() -> Path:
+    """Return where plotly.js is installed."""
     source = find_spec("plotly")
     (place,) = (source.submodule_search_locations or [""])[:1] if source else [""]
-    library = Path(place) / "package_data" / LIBRARY
+    return Path(place) / "package_data" / LIBRARY
+
+
+def publish_library(folder: Path) -> None:
+    """Write plotly.js beside the page, unless it is there. Raises StoreError."""
+    path, library = folder / LIBRARY, library_path()
     if not path.exists() or path.stat().st_size != library.stat().st_size:
         publish(path, library.read_bytes())
 

@@ -4,6 +4,7 @@ Python gives sections of plain data; the files in `templates` make markup of the
 text that they print.
 """
 
+import base64
 import itertools
 import json
 import math
@@ -14,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from jinja2 import ChoiceLoader, Environment, FunctionLoader, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from compressor.digits import PAGE_DIGITS, by_bar, setting
 from compressor.outcome import Regime
@@ -250,18 +251,25 @@ NO_JOBS = JobsToOpen("", (), ())
 SUBJECT = "Reciprocating compressor with joint clearance"
 
 
-def templates(units: Units = "usual") -> Environment:
+def templates(units: Units = "usual", files: Mapping[str, bytes] | None = None) -> Environment:
     """Return the page's templates: they escape what they print, and what they lack is an error.
 
     units: of numbers in what they print, but for markup and what a template escapes itself: code,
-    and words of a case file.
+    and words of a case file; files: of a page that holds them, by name.
     """
+
+    def address(name: str) -> Markup:
+        """Return where a file is: beside the page, or in it."""
+        if not files:
+            return escape(name)
+        kind = "text/csv" if name.endswith(".csv") else "image/png"
+        return Markup(f"data:{kind};base64,{base64.b64encode(files[name]).decode()}")
 
     def in_chosen_units(value: object) -> object:
         is_text = isinstance(value, str) and not isinstance(value, Markup)
         return convert_text(str(value), units) if is_text else value
 
-    return Environment(
+    made = Environment(
         loader=ChoiceLoader([PackageLoader(__package__), FunctionLoader(template_elsewhere)]),
         autoescape=True,
         finalize=None if units == "usual" else in_chosen_units,
@@ -270,6 +278,8 @@ def templates(units: Units = "usual") -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    made.globals |= {"address": address, "single": bool(files)}
+    return made
 
 
 def template_elsewhere(name: str) -> str | None:
@@ -284,16 +294,22 @@ def document(
     running: Running | None = None,
     title: str = "",
     units: Units = "usual",
+    files: Mapping[str, bytes] | None = None,
 ) -> str:
     """Return the whole page: the first section, a list of contents, and the other sections.
 
     running: how the run stands that the page is written beside; title: of the page, `SUBJECT` where
-    there is none; units: of its texts.
+    there is none; units: of its texts; files: pictures, tables and scripts that the page is to
+    hold, by name, in place of those beside it.
     """
+    scripts = [Markup(text.decode()) for name, text in (files or {}).items() if name.endswith("js")]
     data = jobs._asdict() | {"studies": [one._asdict() for one in jobs.studies]}
     facts = Markup(json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"))
-    page = templates(units).get_template("page.html")
-    return page.render(sections=sections, jobs=facts, running=running, title=title, subject=SUBJECT)
+    page = templates(units, files).get_template("page.html")
+    return page.render(
+        sections=sections, jobs=facts, running=running, title=title, subject=SUBJECT,
+        scripts=scripts,
+    )  # fmt: skip
 
 
 def restate_page(page: str, before: Running, now: Running) -> str:

@@ -31,7 +31,6 @@ from compressor.analysis import (
     shaking,
 )
 from compressor.cases import Case, CaseError, points, table, value_in
-from compressor.digits import setting
 from compressor.report.figures import FIGURES, Drawing
 from compressor.report.figures import Figure as PaperFigure
 from compressor.report.figures.diagnosis import (
@@ -41,6 +40,7 @@ from compressor.report.figures.diagnosis import (
     draw_diagnosis_spectra,
 )
 from compressor.report.figures.sweep_data import MEASURES, measures
+from compressor.report.inputs import spelt
 from compressor.report.page import (
     Cell,
     PageTable,
@@ -78,6 +78,15 @@ def is_of_paper(stored: Stored, study: StoredStudy) -> bool:
     count = sum(at >= 0 for at in stored.rows.find([*study.keys]))
     labels = {case.physics_key for case in paper_cases().values()}
     return 0 < count == len(paper_candidates(stored, [study], labels))
+
+
+def repeats_paper(study: StoredStudy, paper: PaperRuns) -> bool:
+    """Return whether all of a study is told as the paper's cases: whole faults, and no notes."""
+    names = {name for name, run in paper.stored.items() if run.attrs["key"] in study.keys}
+    faults = [{label(fault, clearance) for clearance in CLEARANCES} for fault in FAULTS]
+    is_whole = all(not fault & names or fault <= names for fault in faults)
+    shown = {run.attrs["key"] for run in paper.stored.values()}
+    return is_whole and shown.issuperset(study.keys) and not (study.title or study.notes)
 
 
 def find_runs(
@@ -205,21 +214,6 @@ def follows(case: Case, values: Mapping[str, Any], key: str) -> bool:
         return Case.resolve(rest).physics_key == case.physics_key
     except CaseError:
         return False  # what is left fits no more
-
-
-def spelt(value: Any, unit: str) -> str:
-    """Return a value as a case file has it, with its unit."""
-    if value is None:
-        return "none"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, Mapping):
-        return ", ".join(f"{name} {spelt(item, '')}" for name, item in value.items())
-    if isinstance(value, list | tuple):
-        return ", ".join(map(str, value))
-    if isinstance(value, int | float):
-        return setting(value) + (f" {unit}" if unit else "")
-    return str(value)
 
 
 WORN_LABELS = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)

@@ -7,8 +7,9 @@ of the same data by the same code, are not drawn again.
 
 import contextlib
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -35,7 +36,13 @@ from compressor.report.figures import FIGURES
 from compressor.report.figures.pictures import Painter
 from compressor.report.figures.plant_units import in_units
 from compressor.report.figures.sweep import draw_sweep
-from compressor.report.interactive import job_scripts, publish_library, series_name
+from compressor.report.interactive import (
+    LIBRARY,
+    job_scripts,
+    library_path,
+    publish_library,
+    series_name,
+)
 from compressor.report.limits import Limits, read_limits
 from compressor.report.page import (
     Add,
@@ -60,6 +67,7 @@ from compressor.report.paper_sections import (
     label_in_words,
     missing_sections,
     paper_sections,
+    repeats_paper,
     second_anchor,
     second_drawings,
     second_name,
@@ -80,6 +88,7 @@ from compressor.store import (
     Folder,
     Stored,
     StoredStudy,
+    find_study,
     publish,
     read_store,
     read_studies,
@@ -99,28 +108,36 @@ def write_report(
     running: Running | None = None,
     limits: Sequence[str] = (),
     units: Units = "usual",
+    studies: Sequence[str] = (),
+    single: bool = False,
 ) -> Path:
     """Write figures and `index.html` about a folder of results; returns the page's path.
 
     add: what makes more of the page, such as `compressor.studies.page_additions` gives. running:
     how the run stands that still adds to the results; the page says so, and loads itself again.
     limits: of metrics, whose zones tables and curves show, such as
-    `sensor_peak=20,50 m/s²`. units: of figures, tables and texts, of `compressor.units`.
+    `sensor_peak=20,50 m/s²`. units: of figures, tables and texts, of `compressor.units`. studies:
+    names of those to tell of, in this order, by default all, those of searches last. single: report
+    is a file, the page with all that it needs in it.
 
     Raises LimitError where these cannot be used, StoreError where there are no results, or the
     report's folder cannot be written.
     """
     folder, zones = Path(report), read_limits(limits, units)
     with Painter(folder) as painter:
-        contents = build_report(results, command, add, running, painter, zones, units)
+        contents = build_report(results, command, add, running, painter, zones, units, studies)
         files = painter.finish()
     for plate in contents.plates:
         files |= {name: text.encode() for name, text in plate.texts.items()}
     files |= {f"{series_name(key)}.js": text.encode() for key, text in contents.series.items()}
+    if single:
+        page = contents.page({LIBRARY: library_path().read_bytes()} | files)
+        publish(folder, page.encode(errors="backslashreplace"))
+        return folder
     for name, content in files.items():
         publish_changed(folder / name, content)
     publish_library(folder)
-    publish(folder / "index.html", contents.page.encode(errors="backslashreplace"))
+    publish(folder / "index.html", contents.page({}).encode(errors="backslashreplace"))
     remove_stale(folder, contents)
     return folder / "index.html"
 
@@ -144,12 +161,15 @@ def restate(report: Folder, before: Running, now: Running) -> None:
 
 
 class ReportContent(NamedTuple):
-    """A report that is drawn: its figures, the names of its studies, series by job, its page."""
+    """A report that is drawn: its figures, the names of its studies, series by job, its page.
+
+    `page`: returns its text, which holds the files that it is given.
+    """
 
     plates: list[Plate]
     studies: list[str]
     series: dict[str, str]
-    page: str
+    page: Callable[[Mapping[str, bytes]], str]
 
 
 def build_report(
@@ -160,10 +180,12 @@ def build_report(
     painter: Painter,
     limits: Limits,
     units: Units = "usual",
+    names: Sequence[str] = (),
 ) -> ReportContent:
     """Return the figures, series and page of a report, in memory.
 
-    painter: it gets each figure as soon as there is one; limits, units: see `write_report`.
+    painter: it gets each figure as soon as there is one; limits, units, names: of studies, see
+    `write_report`.
     """
 
     def begin(plates: Sequence[Plate]) -> None:
@@ -171,7 +193,7 @@ def build_report(
         for plate in plates:
             painter.add(plate.name, plate.drawing, plate.heading)
 
-    studies, stored = read_studies(results), read_store(results).warned()
+    studies, stored = choose_studies(results, names), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
     papers = [study for study in studies if is_of_paper(stored, study)]
     if not papers:
@@ -185,8 +207,7 @@ def build_report(
     }
     found = shakings(paper)
     of_faults = plates_in([Plate(*parts) for parts in diagnosis_drawings(found, paper)], units)
-    shown = {run.attrs["key"] for run in paper.stored.values()}
-    own = [study for study in studies if not shown.issuperset(study.keys)]
+    own = [study for study in studies if not repeats_paper(study, paper)]
     added = [one(results, studies) for one in add]
     drawn = [
         drawn_study(
@@ -221,10 +242,22 @@ def build_report(
     ]
     series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs.jobs, units)}
     jobs = JobsToOpen(shlex.quote(str(results)), [one.jobs for one in drawn], [*series])
-    titles = {study.title for study in studies if study.title}
+    titled = [study for study in studies if study.title]
+    titles = {study.title for study in titled if not study.is_trial or titled[0].is_trial}
     title = titles.pop() if len(titles) == 1 else ""  # several machines have it in their sections
-    page = document(sections, jobs, running, title, units)
+    page = partial(document, sections, jobs, running, title, units)
     return ReportContent([*of_paper, *later], [study.name for study in studies], series, page)
+
+
+def choose_studies(results: Folder, names: Sequence[str]) -> list[StoredStudy]:
+    """Return the studies of some names, by default all, those of searches last.
+
+    Raises WrongName with the nearest names.
+    """
+    if not names:
+        return sorted(read_studies(results), key=lambda study: study.is_trial)
+    known = read_studies(results, former=True)
+    return [find_study(results, name, known) for name in dict.fromkeys(names)]
 
 
 def plates_in(plates: Sequence[Plate], units: Units) -> list[Plate]:
@@ -304,9 +337,8 @@ def summarise(
 ) -> FirstScreen:
     """Return the page's first screen; judged: the paper's claims."""
     lines = [one.line for one in drawn]
-    each: list[tuple[str, Sequence[MetricChange]]] = [
-        (one.line.name, one.findings) for one in drawn
-    ]
+    told = [one for study, one in zip(own, drawn, strict=True) if not study.is_trial] or drawn
+    each: list[tuple[str, Sequence[MetricChange]]] = [(one.line.name, one.findings) for one in told]
     if paper.stored:
         failed = [n for n, run in paper.stored.items() if str(run["status"].item()) != "ok"]
         counts = f"{len(paper.stored)} of 11 stored" + (f", {len(failed)} failed" if failed else "")

@@ -11,6 +11,7 @@ import xarray as xr
 from compressor.outcome import Regime, regime_words
 from compressor.reasons import remedy
 from compressor.report.figures.sweep_data import measures, swept_values
+from compressor.report.inputs import Inputs, find_inputs
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.report.page import (
     Cell,
@@ -59,7 +60,7 @@ class StudyContent:
     `second_set`: the id of the section with its own Figures 8 to 16, empty where it has none;
     `notes`: lines that others add; `caveats`: what to know beside the numbers, a sentence each;
     `title`, `about`: what its case file says of the machine; `settings`: what `--set` changed;
-    `beside`: the machine without clearance.
+    `beside`: the machine without clearance; `inputs`: what was given, swept and assumed.
     """
 
     case_file: str
@@ -76,6 +77,7 @@ class StudyContent:
     about: str = ""
     settings: Sequence[str] = ()
     beside: HealthyAndWorn | None = None
+    inputs: Inputs | None = None
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,7 @@ def study_sections(
         about=study.notes,
         settings=study.again.overrides,
         beside=compare_healthy(stored, data, units),
+        inputs=find_inputs(stored, study),
     )
     regimes = [name for name in Regime if (data["regime"].values == name).any()]
     table = JobsContent(

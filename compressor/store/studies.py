@@ -33,6 +33,7 @@ from compressor.cases import (
     points,
     row_of,
     table,
+    values_given,
 )
 from compressor.program import VERSION, did_you_mean, library_versions
 from compressor.store.files import (
@@ -84,6 +85,7 @@ class StoredStudy:
     is_grid: bool = True
     title: str = ""  # what the page of the report says of the machine
     notes: str = ""
+    given: tuple[str, ...] = ()  # keys that the file gives, and does not sweep
 
     @property
     def jobs(self) -> int:
@@ -94,6 +96,11 @@ class StoredStudy:
         """Return the name of the study that has replaced this one; "" where none has."""
         named = FORMER.fullmatch(self.name)
         return named[1] if named else ""
+
+    @property
+    def is_trial(self) -> bool:
+        """Return whether its jobs are steps of a search, as of `compsim find`, not of a run."""
+        return shlex.split(self.command)[1:2] not in ([], ["run"])
 
     @property
     def again(self) -> "Again":
@@ -245,6 +252,7 @@ def write_study(
         study.is_grid,
         study.title,
         study.notes,
+        tuple(dict.fromkeys(key for block in study.fixed for key in values_given(block))),
     )
     old = _present(folder, study.name)
     if old:
@@ -308,7 +316,10 @@ def read_study(path: Path) -> StoredStudy:
         plain = json.loads(data)
         del plain["digest"]
         axes = (StoredAxis(a["key"], _frozen(a["values"]), a["units"]) for a in plain["axes"])
-        study = StoredStudy(**plain | {"axes": tuple(axes), "keys": tuple(plain["keys"])})
+        study = StoredStudy(
+            **plain
+            | {"axes": tuple(axes), "keys": tuple(plain["keys"]), "given": tuple(plain["given"])}
+        )
         sizes = [len(axis.values) for axis in study.axes]
         if study.is_grid and study.jobs != math.prod(sizes):
             raise ValueError
@@ -354,7 +365,7 @@ def _is_sound(study: StoredStudy, path: Path) -> bool:
         study.name == path.stem
         and bool(study.former_of) == (path.parent.name == "former")
         and not table()["name"].check(study.former_of or study.name)
-        and all(isinstance(text, str) for text in (*texts, *study.versions))
+        and all(isinstance(text, str) for text in (*texts, *study.versions, *study.given))
         and all(KEY.fullmatch(key) for key in study.keys)
         and isinstance(study.fixed, dict)
         and len({axis.key for axis in study.axes} & swept) == len(study.axes)

@@ -15,6 +15,7 @@ from compressor.analysis.claims import Claim
 from compressor.report import page
 from compressor.report.answer import Assumptions, FirstScreen, MetricChange, Provenance, StudyLine
 from compressor.report.figures.drawing import Drawing, Panel
+from compressor.report.inputs import Inputs
 from compressor.report.page import (
     Cell,
     JobFacts,
@@ -118,7 +119,8 @@ def contents(evil):
         ),
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [plate(evil)],
                                    evil(), evil(), [StudyNote(evil(), evil(), evil())],
-                                   evil(), evil(), [evil()], HealthyAndWorn(evil(), table(evil))),
+                                   evil(), evil(), [evil()], HealthyAndWorn(evil(), table(evil)),
+                                   Inputs(*([(evil(), evil())] for _ in range(5)))),
     }  # fmt: skip
 
 

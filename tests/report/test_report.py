@@ -1,5 +1,6 @@
 """The report: what is on the page, what is not, and that nothing on it escapes or reaches out."""
 
+import base64
 import html.parser
 import itertools
 import json
@@ -12,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from compsim import cli
 from conftest import keep, part_of, store
 
 from compressor.analysis.runs import paper_cases
@@ -474,6 +476,99 @@ def test_of_the_paper_nothing_stands_over_a_sweep_of_one_s_own(own, tmp_path):
     assert not {"figures", "claims", "cases", "printed", "missing"} & {*found.ids}
     assert "Figure" not in found.text
     assert "rod 4.7 kg" not in found.text  # the rod's mass is swept, but the other is ours
+
+
+def section(folder, anchor):
+    """The text of a section of the page."""
+    text = (folder / "index.html").read_text(encoding="utf-8")
+    (found,) = re.findall(rf'<section id="{anchor}">(.*?)</section>', text, re.DOTALL)
+    return Reader(found).text
+
+
+def test_a_study_says_what_was_given_swept_and_assumed(own, tmp_path):
+    file = tmp_path / "fed.yaml"
+    file.write_text(
+        "load: gas\njoint: big_end\nclearance_mm: 0.2\n"
+        "machine: {stroke_mm: 240, rod_mass_kg: [3, 5], pin_radius_mm: 10}\n"
+    )
+    store(own, file, overrides=[*SHORT, *DRAFT])
+    write_report(own, tmp_path / "out", studies=["fed"])
+    text = section(tmp_path / "out", "study-fed")
+    _, text = text.split("Inputs The machine without clearance, by what was given ")
+    told, text = text.split(" Given ")
+    given, text = text.split(" Swept ")
+    swept, text = text.split(" Not given: values of the program ")
+    assumed, _ = text.split(" Without clearance and worn ")
+    assert "rod load tension" in told
+    # the stroke and the pin are the program's own values, too, but the file gives them
+    for words in ("load gas", "big end 0.2 mm", "stroke 240 mm", "pin radius 10 mm"):
+        assert words in given
+        assert words not in assumed
+    assert swept == "machine rod mass 3, 5 kg"
+    for words in ("reciprocating mass 14 kg", "speed 500 rpm", "suction 0.105 MPa", "law impact"):
+        assert words in assumed
+        assert words not in given
+    assert "rod mass" not in assumed
+    assert "viscosity" not in assumed  # there is no oil
+
+
+def test_studies_are_chosen_and_trials_come_last(own, tmp_path, capsys):
+    """The 18 jobs of a search headed the page, since their name comes first."""
+    (study,) = read_studies(own)
+    trial = replace(study, name="a-find-x", command="compsim find own.yaml --over x=1:2")
+    (own / "studies" / "a-find-x.json").write_bytes(encode(trial))
+    write_report(own, tmp_path / "out")
+    ids = [name for name in read(tmp_path / "out").ids if name.startswith("study-")]
+    assert ids == ["study-own", "study-a-find-x"]
+    first = section(tmp_path / "out", "answer")
+    assert "Study a-find-x : 4 jobs" in first
+    assert first.count("Peak contact force") == 1
+    assert "The last job of own" in first
+    report = ["report", str(own), "-o", str(tmp_path / "out")]
+    assert cli.main([*report, "a-find-x"]) == 0
+    assert "study-own" not in read(tmp_path / "out").ids
+    assert "Peak contact force" in section(tmp_path / "out", "answer")
+    capsys.readouterr()
+    assert cli.main([*report, "onw"]) == 2
+    assert "did you mean own" in capsys.readouterr().err
+
+
+def test_a_study_among_the_paper_s_cases_keeps_its_section_and_notes(paper_store, tmp_path):
+    """It was told by the paper's figures alone; so was one of two of the three clearances."""
+    for name in ("rows", "jobs", "studies"):
+        shutil.copytree(paper_store / name, tmp_path / "part" / name)
+    whole = next(one for one in read_studies(paper_store) if one.name == "big-end")
+    two = replace(whole, name="two", keys=whole.keys[:2],
+                  axes=(replace(whole.axes[0], values=whole.axes[0].values[:2]),))  # fmt: skip
+    noted = replace(whole, name="noted", title="Unit 3", notes="Rod weighed in March.")
+    for one in (two, noted):
+        (tmp_path / "part" / "studies" / f"{one.name}.json").write_bytes(encode(one))
+    write_report(tmp_path / "part", tmp_path / "out")
+    found = [name for name in read(tmp_path / "out").ids if name.startswith("study-")]
+    assert found == ["study-noted", "study-two"]
+    assert "Rod weighed in March." in section(tmp_path / "out", "study-noted")
+
+
+def test_a_page_is_one_file(own, tmp_path, capsys):
+    """By mail the page came without its figures."""
+    assert cli.main(["report", str(own), "--single", "-o", str(tmp_path / "mailed")]) == 0
+    out, err = capsys.readouterr()
+    file = tmp_path / "mailed.html"
+    assert out == f"{file}\n"
+    assert f"{file.stat().st_size / 1e6:.1f} MB, all in one file" in err
+    assert not (tmp_path / "mailed").exists()
+    text = file.read_text(encoding="utf-8")
+    found = Reader(text)
+    assert found.sources
+    for source in (*found.sources, *(link for link in found.links if link[0] != "#")):
+        kind, data = source.split(";base64,")
+        assert kind in ("data:image/png", "data:text/csv")
+        assert base64.b64decode(data)
+    write_report(own, tmp_path / "out")
+    for script in (tmp_path / "out").glob("*.js"):
+        assert script.read_text(encoding="utf-8").strip() in text
+    pictures = {path.read_bytes() for path in (tmp_path / "out").glob("*.png")}
+    assert {base64.b64decode(one.split(",")[1]) for one in found.sources} == pictures
 
 
 def test_failed_jobs_are_highlighted_and_everything_is_escaped(own, tmp_path):

@@ -190,7 +190,9 @@ class Figure {
 
   async start() {
     try {
-      await Promise.all([script(LIBRARY), script(`${this.name}.js`)]);
+      // in a single file both are there already
+      await Promise.all([window.Plotly ?? script(LIBRARY),
+        sheets.has(this.name) || script(`${this.name}.js`)]);
       this.sheet = sheets.get(this.name);
       this.build();
       drawn.push(this);

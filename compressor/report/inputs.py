@@ -1,0 +1,108 @@
+"""The inputs of a study: what they mean for the machine; what was given, swept and assumed."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from compressor.analysis import describe_cases
+from compressor.cases import DOUBLES, reads, stands_for, table, value_in
+from compressor.digits import setting
+from compressor.report.figures.sweep_data import name_in_words
+from compressor.store import Stored, StoredStudy
+
+MAX_CASES = 50  # of a study whose machine is described
+MAX_VALUES = 10  # of a swept key that are listed
+NOT_ASSUMED = ("name", "output", "solve", "initial_offset_mm", "healthy_clearance_mm")
+
+HALVES = {half: whole for whole, half in DOUBLES.items()}  # stroke and bore are told as such
+
+Lines = Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """The inputs of a study, a line a thing or a group of keys: its name, and values with units.
+
+    `machine`: its numbers without clearance; `remarks`: on those that are implausible, by key;
+    `assumed`: values of the program, which the file does not give.
+    """
+
+    machine: Lines
+    remarks: Lines
+    given: Lines
+    swept: Lines
+    assumed: Lines
+
+
+def find_inputs(stored: Stored, study: StoredStudy) -> Inputs | None:
+    """Return the inputs of a study; None where this version knows no case of it."""
+    places = [place for place in stored.rows.find([*study.keys]).tolist() if place >= 0]
+    places = places[:: -(-len(places) // MAX_CASES) or 1]
+    cases = [case for place in places if (case := stored.case_at(place))]
+    if not cases:
+        return None
+    machine = describe_cases(cases)
+    swept = {part for axis in study.axes for part in (axis.key, *stands_for(axis.key))}
+    fixed = {
+        key: value
+        for key, row in table().items()
+        if key not in swept and (value := value_in(study.fixed, key)) is not None
+    }
+    # one number of a group such as clearance_mm is that of the joints that have any
+    parts = {part for key in study.given for part in stands_for(key) if fixed.get(part)}
+    given = {key: value for key, value in fixed.items() if key in parts.union(study.given)}
+    assumed = {
+        key: value
+        for key, value in fixed.items()
+        if key not in given and key.partition(".")[0] not in NOT_ASSUMED and reads(cases[0], key)
+    }
+    return Inputs(
+        machine.lines,
+        [*machine.remarks().items()],
+        by_group(given),
+        by_group({axis.key: [*dict.fromkeys(axis.values)] for axis in study.axes}),
+        by_group(assumed),
+    )
+
+
+def by_group(values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return a line for each group of keys: its name, and its keys with values and units."""
+    found: dict[str, list[str]] = {}
+    for key, value in values.items():
+        group, _, name = key.rpartition(".")
+        row = table().get(key)
+        unit = (row.unit or "") if row else ""
+        if key in HALVES and isinstance(value, int | float):
+            name, value = HALVES[key].rpartition(".")[2], 2.0 * value
+        words = name_in_words(re.sub("_(N_per_mm15|percent)$", "", name), unit)
+        text = f"{words} {spell_values(value, unit)}"
+        found.setdefault(name_in_words(group, "mm") or "scene", []).append(text)
+    return [(group, "; ".join(words)) for group, words in found.items()]
+
+
+def spell_values(value: Any, unit: str) -> str:
+    """Return a value, or those of a swept key, with the unit."""
+    if not isinstance(value, list) or len(value) == 1:
+        return spelt(value[0] if isinstance(value, list) else value, unit)
+    values = [one for one in value if one is not None]
+    if len(values) <= MAX_VALUES or not all(isinstance(one, int | float) for one in values):
+        shown = ", ".join(spelt(one, "") for one in values[:MAX_VALUES])
+        more = f" and {len(values) - MAX_VALUES} more" if len(values) > MAX_VALUES else ""
+        return f"{shown}{more} {unit}".rstrip()
+    return f"{len(values)} values from {spelt(min(values), '')} to {spelt(max(values), unit)}"
+
+
+def spelt(value: Any, unit: str) -> str:
+    """Return a value as a case file has it, with its unit."""
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {spelt(item, '')}" for name, item in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(map(str, value))
+    if isinstance(value, int | float):
+        return setting(value) + (f" {unit}" if unit else "")
+    return str(value).replace("_", " ")
