@@ -81,7 +81,8 @@ class RecordFile:
         """Return what the file has, for an error that something is missing."""
         found = ", ".join(one.name for one in self.channels)
         found = f"only {found}" if found else "no signals"
-        left = f"; beside them {'; '.join(self.unused)}" if self.unused else ""
+        link = "; no signals are" if self.channels else ", but"
+        left = f"{link} {'; '.join(self.unused)}" if self.unused else ""
         return f"{found}{left}" + (f" ({self.layout}; {LAYOUT})" if self.layout else "")
 
     def place(self, number: int, sample: int) -> str:

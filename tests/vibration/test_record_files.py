@@ -588,7 +588,7 @@ def test_a_matlab_file_says_what_is_no_signal(tmp_path):
     savemat(path, {"data": {"t": TIMES}, "z": VALUES + 1j, "c": np.array([1, "a"], dtype=object)})
     with pytest.raises(RecordError) as found:
         read_record(path)
-    for told in ("no signals; beside them", "data (a struct with t: save its arrays)",
+    for told in ("no signals, but ", "data (a struct with t: save its arrays)",
                  "z (complex numbers)", "c (a cell array or table"):  # fmt: skip
         assert told in str(found.value)
 

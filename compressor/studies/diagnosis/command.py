@@ -124,10 +124,11 @@ def identify(
 
     The record is a file, .csv, .wav, .mat or .uff. The simplest is a CSV file with the
     columns time_s, acceleration_m_per_s2 and tacho, a signal that rises at each top dead centre;
-    or without tacho, with --rpm and --tdc. What a file does not say, options do. Or it is a stored
-    job with a sensor's record, named by its key or the beginning of it; it is then left out of the
-    study. Joints are ranked by probability, where the study's shares of them are the prior, and
-    each clearance has a 90 % interval. Where no joint of the study fits, that is said first.
+    or without tacho, with --rpm and --tdc. Text as analysers write it is read, too, with
+    decimal commas and titles such as Acc [g]. What a file does not say, options do. Or it is a
+    stored job with a sensor's record, named by its key or the beginning of it; it is then left out
+    of the study. Joints are ranked by probability, where the study's shares of them are the prior,
+    and each clearance has a 90 % interval. Where no joint of the study fits, that is said first.
 
     Exit code 0 also where nothing fits: that is an answer.
     """
