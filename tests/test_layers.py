@@ -55,6 +55,7 @@ LIBRARIES = {  # library -> the modules that may import it
         "compressor.studies.search.find",
         "compressor.studies.calibrate.fit",
         "compressor.solve.bearing",
+        "compressor.solve.measured_gas",
         "compressor.solve.scipy_driver",
         "compressor.solve.run_metrics",
         "compressor.vibration",

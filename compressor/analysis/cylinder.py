@@ -19,8 +19,9 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis.runs import case_of, record_of
-from compressor.cases import Case, open_card, to_si
-from compressor.physics import card_nodes, exact_motion, sample_segments, segments
+from compressor.cases import Case, Machine, to_si
+from compressor.physics import exact_motion, sample_segments, segments
+from compressor.solve import gas_nodes
 
 
 class IdealCycle(NamedTuple):
@@ -70,9 +71,8 @@ def card_works(case: Case) -> dict[str, float]:
     """
     machine, works = case.machine, {}
     radius, length = to_si(machine.crank_radius_mm, "mm"), to_si(machine.rod_length_mm, "mm")
-    for end, path in case.gas.cards.items():
-        card = open_card(path)
-        pressure = 1e6 * card_nodes(card.angles, card.pressures)[:, 0]
+    for end in case.gas.cards:
+        pressure = gas_nodes(case, end)[:, 0]
         angles = np.linspace(0.0, 2.0 * math.pi, pressure.size + 1)
         x, *_ = exact_motion(angles, radius, length, 1.0)
         mean = (pressure + np.roll(pressure, -1)) / 2.0
@@ -101,36 +101,55 @@ def end_states(run: xr.Dataset) -> dict[str, EndState]:
     angles, x = run["crank_angle"].values, 1e3 * run["displacement"].values
     edges, phases = segments(p, angles[-1] / p.omega)
     now = phases[sample_segments(angles / p.omega, edges)]
+    beyond = _stroke_begins(angles, x, machine)
     radius, states = machine.crank_radius_mm, {}
     for end in filter(gas.presses, ("head", "crank")):
         clearance = 0.0 if gas.is_measured else gas.clearance(end, 2 * radius)
         top, bottom = machine.rod_length_mm + radius, machine.rod_length_mm - radius
         space = clearance + (top - x if end == "head" else x - bottom)
         if gas.is_measured:
-            pressure = _card_pressures(gas.cards[end], angles)
+            pressure = _card_pressures(case, end, angles)
         else:
             phase = now % 4 if end == "head" else now // 4
-            pressure = _cycle_pressures(case, end, phase, space)
+            begun = clearance - beyond if end == "head" else clearance + beyond
+            pressure = _cycle_pressures(case, end, phase, space, begun)
         states[end] = EndState(1e3 * _face(case, end) * space / 1e3, pressure)
     return states
 
 
-def _card_pressures(path: str, angles: np.ndarray) -> np.ndarray:
-    """Return the pressures (MPa) of a card at crank angles (rad)."""
-    card = open_card(path)
-    nodes = card_nodes(card.angles, card.pressures)[:, 0]
+def _card_pressures(case: Case, end: str, angles: np.ndarray) -> np.ndarray:
+    """Return the pressures (MPa) of an end's card at crank angles (rad)."""
+    nodes = gas_nodes(case, end)[:, 0] / to_si(1.0, "MPa")
     at = np.linspace(0.0, 2.0 * math.pi, nodes.size + 1)
     return np.interp(angles % (2.0 * math.pi), at, np.append(nodes, nodes[0]))
 
 
-def _cycle_pressures(case: Case, end: str, phase: np.ndarray, space: np.ndarray) -> np.ndarray:
-    """Return the pressures (MPa) of an end's cycle by its phase and its space (mm)."""
+def _stroke_begins(angles: np.ndarray, x: np.ndarray, machine: Machine) -> np.ndarray:
+    """Return how far (mm) the crosshead was beyond its ideal place at the last dead centre.
+
+    angles: rad, x: mm, both of samples, (m,); straight between those beside a dead centre. What
+    begins within a stroke has that of its first sample until the next one.
+    """
+    ideal, *_ = exact_motion(angles, machine.crank_radius_mm, machine.rod_length_mm, 1.0)
+    centres = math.pi * np.floor(angles / math.pi + 1e-9)
+    return np.interp(centres, angles, x - ideal)
+
+
+def _cycle_pressures(
+    case: Case, end: str, phase: np.ndarray, space: np.ndarray, clearance: np.ndarray
+) -> np.ndarray:
+    """Return the pressures (MPa) of an end's cycle by its phase and its space (mm).
+
+    clearance: by which its gas was shut in (mm).
+    """
     gas, stroke = case.gas, 2 * case.machine.crank_radius_mm
     if not gas.has_cycle(end):
         return np.full(space.size, gas.suction_MPa)
-    (inlet, outlet), clearance = gas.open_pressures, gas.clearance(end, stroke)
+    inlet, outlet = gas.open_pressures
     expanded = outlet * (clearance / space) ** gas.exponent
     compressed = inlet * ((clearance + stroke) / space) ** gas.exponent
+    if gas.switching == "exact":
+        return np.clip(np.where(phase < 2, expanded, compressed), inlet, outlet)
     return np.choose(phase, [expanded, inlet, compressed, outlet])
 
 

@@ -1,30 +1,40 @@
-"""Indicator cards: cylinder pressure over the crank's angle, as measured, from CSV files.
+"""Indicator cards: cylinder pressure over the crank's angle, as measured, from text files.
 
-A file has columns `crank_angle_deg` (0 at top dead centre, any step, rising) and `pressure_MPa`
-(absolute), of one revolution or of several, which are averaged on the first one's angles. A case
-holds where a card is and a digest of its numbers, `/data/head.csv@0123456789abcdef0123`; the digest
-is what a job's key has of it.
+A file has a column `crank_angle_deg` (0 at top dead centre, any step, rising) and a pressure for
+each end that it is of: `pressure_bar`, or `head_pressure_bar` and `crank_pressure_bar`; other units
+stand in `UNITS`, and a `g` behind one says that it counts from the ambient pressure. It has one
+revolution or several, which are averaged on the first one's angles. A case holds where a card is
+and a digest of its numbers, `/data/head.csv@0123456789abcdef0123`; the digest is what a job's key
+has of it.
 """
 
-import csv
 import hashlib
 import math
 import os
 import re
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
+from compressor.cases.text_table import TextTableError, open_text_table
 from compressor.program import CompsimError
 
-COLUMNS = ("crank_angle_deg", "pressure_MPa")
+UNITS = {"mpa": 1.0, "kpa": 1e-3, "bar": 0.1, "psi": 6.894757293168e-3}  # MPa
+ANGLE = re.compile(r"(crank_)?angle(_deg|_degrees)?")  # names of columns, as `_plain` writes them
+PRESSURE = re.compile(rf"((head|he|crank|ce)_(end_)?)?(pressure|p)_({'|'.join(UNITS)})([ag]?)")
+NEEDED = (
+    "a card needs crank_angle_deg and pressure_bar, or head_pressure_bar and crank_pressure_bar; "
+    "or MPa, kPa, psi; with a g, as in pressure_barg, they count from the ambient pressure"
+)
 MARKED = re.compile(r"(?s)(.+)@([0-9a-f]{20})")
 MAX_GAP = 20.0  # degrees between neighbours: more leaves a valve's opening to a guess
 MAX_BYTES = 50_000_000
 PRESSURES = (1e-3, 100.0)  # MPa: all below, or any above, are of another unit
+LEAST_GAUGE = -0.102  # MPa
 CLOSING = 1e-6  # degrees: a last sample so near to a whole revolution is the first one's angle
+DRIVING = -0.02  # of pressure range times stroke: work that the gas of no compressor gives
 
 
 class CardError(CompsimError):
@@ -40,17 +50,18 @@ class Card(NamedTuple):
     pressures: tuple[float, ...]  # MPa
     revolutions: int
     scatter: float  # standard deviation of revolutions, rms over angles, MPa; 0 of one
+    is_gauge: bool  # whether pressures count from the ambient one
 
 
-def mark_card(value: str) -> str:
-    """Return the path of a card with the digest of its numbers; one that has it as it is.
+def mark_card(value: str, end: str) -> str:
+    """Return the path of an end's card with the digest of its numbers; one that has it as it is.
 
-    Raises CardError for a file that is no card.
+    end: head or crank. Raises CardError for a file that is no card.
     """
     if MARKED.fullmatch(value):
         return value
     path = os.path.abspath(value)
-    return f"{path}@{digest_of(read_card(path))}"
+    return f"{path}@{digest_of(read_card(path, end))}"
 
 
 def digest_of(card: Card) -> str:
@@ -58,94 +69,97 @@ def digest_of(card: Card) -> str:
     return hashlib.sha256(repr(card).encode()).hexdigest()[:20]
 
 
-def open_card(value: str) -> Card:
-    """Return the card that a case holds. Raises CardError where its numbers are no longer so."""
+def open_card(value: str, end: str) -> Card:
+    """Return the card that a case holds of an end, head or crank.
+
+    Raises CardError where its numbers are no longer so.
+    """
     found = MARKED.fullmatch(value)
     path, digest = found.groups() if found else (value, "")
-    card = read_card(path)
+    card = read_card(path, end)
     if digest != digest_of(card):
         raise CardError(f"{path}: has changed since the case was made: read the case file again")
     return card
 
 
-def read_card(path: str) -> Card:
-    """Return the mean revolution of a file. Raises CardError, with file and line."""
+def read_card(path: str, end: str) -> Card:
+    """Return the mean revolution of an end in a file. Raises CardError, with file and line."""
     try:
         about = os.stat(path)
         if about.st_size > MAX_BYTES:
             raise CardError(f"{path}: is larger than {MAX_BYTES / 1e6:g} MB")
-        return _read_card(path, about.st_mtime_ns, about.st_size)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        text = error.strerror if isinstance(error, OSError) else str(error)
-        raise CardError(f"{path}: cannot be read: {text}") from error
+        return _read_card(path, end, about.st_mtime_ns, about.st_size)
+    except OSError as error:
+        raise CardError(f"{path}: cannot be read: {error.strerror}") from error
+    except TextTableError as error:
+        raise CardError(f"{error}; {NEEDED}") from error
 
 
 @lru_cache(maxsize=32)
-def _read_card(path: str, modified: int, size: int) -> Card:
-    with open(path, newline="", encoding="utf-8-sig") as file:
-        rows = [*_rows(path, file)]
-    if not rows:
-        raise CardError(f"{path}:1: holds no samples")
-    _check_pressures(path, rows)
-    return _mean_revolution(path, rows)
+def _read_card(path: str, end: str, modified: int, size: int) -> Card:
+    table = open_text_table(path)
+    angle, pressure, factor, is_gauge = _find_columns(path, table.names, end)
+    lines, (angles, values) = table.read_columns([angle, pressure])
+    rows = [*zip(lines, angles, (factor * value for value in values), strict=True)]
+    _check_angles(path, rows)
+    _check_pressures(path, rows, table.names[pressure], is_gauge)
+    return _mean_revolution(path, rows, is_gauge)
 
 
 Row = tuple[int, float, float]  # line, degrees, MPa
 
 
-def _rows(path: str, file: Iterator[str]) -> Iterator[Row]:
-    """Yield the samples of a file; angles rise."""
-    reader = csv.reader(file)
-    heads = [name.strip() for name in next(reader, [])]
-    for name in COLUMNS:
-        if name not in heads:
-            given = ", ".join(heads) or "none"
-            raise CardError(
-                f"{path}:1: has no column {name}; its columns are {given[:100]}. A card needs "
-                f"{' and '.join(COLUMNS)}, absolute: 1 bar is 0.1 MPa"
-            )
-    places = [heads.index(name) for name in COLUMNS]
-    before = -math.inf
-    for words in reader:
-        line = reader.line_num
-        if not any(word.strip() for word in words):
-            continue
-        numbers = []
-        for name, place in zip(COLUMNS, places, strict=True):
-            text = words[place].strip() if place < len(words) else ""
-            try:
-                number = float(text)
-            except ValueError:
-                number = math.nan
-            if not math.isfinite(number):
-                raise CardError(f"{path}:{line}: {name} needs a number, not {text[:40]!r}")
-            numbers.append(number)
-        angle, pressure = numbers
+def _plain(name: str) -> str:
+    """Return a column's name in small letters, its other signs as `_`."""
+    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
+
+
+def _find_columns(path: str, names: Sequence[str], end: str) -> tuple[int, int, float, bool]:
+    """Return the columns of the angle and of an end's pressure, its unit in MPa, and if gauge.
+
+    A column of the end's own comes before one that names none. Raises CardError.
+    """
+    plain = [_plain(name) for name in names]
+    angles = [k for k, name in enumerate(plain) if ANGLE.fullmatch(name)]
+    found = [(k, match) for k, name in enumerate(plain) if (match := PRESSURE.fullmatch(name))]
+    own = [(k, match) for k, match in found if (match[2] or "")[:1] == end[0]]
+    pressures = own or [(k, match) for k, match in found if not match[2]]
+    for what, columns in (("crank angle", angles), (f"pressure of the {end} end", pressures)):
+        if len(columns) != 1:
+            given = ", ".join(names)[:100]
+            number = "no column" if not columns else f"{len(columns)} columns"
+            raise CardError(f"{path}: has {number} for the {what}; it has {given}; {NEEDED}")
+    place, match = pressures[0]
+    return angles[0], place, UNITS[match[5]], match[6] == "g"
+
+
+def _check_angles(path: str, rows: Sequence[Row]) -> None:
+    """Raise CardError for angles that do not rise, or leave a gap."""
+    for (_, before, _), (line, angle, _) in pairwise(rows):
         if angle <= before:
             raise CardError(f"{path}:{line}: angles must rise, and {angle:g} follows {before:g}")
-        if angle - before > MAX_GAP and before > -math.inf:
+        if angle - before > MAX_GAP:
             raise CardError(
                 f"{path}:{line}: a gap of {angle - before:g} degrees before {angle:g}; at most "
                 f"{MAX_GAP:g} are bridged"
             )
-        before = angle
-        yield line, angle, pressure
 
 
-def _check_pressures(path: str, rows: Sequence[Row]) -> None:
-    """Raise CardError for pressures that cannot be absolute ones in MPa."""
+def _check_pressures(path: str, rows: Sequence[Row], name: str, is_gauge: bool) -> None:
+    """Raise CardError for pressures that cannot be of the unit of their column."""
     low, high = PRESSURES
-    unit = "give absolute pressures in MPa: 1 bar is 0.1, 1 kPa 0.001, 1 Pa 1e-6"
+    least = LEAST_GAUGE if is_gauge else 0.0
+    unit = f"is {name} the column's unit? {NEEDED}"
     for line, _, pressure in rows:
-        if pressure <= 0.0:
-            raise CardError(f"{path}:{line}: {pressure:g} MPa is no absolute pressure; {unit}")
+        if pressure <= least:
+            raise CardError(f"{path}:{line}: {pressure:g} MPa is below a vacuum; {unit}")
         if pressure > high:
             raise CardError(f"{path}:{line}: {pressure:g} MPa is above {high:g}; {unit}")
     if all(pressure < low for _, _, pressure in rows):
         raise CardError(f"{path}:{rows[0][0]}: all pressures are below {low:g} MPa; {unit}")
 
 
-def _mean_revolution(path: str, rows: Sequence[Row]) -> Card:
+def _mean_revolution(path: str, rows: Sequence[Row], is_gauge: bool) -> Card:
     """Return the mean of the revolutions of samples, on the first one's angles."""
     first, last = rows[0][1], rows[-1][1]
     whole = round((last - first) / 360.0)
@@ -180,7 +194,7 @@ def _mean_revolution(path: str, rows: Sequence[Row]) -> Card:
     angles, pressures = zip(*turned, strict=True)
     if any(after <= before for before, after in pairwise(angles)):
         raise CardError(f"{path}: an angle stands twice in a revolution")
-    return Card(angles, pressures, count, scatter)
+    return Card(angles, pressures, count, scatter, is_gauge)
 
 
 def _between(angle: float, turn: Sequence[tuple[float, float]]) -> float:
@@ -191,3 +205,20 @@ def _between(angle: float, turn: Sequence[tuple[float, float]]) -> float:
     right = turn[place] if place < len(turn) else (first[0] + 360.0, first[1])
     share = (angle - left[0]) / (right[0] - left[0])
     return left[1] + share * (right[1] - left[1])
+
+
+def taken_work(card: Card, end: str, crank_radius: float, rod_length: float) -> float:
+    """Return the work that an end's gas takes in a revolution, over its pressure range and stroke.
+
+    About 0.4 of a compressor, and negative of an engine. end: head or crank; lengths in one unit.
+    """
+    radians = [math.radians(angle) for angle in card.angles]
+    places = [
+        crank_radius * math.cos(a) + math.sqrt(rod_length**2 - (crank_radius * math.sin(a)) ** 2)
+        for a in radians
+    ]
+    turn = [*zip(places, card.pressures, strict=True)]
+    pairs = pairwise([*turn, turn[0]])
+    work = math.fsum(0.5 * (p + q) * (y - x) for (x, p), (y, q) in pairs)
+    span = 2.0 * crank_radius * (max(card.pressures) - min(card.pressures))
+    return (work if end == "head" else -work) / span if span else 0.0

@@ -28,7 +28,7 @@ from compressor.cases.checks import (
     values_given,
 )
 from compressor.cases.conflicts import IN_KEY_IF_READ, conflicts, reads, values_read
-from compressor.cases.groups import CARD_KEYS, Contact, HealthyClearance, Solve
+from compressor.cases.groups import ATMOSPHERE_MPA, CARD_KEYS, Contact, HealthyClearance, Solve
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
 from compressor.cases.optional_groups import fill_guide, fill_wear
 from compressor.cases.parameter import (
@@ -235,8 +235,8 @@ class Case(Settings):
     def find_changed_card(self) -> str:
         """Return what is wrong with the file of an indicator card now; "" for nothing."""
         try:
-            for card in self.gas.cards.values() if self.load == "gas" else ():
-                open_card(card)
+            for end, card in self.gas.cards.items() if self.load == "gas" else ():
+                open_card(card, end)
         except CardError as error:
             return str(error)
         return ""
@@ -325,13 +325,32 @@ def _values_to_read(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def plain_values(values: Mapping[str, Any], problems: list[Problem]) -> dict[str, Any]:
-    """Return nested values without shorthands and synonyms, and with the geometry of materials."""
+    """Return nested values without shorthands and synonyms, and with what follows from others.
+
+    That is the geometry of materials, and the corners and the back pressure of a cylinder of one's
+    own, which a value of it that is the paper's by chance leaves one's own.
+    """
     whole = expand_shorthands(expand_synonyms(values, problems))
     given = values_given(whole)
     pins = given.keys() & {*PER_PART["machine.pin_radius_mm"].values()}
     if pins and "contact.materials" in given and "contact.geometry" not in given:
         whole["contact"] = {**whole["contact"], "geometry": "internal"}
+    group = whole.get("gas", {})
+    if has_own_cylinder(whole, given) and isinstance(group, Mapping):
+        followed = {"switching": "exact", "back_pressure_MPa": ATMOSPHERE_MPA}
+        whole["gas"] = followed | dict(group)
     return whole
+
+
+def has_own_cylinder(values: Mapping[str, Any], given: Container[str]) -> bool:
+    """Return whether a cylinder is not the paper's; given: the dotted keys of nested values."""
+    keys = (key for key in table() if key.startswith("gas."))
+    if any(key in given and key not in FOLLOWING for key in keys):
+        return True
+    has_gas = values.get("load") in ("gas", "typical")
+    return has_gas and any(
+        key in given for key in ("machine.crank_radius_mm", "machine.rod_length_mm")
+    )
 
 
 def identity_parts(case: Case, names: Container[str] = IDENTITY) -> dict[str, str]:
@@ -501,6 +520,7 @@ def with_ideal_joints(case: Case) -> Case:
     return replace(case, joint="none", lubricant=None, wear=None)
 
 
+FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder
 WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
 
 

@@ -21,7 +21,14 @@ from typing import Any, NamedTuple
 
 from compressor.cases.card import mark_card
 from compressor.cases.groups import CARD_KEYS
-from compressor.cases.parameter import NO_VALUE, Parameter, Problem, check_targets, quote_value
+from compressor.cases.parameter import (
+    NO_VALUE,
+    Parameter,
+    Problem,
+    check_targets,
+    end_of_card,
+    quote_value,
+)
 from compressor.cases.table import GROUPS, WORDS, Settings, table
 from compressor.metrics import JOINTS
 from compressor.program import STUDY_GROUPS
@@ -134,7 +141,8 @@ PER_PART = {
     },
     "gas.indicator": {"head": "gas.indicator", "crank": "gas.crank_indicator"},
 }  # fmt: skip
-ONE_SUFFICES = ("gas.indicator",)  # of its parts: the gas may press on one face alone
+# parts that may stand alone: the gas may press on one face
+ONE_SUFFICES = {"gas.indicator": ("head", "crank"), "gas.clearance_percent": ("crank",)}
 # unit at the end of an unknown key -> the unit of ours, and what one of it is there
 OTHER_UNITS = {
     "bar": ("MPa", 0.1), "kPa": ("MPa", 1e-3), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3),
@@ -167,7 +175,7 @@ def written_key(key: str, known: Container[str]) -> str:
 def lacking_part(key: str, value: Mapping[str, Any]) -> str:
     """Return what is wrong with the parts of a value for each; "" if nothing is."""
     parts = [*PER_PART[key]]
-    if {*value} == {*parts} or (key in ONE_SUFFICES and {*value} < {*parts}):
+    if {*value} == {*parts} or [*value] in [[one] for one in ONE_SUFFICES.get(key, ())]:
         return ""
     given = ", ".join(map(str, value))
     return f"needs both, {' and '.join(parts)}, not {given}; or one number for both"
@@ -382,7 +390,7 @@ def check_value(key: str, value: Any, problems: list[Problem]) -> Any:
     if row.kind == "integer":
         return int(value)
     if row.kind == "card":
-        return mark_card(value)
+        return mark_card(value, end_of_card(row.key))
     return tuple(value) if row.kind == "materials" else row.choice_of(value)
 
 

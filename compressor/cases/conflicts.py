@@ -15,6 +15,7 @@ from functools import cache, partial
 from types import FunctionType
 from typing import Any, cast
 
+from compressor.cases.card import DRIVING, CardError, open_card, taken_work
 from compressor.cases.checks import SHORTHANDS, row_of, value_in
 from compressor.cases.groups import CYLINDER_KEYS, ENDS
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
@@ -592,6 +593,17 @@ def _card_conflicts(case: Settings) -> Iterator[Problem]:
                 key, f"is needed with action: {case.gas.action}, the other end being measured; "
                 "write indicator: {head: head.csv, crank: crank.csv}",
             )  # fmt: skip
+            continue
+        with contextlib.suppress(CardError):  # of a file that is gone, which a run tells
+            card = open_card(case.gas.cards[end], end)
+            lengths = case.machine.crank_radius_mm, case.machine.rod_length_mm
+            if (share := taken_work(card, end, *lengths)) < DRIVING:
+                yield Problem(
+                    "gas.indicator" if end == "head" else "gas.crank_indicator",
+                    f"the gas would drive the machine: it gives {-share:.2g} times pressure range "
+                    f"and stroke in a revolution; is it the {'crank' if end == 'head' else 'head'} "
+                    "end's card, or its angle not 0 at top dead centre?",
+                )
 
 
 def _rod_conflicts(case: Settings) -> Iterator[Problem]:

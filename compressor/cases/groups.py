@@ -22,6 +22,7 @@ from compressor.cases.parameter import (
     IDEAL_JOINT,
     LAW,
     MATERIALS,
+    MEASURED,
     RUBBING,
     SERIES,
     SMALL_CLEARANCE,
@@ -232,15 +233,26 @@ class Machine:
 
 # ends of a cylinder, and the actions by which the gas in them presses
 ENDS = {"head": ("single", "double"), "crank": ("double", "crank_end")}
-# what the paper's gas load has not; any of them makes the corners exact
+ATMOSPHERE_MPA = 0.101325
+# what the paper's gas load has not; any of them makes a cylinder of one's own
 CYLINDER_KEYS = (
     "action", "rod_diameter_mm", "clearance_percent", "crank_clearance_percent",
     "valve_loss_percent", "discharge_loss_percent", "unloaded", "indicator", "crank_indicator",
+    "ambient_MPa", "smooth_deg",
 )  # fmt: skip
 OF_CRANK_END = (
     "rod_diameter_mm",
     "crank_clearance_percent",
 )  # facts of a single-acting machine, too
+# what the paper prints of its cylinder: another value makes one of one's own, too
+PAPER_CYLINDER = {
+    "piston_radius_mm": 50.0, "head_clearance_mm": 20.0, "suction_MPa": 0.105,
+    "discharge_MPa": 0.393, "exponent": 1.4,
+}  # fmt: skip
+OWN_CYLINDER = (
+    "a cylinder of one's own: any key of `gas` but this one and {other}, the stroke or the rod's "
+    "length is given"
+)
 CARD_KEYS = ("indicator", "crank_indicator")  # paths of files, with digests of what they hold
 # key of its own -> the key whose value it has without
 AS_THE_OTHER = {
@@ -253,12 +265,13 @@ AS_THE_OTHER = {
 class Gas:
     """The gas load, an ideal cycle (Eq. 13); a case's `gas`, read with `load: gas`.
 
-    The corners of the cycle are printed for the paper's pressures; `exact` follows from any:
+    The corners of the cycle are printed for the paper's cylinder, whose other face is in a vacuum.
+    Any other has the exact ones, and the atmosphere:
 
     >>> import compressor
-    >>> gas = {"discharge_MPa": 0.5, "switching": "exact"}
-    >>> compressor.Case.from_values({"load": "gas", "gas": gas}).gas.discharge_MPa
-    0.5
+    >>> gas = compressor.Case.from_values({"load": "gas", "gas": {"discharge_MPa": 0.5}}).gas
+    >>> gas.switching, gas.back_pressure_MPa
+    ('exact', 0.101325)
 
     The gas presses on the piston from the cylinder's head alone, or, by `action`, from both ends or
     from the crank end. Clearances and valve losses may differ by end and by valve:
@@ -289,18 +302,19 @@ class Gas:
         1.4, "", (1, 5), "Eq. 13", "isentropic exponent", read=CYCLE,
         plausible=Plausible("moist gas and cooled walls lower it", from_to(1.15, 1.4)),
     )  # fmt: skip
-    back_pressure_MPa: float = parameter(
-        0.0, "MPa", (0, 1e3), "assumed",
+    back_pressure_MPa: float | None = parameter(
+        None, "MPa", (0, 1e3), "assumed",
         "pressure on what no gas cycle presses: the piston's other face, or the rod's "
-        "cross-section in a double-acting cylinder",
-        plausible=Plausible(
+        "cross-section in a double-acting cylinder; 0 in the paper's rig, and the atmosphere, "
+        f"{ATMOSPHERE_MPA:g}, in {OWN_CYLINDER.format(other='switching')}",
+        optional=True, plausible=Plausible(
             "a crankcase has the atmosphere's, or a little more", from_to(0.09, 0.15)
         ),
     )  # fmt: skip
     switching: str | None = choice(
         None, ("paper", "exact"), "Eq. 13",
-        "corners of the cycle: as the paper prints them, or where the pressures meet (the default "
-        "with any of the keys below)",
+        "corners of the cycle: as the paper prints them for its rig, or where the pressures meet, "
+        f"the default of {OWN_CYLINDER.format(other='back_pressure_MPa')}",
         optional=True, read=CYCLE,
     )  # fmt: skip
     action: str | None = choice(
@@ -350,6 +364,16 @@ class Gas:
         None, (), "measured", "card of the crank end, over the crank's angle too", kind="card",
         optional=True, read=CRANK_END,
     )  # fmt: skip
+    ambient_MPa: float | None = parameter(
+        None, "MPa", (0, 1e3), "standard",
+        f"pressure from which a card's gauge pressures count; {ATMOSPHERE_MPA:g} by default",
+        above=True, optional=True, read=MEASURED,
+    )  # fmt: skip
+    smooth_deg: float | None = parameter(
+        None, "deg", (0, 60), "program",
+        "width of the window in which noise of a card is smoothed, by cubic least squares; 0 by "
+        "default: none", optional=True, read=MEASURED,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Fill in what a cylinder's keys leave open; what is as without a key goes without it."""
@@ -357,8 +381,13 @@ class Gas:
         if self.is_cylinder:
             filled = {"action": "single", "unloaded": "none", "valve_loss_percent": 0.0}
             values.update({key: value for key, value in filled.items() if values[key] is None})
+        is_own = self.is_cylinder or any(
+            values[key] != printed for key, printed in PAPER_CYLINDER.items()
+        )
         if self.switching is None:
-            values["switching"] = "exact" if self.is_cylinder else "paper"
+            values["switching"] = "exact" if is_own else "paper"
+        if self.back_pressure_MPa is None:
+            values["back_pressure_MPa"] = ATMOSPHERE_MPA if is_own else 0.0
         if self.clearance_percent is not None:
             values["head_clearance_mm"] = None
         for own, shared in AS_THE_OTHER.items():
@@ -381,6 +410,11 @@ class Gas:
         """Return the cards of the ends that press, by end, head or crank."""
         given = {"head": self.indicator, "crank": self.crank_indicator}
         return {end: card for end, card in given.items() if card is not None and self.presses(end)}
+
+    @property
+    def ambient(self) -> float:
+        """Return the pressure (MPa) from which gauge pressures of cards count."""
+        return ATMOSPHERE_MPA if self.ambient_MPa is None else self.ambient_MPa
 
     @property
     def open_pressures(self) -> tuple[float, float]:

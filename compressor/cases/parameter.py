@@ -22,7 +22,7 @@ from functools import lru_cache
 from inspect import cleandoc
 from typing import Any, NamedTuple, TypeVar
 
-from compressor.cases.card import COLUMNS, CardError, mark_card
+from compressor.cases.card import CardError, mark_card
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, READ_BY, law_of
 from compressor.metrics import METRICS
 from compressor.program import CompsimError, did_you_mean
@@ -71,6 +71,7 @@ CRANK_END = Reader(
 )
 HEAD_END = Reader("gas.action: single or double", lambda case: case.gas.action != "crank_end")
 CYCLE = Reader("no gas.indicator", lambda case: not case.gas.is_measured)
+MEASURED = Reader("gas.indicator", lambda case: case.gas.is_measured)
 HEAD_CLEARANCE = Reader(
     "a head end that presses, or one gas.clearance_percent for both",
     lambda case: case.gas.action != "crank_end" or case.gas.crank_clearance_percent is None,
@@ -385,7 +386,7 @@ class Parameter:
         if self.kind == "text":
             return "text"
         if self.kind == "card":
-            return f"the path of a CSV file with columns {' and '.join(COLUMNS)}"
+            return "the path of a CSV file with columns crank_angle_deg and pressure_bar"
         span = f"{'(' if self.above else '['}{self.low:g}, {self.high:g}]"
         number = "a whole number" if self.kind == "integer" else "a number"
         return " or ".join([*self.choices, f"{number} in {span} {self.unit}".strip()])
@@ -475,10 +476,15 @@ class Parameter:
         if not isinstance(value, str) or not value:
             return self._refused(value)
         try:
-            mark_card(value)
+            mark_card(value, end_of_card(self.key))
         except CardError as error:
             return str(error)
         return None
+
+
+def end_of_card(key: str) -> str:
+    """Return the end, head or crank, of which a key gives the card."""
+    return "crank" if key == "gas.crank_indicator" else "head"
 
 
 def join_with_or(words: Sequence[str]) -> str:

@@ -39,6 +39,7 @@ from compressor.physics.step_control import STABILITY_LIMIT, Mode, is_last_step,
 from compressor.physics.systems import (
     beyond_model,
     derivative_with_flows,
+    enter_segment,
     observe_all,
     start,
 )

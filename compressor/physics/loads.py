@@ -6,6 +6,10 @@ The force is positive towards the crank. A load has four phases a revolution (ex
 compression, discharge); the caller names the phase, so that both sides of a corner are exact. A
 cylinder's two ends have phases of their own, and its phase is the head end's plus four times the
 crank end's.
+
+Gas is shut in at a dead centre, with the space that is there: in a worn machine the piston stands
+beyond its ideal place. An integrator notes where in the phase (`begin_stroke`), in the bits above
+the lowest four, so that whoever observes the motion later has it, too.
 """
 
 import math
@@ -13,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from compressor.physics._jit import inline_llvm
+from compressor.physics._jit import inline_llvm, jit
 from compressor.physics.kinematics import angle_at
 from compressor.physics.record import Load, derive
 
@@ -21,33 +25,57 @@ GAS = int(Load.GAS)
 SPRING = int(Load.SPRING)
 CYLINDER = int(Load.CYLINDER)
 EXPANSION, SUCTION, COMPRESSION, DISCHARGE = range(4)
+PLACE_BITS = 4  # of a phase, below the piston's place
+PLACE_UNIT = 2.0**-52  # m
+
+
+@inline_llvm
+def piston_place(phase):
+    """Return how far (m) the piston was beyond its ideal place at the last dead centre.
+
+    Positive towards the cylinder's head.
+    """
+    return (phase >> PLACE_BITS) * PLACE_UNIT
+
+
+@inline_llvm
+def shut_in_force(phase, space, clearance, suction_force, discharge_force, p):
+    """Return the force (N) that gas has in one end of a cylinder with its valves shut: Eq. 6.
+
+    Polytropic. phase: the end's; space: between piston and cover (m); clearance: what it was or
+    would have been at the end's own dead centre (m). The forces are those while valves are open.
+    """
+    if phase >= COMPRESSION:
+        return suction_force * ((clearance + 2.0 * p.crank_radius) / space) ** p.gas_exponent
+    return discharge_force * (clearance / space) ** p.gas_exponent
+
+
+@inline_llvm
+def head_space(phase, x, p):
+    """Return the head end's space (m) and the clearance (m) by which its gas was shut in."""
+    space = p.rod_length + p.crank_radius + p.head_clearance - x
+    return space, p.head_clearance - piston_place(phase)
+
+
+@inline_llvm
+def paper_force(phase, x, p):
+    """Return the force (N) of the gas in the head end whose valves open and shut at angles."""
+    number = phase & 3
+    if number == SUCTION:
+        return p.suction_force
+    if number == DISCHARGE:
+        return p.discharge_force
+    space, clearance = head_space(phase, x, p)
+    return shut_in_force(number, space, clearance, p.suction_force, p.discharge_force, p)
 
 
 @inline_llvm
 def end_force(phase, space, clearance, suction_force, discharge_force, p):
-    """Return the force (N) of the gas in one end of a cylinder: Eq. 6, polytropic.
-
-    phase: the end's. space: between piston and cover (m); clearance: the least that it may be. The
-    forces are those while its valves are open.
-    """
-    if phase == 1:
+    """Return the force (N) of the gas in one end whose valves open where the pressures meet."""
+    if suction_force == discharge_force:  # without a cycle
         return suction_force
-    if phase == 3:
-        return discharge_force
-    if phase == 0:
-        full = clearance
-        force = discharge_force
-    else:
-        full = clearance + 2.0 * p.crank_radius
-        force = suction_force
-    return force * (full / space) ** p.gas_exponent
-
-
-@inline_llvm
-def head_force(phase, x, p):
-    """Return the force (N) of the gas in the head end; x: of the crosshead (m)."""
-    space = p.rod_length + p.crank_radius + p.head_clearance - x
-    return end_force(phase, space, p.head_clearance, p.suction_force, p.discharge_force, p)
+    force = shut_in_force(phase, space, clearance, suction_force, discharge_force, p)
+    return min(max(force, suction_force), discharge_force)
 
 
 @inline_llvm
@@ -56,11 +84,28 @@ def cylinder_force(phase, x, p):
 
     phase: the head end's plus four times the crank end's; x: of the crosshead (m).
     """
+    space, clearance = head_space(phase, x, p)
+    head = end_force(phase & 3, space, clearance, p.suction_force, p.discharge_force, p)
     crank = end_force(
-        phase >> 2, x - (p.rod_length - p.crank_radius) + p.crank_clearance, p.crank_clearance,
-        p.crank_suction_force, p.crank_discharge_force, p,
+        (phase >> 2) & 3, x - (p.rod_length - p.crank_radius) + p.crank_clearance,
+        p.crank_clearance + piston_place(phase), p.crank_suction_force, p.crank_discharge_force, p,
     )  # fmt: skip
-    return head_force(phase & 3, x, p) - crank - p.back_force
+    return head - crank - p.back_force
+
+
+@jit
+def begin_stroke(t, deviation, i, phases, p):
+    """Write into the phase of segment i where the piston was at its last dead centre.
+
+    t: when the segment begins (s), deviation: of the crosshead from its ideal place then (m);
+    phases: of the run's segments, those before i written already. Only gas has it in its phases.
+    """
+    half_turns = p.omega * t / math.pi
+    if abs(half_turns - math.floor(half_turns + 0.5)) < 1e-6:
+        place = math.floor(deviation / PLACE_UNIT + 0.5)
+    else:
+        place = phases[i - 1] >> PLACE_BITS
+    phases[i] = (phases[i] & ((1 << PLACE_BITS) - 1)) + (place << PLACE_BITS)
 
 
 @inline_llvm
@@ -88,7 +133,7 @@ def piston_force(phase, x, v, deviation, deviation_rate, p):
     if p.load == SPRING:
         return spring_force(phase, x, v, deviation, deviation_rate, p)
     if p.load == GAS:
-        return head_force(phase, x, p) - p.back_force
+        return paper_force(phase, x, p) - p.back_force
     if p.load == CYLINDER:
         return cylinder_force(phase, x, p)
     return 0.0
@@ -189,26 +234,23 @@ def cam_corners(crank_radius, rod_length, stroke):
     return rise, math.pi, 2.0 * math.pi - fall
 
 
-def load_corners(p, pressure_ratio, printed):
-    """Return the corners (rad) of the record's load, (3,).
-
-    printed: of a gas those of Eq. 13, not the exact ones.
-    """
+def load_corners(p):
+    """Return the corners (rad) of the record's load in the ideal motion, (3,)."""
     if p["load"] in (Load.NONE, Load.CARD):
         return 0.0, 0.0, 0.0
     if p["load"] == Load.SPRING:
         return cam_corners(p["crank_radius"], p["rod_length"], p["spring_stroke"])
     if p["load"] == Load.CYLINDER:
         return head_corners(p)
-    return printed_corners() if printed else gas_corners(p, pressure_ratio)
+    return printed_corners()
 
 
-def complete(p, pressure_ratio, printed):
+def complete(p):
     """Fill the fields of a record that follow from its others, its corners as by `load_corners`.
 
     p: a record, or a dict with its fields. Raises ValueError as `gas_corners` and `cam_corners`.
     """
-    p["corners"] = load_corners(p, pressure_ratio, printed)
+    p["corners"] = load_corners(p)
     if p["load"] == Load.CYLINDER:
         p["crank_corners"] = crank_corners(p)
     derive(p)
@@ -218,8 +260,8 @@ def segments(p, duration):
     """Return the segments into which the load's corners cut [0, duration] (s).
 
     Returns edges, shape (n + 1,) in s, and phases, shape (n,), which are not to be written: other
-    runs have the same. A corner closer than a billionth of a turn to the end opens no segment of
-    its own.
+    runs have the same. Of gas between exact corners they are those of the ideal motion. A corner
+    closer than a billionth of a turn to the end opens no segment of its own.
     """
     if p["load"] in (Load.NONE, Load.CARD):
         return np.array([0.0, duration]), np.zeros(1, dtype=np.int64)

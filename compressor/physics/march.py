@@ -73,6 +73,7 @@ from compressor.physics.step_control import (
 from compressor.physics.systems import (
     beyond_model,
     derivative_with_flows,
+    enter_segment,
     observe_contact,
     observe_with_energy,
     write_eccentricities,
@@ -412,7 +413,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
     w: stepper; p: record; z: motion and flows, (n + 4,); work: scratch, carried between calls;
     atol, size: absolute tolerance and natural size of each number of the motion, (n,); edges,
     phases: the load's segments; times, states: output grid (m,) and (m, n); tally: gathers
-    metrics. z, w, work, states and tally are written.
+    metrics. z, w, work, phases, states and tally are written.
     """
     work = WorkArrays(
         without_refcount(work.k), without_refcount(work.new), without_refcount(work.column),
@@ -425,6 +426,8 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
     for _ in range(limit):
         if w.status != RUNNING:
             return
+        if w.fresh and w.t == edges[w.segment]:
+            enter_segment(w.t, z, w.segment, phases, p)
         end, phase = edges[w.segment + 1], phases[w.segment]
         if w.fresh:
             derivative_with_flows(w.t, z, phase, p, work.k[0])
@@ -521,19 +524,23 @@ match_speeds = dispatch_on_record(CHOICE, match_contact_speeds, keep_contact_spe
 
 @jit
 def march_twins(
-    w, twin_stepper, p, z, twin, work, twin_work, atol, size, edges, phases, times, states, tally,
-    rows, far, limit,
+    w, twin_stepper, p, z, twin, work, twin_work, atol, size, edges, phases, twin_phases, times,
+    states, tally, rows, far, limit,
 ):  # fmt: skip
     """Advance a motion and its twin in step, until they are `far` apart: twin_stepper is then DONE.
 
-    twin_stepper: of the same pair; twin: its motion and flows, (n + 4,); far: as a share of the
+    twin_stepper: of the same pair; twin: its motion and flows, (n + 4,); twin_phases: as `phases`,
+    of the twin; far: as a share of the
     clearance; rows: scratch, (2, COLUMNS). The rest as for `march`.
     """
     n = size.size
     for _ in range(limit):
         if w.status != RUNNING:
             return
-        steps, phase = w.steps, phases[w.segment]
+        steps, segment = w.steps, w.segment
+        if w.t == edges[segment]:
+            enter_segment(w.t, twin, segment, twin_phases, p)
+        phase = twin_phases[segment]
         twin_stepper.t, twin_stepper.stiff = w.t, w.stiff
         # a plain 1 would be a type of its own, for which numba compiles all of march again
         march(w, p, z, work, atol, size, edges, phases, times, states, tally, np.int64(1))

@@ -5,6 +5,8 @@ The same calls as `motion` and `observe` have for the scenes; `systems` chooses 
 
 import math
 
+import numpy as np
+
 from compressor.physics._jit import inline_once, jit, square_root
 from compressor.physics.contact import LUGRE, bristle_rate, nearness
 from compressor.physics.contact_laws import elastic_energy
@@ -22,6 +24,8 @@ from compressor.physics.mechanism import (
     dot_rows,
     material_work,
     motor_torque,
+    pose_of,
+    unpack,
 )
 from compressor.physics.mechanism_motion import solve
 from compressor.physics.observe import (
@@ -192,6 +196,14 @@ def write_row(now, p, row):
     write_contact_columns(now, p, row)
     write_powers(now, p, row[CRANK_POWER:KINETIC])
     write_energies(now, p, row)
+
+
+@jit
+def deviation(t, y, p):
+    """Return how far (m) the crosshead is from its ideal place at the crank's angle."""
+    motion, vectors = ideal(t, p), np.zeros((2, ROWS))
+    unpack(y, p, vectors[0], vectors[1])
+    return pose_of(motion, vectors[0], vectors[1], p).x - motion.x
 
 
 @jit

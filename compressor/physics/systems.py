@@ -6,6 +6,7 @@ speed; that both agree is a test.
 
 from compressor.physics import mechanism_rows, motion, observe
 from compressor.physics._jit import dispatch_on_record, jit
+from compressor.physics.loads import CYLINDER, GAS, begin_stroke
 from compressor.physics.record import MECHANISM
 
 
@@ -16,6 +17,24 @@ def within_model(y, p):
 
 
 beyond_model = dispatch_on_record(MECHANISM, mechanism_rows.beyond_model, within_model)
+
+
+@jit
+def scene_deviation(t, y, p):
+    """Return how far (m) the crosshead of a scene is from its ideal place."""
+    return y[0]
+
+
+deviation = dispatch_on_record(MECHANISM, mechanism_rows.deviation, scene_deviation)
+
+
+@jit
+def enter_segment(t, y, i, phases, p):
+    """Write what a load's phase of the segment i holds of the state y in which it begins, at t."""
+    if p.load == GAS or p.load == CYLINDER:
+        begin_stroke(t, deviation(t, y, p), i, phases, p)
+
+
 derivative = dispatch_on_record(MECHANISM, mechanism_rows.derivative, motion.derivative)
 derivative_with_flows = dispatch_on_record(
     MECHANISM, mechanism_rows.derivative_with_flows, observe.derivative_with_flows

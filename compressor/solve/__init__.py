@@ -5,6 +5,7 @@ from compressor.solve.cautions import JointScales, cautions, expected_cost, join
 from compressor.solve.error_bars import Metrics, energy_residual
 from compressor.solve.horizon import Twins, predictability_horizon
 from compressor.solve.march_driver import COMPILED
+from compressor.solve.measured_gas import gas_nodes
 from compressor.solve.regime import find_repetition, least_promise, steady, with_settle_rev
 from compressor.solve.request import (
     Cuts,

@@ -19,6 +19,7 @@ from compressor.physics import (
     COLUMNS,
     FLOWS,
     WIDE,
+    Load,
     add_flows,
     lobatto,
     new_tally,
@@ -57,8 +58,8 @@ def closed_form(
 ) -> Trajectory:
     """Return the trajectory of ideal joints over an output grid, without integration.
 
-    `pieces`: into which each stretch between load corners, or each revolution in it, is cut;
-    `timeout`: wall time (s) that it may take.
+    `pieces`: into which each stretch between load corners, or each revolution in it, is cut, but a
+    card's, which is cut at its nodes; `timeout`: wall time (s) that it may take.
     """
     deadline = time.monotonic() + timeout
     edges, phases = segments(p, float(times[-1]))
@@ -66,7 +67,13 @@ def closed_form(
         times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)], new_tally(p)
     )
     start = time.perf_counter()
-    grid = fine_grid(edges, pieces, 2.0 * math.pi / p.omega)
+    turn = 2.0 * math.pi / p.omega
+    if p["load"] == Load.CARD:  # whose curve is of pieces between its nodes
+        edges = np.arange(0.0, edges[-1] / turn, 1.0 / len(p["card"])) * turn
+        edges, phases = np.append(edges, times[-1]), np.zeros(edges.size, dtype=np.int64)
+        grid = edges
+    else:
+        grid = fine_grid(edges, pieces, turn)
     cuts = np.unique(np.concatenate((edges, [settle], grid)))
     owner = sample_segments((cuts[:-1] + cuts[1:]) / 2, edges)
     states = np.zeros((NODES.size, 4))
@@ -131,6 +138,9 @@ def integrate(request: Request) -> Trajectory:
                 step_through(request, result, edges, phases, z)
     except Stop as stop:
         result.reason, result.detail = stop.reason, stop.detail
+    if request.fields["load"] in (Load.GAS, Load.CYLINDER) and result.segments:
+        edges, phases = result.segments
+        result.phases = phases[sample_segments(result.times, edges)]
     result.seconds = time.perf_counter() - began
     return result
 

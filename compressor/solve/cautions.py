@@ -31,12 +31,14 @@ from compressor.cases import (
     paper_notes,
     reads,
     row_of,
+    to_si,
     with_ideal_joints,
 )
 from compressor.metrics import JOINTS
 from compressor.physics import STABILITY_LIMIT, Scene, elastic_form, greatest_load, steepest
 from compressor.solve.attempts import closed_form
 from compressor.solve.march_driver import COMPILED
+from compressor.solve.measured_gas import card_noise, fit_polytrope
 from compressor.solve.request import greatest_depth
 from compressor.solve.si_record import record, scene
 
@@ -46,6 +48,10 @@ PER_RADIAN = {"big_end": 0.3, "small_end": 0.5, "both": 0.7}
 STABILITY_SHARE = 0.5
 ORDER = 5
 STEP_SECONDS = {"big_end": 3.5e-6, "small_end": 3.5e-6, "both": 4.5e-6}  # of compiled methods
+EXPONENTS = (0.95, 1.75)  # that gas is compressed with
+MAX_MISFIT = 0.05  # of a card's lines, rms of the pressure's logarithm
+MAX_UNLIKE = 0.25  # by which a card's clearance may differ from what is given
+MAX_NOISE = 5e-4  # of a card's range of pressure
 SCIPY_SECONDS = 2.5e-4  # of a step of SciPy's methods, with its tally
 
 
@@ -314,6 +320,11 @@ def remarks(case: Case) -> Iterator[Remark]:
     yield from _rod(case)
     yield from _drive(case)
     yield from _cards(case)
+    gas = case.gas
+    alone = gas.crank_clearance_percent is not None and gas.clearance_percent is None
+    if alone and case.load == "gas" and gas.action == "double" and not gas.is_measured:
+        text = f"of the crank end alone: the head end has {gas.head_clearance_mm:g} mm"
+        yield Remark("gas.crank_clearance_percent", text, "clearance")
     if case.wear:
         yield Remark("wear", "compsim wear alone reads it: a run has bores that are new", "unread")
     friction = case.friction
@@ -423,15 +434,54 @@ def _drive(case: Case) -> Iterator[Remark]:
 
 
 def _cards(case: Case) -> Iterator[Remark]:
-    """Yield how far apart the revolutions of a card are, which stands for them by their mean."""
+    """Yield what is odd about measured cards: their scatter, noise, gauge, clearance, exponent."""
     for end, path in case.gas.cards.items() if case.load == "gas" else ():
-        card = open_card(path)
+        card = open_card(path, end)
+        key = "gas.indicator" if end == "head" else "gas.crank_indicator"
         if card.revolutions > 1:
-            key = "gas.indicator" if end == "head" else "gas.crank_indicator"
             range_of = max(card.pressures) - min(card.pressures) or math.inf
             text = f"{card.revolutions} revolutions were averaged; they scatter by "
             text += f"{card.scatter:.2g} MPa (rms), {100 * card.scatter / range_of:.2g} % of the "
             yield Remark(key, f"{text}card's range", "scatter")
+        if card.is_gauge and case.gas.ambient_MPa is None:
+            text = "its gauge pressures count from 1 atmosphere, 1.01325 bar"
+            yield Remark(key, f"{text}; set gas.ambient_MPa for another", "gauge")
+        yield from _card_fit(case, end, key)
+        yield from _card_noise(case, end, key)
+
+
+def _card_fit(case: Case, end: str, key: str) -> Iterator[Remark]:
+    """Yield a card whose compression and expansion do not fit its gas and clearance volume."""
+    fit = fit_polytrope(case, end)
+    if fit is None or fit.misfit > MAX_MISFIT:
+        return
+    stroke = 2 * case.machine.crank_radius_mm
+    given = case.gas.clearance(end, stroke) / stroke
+    says = f"compression and expansion fit a clearance of {100 * fit.clearance:.3g} % at an "
+    says += f"exponent of {fit.exponent:.3g}"
+    if not EXPONENTS[0] <= fit.exponent <= EXPONENTS[1]:
+        text = "are its pressures of the unit that the column says, absolute or gauge, its angle 0 "
+        yield Remark(key, f"{says}: {text}at top dead centre, the stroke the machine's?", "fit")
+    elif case.gas.clearance_percent is not None and abs(fit.clearance / given - 1) > MAX_UNLIKE:
+        yield Remark(key, f"{says}, and {100 * given:.3g} % is given", "fit")
+
+
+def _card_noise(case: Case, end: str, key: str) -> Iterator[Remark]:
+    """Yield noise of a card, which a run makes vibration of."""
+    noise, card = card_noise(case, end), open_card(case.gas.cards[end], end)
+    if noise <= MAX_NOISE * (max(card.pressures) - min(card.pressures)):
+        return
+    force = to_si(noise, "MPa") * math.pi * to_si(case.gas.piston_radius_mm, "mm") ** 2
+    text = f"its samples differ by {noise:.2g} MPa (rms) from their neighbours, which is "
+    text += f"{force:.3g} N on the piston"
+    body, sensor = case.body, case.sensor
+    if body and sensor:
+        mass = body.mass_kg if sensor.place == "body" else body.casing_mass_kg or body.mass_kg
+        sideways = case.machine.crank_radius_mm / case.machine.rod_length_mm / math.sqrt(2.0)
+        share = sideways if sensor.place == "guide" and sensor.direction == "y" else 1.0
+        text += f" and up to {force * share / mass:.2g} m/s2 (rms) at the sensor"
+    smoothed = case.gas.smooth_deg or 0.0
+    yield Remark(key, f"{text}; smoothed over {smoothed:g} degrees: gas.smooth_deg", "noise")
 
 
 def _budgets(case: Case, joints: list[JointScales]) -> Iterator[Remark]:

@@ -97,7 +97,8 @@ class Twins:
     def __init__(self, request: Request, shifted: np.ndarray):
         self.request, self.deadline = request, time.monotonic() + request.timeout
         edges, phases = segments(request.p, float(request.times[-1]))
-        self.edges, self.phases, self.ends = with_cuts(edges, phases, request.cuts)
+        self.edges, phases, self.ends = with_cuts(edges, phases, request.cuts)
+        self.phases, self.twin_phases = phases.copy(), phases.copy()
         self.size = natural_sizes(request.p)
         n = self.size.size
         self.stepper, self.twin_stepper = (prepare_stepper(request, self.size) for _ in range(2))
@@ -117,7 +118,8 @@ class Twins:
             march_twins(
                 stepper, twin_stepper, request.p, self.z, self.twin, self.work, self.twin_work,
                 request.rtol * self.size, self.size, self.edges[: count + 1], self.phases[:count],
-                request.times, self.states, self.tally, self.rows, far, attempts,
+                self.twin_phases[:count], request.times, self.states, self.tally, self.rows, far,
+                attempts,
             )  # fmt: skip
             if twin_stepper.status == Status.DONE:
                 return True

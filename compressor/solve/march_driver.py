@@ -224,11 +224,13 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
     stepper = prepare_stepper(request, size)
     edges, phases, stepper["settle"] = with_edge(edges, phases, request.settle)
     edges, phases, ends = with_cuts(edges, phases, request.cuts)
+    phases = phases.copy()
     march = March(request, size, edges, phases, result.states)
     now = MarchState(stepper, z, new_work(size.size), result.tally)
     # two: where a run stops soon after the last one, the one before begins early enough
     previous = latest = Checkpoint.of(now)
     checkpoint_attempts = 0  # attempts at the last checkpoint
+    result.segments = edges, phases
     for attempts in chunks(request, stepper):
         if result.steps + result.rejected >= checkpoint_attempts + HISTORY_LENGTH:
             previous, latest = latest, Checkpoint.of(now)

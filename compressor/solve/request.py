@@ -188,6 +188,7 @@ class Trajectory:
     stop_time: float = math.nan
     stop_state: np.ndarray = field(default_factory=lambda: np.empty(0))
     history: History = field(default_factory=History)  # the last steps before a stop
+    segments: tuple[np.ndarray, np.ndarray] | None = None  # edges and phases, as run through
     steps: int = 0
     rejected: int = 0
     evaluations: int = 0

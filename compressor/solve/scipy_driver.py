@@ -23,6 +23,7 @@ from compressor.physics import (
     approach_at,
     contact_within,
     derivative_with_flows,
+    enter_segment,
     is_featured,
     lobatto,
     observe_all,
@@ -163,10 +164,12 @@ def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndar
     """Integrate by one of SciPy's methods, segment by segment."""
     right_hand_side = Derivative(request)
     edges, phases, ends = with_cuts(edges, phases, request.cuts)
-    owner = sample_segments(request.times, edges)
+    owner, phases = sample_segments(request.times, edges), phases.copy()
+    result.segments = edges, phases
     try:
-        for i, phase in enumerate(phases):
-            right_hand_side.phase = int(phase)
+        for i in range(phases.size):
+            enter_segment(edges[i], z, i, phases, request.p)
+            right_hand_side.phase = int(phases[i])
             samples = np.flatnonzero(owner == i)
             segment = LoadStretch(request, right_hand_side, result, edges[i], edges[i + 1], samples)
             z = segment.run(z)

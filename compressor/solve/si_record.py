@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case, Guide, joint_stiffness, open_card, to_si
+from compressor.cases import Case, Guide, joint_stiffness, to_si
 from compressor.metrics import JOINTS
 from compressor.physics import (
     FLOWS,
@@ -25,11 +25,11 @@ from compressor.physics import (
     Load,
     Scene,
     bore_fields,
-    card_nodes,
     choose_laws,
     complete,
     derivative_with_flows,
     elastic_form,
+    enter_segment,
     hysteresis,
     is_featured,
     new_record,
@@ -37,6 +37,7 @@ from compressor.physics import (
     state_names,
     static_load,
 )
+from compressor.solve.measured_gas import gas_nodes
 
 NO_APPROACH = 1000.0  # mm/s: of laws that damp by none, and divide nothing by it
 
@@ -61,15 +62,14 @@ def record(case: Case, worn: np.ndarray | None = None) -> np.record:
     """
     p: dict[str, Any] = {}  # what is not set stays zero
     p["scene"] = scene(case)
-    cylinder = case.load == "gas" and case.gas.is_cylinder
-    p["load"] = Load.CYLINDER if cylinder else Load[case.load.upper()]
+    exact = case.load == "gas" and case.gas.switching == "exact"
+    p["load"] = Load.CYLINDER if exact else Load[case.load.upper()]
     if case.load == "gas" and case.gas.is_measured:
         p["load"] = Load.CARD
     _machine(case, p)
     _contact(case, p)
     _gas(case, p)
     _spring(case, p)
-    ratio = case.gas.discharge_MPa / case.gas.suction_MPa
     _film(case, p)
     featured = case.has_features or worn is not None
     if featured:
@@ -77,7 +77,7 @@ def record(case: Case, worn: np.ndarray | None = None) -> np.record:
     if worn is not None:
         p |= bore_fields(worn.shape[1])
         p["worn"] = np.pad(worn, ((0, 0), (0, MAX_SECTORS - worn.shape[1])))
-    complete(p, ratio, printed=case.gas.switching == "paper")
+    complete(p)
     return new_record(case.chooses_laws, featured, p)
 
 
@@ -135,12 +135,12 @@ def _gas(case: Case, p: dict[str, Any]) -> None:
     area = math.pi * to_si(gas.piston_radius_mm, "mm") ** 2
     suction, discharge = (to_si(pressure, "MPa") for pressure in gas.open_pressures)
     p["suction_force"], p["discharge_force"] = suction * area, discharge * area
-    p["back_force"] = to_si(gas.back_pressure_MPa, "MPa") * area
+    p["back_force"] = to_si(gas.back_pressure_MPa or 0.0, "MPa") * area
     p["head_clearance"] = to_si(gas.clearance("head", stroke), "mm")
     p["gas_exponent"] = gas.exponent
     if gas.is_measured and case.load == "gas":
         _cards(case, area, p)
-    elif gas.is_cylinder:
+    elif gas.switching == "exact":
         rod = math.pi * to_si((gas.rod_diameter_mm or 0.0) / 2, "mm") ** 2
         areas = {"head": area * gas.presses("head"), "crank": (area - rod) * gas.presses("crank")}
         for end, prefix in (("head", ""), ("crank", "crank_")):
@@ -149,19 +149,21 @@ def _gas(case: Case, p: dict[str, Any]) -> None:
             p[f"{prefix}suction_force"] = open_at[0] * areas[end]
             p[f"{prefix}discharge_force"] = open_at[1] * areas[end]
         p["crank_clearance"] = to_si(gas.clearance("crank", stroke), "mm")
-        p["back_force"] = to_si(gas.back_pressure_MPa, "MPa") * (areas["head"] - areas["crank"])
+        p["back_force"] = to_si(gas.back_pressure_MPa or 0.0, "MPa") * (
+            areas["head"] - areas["crank"]
+        )
 
 
 def _cards(case: Case, area: float, p: dict[str, Any]) -> None:
     """Set the force of measured gas over the crank's angle; area: of the head's face (m2)."""
     gas = case.gas
     rod = math.pi * to_si((gas.rod_diameter_mm or 0.0) / 2, "mm") ** 2
-    faces, nodes = {"head": area, "crank": rod - area}, 0.0
-    for end, path in gas.cards.items():
-        card = open_card(path)
-        nodes = nodes + faces[end] * 1e6 * card_nodes(card.angles, card.pressures)
+    faces = {"head": area, "crank": rod - area}
+    nodes: Any = 0.0
+    for end in gas.cards:
+        nodes = nodes + faces[end] * gas_nodes(case, end)
     table = np.array(nodes)
-    table[:, 0] -= to_si(gas.back_pressure_MPa, "MPa") * sum(faces[end] for end in gas.cards)
+    table[:, 0] -= to_si(gas.back_pressure_MPa or 0.0, "MPa") * sum(faces[end] for end in gas.cards)
     p["card"], p["discharge_force"] = table, np.abs(table[:, 0]).max()
 
 
@@ -413,15 +415,21 @@ def deflect(p: np.record, y: np.ndarray) -> None:
     n, first = int(p["freedoms"]), int(p["at"][Coordinate.BEND_1])
     modes = slice(first, first + 4)
     z = np.append(y, np.zeros(FLOWS))
-    rates = np.empty_like(z)
+    phases = np.zeros(1, dtype=np.int64)
     response = np.empty((4, 4))
+
+    def accelerations(z: np.ndarray) -> np.ndarray:
+        """Return the modes' accelerations, (4,), as a motion begins with z."""
+        rates = np.empty_like(z)
+        enter_segment(0.0, z, 0, phases, p)
+        derivative_with_flows(0.0, z, phases[0], p, rates)
+        return rates[n:][modes]
+
     for _ in range(DEFLECTION_ROUNDS):
-        derivative_with_flows(0.0, z, 0, p, rates)
-        unmoved = rates[n:][modes].copy()
+        unmoved = accelerations(z)
         for mode in range(4):
             moved = z.copy()
             moved[first + mode] += MODE_SHIFT
-            derivative_with_flows(0.0, moved, 0, p, rates)
-            response[:, mode] = (rates[n:][modes] - unmoved) / MODE_SHIFT
+            response[:, mode] = (accelerations(moved) - unmoved) / MODE_SHIFT
         z[modes] -= np.linalg.solve(response, unmoved)
     y[modes] = z[modes]

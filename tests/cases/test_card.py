@@ -5,12 +5,14 @@ import math
 import os
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from compressor.cases.card import CardError, mark_card, open_card, read_card
 from compressor.cases.case import Case, CaseError
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.solve.cautions import remarks
+from compressor.solve.measured_gas import card_noise, fit_polytrope, gas_nodes
 from compressor.solve.simulate import measure
 
 ANGLES = list(range(0, 360, 5))
@@ -37,7 +39,7 @@ def measured(path, **gas):
 
 
 def test_one_revolution(card):
-    found = read_card(card)
+    found = read_card(card, "head")
     assert found.angles == tuple(map(float, ANGLES))
     assert found.pressures == pytest.approx([pressure(angle) for angle in ANGLES])
     assert (found.revolutions, found.scatter) == (1, 0.0)
@@ -47,8 +49,10 @@ def test_a_closing_sample_and_angles_from_anywhere(tmp_path, card):
     """From -180 to 180 degrees, with other columns; the last angle is the first."""
     rows = [(0.5, pressure(angle), angle) for angle in range(-180, 185, 5)]
     path = write(tmp_path / "b.csv", rows, "time, pressure_MPa ,crank_angle_deg")
-    assert read_card(path).angles == read_card(card).angles
-    assert read_card(path).pressures == pytest.approx(read_card(card).pressures, rel=1e-12)
+    assert read_card(path, "head").angles == read_card(card, "head").angles
+    assert read_card(path, "head").pressures == pytest.approx(
+        read_card(card, "head").pressures, rel=1e-12
+    )
 
 
 def test_revolutions_are_averaged_on_the_first_one_s_angles(tmp_path, card):
@@ -56,9 +60,9 @@ def test_revolutions_are_averaged_on_the_first_one_s_angles(tmp_path, card):
     angles = [0, 2.5, *range(5, 360, 5)]
     rows = [(angle, pressure(angle) - 0.01) for angle in ANGLES]
     rows += [(angle + 360, pressure(angle) + 0.01) for angle in angles]
-    found = read_card(write(tmp_path / "two.csv", rows))
+    found = read_card(write(tmp_path / "two.csv", rows), "head")
     assert found.revolutions == 2
-    assert found.pressures == pytest.approx(read_card(card).pressures, rel=1e-12)
+    assert found.pressures == pytest.approx(read_card(card, "head").pressures, rel=1e-12)
     assert found.scatter == pytest.approx(0.01 * math.sqrt(2), rel=1e-9)
     (told,) = (one for one in remarks(measured(str(tmp_path / "two.csv"))) if one.kind == "scatter")
     assert told.key == "gas.indicator"
@@ -68,28 +72,38 @@ def test_revolutions_are_averaged_on_the_first_one_s_angles(tmp_path, card):
 @pytest.mark.parametrize(
     ("rows", "head", "words"),
     [
-        ([(0, 0.4), (10, 0.5)], "angle,pressure_MPa", ":1: has no column crank_angle_deg; its"),
-        ([(0, 4)], "crank_angle_deg,pressure_bar", ":1: has no column pressure_MPa; its columns "
-         "are crank_angle_deg, pressure_bar"),
+        ([(0, 0.4), (10, 0.5)], "turn,pressure_MPa", ": has no column for the crank angle; it has "
+         "turn, pressure_MPa; a card needs crank_angle_deg and pressure_bar, or head_pressure_bar"),
+        ([(0, 4), (10, 5)], "crank_angle_deg,pressure", ": has no column for the pressure of the "
+         "head end"),
+        ([(0, 4), (10, 5)], "crank_angle_deg,crank_pressure_bar", ": has no column for the "
+         "pressure of the head end; it has crank_angle_deg, crank_pressure_bar"),
+        ([(0, 4, 4), (10, 5, 5)], "crank_angle_deg,pressure_bar,pressure_MPa", ": has 2 columns "
+         "for the pressure of the head end"),
         ([(0, 0.4), (10, 0.5), (10, 0.6)], None, ":4: angles must rise, and 10 follows 10"),
         ([(0, 0.4), (10, 0.5), (5, 0.6)], None, ":4: angles must rise, and 5 follows 10"),
-        ([(0, 0.4), (10, "nan")], None, ":3: pressure_MPa needs a number, not 'nan'"),
-        ([(0, 0.4), ("x", 0.5)], None, ":3: crank_angle_deg needs a number, not 'x'"),
-        ([(0, 0.4), (10,)], None, ":3: pressure_MPa needs a number, not ''"),
+        ([(0, 0.4), (10, "nan")], None, ":3:2: pressure_MPa: 'nan' is not finite"),
+        ([(0, 0.4), ("x", 0.5), (10, 0.4), (20, 0.5)], None, ":3:1: crank_angle_deg: 'x' is no "
+         "number"),
+        ([(0, 0.4), (5, "0.4_01325"), (10, 0.4), (20, 0.5)], None, ":3:2: pressure_MPa: "
+         "'0.4_01325' is no number"),
+        ([(0, 0.4), (10,), (20, 0.4), (30, 0.4)], None, ":3:2: pressure_MPa: '' is no number"),
         ([(0, 0.4), (30, 0.5)], None, ":3: a gap of 30 degrees before 30; at most 20"),
         ([(angle, 0.4) for angle in range(0, 300, 10)], None, ":31: the card ends 70 degrees "
          "before its revolution does"),
-        ([(angle, 400) for angle in range(0, 360, 10)], None, ":2: 400 MPa is above 100; give "
-         "absolute pressures in MPa: 1 bar is 0.1, 1 kPa 0.001, 1 Pa 1e-6"),
+        ([(angle, 400) for angle in range(0, 360, 10)], None, ":2: 400 MPa is above 100; is "
+         "pressure_MPa the column's unit?"),
         ([(angle, 4e-7) for angle in range(0, 360, 10)], None, "all pressures are below 0.001"),
-        ([(angle, -0.01) for angle in range(0, 360, 10)], None, ":2: -0.01 MPa is no absolute"),
-        ([], None, ":1: holds no samples"),
+        ([(angle, -0.01) for angle in range(0, 360, 10)], None, ":2: -0.01 MPa is below a vacuum"),
+        ([(angle, -1.2) for angle in range(0, 360, 10)], "crank_angle_deg,pressure_barg",
+         ":2: -0.12 MPa is below a vacuum"),
+        ([], None, ": holds no rows of numbers"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_with_file_and_line(tmp_path, rows, head, words):
     path = write(tmp_path / "bad.csv", rows, head or "crank_angle_deg,pressure_MPa")
     with pytest.raises(CardError) as caught:
-        read_card(path)
+        read_card(path, "head")
     assert f"{path}{words}" in str(caught.value) or words in str(caught.value)
     assert str(caught.value).startswith(path)
     with pytest.raises(CaseError, match=r"gas\.indicator: .*bad\.csv"):
@@ -100,8 +114,8 @@ def test_files_that_are_none(tmp_path):
     with pytest.raises(CaseError, match=r"gas\.indicator: .*none\.csv: cannot be read: No such"):
         measured(str(tmp_path / "none.csv"))
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(CardError, match="cannot be read"):
-        read_card(str(tmp_path / "binary.csv"))
+    with pytest.raises(CardError, match="is no text"):
+        read_card(str(tmp_path / "binary.csv"), "head")
 
 
 def test_the_key_has_the_numbers_and_not_the_place(tmp_path, card):
@@ -111,7 +125,7 @@ def test_the_key_has_the_numbers_and_not_the_place(tmp_path, card):
     assert measured(same).key == one.key
     other = write(tmp_path / "other" / "y.csv", [(a, pressure(a) + 1e-6) for a in ANGLES])
     assert measured(other).key != one.key
-    assert one.gas.indicator == mark_card(card)
+    assert one.gas.indicator == mark_card(card, "head")
     assert Case.from_values(one.values()) == one
     assert Case.from_attribute(one.attributes()["case"]).key == one.key
 
@@ -126,7 +140,7 @@ def test_a_file_that_has_changed_is_not_run(tmp_path, card):
     os.remove(card)
     assert "cannot be read" in measure(case).attributes["detail"]
     with pytest.raises(CardError):
-        open_card(case.gas.indicator)
+        open_card(case.gas.indicator, "head")
     assert measured(write(tmp_path / "head.csv", [(a, 0.2) for a in ANGLES])).key != case.key
 
 
@@ -162,7 +176,7 @@ def test_paths_are_seen_from_the_case_file(tmp_path, card, monkeypatch):
            "indicator": {"head": "../head.csv", "crank": ["crank.csv", "../head.csv"]}}  # fmt: skip
     (tmp_path / "deeper" / "case.yaml").write_text(json.dumps({"load": "gas", "gas": gas, **SHORT}))
     (study,) = load_studies("deeper/case.yaml")
-    assert [case.gas.cards["head"] for case in study.cases] == [mark_card(card)] * 2
+    assert [case.gas.cards["head"] for case in study.cases] == [mark_card(card, "head")] * 2
     assert [len(axis.values) for axis in study.axes] == [2]
     gas["indicator"] = {"head": "none.csv"}
     (tmp_path / "deeper" / "case.yaml").write_text(json.dumps({"load": "gas", "gas": gas, **SHORT}))
@@ -176,3 +190,113 @@ def test_a_case_in_python_is_checked_when_it_runs(card):
     bad = replace(case, gas=replace(case.gas, indicator=card))  # without its digest
     assert bad.problems == ()  # which is then made
     assert "has changed" in measure(bad).attributes["detail"]
+
+
+def cycle(angle, clearance=0.12, exponent=1.3, low=0.2, high=0.7, crank=False):
+    """Pressure (MPa) of an ideal cycle of the default machine, at a crank angle (degrees)."""
+    a = math.radians(angle)
+    x = 120 * math.cos(a) + math.sqrt(600**2 - (120 * math.sin(a)) ** 2)
+    swept = (720 - x) / 240
+    if crank:
+        swept = 1 - swept
+    if (angle < 180) == crank:
+        return min(high, low * ((clearance + 1) / (clearance + swept)) ** exponent)
+    return max(low, high * (clearance / (clearance + swept)) ** exponent)
+
+
+FINE = [0.5 * k for k in range(720)]
+ROD = {"action": "double", "rod_diameter_mm": 30}
+
+
+def head(path, scale=1.0, more=0.0, name="pressure_MPa", **how):
+    rows = [(angle, scale * cycle(angle, **how) + more) for angle in FINE]
+    return write(path, rows, f"crank_angle_deg,{name}")
+
+
+@pytest.mark.parametrize(
+    ("name", "scale", "more"),
+    [
+        ("pressure_bar", 10.0, 0.0),
+        ("head_pressure_bara", 10.0, 0.0),
+        ("Pressure [kPa]", 1e3, 0.0),
+        ("HE Pressure (psi)", 145.0377377, 0.0),
+        ("pressure_barg", 10.0, -1.01325),
+        ("head_pressure_psig", 145.0377377, -14.69594878),
+    ],
+)
+def test_units_of_a_card_stand_in_its_column(tmp_path, name, scale, more):
+    plain = measured(head(tmp_path / "a.csv"))
+    other = measured(head(tmp_path / "b.csv", scale, more, name))
+    assert gas_nodes(other, "head") == pytest.approx(gas_nodes(plain, "head"), rel=1e-6, abs=0.1)
+    told = [one.message for one in remarks(other) if one.kind == "gauge"]
+    assert bool(told) == name.endswith("g")
+    if told:
+        assert "1.01325 bar; set gas.ambient_MPa" in told[0]
+        lower = measured(str(tmp_path / "b.csv"), ambient_MPa=0.09)
+        fall = gas_nodes(other, "head") - gas_nodes(lower, "head")
+        assert fall[:, 0] == pytest.approx(11325, rel=1e-6)
+
+
+def test_an_analyser_s_file_has_both_ends_header_lines_and_decimal_commas(tmp_path):
+    """As a case of two files in MPa, to the digits of the numbers."""
+    lines = ["Analyser: PRO-4000", "Unit: C-201B", "", "Angle [deg];HE Pressure [barg];CE Pressure"
+             " [barg];Flow"]  # fmt: skip
+    for angle in FINE:
+        bar = [10 * cycle(angle, crank=crank) - 1.01325 for crank in (False, True)]
+        cells = [f"{angle:.1f}", *(f"{one:.6f}" for one in bar), "7"]
+        lines.append(";".join(cells).replace(".", ","))
+    (tmp_path / "plant.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path = str(tmp_path / "plant.csv")
+    ours = measured({"head": path, "crank": path}, **ROD)
+    rows = [(angle, cycle(angle, crank=True)) for angle in FINE]
+    crank = write(tmp_path / "ce.csv", rows)
+    theirs = measured({"head": head(tmp_path / "he.csv"), "crank": crank}, **ROD)
+    for end in ("head", "crank"):
+        nodes = gas_nodes(ours, end)[:, 0]
+        assert nodes == pytest.approx(gas_nodes(theirs, end)[:, 0], rel=1e-6)
+    assert ours.gas.indicator != ours.gas.crank_indicator
+    with pytest.raises(CaseError) as caught:
+        measured({"head": crank, "crank": head(tmp_path / "he.csv")}, **ROD)
+    told = [str(one) for one in caught.value.problems]
+    assert [one.partition(":")[0] for one in told] == ["gas.indicator", "gas.crank_indicator"]
+    assert "is it the crank end's card" in told[0]
+    assert "is it the head end's card" in told[1]
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ({}, None),
+        ({"clearance": 0.2}, "fit a clearance of 20"),
+        ({"scale": 1, "more": -0.101325}, "are its pressures of the unit"),
+        ({"scale": 10, "name": "pressure_MPa"}, None),  # a cycle is one at any scale
+    ],
+)
+def test_a_card_is_held_against_its_own_lines(tmp_path, how, words):
+    """The fit of both polytropic lines finds clearance and exponent."""
+    case = measured(head(tmp_path / "a.csv", **how), clearance_percent=12)
+    told = [one.message for one in remarks(case) if one.kind == "fit"]
+    assert bool(told) == bool(words)
+    if words:
+        assert words in told[0]
+    if "more" not in how:
+        found = fit_polytrope(case, "head")
+        assert found.clearance == pytest.approx(how.get("clearance", 0.12), rel=0.03)
+        assert found.exponent == pytest.approx(1.3, abs=0.01)
+
+
+def test_noise_of_a_card_is_told_and_smoothed(tmp_path):
+    """0.003 MPa: told within a tenth, less by the window's width; a quiet card is not told."""
+    noise = np.random.default_rng(3).normal(0, 0.003, len(FINE))
+    rows = [(a, cycle(a) + n) for a, n in zip(FINE, noise.tolist(), strict=True)]
+    path = write(tmp_path / "noisy.csv", rows)
+    rough, smooth = measured(path), measured(path, smooth_deg=6)
+    assert card_noise(rough, "head") == pytest.approx(0.003, rel=0.1)
+    (told,) = [one.message for one in remarks(rough) if one.kind == "noise"]
+    assert "(rms) from their neighbours, which is 2" in told
+    assert "N on the piston; smoothed over 0 degrees" in told
+    quiet = measured(head(tmp_path / "quiet.csv"))
+    assert [one for one in remarks(quiet) if one.kind == "noise"] == []
+    left = [gas_nodes(one, "head")[:, 0] - gas_nodes(quiet, "head")[:, 0]
+            for one in (rough, smooth)]  # fmt: skip
+    assert left[1].std() < 0.5 * left[0].std()

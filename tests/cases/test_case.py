@@ -174,7 +174,8 @@ def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
                       "materials": ["steel", "steel"]}}, "contact.materials", "give one of the"),
         ({"spring": {"stroke_mm": 240}}, "spring.stroke_mm", "less than the piston's stroke"),
         ({"load": "gas", "gas": {"discharge_MPa": 0.1}}, "gas.discharge_MPa", "must exceed"),
-        ({"load": "gas", "gas": {"exponent": 1.3}}, "gas.switching", "set switching: exact"),
+        ({"load": "gas", "gas": {"exponent": 1.3, "switching": "paper"}}, "gas.switching",
+         "set switching: exact"),
         ({"load": "gas", "gas": {"discharge_MPa": 10, **EXACT_GAS}},
          "gas.head_clearance_mm", "never expands"),
         ({"load": "gas", "gas": {"suction_MPa": 1e-300, **EXACT_GAS}},
@@ -327,6 +328,33 @@ def test_keys_stay_as_they_are_stored(values, key, physics):
     """A key changes only with the model's version: stores hold results under it."""
     case = Case.from_values(values)
     assert (case.key, case.physics_key) == (key, physics)
+
+
+@pytest.mark.parametrize(
+    ("values", "switching", "back"),
+    [
+        ({}, "paper", 0.0),
+        ({"gas": {"back_pressure_MPa": 0.1}}, "paper", 0.1),
+        ({"gas": {"bore_mm": 220}}, "exact", 0.101325),
+        ({"gas": {"bore_mm": 100}}, "exact", 0.101325),  # the paper's, but the file's own
+        ({"gas": {"discharge_MPa": 0.5, "back_pressure_MPa": 0}}, "exact", 0.0),
+        ({"gas": {"action": "single"}}, "exact", 0.101325),
+        ({"gas": {"switching": "exact"}}, "exact", 0.0),
+        ({"machine": {"stroke_mm": 180}}, "exact", 0.101325),
+        ({"machine": {"rod_mass_kg": 5}}, "paper", 0.0),
+    ],
+)
+def test_a_cylinder_of_one_s_own_has_exact_corners_and_the_atmosphere(values, switching, back):
+    case = Case.from_values({"load": "gas", **values})
+    assert (case.gas.switching, case.gas.back_pressure_MPa) == (switching, back)
+    assert Case.from_values(case.values()) == case
+
+
+def test_a_sweep_through_the_paper_s_value_keeps_one_s_own_cylinder(read):
+    cases = read("load: gas\ngas: {discharge_MPa: [0.3, 0.393, 0.5]}").cases
+    assert {(case.gas.switching, case.gas.back_pressure_MPa) for case in cases} == {
+        ("exact", 0.101325)
+    }
 
 
 def test_a_case_tells_what_is_stored_of_it():

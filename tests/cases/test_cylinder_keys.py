@@ -5,6 +5,7 @@ import pytest
 from compressor.cases.case import Case, CaseError
 from compressor.cases.groups import CYLINDER_KEYS
 from compressor.cases.load import CaseFileError, load_studies
+from compressor.solve.cautions import remarks
 from compressor.solve.si_record import record
 
 DOUBLE = {"action": "double", "rod_diameter_mm": 30}
@@ -76,6 +77,19 @@ def test_clearances_are_of_the_stroke():
 )  # fmt: skip
 def test_what_does_not_fit_is_told(gas, words):
     assert words in refused(gas)
+
+
+@pytest.mark.parametrize("clearance", [14, {"crank": 14}, {"head": 12, "crank": 14}])
+def test_a_crank_end_alone_takes_its_clearance_in_every_form(clearance):
+    """Facts of a cylinder: two of the forms were refused, with opposite advice."""
+    one = case({"action": "crank_end", "rod_diameter_mm": 20, "clearance_percent": clearance})
+    assert record(one)["crank_clearance"] == pytest.approx(0.14 * 0.24)
+    assert Case.from_values(one.values()) == one
+    both = {"head": 12, "crank": 14}
+    single = case({"action": "single", "clearance_percent": both})
+    assert record(single)["head_clearance"] == pytest.approx(0.0288)
+    (told,) = remarks(case(DOUBLE | {"clearance_percent": {"crank": 14}}))
+    assert told.message == "of the crank end alone: the head end has 20 mm"
 
 
 def test_a_piston_that_would_reach_a_cover():

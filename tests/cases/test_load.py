@@ -335,8 +335,8 @@ def test_an_unknown_key_is_told_with_what_was_meant(write, text, hint):
         ("spring:\n  stroke_mm: [100, 250]\nsolve: {rtol: 1e-5, accuracy: [fine, draft]}\n",
          ["2:20: spring.stroke_mm: 250 mm must be less than the piston's stroke, 240 mm",
           "3:15: solve.rtol: stands in place of solve.accuracy: give one of the two"]),
-        ("load: gas\ngas: {exponent: 1.3}\n",
-         ["2:1: gas.switching: the printed corners hold for the paper's geometry and pressures "
+        ("load: gas\ngas: {exponent: 1.3, switching: paper}\n",
+         ["2:33: gas.switching: the printed corners hold for the paper's geometry and pressures "
           "only; set switching: exact"]),
     ],
 )  # fmt: skip
@@ -421,9 +421,9 @@ def test_a_wrong_override_is_told_once(write, overrides, expected):
 
 
 def test_what_an_override_breaks_is_told_where_the_file_could_mend_it(write):
-    path = write("load: gas\ngas: {piston_radius_mm: 60}\n")
+    path = write("load: gas\ngas: {switching: paper}\n")
     (message,) = mistakes(path, overrides=["gas.exponent=1.3"])
-    assert message.startswith("case.yaml:2:1: gas.switching: the printed corners hold for")
+    assert message.startswith("case.yaml:2:18: gas.switching: the printed corners hold for")
 
 
 # Hostile files

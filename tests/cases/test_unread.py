@@ -24,13 +24,14 @@ WORN = IDEAL | {"joint": "both", "clearance_mm": {"big_end": 0.2, "small_end": 0
 BIG = WORN | {"joint": "big_end", "clearance_mm": {"big_end": 0.2}}
 SMALL = WORN | {"joint": "small_end", "clearance_mm": {"small_end": 0.2}}
 FREE = WORN | {"load": "none"}
-GAS = WORN | {"load": "gas", "gas": {"switching": "exact"}}
+GAS = WORN | {"load": "gas", "gas": {"switching": "exact", "back_pressure_MPa": 0.1}}
 DOUBLE = WORN | {"load": "gas", "gas": {"action": "double", "rod_diameter_mm": 30}}
 CRANK_END = WORN | {"load": "gas", "gas": {"action": "crank_end", "rod_diameter_mm": 30,
                                            "crank_clearance_percent": 12}}  # fmt: skip
 SINGLE = WORN | {"load": "gas", "gas": {"action": "single"}}
 CRANK_ALONE = WORN | {"load": "gas", "gas": {"action": "crank_end", "rod_diameter_mm": 30}}
-CARD = str(Path(__file__).parent / "card.csv")
+CARD, GAUGE = (str(Path(__file__).parent / name) for name in ("card.csv", "gauge_card.csv"))
+MEASURED = WORN | {"load": "gas", "gas": {"indicator": GAUGE}}
 HERTZ = WORN | {"contact": {"law": "hertz"}}
 DAMPED = WORN | {"contact": {"law": "hunt_crossley", "restitution": 0.5}}
 PIN = {"law": "johnson", "length_mm": 20, "modulus_GPa": 100}
@@ -101,7 +102,7 @@ ENTRIES = {
     "machine.small_end_pin_radius_mm": Entry(12, WORN, (IDEAL, BIG)),
     **entries(
         GAS, WORN, FREE, gas__piston_radius_mm=60, gas__suction_MPa=0.11,
-        gas__discharge_MPa=0.5, gas__exponent=1.3, gas__back_pressure_MPa=0.1,
+        gas__discharge_MPa=0.5, gas__exponent=1.3, gas__back_pressure_MPa=0.2,
         gas__valve_loss_percent=5, gas__discharge_loss_percent=5, gas__unloaded="head",
     ),
     "gas.head_clearance_mm": Entry(25, GAS, (WORN, FREE, CRANK_END)),
@@ -110,6 +111,7 @@ ENTRIES = {
     "gas.indicator": Entry(CARD, SINGLE, (WORN, FREE)),
     "gas.crank_indicator": Entry(CARD, CRANK_ALONE, (WORN, GAS)),
     **entries(DOUBLE, GAS, SINGLE, WORN, gas__rod_diameter_mm=40, gas__crank_clearance_percent=12),
+    **entries(MEASURED, GAS, WORN, gas__ambient_MPa=0.09, gas__smooth_deg=30),
     "gas.switching": Entry("exact", WORN | {"load": "gas"}, (WORN, FREE)),
     **entries(
         WORN, GAS, FREE, spring__stiffness_N_per_mm=30, spring__damping_N_s_per_mm=0.1,

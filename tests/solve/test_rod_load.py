@@ -106,6 +106,7 @@ def test_of_a_double_acting_cylinder():
     gas = {
         "action": "double", "bore_mm": 220, "rod_diameter_mm": 60, "suction_MPa": 0.2,
         "discharge_MPa": 0.7, "exponent": 1.3, "clearance_percent": {"head": 12, "crank": 14},
+        "back_pressure_MPa": 0,
     }  # fmt: skip
     machine = {"stroke_mm": 180, "rod_length_mm": 450, "speed_rpm": 740,
                "reciprocating_mass_kg": 30}  # fmt: skip

@@ -230,7 +230,7 @@ def gas_state(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     clearance = gas.clearance("head", 2 * machine.crank_radius_mm)
     head = machine.rod_length_mm + machine.crank_radius_mm + clearance
     volume = area * (head - run["displacement"].values * 1e3) * 1e-6
-    return volume, run["piston_force"].values / area + gas.back_pressure_MPa
+    return volume, run["piston_force"].values / area + (gas.back_pressure_MPa or 0.0)
 
 
 def name_phases(panel: Panel, run: xr.Dataset, volume: np.ndarray, pressure: np.ndarray) -> None:

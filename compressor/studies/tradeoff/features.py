@@ -277,7 +277,7 @@ FEATURES = (
     ModelFeature(
         "back pressure",
         "gas.back_pressure_MPa",
-        lambda case: case.load == "gas" and case.gas.back_pressure_MPa > 0,
+        lambda case: case.load == "gas" and (case.gas.back_pressure_MPa or 0.0) > 0,
         lambda case: with_values(case, "gas", back_pressure_MPa=0.0),
         lambda case: None,
         "no back pressure",
