@@ -194,7 +194,7 @@ def unload_lane(W, j, runs, job, work):
         else:
             runs.sums[job, i] = word
     tally.crank_work, tally.load_work = runs.z[job, n], runs.z[job, n + 1]
-    tally.damping_loss, tally.friction_loss = runs.z[job, n + 2], runs.z[job, n + 3]
+    tally.contact_work, tally.friction_loss = runs.z[job, n + 2], runs.z[job, n + 3]
 
 
 @jit

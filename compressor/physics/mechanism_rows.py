@@ -9,7 +9,6 @@ import numpy as np
 
 from compressor.physics._jit import inline_once, jit, square_root
 from compressor.physics.contact import LUGRE, bristle_rate, nearness
-from compressor.physics.contact_laws import elastic_energy
 from compressor.physics.kinematics import ideal
 from compressor.physics.mechanism import (
     ACROSS,
@@ -50,7 +49,7 @@ from compressor.physics.observe import (
     VELOCITY,
     WIDE,
     Column,
-    damping_power,
+    contact_power,
     write_frame_forces,
 )
 from compressor.physics.worn_bore import contact_at_wall, wear_off
@@ -126,15 +125,15 @@ def guide_moment(now, p):
 
 @jit
 def write_powers(now, p, row):
-    """Write four powers (W) into row, (4,): of crank and load, lost to damping and friction."""
+    """Write four powers (W) into row, (4,): of crank and load, into contacts, lost to friction."""
     big, small, guide, pose = now.joints.big, now.joints.small, now.joints.guide, now.pose
     forces = now.reactions
     torque = crank_torque(now, p) + p.unbalance * p.gravity * pose.cos_theta
     row[0] = (motor_torque(pose, p) if p.driven else torque) * pose.speed
     row[1] = -now.joints.load * now.velocity[8]
-    damping = damping_power(big) + damping_power(small) + guide.damped
-    damping += now.joints.big_film.loss + now.joints.small_film.loss
-    row[2] = damping + rod_damping_power(now, p)
+    pressed = contact_power(big) + contact_power(small) + guide.damped
+    pressed += now.joints.big_film.loss + now.joints.small_film.loss
+    row[2] = pressed + rod_damping_power(now, p)
     friction = guide.rubbed - big.friction * big.slip - small.friction * small.slip
     friction += forces.big_torque * (pose.speed - now.joints.big_spin)
     friction += forces.small_torque * (now.joints.pin_spin - now.joints.small_spin)
@@ -143,16 +142,13 @@ def write_powers(now, p, row):
 
 @jit
 def write_energies(now, p, row):
-    """Write kinetic and potential energy (J) into the row."""
+    """Write kinetic and potential energy (J) into the row, without the journals' contacts."""
     pose, joints, modes = now.pose, now.joints, now.w[7:11]
     kinetic = 0.0
     for i in range(ROWS):
         kinetic += 0.5 * now.velocity[i] * dot_rows(now.mass[i], 0, ROWS, now.velocity)
     row[KINETIC] = kinetic
     stored = joints.guide.stored + 0.5 * material_work(modes, modes, p)
-    big, small = joints.big, joints.small
-    stored += elastic_energy(big.elastic, big.penetration, p.stiffness[0], p.clearance[0], p)
-    stored += elastic_energy(small.elastic, small.penetration, p.stiffness[1], p.clearance[1], p)
     along = p.rod_centre + dot_rows(FIRST, ACROSS, MODES, modes)
     height = p.crank_radius * pose.sin_theta - now.w[2] - along * pose.sin_phi
     height += dot_rows(FIRST, 0, ACROSS, modes) * pose.cos_phi

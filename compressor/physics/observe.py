@@ -9,7 +9,6 @@ from enum import IntEnum
 
 from compressor.physics._jit import inline_llvm, inline_numba, inline_once, jit, square_root
 from compressor.physics.contact import nearness
-from compressor.physics.contact_laws import elastic_energy
 from compressor.physics.kinematics import ideal
 from compressor.physics.motion import (
     deviation_accelerations,
@@ -48,10 +47,10 @@ class Column(IntEnum):
     GUIDE_MOMENT = 25  # of the crosshead on its guide, about the crank's centre
     CRANK_POWER = 26  # put into the mechanism by the crank, or by the motor that drives it
     LOAD_POWER = 27  # put into the mechanism by the piston force
-    DAMPING_POWER = 28  # lost in the contacts' normal direction and in an elastic rod
+    CONTACT_POWER = 28  # into the contacts' normal direction and an elastic rod's material
     FRICTION_POWER = 29  # lost to friction
     KINETIC = 30
-    POTENTIAL = 31  # contacts' springs and gravity
+    POTENTIAL = 31  # of gravity, a guide's contacts and an elastic rod
     PACE = 32  # time that passes over that of a steady crank
     SHAKING_FORCE = 33  # two: of the machine on its frame; from here on: not in a march
     BEARING_FORCE = 35  # two: on the main bearing
@@ -73,7 +72,7 @@ FORCE_SIZE, DEVIATION = int(Column.FORCE_SIZE), int(Column.DEVIATION)
 JOURNAL_ACCELERATION = int(Column.JOURNAL_ACCELERATION)
 CRANK_TORQUE, GUIDE_MOMENT = int(Column.CRANK_TORQUE), int(Column.GUIDE_MOMENT)
 CRANK_POWER, LOAD_POWER = int(Column.CRANK_POWER), int(Column.LOAD_POWER)
-DAMPING_POWER, FRICTION_POWER = int(Column.DAMPING_POWER), int(Column.FRICTION_POWER)
+FRICTION_POWER = int(Column.FRICTION_POWER)
 KINETIC, POTENTIAL = int(Column.KINETIC), int(Column.POTENTIAL)
 PACE, GUIDE_FORCE = int(Column.PACE), int(Column.GUIDE_FORCE)
 SHAKING_FORCE, BEARING_FORCE = int(Column.SHAKING_FORCE), int(Column.BEARING_FORCE)
@@ -168,12 +167,13 @@ def joint_forces(now, y, p):
 
 
 @inline_llvm
-def damping_power(contact):
-    """Return the power (W) a contact loses in its normal direction, the clamp's included.
+def contact_power(contact):
+    """Return the power (W) that a contact takes in its normal direction: its spring's and its loss.
 
-    Never negative.
+    Both in one: while the force is held at 0 the spring gives its energy up to the loss, which a
+    long step through free flight does not resolve, and both are without effect on the motion.
     """
-    return (contact.normal - contact.elastic) * contact.rate
+    return contact.normal * contact.rate
 
 
 @inline_once
@@ -235,15 +235,15 @@ def frame_of_series(crank, friction, p, rows):
 
 @inline_once
 def powers(now, y, forces, p):
-    """Return the four powers (W): of crank and load, lost to damping and friction."""
+    """Return the four powers (W): of crank and load, into contacts, lost to friction."""
     motion, big, small = now.motion, now.big, now.small
     crank = p.crank_radius * p.omega
     turning = crank * (motion.cos_theta * forces[1] - motion.sin_theta * forces[0])
     if p.clearance[0] > 0.0:
         turning -= p.omega * (p.pin_radius[0] - big.penetration) * big.friction
     pressing = -now.load * (motion.v + y[p.freedoms])
-    damping = damping_power(big) + damping_power(small)
-    return turning, pressing, damping, -big.friction * big.slip - small.friction * small.slip
+    pressed = contact_power(big) + contact_power(small)
+    return turning, pressing, pressed, -big.friction * big.slip - small.friction * small.slip
 
 
 @inline_numba
@@ -254,16 +254,13 @@ def write_powers(now, y, forces, p, out):
 
 @inline_once
 def energies(now, y, p):
-    """Return the kinetic and potential energy (J)."""
+    """Return the kinetic and potential energy (J), the latter without the contacts' springs."""
     v = now.motion.v + y[p.freedoms]
     rate = now.motion.rate + y[2 * p.freedoms - 1]
     kinetic = p.reciprocating_mass * v * v + p.rod_inertia * rate * rate
     vx, vy, height = centre_velocity(now, y, p)
     kinetic += p.rod_mass * (vx * vx + vy * vy)
-    big, small = now.big, now.small
-    potential = elastic_energy(big.elastic, big.penetration, p.stiffness[0], p.clearance[0], p)
-    potential += elastic_energy(small.elastic, small.penetration, p.stiffness[1], p.clearance[1], p)
-    return 0.5 * kinetic, potential + p.rod_mass * p.gravity * height
+    return 0.5 * kinetic, p.rod_mass * p.gravity * height
 
 
 @inline_once

@@ -64,7 +64,7 @@ TALLY = np.dtype(
         ("energy", "f8"),  # at the start
         ("crank_work", "f8"),
         ("load_work", "f8"),
-        ("damping_loss", "f8"),
+        ("contact_work", "f8"),  # of the normal forces, springs and losses; film and rod too
         ("friction_loss", "f8"),
         ("worst_imbalance", "f8"),  # J
         ("peak_kinetic", "f8"),
@@ -168,7 +168,7 @@ def tally_energy(row, flows, tally):
         tally.energy = energy
         tally.started = 1
     tally.crank_work, tally.load_work = flows[0], flows[1]
-    tally.damping_loss, tally.friction_loss = flows[2], flows[3]
+    tally.contact_work, tally.friction_loss = flows[2], flows[3]
     tally.peak_kinetic = max(tally.peak_kinetic, row[KINETIC])
     tally.worst_imbalance = larger_imbalance(
         tally.worst_imbalance, energy - tally.energy, flows[0], flows[1], flows[2], flows[3]

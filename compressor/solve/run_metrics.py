@@ -19,7 +19,14 @@ import numpy as np
 
 from compressor.cases import Case
 from compressor.metrics import METRICS, NUMBERS, QUANTILES
-from compressor.physics import Column, is_featured, read_fields
+from compressor.physics import (
+    COLUMNS,
+    Column,
+    elastic_form,
+    is_featured,
+    observe_all,
+    read_fields,
+)
 from compressor.solve.error_bars import Companion, Metrics, energy_residual
 from compressor.solve.request import Trajectory, last_state, merge_turns
 
@@ -69,13 +76,32 @@ def has_metric(p: np.record, flag: str) -> bool:
     return not flag or (is_featured(p) and bool(p[flag]))
 
 
+def held_by_springs(p: np.record, trajectory: Trajectory) -> float:
+    """Return by how much more energy (J) the contacts' springs hold at a run's end than before."""
+    if not p["clearance"].any() or not trajectory.states[0].size:
+        return 0.0
+    states = np.stack([trajectory.states[0], last_state(trajectory)])
+    rows = np.empty((2, COLUMNS))
+    end = trajectory.stop_time if trajectory.reason else trajectory.times[-1]
+    times, phases = np.array([trajectory.times[0], end]), trajectory.phases[[0, -1]]
+    observe_all(times, states, phases, p, rows)
+    held = np.zeros(2)
+    for joint, (stiffness, clearance) in enumerate(
+        zip(p["stiffness"], p["clearance"], strict=True)
+    ):
+        for k, depth in enumerate(rows[:, Column.PENETRATION + joint].tolist()):
+            if depth > 0.0 and clearance > 0.0:
+                held[k] += elastic_form(stiffness, clearance, p).energy(depth)
+    return float(held[1] - held[0])
+
+
 def ledger(p: np.record, trajectory: Trajectory) -> dict[str, float]:
     """Return the energy flows and counts by name."""
     tally, state = trajectory.tally, last_state(trajectory)
     elastic = is_featured(p) and p["elastic"]
     lost = float(state[p["rod_loss"]]) if elastic else 0.0
     # both are integrated by the same stages: without a contact they are equal but for rounding
-    contact = tally["damping_loss"] - lost
+    contact = tally["contact_work"] - lost - held_by_springs(p, trajectory)
     return {
         "crank_work": tally["crank_work"],
         "load_work": tally["load_work"],

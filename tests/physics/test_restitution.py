@@ -67,7 +67,7 @@ def test_the_damping_s_loss_is_the_lost_energy():
     """Of a drop: m v^2 (1 - e^2) / 2, by the flow that is integrated beside the motion."""
     run, rows = drop("small_end", 0.3, law="flores", restitution=0.7)
     lost = 0.5 * 5.0 * 0.3**2 * (1.0 - given_back(rows) ** 2)
-    assert run.trajectory.tally["damping_loss"] == pytest.approx(lost, rel=1e-5)
+    assert run.trajectory.tally["contact_work"] == pytest.approx(lost, rel=1e-5)
 
 
 def test_below_the_least_approach_less_is_damped():

@@ -132,7 +132,7 @@ def test_a_step_near_a_record_is_told(node, column):
 def test_energy_ledger_of_a_known_step():
     rows = np.zeros((NODES.size, COLUMNS))
     rows[:, Column.CRANK_POWER] = 50 * NODES
-    rows[:, Column.DAMPING_POWER] = 10.0
+    rows[:, Column.CONTACT_POWER] = 10.0
     rows[:, Column.KINETIC] = 100 + 15 * NODES
     tally, flows = new_tally(), np.zeros(4)
     tally_energy(rows[0], flows, tally)

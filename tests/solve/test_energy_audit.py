@@ -17,6 +17,11 @@ from compressor.solve.simulate import measure, simulate
 
 SHORT = {"duration_rev": 0.5, "settle_rev": 0}
 BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
+FLYING = {"stroke_mm": 180, "rod_length_mm": 450, "speed_rpm": 571, "reciprocating_mass_kg": 24,
+          "pin_radius_mm": 35}  # fmt: skip
+CRANK_END = {"action": "crank_end", "bore_mm": 220, "rod_diameter_mm": 60,
+             "crank_clearance_percent": 14, "suction_MPa": 0.2, "discharge_MPa": 0.55,
+             "exponent": 1.3, "back_pressure_MPa": 0.1}  # fmt: skip
 
 
 def case(**solve):
@@ -51,6 +56,49 @@ def test_what_is_allowed_follows_the_tolerance():
         1e-5
     )  # an impact costs as much in a short run
     assert (allowed_residual(1e-13, 4), allowed_residual(1e-2, 4)) == (ROUNDING, MAX_RESIDUAL)
+
+
+@pytest.mark.parametrize("damping", [5000, 20000])
+def test_a_heavily_damped_contact_balances_as_tightly_as_its_steps(damping):
+    """Its force is held at 0 for long, while its spring gives its energy up: nothing is moved."""
+    values = {
+        "joint": "small_end", "clearance_mm": 0.3, "load": "gas", "machine": FLYING,
+        "contact": {"damping_N_s_per_mm": damping}, "gas": CRANK_END,
+    }  # fmt: skip
+    for rtol in (1e-8, 1e-10):
+        solve = {**SHORT, "rtol": rtol, "error_bars": False}
+        found = measure(Case.from_values({**values, "solve": solve}))
+        assert (found.status, found.attributes["rtol"]) == ("ok", rtol)  # at its first tolerance
+        assert found.numbers["energy_residual"] < 10 * rtol
+
+
+def test_what_springs_hold_at_the_end_is_not_lost():
+    """A contact that rests on its spring: energy that is lost by a shorter run is no less."""
+    values = {"joint": "big_end", "clearance_mm": 0.2, "contact": {"damping_N_s_per_mm": 30}}
+    losses = [
+        measure(Case.from_values({**values, "solve": {**SHORT, "duration_rev": rev}})).numbers
+        for rev in np.linspace(0.01, 0.05, 9)
+    ]
+    lost = [numbers["contact_damping_loss"] for numbers in losses]
+    assert (np.diff(lost) >= -1e-9 * max(lost)).all()
+    assert lost[0] >= 0
+
+
+def test_light_masses_with_ideal_joints_balance():
+    """Nothing is integrated: gas does work, and next to no kinetic energy is there beside it."""
+    masses = {"rod_mass_kg": 1e-6, "reciprocating_mass_kg": 1e-6}
+    values = {"joint": "none", "load": "gas", "machine": masses, "output": {"signals": True}}
+    light, heavy = (
+        measure(Case.from_values({**values, "machine": machine})) for machine in (masses, {})
+    )
+    assert (light.status, light.reason) == ("ok", "")
+    assert light.numbers["energy_residual"] < 1e-9
+    assert light.numbers["crank_work"] == pytest.approx(heavy.numbers["crank_work"], rel=1e-9)
+    assert (
+        0
+        < light.numbers["peak_contact_force_error"][0]
+        < 1e-3 * light.numbers["peak_contact_force"][0]
+    )
 
 
 def test_a_run_that_balances_is_run_once(unbalance):

@@ -239,7 +239,7 @@ def test_a_metric_added_to_the_table_has_error_bars(monkeypatch):
     given = attempts.metrics
     monkeypatch.setitem(NUMBERS, "loss", Metric("loss", (), "J", "a toy metric", "velocity"))
     monkeypatch.setattr(
-        attempts, "metrics", lambda p, tally: given(p, tally) | {"loss": tally["damping_loss"]}
+        attempts, "metrics", lambda p, tally: given(p, tally) | {"loss": tally["contact_work"]}
     )
     how = {"duration_rev": 0.5, "settle_rev": 0, "rtol": 1e-5}
     case = Case.from_values({**BOTH, "solve": how})
