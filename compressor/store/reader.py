@@ -6,7 +6,8 @@
     <folder>/former/<name>~<n>.json      the same of a study that another of its name has replaced
     <folder>/shards/<shard>/{rows,jobs}  the same of a run that is one of several
 
-A job is stored when it has a row and, if the row names time series, their file. Every file
+A job is stored when it has a row. Where the file of time series that a row names is gone, as in a
+copy without `jobs`, the job has its metrics, and no series. Every file
 appears under its name only when all of it is on disk, and carries a digest of its bytes. There is
 no index: what is stored is read from the rows. `compressor.store.writer` writes them.
 """
@@ -125,7 +126,7 @@ class Stored:
 
     def __init__(self, folder: Path, segments: Sequence[Segment], damaged: Sequence[DamagedJob]):
         self.folder, self.segments, self.damaged = folder, segments, damaged
-        self.rows = Rows.of(segments, _usable)
+        self.rows = Rows.of(segments, _has_files)
 
     def warned(self) -> "Stored":
         """Return this store, after a StoreWarning of each damage, whose jobs count as missing."""
@@ -265,8 +266,8 @@ class Stored:
         return {} if path is None else read_values(path, names)
 
 
-def _usable(segment: Segment) -> np.ndarray:
-    """Return which rows of a segment count: not those whose time series are gone."""
+def _has_files(segment: Segment) -> np.ndarray:
+    """Return which rows of a segment have the file of time series that they name, if they do."""
     columns = segment.columns
     has_series = columns["samples"] > 0
     if not has_series.any():

@@ -187,7 +187,7 @@ def encode(segment: Segment) -> bytes:
         attrs = {"long_name": "zlib of JSON, a line a row"}
         variables[name] = ((f"bytes_of_{name}",), data, attrs)
     variables["key_again"] = (("row",), columns["key"], {"long_name": COLUMNS["key"][1]})
-    return image(variables, {"Conventions": "SI units"})
+    return image(variables, {"comment": "SI units"})
 
 
 def decode(data: bytes, path: Path) -> Segment:
@@ -275,26 +275,34 @@ class Rows:
     source: np.ndarray  # index of the segment, shape (jobs,)
     row: np.ndarray  # and of the row in it
     columns: dict[str, np.ndarray]
+    gone: np.ndarray  # whether a job's row names time series whose file is gone, (jobs,)
 
     @classmethod
-    def of(cls, segments: Sequence[Segment], usable: Any = None) -> "Rows":
-        """Return the rows of segments that count; `usable` masks those of one (default: all)."""
-        masks = [np.ones(len(s), bool) if usable is None else usable(s) for s in segments]
-        source = np.repeat(np.arange(len(segments)), [mask.sum() for mask in masks])
-        row = np.concatenate([np.flatnonzero(mask) for mask in masks] or [np.zeros(0, int)])
+    def of(cls, segments: Sequence[Segment], has_files: Any = None) -> "Rows":
+        """Return the rows of segments that count.
+
+        has_files: returns which rows of a segment have all their files (default: all); the others
+        count as rows without time series.
+        """
+        source = np.repeat(np.arange(len(segments)), [len(s) for s in segments])
+        row = np.concatenate([np.arange(len(s)) for s in segments] or [np.zeros(0, int)])
         columns = {
             name: np.concatenate(
-                [s.columns[name][mask] for s, mask in zip(segments, masks, strict=True)]
-                or [np.zeros(0, kind if kind != "S" else "S1")]
+                [s.columns[name] for s in segments] or [np.zeros(0, kind if kind != "S" else "S1")]
             )
             for name, (kind, *_) in COLUMNS.items()
         }
+        gone = np.zeros(len(row), bool)
+        if has_files is not None and segments:
+            gone = ~np.concatenate([has_files(s) for s in segments])
+            columns["samples"][gone] = 0
+            columns["precision"][gone] = columns["digest"][gone] = b""
         # by key, completeness and serial: of a key's rows the last one counts
         order = np.lexsort((columns["serial"], completeness(columns), columns["key"]))
         keys = columns["key"][order]
         chosen = order[np.append(keys[1:] != keys[:-1], True)[: len(keys)]]
         chosen_columns = {name: values[chosen] for name, values in columns.items()}
-        return cls(tuple(segments), source[chosen], row[chosen], chosen_columns)
+        return cls(tuple(segments), source[chosen], row[chosen], chosen_columns, gone[chosen])
 
     def __len__(self) -> int:
         return len(self.row)

@@ -90,7 +90,7 @@ def _of_failures(rows: Rows, study: StoredStudy) -> list[str]:
 
 
 def run_caveats(rows: Rows, study: StoredStudy) -> list[str]:
-    """Return a sentence for each caveat that runs show: unrepeated motions, clipped records."""
+    """Return a sentence for each caveat of runs: series gone, no repetition, clipped records."""
     positions = rows.find(study.keys)
     there = positions >= 0
     there[there] = rows.words["status"][positions[there]] == "ok"
@@ -102,6 +102,7 @@ def run_caveats(rows: Rows, study: StoredStudy) -> list[str]:
     unrepeated = is_unrepeated(regimes, numbers["settled_rev"])
     late = is_late(regimes, numbers["settled_rev"], settle)
     return [
+        *_of_files(int(rows.gone[positions].sum()), positions.size),
         *_of_repetition(int(unrepeated.sum()), int(late.sum()), positions.size),
         *_of_clipping(numbers["clipped_fraction"]),
     ]
@@ -147,6 +148,15 @@ def job_caveats(numbers: Mapping[str, Any], attributes: Mapping[str, Any]) -> li
         found.append(text)
     found += [f"{key}: {note}" for key, note in paper_notes(case).items()]
     return [*found, *(f"{key}: {text}" for key, text in outside_judged(case.values()).items())]
+
+
+def _of_files(gone: int, jobs: int) -> Iterator[str]:
+    """Yield a sentence about jobs whose time series are gone, as in a copy without them."""
+    if gone:
+        yield (
+            f"{gone} of {jobs} jobs have metrics alone: the files of their time series are gone; "
+            "bring the folder jobs, or run the case file again"
+        )
 
 
 def _of_repetition(unrepeated: int, late: int, jobs: int) -> Iterator[str]:

@@ -8,7 +8,7 @@ import pytest
 from compressor.cases.load import load_studies
 from compressor.store.files import StoreError
 from compressor.store.reader import open_study, read_job, read_store
-from compressor.store.status import verify
+from compressor.store.status import standings, verify
 from compressor.store.writer import Writer
 from compressor.sweep.sweep import sweep
 
@@ -97,6 +97,25 @@ def test_a_result_that_replaces_another_but_lacks_its_series_costs_nothing(run, 
         pass
     assert sorted((tmp_path / "out/jobs").iterdir()) == sorted(first)
     assert (accelerations(tmp_path / "out") == expected).all()
+
+
+def test_a_copy_without_series_has_its_metrics(run, tmp_path):
+    run(tmp_path / "full")
+    shutil.copytree(tmp_path / "full", tmp_path / "part", ignore=shutil.ignore_patterns("jobs"))
+    whole, part = (open_study(tmp_path / name) for name in ("full", "part"))
+    assert part.status.values.tolist() == ["ok", "ok"]
+    assert (part.peak_acceleration == whole.peak_acceleration).all()
+    assert "acceleration" in whole
+    assert "acceleration" not in part
+    (one,) = standings(tmp_path / "part")
+    assert (one.ok, one.failed, one.missing) == (2, 0, 0)
+    assert one.caveats[0].startswith("2 of 2 jobs have metrics alone: the files of their time")
+    assert len(verify(tmp_path / "part")) == 2
+    (study,) = load_studies(tmp_path / "small.yaml", overrides=["output.keep=metrics"])
+    assert sweep([study], tmp_path / "part", 1).run_now == 0
+    assert sweep(load_studies(tmp_path / "small.yaml"), tmp_path / "part", 1).run_now == 2
+    assert (accelerations(tmp_path / "part") == accelerations(tmp_path / "full")).all()
+    assert verify(tmp_path / "part") == standings(tmp_path / "part")[0].caveats == []
 
 
 def test_rows_that_are_gone_are_told_by_series_and_studies(run, tmp_path):
