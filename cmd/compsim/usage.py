@@ -44,7 +44,9 @@ class Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command and its arguments. Raises UsageError for an unknown name."""
         word = args[0]
-        unknown = self.get_command(ctx, word) is None and not word.startswith("-")
+        if (command := self.get_command(ctx, word)) and not ctx.resilient_parsing:
+            refuse_empty_words(args[1:], click.Context(command, ctx, info_name=word))
+        unknown = command is None and not word.startswith("-")
         if unknown and not ctx.resilient_parsing:
             raise click.UsageError(self.describe_unknown(word, args[1:]), ctx)
         return super().resolve_command(ctx, args)
@@ -64,6 +66,23 @@ class Commands(click.Group):
             return f"{word!r} is a folder, and a command comes first: {line}"
         near = did_you_mean(word, self.commands) or f"there are {', '.join(self.commands)}"
         return f"No such command {word!r}; {near}"
+
+
+MAY_BE_EMPTY = ("--only",)  # which selects all jobs then
+
+
+def refuse_empty_words(words: Sequence[str], ctx: click.Context) -> None:
+    """Raise UsageError for an empty word among those after a command: `-o ""` is no folder.
+
+    A shell passes one on where a variable in quotes is not set.
+    """
+    for before, word in zip(("", *words), words, strict=False):
+        if word and not (word.startswith("--") and word.find("=") == len(word) - 1):
+            continue
+        option = word[:-1] or (before if before.startswith("-") and before != "--" else "")
+        if option not in MAY_BE_EMPTY:
+            what = f"{option} is given an empty word" if option else "an argument is empty"
+            raise click.UsageError(f"{what}: is a shell variable not set?", ctx)
 
 
 def one_line(error: click.ClickException, arguments: Sequence[str]) -> str:
