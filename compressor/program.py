@@ -148,11 +148,15 @@ def machine_code_folder() -> Path:
 
 def _machine_code_base() -> Path:
     named = os.environ.get(CODE_VARIABLE)
+    if named and _can_write(place := Path(named) / "compsim"):
+        return place
     if named:
-        return Path(named) / "compsim"
+        del os.environ[CODE_VARIABLE]  # also for workers
+        text = f"nothing can be written to {named} ({CODE_VARIABLE}): another folder is used"
+        warnings.warn(text, CompsimWarning, stacklevel=2)
     for find in (lambda: COMPILED / "__pycache__", _user_cache):
         with contextlib.suppress(RuntimeError):  # a user without a home
-            if _may_write(place := find()):
+            if _can_write(place := find()):
                 return place
     place = Path(tempfile.mkdtemp(prefix="compsim-"))
     os.environ[CODE_VARIABLE] = str(place)  # read by workers, too
@@ -170,10 +174,25 @@ def _user_cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "compsim"
 
 
-def _may_write(folder: Path) -> bool:
-    """Return whether files can be written to a folder, which need not be there yet."""
-    above = next((place for place in (folder, *folder.parents) if os.path.exists(place)), folder)
-    return os.path.isdir(above) and os.access(above, os.W_OK | os.X_OK)
+PROBE = bytes(100_000)  # what the machine code of a small function takes, about
+WRITABLE: set[Path] = set()  # folders in which that was tried
+
+
+def _can_write(folder: Path) -> bool:
+    """Return whether files can be written to a folder, which is made; by trying it once.
+
+    Permissions say nothing of a full disk, of /proc, or of a link that leads nowhere.
+    """
+    if folder in WRITABLE and folder.is_dir():
+        return True
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(PROBE)
+    except OSError:
+        return False
+    WRITABLE.add(folder)
+    return True
 
 
 def _remove_own(folder: Path, process: int) -> None:

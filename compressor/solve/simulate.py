@@ -279,7 +279,7 @@ def attributes(case: Case, solution: Solution) -> dict[str, object]:
     """Return what a reader of the file needs to know of the case and the program."""
     trajectory = solution.trajectory
     attrs: dict[str, object] = {
-        "Conventions": "SI units; forces act on the rod; the frame of the README",
+        "comment": "SI units; forces act on the rod; the frame of the README",
         **case.attributes(),
         "complete": 0 if trajectory.reason else 1,
         "settle": settle_time(solution),

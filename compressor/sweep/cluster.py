@@ -11,6 +11,7 @@ import math
 import multiprocessing
 import os
 import pickle
+import re
 import threading
 import time
 import uuid
@@ -255,6 +256,7 @@ def describe_lost_scheduler(client: Any) -> ClusterError:
     return ClusterError(f"{address}: the scheduler was lost; the same command goes on with another")
 
 
+WITH_PORT = re.compile(r":\d+/?$|^inproc://")
 EXTRA = "--backend dask needs dask.distributed: pip install 'compsim[dask]'"
 CONNECT_SECONDS = 8.0  # s until a scheduler that does not answer counts as not there
 CLOSE_SECONDS = 2.0  # s in which a scheduler may take leave
@@ -276,6 +278,8 @@ class Cluster:
             from distributed import Client
         except ImportError as error:
             raise ClusterError(EXTRA) from error
+        if not WITH_PORT.search(self.address):
+            raise ClusterError(f"{self.address}: names no port; write tcp://host:8786")
         for name in ("distributed", "tornado"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # we speak for it
         dial = partial(Client, self.address, timeout=CONNECT_SECONDS, set_as_default=False)

@@ -7,6 +7,7 @@ before a Ctrl-C is not compiled again.
 """
 
 import hashlib
+import os
 import threading
 import time
 from collections import Counter
@@ -16,6 +17,7 @@ from typing import NamedTuple
 
 from compressor.cases import Case
 from compressor.program import COMPILED, library_versions, machine_code_folder
+from compressor.store import StoreError
 
 SECONDS_TO_REMARK = 2.0  # s of compiling before a remark on it
 COMPILING = (
@@ -162,16 +164,29 @@ def marker(part: str) -> Path:
     return machine_code_folder() / f"compiled-{known}-{part}"
 
 
+def is_interpreted() -> bool:
+    """Return whether numba is told to compile nothing, as for debugging."""
+    return os.environ.get("NUMBA_DISABLE_JIT", "0").strip() not in ("", "0")
+
+
 def compile_once(needs: Needs, remark: Callable[[str], None]) -> None:
     """Compile here what this machine has not compiled before, so that workers need but load it.
 
     Part by part: those that are finished when the program is stopped are not compiled again.
+    Raises StoreError where machine code cannot be written.
     """
+    if is_interpreted():
+        remark("NUMBA_DISABLE_JIT is set: nothing is compiled, and runs take tens of times as long")
     ahead = needs.uncompiled
     for number, (part, alone) in enumerate(ahead.items(), 1):
         what, seconds = name_part(part)
         text = COMPILING.format(number=number, count=len(ahead), what=what, seconds=seconds)
-        load_with_remark(alone, text, remark)
-        path = marker(part)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
+        try:
+            load_with_remark(alone, text, remark)
+            path = marker(part)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.touch()
+        except OSError as error:
+            remedy = "free some space there, or set NUMBA_CACHE_DIR to another folder"
+            problem = f"machine code cannot be kept here: {error.strerror or error}"
+            raise StoreError(machine_code_folder(), problem, remedy) from error

@@ -132,6 +132,32 @@ def test_where_nothing_may_be_written_code_is_compiled_for_the_process(read_only
     assert "set NUMBA_CACHE_DIR to a folder that stays" in done.stderr
 
 
+@pytest.mark.parametrize("kind", ["dangling link", "file", "below a file", "proc", "full disk"])
+def test_a_named_folder_that_takes_no_file_is_replaced_with_a_remark(kind, tmp_path, monkeypatch):
+    named = Path("/proc") if kind == "proc" else tmp_path / "named"
+    if kind == "dangling link":
+        named.symlink_to("nowhere")
+    elif kind.endswith("file"):
+        named.write_text("")
+        named = named / "deep" if kind == "below a file" else named
+    elif kind == "full disk":
+
+        def refuse(dir=None):
+            if Path(dir).is_relative_to(named):
+                raise OSError(28, "No space left on device")
+            return made(dir=dir)
+
+        made = program.tempfile.TemporaryFile
+        monkeypatch.setattr(program.tempfile, "TemporaryFile", refuse)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(named))
+    with pytest.warns(
+        program.CompsimWarning, match=rf"{named} \(NUMBA_CACHE_DIR\): another folder"
+    ):
+        found = program.machine_code_folder()
+    assert found.parent == program.COMPILED / "__pycache__"
+    assert program.machine_code_folder() == found  # without a remark, also in workers
+
+
 def test_a_user_without_a_home_may_name_a_folder(tmp_path, monkeypatch):
     def nobody():
         raise RuntimeError("Could not determine home directory.")
