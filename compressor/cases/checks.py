@@ -145,9 +145,15 @@ PER_PART = {
 ONE_SUFFICES = {"gas.indicator": ("head", "crank"), "gas.clearance_percent": ("crank",)}
 # unit at the end of an unknown key -> the unit of ours, and what one of it is there
 OTHER_UNITS = {
-    "bar": ("MPa", 0.1), "kPa": ("MPa", 1e-3), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3),
-    "cm": ("mm", 10.0), "m": ("mm", 1e3), "kN": ("N", 1e3),
+    "bar": ("MPa", 0.1), "bara": ("MPa", 0.1), "kPa": ("MPa", 1e-3), "Pa": ("MPa", 1e-6),
+    "psi": ("MPa", 6.894757e-3), "psia": ("MPa", 6.894757e-3), "barg": ("MPa", 0.1),
+    "psig": ("MPa", 6.894757e-3), "um": ("mm", 1e-3), "cm": ("mm", 10.0), "m": ("mm", 1e3),
+    "kN": ("N", 1e3),
 }  # fmt: skip
+GAUGE = ("barg", "psig", "psi")  # as which pressures are read on a gauge
+ATMOSPHERE = 0.101325  # MPa
+DIAMETER = re.compile(r"(?i)(.*_)?(diameter|diametral|dia)(_.*)?")
+OF_SMALL_END = ("crosshead", "wrist", "gudgeon", "small_end", "piston_pin")
 PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
 TWICE = "stands in place of {}: give one of the two"
 
@@ -156,6 +162,17 @@ def halve(value: Any) -> Any:
     """Return half of a number, and any other value as it is."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return value / 2 if is_number else value
+
+
+def check_double(key: str, value: Any) -> str | None:
+    """Return what is wrong with a value of a key of `DOUBLES`, in its own numbers; None if nothing.
+
+    Of one value: what is swept is checked where its values are made.
+    """
+    if isinstance(value, Mapping | list | tuple) or hasattr(value, "ndim") or value is None:
+        return None
+    row = table()[DOUBLES[key]]
+    return dataclasses.replace(row, key=key, low=2 * row.low, high=2 * row.high).check(value)
 
 
 def by_part(key: str, value: Any) -> Mapping[str, str]:
@@ -192,7 +209,10 @@ def expand_synonyms(values: Mapping[str, Any], problems: list[Problem]) -> dict[
         if own in within:
             problems.append(Problem(synonym, TWICE.format(key)))
         rest = {inner: value for inner, value in within.items() if inner != name}
-        whole[group] = {own: halve(within[name])} | rest
+        message = check_double(synonym, within[name])
+        if message:
+            problems.append(Problem(synonym, message))
+        whole[group] = rest if message else {own: halve(within[name])} | rest
     for key in PER_PART:
         group, _, name = key.partition(".")
         within = whole.get(group)
@@ -220,11 +240,34 @@ def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
     key = f"{stem}_{ours}"
     if not stem or key not in allowed:
         return ""
+    gauge = unit in GAUGE
     values = value if isinstance(value, list | tuple) else [value]
+    more = f" + {ATMOSPHERE:g}" if gauge else ""
+    note = "; pressures are absolute: gauge pressure and the atmosphere's" if gauge else ""
     if not all(isinstance(one, int | float) and not isinstance(one, bool) for one in values):
-        return f"; write {key}: 1 {unit} is {factor:g} {ours}"
-    amounts = ", ".join(f"{one * factor:.12g}" for one in values)
-    return f"; write {key}: " + (f"[{amounts}]" if isinstance(value, list | tuple) else amounts)
+        return f"; write {key}: 1 {unit} is {factor:g}{more} {ours}{note}"
+    digits = ".4g" if unit.startswith("psi") or gauge else ".12g"
+    amounts = ", ".join(f"{one * factor + ATMOSPHERE * gauge:{digits}}" for one in values)
+    several = isinstance(value, list | tuple)
+    return f"; write {key}: " + (f"[{amounts}]" if several else amounts) + note
+
+
+def of_diameter(name: str, group: str, value: Any) -> str:
+    """Return the hint at a diameter where we have a radius or a bore; "" for another name."""
+    if not DIAMETER.fullmatch(name):
+        return ""
+    half = f"{halve(value):g}" if halve(value) is not value else "..."
+    if "clearance" in name:
+        return f"; clearance_mm is radial, half of it: write clearance_mm: {half}"
+    if "pin" in name.split("_") or "journal" in name:
+        own = "small_end" if any(word in name for word in OF_SMALL_END) else "big_end"
+        named = own == "small_end" or "crank" in name or "big" in name
+        form = f"{{{own}: {half}, ...}}" if named else half
+        return f"; write machine.pin_radius_mm: {form}, half of it"
+    if "rod" not in name and any(word in name for word in ("piston", "cylinder", "bore")):
+        whole = f"{value:g}" if half != "..." else "..."
+        return f"; write gas.bore_mm: {whole}"
+    return ""
 
 
 def of_percent(name: str, group: str) -> str:
@@ -268,6 +311,7 @@ def describe_unknown(name: str, group: str, file: bool = True, value: Any = None
     hint = (
         in_our_unit(name, value, accepted_keys(group))
         or of_percent(name, group)
+        or of_diameter(name, group, value)
         or suggestion(name, group)
         or f"; {whole} has {', '.join(known_keys(group, file))}"
     )
@@ -307,8 +351,8 @@ def suggestion(name: str, group: str) -> str:
         return "; put a space after the colon"
     if name in DOUBLES:
         return f"; write {DOUBLES[name]}, which is half of it"
-    keys = probable_keys(name, group)
-    return f"; did you mean {' or '.join(keys)}?" if keys else ""
+    keys = probable_keys(name, group) or [key for key in table() if _leaf(key) == name]
+    return f"; did you mean {' or '.join(keys)}?" if 0 < len(keys) <= MAX_MEANT else ""
 
 
 def probable_keys(name: str, group: str) -> list[str]:

@@ -437,10 +437,11 @@ def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         return
     share = moving_mass(case) / body.mass_kg
     if share > MAX_MOVING_SHARE:
+        much = f"{share:.3g} times" if share >= 1 else f"{100 * share:.2g} % of"
         yield Problem(
             "body.mass_kg",
-            f"the moving parts have {100 * share:.2g} % of the body's mass; it is driven one way, "
-            f"which holds up to {100 * MAX_MOVING_SHARE:g} %: give a heavier body",
+            f"the moving parts have {much} the body's mass; it is driven one way, which holds up "
+            f"to {100 * MAX_MOVING_SHARE:g} %: give a heavier body, in kg",
         )
     for axis in sorted({*body.freedoms[:2]} & {*AXES}):
         yield from _resonance_conflicts(case, axis)
@@ -476,7 +477,7 @@ def _resonance_conflicts(case: Settings, axis: str) -> Iterator[Problem]:
             yield Problem(
                 f"body.{key}",
                 f"order {order} of the speed, {frequency:.3g} Hz, is so near that the "
-                f"body would change the force that drives it by {100 * back:.2g} %; "
+                f"body would change the force that drives it by {100 * back:.0f} %; "
                 f"move {key}, or give a heavier body",
             )
 

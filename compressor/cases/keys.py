@@ -16,6 +16,7 @@ from compressor.cases.checks import (
     TWICE,
     accepted_keys,
     by_part,
+    check_double,
     describe_unknown,
     halve,
     lacking_part,
@@ -79,6 +80,10 @@ def _add_leaf(found: Leaves, key: str, node: Node, problems: list[FileProblem]) 
     doubled = next((word for word, half in DOUBLES.items() if half == own), own)
     if own in found.values and own != doubled:
         problems.append(FileProblem(node.key_place, doubled, TWICE.format(own)))
+    wrong = check_double(key, node.value) if own != key else None
+    if wrong:
+        problems.append(FileProblem(node.place, key, wrong))
+        node = replace(node, value=None)
     found.values[own] = node if own == key else _halve_node(node)
     found.places[own] = node.key_place
 

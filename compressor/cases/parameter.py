@@ -188,6 +188,11 @@ def by_law(group: str, key: str) -> Reader:
 
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
+# metal of a bush or a pin -> which of ours to take for it, by its modulus of elasticity
+COPPER = "copper, whose modulus is nearest"
+SOFT = "copper, the softer one, or give contact.stiffness_N_per_mm15: babbitt has about 50 GPa"
+OTHER_METALS = dict.fromkeys(("bronze", "brass", "cast iron", "cast_iron"), COPPER)
+OTHER_METALS |= dict.fromkeys(("babbitt", "babbit", "white metal", "white_metal"), SOFT)
 NO_VALUE = "has no value; leave the key out to get its default"
 # a number that is written as text, with a comma or a unit
 AS_NUMBER = re.compile(r"\s*([-+]?\d+(?:([.,])\d+)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII)
@@ -454,6 +459,8 @@ class Parameter:
             return message
         lower = dict(self.aliases)
         lower |= {choice.lower(): choice for choice in (*self.choices, "true", "false")}
+        if self.kind == "materials" and word.lower() in OTHER_METALS:
+            return f"{message}; take {OTHER_METALS[word.lower()]}"
         near = get_close_matches(word[:MAX_WORD].lower(), lower, n=1)
         if near and lower[near[0]] in self.needed:
             return f"{message}; did you mean {lower[near[0]]}?"

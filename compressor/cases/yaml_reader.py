@@ -74,6 +74,7 @@ MAX_PARTS = 50_000  # keys, values and brackets, which take a second
 NOT_ZERO = re.compile("[^eE]*[1-9]")
 ODD_BREAKS = re.compile("[\x85\u2028\u2029]")  # lines for PyYAML, not for YAML 1.2 or an editor
 
+DECIMALS = re.compile(r"0\d+")  # behind a decimal comma, as in [0,05]
 NULLS = {"", "~", "null", "Null", "NULL"}
 BOOLEANS = {"true": True, "True": True, "TRUE": True}
 BOOLEANS |= {"false": False, "False": False, "FALSE": False}
@@ -156,6 +157,7 @@ def read_file(path: str, problems: list[FileProblem]) -> Node | None:
 
 def read_text(text: str, start: Place, problems: list[FileProblem]) -> Node | None:
     """Return the value of a YAML text, or None; a `start` without a line is everything's place."""
+    text = separate_by_spaces(text)
     builder = _Builder(text, start, problems)
     if odd := ODD_BREAKS.search(text):
         problems.append(_forbidden(text, odd.start(), start))
@@ -165,8 +167,13 @@ def read_text(text: str, start: Place, problems: list[FileProblem]) -> Node | No
     except _Unreadable as error:
         problems.append(error.args[0])
     except yaml.MarkedYAMLError as error:
-        place = builder.place(error.problem_mark or error.context_mark)
+        mark = error.problem_mark or error.context_mark
+        place = builder.place(mark)
         hint = "; indent with spaces, not tabs" if "'\\t'" in str(error.problem) else ""
+        slip = find_slip(text, mark.line) if mark and not hint else None
+        if slip and start.line:
+            problems.append(FileProblem(Place(start.file, slip[0] + 1, 1), "", slip[1]))
+            return None
         problems.append(
             FileProblem(place, "", f"is no YAML: {shorten(str(error.problem), 120)}{hint}")
         )
@@ -175,6 +182,46 @@ def read_text(text: str, start: Place, problems: list[FileProblem]) -> Node | No
     except (ValueError, OverflowError):  # PyYAML on "\UFFFFFFFF" or %YAML 1.999...
         problems.append(FileProblem(builder.last, "", "is no YAML: a number is too large here"))
     return None
+
+
+def find_slip(text: str, last: int) -> tuple[int, str] | None:
+    """Return the line (from 0) at which a beginner's mistake stands, and what to do; or None.
+
+    last: the line that a parser stopped at, often the one behind the mistake.
+    """
+    lines = text.split("\n")[: last + 1]
+    filled = [(n, line) for n, line in enumerate(lines) if line.strip() and line.strip()[0] != "#"]
+    for number, line in filled[-2:]:
+        if found := NO_SPACE.match(line):
+            return number, f"put a space after the colon: {found[1]}: {found[2]}"
+        if found := EQUALS.match(line):
+            return number, f"write a colon and a space in place of =: {found[1]}: {found[2]}"
+    if len(filled) < 2:
+        return None
+    (_, before), (number, line) = filled[-2:]
+    indents = [len(one) - len(one.lstrip()) for one in (before, line)]
+    if indents[0] != indents[1] and KEY.match(line):
+        return number, (
+            f"is indented by {indents[1]} columns, the line before by {indents[0]}: keys of one "
+            "group stand in one column, and a group's own line ends in its colon"
+        )
+    return None
+
+
+NO_SPACE = re.compile(r"\s*([A-Za-z]\w*):([^\s:/][^:]*?)\s*(?:#.*)?$")
+EQUALS = re.compile(r"\s*([A-Za-z]\w*)\s*=\s*(.*?)\s*(?:#.*)?$")
+KEY = re.compile(r"\s*[A-Za-z]\w*\s*:(\s|$)")
+TABS = re.compile(r"""^([ ]*[^\s'"][^'"\n]*?)\t""", re.MULTILINE)
+
+
+def separate_by_spaces(text: str) -> str:
+    """Return a text with a space for each tab behind a line's first word and before any quote.
+
+    YAML 1.2 has tabs there, PyYAML none; places stay.
+    """
+    while (changed := TABS.sub(r"\1 ", text)) != text:
+        text = changed
+    return text
 
 
 def _forbidden(text: str, position: int, start: Place) -> FileProblem:
@@ -284,8 +331,13 @@ class _Builder:
         return value
 
     def sequence(self, key: str, depth: int) -> list[Node]:
-        items = []
+        items: list[Node] = []
         while not isinstance(event := next(self.events), yaml.SequenceEndEvent):
+            text = getattr(event, "value", None)
+            if items and text and event.style is None and DECIMALS.fullmatch(text):
+                before = items[-1].plain()
+                message = f"a decimal comma? write {before}.{text}; commas separate values"
+                self.note(event, key, message)
             items.append(self.node(event, key, depth + 1, None))
         return items
 

@@ -1,0 +1,58 @@
+"""Mistakes of someone who writes a first case file: text, line and column, and what is answered."""
+
+import pytest
+
+from compressor.cases.load import CaseFileError, load_cases
+
+MISTAKES = [
+    # the key that was written, not the one that stands for it
+    ("machine:\n  stroke_mm: 127 mm", "2:14: machine.stroke_mm: needs a number", "write 127"),
+    ("load: gas\ngas: {bore_mm: 267 mm}", "2:16: gas.bore_mm: needs a number", "write 267"),
+    ("machine: {stroke_mm: -3}", "1:22: machine.stroke_mm: -3 is outside", "(0, 200000] mm"),
+    # diameters
+    ("machine: {pin_diameter_mm: 102}", "1:11", "write machine.pin_radius_mm: 51, half of it"),
+    ("clearance_diametral_mm: 0.35", "1:1", "radial, half of it: write clearance_mm: 0.175"),
+    ("machine: {crank_pin_diameter_mm: 190}", "1:11", "pin_radius_mm: {big_end: 95, ...}, half"),
+    ("machine: {crosshead_pin_diameter_mm: 102}", "1:11", "{small_end: 51, ...}, half of it"),
+    ("gas: {piston_diameter_mm: 267}", "1:7", "unknown key; write gas.bore_mm: 267"),
+    # units
+    ("gas: {suction_barg: 3.1}", "1:7", "write suction_MPa: 0.4113; pressures are absolute"),
+    ("gas: {suction_psi: 45}", "1:7", "write suction_MPa: 0.4116; pressures are absolute"),
+    ("gas: {suction_bara: 4.1}", "1:7", "write suction_MPa: 0.41"),
+    ("joint: big_end\nclearance_mm: [0,05]", "2:18: clearance_mm", "decimal comma? write 0.05"),
+    ("body: {mass_kg: 9}\nmachine: {reciprocating_mass_kg: 172}", "1:17: body.mass_kg",
+     "the moving parts have 19.6 times the body's mass"),
+    # another group's key
+    ("machine: {exponent: 1.3}", "1:11: machine.exponent", "did you mean gas.exponent or"),
+    # YAML: the line where it was made
+    ("machine:\n  stroke_mm:127\n  rod_length_mm: 343", "2:1",
+     "space after the colon: stroke_mm: 127"),
+    ("machine:\n  stroke_mm = 127\n  rod_length_mm: 343", "2:1", "in place of =: stroke_mm: 127"),
+    ("machine:\n  stroke_mm: 127\n   speed_rpm: 343", "3:1", "is indented by 3 columns, the line"),
+    ("machine:\n  stroke_mm: 127\n speed_rpm: 343", "3:1", "is indented by 1 columns, the line"),
+    ("machine:\n\tstroke_mm: 127", "2:1", "indent with spaces, not tabs"),
+    # materials that are not in the table
+    ("joint: big_end\nclearance_mm: 0.1\ncontact: {materials: [steel, bronze]}", "3:22",
+     "take copper, whose modulus is nearest"),
+    ("joint: big_end\nclearance_mm: 0.1\ncontact: {materials: [steel, babbitt]}", "3:22",
+     "take copper, the softer one"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "where", "answer"), MISTAKES, ids=[one[0] for one in MISTAKES])
+def test_a_mistake_is_answered_where_it_was_made(text, where, answer, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "m.yaml").write_text(text)
+    with pytest.raises(CaseFileError) as caught:
+        load_cases("m.yaml")
+    lines = [line for line in str(caught.value).splitlines() if answer in line]
+    assert lines, caught.value
+    assert lines[0].startswith(f"m.yaml:{where}")
+    assert "crank_radius_mm" not in lines[0]
+    assert "piston_radius_mm" not in lines[0]
+
+
+def test_tabs_separate_as_yaml_1_2_has_them(tmp_path):
+    (tmp_path / "m.yaml").write_text("joint:\tbig_end\nclearance_mm: 0.1\t# radial\n")
+    (case,) = load_cases(tmp_path / "m.yaml")
+    assert (case.joint, case.clearance_mm.big_end) == ("big_end", 0.1)
