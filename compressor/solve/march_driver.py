@@ -260,7 +260,7 @@ def check_march(
     status = Status(int(stepper.status))
     check_state(request.p, z)
     if status == Status.PENETRATION_IMPLAUSIBLE:
-        raise Stop(Reason.PENETRATION_IMPLAUSIBLE, too_deep(deepest, request.p))
+        raise Stop(*too_deep(deepest, request.p))
     if status == Status.NON_FINITE:
         raise Stop(Reason.NON_FINITE, "the state or its rates are no longer finite")
     if status == Status.STEP_UNDERFLOW:

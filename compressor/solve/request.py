@@ -16,6 +16,7 @@ from compressor.physics import (
     Fields,
     beyond_model,
     elastic_form,
+    greatest_load,
     is_featured,
     new_tally,
     read_fields,
@@ -246,6 +247,18 @@ def greatest_depth(p: Fields) -> tuple[float, str]:
     return tenth, "a tenth of the pin radius"
 
 
-def too_deep(depth: float, p: np.record) -> str:
-    """Return what is wrong with a penetration (m)."""
-    return f"{depth * 1e3:.3g} mm, more than {greatest_depth(p)[1]}"
+MAX_ENERGY = 100.0  # times the machine's: no motion brings a contact so far, a step too long does
+
+
+def too_deep(depth: float, p: np.record) -> tuple[Reason, str]:
+    """Return the reason for a penetration (m) beyond `greatest_depth`, and its detail."""
+    most, words = greatest_depth(p)
+    speed = p["crank_radius"] * p["omega"]
+    kinetic = 0.5 * (p["rod_mass"] + p["reciprocating_mass"]) * speed**2
+    present = kinetic + 2.0 * p["crank_radius"] * greatest_load(p)
+    joints = zip(p["stiffness"].tolist(), p["clearance"].tolist(), strict=True)
+    needed = min(elastic_form(k, c, p).energy(most) for k, c in joints if c > 0.0)
+    if needed > MAX_ENERGY * present:
+        text = "a step went into a contact that is too stiff for it at this tolerance"
+        return Reason.CONTACT_UNDERRESOLVED, f"{depth * 1e3:.3g} mm: {text}"
+    return Reason.PENETRATION_IMPLAUSIBLE, f"{depth * 1e3:.3g} mm, more than {words}"

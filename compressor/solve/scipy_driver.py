@@ -310,5 +310,5 @@ class LoadStretch:
         """Raise Stop when a journal sinks in implausibly deep."""
         depth, p = float(self.result.tally.deepest), self.request.p
         if not depth <= greatest_depth(p)[0]:
-            raise Stop(Reason.PENETRATION_IMPLAUSIBLE, too_deep(depth, p))
+            raise Stop(*too_deep(depth, p))
         self.right_hand_side.check_budget()

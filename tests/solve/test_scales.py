@@ -20,6 +20,7 @@ from compressor.solve.cautions import (
     expected_steps,
     greatest_force,
 )
+from compressor.solve.request import too_deep
 from compressor.solve.si_record import record, stiffness_of
 from compressor.solve.simulate import simulate
 
@@ -162,3 +163,13 @@ def test_the_damping_ratio_is_that_of_the_linearised_contact():
     undamped = {"joint": "big_end", "clearance_mm": 0.2, "contact": {"damping_N_s_per_mm": 0}}
     (scales,) = contact_scales(Case.resolve(undamped))
     assert scales.damping_ratio == 0
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "reason"), [(300, "penetration_implausible"), (1e15, "contact_underresolved")]
+)
+def test_a_journal_too_deep_is_soft_or_stepped_over(stiffness, reason):
+    """No motion of the machine has the energy to go so deep into a stiff contact: a step has."""
+    values = {"joint": "big_end", "clearance_mm": 0.2, "load": "gas"}
+    p = record(Case.from_values({**values, "contact": {"stiffness_N_per_mm15": stiffness}}))
+    assert too_deep(1.38, p)[0] == reason
