@@ -111,11 +111,16 @@ def _read_last_turn(
 
 
 def _reversals(turns: np.ndarray, load: np.ndarray) -> tuple[float, ...]:
-    """Return the crank angles (degrees) at which a force changes its sign, straight between."""
-    before, after = load[:-1], load[1:]
-    crossing = np.flatnonzero(before * after < 0.0)
-    part = before[crossing] / (before[crossing] - after[crossing])
-    at = turns[crossing] + part * (turns[crossing + 1] - turns[crossing])
+    """Return the crank angles (degrees) at which a force changes its sign, straight between.
+
+    Of a force that is zero for a while, as in flight, it is where it is zero for the last time.
+    """
+    (loaded,) = np.nonzero(load)
+    changes = np.flatnonzero(load[loaded[:-1]] * load[loaded[1:]] < 0.0)
+    after = loaded[changes + 1]
+    before = after - 1  # on the other side, or without load
+    part = load[before] / (load[before] - load[after])
+    at = turns[before] + part * (turns[after] - turns[before])
     return tuple(sorted(float(one) for one in 360.0 * (at % 1.0)))
 
 

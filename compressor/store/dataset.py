@@ -16,7 +16,7 @@ from xarray.core import indexing
 
 from compressor.cases import phrase_of, points, table, value_in
 from compressor.digits import is_known
-from compressor.metrics import METRICS, NUMBERS, SIZES
+from compressor.metrics import BARRED, NUMBERS, SIZES
 from compressor.outcome import coordinates, word_variables
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
@@ -117,10 +117,10 @@ def mask_untrusted(dataset: xr.Dataset) -> xr.Dataset:
     known = np.vectorize(is_known, otypes=[bool])
     is_ok = dataset["status"] == "ok"
     masked = {}
-    for name in METRICS:
+    for name, row in BARRED.items():
         if name in dataset:
-            bar = dataset[f"{name}_error"]
-            vouched = xr.apply_ufunc(known, dataset[name], bar, METRICS[name].bar.relative)
+            bar = dataset.get(f"{name}_error", np.nan * dataset[name])
+            vouched = xr.apply_ufunc(known, dataset[name], bar, row.bar.relative)
             masked[name] = dataset[name].where(vouched & is_ok)
             masked[f"{name}_error"] = bar.where(vouched & is_ok)
     return dataset.assign(masked)

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from compressor.analysis.contacts import impacts
-from compressor.analysis.cycle import read_cycle
+from compressor.analysis.cycle import _reversals, read_cycle
 from compressor.analysis.plot_captions import PLOT_CAPTIONS, SweptRow
 from compressor.analysis.runs import record_of
 from compressor.analysis.shaking import NoSeriesError, frame_forces, healthy_twin
@@ -77,6 +77,16 @@ def test_reversals_are_where_the_load_is_zero(sensed):
     assert np.abs(at).max() < 2e-3 * np.abs(found.rod_load).max()
     twin = read_cycle(healthy_twin(sensed))
     assert len(twin.reversals) == 2
+
+
+@pytest.mark.parametrize("flight", [0, 1, 3])
+def test_a_reversal_through_flight_is_one(flight):
+    """Tension, no load, compression: a change of side where load comes back; a dip to 0 is none."""
+    zeros = [0.0] * flight
+    load = np.array([2.0, 2.0, *zeros, -2.0, -2.0, *zeros, -2.0])
+    turns = 3.0 + np.arange(load.size) / 100
+    at = 1 + flight if flight else 1.5
+    assert _reversals(turns, load) == pytest.approx((3.6 * at,))
 
 
 def test_valve_events_are_the_corners_of_the_gas_cycle(sensed):

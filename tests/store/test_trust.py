@@ -2,10 +2,12 @@
 
 import io
 import json
+import math
 
 import h5py
 import numpy as np
 import pytest
+import xarray as xr
 from compsim import cli
 from conftest import keep
 
@@ -15,6 +17,7 @@ from compressor.metrics import METRICS, NUMBERS, QUANTILES
 from compressor.outcome import REGIME_WORDS, Regime
 from compressor.report import write_report
 from compressor.solve.simulate import measure, simulate
+from compressor.store.dataset import mask_untrusted
 from compressor.store.export import export
 from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import open_study, read_store
@@ -117,6 +120,23 @@ def test_what_is_not_known_can_be_masked(ring):
     assert known["peak_acceleration"].where(chaotic).isnull().all()
     assert known["peak_acceleration"].where(every["promise"] == "kept").notnull().sum() == 1
     assert known["rms_acceleration"].attrs == every["rms_acceleration"].attrs
+
+
+def test_numbers_that_few_jobs_have_can_be_masked():
+    """Of the rod load, the body and its sensor as well; without any bar nothing is known."""
+    jobs = {
+        "status": ["ok", "ok", "failed"], "sensor_rms": [5.0] * 3,
+        "sensor_rms_error": [math.inf, 0.1, 0.1], "peak_rod_load_tension": [9.0] * 3,
+        "peak_rod_load_tension_error": [1.0, 10.0, 1.0], "rod_load_reversal_angle": [2.0] * 3,
+        "rod_load_reversal_angle_error": [math.inf, 3.0, 1.0], "body_velocity_rms": [1.0] * 3,
+    }  # fmt: skip
+    found = mask_untrusted(xr.Dataset({name: ("job", values) for name, values in jobs.items()}))
+    kept = {
+        "sensor_rms": [False, True, False], "peak_rod_load_tension": [True, False, False],
+        "rod_load_reversal_angle": [False, True, False], "body_velocity_rms": [False] * 3,
+    }  # fmt: skip
+    for name, known in kept.items():
+        assert found[name].notnull().values.tolist() == known, name
 
 
 def test_numbers_without_bars_are_not_known(tmp_path):
