@@ -54,14 +54,12 @@ class Metric(NamedTuple):
     contact: bool = False  # of a contact: without meaning at an ideal joint
     # how it comes from the run; a count grows with it, a rate is a count by revolutions
     kind: Literal["greatest", "root", "share", "count", "rate"] = "share"
-    # what it is made from: sums over the dense solution, samples of it, or the motion of the body
-    # and its sensor's record, with an error bar; other numbers or series; the revolutions of a
-    # chaotic motion; anything else of the run
-    source: Literal[
-        "tally", "samples", "body", "error", "series", "statistics", "sensor", "run"
-    ] = "tally"
+    # what it is made from: sums over the dense solution, or the motion of the body and its sensor's
+    # record, with an error bar; other numbers or series; the revolutions of a chaotic motion;
+    # anything else of the run
+    source: Literal["tally", "body", "error", "series", "statistics", "sensor", "run"] = "tally"
     when: str = ""  # what few jobs have, others are nan: a flag of the record, or another word
-    joint: int = 0  # whose part of its series counts for samples, in JOINTS
+    joint: int = 0  # whose part of its series counts for a metric without that dimension, in JOINTS
     limit: float = math.nan  # above which it is a fault
 
     @property
@@ -71,8 +69,8 @@ class Metric(NamedTuple):
 
     @property
     def is_pure_number(self) -> bool:
-        """Return whether it has no unit: a share or a count, which may be 0."""
-        return self.unit in ("1", "1/rev")
+        """Return whether it has no unit: a share, a count or an angle, which may be 0."""
+        return self.unit in ("1", "1/rev", "rad")
 
     @property
     def counted(self) -> bool:
@@ -156,23 +154,23 @@ TABLE = (
     Metric(
         "rod_load_reversal_angle", (), "rad",
         "crank angle a revolution on the smaller side of the rod load",
-        "contact_force", shown=Shown("rod load reversal", "°", math.degrees(1.0)),
-        source="samples", when="signals", joint=1,
+        "contact_force", Bar(5.0, 1.0, False), Shown("rod load reversal", "°", math.degrees(1.0)),
+        when="signals", joint=1,
     ),
     Metric(
         "rod_load_reversal_share", (), "1",
         "peak of the smaller side of the rod load over that of the other",
-        "contact_force", source="samples", when="signals", joint=1,
+        "contact_force", Bar(5.0, 0.3, False), kind="greatest", when="signals", joint=1,
     ),
     Metric(
         "peak_rod_load_tension", (), "N", "greatest pull of the rod load at the crosshead pin",
-        "contact_force", shown=Shown("peak rod load, tension", "kN", 1e-3),
-        source="samples", when="signals", joint=1,
+        "contact_force", shown=Shown("peak rod load, tension", "kN", 1e-3), kind="greatest",
+        when="signals", joint=1,
     ),
     Metric(
         "peak_rod_load_compression", (), "N", "greatest push of the rod load at the crosshead pin",
-        "contact_force", shown=Shown("peak rod load, compression", "kN", 1e-3),
-        source="samples", when="signals", joint=1,
+        "contact_force", shown=Shown("peak rod load, compression", "kN", 1e-3), kind="greatest",
+        when="signals", joint=1,
     ),
     *(
         Metric(name, (), unit, phrase, source="run")
@@ -311,11 +309,11 @@ def every_number() -> Iterator[Metric]:
     for row in metrics:
         yield from () if row.when else statistics_of(row)
     yield from of_source("statistics")
-    for row in (*of_source("samples"), *of_source("body")):
+    for row in of_source("body"):
         yield from (row, error_bar(row))
     yield from of_source("sensor")
 
 
 NUMBERS = {row.name: row for row in every_number()}
 METRICS = {row.name: row for row in of_source("tally") if not row.when}  # of every run
-BARRED = {row.name: row for row in NUMBERS.values() if row.source in ("tally", "samples", "body")}
+BARRED = {row.name: row for row in NUMBERS.values() if row.source in ("tally", "body")}

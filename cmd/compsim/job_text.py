@@ -37,7 +37,7 @@ def sections(
     limits: of the rod load's reversal, degrees and percent; units: of the numbers.
     """
     yield "", align_lines(stop(found))
-    known = numbers(found, units, "tally", "statistics", "samples", "body")
+    known = numbers(found, units, "tally", "statistics", "body")
     lines = align_lines([*known, *reversal_verdict(found, *limits), *healthy_motion(found, units)])
     notes = [*film(found), *cautions(found), *found.caveats]
     yield "metrics, with their error bars", [*lines, *notes]

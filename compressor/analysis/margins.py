@@ -16,7 +16,7 @@ import xarray as xr
 from compressor.analysis.contacts import FOLLOWING, contact_modes, impacts
 from compressor.analysis.runs import settled_part
 from compressor.analysis.shaking import ORDER, evenly, whole_revolutions
-from compressor.solve import mean_bar, sure
+from compressor.solve import average_bar, mean_bar
 
 
 class BarredNumber(NamedTuple):
@@ -103,7 +103,7 @@ def revolutions(run: xr.Dataset) -> Iterator[xr.Dataset]:
 def by_revolution(run: xr.Dataset, value: Callable[[xr.Dataset], float]) -> float:
     """Return half of the 95 % interval of a value's mean over revolutions, by their scatter.
 
-    inf of a single revolution.
+    inf of too few revolutions.
     """
     return mean_bar(np.array([value(turn) for turn in revolutions(run)]))
 
@@ -125,7 +125,7 @@ def peak(run: xr.Dataset, name: str, **where: str) -> BarredNumber:
     value, error = (
         float(run[n].sel(where)) for n in (f"{name}_mean", f"{name}_mean_standard_error")
     )
-    return BarredNumber(value, float(sure(np.array(error), int(run["revolutions"]))))
+    return BarredNumber(value, float(average_bar(np.array(error), int(run["revolutions"]))))
 
 
 def metric(run: xr.Dataset, name: str, **where: str) -> BarredNumber:

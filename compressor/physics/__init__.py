@@ -50,6 +50,5 @@ from compressor.physics.tally import (
     new_tally,
     tally_energy,
     tally_step,
-    write_gap_fractions,
 )
 from compressor.physics.worn_bore import bore_fields

@@ -221,7 +221,7 @@ def work_arrays(runs, job):
     w = runs.works
     return WorkArrays(
         w.k[job], w.new[job], w.column[job], w.jacobian[job], w.dense[job], w.weights[job],
-        w.y[job], w.rows[job], w.gap_fraction[job], w.row[job],
+        w.y[job], w.rows[job], w.gap_fraction[job], w.sides[job], w.row[job],
     )  # fmt: skip
 
 

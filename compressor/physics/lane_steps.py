@@ -79,7 +79,7 @@ FIRST_TALLY_ROW, TALLY_WORDS = TALLY_ROWS["seconds"], TALLY.itemsize // 8
 (
     SECONDS, SQUARE_ACCELERATION, SQUARE_DEVIATION, TORQUE_SUM, MOMENT_SUM, PEAK, _,
     MAX_PENETRATION, LOSS_SECONDS, IMPACTS, RELEASES, TOUCHING, FLOWN, DEEPEST, ENERGY, _, _, _, _,
-    IMBALANCE, PEAK_KINETIC, _,
+    IMBALANCE, PEAK_KINETIC, _, _, _, _, _,
 ) = TALLY_ROWS.values()  # fmt: skip
 IS_COUNT = np.concatenate(
     [np.full(TALLY[name].itemsize // 8, TALLY[name].base.kind == "i") for name in TALLY_ROWS]

@@ -42,6 +42,7 @@ from compressor.physics.onset import (
     locate_change,
     may_change,
     may_touch,
+    shift_of_change,
     store_approach_velocity,
 )
 from compressor.physics.record import CHOICE, MECHANISM, zero
@@ -79,6 +80,9 @@ from compressor.physics.systems import (
     write_eccentricities,
 )
 from compressor.physics.tally import (
+    PEAKED,
+    ROD_LOAD,
+    extreme_of,
     gap_fraction_between,
     lobatto,
     may_beat_peaks,
@@ -89,6 +93,9 @@ from compressor.physics.tally import (
 NODES, WEIGHTS = lobatto(5)  # at which a step is observed
 COARSE_WEIGHTS = np.zeros(NODES.size)  # at its ends and in its middle alone
 COARSE_WEIGHTS[::2] = lobatto(3)[1]
+TOP_LOOKS = 12  # at most, at a peak within a step
+PEAK_TOLERANCE = 1e-10  # of a peak: a parabola that rises above it by less is not looked at
+CROSSING_TOLERANCE = 1e-8  # of a step: as well as a change of the rod load's side is placed
 # of the stages of each explicit pair, at these nodes: (pair, node, stage)
 NODE_WEIGHTS = np.array(
     [[P[pair] @ s ** np.arange(1, 5) for s in NODES] for pair in RungeKuttaPair]
@@ -158,6 +165,8 @@ class WorkArrays(NamedTuple):
     y: np.ndarray  # (n,)
     rows: np.ndarray  # (5, COLUMNS): observed at a step's nodes
     gap_fraction: np.ndarray  # (2,): share of the step without contact, by joint
+    # (4,): share of the step with the rod load above and below zero, its tension and compression
+    sides: np.ndarray
     row: np.ndarray
 
 
@@ -178,7 +187,7 @@ def new_work(n):
     return WorkArrays(
         np.zeros((STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((size, n)),
         np.zeros((5, n)), np.zeros(STAGES), np.zeros(n), np.zeros((NODES.size, COLUMNS)),
-        np.zeros(2), np.zeros(COLUMNS),
+        np.zeros(2), np.zeros(4), np.zeros(COLUMNS),
     )  # fmt: skip
 
 
@@ -309,11 +318,11 @@ def sample_grid(w, t_end, h, z, work, times, states):
 
 
 @inline_llvm
-def measure_gap_fractions(w, h, stride, work, phase, p):
+def measure_gap_fractions(w, h, stride, work, size, phase, p, tally):
     """Write the share of a step that each joint is without contact.
 
     Where contact changes between two nodes, up to where it does on the interpolant, if there is
-    one.
+    one; the tally adds up how far that may move.
     """
     for joint in range(2):
         gap_fraction = 0.0
@@ -329,24 +338,156 @@ def measure_gap_fractions(w, h, stride, work, phase, p):
                         joint, low, high, before, after, w.t, h, work.dense, phase, p, work.y
                     )
                     share = (s - low if after > 0.0 else high - s) / (high - low)
+                    rate = (after - before) / (high - low)
+                    tally.switch_shift[joint] += h * shift_of_change(
+                        joint, s, rate, w.t, h, work.dense, size, phase, p, work.y
+                    )
                 gap_fraction += share * (high - low)
         work.gap_fraction[joint] = gap_fraction
 
 
+@jit
+def look_within(s, column, w, base, h, z, work, phase, p):
+    """Return an observed column at the fraction s of the step just taken; writes work.y, .row."""
+    if w.has_dense:
+        interpolate(s, work.dense, work.y)
+    else:
+        weights_at(w.pair, s, work.weights)
+        combine(work.weights, h, z, work.k, work.y)
+    observe_contact(ideal_after(base, s * h, p), work.y, phase, p, work.row)
+    return work.row[column]
+
+
 @inline_llvm
-def accumulate_metrics(w, h, stride, work, phase, p, tally):
+def signed(value, sign):
+    """Return the value times a sign, or its size where the sign is 0."""
+    return abs(value) if sign == 0.0 else sign * value
+
+
+@jit
+def find_top(column, sign, known, w, base, h, stride, z, work, phase, p):
+    """Return the greater of `known` and the greatest value of a column over the step just taken.
+
+    The step's nodes count, and looks at the tops of parabolas, as long as these are above it.
+    sign: 1 or -1, or 0 for |value|.
+    """
+    best, last = 0, NODES.size - 1
+    for i in range(0, NODES.size, stride):
+        if signed(work.rows[i, column], sign) > signed(work.rows[best, column], sign):
+            best = i
+    known = max(known, signed(work.rows[best, column], sign))
+    i = min(max(best, stride), last - stride)
+    left, middle, right = NODES[i - stride], NODES[i], NODES[i + stride]
+    before, here = work.rows[i - stride, column], signed(work.rows[i, column], sign)
+    before, after = signed(before, sign), signed(work.rows[i + stride, column], sign)
+    for _ in range(TOP_LOOKS):
+        at, top = extreme_of(left - middle, right - middle, before, here, after)
+        at += middle
+        if not (top - known > PEAK_TOLERANCE * known and left < at < right):
+            break
+        value = signed(look_within(at, column, w, base, h, z, work, phase, p), sign)
+        known = max(known, value)
+        end, side = (middle, here) if value > here else (at, value)  # what lies beyond is no top
+        if (value > here) == (at > middle):
+            left, before = end, side
+        else:
+            right, after = end, side
+        if value > here:
+            middle, here = at, value
+    return known
+
+
+@jit
+def skip_tops(w, base, h, stride, z, work, phase, p, tally):
+    """Return at once: the tally's own peaks will do."""
+
+
+@jit
+def raise_tops(w, base, h, stride, z, work, phase, p, tally):
+    """Raise the tally's peaks by `find_top` of the step just taken."""
+    for k in range(PEAKED):
+        tally.peak[k] = find_top(
+            ACCELERATION + k, 0.0, tally.peak[k], w, base, h, stride, z, work, phase, p
+        )
+
+
+look_for_peaks = dispatch_on_record(MECHANISM, raise_tops, skip_tops)
+
+
+@jit
+def add_sides(low, high, before, after, w, base, h, z, work, phase, p):
+    """Add to work.sides how much of a step, from low to high, the rod load is on each side.
+
+    before, after: the load (N) there. Where they are not on one side, each side reaches up to where
+    the load leaves it: between two sides it may be zero for a while.
+    """
+    if before * after > 0.0:
+        work.sides[0 if after > 0.0 else 1] += high - low
+        return
+    for side in range(2):
+        end, away, load = (low, high, before) if side == 0 else (high, low, after)
+        if load == 0.0:
+            continue
+        inside, outside = end, away
+        while abs(outside - inside) > CROSSING_TOLERANCE:
+            middle = 0.5 * (inside + outside)
+            if look_within(middle, ROD_LOAD, w, base, h, z, work, phase, p) * load > 0.0:
+                inside = middle
+            else:
+                outside = middle
+        work.sides[0 if load > 0.0 else 1] += abs(0.5 * (inside + outside) - end)
+
+
+@jit
+def measure_sides(w, base, h, stride, z, work, phase, p, tally):
+    """Write the step's shares and peaks of both sides of the rod load into work.sides.
+
+    A load that changes its side twice between two nodes is found by the parabola through three.
+    """
+    work.sides[0], work.sides[1] = 0.0, 0.0
+    for side in range(2):
+        sign, known = 1.0 - 2.0 * side, tally.side_peak[side]
+        work.sides[2 + side] = find_top(
+            ROD_LOAD, sign, known, w, base, h, stride, z, work, phase, p
+        )
+    for i in range(stride, NODES.size, stride):
+        low, high = NODES[i - stride], NODES[i]
+        before, after = work.rows[i - stride, ROD_LOAD], work.rows[i, ROD_LOAD]
+        middle = i if i + stride < NODES.size else i - stride
+        here = work.rows[middle, ROD_LOAD]
+        at, extreme = extreme_of(
+            NODES[middle - stride] - NODES[middle], NODES[middle + stride] - NODES[middle],
+            work.rows[middle - stride, ROD_LOAD], here, work.rows[middle + stride, ROD_LOAD],
+        )  # fmt: skip
+        at += NODES[middle]
+        if before * after > 0.0 and low < at < high and extreme * here <= 0.0:
+            load = look_within(at, ROD_LOAD, w, base, h, z, work, phase, p)
+            add_sides(low, at, before, load, w, base, h, z, work, phase, p)
+            add_sides(at, high, load, after, w, base, h, z, work, phase, p)
+        else:
+            add_sides(low, high, before, after, w, base, h, z, work, phase, p)
+
+
+@inline_llvm
+def accumulate_metrics(w, base, h, stride, z, work, size, phase, p, tally):
     """Tally an accepted step that has been observed, and audit its energy."""
+    measured = w.t >= w.settle
+    if measured and tally.has_rod_load:
+        measure_sides(w, base, h, stride, z, work, phase, p, tally)
+    if measured:
+        look_for_peaks(w, base, h, stride, z, work, phase, p, tally)
     last = NODES.size - 1
     for j in range(ACCELERATION, COLUMNS):
         work.row[j] = work.rows[last, j]
     w.observed = 1
     n = work.y.size
     tally_energy(work.row, work.new[n:], tally)
-    measured = w.t >= w.settle
     if measured:
-        measure_gap_fractions(w, h, stride, work, phase, p)
+        measure_gap_fractions(w, h, stride, work, size, phase, p, tally)
     weights = WEIGHTS if stride == 1 else COARSE_WEIGHTS
-    tally_step(h, NODES, weights, work.rows, stride, work.gap_fraction, measured, tally, p)
+    tally_step(
+        h, NODES, weights, work.rows, stride, work.gap_fraction, work.sides, measured, tally, p
+    )
 
 
 @jit
@@ -419,7 +560,8 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         without_refcount(work.k), without_refcount(work.new), without_refcount(work.column),
         without_refcount(work.jacobian), without_refcount(work.dense),
         without_refcount(work.weights), without_refcount(work.y), without_refcount(work.rows),
-        without_refcount(work.gap_fraction), without_refcount(work.row),
+        without_refcount(work.gap_fraction), without_refcount(work.sides),
+        without_refcount(work.row),
     )  # fmt: skip
     z, atol, size = without_refcount(z), without_refcount(atol), without_refcount(size)
     times, states = without_refcount(times), without_refcount(states)
@@ -458,7 +600,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
             continue
         at_edge = not landing and h == end - w.t
         reached = end if at_edge else w.t + h
-        accumulate_metrics(w, h, stride, work, phase, p, tally)
+        accumulate_metrics(w, base, h, stride, z, work, size, phase, p, tally)
         wear_step(w, base, h, z, work, phase, p, tally)
         sample_grid(w, reached, h, z, work, times, states)
         w.taken = h

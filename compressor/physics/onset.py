@@ -18,7 +18,8 @@ INTERVALS = 12  # of a step, at whose ends the nearness is sampled
 STEP_EDGE = 1e-4  # of a step: samples beside both ends show a maximum in the first or last interval
 MAX_SAMPLE = INTERVALS + 2  # number of the last sample; the first is 0
 MAX_HALVINGS = 40
-CHANGE_TOLERANCE = 1e-5  # of a step: as well as a change of contact is placed for the metrics
+CHANGE_TOLERANCE = 1e-8  # of a step: as well as a change of contact is placed for the metrics
+SMALL_CHANGE = 1e-6  # of the natural size of a state: by which a change of contact is moved
 LANDING_FRACTION = 1e-3  # of a step: an onset nearer to its start is the one it started from
 NEVER = 2.0  # a fraction of the step beyond its end
 
@@ -199,6 +200,25 @@ def locate_change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
         else:
             low, at_low = s, now
     return 0.5 * (low + high)
+
+
+@jit
+def shift_of_change(joint, s, rate, t, h, dense, size, phase, p, y):
+    """Return by how much of a step a change of contact moves for a state off by its natural size.
+
+    The motion's numbers count one by one, as a root of squares. rate: of the nearness, in steps;
+    size: natural size of each number of the motion, (n,); y: scratch. A journal that is pressed
+    out of its oil or off its bore slowly, under full damping, loses contact at a moment that a
+    speed wrong by some tolerances moves far.
+    """
+    at, total = nearness_at(joint, s, t, h, dense, phase, p, y), 0.0
+    for i in range(size.size):
+        interpolate(s, dense, y)
+        y[i] += SMALL_CHANGE * size[i]
+        contact = contact_at(joint, t + s * h, y, phase, p)
+        change = nearness(contact, p.stiffness[joint], p.clearance[joint], p) - at
+        total += (change / SMALL_CHANGE) ** 2
+    return math.sqrt(total) / abs(rate)
 
 
 @inline_once

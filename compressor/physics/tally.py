@@ -15,9 +15,9 @@ from compressor.physics.observe import (
     CRANK_POWER,
     CRANK_TORQUE,
     DEVIATION,
+    FORCE,
     GUIDE_MOMENT,
     KINETIC,
-    NEARNESS,
     NORMAL,
     PACE,
     PENETRATION,
@@ -28,6 +28,7 @@ from compressor.physics.record import MAX_SECTORS, MECHANISM, is_featured, zero
 # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAK_NEARNESS = 0.98
 PEAKED = DEVIATION - ACCELERATION  # columns whose greatest size is tallied
+ROD_LOAD = FORCE + 2  # force on the small end along x, positive in tension
 
 
 def lobatto(n):
@@ -69,6 +70,11 @@ TALLY = np.dtype(
         ("worst_imbalance", "f8"),  # J
         ("peak_kinetic", "f8"),
         ("started", "i8"),
+        # s by which changes of contact move, in all, where the state is off by its natural size
+        ("switch_shift", "f8", (2,)),
+        ("has_rod_load", "i8"),  # whether the rod load, x of the small end's force, is tallied
+        ("side_peak", "f8", (2,)),  # its greatest tension and compression, N
+        ("side_seconds", "f8", (2,)),  # that a steady crank takes while it is above and below zero
     ],
     align=True,
 )
@@ -86,12 +92,14 @@ WORN = np.dtype(
 )  # fmt: skip
 
 
-def new_tally(p=None):
+def new_tally(p=None, has_rod_load=False):
     """Return an empty tally; a joint counts as touching until it is seen apart.
 
     p: the run's record, where it may be that of a mechanism with features, whose bores may wear.
+    has_rod_load: whether the rod load is tallied.
     """
     tally = zero(TALLY if p is None or not is_featured(p) else WORN)
+    tally["has_rod_load"] = has_rod_load
     tally["touching"] = 1
     tally["max_penetration"] = -math.inf
     tally["deepest"] = -math.inf
@@ -113,6 +121,19 @@ def vertex(left, right, before, here, after):
         if left < at < right:
             return here + 0.5 * slope * at
     return here
+
+
+@inline_llvm
+def extreme_of(left, right, before, here, after):
+    """Return the place and the value of the extreme of the parabola through three values.
+
+    nan of a straight line. left, right: places of the outer values from the middle one's.
+    """
+    slope_left = (before - here) / left
+    slope_right = (after - here) / right
+    curvature = (slope_right - slope_left) / (right - left)
+    at = -0.5 * (slope_left - curvature * left) / curvature if curvature != 0.0 else math.nan
+    return at, here - curvature * at * at
 
 
 @inline_llvm
@@ -145,6 +166,28 @@ def peak_of(nodes, rows, every, column, known, size):
         before, here, after = abs(before), abs(here), abs(after)
     left, right = nodes[i - every] - nodes[i], nodes[i + every] - nodes[i]
     return max(top, known, vertex(left, right, before, here, after))
+
+
+@jit
+def add_peaks(nodes, rows, every, tally, p):
+    """Raise the tally's peaks by the nodes of a step, and by parabolas through them."""
+    for k in range(PEAKED):
+        if may_exceed(tally.top[k], tally.peak[k]):
+            tally.peak[k] = peak_of(nodes, rows, every, ACCELERATION + k, tally.peak[k], True)
+
+
+@jit
+def add_peaks_of_nodes(nodes, rows, every, tally, p):
+    """Raise the tally's peaks by the nodes of a step alone.
+
+    A mechanism's load may ripple between them: who integrates it looks for tops on the dense
+    solution, so that no sample of it lies above them.
+    """
+    for k in range(PEAKED):
+        tally.peak[k] = max(tally.peak[k], tally.top[k])
+
+
+peaks_of_step = dispatch_on_record(MECHANISM, add_peaks_of_nodes, add_peaks)
 
 
 @inline_llvm
@@ -213,19 +256,6 @@ def gap_fraction_between(before, after):
     if high <= 0.0:
         return 1.0
     return low / (low - high) if low < 0.0 else 0.0
-
-
-@jit
-def write_gap_fractions(nodes, rows, gap_fraction):
-    """Write the share of a step that each joint is without contact, by lines between its nodes.
-
-    nodes: (m,), rows: (m, COLUMNS), gap_fraction: (2,), written.
-    """
-    gap_fraction[:] = 0.0
-    for joint in range(2):
-        for i in range(1, nodes.size):
-            before, after = rows[i - 1, NEARNESS + joint], rows[i, NEARNESS + joint]
-            gap_fraction[joint] += (nodes[i] - nodes[i - 1]) * gap_fraction_between(before, after)
 
 
 @jit
@@ -328,13 +358,15 @@ add_time = dispatch_on_record(MECHANISM, add_both_seconds, add_seconds)
 
 
 @inline_llvm
-def tally_step(span, nodes, weights, rows, every, gap_fraction, measured, tally, p):
+def tally_step(span, nodes, weights, rows, every, gap_fraction, sides, measured, tally, p):
     """Add one step (or part of one) of length span (s) to the tally.
 
     nodes, weights: (m,), both ends of the step and between them; rows: (m, COLUMNS), observed at
     the nodes; every: 1, or 2 where only the first, third, ... row is filled, with `weights` zero
-    at the others; gap_fraction: (2,), share of the step without contact, by joint; measured:
-    whether the metrics count (after settling); the depth of contact over the whole run always does.
+    at the others; gap_fraction: (2,), share of the step without contact, by joint; sides: (4,),
+    share of it with the rod load above and below zero, and its greatest tension and compression
+    (N), read where that is tallied; measured: whether the metrics count (after settling); the depth
+    of contact over the whole run always does.
 
     span is that of a steady crank; what is tallied are shares and means of the time that passes.
     """
@@ -355,6 +387,8 @@ def tally_step(span, nodes, weights, rows, every, gap_fraction, measured, tally,
         tally.guide_moment += weight * rows[i, GUIDE_MOMENT]
         for k in range(PEAKED):
             tally.top[k] = max(tally.top[k], abs(rows[i, ACCELERATION + k]))
-    for k in range(PEAKED):
-        if may_exceed(tally.top[k], tally.peak[k]):
-            tally.peak[k] = peak_of(nodes, rows, every, ACCELERATION + k, tally.peak[k], True)
+    peaks_of_step(nodes, rows, every, tally, p)
+    if tally.has_rod_load:
+        for side in range(2):
+            tally.side_seconds[side] += span * sides[side]
+            tally.side_peak[side] = max(tally.side_peak[side], sides[2 + side])

@@ -16,7 +16,15 @@ from compressor.solve.request import (
     passed_time,
     revolutions,
 )
-from compressor.solve.run_metrics import mean_bar, metrics, parts, standard_error, statistics, sure
+from compressor.solve.run_metrics import (
+    average_bar,
+    mean_bar,
+    metrics,
+    parts,
+    standard_error,
+    statistics,
+    sure,
+)
 from compressor.solve.scipy_driver import LOCAL
 from compressor.solve.series import SIGNALS, signals_of_scene
 from compressor.solve.si_record import initial_state, is_ideal, record, stiffness_of

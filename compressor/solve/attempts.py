@@ -18,7 +18,6 @@ from compressor.cases import TIGHTEST, Case
 from compressor.physics import (
     COLUMNS,
     FLOWS,
-    WIDE,
     Load,
     add_flows,
     lobatto,
@@ -44,27 +43,31 @@ from compressor.solve.error_bars import (
 )
 from compressor.solve.march_driver import COMPILED, LANE_METHODS, march_through
 from compressor.solve.request import Cuts, Request, Stop, Trajectory, Turns, merge_turns, overdue
-from compressor.solve.run_metrics import metrics, sampled_bars, sampled_metrics, sampled_times
+from compressor.solve.run_metrics import metrics, switch_errors
 from compressor.solve.scipy_driver import step_through
 from compressor.solve.series import compared_times, distances, finer, journal_distance, take_samples
 from compressor.solve.si_record import initial_state, is_ideal, length_and_speed, record
+from compressor.solve.within_step import Observer, look_at_step
 
 NODES, WEIGHTS = lobatto(9)
 PIECES_PER_CHECK = 256  # of the quadrature between two looks at the clock
 
 
 def closed_form(
-    p: np.record, times: np.ndarray, settle: float, pieces: int, timeout: float = math.inf
-) -> Trajectory:
+    p: np.record, times: np.ndarray, settle: float, pieces: int, timeout: float = math.inf,
+    has_rod_load: bool = False,
+) -> Trajectory:  # fmt: skip
     """Return the trajectory of ideal joints over an output grid, without integration.
 
     `pieces`: into which each stretch between load corners, or each revolution in it, is cut, but a
-    card's, which is cut at its nodes; `timeout`: wall time (s) that it may take.
+    card's, which is cut at its nodes; `timeout`: wall time (s) that it may take; `has_rod_load`:
+    whether the rod load is tallied.
     """
     deadline = time.monotonic() + timeout
     edges, phases = segments(p, float(times[-1]))
+    tally = new_tally(p, has_rod_load)
     result = Trajectory(
-        times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)], new_tally(p)
+        times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)], tally
     )
     start = time.perf_counter()
     turn = 2.0 * math.pi / p.omega
@@ -78,7 +81,7 @@ def closed_form(
     owner = sample_segments((cuts[:-1] + cuts[1:]) / 2, edges)
     states = np.zeros((NODES.size, 4))
     rows = np.empty((NODES.size, COLUMNS))
-    flows, gaps = np.zeros(FLOWS), np.zeros(2)
+    flows, gaps, sides = np.zeros(FLOWS), np.zeros(2), np.zeros(4)
     for number, (begin, end) in enumerate(itertools.pairwise(cuts)):
         phase = phases[owner[number]]
         if number % PIECES_PER_CHECK == 0 and time.monotonic() > deadline:
@@ -88,12 +91,26 @@ def closed_form(
             break
         nodes = begin + (end - begin) * NODES
         observe_all(nodes, states, np.full(NODES.size, phase), p, rows)
-        tally_energy(rows[0], flows, result.tally)
+        tally_energy(rows[0], flows, tally)
         add_flows(rows, WEIGHTS, end - begin, flows)
-        tally_energy(rows[-1], flows, result.tally)
-        tally_step(end - begin, NODES, WEIGHTS, rows, 1, gaps, begin >= settle, result.tally, p)
+        tally_energy(rows[-1], flows, tally)
+        measured = begin >= settle
+        if measured:
+            look_at_step(p, ideal_observer(p, begin, end, phase), NODES, rows, tally, sides)
+        tally_step(end - begin, NODES, WEIGHTS, rows, 1, gaps, sides, measured, tally, p)
     result.seconds = time.perf_counter() - start
     return result
+
+
+def ideal_observer(p: np.record, begin: float, end: float, phase: int) -> Observer:
+    """Return what observes an ideal machine at a fraction of the time (s) from begin to end."""
+    rows, state, phases = np.empty((1, COLUMNS)), np.zeros((1, 4)), np.array([phase])
+
+    def observe(s: float) -> np.ndarray:
+        observe_all(np.array([begin + s * (end - begin)]), state, phases, p, rows)
+        return rows[0]
+
+    return observe
 
 
 def fine_grid(edges: np.ndarray, pieces: int, turn: float) -> np.ndarray:
@@ -116,7 +133,8 @@ def prepare_run(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, n
     edges, phases = segments(request.fields, float(request.times[-1]))
     owner = sample_segments(request.times, edges)
     states = np.full((request.times.size, request.start.size), math.nan)
-    result = Trajectory(request.times, states, phases[owner], new_tally(request.p))
+    tally = new_tally(request.p, request.has_rod_load)
+    result = Trajectory(request.times, states, phases[owner], tally)
     z = np.zeros(request.start.size + FLOWS)
     z[:-FLOWS] = request.start
     rows = np.empty((1, COLUMNS))
@@ -145,7 +163,7 @@ def integrate(request: Request) -> Trajectory:
     return result
 
 
-PIECES = 32  # of the ideal scene's quadrature
+PIECES = 32  # of the ideal scene's quadrature, a revolution
 FINER_POWER = 0.3  # power of the tolerance by which they become more
 TIGHTER_FACTOR = 2.5  # times: the run that errors are estimated by
 OVERRUN_RTOL = 2e-4  # tolerances from which on explicit steps may run over friction's fast modes
@@ -165,8 +183,8 @@ class Solution:
     accuracy promises was `kept`, or `none` was given; `horizon` (s): nan where none was looked for;
     `settle` (s): from where metrics count; `turns`: tallies of the settled revolutions, if they
     were cut; `statistics`: of a chaotic motion; `regime`: of `Regime`, or "" where nothing is
-    known; `period`, `settled` (rev): of a periodic motion, nan of others; `rows`: observed at
-    `sampled_times`, none without signals; `companions`: the runs that errors are estimated by.
+    known; `period`, `settled` (rev): of a periodic motion, nan of others; `companions`: the runs
+    that errors are estimated by.
     """
 
     p: np.record
@@ -186,7 +204,6 @@ class Solution:
     regime: str = ""
     period: float = math.nan
     settled: float = math.nan
-    rows: np.ndarray = field(default_factory=lambda: np.empty((0, WIDE)))
     companions: "tuple[Solution, ...]" = ()
 
     def journals_apart(self, other: "Solution") -> float:
@@ -254,8 +271,9 @@ def run_at_tolerance(
     if is_ideal(case):
         pieces = round(PIECES * (case.rtol / rtol) ** FINER_POWER)
         return solution_of_trajectory(
-            rtol, p, times, closed_form(p, times.all, case.settle, pieces, timeout)
-        )
+            rtol, p, times,
+            closed_form(p, times.all, case.settle, pieces, timeout, case.output.signals),
+        )  # fmt: skip
     request = build_request(case, rtol, p, times, state)
     request.timeout, request.cuts = timeout, cuts
     trajectory = integrate(request)
@@ -291,12 +309,11 @@ def run_until_balanced(rtol: float, run_at: Callable[[float], tuple[Solution, fl
 
 
 class Times(NamedTuple):
-    """Times (s) of a run: settled; its output, its comparison, its metrics; all of them."""
+    """Times (s) of a run: settled; its output, its comparison; all of them."""
 
     settle: float
     output: np.ndarray
     compared: np.ndarray
-    sampled: np.ndarray
     all: np.ndarray
 
 
@@ -307,7 +324,7 @@ MAX_TIMES = 16
 def times_of(case: Case, sampled: bool) -> Times:
     """Return the times at which a run of a case is sampled, those of many cases in common."""
     stride = finer(case) if sampled else 0
-    key = case.solve, case.machine.speed_rpm, case.output.signals, stride
+    key = case.solve, case.machine.speed_rpm, stride
     if (known := TIMES.get(key)) is None:
         if len(TIMES) >= MAX_TIMES:
             TIMES.clear()
@@ -320,12 +337,8 @@ def make_times(case: Case, stride: int) -> Times:
     samples = stride * round(case.steps) or 1
     output = case.duration * (np.arange(samples + 1) / samples)
     compared = compared_times(case) if case.wants_bars else output[:0]
-    metered = sampled_times(case)
-    union = output
-    for times in (compared, metered):
-        if times.size:
-            union = np.union1d(union, times)
-    return Times(case.settle, output, compared, metered, union)
+    union = np.union1d(output, compared) if compared.size else output
+    return Times(case.settle, output, compared, union)
 
 
 def build_request(
@@ -338,24 +351,20 @@ def build_request(
     else:
         y = np.zeros(len(state_names(p)))
         y[:] = state
-    return Request(p, y, times.all, times.settle, rtol, settings.method, settings.max_steps)
+    return Request(
+        p, y, times.all, times.settle, rtol, settings.method, settings.max_steps,
+        has_rod_load=case.output.signals,
+    )  # fmt: skip
 
 
 def solution_of_trajectory(
     rtol: float, p: np.record, times: Times, trajectory: Trajectory
 ) -> Solution:
     """Return the `Solution` of an attempt's trajectory: metrics and samples, without errors."""
-    rows = np.empty((0, WIDE))
-    if times.sampled.size:
-        remaining = np.union1d(times.output, times.compared)
-        rows = take_samples(p, trajectory, times.sampled, remaining, WIDE)
     samples = take_samples(p, trajectory, times.compared, times.output)
     reason, detail = trajectory.reason, trajectory.detail
     numbers = {} if reason else metrics(p, trajectory.tally)
-    numbers |= sampled_metrics(rows, numbers) if numbers else {}
-    return Solution(
-        p, trajectory, rtol, times.settle, numbers, samples, reason, detail, rows=rows
-    )  # fmt: skip
+    return Solution(p, trajectory, rtol, times.settle, numbers, samples, reason, detail)
 
 
 def companion_rtol(p: np.record, rtol: float) -> float | None:
@@ -414,12 +423,11 @@ def estimate_errors(solution: Solution, *others: Solution) -> None:
         one.companions = ()  # so that the runs of a long search are not all in memory
     solution.companions = others
     residual = energy_residual(solution.trajectory.tally)
+    switching = switch_errors(solution.metrics, solution.trajectory.tally, solution.rtol)
     companions = [compare_with_run(solution, one) for one in others if not one.reason]
     runs: list[Companion | None] = [*companions] or [None]
-    found, rows = solution.metrics, solution.rows
-    solution.bars = longest_bars(
-        [bars(found, one, residual) | sampled_bars(rows, found, one) for one in runs]
-    )
+    found = [bars(solution.metrics, one, residual, switching) for one in runs]
+    solution.bars = longest_bars(found)
     solution.series_errors = longest_bars([series_errors(one) for one in runs])
 
 

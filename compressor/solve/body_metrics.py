@@ -14,7 +14,13 @@ from compressor.metrics import NUMBERS
 from compressor.outcome import Regime
 from compressor.solve.attempts import Solution
 from compressor.solve.error_bars import LOOSER, Metrics, closeness
-from compressor.solve.run_metrics import MAX_BATCHES, parts, standard_error, sure
+from compressor.solve.run_metrics import (
+    MAX_BATCHES,
+    average_bar,
+    count_bar,
+    parts,
+    standard_error,
+)
 from compressor.solve.series import rows_of, signals
 from compressor.vibration import Forces, Monitored, shake_body
 
@@ -157,6 +163,11 @@ def scatter_bars(case: Case, found: Monitored, metrics: Metrics) -> Metrics:
         means = np.array([
             np.mean([np.asarray(one[name]) ** power for one in batch], axis=0) for batch in batches
         ])  # fmt: skip
-        error = sure(standard_error(means), len(per_turn))
-        bars[name] = error / (2.0 * np.asarray(value)) if power == 2 else error
+        error = average_bar(standard_error(means), len(per_turn))
+        if power == 2:
+            size = np.asarray(value)
+            bars[name] = np.divide(error, 2.0 * size, out=error.copy(), where=size > 0.0)
+        else:
+            least = count_bar(np.asarray(value) * len(per_turn)) / len(per_turn)
+            bars[name] = np.maximum(error, least)
     return bars

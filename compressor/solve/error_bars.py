@@ -7,7 +7,9 @@ what they miss of the energy's change is error of the run itself, whatever its c
 The difference from a tighter run is mostly the run's own error, and a little more than it bounds
 that; of the difference from a looser run, which is mostly the looser one's error, a share does
 (`closeness`). A metric's own difference may be small by chance: the distance of the time series
-that it is taken from stands beside it. The energy residual is a floor. Where a motion enlarges the
+that it is taken from stands beside it. So may the moment of a change of contact: how far a state
+that is wrong by some tolerances moves it is added to shares of time. The energy residual is a
+floor. Where a motion enlarges the
 errors of its steps (`is_amplified`), two runs may agree by chance in all numbers; there a third one
 is made, and the longest bars count. Where a series or the acceleration may be wrong by all of
 itself, no metric with a unit that is taken from it is known.
@@ -53,6 +55,7 @@ def allowed_residual(rtol: float, revolutions: float) -> float:
 
 
 Metrics = dict[str, Any]  # by name: a number, or an array over joints (and axes)
+SIDES = "peak_rod_load_tension", "peak_rod_load_compression"
 
 TIGHTER_DISTANCE_FACTOR = 3.0  # of the distance of a time series to a tighter run's
 LOOSER, TEN, FALL = 0.37, 10.0, 0.65  # share of a run TEN times looser, and how it falls beyond
@@ -110,10 +113,13 @@ def ratio_of(share: float) -> float:
     return TEN * (LOOSER / share) ** (1.0 / FALL)
 
 
-def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -> Metrics:
+def bars(
+    metrics: Mapping[str, Any], other: Companion | None, residual: float, switching: Metrics
+) -> Metrics:
     """Return the error bar of each metric of a run's tally, in its unit and shape.
 
-    residual: energy imbalance relative to what the contacts lose. All are inf without another run,
+    residual: energy imbalance relative to what the contacts lose; switching: how far some of them
+    move with changes of contact (`run_metrics.switch_errors`). All are inf without another run,
     and those of metrics with a unit also where their series, or the acceleration, may be wrong by
     all of itself.
     """
@@ -122,16 +128,20 @@ def bars(metrics: Mapping[str, Any], other: Companion | None, residual: float) -
     errors = {}
     for name, value in metrics.items():
         metric = NUMBERS[name]
-        if metric.source != "tally":
-            continue
         bar, size = metric.bar, np.ones(np.shape(value)) if metric.is_pure_number else np.abs(value)
+        if name in SIDES:  # a small peak is as wrong as the force is
+            size = max(metrics[side] for side in SIDES)
+        apart = other.apart[metric.series]
+        if np.ndim(apart) and "joint" not in metric.dims:
+            apart = apart[metric.joint]
         # a metric's own difference may be small by chance, that of its series is not
         difference = bar.own * np.abs(np.asarray(value) - other.metrics[name])
-        series_part = bar.path * to_metric_shape(other.apart[metric.series], np.ndim(value)) * size
+        series_part = bar.path * to_metric_shape(apart, np.ndim(value)) * size
         errors[name] = other.closeness * np.hypot(difference, series_part)
+        errors[name] = errors[name] + switching.get(name, 0.0)
         if not metric.is_pure_number:
             errors[name] = np.maximum(errors[name], max(FLOOR * residual, bar.least) * size)
-            farthest = np.maximum(other.apart[metric.series], other.apart["acceleration"])
+            farthest = np.maximum(apart, other.apart["acceleration"])
             lost = TIGHTER_DISTANCE_FACTOR * other.closeness * farthest >= 1.0
             errors[name] = np.where(to_metric_shape(lost, np.ndim(value)), np.inf, errors[name])
     return errors

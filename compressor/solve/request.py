@@ -26,9 +26,13 @@ from compressor.reasons import Reason
 Turns = list[np.record]  # tallies, of one revolution each
 SUMS = (
     "seconds", "square_acceleration", "square_deviation", "crank_torque", "guide_moment",
-    "loss_seconds", "impacts", "releases",
+    "loss_seconds", "impacts", "releases", "switch_shift", "side_seconds",
 )  # fmt: skip
-GREATEST_FIELDS = ("peak", "max_penetration")  # the others go on from the start of the run
+GREATEST_FIELDS = (
+    "peak",
+    "max_penetration",
+    "side_peak",
+)  # the others go on from the start of the run
 WEAR_SUMS = ("steady_seconds", "slid", "worn")  # sums of a mechanism with features
 SAME_TIME = 1e-12  # of the run: edges this near to each other are one
 
@@ -132,7 +136,7 @@ class Request:
     """What to integrate: a record (SI), the initial state, samples, span, settings and budgets.
 
     `cuts`: where the tally is cut into revolutions, if it is; the run's own tally is then of what
-    follows the last one.
+    follows the last one. `has_rod_load`: whether the rod load is tallied.
     """
 
     p: np.record
@@ -144,6 +148,7 @@ class Request:
     max_steps: int = 5_000_000
     timeout: float = math.inf  # s
     cuts: Cuts | None = None
+    has_rod_load: bool = False
 
     @cached_property
     def fields(self) -> dict[str, Any]:

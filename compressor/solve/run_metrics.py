@@ -1,4 +1,4 @@
-"""The metrics of a run: from its tally, from samples, and averages where it is chaotic.
+"""The metrics of a run: from its tally, and averages where it is chaotic.
 
 How the rod load at the crosshead pin changes its side, which keeps the pin's bearing oiled. API 618
 (5th edition, 6.6.4) judges the combined rod load there: for how many degrees of a revolution it
@@ -12,12 +12,11 @@ Glynn, Stochastic Simulation, 2007, III.5).
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case
 from compressor.metrics import METRICS, NUMBERS, QUANTILES
 from compressor.physics import (
     COLUMNS,
@@ -27,7 +26,7 @@ from compressor.physics import (
     observe_all,
     read_fields,
 )
-from compressor.solve.error_bars import Companion, Metrics, energy_residual
+from compressor.solve.error_bars import ORDER, Metrics, energy_residual
 from compressor.solve.request import Trajectory, last_state, merge_turns
 
 ROUNDING = 1e-12
@@ -68,7 +67,17 @@ def metrics(p: np.record, tallied: np.record) -> Metrics:
         "mean_crank_torque": tally["crank_torque"] / seconds,
         "mean_guide_moment": tally["guide_moment"] / seconds,
     } | dict(zip(of_joints, clear, strict=True))
-    return {name: value for name, value in numbers.items() if has_metric(p, NUMBERS[name].when)}
+    numbers = {name: value for name, value in numbers.items() if has_metric(p, NUMBERS[name].when)}
+    if tally["has_rod_load"]:
+        (pull, push), greater = tally["side_peak"], tally["side_peak"].max()
+        numbers |= {
+            # without load, as in flight, the rod is on neither side
+            "rod_load_reversal_angle": math.tau * tally["side_seconds"].min() / steady,
+            "rod_load_reversal_share": min(pull, push) / greater if greater else 0.0,
+            "peak_rod_load_tension": pull,
+            "peak_rod_load_compression": push,
+        }
+    return numbers
 
 
 def has_metric(p: np.record, flag: str) -> bool:
@@ -95,6 +104,25 @@ def held_by_springs(p: np.record, trajectory: Trajectory) -> float:
     return float(held[1] - held[0])
 
 
+SWITCHING = 2.0  # times rtol ** ORDER: natural sizes of a state that it may be off by
+
+
+def switch_errors(metrics: Mapping[str, Any], tally: np.record, rtol: float) -> Metrics:
+    """Return how far a run's changes of contact may move the metrics that are shares of time.
+
+    Two runs may agree in the moment of one change by chance; how far a state that is off by the
+    tolerance moves it (`physics.onset.shift_of_change`) is known of each. `SWITCHING` holds for 99
+    of 100 changes at rtol 1e-5 to 1e-8, by runs at 1e-11.
+    """
+    if not metrics:
+        return {}
+    share = SWITCHING * rtol**ORDER * tally["switch_shift"] / (tally["seconds"] or math.nan)
+    found = {"contact_loss_fraction": share}
+    if tally["has_rod_load"]:
+        found["rod_load_reversal_angle"] = math.tau * share[1]
+    return found
+
+
 def ledger(p: np.record, trajectory: Trajectory) -> dict[str, float]:
     """Return the energy flows and counts by name."""
     tally, state = trajectory.tally, last_state(trajectory)
@@ -116,114 +144,11 @@ def ledger(p: np.record, trajectory: Trajectory) -> dict[str, float]:
     }
 
 
-SAMPLES_PER_REV = 1440  # for `SAMPLED` metrics
-MIN_SAMPLES, MAX_SAMPLES = 64, 200_000  # of them over a settled part
-SMALL_END = Column.FORCE + 2  # of the pin's force along x, positive in tension
-
-
-def sampled_times(case: Case) -> np.ndarray:
-    """Return the times (s) after settling at which a run is sampled for `SAMPLED` metrics.
-
-    Empty without signals.
-    """
-    span = case.duration - case.settle
-    samples = min(max(SAMPLES_PER_REV * span / case.turn, MIN_SAMPLES), MAX_SAMPLES)
-    count = round(samples) if case.output.signals else 0
-    return case.settle + span / max(count, 1) * (np.arange(count) + 0.5)
-
-
-def reversal_angle(rows: np.ndarray, peak: float) -> float:
-    """Return the crank angle (rad) of the rod load's smaller side, straight between samples."""
-    load = rows[:, SMALL_END]
-    before, after = load[:-1], load[1:]
-    width = np.abs(after - before)
-    above = np.maximum(before, 0.0) + np.maximum(after, 0.0)
-    # of a step whose ends have the same sign all or nothing, else the part above zero
-    crossing = before * after < 0.0
-    part = np.divide(above, width, out=np.zeros_like(width), where=crossing)
-    inside = np.where(crossing, part, before + after > 0.0).sum()
-    tension = (inside + 0.5 * (load[0] > 0.0) + 0.5 * (load[-1] > 0.0)) / load.size
-    return 2.0 * math.pi * min(tension, 1.0 - tension)
-
-
-def greatest_sides(rows: np.ndarray, peak: float) -> tuple[float, float]:
-    """Return the greatest tension and compression (N) of the rod load; 0 without any.
-
-    Samples say which is greater, and `peak` how great: the one that they found may lie between two.
-    """
-    load = rows[:, SMALL_END]
-    pull, push = max(float(load.max()), 0.0), max(float(-load.min()), 0.0)
-    return (max(pull, peak), push) if pull >= push else (pull, max(push, peak))
-
-
-def greatest_pull(rows: np.ndarray, peak: float) -> float:
-    """Return the greatest tension (N) of the rod load; 0 without any."""
-    return greatest_sides(rows, peak)[0]
-
-
-def greatest_push(rows: np.ndarray, peak: float) -> float:
-    """Return the greatest compression (N) of the rod load; 0 without any."""
-    return greatest_sides(rows, peak)[1]
-
-
-def reversal_share(rows: np.ndarray, peak: float) -> float:
-    """Return the peak of the rod load's smaller side over that of the greater one."""
-    pull, push = greatest_sides(rows, peak)
-    greater = max(pull, push)
-    return min(pull, push) / greater if greater else 0.0
-
-
-# metrics of samples: from observed rows, (m, WIDE), each in the middle of one of m equal steps, and
-# the greatest rod load (N) of the whole solution
-SAMPLED: dict[str, Callable[[np.ndarray, float], float]] = {
-    "rod_load_reversal_angle": reversal_angle,
-    "rod_load_reversal_share": reversal_share,
-    "peak_rod_load_tension": greatest_pull,
-    "peak_rod_load_compression": greatest_push,
-}
-
-
-def sampled_metrics(rows: np.ndarray, found: Mapping[str, Any]) -> Metrics:
-    """Return the `SAMPLED` metrics by name; none without rows.
-
-    found: the run's `metrics`; without them by samples alone.
-    """
-    peak = float(found["peak_contact_force_axis"][1][0]) if found else 0.0  # small end, along x
-    return {name: measure(rows, peak) for name, measure in SAMPLED.items()} if len(rows) else {}
-
-
-def sampled_bars(rows: np.ndarray, found: Mapping[str, Any], other: Companion | None) -> Metrics:
-    """Return the error bar of each `SAMPLED` metric, by another run; none without one.
-
-    Half of what a third of the samples changes, whichever third, stands for what is lost between
-    them: it bounds what a peak with a kink loses, and is at least 4 times what a parabola's top
-    does, wherever they lie between two samples. Where the smaller side may have lost so much that
-    the greatest load is its own, both sides' bars reach what samples say. The bars are as careful
-    as those of the metrics that were calibrated (`compressor.metrics.Bar`).
-    """
-    if other is None or not len(rows):
-        return {}
-    numbers, plain = sampled_metrics(rows, found), sampled_metrics(rows, {})
-    thirds = [third for k in range(3) if (third := sampled_metrics(rows[k::3], found))]
-    lost = {
-        name: 0.5 * max(abs(value - third[name]) for third in thirds)
-        for name, value in numbers.items()
-    }
-    sides = "peak_rod_load_tension", "peak_rod_load_compression"
-    smaller, greater = sorted(sides, key=lambda side: plain[side])
-    is_sure, bars = plain[smaller] + lost[smaller] < numbers[greater], {}
-    for name, value in numbers.items():
-        row = NUMBERS[name]
-        distance = float(np.ravel(other.apart[row.series])[row.joint])
-        path = row.bar.path * distance * abs(value)
-        by_run = other.closeness * math.hypot(row.bar.own * (value - other.metrics[name]), path)
-        bars[name] = by_run + lost[name] + (0.0 if is_sure else abs(value - plain[name]))
-    return bars
-
-
 MAX_BATCHES = 30
 MIN_SECTION = 5  # revolutions for a quantile
 T_QUANTILE = 0.975  # quantile of Student's t: a bar holds in 95 % of cases
+NORMAL = 1.96  # the same of a normal distribution
+MIN_REVOLUTIONS = 10  # settled ones, below which an average's bar is not known
 RMS_ERROR_AIM = 0.01  # of rms_acceleration: its standard error that revolutions are counted for
 
 
@@ -305,21 +230,58 @@ def sure(error: np.ndarray, revolutions: int) -> np.ndarray:
     return np.asarray(error) * float(stdtrit(max(batches - 1, 1), T_QUANTILE))
 
 
-def mean_bar(values: np.ndarray) -> float:
-    """Return half of the 95 % interval of the mean of revolutions' values, by batch means.
+def average_bar(error: np.ndarray, revolutions: int) -> np.ndarray:
+    """Return the error bar of an average over a chaotic motion's revolutions: `sure`, or inf.
 
-    values: (n,), in a row. inf of a single one.
+    It is inf below `MIN_REVOLUTIONS`: batches that are alike by chance would tell of no error.
+    """
+    if revolutions < MIN_REVOLUTIONS:
+        return np.full(np.shape(error), math.inf)
+    return sure(error, revolutions)
+
+
+def count_bar(count: np.ndarray) -> np.ndarray:
+    """Return how far the mean of a Poisson count may lie above it in 95 % of cases.
+
+    By the score interval, also of 0: the least bar of a count of a chaotic motion's events.
+    """
+    return 0.5 * NORMAL**2 + NORMAL * np.sqrt(count + 0.25 * NORMAL**2)
+
+
+def mean_bar(values: np.ndarray) -> float:
+    """Return half of the 95 % interval of the mean of a chaotic motion's values, by batch means.
+
+    values: (n,), of revolutions in a row. inf below `MIN_REVOLUTIONS`.
     """
     means = np.array([part.mean() for part in parts(values, MAX_BATCHES, 1)])
-    return float(sure(standard_error(means), len(values)))
+    return float(average_bar(standard_error(means), len(values)))
 
 
-def chaotic_bars(estimates: Metrics, numbers: Metrics) -> Metrics:
-    """Return the error bars of a chaotic run's metrics: of averages; greatest values have inf."""
-    bars = {}
-    for name, row in METRICS.items():
+def chaotic_bars(
+    p: np.record, turns: Sequence[np.record], estimates: Metrics, numbers: Metrics
+) -> Metrics:
+    """Return the error bars of a chaotic run's metrics: of averages; greatest values have inf.
+
+    turns: tallies of its revolutions; estimates: their `statistics`; numbers: the metrics. Those of
+    contacts at ideal joints have no error.
+    """
+    bars, count = {}, len(turns)
+    batches = [metrics(p, merge_turns(part)) for part in parts(turns, MAX_BATCHES, 1)]
+    for name, value in numbers.items():
+        row = NUMBERS[name]
         if row.kind == "greatest":
-            bars[name] = np.where(np.asarray(numbers[name]) == 0.0, 0.0, math.inf)
+            known = np.asarray(value) == 0.0 if not row.when else False
+            bars[name] = np.where(known, 0.0, math.inf)
+            continue
+        if row.when:
+            error = standard_error(np.array([one[name] for one in batches]))
         else:
-            bars[name] = sure(estimates[f"{name}_standard_error"], int(estimates["revolutions"]))
+            error = estimates[f"{name}_standard_error"]
+        bars[name] = average_bar(error, count)
+        if row.counted:
+            in_all = 1 if row.kind == "count" else count
+            least = count_bar(np.asarray(value) * in_all) / in_all
+            bars[name] = np.maximum(bars[name], least)
+        if row.contact:
+            bars[name] = np.where(p["clearance"] == 0.0, 0.0, bars[name])
     return bars

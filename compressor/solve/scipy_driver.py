@@ -31,7 +31,6 @@ from compressor.physics import (
     tally_energy,
     tally_step,
     wear_all,
-    write_gap_fractions,
 )
 from compressor.reasons import Reason
 from compressor.solve.request import (
@@ -45,7 +44,8 @@ from compressor.solve.request import (
     too_deep,
     with_cuts,
 )
-from compressor.solve.si_record import absolute_tolerances, length_and_speed
+from compressor.solve.si_record import absolute_tolerances, length_and_speed, natural_sizes
+from compressor.solve.within_step import find_crossings, look_at_step, share_above
 
 SAMPLES_IN_STEP = 17  # times in a step at which gaps are looked at, both ends included
 MAX_HALVINGS = 50
@@ -120,6 +120,7 @@ MIN_RTOL = 2.3e-14  # SciPy's own floor
 BAD_EVALUATIONS = 300  # non-finite right-hand sides in a row before a run is given up
 EVALUATIONS_PER_STEP = 50  # a step that never ends is caught by its evaluations
 NODES, WEIGHTS = lobatto(9)  # SciPy's steps may be long
+SMALL_CHANGE = 1e-6  # of a state's natural size: by which a change of contact is moved
 KICK = 30.0  # tolerances of speed: what a contact within one step may add unseen
 
 
@@ -279,11 +280,45 @@ class LoadStretch:
         phases = np.full(times.size, self.right_hand_side.phase)
         observe_all(times, states, phases, self.request.p, rows)
         self.check_contact(begin, end - begin, rows)
-        tally, p, gap_fraction = self.result.tally, self.request.p, np.empty(2)
-        write_gap_fractions(NODES, rows, gap_fraction)
-        tally_step(end - begin, NODES, WEIGHTS, rows, 1, gap_fraction, measured, tally, p)
+        tally, p = self.result.tally, self.request.p
+        gap_fraction, sides = np.zeros(2), np.zeros(4)
+        if measured:
+            self.measure_parts(dense, begin, end, rows, gap_fraction, sides)
+        tally_step(end - begin, NODES, WEIGHTS, rows, 1, gap_fraction, sides, measured, tally, p)
         if measured and is_featured(p) and p["sectors"]:
             wear_all(times, states, phases, (end - begin) * WEIGHTS, p, tally)
+
+    def measure_parts(self, dense, begin, end, rows, gap_fraction, sides) -> None:
+        """Write the shares of a step without contact, by joint, and its rod load's sides.
+
+        rows: observed at NODES; gap_fraction, (2,), and sides, (4,), as `tally_step` takes them,
+        are written. The tally takes peaks, and how far changes of contact may move.
+        """
+        request, tally, span = self.request, self.result.tally, end - begin
+        found, phase = np.empty((1, COLUMNS)), np.array([self.right_hand_side.phase])
+
+        def observe(s: float, change: np.ndarray | float = 0.0) -> np.ndarray:
+            state = np.ascontiguousarray(dense(begin + s * span)[:-FLOWS] + change)[np.newaxis]
+            observe_all(np.array([begin + s * span]), state, phase, request.p, found)
+            return found[0]
+
+        def measure_gap(joint: int) -> None:
+            column = Column.NEARNESS + joint
+            changes = find_crossings(lambda s: float(observe(s)[column]), NODES, rows[:, column])
+            gap_fraction[joint] = 1.0 - share_above(rows[0, column], changes)
+            for at, rate in changes:
+                small, here = (
+                    SMALL_CHANGE * np.diag(natural_sizes(request.fields)),
+                    observe(at)[column],
+                )
+                moved = [observe(at, one)[column] - here for one in small]
+                shift = np.linalg.norm(moved) / SMALL_CHANGE / abs(rate)
+                tally["switch_shift"][joint] += span * shift
+
+        for joint in range(2):
+            if request.p["clearance"][joint] > 0.0:
+                measure_gap(joint)
+        look_at_step(request.p, observe, NODES, rows, tally, sides)
 
     def check_contact(self, begin: float, span: float, rows: np.ndarray) -> None:
         """Raise Stop where a whole contact lies within a step and its impulse is no small error."""

@@ -170,6 +170,7 @@ def may_run_in_lanes(case: Case) -> bool:
     """Return whether a case may be simulated in lanes, by what it says of its solution."""
     settings = case.solve
     fits = case.is_plain and not case.problems and settings.method in LANE_METHODS
+    fits = fits and not case.output.signals  # lanes tally no rod load
     fits = fits and settings.settle_rev != "auto"
     return fits and settings.timeout_s >= MIN_TIME and settings.max_steps >= MAX_ATTEMPTS
 
@@ -478,7 +479,7 @@ def chaotic_solution(case: Case, solution: Solution, search: HorizonSearch) -> S
         estimate_errors(now)
         if now.turns:
             now.statistics = statistics(now.p, now.turns)
-            now.bars |= chaotic_bars(now.statistics, now.metrics)
+            now.bars |= chaotic_bars(now.p, now.turns, now.statistics, now.metrics)
         if excess_over_promise(case, now) > 1.0 and case.targets:
             reason = f"the motion is chaotic from {horizon / case.turn:.3g} revolutions on"
             return fail_accuracy(case, now, reason)

@@ -15,12 +15,12 @@ from compressor.physics.tally import (
     peak_of,
     tally_energy,
     tally_step,
-    write_gap_fractions,
 )
 from compressor.solve.si_record import record
 
 NODES, WEIGHTS = lobatto(9)
 APART = np.array([0.25, 0.75])  # shares of a step without contact
+SIDES = np.array([0.5, 0.2, 30.0, 8.0])  # and with the rod load above and below zero; its peaks
 
 
 @pytest.mark.parametrize("n", [3, 5, 9])
@@ -56,7 +56,7 @@ def test_tally_of_a_known_step():
     rows[:, Column.NORMAL] = np.where(NODES > 0.5, 10.0, 0.0)
     rows[:, Column.PENETRATION] = NODES - 0.5
     tally = new_tally()
-    tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, True, tally, p)
+    tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, SIDES, True, tally, p)
     assert tally.seconds == pytest.approx(1e-4)
     assert tally.square_acceleration == pytest.approx(9e-4)
     assert (tally.impacts.tolist(), tally.releases.tolist()) == ([1, 0], [0, 0])
@@ -64,7 +64,7 @@ def test_tally_of_a_known_step():
     assert tally.loss_seconds.tolist() == [pytest.approx(0.25e-4), 0.0]
     assert (tally.touching[0], tally.flown[0]) == (1, 0)
     rows[:, Column.NORMAL], rows[:, Column.PENETRATION] = 0.0, -1.0
-    tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, True, tally, p)
+    tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, SIDES, True, tally, p)
     assert (tally.touching[0], tally.flown[0]) == (0, 1)
 
 
@@ -80,7 +80,7 @@ def test_contact_begins_after_flight_or_inside_the_penetration(penetration, impa
     rows[:, Column.NORMAL] = [10.0, 10.0, 0.0, 10.0, 10.0]
     rows[:, Column.PENETRATION] = 1e-6 * np.array(penetration)
     tally = new_tally()
-    tally_step(1e-4, nodes, weights, rows, 1, APART, True, tally, p)
+    tally_step(1e-4, nodes, weights, rows, 1, APART, SIDES, True, tally, p)
     assert (tally.impacts[0], tally.releases[0]) == (impacts, releases)
     assert not tally.flown.any()
 
@@ -94,12 +94,16 @@ def test_contact_is_a_positive_nearness(before, after, share):
     assert gap_fraction_between(before, after) == pytest.approx(share)
 
 
-def test_time_apart_is_measured_by_lines_between_nodes():
-    rows, apart = np.zeros((NODES.size, COLUMNS)), np.empty(2)
-    rows[:, Column.NEARNESS] = 1e-9 * (NODES - 0.47)
-    rows[:, Column.NEARNESS + 1] = 0.8 - NODES
-    write_gap_fractions(NODES, rows, apart)
-    assert apart == pytest.approx([0.47, 0.2])
+def test_the_rod_load_is_tallied_by_its_sides():
+    p, rows = record(Case.from_values({})), np.zeros((NODES.size, COLUMNS))
+    plain, tally = new_tally(), new_tally(None, True)
+    for sides in (SIDES, np.array([0.08, 0.3, 2.0, 1.0])):
+        for one in (plain, tally):
+            tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, sides, True, one, p)
+    assert tally.side_seconds == pytest.approx([0.58e-4, 0.5e-4])
+    assert tally.side_peak.tolist() == [30.0, 8.0]
+    assert not plain.side_peak.any()
+    assert not plain.side_seconds.any()
 
 
 def test_every_other_node_of_a_step_will_do():
@@ -109,10 +113,11 @@ def test_every_other_node_of_a_step_will_do():
     weights[::2] = np.linspace(1, 2, 5)
     whole, sparse = new_tally(), new_tally()
     tally_step(
-        1e-4, NODES[::2].copy(), weights[::2].copy(), rows[::2].copy(), 1, APART, True, whole, p
-    )
+        1e-4, NODES[::2].copy(), weights[::2].copy(), rows[::2].copy(), 1, APART, SIDES, True,
+        whole, p,
+    )  # fmt: skip
     rows[1::2] = np.nan
-    tally_step(1e-4, NODES, weights, rows, 2, APART, True, sparse, p)
+    tally_step(1e-4, NODES, weights, rows, 2, APART, SIDES, True, sparse, p)
     assert sparse == whole
 
 
@@ -122,7 +127,7 @@ def test_a_step_near_a_record_is_told(node, column):
     p = record(Case.from_values({"joint": "both", "clearance_mm": 0.2}))
     tally, rows = new_tally(), np.zeros((NODES.size, COLUMNS))
     rows[:, Column.ACCELERATION : Column.NORMAL + 2] = 1.0
-    tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, True, tally, p)
+    tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, SIDES, True, tally, p)
     rows *= 0.97
     assert not may_beat_peaks(rows, 4, tally)
     rows[node, column] = 0.99

@@ -4,14 +4,17 @@ import math
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from compressor.metrics import METRICS, NUMBERS, QUANTILES
 from compressor.physics import new_record, new_tally
 from compressor.solve.request import merge_turns
 from compressor.solve.run_metrics import (
     MAX_BATCHES,
+    MIN_REVOLUTIONS,
     MIN_SECTION,
     chaotic_bars,
+    count_bar,
     metrics,
     parts,
     standard_error,
@@ -40,6 +43,11 @@ def turns(rng, count, pull=0.0):
     return found
 
 
+def poisson_upper(count):
+    """The exact upper end of the 95 % interval of a Poisson mean (Garwood, Biometrika 28, 1936)."""
+    return stats.chi2.ppf(0.975, 2 * count + 2) / 2
+
+
 @pytest.fixture
 def record():
     p = new_record()
@@ -58,7 +66,7 @@ def test_bars_hold_the_true_average_in_95_of_100_runs(record, count, pull):
     for _ in range(200):
         each = turns(rng, count, pull)
         found, numbers = statistics(record, each), metrics(record, merge_turns(each))
-        bars = chaotic_bars(found, numbers)
+        bars = chaotic_bars(record, each, found, numbers)
         for name, value in exact.items():
             held[name] += bool((np.abs(numbers[name] - value) <= bars[name]).all())
     assert all(180 <= number <= 198 for number in held.values()), held
@@ -91,7 +99,7 @@ def test_a_single_revolution_tells_no_error(record):
     for name, value in found.items():
         if name.endswith("error") or name == "revolutions_to_one_percent":
             assert np.isposinf(value).all(), name
-    bars = chaotic_bars(found, metrics(record, merge_turns(each)))
+    bars = chaotic_bars(record, each, found, metrics(record, merge_turns(each)))
     assert bars.keys() == METRICS.keys()
     assert all(np.isposinf(bar).all() for bar in bars.values())
 
@@ -99,10 +107,38 @@ def test_a_single_revolution_tells_no_error(record):
 def test_greatest_values_have_no_bar_but_an_ideal_joint_has_none_to_err_in(record):
     record["clearance"][1] = 0.0
     each = turns(np.random.default_rng(5), 40)
-    bars = chaotic_bars(statistics(record, each), metrics(record, merge_turns(each)))
+    numbers = metrics(record, merge_turns(each))
+    bars = chaotic_bars(record, each, statistics(record, each), numbers)
     assert np.isposinf(bars["peak_acceleration"])
     assert bars["max_penetration"].tolist() == [math.inf, 0.0]
     assert 0 < bars["rms_acceleration"] < 1
+
+
+def test_batches_that_agree_by_chance_say_nothing(record):
+    """Two revolutions alike had a bar of 0; a count has a Poisson one at least."""
+
+    def bars_of(count):
+        each = turns(np.random.default_rng(6), 1) * count
+        numbers = metrics(record, merge_turns(each))
+        return numbers, chaotic_bars(record, each, statistics(record, each), numbers)
+
+    _, few = bars_of(MIN_REVOLUTIONS - 1)
+    assert all(np.isposinf(bar).all() for bar in few.values())
+    numbers, many = bars_of(MIN_REVOLUTIONS)
+    assert many["rms_acceleration"] == pytest.approx(0.0, abs=1e-9)
+    counts = numbers["impact_count"]
+    assert (many["impact_count"] >= 1.96 * np.sqrt(counts)).all()
+    np.testing.assert_allclose(many["impacts_per_rev"], many["impact_count"] / MIN_REVOLUTIONS)
+    assert (
+        many["releases_per_rev"] * MIN_REVOLUTIONS > 3.0
+    ).all()  # of none, as by the rule of three
+
+
+def test_the_least_bar_of_a_count_is_that_of_a_poisson_one():
+    """The mean of which a count lies at the lower 2.5 % quantile is within it, to a tenth."""
+    for count in (0, 1, 5, 24, 1000):
+        upper = poisson_upper(count)
+        assert count_bar(np.array(count)) == pytest.approx(upper - count, rel=0.1, abs=0.2)
 
 
 @pytest.mark.parametrize("count", [1, 2, 29, 30, 31, 59, 60, 100, 1000])

@@ -16,7 +16,7 @@ import numpy as np
 from compressor.cases import Study, load_studies, row_of
 from compressor.metrics import AXES, BARRED, JOINTS, NUMBERS, SEGMENTS, THRESHOLDS
 from compressor.program import CompsimError, did_you_mean
-from compressor.solve import sure
+from compressor.solve import average_bar
 from compressor.units import READABLE, Units, read_quantity, split_number, unit_in
 
 SIGNS = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
@@ -124,7 +124,7 @@ class Goal:
             mean = f"{self.metric}_mean"
             value = self._at(numbers, mean)
             error = np.array(self._at(numbers, f"{mean}_standard_error"))
-            bar = float(sure(error, max(1, int(numbers["revolutions"]))))
+            bar = float(average_bar(error, int(numbers["revolutions"])))
         else:
             value = self._at(numbers, self.metric)
             bar = self._at(numbers, f"{self.metric}_error")
