@@ -1174,6 +1174,32 @@ def film_words():
     )
 
 
+def deciding_table():
+    """What numbers that a plant can only guess make of the machine, a row each."""
+    rows = {}
+    for one in kept("nameplate.json")["decides"]:
+        rows.setdefault(one["number"], []).append(one)
+
+    def cell(each, size, metric, unit):
+        return " / ".join(f"{one[size][metric] / unit:.3g}" for one in each)
+
+    plain = rows[""][0]["0.24"]
+
+    def moved(each):
+        return max(abs(one["0.24"][name] / plain[name] - 1.0) for one in each for name in plain)
+
+    ranked = sorted(rows.items(), key=lambda item: -moved(item[1]) if item[0] else -math.inf)
+    listed = [
+        [f"`{number}`" if number else "as in the file", " / ".join(one["value"] for one in each),
+         *(cell(each, size, "peak_contact_force", 1e3) for size in ("0.24", "0.4")),
+         cell(each, "0.24", "sensor_rms", 1.0), cell(each, "0.24", "body_velocity_rms", 1e-3)]
+        for number, each in ranked
+    ]  # fmt: skip
+    head = ["number", "it may be", "force on the pin at 0.24 mm, kN", "at 0.4 mm",
+            "sensor at 0.24 mm, m/s² rms", "body along x, mm/s rms"]  # fmt: skip
+    return markdown(head, listed)
+
+
 def oil_words():
     """What the film of oil makes of the force on a worn pin."""
     oils = kept("nameplate.json")["oils"]
@@ -1323,7 +1349,11 @@ PAGES = {
     "configs/README.md": {"parameters": parameter_tables},
     "compressor/docs/extremes.md": {"reasons": reason_table, "stress-words": extremes_words},
     "compressor/docs/diagnosis.md": {"identify-words": identify_words},
-    "compressor/docs/my-machine.md": {"nameplate": nameplate_table, "films": film_words},
+    "compressor/docs/my-machine.md": {
+        "nameplate": nameplate_table,
+        "films": film_words,
+        "decides": deciding_table,
+    },
     "compressor/docs/speed-or-accuracy.md": {"choose": choose_table},
     "compressor/docs/the-paper.md": {"paper": paper_words},
     "tests/results/README.md": {

@@ -162,13 +162,14 @@ def test_the_words_about_the_nameplate_s_machine_follow_from_the_runs(ran):
     machine = compressor.open_study(ran[0] / "results", "machine")
     pin = machine.peak_contact_force.sel(joint="small_end").values / 1e3
     (told,) = re.findall(
-        r"the force on the pin stays at (\d+) kN. .* At 0.4 mm it hammers, with (\d+)", WORDS
-    )
-    assert (f"{pin[0]:.0f}", f"{pin[2]:.0f}") == told
-    assert f"{pin[1]:.0f}" == told[0]
+        r"with (\d+) kN on it. At 0.24 mm it begins to strike, with (\d+) kN, and at 0.4 mm it "
+        r"hammers, with (\d+) kN", WORDS
+    )  # fmt: skip
+    assert tuple(f"{force:.0f}" for force in pin) == told
+    assert "where the force is a fifth greater" in WORDS
+    assert pin[1] / pin[0] == pytest.approx(1.2, abs=0.03)
     knock = machine.knock.sel(joint="small_end").values
-    assert "hardest blow is two thirds of that force" in WORDS
-    assert knock[0] < 0.25 < knock[1] == pytest.approx(2 / 3, abs=0.02)
+    assert knock[0] < 0.25 < knock[1] < knock[2]
     assert "The rod load reverses over some 150 degrees at every clearance" in WORDS
     assert (abs(np.degrees(machine.rod_load_reversal_angle) - 150) < 5).all()
     (told,) = re.findall(r"moves (\d) mm/s when sound and ([\d.]+) mm/s when worn", WORDS)

@@ -3,7 +3,9 @@
 Writes a small JSON file with the numbers that compressor/docs/my-machine.md shows, and the keys of
 the jobs: another case file or model makes others, and tests/test_pages.py then asks for a new run.
 The same is run with other shares of the clearance in which the oil film gets no thinner: how far
-the answer depends on that assumption.
+the answer depends on that assumption. What decides it: numbers that a plant can only guess, each at
+both ends of its plausible range, as `compsim explain --models` takes them, and natural frequencies
+of foundations.
 """
 
 import json
@@ -19,9 +21,19 @@ from measure_accuracy import provenance
 import compressor
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
+from compressor.studies.tradeoff.model_choices import Choice, vary_numbers
 
 CLEARANCE = 0.2  # mm
 LAST_SHARES = (0.05, 0.01)  # beside the default, which is that of the file
+
+BEFORE, WORN = 0.24, 0.4  # mm: the oil still cushions the pin of the file; it hammers
+DECIDING = (
+    "lubricant.bearing_length_mm.small_end", "lubricant.viscosity_mPa_s",
+    "machine.rod_inertia_kg_m2", "machine.rod_centre_mm", "gas.valve_loss_percent.suction",
+    "gas.discharge_MPa", "body.casing_mass_kg",
+)  # fmt: skip
+FOUNDATIONS = (30.0, 40.0, 80.0)  # Hz, along the cylinder, beside that of the file
+DECIDED = ("peak_contact_force", "sensor_rms", "body_velocity_rms")
 
 SHOWN = (
     "peak_contact_force", "impacts_per_rev", "rod_load_reversal_angle", "sensor_rms",
@@ -63,6 +75,33 @@ def peak(case):
             "regime": run.attrs["regime"]}  # fmt: skip
 
 
+def decided():
+    """What each number in doubt makes of two jobs: rows of the number, its value and metrics."""
+    (study,) = load_studies(example("machine"))
+    sizes = [round(case.clearance_mm.small_end, 9) for case in study.cases]
+    every = {size: [*machines(study, sizes.index(size))] for size in (BEFORE, WORN)}
+    rows = []
+    for pair in zip(*every.values(), strict=True):
+        one = pair[0]
+        assert {other.name for other in pair} == {one.name}
+        found = {"number": one.varied, "value": one.name.removeprefix(one.varied).strip()}
+        for size, other in zip(every, pair, strict=True):
+            run = compressor.simulate(other.case)
+            found[f"{size:g}"] = {metric: number(run[metric])[0] for metric in DECIDED}
+        rows.append(found)
+    return rows
+
+
+def machines(study, job):
+    """A job as it is, with each deciding number at both ends, and on each foundation."""
+    case, key = study.cases[job], "body.frequency_x_Hz"
+    yield Choice("", case)
+    yield from (one for one in vary_numbers(study, job) if one.varied in DECIDING)
+    for frequency in FOUNDATIONS:
+        body = replace(case.body, frequency_x_Hz=frequency)
+        yield Choice(f"{key} {frequency:g}", replace(case, body=body), varied=key)
+
+
 def plain(value):
     return value.item() if hasattr(value, "item") else value
 
@@ -79,6 +118,7 @@ def main(target):
                 found[share] = rows(study)
         films = [{"last_share": share, "rows": found[share]} for share in LAST_SHARES]
         kept = provenance("make nameplate") | {"rows": found[None], "films": films, "oils": oils()}
+        kept["decides"] = decided()
     Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
 
 

@@ -64,6 +64,10 @@ LENGTHS = {"big_end": 70, "small_end": 20}
         (OILED | {"lubricant": {"bearing_length_mm": LENGTHS}, "machine": TWO_PINS},
          "lubricant.bearing_length_mm", "and yours has 35 mm"),
         (OILED | {"wear": True, "machine": TWO_PINS}, "wear.bore_length_mm", "60 and 35 mm"),
+        ({"machine": {"rod_mass_kg": 54, "rod_length_mm": 343, "rod_centre_mm": 114}},
+         "machine.rod_inertia_kg_m2", "0.529 kg m2 is the default, of a uniform bar, whose centre "
+         "is in its middle, and that of yours is not: drawn rods have up to 2 times as much, and "
+         "at most 1.41, with all"),
         ({"body": {"mass_kg": 9000}, "sensor": True}, "body.casing_mass_kg",
          "360 kg is the default, a 25th of the body: levels of the sensor go as its inverse"),
     ],

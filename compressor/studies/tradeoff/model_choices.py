@@ -241,15 +241,14 @@ def shown_words(value: Any) -> str:
 
 
 def bare(case: Case, limit: float = math.inf) -> Case:
-    """Return a case that gives the same metrics with their error bars.
+    """Return a case that gives the same metrics with their error bars, and keeps no series.
 
-    Time series are made where metrics are taken from them. limit: seconds that its run may take.
+    limit: seconds that its run may take.
     """
     seconds = min(case.solve.timeout_s, limit)
     solve = replace(case.solve, error_bars=True, timeout_s=seconds)
-    signals = case.output.signals
-    keep = "series" if case.body or signals else "metrics"
-    return replace(case, wear=None, output=Output(keep, signals=signals), solve=solve)
+    output = Output("metrics", signals=case.output.signals)
+    return replace(case, wear=None, output=output, solve=solve)
 
 
 def choose_job(study: Study, folder: Folder) -> tuple[int, str]:
@@ -323,7 +322,7 @@ def fastest_run(case: Case, repeats: int) -> xr.Dataset:
 
 
 def compared(run: xr.Dataset) -> xr.Dataset:
-    """Return what is compared of a run, with its attributes; its time series are dropped."""
+    """Return what is compared of a run, with its attributes."""
     names = (name + end for name in COMPARED for end in ("", "_error"))
     return run[[*WORDS, *(name for name in names if name in run)]]
 
