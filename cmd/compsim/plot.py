@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from compressor.units import Units
 
 FIGURES = (
-    "analyst", "signals", "cards", "spectra", "orbits", "modes", "impacts",
+    "analyst", "loads", "signals", "cards", "spectra", "orbits", "modes", "impacts",
     "cycles", "segments", "waterfall", "map",
     *(name for kind in STUDIES for name in kind.figures),
 )  # fmt: skip
@@ -36,8 +36,8 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 @of_results(ONE_JOB, jobs)
 @click.option(
     "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
-    help="Draw only these figures: of a job analyst, signals, cards, spectra, orbits, modes, "
-    f"impacts; of a study cycles, segments, waterfall, map{MORE}.",
+    help="Draw only these figures: of a job analyst, loads, signals, cards, spectra, orbits, "
+    f"modes, impacts; of a study cycles, segments, waterfall, map{MORE}.",
 )  # fmt: skip
 @click.option("-o", "--output", default="plots", show_default=True, shell_complete=folders,
               help="Write the figures into this folder.")  # fmt: skip

@@ -12,7 +12,7 @@ from compressor.analysis.contacts import (
     joints_with_clearance,
     mode_shares,
 )
-from compressor.analysis.cycle import read_cycle
+from compressor.analysis.cycle import read_cycle, read_loads
 from compressor.analysis.cylinder import cylinder_words, end_states
 from compressor.analysis.effects import (
     Effects,

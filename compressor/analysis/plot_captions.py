@@ -15,7 +15,7 @@ from compressor.analysis.contacts import (
     joints_with_clearance,
     mode_shares,
 )
-from compressor.analysis.cycle import Cycle, read_cycle
+from compressor.analysis.cycle import Cycle, read_cycle, read_loads
 from compressor.analysis.cylinder import cylinder_words, end_states
 from compressor.analysis.orbit import orbit
 from compressor.analysis.runs import SPOKEN, case_of, record_of, settled_revolutions
@@ -438,6 +438,17 @@ def span(values: np.ndarray, form: str = ".2f") -> str:
     return f"{values.min():{form}} to {values.max():{form}}"
 
 
+def loads(run: xr.Dataset, twin: Twin) -> str:
+    """Describe the loads of the last revolution: their greatest tension and compression."""
+    sentences = ["Tension is positive."]
+    for one, where in ((twin, ", without clearance"), (run, "")):
+        if one is not None:
+            _, found = read_loads(one)
+            each = (f"{name} {span(1e-3 * load)} kN" for name, load in found.items())
+            sentences.append(f"Loads of the last revolution{where}: {', '.join(each)}.")
+    return " ".join(sentences) + caution(run)
+
+
 def newtons(force: float) -> str:
     """Return a force (N) in words."""
     if force < MIN_FORCE:
@@ -449,6 +460,7 @@ def newtons(force: float) -> str:
 PLOT_CAPTIONS: dict[str, dict[str, Callable[..., str]]] = {
     "job": {
         "analyst": analyst,
+        "loads": loads,
         "signals": signals,
         "cards": cards,
         "spectra": spectra,

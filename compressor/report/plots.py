@@ -31,6 +31,7 @@ from compressor.report.figures.job import (
     draw_cards,
     draw_cycles,
     draw_impacts,
+    draw_loads,
     draw_map,
     draw_modes,
     draw_orbits,
@@ -127,7 +128,7 @@ def publish_drawings(
 JOB, STUDY = PLOT_CAPTIONS["job"], PLOT_CAPTIONS["study"]
 OF_CONTACT = {"orbits": draw_orbits, "modes": draw_modes, "impacts": draw_impacts}
 BESIDE_TWIN = {
-    "analyst": draw_analyst, "signals": draw_signals, "cards": draw_cards,
+    "analyst": draw_analyst, "loads": draw_loads, "signals": draw_signals, "cards": draw_cards,
     "spectra": draw_spectra,
 }  # fmt: skip
 OVER_AXIS = {
@@ -138,6 +139,7 @@ OVER_AXIS = {
 }
 TITLES = {
     "analyst": "a revolution as an analyst reads it",
+    "loads": "gas load, inertia and rod load over crank angle",
     "signals": "acceleration, forces and torque over crank angle",
     "cards": "indicator cards",
     "spectra": "order spectra",

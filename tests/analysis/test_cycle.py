@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from compressor.analysis.contacts import impacts
-from compressor.analysis.cycle import _reversals, read_cycle
+from compressor.analysis.cycle import _reversals, read_cycle, read_loads
 from compressor.analysis.plot_captions import PLOT_CAPTIONS, SweptRow
 from compressor.analysis.runs import record_of
 from compressor.analysis.shaking import NoSeriesError, frame_forces, healthy_twin
@@ -219,3 +219,13 @@ def test_segments_over_their_limits_are_told():
     )  # fmt: skip
     assert (doubtful.x.tolist(), doubtful.y.tolist()) == ([85.0], [1.0])
     np.testing.assert_allclose(drawing.panels[0].traces[0].z[2, 32], 9.5 / 3)
+
+
+def test_gas_and_inertia_make_the_rod_load():
+    """Of a machine without clearance, and with it: Newton's law of the crosshead."""
+    for worn in ({}, {"joint": "both", "clearance_mm": 0.1}):
+        run = simulate(Case.from_values({"load": "gas"} | worn))
+        degrees, loads = read_loads(run)
+        assert degrees[-1] - degrees[0] == pytest.approx(360.0)
+        assert np.abs(loads["rod"]).max() > 3e3
+        assert np.allclose(loads["rod"], loads["gas"] + loads["inertia"], atol=1e-6, rtol=1e-6)

@@ -108,7 +108,8 @@ def test_a_job_is_drawn_with_its_numbers(plot, folder):
     names = [f"plots/{mine[:10]}-{name}.png" for name in drawn]
     assert [*found] == names
     run = job(folder, "worn", 3)
-    analyst, signals, spectra, orbits, modes, impacts = found.values()
+    analyst, loads, signals, spectra, orbits, modes, impacts = found.values()
+    assert "without clearance: gas " in loads
     force = frame_forces(run)
     last = slice(2 * 720, None)
     x = force["shaking_force"][last, 0] / 1e3
@@ -239,8 +240,8 @@ def test_ideal_joints_have_no_contacts_to_draw(plot, folder, unpainted):
     code, found, _ = plot(mine)
     assert code == 0
     drawn = [name.rpartition("-")[2] for name in found]
-    assert drawn == ["analyst.png", "signals.png", "cards.png", "spectra.png"]
-    assert "No joint has clearance" in [*found.values()][1]
+    assert drawn == ["analyst.png", "loads.png", "signals.png", "cards.png", "spectra.png"]
+    assert "No joint has clearance" in [*found.values()][2]
     code, found, err = plot(mine, "--what", "orbits")
     assert (code, found) == (2, {})
     assert "ideal joints" in err

@@ -21,6 +21,7 @@ from compressor.analysis import (
     joints_with_clearance,
     last_revolution,
     read_cycle,
+    read_loads,
     row_modes_words,
     rows_modes,
     sensor_envelope,
@@ -241,6 +242,33 @@ def draw_signals(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
     panels[0, 0].x.step = 90.0
     for panel in panels[-1]:
         panel.x.title = ANGLE_AXIS
+    share_scales(figure.panels, "x")
+    figure.legend = [] if twin is None else panels[0, 0].traces[::-1]
+    return figure
+
+
+LOADS = (
+    ("load of gas or spring on the piston, tension positive", "$F_g$ (kN)", "gas"),
+    ("inertia of what reciprocates", "$F_i$ (kN)", "inertia"),
+    ("rod load at the crosshead pin: both combined", "$F_r$ (kN)", "rod"),
+)
+
+
+def draw_loads(run: xr.Dataset, twin: xr.Dataset | None) -> Drawing:
+    """Return the gas load, inertia and rod load over a revolution, with the ideal machine's."""
+    figure, panels = make_grid(3, 1, 7.2)
+    for one, line, name in ((twin, TWIN, NAMES["twin"]), (run, THIS, NAMES["this"])):
+        if one is None:
+            continue
+        degrees, loads = read_loads(one)
+        for panel, (title, axis, key) in zip(panels[:, 0], LOADS, strict=True):
+            panel.plot(degrees, loads[key] * KILONEWTON, line, name)
+            panel.title, panel.y.title = title, axis
+        panels[0, 0].x.span(degrees[0], degrees[-1])
+    panels[0, 0].x.step = 90.0
+    panels[-1, 0].x.title = ANGLE_AXIS
+    for panel in panels[:, 0]:
+        panel.notes.append(Note(y=0.0, style=ZERO))
     share_scales(figure.panels, "x")
     figure.legend = [] if twin is None else panels[0, 0].traces[::-1]
     return figure
