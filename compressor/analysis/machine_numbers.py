@@ -192,6 +192,7 @@ class MachineDescription:
 EXPLAINED = {
     "machine.speed_rpm": ("machine.stroke_mm", "gas.bore_mm"),
     "machine.crank_radius_mm": ("machine.stroke_mm",),
+    "machine.pin_radius_mm": ("clearance_mm",),
     "machine.rod_length_mm": ("machine.rod_centre_mm",),
     "gas.suction_MPa": ("gas.bore_mm",),
     "gas.rod_diameter_mm": ("gas.discharge_MPa",),
