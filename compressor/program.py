@@ -7,12 +7,13 @@ import os
 import shutil
 import tempfile
 import threading
+import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from importlib import metadata
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 VERSION = "0.1.0"  # the one place; CHANGELOG.md says what has changed
 PROGRAM = f"compsim {VERSION}"  # as stored results name it
@@ -27,11 +28,40 @@ MAX_MEANT = 3  # words that may have been meant
 MAX_WORD_LENGTH = 100  # characters of a word that others are compared with
 
 
+Thing = TypeVar("Thing")
 Progress = Callable[[int, int, str], None]  # things done, things in all, a remark or ""
 
 
 def no_progress(done: int, total: int, remark: str) -> None:
     """Report progress to nobody."""
+
+
+def duration(seconds: float) -> str:
+    """Return the seconds as people say them."""
+    if seconds < 100:
+        return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def watched(
+    things: Sequence[Thing],
+    name: str,
+    progress: Progress,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Iterator[Thing]:
+    """Yield things and report how many are done, and early on about how long all will take.
+
+    By the time of the second one: the first one loads what all need. name: their plural.
+    """
+    remark, began = "", 0.0
+    for number, thing in enumerate(things):
+        if number == 2:
+            remark = f"{len(things)} {name}, about {duration((clock() - began) * len(things))}"
+        progress(number, len(things), remark)
+        remark, began = "", clock()
+        yield thing
+    progress(len(things), len(things), "")
 
 
 class CompsimError(Exception):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from compressor.program import duration
 from compressor.studies import by_kind
 from compsim.progress import ProgressReporter
 from compsim.screen import (
@@ -14,7 +15,6 @@ from compsim.screen import (
     as_json,
     caution,
     configs_argument,
-    duration,
     jobs_option,
     jsonable,
     limit,
@@ -31,6 +31,8 @@ from compsim.screen import (
 
 if TYPE_CHECKING:
     from compressor.sweep import Forecast
+
+BUSY = 0.8  # of the cores: below, a machine is busy with other things
 
 
 @click.command()
@@ -108,10 +110,18 @@ def plan(
 
 
 def cost(whole: "Forecast") -> str:
-    """Return the line of what a run will take: time with its range, workers, bytes, compiling."""
+    """Return the line of what a run will take: time with its range, workers, bytes, compiling.
+
+    Where others are at work on this machine, also the time without them.
+    """
+    from compressor.sweep import cores
+
     workers, by = plural(whole.workers, "worker"), f"by {plural(whole.timed, 'timed job')}"
     if whole.timed < whole.missing and not math.isnan(whole.most):
         by = f"{duration(whole.least)} to {duration(whole.most)} {by}"
     first = f", after about {duration(whole.compiling)} of compiling" if whole.compiling else ""
+    idle = min(whole.workers, cores())
+    alone = whole.seconds * whole.cores / idle
+    busy = f", or {duration(alone)} if nothing else ran" if whole.cores < BUSY * idle else ""
     taken = f"about {duration(whole.seconds)} with {workers} ({by})"
-    return f"{taken}{first}, and {size(whole.bytes)}"
+    return f"{taken}{busy}{first}, and {size(whole.bytes)}"

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from compsim.screen import duration, plural, say, say_wrapped
+from compressor.program import duration
+from compsim.screen import plural, say, say_wrapped
 
 if TYPE_CHECKING:
     from rich.progress import Progress

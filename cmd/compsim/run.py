@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compressor.program import printable
+from compressor.program import duration, printable
 from compressor.studies import by_kind
 from compsim.progress import ProgressReporter
 from compsim.screen import (
@@ -18,7 +18,6 @@ from compsim.screen import (
     all_stored,
     caution,
     configs_argument,
-    duration,
     jobs_option,
     limit,
     one_thread_each,

@@ -254,14 +254,6 @@ def report_changes(studies: "Sequence[Study]", folder: str) -> None:
             say(f"  compsim export {one.former} -i {shlex.quote(folder)} -o {one.former}.csv")
 
 
-def duration(seconds: float) -> str:
-    """Return the seconds as people say them."""
-    if seconds < 100:
-        return f"{seconds:.0f} s" if seconds >= 10 else f"{seconds:.1f} s"
-    minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
-
-
 def plural(count: int, thing: str = "job") -> str:
     """Return a number of things in words: 1 job, 2 jobs."""
     return f"{count} {thing}" + ("s" if count != 1 else "")

@@ -2,14 +2,16 @@
 
 Counts come first, at once. Then a dozen jobs of each study, drawn evenly over its design, are run
 and timed, within some seconds. The others are taken to cost as much for every revolution, in the
-mean; how far the drawn ones differ gives a range. Jobs are drawn alike each time.
+mean; how far the drawn ones differ gives a range. Jobs are drawn alike each time. What they cost is
+processor time; how much of that workers get in a second is measured, too, since others may be at
+work on this machine.
 """
 
 import itertools
 import math
 import random
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -17,6 +19,7 @@ import numpy as np
 
 from compressor.cases import Case, Study, points
 from compressor.store import Folder, read_store, series_file
+from compressor.sweep.speed import cores_at_work
 from compressor.sweep.wanted import RequestedJobs, revolutions, stored_ends
 from compressor.sweep.warm_up import Needs, compile_once, compile_seconds
 
@@ -24,7 +27,8 @@ ROW_BYTES = 462  # of one job in a file of rows, measured by `make store-bench`
 MAX_CASES = 10_000  # of the missing jobs of a study that are looked at, evenly drawn
 TIMED_JOBS = 12  # jobs of a study that are timed
 TIMING_SECONDS = 4.0  # s of timing, of all studies, after which no further job is begun
-SEARCHED: list[str] = []  # the first job of this process in which chaos was looked for
+LONG_JOB = 120.0  # s of a job that is not run twice for what loading was in it
+LOADED: set[bool] = set()  # whether chaos was looked for, in the jobs that this process has run
 
 
 @dataclass(frozen=True)
@@ -59,8 +63,10 @@ class StudyShare:
 class Forecast:
     """What is ahead of some studies; `seconds` are of wall time, with `workers` processes.
 
-    `least`, `most`: the range of `seconds`, nan where too few jobs were timed; `compiling`: seconds
-    before the first job, where this machine has not compiled all that the run needs.
+    `least`, `most`: the range of `seconds`, nan where too few jobs were timed; `loading`: those of
+    them in which workers load what they need; `cores`: idle cores that these workers are worth here
+    and now; `compiling`: seconds before the first job, where this machine has not compiled all that
+    the run needs.
     """
 
     jobs: int
@@ -73,6 +79,8 @@ class Forecast:
     least: float = 0.0
     most: float = 0.0
     timed: int = 0
+    loading: float = 0.0
+    cores: float = 1.0
     compiling: int = 0
     bytes: int = 0
 
@@ -85,14 +93,19 @@ class Ahead:
         self.missing = missing  # keys, by study
         self.cases = cases  # of some of them, by key
 
-    def with_times(self, workers: int, remark: Callable[[str], None]) -> Forecast:
-        """Return the whole forecast, for so many processes; `remark` is called about compiling."""
+    def with_times(
+        self, workers: int, remark: Callable[[str], None], jobs: int = TIMED_JOBS
+    ) -> Forecast:
+        """Return the whole forecast, for so many processes; `remark` is called about compiling.
+
+        jobs: how many of a study are timed at most.
+        """
         if not self.counts.missing:
             return self.counts
         looked_at = list(self.cases.values())
         needs = Needs.of(looked_at)
         compile_once(needs, remark)
-        drawn = {part.study: draw_cases(self.missing[part.study], self.cases)
+        drawn = {part.study: draw_cases(self.missing[part.study], self.cases)[:jobs]
                  for part in self.counts.studies if part.missing}  # fmt: skip
         costs = time_in_turn(drawn, TIMING_SECONDS)
         parts = [
@@ -100,14 +113,24 @@ class Ahead:
             for part in self.counts.studies
         ]
         working = min(workers, self.counts.missing)
+        at_once = cores_at_work(working)
+        loading = working * sum(cost.loading for some in costs.values() for cost in some)
+        # the last jobs leave workers idle: nine jobs take two workers as long as ten
+        rounds = math.ceil(self.counts.missing / working) * working / self.counts.missing
+
+        def wall(seconds: Iterable[float]) -> float:
+            return (loading + rounds * sum(seconds)) / at_once
+
         return replace(
             self.counts,
             studies=tuple(parts),
             workers=working,
-            seconds=sum(part.seconds for part in parts) / working,
-            least=sum(part.least for part in parts) / working,
-            most=sum(part.most for part in parts) / working,
+            seconds=wall(part.seconds for part in parts),
+            least=wall(part.least for part in parts),
+            most=wall(part.most for part in parts),
             timed=sum(part.timed for part in parts),
+            loading=wall([]),
+            cores=at_once,
             compiling=compile_seconds(needs.with_lanes(looked_at)),
             bytes=sum(part.bytes for part in parts),
         )
@@ -167,10 +190,15 @@ def next_of(study: Study, keys: set[str], most: int) -> Iterator[Next]:
 
 
 class Cost(NamedTuple):
-    """What a job took: seconds of one core for a revolution, bytes of its file for a sample."""
+    """What a job took: seconds of one core for a revolution, bytes of its file for a sample.
+
+    loading: s of one core that a process spends once, on its first job: libraries, machine code,
+    tables of a bearing.
+    """
 
     turn: float
     sample: float
+    loading: float = 0.0
 
 
 def draw_cases(keys: Sequence[str], cases: Mapping[str, Case]) -> list[Case]:
@@ -188,16 +216,16 @@ def draw_cases(keys: Sequence[str], cases: Mapping[str, Case]) -> list[Case]:
 
 
 def time_in_turn(drawn: Mapping[str, Sequence[Case]], seconds: float) -> dict[str, list[Cost]]:
-    """Return the costs of jobs of each study, run in turn until so many seconds are over.
+    """Return the costs of jobs of each study, run in turn until these have taken so many seconds.
 
     At least one of each study is run.
     """
-    end = time.perf_counter() + seconds
     costs: dict[str, list[Cost]] = {study: [] for study in drawn}
     for number in range(TIMED_JOBS):
         for study, cases in drawn.items():
-            if number < len(cases) and (number == 0 or time.perf_counter() < end):
+            if number < len(cases) and (number == 0 or seconds > 0.0):
                 costs[study].append(measure_cost(cases[number]))
+                seconds -= costs[study][-1].turn * revolutions(cases[number])
     return costs
 
 
@@ -220,22 +248,24 @@ def mean_with_range(values: Sequence[float], of: int) -> tuple[float, float, flo
 
 
 def measure_cost(case: Case) -> Cost:
-    """Return what a job costs; it runs again where machine code was loaded in that time.
+    """Return what a job costs; the first of a process runs again, for what was loading in it.
 
-    The first search for chaos of a process loads its own.
+    The first search for chaos of a process loads machine code of its own.
     """
     took, size, searched = run_timed(case)
-    if searched and not SEARCHED:
-        SEARCHED.append(case.key)
-        took, size, _ = run_timed(case)
-    return Cost(took / revolutions(case), size / (case.steps + 1))
+    loading = 0.0
+    if searched not in LOADED and took < LONG_JOB:
+        LOADED.update((False, searched))
+        again, size, _ = run_timed(case)
+        loading, took = max(0.0, took - again), again
+    return Cost(took / revolutions(case), size / (case.steps + 1), loading)
 
 
 def run_timed(case: Case) -> tuple[float, int, bool]:
     """Return the seconds that a job took, its file's bytes, and whether chaos was looked for."""
+    began = time.process_time()
     from compressor.solve import measure, observe  # needs numba: only to simulate
 
-    began = time.process_time()
     size = 0
     if case.output.keep == "metrics":
         found = measure(case)

@@ -18,6 +18,7 @@ from typing import NamedTuple
 from compressor.cases import Case
 from compressor.program import COMPILED, library_versions, machine_code_folder
 from compressor.store import StoreError
+from compressor.sweep.speed import slowness
 
 SECONDS_TO_REMARK = 2.0  # s of compiling before a remark on it
 COMPILING = (
@@ -26,17 +27,17 @@ COMPILING = (
 )
 METHOD = "one method"  # a part that adds only a few functions
 WHAT = {
-    "auto": ("dry joints", 20),
-    METHOD: ("solve.method {}", 2),
-    "horizon": ("the horizon of dry joints", 5),
-    "lanes-1": ("jobs side by side, big end", 25),
-    "lanes-2": ("jobs side by side, small end", 25),
-    "lanes-3": ("jobs side by side, both joints", 35),
-    "laws": ("other laws of contact and friction", 20),
-    "laws-horizon": ("the horizon of other laws", 8),
-    "features": ("mechanisms with features, such as oil or an elastic rod", 40),
-    "features-horizon": ("the horizon of mechanisms with features", 6),
-}  # by part: what it is, and the seconds that it takes an idle core
+    "auto": ("dry joints", 26),
+    METHOD: ("solve.method {}", 1),
+    "horizon": ("the horizon of dry joints", 7),
+    "lanes-1": ("jobs side by side, big end", 36),
+    "lanes-2": ("jobs side by side, small end", 36),
+    "lanes-3": ("jobs side by side, both joints", 37),
+    "laws": ("other laws of contact and friction", 28),
+    "laws-horizon": ("the horizon of other laws", 12),
+    "features": ("mechanisms with features, such as oil or an elastic rod", 50),
+    "features-horizon": ("the horizon of mechanisms with features", 8),
+}  # by part: what it is, and the seconds that it takes speed.REFERENCE
 LANES = {1: "big_end", 2: "small_end", 3: "both"}  # scenes whose runs march side by side
 MIN_JOBS_TO_LOAD, MIN_JOBS_TO_COMPILE = 16, 4000  # of a scene, for its lanes
 MAX_JOBS_SEEN = 1000  # jobs that are looked at for it
@@ -146,13 +147,13 @@ def load_with_remark(needs: Needs, text: str, remark: Callable[[str], None]) -> 
 
 
 def name_part(part: str) -> tuple[str, int]:
-    """Return what a part of the equations is, in words, and the seconds that compiling it takes."""
+    """Return what a part of the equations is, in words, and the seconds of compiling it here."""
     what, seconds = WHAT.get(part, WHAT[METHOD])
-    return what.format(part), seconds
+    return what.format(part), max(1, round(seconds * slowness()))
 
 
 def compile_seconds(needs: Needs) -> int:
-    """Return seconds of compiling that are ahead of a run with these needs, on an idle machine."""
+    """Return seconds of compiling that are ahead of a run with these needs, on this machine."""
     return sum(name_part(part)[1] for part in needs.uncompiled)
 
 

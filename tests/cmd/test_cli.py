@@ -14,11 +14,11 @@ from pathlib import Path
 
 import pytest
 from compsim import cli, plan, run
-from compsim.screen import duration
 
 from compressor.analysis.runs import paper_cases
 from compressor.cases import load
 from compressor.cases.load import MAX_JOBS, load_cases
+from compressor.program import duration
 from compressor.store import reader as store
 from compressor.store.studies import read_studies
 from compressor.store.writer import Writer

@@ -129,6 +129,8 @@ def test_xarray_reads_a_segment(tmp_path):
         assert found.peak_contact_force_axis.dims == ("row", "joint", "axis")
         assert found.peak_acceleration.values.tolist() == [0, 1, 2, 3, 4]
         assert found.peak_acceleration.attrs["units"] == "m/s2"
+        assert found.attrs["comment"] == "SI units"
+        assert "Conventions" not in found.attrs  # which names a convention of CF's list, not units
         assert set(NUMBERS) <= set(found)
 
 

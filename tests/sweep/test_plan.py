@@ -84,6 +84,8 @@ def test_a_job_that_is_stored_and_does_not_serve_is_missing(studies):
 def test_of_many_missing_jobs_some_are_looked_at(studies, monkeypatch):
     (study,) = studies(one=NINE)
     monkeypatch.setattr(plan, "TIMING_SECONDS", 60.0)
+    monkeypatch.setattr(plan, "cores_at_work", float)
+    monkeypatch.setattr(plan, "LOADED", {False, True})
     whole = forecast([study], "results", 0).with_times(2, str)
     monkeypatch.setattr(plan, "MAX_CASES", 3)
     study = noted(study)
@@ -92,7 +94,7 @@ def test_of_many_missing_jobs_some_are_looked_at(studies, monkeypatch):
     some = found.with_times(2, str)
     assert some.bytes == whole.bytes == 9 * ROW_BYTES
     assert (some.workers, some.missing, some.studies[0].missing) == (2, 9, 9)
-    assert some.studies[0].seconds == pytest.approx(2 * some.seconds)
+    assert 10 / 9 * some.studies[0].seconds == pytest.approx(2 * some.seconds)  # five turns
     assert some.seconds > 0
     assert (whole.timed, some.timed) == (9, 3)
     assert whole.least == whole.seconds == whole.most
@@ -100,7 +102,10 @@ def test_of_many_missing_jobs_some_are_looked_at(studies, monkeypatch):
 
 
 def timed_as(monkeypatch, seconds):
-    """Jobs that take so long by their rod's mass; the ones that were timed, in turn."""
+    """Jobs that take so long by their rod's mass; the ones that were timed, in turn.
+
+    Nothing is left to load, and workers have a core each.
+    """
     made = []
 
     def ran(case):
@@ -108,12 +113,15 @@ def timed_as(monkeypatch, seconds):
         return seconds(case), 0, False
 
     monkeypatch.setattr(plan, "run_timed", ran)
+    monkeypatch.setattr(plan, "LOADED", {False, True})
+    monkeypatch.setattr(plan, "cores_at_work", float)
     monkeypatch.setattr(plan, "compile_once", lambda *_: None)
     return made
 
 
 def test_a_dozen_jobs_drawn_over_the_design_tell_the_time(studies, monkeypatch):
     """A fifth of them twenty times as long as the first one, which alone was timed before."""
+    monkeypatch.setattr(plan, "TIMING_SECONDS", 1e9)
     made = timed_as(monkeypatch, lambda case: 1.0 if case.machine.rod_mass_kg < 4.6 else 20.0)
     axes = {"machine": {"rod_mass_kg": {"linspace": [3, 5, 100]}}}
     found = forecast(studies(one=axes), "results", 0).with_times(1, str)
@@ -153,28 +161,59 @@ def test_the_range_is_student_s_and_knows_what_was_timed():
 def test_loading_the_search_for_chaos_is_no_part_of_a_job_s_time(studies, monkeypatch):
     took = iter([60.0, 2.0, 3.0])
     monkeypatch.setattr(plan, "run_timed", lambda case: (next(took), 0, True))
-    monkeypatch.setattr(plan, "SEARCHED", [])
+    monkeypatch.setattr(plan, "LOADED", set())
     (case,) = studies(one={})[0].cases
     turns = case.duration / case.turn
-    assert [plan.measure_cost(case).turn * turns for _ in range(2)] == pytest.approx([2.0, 3.0])
+    costs = [plan.measure_cost(case) for _ in range(2)]
+    assert [cost.turn * turns for cost in costs] == pytest.approx([2.0, 3.0])
+    assert [cost.loading for cost in costs] == [58.0, 0.0]
+
+
+def test_load_of_the_machine_and_of_workers_is_time_of_a_run(studies, monkeypatch, capsys):
+    """Two workers on half a core: 7 s of loading each, and 1 s for each of nine jobs.
+
+    It was told as if each worker had a core, and began at once: 4.5 s.
+    """
+    took = iter([8.0, *[1.0] * 9])
+    timed_as(monkeypatch, lambda case: next(took))
+    monkeypatch.setattr(plan, "LOADED", set())
+    monkeypatch.setattr(plan, "TIMING_SECONDS", 60.0)
+    monkeypatch.setattr(plan, "cores_at_work", lambda workers: 0.5)
+    studies(one=NINE)
+    assert cli.main(["plan", "one.yaml", "-j", "2"]) == 0
+    # of an even number of jobs, since one worker idles in the end
+    told = (2 * 7.0 + 10 * 1.0) / 0.5
+    assert f"about {told:.0f} s with 2 workers (by 9 timed jobs), or " in capsys.readouterr().out
+
+
+def test_workers_are_not_worth_more_than_cores(studies, monkeypatch):
+    """It divided by the number of workers, however few cores there were."""
+    timed_as(monkeypatch, lambda case: 1.0)
+    monkeypatch.setattr(plan, "TIMING_SECONDS", 60.0)
+    asked = []
+    monkeypatch.setattr(plan, "cores_at_work", lambda workers: asked.append(workers) or 2.0)
+    found = forecast(studies(one=NINE), "results", 0).with_times(300, str)
+    assert (found.seconds, found.workers, asked) == (pytest.approx(4.5), 9, [9])
 
 
 def test_compiling_that_is_ahead_is_told(studies, monkeypatch, tmp_path, capsys):
     """Lanes are compiled by `run` alone; the rest is, too, before anything is timed."""
     timed_as(monkeypatch, lambda case: 0.01)
     monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
+    monkeypatch.setattr(warm_up, "slowness", lambda: 1.0)
     monkeypatch.setattr(warm_up, "MIN_JOBS_TO_COMPILE", 5)
     warm_up.marker("auto").touch()
     studies(one={**NINE, "joint": "both", "clearance_mm": 0.1})
     assert cli.main(["plan", "one.yaml", "-j", "1"]) == 0
     said = capsys.readouterr().out
-    assert "(by 9 timed jobs), after about 35 s of compiling, and " in said
+    assert "(by 9 timed jobs), after about 37 s of compiling, and " in said
     warm_up.marker("lanes-3").touch()
     assert cli.main(["plan", "one.yaml", "-j", "1"]) == 0
     assert "compiling" not in capsys.readouterr().out
 
 
 def test_the_range_is_told_and_json_has_no_nan(studies, monkeypatch, capsys):
+    monkeypatch.setattr(plan, "TIMING_SECONDS", 1e9)
     timed_as(monkeypatch, lambda case: 60.0 * case.machine.rod_mass_kg)
     studies(one={"machine": {"rod_mass_kg": {"linspace": [3, 5, 40]}}})
     assert cli.main(["plan", "one.yaml", "-j", "2"]) == 0

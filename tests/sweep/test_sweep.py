@@ -238,12 +238,13 @@ def test_compiling_is_told_once_for_each_version(studies, tmp_path, monkeypatch,
     told = []
     for name in ("one", "one", "two"):
         monkeypatch.setattr(warm_up, "machine_code_folder", lambda name=name: tmp_path / name)
+        monkeypatch.setattr(warm_up, "slowness", lambda: 1.0)
         sweep(studies(one={}), tmp_path / "out" / str(len(told)), 1, lambda *e: told.append(e[2]))
     remarks = [remark for remark in told if remark]
     assert (
         remarks[0::2]
         == [
-            "compiling the equations, part 1 of 1: dry joints, about 20 s; each part once for each "
+            "compiling the equations, part 1 of 1: dry joints, about 26 s; each part once for each "
             "version of the program, and a stop loses nothing"
         ]
         * 2
@@ -254,10 +255,11 @@ def test_compiling_is_told_once_for_each_version(studies, tmp_path, monkeypatch,
 def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     """What was finished before a stop is not compiled again."""
     monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
+    monkeypatch.setattr(warm_up, "slowness", lambda: 1.0)
     needs = warm_up.Needs(("auto", "Radau"), True, (3,), laws=True)
     ahead = ["Radau", "auto", "horizon", "lanes-3", "laws", "laws-horizon"]
     assert sorted(needs.parts) == ahead
-    assert warm_up.compile_seconds(needs) == 20 + 2 + 5 + 35 + 20 + 8
+    assert warm_up.compile_seconds(needs) == 26 + 1 + 7 + 37 + 28 + 12
     loaded, told = [], []
 
     def load(alone):
@@ -272,12 +274,12 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         warm_up.compile_once(needs, pytest.fail)
     assert list(needs.uncompiled) == ["lanes-3", "laws", "laws-horizon"]
-    assert warm_up.compile_seconds(needs) == 35 + 20 + 8
+    assert warm_up.compile_seconds(needs) == 37 + 28 + 12
     loaded.clear()
     warm_up.compile_once(needs, pytest.fail)
     assert loaded == [needs.parts[part] for part in ("lanes-3", "laws", "laws-horizon")]
-    assert "part 2 of 6: solve.method Radau, about 2 s" in told[1]
-    assert "part 1 of 3: jobs side by side, both joints, about 35 s" in told[3]
+    assert "part 2 of 6: solve.method Radau, about 1 s" in told[1]
+    assert "part 1 of 3: jobs side by side, both joints, about 37 s" in told[3]
     assert not needs.uncompiled
     assert warm_up.compile_seconds(needs) == 0
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from compressor.cases import HealthyClearance, Sensor, points
-from compressor.program import CompsimError, Progress
+from compressor.program import CompsimError, Progress, watched
 from compressor.store import (
     DamagedJob,
     Folder,
@@ -109,8 +109,7 @@ def read_study(
     bands, clipped = options.bands, 0
     values: Mapping[str, Any] = {}
     own = dict(zip(source.keys, points(source), strict=True))
-    for number, (key, point) in enumerate(own.items()):
-        progress(number, len(own), "")
+    for key, point in watched([*own.items()], "records", progress):
         job = read_job(stored, key, healthy, bands, options)
         if isinstance(job, str):
             left[job] += 1
@@ -120,7 +119,6 @@ def read_study(
         of_case = job.pop("values")
         values = of_case if job["joint"] != SOUND else values
         rows.append({**job, "key": key, "draw": name_draw(point)})
-    progress(len(own), len(own), "")
     if not rows:
         raise explain_no_windows(source, left, options)
     return replace(stack_windows(rows, bands or ()), left_out=left, clipped=clipped, values=values)

@@ -11,7 +11,6 @@ from compsim.screen import (
     DONE,
     SOME_FAILED,
     all_stored,
-    duration,
     plural,
     print_text,
     say,
@@ -20,7 +19,7 @@ from compsim.screen import (
     unread,
 )
 
-from compressor.program import printable
+from compressor.program import duration, printable
 
 if TYPE_CHECKING:
     from compressor.cases import Study

@@ -21,14 +21,17 @@ from compsim.screen import (
     output_option,
     plural,
     print_text,
+    say_wrapped,
     setting,
     units_option,
     wrap_line,
 )
 
 from compressor.digits import by_bar
+from compressor.program import duration
 
 if TYPE_CHECKING:
+    from compressor.cases import Study
     from compressor.studies.search.find import SearchResult
     from compressor.studies.search.question import JobReading, Question
     from compressor.units import Units
@@ -94,11 +97,12 @@ def find(
     one_thread_each()  # before numpy loads
     question = question_of(config, options)
     study = question.checked()
-    if not quiet:
-        caution([study])
     from compressor.studies.search.find import find as search
     from compressor.sweep import cores
 
+    if not quiet:
+        caution([study])
+        tell_ahead(question, study, output, jobs or cores())
     with ProgressReporter(quiet, "points") as progress:
         answer = search(question, output, jobs or cores(), progress)
     if answer.base:
@@ -110,6 +114,24 @@ def find(
             indent = len(line) - len(line.lstrip())
             print_text("\n".join(wrap_line(line.lstrip(), indent)))
     return SOME_FAILED if answer.failed else DONE
+
+
+def tell_ahead(question: "Question", study: "Study", folder: str, workers: int) -> None:
+    """Report how many runs a search will take, and about how long, by timing one of them."""
+    from compressor.sweep import forecast
+
+    found = forecast([study], folder, 0)
+    if missing := found.counts.missing:
+        whole = found.with_times(workers, say_wrapped, 1)
+        steps, points = question.most_to_narrow(workers)
+        each = (whole.seconds - whole.loading) / missing
+        if steps == points:  # one at a time
+            each *= max(1.0, whole.cores)
+        more = steps * whole.loading + points * each  # each step starts workers of its own
+        say_wrapped(
+            f"{plural(missing, 'run')} to scan, about {duration(whole.seconds)}; then up to "
+            f"{points} to narrow the answer, about {duration(more)}"
+        )
 
 
 def question_of(config: str, options: dict[str, Any]) -> "Question":

@@ -11,13 +11,14 @@ from compsim.progress import ProgressReporter
 from compsim.screen import (
     DONE,
     SOME_FAILED,
-    duration,
     jobs_option,
     one_thread_each,
     plural,
     print_text,
     say,
 )
+
+from compressor.program import duration
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,7 +18,6 @@ from compsim.screen import (
     WIDTH,
     caution,
     configs_argument,
-    duration,
     jobs_option,
     jsonable,
     limit,
@@ -32,6 +31,7 @@ from compsim.screen import (
 )
 
 from compressor.digits import by_bar
+from compressor.program import duration
 
 if TYPE_CHECKING:
     import xarray as xr

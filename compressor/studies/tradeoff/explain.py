@@ -31,7 +31,7 @@ from compressor.cases import (
 )
 from compressor.metrics import JOINTS
 from compressor.physics import state_names
-from compressor.program import Progress, no_progress
+from compressor.program import Progress, duration, no_progress
 from compressor.solve import (
     JointScales,
     expected_cost,
@@ -111,9 +111,15 @@ def explain(
     called with how many features have been tried, of how many.
     """
     case = study.cases[0]
-    run, seconds, solution_seconds = time_case(case, repeats)
+    run, seconds, solution_seconds = time_case(case, 1)
     repeats = repeats if seconds < SLOW_SECONDS else 1
     ended = complete(run)
+    if ended and run["steps"] > 0 and (paid := len(paid_features(case))):
+        runs = repeats + 1 + paid * (1 + 2 * repeats)
+        ahead = seconds * (repeats + 1 + paid) + solution_seconds * 2 * repeats * paid
+        progress(0, paid, f"{runs} runs, about {duration(ahead)}")
+    if repeats > 1:
+        run, seconds, solution_seconds = time_case(case, repeats - 1)
     active, absent = terms(case)
     if case.body and ended:
         active["body"] = body_words(case, run)
@@ -313,9 +319,14 @@ def ideal_scales(case: Case) -> Iterator[JointScales]:
         yield joint_scales(p, joint, float(ideal["peak_contact_force"].sel(joint=joint)))
 
 
+def paid_features(case: Case) -> list[ModelFeature]:
+    """Return the features of the model that a case pays for."""
+    return [feature for feature in FEATURES if feature.paid(case)]
+
+
 def advise(case: Case, repeats: int, progress: Progress) -> Iterator[Advice]:
     """Yield the effect of each feature that a case pays for, and whether it could be left out."""
-    paid = [feature for feature in FEATURES if feature.paid(case)]
+    paid = paid_features(case)
     if not paid:
         return
     allowed, known = promise(case), simulate(comparable(case))

@@ -14,7 +14,6 @@ from compsim.screen import (
     all_stored,
     as_json,
     configs_argument,
-    duration,
     jobs_option,
     one_thread_each,
     output_option,
@@ -26,7 +25,7 @@ from compsim.screen import (
     stored_before,
 )
 
-from compressor.program import printable
+from compressor.program import duration, printable
 
 if TYPE_CHECKING:
     from compressor.cases import Study
