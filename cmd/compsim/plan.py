@@ -73,7 +73,6 @@ def plan(
             *configs, overrides=overrides, max_jobs=max_jobs, only=only, progress=progress
         )
     caution(studies, None)
-    report_machines(studies)
     kinds = by_kind(studies)
     studies = kinds.pop(None, [])
     ahead = {kind: kind.module("command").ahead(its, output) for kind, its in kinds.items() if kind}
@@ -86,6 +85,7 @@ def plan(
     if not studies:
         return DONE
     report_changes(studies, output)
+    report_machines(studies)
     from compressor.analysis import describe_machine
     from compressor.sweep import forecast
 

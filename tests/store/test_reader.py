@@ -187,13 +187,15 @@ def test_what_is_not_stored_is_no_job(tmp_path):
         store.read_job(tmp_path, key)
 
 
-def test_a_job_without_row_or_without_file_is_not_stored(ideal, tmp_path):
+def test_a_job_without_row_is_not_stored_and_one_without_file_has_its_metrics(ideal, tmp_path):
     write_named(tmp_path, ideal, Output())
     assert store.read_store(tmp_path).keys() == set()
     keep(tmp_path, ideal)
-    assert store.read_store(tmp_path).keys() == {ideal.attrs["key"]}
+    assert store.read_store(tmp_path).status(ideal.attrs["key"]).samples == ideal.sizes["time"]
     file_of(tmp_path, ideal).unlink()
-    assert store.read_store(tmp_path).keys() == set()
+    end = store.read_store(tmp_path).status(ideal.attrs["key"])
+    assert (end.status, end.samples) == ("ok", 0)
+    assert end.numbers["steps"] == ideal.steps
 
 
 @pytest.mark.parametrize("key", ["../../etc/passwd", "", "0" * 19, "0" * 21, "G" * 20])

@@ -109,7 +109,7 @@ def kept_as(precision):
 )
 @pytest.mark.parametrize("shard", ["", "a"])
 def test_a_better_row_stays_whoever_writes_last(better, worse, shard, tmp_path, monkeypatch):
-    monkeypatch.setattr(store, "_usable", lambda segment: np.ones(len(segment), bool))
+    monkeypatch.setattr(store, "_has_files", lambda segment: np.ones(len(segment), bool))
     monkeypatch.setattr(writer, "name_pending", list)
     (tmp_path / "jobs").mkdir()
     (tmp_path / "shards/a/jobs").mkdir(parents=True)
