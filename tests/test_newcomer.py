@@ -155,16 +155,15 @@ def test_the_page_on_features_is_right(tmp_path):
 def test_the_page_on_metrics_is_right(tmp_path):
     copy_of_the_program(tmp_path)
     found = blocks("## How to add a metric", "## How to add a figure")
-    row, value, of_a_drive, speed, of_samples, force = found
+    row, value, of_a_drive, speed = found
     changed(
         tmp_path, "compressor/metrics.py",
-        (indented(row + of_a_drive + of_samples), '    Metric(\n        "impact_count"', False),
+        (indented(row + of_a_drive), '    Metric(\n        "impact_count"', False),
     )  # fmt: skip
     changed(
         tmp_path, "compressor/solve/run_metrics.py",
         (textwrap.indent(value, " " * 8), '        "impact_count"', False),
         (textwrap.indent(speed, " " * 8), '        "mean_crank_torque"', False),
-        (indented(force), '    "rod_load_reversal_angle": ', False),
     )  # fmt: skip
     code = (
         "import compressor\n"
@@ -175,19 +174,16 @@ def test_the_page_on_metrics_is_right(tmp_path):
         "for name in ('contact_seconds_per_rev', 'contact_seconds_per_rev_error',\n"
         "             'contact_loss_fraction'):\n"
         "    print(float(run[name].sel(joint='big_end')))\n"
-        "values = {'drive': {'flywheel_kg_m2': 0.5}, 'output': {'signals': True}}\n"
+        "values = {'drive': {'flywheel_kg_m2': 0.5}}\n"
         "more = compressor.simulate(compressor.Case.from_values(values | {'solve': solve}))\n"
-        "for name in ('mean_crank_speed', 'peak_shaking_force'):\n"
-        "    print(float(more[name]), float(more[f'{name}_error']), name in run)\n"
-        "print(float(more.crank_speed.mean()), float(abs(more.shaking_force).max('time')[0]))\n"
+        "print(float(more.mean_crank_speed), float(more.mean_crank_speed_error))\n"
+        "print('mean_crank_speed' in run, float(more.crank_speed.mean()))\n"
     )
     unit, *told = run_in(tmp_path, "-c", code, cwd=tmp_path).split()
-    speed, its_bar, _, force, their_bar, _, mean, greatest = told[3:]
-    assert told[5] == told[8] == "False"
+    speed, its_bar, of_others, mean = told[3:]
+    assert of_others == "False"
     assert float(speed) == pytest.approx(float(mean), rel=1e-3)
-    assert float(force) == pytest.approx(float(greatest), rel=1e-2)
     assert 0 < float(its_bar) < 0.1 * float(speed)
-    assert 0 < float(their_bar) < 0.1 * float(force)
     found, bar, lost = map(float, told[:3])
     assert unit == "s"
     assert found == pytest.approx((1 - lost) * 60 / 500)

@@ -206,7 +206,7 @@ def test_shards(case_file, capsys):
     assert "nothing to do: all 3 jobs" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("part", ["0/2", "3/2", "2", "a/b", "1/-2", ""])
+@pytest.mark.parametrize("part", ["0/2", "3/2", "2", "a/b", "1/-2"])
 def test_what_is_no_shard_is_a_usage_error(part, case_file, capsys):
     case_file("one.yaml")
     assert cli.main(["run", "one.yaml", "--shard", part]) == 2
@@ -276,8 +276,8 @@ def test_many_failures_are_counted(case_file, capsys):
 def reporter(monkeypatch):
     """Stands in for compressor.report, which draws for seconds."""
 
-    def write_report(results, report, command, add, running, limits, units):
-        assert (running, limits, units) == (None, (), "usual")
+    def write_report(results, report, command, add, running, limits, units, studies, single):
+        assert (running, limits, units, studies, single) == (None, (), "usual", (), False)
         read_studies(results)
         place, other = [one.keywords["place"] for one in add if one.keywords["place"]]
         assert other == "alarms"

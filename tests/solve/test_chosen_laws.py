@@ -175,7 +175,7 @@ def test_pins_in_bores_by_three_integrators(law):
     """Undamped but for friction: explicit, stiff, and SciPy's DOP853, which lands on no onset."""
     contact = {"law": law, "length_mm": 20, "materials": ["steel", "copper"]}
     values = {"joint": "both", "clearance_mm": 0.2, "contact": contact}
-    solve = {"duration_rev": 0.1, "settle_rev": 0, "error_bars": False, "rtol": 1e-10}
+    solve = {"duration_rev": 0.06, "settle_rev": 0, "error_bars": False, "rtol": 1e-10}
     runs = [
         simulate(Case.resolve({**values, "solve": {**solve, "method": method}}))
         for method in ("TSIT5", "RODAS", "DOP853")
