@@ -163,7 +163,7 @@ def scatter_bars(case: Case, found: Monitored, metrics: Metrics) -> Metrics:
         means = np.array([
             np.mean([np.asarray(one[name]) ** power for one in batch], axis=0) for batch in batches
         ])  # fmt: skip
-        error = average_bar(standard_error(means), len(per_turn))
+        error = np.asarray(average_bar(standard_error(means), len(per_turn)))
         if power == 2:
             size = np.asarray(value)
             bars[name] = np.divide(error, 2.0 * size, out=error.copy(), where=size > 0.0)

@@ -114,7 +114,10 @@ def ratio_of(share: float) -> float:
 
 
 def bars(
-    metrics: Mapping[str, Any], other: Companion | None, residual: float, switching: Metrics
+    metrics: Mapping[str, Any],
+    other: Companion | None,
+    residual: float,
+    switching: Metrics | None = None,
 ) -> Metrics:
     """Return the error bar of each metric of a run's tally, in its unit and shape.
 
@@ -138,7 +141,7 @@ def bars(
         difference = bar.own * np.abs(np.asarray(value) - other.metrics[name])
         series_part = bar.path * to_metric_shape(apart, np.ndim(value)) * size
         errors[name] = other.closeness * np.hypot(difference, series_part)
-        errors[name] = errors[name] + switching.get(name, 0.0)
+        errors[name] = errors[name] + (switching or {}).get(name, 0.0)
         if not metric.is_pure_number:
             errors[name] = np.maximum(errors[name], max(FLOOR * residual, bar.least) * size)
             farthest = np.maximum(apart, other.apart["acceleration"])

@@ -97,16 +97,16 @@ def test_an_impact_at_a_window_s_edge_or_of_the_slowest_speed_is_in_doubt(paper_
     assert hit_error(found._replace(table=hits), "big_end") == pytest.approx(2 / 36 / 3)
 
 
-def test_a_chaotic_run_s_shares_have_the_scatter_of_its_revolutions(paper_runs):
+def test_a_chaotic_run_s_shares_are_unknown_of_three_revolutions(paper_runs):
     run = paper_runs["big_end 0.2"].copy(deep=True)
     angle = run["crank_angle"].values
     turn = np.floor(angle / (2.0 * np.pi) + 1e-9)
     ringing = np.cos(60 * angle) * ((np.degrees(angle) % 360) < 90.0 * turn)
     run["contact_force"].loc[{"joint": "big_end", "axis": "x"}] = 100.0 * ringing
     run.attrs["regime"] = "chaotic"
-    error = measured_shares(run, "big_end").energy_angle.error
-    # shares of about 1, 2 and 3 quarters of 0.6: deviation 0.15, times 4.303 over sqrt(3)
-    assert error == pytest.approx(0.15 * 4.303 / np.sqrt(3), rel=0.1)
+    found = measured_shares(run, "big_end").energy_angle
+    assert 0.3 < found.value < 0.6  # shares of about 1, 2 and 3 quarters of 0.6
+    assert found.error == np.inf
 
 
 def test_the_paper_s_default_machine_is_not_more_continuous_at_the_big_end(paper_runs):

@@ -61,21 +61,21 @@ def test_a_margin_moves_with_its_measure(paper_runs):
 
 
 def test_a_chaotic_peak_is_its_mean_over_revolutions():
-    """With Student's t of three revolutions, 4.303, for the standard error."""
+    """With Student's t of twelve revolutions, 2.201, for the standard error."""
     run = xr.Dataset(
-        {"peak_acceleration": 130.0, "peak_acceleration_mean": 120.0, "revolutions": 3.0,
+        {"peak_acceleration": 130.0, "peak_acceleration_mean": 120.0, "revolutions": 12.0,
          "peak_acceleration_mean_standard_error": 2.0, "peak_acceleration_error": np.inf},
         attrs={"regime": "chaotic"},
     )  # fmt: skip
-    assert peak(run, "peak_acceleration") == pytest.approx((120.0, 8.605), rel=1e-3)
+    assert peak(run, "peak_acceleration") == pytest.approx((120.0, 4.402), rel=1e-3)
     run.attrs["regime"] = "periodic"
     assert peak(run, "peak_acceleration") == (130.0, math.inf)
 
 
 def test_the_scatter_of_revolutions_is_a_chaotic_value_s_error():
-    """Of 1, 2 and 6 over three revolutions: mean 3, standard deviation 2.646."""
-    angle = np.linspace(0.0, 8.0 * np.pi, 401)
-    level = np.repeat([50.0, 1.0, 2.0, 6.0], 100)
+    """Of 1, 2 and 6 over twelve revolutions: mean 3, standard deviation 2.256."""
+    angle = np.linspace(0.0, 26.0 * np.pi, 1301)
+    level = np.repeat([50.0, *([1.0, 2.0, 6.0] * 4)], 100)
     run = xr.Dataset(
         {"a": ("time", np.append(level, 6.0)), "crank_angle": ("time", angle)},
         {"time": angle / (2.0 * np.pi)}, attrs={"settle": 1.0, "regime": "chaotic"},
@@ -84,9 +84,9 @@ def test_the_scatter_of_revolutions_is_a_chaotic_value_s_error():
     def middle(part):
         return float(part["a"].median())
 
-    assert len([*revolutions(run)]) == 3
+    assert len([*revolutions(run)]) == 12
     found = measure(run, middle, 0.1)
-    assert found == pytest.approx((2.0, 4.303 * 2.646 / math.sqrt(3)), rel=1e-3)
+    assert found == pytest.approx((2.0, 2.201 * 2.256 / math.sqrt(12)), rel=1e-3)
     run.attrs["regime"] = "periodic"
     assert measure(run, middle, 0.1) == (2.0, 0.1)
 

@@ -35,7 +35,8 @@ BUGS = [
     ("a wrong term of the series of cosine", "physics/kinematics.py",
      "C4, C6, C8 = 1 / 24", "C4, C6, C8 = 1 / 12"),
     ("the stroke is a radius, not a diameter", "physics/loads.py",
-     "full = clearance + 2.0 * p.crank_radius", "full = clearance + p.crank_radius"),
+     "suction_force * ((clearance + 2.0 * p.crank_radius)",
+     "suction_force * ((clearance + p.crank_radius)"),
     ("the cam does not close", "physics/loads.py",
      "angle_at(rod_length - crank_radius + stroke", "angle_at(rod_length + crank_radius - stroke"),
     ("the follower's lift is the spring's stroke", "analysis/cam.py",
@@ -67,7 +68,7 @@ BUGS = [
     ("SciPy's atol is 1e-6", "solve/si_record.py",
      "return rtol * np.concatenate((natural_sizes", "return 1e-6 * np.concatenate((natural_sizes"),
     ("SciPy's phase is not changed at a corner", "solve/scipy_driver.py",
-     "right_hand_side.phase = int(phase)", "right_hand_side.phase = 0"),
+     "right_hand_side.phase = int(phases[i])", "right_hand_side.phase = 0"),
 ]  # fmt: skip
 
 

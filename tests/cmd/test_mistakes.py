@@ -109,7 +109,7 @@ MISTAKES = [
     ("show wear clearance_mm=0.25", "no job of wear has clearance_mm=0.25; there are 0.1, 0.2"),
     ("show wear 0.1", "'0.1' is no AXIS=VALUE of wear; its axes are clearance_mm"),
     ("show ffffffff", "no job's key begins with 'ffffffff'"),
-    ("show ''", "9 jobs' keys begin with ''", "give more of the key"),
+    ("show ''", "an argument is empty", "is a shell variable not set?"),
     ("show wear --json --units plant", "--json has all numbers in SI", "leave out --units plant"),
     ("show", "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
     ("export gird -o x.csv", "holds no study 'gird'; it holds big-end, wear"),

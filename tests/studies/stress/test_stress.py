@@ -174,7 +174,7 @@ def test_a_wrong_number_that_no_bar_tells_of_is_silent(run):
     assert verdict == "silent_wrong"
     assert excess.ratio > 1
     assert len(result.by) == 2
-    other.bars = bars(other.metrics, None, 0.0, {})  # inf: it tells that it knows nothing
+    other.bars = bars(other.metrics, None, 0.0)  # inf: it tells that it knows nothing
     verdict, _, _ = agreed_verdict(Case.from_values(CASE), other, compare, finding(other))
     assert verdict == "ok"
 
