@@ -180,11 +180,11 @@ def test_the_words_about_the_nameplate_s_machine_follow_from_the_runs(ran):
     )
     sensor = machine.sensor_rms.values
     assert (f"{sensor[0]:.1f}", f"{sensor[1]:.1f}", f"{sensor[2]:.0f}") == told
-    (told,) = re.findall(r"The force is (\d+) kN instead of (\d+): three percent", WORDS)
+    (told,) = re.findall(r"The force is (\d+) kN instead of (\d+): four percent", WORDS)
     thick = compressor.open_study(ran[0] / "results", "thick")
     other = thick.peak_contact_force.sel(joint="small_end").item() / 1e3
     assert (f"{other:.0f}", f"{pin[2]:.0f}") == told
-    assert abs(1 - other / pin[2]) == pytest.approx(0.03, abs=0.005)
+    assert abs(1 - other / pin[2]) == pytest.approx(0.04, abs=0.005)
 
 
 @pytest.mark.slow
