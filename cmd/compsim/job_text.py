@@ -41,7 +41,7 @@ def sections(
     lines = align_lines([*known, *reversal_verdict(found, *limits), *healthy_motion(found, units)])
     notes = [*film(found), *cautions(found), *found.caveats]
     yield "metrics, with their error bars", [*lines, *notes]
-    yield "its machine at a steady speed, with ideal joints", align_lines(machine(found))
+    yield "its machine at a steady speed, with ideal joints", align_lines(machine(found, units))
     yield (
         "relative errors of the time series",
         align_lines(series_errors(found)),
@@ -273,11 +273,11 @@ def cautions(found: "JobReport") -> list[str]:
     return lines
 
 
-def machine(found: "JobReport") -> list[Line]:
+def machine(found: "JobReport", units: Units) -> list[Line]:
     """Return what the job's machine has without clearance: gas load, inertia, rod load and more."""
     from compressor.analysis import describe_cases
 
-    return describe_cases([found.case]).lines if "case" in found.attributes else []
+    return describe_cases([found.case]).lines(units) if "case" in found.attributes else []
 
 
 def facts(found: "JobReport") -> list[Line]:

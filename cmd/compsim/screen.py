@@ -221,7 +221,7 @@ def report_machines(studies: "Sequence[Study]") -> None:
 
     for study in studies:
         say(f"{study.name}: its machine, without clearance")
-        say("\n".join(machine_lines(describe_machine(study).lines)))
+        say("\n".join(machine_lines(describe_machine(study).lines())))
 
 
 def machine_lines(things: Sequence[tuple[str, str]], indent: int = 2) -> Iterator[str]:

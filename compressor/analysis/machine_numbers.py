@@ -20,6 +20,7 @@ from compressor.cases import Case, Study, joint_stiffness, row_of, value_in, wit
 from compressor.metrics import JOINTS
 from compressor.physics import WIDE, Column, observe_all, segments
 from compressor.solve import record
+from compressor.units import Units, unit_in
 
 MAX_CASES = 200  # of a study that are looked at
 PIECES = 500  # samples of each phase of the load: peaks between its corners to a few 1e-6
@@ -153,11 +154,11 @@ class MachineNumber:
     key: str = ""
     remark: str = ""
 
-    @property
-    def value(self) -> str:
+    def value(self, units: Units = "usual") -> str:
         """Return the number with its unit as text: `62.2 kN`, or `40 to 62.2 kN`."""
-        both = dict.fromkeys(map(_format, (self.low, self.high)))
-        return f"{' to '.join(both)} {self.unit}".rstrip()
+        unit, factor = unit_in(self.unit, units)
+        both = dict.fromkeys(_format(factor * one) for one in (self.low, self.high))
+        return f"{' to '.join(both)} {unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -166,13 +167,12 @@ class MachineDescription:
 
     numbers: tuple[MachineNumber, ...]
 
-    @property
-    def lines(self) -> list[tuple[str, str]]:
+    def lines(self, units: Units = "usual") -> list[tuple[str, str]]:
         """Return a line for each thing: its name, and its numbers in words."""
         found: dict[str, list[str]] = {}
         for number in self.numbers:
             thing, _, quantity = number.name.partition(", ")
-            found.setdefault(thing, []).append(f"{quantity} {number.value}")
+            found.setdefault(thing, []).append(f"{quantity} {number.value(units)}")
         return [(thing, ", ".join(words)) for thing, words in found.items()]
 
     def remarks(self, warned: Collection[str] = ()) -> dict[str, str]:
@@ -390,7 +390,7 @@ def _over_cases(
         key, hint = "machine.rod_length_mm", f"it is in mm; or the stroke is too short: {STROKE}"
     range_ = f"at least {usual.low:g}" if plain.high < usual.low else f"at most {usual.high:g}"
     thing, _, quantity = name.partition(", ")
-    remark = f"{thing}: {quantity} {plain.value}, where {range_} is usual; {hint}"
+    remark = f"{thing}: {quantity} {plain.value()}, where {range_} is usual; {hint}"
     return replace(plain, key=key, remark=remark)
 
 

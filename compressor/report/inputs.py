@@ -58,7 +58,7 @@ def find_inputs(stored: Stored, study: StoredStudy) -> Inputs | None:
         if key not in given and key.partition(".")[0] not in NOT_ASSUMED and reads(cases[0], key)
     }
     return Inputs(
-        machine.lines,
+        machine.lines(),
         [*machine.remarks().items()],
         by_group(given),
         by_group({axis.key: [*dict.fromkeys(axis.values)] for axis in study.axes}),

@@ -100,6 +100,7 @@ def test_numbers_may_be_in_plant_units_or_si(paper_store, show):
         ).groups()
         assert unit == newtons
         assert float(value) == pytest.approx(force / (1e3 if unit == "kN" else 1.0), rel=1e-3)
+        assert re.search(rf"peak load [\d.]+ {newtons}\b", told["big end"])
 
 
 def test_nothing_is_an_array_and_nothing_is_said_of_a_contact_that_is_none(paper_store, show):

@@ -458,7 +458,7 @@ def lines(facts: "Explanation") -> Iterator[str]:
     yield from wrap_line(
         f"{facts.study}: {plural(facts.jobs)}" + (f"; explained: {point}" if point else ""), 0
     )
-    for number, text in enumerate(machine_lines(facts.machine.lines, 2 + INDENT)):
+    for number, text in enumerate(machine_lines(facts.machine.lines(), 2 + INDENT)):
         yield text if number else f"  {'machine':<{INDENT}}{text.lstrip()}"
     count = len(facts.unknowns)
     solved = f"{count} degrees of freedom" if count else "closed form, nothing integrated"
