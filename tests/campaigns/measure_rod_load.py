@@ -111,7 +111,8 @@ def follow(case, more=()):
     edges, _ = segments(p, case.duration)
     count = round(360.0 * case.duration / case.turn / STEP_DEG)
     times = np.linspace(0.0, case.duration, count + 1)
-    times = np.unique(np.concatenate([times, edges - beside, edges + beside, more]))
+    ends = [case.settle, case.duration]  # or a rounded one would leave out the first sample
+    times = np.unique(np.concatenate([times, ends, edges - beside, edges + beside, more]))
     times = times[(times >= 0.0) & (times <= case.duration)]
     if is_ideal(case):
         run = closed_form(p, times, case.settle, 8)
