@@ -93,6 +93,12 @@ USUAL = {
         0.0, 6.0, ("gas.piston_radius_mm", "gas.suction_MPa", "gas.discharge_MPa"),
         above=("gas.bore_mm", f"{BORE}; or reciprocating_mass_kg and speed_rpm are too high"),
     ),
+    # all that turns and half of what reciprocates: 40 to 80 %
+    "counterweight, of rotating and reciprocating inertia": Usual(
+        0.0, 100.0, ("machine.counterweight_kg_mm",),
+        above=("machine.counterweight_kg_mm", "it is mass times its centre's distance from the "
+               "axis, in kg mm"),
+    ),
     # rods are sized for 30 to 70 MPa
     "piston rod, stress": Usual(
         0.0, 120.0, ("gas.suction_MPa", "gas.discharge_MPa", "gas.rod_diameter_mm"),
@@ -109,7 +115,7 @@ USUAL = {
         2.0, 80.0, ("lubricant.viscosity_mPa_s",),
         below=("lubricant.viscosity_mPa_s", "it is in mPa s at the bearings' temperature"),
         above=("lubricant.viscosity_mPa_s", "it is in mPa s at the bearings' temperature, and no "
-               "ISO VG class: VG 150 has 48 mPa s at 65 °C"),
+               "ISO VG class: VG 150 has 48 mPa s at 60 °C"),
     ),
 }  # fmt: skip
 # of either pin
@@ -302,6 +308,10 @@ def _numbers_of_sound(sound: Case) -> Named:
         yield from _both_sides(f"{sound.load} load", loads.gas)
     inertia = machine.reciprocating_mass_kg * machine.crank_radius_mm * sound.omega**2 * 1e-6
     yield "piston, inertia", (inertia * (1.0 + ratio), "kN")
+    if sound.counterweight:
+        whole = (machine.rod_mass_kg + machine.reciprocating_mass_kg) * machine.crank_radius_mm
+        share = 100.0 * sound.counterweight / whole
+        yield "counterweight, of rotating and reciprocating inertia", (share, "%")
     gas_peak = 1e-3 * float(np.abs(loads.gas).max())
     if sound.load == "gas" and (sound.gas.is_measured or sound.gas.compressing_ends):
         yield "piston, inertia over gas load", (inertia * (1.0 + ratio) / gas_peak, "")

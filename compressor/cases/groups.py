@@ -55,6 +55,7 @@ VALVE_LOSS = Plausible(
 )  # fmt: skip
 CONTACT_GUESS = Plausible("no joint's contact is known better", times(0.5, 2), times(0.5, 2))
 SMOOTHING = Plausible("a smoothing of the law, which nobody measures", times(0.3, 3))
+HALF_BALANCED = from_to(0, 0.5)
 BEARING_LENGTH = Plausible(
     "grooves and holes shorten what bears", times(0.5, 1.25), times(0.5, 1.25)
 )  # fmt: skip
@@ -208,6 +209,7 @@ class Machine:
     balance_reciprocating: float | None = parameter(
         None, "", (0, 1), "as balance", "share of what reciprocates that a counterweight balances",
         optional=True, read=BALANCE,
+        plausible=Plausible("no nameplate has it", HALF_BALANCED, HALF_BALANCED),
     )  # fmt: skip
 
     def __post_init__(self) -> None:

@@ -319,6 +319,7 @@ def remarks(case: Case) -> Iterator[Remark]:
     for key, note in paper_notes(case).items():
         yield Remark(key, note, "default")
     yield from _casing(case)
+    yield from _foundation(case)
     for joint in joints:
         yield from _depths(case, joint)
     yield from _rod(case)
@@ -374,6 +375,32 @@ def _casing(case: Case) -> Iterator[Remark]:
             "m/s²; compsim calibrate finds it by a record"
         )
         yield Remark(key, text, "default")
+
+
+NEAR_RESONANCE = 0.1  # of an order's frequency: nearer, the body's motion is a resonance's
+
+
+def _foundation(case: Case) -> Iterator[Remark]:
+    """Yield what decides a body's velocity: no counterweight, and a resonance with order 1 or 2."""
+    body, speed = case.body, case.machine.speed_rpm / 60.0
+    if body is None or body.mass_kg == Body().mass_kg:
+        return
+    if not case.counterweight:
+        text = (
+            "nothing balances what turns with the crank, and the body moves by all of it: give the "
+            "counterweight that a machine has, here or as counterweight_kg_mm"
+        )
+        yield Remark("machine.balance", text, "default")
+    for axis in "xy":
+        natural = getattr(body, f"frequency_{axis}_Hz")
+        for order in (1, 2):
+            if abs(natural - order * speed) < NEAR_RESONANCE * order * speed:
+                text = (
+                    f"{natural:g} Hz is near {order * speed:.3g} Hz, order {order} of the speed: "
+                    "the body's velocity is a resonance's, and follows its frequency and damping, "
+                    "which have to be measured"
+                )
+                yield Remark(f"body.frequency_{axis}_Hz", text, "resonance")
 
 
 def _proportions(case: Case) -> Iterator[Remark]:

@@ -33,6 +33,7 @@ machine:
   rod_centre_mm: 114
   reciprocating_mass_kg: 118
   pin_radius_mm: {big_end: 95, small_end: 51}
+  balance: {rotating: 1.0, reciprocating: 0.0}
 load: gas
 gas:
   action: double
@@ -61,6 +62,7 @@ BY_HAND = {
     "piston, mean speed": 2 * 0.127 * 985 / 60,
     "piston, inertia": 118 * 0.0635 * (985 * math.pi / 30) ** 2 * (1 + 63.5 / 343) / 1e3,
     "small end, pressure": 62.85e3 / (102 * 100),
+    "counterweight, of rotating and reciprocating inertia": 100 * 54 * (1 - 114 / 343) / (54 + 118),
 }
 MISTAKES = {  # what was written in place of what, with the key that the remark names
     "the bore as a radius": ("bore_mm: 267", "bore_mm: 133.5", "gas.bore_mm"),
@@ -78,6 +80,10 @@ MISTAKES = {  # what was written in place of what, with the key that the remark 
     "the centre from the other end": ("centre_mm: 114", "centre_mm: 229", "machine.rod_centre_mm"),
     "pins' diameters as radii": (
         "{big_end: 95, small_end: 51}", "{big_end: 190, small_end: 102}", "machine.pin_radius_mm",
+    ),
+    "a counterweight ten times too heavy": (
+        "balance: {rotating: 1.0, reciprocating: 0.0}", "counterweight_kg_mm: 22893",
+        "machine.counterweight_kg_mm",
     ),
     "a piston rod's radius": ("rod_diameter_mm: 50.8", "rod_diameter_mm: 5.08",
                               "gas.rod_diameter_mm"),

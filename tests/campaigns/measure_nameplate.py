@@ -30,7 +30,7 @@ BEFORE, WORN = 0.24, 0.4  # mm: the oil still cushions the pin of the file; it h
 DECIDING = (
     "lubricant.bearing_length_mm.small_end", "lubricant.viscosity_mPa_s",
     "machine.rod_inertia_kg_m2", "machine.rod_centre_mm", "gas.valve_loss_percent.suction",
-    "gas.discharge_MPa", "body.casing_mass_kg",
+    "gas.discharge_MPa", "body.casing_mass_kg", "machine.balance.reciprocating",
 )  # fmt: skip
 FOUNDATIONS = (30.0, 40.0, 80.0)  # Hz, along the cylinder, beside that of the file
 DECIDED = ("peak_contact_force", "sensor_rms", "body_velocity_rms")

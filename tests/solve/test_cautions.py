@@ -70,6 +70,11 @@ LENGTHS = {"big_end": 70, "small_end": 20}
          "at most 1.41, with all"),
         ({"body": {"mass_kg": 9000}, "sensor": True}, "body.casing_mass_kg",
          "360 kg is the default, a 25th of the body: levels of the sensor go as its inverse"),
+        ({"body": {"mass_kg": 9000}}, "machine.balance", "nothing balances what turns"),
+        ({"body": {"mass_kg": 9000, "frequency_x_Hz": 30}, "machine": {"speed_rpm": 985}},
+         "body.frequency_x_Hz", "30 Hz is near 32.8 Hz, order 2 of the speed"),
+        ({"body": {"mass_kg": 9000, "frequency_y_Hz": 15}, "machine": {"speed_rpm": 985}},
+         "body.frequency_y_Hz", "15 Hz is near 16.4 Hz, order 1 of the speed"),
     ],
 )  # fmt: skip
 def test_a_default_that_decides_is_told_of_beside_what_is_given(values, key, words):
@@ -89,10 +94,15 @@ def test_a_default_that_decides_is_told_of_beside_what_is_given(values, key, wor
         {"body": True, "sensor": True},
         {"body": {"mass_kg": 9000, "casing_mass_kg": 60}, "sensor": True},
         {"body": {"mass_kg": 9000}},
+        {"body": {"mass_kg": 9000, "frequency_x_Hz": 37, "frequency_y_Hz": 50},
+         "machine": {"speed_rpm": 985, "balance": {"rotating": 1.0, "reciprocating": 0.0}}},
+        {"body": {"mass_kg": 9000}, "machine": {"counterweight_kg_mm": 100}},
     ],
 )  # fmt: skip
 def test_what_is_given_or_goes_with_the_defaults_is_not_told_of(values):
     keys = {"lubricant.bearing_length_mm", "machine.rod_inertia_kg_m2", "body.casing_mass_kg"}
+    if "machine" in values and "body" in values:
+        keys |= {"machine.balance", "body.frequency_x_Hz", "body.frequency_y_Hz"}
     assert not keys & {key for key, _ in odd(**values)}
 
 
