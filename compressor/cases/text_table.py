@@ -95,8 +95,8 @@ class TextTable:
     def _column(self, texts: list[str], lines: Sequence[int], column: int) -> list[float]:
         """Return cells as numbers: all at once where they are plain, else one by one."""
         whole = "\n".join(texts)
-        if self.decimal == "," and "." not in whole:
-            whole = whole.replace(",", ".")
+        if self.decimal == ",":
+            whole = whole.replace(".", "_").replace(",", ".")  # as `parse_number` does
         if PLAIN.fullmatch(whole):
             with contextlib.suppress(ValueError):
                 values = [float(text) for text in whole.split("\n")] if texts else []
@@ -113,7 +113,10 @@ class TextTable:
         if value is not None or NOT_FINITE.fullmatch(text):
             remedy = "cut the table, or fill the gap"
             raise TextTableError(f"{where}: {shown} is not finite; {remedy}")
-        remedy = f"write numbers with a decimal {DECIMALS[self.decimal]}, and leave no cell empty"
+        remedy = (
+            f"write numbers with a decimal {DECIMALS[self.decimal]}, without signs of thousands, "
+            "and leave no cell empty"
+        )
         raise TextTableError(f"{where}: {shown} is no number; {remedy}")
 
 
