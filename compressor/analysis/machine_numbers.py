@@ -24,7 +24,6 @@ from compressor.units import Units, unit_in
 
 MAX_CASES = 200  # of a study that are looked at
 PIECES = 500  # samples of each phase of the load: peaks between its corners to a few 1e-6
-ATMOSPHERE = 0.101325  # MPa
 
 
 class Usual(NamedTuple):
@@ -346,9 +345,9 @@ def _numbers_of_gas(sound: Case) -> Named:
         percent = 100.0 * cycle.clearance_volume / cycle.swept_volume
         yield f"cylinder, clearance at the {end}", (percent, "%")
     yield "suction, absolute", (gas.suction_MPa, "MPa")
-    yield "suction, gauge", (10.0 * (gas.suction_MPa - ATMOSPHERE), "bar")
+    yield "suction, gauge", (10.0 * (gas.suction_MPa - gas.ambient), "bar")
     yield "discharge, absolute", (gas.discharge_MPa, "MPa")
-    yield "discharge, gauge", (10.0 * (gas.discharge_MPa - ATMOSPHERE), "bar")
+    yield "discharge, gauge", (10.0 * (gas.discharge_MPa - gas.ambient), "bar")
 
 
 def _both_sides(name: str, load: np.ndarray) -> Named:

@@ -19,8 +19,8 @@ from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from compressor.cases.card import mark_card
-from compressor.cases.groups import CARD_KEYS
+from compressor.cases.card import UNITS, mark_card
+from compressor.cases.groups import ATMOSPHERE_MPA, CARD_KEYS
 from compressor.cases.parameter import (
     NO_VALUE,
     Parameter,
@@ -145,13 +145,11 @@ PER_PART = {
 ONE_SUFFICES = {"gas.indicator": ("head", "crank"), "gas.clearance_percent": ("crank",)}
 # unit at the end of an unknown key -> the unit of ours, and what one of it is there
 OTHER_UNITS = {
-    "bar": ("MPa", 0.1), "bara": ("MPa", 0.1), "kPa": ("MPa", 1e-3), "Pa": ("MPa", 1e-6),
-    "psi": ("MPa", 6.894757e-3), "psia": ("MPa", 6.894757e-3), "barg": ("MPa", 0.1),
-    "psig": ("MPa", 6.894757e-3), "um": ("mm", 1e-3), "cm": ("mm", 10.0), "m": ("mm", 1e3),
-    "kN": ("N", 1e3),
+    **{f"{unit}{end}": ("MPa", UNITS[unit]) for unit in ("bar", "psi") for end in ("", "a", "g")},
+    "kPa": ("MPa", UNITS["kpa"]), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3), "cm": ("mm", 10.0),
+    "m": ("mm", 1e3), "kN": ("N", 1e3),
 }  # fmt: skip
 GAUGE = ("barg", "psig", "psi")  # as which pressures are read on a gauge
-ATMOSPHERE = 0.101325  # MPa
 DIAMETER = re.compile(r"(?i)(.*_)?(diameter|diametral|dia)(_.*)?")
 OF_SMALL_END = ("crosshead", "wrist", "gudgeon", "small_end", "piston_pin")
 PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
@@ -242,12 +240,12 @@ def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
         return ""
     gauge = unit in GAUGE
     values = value if isinstance(value, list | tuple) else [value]
-    more = f" + {ATMOSPHERE:g}" if gauge else ""
+    more = f" + {ATMOSPHERE_MPA:g}" if gauge else ""
     note = "; pressures are absolute: gauge pressure and the atmosphere's" if gauge else ""
     if not all(isinstance(one, int | float) and not isinstance(one, bool) for one in values):
         return f"; write {key}: 1 {unit} is {factor:g}{more} {ours}{note}"
     digits = ".4g" if unit.startswith("psi") or gauge else ".12g"
-    amounts = ", ".join(f"{one * factor + ATMOSPHERE * gauge:{digits}}" for one in values)
+    amounts = ", ".join(f"{one * factor + ATMOSPHERE_MPA * gauge:{digits}}" for one in values)
     several = isinstance(value, list | tuple)
     return f"; write {key}: " + (f"[{amounts}]" if several else amounts) + note
 

@@ -135,11 +135,12 @@ def _gas(case: Case, p: dict[str, Any]) -> None:
     area = math.pi * to_si(gas.piston_radius_mm, "mm") ** 2
     suction, discharge = (to_si(pressure, "MPa") for pressure in gas.open_pressures)
     p["suction_force"], p["discharge_force"] = suction * area, discharge * area
-    p["back_force"] = to_si(gas.back_pressure_MPa or 0.0, "MPa") * area
+    back = to_si(gas.back_pressure_MPa or 0.0, "MPa")
+    p["back_force"] = back * area
     p["head_clearance"] = to_si(gas.clearance("head", stroke), "mm")
     p["gas_exponent"] = gas.exponent
     if gas.is_measured and case.load == "gas":
-        _cards(case, area, p)
+        _cards(case, area, back, p)
     elif gas.switching == "exact":
         rod = math.pi * to_si((gas.rod_diameter_mm or 0.0) / 2, "mm") ** 2
         areas = {"head": area * gas.presses("head"), "crank": (area - rod) * gas.presses("crank")}
@@ -149,13 +150,14 @@ def _gas(case: Case, p: dict[str, Any]) -> None:
             p[f"{prefix}suction_force"] = open_at[0] * areas[end]
             p[f"{prefix}discharge_force"] = open_at[1] * areas[end]
         p["crank_clearance"] = to_si(gas.clearance("crank", stroke), "mm")
-        p["back_force"] = to_si(gas.back_pressure_MPa or 0.0, "MPa") * (
-            areas["head"] - areas["crank"]
-        )
+        p["back_force"] = back * (areas["head"] - areas["crank"])
 
 
-def _cards(case: Case, area: float, p: dict[str, Any]) -> None:
-    """Set the force of measured gas over the crank's angle; area: of the head's face (m2)."""
+def _cards(case: Case, area: float, back: float, p: dict[str, Any]) -> None:
+    """Set the force of measured gas over the crank's angle.
+
+    area: of the head's face (m2); back: pressure (Pa) on the faces' other side.
+    """
     gas = case.gas
     rod = math.pi * to_si((gas.rod_diameter_mm or 0.0) / 2, "mm") ** 2
     faces = {"head": area, "crank": rod - area}
@@ -163,7 +165,7 @@ def _cards(case: Case, area: float, p: dict[str, Any]) -> None:
     for end in gas.cards:
         nodes = nodes + faces[end] * gas_nodes(case, end)
     table = np.array(nodes)
-    table[:, 0] -= to_si(gas.back_pressure_MPa or 0.0, "MPa") * sum(faces[end] for end in gas.cards)
+    table[:, 0] -= back * sum(faces[end] for end in gas.cards)
     p["card"], p["discharge_force"] = table, np.abs(table[:, 0]).max()
 
 

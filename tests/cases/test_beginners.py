@@ -2,6 +2,8 @@
 
 import pytest
 
+from compressor.cases.card import UNITS
+from compressor.cases.checks import OTHER_UNITS
 from compressor.cases.load import CaseFileError, load_cases
 
 MISTAKES = [
@@ -56,3 +58,9 @@ def test_tabs_separate_as_yaml_1_2_has_them(tmp_path):
     (tmp_path / "m.yaml").write_text("joint:\tbig_end\nclearance_mm: 0.1\t# radial\n")
     (case,) = load_cases(tmp_path / "m.yaml")
     assert (case.joint, case.clearance_mm.big_end) == ("big_end", 0.1)
+
+
+def test_a_unit_of_pressure_is_the_same_in_keys_and_in_cards():
+    both = {unit: UNITS[unit.lower()] for unit in OTHER_UNITS if unit.lower() in UNITS}
+    assert {*both} == {"bar", "kPa", "psi"}
+    assert {unit: OTHER_UNITS[unit] for unit in both} == {u: ("MPa", f) for u, f in both.items()}
