@@ -219,7 +219,7 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
     used = [f for f in shown if f.paid(case) and not (ideal and f.key == "friction")]
     active = {feature.name: paid_value(case, feature) for feature in used}
     absent = tuple(feature.name for feature in shown if feature not in used)
-    if case.load == "gas" and case.gas.is_cylinder:
+    if case.load == "gas" and case.gas.switching == "exact":
         active["cylinder"] = cylinder_words(case)
     if case.counterweight:
         active["counterweight"] = counterweight_words(case)

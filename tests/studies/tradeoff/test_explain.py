@@ -181,6 +181,14 @@ def test_freedoms_and_terms():
     assert "steel on copper" in terms(steel)[0]["contact"]
 
 
+def test_power_is_told_of_every_cylinder_with_exact_corners():
+    """The efficiency is 1 + c - c r^(1/n) of a clearance of 20 mm in a stroke of 240."""
+    own = terms(Case.from_values({"load": "gas", "gas": {"discharge_MPa": 0.5}}))[0]
+    efficiency = 1 + 20 / 240 * (1 - (0.5 / 0.105) ** (1 / 1.4))
+    assert f"at a volumetric efficiency of {efficiency:.3g}" in own["cylinder"]
+    assert "cylinder" not in terms(Case.from_values({"load": "gas"}))[0]  # the paper's corners
+
+
 @pytest.mark.parametrize("word", ACCURACY)
 def test_promises(word):
     assert promise(Case.from_values({"solve": {"accuracy": word}})) == ACCURACY[word].promise
