@@ -53,6 +53,11 @@ GRID = "peaks from the output grid"
 SCALES = {"÷ 2": 0.5, "× 2": 2.0}  # of the contact's stiffness and damping
 SCALED = ("contact.stiffness_N_per_mm15", "contact.damping_N_s_per_mm")  # by `scale_contact`
 SAME_STIFFNESS = 1.01  # stiffnesses of two joints
+FOLLOWING = ("switching", "back_pressure_MPa")
+OWN_CORNERS = (
+    "cannot be: the paper prints the corners of its own cylinder alone; gas: {switching: exact, "
+    "back_pressure_MPa: 0} has those of any"
+)
 GROUPS = ("contact", "friction", "lubricant", "guide", "rod")  # that a choice may fill in
 WORDS = ("status", "reason", "seconds")
 # of every run, and what else is shown of it: rod load, body and sensor
@@ -76,7 +81,8 @@ def vary_numbers(study: Study, job: int, named: Sequence[str] = ()) -> Iterator[
     """Yield a job with each number in doubt at both ends of its plausible range.
 
     In doubt is what the file does not give, and what a plant can only guess; named: other keys that
-    are, though the file gives them. A key that the file sweeps is not varied.
+    are, though the file gives them. A key that the file sweeps is not varied, nor is the paper's
+    cylinder with the corners that the paper prints of it.
     """
     case, nested = study.cases[job], study.given(job)
     given, swept = values_given(nested), {axis.key for axis in study.axes}
@@ -92,9 +98,15 @@ def vary_numbers(study: Study, job: int, named: Sequence[str] = ()) -> Iterator[
         if span is None or value is None or (key in swept and not is_named):
             continue
         group, _, name = key.partition(".")
+        of_gas = key.startswith("gas.")
+        if of_gas and case.gas.switching == "paper" and name != "back_pressure_MPa":
+            yield Choice(written, None, OWN_CORNERS, written)
+            continue
+        # which follow from what else is given of a cylinder, and are to stay
+        held = {own: getattr(case.gas, own) for own in FOLLOWING} if of_gas else {}
         for end in span.ends(value):
             within = nested.get(group)
-            changed = {**(within if isinstance(within, Mapping) else {}), name: end}
+            changed = {**held, **(within if isinstance(within, Mapping) else {}), name: end}
             label = f"{written} {end:.4g}"
             try:
                 other = Case.resolve(nested | {group: changed})

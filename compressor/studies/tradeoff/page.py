@@ -239,7 +239,8 @@ def headline(table: ModelTable) -> str:
 
 def scope_text(table: ModelTable) -> str:
     """Return what was varied, as the subject of a sentence."""
-    numbers = len({row.varied for row in table.rows if row.varied})
+    run = [row for row in table.rows if not math.isnan(row.time_ratio)]
+    numbers = len({row.varied for row in run if row.varied})
     models = sum(not row.varied for row in table.rows)
     parts = []
     if numbers:

@@ -225,6 +225,34 @@ def test_a_number_that_the_command_names_is_varied_though_it_is_given(tmp_path):
     assert (named["machine.rod_mass_kg"], named["body.mass_kg"]) == ([20, 80], [3000, 12000])
 
 
+PAPER_RIG = "joint: big_end\nclearance_mm: 0.2\nload: gas\n"
+
+
+def test_a_varied_number_of_the_gas_leaves_corners_and_back_pressure(tmp_path):
+    """Else the exponent had a share of what the corners and the atmosphere change."""
+    for gas in ("{switching: exact}", "{discharge_MPa: 0.5}", "{action: single}"):
+        study = read_study(tmp_path, f"{PAPER_RIG}gas: {gas}\n")
+        rows = [one for one in vary_numbers(study, 0) if one.varied.startswith("gas.")]
+        assert {"gas.exponent", "gas.suction_MPa"} < {one.varied for one in rows}
+        for one in rows:
+            name = one.varied.removeprefix("gas.")
+            value = {name: getattr(one.case.gas, name)}
+            assert replace(study.cases[0].gas, **value) == one.case.gas, one.name
+
+
+def test_the_paper_s_corners_are_of_its_own_cylinder(tmp_path):
+    rows = [one for one in vary_numbers(read_study(tmp_path, PAPER_RIG), 0)
+            if one.varied.startswith("gas.")]  # fmt: skip
+    names = ["head_clearance_mm", "suction_MPa", "discharge_MPa", "exponent"]
+    assert [one.varied for one in rows if not one.case] == [f"gas.{name}" for name in names]
+    assert all(
+        "cannot be: the paper prints the corners" in one.note for one in rows if not one.case
+    )
+    assert [one.case.gas for one in rows if one.case] == [
+        replace(Case().gas, back_pressure_MPa=back) for back in (0.09, 0.15)
+    ]
+
+
 def test_an_end_that_cannot_be_says_why(tmp_path):
     study = read_study(tmp_path, PLANT.replace("big_end: 70", "big_end: 110"))
     (one,) = (x for x in vary_numbers(study, 1) if x.name.endswith(".big_end 137.5"))

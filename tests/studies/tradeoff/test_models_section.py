@@ -130,6 +130,8 @@ def test_the_line_says_how_many_numbers_are_in_doubt_and_what_moves_the_sensor()
     assert ". 1 number in doubt and 3 other models, each alone, move this peak by" in headline(
         table
     )
+    data["varied"][5] = "impossible"
+    assert ". 1 number in doubt and 2 other models, each" in headline(model_table(data))
     assert "; they move the sensor rms by -50 to +400 %, most by other law;" in headline(table)
     text = [*model_lines("worn, the only job", table)]
     start = place_of(text, "peak acceleration: ")
