@@ -47,7 +47,6 @@ from compressor.analysis.shaking import (
     ORDER,
     NoSeriesError,
     Shaking,
-    body_velocity_rms,
     deviation_spectrum,
     frame_forces,
     healthy_body_velocity_rms,

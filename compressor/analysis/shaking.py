@@ -91,23 +91,11 @@ def healthy_twin(run: xr.Dataset, sensed: bool = False) -> xr.Dataset:
     return simulate(Case.resolve(values))
 
 
-def body_velocity_rms(run: xr.Dataset) -> np.ndarray:
-    """Return the rms velocity (m/s) of a run's body over its whole settled revolutions, by axis.
-
-    Raises NoSeriesError as `whole_revolutions`, and for a run without a body.
-    """
-    if "body_velocity" not in run:
-        raise NoSeriesError("the run has no body")
-    settled, _ = whole_revolutions(run)
-    velocity = settled["body_velocity"].transpose("time", "axis").values[:-1]
-    return np.sqrt((velocity**2).mean(axis=0))
-
-
 def healthy_body_velocity_rms(case: Case) -> np.ndarray:
-    """Return `body_velocity_rms` of a case's machine with ideal joints, (2,): from closed forms."""
+    """Return the metric `body_velocity_rms` of a case's machine with ideal joints, m/s, (2,)."""
     values = replace(with_ideal_joints(case), sensor=None).values()
     values["solve"]["error_bars"] = False
-    return body_velocity_rms(simulate(Case.resolve(values)))
+    return simulate(Case.resolve(values))["body_velocity_rms"].values
 
 
 ORDER = 12  # of the crank speed: above it the ideal machine's force has next to nothing
