@@ -42,6 +42,7 @@ class Usual(NamedTuple):
 STROKE = "stroke_mm is the whole stroke, crank_radius_mm half of it"
 BORE = "bore_mm is the whole bore, piston_radius_mm half of it"
 IN_MPA = "pressures are in MPa: 1 bar is 0.1 MPa"
+OF_CARD = "its pressures are in the unit that the column's title says, gauge or absolute"
 ABSOLUTE = "pressures are absolute: gauge pressure plus the atmosphere's 0.101 MPa"
 PIN = "pin_radius_mm is half of the pin's diameter"
 # Wider than usual practice, so that no real machine is remarked on; what is narrower in books
@@ -200,7 +201,7 @@ EXPLAINED = {
     "machine.pin_radius_mm": ("clearance_mm",),
     "machine.rod_length_mm": ("machine.rod_centre_mm",),
     "gas.suction_MPa": ("gas.bore_mm",),
-    "gas.rod_diameter_mm": ("gas.discharge_MPa",),
+    "gas.rod_diameter_mm": ("gas.discharge_MPa", "gas.indicator", "gas.crank_indicator"),
 }  # fmt: skip
 
 
@@ -393,8 +394,13 @@ def _over_cases(
     is_usual = plain.high >= usual.low and plain.low <= usual.high
     if is_usual or not hint or not any(_is_own(case, usual.keys) for case in cases):
         return plain
-    if name in BEARING and not (cases[0].load == "gas" and _is_own(cases[0], GAS_KEYS)):
-        key = "lubricant.bearing_length_mm"
+    gas = cases[0].gas if cases[0].load == "gas" else None
+    if name in BEARING and not (gas and (gas.is_measured or _is_own(cases[0], GAS_KEYS))):
+        key = "lubricant.bearing_length_mm" if cases[0].lubricant else "contact.length_mm"
+        hint = hint.rpartition("; or ")[2]
+    if gas and gas.is_measured and key == "gas.discharge_MPa":
+        key = "gas.indicator" if "head" in gas.cards else "gas.crank_indicator"
+        hint = hint.replace(IN_MPA, OF_CARD)
     if name == "rod, crank ratio" and plain.high < LONG_ROD:
         key, hint = "machine.rod_length_mm", f"it is in mm; or the stroke is too short: {STROKE}"
     range_ = f"at least {usual.low:g}" if plain.high < usual.low else f"at most {usual.high:g}"

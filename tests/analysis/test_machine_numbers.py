@@ -128,6 +128,38 @@ def test_a_mistake_is_remarked_on_with_its_key(name, read):
     assert list(describe_machine(read(text)).remarks()) == [key]
 
 
+CARDS = "\n".join(["crank_angle_deg,head_pressure_bar,crank_pressure_bar", *(
+    f"{n},{30 + 20 * math.cos(math.radians(n)):.2f},{30 - 20 * math.cos(math.radians(n)):.2f}"
+    for n in range(0, 360, 10)
+)])  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("action", "card", "key"),
+    [("double", "{head: c.csv, crank: c.csv}", "gas.indicator"),
+     ("crank_end", "{crank: c.csv}", "gas.crank_indicator")],
+)  # fmt: skip
+def test_a_remark_on_a_measured_cylinder_names_its_card(action, card, key, read, tmp_path):
+    """It named gas.discharge_MPa, which nothing reads beside a card."""
+    (tmp_path / "c.csv").write_text(CARDS, encoding="utf-8")
+    text = f"load: gas\ngas: {{action: {action}, bore_mm: 267, rod_diameter_mm: 25, "
+    remarks = describe_machine(read(f"{text}discharge_MPa: 1.0, indicator: {card}}}")).remarks()
+    assert "stress" in remarks[key]
+    assert "unit that the column's title says" in remarks[key]
+    assert "gas.discharge_MPa" not in remarks
+
+
+@pytest.mark.parametrize(
+    ("given", "key"),
+    [("lubricant: {bearing_length_mm: 15}", "lubricant.bearing_length_mm"),
+     ("contact: {law: johnson, length_mm: 1, materials: [steel, steel]}", "contact.length_mm")],
+)  # fmt: skip
+def test_the_pressure_of_a_bearing_names_its_own_length(given, key, read):
+    text = "joint: both\nclearance_mm: 0.05\nmachine: {speed_rpm: 2500, pin_radius_mm: 15}\n"
+    remarks = describe_machine(read(text + given)).remarks()
+    assert remarks[key].endswith("is usual; bearing length and pin are too small")
+
+
 def test_what_a_plausible_machine_could_have_shows_in_its_numbers(read):
     """Gauge pressures as absolute ones, and 180 mm pins for 90 mm: no remark, but the number."""
     gauge = NAMEPLATE.replace("0.4113", "0.31").replace("1.0413", "0.94")
