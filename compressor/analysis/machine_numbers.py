@@ -88,6 +88,10 @@ USUAL = {
         1.0, math.inf, ("gas.clearance_percent", "gas.crank_clearance_percent"),
         below=("gas.clearance_percent", "it is in per cent of the swept volume: 17, not 0.17"),
     ),
+    # 0.3 to 3; plungers of the highest pressures have less
+    "cylinder, bore over stroke": Usual(
+        0.1, 3.0, ("gas.piston_radius_mm",), above=("gas.piston_radius_mm", BORE)
+    ),
     # 0.3 to 3: a frame is sized by its gas load
     "piston, inertia over gas load": Usual(
         0.0, 6.0, ("gas.piston_radius_mm", "gas.suction_MPa", "gas.discharge_MPa"),
@@ -194,14 +198,17 @@ class MachineDescription:
         return found
 
 
+LOADS = ("gas.discharge_MPa", "gas.indicator", "gas.crank_indicator")
 # key that a caution or a remark is about -> keys of others that it explains, too
 EXPLAINED = {
     "machine.speed_rpm": ("machine.stroke_mm", "gas.bore_mm"),
-    "machine.crank_radius_mm": ("machine.stroke_mm",),
     "machine.pin_radius_mm": ("clearance_mm",),
-    "machine.rod_length_mm": ("machine.rod_centre_mm",),
+    "machine.rod_length_mm": ("machine.rod_centre_mm", "gas.piston_radius_mm"),
     "gas.suction_MPa": ("gas.bore_mm",),
-    "gas.rod_diameter_mm": ("gas.discharge_MPa", "gas.indicator", "gas.crank_indicator"),
+    "gas.piston_radius_mm": LOADS,
+    "gas.rod_diameter_mm": LOADS,
+    "machine.crank_radius_mm": ("machine.stroke_mm",),
+    "machine.stroke_mm": ("gas.piston_radius_mm",),
 }  # fmt: skip
 
 
@@ -300,6 +307,9 @@ def _numbers_of_sound(sound: Case) -> Named:
         yield from _numbers_of_gas(sound)
     yield "piston, mean speed", (4e-3 * machine.crank_radius_mm / sound.turn, "m/s")
     yield "rod, crank ratio", (ratio, "")
+    if sound.load == "gas":  # behind what tells of a stroke that explains it
+        bore_ratio = sound.gas.piston_radius_mm / machine.crank_radius_mm
+        yield "cylinder, bore over stroke", (bore_ratio, "")
     centre = (machine.rod_centre_mm or 0.0) / machine.rod_length_mm
     yield "rod, mass centre over length", (centre, "")
     pins = sum(machine.pin_radius(joint) for joint in JOINTS)

@@ -66,6 +66,9 @@ BY_HAND = {
 }
 MISTAKES = {  # what was written in place of what, with the key that the remark names
     "the bore as a radius": ("bore_mm: 267", "bore_mm: 133.5", "gas.bore_mm"),
+    "the whole bore as the radius": (
+        "bore_mm: 267", "piston_radius_mm: 267", "gas.piston_radius_mm",
+    ),
     "the crank radius as the stroke": ("stroke_mm: 127", "stroke_mm: 63.5", "machine.stroke_mm"),
     "a rod ten times too long": ("length_mm: 343", "length_mm: 3430", "machine.rod_length_mm"),
     "bar as MPa": (
