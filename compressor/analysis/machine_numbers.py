@@ -207,8 +207,8 @@ EXPLAINED = {
     "gas.suction_MPa": ("gas.bore_mm",),
     "gas.piston_radius_mm": LOADS,
     "gas.rod_diameter_mm": LOADS,
-    "machine.crank_radius_mm": ("machine.stroke_mm",),
-    "machine.stroke_mm": ("gas.piston_radius_mm",),
+    "machine.crank_radius_mm": ("machine.stroke_mm", "gas.bore_mm", *LOADS),
+    "machine.stroke_mm": ("gas.piston_radius_mm", "gas.bore_mm", *LOADS),
 }  # fmt: skip
 
 

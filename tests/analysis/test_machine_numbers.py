@@ -198,6 +198,16 @@ def test_a_caution_about_the_speed_explains_the_piston_s(read):
     assert describe_machine(study).remarks(warned) == {}
 
 
+@pytest.mark.parametrize("stroke", ["stroke_mm: 300", "crank_radius_mm: 200"])
+def test_a_stroke_that_is_too_long_explains_the_forces(stroke, read):
+    """The bore stood beside the right caution, and the discharge pressure for the rod's stress."""
+    study = read(NAMEPLATE.replace("stroke_mm: 127", stroke))
+    machine, warned = describe_machine(study), {one.key for one in cautions(study)}
+    assert "machine.crank_radius_mm" in warned
+    assert machine.remarks(warned) == {}
+    assert [*machine.remarks()] == ["machine.stroke_mm"]
+
+
 @pytest.mark.parametrize("load", ["none", "spring", "gas"])
 def test_loads_are_those_of_a_run_without_clearance(load):
     """And m a + F: the gas load less what the reciprocating mass takes."""
