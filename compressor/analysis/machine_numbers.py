@@ -234,7 +234,7 @@ def machine_numbers(cases: Sequence[Case]) -> tuple[MachineNumber, ...]:
     units: dict[str, str] = {}
     known: dict[str, dict[str, tuple[float, str]]] = {}
     for case in cases:
-        sound = sound_machine(case)
+        sound = with_ideal_joints(case, features=False)
         if sound.physics_key not in known:  # a sweep of clearances has one machine
             known[sound.physics_key] = dict(_numbers_of_sound(sound))
         of_pins = _numbers_of_pins(case, known[sound.physics_key])
@@ -247,14 +247,6 @@ def machine_numbers(cases: Sequence[Case]) -> tuple[MachineNumber, ...]:
 
 def _is_of_pin(name: str) -> bool:
     return name.startswith(tuple(joint.replace("_", " ") for joint in JOINTS))
-
-
-def sound_machine(case: Case) -> Case:
-    """Return the case without clearance and features: rigid, at a steady speed."""
-    return replace(
-        with_ideal_joints(case), friction=None, guide=None, drive=None, rod=None, body=None,
-        sensor=None,
-    )  # fmt: skip
 
 
 class RevolutionLoads(NamedTuple):
@@ -272,7 +264,7 @@ class RevolutionLoads(NamedTuple):
 
 
 def revolution_loads(sound: Case) -> RevolutionLoads:
-    """Return the `RevolutionLoads` of a `sound_machine`, at both sides of each corner of its load.
+    """Return the `RevolutionLoads` of a sound machine, at both sides of each corner of its load.
 
     By the equations that its run has.
     """

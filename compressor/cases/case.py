@@ -515,9 +515,16 @@ def _as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> list[
     return [*dict.fromkeys(found)]
 
 
-def with_ideal_joints(case: Case) -> Case:
-    """Return the case without clearance, and so without oil and wear."""
-    return replace(case, joint="none", lubricant=None, wear=None)
+def with_ideal_joints(case: Case, features: bool = True) -> Case:
+    """Return the case without clearance, and so without oil and wear.
+
+    features: False gives the sound machine, which is rigid and at a steady speed: without friction,
+    guide, drive, rod, body and sensor, too.
+    """
+    ideal = replace(case, joint="none", lubricant=None, wear=None)
+    if features:
+        return ideal
+    return replace(ideal, friction=None, guide=None, drive=None, rod=None, body=None, sensor=None)
 
 
 FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder

@@ -462,11 +462,7 @@ def _drive(case: Case) -> Iterator[Remark]:
     drive = case.drive
     if drive is None or case.load == "none":
         return
-    plain = replace(
-        with_ideal_joints(case), friction=None, guide=None, drive=None, rod=None,
-        body=None, sensor=None,
-    )  # fmt: skip
-    p, turn = record(plain), plain.turn
+    p, turn = record(with_ideal_joints(case, features=False)), case.turn
     tally = closed_form(p, np.array([0.0, turn]), 0.0, TURN_PIECES).tally
     needed, slope = float(tally["crank_torque"]) / turn, drive.slope_N_m_s
     most = drive.torque_N_m + slope * case.omega

@@ -12,9 +12,8 @@ from compressor.analysis.machine_numbers import (
     describe_machine,
     machine_numbers,
     revolution_loads,
-    sound_machine,
 )
-from compressor.cases.case import Case
+from compressor.cases.case import Case, with_ideal_joints
 from compressor.cases.load import load_studies
 from compressor.physics import exact_motion
 from compressor.solve.cautions import cautions
@@ -212,7 +211,7 @@ def test_a_stroke_that_is_too_long_explains_the_forces(stroke, read):
 def test_loads_are_those_of_a_run_without_clearance(load):
     """And m a + F: the gas load less what the reciprocating mass takes."""
     case = Case.from_values({"load": load, "machine": {"gravity_m_per_s2": 9.81}})
-    loads, run = revolution_loads(sound_machine(case)), simulate(case)
+    loads, run = revolution_loads(with_ideal_joints(case, features=False)), simulate(case)
     _, _, a = exact_motion(loads.angle, 0.12, 0.6, case.omega)
     assert np.allclose(loads.inertia, -14.0 * a, atol=1e-6)
     peak = float(run["peak_contact_force_axis"].sel(joint="small_end", axis="x"))
@@ -225,7 +224,10 @@ def test_features_and_clearance_leave_the_sound_machine_as_it_is():
     plain = Case.from_values({"load": "gas"})
     worn = {"joint": "both", "clearance_mm": 0.1, "rod": True, "drive": True, "guide": True}
     case = Case.from_values({"load": "gas", **worn})
-    assert sound_machine(case).physics_key == replace(plain, friction=None).physics_key
+    assert (
+        with_ideal_joints(case, features=False).physics_key
+        == replace(plain, friction=None).physics_key
+    )
     two = by_name(machine_numbers([plain, case]))
     assert two["rod load, tension"].low == two["rod load, tension"].high
 

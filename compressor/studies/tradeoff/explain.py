@@ -309,9 +309,7 @@ def ideal_scales(case: Case) -> Iterator[JointScales]:
 
     The ideal machine has none of a case's features: its guide, drive and rod are ideal, too.
     """
-    friction = case.friction and replace(case.friction, ideal_joints=False)
-    plain = replace(with_ideal_joints(case), friction=friction, guide=None, drive=None, rod=None)
-    p, ideal = record(case), simulate(plain)
+    p, ideal = record(case), simulate(with_ideal_joints(case, features=False))
     for joint in faulty(case):
         yield joint_scales(p, joint, float(ideal["peak_contact_force"].sel(joint=joint)))
 
