@@ -26,7 +26,8 @@ ANGLE = re.compile(r"(crank_)?angle(_deg|_degrees)?")  # names of columns, as `_
 PRESSURE = re.compile(rf"((head|he|crank|ce)_(end_)?)?(pressure|p)_({'|'.join(UNITS)})([ag]?)")
 NEEDED = (
     "a card needs crank_angle_deg and pressure_bar, or head_pressure_bar and crank_pressure_bar; "
-    "or MPa, kPa, psi; with a g, as in pressure_barg, they count from the ambient pressure"
+    "or MPa, kPa, psi, all absolute; with a g, as in pressure_barg, they count from the ambient "
+    "pressure"
 )
 MARKED = re.compile(r"(?s)(.+)@([0-9a-f]{20})")
 MAX_GAP = 20.0  # degrees between neighbours: more leaves a valve's opening to a guess

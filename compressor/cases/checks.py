@@ -149,7 +149,8 @@ OTHER_UNITS = {
     "kPa": ("MPa", UNITS["kpa"]), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3), "cm": ("mm", 10.0),
     "m": ("mm", 1e3), "kN": ("N", 1e3),
 }  # fmt: skip
-GAUGE = ("barg", "psig", "psi")  # as which pressures are read on a gauge
+GAUGE = ("barg", "psig")
+ABSOLUTE = ("bara", "psia")
 DIAMETER = re.compile(r"(?i)(.*_)?(diameter|diametral|dia)(_.*)?")
 OF_SMALL_END = ("crosshead", "wrist", "gudgeon", "small_end", "piston_pin")
 PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
@@ -242,6 +243,8 @@ def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
     values = value if isinstance(value, list | tuple) else [value]
     more = f" + {ATMOSPHERE_MPA:g}" if gauge else ""
     note = "; pressures are absolute: gauge pressure and the atmosphere's" if gauge else ""
+    if ours == "MPa" and unit not in GAUGE + ABSOLUTE:
+        note = f", absolute; to a gauge's add the atmosphere's {ATMOSPHERE_MPA:g}"
     if not all(isinstance(one, int | float) and not isinstance(one, bool) for one in values):
         return f"; write {key}: 1 {unit} is {factor:g}{more} {ours}{note}"
     digits = ".4g" if unit.startswith("psi") or gauge else ".12g"

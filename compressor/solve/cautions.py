@@ -48,7 +48,8 @@ PER_RADIAN = {"big_end": 0.3, "small_end": 0.5, "both": 0.7}
 STABILITY_SHARE = 0.5
 ORDER = 5
 STEP_SECONDS = {"big_end": 3.5e-6, "small_end": 3.5e-6, "both": 4.5e-6}  # of compiled methods
-EXPONENTS = (0.95, 1.75)  # that gas is compressed with
+EXPONENTS = (1.0, 1.5)  # that gas is compressed with
+LEAST_PRESSURE = 0.07  # MPa, absolute, that a compressor takes in; less is a vacuum pump
 MAX_MISFIT = 0.05  # of a card's lines, rms of the pressure's logarithm
 MAX_UNLIKE = 0.25  # by which a card's clearance may differ from what is given
 MAX_NOISE = 5e-4  # of a card's range of pressure
@@ -472,7 +473,7 @@ def _drive(case: Case) -> Iterator[Remark]:
 
 
 def _cards(case: Case) -> Iterator[Remark]:
-    """Yield what is odd about measured cards: their scatter, noise, gauge, clearance, exponent."""
+    """Yield what is odd about measured cards: scatter, noise, pressures, clearance, exponent."""
     for end, path in case.gas.cards.items() if case.load == "gas" else ():
         card = open_card(path, end)
         key = "gas.indicator" if end == "head" else "gas.crank_indicator"
@@ -484,6 +485,11 @@ def _cards(case: Case) -> Iterator[Remark]:
         if card.is_gauge and case.gas.ambient_MPa is None:
             text = "its gauge pressures count from 1 atmosphere, 1.01325 bar"
             yield Remark(key, f"{text}; set gas.ambient_MPa for another", "gauge")
+        least = min(card.pressures)
+        if least < LEAST_PRESSURE and not card.is_gauge:
+            text = f"its least pressure is {least:.2g} MPa absolute, below the {LEAST_PRESSURE:g} "
+            text += "that compressors take in: gauge pressures have a g behind the unit of their "
+            yield Remark(key, f"{text}column, as in pressure_barg", "vacuum")
         yield from _card_fit(case, end, key)
         yield from _card_noise(case, end, key)
 
@@ -491,15 +497,19 @@ def _cards(case: Case) -> Iterator[Remark]:
 def _card_fit(case: Case, end: str, key: str) -> Iterator[Remark]:
     """Yield a card whose compression and expansion do not fit its gas and clearance volume."""
     fit = fit_polytrope(case, end)
-    if fit is None or fit.misfit > MAX_MISFIT:
+    if fit is None:
         return
+    doubt = "are its pressures of the unit that the column says, absolute or gauge, its angle 0 at "
+    doubt += "top dead centre, the stroke the machine's?"
     stroke = 2 * case.machine.crank_radius_mm
     given = case.gas.clearance(end, stroke) / stroke
     says = f"compression and expansion fit a clearance of {100 * fit.clearance:.3g} % at an "
     says += f"exponent of {fit.exponent:.3g}"
-    if not EXPONENTS[0] <= fit.exponent <= EXPONENTS[1]:
-        text = "are its pressures of the unit that the column says, absolute or gauge, its angle 0 "
-        yield Remark(key, f"{says}: {text}at top dead centre, the stroke the machine's?", "fit")
+    if fit.misfit > MAX_MISFIT:
+        text = "its compression and expansion fit no polytropic lines, whatever the clearance"
+        yield Remark(key, f"{text}: {doubt}", "fit")
+    elif not EXPONENTS[0] <= fit.exponent <= EXPONENTS[1]:
+        yield Remark(key, f"{says}: {doubt}", "fit")
     elif case.gas.clearance_percent is not None and abs(fit.clearance / given - 1) > MAX_UNLIKE:
         yield Remark(key, f"{says}, and {100 * given:.3g} % is given", "fit")
 

@@ -19,7 +19,11 @@ MISTAKES = [
     ("gas: {piston_diameter_mm: 267}", "1:7", "unknown key; write gas.bore_mm: 267"),
     # units
     ("gas: {suction_barg: 3.1}", "1:7", "write suction_MPa: 0.4113; pressures are absolute"),
-    ("gas: {suction_psi: 45}", "1:7", "write suction_MPa: 0.4116; pressures are absolute"),
+    ("gas: {suction_psig: 45}", "1:7", "write suction_MPa: 0.4116; pressures are absolute"),
+    ("gas: {suction_psi: 45}", "1:7",
+     "write suction_MPa: 0.3103, absolute; to a gauge's add the atmosphere's 0.101325"),
+    ("gas: {suction_bar: 4.1}", "1:7", "write suction_MPa: 0.41, absolute; to a gauge's add"),
+    ("gas: {suction_psia: 45}", "1:7", "write suction_MPa: 0.3103"),
     ("gas: {suction_bara: 4.1}", "1:7", "write suction_MPa: 0.41"),
     ("joint: big_end\nclearance_mm: [0,05]", "2:18: clearance_mm", "decimal comma? write 0.05"),
     ("body: {mass_kg: 9}\nmachine: {reciprocating_mass_kg: 172}", "1:17: body.mass_kg",

@@ -285,6 +285,24 @@ def test_a_card_is_held_against_its_own_lines(tmp_path, how, words):
         assert found.exponent == pytest.approx(1.3, abs=0.01)
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "kinds"),
+    [
+        (0.105, 0.4, {"vacuum": "0.0037 MPa absolute", "fit": "fit no polytropic lines"}),
+        (0.2, 0.7, {"fit": "at an exponent of 1.88"}),
+        (0.3, 0.9, {"fit": "at an exponent of 1.64"}),
+    ],
+)
+def test_gauge_pressures_that_are_called_absolute_are_told(tmp_path, low, high, kinds):
+    """The less pressure there is, the worse is the fit: where none was, nothing was told."""
+    case = measured(head(tmp_path / "a.csv", 10, -1.01325, "pressure_bar", low=low, high=high))
+    told = {one.kind: one.message for one in remarks(case) if one.key == "gas.indicator"}
+    assert told.keys() == kinds.keys()
+    assert all(words in told[kind] for kind, words in kinds.items())
+    right = measured(head(tmp_path / "b.csv", 10, -1.01325, "pressure_barg", low=low, high=high))
+    assert [one.kind for one in remarks(right) if one.key == "gas.indicator"] == ["gauge"]
+
+
 def test_noise_of_a_card_is_told_and_smoothed(tmp_path):
     """0.003 MPa: told within a tenth, less by the window's width; a quiet card is not told."""
     noise = np.random.default_rng(3).normal(0, 0.003, len(FINE))
