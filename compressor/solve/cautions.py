@@ -32,6 +32,7 @@ from compressor.cases import (
     reads,
     row_of,
     to_si,
+    value_of,
     with_ideal_joints,
 )
 from compressor.metrics import JOINTS
@@ -501,8 +502,10 @@ def _card_fit(case: Case, end: str, key: str) -> Iterator[Remark]:
         return
     doubt = "are its pressures of the unit that the column says, absolute or gauge, its angle 0 at "
     doubt += "top dead centre, the stroke the machine's?"
-    stroke = 2 * case.machine.crank_radius_mm
+    stroke, given_by = 2 * case.machine.crank_radius_mm, case.gas.clearance_key(end)
     given = case.gas.clearance(end, stroke) / stroke
+    row = row_of(given_by)
+    is_given = row is not None and value_of(case, given_by) != row.default
     says = f"compression and expansion fit a clearance of {100 * fit.clearance:.3g} % at an "
     says += f"exponent of {fit.exponent:.3g}"
     if fit.misfit > MAX_MISFIT:
@@ -510,8 +513,8 @@ def _card_fit(case: Case, end: str, key: str) -> Iterator[Remark]:
         yield Remark(key, f"{text}: {doubt}", "fit")
     elif not EXPONENTS[0] <= fit.exponent <= EXPONENTS[1]:
         yield Remark(key, f"{says}: {doubt}", "fit")
-    elif case.gas.clearance_percent is not None and abs(fit.clearance / given - 1) > MAX_UNLIKE:
-        yield Remark(key, f"{says}, and {100 * given:.3g} % is given", "fit")
+    elif is_given and abs(fit.clearance / given - 1) > MAX_UNLIKE:
+        yield Remark(key, f"{says}, and {given_by} gives {100 * given:.3g} %", "fit")
 
 
 def _card_noise(case: Case, end: str, key: str) -> Iterator[Remark]:
