@@ -147,11 +147,13 @@ ONE_SUFFICES = {"gas.indicator": ("head", "crank"), "gas.clearance_percent": ("c
 OTHER_UNITS = {
     **{f"{unit}{end}": ("MPa", UNITS[unit]) for unit in ("bar", "psi") for end in ("", "a", "g")},
     "kPa": ("MPa", UNITS["kpa"]), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3), "cm": ("mm", 10.0),
-    "m": ("mm", 1e3), "kN": ("N", 1e3),
+    "m": ("mm", 1e3), "in": ("mm", 25.4), "inch": ("mm", 25.4), "kN": ("N", 1e3),
 }  # fmt: skip
 GAUGE = ("barg", "psig")
 ABSOLUTE = ("bara", "psia")
-DIAMETER = re.compile(r"(?i)(.*_)?(diameter|diametral|dia)(_.*)?")
+DIAMETER = re.compile(r"(?i)(\w*_)?(diameter|diametral|dia)(_\w*)?")
+OF_PIN = re.compile(r"pin(?!dle)|wrist|gudgeon|journal|(?<!main_)bearing|big_end|small_end")
+OF_PISTON_ROD = re.compile(r"(?<!con)(?<!con_)(?<!connecting_)rod")
 OF_SMALL_END = ("crosshead", "wrist", "gudgeon", "small_end", "piston_pin")
 PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
 TWICE = "stands in place of {}: give one of the two"
@@ -254,21 +256,27 @@ def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
 
 
 def of_diameter(name: str, group: str, value: Any) -> str:
-    """Return the hint at a diameter where we have a radius or a bore; "" for another name."""
+    """Return the hint at the diameter of a pin, a bore or a piston rod; "" for another name."""
     if not DIAMETER.fullmatch(name):
         return ""
-    half = f"{halve(value):g}" if halve(value) is not value else "..."
+    ours, factor = OTHER_UNITS.get(name.rpartition("_")[2], ("mm", 1.0))
+    is_number = halve(value) is not value and ours == "mm"
+    whole = f"{value * factor:.12g}" if is_number else "..."
+    half = f"{value * factor / 2:.12g}" if is_number else "..."
     if "clearance" in name:
         return f"; clearance_mm is radial, half of it: write clearance_mm: {half}"
-    if "pin" in name.split("_") or "journal" in name:
+    if OF_PIN.search(name):
         own = "small_end" if any(word in name for word in OF_SMALL_END) else "big_end"
         named = own == "small_end" or "crank" in name or "big" in name
         form = f"{{{own}: {half}, ...}}" if named else half
         return f"; write machine.pin_radius_mm: {form}, half of it"
-    if "rod" not in name and any(word in name for word in ("piston", "cylinder", "bore")):
-        whole = f"{value:g}" if half != "..." else "..."
-        return f"; write gas.bore_mm: {whole}"
-    return ""
+    if group not in ("", "machine", "gas"):
+        return ""
+    if OF_PISTON_ROD.search(name):
+        return f"; write gas.rod_diameter_mm: {whole}, the piston rod's"
+    of_bore = any(word in name for word in ("piston", "cylinder", "bore"))
+    is_bare = group == "gas" and name.startswith("dia")
+    return f"; write gas.bore_mm: {whole}" if of_bore or is_bare else ""
 
 
 def of_percent(name: str, group: str) -> str:
@@ -313,7 +321,7 @@ def describe_unknown(name: str, group: str, file: bool = True, value: Any = None
         in_our_unit(name, value, accepted_keys(group))
         or of_percent(name, group)
         or of_diameter(name, group, value)
-        or suggestion(name, group)
+        or ("" if DIAMETER.fullmatch(name) else suggestion(name, group))  # of another part
         or f"; {whole} has {', '.join(known_keys(group, file))}"
     )
     return f"unknown key{hint}"

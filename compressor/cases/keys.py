@@ -25,6 +25,7 @@ from compressor.cases.checks import (
 )
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.groups import CARD_KEYS
+from compressor.cases.parameter import NO_VALUE
 from compressor.cases.swept import FORMS
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS
 from compressor.cases.yaml_reader import FileProblem, Node, Place, read_text, shorten
@@ -133,6 +134,8 @@ def _known_entries(
             message = "unknown key"
             if len(problems) < MAX_SUGGESTIONS:
                 message = describe_unknown(name, group, value=item.plain())
+                empty = item.place, NO_VALUE  # an unknown key has no default
+                problems[:] = [one for one in problems if (one.place, one.message) != empty]
             key = f"{group}.{name}" if group else name
             problems.append(FileProblem(item.key_place, key, message))
         elif item.value is not None:

@@ -17,6 +17,16 @@ MISTAKES = [
     ("machine: {crank_pin_diameter_mm: 190}", "1:11", "pin_radius_mm: {big_end: 95, ...}, half"),
     ("machine: {crosshead_pin_diameter_mm: 102}", "1:11", "{small_end: 51, ...}, half of it"),
     ("gas: {piston_diameter_mm: 267}", "1:7", "unknown key; write gas.bore_mm: 267"),
+    ("gas: {diameter_mm: 267}", "1:7", "write gas.bore_mm: 267"),
+    ("machine: {crankpin_diameter_mm: 190}", "1:11", "pin_radius_mm: {big_end: 95, ...}, half"),
+    ("machine: {big_end_diameter_mm: 190}", "1:11", "pin_radius_mm: {big_end: 95, ...}, half"),
+    ("machine: {small_end_diameter_mm: 102}", "1:11", "pin_radius_mm: {small_end: 51, ...}, half"),
+    ("machine: {wristpin_diameter_mm: 102}", "1:11", "pin_radius_mm: {small_end: 51, ...}, half"),
+    ("machine: {crossheadpin_dia_mm: 102}", "1:11", "pin_radius_mm: {small_end: 51, ...}, half"),
+    ("lubricant: {bearing_diameter_mm: 190}", "1:13", "machine.pin_radius_mm: 95, half of it"),
+    ("machine: {pin_diameter_cm: 19}", "1:11", "machine.pin_radius_mm: 95, half of it"),
+    ("machine: {rod_diameter_mm: 50.8}", "1:11", "gas.rod_diameter_mm: 50.8, the piston rod's"),
+    ("machine: {stroke_in: 5}", "1:11", "write stroke_mm: 127"),
     # units
     ("gas: {suction_barg: 3.1}", "1:7", "write suction_MPa: 0.4113; pressures are absolute"),
     ("gas: {suction_psig: 45}", "1:7", "write suction_MPa: 0.4116; pressures are absolute"),
@@ -56,6 +66,34 @@ def test_a_mistake_is_answered_where_it_was_made(text, where, answer, tmp_path, 
     assert lines[0].startswith(f"m.yaml:{where}")
     assert "crank_radius_mm" not in lines[0]
     assert "piston_radius_mm" not in lines[0]
+
+
+def told(text, tmp_path):
+    """Return what is said of a file."""
+    (tmp_path / "m.yaml").write_text(text)
+    with pytest.raises(CaseFileError) as caught:
+        load_cases(tmp_path / "m.yaml")
+    return [problem.message for problem in caught.value.problems]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["machine: {crank_diameter_mm: 300}", "machine: {main_bearing_diameter_mm: 200}",
+     "machine: {conrod_diameter_mm: 60}", "rod: {diameter_mm: 50}", "wear: {bore_diameter_mm: 20}"],
+)  # fmt: skip
+def test_a_diameter_of_what_has_none_leads_to_no_other_part(text, tmp_path):
+    """A crank's diameter led to its radius, which is half a stroke, a rod's to its depth."""
+    group = text.partition(":")[0]
+    assert told(text, tmp_path)[0].startswith(f"unknown key; {group} has ")
+
+
+def test_an_unknown_key_without_a_value_has_no_default(tmp_path):
+    """It was said to leave it out to get its default."""
+    for text in ("machine:\n  rod_mas_kg:\n", "blocks: [{machine: {rod_mas_kg: }}]"):
+        assert told(text, tmp_path) == ["unknown key; did you mean machine.rod_mass_kg?"]
+    assert told("machine:\n  rod_mass_kg:\n", tmp_path) == [
+        "has no value; leave the key out to get its default"
+    ]
 
 
 def test_tabs_separate_as_yaml_1_2_has_them(tmp_path):
