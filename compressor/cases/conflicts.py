@@ -264,11 +264,15 @@ def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
         ratio = case.lubricant.bearing_length(joint) / width
         own = joint == "small_end" and case.lubricant.small_end_bearing_length_mm
         if case.joint in (joint, "both") and not MIN_RATIO <= ratio <= MAX_RATIO:
-            yield Problem(
-                f"lubricant.{'small_end_' if own else ''}bearing_length_mm",
+            key = f"lubricant.{'small_end_' if own else ''}bearing_length_mm"
+            text = (
                 f"is {ratio:.3g} times the diameter of the pin, {width:g} mm; the film's numbers "
-                f"hold from {MIN_RATIO:g} to {MAX_RATIO:g} times",
+                f"hold from {MIN_RATIO:g} to {MAX_RATIO:g} times"
             )
+            if key not in given:
+                default = f"{case.lubricant.bearing_length_mm:g} mm is the default, of the paper's"
+                text += f"; {default} pin: give the length that bears"
+            yield Problem(key, text)
 
 
 def wear_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
