@@ -198,19 +198,22 @@ def find_slip(text: str, last: int) -> tuple[int, str] | None:
             return number, f"write a colon and a space in place of =: {found[1]}: {found[2]}"
     if len(filled) < 2:
         return None
-    (_, before), (number, line) = filled[-2:]
-    indents = [len(one) - len(one.lstrip()) for one in (before, line)]
-    if indents[0] != indents[1] and KEY.match(line):
-        return number, (
-            f"is indented by {indents[1]} columns, the line before by {indents[0]}: keys of one "
-            "group stand in one column, and a group's own line ends in its colon"
-        )
-    return None
+    earlier, (at_before, before), (number, line) = [(-1, ""), *filled][-3:]
+    first, second, last_one = (len(one) - len(one.lstrip()) for one in (earlier[1], before, line))
+    if second == last_one or not KEY.match(line):
+        return None
+    rule = "keys of one group stand in one column, and a group's own line ends in its colon"
+    opens = first == second and GROUP.match(earlier[1])
+    if second < last_one and (first == last_one or opens):  # it alone stands out of its group
+        text = f"is indented by {second} columns, the line after it by {last_one}"
+        return at_before, f"{text}: {rule}"
+    return number, f"is indented by {last_one} columns, the line before by {second}: {rule}"
 
 
 NO_SPACE = re.compile(r"\s*([A-Za-z]\w*):([^\s:/][^:]*?)\s*(?:#.*)?$")
 EQUALS = re.compile(r"\s*([A-Za-z]\w*)\s*=\s*(.*?)\s*(?:#.*)?$")
 KEY = re.compile(r"\s*[A-Za-z]\w*\s*:(\s|$)")
+GROUP = re.compile(r"\s*[A-Za-z]\w*\s*:\s*(#.*)?$")
 TABS = re.compile(r"""^([ ]*[^\s'"][^'"\n]*?)\t""", re.MULTILINE)
 
 

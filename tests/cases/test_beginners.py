@@ -46,6 +46,10 @@ MISTAKES = [
     ("machine:\n  stroke_mm = 127\n  rod_length_mm: 343", "2:1", "in place of =: stroke_mm: 127"),
     ("machine:\n  stroke_mm: 127\n   speed_rpm: 343", "3:1", "is indented by 3 columns, the line"),
     ("machine:\n  stroke_mm: 127\n speed_rpm: 343", "3:1", "is indented by 1 columns, the line"),
+    ("joint: none\nmachine:  # ours\nstroke_mm: 127\n  rod_length_mm: 343", "3:1",
+     "is indented by 0 columns, the line after it by 2: keys of one group stand in one column"),
+    ("machine:\n  stroke_mm: 127\nspeed_rpm: 985\n  rod_length_mm: 343", "3:1", "by 0 columns"),
+    ("load: gas\n  bore_mm: 267", "2:1", "is indented by 2 columns, the line before by 0"),
     ("machine:\n\tstroke_mm: 127", "2:1", "indent with spaces, not tabs"),
     # materials that are not in the table
     ("joint: big_end\nclearance_mm: 0.1\ncontact: {materials: [steel, bronze]}", "3:22",
