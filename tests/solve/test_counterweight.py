@@ -197,7 +197,7 @@ def test_orders_of_the_nameplate_machine_by_hand():
     values |= {"solve": TURN, "output": {"signals": True}}
     found, square = simulate(Case.resolve(values)), (740 * math.pi / 30) ** 2
     along, up = orders(found, "x"), orders(found, "y")
-    pin, crosshead, ratio = 40 * (1 - 150 / 450), 100 + 40 * 150 / 450, 90 / 450
+    crosshead, ratio = 100 + 40 * 150 / 450, 90 / 450
     half = crosshead / 2  # which the counterweight balances, beside all of the pin
     assert up[1].imag == pytest.approx(0.09 * half * square, rel=1e-9)
     assert along[1].real == pytest.approx(0.09 * half * square, rel=1e-6)
