@@ -32,7 +32,6 @@ from compressor.cases import (
     reads,
     row_of,
     to_si,
-    value_of,
     with_ideal_joints,
 )
 from compressor.metrics import JOINTS
@@ -504,8 +503,8 @@ def _card_fit(case: Case, end: str, key: str) -> Iterator[Remark]:
     doubt += "top dead centre, the stroke the machine's?"
     stroke, given_by = 2 * case.machine.crank_radius_mm, case.gas.clearance_key(end)
     given = case.gas.clearance(end, stroke) / stroke
-    row = row_of(given_by)
-    is_given = row is not None and value_of(case, given_by) != row.default
+    value, row = getattr(case.gas, given_by.removeprefix("gas.")), row_of(given_by)
+    is_given = row is not None and value != row.default
     says = f"compression and expansion fit a clearance of {100 * fit.clearance:.3g} % at an "
     says += f"exponent of {fit.exponent:.3g}"
     if fit.misfit > MAX_MISFIT:
