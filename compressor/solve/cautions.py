@@ -38,7 +38,7 @@ from compressor.metrics import JOINTS
 from compressor.physics import STABILITY_LIMIT, Scene, elastic_form, greatest_load, steepest
 from compressor.solve.attempts import closed_form
 from compressor.solve.march_driver import COMPILED
-from compressor.solve.measured_gas import card_noise, fit_polytrope
+from compressor.solve.measured_gas import card_noise, fit_polytrope, sensed_noise
 from compressor.solve.request import greatest_depth
 from compressor.solve.si_record import record, scene
 
@@ -522,14 +522,11 @@ def _card_noise(case: Case, end: str, key: str) -> Iterator[Remark]:
     if noise <= MAX_NOISE * (max(card.pressures) - min(card.pressures)):
         return
     force = to_si(noise, "MPa") * math.pi * to_si(case.gas.piston_radius_mm, "mm") ** 2
-    text = f"its samples differ by {noise:.2g} MPa (rms) from their neighbours, which is "
-    text += f"{force:.3g} N on the piston"
-    body, sensor = case.body, case.sensor
-    if body and sensor:
-        mass = body.mass_kg if sensor.place == "body" else body.casing_mass_kg or body.mass_kg
-        sideways = case.machine.crank_radius_mm / case.machine.rod_length_mm / math.sqrt(2.0)
-        share = sideways if sensor.place == "guide" and sensor.direction == "y" else 1.0
-        text += f" and up to {force * share / mass:.2g} m/s2 (rms) at the sensor"
+    text = f"noise or rounding of its samples is about {noise:.2g} MPa (rms), {force:.3g} N on the "
+    text += "piston"
+    level = sensed_noise(case, end)
+    if level > 0.0:
+        text += f", and makes about {level:.2g} m/s2 (rms) at the sensor of the sound machine"
     smoothed = case.gas.smooth_deg or 0.0
     yield Remark(key, f"{text}; smoothed over {smoothed:g} degrees: gas.smooth_deg", "noise")
 

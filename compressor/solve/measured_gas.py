@@ -13,6 +13,9 @@ from compressor.cases import Case, open_card, to_si
 from compressor.physics import card_nodes, exact_motion
 
 SMOOTHING_ORDER = 3  # of the polynomials in a window
+NOISE_WINDOW = 6.0  # degrees, in which noise is told from the card
+DIGITS = 12  # of a pressure in MPa: what differs beyond them is rounding of binary numbers
+OFF_STEP = 0.05  # of a step, by which a multiple of it may be off
 POLYTROPIC = (0.2, 0.8)  # shares of the pressure's logarithmic range between which lines are fitted
 MIN_FITTED = 5  # samples on each of the two lines
 CLEARANCES = np.geomspace(0.005, 3.0, 400)  # of the swept volume, that are tried
@@ -28,28 +31,65 @@ def gas_nodes(case: Case, end: str) -> np.ndarray:
     nodes = to_si(1.0, "MPa") * card_nodes(card.angles, card.pressures)
     if card.is_gauge:
         nodes[:, 0] += to_si(gas.ambient, "MPa")
-    width = 2 * round((gas.smooth_deg or 0.0) * len(nodes) / 720.0) + 1
-    if width > SMOOTHING_ORDER + 1:
-        from scipy.signal import savgol_filter
+    return smooth_nodes(nodes, gas.smooth_deg or 0.0)
 
-        values = nodes[:, 0].copy()
-        for derivative in (0, 1):
-            nodes[:, derivative] = savgol_filter(
-                values, width, SMOOTHING_ORDER, deriv=derivative, mode="wrap"
-            )
-    return nodes
+
+def smooth_nodes(nodes: np.ndarray, degrees: float) -> np.ndarray:
+    """Return values and slopes a node, (m, 2), smoothed in a window; 0 degrees: as they are."""
+    width = 2 * round(degrees * len(nodes) / 720.0) + 1
+    if width <= SMOOTHING_ORDER + 1:
+        return nodes
+    from scipy.signal import savgol_filter
+
+    both = [
+        savgol_filter(nodes[:, 0], width, SMOOTHING_ORDER, deriv=derivative, mode="wrap")
+        for derivative in (0, 1)
+    ]
+    return np.stack(both, axis=1)
 
 
 def card_noise(case: Case, end: str) -> float:
     """Return the standard deviation (MPa) of what differs from sample to sample in a card.
 
     By the median of its fourth differences, which hold little of a pressure that valves and piston
-    make.
+    make; at least that of rounding, where all pressures are multiples of a step.
     """
     card = open_card(case.gas.cards[end], end)
     values = np.array(card.pressures)
     bends = np.diff(np.concatenate([values[-2:], values, values[:2]]), 4)
-    return float(np.median(np.abs(bends)) / (0.6745 * math.sqrt(70.0)))
+    noise = float(np.median(np.abs(bends)) / (0.6745 * math.sqrt(70.0)))
+    step = np.diff(np.unique(values.round(DIGITS))).min(initial=math.inf)
+    multiples = values / step
+    if math.isinf(step) or np.abs(multiples - np.round(multiples)).max() > OFF_STEP:
+        return noise
+    return max(noise, float(step) / math.sqrt(12.0))
+
+
+def sensed_noise(case: Case, end: str) -> float:
+    """Return the acceleration (m/s2, rms) that a sensor has of the noise of an end's card.
+
+    Noise is here what a window smooths off the card as the case has it, smoothed already or not. It
+    moves the casing at the sensor, before its filter, of the machine with ideal joints; the frame
+    as a whole, and the guide along x, have no force of the gas, and 0.
+    """
+    machine, gas, body, sensor = case.machine, case.gas, case.body, case.sensor
+    if body is None or sensor is None or not body.casing or sensor.place == "body":
+        return 0.0
+    if (sensor.place, sensor.direction) == ("guide", "x"):
+        return 0.0
+    from compressor.vibration import casing_motion
+
+    nodes = gas_nodes(case, end)
+    rough = (nodes - smooth_nodes(nodes, NOISE_WINDOW))[:, 0]
+    rod = (gas.rod_diameter_mm or 0.0) / 2 if end == "crank" else 0.0
+    area = math.pi * (to_si(gas.piston_radius_mm, "mm") ** 2 - to_si(rod, "mm") ** 2)
+    force = area * np.append(rough, rough[0])
+    if sensor.direction == "y":  # by the slope of the rod
+        sines = np.sin(np.linspace(0.0, 2.0 * math.pi, force.size))
+        sines *= machine.crank_radius_mm / machine.rod_length_mm
+        force *= sines / np.sqrt(1.0 - sines**2)
+    moved = casing_motion(body, force, case.turn / rough.size, steady=True)
+    return float(np.sqrt(np.mean(moved.acceleration[:-1] ** 2)))
 
 
 class Polytrope(NamedTuple):

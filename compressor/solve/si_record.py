@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case, Guide, joint_stiffness, to_si
+from compressor.cases import Case, joint_stiffness, to_si
 from compressor.metrics import JOINTS
 from compressor.physics import (
     FLOWS,
@@ -194,12 +194,14 @@ def _film(case: Case, p: dict[str, Any]) -> None:
     ]
 
 
-def _guide_contact(case: Case, guide: Guide, p: dict[str, Any]) -> None:
+def _guide_contact(case: Case, p: dict[str, Any]) -> None:
     """Set how a corner of the crosshead meets its guide.
 
     As the joints do, where it has no keys of its own; without their restitution by ADAMS's IMPACT.
     """
-    contact = case.contact
+    guide, contact = case.guide, case.contact
+    if guide is None:
+        return
     exponent = guide.exponent or contact.exponent
     damping = guide.damping_N_s_per_mm
     damping = contact.damping_N_s_per_mm if damping is None else damping
@@ -225,7 +227,7 @@ def _features(case: Case, p: dict[str, Any]) -> None:
         p["guide_clearance"] = to_si(guide.clearance_mm, "mm")
         p["guide_length"] = to_si(guide.crosshead_length_mm, "mm") / 2
         p["guide_height"] = to_si(guide.crosshead_height_mm, "mm") / 2
-        _guide_contact(case, guide, p)
+        _guide_contact(case, p)
         p["guide_friction"] = guide.friction
         p["guide_stiction"] = to_si(guide.stiction_velocity_mm_per_s, "mm/s")
         p["crosshead_inertia"] = guide.crosshead_inertia_kg_m2 or 0.0

@@ -1,7 +1,7 @@
 """What a frame does with the forces on it, and how its signals are read."""
 
 from compressor.vibration.accelerometer import Record, analogue_rate, find_noise_mistake, noisy
-from compressor.vibration.body import Forces
+from compressor.vibration.body import Forces, casing_motion
 from compressor.vibration.envelope import (
     energy_angle,
     envelope_spectrum,
