@@ -19,7 +19,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis.runs import case_of, record_of
-from compressor.cases import Case, Machine, to_si
+from compressor.cases import Case, to_si
 from compressor.physics import exact_motion, sample_segments, segments
 from compressor.solve import gas_nodes
 
@@ -101,7 +101,7 @@ def end_states(run: xr.Dataset) -> dict[str, EndState]:
     angles, x = run["crank_angle"].values, 1e3 * run["displacement"].values
     edges, phases = segments(p, angles[-1] / p.omega)
     now = phases[sample_segments(angles / p.omega, edges)]
-    beyond = _stroke_begins(angles, x, machine)
+    beyond = _stroke_begins(case, angles, x)
     radius, states = machine.crank_radius_mm, {}
     for end in filter(gas.presses, ("head", "crank")):
         clearance = 0.0 if gas.is_measured else gas.clearance(end, 2 * radius)
@@ -124,13 +124,14 @@ def _card_pressures(case: Case, end: str, angles: np.ndarray) -> np.ndarray:
     return np.interp(angles % (2.0 * math.pi), at, np.append(nodes, nodes[0]))
 
 
-def _stroke_begins(angles: np.ndarray, x: np.ndarray, machine: Machine) -> np.ndarray:
+def _stroke_begins(case: Case, angles: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Return how far (mm) the crosshead was beyond its ideal place at the last dead centre.
 
     angles: rad, x: mm, both of samples, (m,); straight between those beside a dead centre. What
     begins within a stroke has that of its first sample until the next one.
     """
-    ideal, *_ = exact_motion(angles, machine.crank_radius_mm, machine.rod_length_mm, 1.0)
+    lengths = case.machine.crank_radius_mm, case.machine.rod_length_mm
+    ideal, *_ = exact_motion(angles, *lengths, 1.0)
     centres = math.pi * np.floor(angles / math.pi + 1e-9)
     return np.interp(centres, angles, x - ideal)
 
