@@ -22,6 +22,7 @@ from compressor.analysis.effects import (
     trend,
 )
 from compressor.analysis.machine_numbers import describe_cases, describe_machine
+from compressor.analysis.margins import mean_peak
 from compressor.analysis.plot_captions import (
     PLOT_CAPTIONS,
     SweptRow,

@@ -117,11 +117,16 @@ def measure(run: xr.Dataset, value: Callable[[xr.Dataset], float], error: float)
 def peak(run: xr.Dataset, name: str, **where: str) -> BarredNumber:
     """Return a greatest value of a run with its error bar; where: its joint.
 
-    Of a chaotic run the mean over revolutions of each one's greatest value, since that of the whole
-    run grows with its length.
+    Of a chaotic run it is `mean_peak`, since that of the whole run grows with its length.
     """
-    if not is_chaotic(run):
-        return metric(run, name, **where)
+    return mean_peak(run, name, **where) if is_chaotic(run) else metric(run, name, **where)
+
+
+def mean_peak(run: xr.Dataset, name: str, **where: str) -> BarredNumber:
+    """Return the mean over a chaotic run's revolutions of each one's greatest value, with its bar.
+
+    where: its joint.
+    """
     value, error = (
         float(run[n].sel(where)) for n in (f"{name}_mean", f"{name}_mean_standard_error")
     )

@@ -18,12 +18,13 @@ import numpy as np
 import xarray as xr
 from markupsafe import Markup
 
-from compressor.analysis import SPOKEN, Claim
+from compressor.analysis import SPOKEN, Claim, mean_peak
 from compressor.cases import MODEL_VERSION, Case
 from compressor.digits import UNKNOWN, is_known, setting
 from compressor.metrics import BARRED, JOINTS
+from compressor.outcome import Regime
 from compressor.program import PROGRAM, library_versions
-from compressor.report.figures.sweep_data import Measure, measures, name_in_words
+from compressor.report.figures.sweep_data import Measure, measures, name_in_words, swept_values
 from compressor.report.page import Section, format_measure, number, templates
 from compressor.store import Folder, Stored, StoredStudy
 from compressor.units import Units
@@ -292,16 +293,34 @@ def findings(jobs: Iterable[tuple[str, xr.Dataset]], units: Units = "usual") -> 
     named = [(name, job) for name, job in jobs if str(job["status"].item()) == "ok"]
     known = list(dict.fromkeys(m for _, job in named for m in measures(job, units)))
     names = [name for name, _ in named]
-    columns = ((m, np.array([m.read(job) for _, job in named]).T) for m in known)
+    columns = ((m, np.array([read_numbers(m, job) for _, job in named]).T) for m in known)
     rows = [(m, values, bars) for m, (values, bars) in columns]
     return rank_findings(rows, names, {joint for _, job in named for joint in worn_joints(job)})
 
 
 def study_findings(data: xr.Dataset, units: Units = "usual") -> list[MetricChange]:
     """Return the metrics that change most over a study's jobs, as `open_study` gives it."""
-    known = measures(data, units)
-    rows = [(m, m.of(data).values.ravel(), m.bar(data).values.ravel()) for m in known]
-    return rank_findings(rows, Points(data), worn_joints(data))
+    points = Points(data)
+    numbers = ((m, read_numbers(m, data)) for m in measures(data, units))
+    rows = [(m, values.ravel(), bars.ravel()) for m, (values, bars) in numbers]
+    return rank_findings(rows, points, worn_joints(data), points.ascending)
+
+
+def read_numbers(measure: Measure, data: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Return a measure and its error bars, of a job or in the shape of a study's.
+
+    A single blow of a chaotic motion has no meaning: of its knock the mean over revolutions of the
+    hardest one in each counts, with its 95 % interval, as in `compsim find`.
+    """
+    if measure.variable not in data:
+        return np.array(math.nan), np.array(math.nan)
+    values, bars = measure.of(data).values.copy(), measure.bar(data).values.copy()
+    if measure.variable == KNOCK and f"{KNOCK}_mean" in data:
+        regime = data["regime"]
+        for place in np.argwhere((regime.values == Regime.CHAOTIC) & ~np.isnan(values)):
+            job = data.isel(dict(zip(regime.dims, place, strict=True)))
+            values[tuple(place)], bars[tuple(place)] = mean_peak(job, KNOCK, joint=measure.joint)
+    return values, bars
 
 
 def worn_joints(data: xr.Dataset) -> set[str]:
@@ -323,6 +342,15 @@ class Points(Sequence[str]):
             if {*of.dims} <= {*status.dims} and "case_key" in of.attrs
         ]
         self.data, self.shape, self.dims = data, status.shape, status.dims
+
+    @property
+    def ascending(self) -> list[int]:
+        """Return the numbers of the jobs by the one number that is swept, none without one."""
+        swept = {name: values for name, values in swept_values(self.data).items()
+                 if name in self.names and len({*values.tolist()}) > 1}  # fmt: skip
+        values = next(iter(swept.values()), np.array([]))
+        is_one = len(swept) == 1 and values.dtype.kind in "fiu" and not np.isnan(values).any()
+        return np.argsort(values, kind="stable").tolist() if is_one else []
 
     def __len__(self) -> int:
         return math.prod(self.shape)
@@ -352,10 +380,12 @@ def rank_findings(
     rows: Iterable[tuple[Measure, np.ndarray, np.ndarray]],
     names: Sequence[str],
     worn: Collection[str] = (),
+    ascending: Sequence[int] = (),
 ) -> list[MetricChange]:
     """Return the findings of measures over jobs, the greatest change first, one a metric.
 
-    worn: joints whose contact force is meant; where there is none, that of any. Knock comes first.
+    worn: joints whose contact force is meant; where there is none, that of any. ascending: as of
+    `Points`. Knock comes first.
     """
     best: dict[str, MetricChange] = {}
     for measure, values, bars in rows:
@@ -365,20 +395,38 @@ def rank_findings(
             continue
         found = finding(measure, values, bars, names)
         if found and measure.variable == KNOCK:
-            found = judge_knock(found, values)
+            found = judge_knock(found, values, bars, names, ascending)
         if found and (measure.variable not in best or found.rank > best[measure.variable].rank):
             best[measure.variable] = found
     return choose_findings(sorted(best.values(), key=lambda found: -found.rank), MAX_FINDINGS)
 
 
-def judge_knock(found: MetricChange, values: np.ndarray) -> MetricChange:
-    """Return the finding of a joint's knock with how many jobs knock, ranked by the hardest."""
-    known = values[~np.isnan(values)]
-    count = int(np.sum(known > BARRED[KNOCK].limit))
-    words = f"{count or 'none'} of {len(known)} jobs knock" + "s" * (count < 2)
-    if len(known) == 1:
-        words = "it knocks" if count else "it does not knock"
-    return replace(found, change=words, rank=float(known.max()), first=True)
+def judge_knock(
+    found: MetricChange,
+    values: np.ndarray,
+    bars: np.ndarray,
+    names: Sequence[str],
+    ascending: Sequence[int] = (),
+) -> MetricChange:
+    """Return the finding of a joint's knock with which jobs knock, ranked by what is sure of it.
+
+    A job whose error bar holds the limit may knock.
+    """
+    limit, bars = BARRED[KNOCK].limit, np.nan_to_num(bars, nan=0.0, posinf=math.inf)
+    knocks, quiet = values - bars > limit, values + bars <= limit
+    count, known = int(knocks.sum()), ~np.isnan(values)
+    unsure = int((known & ~knocks & ~quiet).sum())
+    if known.sum() == 1:
+        words = "it may knock" if unsure else "it knocks" if count else "it does not knock"
+    else:
+        words = f"{count or 'none'} of {known.sum()} jobs knock" + "s" * (count < 2)
+        along = [n for n in ascending if known[n]]
+        hits = knocks[along]
+        if 0 < count < len(along) and not np.diff(hits).sum() > 1:
+            end = along[int(np.argmax(hits))] if hits[-1] else along[count - 1]
+            words += f", from {names[end]} on" if hits[-1] else f", up to {names[end]}"
+        words += f"; {unsure} may" if unsure else ""
+    return replace(found, change=words, rank=float((values - bars)[known].max()), first=True)
 
 
 def choose_findings(ranked: Sequence[MetricChange], count: int) -> list[MetricChange]:

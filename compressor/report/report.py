@@ -31,6 +31,7 @@ from compressor.report.answer import (
     provenance_section,
     round_robin,
     study_findings,
+    worn_joints,
 )
 from compressor.report.figures import FIGURES
 from compressor.report.figures.pictures import Painter
@@ -322,7 +323,10 @@ def drawn_study(
 def motion_cautions(stored: Stored, study: StoredStudy, data: xr.Dataset) -> list[str]:
     """Return which of a study's jobs are chaotic or have not settled, a sentence each."""
     chaotic = int((data["regime"].values == Regime.CHAOTIC).sum())
-    texts = [f"{chaotic} of {study.jobs} jobs are chaotic, and their peaks do not count here"]
+    of_knock = "; knock is a mean over their revolutions" if worn_joints(data) else ""
+    texts = [
+        f"{chaotic} of {study.jobs} jobs are chaotic, and their peaks do not count here{of_knock}"
+    ]
     found = [*texts[: chaotic > 0], *run_caveats(stored.rows, study)]
     return [f"Study {study.name}: {text}." for text in found]
 

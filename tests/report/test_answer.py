@@ -184,6 +184,55 @@ def test_the_hardest_knock_heads_the_first_screen_with_how_many_jobs_knock():
     assert (quiet.high, quiet.change) == ("0.1000", "none of 3 jobs knocks")
 
 
+def knocking(knock, error, mean=None, regime="periodic", turns=20):
+    """A study of the small end's knock over its clearance, 0.1, 0.2 ... mm, out of order."""
+    joint, count = ["big_end", "small_end"], len(knock)
+    dims = ("clearance_mm",)
+
+    def of_joint(values):
+        return (*dims, "joint"), np.stack([np.zeros(count), np.array(values, float)], axis=1)
+
+    mean = knock if mean is None else mean
+    data = {
+        "status": (dims, np.full(count, "ok", object)), "key": (dims, np.arange(count).astype(str)),
+        "regime": (dims, np.broadcast_to(np.array(regime, object), count)),
+        "knock": of_joint(knock), "knock_error": of_joint(error), "knock_mean": of_joint(mean),
+        "knock_mean_standard_error": of_joint(np.full(count, 0.005)),
+        "revolutions": (dims, np.full(count, float(turns))),
+        "max_penetration": of_joint([1e-6] * count),
+    }  # fmt: skip
+    sizes = 0.1 * np.arange(1, count + 1)
+    at = {"clearance_mm": (dims, sizes, {"units": "mm", "case_key": "clearance_mm"})}
+    data = xr.Dataset(data, {**at, "joint": joint})
+    return study_findings(data.isel(clearance_mm=np.roll(np.arange(count), 1)))[0]
+
+
+def test_only_a_knock_beyond_its_bar_counts_and_from_where_on():
+    """Jobs whose bar held the limit, and those that are not known, were counted as knocking."""
+    found = knocking([0.1, 0.24, 0.4, 0.7], [0.01, 0.02, 0.01, 0.01])
+    assert found.change == "2 of 4 jobs knock, from clearance 0.3 mm on; 1 may"
+    assert (found.at_low, found.at_high) == ("clearance 0.1 mm", "clearance 0.4 mm")
+    falling = knocking([0.7, 0.24, 0.1], [0.0, np.nan, 0.0])
+    assert falling.change == "1 of 3 jobs knocks, up to clearance 0.1 mm"
+    assert knocking([0.7, 0.1, 0.7], [0.0] * 3).change == "2 of 3 jobs knock"
+    assert knocking([0.3, 0.4], [0.01, 0.01]).change == "2 of 2 jobs knock"
+    assert knocking([0.3, 0.4], [0.1, 0.2]).change == "none of 2 jobs knocks; 2 may"
+    assert knocking([0.3], [0.01]).change == "it knocks"
+    assert knocking([0.3], [0.1]).change == knocking([0.3], [np.inf]).change == "it may knock"
+    assert knocking([0.2], [0.01]).change == "it does not knock"
+
+
+def test_a_chaotic_job_knocks_by_its_mean_over_revolutions():
+    """It was told as "unknown, it knocks", above the sentence that its peak does not count."""
+    one = knocking([0.9], [np.inf], [0.4], "chaotic")
+    assert (one.high, one.change) == ("0.400 ± 0.011", "it knocks")  # of Student's t
+    assert knocking([0.9], [np.inf], [0.1], "chaotic").change == "it does not knock"
+    few = knocking([0.9], [np.inf], [0.4], "chaotic", turns=9)
+    assert (few.high, few.change) == ("unknown", "it may knock")
+    some = knocking([0.1, 0.9], [0.01, np.inf], [0.1, 0.4], ["periodic", "chaotic"])
+    assert some.change == "1 of 2 jobs knocks, from clearance 0.2 mm on"
+
+
 def test_joints_with_clearance_are_found_in_any_job(study):
     assert worn_joints(study) == set()
     depth = np.zeros((2, 3, 2))
