@@ -78,9 +78,9 @@ TOGETHER = {
 }
 # modules that take long; the others, in small pieces, then even out the processes. The first
 # ones compile each its own part of the equations, so that two processes do not compile the same at
-# once: lanes and then the march, chosen laws, mechanisms
+# once: the march, chosen laws, mechanisms
 LONG = (
-    "physics/test_lane_steps", "physics/test_contact_laws", "solve/test_chosen_laws",
+    "physics/test_march", "physics/test_contact_laws", "solve/test_chosen_laws",
     "campaigns/test_chaos_processes", "solve/test_feature_runs", "sweep/test_execution",
     "campaigns/test_chaos_files", "cases/test_load", "studies/stress/test_stress",
     "solve/test_integrate", "test_pages", "test_tutorial", "sweep/test_cluster",
@@ -329,8 +329,7 @@ def jobs_here():
 
     def run_batches(work, jobs, workers, pulse=lambda: None):
         for name, payload, _ in jobs:
-            known = workers.ahead([payload]) if workers.ahead else ()
-            yield JobResult(name, work(payload, *known), 0.01)
+            yield JobResult(name, work(payload), 0.01)
             pulse()
 
     with pytest.MonkeyPatch.context() as patch:

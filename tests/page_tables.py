@@ -363,27 +363,6 @@ def throughput_table():
         f"| {name} | {one['now']:.3g} | {one['before']:.3g} | {one['times as fast']:.2f} |"
         for name, one in found["compared"].items()
     ]
-    for kind, cases in (
-        ("lanes", "random cases with error bars"),
-        ("bare", "a sweep without error bars"),
-    ):
-        lines += [
-            "",
-            f"| {cases} | jobs | jobs with a different bit | ms a job alone | in SIMD lanes "
-            "| times as fast |",
-            "|---|---|---|---|---|---|",
-        ]
-        lines += [
-            f"| {joint} | {one['cases']} | {one['differ']} | {one['alone_ms']:.3g} "
-            f"| {one['lanes_ms']:.3g} | {one['times as fast']:.2f} |"
-            for joint, one in found[kind].items()
-        ]
-    bare = {joint: one["lanes_ms"] for joint, one in found["bare"].items()}
-    lines += [
-        "",
-        f"In lanes, a job of that sweep with both joints takes "
-        f"{bare['both'] / bare['big_end']:.1f} times as long as one at the big end.",
-    ]
     return "\n".join(lines) + "\n"
 
 

@@ -253,11 +253,6 @@ class Case(Settings):
         measured = self.load == "gas" and self.gas.is_measured
         return bool(self.lubricant or self.guide or self.drive or self.rod or rubbing or measured)
 
-    @property
-    def is_plain(self) -> bool:
-        """Return whether it has default laws and no features: many such runs march in lanes."""
-        return not (self.chooses_laws or self.has_features)
-
     @cached_property
     def physics_key(self) -> str:
         """Return the hash of physics and span, without the solver: 20 hexadecimal digits."""

@@ -5,7 +5,6 @@ from compressor.physics.contact import choose_laws, hysteresis, steepest
 from compressor.physics.contact_laws import elastic_form
 from compressor.physics.film import film_constants
 from compressor.physics.kinematics import exact_motion, series_motion
-from compressor.physics.lane_march import MIN_FULL, Run, march_side_by_side
 from compressor.physics.loads import (
     complete,
     gas_corners,

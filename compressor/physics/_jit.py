@@ -25,9 +25,6 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 COLLECTING = (200_000, 50, 50)  # gc's thresholds while numba compiles
 
 ENABLED = os.environ.get("COMPSIM_JIT", "1") != "0"
-# of processors that run at full speed with vectors of 512 bits (Intel's from Ice Lake on);
-# LLVM makes those of 256 for all alike, which takes lanes a fifth longer
-WIDE_VECTORS = "+avx512vbmi2"
 TARGET_LOCK = threading.RLock()  # or two threads would each make a function, of two types to numba
 
 
@@ -78,20 +75,15 @@ class Intrinsic(Deferred):
 
 @functools.cache
 def load_numba() -> None:
-    """Set up numba: folder of machine code, width of vectors, types of `Deferred` and `ByKind`."""
+    """Set up numba: folder of machine code, types of `Deferred` and `ByKind`."""
     import numba
     from numba.core import event
-    from numba.core.codegen import get_host_cpu_features
     from numba.core.registry import cpu_target
     from numba.extending import typeof_impl
 
     folder = machine_code_folder()
     discard_other_code(folder)
     numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
-    if numba.config.CPU_FEATURES is None:  # type: ignore[attr-defined]
-        features = get_host_cpu_features()
-        if WIDE_VECTORS in features.split(","):
-            numba.config.CPU_FEATURES = f"{features},-prefer-256-bit"  # type: ignore[attr-defined]
 
     @typeof_impl.register(Deferred)
     def type_of(value: Deferred, _: object) -> Any:
@@ -148,10 +140,9 @@ def _compile(function: Function, **options: Any) -> Function:
 def jit(function: Function) -> Function:
     """Compile `function` on its first call and keep the machine code on disk.
 
-    Arithmetic is IEEE's, in the order written, so that a run has the same bits by itself and in a
-    lane beside others; products and sums are fused where `fma` says so. A division by zero
-    gives inf or nan, not an exception, so that the caller can judge a state that went wrong. As it
-    is with ``COMPSIM_JIT=0``.
+    Arithmetic is IEEE's, in the order written; products and sums are fused where `fma` says so. A
+    division by zero gives inf or nan, not an exception, so that the caller can judge a state that
+    went wrong. As it is with ``COMPSIM_JIT=0``.
     """
     return _compile(function)
 
@@ -159,24 +150,9 @@ def jit(function: Function) -> Function:
 def inline_llvm(function: Function) -> Function:
     """Return `jit`, written by LLVM into each caller, whatever its size.
 
-    It compiles in a small part of the time that `inline_numba` takes.
+    It compiles in a small part of the time that numba's own inlining takes.
     """
     return _compile(function, forceinline=True)
-
-
-def inline_numba(function: Function) -> Function:
-    """Return `inline_llvm`, written by numba instead where modules of lanes call it.
-
-    For what loops over lanes call with tuples or arrays. By `inline_llvm`, LLVM sees too late that
-    nothing is called there, and makes no vector code of the loop. Numba's passes over it are then
-    taken again for each caller, so that others than lanes do without.
-    """
-    return _compile(function, forceinline=True, inline=is_for_lanes)
-
-
-def is_for_lanes(call: Any, caller: Any, callee: Any) -> bool:
-    """Return whether a call stands in a loop over lanes: numba passes its own forms of each."""
-    return str(caller.func_id.modname).startswith("compressor.physics.lane_")
 
 
 def inline_once(function: Function) -> Function:

@@ -16,7 +16,6 @@ from compressor.physics._jit import (
     dispatch_on_record,
     fma,
     inline_llvm,
-    inline_numba,
     inline_once,
     jit,
     square_root,
@@ -189,7 +188,7 @@ class ContactState(NamedTuple):
 NO_CONTACT = ContactState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-@inline_numba
+@inline_llvm
 def joint_contact(eccentricity, spins, bearing, carried, p):
     """Return the contact between a joint's journal and the rod's bore.
 

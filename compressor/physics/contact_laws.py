@@ -30,7 +30,6 @@ import numpy as np
 from compressor.physics._jit import (
     fma,
     inline_llvm,
-    inline_numba,
     inline_once,
     square_root,
     uncompiled,
@@ -298,7 +297,7 @@ def normal_force(penetration, rate, approach, stiffness, clearance, p):
     return impact(penetration, rate, stiffness, p)
 
 
-@inline_numba
+@inline_llvm
 def in_contact(normal):
     """Return whether a joint is in contact: F_N > 0, everywhere in the program."""
     return normal > 0.0

@@ -1,4 +1,4 @@
-"""Elementary functions without a branch or a call, so that loops over lanes become vector code.
+"""Elementary functions without a call.
 
 They give the same bits on every machine, which libraries do not promise. Polynomials are summed in
 pairs, each with one rounding: a step waits for them.

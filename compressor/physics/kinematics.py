@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import fma, inline_numba, jit, square_root
+from compressor.physics._jit import fma, inline_llvm, jit, square_root
 from compressor.physics.elementary import direction
 
 MAX_SERIES_ANGLE = 0.1  # rad: the widest angle at which the series of `small_angle` lack nothing
@@ -39,7 +39,7 @@ def ideal(t, p):
     return ideal_at(math.cos(theta), math.sin(theta), p)
 
 
-@inline_numba
+@inline_llvm
 def ideal_at(cos_theta, sin_theta, p):
     """Return the `IdealMotion` at a crank angle given by its cosine and sine."""
     ratio = p.crank_ratio
@@ -56,7 +56,7 @@ def ideal_at(cos_theta, sin_theta, p):
     return IdealMotion(cos_theta, sin_theta, sin_phi, cos_phi, rate, spin_up, x, v, a)
 
 
-@inline_numba
+@inline_llvm
 def small_angle(angle, p):
     """Return sine and cosine of an angle (rad).
 
@@ -72,13 +72,13 @@ def small_angle(angle, p):
     return sine, cosine
 
 
-@inline_numba
+@inline_llvm
 def crank_direction(t, p):
     """Return the cosine and sine of the crank angle at time t (s)."""
     return direction(p.omega * t)
 
 
-@inline_numba
+@inline_llvm
 def ideal_after(base, span, p):
     """Return the `IdealMotion` a time (s) after the crank angle whose (cosine, sine) is the base.
 

@@ -13,7 +13,7 @@ nanometre keeps its digits.
 import math
 from typing import NamedTuple
 
-from compressor.physics._jit import fma, inline_llvm, inline_numba, inline_once, jit
+from compressor.physics._jit import fma, inline_llvm, inline_once, jit
 from compressor.physics.contact import (
     LUGRE,
     NO_CONTACT,
@@ -209,7 +209,7 @@ class Instant(NamedTuple):
     centre_y: float
 
 
-@inline_numba
+@inline_llvm
 def evaluate(motion, y, phase, p):
     """Return the `Instant` of a state around the ideal motion, in the load's phase.
 
@@ -264,7 +264,7 @@ def write_carried_rates(now, y, p, out):
             out[place + 3] = bristle_rate(now.small.slip, y[place + 3], p)
 
 
-@inline_numba
+@inline_llvm
 def write_derivative(now, y, p, out):
     """Write dy/dt at an evaluated instant into out."""
     n = p.freedoms

@@ -7,7 +7,7 @@ The right-hand side records nothing. `observe` writes one row of quantities; the
 import math
 from enum import IntEnum
 
-from compressor.physics._jit import inline_llvm, inline_numba, inline_once, jit, square_root
+from compressor.physics._jit import inline_llvm, inline_once, jit, square_root
 from compressor.physics.contact import nearness
 from compressor.physics.kinematics import ideal
 from compressor.physics.motion import (
@@ -139,7 +139,7 @@ def centre_acceleration(now, y, p):
     return ax, c * (sin_phi * rate * rate - cos_phi * now.spin_up) - pin * motion.sin_theta
 
 
-@inline_numba
+@inline_llvm
 def joint_forces(now, y, p):
     """Return the forces (N) on the rod: big end x and y, small end x and y.
 
@@ -246,7 +246,7 @@ def powers(now, y, forces, p):
     return turning, pressing, pressed, -big.friction * big.slip - small.friction * small.slip
 
 
-@inline_numba
+@inline_llvm
 def write_powers(now, y, forces, p, out):
     """Write the four `powers` (W) into out[0:4]."""
     out[0], out[1], out[2], out[3] = powers(now, y, forces, p)
@@ -308,7 +308,7 @@ def observed_columns(now, y, forces, p):
     )  # fmt: skip
 
 
-@inline_numba
+@inline_llvm
 def write_contact_columns(now, y, forces, p, row):
     """Write the columns from ACCELERATION to GUIDE_MOMENT into the row."""
     columns = observed_columns(now, y, forces, p)
@@ -316,7 +316,7 @@ def write_contact_columns(now, y, forces, p, row):
         row[ACCELERATION + i] = columns[i]
 
 
-@inline_numba
+@inline_llvm
 def write_columns(now, y, forces, p, row):
     """Write the columns from ACCELERATION on into the row."""
     write_contact_columns(now, y, forces, p, row)

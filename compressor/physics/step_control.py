@@ -1,8 +1,7 @@
 """Whether a step is taken, how long the next one is, and which method takes it.
 
 PI control of the error, a first step from the rates, and the measured test for stiffness by which
-a stepper turns to the stiff partner and back. Functions of numbers alone are the rules that `march`
-and its lanes (`lane_control`) both call.
+a stepper turns to the stiff partner and back.
 """
 
 import math

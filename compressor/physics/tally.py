@@ -150,7 +150,7 @@ def peak_of(nodes, rows, every, column, known, size):
     """Return the greater of `known` and the largest value of a column over a step, or |value|.
 
     The step's nodes count, `every` first, second, ... of them, and the parabola through the best.
-    size: whether |value| is meant. `lane_control.top_and_vertex` is the same without a branch.
+    size: whether |value| is meant.
     """
     last = nodes.size - 1
     best, top = 0, -math.inf

@@ -29,4 +29,4 @@ from compressor.solve.scipy_driver import LOCAL
 from compressor.solve.series import SIGNALS, signals_of_scene
 from compressor.solve.si_record import initial_state, is_ideal, record, stiffness_of
 from compressor.solve.simulate import measure, observe, simulate, with_series
-from compressor.solve.solution import side_by_side, solve
+from compressor.solve.solution import solve

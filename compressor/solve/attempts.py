@@ -8,7 +8,7 @@ Gauss-Lobatto nodes for the metrics, and sample it on the output grid.
 import itertools
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -41,7 +41,7 @@ from compressor.solve.error_bars import (
     next_audit_rtol,
     series_errors,
 )
-from compressor.solve.march_driver import COMPILED, LANE_METHODS, march_through
+from compressor.solve.march_driver import COMPILED, march_through
 from compressor.solve.request import Cuts, Request, Stop, Trajectory, Turns, merge_turns, overdue
 from compressor.solve.run_metrics import metrics, switch_errors
 from compressor.solve.scipy_driver import step_through
@@ -211,24 +211,6 @@ class Solution:
         return journal_distance(self.p, self.samples, other.samples)
 
 
-Ahead = Mapping[float, Solution]  # attempts of a case that were made before, by tolerance
-NOTHING_AHEAD: Ahead = {}
-
-
-class RunNeeded(Exception):
-    """A run that a case needs next, of those that were not made before."""
-
-    def __init__(self, case: Case, rtol: float, sampled: bool):
-        self.case, self.rtol, self.sampled = case, rtol, sampled
-        super().__init__(f"a run at rtol {rtol:g}")
-
-
-class RunsAhead(dict[float, Solution]):
-    """Attempts of a case that were made before; while `is_planned`, a missing one is not made."""
-
-    is_planned = False
-
-
 def moves_body(case: Case) -> bool:
     """Return whether a case's runs move a body, for which they are sampled."""
     return case.body is not None
@@ -239,20 +221,12 @@ def is_sampled(case: Case) -> bool:
     return case.output.keep == "series" or moves_body(case)
 
 
-def take_run(
-    ahead: Ahead, case: Case, rtol: float, timeout: float, sampled: bool = False
-) -> Solution:
-    """Return an attempt that was made before, or `run_at_tolerance`.
+def run_and_sample(case: Case, rtol: float, timeout: float, sampled: bool = False) -> Solution:
+    """Return `run_at_tolerance`; a run of a case with a body is sampled in any case.
 
-    Each run of a case with a body is `sampled`, since it moves the body for error bars. Raises
-    RunNeeded in place of `run_at_tolerance` while the attempts are planned.
+    It moves the body, whose error bars need it.
     """
-    if case.solve.method in LANE_METHODS and (made := ahead.get(rtol)):
-        return made
-    sampled = sampled or moves_body(case)
-    if isinstance(ahead, RunsAhead) and ahead.is_planned:
-        raise RunNeeded(case, rtol, sampled)
-    return run_at_tolerance(case, rtol, timeout, sampled)
+    return run_at_tolerance(case, rtol, timeout, sampled or moves_body(case))
 
 
 def run_at_tolerance(
@@ -384,9 +358,7 @@ def overruns_friction(p: np.record, rtol: float) -> bool:
     return rubs and rtol * length_and_speed(p)[1] > MAX_SPEED_ERROR * p["stiction_velocity"]
 
 
-def comparison_run(
-    case: Case, solution: Solution, timeout: float, ahead: Ahead = NOTHING_AHEAD
-) -> Solution:
+def comparison_run(case: Case, solution: Solution, timeout: float) -> Solution:
     """Return another run of a case, by which a run's errors are estimated.
 
     For a run with no looser one before it. A tighter run; at the tightest tolerance a looser one.
@@ -394,15 +366,15 @@ def comparison_run(
     """
     tighter = companion_rtol(solution.p, solution.rtol)
     if tighter is not None:
-        return take_run(ahead, case, tighter, timeout)
+        return run_and_sample(case, tighter, timeout)
     if overruns_friction(solution.p, solution.rtol):
         stiff = replace(case, solve=replace(case.solve, method="RODAS"))
-        return take_run(ahead, stiff, solution.rtol / STIFF_TIGHTER, timeout)
-    return take_run(ahead, case, 10.0 * solution.rtol, timeout)
+        return run_and_sample(stiff, solution.rtol / STIFF_TIGHTER, timeout)
+    return run_and_sample(case, 10.0 * solution.rtol, timeout)
 
 
 def looser_comparison_run(
-    case: Case, solution: Solution, other: Solution, timeout: float, ahead: Ahead = NOTHING_AHEAD
+    case: Case, solution: Solution, other: Solution, timeout: float
 ) -> Solution | None:
     """Return a looser run, by which errors are estimated as well where the motion enlarges them.
 
@@ -410,7 +382,7 @@ def looser_comparison_run(
     """
     if other.reason or not is_amplified(solution.rtol, distances(solution.samples, other.samples)):
         return None
-    looser = take_run(ahead, case, LOOSER_FACTOR * solution.rtol, timeout)
+    looser = run_and_sample(case, LOOSER_FACTOR * solution.rtol, timeout)
     return None if looser.reason else looser
 
 

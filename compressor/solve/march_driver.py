@@ -48,7 +48,6 @@ COMPILED = {
     "TSIT5": (Mode.EXPLICIT, RungeKuttaPair.TSIT5),
     "RODAS": (Mode.STIFF, RungeKuttaPair.DOPRI5),
 }
-LANE_METHODS = ("auto", "TSIT5")
 CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
 
 

@@ -42,25 +42,16 @@ MOMENT_REV = 1e-6  # rev
 SAME_REVOLUTION = 1e-9  # relative distance of revolutions that rounding makes
 
 
-# what `twins_part` changes
-FOUND = ("horizon", "stopped", "rtol", "together_until", "twin_evaluations")
-
-
 class HorizonSearch:
     """A search for the horizon of a case beside its runs, and the budget of both.
 
     The budget counts evaluations of the equations, so that results do not depend on how busy the
     machine is. `horizon`: time (s) at which twins part; inf where they do not, nan as long as that
     is not known; `stopped`: the budget ended the search before that was known.
-
-    known: what an earlier search of the case found at each call of `twins_part`, by name; this one
-    adds what it finds later.
     """
 
-    def __init__(self, case: Case, known: list[dict[str, float]] | None = None):
+    def __init__(self, case: Case):
         self.case = case
-        self.known: list[dict[str, float]] = [] if known is None else known
-        self.calls = 0  # of `twins_part`
         self.began = time.monotonic()
         self.horizon = math.nan
         self.stopped = False
@@ -125,16 +116,11 @@ class HorizonSearch:
         end = self.case.duration
         if self.case.solve.horizon != "auto":
             return self.horizon < end
-        self.calls += 1
-        if self.calls <= len(self.known):
-            vars(self).update(self.known[self.calls - 1])
-            return self.horizon < end
         for span in [min(FIRST_LOOK_REV * self.case.turn, end), end][: 1 + whole]:
             work = min(TWINS_BUDGET * self.run_evaluations - self.twin_evaluations, self.work_left)
             if math.isnan(self.horizon) and span > self.together_until:
                 has_budget = work > 0.0 and self.left > 0.0
                 self.stopped = not (has_budget and self.search_span(span, work))
-        self.known.append({name: getattr(self, name) for name in FOUND})
         return self.horizon < end
 
     def search_span(self, span: float, work: float) -> bool:

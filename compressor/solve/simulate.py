@@ -12,7 +12,7 @@ from compressor.outcome import DatasetParts, Outcome, row, without_run, word_var
 from compressor.physics import FLOWS, is_featured, state_names
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
-from compressor.solve.attempts import NOTHING_AHEAD, Ahead, Solution
+from compressor.solve.attempts import Solution
 from compressor.solve.error_bars import Metrics
 from compressor.solve.request import NONE, Trajectory, last_state, passed_time
 from compressor.solve.run_metrics import ledger
@@ -183,11 +183,11 @@ def as_dataset(table: DatasetParts) -> "xr.Dataset":
     return dataset
 
 
-def observe(case: Case, ahead: Ahead = NOTHING_AHEAD) -> tuple[Outcome, DatasetParts]:
+def observe(case: Case) -> tuple[Outcome, DatasetParts]:
     """Simulate one case; return its `Outcome` and what its Dataset is made of (see `simulate`)."""
     if refused := refused_outcome(case):
         return refused, refused.table({})
-    return with_series(case, solve(case, ahead))
+    return with_series(case, solve(case))
 
 
 def with_series(case: Case, solution: Solution) -> tuple[Outcome, DatasetParts]:
@@ -205,9 +205,9 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, DatasetParts]:
     return result, result.table(variables)
 
 
-def measure(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Outcome:
+def measure(case: Case) -> Outcome:
     """Simulate one case; return its `Outcome` alone: what `simulate` gives less the time series."""
-    return refused_outcome(case) or whole_outcome(case, solve(case, ahead))
+    return refused_outcome(case) or whole_outcome(case, solve(case))
 
 
 def whole_outcome(case: Case, solution: Solution) -> Outcome:

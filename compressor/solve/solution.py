@@ -1,40 +1,18 @@
-"""Solve a case: ever tighter runs until energy balances and what accuracy promises holds.
-
-The attempts that several cases begin with, made side by side in lanes of the march. They are those
-that each would make by itself, to the bit: what cannot be made so is left to it.
-"""
+"""Solve a case: ever tighter runs until energy balances and what accuracy promises holds."""
 
 import math
-import time
-from collections.abc import Collection, Sequence
-from dataclasses import replace
-from typing import NamedTuple
-
-import numpy as np
 
 from compressor.cases import TIGHTEST, Case
 from compressor.outcome import Regime
-from compressor.physics import MIN_FULL, Run, march_side_by_side
 from compressor.reasons import Reason
 from compressor.solve.attempts import (
-    NOTHING_AHEAD,
-    Ahead,
-    RunNeeded,
-    RunsAhead,
     Solution,
-    Times,
-    build_request,
-    companion_rtol,
     comparison_run,
     estimate_errors,
     is_sampled,
     looser_comparison_run,
-    moves_body,
-    prepare_run,
+    run_and_sample,
     run_at_tolerance,
-    solution_of_trajectory,
-    take_run,
-    times_of,
 )
 from compressor.solve.error_bars import (
     ORDER,
@@ -47,177 +25,15 @@ from compressor.solve.error_bars import (
     relative_bar,
 )
 from compressor.solve.horizon import predictability_horizon
-from compressor.solve.march_driver import LANE_METHODS, prepare_stepper
 from compressor.solve.regime import (
     DOUBTFUL,
     HorizonSearch,
     has_doubtful_bars,
     repeats,
-    with_settle_rev,
     with_span,
 )
-from compressor.solve.request import Cuts, Trajectory, revolutions, with_edge
+from compressor.solve.request import Cuts, revolutions
 from compressor.solve.run_metrics import chaotic_bars, statistics
-from compressor.solve.si_record import natural_sizes, record, scene
-
-MAX_ATTEMPTS = 500_000  # of a step, of a run in a lane: a longer one is looked at by the clock
-MIN_TIME = 10.0  # s of wall time that a case must have: the clock is not looked at in lanes
-MAX_TIME = 3.0  # s of wall time after which no further attempts are begun in lanes
-MAX_SAMPLES = 100_000  # of a run in a lane
-STEPS_POWER = -0.2  # of the tolerance by which a run's steps grow, by the order of the method
-
-
-class LaneRequest(NamedTuple):
-    """A run that lanes are to make: the number of its case, and the request for it."""
-
-    case: int
-    rtol: float
-    max_steps: int
-    times: Times
-    run: Run
-    trajectory: Trajectory
-
-
-class Plan(RunsAhead):
-    """The runs of a case that lanes have made; also what came of them, where no other is needed.
-
-    `search`, `solution`: of `refine_until_accurate`, None as long as it has not ended; `known`: of
-    `HorizonSearch`.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.search: HorizonSearch | None = None
-        self.solution: Solution | None = None
-        self.known: list[dict[str, float]] = []
-
-    def next_run(self, case: Case) -> RunNeeded | None:
-        """Return the run that a case needs next, None where it needs none."""
-        search, self.is_planned = HorizonSearch(case, self.known), True
-        try:
-            self.solution = refine_until_accurate(case, search, self)
-        except RunNeeded as needed:
-            return needed
-        except Exception:  # it is raised again, and is its own, where the case is solved
-            return None
-        finally:
-            self.is_planned = False
-        self.search = search
-        return None
-
-
-def side_by_side(cases: Sequence[Case], scenes: Collection[int]) -> list[Plan]:
-    """Return the attempts of each case, by tolerance, as far as lanes can make them.
-
-    First the attempts that each case begins with, then those that it is found to need. scenes:
-    those for which lanes are compiled. A case that cannot run in lanes has none.
-    """
-    deadline = time.monotonic() + MAX_TIME
-    plans = [Plan() for _ in cases]
-    requests: dict[int, list[LaneRequest]] = {number: [] for number in scenes}
-    for number, case in enumerate(cases):
-        if may_run_in_lanes(case) and (of := int(scene(case))) in requests:
-            requests[of] += attempts_of(number, case)
-    for attempts in requests.values():
-        while attempts:
-            make_attempts(attempts, plans)
-            lost = {one.case for one in attempts if one.rtol not in plans[one.case]}
-            further = [
-                further_attempt(number, cases[number], plans)
-                for number in dict.fromkeys(one.case for one in attempts)
-                if number not in lost and time.monotonic() < deadline
-            ]
-            attempts = [one for one in further if one]
-            if len(attempts) < MIN_FULL:  # each is as fast by itself
-                break
-    return plans
-
-
-def make_attempts(attempts: Sequence[LaneRequest], plans: Sequence[Plan]) -> None:
-    """March attempts of cases of one scene side by side, and add those that end to the plans."""
-    # the longest first: the last ones to end leave lanes empty
-    attempts = sorted(attempts, key=expected_length, reverse=True)
-    began = time.perf_counter()
-    runs = march_side_by_side([one.run for one in attempts], MAX_ATTEMPTS)
-    evaluations = sum(int(run.stepper["evaluations"]) for run in runs if run)
-    per_evaluation = (time.perf_counter() - began) / max(evaluations, 1)
-    for one, run in zip(attempts, runs, strict=True):
-        if run and run.stepper["steps"] + run.stepper["rejected"] < one.max_steps:
-            plans[one.case][one.rtol] = lane_solution(one, run, per_evaluation)
-
-
-def expected_length(one: LaneRequest) -> float:
-    """Return about how many steps an attempt takes, but for a factor that all have in common."""
-    return float(one.run.edges[-1] / one.run.stepper["contact_step"] * one.rtol**STEPS_POWER)
-
-
-def further_attempt(number: int, case: Case, plans: Sequence[Plan]) -> LaneRequest | None:
-    """Return the attempt that a case needs next, by the plans, if lanes can make it."""
-    case = with_settle_rev(case, float(case.solve.settle_rev), 1)
-    needed = plans[number].next_run(case)
-    if needed is None or needed.case.solve.method not in LANE_METHODS:
-        return None
-    rtol, steps = min((rtol, made.trajectory.steps) for rtol, made in plans[number].items())
-    if steps * (needed.rtol / rtol) ** STEPS_POWER > MAX_ATTEMPTS:  # it would not end in a lane
-        return None
-    p, times = record(case), times_of(case, needed.sampled)
-    if times.all.size > MAX_SAMPLES:
-        return None
-    return lane_request(number, needed.case, needed.rtol, p, times)
-
-
-def may_run_in_lanes(case: Case) -> bool:
-    """Return whether a case may be simulated in lanes, by what it says of its solution."""
-    settings = case.solve
-    fits = case.is_plain and not case.problems and settings.method in LANE_METHODS
-    fits = fits and not case.output.signals  # lanes tally no rod load
-    fits = fits and settings.settle_rev != "auto"
-    return fits and settings.timeout_s >= MIN_TIME and settings.max_steps >= MAX_ATTEMPTS
-
-
-def attempts_of(number: int, case: Case) -> list[LaneRequest]:
-    """Return what a case's first attempt needs, and its companion's."""
-    case = with_settle_rev(case, float(case.solve.settle_rev), 1)
-    p, sampled = record(case), is_sampled(case)
-    requests = [lane_request(number, case, case.rtol, p, times_of(case, sampled))]
-    if case.wants_bars and (tighter := companion_rtol(p, case.rtol)):
-        if sampled:
-            requests.append(
-                lane_request(number, case, tighter, p, times_of(case, moves_body(case)))
-            )
-        else:  # all but the tolerance is the same
-            requests.append(with_tolerance(requests[0], tighter))
-    return [one for one in requests if one.times.all.size <= MAX_SAMPLES]
-
-
-def with_tolerance(one: LaneRequest, rtol: float) -> LaneRequest:
-    """Return the same attempt at another tolerance."""
-    stepper = one.run.stepper.copy()
-    stepper["rtol"] = rtol
-    run, trajectory = one.run._replace(stepper=stepper), replace(one.trajectory)
-    return one._replace(rtol=rtol, run=run, trajectory=trajectory)
-
-
-def lane_request(number: int, case: Case, rtol: float, p: np.record, times: Times) -> LaneRequest:
-    """Return an attempt of a case in the form that lanes take."""
-    request = build_request(case, rtol, p, times)
-    trajectory, edges, phases, z = prepare_run(request)
-    size = natural_sizes(request.fields)
-    stepper = prepare_stepper(request, size)
-    edges, phases, stepper["settle"] = with_edge(edges, phases, request.settle)
-    run = Run(stepper, p, z, size, edges, phases, times.all, trajectory.states, trajectory.tally)
-    return LaneRequest(number, rtol, request.max_steps, times, run, trajectory)
-
-
-def lane_solution(one: LaneRequest, run: Run, each: float) -> Solution:
-    """Return an attempt whose run has reached its end; each: wall time (s) of an evaluation."""
-    stepper, trajectory = run.stepper, one.trajectory
-    trajectory.states, trajectory.tally = run.states, run.tally
-    trajectory.steps, trajectory.rejected = int(stepper["steps"]), int(stepper["rejected"])
-    trajectory.evaluations = int(stepper["evaluations"])
-    trajectory.seconds = each * trajectory.evaluations
-    return solution_of_trajectory(one.rtol, run.p, one.times, trajectory)
-
 
 OUT_OF_BUDGET = (
     Reason.BUDGET_STEPS,
@@ -228,7 +44,7 @@ ERROR_AIM = 0.7  # of what is allowed: where the next run's error is aimed at
 MIN_TIGHTENING, MAX_TIGHTENING = 10.0, 1000.0  # times tighter that the next run may be
 
 
-def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> Solution:
+def refine_until_accurate(case: Case, search: HorizonSearch) -> Solution:
     """Return the first run that keeps its promise, or the last whole one as a failed job.
 
     A first run is compared with one a little tighter, and with a looser one, too, where the motion
@@ -243,7 +59,7 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
     before: Solution | None = None
     unsound = 0  # runs that did not balance
     while True:
-        now = take_run(ahead, search.within_budget(case), rtol, search.left, is_sampled(case))
+        now = run_and_sample(search.within_budget(case), rtol, search.left, is_sampled(case))
         if now.reason:
             return end_early(case, best, now, search)
         search.count(now.trajectory)
@@ -259,7 +75,7 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
         if not case.wants_bars:
             return now
         if before is None:
-            other = comparison_run(case, now, search.left, ahead)
+            other = comparison_run(case, now, search.left)
             search.count(other.trajectory)
         else:
             other = before
@@ -267,7 +83,7 @@ def refine_until_accurate(case: Case, search: HorizonSearch, ahead: Ahead) -> So
         excess, third = excess_over_promise(case, now), None
         if excess <= 1.0:
             # two runs may agree by chance where the motion enlarges their errors: ask a third
-            excess, third = recheck(case, now, other, before is None, search, ahead)
+            excess, third = recheck(case, now, other, before is None, search)
         if excess <= 1.0:
             now.promise = "kept" if has_promise(case) else "none"
             return now
@@ -288,7 +104,7 @@ def tightest(case: Case, now: Solution, *others: Solution) -> Solution:
 
 
 def recheck(
-    case: Case, now: Solution, other: Solution, first: bool, search: HorizonSearch, ahead: Ahead
+    case: Case, now: Solution, other: Solution, first: bool, search: HorizonSearch
 ) -> tuple[float, Solution | None]:
     """Compare a run that seems to keep its promise with a third one; two may agree by chance.
 
@@ -297,9 +113,9 @@ def recheck(
     run where it is by that.
     """
     if first:
-        third = looser_comparison_run(case, now, other, search.left, ahead)
+        third = looser_comparison_run(case, now, other, search.left)
     else:
-        third = comparison_run(case, now, search.left, ahead)
+        third = comparison_run(case, now, search.left)
         if third.reason or third.rtol == other.rtol:
             third = None
     excess = excess_over_promise(case, now)
@@ -384,25 +200,19 @@ def missed_promises(case: Case, solution: Solution) -> list[str]:
     return [f"acceleration: its error may be {error:.2g} of it, not {case.promise:g}"]
 
 
-EVALUATION = 1e-7  # s, about, of an attempt made alone: it counts against timeout_s
 SEARCH_ENDED = "the search for chaos came to its limit"
 CHAOTIC_RTOL = 1e-6  # at the loosest, of the run that statistics are taken from
 
 
-def solve(case: Case, ahead: Ahead = NOTHING_AHEAD) -> Solution:
+def solve(case: Case) -> Solution:
     """Return a case's motion, with errors, regime and horizon as far as they are wanted.
 
-    ahead: its attempts that `side_by_side` has made. Raises nothing for a run that fails: its
-    `reason` and `detail` say why.
+    Raises nothing for a run that fails: its `reason` and `detail` say why.
     """
-    plan = ahead if isinstance(ahead, Plan) else Plan()
-    search = plan.search or HorizonSearch(case, plan.known)
-    search.began = time.monotonic() - search.twin_evaluations * EVALUATION
-    for attempt in ahead.values():
-        search.began -= attempt.trajectory.evaluations * EVALUATION
+    search = HorizonSearch(case)
     settling = with_span(case, search)
     case = search.case = settling.case
-    solution = plan.solution or refine_until_accurate(case, search, ahead)
+    solution = refine_until_accurate(case, search)
     solution.settled = settling.settled
     if solution.reason not in ("", Reason.ACCURACY_NOT_REACHED):
         return solution

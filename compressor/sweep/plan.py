@@ -131,7 +131,7 @@ class Ahead:
             timed=sum(part.timed for part in parts),
             loading=wall([]),
             cores=at_once,
-            compiling=compile_seconds(needs.with_lanes(looked_at)),
+            compiling=compile_seconds(needs),
             bytes=sum(part.bytes for part in parts),
         )
 

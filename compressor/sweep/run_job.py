@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from compressor.cases import Case
 from compressor.outcome import Outcome
@@ -18,18 +18,18 @@ class Carried(NamedTuple):
     data: bytes
 
 
-def run_job(place: Path | None, case: Case, ahead: Any = None) -> Outcome | Carried | StoreError:
+def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
     """Simulate a case and store its time series in a place, in a worker; the row is the Writer's.
 
-    Without a place, what is to be stored comes back. ahead: what `run_ahead` has made of the case.
+    Without a place, what is to be stored comes back.
     A StoreError is returned, since it ends the sweep: an exception is a failure of the job alone.
     """
     from compressor.solve import measure, observe  # needs numba: only to simulate
 
     with ignore_warnings():  # a solver's remarks; what matters is in the result
         if case.output.keep == "metrics":
-            return measure(case, ahead or {})
-        found, dataset = observe(case, ahead or {})
+            return measure(case)
+        found, dataset = observe(case)
     if found.reason == Reason.INVALID_INPUT:
         return found
     if place is None:
@@ -39,10 +39,3 @@ def run_job(place: Path | None, case: Case, ahead: Any = None) -> Outcome | Carr
         return replace(found, series=write_series(place, dataset, case.output))
     except StoreError as error:
         return error
-
-
-def run_ahead(scenes: tuple[int, ...], cases: list[Case]) -> list[Any]:
-    """Return what is computed of several cases at once: first attempts, of cases of some scenes."""
-    from compressor.solve import side_by_side
-
-    return side_by_side(cases, scenes)

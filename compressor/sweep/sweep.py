@@ -19,7 +19,7 @@ from compressor.program import Progress, no_progress
 from compressor.reasons import Reason
 from compressor.store import Folder, StoreError, Writer, write_study
 from compressor.sweep.execution import Input, drain, require_posix, run_batches
-from compressor.sweep.run_job import run_ahead, run_job
+from compressor.sweep.run_job import run_job
 from compressor.sweep.wanted import (
     JobEnd,
     PendingCases,
@@ -205,7 +205,7 @@ def local(workers: int) -> Backend:
         remark: Callable[[str], None],
         pulse: Callable[[], object],
     ) -> Generator[JobResult | JobLost, None, None]:
-        needs, work = Needs.of(cases).with_lanes(cases), partial(run_job, place)
+        needs, work = Needs.of(cases), partial(run_job, place)
         return run_here(work, LazyCases(cases), needs, workers, remark, pulse)
 
     return run
@@ -244,17 +244,13 @@ def run_here(
 ) -> Generator[JobResult | JobLost, None, None]:
     """Return the generator of how jobs end in processes here, which load the equations first.
 
-    They are compiled before, if there is a job. Where the needs name scenes for lanes, jobs are
-    cases, and `work` takes what `run_ahead` gives. Raises what `run_batches` raises, and
+    They are compiled before, if there is a job. Raises what `run_batches` raises, and
     UnsupportedSystem on Windows.
     """
     require_posix()
     if jobs:
         compile_once(needs, remark)
-    ahead = partial(run_ahead, needs.lanes) if needs.lanes else None
-    return run_batches(
-        work, jobs, Workers(workers, partial(load, needs), ahead, grace=GRACE), pulse
-    )
+    return run_batches(work, jobs, Workers(workers, partial(load, needs), grace=GRACE), pulse)
 
 
 class LazyCases(Sequence[Any]):

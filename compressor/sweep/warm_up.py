@@ -10,8 +10,7 @@ import hashlib
 import os
 import threading
 import time
-from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,30 +29,23 @@ WHAT = {
     "auto": ("dry joints", 26),
     METHOD: ("solve.method {}", 1),
     "horizon": ("the horizon of dry joints", 7),
-    "lanes-1": ("jobs side by side, big end", 36),
-    "lanes-2": ("jobs side by side, small end", 36),
-    "lanes-3": ("jobs side by side, both joints", 37),
     "laws": ("other laws of contact and friction", 28),
     "laws-horizon": ("the horizon of other laws", 12),
     "features": ("mechanisms with features, such as oil or an elastic rod", 50),
     "features-horizon": ("the horizon of mechanisms with features", 8),
 }  # by part: what it is, and the seconds that it takes speed.REFERENCE
-LANES = {1: "big_end", 2: "small_end", 3: "both"}  # scenes whose runs march side by side
-MIN_JOBS_TO_LOAD, MIN_JOBS_TO_COMPILE = 16, 4000  # of a scene, for its lanes
-MAX_JOBS_SEEN = 1000  # jobs that are looked at for it
 LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 
 
 class Needs(NamedTuple):
     """The parts of the equations that some cases need.
 
-    methods: of integration; horizon: perturbed trajectories; lanes: scenes whose runs march side by
-    side; laws: others than the default ones; features: a mechanism with any.
+    methods: of integration; horizon: perturbed trajectories; laws: others than the default ones;
+    features: a mechanism with any.
     """
 
     methods: tuple[str, ...] = ()
     horizon: bool = False
-    lanes: tuple[int, ...] = ()
     laws: bool = False
     features: bool = False
 
@@ -73,7 +65,6 @@ class Needs(NamedTuple):
         found = {method: Needs((method,)) for method in self.methods}
         if self.horizon:
             found["horizon"] = Needs(horizon=True)
-        found |= {f"lanes-{of}": Needs(lanes=(of,)) for of in self.lanes}
         alone = {"laws": Needs(self.methods, laws=True)} if self.laws else {}
         alone |= {"features": Needs(self.methods, features=True)} if self.features else {}
         found |= alone
@@ -86,39 +77,16 @@ class Needs(NamedTuple):
         """Return those of the parts that this machine has not compiled before."""
         return {part: alone for part, alone in self.parts.items() if not marker(part).exists()}
 
-    def with_lanes(self, cases: Sequence[Case]) -> "Needs":
-        """Return the needs with the scenes that have enough jobs to march side by side.
-
-        Results are the same to the bit without: lanes that are not compiled yet need many
-        more jobs than those that are only to be loaded.
-        """
-        step = max(1, len(cases) // MAX_JOBS_SEEN)
-        sample = (cases[i] for i in range(0, len(cases), step))
-        counts = Counter(case.joint for case in sample if case.is_plain)
-        least = {
-            of: MIN_JOBS_TO_LOAD if marker(f"lanes-{of}").exists() else MIN_JOBS_TO_COMPILE
-            for of in LANES
-        }
-        worthwhile = (of for of, joint in LANES.items() if counts[joint] * step >= least[of])
-        return self._replace(lanes=tuple(worthwhile))
-
 
 def load(needs: Needs) -> None:
     """Load the equations, or compile them, by runs that are as short as can be."""
-    from compressor.solve import (
-        measure,
-        side_by_side,
-    )  # needs numba: only where something is simulated
+    from compressor.solve import measure  # needs numba: only where something is simulated
 
     solve = {"duration_rev": 0.01, "settle_rev": 0, "output_step_deg": 0.36}
     measure(Case.from_values({"solve": solve}))
     hows: list[dict[str, object]] = [{"method": method} for method in needs.methods]
     if needs.horizon:
         hows.append({"horizon": True})
-    if needs.lanes:
-        short = {"clearance_mm": 0.1, "solve": solve}
-        cases = [Case.from_values({"joint": joint, **short}) for joint in LANES.values()]
-        side_by_side(cases, needs.lanes)
     values: dict[str, object] = {"joint": "both", "clearance_mm": 0.1}
     kinds: list[dict[str, object]] = [{}]
     if needs.laws:

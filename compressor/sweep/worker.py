@@ -56,15 +56,13 @@ class JobLost:
 class Workers:
     """Worker processes: how many, and the rules for them.
 
-    `prepare` is called once in each, before its clocks and limits are set. `ahead`: called with
-    all jobs of a batch before the first one is done; what it gives for each is its work's second
-    argument. `memory`: bytes that a job may add (by default `memory_share`). `grace`: s beyond its
-    time in which a job may end by itself.
+    `prepare` is called once in each, before its clocks and limits are set. `memory`: bytes that a
+    job may add (by default `memory_share`). `grace`: s beyond its time in which a job may end by
+    itself.
     """
 
     count: int = 2
     prepare: Callable[[], object] = int
-    ahead: Callable[[list[Any]], Sequence[Any]] | None = None
     memory: int | None = None
     grace: float = 1.0
     target_seconds: float = 0.2
@@ -132,19 +130,16 @@ def do_batch(path: str, data: bytes, count: int) -> str:
         return problem
     with open(path, "r+b") as file, mmap.mmap(file.fileno(), NOTE.size) as note:
         found: list[JobResult | JobLost] = []
-        start = time.monotonic()
-        NOTE.pack_into(note, 0, os.getpid(), 0, start)
-        jobs = look_ahead(data, count)
-        began = time.monotonic()  # jobs that are given back would lose what was computed ahead
-        each = (began - start) / count
+        began = time.monotonic()
+        NOTE.pack_into(note, 0, os.getpid(), 0, began)
+        jobs = read_jobs(data, count)
         try:
             with sync_later():  # or each job would wait for the disk
                 for position, job in enumerate(jobs):
                     start = time.monotonic()
                     NOTE.pack_into(note, 0, os.getpid(), position, start)
-                    found.append(perform(job, start - each))
-                    start = time.monotonic()
-                    if start - began > MAX_OVERRUN * HERE["rules"].target_seconds:
+                    found.append(perform(job, start))
+                    if time.monotonic() - began > MAX_OVERRUN * HERE["rules"].target_seconds:
                         break
         except StoreError as error:  # no job's time series are known to be on disk
             found = [JobResult(None, pickle.dumps(error, pickle.HIGHEST_PROTOCOL), 0.0)]
@@ -154,26 +149,23 @@ def do_batch(path: str, data: bytes, count: int) -> str:
     return ""
 
 
-def look_ahead(data: bytes, count: int) -> Sequence[Callable[[], tuple[Any, ...]]]:
-    """Return for each job of a batch a function that returns the arguments of its work."""
-    ahead = HERE["rules"].ahead
+def read_jobs(data: bytes, count: int) -> Sequence[Callable[[], Any]]:
+    """Return for each job of a batch a function that returns the argument of its work."""
     try:
-        jobs = pickle.loads(data)
-        known = [(job,) for job in jobs] if ahead is None else zip(jobs, ahead(jobs), strict=True)
-        return [partial(tuple, arguments) for arguments in known]
+        return [partial(lambda job: job, job) for job in pickle.loads(data)]
     except MemoryError:  # each job by itself will need less, or fail alone
-        return [partial(only, data, position) for position in range(count)]
+        return [partial(read_job, data, position) for position in range(count)]
 
 
-def only(data: bytes, position: int) -> tuple[Any]:
-    """Return the single argument of a job's work."""
-    return (pickle.loads(data)[position],)
+def read_job(data: bytes, position: int) -> Any:
+    """Return the argument of a job's work, of those of a batch."""
+    return pickle.loads(data)[position]
 
 
-def perform(job: Callable[[], tuple[Any, ...]], start: float) -> JobResult | JobLost:
+def perform(job: Callable[[], Any], start: float) -> JobResult | JobLost:
     """Return the result of one job, pickled, or why it has none."""
     try:
-        result = pickle.dumps(HERE["work"](*job()), pickle.HIGHEST_PROTOCOL)
+        result = pickle.dumps(HERE["work"](job()), pickle.HIGHEST_PROTOCOL)
         return JobResult(None, result, time.monotonic() - start)
     except MemoryError:
         most = f"needs more than the {HERE['rules'].memory / 1e9:.3g} GB that a worker may add"

@@ -10,7 +10,6 @@ own, started cold; its memory is the greatest resident set, of the parent where 
 import dataclasses
 import functools
 import json
-import math
 import os
 import shutil
 import subprocess
@@ -21,7 +20,6 @@ from pathlib import Path
 
 from compressor.cases.load import load_studies
 from compressor.store.studies import read_studies
-from compressor.sweep import warm_up
 from compressor.sweep.sweep import sweep
 
 JOBS = 100_000
@@ -67,8 +65,6 @@ def stub_sweep(jobs):
     with ProcessPoolExecutor(1) as other:  # as in a real run, this process has no equations
         found = other.submit(measured, study.cases[0]).result()
     sys.modules["compressor.sweep.sweep"].run_job = functools.partial(answered, found)
-    # no lanes: they would simulate
-    warm_up.MIN_JOBS_TO_LOAD = warm_up.MIN_JOBS_TO_COMPILE = math.inf
     sweep([study], "results", 2)
 
 

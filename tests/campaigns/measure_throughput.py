@@ -23,14 +23,10 @@ from pathlib import Path
 
 import numpy as np
 from measure_accuracy import provenance
-from random_cases import strangers
 
-from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.solve.simulate import measure
-from compressor.solve.solution import side_by_side
 from compressor.store.reader import read_store
-from compressor.sweep.warm_up import LANES, MIN_JOBS_TO_COMPILE
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = sorted(map(str, (ROOT / "configs").glob("*.yaml")))
@@ -46,8 +42,8 @@ COMMANDS = {
     "the same with the extra dask installed": ["-c", f"import compressor; {ONE_CASE}"],
     "compsim run configs/*.yaml": ["-m", "compsim", "run", *CONFIGS, "-j", "2", "--quiet"],
 }  # fmt: skip
-SEED, RUNS = 1516, 48  # of the random cases that march side by side
 BEFORE = "9ef7857"  # with which this version is compared: that before issue 34
+MANY = 4000  # jobs from which on versions before 27 November compiled code for jobs side by side
 SOLVER = """
 import json
 from compressor.cases import Case
@@ -167,10 +163,10 @@ def compared(commit):
             for tree in (ROOT, other):  # compiled before anything counts
                 said(["-c", SOLVER], folder, tree)
                 said(["-c", CALLS], folder, tree)
-                Path(folder, "many.yaml").write_text(many(MIN_JOBS_TO_COMPILE), encoding="utf-8")
+                Path(folder, "many.yaml").write_text(many(MANY), encoding="utf-8")
                 # each into a folder of its own, or the second finds all jobs stored
-                lanes = ["run", "many.yaml", "--quiet", "-o", "now" if tree == ROOT else "then"]
-                said(["-m", "compsim", *lanes], folder, tree)
+                first = ["run", "many.yaml", "--quiet", "-o", "now" if tree == ROOT else "then"]
+                said(["-m", "compsim", *first], folder, tree)
             pairs = []
             for turn in range(TURNS):
                 trees = (ROOT, other) if turn % 2 else (other, ROOT)
@@ -218,57 +214,8 @@ def sweeping(jobs):
     }
 
 
-def lanes():
-    """Cases job by job and side by side, by what they are and joint: bits that differ, and speed.
-
-    Random ones with error bars, and a sweep without.
-    """
-    found = {"lanes": {}, "bare": {}}
-    for scene, joint in LANES.items():
-        drawn = [one for one in strangers(SEED, 10 * RUNS) if one["joint"] == joint][:RUNS]
-        values = {"load": "spring", "output": {"keep": "metrics"}}
-        found["lanes"][joint] = beside([Case.from_values(one | values) for one in drawn], scene)
-        text = many(RUNS, joint=joint)
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder, "many.yaml")
-            path.write_text(text, encoding="utf-8")
-            found["bare"][joint] = beside([*load_studies(path)[0].cases], scene)
-    return found
-
-
-def beside(cases, scene):
-    """How fast cases of a scene are side by side and job by job, in turn: CPU time."""
-    measure(cases[0], side_by_side(cases, (scene,))[0])  # compiled before anything counts
-    times, differ = [], 0
-    for turn in range(TURNS):
-        seconds, outcomes = {}, {}
-        for way in ("alone", "lanes") if turn % 2 else ("lanes", "alone"):
-            began = time.process_time()
-            ahead = side_by_side(cases, (scene,)) if way == "lanes" else [{}] * len(cases)
-            pairs = zip(cases, ahead, strict=True)
-            outcomes[way] = [told(measure(case, made)) for case, made in pairs]
-            seconds[way] = time.process_time() - began
-        times.append(seconds)
-        ours = zip(outcomes["alone"], outcomes["lanes"], strict=True)
-        differ = max(differ, sum(one != other for one, other in ours))
-    return {
-        "cases": len(cases),
-        "differ": differ,
-        "alone_ms": 1e3 * statistics.median(one["alone"] for one in times) / len(cases),
-        "lanes_ms": 1e3 * statistics.median(one["lanes"] for one in times) / len(cases),
-        "times as fast": statistics.median(one["alone"] / one["lanes"] for one in times),
-    }
-
-
-def told(outcome):
-    """All that is stored of an outcome but the wall time of its run."""
-    numbers = outcome.numbers.copy()
-    numbers["seconds"] = 0.0
-    return outcome.status, outcome.reason, numbers.tobytes(), outcome.attributes
-
-
 def main(target, jobs=10_000, commit=BEFORE):
-    kept = {**provenance("make throughput"), **lanes()}  # first: compiled for all
+    kept = {**provenance("make throughput")}
     kept |= {"start": starting(), "sweep": sweeping(int(jobs))}
     kept |= {"before": commit, "compared": compared(commit)}
     Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")

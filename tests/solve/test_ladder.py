@@ -132,7 +132,7 @@ def test_where_errors_are_enlarged_a_looser_run_is_asked_as_well(asked):
 def test_runs_that_agree_by_chance_keep_no_promise(monkeypatch, asked):
     """Made to agree in all numbers, and nearly in their course; the looser run tells."""
 
-    def lucky(case, solution, timeout, ahead=attempts.NOTHING_AHEAD):
+    def lucky(case, solution, timeout):
         if solution.rtol < ACCURACY["draft"].rtol:
             return attempts.comparison_run(case, solution, timeout)
         other = replace(solution, rtol=solution.rtol / attempts.TIGHTER_FACTOR)
@@ -180,8 +180,8 @@ def test_a_third_run_that_tells_more_is_what_the_next_run_is_compared_with(monke
     """It is tighter than the one that it spoke against; a failed one is not heard."""
     original, made, rtol = solution.recheck, [], ACCURACY["standard"].rtol
 
-    def wary(case, now, other, first, search, ahead):
-        excess, _ = original(case, now, other, first, search, ahead)
+    def wary(case, now, other, first, search):
+        excess, _ = original(case, now, other, first, search)
         made.append(asked[-1])
         if len(made) == 1:
             third = attempts.comparison_run(case, now, search.left)

@@ -163,47 +163,6 @@ def test_a_long_batch_gives_its_rest_back():
     assert len({ends[n] for n in range(30, 50)}) == 2
 
 
-def ahead(jobs):
-    return [(len(jobs), job * job) for job in jobs]
-
-
-def test_jobs_of_a_batch_are_looked_at_together():
-    """Before the first of them; each gets what is its own, with fair shares of the time."""
-
-    def slow(jobs):
-        time.sleep(0.002 * len(jobs))
-        return ahead(jobs)
-
-    ends = list(run_batches(lambda job, known: known, named(range(300)), Workers(1, ahead=slow)))
-    found = results(ends)
-    assert {job: square for job, (_, square) in found.items()} == {n: n * n for n in range(300)}
-    assert max(count for count, _ in found.values()) > 20
-    assert all(0.001 < end.seconds < 0.1 for end in ends)
-
-
-def test_memory_that_a_batch_lacks_is_not_missed_by_its_jobs():
-    def greedy(jobs):
-        raise MemoryError
-
-    ends = run_batches(lambda job, known="alone": known, named(range(30)), Workers(1, ahead=greedy))
-    assert {*results(ends).values()} == {"alone"}
-
-
-def test_a_death_in_a_look_ahead_costs_its_cause_alone():
-    def deadly(jobs):
-        if 17 in jobs:
-            os.kill(os.getpid(), signal.SIGSEGV)
-        return ahead(jobs)
-
-    ends = list(
-        run_batches(lambda job, known: known[1], named(range(60)), Workers(1, ahead=deadly))
-    )
-    lost = [end for end in ends if isinstance(end, JobLost)]
-    assert [(end.id, end.reason) for end in lost] == [(17, "worker_died")]
-    done = {end.id: end.result for end in ends if not isinstance(end, JobLost)}
-    assert done == {n: n * n for n in range(60) if n != 17}
-
-
 def test_large_payloads_and_results_pass():
     jobs = [(n, bytes(30_000_000), 60.0) for n in range(3)]
     ends = results(run_batches(lambda data: data + b"1", jobs, Workers()))

@@ -6,7 +6,6 @@ import re
 import signal
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -256,14 +255,14 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     """What was finished before a stop is not compiled again."""
     monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
     monkeypatch.setattr(warm_up, "slowness", lambda: 1.0)
-    needs = warm_up.Needs(("auto", "Radau"), True, (3,), laws=True)
-    ahead = ["Radau", "auto", "horizon", "lanes-3", "laws", "laws-horizon"]
+    needs = warm_up.Needs(("auto", "Radau"), True, laws=True)
+    ahead = ["Radau", "auto", "horizon", "laws", "laws-horizon"]
     assert sorted(needs.parts) == ahead
-    assert warm_up.compile_seconds(needs) == 26 + 1 + 7 + 37 + 28 + 12
+    assert warm_up.compile_seconds(needs) == 26 + 1 + 7 + 28 + 12
     loaded, told = [], []
 
     def load(alone):
-        if alone.lanes and len(loaded) == 3:
+        if alone.laws and len(loaded) == 3:
             raise KeyboardInterrupt
         loaded.append(alone)
 
@@ -273,20 +272,20 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     )
     with pytest.raises(KeyboardInterrupt):
         warm_up.compile_once(needs, pytest.fail)
-    assert list(needs.uncompiled) == ["lanes-3", "laws", "laws-horizon"]
-    assert warm_up.compile_seconds(needs) == 37 + 28 + 12
+    assert list(needs.uncompiled) == ["laws", "laws-horizon"]
+    assert warm_up.compile_seconds(needs) == 28 + 12
     loaded.clear()
     warm_up.compile_once(needs, pytest.fail)
-    assert loaded == [needs.parts[part] for part in ("lanes-3", "laws", "laws-horizon")]
-    assert "part 2 of 6: solve.method Radau, about 1 s" in told[1]
-    assert "part 1 of 3: jobs side by side, both joints, about 37 s" in told[3]
+    assert loaded == [needs.parts[part] for part in ("laws", "laws-horizon")]
+    assert "part 2 of 5: solve.method Radau, about 1 s" in told[1]
+    assert "part 1 of 2: other laws of contact and friction, about 28 s" in told[3]
     assert not needs.uncompiled
     assert warm_up.compile_seconds(needs) == 0
 
 
 def test_every_part_that_can_be_needed_has_words():
     for kinds in ({"laws": True}, {"features": True}):
-        needs = warm_up.Needs(("auto",), True, tuple(warm_up.LANES), **kinds)
+        needs = warm_up.Needs(("auto",), True, **kinds)
         assert {*needs.parts} <= {*warm_up.WHAT}
 
 
@@ -331,38 +330,6 @@ def test_a_stop_amid_compiling_loses_no_finished_function(tmp_path):
     assert compiled("middle")[:3] == ["stopped", "inner", "middle"]
     assert compiled("none") in (["outer"], ["middle", "outer"])  # the last may not be stored yet
     assert compiled("none") == []
-
-
-def test_jobs_in_lanes_are_stored_with_the_same_bits(studies, tmp_path, monkeypatch):
-    """Side by side in workers, or each by itself: the rows differ by wall times alone."""
-    lengths = [round(0.1 + 0.005 * k, 3) for k in range(30)]
-    made = studies(many={"joint": "both", "clearance_mm": lengths, "output": {"keep": "metrics"}})
-    rows = []
-    for name, fewest in (("lanes", 1), ("alone", 10**9)):
-        monkeypatch.setattr(warm_up, "MIN_JOBS_TO_LOAD", fewest)
-        monkeypatch.setattr(warm_up, "MIN_JOBS_TO_COMPILE", fewest)
-        needs = warm_up.Needs.of(made[0].cases).with_lanes(made[0].cases)
-        assert needs.lanes == ((3,) if name == "lanes" else ())
-        sweep(made, tmp_path / name, 2)
-        data = store.open_study(tmp_path / name, "many").load()
-        rows.append(data.drop_vars(["seconds"]))
-    assert (rows[0]["status"] == "ok").all()
-    assert rows[0].equals(rows[1])
-
-
-def test_lanes_are_compiled_for_many_jobs_alone(studies, tmp_path, monkeypatch):
-    """Where they have been compiled before, a few jobs are enough to load them."""
-    few = studies(few={**BOTH, "clearance_mm": [0.1 + 0.001 * k for k in range(20)]})[0].cases
-    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
-    assert warm_up.Needs().with_lanes(few).lanes == ()
-    assert warm_up.Needs().with_lanes([few[0]] * warm_up.MIN_JOBS_TO_COMPILE).lanes == (3,)
-    warm_up.marker("lanes-3").touch()
-    assert warm_up.Needs().with_lanes(few).lanes == (3,)
-    assert warm_up.Needs().with_lanes([few[0]]).lanes == ()
-    chosen = [replace(case, contact=replace(case.contact, law="hertz")) for case in few]
-    assert warm_up.Needs().with_lanes(chosen).lanes == ()  # which do not march in them
-    assert list(warm_up.Needs.of(chosen).parts) == ["auto", "laws"]
-    assert list(warm_up.Needs.of(few).parts) == ["auto"]
 
 
 def test_laws_are_an_axis_of_a_sweep(studies, tmp_path, in_process):

@@ -75,11 +75,11 @@ def poisoned(kinds):
     return prepare
 
 
-def harmful(kinds, place, case, ahead=None):
+def harmful(kinds, place, case):
     """Run a case, unless it is one that does harm: in a worker."""
     if case.key in kinds:
         KINDS[kinds[case.key]][0]()
-    return SWEEP.run_job(place, case, ahead)
+    return SWEEP.run_job(place, case)
 
 
 def mixed(folder, draw):

@@ -20,7 +20,6 @@ from peers.mechanism import loosest
 from compressor.cases.case import Case
 from compressor.solve.simulate import measure
 from compressor.store import open_study
-from compressor.sweep.warm_up import MIN_JOBS_TO_COMPILE
 
 ROOT = Path(__file__).parents[3]
 SCRIPT = Path(__file__).with_name("script.py")
@@ -152,7 +151,7 @@ def compare(jobs=JOBS, few=FEW, turns=TURNS):
     ways |= {way: (run_ours, solve) for way, solve in OURS.items()}
     equal = {"rtol": ours, "error_bars": False}
     ways[f"`compsim run` without error bars, rtol {ours:g}"] = run_ours, equal
-    run_in_folder(run_ours, MIN_JOBS_TO_COMPILE, equal)  # also what many jobs need
+    run_in_folder(run_ours, few, equal)  # so that nothing is compiled while it is timed
     times, errors = {way: [] for way in ways}, {}
     for turn in range(turns):
         print(f"sweeps: turn {turn + 1} of {turns}", file=sys.stderr)
