@@ -1,15 +1,20 @@
 """Write what the program computes of many cases, to the last bit (make oracle), and compare two.
 
-A change of the source that is to change no number is judged by it: `write_oracle.py NEW.json`
-before and after, then `write_oracle.py NEW.json --against OLD.json`, which prints what differs and
-ends with 1 if anything does. Of each case: its keys, every number and word of its row (numbers as
-hex, times that the machine took left out) and a digest of its series; of the report over
-configs/, a digest of the CSV of each figure. The results are of one machine and its libraries.
+A change of the source that is to change no number is judged by it: `write_oracle.py NEW.json
+--against OLD.json` prints what differs and ends with 1 if anything does. With `--within`, a number
+that has an error bar differs only where it lies farther than both bars from the old one; numbers
+without a bar, series, keys and figures are then not compared. Of each case: its keys, every number
+and word of its row (numbers as hex, times that the machine took left out) and a digest of its
+series; of the report over configs/, a digest of the CSV of each figure. The results are of one
+machine and its libraries, which the file names. A file whose name ends with .xz is packed.
 """
 
 import argparse
 import hashlib
 import json
+import lzma
+import math
+import platform
 import sys
 import tempfile
 from dataclasses import replace
@@ -34,6 +39,7 @@ SEED = 33
 OF_CLAIMS = {"assumptions.yaml"}  # a base of `compsim claims`, which run refuses
 SCIPY_METHODS = ("DOP853", "RK45", "Radau", "LSODA")
 TIMINGS = ("seconds", "written", "versions", "host")  # parts of names of what differs by the run
+WORDS = ("status", "reason", "promise", "regime")  # of a row, that `--within` compares
 PATIENCE = 600.0  # s of wall time for a case: a busy machine is to change no result
 JOBS_OF_A_STUDY = 12  # the first ones of an example
 
@@ -96,6 +102,13 @@ def figures():
         }
 
 
+def machine():
+    """Return processor and libraries, which the last bits depend on."""
+    with open("/proc/cpuinfo", encoding="utf-8") as file:
+        names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]
+    return {"processor": names[:1], "python": platform.python_version()}
+
+
 def differences(new, old):
     """Return a line for each thing that differs between two files of this script."""
     lines = []
@@ -110,13 +123,60 @@ def differences(new, old):
     return lines
 
 
-def main(target, jobs, against):
+def beyond_bars(new, old):
+    """Return a line for each case that is only in one file, or whose words or numbers differ.
+
+    Numbers differ where they are farther apart than the sum of both error bars.
+    """
+    lines = []
+    for name in sorted((new.keys() | old.keys()) - {"figures", "machine"}):
+        if name not in new or name not in old:
+            lines.append(f"{name}: only in the {'new' if name in new else 'old'} file")
+            continue
+        now, then = new[name], old[name]
+        lines += [
+            f"{name}: {word}: {then.get(word)} was, {now.get(word)} is"
+            for word in WORDS
+            if now.get(word) != then.get(word)
+        ]
+        for number in then:
+            bar = f"{number}_error"
+            if bar in now and bar in then and number in now:
+                pairs = zip(*(map(read, one) for one in (now[number], then[number])), strict=True)
+                bars = zip(*(map(read, one) for one in (now[bar], then[bar])), strict=True)
+                lines += [
+                    f"{name}: {number}: {b!r} was, {a!r} is, bars {d:.2g} and {c:.2g}"
+                    for (a, b), (c, d) in zip(pairs, bars, strict=True)
+                    if abs(a - b) > c + d or math.isnan(a) != math.isnan(b)
+                ]
+    return lines
+
+
+def read(text):
+    """Return a number that `exact` wrote; what is no number is nan."""
+    return float.fromhex(text) if isinstance(text, str) and "x" in text else math.nan
+
+
+def load(path):
+    """Return what a file of this script holds."""
+    data = Path(path).read_bytes()
+    return json.loads(lzma.decompress(data) if str(path).endswith(".xz") else data)
+
+
+def save(found, path):
+    """Write a file of this script."""
+    data = (json.dumps(found, indent=0) + "\n").encode()
+    Path(path).write_bytes(lzma.compress(data, preset=9) if str(path).endswith(".xz") else data)
+
+
+def main(target, jobs, against, within):
     cases = cases_by_name()
     found = Parallel(n_jobs=jobs, verbose=1)(delayed(outcome)(case) for case in cases.values())
-    made = dict(zip(cases, found, strict=True)) | {"figures": figures()}
-    Path(target).write_text(json.dumps(made, indent=0) + "\n", encoding="utf-8")
+    made = dict(zip(cases, found, strict=True)) | {"figures": figures(), "machine": machine()}
+    save(made, target)
     if against:
-        lines = differences(made, json.loads(Path(against).read_text(encoding="utf-8")))
+        compare = beyond_bars if within else differences
+        lines = compare(made, load(against))
         print("\n".join(lines) or f"{len(made)} entries are equal")
         sys.exit(bool(lines))
 
@@ -126,5 +186,6 @@ if __name__ == "__main__":
     parser.add_argument("target", help="file to write")
     parser.add_argument("--jobs", type=int, default=2, help="worker processes")
     parser.add_argument("--against", default="", help="an older file to compare with")
+    parser.add_argument("--within", action="store_true", help="compare within both error bars")
     asked = parser.parse_args()
-    main(asked.target, asked.jobs, asked.against)
+    main(asked.target, asked.jobs, asked.against, asked.within)
