@@ -13,7 +13,16 @@ from compressor.physics.loads import (
     segments,
     static_load,
 )
-from compressor.physics.march import Status, WorkArrays, march, march_twins, new_stepper, new_work
+from compressor.physics.march import (
+    LAST_STEPS,
+    Attempt,
+    Status,
+    WorkArrays,
+    march,
+    march_twins,
+    new_stepper,
+    new_work,
+)
 from compressor.physics.mechanism_rows import STALLED, wear_all
 from compressor.physics.observe import (
     COLUMNS,

@@ -117,6 +117,20 @@ class Status(IntEnum):
 # numba wants plain integers
 RUNNING, DONE, NON_FINITE, STEP_UNDERFLOW, PENETRATION_IMPLAUSIBLE, BEYOND_MODEL = map(int, Status)
 
+
+class Attempt(IntEnum):
+    """What became of an attempt of a step; by the stiff partner STIFF more."""
+
+    REFUSED = 0
+    TAKEN = 1
+    TO_ONSET = 2
+    CUT_AT_ONSET = 3
+    STIFF = 4
+
+
+REFUSED, TAKEN, TO_ONSET, CUT_AT_ONSET, STIFF = map(int, Attempt)
+LAST_STEPS = 16  # attempts that are kept for whoever asks why a run stopped
+
 STEPPER = np.dtype(
     [
         ("pair", "i8"),
@@ -136,6 +150,7 @@ STEPPER = np.dtype(
         ("evaluations", "i8"),
         ("rejected", "i8"),
         ("onsets", "i8"),
+        ("attempts", "i8"),  # of a step: taken, refused, and cut short by an onset
         ("watch", "i8"),  # whether onsets of contact are watched
         ("mode", "i8"),  # Mode
         ("stiff", "i8"),  # whether the present step is the stiff partner's
@@ -168,6 +183,7 @@ class WorkArrays(NamedTuple):
     # (4,): share of the step with the rod load above and below zero, its tension and compression
     sides: np.ndarray
     row: np.ndarray
+    last: np.ndarray  # (LAST_STEPS, 4): the last attempts in a ring: begin, length, error, Attempt
 
 
 def new_stepper(mode):
@@ -187,7 +203,7 @@ def new_work(n):
     return WorkArrays(
         np.zeros((STAGES, size)), np.zeros(size), np.zeros(size), np.zeros((size, n)),
         np.zeros((5, n)), np.zeros(STAGES), np.zeros(n), np.zeros((NODES.size, COLUMNS)),
-        np.zeros(2), np.zeros(4), np.zeros(COLUMNS),
+        np.zeros(2), np.zeros(4), np.zeros(COLUMNS), np.zeros((LAST_STEPS, 4)),
     )  # fmt: skip
 
 
@@ -509,6 +525,32 @@ def finish_at_event(w, h, work, phase, p, tally):
 
 
 @jit
+def pass_with_crank(t, z, p):
+    """Return the time (s) that has passed when a crank is where a steady one were at t."""
+    return t + z[p.at[0] - 1] if p.driven else t
+
+
+@jit
+def pass_steadily(t, z, p):
+    """Return t: a steady crank's time is the time that passes."""
+    return t
+
+
+# of rates in place of z, and 1 in place of t: how fast time passes
+pass_time = dispatch_on_record(MECHANISM, pass_with_crank, pass_steadily)
+
+
+@inline_llvm
+def begin_attempt(w, h, z, error, work, p):
+    """Write an attempt of a step, REFUSED as long as nothing else is known, and return its row."""
+    row = work.last[w.attempts % LAST_STEPS]
+    row[0], row[1] = pass_time(w.t, z, p), h * pass_time(1.0, work.k[0], p)
+    row[2], row[3] = error, REFUSED + STIFF * w.stiff
+    w.attempts += 1
+    return row
+
+
+@jit
 def is_finite(new):
     """Return whether every number of a state is finite."""
     total = 0.0
@@ -561,7 +603,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         without_refcount(work.jacobian), without_refcount(work.dense),
         without_refcount(work.weights), without_refcount(work.y), without_refcount(work.rows),
         without_refcount(work.gap_fraction), without_refcount(work.sides),
-        without_refcount(work.row),
+        without_refcount(work.row), work.last,
     )  # fmt: skip
     z, atol, size = without_refcount(z), without_refcount(atol), without_refcount(size)
     times, states = without_refcount(times), without_refcount(states)
@@ -585,6 +627,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
             h = w.landing
         base = crank_direction(w.t, p)
         error = try_step(w, base, h, z, work, atol, size, phase, p)
+        attempt = begin_attempt(w, h, z, error, work, p)
         if not landing:
             if not is_accepted(error):
                 refuse(w, h, error)
@@ -595,8 +638,10 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
             # a step that the segment's end cut short says nothing against longer ones
             w.h = max(w.h, next_h) if h < w.h else next_h
         stride = observe_step(w, base, h, z, work, phase, p, tally)
+        attempt[3] += TO_ONSET if landing else TAKEN
         met = landing and finish_at_event(w, h, work, phase, p, tally)
         if not landing and onset_ahead(w, h, stride, work, phase, p):
+            attempt[3] += CUT_AT_ONSET - TAKEN
             continue
         at_edge = not landing and h == end - w.t
         reached = end if at_edge else w.t + h

@@ -1,25 +1,20 @@
-"""Integrate by the compiled march, in chunks between which budgets are checked.
+"""Integrate by the compiled march, in chunks between which budgets are checked."""
 
-A march can be resumed to the bit. So a run that ends well leaves nothing behind, and one that stops
-is taken up again from its last checkpoint, to record its last steps one by one.
-"""
-
-import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from compressor.physics import (
     FLOWS,
+    LAST_STEPS,
+    Attempt,
     Mode,
     RungeKuttaPair,
     Status,
     WorkArrays,
     derivative_with_flows,
-    is_last_step,
     march,
     new_stepper,
     new_work,
@@ -27,7 +22,7 @@ from compressor.physics import (
 )
 from compressor.reasons import Reason
 from compressor.solve.request import (
-    HISTORY_LENGTH,
+    NONE,
     History,
     Request,
     Stop,
@@ -35,7 +30,6 @@ from compressor.solve.request import (
     check_state,
     greatest_depth,
     overdue,
-    passed_time,
     too_deep,
     with_cuts,
     with_edge,
@@ -51,91 +45,6 @@ COMPILED = {
 CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
 
 
-class MarchState(NamedTuple):
-    """All that `march` writes but the output samples."""
-
-    stepper: np.record
-    z: np.ndarray  # motion and flows, (n + 4,)
-    work: WorkArrays
-    tally: np.record
-
-    def copy(self) -> "MarchState":
-        """Return a copy that a march may go on from."""
-        work = WorkArrays(*(array.copy() for array in self.work))
-        return MarchState(self.stepper.copy(), self.z.copy(), work, self.tally.copy())
-
-    @property
-    def attempts(self) -> int:
-        """Return the steps attempted so far: taken, refused, and cut short by an onset."""
-        w = self.stepper
-        return int(w.steps + w.rejected + w.onsets + (w.landing > 0.0))
-
-
-class Checkpoint(NamedTuple):
-    """A `MarchState` to resume from: of its work arrays, what a call of `march` reads.
-
-    Records are stored as bytes: numpy takes five microseconds to copy one, a fiftieth for these.
-    """
-
-    stepper: bytes
-    z: np.ndarray
-    rates: np.ndarray  # work.k[0]
-    row: np.ndarray
-    tally: bytes
-    kind: np.dtype  # of the tally
-
-    @classmethod
-    def of(cls, now: MarchState) -> "Checkpoint":
-        """Return a checkpoint, in about a microsecond."""
-        work = now.work
-        return cls(
-            now.stepper.tobytes(), now.z.copy(), work.k[0].copy(), work.row.copy(),
-            now.tally.tobytes(), now.tally.dtype,
-        )  # fmt: skip
-
-    def restore(self) -> MarchState:
-        """Return the state at the checkpoint."""
-        work = new_work(self.z.size - FLOWS)
-        work.k[0], work.row[:] = self.rates, self.row
-        return MarchState(
-            unpack_record(self.stepper, new_stepper(0).dtype),
-            self.z.copy(),
-            work,
-            unpack_record(self.tally, self.kind),
-        )
-
-
-def unpack_record(data: bytes, kind: np.dtype) -> np.record:
-    """Return a record of a kind, that compiled code may write, from its bytes."""
-    return np.frombuffer(bytearray(data), kind).view(np.recarray)[0]
-
-
-@dataclass(frozen=True)
-class March:
-    """A request in the form that the compiled loop takes.
-
-    `size`: of each number of the motion, (n,); `edges`, `phases`: the load's segments; `states`:
-    the output samples, which are written.
-    """
-
-    request: Request
-    size: np.ndarray
-    edges: np.ndarray
-    phases: np.ndarray
-    states: np.ndarray
-
-    def advance(self, now: MarchState, attempts: int, segments: int | None = None) -> None:
-        """Go on by at most so many attempts of a step, through the first so many segments."""
-        request, size = self.request, self.size
-        edges, phases = self.edges, self.phases
-        if segments is not None:
-            edges, phases = edges[: segments + 1], phases[:segments]
-        march(
-            now.stepper, request.p, now.z, now.work, request.rtol * size, size, edges, phases,
-            request.times, self.states, now.tally, attempts,
-        )  # fmt: skip
-
-
 def prepare_stepper(request: Request, size: np.ndarray) -> np.record:
     """Return a stepper at the start of a run by a compiled method; `size` as of `natural_sizes`."""
     mode, pair = COMPILED[request.method]
@@ -147,64 +56,45 @@ def prepare_stepper(request: Request, size: np.ndarray) -> np.record:
     return stepper
 
 
-def retrace(before: MarchState, after: MarchState, march: March) -> History:
-    """Return the history of a march from the state `before` to that at its stop, `after`.
+WORDS = {
+    Attempt.REFUSED: "refused", Attempt.TAKEN: "taken", Attempt.TO_ONSET: "to an onset",
+    Attempt.CUT_AT_ONSET: "cut at an onset",
+}  # fmt: skip
 
-    `before` is written.
-    """
-    attempts = after.attempts - before.attempts
-    if attempts > HISTORY_LENGTH:
-        march.advance(before, attempts - HISTORY_LENGTH)
-    history = History()
-    for _ in range(min(attempts, HISTORY_LENGTH)):
-        now = before.copy()
-        w = now.stepper
-        if w.fresh:
-            phase = int(march.phases[w.segment])
-            derivative_with_flows(w.t, now.z, phase, march.request.p, now.work.k[0])
-        march.advance(before, 1)
-        step = attempted_length(now.stepper, before.stepper, float(march.edges[w.segment + 1]))
-        scaled = scaled_error(now, before, step, march.request.rtol, march.size)
-        error = math.sqrt(float(np.mean(scaled**2)))
-        p, rates = march.request.p, now.work.k[0]
-        time, pace = float(passed_time(p, w.t, now.z)), float(passed_time(p, 1.0, rates))
-        history.add(time, step * pace, error, describe_attempt(now.stepper, before.stepper))
-        history.dominant = dominant(scaled, before.work.new[: march.size.size])
+
+def read_history(stepper: np.record, work: WorkArrays) -> History:
+    """Return the last steps of a march, by its ring of them."""
+    history, method = History(), RungeKuttaPair(int(stepper.pair)).name
+    attempts = int(stepper.attempts)
+    for number in range(max(0, attempts - LAST_STEPS), attempts):
+        begin, length, error, code = work.last[number % LAST_STEPS].tolist()
+        name = "RODAS" if code >= Attempt.STIFF else method
+        history.add(begin, length, error, f"{name} {WORDS[Attempt(int(code) % Attempt.STIFF)]}")
     return history
 
 
-def attempted_length(now: np.record, then: np.record, end: float) -> float:
-    """Return the length (s) of the step that was attempted, by the rules of `march`."""
-    if then.steps > now.steps:
-        return float(then.t - now.t)
-    if now.landing > 0.0 or now.h == 0.0:
-        return float(now.landing) or math.nan
-    h = min(now.h, end - now.t)
-    return float(end - now.t if is_last_step(now.t, h, end) else h)
+def find_dominant(now: "March") -> int:
+    """Return the number of the motion that is not finite, or has the next step's largest error.
 
-
-def scaled_error(
-    now: MarchState, then: MarchState, step: float, rtol: float, size: np.ndarray
-) -> np.ndarray:
-    """Return the estimated error of each number of the motion over its tolerance, (n,)."""
-    n = now.z.size - FLOWS
-    error = step_error(now.stepper, now.work.k, then.work.k, step)[:n]
-    largest = np.maximum(np.abs(now.z[:n]), np.abs(then.work.new[:n]))
-    return error / (rtol * (size + largest))
-
-
-def dominant(scaled: np.ndarray, new: np.ndarray) -> int:
-    """Return the number of the state that went bad first, or has the largest error."""
-    bad = np.flatnonzero(~np.isfinite(new) | ~np.isfinite(scaled))
+    A copy of the march goes on by one attempt of a step.
+    """
+    now = replace(
+        now, stepper=now.stepper.copy(), z=now.z.copy(), tally=now.tally.copy(),
+        states=now.states.copy(), phases=now.phases.copy(),
+    )  # fmt: skip
+    stepper, z, work, n = now.stepper, now.z, now.work, now.size.size
+    if not np.isfinite(z[:n]).all():
+        return int(np.flatnonzero(~np.isfinite(z[:n]))[0])
+    if stepper.segment == now.phases.size:
+        return NONE
+    derivative_with_flows(stepper.t, z, int(now.phases[stepper.segment]), now.request.p, work.k[0])
+    begin, rates, before = z[:n].copy(), work.k[:1].copy(), stepper.copy()
+    stepper["status"], stepper["fresh"] = Status.RUNNING, 0
+    now.advance(1)
+    error = step_error(before, rates, work.k, 1.0)[:n]
+    scaled = error / (now.size + np.maximum(np.abs(begin), np.abs(work.new[:n])))
+    bad = np.flatnonzero(~np.isfinite(work.new[:n]) | ~np.isfinite(scaled))
     return int(bad[0]) if bad.size else int(np.abs(scaled).argmax())
-
-
-def describe_attempt(now: np.record, then: np.record) -> str:
-    """Return the method of an attempt, and what became of it."""
-    method = "RODAS" if now.stiff else RungeKuttaPair(int(now.pair)).name
-    if then.steps > now.steps:
-        return f"{method} to an onset" if now.landing > 0.0 else f"{method} taken"
-    return f"{method} refused" if then.rejected > now.rejected else f"{method} cut at an onset"
 
 
 CHUNK = 2048  # attempts of the march between two looks at the clock: 7 ms, or stiff ones 50 ms
@@ -216,6 +106,30 @@ def chunks(request: Request, stepper: np.record) -> Iterator[int]:
         yield min(CHUNK, request.max_steps - stepper.steps - stepper.rejected)
 
 
+@dataclass(frozen=True)
+class March:
+    """A run in the form that the compiled loop takes; `march` says what each is."""
+
+    request: Request
+    stepper: np.record
+    z: np.ndarray
+    work: WorkArrays
+    size: np.ndarray
+    edges: np.ndarray
+    phases: np.ndarray
+    states: np.ndarray
+    tally: np.record
+
+    def advance(self, attempts: int, segments: int | None = None) -> None:
+        """Go on by at most so many attempts of a step, through the first so many segments."""
+        request, count = self.request, self.phases.size if segments is None else segments
+        march(
+            self.stepper, request.p, self.z, self.work, request.rtol * self.size, self.size,
+            self.edges[: count + 1], self.phases[:count], request.times, self.states, self.tally,
+            attempts,
+        )  # fmt: skip
+
+
 def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
     """Integrate by the compiled loop into `result`. Raises Stop."""
     deadline = time.monotonic() + request.timeout
@@ -223,18 +137,13 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
     stepper = prepare_stepper(request, size)
     edges, phases, stepper["settle"] = with_edge(edges, phases, request.settle)
     edges, phases, ends = with_cuts(edges, phases, request.cuts)
-    phases = phases.copy()
-    march = March(request, size, edges, phases, result.states)
-    now = MarchState(stepper, z, new_work(size.size), result.tally)
-    # two: where a run stops soon after the last one, the one before begins early enough
-    previous = latest = Checkpoint.of(now)
-    checkpoint_attempts = 0  # attempts at the last checkpoint
+    phases = phases.copy()  # a march writes into them where a gas is shut in
+    now = March(
+        request, stepper, z, new_work(size.size), size, edges, phases, result.states, result.tally
+    )
     result.segments = edges, phases
     for attempts in chunks(request, stepper):
-        if result.steps + result.rejected >= checkpoint_attempts + HISTORY_LENGTH:
-            previous, latest = latest, Checkpoint.of(now)
-            checkpoint_attempts = result.steps + result.rejected
-        march.advance(now, attempts, ends[0] if ends else phases.size)
+        now.advance(attempts, ends[0] if ends else None)
         result.steps, result.rejected = int(stepper.steps), int(stepper.rejected)
         result.evaluations = int(stepper.evaluations)
         if stepper.status == Status.DONE and ends and request.cuts:
@@ -247,8 +156,8 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
             check_march(request, stepper, z, float(result.tally.deepest), deadline)
         except Stop:
             result.stop_time, result.stop_state = float(stepper.t), z[:-FLOWS].copy()
-            enough = result.steps + result.rejected >= checkpoint_attempts + HISTORY_LENGTH
-            result.history = retrace((latest if enough else previous).restore(), now, march)
+            result.history = read_history(stepper, now.work)
+            result.history.dominant = find_dominant(now)
             raise
 
 

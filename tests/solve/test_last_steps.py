@@ -68,21 +68,17 @@ def test_a_history_is_that_of_the_run(method, monkeypatch):
     assert {text.split()[0] for text in words(found)} == {expected}
 
 
-def test_the_errors_are_those_that_the_control_saw():
+def test_the_errors_are_those_that_the_control_saw(monkeypatch):
     """After a step that is taken the control remembers the logarithm of its error's norm."""
-    request = simulate_request(max_steps=60)
     now = []
-    original = march_driver.retrace
+    original = march_driver.read_history
 
-    def looking(before, after, *rest):
-        now.append(float(after.stepper.error))
-        return original(before, after, *rest)
+    def looking(stepper, work):
+        now.append(float(stepper.error))
+        return original(stepper, work)
 
-    march_driver.retrace, kept = looking, march_driver.retrace
-    try:
-        history = integrate(request).history
-    finally:
-        march_driver.retrace = kept
+    monkeypatch.setattr(march_driver, "read_history", looking)
+    history = integrate(simulate_request(max_steps=60)).history
     last = [e for e, text in zip(history.errors, history.words, strict=True) if "taken" in text][-1]
     assert math.log(max(last, 1e-4)) == pytest.approx(now[0], abs=1e-9)
 
