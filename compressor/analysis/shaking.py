@@ -38,7 +38,7 @@ def frame_forces(run: xr.Dataset) -> dict[str, np.ndarray]:
             for name, (dims, _, _) in SIGNALS.items()
         }
     case = case_of(run)
-    if not case.has_features:
+    if not (case.needs_mechanism or case.lubricant):
         return signals_of_scene(record_of(run), run)
     values = case.values()
     solve = {name: value for name, value in values["solve"].items() if name != "accuracy"}

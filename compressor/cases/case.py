@@ -247,11 +247,16 @@ class Case(Settings):
         return self.contact.law != CONTACT_LAWS[0] or bool(self.friction and self.friction.law)
 
     @property
-    def has_features(self) -> bool:
-        """Return whether oil, a guide, a drive, a rod, rubbing joints or a card are modelled."""
-        rubbing = self.friction and self.friction.ideal_joints
+    def chooses_forces(self) -> bool:
+        """Return whether it has laws, a film or a load that runs by default do not have."""
         measured = self.load == "gas" and self.gas.is_measured
-        return bool(self.lubricant or self.guide or self.drive or self.rod or rubbing or measured)
+        return self.chooses_laws or self.lubricant is not None or measured
+
+    @property
+    def needs_mechanism(self) -> bool:
+        """Return whether a guide, a drive, a rod or rubbing joints need the general mechanism."""
+        rubbing = self.friction and self.friction.ideal_joints
+        return bool(self.guide or self.drive or self.rod or rubbing)
 
     @cached_property
     def physics_key(self) -> str:

@@ -18,9 +18,10 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import jit
-from compressor.physics.record import CARD_NODES
+from compressor.physics._jit import dispatch_on_record, inline_llvm, jit
+from compressor.physics.record import CARD_NODES, CHOICE, Load
 
+CARD = int(Load.CARD)
 PER_NODE = 2.0 * math.pi / CARD_NODES  # rad
 
 
@@ -38,6 +39,21 @@ def card_force(cos_theta, sin_theta, p):
     here, there = p.card[node, 1], p.card[after, 1]
     bend = (1.0 - s) * (here - rise) + s * (rise - there)
     return p.card[node, 0] + s * (rise + (1.0 - s) * bend)
+
+
+@jit
+def force_of_card(cos_theta, sin_theta, p):
+    """Return `card_force` of a load that was measured, 0 of any other."""
+    return card_force(cos_theta, sin_theta, p) if p.load == CARD else 0.0
+
+
+@inline_llvm
+def no_card(cos_theta, sin_theta, p):
+    """Return 0: records of the default forces have no card."""
+    return 0.0
+
+
+measured_force = dispatch_on_record(CHOICE, force_of_card, no_card)
 
 
 def card_nodes(angles, values):

@@ -183,9 +183,12 @@ class ContactState(NamedTuple):
     slip: float  # v_t
     elastic: float  # part of it without damping
     unclamped: float  # normal force before the clamp at zero
+    # of an oil film, whose force and moment on the rod are in those above
+    film_moment: float  # on the journal, N m
+    film_loss: float  # power that it takes, W
 
 
-NO_CONTACT = ContactState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_CONTACT = ContactState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inline_llvm
@@ -203,7 +206,7 @@ def joint_contact(eccentricity, spins, bearing, carried, p):
     distance = square_root(fma(ex, ex, ey * ey))
     penetration = distance - clearance
     if distance == 0.0:
-        return ContactState(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, 0.0, 0.0, 0.0)
+        return ContactState(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     per_distance = 1.0 / distance
     nx = ex * per_distance
     ny = ey * per_distance
@@ -222,7 +225,7 @@ def joint_contact(eccentricity, spins, bearing, carried, p):
     fy = fma(normal, ny, -(friction * nx))
     moment = -bore * friction
     return ContactState(
-        fx, fy, moment, normal, friction, penetration, rate, slip, elastic, unclamped
+        fx, fy, moment, normal, friction, penetration, rate, slip, elastic, unclamped, 0.0, 0.0
     )
 
 

@@ -33,8 +33,10 @@ import math
 
 import numpy as np
 
-from compressor.physics._jit import jit, uncompiled
+from compressor.physics._jit import dispatch_on_record, inline_llvm, jit, uncompiled
+from compressor.physics.contact import ContactState
 from compressor.physics.contact_laws import rise
+from compressor.physics.record import CHOICE
 
 CENTRE_ECCENTRICITY = 0.1
 SHAPES = {"rotation": 14, "attitude": 14, "squeeze": 22}  # numbers, and terms of each polynomial
@@ -246,3 +248,25 @@ def film(joint, eccentricity, spins, p):
     lost = shear * (journal_spin - bore_spin) + half * (journal_spin + bore_spin)
     lost -= normal * radial + side * across
     return fx, fy, -shear - half, shear - half, lost
+
+
+@jit
+def oiled_contact(joint, contact, eccentricity, spins, p):
+    """Return a joint's `ContactState` with the force, the moments and the loss of its film."""
+    if p.viscosity == 0.0:
+        return contact
+    fx, fy, journal, bore, lost = film(joint, eccentricity, spins, p)
+    return ContactState(
+        contact.fx - fx, contact.fy - fy, contact.moment + bore, contact.normal, contact.friction,
+        contact.penetration, contact.rate, contact.slip, contact.elastic, contact.unclamped,
+        journal, lost,
+    )  # fmt: skip
+
+
+@inline_llvm
+def dry_contact(joint, contact, eccentricity, spins, p):
+    """Return the contact: records of the default forces have no oil."""
+    return contact
+
+
+add_film = dispatch_on_record(CHOICE, oiled_contact, dry_contact)

@@ -34,15 +34,14 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics._jit import fma, jit, square_root
-from compressor.physics.card import card_force
+from compressor.physics.card import measured_force
 from compressor.physics.contact import NO_CONTACT, ContactState, carried_numbers, joint_contact
 from compressor.physics.contact_laws import power, rise
-from compressor.physics.film import film
+from compressor.physics.film import add_film
 from compressor.physics.loads import piston_force
-from compressor.physics.record import BIG_END, SMALL_END, Coordinate, Load
+from compressor.physics.record import BIG_END, SMALL_END, Coordinate
 from compressor.physics.worn_bore import worn_contact
 
-CARD = int(Load.CARD)
 MODES = 4  # two across, two along
 ACROSS = 2  # so many of them, the first, are across
 BIG_SLOPE = math.pi * np.array([1.0, 2.0, 0.0, 0.0])  # at the ends, times the length
@@ -306,23 +305,11 @@ class Pose(NamedTuple):
     spin: float  # of the rod, counter-clockwise
 
 
-class Film(NamedTuple):
-    """What a joint's oil film does beside its force on the rod, which is in the contact's."""
-
-    moment: float  # on the journal, N m
-    loss: float  # power that the film takes, W
-
-
-NO_FILM = Film(0.0, 0.0)
-
-
 class Joints(NamedTuple):
     """Contacts, guide and load, and the bores' spins: all forces that need no acceleration."""
 
     big: ContactState  # with the film's force and moment, where a joint has one
     small: ContactState
-    big_film: Film
-    small_film: Film
     guide: Guided
     load: float
     big_spin: float  # rad/s, of the rod's bore
@@ -411,19 +398,6 @@ def fill_bias(pose, rates, p, bias):
 
 
 @jit
-def oiled_contact(joint, contact, eccentricity, spins, p):
-    """Return a joint's `ContactState` with its film's force and moment, and the `Film`."""
-    if p.viscosity == 0.0:
-        return contact, NO_FILM
-    fx, fy, journal, bore, lost = film(joint, eccentricity, spins, p)
-    oiled = ContactState(
-        contact.fx - fx, contact.fy - fy, contact.moment + bore, contact.normal, contact.friction,
-        contact.penetration, contact.rate, contact.slip, contact.elastic, contact.unclamped,
-    )  # fmt: skip
-    return oiled, Film(journal, lost)
-
-
-@jit
 def bore_axes(slope, modes, pose, p):
     """Return the cosine and sine of a bore's angle, counter-clockwise.
 
@@ -451,7 +425,6 @@ def joints_of(phase, y, motion, pose, w, velocity, p):
     small_spin = pose.spin + dot_rows(SMALL_SLOPE, 0, MODES, modes) / p.rod_length
     pin_spin = velocity[10]
     big, small = NO_CONTACT, NO_CONTACT
-    big_film, small_film = NO_FILM, NO_FILM
     if p.clearance[0] > 0.0:
         place = p.at[1]
         eccentricity = y[place], y[place + 1], y[n + place], y[n + place + 1]
@@ -459,7 +432,7 @@ def joints_of(phase, y, motion, pose, w, velocity, p):
         spins = pose.speed, big_spin
         axes = bore_axes(BIG_SLOPE, w[7:11], pose, p)
         big = bore_contact(BIG_END, eccentricity, axes, spins, carried, p)
-        big, big_film = oiled_contact(BIG_END, big, eccentricity, spins, p)
+        big = add_film(BIG_END, big, eccentricity, spins, p)
     if p.clearance[1] > 0.0:
         place = p.at[3]
         eccentricity = y[place], y[place + 1], y[n + place], y[n + place + 1]
@@ -467,17 +440,16 @@ def joints_of(phase, y, motion, pose, w, velocity, p):
         spins = pin_spin, small_spin
         axes = bore_axes(SMALL_SLOPE, w[7:11], pose, p)
         small = bore_contact(SMALL_END, eccentricity, axes, spins, carried, p)
-        small, small_film = oiled_contact(SMALL_END, small, eccentricity, spins, p)
+        small = add_film(SMALL_END, small, eccentricity, spins, p)
     guide = UNGUIDED
     if p.tilting:
         rates = velocity[8], velocity[9], velocity[10]
         guide = corners(pose.height, pose.tilt, rates, p)
     ideal_v = motion.v * pose.speed / p.omega
     load = piston_force(phase, pose.x, velocity[8], pose.x - motion.x, velocity[8] - ideal_v, p)
-    if p.load == CARD:
-        load = card_force(motion.cos_theta, motion.sin_theta, p)
+    load += measured_force(motion.cos_theta, motion.sin_theta, p)
     return Joints(
-        big, small, big_film, small_film, guide, load, big_spin, small_spin, pin_spin
+        big, small, guide, load, big_spin, small_spin, pin_spin
     )  # fmt: skip
 
 
@@ -487,14 +459,14 @@ def add_forces(pose, joints, p, force):
     big, small, guide = joints.big, joints.small, joints.guide
     c, s = pose.cos_theta, pose.sin_theta
     force[0] -= p.crank_radius * (c * big.fy - s * big.fx)
-    force[0] += (p.pin_radius[0] - big.penetration) * big.friction + joints.big_film.moment
+    force[0] += (p.pin_radius[0] - big.penetration) * big.friction + big.film_moment
     force[0] -= p.unbalance * p.gravity * c
     if p.driven:
         force[0] += motor_torque(pose, p)
     add_on_rod(pose, (big.fx, big.fy, big.moment), (small.fx, small.fy, small.moment), p, force)
     force[8] += guide.fx - joints.load - small.fx
     force[9] += guide.fy - p.reciprocating_mass * p.gravity - small.fy
-    force[10] += guide.moment + joints.small_film.moment
+    force[10] += guide.moment + small.film_moment
     force[10] += (p.pin_radius[1] - small.penetration) * small.friction
 
 

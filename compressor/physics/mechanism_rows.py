@@ -103,7 +103,7 @@ def crank_torque(now, p):
     pose, forces, big = now.pose, now.reactions, now.joints.big
     torque = p.crank_radius * (pose.cos_theta * forces.big_y - pose.sin_theta * forces.big_x)
     torque += forces.big_torque
-    return torque - (p.pin_radius[0] - big.penetration) * big.friction - now.joints.big_film.moment
+    return torque - (p.pin_radius[0] - big.penetration) * big.friction - big.film_moment
 
 
 @jit
@@ -119,7 +119,7 @@ def guide_moment(now, p):
     if not p.tilting:
         small = now.joints.small
         moment += (p.pin_radius[1] - small.penetration) * small.friction
-        moment += now.joints.small_film.moment - forces.small_torque
+        moment += small.film_moment - forces.small_torque
     return moment
 
 
@@ -132,7 +132,7 @@ def write_powers(now, p, row):
     row[0] = (motor_torque(pose, p) if p.driven else torque) * pose.speed
     row[1] = -now.joints.load * now.velocity[8]
     pressed = contact_power(big) + contact_power(small) + guide.damped
-    pressed += now.joints.big_film.loss + now.joints.small_film.loss
+    pressed += big.film_loss + small.film_loss
     row[2] = pressed + rod_damping_power(now, p)
     friction = guide.rubbed - big.friction * big.slip - small.friction * small.slip
     friction += forces.big_torque * (pose.speed - now.joints.big_spin)

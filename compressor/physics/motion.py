@@ -14,6 +14,7 @@ import math
 from typing import NamedTuple
 
 from compressor.physics._jit import fma, inline_llvm, inline_once, jit
+from compressor.physics.card import measured_force
 from compressor.physics.contact import (
     LUGRE,
     NO_CONTACT,
@@ -23,6 +24,7 @@ from compressor.physics.contact import (
     joint_contact,
 )
 from compressor.physics.contact_laws import has_chosen_laws
+from compressor.physics.film import add_film
 from compressor.physics.kinematics import IdealMotion, ideal, small_angle
 from compressor.physics.loads import piston_force
 from compressor.physics.record import BIG_END as AT_BIG_END
@@ -104,7 +106,8 @@ def eccentricities_both(y, turn, p):
 def load_force(phase, y, motion, p):
     """Return the piston force (N) in the state y around the ideal motion."""
     n = p.freedoms
-    return piston_force(phase, motion.x + y[0], motion.v + y[n], y[0], y[n], p)
+    load = piston_force(phase, motion.x + y[0], motion.v + y[n], y[0], y[n], p)
+    return load + measured_force(motion.cos_theta, motion.sin_theta, p)
 
 
 @inline_llvm
@@ -161,7 +164,8 @@ def contact_big_end(y, motion, turn, p):
     big = eccentricity_big_end(y, turn, p)
     spins = p.omega, -motion.rate - y[3]
     bearing = p.pin_radius[0], p.clearance[0], p.stiffness[0]
-    return joint_contact(big, spins, bearing, carried_numbers(AT_BIG_END, y, p), p)
+    contact = joint_contact(big, spins, bearing, carried_numbers(AT_BIG_END, y, p), p)
+    return add_film(AT_BIG_END, contact, big, spins, p)
 
 
 @inline_once
@@ -170,7 +174,8 @@ def contact_small_end(y, motion, turn, p):
     small = eccentricity_small_end(y, turn, p)
     spins = 0.0, -motion.rate - y[3]
     bearing = p.pin_radius[1], p.clearance[1], p.stiffness[1]
-    return joint_contact(small, spins, bearing, carried_numbers(AT_SMALL_END, y, p), p)
+    contact = joint_contact(small, spins, bearing, carried_numbers(AT_SMALL_END, y, p), p)
+    return add_film(AT_SMALL_END, contact, small, spins, p)
 
 
 @inline_once
@@ -178,11 +183,14 @@ def contacts_both(y, motion, turn, p):
     """Return `joint_contact` of the big end and of the small end in scene both."""
     big, small = eccentricities_both(y, turn, p)
     spin = -motion.rate - y[7]
+    spins = p.omega, spin
     bearing = p.pin_radius[0], p.clearance[0], p.stiffness[0]
-    at_big = joint_contact(big, (p.omega, spin), bearing, carried_numbers(AT_BIG_END, y, p), p)
+    at_big = joint_contact(big, spins, bearing, carried_numbers(AT_BIG_END, y, p), p)
+    at_big = add_film(AT_BIG_END, at_big, big, spins, p)
+    spins = 0.0, spin
     bearing = p.pin_radius[1], p.clearance[1], p.stiffness[1]
-    at_small = joint_contact(small, (0.0, spin), bearing, carried_numbers(AT_SMALL_END, y, p), p)
-    return at_big, at_small
+    at_small = joint_contact(small, spins, bearing, carried_numbers(AT_SMALL_END, y, p), p)
+    return at_big, add_film(AT_SMALL_END, at_small, small, spins, p)
 
 
 @inline_llvm

@@ -177,21 +177,21 @@ def contact_power(contact):
 
 
 @inline_once
-def torque_and_moment(crank, x, forces, friction, penetration, p):
+def torque_and_moment(crank, x, forces, friction, penetration, film, p):
     """Return the torque (N m) that drives the crank, and the moment of the crosshead on its guide.
 
     The guide bears the crosshead's force at its lever and, since the crosshead cannot tilt, the
     couple that the small end's friction puts on the pin.
 
     crank: cosine and sine of its angle; x: of the crosshead, m; forces: `joint_forces`, N;
-    friction, penetration: of both contacts, N and m.
+    friction, penetration, film: of both contacts, N and m, and the films' moments on the journals.
     """
     torque = p.crank_radius * (crank[0] * forces[1] - crank[1] * forces[0])
     if p.clearance[0] > 0.0:
-        torque -= (p.pin_radius[0] - penetration[0]) * friction[0]
+        torque -= (p.pin_radius[0] - penetration[0]) * friction[0] + film[0]
     moment = -x * (forces[3] + p.reciprocating_mass * p.gravity)
     if p.clearance[1] > 0.0:
-        moment += (p.pin_radius[1] - penetration[1]) * friction[1]
+        moment += (p.pin_radius[1] - penetration[1]) * friction[1] + film[1]
     return torque, moment
 
 
@@ -220,7 +220,7 @@ def write_scene_frame(cos_theta, sin_theta, p, row):
 
 @jit
 def frame_of_series(crank, friction, p, rows):
-    """Write a scene's torque, moment and forces on the frame into rows, (m, WIDE), by its series.
+    """Write a dry scene's torque, moment and forces on its frame into rows, (m, WIDE), by series.
 
     crank: cosine and sine of its angle, (2, m); friction: of both contacts, (m, 2), N.
     """
@@ -228,7 +228,7 @@ def frame_of_series(crank, friction, p, rows):
         row = rows[i]
         forces, penetration = row[FORCE:FORCE_SIZE], row[PENETRATION:NORMAL]
         row[CRANK_TORQUE], row[GUIDE_MOMENT] = torque_and_moment(
-            crank[:, i], row[DISPLACEMENT], forces, friction[i], penetration, p
+            crank[:, i], row[DISPLACEMENT], forces, friction[i], penetration, (0.0, 0.0), p
         )
         write_scene_frame(crank[0, i], crank[1, i], p, row)
 
@@ -240,9 +240,9 @@ def powers(now, y, forces, p):
     crank = p.crank_radius * p.omega
     turning = crank * (motion.cos_theta * forces[1] - motion.sin_theta * forces[0])
     if p.clearance[0] > 0.0:
-        turning -= p.omega * (p.pin_radius[0] - big.penetration) * big.friction
+        turning -= p.omega * ((p.pin_radius[0] - big.penetration) * big.friction + big.film_moment)
     pressing = -now.load * (motion.v + y[p.freedoms])
-    pressed = contact_power(big) + contact_power(small)
+    pressed = contact_power(big) + contact_power(small) + big.film_loss + small.film_loss
     return turning, pressing, pressed, -big.friction * big.slip - small.friction * small.slip
 
 
@@ -295,7 +295,7 @@ def observed_columns(now, y, forces, p):
     motion, friction = now.motion, (big.friction, small.friction)
     torque, moment = torque_and_moment(
         (motion.cos_theta, motion.sin_theta), motion.x + y[0], forces, friction,
-        (big.penetration, small.penetration), p,
+        (big.penetration, small.penetration), (big.film_moment, small.film_moment), p,
     )  # fmt: skip
     return (
         now.a, forces[0], forces[1], forces[2], forces[3],

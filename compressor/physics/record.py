@@ -153,7 +153,7 @@ FIELDS: list[tuple] = [
     ("crank_clearance", "f8"),  # m
     ("crank_corners", "f8", (2,)),  # angles at which its discharge and its suction begin, rad
 ]
-# of a mechanism whose worn joints are lubricated
+# of joints that are lubricated
 FILM: list[tuple] = [
     ("viscosity", "f8"),  # of the oil, Pa s; 0 of dry joints
     ("film_length", "f8", (2,)),  # of each joint's bearing, m
@@ -169,7 +169,7 @@ WEAR: list[tuple] = [
     ("worn", "f8", (2, MAX_SECTORS)),  # per joint, m
 ]
 CARD_NODES = 1440  # a revolution
-# of a mechanism whose gas was measured
+# of gas that was measured
 CARD: list[tuple] = [
     ("card", "f8", (CARD_NODES, 2)),  # force (N) over the crank's angle, and its slope a node
 ]
@@ -206,9 +206,9 @@ FEATURES: list[tuple] = [
 # those for the default one hold nothing of the others (`_jit.dispatch_on_record`).
 CHOICE, MECHANISM = 2, 3
 RECORD = np.dtype([*FIELDS, ("laws", "f8", (1,))], align=True)
-CHOSEN = np.dtype([*FIELDS, ("laws", "f8", (CHOICE,))], align=True)
+CHOSEN = np.dtype([*FIELDS, *FILM, *CARD, ("laws", "f8", (CHOICE,))], align=True)
 FEATURED = np.dtype(
-    [*FIELDS, *FILM, *WEAR, *CARD, *FEATURES, ("laws", "f8", (MECHANISM,))], align=True
+    [*FIELDS, *FILM, *CARD, *WEAR, *FEATURES, ("laws", "f8", (MECHANISM,))], align=True
 )
 
 
@@ -231,7 +231,8 @@ def new_record(
 ) -> np.record:
     """Return a record with these values by field, and zeros elsewhere.
 
-    chosen: for laws but the default ones; featured: for a mechanism with `FEATURES` and any laws.
+    chosen: for forces but the default ones: other laws, oil, a card; featured: for a mechanism with
+    `FEATURES` and any forces.
     """
     kind = FEATURED if featured else CHOSEN if chosen else RECORD
     if values is None:

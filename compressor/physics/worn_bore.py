@@ -168,7 +168,8 @@ def contact_at_wall(joint, contact, eccentricity, axes, rod_spin, p):
     x, y = nearest_wall(overlap, deepest, p)
     return ContactState(
         contact.fx, contact.fy, contact.moment, contact.normal, contact.friction, deepest,
-        x * vx + y * vy, contact.slip, contact.elastic, contact.unclamped,
+        x * vx + y * vy, contact.slip, contact.elastic, contact.unclamped, contact.film_moment,
+        contact.film_loss,
     )  # fmt: skip
 
 
@@ -201,7 +202,7 @@ def worn_contact(joint, eccentricity, axes, spins, carried, p):
     c, s = axes
     return ContactState(
         c * fx - s * fy, s * fx + c * fy, moment, normal, friction, penetration, rate, slip,
-        elastic, unclamped,
+        elastic, unclamped, 0.0, 0.0,
     )  # fmt: skip
 
 

@@ -71,14 +71,14 @@ def record(case: Case, worn: np.ndarray | None = None) -> np.record:
     _gas(case, p)
     _spring(case, p)
     _film(case, p)
-    featured = case.has_features or worn is not None
+    featured = case.needs_mechanism or worn is not None
     if featured:
         _features(case, p)
     if worn is not None:
         p |= bore_fields(worn.shape[1])
         p["worn"] = np.pad(worn, ((0, 0), (0, MAX_SECTORS - worn.shape[1])))
     complete(p)
-    return new_record(case.chooses_laws, featured, p)
+    return new_record(case.chooses_forces, featured, p)
 
 
 def offsets(case: Case) -> np.ndarray:
@@ -333,7 +333,7 @@ def film_damping(p: Fields) -> float:
 
     Of the joint with the smaller clearance, whose film is the stiffer one.
     """
-    if not is_featured(p) or p["viscosity"] == 0.0:
+    if p["laws"].size == 1 or p["viscosity"] == 0.0:
         return 0.0
     clearance, joint = min((one, j) for j, one in enumerate(p["clearance"].tolist()) if one > 0.0)
     length, pin = p["film_length"][joint], p["pin_radius"][joint]

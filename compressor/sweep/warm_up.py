@@ -55,8 +55,8 @@ class Needs(NamedTuple):
         for case in cases:  # which may be made one by one
             methods.add(case.solve.method)
             twins = twins or case.solve.horizon is True
-            features = features or case.has_features
-            laws = laws or (case.chooses_laws and not case.has_features)
+            features = features or case.needs_mechanism
+            laws = laws or (case.chooses_forces and not case.needs_mechanism)
         return cls(tuple(sorted(methods)), twins, laws=laws, features=features)
 
     @property

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
 from compressor.physics._jit import ENABLED
-from compressor.physics.contact import ContactState, nearness
+from compressor.physics.contact import NO_CONTACT, nearness
 from compressor.physics.contact_laws import normal_force
 from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.loads import segments
@@ -262,7 +262,9 @@ def test_nearness_is_positive_where_the_contact_pushes(penetration, rate):
     normal, elastic, unclamped = normal_force(
         penetration, rate, 1.0, p.stiffness[1], p.clearance[1], p
     )
-    contact = ContactState(0.0, 0.0, 0.0, normal, 0.0, penetration, rate, 0.0, elastic, unclamped)
+    contact = NO_CONTACT._replace(
+        normal=normal, penetration=penetration, rate=rate, elastic=elastic, unclamped=unclamped
+    )
     assert (nearness(contact, p.stiffness[1], p.clearance[1], p) > 0) == (normal > 0)
 
 
@@ -273,7 +275,7 @@ def test_a_clamped_force_counts_as_a_length(exponent):
     p.exponent = exponent
     pull = p.stiffness[1] * p.full_damping**exponent
     for share in (1.0, 0.01):
-        contact = ContactState(0.0, 0.0, 0.0, 0.0, 0.0, 1e-6, -1.0, 0.0, 0.0, -share * pull)
+        contact = NO_CONTACT._replace(penetration=1e-6, rate=-1.0, unclamped=-share * pull)
         assert nearness(contact, p.stiffness[1], p.clearance[1], p) == pytest.approx(
             -share * p.full_damping
         )

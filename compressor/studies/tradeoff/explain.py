@@ -122,7 +122,8 @@ def explain(
     if case.body and ended:
         active["body"] = body_words(case, run)
     joints = tuple(ideal_scales(case))
-    steps, expected = (0.0, 0.0) if case.has_features else expected_cost(case, joints)
+    unknown = case.needs_mechanism or case.lubricant
+    steps, expected = (0.0, 0.0) if unknown else expected_cost(case, joints)
     return Explanation(
         study=study.name,
         path=study.path,
