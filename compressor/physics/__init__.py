@@ -32,6 +32,7 @@ from compressor.physics.observe import (
 )
 from compressor.physics.onset import approach_at
 from compressor.physics.record import (
+    CHOICE,
     MAX_SECTORS,
     Coordinate,
     Fields,

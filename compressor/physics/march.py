@@ -427,7 +427,7 @@ def raise_tops(w, base, h, stride, z, work, phase, p, tally):
         )
 
 
-look_for_peaks = dispatch_on_record(MECHANISM, raise_tops, skip_tops)
+look_for_peaks = dispatch_on_record(CHOICE, raise_tops, skip_tops)
 
 
 @jit

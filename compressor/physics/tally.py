@@ -23,7 +23,7 @@ from compressor.physics.observe import (
     PENETRATION,
     POTENTIAL,
 )
-from compressor.physics.record import MAX_SECTORS, MECHANISM, is_featured, zero
+from compressor.physics.record import CHOICE, MAX_SECTORS, MECHANISM, is_featured, zero
 
 # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAK_NEARNESS = 0.98
@@ -180,14 +180,14 @@ def add_peaks(nodes, rows, every, tally, p):
 def add_peaks_of_nodes(nodes, rows, every, tally, p):
     """Raise the tally's peaks by the nodes of a step alone.
 
-    A mechanism's load may ripple between them: who integrates it looks for tops on the dense
-    solution, so that no sample of it lies above them.
+    Chosen forces, such as a card's, may ripple between them: who integrates looks for tops on the
+    dense solution, so that no sample of it lies above them.
     """
     for k in range(PEAKED):
         tally.peak[k] = max(tally.peak[k], tally.top[k])
 
 
-peaks_of_step = dispatch_on_record(MECHANISM, add_peaks_of_nodes, add_peaks)
+peaks_of_step = dispatch_on_record(CHOICE, add_peaks_of_nodes, add_peaks)
 
 
 @inline_llvm

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from compressor.physics import Column, is_featured
+from compressor.physics import CHOICE, Column
 
 Observer = Callable[[float], np.ndarray]  # returns the row observed at a fraction of a step
 
@@ -97,12 +97,12 @@ def look_at_step(
     p: np.record, observe: Observer, nodes: np.ndarray, rows: np.ndarray, tally: np.record,
     sides: np.ndarray,
 ) -> None:  # fmt: skip
-    """Raise a mechanism's peaks by the tops within a step, and write the sides of its rod load.
+    """Raise peaks under chosen forces by the tops within a step, and write the rod load's sides.
 
     rows: observed at nodes, (m, COLUMNS); sides: (4,), as `tally_step` takes them, where the tally
     has a rod load.
     """
-    if is_featured(p):
+    if p["laws"].size >= CHOICE:
         sizes = np.abs(rows[:, PEAKED])
         # a parabola rises above neighbours by less than half their range
         may_beat = 1.5 * sizes.max(axis=0) - 0.5 * sizes.min(axis=0) > tally["peak"]
