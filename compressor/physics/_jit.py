@@ -95,7 +95,7 @@ def load_numba() -> None:
 
     event.register("numba:compile", collect_seldom())
     # to be known before anything is compiled
-    for intrinsic in (without_refcount, fma, square_root):
+    for intrinsic in (without_refcount, square_root):
         intrinsic.make_target()  # type: ignore[union-attr]
 
 
@@ -130,7 +130,10 @@ def _compile(function: Function, **options: Any) -> Function:
         import numba
 
         # C code calls none of them: its wrappers would only take time to compile
-        how: Any = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True, **options}
+        how: Any = {
+            "cache": True, "error_model": "numpy", "fastmath": {"contract"},
+            "no_cfunc_wrapper": True, **options,
+        }  # fmt: skip
         return numba.njit(**how)(function)
 
     deferred: Any = Deferred(make, function)
@@ -140,7 +143,7 @@ def _compile(function: Function, **options: Any) -> Function:
 def jit(function: Function) -> Function:
     """Compile `function` on its first call and keep the machine code on disk.
 
-    Arithmetic is IEEE's, in the order written; products and sums are fused where `fma` says so. A
+    Arithmetic is IEEE's, in the order written, but that a product and a sum may be rounded once. A
     division by zero gives inf or nan, not an exception, so that the caller can judge a state that
     went wrong. As it is with ``COMPSIM_JIT=0``.
     """
@@ -238,20 +241,6 @@ def _without_refcount() -> Any:
     return intrinsic(borrowed)
 
 
-def _fma() -> Any:
-    """Return numba's intrinsic of `fma`."""
-    from numba.core import types
-    from numba.extending import intrinsic
-
-    def fused(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
-        def lower(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            return builder.fma(*values)
-
-        return types.float64(types.float64, types.float64, types.float64), lower
-
-    return intrinsic(fused)
-
-
 def _square_root() -> Any:
     """Return numba's intrinsic of `square_root`."""
     from numba.core import types
@@ -265,11 +254,6 @@ def _square_root() -> Any:
         return types.float64(types.float64), lower
 
     return intrinsic(square_root)
-
-
-def fma(a: float, b: float, c: float) -> float:
-    """Return a b + c, rounded once: one instruction instead of two. Python itself rounds twice."""
-    return a * b + c
 
 
 def square_root(a: float) -> float:
@@ -290,6 +274,5 @@ def without_refcount(array: Any) -> Any:
 
 
 if ENABLED:
-    fma = Intrinsic(_fma, fma)  # type: ignore[assignment]
     square_root = Intrinsic(_square_root, square_root)  # type: ignore[assignment]
     without_refcount = Intrinsic(_without_refcount, without_refcount)  # type: ignore[assignment]

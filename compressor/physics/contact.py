@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 from compressor.physics._jit import (
     dispatch_on_record,
-    fma,
     inline_llvm,
     inline_once,
     jit,
@@ -53,7 +52,7 @@ AMBROSIO, LUGRE = int(FrictionLaw.AMBROSIO), int(FrictionLaw.LUGRE)
 def adams(slip, p):
     """Return ADAMS's law: a rise to `static` at the stiction velocity, then a fall to `dynamic`."""
     fall = rise((abs(slip) - p.stiction_velocity) * p.per_transition)
-    size = fma(p.dynamic - p.static, fall, p.static)
+    size = (p.dynamic - p.static) * fall + p.static
     return (2.0 * rise((slip + p.stiction_velocity) * p.per_stiction) - 1.0) * size
 
 
@@ -75,7 +74,7 @@ def ambrosio(slip, p):
 def stribeck(slip, p):
     """Return LuGre's coefficient in steady sliding without its viscous part."""
     ratio = slip / p.stiction_velocity
-    return fma(p.static - p.dynamic, math.exp(-ratio * ratio), p.dynamic)
+    return (p.static - p.dynamic) * math.exp(-ratio * ratio) + p.dynamic
 
 
 @jit
@@ -94,7 +93,7 @@ def bristle_rate(slip, bristle, p):
 def lugre(slip, bristle, p):
     """Return LuGre's law (Canudas de Wit et al., IEEE Trans. Autom. Control 40, 1995)."""
     bending = p.bristle_damping * bristle_rate(slip, bristle, p)
-    return fma(p.bristle_stiffness, bristle, fma(p.viscous, slip, bending))
+    return p.bristle_stiffness * bristle + (p.viscous * slip + bending)
 
 
 @jit
@@ -203,26 +202,26 @@ def joint_contact(eccentricity, spins, bearing, carried, p):
     """
     ex, ey, ex_rate, ey_rate = eccentricity
     pin, clearance, stiffness = bearing
-    distance = square_root(fma(ex, ex, ey * ey))
+    distance = square_root(ex * ex + ey * ey)
     penetration = distance - clearance
     if distance == 0.0:
         return ContactState(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     per_distance = 1.0 / distance
     nx = ex * per_distance
     ny = ey * per_distance
-    rate = fma(ex_rate, nx, ey_rate * ny)
+    rate = ex_rate * nx + ey_rate * ny
     bore = pin + clearance
     arm = pin - penetration
     journal_spin, rod_spin = spins
-    turning = fma(journal_spin, arm, -(rod_spin * bore))
-    slip = fma(ey_rate, nx, fma(-ex_rate, ny, turning))
+    turning = journal_spin * arm - rod_spin * bore
+    slip = ey_rate * nx + (turning - ex_rate * ny)
     approach, bristle = carried
     normal, elastic, unclamped = normal_force(penetration, rate, approach, stiffness, clearance, p)
     friction = 0.0
     if p.friction and in_contact(normal):
         friction = -friction_coefficient(slip, bristle, p) * normal
-    fx = fma(normal, nx, friction * ny)
-    fy = fma(normal, ny, -(friction * nx))
+    fx = normal * nx + friction * ny
+    fy = normal * ny - friction * nx
     moment = -bore * friction
     return ContactState(
         fx, fy, moment, normal, friction, penetration, rate, slip, elastic, unclamped, 0.0, 0.0

@@ -28,7 +28,6 @@ from enum import IntEnum
 import numpy as np
 
 from compressor.physics._jit import (
-    fma,
     inline_llvm,
     inline_once,
     square_root,
@@ -248,7 +247,7 @@ def impact(penetration, rate, stiffness, p):
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
     elastic = impact_elastic(penetration, stiffness, p)
-    unclamped = fma(p.damping * rise(penetration * p.per_full_damping), rate, elastic)
+    unclamped = p.damping * rise(penetration * p.per_full_damping) * rate + elastic
     return max(0.0, unclamped), elastic, unclamped
 
 
@@ -281,7 +280,7 @@ def hysteretic(penetration, rate, approach, stiffness, clearance, p):
     if penetration <= 0.0:
         return 0.0, 0.0, 0.0
     elastic = elastic_force(penetration, stiffness, clearance, p)
-    unclamped = fma(elastic * p.hysteresis / approach, rate, elastic)
+    unclamped = elastic * p.hysteresis / approach * rate + elastic
     return max(0.0, unclamped), elastic, unclamped
 
 

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import fma, inline_llvm, jit, square_root
-from compressor.physics.elementary import direction
+from compressor.physics._jit import inline_llvm, jit, square_root
 
 MAX_SERIES_ANGLE = 0.1  # rad: the widest angle at which the series of `small_angle` lack nothing
 # their coefficients: faster than to divide
@@ -67,15 +66,15 @@ def small_angle(angle, p):
         return math.sin(angle), math.cos(angle)
     s = angle * angle
     q = s * s
-    sine = fma(angle * s, fma(q, fma(s, S9, S7), fma(s, S5, S3)), angle)
-    cosine = 1.0 - fma(-q, fma(q, C8, fma(s, C6, C4)), 0.5 * s)
+    sine = angle * s * (q * (s * S9 + S7) + (s * S5 + S3)) + angle
+    cosine = 1.0 - (0.5 * s - q * (q * C8 + (s * C6 + C4)))
     return sine, cosine
 
 
 @inline_llvm
 def crank_direction(t, p):
     """Return the cosine and sine of the crank angle at time t (s)."""
-    return direction(p.omega * t)
+    return math.cos(p.omega * t), math.sin(p.omega * t)
 
 
 @inline_llvm
@@ -85,8 +84,8 @@ def ideal_after(base, span, p):
     A step turns the crank by little, so that these need no sine and cosine of their own.
     """
     sine, cosine = small_angle(p.omega * span, p)
-    cos_theta = fma(base[0], cosine, -(base[1] * sine))
-    return ideal_at(cos_theta, fma(base[1], cosine, base[0] * sine), p)
+    cos_theta = base[0] * cosine - base[1] * sine
+    return ideal_at(cos_theta, base[1] * cosine + base[0] * sine, p)
 
 
 def exact_motion(theta, crank_radius, rod_length, omega):

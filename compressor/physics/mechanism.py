@@ -33,7 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import fma, jit, square_root
+from compressor.physics._jit import jit, square_root
 from compressor.physics.card import measured_force
 from compressor.physics.contact import NO_CONTACT, ContactState, carried_numbers, joint_contact
 from compressor.physics.contact_laws import power, rise
@@ -229,7 +229,7 @@ def corner_force(penetration, rate, lever, p):
         damping = elastic * p.guide_hysteresis / speed
     else:
         damping = p.guide_damping * rise(penetration * p.per_guide_full_damping)
-    return max(0.0, fma(damping, rate, elastic)), elastic
+    return max(0.0, damping * rate + elastic), elastic
 
 
 @jit

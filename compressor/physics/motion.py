@@ -13,7 +13,7 @@ nanometre keeps its digits.
 import math
 from typing import NamedTuple
 
-from compressor.physics._jit import fma, inline_llvm, inline_once, jit
+from compressor.physics._jit import inline_llvm, inline_once, jit
 from compressor.physics.card import measured_force
 from compressor.physics.contact import (
     LUGRE,
@@ -49,10 +49,10 @@ class Turn(NamedTuple):
 def rod_turn(motion, eta, eta_rate, p):
     """Return the `Turn` of the rod by eta from the ideal angle phi, without cancellation."""
     sin_half, cos_half = small_angle(0.5 * eta, p)
-    dc = -2.0 * sin_half * fma(motion.sin_phi, cos_half, motion.cos_phi * sin_half)
-    ds = 2.0 * sin_half * fma(motion.cos_phi, cos_half, -(motion.sin_phi * sin_half))
-    dc_rate = -fma(ds, motion.rate, (motion.sin_phi + ds) * eta_rate)
-    ds_rate = fma(dc, motion.rate, (motion.cos_phi + dc) * eta_rate)
+    dc = -2.0 * sin_half * (motion.sin_phi * cos_half + motion.cos_phi * sin_half)
+    ds = 2.0 * sin_half * (motion.cos_phi * cos_half - motion.sin_phi * sin_half)
+    dc_rate = -(ds * motion.rate + (motion.sin_phi + ds) * eta_rate)
+    ds_rate = dc * motion.rate + (motion.cos_phi + dc) * eta_rate
     return Turn(dc, ds, dc_rate, ds_rate)
 
 
@@ -64,7 +64,7 @@ def eccentricity_big_end(y, turn, p):
     """
     dc, ds, dc_rate, ds_rate = turn
     length = p.rod_length
-    return fma(length, dc, -y[0]), -length * ds, fma(length, dc_rate, -y[2]), -length * ds_rate
+    return length * dc - y[0], -length * ds, length * dc_rate - y[2], -length * ds_rate
 
 
 @inline_llvm
@@ -75,7 +75,7 @@ def eccentricity_small_end(y, turn, p):
     """
     dc, ds, dc_rate, ds_rate = turn
     length = p.rod_length
-    return fma(-length, dc, y[0]), length * ds, fma(-length, dc_rate, y[2]), length * ds_rate
+    return y[0] - length * dc, length * ds, y[2] - length * dc_rate, length * ds_rate
 
 
 @inline_llvm
@@ -87,18 +87,8 @@ def eccentricities_both(y, turn, p):
     dc, ds, dc_rate, ds_rate = turn
     a = p.rod_centre
     b = p.rod_length - a
-    big = (
-        fma(a, dc, -y[1]),
-        fma(-a, ds, -y[2]),
-        fma(a, dc_rate, -y[5]),
-        fma(-a, ds_rate, -y[6]),
-    )
-    small = (
-        fma(-b, dc, y[0] - y[1]),
-        fma(b, ds, -y[2]),
-        fma(-b, dc_rate, y[4] - y[5]),
-        fma(b, ds_rate, -y[6]),
-    )
+    big = (a * dc - y[1], -y[2] - a * ds, a * dc_rate - y[5], -y[6] - a * ds_rate)
+    small = (y[0] - y[1] - b * dc, b * ds - y[2], y[4] - y[5] - b * dc_rate, b * ds_rate - y[6])
     return big, small
 
 
@@ -121,11 +111,11 @@ def solve_big_end(y, motion, turn, load, contact, p):
     mass = p.reciprocating_mass + p.rod_mass
     inertia = p.rod_inertia + p.rod_mass * b * b
     push = contact.fx - load - p.rod_mass * b * cos_phi * rate * rate
-    moment = p.rod_length * fma(sin_phi, contact.fx, cos_phi * contact.fy) - contact.moment
+    moment = p.rod_length * (sin_phi * contact.fx + cos_phi * contact.fy) - contact.moment
     moment -= p.rod_mass * p.gravity * b * cos_phi
-    per_determinant = 1.0 / fma(mass, inertia, -(coupling * coupling))
-    a = fma(inertia, push, -(coupling * moment)) * per_determinant
-    spin_up = fma(mass, moment, -(coupling * push)) * per_determinant
+    per_determinant = 1.0 / (mass * inertia - coupling * coupling)
+    a = (inertia * push - coupling * moment) * per_determinant
+    spin_up = (mass * moment - coupling * push) * per_determinant
     return a, spin_up
 
 
@@ -135,7 +125,7 @@ def solve_small_end(motion, turn, load, contact, p):
     sin_phi = motion.sin_phi + turn.ds
     cos_phi = motion.cos_phi + turn.dc
     a = (-load - contact.fx) * p.per_reciprocating_mass
-    moment = -p.rod_length * fma(sin_phi, contact.fx, cos_phi * contact.fy) - contact.moment
+    moment = -p.rod_length * (sin_phi * contact.fx + cos_phi * contact.fy) - contact.moment
     pin = p.crank_radius * p.omega * p.omega  # the crankpin's centripetal acceleration
     carried = pin * (sin_phi * motion.cos_theta + cos_phi * motion.sin_theta)
     moment += p.rod_mass * p.rod_centre * (p.gravity * cos_phi - carried)
@@ -152,8 +142,8 @@ def solve_both(motion, turn, load, big, small, p):
     per_mass = p.per_rod_mass
     centre_x = (big.fx + small.fx) * per_mass
     centre_y = (big.fy + small.fy) * per_mass - p.gravity
-    moment = p.rod_centre * fma(cos_phi, big.fy, sin_phi * big.fx)
-    moment -= (p.rod_length - p.rod_centre) * fma(cos_phi, small.fy, sin_phi * small.fx)
+    moment = p.rod_centre * (cos_phi * big.fy + sin_phi * big.fx)
+    moment -= (p.rod_length - p.rod_centre) * (cos_phi * small.fy + sin_phi * small.fx)
     moment -= big.moment + small.moment
     return a, centre_x, centre_y, moment * p.per_rod_inertia
 

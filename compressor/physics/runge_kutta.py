@@ -10,13 +10,12 @@ from enum import IntEnum
 
 import numpy as np
 
-from compressor.physics._jit import fma, inline_llvm, inline_once, square_root
+from compressor.physics._jit import inline_llvm, inline_once, square_root
 from compressor.physics.kinematics import ideal_after
 from compressor.physics.systems import derivative_and_columns, write_flowing_derivative
 
 STAGES = 7
 FLOWS = 4
-LANES = 4  # sums are taken four unknowns at a time, which a processor does at once
 
 
 class RungeKuttaPair(IntEnum):
@@ -113,51 +112,32 @@ def take_step(pair, base, h, z, k, phase, p, new, row):
     for stage in range(1, STAGES):
         motion = ideal_after(base, C[pair, stage] * h, p)
         size = z.size if stage == STAGES - 1 else n
-        for i in range(0, size, LANES):
-            a, b, c, d = 0.0, 0.0, 0.0, 0.0
-            for j in range(stage):
-                weight = A[pair, stage, j]
-                a = fma(weight, k[j, i], a)
-                b = fma(weight, k[j, i + 1], b)
-                c = fma(weight, k[j, i + 2], c)
-                d = fma(weight, k[j, i + 3], d)
-            new[i] = fma(h, a, z[i])
-            new[i + 1] = fma(h, b, z[i + 1])
-            new[i + 2] = fma(h, c, z[i + 2])
-            new[i + 3] = fma(h, d, z[i + 3])
+        for i in range(size):
+            new[i] = z[i]
+        for j in range(stage):
+            weight = h * A[pair, stage, j]
+            for i in range(size):
+                new[i] += weight * k[j, i]
         if stage < STAGES - 1:
             write_flowing_derivative(motion, new, phase, p, k[stage])
         else:
             derivative_and_columns(motion, new, phase, p, k[stage], row)
 
 
-@inline_llvm
-def error_share(error, before, after, rtol, atol):
-    """Return a number's estimated error over its tolerance.
-
-    before, after: the number at both ends of the step; the larger one sets the tolerance.
-    """
-    return error / fma(rtol, max(abs(before), abs(after)), atol)
-
-
 @inline_once
 def error_norm(pair, h, z, new, k, rtol, atol):
-    """Return the root mean square over the motion of the estimated error over its tolerance."""
+    """Return the root mean square over the motion of the estimated error over its tolerance.
+
+    The larger of a number at both ends of the step sets its tolerance.
+    """
     n = z.size - FLOWS
     total = 0.0
-    for i in range(0, n, LANES):
-        a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for i in range(n):
+        error = 0.0
         for j in range(STAGES):
-            weight = E[pair, j]
-            a = fma(weight, k[j, i], a)
-            b = fma(weight, k[j, i + 1], b)
-            c = fma(weight, k[j, i + 2], c)
-            d = fma(weight, k[j, i + 3], d)
-        a = error_share(a, z[i], new[i], rtol, atol[i])
-        b = error_share(b, z[i + 1], new[i + 1], rtol, atol[i + 1])
-        c = error_share(c, z[i + 2], new[i + 2], rtol, atol[i + 2])
-        d = error_share(d, z[i + 3], new[i + 3], rtol, atol[i + 3])
-        total = fma(d, d, fma(c, c, fma(b, b, fma(a, a, total))))
+            error += E[pair, j] * k[j, i]
+        share = error / (rtol * max(abs(z[i]), abs(new[i])) + atol[i])
+        total += share * share
     return h * square_root(total / n)
 
 
@@ -167,54 +147,39 @@ def weights_at(pair, s, weights):
     for stage in range(STAGES):
         a, b = P[pair, stage, 0], P[pair, stage, 1]
         c, d = P[pair, stage, 2], P[pair, stage, 3]
-        weights[stage] = s * fma(s, fma(s, fma(s, d, c), b), a)
+        weights[stage] = s * (s * (s * (s * d + c) + b) + a)
 
 
 @inline_llvm
 def combine(weights, h, z, k, out):
     """Write the motion for these weights of the stages into out, (n,), without the interpolant."""
-    for i in range(0, out.size, LANES):
-        a, b, c, d = 0.0, 0.0, 0.0, 0.0
-        for stage in range(STAGES):
-            weight = weights[stage]
-            a = fma(weight, k[stage, i], a)
-            b = fma(weight, k[stage, i + 1], b)
-            c = fma(weight, k[stage, i + 2], c)
-            d = fma(weight, k[stage, i + 3], d)
-        out[i] = fma(h, a, z[i])
-        out[i + 1] = fma(h, b, z[i + 1])
-        out[i + 2] = fma(h, c, z[i + 2])
-        out[i + 3] = fma(h, d, z[i + 3])
+    for i in range(out.size):
+        out[i] = z[i]
+    for stage in range(STAGES):
+        weight = h * weights[stage]
+        for i in range(out.size):
+            out[i] += weight * k[stage, i]
 
 
 @inline_llvm
 def extend(pair, h, z, k, dense):
     """Write a step's interpolant into dense, (5, n): y(s) = sum over j of dense[j] s^j."""
-    for i in range(0, dense.shape[1], LANES):
-        for lane in range(LANES):
-            dense[0, i + lane] = z[i + lane]
-        for j in range(4):
-            a, b, c, d = 0.0, 0.0, 0.0, 0.0
-            for stage in range(STAGES):
-                weight = P[pair, stage, j]
-                a = fma(weight, k[stage, i], a)
-                b = fma(weight, k[stage, i + 1], b)
-                c = fma(weight, k[stage, i + 2], c)
-                d = fma(weight, k[stage, i + 3], d)
-            dense[j + 1, i] = h * a
-            dense[j + 1, i + 1] = h * b
-            dense[j + 1, i + 2] = h * c
-            dense[j + 1, i + 3] = h * d
+    n = dense.shape[1]
+    for i in range(n):
+        dense[0, i] = z[i]
+    for j in range(4):
+        for i in range(n):
+            dense[j + 1, i] = 0.0
+        for stage in range(STAGES):
+            weight = h * P[pair, stage, j]
+            for i in range(n):
+                dense[j + 1, i] += weight * k[stage, i]
 
 
 @inline_llvm
 def interpolate(s, dense, out):
     """Write the motion at the fraction s of a step into out, shape (n,)."""
-    for i in range(0, out.size, LANES):
-        a, b, c, d = dense[4, i], dense[4, i + 1], dense[4, i + 2], dense[4, i + 3]
-        for j in range(3, -1, -1):
-            a = fma(a, s, dense[j, i])
-            b = fma(b, s, dense[j, i + 1])
-            c = fma(c, s, dense[j, i + 2])
-            d = fma(d, s, dense[j, i + 3])
-        out[i], out[i + 1], out[i + 2], out[i + 3] = a, b, c, d
+    for i in range(out.size):
+        out[i] = dense[0, i] + s * (
+            dense[1, i] + s * (dense[2, i] + s * (dense[3, i] + s * dense[4, i]))
+        )

@@ -11,7 +11,6 @@ import numpy as np
 
 from compressor.physics import rosenbrock
 from compressor.physics._jit import inline_llvm, inline_once, jit, square_root
-from compressor.physics.elementary import exponential, logarithm
 from compressor.physics.runge_kutta import FLOWS, STAGES, A, E
 from compressor.physics.systems import derivative_with_flows
 
@@ -108,7 +107,7 @@ def shortest_step(t, omega):
 @inline_llvm
 def log_error(error):
     """Return the logarithm of an error norm, as the control reads it."""
-    return logarithm(max(error, 1e-10))
+    return math.log(max(error, 1e-10))
 
 
 @inline_llvm
@@ -118,14 +117,14 @@ def growth(now, last, order):
     now, last: `log_error` of the accepted step and of the one before it.
     """
     # the last error damps steps that stability holds, which I control lets swing about the limit
-    factor = SAFETY * exponential((INTEGRAL * last - PROPORTIONAL * now) / order)
+    factor = SAFETY * math.exp((INTEGRAL * last - PROPORTIONAL * now) / order)
     return min(GROW, max(SHRINK, factor))
 
 
 @inline_llvm
 def shrinkage(now, order):
     """Return the next attempt's length over that of a refused one, by `log_error`."""
-    return max(SHRINK, SAFETY * exponential(-now / order))
+    return max(SHRINK, SAFETY * math.exp(-now / order))
 
 
 @inline_once

@@ -8,7 +8,6 @@ import os
 import shutil
 import subprocess
 import sys
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ import pytest
 
 from compressor import program
 from compressor.physics import _jit
-from compressor.physics._jit import dispatch_on_record, fma, inline_llvm, jit, square_root
+from compressor.physics._jit import dispatch_on_record, inline_llvm, jit, square_root
 from compressor.physics.record import new_record
 
 COMPRESSOR = Path(program.__file__).parent
@@ -85,12 +84,12 @@ def test_machine_code_belongs_to_its_sources(tmp_path, monkeypatch):
 
 HOMELESS = """
 import os
-from compressor.physics import elementary
+from compressor.physics.motion import versine
 from compressor.program import machine_code_folder
 
 folder = machine_code_folder()
 assert machine_code_folder() == folder
-elementary.direction(0.5)
+versine(0.5)
 assert [*folder.rglob("*.nbi")], "nothing was kept"
 print(folder.parent.parent, folder.is_relative_to(os.environ["NUMBA_CACHE_DIR"]))
 """
@@ -166,24 +165,6 @@ def test_a_user_without_a_home_may_name_a_folder(tmp_path, monkeypatch):
     assert program.machine_code_folder().parent == program.COMPILED / "__pycache__"  # not looked at
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert program.machine_code_folder().parent == tmp_path / "compsim"
-
-
-@pytest.mark.compiled
-def test_a_fused_product_is_rounded_once():
-    numba = pytest.importorskip("numba")
-    _jit.load_numba()
-
-    @numba.njit
-    def compiled(a, b, c):
-        return fma(a, b, c)
-
-    draw = np.random.default_rng(7)
-    for _ in range(200):
-        a, b = draw.normal(size=2)
-        c = -a * b * (1 + draw.integers(-3, 4) * 2.0**-50)  # most of the sum cancels
-        exact = float(Fraction(a) * Fraction(b) + Fraction(c))
-        assert compiled(a, b, c) == exact
-        assert fma(a, b, c) == a * b + c  # from Python
 
 
 @pytest.mark.compiled

@@ -139,6 +139,8 @@ def test_bars_hold_the_errors_of_random_cases(monkeypatch):
             known = np.isfinite(ours[name]) & (away > 0)
             shares[name] += (away[known] / bar[known]).tolist()
     for name, found in shares.items():
+        if not found:  # all three are equal to the bit, as counts may be
+            continue
         assert max(found) <= (2.0 if "segment" in name else 1.0), name
         assert np.mean(np.array(found) > 1.0) < 0.01, name
 

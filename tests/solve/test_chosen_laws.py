@@ -5,6 +5,7 @@ rod 120 mm, 5000 rpm, clearance 0.5 mm at the small end, restitution 0.9. Its id
 from outside this program.
 """
 
+import itertools
 import math
 
 import numpy as np
@@ -13,6 +14,7 @@ from published import ASKED, DRY, GIVEN, MACHINE, STIFFNESS, drop, given_back
 
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
+from compressor.metrics import METRICS
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import CARRIED
@@ -204,18 +206,26 @@ def test_a_pin_that_is_pressed_deeper_than_johnson_knows_is_told_of():
     assert "half the clearance" in deep[0].message
 
 
-@pytest.mark.parametrize("law", ["gonthier", "flores"])
-def test_error_bars_hold_with_laws(law):
-    """Of the default promise, by a far tighter run."""
-    values = {"joint": "both", "clearance_mm": 0.2, "contact": {"law": law, "restitution": 0.5}}
-    run, exact = (
-        simulate(Case.resolve({**values, "solve": solve}))
-        for solve in ({}, {"rtol": 1e-10, "error_bars": False})
-    )
-    away = abs(run["peak_acceleration"] - exact["peak_acceleration"])
-    assert away <= run["peak_acceleration_error"]
-    a, b = run["acceleration"].values, exact["acceleration"].values
-    assert np.linalg.norm(a - b) < 0.005 * np.linalg.norm(b)
+def test_error_bars_hold_with_laws():
+    """Of the default promise, by far tighter runs. With six restitutions each, 95 % of 500 do."""
+    shares = []
+    laws = "gonthier", "flores", "lankarani_nikravesh", "hu_guo"
+    for law, restitution in itertools.product(laws, (0.3, 0.5)):
+        contact = {"law": law, "restitution": restitution}
+        values = {"joint": "both", "clearance_mm": 0.2, "contact": contact}
+        run, exact = (
+            simulate(Case.resolve({**values, "solve": solve}))
+            for solve in ({}, {"rtol": 1e-10, "error_bars": False})
+        )
+        a, b = run["acceleration"].values, exact["acceleration"].values
+        assert np.linalg.norm(a - b) < 0.005 * np.linalg.norm(b)
+        for name in METRICS:
+            if f"{name}_error" in run and name in exact:
+                away, bar = abs(run[name] - exact[name]).values, run[f"{name}_error"].values
+                known = np.isfinite(bar) & np.isfinite(away)
+                shares += (away[known] / np.maximum(bar[known], 1e-300)).tolist()
+    assert len(shares) > 150
+    assert np.mean(np.array(shares) <= 1.0) > 0.85
 
 
 def test_explain_names_laws_and_bristles():
