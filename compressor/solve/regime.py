@@ -19,10 +19,17 @@ import numpy as np
 from compressor.cases import ACCURACY, TIGHTEST, Case
 from compressor.metrics import METRICS
 from compressor.reasons import Reason
-from compressor.solve.attempts import run_at_tolerance
+from compressor.solve.attempts import Solution, is_sampled, run_at_tolerance, times_of
 from compressor.solve.error_bars import Metrics, relative_bar
 from compressor.solve.horizon import Parting, follow_case_twins
-from compressor.solve.request import Cuts, Trajectory, Turns, revolutions
+from compressor.solve.request import (
+    SAME_TIME,
+    Cuts,
+    Trajectory,
+    Turns,
+    merge_turns,
+    revolutions,
+)
 from compressor.solve.run_metrics import metrics
 from compressor.solve.series import compared_per_rev, distances
 from compressor.solve.si_record import is_ideal, record
@@ -220,6 +227,7 @@ def repeats(
 MEASURED_REV = 3  # revolutions after settling with `duration_rev: auto`: as the default's
 MAX_PERIOD_REV = 4  # rev: period that is looked for
 AGREEMENTS = 2  # revolutions in a row, at least, that are to agree with earlier ones
+LOOKED_AT = 2 * MAX_PERIOD_REV  # revolutions, the last ones, by which that is seen
 
 
 @dataclass(frozen=True)
@@ -227,13 +235,15 @@ class Settling:
     """A case with numbers for its span, and what is known of where it settles.
 
     `settled` (rev): nan where it was not looked for, or not found; `period` (rev): after which
-    metrics agree, nan where that is not known; `detail`: why it was not found.
+    metrics agree, nan where that is not known; `detail`: why it was not found; `run`: of the case,
+    by which it was found.
     """
 
     case: Case
     settled: float = math.nan
     period: float = math.nan
     detail: str = ""
+    run: Solution | None = None
 
 
 def with_span(case: Case, search: HorizonSearch) -> Settling:
@@ -247,24 +257,61 @@ def with_span(case: Case, search: HorizonSearch) -> Settling:
     if is_ideal(case):  # a function of the crank angle
         return Settling(with_settle_rev(case, 0.0, 1), 0.0, 1.0)
     max_revolutions = int(case.duration / case.turn * (1 + 1e-12))
+    ends_settled = case.solve.duration_rev == "auto"
+    longest = with_settle_rev(case, 0.0, 1, float(max_revolutions) if ends_settled else None)
     p, within = record(case), least_promise(case)
+    turns: list[Metrics] = []
+    found: list[tuple[int, int]] = []
 
-    def is_settled(turns: Turns) -> bool:
-        return steady([metrics(p, turn) for turn in turns], within) is not None
+    def is_settled(tallies: Turns) -> bool:
+        """Note the revolution that has ended, and where the last ones agree for the first time."""
+        turns.append(metrics(p, tallies[-1]))
+        if not found and (last := steady(turns[-LOOKED_AT:], within)):
+            found.append((last[0] + max(0, len(turns) - LOOKED_AT), last[1]))
+        return bool(found) and ends_settled
 
-    scout = with_settle_rev(case, 0.0, 1, float(max_revolutions))
-    scout = replace(scout, solve=replace(scout.solve, error_bars=False, accuracy="standard"))
-    cuts = Cuts(revolutions(0.0, scout.duration, case.turn), is_settled)
-    run_at_tolerance(scout, case.rtol, search.left, False, cuts)
-    per_revolution = [metrics(p, turn) for turn in cuts.turns]
-    repetition = steady(per_revolution, within)
-    if repetition is None:
+    cuts = Cuts(revolutions(0.0, longest.duration, case.turn), is_settled)
+    run = run_at_tolerance(longest, case.rtol, search.left, is_sampled(case), cuts)
+    if not found:
         half = float(max_revolutions // 2)
         text = f"in {max_revolutions} revolutions no {AGREEMENTS + 1} agree within {within:.2g}"
-        longest = with_settle_rev(case, half, 1, float(max_revolutions))
-        return Settling(longest, detail=text)
-    first, period = repetition
-    return Settling(with_settle_rev(case, float(first), period), float(first), float(period))
+        later = with_settle_rev(case, half, 1, float(max_revolutions))
+        return Settling(later, detail=text)
+    first, period = found[0]
+    settled = with_settle_rev(case, float(first), period)
+    return Settling(
+        settled, float(first), float(period), run=settled_part(run, longest, settled, cuts)
+    )
+
+
+def settled_part(run: Solution, longest: Case, case: Case, cuts: Cuts) -> Solution | None:
+    """Return a run of the longest span as that of a case whose metrics count later.
+
+    cuts: into revolutions, of the run. None where it is of other times than the case's, or stopped.
+    """
+    times, trajectory = times_of(case, is_sampled(case)), run.trajectory
+    first, last = (round(time / case.turn) for time in (case.settle, case.duration))
+    count, per_rev = times.output.size, compared_per_rev(case)
+    output = trajectory.times[:count] if is_sampled(case) else times.output
+    same = output.size == count and np.allclose(output, times.output, rtol=1e-12)
+    ends_whole = abs(case.duration - last * case.turn) < SAME_TIME * case.duration
+    if run.reason or not same or not ends_whole or per_rev != compared_per_rev(longest):
+        return None
+    assert trajectory.segments is not None
+    states, phases = trajectory.states[:count].copy(), trajectory.phases[:count].copy()
+    edges, of_segments = trajectory.segments
+    states[-1] = cuts.states[last - 1]
+    phases[-1] = of_segments[np.searchsorted(edges, case.duration * (1.0 - SAME_TIME)) - 1]
+    part = replace(
+        trajectory, times=output, states=states, phases=phases,
+        tally=merge_turns(run.turns[first:last]),
+    )  # fmt: skip
+    begin = first * per_rev
+    samples = run.samples[begin : begin + times.compared.size]
+    numbers = metrics(run.p, part.tally)
+    return replace(
+        run, trajectory=part, settle=case.settle, metrics=numbers, samples=samples, turns=[]
+    )
 
 
 def with_settle_rev(case: Case, settle: float, period: int, duration: float | None = None) -> Case:

@@ -44,14 +44,16 @@ ERROR_AIM = 0.7  # of what is allowed: where the next run's error is aimed at
 MIN_TIGHTENING, MAX_TIGHTENING = 10.0, 1000.0  # times tighter that the next run may be
 
 
-def refine_until_accurate(case: Case, search: HorizonSearch) -> Solution:
+def refine_until_accurate(
+    case: Case, search: HorizonSearch, first: Solution | None = None
+) -> Solution:
     """Return the first run that keeps its promise, or the last whole one as a failed job.
 
     A first run is compared with one a little tighter, and with a looser one, too, where the motion
     enlarges errors. Each further one is as much tighter as its errors are expected to need. It is
     compared with the one before and, where it seems to keep the promise, with one a little tighter
     as well. Where errors are as large as the numbers, twins show whether the motion is chaotic;
-    that ends the search, and so does its budget.
+    that ends the search, and so does its budget. first: the first run, if it was made already.
     """
     rtol = case.rtol
     best: Solution | None = None  # the last whole run
@@ -59,7 +61,10 @@ def refine_until_accurate(case: Case, search: HorizonSearch) -> Solution:
     before: Solution | None = None
     unsound = 0  # runs that did not balance
     while True:
-        now = run_and_sample(search.within_budget(case), rtol, search.left, is_sampled(case))
+        now, first = first, None
+        if now is None:
+            within = search.within_budget(case)
+            now = run_and_sample(within, rtol, search.left, is_sampled(case))
         if now.reason:
             return end_early(case, best, now, search)
         search.count(now.trajectory)
@@ -212,7 +217,7 @@ def solve(case: Case) -> Solution:
     search = HorizonSearch(case)
     settling = with_span(case, search)
     case = search.case = settling.case
-    solution = refine_until_accurate(case, search)
+    solution = refine_until_accurate(case, search, settling.run)
     solution.settled = settling.settled
     if solution.reason not in ("", Reason.ACCURACY_NOT_REACHED):
         return solution
