@@ -1,9 +1,10 @@
 """The mechanics: numbers in, numbers out; only numpy and the one door to numba."""
 
+from compressor.physics._jit import uncompiled
 from compressor.physics.card import card_nodes
 from compressor.physics.contact import choose_laws, hysteresis, steepest
 from compressor.physics.contact_laws import elastic_form
-from compressor.physics.film import film_constants
+from compressor.physics.film import short_film
 from compressor.physics.kinematics import exact_motion, series_motion
 from compressor.physics.loads import (
     complete,
@@ -33,6 +34,7 @@ from compressor.physics.observe import (
 from compressor.physics.onset import approach_at
 from compressor.physics.record import (
     CHOICE,
+    FILM_TERMS,
     MAX_SECTORS,
     Coordinate,
     Fields,

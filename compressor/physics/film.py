@@ -14,10 +14,9 @@ short bearing's direction (`film_numbers_at`), to some per cent of one Reynolds 
 (physics/README.md, Oil film). Holland's sum of F_D and F_V is no such thing: where a journal leaves
 the wall slowly it keeps the force of rotation, most of which the opening takes away.
 
-The numbers are Butenschoen's approximations (Das hydrodynamische, zylindrische Gleitlager
-endlicher Breite unter instationaerer Belastung, Karlsruhe 1976), which are some per cent off his
-tables, times polynomials that make them those of Reynolds' equation (`solve.bearing`), which his
-tables are. They are the short bearing's times what its open ends take away.
+The numbers are those of Reynolds' equation, solved once for a bearing's length over its diameter
+(`solve.bearing`): as polynomials of sqrt(1 - eps), in which they are smooth up to the wall, over
+the short bearing's.
 
 Below `CENTRE_ECCENTRICITY` the numbers go to those that make the centre smooth: a force against
 the velocity.
@@ -31,122 +30,12 @@ bore its load, and struck: how hard, followed from the share.
 
 import math
 
-import numpy as np
-
-from compressor.physics._jit import dispatch_on_record, inline_llvm, jit, uncompiled
+from compressor.physics._jit import dispatch_on_record, inline_llvm, jit
 from compressor.physics.contact import ContactState
 from compressor.physics.contact_laws import rise
-from compressor.physics.record import CHOICE
+from compressor.physics.record import CHOICE, FILM_TERMS
 
 CENTRE_ECCENTRICITY = 0.1
-SHAPES = {"rotation": 14, "attitude": 14, "squeeze": 22}  # numbers, and terms of each polynomial
-TERMS = sum(SHAPES.values())
-TURNED, SQUEEZED = 14, 28  # where the second and the third begin
-
-
-@jit
-def polynomial(constants, begin, end, x):
-    """Return the value of the polynomial whose constants, lowest first, stand from begin to end."""
-    total = 0.0
-    for i in range(end - 1, begin - 1, -1):
-        total = total * x + constants[i]
-    return total
-
-
-@jit
-def end_factor(eps, b):
-    """Return by what factor the open ends weaken a film: Butenschoen's, of a1 and a2.
-
-    b: length over diameter.
-    """
-    a1 = 1.1642 + b * (-1.9456 + b * (7.1161 + b * (-10.1073 + b * 5.0141)))
-    a2 = 1.000026 + b * (0.023634 + b * (0.4215 + b * (0.038817 + b * 0.090551)))
-    return b * b * a1 * (1.0 - eps) / (a2 - eps)
-
-
-@jit
-def short_rotation(eps):
-    """Return `rotation_shape` of a short bearing, over (B / D)^2."""
-    room = 1.0 - eps * eps
-    return math.sqrt(math.pi * math.pi * room + 16.0 * eps * eps) / (2.0 * room * room)
-
-
-@jit
-def short_squeeze(eps):
-    """Return `squeeze_shape` of a short bearing, over (B / D)^2."""
-    room = 1.0 - eps * eps
-    half = (0.5 * math.pi - 0.5 * math.acos(eps)) * (1.0 + 2.0 * eps * eps)
-    shape = half + 1.5 * eps * math.sqrt(room)
-    return 4.0 * shape / (room * room * math.sqrt(room))
-
-
-@jit
-def rotation_shape(eps, b):
-    """Return the Sommerfeld number of the rotation over eps, which stays finite at the centre."""
-    return short_rotation(eps) * end_factor(eps, b)
-
-
-@jit
-def squeeze_shape(eps, b):
-    """Return the Sommerfeld number of the squeeze; eps negative: of a film that is pulled apart."""
-    return short_squeeze(eps) * end_factor(eps, b)
-
-
-@jit
-def attitude_shape(eps, b):
-    """Return the angle (rad) from the load to the line of centres, along the rotation."""
-    series = 6.6294 - 1.591732 * b
-    series = series * eps - 13.3415 + 3.424337 * b
-    series = series * eps + 8.73393 - 2.3291 * b
-    series = series * eps - 2.5905 + 0.798745 * b
-    series = series * eps + 1.152624 - 0.105465 * b
-    return math.atan2(math.pi * math.sqrt(1.0 - eps * eps), 2.0 * eps) * series
-
-
-def film_constants(ratio, share, number):
-    """Return the constants of the film's polynomials, and the squeeze's number at the wall.
-
-    (`TERMS` + 1,) numbers. The polynomials lead from Butenschoen's approximations to other numbers
-    at Chebyshev's points of the eccentricities that a film with this last share may have. ratio: B
-    / D; number: a function of a name in `SHAPES`, an eccentricity and a ratio.
-    """
-    shape_of = {"rotation": rotation_shape, "attitude": attitude_shape, "squeeze": squeeze_shape}
-    max_eps, constants = 1.0 - 0.5 * share, []
-    for name, count in SHAPES.items():
-        least = -max_eps if name == "squeeze" else 0.0
-        nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
-        eps = least + (max_eps - least) * (nodes + 1.0) / 2.0
-        quotient = [number(name, one, ratio) / shape_of[name](one, ratio) for one in eps]
-        fit = np.polynomial.Chebyshev.fit(eps, quotient, count - 1)
-        constants += fit.convert(kind=np.polynomial.Polynomial).coef.tolist()
-    wall = uncompiled(bounded_eccentricity)(1.0, share)
-    return (*constants, uncompiled(squeeze_number)(wall, ratio, np.array(constants)))
-
-
-@jit
-def rotation_number(eps, b, constants):
-    """Return `rotation_shape` as Reynolds' equation has it; level at the centre."""
-    number = rotation_shape(eps, b) * polynomial(constants, 0, TURNED, eps)
-    centre = rotation_shape(0.0, b) * constants[0]
-    return centre + (number - centre) * rise(eps / CENTRE_ECCENTRICITY)
-
-
-@jit
-def attitude(eps, b, constants):
-    """Return `attitude_shape` as Reynolds' equation has it; a right angle at the centre."""
-    angle = attitude_shape(eps, b) * polynomial(constants, TURNED, SQUEEZED, eps)
-    return 0.5 * math.pi + (angle - 0.5 * math.pi) * rise(eps / CENTRE_ECCENTRICITY)
-
-
-@jit
-def squeeze_number(eps, b, constants):
-    """Return `squeeze_shape` as Reynolds' equation has it.
-
-    At the centre the same in all directions.
-    """
-    number = squeeze_shape(eps, b) * polynomial(constants, SQUEEZED, TERMS, eps)
-    centre = 2.0 * rotation_number(0.0, b, constants)
-    return centre + (number - centre) * rise(abs(eps) / CENTRE_ECCENTRICITY)
 
 
 @jit
@@ -187,7 +76,34 @@ def short_film(eps, wedge, closing):
 
 
 @jit
-def film_numbers_at(eps, wedge, closing, b, constants):
+def short_bearing_shares(eps, constants):
+    """Return a bearing's numbers over the short one's: pressed, pulled apart, turned; its attitude.
+
+    Of the attitude, tan(beta / 2) over that of Ocvirk's angle. constants: (4, FILM_TERMS), of
+    `solve.bearing.film_constants`. Those of a film at its centre are one.
+    """
+    u = math.sqrt(1.0 - eps)
+    pressed, pulled, turned, further = 0.0, 0.0, 0.0, 0.0
+    for i in range(FILM_TERMS - 1, -1, -1):
+        pressed = pressed * u + constants[0, i]
+        pulled = pulled * u + constants[1, i]
+        turned = turned * u + constants[2, i]
+        further = further * u + constants[3, i]
+    pressed, pulled, turned = (1.0 - eps) / pressed, (1.0 + eps) / pulled, (1.0 - eps) / turned
+    if eps < CENTRE_ECCENTRICITY:
+        centre = 0.0
+        for i in range(FILM_TERMS):
+            centre += constants[2, i]
+        centre, out = 1.0 / centre, rise(eps / CENTRE_ECCENTRICITY)
+        pressed = centre + (pressed - centre) * out
+        pulled = centre + (pulled - centre) * out
+        turned = centre + (turned - centre) * out
+        further = 1.0 + (further - 1.0) * out
+    return pressed, pulled, turned, further
+
+
+@jit
+def film_numbers_at(eps, wedge, closing, constants):
     """Return the numbers of `short_film` of a bearing of finite length, with the factor (B / D)^2.
 
     The short bearing's force at the angle psi from the line of centres is turned to beta, with
@@ -200,19 +116,15 @@ def film_numbers_at(eps, wedge, closing, b, constants):
     if not size > 0.0:
         return 0.0, 0.0
     cosine, sine = normal / size, across / size
-    pressed = squeeze_number(eps, b, constants) / short_squeeze(eps)
-    pulled = squeeze_number(-eps, b, constants) / short_squeeze(-eps)
-    turned = rotation_number(eps, b, constants) / short_rotation(eps)
+    pressed, pulled, turned, further = short_bearing_shares(eps, constants)
     middle, slope = 0.5 * (pressed + pulled), 0.5 * (pressed - pulled)
     # the direction of a short bearing that turns: Ocvirk's attitude
     wide, far = math.pi * math.sqrt(1.0 - eps * eps), 4.0 * eps
-    length = math.sqrt(wide * wide + far * far)
-    ocvirk = far / length
+    ocvirk = far / math.sqrt(wide * wide + far * far)
     from_pressed = (1.0 - cosine) / (1.0 - ocvirk)
     near = 2.0 * from_pressed / (1.0 + from_pressed * from_pressed)
     near *= (1.0 + cosine) / (1.0 + ocvirk)
     size *= middle + slope * cosine + (turned - middle - slope * ocvirk) * near
-    further = math.tan(0.5 * attitude(eps, b, constants)) * (length + far) / wide
     towards, away = 1.0 + cosine, further * further * (1.0 - cosine)
     size /= towards + away
     return size * (towards - away), size * 2.0 * further * sine
@@ -233,13 +145,12 @@ def film(joint, eccentricity, spins, p):
     radial, across = ex_rate * nx + ey_rate * ny, ey_rate * nx - ex_rate * ny
     eps = bounded_eccentricity(distance / clearance, p.film_share)
     length = p.film_length[joint]
-    ratio = 0.5 * length / pin
     relative = clearance / pin
     size = 2.0 * length * pin * p.viscosity / (relative * relative)
     journal_spin, bore_spin = spins
     per_distance = eps / distance if distance > 0.0 else 1.0 / clearance
     wedge = eps * (journal_spin + bore_spin) - 2.0 * across * per_distance  # eps w
-    away, along = film_numbers_at(eps, wedge, radial / clearance, ratio, constants)
+    away, along = film_numbers_at(eps, wedge, radial / clearance, constants)
     normal, side = -size * away, size * along
     fx, fy = normal * nx - side * ny, normal * ny + side * nx
     shear = 2.0 * math.pi * p.viscosity * length * pin**3

@@ -153,12 +153,14 @@ FIELDS: list[tuple] = [
     ("crank_clearance", "f8"),  # m
     ("crank_corners", "f8", (2,)),  # angles at which its discharge and its suction begin, rad
 ]
+FILM_TERMS = 10  # of each polynomial of a film
 # of joints that are lubricated
 FILM: list[tuple] = [
     ("viscosity", "f8"),  # of the oil, Pa s; 0 of dry joints
     ("film_length", "f8", (2,)),  # of each joint's bearing, m
     ("film_share", "f8"),  # of the clearance: the film's last, in which it gets no thinner
-    ("film_constants", "f8", (2, 51)),  # of each joint, `film.film_constants`
+    ("film_constants", "f8", (2, 4, FILM_TERMS)),  # of each joint, `film.short_bearing_shares`
+    ("film_stiffest", "f8", (2,)),  # of each joint: the squeeze's number at the wall
 ]
 MAX_SECTORS = 180
 # of a mechanism whose bores wear

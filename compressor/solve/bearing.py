@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics import film_constants
+from compressor.physics import FILM_TERMS, short_film, uncompiled
 
 GRID = (96, 12)  # cells around and along half the bearing
 MAX_LOOKS = 200  # in which the cells that bear are found
@@ -98,17 +98,36 @@ def _forces(
 
 
 @lru_cache(maxsize=64)
-def film_numbers(ratio: float, share: float) -> tuple[float, ...]:
-    """Return `film_constants` of a bearing's length over its diameter and a film's last share."""
-    return film_constants(ratio, share, _number)
+def film_constants(ratio: float, share: float) -> tuple[np.ndarray, float]:
+    """Return what a film's numbers are made of, and the squeeze's number at the wall.
+
+    The polynomials of `physics.film.short_bearing_shares`, (4, FILM_TERMS), through Reynolds'
+    numbers at Chebyshev's points of sqrt(1 - eps) from the centre to the film's thinnest. ratio: B
+    / D; share: the film's last one, of the clearance.
+    """
+    thinnest = 0.5 * share
+    least = np.sqrt(thinnest)
+    nodes = np.cos(np.pi * (np.arange(FILM_TERMS) + 0.5) / FILM_TERMS)
+    u = least + 0.5 * (1.0 - least) * (nodes + 1.0)
+    values = np.array([_over_short(1.0 - one * one, ratio) for one in u])
+    fits = [np.polynomial.Chebyshev.fit(u, column, FILM_TERMS - 1) for column in values.T]
+    constants = np.array([fit.convert(kind=np.polynomial.Polynomial).coef for fit in fits])
+    short = uncompiled(short_film)(1.0 - thinnest, 0.0, 1.0)[0]
+    return constants, float(short * thinnest / fits[0](least))
 
 
-def _number(shape: str, eps: float, ratio: float) -> float:
-    """Return Reynolds' number in place of a shape's."""
-    if shape == "squeeze":
-        way = 1 if eps >= 0.0 else -1
-        return way * reynolds(abs(eps), ratio, way).normal
-    numbers = reynolds(eps, ratio)
-    if shape == "rotation":
-        return float(np.hypot(numbers.normal, numbers.across))
-    return float(np.arctan2(numbers.across, numbers.normal))
+def _over_short(eps: float, ratio: float) -> tuple[float, ...]:
+    """Return short numbers over Reynolds', times what they fall by to the wall; and the attitude.
+
+    Pressed, pulled apart, turned; tan(beta / 2) over that of Ocvirk's angle.
+    """
+    short = uncompiled(short_film)
+    turned, ocvirk = reynolds(eps, ratio), short(eps, 1.0, 0.0)
+    pressed, pulled = (abs(reynolds(eps, ratio, way).normal) for way in (1, -1))
+    return (
+        (1.0 - eps) * short(eps, 0.0, 1.0)[0] / pressed,
+        (1.0 + eps) * -short(eps, 0.0, -1.0)[0] / pulled,
+        (1.0 - eps) * np.hypot(*ocvirk) / np.hypot(*turned),
+        np.tan(0.5 * np.arctan2(turned.across, turned.normal))
+        / np.tan(0.5 * np.arctan2(ocvirk[1], ocvirk[0])),
+    )

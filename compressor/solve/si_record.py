@@ -183,15 +183,18 @@ def _film(case: Case, p: dict[str, Any]) -> None:
     lubricant = case.lubricant
     if lubricant is None:
         return
-    from compressor.solve.bearing import film_numbers
+    from compressor.solve.bearing import film_constants
 
     lengths = [to_si(lubricant.bearing_length(joint), "mm") for joint in JOINTS]
     p["viscosity"] = to_si(lubricant.viscosity_mPa_s, "mPa s")
     p["film_length"], p["film_share"] = lengths, lubricant.last_share
-    p["film_constants"] = [
-        film_numbers(0.5 * length / pin, lubricant.last_share)
-        for length, pin in zip(lengths, p["pin_radius"], strict=True)
-    ]
+    p["film_constants"], p["film_stiffest"] = zip(
+        *(
+            film_constants(0.5 * length / pin, lubricant.last_share)
+            for length, pin in zip(lengths, p["pin_radius"], strict=True)
+        ),
+        strict=True,
+    )
 
 
 def _guide_contact(case: Case, p: dict[str, Any]) -> None:
@@ -338,7 +341,7 @@ def film_damping(p: Fields) -> float:
     clearance, joint = min((one, j) for j, one in enumerate(p["clearance"].tolist()) if one > 0.0)
     length, pin = p["film_length"][joint], p["pin_radius"][joint]
     size = 2.0 * length * p["viscosity"] * pin**3 / clearance**2
-    return float(size * p["film_constants"][joint, -1] / clearance)
+    return float(size * p["film_stiffest"][joint] / clearance)
 
 
 def natural_sizes(p: Fields) -> np.ndarray:

@@ -11,7 +11,4 @@ EQUIVALENT: dict[str, str] = {
     "contact_laws.py, solve_rising: rising(middle) < value -> rising(middle) <= value": (
         "where a middle has the value itself, both ends close in on it"
     ),
-    "film.py, attitude_shape: 0.105465 * b -> 0.105465": (
-        "film_constants leads from this shape, as it is, to Reynolds' own numbers"
-    ),
 }
