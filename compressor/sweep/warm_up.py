@@ -29,9 +29,9 @@ WHAT = {
     "auto": ("dry joints", 26),
     METHOD: ("solve.method {}", 1),
     "horizon": ("the horizon of dry joints", 7),
-    "laws": ("other laws of contact and friction", 28),
-    "laws-horizon": ("the horizon of other laws", 12),
-    "features": ("mechanisms with features, such as oil or an elastic rod", 50),
+    "laws": ("oil, cards and other laws", 28),
+    "laws-horizon": ("the horizon with oil, cards and other laws", 12),
+    "features": ("mechanisms with features, such as play in the guide or an elastic rod", 50),
     "features-horizon": ("the horizon of mechanisms with features", 8),
 }  # by part: what it is, and the seconds that it takes speed.REFERENCE
 LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
@@ -40,7 +40,7 @@ LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 class Needs(NamedTuple):
     """The parts of the equations that some cases need.
 
-    methods: of integration; horizon: perturbed trajectories; laws: others than the default ones;
+    methods: of integration; horizon: perturbed trajectories; laws: forces but the default ones;
     features: a mechanism with any.
     """
 

@@ -278,7 +278,7 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     warm_up.compile_once(needs, pytest.fail)
     assert loaded == [needs.parts[part] for part in ("laws", "laws-horizon")]
     assert "part 2 of 5: solve.method Radau, about 1 s" in told[1]
-    assert "part 1 of 2: other laws of contact and friction, about 28 s" in told[3]
+    assert "part 1 of 2: oil, cards and other laws, about 28 s" in told[3]
     assert not needs.uncompiled
     assert warm_up.compile_seconds(needs) == 0
 
