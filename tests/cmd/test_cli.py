@@ -421,7 +421,9 @@ def without_laws(monkeypatch):
 
         def plain(*of, whole=whole):
             cases = [one for one in whole(*of) if one.case]
-            return [one for one in cases if not (one.case.chooses_laws or one.case.has_features)]
+            return [
+                one for one in cases if not (one.case.chooses_forces or one.case.needs_mechanism)
+            ]
 
         monkeypatch.setattr(module, name, plain)
 

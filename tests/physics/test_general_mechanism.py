@@ -206,11 +206,19 @@ def test_the_frame_takes_the_momentum_that_the_parts_lose(lagrange, joint, featu
         assert found == pytest.approx(lost, abs=1e-11 * size)
 
 
+@pytest.mark.parametrize("forces", ["plain", "oil", "card"])
 @pytest.mark.parametrize("gravity", [0, 9.81])
 @pytest.mark.parametrize("joint", SCENES)
-def test_a_scene_is_the_mechanism_without_features(joint, gravity):
+def test_a_scene_is_the_mechanism_without_features(joint, gravity, forces, tmp_path):
     """All that is observed, at random states: the hand-written equations are its special cases."""
     values = {"machine": {"gravity_m_per_s2": gravity, "rod_centre_mm": 250}}
+    if forces == "oil" and joint != "none":
+        values["lubricant"] = {"viscosity_mPa_s": 60, "bearing_length_mm": 15}
+    if forces == "card":
+        card = tmp_path / "card.csv"
+        lines = (f"{k},{0.5 + 0.3 * math.cos(math.radians(k + 20)):.6f}" for k in range(360))
+        card.write_text("crank_angle_deg,pressure_MPa\n" + "\n".join(lines), encoding="utf-8")
+        values |= {"load": "gas", "gas": {"indicator": str(card)}}
     q = featured(joint, (), values, crank_inertia=0.0, unbalance=-0.3, guide_friction=0.0)
     clearance = {} if joint == "none" else {"joint": joint, "clearance_mm": 0.2}
     p = record(Case.from_values(clearance | values))
@@ -223,6 +231,7 @@ def test_a_scene_is_the_mechanism_without_features(joint, gravity):
         if joint == "none":
             y[:] = 0.0
         off = scene_eccentricities(joint, t, y, n, p)
+        y = np.append(y, np.zeros(max(len(state_names(p)) - y.size, 0)))  # what contacts carry
         z, m = np.zeros(len(state_names(q))), int(q["freedoms"])
         z[:m] = np.array([one[:2] for one in off]).ravel()
         z[m : 2 * m] = np.array([one[2:] for one in off]).ravel()
