@@ -122,7 +122,7 @@ def test_the_page_on_features_is_right(tmp_path):
          (indented(of_groups), '    "rod": Rod,\n', False),
          (indented(of_words), "WORDS = {\n", True),
          (indented(of_settings), "    rod: Rod |", False)),
-        ("compressor/cases/case.py", ("self.damper or ", "return bool(self.lubricant or ", True)),
+        ("compressor/cases/case.py", ("self.damper or ", "return bool(self.guide or ", True)),
         ("compressor/physics/record.py", (indented(number), '    ("axial_stiffness"', False)),
         ("compressor/solve/si_record.py", (indented(value), "    if rod:\n", False)),
         ("compressor/physics/mechanism.py", (function + "\n\n", "class BodyRow(", False),

@@ -250,7 +250,8 @@ class Case(Settings):
     def chooses_forces(self) -> bool:
         """Return whether it has laws, a film or a load that runs by default do not have."""
         measured = self.load == "gas" and self.gas.is_measured
-        return self.chooses_laws or self.lubricant is not None or measured
+        at_joints = self.chooses_laws or self.lubricant is not None
+        return measured or (at_joints and self.joint != "none")
 
     @property
     def needs_mechanism(self) -> bool:

@@ -64,7 +64,7 @@ BUGS = [
     ("the rod's inertia missing in an ideal joint's force", "physics/observe.py",
      "-p.rod_inertia * now.spin_up", "0.0"),
     ("the march's atol is 1e-6", "solve/march_driver.py",
-     "work, request.rtol * size, size", "work, 0.0 * size + 1e-6, size"),
+     "request.rtol * self.size, self.size", "0.0 * self.size + 1e-6, self.size"),
     ("SciPy's atol is 1e-6", "solve/si_record.py",
      "return rtol * np.concatenate((natural_sizes", "return 1e-6 * np.concatenate((natural_sizes"),
     ("SciPy's phase is not changed at a corner", "solve/scipy_driver.py",
