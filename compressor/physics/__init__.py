@@ -46,7 +46,7 @@ from compressor.physics.record import (
     state_names,
 )
 from compressor.physics.runge_kutta import FLOWS, RungeKuttaPair
-from compressor.physics.step_control import STABILITY_LIMIT, Mode, is_last_step, step_error
+from compressor.physics.step_control import STABILITY_LIMIT, Mode, step_error
 from compressor.physics.systems import (
     beyond_model,
     derivative_with_flows,
