@@ -232,16 +232,18 @@ def run_and_sample(case: Case, rtol: float, timeout: float, sampled: bool = Fals
 def run_at_tolerance(
     case: Case, rtol: float, timeout: float, sampled: bool, cuts: Cuts | None = None,
     state: np.ndarray | None = None, worn: np.ndarray | None = None,
+    sampled_until: float = math.inf,
 ) -> Solution:  # fmt: skip
     """Return one run of a case at a tolerance, without errors, within a wall time (s).
 
     `sampled`: whether on the output grid; steps do not land on it, so that metrics are the same
     without. `cuts`: into revolutions; metrics are of all of them. `state`: the motion at the start,
     top dead centre (`physics.state_names`), in place of the case's own; no ideal scene has one.
-    `worn`: what is worn off the bores (m), (joint, sector). A run that stops raises nothing: its
-    `reason` says why.
+    `worn`: what is worn off the bores (m), (joint, sector). `sampled_until`: the time (s) behind
+    which a long run has no samples but its end. A run that stops raises nothing: its `reason` says
+    why.
     """
-    p, times = record(case, worn), times_of(case, sampled)
+    p, times = record(case, worn), times_of(case, sampled).until(sampled_until)
     if is_ideal(case):
         pieces = round(PIECES * (case.rtol / rtol) ** FINER_POWER)
         return solution_of_trajectory(
@@ -289,6 +291,16 @@ class Times(NamedTuple):
     output: np.ndarray
     compared: np.ndarray
     all: np.ndarray
+
+    def until(self, time: float) -> "Times":
+        """Return these times without those behind a time (s), but for the end."""
+        end = self.output[-1]
+        if time >= end:
+            return self
+        parts = (
+            one[(one <= time) | (one == end)] for one in (self.output, self.compared, self.all)
+        )
+        return Times(self.settle, *parts)
 
 
 TIMES: dict[tuple, Times] = {}  # of the last cases, by what they depend on

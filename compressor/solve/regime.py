@@ -227,6 +227,7 @@ def repeats(
 MEASURED_REV = 3  # revolutions after settling with `duration_rev: auto`: as the default's
 MAX_PERIOD_REV = 4  # rev: period that is looked for
 AGREEMENTS = 2  # revolutions in a row, at least, that are to agree with earlier ones
+SAMPLED_REV = 12.001  # rev: of a motion that settles later the run is made again, with samples
 LOOKED_AT = 2 * MAX_PERIOD_REV  # revolutions, the last ones, by which that is seen
 
 
@@ -271,7 +272,10 @@ def with_span(case: Case, search: HorizonSearch) -> Settling:
         return bool(found) and ends_settled
 
     cuts = Cuts(revolutions(0.0, longest.duration, case.turn), is_settled)
-    run = run_at_tolerance(longest, case.rtol, search.left, is_sampled(case), cuts)
+    within_samples = SAMPLED_REV * case.turn if ends_settled else math.inf
+    run = run_at_tolerance(
+        longest, case.rtol, search.left, is_sampled(case), cuts, sampled_until=within_samples
+    )
     if not found:
         half = float(max_revolutions // 2)
         text = f"in {max_revolutions} revolutions no {AGREEMENTS + 1} agree within {within:.2g}"

@@ -24,6 +24,7 @@ POLES = 8  # of the anti-aliasing filter, Butterworth
 ANALOGUE_RATE_FACTOR = 8.0
 USUAL = 2.56  # sampling rate over the highest frequency of interest
 LEAD_IN = 1  # revolutions before the record, in which the low-pass filter forgets its start
+NEIGHBOURS = 32  # samples that a spline is made of for one value between them
 
 
 @dataclass(frozen=True)
@@ -121,9 +122,15 @@ def mode_of(sensor: Sensor) -> tuple[float, float]:
 
 
 def state_at(motion: OscillatorMotion, step: float, time: float) -> tuple[float, float]:
-    """Return displacement and velocity of a motion that repeats itself, at a time (s)."""
+    """Return displacement and velocity of a motion that repeats itself, at a time (s).
+
+    By a cubic spline through its `NEIGHBOURS` samples, beyond which hardly any counts.
+    """
+    last = len(motion.displacement) - 1
+    first = int(time // step) - NEIGHBOURS // 2
+    where = np.arange(first, first + NEIGHBOURS)
     place, speed = (
-        float(interpolate_periodic(values, step, np.array([time]))[0]) for values in motion[:2]
+        float(CubicSpline(where, values[where % last])(time / step)) for values in motion[:2]
     )
     return place, speed
 
