@@ -50,8 +50,8 @@ format: install  ## let ruff format and mend what it can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-oracle: install  ## write what the program computes of 500 cases to oracle.json, to the bit (5 minutes)
-	$(CAMPAIGN)/write_oracle.py oracle.json
+oracle: install  ## write what 500 cases give to oracle.json.xz, to the bit, and compare it with the numbers kept, within both error bars (5 minutes)
+	$(CAMPAIGN)/write_oracle.py oracle.json.xz --against tests/results/oracle.json.xz --within
 
 calibration: install  ## measure what estimates of errors are worth, on cases that judge nothing (8 minutes)
 	$(CAMPAIGN)/calibrate_errors.py tests/results/calibration.json

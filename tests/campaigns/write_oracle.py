@@ -141,7 +141,8 @@ def beyond_bars(new, old):
         ]
         for number in then:
             bar = f"{number}_error"
-            if bar in now and bar in then and number in now:
+            each = [one.get(name) for one in (now, then) for name in (number, bar)]
+            if None not in each and len({*map(len, each)}) == 1:
                 pairs = zip(*(map(read, one) for one in (now[number], then[number])), strict=True)
                 bars = zip(*(map(read, one) for one in (now[bar], then[bar])), strict=True)
                 lines += [

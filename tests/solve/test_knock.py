@@ -88,7 +88,7 @@ def test_it_is_known_within_its_bar_by_another_method_and_0_without_clearance():
      (0.2, 50, 48, True), (0.15, 60, 24, True), (0.25, 50, 24, True)],
 )  # fmt: skip
 def test_an_oiled_pin_knocks_where_a_sensor_hears_it(clearance, length, viscosity, knocks):
-    """On the guide's sensor, times the sound pin's 1.65 m/s2: 1, 1.1, 1.2; 5, 2.2 and 93.
+    """On the guide's sensor, times the sound pin's 1.52 m/s2: 1, 1, 1.6; 6.7, 2.4 and 103.
 
     The film takes the blow of all but the last one: dry contact does not tell them apart.
     """
