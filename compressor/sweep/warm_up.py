@@ -40,31 +40,35 @@ LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 class Needs(NamedTuple):
     """The parts of the equations that some cases need.
 
-    methods: of integration; horizon: perturbed trajectories; laws: forces but the default ones;
-    features: a mechanism with any.
+    methods: of integration; horizon: perturbed trajectories; plain: the default forces alone; laws:
+    others beside them; features: a mechanism with any.
     """
 
     methods: tuple[str, ...] = ()
     horizon: bool = False
+    plain: bool = False
     laws: bool = False
     features: bool = False
 
     @classmethod
     def of(cls, cases: Iterable[Case]) -> "Needs":
-        methods, twins, laws, features = {"auto"}, False, False, False
+        methods, twins, plain, laws, features = {"auto"}, False, False, False, False
         for case in cases:  # which may be made one by one
             methods.add(case.solve.method)
             twins = twins or case.solve.horizon is True
             features = features or case.needs_mechanism
             laws = laws or (case.chooses_forces and not case.needs_mechanism)
-        return cls(tuple(sorted(methods)), twins, laws=laws, features=features)
+            plain = plain or not (case.chooses_forces or case.needs_mechanism)
+        return cls(tuple(sorted(methods)), twins, plain, laws, features)
 
     @property
     def parts(self) -> "dict[str, Needs]":
         """Return the parts of the equations that are needed, by name, each as needs of its own."""
-        found = {method: Needs((method,)) for method in self.methods}
-        if self.horizon:
-            found["horizon"] = Needs(horizon=True)
+        found: dict[str, Needs] = {}
+        if self.plain:
+            found |= {method: Needs((method,), plain=True) for method in self.methods}
+        if self.plain and self.horizon:
+            found["horizon"] = Needs(horizon=True, plain=True)
         alone = {"laws": Needs(self.methods, laws=True)} if self.laws else {}
         alone |= {"features": Needs(self.methods, features=True)} if self.features else {}
         found |= alone
@@ -88,7 +92,7 @@ def load(needs: Needs) -> None:
     if needs.horizon:
         hows.append({"horizon": True})
     values: dict[str, object] = {"joint": "both", "clearance_mm": 0.1}
-    kinds: list[dict[str, object]] = [{}]
+    kinds: list[dict[str, object]] = [{}] if needs.plain else []
     if needs.laws:
         kinds.append({"contact": {"law": "hertz"}})
     if needs.features:

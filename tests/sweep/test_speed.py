@@ -41,7 +41,7 @@ def test_workers_that_share_one_half_of_a_core_are_worth_that(workers):
 
 def test_compiling_is_told_by_how_slow_this_machine_is(tmp_path, monkeypatch):
     monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
-    needs, told = warm_up.Needs(("auto", "Radau"), laws=True), []
+    needs, told = warm_up.Needs(("auto", "Radau"), plain=True, laws=True), []
     for slow in (1.0, 3.0):
         monkeypatch.setattr(warm_up, "slowness", lambda slow=slow: slow)
         told.append(warm_up.compile_seconds(needs))
@@ -54,7 +54,7 @@ def test_a_set_switch_against_compiling_is_told(tmp_path, monkeypatch):
     told = []
     for value in ("0", "1"):
         monkeypatch.setenv("NUMBA_DISABLE_JIT", value)
-        warm_up.compile_once(warm_up.Needs(("auto",)), told.append)
+        warm_up.compile_once(warm_up.Needs(("auto",), plain=True), told.append)
     (text,) = told
     assert text.startswith("NUMBA_DISABLE_JIT is set: nothing is compiled")
 

@@ -255,7 +255,7 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     """What was finished before a stop is not compiled again."""
     monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
     monkeypatch.setattr(warm_up, "slowness", lambda: 1.0)
-    needs = warm_up.Needs(("auto", "Radau"), True, laws=True)
+    needs = warm_up.Needs(("auto", "Radau"), True, plain=True, laws=True)
     ahead = ["Radau", "auto", "horizon", "laws", "laws-horizon"]
     assert sorted(needs.parts) == ahead
     assert warm_up.compile_seconds(needs) == 26 + 1 + 7 + 28 + 12
@@ -283,9 +283,19 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     assert warm_up.compile_seconds(needs) == 0
 
 
+def test_only_what_cases_need_is_compiled():
+    """A machine with oil in its joints needs no equations of dry ones."""
+    oiled = {"joint": "both", "clearance_mm": 0.1, "lubricant": True}
+    for values, parts in (
+        ({"joint": "both", "clearance_mm": 0.1}, {"auto"}), (oiled, {"laws"}),
+        (oiled | {"guide": True}, {"features"}),
+    ):  # fmt: skip
+        assert {*warm_up.Needs.of([Case.from_values(values)]).parts} == parts
+
+
 def test_every_part_that_can_be_needed_has_words():
     for kinds in ({"laws": True}, {"features": True}):
-        needs = warm_up.Needs(("auto",), True, **kinds)
+        needs = warm_up.Needs(("auto",), True, plain=True, **kinds)
         assert {*needs.parts} <= {*warm_up.WHAT}
 
 
@@ -351,7 +361,7 @@ def test_a_copied_folder_compiles_again(tmp_path, monkeypatch):
     monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
     for place in ("here", "here", "copy", "copy", "here"):
         monkeypatch.setattr(warm_up, "COMPILED", tmp_path / place)
-        warm_up.compile_once(warm_up.Needs(("auto",)), lambda remark: None)
+        warm_up.compile_once(warm_up.Needs(("auto",), plain=True), lambda remark: None)
     assert len(loaded) == 2
 
 

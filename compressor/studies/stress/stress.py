@@ -140,7 +140,7 @@ def campaign(
     tasks = [(number, (number, seed, budget), TIMEOUT) for number in missing]
     remark = partial(progress, total - len(missing), total)
     features = budget.drawn == extremes.FEATURES
-    needs = Needs(("auto",), horizon=True, laws=bool(budget.drawn), features=features)
+    needs = Needs(("auto",), True, plain=True, laws=bool(budget.drawn), features=features)
     running = run_here(run_scene, tasks, needs, workers, remark)
     try:
         for end in running:
