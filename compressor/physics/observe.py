@@ -345,14 +345,14 @@ def observe(t, y, phase, p, row):
         write_scene_frame(motion.cos_theta, motion.sin_theta, p, row)
 
 
-@inline_llvm
+@jit
 def observe_contact(motion, y, phase, p, row):
     """Write the columns from ACCELERATION to GUIDE_MOMENT: by which a step is tallied within."""
     now = evaluate(motion, y, phase, p)
     write_contact_columns(now, y, joint_forces(now, y, p), p, row)
 
 
-@inline_llvm
+@jit
 def observe_with_energy(motion, y, phase, p, row):
     """Write the columns from ACCELERATION on: what a step is judged, tallied and audited by."""
     now = evaluate(motion, y, phase, p)
@@ -388,7 +388,7 @@ def write_flowing_derivative(motion, z, phase, p, out):
     write_powers(now, y, joint_forces(now, y, p), p, out[n:])
 
 
-@inline_llvm
+@jit
 def derivative_and_columns(motion, z, phase, p, out, row):
     """Write both `derivative_with_flows` and `observe_with_energy` from one evaluation."""
     n = z.size - 4
