@@ -407,7 +407,9 @@ def estimate_errors(solution: Solution, *others: Solution) -> None:
         one.companions = ()  # so that the runs of a long search are not all in memory
     solution.companions = others
     residual = energy_residual(solution.trajectory.tally)
-    switching = switch_errors(solution.metrics, solution.trajectory.tally, solution.rtol)
+    switching = switch_errors(
+        solution.p, solution.metrics, solution.trajectory.tally, solution.rtol
+    )
     companions = [compare_with_run(solution, one) for one in others if not one.reason]
     runs: list[Companion | None] = [*companions] or [None]
     found = [bars(solution.metrics, one, residual, switching) for one in runs]

@@ -23,6 +23,7 @@ from compressor.physics import (
     Column,
     elastic_form,
     is_featured,
+    is_oiled,
     observe_all,
     read_fields,
 )
@@ -107,7 +108,9 @@ def held_by_springs(p: np.record, trajectory: Trajectory) -> float:
 SWITCHING = 2.0  # times rtol ** ORDER: natural sizes of a state that it may be off by
 
 
-def switch_errors(metrics: Mapping[str, Any], tally: np.record, rtol: float) -> Metrics:
+def switch_errors(
+    p: np.record, metrics: Mapping[str, Any], tally: np.record, rtol: float
+) -> Metrics:
     """Return how far a run's changes of contact may move the metrics that are shares of time.
 
     Two runs may agree in the moment of one change by chance; how far a state that is off by the
@@ -118,7 +121,7 @@ def switch_errors(metrics: Mapping[str, Any], tally: np.record, rtol: float) -> 
         return {}
     share = SWITCHING * rtol**ORDER * tally["switch_shift"] / (tally["seconds"] or math.nan)
     found = {"contact_loss_fraction": share}
-    if tally["has_rod_load"]:
+    if tally["has_rod_load"] and not is_oiled(p):  # whose load ends where dry contact does
         found["rod_load_reversal_angle"] = math.tau * share[1]
     return found
 

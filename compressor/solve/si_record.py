@@ -32,6 +32,7 @@ from compressor.physics import (
     enter_segment,
     hysteresis,
     is_featured,
+    is_oiled,
     new_record,
     start,
     state_names,
@@ -336,7 +337,7 @@ def film_damping(p: Fields) -> float:
 
     Of the joint with the smaller clearance, whose film is the stiffer one.
     """
-    if p["laws"].size == 1 or p["viscosity"] == 0.0:
+    if not is_oiled(p):
         return 0.0
     clearance, joint = min((one, j) for j, one in enumerate(p["clearance"].tolist()) if one > 0.0)
     length, pin = p["film_length"][joint], p["pin_radius"][joint]
