@@ -303,24 +303,9 @@ class Times(NamedTuple):
         return Times(self.settle, *parts)
 
 
-TIMES: dict[tuple, Times] = {}  # of the last cases, by what they depend on
-MAX_TIMES = 16
-
-
 def times_of(case: Case, sampled: bool) -> Times:
-    """Return the times at which a run of a case is sampled, those of many cases in common."""
-    stride = finer(case) if sampled else 0
-    key = case.solve, case.machine.speed_rpm, stride
-    if (known := TIMES.get(key)) is None:
-        if len(TIMES) >= MAX_TIMES:
-            TIMES.clear()
-        known = TIMES[key] = make_times(case, stride)
-    return known
-
-
-def make_times(case: Case, stride: int) -> Times:
-    """Return the times at which a run is sampled; stride: output times a step, 0 for both ends."""
-    samples = stride * round(case.steps) or 1
+    """Return the times at which a run of a case is sampled: its output, or both ends alone."""
+    samples = finer(case) * round(case.steps) if sampled else 1
     output = case.duration * (np.arange(samples + 1) / samples)
     compared = compared_times(case) if case.wants_bars else output[:0]
     union = np.union1d(output, compared) if compared.size else output

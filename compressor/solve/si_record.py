@@ -10,7 +10,6 @@ moment on.
 """
 
 import math
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -396,25 +395,10 @@ def initial_state(case: Case, p: np.record, shift: np.ndarray | float = 0.0) -> 
     as it is then, at rest in itself.
     """
     journals = offsets(case) + shift
-    if p["laws"].size == 1:
-        return plain_start(journals.tobytes(), p["scene"], p["rod_length"], p["rod_centre"]).copy()
     y = np.zeros(len(state_names(p)))
     start(journals, y, p)
     if is_featured(p) and p["elastic"]:
         deflect(p, y)
-    return y
-
-
-@lru_cache(maxsize=64)
-def plain_start(journals: bytes, scene: int, rod_length: float, rod_centre: float) -> np.ndarray:
-    """Return the state at time 0 of default laws and no features, which reads no other number.
-
-    journals: their positions in their bores (m), (joint, axis), as bytes: of 0.0 and -0.0, which
-    are equal, the states differ.
-    """
-    p = new_record(values={"scene": scene, "rod_length": rod_length, "rod_centre": rod_centre})
-    y = np.zeros(len(state_names(p)))
-    start(np.frombuffer(journals).reshape(2, 2).copy(), y, p)
     return y
 
 

@@ -110,10 +110,6 @@ def one_way_errors(case: Case, velocities: tuple, step: float) -> list[float]:
     return bounds
 
 
-MAX_TEMPLATE_SIZE = 1_000_000  # samples of a Dataset that is kept as a template
-TEMPLATES: dict[tuple, "xr.Dataset"] = {}  # the last Dataset without values, by its shapes
-
-
 def simulate(case: Case) -> "xr.Dataset":
     """Simulate one case and return its Dataset: status, metrics, error bars, time series.
 
@@ -153,34 +149,10 @@ def simulate(case: Case) -> "xr.Dataset":
 
 
 def as_dataset(table: DatasetParts) -> "xr.Dataset":
-    """Return the Dataset of a table.
-
-    Where the last one had the same shapes, it is copied with other values: to make a new one takes
-    xarray three times as long, since it compares each variable with all others.
-    """
+    """Return the Dataset of a table."""
     import xarray as xr
 
-    shape = tuple((name, one.dims, one.values.shape) for name, one in table.variables.items())
-    indexes = {name: one for name, one in table.variables.items() if one.dims == (name,)}
-    template = TEMPLATES.get(shape)
-    if template is None or not all(
-        np.array_equal(template.variables[name].values, one.values) for name, one in indexes.items()
-    ):
-        blank = {
-            name: one._replace(values=np.broadcast_to(np.zeros((), one.values.dtype), sizes))
-            for (name, _, sizes), one in zip(shape, table.variables.values(), strict=True)
-        }
-        template = xr.Dataset(blank | indexes)
-        TEMPLATES.clear()
-        if all(size <= MAX_TEMPLATE_SIZE for size in template.sizes.values()):
-            TEMPLATES[shape] = template
-    dataset = template.copy(
-        data={str(name): table.variables[str(name)].values for name in template.data_vars}
-    )
-    for name, variable in dataset.variables.items():
-        variable.attrs = dict(table.variables[str(name)].attrs)
-    dataset.attrs = dict(table.attrs)
-    return dataset
+    return xr.Dataset(dict(table.variables), attrs=dict(table.attrs))
 
 
 def observe(case: Case) -> tuple[Outcome, DatasetParts]:
