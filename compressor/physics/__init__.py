@@ -41,7 +41,6 @@ from compressor.physics.record import (
     Load,
     Scene,
     is_featured,
-    is_oiled,
     new_record,
     read_fields,
     state_names,

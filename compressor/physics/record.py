@@ -260,11 +260,6 @@ def is_featured(p: Fields) -> bool:
     return bool(p["laws"].size == MECHANISM)
 
 
-def is_oiled(p: Fields) -> bool:
-    """Return whether joints of a record have an oil film."""
-    return bool(p["laws"].size > 1 and p["viscosity"] > 0.0)
-
-
 def find_coordinates(p: Fields) -> list[Coordinate]:
     """Return the coordinates, but the crank's, of a mechanism's features and clearances."""
     coordinates = []

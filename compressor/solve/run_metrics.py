@@ -23,12 +23,12 @@ from compressor.physics import (
     Column,
     elastic_form,
     is_featured,
-    is_oiled,
     observe_all,
     read_fields,
 )
 from compressor.solve.error_bars import ORDER, Metrics, energy_residual
 from compressor.solve.request import Trajectory, last_state, merge_turns
+from compressor.solve.si_record import is_oiled
 
 ROUNDING = 1e-12
 

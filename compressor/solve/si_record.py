@@ -31,7 +31,6 @@ from compressor.physics import (
     enter_segment,
     hysteresis,
     is_featured,
-    is_oiled,
     new_record,
     start,
     state_names,
@@ -329,6 +328,11 @@ def length_and_speed(p: Fields) -> tuple[float, float]:
     if (damping := film_damping(p)) > 0.0:
         speed = min(speed, force / damping)
     return length, speed
+
+
+def is_oiled(p: Fields) -> bool:
+    """Return whether joints of a record have an oil film."""
+    return bool(p["laws"].size > 1 and p["viscosity"] > 0.0)
 
 
 def film_damping(p: Fields) -> float:

