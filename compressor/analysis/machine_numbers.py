@@ -327,7 +327,7 @@ def _numbers_of_sound(sound: Case) -> Named:
         yield "piston rod, stress", (peak / (math.pi / 4.0 * rod**2), "MPa")
     for joint, peak in zip(JOINTS, loads.sizes.max(axis=0), strict=True):
         name = joint.replace("_", " ")
-        yield f"{name}, pin", (2.0 * machine.pin_radius(joint), "mm")
+        yield f"{name}, pin diameter", (2.0 * machine.pin_radius(joint), "mm")
         yield f"{name}, peak load", (1e-3 * float(peak), "kN")
 
 
@@ -348,9 +348,9 @@ def _numbers_of_gas(sound: Case) -> Named:
         percent = 100.0 * cycle.clearance_volume / cycle.swept_volume
         yield f"cylinder, clearance at the {end}", (percent, "%")
     yield "suction, absolute", (gas.suction_MPa, "MPa")
-    yield "suction, gauge", (10.0 * (gas.suction_MPa - gas.ambient), "bar")
+    yield "suction, a gauge reads", (10.0 * (gas.suction_MPa - gas.ambient), "bar")
     yield "discharge, absolute", (gas.discharge_MPa, "MPa")
-    yield "discharge, gauge", (10.0 * (gas.discharge_MPa - gas.ambient), "bar")
+    yield "discharge, a gauge reads", (10.0 * (gas.discharge_MPa - gas.ambient), "bar")
 
 
 def _both_sides(name: str, load: np.ndarray) -> Named:

@@ -10,9 +10,11 @@ length it is known in three directions,
     F_V = So_V(eps) B D eta eps' / psi^2  of squeeze, along it; pulled apart: as of -eps
 
 B and D length and diameter, psi the clearance over the radius. Between them it follows from the
-short bearing's direction (`film_numbers_at`), to some per cent of one Reynolds field
-(physics/README.md, Oil film). Holland's sum of F_D and F_V is no such thing: where a journal leaves
-the wall slowly it keeps the force of rotation, most of which the opening takes away.
+short bearing's direction (`film_numbers_at`), to some per cent of one Reynolds field where the film
+is pressed, and of the force of rotation alone where it is pulled apart and bears little: up to a
+quarter of its own near the wall (physics/README.md, Oil film). Holland's sum of F_D and F_V is no
+such thing: where a journal leaves the wall slowly it keeps the force of rotation, most of which the
+opening takes away.
 
 The numbers are those of Reynolds' equation, solved once for a bearing's length over its diameter
 (`solve.bearing`): as polynomials of sqrt(1 - eps), in which they are smooth up to the wall, over

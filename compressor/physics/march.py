@@ -95,6 +95,7 @@ COARSE_WEIGHTS = np.zeros(NODES.size)  # at its ends and in its middle alone
 COARSE_WEIGHTS[::2] = lobatto(3)[1]
 TOP_LOOKS = 12  # at most, at a peak within a step
 PEAK_TOLERANCE = 1e-10  # of a peak: a parabola that rises above it by less is not looked at
+SAME_SPEED = 1e-9  # of a speed: as near as it is when it is computed again
 CROSSING_TOLERANCE = 1e-8  # of a step: as well as a change of the rod load's side is placed
 # of the stages of each explicit pair, at these nodes: (pair, node, stage)
 NODE_WEIGHTS = np.array(
@@ -696,7 +697,8 @@ def match_contact_speeds(w, z, twin, work, phase, p):
         if p.clearance[joint] > 0.0:
             place = 2 * p.freedoms + joint
             _, speed = approach_at(joint, w.t, z[:n], phase, p, work.y, work.column[:n])
-            if z[place] == max(speed, p.least_approach):  # it has met just now
+            met = max(speed, p.least_approach)  # to rounding, which is not the same in each caller
+            if abs(z[place] - met) <= SAME_SPEED * met:  # it has met just now
                 _, speed = approach_at(joint, w.t, twin[:n], phase, p, work.y, work.column[:n])
                 twin[place] = max(speed, p.least_approach)
 

@@ -57,7 +57,7 @@ BY_HAND = {
     "rod load, reversal": 164.03,  # degrees
     "rod, crank ratio": 63.5 / 343,
     "cylinder, pressure ratio": 2.5317,
-    "suction, gauge": 3.1,  # bar
+    "suction, a gauge reads": 3.1,  # bar
     "piston, mean speed": 2 * 0.127 * 985 / 60,
     "piston, inertia": 118 * 0.0635 * (985 * math.pi / 30) ** 2 * (1 + 63.5 / 343) / 1e3,
     "small end, pressure": 62.85e3 / (102 * 100),
@@ -117,7 +117,7 @@ def test_a_nameplate_s_numbers_are_those_by_hand(read):
     assert machine.remarks() == {}
     lines = dict(machine.lines())
     assert lines["rod load"] == "tension 62.18 kN, compression 51.55 kN, reversal 164 degrees"
-    assert lines["suction"] == "absolute 0.4113 MPa, gauge 3.1 bar"
+    assert lines["suction"] == "absolute 0.4113 MPa, a gauge reads 3.1 bar"
 
 
 @pytest.mark.parametrize("name", MISTAKES)
@@ -166,10 +166,10 @@ def test_what_a_plausible_machine_could_have_shows_in_its_numbers(read):
     """Gauge pressures as absolute ones, and 180 mm pins for 90 mm: no remark, but the number."""
     gauge = NAMEPLATE.replace("0.4113", "0.31").replace("1.0413", "0.94")
     found = by_name(describe_machine(read(gauge)).numbers)
-    assert found["suction, gauge"].value() == "2.087 bar"  # where 3.1 is on the plate
+    assert found["suction, a gauge reads"].value() == "2.087 bar"  # where 3.1 is on the plate
     pins = NAMEPLATE.replace("{big_end: 95, small_end: 51}", "{big_end: 90, small_end: 60}")
     found = by_name(describe_machine(read(pins)).numbers)
-    assert found["big end, pin"].value() == "180 mm"
+    assert found["big end, pin diameter"].value() == "180 mm"
 
 
 @pytest.mark.parametrize(
