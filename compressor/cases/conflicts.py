@@ -556,10 +556,13 @@ def _load_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         clearance = gas.clearance(end, stroke)
         if clearance <= play:
             cover = "head" if end == "head" else "cover at the crank end"
+            key, remedy = gas.clearance_key(end), "raise it"
+            if key.endswith("percent") and clearance < 0.01 * stroke:
+                remedy += "; it is in per cent of the swept volume: 17, not 0.17"
             yield Problem(
-                gas.clearance_key(end),
+                key,
                 f"{clearance:g} mm does not exceed the clearances, {play:g} mm in all: the piston "
-                f"would reach the cylinder {cover}, where the gas force has no bound; raise it",
+                f"would reach the cylinder {cover}, where the gas force has no bound; {remedy}",
             )
     if gas.unloaded not in (None, "none") and not gas.presses(gas.unloaded):
         yield Problem(

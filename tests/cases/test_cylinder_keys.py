@@ -97,6 +97,7 @@ def test_a_piston_that_would_reach_a_cover():
     found = refused(DOUBLE | {"clearance_percent": {"head": 10, "crank": 0.2}}, **worn)
     assert "gas.crank_clearance_percent: 0.48 mm does not exceed the clearances, 0.6 mm" in found
     assert "the cylinder cover at the crank end" in found
+    assert "raise it; it is in per cent of the swept volume: 17, not 0.17" in found
 
 
 def test_studies_sweep_ends_and_valves(tmp_path, monkeypatch):
