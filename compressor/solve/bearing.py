@@ -31,27 +31,36 @@ class Reynolds(NamedTuple):
     across: float
 
 
-def reynolds(eps: float, ratio: float, squeeze: int = 0, grid: tuple[int, int] = GRID) -> Reynolds:
+Bearing = dict[tuple[float, tuple[int, int]], np.ndarray]  # by squeeze and grid: cells that bear
+
+
+def reynolds(
+    eps: float, ratio: float, squeeze: int = 0, grid: tuple[int, int] = GRID,
+    near: Bearing | None = None,
+) -> Reynolds:  # fmt: skip
     """Return the Sommerfeld numbers of a film at an eccentricity, for B / D = ratio.
 
-    squeeze: 0 of a film that turns, 1 of one that is pressed, -1 of one that is pulled apart.
+    squeeze: 0 of a film that turns, 1 of one that is pressed, -1 of one that is pulled apart; near:
+    cells that bore at an eccentricity nearby, where the search for them begins; it is written.
     """
-    return Reynolds(*forces(eps, ratio, 0.0 if squeeze else 1.0, squeeze, grid))
+    return Reynolds(*forces(eps, ratio, 0.0 if squeeze else 1.0, squeeze, grid, near))
 
 
 def forces(
-    eps: float, ratio: float, turning: float, squeeze: float, grid: tuple[int, int] = GRID
-) -> np.ndarray:
+    eps: float, ratio: float, turning: float, squeeze: float, grid: tuple[int, int] = GRID,
+    near: Bearing | None = None,
+) -> np.ndarray:  # fmt: skip
     """Return the numbers of `Reynolds`, (2,), of a film that turns and is squeezed at once.
 
     turning: w eps, squeeze: eps', both over one speed.
     """
-    coarse = _forces(eps, ratio, turning, squeeze, (grid[0] // 2, grid[1] // 2))
-    return (4.0 * _forces(eps, ratio, turning, squeeze, grid) - coarse) / 3.0
+    near = {} if near is None else near
+    coarse = _forces(eps, ratio, turning, squeeze, (grid[0] // 2, grid[1] // 2), near)
+    return (4.0 * _forces(eps, ratio, turning, squeeze, grid, near) - coarse) / 3.0
 
 
 def _forces(
-    eps: float, ratio: float, turning: float, squeeze: float, grid: tuple[int, int]
+    eps: float, ratio: float, turning: float, squeeze: float, grid: tuple[int, int], near: Bearing
 ) -> np.ndarray:
     """Return both numbers on one grid, (2,)."""
     from scipy.sparse import csr_matrix
@@ -83,7 +92,7 @@ def _forces(
     matrix = csr_matrix((values, (rows, columns)), shape=(cell.size, cell.size))
     right = np.repeat(source, along)
     open_end = np.zeros(cell.size, bool) if squeeze else i == 0
-    bears, pressure = ~open_end, np.zeros(cell.size)
+    bears, pressure = near.get((squeeze, grid), ~open_end), np.zeros(cell.size)
     for _ in range(MAX_LOOKS):
         pressure[:] = 0.0
         cells = np.flatnonzero(bears)
@@ -93,6 +102,7 @@ def _forces(
         if (now == bears).all():
             break
         bears = now
+    near[squeeze, grid] = bears
     summed = pressure.reshape(grid).sum(axis=1) * width * 2.0 / along
     return np.array([-(summed @ cosine), summed @ sine]) / 4.0
 
@@ -109,21 +119,22 @@ def film_constants(ratio: float, share: float) -> tuple[np.ndarray, float]:
     least = np.sqrt(thinnest)
     nodes = np.cos(np.pi * (np.arange(FILM_TERMS) + 0.5) / FILM_TERMS)
     u = least + 0.5 * (1.0 - least) * (nodes + 1.0)
-    values = np.array([_over_short(1.0 - one * one, ratio) for one in u])
+    near: Bearing = {}
+    values = np.array([_over_short(1.0 - one * one, ratio, near) for one in u])
     fits = [np.polynomial.Chebyshev.fit(u, column, FILM_TERMS - 1) for column in values.T]
     constants = np.array([fit.convert(kind=np.polynomial.Polynomial).coef for fit in fits])
     short = uncompiled(short_film)(1.0 - thinnest, 0.0, 1.0)[0]
     return constants, float(short * thinnest / fits[0](least))
 
 
-def _over_short(eps: float, ratio: float) -> tuple[float, ...]:
+def _over_short(eps: float, ratio: float, near: Bearing) -> tuple[float, ...]:
     """Return short numbers over Reynolds', times what they fall by to the wall; and the attitude.
 
     Pressed, pulled apart, turned; tan(beta / 2) over that of Ocvirk's angle.
     """
     short = uncompiled(short_film)
-    turned, ocvirk = reynolds(eps, ratio), short(eps, 1.0, 0.0)
-    pressed, pulled = (abs(reynolds(eps, ratio, way).normal) for way in (1, -1))
+    turned, ocvirk = reynolds(eps, ratio, near=near), short(eps, 1.0, 0.0)
+    pressed, pulled = (abs(reynolds(eps, ratio, way, near=near).normal) for way in (1, -1))
     return (
         (1.0 - eps) * short(eps, 0.0, 1.0)[0] / pressed,
         (1.0 + eps) * -short(eps, 0.0, -1.0)[0] / pulled,
