@@ -44,7 +44,7 @@ def duration(seconds: float) -> str:
     return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
 
 
-def watched(
+def report_progress(
     things: Sequence[Thing],
     name: str,
     progress: Progress,

@@ -221,6 +221,11 @@ def test_the_words_about_what_decides_the_nameplate_s_answer():
         heavy = found["body.casing_mass_kg", value]["0.24"]
         assert heavy["sensor_rms"] / plain["0.24"]["sensor_rms"] == pytest.approx(times, rel=0.02)
         assert heavy["peak_contact_force"] == plain["0.24"]["peak_contact_force"]
+    heavy = found["machine.balance.reciprocating", "0"]["0.24"]
+    speeds = [1e3 * one["body_velocity_rms"] for one in (heavy, plain["0.24"])]
+    said = "{:.2f} mm/s where it balances nothing of what reciprocates, {:.2f} mm/s with half"
+    assert said.format(*speeds) in " ".join(PAGES["compressor/docs/my-machine.md"].split())
+    assert heavy["peak_contact_force"] == plain["0.24"]["peak_contact_force"]
     stiff = found["body.frequency_x_Hz", "80"]["0.24"]
     assert stiff["sensor_rms"] == plain["0.24"]["sensor_rms"]
     assert stiff["body_velocity_rms"] < 0.5 * plain["0.24"]["body_velocity_rms"]

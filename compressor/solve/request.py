@@ -11,6 +11,7 @@ import numpy as np
 from compressor.cases import IMPLAUSIBLE
 from compressor.physics import (
     FLOWS,
+    LAST_STEPS,
     STALLED,
     Coordinate,
     Fields,
@@ -117,7 +118,6 @@ def with_edge(
     return edges, np.concatenate((phases[:i], phases[i - 1 : i], phases[i:])), time
 
 
-HISTORY_LENGTH = 16  # attempts that a history keeps
 NONE = -1  # in place of a number of the state
 
 
@@ -167,14 +167,14 @@ class History:
     dominant: int = NONE  # number of the state that drove the last error, or went bad
 
     def add(self, time: float, step: float, error: float, words: str) -> None:
-        """Append an attempt; more than HISTORY_LENGTH push out the first."""
+        """Append an attempt; more than LAST_STEPS push out the first."""
         self.times.append(time)
         self.steps.append(step)
         self.errors.append(error)
         self.words.append(words)
         column: list
         for column in (self.times, self.steps, self.errors, self.words):
-            del column[:-HISTORY_LENGTH]
+            del column[:-LAST_STEPS]
 
 
 @dataclass

@@ -7,11 +7,11 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.cases.groups import METHODS
+from compressor.physics import LAST_STEPS
 from compressor.physics.record import STATE_NAMES, Scene
 from compressor.solve import march_driver
 from compressor.solve.attempts import integrate
 from compressor.solve.march_driver import COMPILED
-from compressor.solve.request import HISTORY_LENGTH
 from compressor.solve.simulate import measure, simulate
 
 BOTH = {"joint": "both", "clearance_mm": 0.3}
@@ -29,7 +29,7 @@ def words(attributes):
 def test_the_history_ends_where_the_run_stopped():
     found = stopped(solve={"max_steps": 500})
     times, steps = found["stop_history_time"], found["stop_history_step"]
-    assert len(times) == len(steps) == len(found["stop_history_error"]) == HISTORY_LENGTH
+    assert len(times) == len(steps) == len(found["stop_history_error"]) == LAST_STEPS
     taken = np.array([text.endswith(("taken", "to an onset")) for text in words(found)])
     assert (times + np.where(taken, steps, 0))[-1] == pytest.approx(found["stop_time"], rel=1e-12)
     assert times[1:] == pytest.approx((times + np.where(taken, steps, 0))[:-1], rel=1e-12)
@@ -133,13 +133,13 @@ def test_the_budget_of_steps_is_kept_exactly(method, most):
     found = measure(Case.from_values({**BOTH, "solve": {"max_steps": most, "method": method}}))
     assert found.reason == "budget_steps"
     assert found.numbers["steps"] + found.numbers["rejected"] == most
-    assert len(words(found.attributes)) == min(most, HISTORY_LENGTH)
+    assert len(words(found.attributes)) == min(most, LAST_STEPS)
 
 
 @pytest.mark.parametrize("method", SCIPY)
 def test_steps_of_scipy_s_methods_are_told_without_errors(method):
     found = stopped(solve={"max_steps": 20, "method": method})
-    assert words(found) == [f"{method} taken"] * HISTORY_LENGTH
+    assert words(found) == [f"{method} taken"] * LAST_STEPS
     assert np.isnan(found["stop_history_error"]).all()
 
 

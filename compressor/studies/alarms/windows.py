@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from compressor.cases import HealthyClearance, Sensor, points
-from compressor.program import CompsimError, Progress, watched
+from compressor.program import CompsimError, Progress, report_progress
 from compressor.store import (
     DamagedJob,
     Folder,
@@ -109,7 +109,7 @@ def read_study(
     bands, clipped = options.bands, 0
     values: Mapping[str, Any] = {}
     own = dict(zip(source.keys, points(source), strict=True))
-    for key, point in watched([*own.items()], "records", progress):
+    for key, point in report_progress([*own.items()], "records", progress):
         job = read_job(stored, key, healthy, bands, options)
         if isinstance(job, str):
             left[job] += 1

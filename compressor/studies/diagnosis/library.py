@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.cases import PerJoint, name_worn_joint, points
-from compressor.program import PROGRAM, Progress, no_progress, watched
+from compressor.program import PROGRAM, Progress, no_progress, report_progress
 from compressor.store import (
     Folder,
     Stored,
@@ -137,7 +137,7 @@ def _compute_features(stored: Stored, positions: dict[str, int], progress: Progr
     """
     rows: list[tuple[str, str, list[float], np.ndarray]] = []
     unknown = 0  # jobs whose case this version cannot read
-    for key, place in watched([*positions.items()], "records", progress):
+    for key, place in report_progress([*positions.items()], "records", progress):
         record = job_record(stored, key)
         if record is None:
             continue

@@ -33,7 +33,7 @@ from compressor.cases import (
     written_key,
 )
 from compressor.metrics import BARRED, JOINTS, METRICS
-from compressor.program import PROGRAM, Progress, no_progress, watched
+from compressor.program import PROGRAM, Progress, no_progress, report_progress
 from compressor.solve import simulate
 from compressor.store import Folder, read_store
 from compressor.studies.tradeoff.features import (
@@ -317,7 +317,9 @@ def run_choices(
     runs = [compared(fastest_run(bare(case), max(2, repeats)))]
     if not complete(runs[0]):
         return runs
-    for one in watched(choices, "runs", lambda done, _, remark: progress(1 + done, total, remark)):
+    for one in report_progress(
+        choices, "runs", lambda done, _, remark: progress(1 + done, total, remark)
+    ):
         other = one.case and bare(one.case, MAX_SECONDS)
         runs.append(compared(fastest_run(other, repeats)) if other else empty_run(runs[0]))
     return runs
