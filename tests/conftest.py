@@ -71,10 +71,6 @@ TOGETHER = {
     "tests/studies/wear/test_stages.py": "features",
     "tests/studies/wear/test_wear_command.py": "features",
     "tests/campaigns/test_wear_campaign.py": "features",
-    "tests/campaigns/test_chaotic.py": "twins",
-    "tests/studies/stress/test_stress.py": "twins",
-    "tests/solve/test_horizon.py": "twins",
-    "tests/studies/regimes/test_lyapunov.py": "twins",
 }
 # modules that take long; the others, in small pieces, then even out the processes. The first
 # ones compile each its own part of the equations, so that two processes do not compile the same at

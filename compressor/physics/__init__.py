@@ -20,7 +20,6 @@ from compressor.physics.march import (
     Status,
     WorkArrays,
     march,
-    march_twins,
     new_stepper,
     new_work,
 )

@@ -3,13 +3,6 @@
 `march` advances a `Stepper` by at most a number of steps and returns, so that Python can look at
 the clock; called again it goes on, to the bit. Steps land on load corners and on onsets of
 contact; the dense solution feeds the output grid and the tally.
-
-A second motion in step with the first: how fast neighbours part, without noise of step control. Two
-runs that choose their steps for themselves differ by their errors. Here the twin takes every step
-that the first motion took, by the same method and of the same length to the bit: twins that start
-alike stay alike to the bit, and what parts others are the steps' own laws. These are those of the
-motion only at a tight tolerance: at a loose one the explicit pair's steps cross the edge of
-stability now and then, where a difference grows by as much as rtol exceeds rounding.
 """
 
 import math
@@ -24,7 +17,6 @@ from compressor.physics._jit import (
     inline_llvm,
     inline_once,
     jit,
-    square_root,
     without_refcount,
 )
 from compressor.physics.kinematics import crank_direction, ideal, ideal_after
@@ -32,12 +24,10 @@ from compressor.physics.mechanism_rows import wear_at
 from compressor.physics.observe import (
     ACCELERATION,
     COLUMNS,
-    ECCENTRICITY,
     NEARNESS,
 )
 from compressor.physics.onset import (
     LANDING_FRACTION,
-    approach_at,
     first_onset,
     locate_change,
     may_change,
@@ -77,7 +67,6 @@ from compressor.physics.systems import (
     enter_segment,
     observe_contact,
     observe_with_energy,
-    write_eccentricities,
 )
 from compressor.physics.tally import (
     PEAKED,
@@ -95,7 +84,6 @@ COARSE_WEIGHTS = np.zeros(NODES.size)  # at its ends and in its middle alone
 COARSE_WEIGHTS[::2] = lobatto(3)[1]
 TOP_LOOKS = 12  # at most, at a peak within a step
 PEAK_TOLERANCE = 1e-10  # of a peak: a parabola that rises above it by less is not looked at
-SAME_SPEED = 1e-9  # of a speed: as near as it is when it is computed again
 CROSSING_TOLERANCE = 1e-8  # of a step: as well as a change of the rod load's side is placed
 # of the stages of each explicit pair, at these nodes: (pair, node, stage)
 NODE_WEIGHTS = np.array(
@@ -147,7 +135,6 @@ STEPPER = np.dtype(
         ("segment", "i8"),
         ("sample", "i8"),  # next output sample
         ("steps", "i8"),
-        ("taken", "f8"),  # length of the last accepted step
         ("evaluations", "i8"),
         ("rejected", "i8"),
         ("onsets", "i8"),
@@ -649,93 +636,9 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         accumulate_metrics(w, base, h, stride, z, work, size, phase, p, tally)
         wear_step(w, base, h, z, work, phase, p, tally)
         sample_grid(w, reached, h, z, work, times, states)
-        w.taken = h
         was_stiff = w.stiff
         choose_method(w, h, z, work, size)
         accept_step(w, z, work, reached, was_stiff or met, at_edge, phases.size)
         if met:  # what is seen at t is not what the step saw at its end
             w.observed = 0
         stop_beyond(w, z, tally, p)
-
-
-@jit
-def separation(t, y, other, p, rows):
-    """Return the greatest distance of two states' eccentricities, over the joint's clearance."""
-    write_eccentricities(t, y, p, rows[0])
-    write_eccentricities(t, other, p, rows[1])
-    worst = 0.0
-    for joint in range(2):
-        if p.clearance[joint] > 0.0:
-            i = ECCENTRICITY + 2 * joint
-            dx, dy = rows[1, i] - rows[0, i], rows[1, i + 1] - rows[0, i + 1]
-            distance = square_root(dx * dx + dy * dy) / p.clearance[joint]
-            if not distance <= worst:  # keeps a nan
-                worst = distance
-    return worst
-
-
-@inline_llvm
-def step_twin(w, twin_stepper, twin, work, atol, size, phase, p):
-    """Take the step that a stepper took, from twin_stepper.t on, in the twin's motion."""
-    if twin_stepper.fresh:
-        derivative_with_flows(twin_stepper.t, twin, phase, p, work.k[0])
-    base = crank_direction(twin_stepper.t, p)
-    try_step(twin_stepper, base, w.taken, twin, work, atol, size, phase, p)
-    for i in range(twin.size):
-        twin[i] = work.new[i]
-        work.k[0, i] = work.k[STAGES - 1, i]
-    twin_stepper.fresh = w.fresh
-
-
-@inline_llvm
-def match_contact_speeds(w, z, twin, work, phase, p):
-    """Store approach speeds in the twin where the first motion has just stored its own."""
-    if not w.landed:
-        return
-    n = work.y.size
-    for joint in range(2):
-        if p.clearance[joint] > 0.0:
-            place = 2 * p.freedoms + joint
-            _, speed = approach_at(joint, w.t, z[:n], phase, p, work.y, work.column[:n])
-            met = max(speed, p.least_approach)  # to rounding, which is not the same in each caller
-            if abs(z[place] - met) <= SAME_SPEED * met:  # it has met just now
-                _, speed = approach_at(joint, w.t, twin[:n], phase, p, work.y, work.column[:n])
-                twin[place] = max(speed, p.least_approach)
-
-
-@jit
-def keep_contact_speeds(w, z, twin, work, phase, p):
-    """Return at once: with the default laws a motion carries no approach speeds."""
-
-
-match_speeds = dispatch_on_record(CHOICE, match_contact_speeds, keep_contact_speeds)
-
-
-@jit
-def march_twins(
-    w, twin_stepper, p, z, twin, work, twin_work, atol, size, edges, phases, twin_phases, times,
-    states, tally, rows, far, limit,
-):  # fmt: skip
-    """Advance a motion and its twin in step, until they are `far` apart: twin_stepper is then DONE.
-
-    twin_stepper: of the same pair; twin: its motion and flows, (n + 4,); twin_phases: as `phases`,
-    of the twin; far: as a share of the
-    clearance; rows: scratch, (2, COLUMNS). The rest as for `march`.
-    """
-    n = size.size
-    for _ in range(limit):
-        if w.status != RUNNING:
-            return
-        steps, segment = w.steps, w.segment
-        if w.t == edges[segment]:
-            enter_segment(w.t, twin, segment, twin_phases, p)
-        phase = twin_phases[segment]
-        twin_stepper.t, twin_stepper.stiff = w.t, w.stiff
-        # a plain 1 would be a type of its own, for which numba compiles all of march again
-        march(w, p, z, work, atol, size, edges, phases, times, states, tally, np.int64(1))
-        if w.steps > steps:
-            step_twin(w, twin_stepper, twin, twin_work, atol, size, phase, p)
-            match_speeds(w, z, twin, twin_work, phase, p)
-            if not separation(w.t, z[:n], twin[:n], p, rows) <= far:
-                twin_stepper.status = DONE
-                return

@@ -1,16 +1,15 @@
 """A case -> its outcome: motion, metrics, error bars, reasons."""
 
-from compressor.solve.attempts import Solution, run_at_tolerance, run_until_balanced
+from compressor.solve.attempts import Solution, integrate, run_at_tolerance, run_until_balanced
 from compressor.solve.cautions import JointScales, cautions, expected_cost, joint_scales
 from compressor.solve.error_bars import Metrics, energy_residual
-from compressor.solve.horizon import Twins, predictability_horizon
+from compressor.solve.horizon import predictability_horizon
 from compressor.solve.march_driver import COMPILED
 from compressor.solve.measured_gas import gas_nodes
 from compressor.solve.regime import find_repetition, least_promise, steady, with_settle_rev
 from compressor.solve.request import (
     Cuts,
     Request,
-    Stop,
     Turns,
     merge_turns,
     passed_time,
@@ -27,6 +26,6 @@ from compressor.solve.run_metrics import (
 )
 from compressor.solve.scipy_driver import LOCAL
 from compressor.solve.series import SIGNALS, signals_of_scene
-from compressor.solve.si_record import initial_state, is_ideal, record, stiffness_of
+from compressor.solve.si_record import initial_state, is_ideal, natural_sizes, record, stiffness_of
 from compressor.solve.simulate import measure, observe, simulate, with_series
 from compressor.solve.solution import solve

@@ -221,14 +221,6 @@ def is_sampled(case: Case) -> bool:
     return case.output.keep == "series" or moves_body(case)
 
 
-def run_and_sample(case: Case, rtol: float, timeout: float, sampled: bool = False) -> Solution:
-    """Return `run_at_tolerance`; a run of a case with a body is sampled in any case.
-
-    It moves the body, whose error bars need it.
-    """
-    return run_at_tolerance(case, rtol, timeout, sampled or moves_body(case))
-
-
 def run_at_tolerance(
     case: Case, rtol: float, timeout: float, sampled: bool, cuts: Cuts | None = None,
     state: np.ndarray | None = None, worn: np.ndarray | None = None,
@@ -363,11 +355,11 @@ def comparison_run(case: Case, solution: Solution, timeout: float) -> Solution:
     """
     tighter = companion_rtol(solution.p, solution.rtol)
     if tighter is not None:
-        return run_and_sample(case, tighter, timeout)
+        return run_at_tolerance(case, tighter, timeout, moves_body(case))
     if overruns_friction(solution.p, solution.rtol):
         stiff = replace(case, solve=replace(case.solve, method="RODAS"))
-        return run_and_sample(stiff, solution.rtol / STIFF_TIGHTER, timeout)
-    return run_and_sample(case, 10.0 * solution.rtol, timeout)
+        return run_at_tolerance(stiff, solution.rtol / STIFF_TIGHTER, timeout, moves_body(case))
+    return run_at_tolerance(case, 10.0 * solution.rtol, timeout, moves_body(case))
 
 
 def looser_comparison_run(
@@ -379,7 +371,7 @@ def looser_comparison_run(
     """
     if other.reason or not is_amplified(solution.rtol, distances(solution.samples, other.samples)):
         return None
-    looser = run_and_sample(case, LOOSER_FACTOR * solution.rtol, timeout)
+    looser = run_at_tolerance(case, LOOSER_FACTOR * solution.rtol, timeout, moves_body(case))
     return None if looser.reason else looser
 
 

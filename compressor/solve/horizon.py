@@ -1,66 +1,58 @@
-"""How long a motion can be foretold: the time in which close twins part.
+"""How long a motion can be foretold: the time in which close motions part.
 
-Beyond it two correct solutions differ by more than any error bar, so that a number that
-depends on the course of the motion has none; statistics still have a meaning. Twins go in step
-(`compressor.physics.march`), at a tolerance of their own: each step adds an error of about rtol,
-which must be small beside the shift that is followed. Looser ones were measured to mislead: at
-4e-6, explicit steps at the edge of stability part twins of a regular motion within a third of a
-revolution; at 1e-11 one horizon of five was off by a third. At 1e-12 horizons agree with those at
-1e-13, and with those of two separate runs, to a few thousandths (tests/solve/test_horizon.py).
+Beyond it two correct solutions differ by more than any error bar, so that a number that depends on
+the course of the motion has none; statistics still have a meaning. Two runs are compared, one with
+its journals shifted, each with steps of its own, at a tolerance of their own: their errors must be
+small beside the shift that is followed. At 1e-12 a horizon is that at 1e-13 to a hundredth
+(tests/solve/test_horizon.py).
 """
 
 import math
 import time
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from compressor.cases import Case
-from compressor.physics import (
-    COLUMNS,
-    FLOWS,
-    Coordinate,
-    Status,
-    is_featured,
-    march_twins,
-    new_tally,
-    new_work,
-    segments,
-)
+from compressor.physics import COLUMNS, Column, Coordinate, is_featured, observe_all
 from compressor.reasons import Reason
-from compressor.solve.march_driver import check_march, chunks, prepare_stepper
-from compressor.solve.request import Request, Stop, with_cuts
-from compressor.solve.si_record import initial_state, is_ideal, natural_sizes, record
+from compressor.solve.attempts import integrate
+from compressor.solve.request import Request, Trajectory
+from compressor.solve.si_record import initial_state, is_ideal, record
 
-TWIN_DISTANCE = 1e-9  # of the clearance: how far from the motion its twin starts
+SHIFT = 1e-9  # of the clearance: how far from the motion the other one starts
 PARTED_DISTANCE = 1e-2  # of the clearance: how far apart they are no longer one motion
-TWINS_RTOL = 1e-12  # of the twins, whatever the case has
+HORIZON_RTOL = 1e-12  # of both runs, whatever the case has
+LOOKS_PER_REV = 720  # at which the two are compared
+FIRST_SPAN_REV, SPAN_GROWTH = 0.5, 4.0  # most chaotic motions part early: short runs come first
 
 
 def predictability_horizon(
-    case: Case, timeout: float = math.inf, rtol: float = TWINS_RTOL, close: float = TWIN_DISTANCE
+    case: Case, timeout: float = math.inf, rtol: float = HORIZON_RTOL, shift: float = SHIFT
 ) -> float:
-    """Return the time (s) until a twin that starts 1e-9 of the clearance away is 1 % of it away.
+    """Return the time (s) until a motion shifted by 1e-9 of the clearance is 1 % of it away.
 
     The journal of each joint with clearance is shifted, as much along x as along y; the distance
-    is that of the eccentricities at the worse joint, seen at the end of each step. inf where the
-    twins are still close at the end of the case, or the joints are ideal. Where their run stops
-    before, as by `timeout` (s) or the case's max_steps, the time up to there: no more is known.
+    is that of the eccentricities at the worse joint, or of the crosshead in a guide with play, at
+    every half degree. inf where the two are still close at the end of the case, or the joints are
+    ideal. Where a run stops before, as by `timeout` (s) or the case's max_steps, the time up to
+    there: no more is known.
     The case's own method and tolerance do not count: the horizon belongs to the motion.
     """
-    return follow_case_twins(case, case.duration, rtol, close, timeout).horizon
+    return compare_shifted(case, case.duration, rtol, shift, timeout).horizon
 
 
 class Parting(NamedTuple):
-    """Up to when (s) twins were followed, whether they parted there, or came to the end.
+    """Up to when (s) two motions were compared, whether they parted there, or came to the end.
 
-    `attempts`: of a step, by the first of the two.
+    `evaluations`: of both runs.
     """
 
     time: float
     parted: bool
     whole: bool
-    attempts: int = 0
+    evaluations: int = 0
 
     @property
     def horizon(self) -> float:
@@ -68,82 +60,155 @@ class Parting(NamedTuple):
         return math.inf if self.whole else self.time
 
 
-def follow_case_twins(
-    case: Case, span: float, rtol: float, close: float, timeout: float
-) -> Parting:
-    """Follow twins over a span (s), `close` at its begin, within a wall time (s).
+def compare_shifted(case: Case, end: float, rtol: float, shift: float, timeout: float) -> Parting:
+    """Compare a motion with one that is shifted, over ever longer spans up to an end (s).
 
-    As `predictability_horizon`, whose docstring says what counts as apart.
+    Each run of a span has the case's max_steps; all of them a wall time (s).
     """
     if is_ideal(case):
-        return Parting(span, False, True)
+        return Parting(end, False, True)
+    deadline, evaluations = time.monotonic() + timeout, 0
+    span = FIRST_SPAN_REV * case.turn
+    while True:
+        span = min(span, end)
+        found = compare_over(case, span, rtol, shift, deadline - time.monotonic())
+        evaluations += found.evaluations
+        if not found.whole or span == end:
+            return found._replace(evaluations=evaluations)
+        span *= SPAN_GROWTH
+
+
+def compare_over(case: Case, span: float, rtol: float, shift: float, timeout: float) -> Parting:
+    """Compare both runs over one span (s), as `compare_shifted` does."""
+    deadline = time.monotonic() + timeout
     p = record(case)
-    start = initial_state(case, p)
-    twin_start = initial_state(case, p, close * p["clearance"][:, None] / math.sqrt(2.0))
+    starts = [
+        initial_state(case, p, part * p["clearance"][:, None] / math.sqrt(2.0))
+        for part in (0.0, shift)
+    ]
     if is_featured(p) and p["tilting"]:
-        twin_start[p["at"][Coordinate.GUIDE]] += close * p["guide_clearance"]
-    ends = np.array([0.0, span])
-    request = Request(p, start, ends, 0.0, rtol, "auto", case.solve.max_steps, timeout)
-    return follow_twins(request, twin_start)
+        starts[1][p["at"][Coordinate.GUIDE]] += shift * p["guide_clearance"]
+    times = np.linspace(0.0, span, math.ceil(LOOKS_PER_REV * span / case.turn) + 1)
+
+    def run(start: np.ndarray) -> Trajectory:
+        left, most = deadline - time.monotonic(), case.solve.max_steps
+        return integrate(Request(p, start, times, 0.0, rtol, "auto", most, left))
+
+    one, other = map(run, starts)
+    ends = [run.stop_time if run.reason else span for run in (one, other)]
+    apart = distance_over_clearance(p, one, other)
+    evaluations = one.evaluations + other.evaluations
+    parted = np.flatnonzero(apart > PARTED_DISTANCE)
+    if parted.size:
+        return Parting(float(times[parted[0]]), True, False, evaluations)
+    return Parting(min(ends), False, not (one.reason or other.reason), evaluations)
 
 
-class Twins:
-    """A motion and its twin, which takes the same steps, on their way through segments of time.
+def distance_over_clearance(p: np.record, one: Trajectory, other: Trajectory) -> np.ndarray:
+    """Return the distance of two runs at their times, (m,), as a share of the clearance.
 
-    request: of a compiled method; shifted: the twin's initial state. `ends`: the number of
-    segments up to each of the request's cuts.
+    At the worst joint, or in the guide where it has play; nan where one of them has stopped.
+    """
+    found = []
+    for run in (one, other):
+        rows = np.empty((run.times.size, COLUMNS))
+        observe_all(run.times, run.states, run.phases, p, rows)
+        found.append(rows[:, Column.ECCENTRICITY : Column.ACCELERATION].reshape(-1, 2, 2))
+    worn = p["clearance"] > 0.0
+    apart = np.linalg.norm(found[1] - found[0], axis=2)[:, worn] / p["clearance"][worn]
+    if is_featured(p) and p["tilting"]:
+        guide = p["at"][Coordinate.GUIDE]
+        across = np.abs(other.states[:, guide] - one.states[:, guide]) / p["guide_clearance"]
+        apart = np.column_stack((apart, across))
+    return apart.max(axis=1)
+
+
+WORK = 20.0  # times the evaluations of the first run: for all runs, and again for shifted ones
+MIN_WORK = 20_000_000  # evaluations that they may take at least: about 2 s
+LOOK_RTOL, LOOK_SHIFT = 1e-9, 1e-6  # of runs that are to tell whether a motion is chaotic
+SURE_FACTOR = 10.0  # times tighter: where two motions part, these are to part as well
+LATER_FACTOR = 1.5  # times the first horizon, within which they are to
+
+
+class Search:
+    """What the runs of a case took and may take, and what they tell of its horizon.
+
+    The budget counts evaluations of the equations, so that results do not depend on how busy the
+    machine is. `horizon`: time (s) at which motions part; inf where they do not, nan as long as
+    that is not known; `stopped`: the budget ended the search before that was known.
     """
 
-    def __init__(self, request: Request, shifted: np.ndarray):
-        self.request, self.deadline = request, time.monotonic() + request.timeout
-        edges, phases = segments(request.p, float(request.times[-1]))
-        self.edges, phases, self.ends = with_cuts(edges, phases, request.cuts)
-        self.phases, self.twin_phases = phases.copy(), phases.copy()
-        self.size = natural_sizes(request.p)
-        n = self.size.size
-        self.stepper, self.twin_stepper = (prepare_stepper(request, self.size) for _ in range(2))
-        self.z, self.twin = (np.append(y, np.zeros(FLOWS)) for y in (request.start, shifted))
-        self.work, self.twin_work = new_work(n), new_work(n)
-        self.rows, self.tally = np.zeros((2, COLUMNS)), new_tally(request.p)
-        self.states = np.empty((request.times.size, n))
+    def __init__(self, case: Case):
+        self.case = case
+        self.began = time.monotonic()
+        self.horizon = math.nan
+        self.stopped = False
+        self.first = 0  # evaluations of the first run
+        self.evaluations = 0  # of all runs
+        self.shifted_evaluations = 0  # of shifted runs, and those beside them
+        self.per_step = 1.0  # evaluations of an attempt of a step, in the last run
 
-    def advance(self, count: int, far: float) -> bool:
-        """Advance through `count` segments; return whether the twins got `far` apart before.
+    @property
+    def left(self) -> float:
+        """Return the wall time (s) that the case may still take."""
+        return self.case.solve.timeout_s - (time.monotonic() - self.began)
 
-        far: as a share of the clearance, at which they stop. Raises Stop.
+    @property
+    def work(self) -> float:
+        """Return the evaluations that all runs may take together."""
+        return max(WORK * self.first, MIN_WORK)
+
+    def count(self, run: Trajectory) -> None:
+        """Count the evaluations of a run."""
+        self.first = self.first or run.evaluations
+        self.evaluations += run.evaluations
+        self.per_step = max(run.evaluations / max(run.steps + run.rejected, 1), 1.0)
+
+    def within_budget(self) -> Case:
+        """Return the case with no more steps than the budget still allows; all for a first run."""
+        return self.limited(self.work - self.evaluations) if self.first else self.case
+
+    def limited(self, evaluations: float) -> Case:
+        """Return the case with no more steps than so many evaluations allow."""
+        steps = min(self.case.solve.max_steps, max(1, int(evaluations / self.per_step)))
+        return replace(self.case, solve=replace(self.case.solve, max_steps=steps))
+
+    def limit_of(self, run: Trajectory) -> str:
+        """Return the words for a run that the budget ended, "" for any other."""
+        steps = run.steps + run.rejected
+        if run.reason != Reason.BUDGET_STEPS or steps >= self.case.solve.max_steps:
+            return ""
+        return (
+            f"more than {self.work:.3g} evaluations in all, the budget of a job's runs; "
+            "solve.rtol sets a tolerance without it"
+        )
+
+    def parts(self, whole: bool) -> bool:
+        """Return whether the motion parts from one that is shifted, as far as is known.
+
+        A short span suffices for most chaotic motions; the whole one is followed only where
+        `whole` says so. Where they part, tighter runs are to part there as well.
         """
-        request, stepper, twin_stepper = self.request, self.stepper, self.twin_stepper
-        stepper.status = Status.RUNNING
-        for attempts in chunks(request, stepper):
-            march_twins(
-                stepper, twin_stepper, request.p, self.z, self.twin, self.work, self.twin_work,
-                request.rtol * self.size, self.size, self.edges[: count + 1], self.phases[:count],
-                self.twin_phases[:count], request.times, self.states, self.tally, self.rows, far,
-                attempts,
-            )  # fmt: skip
-            if twin_stepper.status == Status.DONE:
-                return True
-            if stepper.status != Status.DONE:
-                self.check()
-        return False
+        case = self.case
+        if case.solve.horizon == "auto" and math.isnan(self.horizon) and not self.stopped:
+            if self.left <= 0.0:
+                self.stopped = True
+                return False
+            end = case.duration if whole else min(FIRST_SPAN_REV * case.turn, case.duration)
+            found = self.compare(end, LOOK_RTOL)
+            if found.parted:
+                found = self.compare(
+                    min(LATER_FACTOR * found.time, case.duration), LOOK_RTOL / SURE_FACTOR
+                )
+                self.horizon = found.time if found.parted else math.nan
+            elif found.whole and end == case.duration:
+                self.horizon = math.inf
+            self.stopped = not (found.parted or found.whole)
+        return self.horizon < case.duration
 
-    def check(self) -> None:
-        """Raise Stop where one of the two may go no further, or the time is up."""
-        check_march(self.request, self.stepper, self.z, float(self.tally.deepest), self.deadline)
-        if not np.isfinite(self.twin).all():
-            raise Stop(Reason.NON_FINITE, "the twin is no longer finite")
-
-
-def follow_twins(request: Request, shifted: np.ndarray, far: float = PARTED_DISTANCE) -> Parting:
-    """Follow a motion and its twin until they are `far` apart, as a share of the clearance.
-
-    request: of a compiled method; shifted: the twin's initial state.
-    """
-    twins = Twins(request, shifted)
-    stepper, parted, whole = twins.stepper, False, False
-    try:
-        parted = twins.advance(twins.phases.size, far)
-        whole = not parted
-    except Stop:
-        pass
-    return Parting(float(stepper.t), parted, whole, int(stepper.steps + stepper.rejected))
+    def compare(self, end: float, rtol: float) -> Parting:
+        """Compare the motion with a shifted one up to an end (s), within the budget."""
+        case = self.limited((self.work - self.shifted_evaluations) / 2)
+        found = compare_shifted(case, end, rtol, LOOK_SHIFT, self.left)
+        self.shifted_evaluations += found.evaluations
+        return found

@@ -1,8 +1,8 @@
 """Which regime a motion is in, and from which revolution on its metrics count.
 
 A run that keeps a promise is predictable: two runs at different tolerances, each a motion started a
-little elsewhere, stayed together to its end. Where errors stay as large as the numbers, twins in
-step distinguish an unpredictable motion from one that needs a tighter run.
+little elsewhere, stayed together to its end. Where errors stay as large as the numbers, a shifted
+run (`compressor.solve.horizon`) tells an unpredictable motion from one that needs a tighter run.
 
 From which revolution on metrics count, where a case leaves that to the program. A run is followed
 revolution by revolution until the metrics of several in a row agree within what accuracy promises:
@@ -10,22 +10,19 @@ each with the one before, or with the one a period earlier.
 """
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compressor.cases import ACCURACY, TIGHTEST, Case
+from compressor.cases import ACCURACY, Case
 from compressor.metrics import METRICS
-from compressor.reasons import Reason
 from compressor.solve.attempts import Solution, is_sampled, run_at_tolerance, times_of
 from compressor.solve.error_bars import Metrics, relative_bar
-from compressor.solve.horizon import Parting, follow_case_twins
+from compressor.solve.horizon import Search
 from compressor.solve.request import (
     SAME_TIME,
     Cuts,
-    Trajectory,
     Turns,
     merge_turns,
     revolutions,
@@ -35,140 +32,7 @@ from compressor.solve.series import compared_per_rev, distances
 from compressor.solve.si_record import is_ideal, record
 
 DOUBTFUL = 0.1  # of a number: an error from which on chaos is looked for
-TWINS_BUDGET = 3.0  # times the evaluations of the runs, for twins
-WORK = 20.0  # times the evaluations of the first run, for tighter runs and twins together
-FOR_RUNS = 0.75  # of that, for runs: what they leave shows whether the motion is chaotic
-MIN_WORK = 20_000_000  # evaluations that they may take at least: about 2 s
-TWO = 2  # motions that march in step
-FIRST_LOOK_REV = 0.5  # rev: looked at first
-RTOL = 1e-9  # of the twins, at first
-SURE_FACTOR = 10.0  # times tighter: where twins part, these are to part as well
-TWIN_DISTANCE = 1e-6  # of the clearance: how far from the motion its twin starts
-LATER_FACTOR = 1.5  # times the first horizon, within which they are to
-MOMENT_REV = 1e-6  # rev
 SAME_REVOLUTION = 1e-9  # relative distance of revolutions that rounding makes
-
-
-class HorizonSearch:
-    """A search for the horizon of a case beside its runs, and the budget of both.
-
-    The budget counts evaluations of the equations, so that results do not depend on how busy the
-    machine is. `horizon`: time (s) at which twins part; inf where they do not, nan as long as that
-    is not known; `stopped`: the budget ended the search before that was known.
-    """
-
-    def __init__(self, case: Case):
-        self.case = case
-        self.began = time.monotonic()
-        self.horizon = math.nan
-        self.stopped = False
-        self.rtol = RTOL
-        self.together_until = 0.0  # s up to which twins stayed together
-        self.first = 0  # evaluations of the first run
-        self.run_evaluations = 0  # evaluations of all runs
-        self.twin_evaluations = 0.0  # evaluations
-        self.per_step = 1.0  # evaluations of an attempt of a step, in the last run
-
-    @property
-    def left(self) -> float:
-        """Return the wall time (s) that the case may still take."""
-        return self.case.solve.timeout_s - (time.monotonic() - self.began)
-
-    @property
-    def work(self) -> float:
-        """Return the evaluations that the job's runs and twins may take together."""
-        return max(WORK * self.first, MIN_WORK)
-
-    @property
-    def work_left(self) -> float:
-        """Return the evaluations that twins may still take."""
-        return self.work - self.run_evaluations - self.twin_evaluations
-
-    def count(self, run: Trajectory) -> None:
-        """Count the evaluations of a run."""
-        self.first = self.first or run.evaluations
-        self.run_evaluations += run.evaluations
-        self.per_step = max(run.evaluations / max(run.steps + run.rejected, 1), 1.0)
-
-    def within_budget(self, case: Case, evaluations: float | None = None) -> Case:
-        """Return the case with no more steps than so many evaluations, or the runs' budget, allow.
-
-        A first run has the case's own limit of steps.
-        """
-        if not self.first:
-            return case
-        if evaluations is None:
-            evaluations = FOR_RUNS * self.work - self.run_evaluations - self.twin_evaluations
-        steps = min(case.solve.max_steps, max(1, int(evaluations / self.per_step)))
-        return replace(case, solve=replace(case.solve, max_steps=steps))
-
-    def limit_of(self, run: Trajectory) -> str:
-        """Return the words for a run that the budget ended, "" for any other."""
-        if (
-            run.reason != Reason.BUDGET_STEPS
-            or run.steps + run.rejected >= self.case.solve.max_steps
-        ):
-            return ""
-        return (
-            f"more than {FOR_RUNS * self.work:.3g} evaluations in all, the budget of a job's runs; "
-            "solve.rtol sets a tolerance without it"
-        )
-
-    def twins_part(self, whole: bool) -> bool:
-        """Return whether twins part, as far as is known.
-
-        A short span is tried first, which suffices for most chaotic motions, and the whole one only
-        where `whole` says so.
-        """
-        end = self.case.duration
-        if self.case.solve.horizon != "auto":
-            return self.horizon < end
-        for span in [min(FIRST_LOOK_REV * self.case.turn, end), end][: 1 + whole]:
-            work = min(TWINS_BUDGET * self.run_evaluations - self.twin_evaluations, self.work_left)
-            if math.isnan(self.horizon) and span > self.together_until:
-                has_budget = work > 0.0 and self.left > 0.0
-                self.stopped = not (has_budget and self.search_span(span, work))
-        return self.horizon < end
-
-    def search_span(self, span: float, work: float) -> bool:
-        """Follow twins over a span (s) by at most `work` evaluations; return whether it sufficed.
-
-        Where twins part, tighter ones are followed up to there. If these stay together it was the
-        steps that parted the others; what follows is followed as tightly.
-        """
-        self.began += load_twins(self.case)
-        limit = self.twin_evaluations + work
-
-        def follow(span: float, rtol: float) -> Parting:
-            case = self.within_budget(self.case, (limit - self.twin_evaluations) / TWO)
-            parting = follow_case_twins(case, span, rtol, TWIN_DISTANCE, self.left)
-            self.twin_evaluations += TWO * parting.attempts * self.per_step
-            return parting
-
-        parting = follow(span, self.rtol)
-        while parting.parted and self.rtol > TIGHTEST * SURE_FACTOR:
-            longer_span = min(LATER_FACTOR * parting.time, self.case.duration)
-            tighter = follow(longer_span, self.rtol / SURE_FACTOR)
-            if tighter.parted:
-                self.horizon = tighter.time
-            if not tighter.whole:
-                return tighter.parted
-            self.rtol /= SURE_FACTOR
-            parting = follow(span, self.rtol)
-        if parting.whole:
-            self.together_until = span
-            self.horizon = math.inf if span == self.case.duration else math.nan
-        return parting.whole or parting.parted
-
-
-def load_twins(case: Case) -> float:
-    """Load what twins need, or compile it once on a machine; return the time (s) that took.
-
-    That time does not count against the case's.
-    """
-    began = time.monotonic()
-    follow_case_twins(case, MOMENT_REV * case.turn, RTOL, TWIN_DISTANCE, math.inf)
-    return time.monotonic() - began
 
 
 def has_doubtful_bars(metrics: Metrics, bars: Metrics) -> bool:
@@ -247,7 +111,7 @@ class Settling:
     run: Solution | None = None
 
 
-def with_span(case: Case, search: HorizonSearch) -> Settling:
+def with_span(case: Case, search: Search) -> Settling:
     """Return a case with numbers for `settle_rev: auto` and `duration_rev: auto`, as `Settling`.
 
     Within the case's wall time.

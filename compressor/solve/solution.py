@@ -11,23 +11,19 @@ from compressor.solve.attempts import (
     estimate_errors,
     is_sampled,
     looser_comparison_run,
-    run_and_sample,
     run_at_tolerance,
 )
 from compressor.solve.error_bars import (
-    ORDER,
     allowed_residual,
-    closeness,
     energy_residual,
     missed_targets,
     next_audit_rtol,
     ratio_of,
     relative_bar,
 )
-from compressor.solve.horizon import predictability_horizon
+from compressor.solve.horizon import Search, predictability_horizon
 from compressor.solve.regime import (
     DOUBTFUL,
-    HorizonSearch,
     has_doubtful_bars,
     repeats,
     with_span,
@@ -44,33 +40,26 @@ ERROR_AIM = 0.7  # of what is allowed: where the next run's error is aimed at
 MIN_TIGHTENING, MAX_TIGHTENING = 10.0, 1000.0  # times tighter that the next run may be
 
 
-def refine_until_accurate(
-    case: Case, search: HorizonSearch, first: Solution | None = None
-) -> Solution:
+def refine_until_accurate(case: Case, search: Search, first: Solution | None = None) -> Solution:
     """Return the first run that keeps its promise, or the last whole one as a failed job.
 
-    A first run is compared with one a little tighter, and with a looser one, too, where the motion
-    enlarges errors. Each further one is as much tighter as its errors are expected to need. It is
-    compared with the one before and, where it seems to keep the promise, with one a little tighter
-    as well. Where errors are as large as the numbers, twins show whether the motion is chaotic;
-    that ends the search, and so does its budget. first: the first run, if it was made already.
+    Each run is compared with one a little tighter, and with the run before it. The next one is as
+    much tighter as the errors need. Where those of the first are as large as the numbers, a shifted
+    run over a short span shows whether the motion is chaotic; that ends the search, and so does its
+    budget. first: the first run, if it was made already.
     """
-    rtol = case.rtol
+    rtol, unsound = case.rtol, 0  # runs whose energy does not balance
     best: Solution | None = None  # the last whole run
-    # the tightest run that balances, which the next one is compared with
-    before: Solution | None = None
-    unsound = 0  # runs that did not balance
+    before: Solution | None = None  # the last one whose energy balances
     while True:
-        now, first = first, None
-        if now is None:
-            within = search.within_budget(case)
-            now = run_and_sample(within, rtol, search.left, is_sampled(case))
+        now = first or run_at_tolerance(search.within_budget(), rtol, search.left, is_sampled(case))
+        first = None
         if now.reason:
             return end_early(case, best, now, search)
         search.count(now.trajectory)
         best = now
         if not energy_balances(case, now):
-            # error bars compare two runs: where both lack the same energy they would agree
+            # error bars compare runs: where both lack the same energy they would agree
             unsound += 1
             tighter = next_audit_rtol(rtol, unsound)
             if tighter is None:
@@ -79,57 +68,36 @@ def refine_until_accurate(
             continue
         if not case.wants_bars:
             return now
-        if before is None:
-            other = comparison_run(case, now, search.left)
-            search.count(other.trajectory)
-        else:
-            other = before
-        estimate_errors(now, other)
-        excess, third = excess_over_promise(case, now), None
-        if excess <= 1.0:
-            # two runs may agree by chance where the motion enlarges their errors: ask a third
-            excess, third = recheck(case, now, other, before is None, search)
+        others = comparison_runs(case, now, before, search)
+        estimate_errors(now, *others)
+        excess = excess_over_promise(case, now)
         if excess <= 1.0:
             now.promise = "kept" if has_promise(case) else "none"
             return now
-        if looks_chaotic(now) and search.twins_part(whole=before is not None):
+        if before is None and looks_chaotic(now) and search.parts(whole=False):
             return now
-        if other.reason or min(rtol, other.rtol) < 1.01 * TIGHTEST:
-            return fail_accuracy(case, now, other.detail or "no run is tighter")
-        reference = third or other
-        before = tightest(case, now, other, reference)
-        tighter = before.rtol / tighten_factor(excess, reference.rtol / now.rtol)
-        rtol = max(float(f"{tighter:.1e}"), TIGHTEST)
+        if rtol < 1.01 * TIGHTEST or all(one.reason for one in others):
+            return fail_accuracy(case, now, others[0].detail or "no run is tighter")
+        before = now
+        tightening = min(max(ratio_of(ERROR_AIM / excess), MIN_TIGHTENING), MAX_TIGHTENING)
+        rtol = max(float(f"{rtol / tightening:.1e}"), TIGHTEST)
 
 
-def tightest(case: Case, now: Solution, *others: Solution) -> Solution:
-    """Return the tightest of some runs that balances and can still be made tighter; else `now`."""
-    fit = [one for one in others if one.rtol > 1.01 * TIGHTEST and energy_balances(case, one)]
-    return min([now, *fit], key=lambda run: run.rtol)
+def comparison_runs(
+    case: Case, now: Solution, before: Solution | None, search: Search
+) -> list[Solution]:
+    """Return the runs that a run's errors are estimated by: a tighter one, and the one before.
 
-
-def recheck(
-    case: Case, now: Solution, other: Solution, first: bool, search: HorizonSearch
-) -> tuple[float, Solution | None]:
-    """Compare a run that seems to keep its promise with a third one; two may agree by chance.
-
-    first: the run is the case's first, which needs a third one only where the motion enlarges
-    errors. Returns the error over what is promised by the worse of both comparisons, and the third
-    run where it is by that.
+    A first run has none before; where the motion enlarges errors, two runs may agree by chance, and
+    a looser one is made in its place.
     """
-    if first:
-        third = looser_comparison_run(case, now, other, search.left)
-    else:
-        third = comparison_run(case, now, search.left)
-        if third.reason or third.rtol == other.rtol:
-            third = None
-    excess = excess_over_promise(case, now)
-    if third is None:
-        return excess, None
-    search.count(third.trajectory)
-    estimate_errors(now, other, third)
-    larger = excess_over_promise(case, now)
-    return larger, third if larger > excess else None
+    runs = [comparison_run(case, now, search.left)]
+    if before is None:
+        looser = looser_comparison_run(case, now, runs[0], search.left)
+        runs += [looser] if looser else []
+    for one in runs:
+        search.count(one.trajectory)
+    return runs + ([before] if before else [])
 
 
 def has_promise(case: Case) -> bool:
@@ -152,15 +120,6 @@ def looks_chaotic(solution: Solution) -> bool:
     return solution.series_errors["acceleration"] >= DOUBTFUL
 
 
-def tighten_factor(excess: float, ratio: float) -> float:
-    """Return how many times tighter than both of a pair the next run is to be.
-
-    excess: of the pair's estimate over what is promised; ratio: of their tolerances.
-    """
-    error = excess * max(ratio, 1.0 / ratio) ** -ORDER / closeness(ratio)
-    return min(max(ratio_of(ERROR_AIM / error), MIN_TIGHTENING), MAX_TIGHTENING)
-
-
 def energy_balances(case: Case, solution: Solution) -> bool:
     """Return whether the energy of a whole run balances as well as the case requires."""
     return energy_residual(solution.trajectory.tally) <= allowed_residual(
@@ -168,7 +127,7 @@ def energy_balances(case: Case, solution: Solution) -> bool:
     )
 
 
-def end_early(case: Case, best: Solution | None, now: Solution, search: HorizonSearch) -> Solution:
+def end_early(case: Case, best: Solution | None, now: Solution, search: Search) -> Solution:
     """Return what is left of a case whose present run did not reach its end."""
     if best is None or now.reason not in OUT_OF_BUDGET:
         return now
@@ -214,7 +173,7 @@ def solve(case: Case) -> Solution:
 
     Raises nothing for a run that fails: its `reason` and `detail` say why.
     """
-    search = HorizonSearch(case)
+    search = Search(case)
     settling = with_span(case, search)
     case = search.case = settling.case
     solution = refine_until_accurate(case, search, settling.run)
@@ -231,12 +190,12 @@ def solve(case: Case) -> Solution:
     return solution
 
 
-def find_horizon(case: Case, solution: Solution, search: HorizonSearch) -> None:
+def find_horizon(case: Case, solution: Solution, search: Search) -> None:
     """Find a motion's horizon, where it is requested, or where errors are as large as numbers."""
     if case.solve.horizon is True:
         search.horizon = predictability_horizon(case, search.left)
     elif case.wants_bars and is_in_doubt(case, solution):
-        search.twins_part(whole=True)
+        search.parts(whole=True)
         if solution.reason and search.stopped:
             solution.detail += f"; {SEARCH_ENDED}"
     solution.horizon = search.horizon
@@ -256,7 +215,7 @@ def is_in_doubt(case: Case, solution: Solution) -> bool:
     )
 
 
-def name_regime(case: Case, solution: Solution, search: HorizonSearch, period: float) -> None:
+def name_regime(case: Case, solution: Solution, search: Search, period: float) -> None:
     """Set the regime of a motion that is not chaotic: predictable, periodic or undecided.
 
     period (rev): after which the metrics agree, where that is known; else nan.
@@ -274,7 +233,7 @@ def name_regime(case: Case, solution: Solution, search: HorizonSearch, period: f
         solution.settled = since if shortest else case.settle / case.turn
 
 
-def chaotic_solution(case: Case, solution: Solution, search: HorizonSearch) -> Solution:
+def chaotic_solution(case: Case, solution: Solution, search: Search) -> Solution:
     """Run a motion that cannot be foretold once more, for statistics over its revolutions.
 
     No error of a single course is claimed; averages have their statistical one.

@@ -28,11 +28,8 @@ METHOD = "one method"  # a part that adds only a few functions
 WHAT = {
     "auto": ("dry joints", 26),
     METHOD: ("solve.method {}", 1),
-    "horizon": ("the horizon of dry joints", 7),
     "laws": ("oil, cards and other laws", 28),
-    "laws-horizon": ("the horizon with oil, cards and other laws", 12),
     "features": ("mechanisms with features, such as play in the guide or an elastic rod", 50),
-    "features-horizon": ("the horizon of mechanisms with features", 8),
 }  # by part: what it is, and the seconds that it takes speed.REFERENCE
 LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 
@@ -40,26 +37,24 @@ LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 class Needs(NamedTuple):
     """The parts of the equations that some cases need.
 
-    methods: of integration; horizon: perturbed trajectories; plain: the default forces alone; laws:
-    others beside them; features: a mechanism with any.
+    methods: of integration; plain: the default forces alone; laws: others beside them; features: a
+    mechanism with any.
     """
 
     methods: tuple[str, ...] = ()
-    horizon: bool = False
     plain: bool = False
     laws: bool = False
     features: bool = False
 
     @classmethod
     def of(cls, cases: Iterable[Case]) -> "Needs":
-        methods, twins, plain, laws, features = {"auto"}, False, False, False, False
+        methods, plain, laws, features = {"auto"}, False, False, False
         for case in cases:  # which may be made one by one
             methods.add(case.solve.method)
-            twins = twins or case.solve.horizon is True
             features = features or case.needs_mechanism
             laws = laws or (case.chooses_forces and not case.needs_mechanism)
             plain = plain or not (case.chooses_forces or case.needs_mechanism)
-        return cls(tuple(sorted(methods)), twins, plain, laws, features)
+        return cls(tuple(sorted(methods)), plain, laws, features)
 
     @property
     def parts(self) -> "dict[str, Needs]":
@@ -67,13 +62,8 @@ class Needs(NamedTuple):
         found: dict[str, Needs] = {}
         if self.plain:
             found |= {method: Needs((method,), plain=True) for method in self.methods}
-        if self.plain and self.horizon:
-            found["horizon"] = Needs(horizon=True, plain=True)
-        alone = {"laws": Needs(self.methods, laws=True)} if self.laws else {}
-        alone |= {"features": Needs(self.methods, features=True)} if self.features else {}
-        found |= alone
-        if self.horizon:
-            found |= {f"{kind}-horizon": one._replace(horizon=True) for kind, one in alone.items()}
+        found |= {"laws": Needs(self.methods, laws=True)} if self.laws else {}
+        found |= {"features": Needs(self.methods, features=True)} if self.features else {}
         return found
 
     @property
@@ -88,9 +78,6 @@ def load(needs: Needs) -> None:
 
     solve = {"duration_rev": 0.01, "settle_rev": 0, "output_step_deg": 0.36}
     measure(Case.from_values({"solve": solve}))
-    hows: list[dict[str, object]] = [{"method": method} for method in needs.methods]
-    if needs.horizon:
-        hows.append({"horizon": True})
     values: dict[str, object] = {"joint": "both", "clearance_mm": 0.1}
     kinds: list[dict[str, object]] = [{}] if needs.plain else []
     if needs.laws:
@@ -98,8 +85,8 @@ def load(needs: Needs) -> None:
     if needs.features:
         kinds.append({"guide": True})
     for kind in kinds:
-        for how in hows:
-            measure(Case.from_values({**values, **kind, "solve": solve | how}))
+        for method in needs.methods:
+            measure(Case.from_values({**values, **kind, "solve": {**solve, "method": method}}))
 
 
 def load_with_remark(needs: Needs, text: str, remark: Callable[[str], None]) -> None:

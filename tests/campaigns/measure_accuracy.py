@@ -30,8 +30,7 @@ from compressor.cases.parameter import ACCURACY
 from compressor.metrics import METRICS
 from compressor.outcome import Regime
 from compressor.report.figures.pictures import render
-from compressor.solve.horizon import predictability_horizon
-from compressor.solve.regime import TWIN_DISTANCE
+from compressor.solve.horizon import LOOK_SHIFT, predictability_horizon
 from compressor.solve.simulate import simulate
 
 SEEDS = (911, 912, 913)
@@ -128,7 +127,7 @@ def random_case(values, traded):
         }
     if any(row["regime"] == Regime.CHAOTIC for row in found["words"].values()):
         case = Case.from_values(values)
-        found["parted"] = predictability_horizon(case, close=TWIN_DISTANCE) < case.duration
+        found["parted"] = predictability_horizon(case, shift=LOOK_SHIFT) < case.duration
     if traded:
         for rtol in RTOLS:
             found["rtols"][rtol] = errors(run(values, rtol=rtol), truth, peak, rtol)

@@ -6,7 +6,6 @@ from outside this program.
 """
 
 import itertools
-import math
 
 import numpy as np
 import pytest
@@ -15,20 +14,13 @@ from published import ASKED, DRY, GIVEN, MACHINE, STIFFNESS, drop, given_back
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
 from compressor.metrics import METRICS
-from compressor.physics.motion import start
-from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import CARRIED
-from compressor.solve.attempts import integrate
 from compressor.solve.cautions import remarks
 from compressor.solve.horizon import (
-    PARTED_DISTANCE,
-    TWIN_DISTANCE,
-    follow_twins,
     predictability_horizon,
 )
-from compressor.solve.request import Request
 from compressor.solve.scipy_driver import needs_landings
-from compressor.solve.si_record import natural_sizes, offsets, record
+from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.explain import terms, unknown_names
 
@@ -66,7 +58,7 @@ def test_the_dry_joint_keeps_its_energy_and_says_what_is_known_of_it():
     """With its restitution the journal soon stays in contact; without damping it flies and hits,
     and cannot be foretold for two revolutions.
     """
-    run = simulate(dry(duration_rev=10, settle_rev=2))
+    run = simulate(dry(duration_rev=6, settle_rev=2))
     assert run["status"].item() == "ok"
     assert run.attrs["regime"] == "predictable"
     assert run["contact_loss_fraction"].sel(joint="small_end") < 0.05
@@ -76,41 +68,6 @@ def test_the_dry_joint_keeps_its_energy_and_says_what_is_known_of_it():
     assert run["status"].item() == "ok"
     assert run.attrs["regime"] == "chaotic"
     assert run["contact_loss_fraction"].sel(joint="small_end") > 0.5
-
-
-def request(case, shift, rtol, samples=1):
-    p = record(case)
-    y = np.zeros(natural_sizes(p).size)
-    start(offsets(case) + shift * p["clearance"][:, None] / math.sqrt(2), y, p)
-    times = case.duration * np.arange(samples + 1) / samples
-    return Request(p, y, times, 0.0, rtol, "auto")
-
-
-def test_twins_that_start_alike_stay_alike():
-    """Through hundreds of impacts, each with its own speed."""
-    asked = request(dry(duration_rev=3, settle_rev=0), 0.0, 1e-9)
-    assert follow_twins(asked, asked.start.copy(), far=1e-9).horizon == math.inf
-
-
-def test_a_horizon_is_that_of_two_separate_runs():
-    """Of a joint that hardly damps. Each run lands on its own onsets, and carries its own speeds;
-    the twin meets where the first motion does, which holds to first order in their distance.
-    """
-    contact = {**DRY["contact"], "law": "flores", "restitution": 0.99}
-    solve = {"duration_rev": 2, "settle_rev": 0}
-    case, pair = Case.resolve({**DRY, "contact": contact, "solve": solve}), []
-    for shift in (0.0, TWIN_DISTANCE):
-        asked = request(case, shift, 1e-13, samples=20_000)
-        run = integrate(asked)
-        rows = np.empty((asked.times.size, COLUMNS))
-        observe_all(asked.times, run.states, run.phases, asked.p, rows)
-        pair.append(rows[:, Column.ECCENTRICITY + 2 : Column.ECCENTRICITY + 4])
-    apart = np.hypot(*(pair[1] - pair[0]).T) / 0.5e-3
-    twin = request(case, TWIN_DISTANCE, 1e-13).start
-    for far, rel in ((1e-7, 0.01), (1e-5, 0.01), (PARTED_DISTANCE, 0.06)):
-        parted = case.duration * np.flatnonzero(apart > far)[0] / 20_000
-        found = follow_twins(request(case, 0.0, 1e-13), twin, far=far).horizon
-        assert found == pytest.approx(parted, rel=rel)
 
 
 @pytest.mark.parametrize(("law", "joint"), [("flores", "both"), ("hu_guo", "small_end")])

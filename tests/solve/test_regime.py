@@ -13,20 +13,19 @@ from compressor.cases.case import Case
 from compressor.metrics import METRICS, SERIES
 from compressor.outcome import Regime
 from compressor.physics import COLUMNS, Column
-from compressor.solve import regime
-from compressor.solve.horizon import Parting, predictability_horizon
-from compressor.solve.regime import (
-    FIRST_LOOK_REV,
-    FOR_RUNS,
+from compressor.solve import horizon
+from compressor.solve.horizon import (
+    FIRST_SPAN_REV,
+    LOOK_RTOL,
+    LOOK_SHIFT,
     MIN_WORK,
-    RTOL,
     SURE_FACTOR,
-    TWIN_DISTANCE,
-    TWINS_BUDGET,
     WORK,
-    HorizonSearch,
-    repeats,
+    Parting,
+    Search,
+    predictability_horizon,
 )
+from compressor.solve.regime import repeats
 from compressor.solve.request import Trajectory
 from compressor.solve.series import compared_per_rev, compared_times
 from compressor.solve.simulate import measure
@@ -47,9 +46,9 @@ def chaotic():
 def test_chaos_is_found_without_being_asked(chaotic):
     assert (chaotic.status, chaotic.attributes["regime"]) == ("ok", "chaotic")
     assert chaotic.attributes["promise"] == "none"
-    horizon = chaotic.numbers["predictability_horizon"]
-    twins = predictability_horizon(case(CHAOTIC), close=TWIN_DISTANCE)
-    assert horizon == pytest.approx(twins, rel=0.05)
+    parted = chaotic.numbers["predictability_horizon"]
+    alone = predictability_horizon(case(CHAOTIC), shift=LOOK_SHIFT)
+    assert parted == pytest.approx(alone, rel=0.05)
     assert chaotic.numbers["revolutions"] == 13
     assert chaotic.numbers["revolutions_to_one_percent"] > 13
 
@@ -80,7 +79,7 @@ def test_accuracy_by_number_is_kept_by_averages_of_chaos_alone():
 
 @pytest.mark.parametrize("joint", ["none", "big_end", "small_end", "both"])
 def test_the_paper_s_cases_are_periodic_and_not_searched(joint, monkeypatch):
-    monkeypatch.setattr(HorizonSearch, "twins_part", None)
+    monkeypatch.setattr(Search, "parts", None)
     values = {"joint": joint} | ({} if joint == "none" else {"clearance_mm": 0.2})
     found = measure(case(values, duration_rev=8))
     assert (found.attributes["promise"], found.attributes["regime"]) == ("kept", "periodic")
@@ -116,116 +115,107 @@ def run_of(evaluations, **ended):
 
 def searched(of, *runs):
     """A search beside runs of so many evaluations."""
-    search = HorizonSearch(of)
+    search = Search(of)
     for evaluations in runs:
         search.count(run_of(evaluations))
     return search
 
 
-def followed(monkeypatch, *found, needs=1000):
-    """Twins that end as they are told to; they need so many attempts, or stop at their limit."""
+def compared(monkeypatch, *found, needs=1000):
+    """Comparisons that end as they are told to; they need so many evaluations, or stop before."""
     asked, ends = [], itertools.chain(found, itertools.repeat(found[-1]))
 
-    def part(of, span, rtol, close, timeout):
-        if timeout == math.inf:  # machine code is loaded
-            return Parting(0.0, False, True)
-        asked.append((span / of.turn, rtol, of.solve.max_steps))
-        attempts = min(needs, of.solve.max_steps)
-        end = next(ends) if attempts == needs else Parting(0.0, False, False)
-        return end._replace(attempts=attempts)
+    def compare(of, end, rtol, shift, timeout):
+        asked.append((end / of.turn, rtol, of.solve.max_steps))
+        allowed = 2 * 6 * of.solve.max_steps
+        one = next(ends) if needs <= allowed else Parting(0.0, False, False)
+        return one._replace(evaluations=min(needs, allowed))
 
-    monkeypatch.setattr(regime, "follow_case_twins", part)
+    monkeypatch.setattr(horizon, "compare_shifted", compare)
     return asked
+
+
+TIGHTER = pytest.approx(LOOK_RTOL / SURE_FACTOR)
 
 
 def test_a_short_span_is_looked_at_first(monkeypatch):
     of = case()
     parted = Parting(0.1 * of.turn, True, False)
-    asked = followed(monkeypatch, parted)
+    asked = compared(monkeypatch, parted)
     search = searched(of, 600_000)
-    assert search.twins_part(whole=True)
+    assert search.parts(whole=False)
     assert search.horizon == parted.time
-    assert [row[:2] for row in asked] == [
-        (FIRST_LOOK_REV, RTOL),
-        (pytest.approx(0.15), RTOL / SURE_FACTOR),
-    ]
+    expected = [(FIRST_SPAN_REV, LOOK_RTOL), (pytest.approx(0.15), TIGHTER)]
+    assert [row[:2] for row in asked] == expected
+    assert search.parts(whole=True)
+    assert len(asked) == 2  # it is known
 
 
-def test_twins_that_part_at_a_loose_tolerance_alone_are_no_chaos(monkeypatch):
+def test_motions_that_stay_together_to_the_end_do_not_part(monkeypatch):
+    of = case()
+    asked = compared(monkeypatch, Parting(of.duration, False, True))
+    search = searched(of, 600_000)
+    assert not search.parts(whole=False)
+    assert math.isnan(search.horizon)
+    assert not search.parts(whole=True)
+    assert search.horizon == math.inf
+    assert [row[:2] for row in asked] == [(FIRST_SPAN_REV, LOOK_RTOL), (4.0, LOOK_RTOL)]
+
+
+def test_motions_that_part_at_a_loose_tolerance_alone_are_no_chaos(monkeypatch):
+    """Nor is it known that they never part."""
     of = case()
     together = Parting(of.duration, False, True)
-    asked = followed(monkeypatch, Parting(0.1 * of.turn, True, False), together)
+    asked = compared(monkeypatch, Parting(0.1 * of.turn, True, False), together)
     search = searched(of, 600_000)
-    assert not search.twins_part(whole=True)
-    assert search.horizon == math.inf
-    tight = pytest.approx(RTOL / SURE_FACTOR)
-    expected = [
-        (FIRST_LOOK_REV, RTOL),
-        (pytest.approx(0.15), tight),
-        (FIRST_LOOK_REV, tight),
-        (4.0, tight),
-    ]
-    assert [row[:2] for row in asked] == expected
-
-
-def test_twins_that_part_at_no_two_tolerances_leave_it_open(monkeypatch):
-    of = case()
-    parted, together = Parting(0.1 * of.turn, True, False), Parting(of.duration, False, True)
-    asked = followed(monkeypatch, *[parted, together] * 20)
-    search = searched(of, 600_000)
-    assert not search.twins_part(whole=False)
+    assert not search.parts(whole=True)
     assert math.isnan(search.horizon)
-    assert search.together_until == 0.0
     assert not search.stopped
-    assert min(rtol for _, rtol, _ in asked) >= 0.99e-12
+    assert [row[:2] for row in asked] == [(4.0, LOOK_RTOL), (pytest.approx(0.15), TIGHTER)]
 
 
-@pytest.mark.parametrize("needs", [1000, 12_000, 10**6])
-def test_the_search_takes_no_more_than_its_share(monkeypatch, needs):
-    """Of what the runs have taken, in evaluations: the clock does not count."""
+@pytest.mark.parametrize("needs", [1000, 12_000_000, 10**9])
+def test_a_search_takes_no_more_than_its_budget(monkeypatch, needs):
+    """In evaluations: the clock does not count."""
     of = case()
-    asked = followed(monkeypatch, Parting(0.0, False, True), needs=needs)
-    search = HorizonSearch(of)
-    for _ in range(4):  # a run, and a look
-        search.count(run_of(60_000))
-        search.twins_part(whole=True)
-        assert search.twin_evaluations <= TWINS_BUDGET * search.run_evaluations
+    asked = compared(monkeypatch, Parting(of.duration, False, True), needs=needs)
+    search = searched(of, 60_000)
+    search.parts(whole=False)
+    search.parts(whole=True)
+    assert search.shifted_evaluations <= MIN_WORK
     assert asked
-    assert search.horizon == math.inf or needs > 12_000
-    assert search.stopped == (needs > 12_000)
+    assert search.stopped == (needs > 1000)
+    assert search.horizon == math.inf or search.stopped
 
 
-def test_runs_and_twins_have_twenty_times_the_first_run_s_work(monkeypatch):
+def test_runs_have_twenty_times_the_first_run_s_work_and_shifted_ones_again(monkeypatch):
     """Or two seconds' worth, if that is more; a first run has the case's limit alone."""
     of = case()
-    assert HorizonSearch(of).within_budget(of) is of
-    assert searched(of, 6000).work_left == MIN_WORK - 6000
-    asked = followed(monkeypatch, Parting(0.0, False, True), needs=10**7)
-    search = searched(of, 6_000_000, 42_000_000)
-    left = FOR_RUNS * WORK * 6_000_000 - 48_000_000
-    assert search.within_budget(of).solve.max_steps == min(left // 6, of.solve.max_steps)
+    assert Search(of).within_budget() is of
+    assert searched(of, 6000).within_budget().solve.max_steps == (MIN_WORK - 6000) // 6
+    asked = compared(monkeypatch, Parting(0.0, False, True), needs=10**9)
+    search = searched(of, 6_000_000, 90_000_000)
+    left = WORK * 6_000_000 - 96_000_000
+    assert search.within_budget().solve.max_steps == min(left // 6, of.solve.max_steps)
     search.count(run_of(42_000_000))
-    assert search.within_budget(of).solve.max_steps == 1
-    left = WORK * 6_000_000 - 90_000_000
-    assert search.work_left == left
-    search.twins_part(whole=True)
-    assert asked == [(FIRST_LOOK_REV, RTOL, left // 6 // 2)]
+    assert search.within_budget().solve.max_steps == 1
+    search.parts(whole=True)
+    assert asked == [(4.0, LOOK_RTOL, of.solve.max_steps)]
     assert search.stopped
-    assert search.work_left == 0
 
 
 def test_a_run_that_the_budget_ended_says_so():
     search = searched(case(), 6000)
     ended = run_of(6_000_000, reason="budget_steps")
-    assert search.limit_of(ended).startswith("more than 1.5e+07 evaluations in all, the budget")
+    assert search.limit_of(ended).startswith("more than 2e+07 evaluations in all, the budget")
     assert search.limit_of(run_of(6 * 5_000_000, reason="budget_steps")) == ""
     assert search.limit_of(run_of(6000, reason="budget_seconds")) == ""
 
 
 def test_a_case_that_needs_more_than_its_budget_is_refused_in_these_words(monkeypatch):
     """However fast the clock runs: the budget counts evaluations."""
-    monkeypatch.setattr(regime, "MIN_WORK", 0)
-    monkeypatch.setattr(regime, "WORK", 4.0)
+    monkeypatch.setattr(horizon, "MIN_WORK", 0)
+    monkeypatch.setattr(horizon, "WORK", 4.0)
     machine = {"rod_mass_kg": 6.276, "reciprocating_mass_kg": 11.54, "speed_rpm": 190.1}
     values = {"joint": "big_end", "clearance_mm": 0.06779, "machine": machine}  # ill-conditioned
     found = measure(case(values, accuracy="fine"))
@@ -243,18 +233,16 @@ def test_a_search_ends_with_the_job_s_time(monkeypatch):
     """The clock counts for timeout_s alone."""
     now = [0.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    asked = followed(monkeypatch, Parting(0.0, False, True))
-    search = searched(case(timeout_s=3.0), 600_000)
+    search = searched(case(CHAOTIC, timeout_s=3.0), 600_000)
     now[0] += 2.5
     assert search.left == pytest.approx(0.5)
     now[0] += 0.5
-    search.twins_part(whole=True)
-    assert not asked
+    assert not search.parts(whole=True)
     assert search.stopped
 
 
 def test_what_cannot_be_told_in_the_time_is_undecided(monkeypatch):
-    monkeypatch.setattr(HorizonSearch, "twins_part", lambda self, whole: False)
+    monkeypatch.setattr(Search, "parts", lambda self, whole: False)
     found = measure(case(CHAOTIC, rtol=1e-6))
     assert (found.status, found.attributes["regime"]) == ("ok", Regime.UNDECIDED)
     found = measure(case(CHAOTIC, accuracy="reference"))

@@ -255,14 +255,14 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     """What was finished before a stop is not compiled again."""
     monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
     monkeypatch.setattr(warm_up, "slowness", lambda: 1.0)
-    needs = warm_up.Needs(("auto", "Radau"), True, plain=True, laws=True)
-    ahead = ["Radau", "auto", "horizon", "laws", "laws-horizon"]
+    needs = warm_up.Needs(("auto", "Radau"), plain=True, laws=True)
+    ahead = ["Radau", "auto", "laws"]
     assert sorted(needs.parts) == ahead
-    assert warm_up.compile_seconds(needs) == 26 + 1 + 7 + 28 + 12
+    assert warm_up.compile_seconds(needs) == 26 + 1 + 28
     loaded, told = [], []
 
     def load(alone):
-        if alone.laws and len(loaded) == 3:
+        if alone.laws and len(loaded) == 2:
             raise KeyboardInterrupt
         loaded.append(alone)
 
@@ -272,13 +272,13 @@ def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
     )
     with pytest.raises(KeyboardInterrupt):
         warm_up.compile_once(needs, pytest.fail)
-    assert list(needs.uncompiled) == ["laws", "laws-horizon"]
-    assert warm_up.compile_seconds(needs) == 28 + 12
+    assert list(needs.uncompiled) == ["laws"]
+    assert warm_up.compile_seconds(needs) == 28
     loaded.clear()
     warm_up.compile_once(needs, pytest.fail)
-    assert loaded == [needs.parts[part] for part in ("laws", "laws-horizon")]
-    assert "part 2 of 5: solve.method Radau, about 1 s" in told[1]
-    assert "part 1 of 2: oil, cards and other laws, about 28 s" in told[3]
+    assert loaded == [needs.parts[part] for part in ("laws",)]
+    assert "part 2 of 3: solve.method Radau, about 1 s" in told[1]
+    assert "part 1 of 1: oil, cards and other laws, about 28 s" in told[2]
     assert not needs.uncompiled
     assert warm_up.compile_seconds(needs) == 0
 
@@ -295,7 +295,7 @@ def test_only_what_cases_need_is_compiled():
 
 def test_every_part_that_can_be_needed_has_words():
     for kinds in ({"laws": True}, {"features": True}):
-        needs = warm_up.Needs(("auto",), True, plain=True, **kinds)
+        needs = warm_up.Needs(("auto",), plain=True, **kinds)
         assert {*needs.parts} <= {*warm_up.WHAT}
 
 

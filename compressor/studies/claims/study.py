@@ -165,7 +165,7 @@ def judge_machines(
     total, written, done = len(keys), time.monotonic(), len(keys) - len(missing)
     progress(done, total, "")
     tasks = [(number, cases[number], TIMEOUT) for number in missing]
-    needs = Needs.of(cases)._replace(horizon=True)
+    needs = Needs.of(cases)
     running = run_here(judge, tasks, needs, workers, partial(progress, done, total))
     try:
         for end in running:

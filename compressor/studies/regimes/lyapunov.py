@@ -1,62 +1,67 @@
 """The largest Lyapunov exponent of a motion: how fast close motions part, or come together.
 
-Benettin, Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980): a twin starts a small distance away;
-after each short interval the growth ln(d / d0) is taken, and the difference is pulled back to d0
-along itself. It turns into the direction that grows fastest. Twins go in step
-(`compressor.physics.march`), by the stiff method alone: explicit steps that stability holds part
-twins of motions that draw them together. A small end with a hundred times the paper's damping was
-measured at -1.0 by stiff steps and at +17 by explicit ones of the same tolerance. On periodic
-motions the exponent is the logarithm of the largest Floquet multiplier
-(tests/studies/regimes/test_lyapunov.py).
+Benettin, Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980): a second run starts a small distance
+away; after each revolution the growth ln(d / d0) is taken, and the difference is pulled back to d0
+along itself. It turns into the direction that grows fastest. Each run has steps of its own, at a
+tolerance far below d0. A difference that grows too large within a revolution to be a small one is
+followed up to there alone. On periodic motions the exponent is the logarithm of the largest Floquet
+multiplier (tests/studies/regimes/test_lyapunov.py).
 """
 
 import math
 import time
 from collections.abc import Callable
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from compressor.cases import Case
-from compressor.reasons import Reason
 from compressor.solve import (
-    Cuts,
     Request,
-    Stop,
-    Twins,
+    integrate,
     is_ideal,
+    natural_sizes,
     parts,
     record,
     standard_error,
     sure,
 )
 
-METHOD = "RODAS"  # of the twins, whatever the case has
-RTOLS = (1e-8, 1e-7, 1e-6)  # the next one where steps shrink to nothing, on a contact's edge
-TWIN_DISTANCE = 1e-7  # natural sizes: how far from the motion its twin starts
-LOST_DISTANCE = 1e-12  # natural sizes: a distance that rounding alone makes, and below
+RTOL = 1e-12  # of both runs, whatever the case has
+SHIFT = 1e-6  # natural sizes: how far from the motion the other one starts
+LOST_DISTANCE = 1e-11  # natural sizes: a distance that steps and rounding make, and below
+FAR_DISTANCE = 1e-2  # natural sizes: a distance that is not small any more
 INTERVALS = 36  # in a revolution: a joint's differences grow or shrink by some 20 times in one
 # revolutions at least, and a quarter of those counted, in which the difference turns
 MIN_TURNING_REV = 4
 MAX_BATCHES, MIN_BATCH = 16, 4  # batches, and revolutions in one: whole periods of 1, 2 and 4
-# 1/revolution: what steps of RTOLS change; the paper's joints were measured at half of the first
-# two, the third goes on in their course
-OF_STEPS = 0.01, 0.03, 0.1
-NO_LIMIT = 2**62  # attempts of a step
+OF_STEPS = 0.01  # 1/revolution: what the runs' own errors change
+MAX_STEPS = 10_000_000  # of one revolution
 
 
 class Exponent(NamedTuple):
     """A largest Lyapunov exponent, in 1/revolution.
 
     `value` and `error`: half the length of the interval that holds in 95 % of cases, what steps
-    change included; both nan where the twins' run stopped before its end. `at_most`: the twins
-    came as near to each other as rounding, so that the exponent is `value` or less.
+    change included; both nan where a run stopped before its end. `at_most`: the runs
+    came as near to each other as their errors, so that the exponent is `value` or less.
     """
 
     value: float
     error: float
     at_most: bool = False
+
+
+class Growth(NamedTuple):
+    """How a difference grew within a span: ln(d / d0), the span's revolutions, its last direction.
+
+    `lost`: it shrank to what errors make; `growth` is then a bound from above.
+    """
+
+    growth: float
+    span: float
+    difference: np.ndarray
+    lost: bool
 
 
 def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: float) -> Exponent:
@@ -73,59 +78,58 @@ def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: f
         raise ValueError("all joints are ideal: the crank alone moves the machine")
     if revolutions < 1:
         raise ValueError(f"{revolutions} revolutions: an exponent needs one at least")
-    turning = max(MIN_TURNING_REV, math.ceil(revolutions / 4))
-    times = case.turn * np.arange(1, INTERVALS * (turning + revolutions) + 1) / INTERVALS
+    p, deadline = record(case), time.monotonic() + timeout
+    size, times = natural_sizes(p), case.turn * np.arange(INTERVALS + 1) / INTERVALS
     # positions and rates alone: what else a state holds, such as a crank's lag, need not fade
-    moving = 2 * int(record(case)["freedoms"])
+    moving = 2 * int(p["freedoms"])
     push = np.zeros(state.size)
-    push[:moving] = TWIN_DISTANCE / math.sqrt(moving)
-    deadline = time.monotonic() + timeout
-    p, ends = record(case), np.array([0.0, times[-1]])
-    for rtol, of_steps in zip(RTOLS, OF_STEPS, strict=True):
+    push[:moving] = SHIFT / math.sqrt(moving)
+
+    def run(start: np.ndarray) -> np.ndarray:
+        """Return a motion at all `times`, nan from where it stopped."""
         left = deadline - time.monotonic()
-        request = Request(p, state, ends, 0.0, rtol, METHOD, NO_LIMIT, left, Cuts(times))
-        twins = Twins(request, state)
-        try:
-            found, lost = growths(partial(follow, twins), push, times.size, LOST_DISTANCE)
-        except Stop as stop:
-            if stop.reason == Reason.BUDGET_SECONDS:
-                break
-            continue
-        each, lost = (row.reshape(-1, INTERVALS)[turning:] for row in (found, lost))
-        value, error = mean_with_error(each.sum(axis=1))
-        return Exponent(value, error + of_steps, bool(lost.any()))
-    return Exponent(math.nan, math.nan)
+        return integrate(Request(p, start, times, 0.0, RTOL, "auto", MAX_STEPS, left)).states
 
+    def follow(difference: np.ndarray) -> np.ndarray:
+        """Return a difference over the next revolution, (INTERVALS, n), in natural sizes."""
+        nonlocal state
+        states, others = run(state), run(state + difference * size)
+        state = states[-1]
+        return (others - states)[1:] / size
 
-def follow(twins: Twins, difference: np.ndarray) -> np.ndarray:
-    """Return a difference at the end of the next interval, in natural sizes. Raises Stop."""
-    n = twins.size.size
-    twins.twin[:n] = twins.z[:n] + difference * twins.size
-    twins.advance(twins.ends.pop(0), math.inf)
-    twins.check()
-    return (twins.twin[:n] - twins.z[:n]) / twins.size
+    turning = max(MIN_TURNING_REV, math.ceil(revolutions / 4))
+    found = growths(follow, push, turning + revolutions)[turning:]
+    if len(found) < revolutions:
+        return Exponent(math.nan, math.nan)
+    spans = np.array([one.span for one in found])
+    value, error = mean_with_error(np.array([one.growth for one in found]) / spans.mean())
+    return Exponent(value, error + OF_STEPS, any(one.lost for one in found))
 
 
 def growths(
-    follow: Callable[[np.ndarray], np.ndarray], push: np.ndarray, count: int, least: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return growth ln(d / d0) of a difference in each of `count` intervals, and where it was lost.
+    follow: Callable[[np.ndarray], np.ndarray], push: np.ndarray, count: int
+) -> list[Growth]:
+    """Return the growth of a difference in each of `count` spans, fewer where a run stopped.
 
-    follow: takes the difference at the begin of an interval, gives it at the end, and goes on to
-    the next one; push: the first difference, whose length d0 all others get; least: a length that
-    rounding makes. A shorter one is lost: the growth is then ln(least / d0), a bound from above.
+    follow: takes the difference at the begin of a span, gives it at all looks until its end,
+    (looks, n), and goes on to the next one; push: the first difference, whose length d0 all others
+    get. It is looked at until it is `FAR_DISTANCE` long.
     """
-    close = float(np.linalg.norm(push))
-    found, lost = np.empty(count), np.zeros(count, dtype=bool)
+    close, found = float(np.linalg.norm(push)), []
     difference = push
-    for i in range(count):
-        after = follow(difference)
-        length = float(np.linalg.norm(after))
-        lost[i] = length < least
-        found[i] = math.log(max(length, least) / close)
-        if length > 0.0:
-            difference = after * (close / length)
-    return found, lost
+    for _ in range(count):
+        differences = follow(difference)
+        lengths = np.linalg.norm(differences, axis=1)
+        far = np.flatnonzero(lengths > FAR_DISTANCE)
+        last = int(far[0]) if far.size else len(lengths) - 1
+        if not np.isfinite(lengths).all():
+            break
+        lost = bool(lengths[last] < LOST_DISTANCE)
+        growth = math.log(max(lengths[last], LOST_DISTANCE) / close)
+        if lengths[-1] > 0.0:
+            difference = differences[-1] * (close / lengths[-1])
+        found.append(Growth(growth, (last + 1) / len(lengths), difference, lost))
+    return found
 
 
 def mean_with_error(values: np.ndarray) -> tuple[float, float]:

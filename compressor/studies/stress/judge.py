@@ -8,7 +8,7 @@ integrator at a hundredth of the tolerance, not below 1e-12. Judges are run unti
 same: one that agrees settles a scene, two that do not make it wrong, and so does one alone where no
 other reaches the end; two that contradict each other leave it unjudged.
 
-Numbers are comparable only as long as the motion can be foretold: until a twin, pushed by 1e-9 of
+Numbers are comparable only as long as the motion can be foretold: until a run, shifted by 1e-9 of
 the clearance, is 1 % of it away. A run that goes on beyond is judged twice. Cut to that horizon (in
 sixteenths of the span), with error bars of its own, it is judged like any other; the whole of it by
 statistics, at a tenth of the tolerance: rms values within 50 %, time without contact within a
@@ -237,7 +237,7 @@ def size(name: str, metrics: dict[str, Any]) -> float:
 
 
 def horizon(case: Case) -> int:
-    """Return the parts of the span in which a twin stays close, as far as that is found out."""
+    """Return the parts of the span in which a shifted run stays close, as far as known."""
     patient = replace(case, solve=replace(case.solve, max_steps=MORE_STEPS * case.solve.max_steps))
     seconds = predictability_horizon(patient, SECONDS)
     return PARTS if seconds == math.inf else int(PARTS * seconds / case.duration)

@@ -49,7 +49,7 @@ NUMBERS = {
     "evaluations": ("1", "evaluations of the right-hand side"),
     "end": ("1", "share of the span that the run came through"),
     "energy_residual": ("1", "worst energy imbalance relative to the contact's losses"),
-    "horizon": ("1", "share of the span in which a twin stays close"),
+    "horizon": ("1", "share of the span in which a shifted run stays close"),
     "judged": ("1", "share of the span that was judged by number"),
     "apart": ("1", "how far the journals came apart from the judge's, over their room"),
     "excess": ("1", "greatest error of a metric over the greatest that is told or expected"),
@@ -140,7 +140,7 @@ def campaign(
     tasks = [(number, (number, seed, budget), TIMEOUT) for number in missing]
     remark = partial(progress, total - len(missing), total)
     features = budget.drawn == extremes.FEATURES
-    needs = Needs(("auto",), True, plain=True, laws=bool(budget.drawn), features=features)
+    needs = Needs(("auto",), plain=True, laws=bool(budget.drawn), features=features)
     running = run_here(run_scene, tasks, needs, workers, remark)
     try:
         for end in running:

@@ -310,7 +310,7 @@ def run_choices(
     total = 1 + len(choices)
     # each choice has little time, which compiling its equations would use up
     every = [case, *(one.case for one in choices if one.case)]
-    needs = Needs.of(every)._replace(horizon=True)
+    needs = Needs.of(every)
     compile_once(needs, lambda remark: progress(0, total, remark))
     progress(0, total, "")
     # the first one may load compiled code

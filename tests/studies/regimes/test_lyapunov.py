@@ -9,11 +9,12 @@ from compressor.cases.case import Case
 from compressor.physics.motion import start
 from compressor.physics.record import FREEDOMS
 from compressor.solve.attempts import integrate
-from compressor.solve.horizon import PARTED_DISTANCE, TWIN_DISTANCE, predictability_horizon
+from compressor.solve.horizon import PARTED_DISTANCE, SHIFT, predictability_horizon
 from compressor.solve.request import Request
 from compressor.solve.si_record import natural_sizes, offsets, record, scene
 from compressor.studies.regimes import lyapunov
 from compressor.studies.regimes.lyapunov import (
+    LOST_DISTANCE,
     OF_STEPS,
     growths,
     largest_exponent,
@@ -43,20 +44,23 @@ def settled(made, revolutions=12, rtol=1e-10, begin=None):
 
 
 def logistic(x):
-    """The logistic map's twins at r = 4, whose exponent is ln 2."""
+    """The logistic map at r = 4, whose exponent is ln 2."""
 
     def follow(difference):
         nonlocal x
         other, x = 4 * (x + difference) * (1 - x - difference), 4 * x * (1 - x)
-        return other - x
+        return (other - x)[np.newaxis]
 
     return follow
 
 
+def rates(found):
+    return np.array([one.growth for one in found])
+
+
 def test_the_logistic_map_has_ln_2():
-    found, lost = growths(logistic(np.array([0.3])), np.array([1e-9]), 8000, 1e-14)
-    assert not lost.any()
-    value, error = mean_with_error(found)
+    found = growths(logistic(np.array([0.3])), np.array([1e-9]), 8000)
+    value, error = mean_with_error(rates(found))
     assert abs(value - math.log(2)) < error < 0.03
 
 
@@ -67,20 +71,27 @@ def test_a_linear_oscillator_has_its_slowest_decay(damping, expected):
     values, vectors = np.linalg.eig(matrix)
     period = 0.05 * math.pi / 2.0 / math.sqrt(abs(1 - damping**2))
     map_ = (vectors @ np.diag(np.exp(values * period)) @ np.linalg.inv(vectors)).real
-    found, lost = growths(lambda difference: map_ @ difference, np.array([1e-6, 1e-6]), 4000, 1e-14)
-    assert not lost.any()
-    value, error = mean_with_error(found[400:] / period)
+    push = np.array([1e-6, 1e-6])
+    found = growths(lambda difference: (map_ @ difference)[np.newaxis], push, 4000)
+    assert not any(one.lost for one in found)
+    value, error = mean_with_error(rates(found)[400:] / period)
     assert value == pytest.approx(expected, abs=1e-6)
     assert abs(value - expected) <= error + 1e-9
 
 
-def test_a_difference_that_rounding_swallows_gives_a_bound():
-    found, lost = growths(lambda difference: 1e-9 * difference, np.array([1e-7]), 5, 1e-12)
-    assert lost.all()
-    assert found == pytest.approx(math.log(1e-5))
-    found, lost = growths(lambda difference: 0.0 * difference, np.array([1e-7]), 5, 1e-12)
-    assert lost.all()
-    assert found == pytest.approx(math.log(1e-5))
+@pytest.mark.parametrize("factor", [1e-9, 0.0])
+def test_a_difference_that_errors_swallow_gives_a_bound(factor):
+    found = growths(lambda difference: factor * difference[np.newaxis], np.array([1e-7]), 5)
+    assert all(one.lost for one in found)
+    assert rates(found) == pytest.approx(math.log(LOST_DISTANCE / 1e-7))
+
+
+def test_a_difference_is_followed_as_long_as_it_is_small():
+    """It doubles at each of 30 looks: a hundredth is passed at the 17th, from 1e-7."""
+    each = 2.0 ** np.arange(1, 31)[:, np.newaxis]
+    (one,) = growths(lambda difference: each * difference, np.array([1e-7]), 1)
+    assert one.span == pytest.approx(17 / 30)
+    assert one.growth == pytest.approx(17 * math.log(2.0))
 
 
 def test_batches_hold_whole_periods():
@@ -112,28 +123,26 @@ def test_of_a_periodic_motion_it_is_the_largest_floquet_multiplier(joint):
     multipliers = np.linalg.eigvals((np.subtract(*ends) / size / 2e-4).T)
     expected = math.log(np.abs(multipliers).max())
     found = largest_exponent(made, y, 8, math.inf)
-    assert found.value == pytest.approx(expected, abs=OF_STEPS[0])
-    assert abs(found.value - expected) < found.error < 0.02
+    assert found.value == pytest.approx(expected, abs=OF_STEPS)
+    # of two batches of revolutions, whose scatter Student's t takes times 12.7
+    assert abs(found.value - expected) < found.error < 0.1
     assert not found.at_most
 
 
-def test_of_a_chaotic_motion_it_is_the_rate_at_which_twins_part():
+def test_of_a_chaotic_motion_it_is_the_rate_at_which_motions_part():
     made = case(LIGHT)
     found = largest_exponent(made, settled(made, 4, 1e-8), 12, math.inf)
-    rate = math.log(PARTED_DISTANCE / TWIN_DISTANCE) / (predictability_horizon(made) / made.turn)
+    rate = math.log(PARTED_DISTANCE / SHIFT) / (predictability_horizon(made) / made.turn)
     assert found.value - found.error > 0.0
     assert 0.5 * rate < found.value < 2.0 * rate
 
 
-def test_steps_that_stability_holds_do_not_part_twins(monkeypatch):
-    """Explicit steps of the same tolerance do, of this motion with heavy damping."""
+def test_explicit_steps_that_stability_holds_do_not_part_motions():
+    """Of a motion with heavy damping, by the shifted run's own steps."""
     heavy = {"damping_N_s_per_mm": 336e2}
     made = case({"joint": "small_end", "clearance_mm": 0.2, "contact": heavy})
-    y = settled(made, 4, 1e-6)
-    found = largest_exponent(made, y, 4, math.inf)
+    found = largest_exponent(made, settled(made, 4, 1e-6), 4, math.inf)
     assert -1.1 < found.value < -0.8
-    monkeypatch.setattr(lyapunov, "METHOD", "auto")
-    assert largest_exponent(made, y, 2, math.inf).value > 1.0
 
 
 def test_the_same_call_gives_the_same_bits():
@@ -142,21 +151,14 @@ def test_the_same_call_gives_the_same_bits():
     assert largest_exponent(made, y, 1, math.inf) == largest_exponent(made, y.copy(), 1, 1e3)
 
 
-def test_a_value_is_a_bound_where_rounding_is_reached(monkeypatch):
+def test_a_value_is_a_bound_where_errors_are_reached(monkeypatch):
     made = case({"joint": "big_end", "clearance_mm": 0.2})
     y = at_rest(made)
     plain = largest_exponent(made, y, 1, math.inf)
-    monkeypatch.setattr(lyapunov, "LOST_DISTANCE", 0.5 * lyapunov.TWIN_DISTANCE)
+    monkeypatch.setattr(lyapunov, "LOST_DISTANCE", 0.5 * lyapunov.SHIFT)
     found = largest_exponent(made, y, 1, math.inf)
     assert (plain.at_most, found.at_most) == (False, True)
     assert found.value > plain.value
-
-
-def test_where_stiff_steps_shrink_to_nothing_looser_ones_go_on():
-    heavy = {"damping_N_s_per_mm": 336e2}
-    made = case({"joint": "big_end", "clearance_mm": 0.2, "contact": heavy})
-    found = largest_exponent(made, at_rest(made), 1, math.inf)
-    assert math.isfinite(found.value)
 
 
 def test_what_has_no_exponent_is_refused():
