@@ -295,11 +295,11 @@ def series_error(name: str) -> Metric:
 
 
 def statistics_of(row: Metric) -> Iterator[Metric]:
-    """Yield the rows of a metric's statistics in a chaotic motion, with standard errors."""
+    """Yield the rows of a metric's statistics in a chaotic motion; averages have an error."""
     if row.kind == "greatest":
-        for word, dims in (("mean", ()), ("quantile", ("quantile",))):
-            statistic = derive(row, word, f"{word} over revolutions of each one's", dims)
-            yield from (statistic, derive(statistic, "standard_error", "standard error of"))
+        mean = derive(row, "mean", "mean over revolutions of each one's")
+        yield from (mean, derive(mean, "standard_error", "standard error of"))
+        yield derive(row, "quantile", "quantile over revolutions of each one's", ("quantile",))
     else:
         yield derive(row, "standard_error", "standard error of")
 

@@ -7,8 +7,7 @@ lies on its smaller side, and how great its peak on that side is beside the othe
 What is known of a chaotic motion: averages and peaks over revolutions, with standard errors.
 Revolutions follow on each other and are no independent draws. So standard errors come from batch
 means (Schmeiser, Operations Research 30, 1982): of up to `MAX_BATCHES` batches of as many
-revolutions each. A quantile's is that of the batches' own quantiles (sectioning: Asmussen and
-Glynn, Stochastic Simulation, 2007, III.5).
+revolutions each.
 """
 
 import math
@@ -148,7 +147,6 @@ def ledger(p: np.record, trajectory: Trajectory) -> dict[str, float]:
 
 
 MAX_BATCHES = 30
-MIN_SECTION = 5  # revolutions for a quantile
 T_QUANTILE = 0.975  # quantile of Student's t: a bar holds in 95 % of cases
 NORMAL = 1.96  # the same of a normal distribution
 MIN_REVOLUTIONS = 10  # settled ones, below which an average's bar is not known
@@ -184,24 +182,16 @@ def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
 
 
 def summarize_peaks(name: str, values: np.ndarray) -> Metrics:
-    """Return mean and quantiles of the revolutions' greatest values, with standard errors.
+    """Return mean, with its standard error, and quantiles of the revolutions' greatest values.
 
     values: (revolutions, ...).
     """
     means = np.array([part.mean(axis=0) for part in parts(values, MAX_BATCHES, 1)])
-    sections = parts(values, MAX_BATCHES, MIN_SECTION)
-    section_quantiles = np.array([quantiles(part) for part in sections])
     return {
         f"{name}_mean": values.mean(axis=0),
         f"{name}_mean_standard_error": standard_error(means),
-        f"{name}_quantile": quantiles(values),
-        f"{name}_quantile_standard_error": standard_error(section_quantiles),
+        f"{name}_quantile": np.moveaxis(np.quantile(values, QUANTILES, axis=0), 0, -1),
     }
-
-
-def quantiles(values: np.ndarray) -> np.ndarray:
-    """Return the `QUANTILES` over the first axis, as the last one."""
-    return np.moveaxis(np.quantile(values, QUANTILES, axis=0), 0, -1)
 
 
 def parts(items: Sequence | np.ndarray, most: int, least: int) -> list:

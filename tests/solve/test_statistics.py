@@ -12,7 +12,6 @@ from compressor.solve.request import merge_turns
 from compressor.solve.run_metrics import (
     MAX_BATCHES,
     MIN_REVOLUTIONS,
-    MIN_SECTION,
     chaotic_bars,
     count_bar,
     metrics,
@@ -79,16 +78,13 @@ def test_revolutions_to_one_percent_are_as_many_as_it_takes(record):
     assert np.median(found) == pytest.approx(25, rel=0.2)
 
 
-def test_quantiles_and_their_errors_are_those_of_the_draw():
-    """Of exponential draws: median log 2, 95 % quantile log 20, errors sqrt(q/(1-q)/n)."""
+def test_quantiles_are_those_of_the_draw():
+    """Of exponential draws: median log 2, 95 % quantile log 20."""
     rng = np.random.default_rng(3)
     rows = [summarize_peaks("x", rng.exponential(size=(600, 2))) for _ in range(100)]
     expected = -np.log(1 - np.array(QUANTILES))
-    errors = np.sqrt(np.array(QUANTILES) / (1 - np.array(QUANTILES)) / 600)
     mean = np.mean([row["x_quantile"] for row in rows], axis=0)
     np.testing.assert_allclose(mean, [expected] * 2, rtol=0.02)
-    told = np.median([row["x_quantile_standard_error"] for row in rows], axis=0)
-    np.testing.assert_allclose(told, [errors] * 2, rtol=0.25)
     np.testing.assert_allclose(np.mean([row["x_mean"] for row in rows], axis=0), 1.0, rtol=0.01)
 
 
@@ -148,7 +144,7 @@ def test_batches_are_alike_and_few(count):
     assert len(batches) <= MAX_BATCHES
     assert batches[-1][-1] == count - 1  # what is left out is the beginning
     assert sum(map(len, batches)) > count / 2
-    assert all(len(s) >= min(count, MIN_SECTION) for s in parts(range(count), 30, MIN_SECTION))
+    assert all(len(s) >= min(count, 5) for s in parts(range(count), 30, 5))
 
 
 def test_the_error_of_a_mean():
