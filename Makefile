@@ -83,7 +83,7 @@ sweep-bench: install  ## measure 100,000 jobs, killed three times and resumed (t
 validation: install  ## compare with what others have published (a minute)
 	$(CAMPAIGN)/measure_validation.py tests/results/validation.json
 
-wear: install  ## measure wear by steps and sectors, and on machines drawn at random (ten minutes)
+wear: install  ## measure wear by steps, and on machines drawn at random (two minutes)
 	$(CAMPAIGN)/measure_wear.py tests/results/wear.json
 
 peers: install  ## time other tools and ours in turn on one problem (about six minutes)

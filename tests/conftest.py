@@ -66,7 +66,6 @@ TOGETHER = {
     "tests/solve/test_lubricated.py": "features",
     "tests/solve/test_model_version.py": "features",
     "tests/solve/test_references.py": "features",
-    "tests/physics/test_worn_bore.py": "features",
     "tests/studies/stress/test_stress_laws.py": "features",
     "tests/studies/wear/test_stages.py": "features",
     "tests/studies/wear/test_wear_command.py": "features",

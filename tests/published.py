@@ -237,26 +237,19 @@ BEARING = [
 ]  # fmt: skip
 
 
-def lobes(angles):
-    """What is worn off an uneven bore (m), a pit and three lobes, of no symmetry."""
-    return 6e-5 * np.exp(2.0 * (np.cos(angles - 0.4) - 1.0)) + 1e-5 * (1.0 + np.sin(3 * angles))
-
-
 COEFFICIENT = 0.1  # of friction, the same at any speed
 
 
-def uneven(joint):
-    """A case of Coulomb's friction, and its record with a bore worn in three lobes and a pit."""
+def rubbing(joint, **values):
+    """A case of Coulomb's friction, whose energy over the coefficient is what rubs."""
     friction = {
         "law": "coulomb_tanh", "static": COEFFICIENT, "dynamic": COEFFICIENT,
         "stiction_velocity_mm_per_s": 0.01, "friction_velocity_mm_per_s": 0.01,
     }  # fmt: skip
-    case = Case.resolve({
-        "joint": joint, "clearance_mm": 0.2, "wear": True, "load": "none", "friction": friction,
-        "solve": {"duration_rev": 1, "settle_rev": 0, "rtol": 1e-9},
+    return Case.resolve({
+        "joint": joint, "clearance_mm": 0.2, "load": "none", "friction": friction,
+        "solve": {"duration_rev": 1, "settle_rev": 0, "rtol": 1e-9, "error_bars": False}, **values,
     })  # fmt: skip
-    angles = 2 * math.pi / 72 * np.arange(72)
-    return case, record(case, np.array([lobes(angles)] * 2))
 
 
 # Exudyn's test model `sliderCrankFloatingTest`: a crank of 0.1 m and a rod of 0.3 m on a frame that

@@ -56,4 +56,4 @@ from compressor.analysis.shaking import (
     sensor_envelope,
     shaking,
 )
-from compressor.analysis.wear import interpolate_hours
+from compressor.analysis.wear import interpolate_hours, rubbing_work

@@ -281,8 +281,8 @@ def wear_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         return
     if case.lubricant:
         yield Problem(
-            "wear", "of a bore that runs dry is known, and the film's numbers are those of a round "
-            "one: leave out lubricant or wear",
+            "wear", "of a bore that runs dry is known, not that of one whose film parts journal "
+            "and bore: leave out lubricant or wear",
         )  # fmt: skip
     most = max(case.clearance_mm.big_end, case.clearance_mm.small_end)
     if case.wear.limit_mm is not None and case.wear.limit_mm <= most:

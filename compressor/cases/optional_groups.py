@@ -409,10 +409,10 @@ value = partial(parameter, identity=False)  # of no single run
 @document_fields
 @dataclass(frozen=True)
 class Wear:
-    """How the rod's bores wear in joints with clearance; a case's `wear`, None: they stay round.
+    """How the rod's bores wear in joints with clearance; a case's `wear`, None by default.
 
-    `compsim wear` follows them over operating hours, by Archard's law on a bore divided into
-    sectors. A single run has an unworn bore. `True` stands for the defaults:
+    `compsim wear` opens the clearances over operating hours, by Archard's law. A single run has
+    the clearances that are given. `True` stands for the defaults:
 
     >>> import compressor
     >>> case = compressor.Case.from_values({"joint": "both", "clearance_mm": 0.1, "wear": True})
@@ -431,7 +431,7 @@ class Wear:
     )
     limit_mm: float | None = value(
         None, "mm", (0, 1e4), "assumed: twice the greater clearance",
-        "clearance at the deepest place, at which a joint counts as worn out", above=True,
+        "radial clearance at which a joint counts as worn out", above=True,
         optional=True,
     )  # fmt: skip
     hours: float = value(
@@ -439,16 +439,12 @@ class Wear:
         above=True,
     )  # fmt: skip
     step_mm: float = value(
-        0.01, "mm", (0, 1e4), "program: tests/results/wear.md",
-        "wear at the deepest place after which the motion is computed again", above=True,
+        0.02, "mm", (0, 1e4), "program: tests/results/wear.md",
+        "growth of a clearance after which the motion is computed again", above=True,
     )  # fmt: skip
     bore_length_mm: float = value(
         20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of the bores", above=True
     )
-    sectors: int = value(
-        72, "", (24, 180), "program: tests/results/wear.md",
-        "sectors of a bore, by angle", kind="integer",
-    )  # fmt: skip
 
 
 def fill_wear(wear: Wear, clearance_mm: PerJoint) -> Wear:

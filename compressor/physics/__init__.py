@@ -23,7 +23,7 @@ from compressor.physics.march import (
     new_stepper,
     new_work,
 )
-from compressor.physics.mechanism_rows import STALLED, wear_all
+from compressor.physics.mechanism_rows import STALLED
 from compressor.physics.observe import (
     COLUMNS,
     WIDE,
@@ -34,7 +34,6 @@ from compressor.physics.onset import approach_at
 from compressor.physics.record import (
     CHOICE,
     FILM_TERMS,
-    MAX_SECTORS,
     Coordinate,
     Fields,
     Load,
@@ -61,4 +60,3 @@ from compressor.physics.tally import (
     tally_energy,
     tally_step,
 )
-from compressor.physics.worn_bore import bore_fields

@@ -20,7 +20,6 @@ from compressor.physics._jit import (
     without_refcount,
 )
 from compressor.physics.kinematics import crank_direction, ideal, ideal_after
-from compressor.physics.mechanism_rows import wear_at
 from compressor.physics.observe import (
     ACCELERATION,
     COLUMNS,
@@ -193,31 +192,6 @@ def new_work(n):
         np.zeros((5, n)), np.zeros(STAGES), np.zeros(n), np.zeros((NODES.size, COLUMNS)),
         np.zeros(2), np.zeros(4), np.zeros(COLUMNS), np.zeros((LAST_STEPS, 4)),
     )  # fmt: skip
-
-
-@jit
-def skip_wear(w, base, h, z, work, phase, p, tally):
-    """Return at once: no bore of these records wears."""
-
-
-@jit
-def add_step_wear(w, base, h, z, work, phase, p, tally):
-    """Add to the tally what sliding wears off in the step just taken, by its nodes."""
-    if not p.sectors or w.t < w.settle:
-        return
-    n = work.y.size
-    for i in range(NODES.size):
-        for j in range(n):
-            work.y[j] = z[j] if i == 0 else work.new[j]
-        if 0 < i < NODES.size - 1:
-            if w.stiff:
-                interpolate(NODES[i], work.dense, work.y)
-            else:
-                combine(NODE_WEIGHTS[w.pair, i], h, z, work.k, work.y)
-        wear_at(ideal_after(base, NODES[i] * h, p), work.y, phase, WEIGHTS[i] * h, p, tally)
-
-
-wear_step = dispatch_on_record(MECHANISM, add_step_wear, skip_wear)
 
 
 MIDDLE = NODES.size // 2
@@ -634,7 +608,6 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         at_edge = not landing and h == end - w.t
         reached = end if at_edge else w.t + h
         accumulate_metrics(w, base, h, stride, z, work, size, phase, p, tally)
-        wear_step(w, base, h, z, work, phase, p, tally)
         sample_grid(w, reached, h, z, work, times, states)
         was_stiff = w.stiff
         choose_method(w, h, z, work, size)

@@ -40,7 +40,6 @@ from compressor.physics.contact_laws import power, rise
 from compressor.physics.film import add_film
 from compressor.physics.loads import piston_force
 from compressor.physics.record import BIG_END, SMALL_END, Coordinate
-from compressor.physics.worn_bore import worn_contact
 
 MODES = 4  # two across, two along
 ACROSS = 2  # so many of them, the first, are across
@@ -398,26 +397,6 @@ def fill_bias(pose, rates, p, bias):
 
 
 @jit
-def bore_axes(slope, modes, pose, p):
-    """Return the cosine and sine of a bore's angle, counter-clockwise.
-
-    slope: of the rod's modes at that end, (4,), as `BIG_SLOPE`.
-    """
-    turned = dot_rows(slope, 0, MODES, modes) / p.rod_length
-    c, s = math.cos(turned), math.sin(turned)
-    return pose.cos_phi * c + pose.sin_phi * s, pose.cos_phi * s - pose.sin_phi * c
-
-
-@jit
-def bore_contact(joint, eccentricity, axes, spins, carried, p):
-    """Return a joint's `ContactState`, with a round bore or a worn one."""
-    if p.sectors:
-        return worn_contact(joint, eccentricity, axes, spins, carried, p)
-    bearing = p.pin_radius[joint], p.clearance[joint], p.stiffness[joint]
-    return joint_contact(eccentricity, spins, bearing, carried, p)
-
-
-@jit
 def joints_of(phase, y, motion, pose, w, velocity, p):
     """Return the `Joints` at a state; w: coordinates, (11,); velocity: of the bodies, (11,)."""
     n, modes = p.freedoms, velocity[4:8]
@@ -430,16 +409,16 @@ def joints_of(phase, y, motion, pose, w, velocity, p):
         eccentricity = y[place], y[place + 1], y[n + place], y[n + place + 1]
         carried = carried_numbers(BIG_END, y, p)
         spins = pose.speed, big_spin
-        axes = bore_axes(BIG_SLOPE, w[7:11], pose, p)
-        big = bore_contact(BIG_END, eccentricity, axes, spins, carried, p)
+        bearing = p.pin_radius[0], p.clearance[0], p.stiffness[0]
+        big = joint_contact(eccentricity, spins, bearing, carried, p)
         big = add_film(BIG_END, big, eccentricity, spins, p)
     if p.clearance[1] > 0.0:
         place = p.at[3]
         eccentricity = y[place], y[place + 1], y[n + place], y[n + place + 1]
         carried = carried_numbers(SMALL_END, y, p)
         spins = pin_spin, small_spin
-        axes = bore_axes(SMALL_SLOPE, w[7:11], pose, p)
-        small = bore_contact(SMALL_END, eccentricity, axes, spins, carried, p)
+        bearing = p.pin_radius[1], p.clearance[1], p.stiffness[1]
+        small = joint_contact(eccentricity, spins, bearing, carried, p)
         small = add_film(SMALL_END, small, eccentricity, spins, p)
     guide = UNGUIDED
     if p.tilting:

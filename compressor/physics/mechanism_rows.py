@@ -12,13 +12,10 @@ from compressor.physics.contact import LUGRE, bristle_rate, nearness
 from compressor.physics.kinematics import ideal
 from compressor.physics.mechanism import (
     ACROSS,
-    BIG_SLOPE,
     COORDINATES,
     FIRST,
     MODES,
     ROWS,
-    SMALL_SLOPE,
-    bore_axes,
     corner_depth,
     dot_rows,
     material_work,
@@ -52,7 +49,6 @@ from compressor.physics.observe import (
     contact_power,
     write_frame_forces,
 )
-from compressor.physics.worn_bore import contact_at_wall, wear_off
 
 GUIDE_GAP, CRANK_SPEED = int(Column.GUIDE_GAP), int(Column.CRANK_SPEED)
 MOTOR_TORQUE = int(Column.MOTOR_TORQUE)
@@ -279,43 +275,10 @@ def observe_all(times, states, phases, p, rows):
 
 
 @jit
-def at_joint(joint, now, p):
-    """Return a joint's `ContactState`, eccentricity with its rate, and its bore's axes and spin."""
-    i = 1 + 2 * joint
-    eccentricity = now.w[i], now.w[i + 1], now.rates[i], now.rates[i + 1]
-    if joint == 0:
-        axes = bore_axes(BIG_SLOPE, now.w[7:11], now.pose, p)
-        return now.joints.big, eccentricity, axes, now.joints.big_spin
-    axes = bore_axes(SMALL_SLOPE, now.w[7:11], now.pose, p)
-    return now.joints.small, eccentricity, axes, now.joints.small_spin
-
-
-@inline_once
-def wear_at(motion, y, phase, weight, p, tally):
-    """Add to the tally what sliding wears off at a state that stands for `weight` (s) of t."""
-    now = solve(motion, y, phase, p)
-    weight *= pace_of(now, p)
-    for joint in range(2):
-        if p.clearance[joint] > 0.0:
-            contact, eccentricity, axes, _ = at_joint(joint, now, p)
-            wear_off(joint, contact, eccentricity, axes, weight, p, tally)
-
-
-@jit
-def wear_all(times, states, phases, weights, p, tally):
-    """Add to the tally what sliding wears off at m states, (m, k), as `wear_at` does.
-
-    times, weights: s, (m,); phases: of the load, (m,) integers; p: of a mechanism with worn bores.
-    """
-    for i in range(times.size):
-        wear_at(ideal(times[i], p), states[i], phases[i], weights[i], p, tally)
-
-
-@jit
 def contact_at(joint, t, y, phase, p):
-    """Return a joint's `ContactState` at a time and state; on a worn bore as it meets the wall."""
-    contact, eccentricity, axes, spin = at_joint(joint, solve(ideal(t, p), y, phase, p), p)
-    return contact_at_wall(joint, contact, eccentricity, axes, spin, p) if p.sectors else contact
+    """Return a joint's `ContactState` at a time and state."""
+    joints = solve(ideal(t, p), y, phase, p).joints
+    return joints.big if joint == 0 else joints.small
 
 
 @jit

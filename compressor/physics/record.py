@@ -162,14 +162,6 @@ FILM: list[tuple] = [
     ("film_constants", "f8", (2, 4, FILM_TERMS)),  # of each joint, `film.short_bearing_shares`
     ("film_stiffest", "f8", (2,)),  # of each joint: the squeeze's number at the wall
 ]
-MAX_SECTORS = 180
-# of a mechanism whose bores wear
-WEAR: list[tuple] = [
-    ("sectors", "i8"),  # that a bore is divided into by angle; 0: round bores
-    ("sector", "f8"),  # width of one, rad
-    ("towards", "f8", (MAX_SECTORS, 2)),  # directions of the nodes between them, x and y
-    ("worn", "f8", (2, MAX_SECTORS)),  # per joint, m
-]
 CARD_NODES = 1440  # a revolution
 # of gas that was measured
 CARD: list[tuple] = [
@@ -209,9 +201,7 @@ FEATURES: list[tuple] = [
 CHOICE, MECHANISM = 2, 3
 RECORD = np.dtype([*FIELDS, ("laws", "f8", (1,))], align=True)
 CHOSEN = np.dtype([*FIELDS, *FILM, *CARD, ("laws", "f8", (CHOICE,))], align=True)
-FEATURED = np.dtype(
-    [*FIELDS, *FILM, *CARD, *WEAR, *FEATURES, ("laws", "f8", (MECHANISM,))], align=True
-)
+FEATURED = np.dtype([*FIELDS, *FILM, *CARD, *FEATURES, ("laws", "f8", (MECHANISM,))], align=True)
 
 
 def zero(kind: np.dtype) -> np.record:

@@ -23,7 +23,7 @@ from compressor.physics.observe import (
     PENETRATION,
     POTENTIAL,
 )
-from compressor.physics.record import CHOICE, MAX_SECTORS, MECHANISM, is_featured, zero
+from compressor.physics.record import CHOICE, MECHANISM, zero
 
 # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAK_NEARNESS = 0.98
@@ -49,6 +49,7 @@ def lobatto(n):
 TALLY = np.dtype(
     [
         ("seconds", "f8"),  # of machine time measured
+        ("steady_seconds", "f8"),  # that a steady crank takes for the same angle
         ("square_acceleration", "f8"),
         ("square_deviation", "f8"),
         ("crank_torque", "f8"),  # integrals over time, N m s
@@ -80,25 +81,12 @@ TALLY = np.dtype(
 )
 
 
-WORN = np.dtype(
-    [
-        # first: to numba, a record with fields behind another's is one of those
-        ("steady_seconds", "f8"),  # that a steady crank takes for the angle of `seconds`
-        ("slid", "f8", (2,)),  # integral of N |v| by joint, J: what wear is in proportion to
-        ("worn", "f8", (2, MAX_SECTORS)),  # its parts, by node of the bore
-        *[(name, TALLY[name]) for name in TALLY.names or ()],
-    ],
-    align=True,
-)  # fmt: skip
-
-
-def new_tally(p=None, has_rod_load=False):
+def new_tally(has_rod_load=False):
     """Return an empty tally; a joint counts as touching until it is seen apart.
 
-    p: the run's record, where it may be that of a mechanism with features, whose bores may wear.
     has_rod_load: whether the rod load is tallied.
     """
-    tally = zero(TALLY if p is None or not is_featured(p) else WORN)
+    tally = zero(TALLY)
     tally["has_rod_load"] = has_rod_load
     tally["touching"] = 1
     tally["max_penetration"] = -math.inf
@@ -341,22 +329,6 @@ def crank_pace_of_step(weights, rows, every, p):
 pace_of_step = dispatch_on_record(MECHANISM, crank_pace_of_step, steady_pace_of_step)
 
 
-@jit
-def add_seconds(span, passing, tally, p):
-    """Add a measured step to the tally's time."""
-    tally.seconds += passing
-
-
-@jit
-def add_both_seconds(span, passing, tally, p):
-    """Add a measured step to the tally's time, and to that of a steady crank."""
-    tally.seconds += passing
-    tally.steady_seconds += span
-
-
-add_time = dispatch_on_record(MECHANISM, add_both_seconds, add_seconds)
-
-
 @inline_llvm
 def tally_step(span, nodes, weights, rows, every, gap_fraction, sides, measured, tally, p):
     """Add one step (or part of one) of length span (s) to the tally.
@@ -376,7 +348,8 @@ def tally_step(span, nodes, weights, rows, every, gap_fraction, sides, measured,
             tally_contact(joint, seconds, nodes, rows, every, gap_fraction, measured, tally)
     if not measured:
         return
-    add_time(span, seconds, tally, p)
+    tally.seconds += seconds
+    tally.steady_seconds += span
     for k in range(PEAKED):
         tally.top[k] = 0.0
     for i in range(0, nodes.size, every):

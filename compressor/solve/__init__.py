@@ -12,7 +12,6 @@ from compressor.solve.request import (
     Request,
     Turns,
     merge_turns,
-    passed_time,
     revolutions,
 )
 from compressor.solve.run_metrics import (
@@ -26,6 +25,6 @@ from compressor.solve.run_metrics import (
 )
 from compressor.solve.scipy_driver import LOCAL
 from compressor.solve.series import SIGNALS, signals_of_scene
-from compressor.solve.si_record import initial_state, is_ideal, natural_sizes, record, stiffness_of
+from compressor.solve.si_record import is_ideal, natural_sizes, record, stiffness_of
 from compressor.solve.simulate import measure, observe, simulate, with_series
 from compressor.solve.solution import solve

@@ -65,7 +65,7 @@ def closed_form(
     """
     deadline = time.monotonic() + timeout
     edges, phases = segments(p, float(times[-1]))
-    tally = new_tally(p, has_rod_load)
+    tally = new_tally(has_rod_load)
     result = Trajectory(
         times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)], tally
     )
@@ -133,7 +133,7 @@ def prepare_run(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, n
     edges, phases = segments(request.fields, float(request.times[-1]))
     owner = sample_segments(request.times, edges)
     states = np.full((request.times.size, request.start.size), math.nan)
-    tally = new_tally(request.p, request.has_rod_load)
+    tally = new_tally(request.has_rod_load)
     result = Trajectory(request.times, states, phases[owner], tally)
     z = np.zeros(request.start.size + FLOWS)
     z[:-FLOWS] = request.start
@@ -223,19 +223,17 @@ def is_sampled(case: Case) -> bool:
 
 def run_at_tolerance(
     case: Case, rtol: float, timeout: float, sampled: bool, cuts: Cuts | None = None,
-    state: np.ndarray | None = None, worn: np.ndarray | None = None,
-    sampled_until: float = math.inf,
+    state: np.ndarray | None = None, sampled_until: float = math.inf,
 ) -> Solution:  # fmt: skip
     """Return one run of a case at a tolerance, without errors, within a wall time (s).
 
     `sampled`: whether on the output grid; steps do not land on it, so that metrics are the same
     without. `cuts`: into revolutions; metrics are of all of them. `state`: the motion at the start,
     top dead centre (`physics.state_names`), in place of the case's own; no ideal scene has one.
-    `worn`: what is worn off the bores (m), (joint, sector). `sampled_until`: the time (s) behind
-    which a long run has no samples but its end. A run that stops raises nothing: its `reason` says
-    why.
+    `sampled_until`: the time (s) behind which a long run has no samples but its end. A run that
+    stops raises nothing: its `reason` says why.
     """
-    p, times = record(case, worn), times_of(case, sampled).until(sampled_until)
+    p, times = record(case), times_of(case, sampled).until(sampled_until)
     if is_ideal(case):
         pieces = round(PIECES * (case.rtol / rtol) ** FINER_POWER)
         return solution_of_trajectory(

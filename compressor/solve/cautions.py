@@ -337,7 +337,9 @@ def remarks(case: Case) -> Iterator[Remark]:
         text = f"of the crank end alone: the head end has {gas.head_clearance_mm:g} mm"
         yield Remark("gas.crank_clearance_percent", text, "clearance")
     if case.wear:
-        yield Remark("wear", "compsim wear alone reads it: a run has bores that are new", "unread")
+        yield Remark(
+            "wear", "compsim wear alone reads it: a run has the clearances that are given", "unread"
+        )
     friction = case.friction
     if friction and friction.law in (None, "lugre") and friction.static < friction.dynamic:
         text = f"{friction.static:g} is below the dynamic one, {friction.dynamic:g}"

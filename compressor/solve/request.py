@@ -26,15 +26,14 @@ from compressor.reasons import Reason
 
 Turns = list[np.record]  # tallies, of one revolution each
 SUMS = (
-    "seconds", "square_acceleration", "square_deviation", "crank_torque", "guide_moment",
-    "loss_seconds", "impacts", "releases", "switch_shift", "side_seconds",
+    "seconds", "steady_seconds", "square_acceleration", "square_deviation", "crank_torque",
+    "guide_moment", "loss_seconds", "impacts", "releases", "switch_shift", "side_seconds",
 )  # fmt: skip
 GREATEST_FIELDS = (
     "peak",
     "max_penetration",
     "side_peak",
 )  # the others go on from the start of the run
-WEAR_SUMS = ("steady_seconds", "slid", "worn")  # sums of a mechanism with features
 SAME_TIME = 1e-12  # of the run: edges this near to each other are one
 
 
@@ -62,8 +61,6 @@ class Cuts:
         fresh = new_tally()
         for name in SUMS + GREATEST_FIELDS:
             tally[name] = fresh[name]
-        for name in worn_sums(tally):
-            tally[name] = 0.0
         return not self.enough(self.turns)
 
 
@@ -75,15 +72,10 @@ def revolutions(begin: float, end: float, turn: float) -> np.ndarray:
     return begin + turn * np.arange(1, int((end - begin) / turn * (1 + SAME_TIME)) + 1)
 
 
-def worn_sums(tally: np.record) -> tuple[str, ...]:
-    """Return the sums that a tally has beside `SUMS`."""
-    return WEAR_SUMS if "worn" in (tally.dtype.names or ()) else ()
-
-
 def merge_turns(turns: Sequence[np.record]) -> np.record:
     """Return one tally of several revolutions in a row: sums are added, peaks the greatest."""
     whole = turns[-1].copy()
-    for name in (*SUMS, *worn_sums(whole)):
+    for name in SUMS:
         whole[name] = sum(turn[name] for turn in turns)
     for name in GREATEST_FIELDS:
         whole[name] = np.max([turn[name] for turn in turns], axis=0)

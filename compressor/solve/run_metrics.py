@@ -45,8 +45,7 @@ def metrics(p: np.record, tallied: np.record) -> Metrics:
     force = tally["peak"][sizes:journals]
     blow = moved * tally["peak"][journals:]
     # the spans of steps add up to within rounding: whole revolutions are to stay whole
-    name = "steady_seconds" if is_featured(p) else "seconds"
-    steady = tally[name] or math.nan
+    steady = tally["steady_seconds"] or math.nan
     revolutions = round(float(steady * p["omega"]) / math.tau, 9)
     of_joints = {
         "knock": np.divide(blow, force, out=np.zeros(2), where=force > 0.0),

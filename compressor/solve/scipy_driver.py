@@ -24,13 +24,11 @@ from compressor.physics import (
     contact_within,
     derivative_with_flows,
     enter_segment,
-    is_featured,
     lobatto,
     observe_all,
     sample_segments,
     tally_energy,
     tally_step,
-    wear_all,
 )
 from compressor.reasons import Reason
 from compressor.solve.request import (
@@ -285,8 +283,6 @@ class LoadStretch:
         if measured:
             self.measure_parts(dense, begin, end, rows, gap_fraction, sides)
         tally_step(end - begin, NODES, WEIGHTS, rows, 1, gap_fraction, sides, measured, tally, p)
-        if measured and is_featured(p) and p["sectors"]:
-            wear_all(times, states, phases, (end - begin) * WEIGHTS, p, tally)
 
     def measure_parts(self, dense, begin, end, rows, gap_fraction, sides) -> None:
         """Write the shares of a step without contact, by joint, and its rod load's sides.

@@ -18,12 +18,10 @@ from compressor.cases import Case, joint_stiffness, to_si
 from compressor.metrics import JOINTS
 from compressor.physics import (
     FLOWS,
-    MAX_SECTORS,
     Coordinate,
     Fields,
     Load,
     Scene,
-    bore_fields,
     choose_laws,
     complete,
     derivative_with_flows,
@@ -53,11 +51,11 @@ def is_ideal(case: Case) -> bool:
     return scene(case) == Scene.IDEAL and not (play or case.drive or case.rod)
 
 
-def record(case: Case, worn: np.ndarray | None = None) -> np.record:
+def record(case: Case) -> np.record:
     """Return the record of a case, every number in SI.
 
-    worn: what was worn off both bores (m), (joint, sector); None: they are round. Raises ValueError
-    where the gas cycle or the cam has no corners, as `gas_corners` and `cam_corners`.
+    Raises ValueError where the gas cycle or the cam has no corners, as `gas_corners` and
+    `cam_corners`.
     """
     p: dict[str, Any] = {}  # what is not set stays zero
     p["scene"] = scene(case)
@@ -70,14 +68,10 @@ def record(case: Case, worn: np.ndarray | None = None) -> np.record:
     _gas(case, p)
     _spring(case, p)
     _film(case, p)
-    featured = case.needs_mechanism or worn is not None
-    if featured:
+    if case.needs_mechanism:
         _features(case, p)
-    if worn is not None:
-        p |= bore_fields(worn.shape[1])
-        p["worn"] = np.pad(worn, ((0, 0), (0, MAX_SECTORS - worn.shape[1])))
     complete(p)
-    return new_record(case.chooses_forces, featured, p)
+    return new_record(case.chooses_forces, case.needs_mechanism, p)
 
 
 def offsets(case: Case) -> np.ndarray:

@@ -170,8 +170,7 @@ ENTRIES = {
     ),
     **entries(
         WEARING, IDEAL, wear__coefficient_mm3_per_N_m=1e-7, wear__coefficient_factor=3,
-        wear__limit_mm=0.206, wear__hours=1, wear__step_mm=0.02, wear__bore_length_mm=15,
-        wear__sectors=36,
+        wear__limit_mm=0.206, wear__hours=1, wear__step_mm=0.03, wear__bore_length_mm=15,
     ),
     **entries(
         HEARD, body__freedoms="xy", body__mass_kg=600, body__damping_ratio=0.1, body__start="rest",

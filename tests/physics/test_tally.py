@@ -96,7 +96,7 @@ def test_contact_is_a_positive_nearness(before, after, share):
 
 def test_the_rod_load_is_tallied_by_its_sides():
     p, rows = record(Case.from_values({})), np.zeros((NODES.size, COLUMNS))
-    plain, tally = new_tally(), new_tally(None, True)
+    plain, tally = new_tally(), new_tally(True)
     for sides in (SIDES, np.array([0.08, 0.3, 2.0, 1.0])):
         for one in (plain, tally):
             tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, sides, True, one, p)

@@ -31,7 +31,7 @@ def turns(rng, count, pull=0.0):
     for _ in range(count):
         level = pull * level + math.sqrt(1 - pull**2) * rng.normal()
         tally = new_tally()
-        tally.seconds = TURN
+        tally.seconds = tally.steady_seconds = TURN
         tally.square_acceleration = 0.1 * (100.0 + 10.0 * level)
         tally.square_deviation = 0.1 * 25.0
         tally.peak[:] = rng.exponential(size=tally.peak.shape)

@@ -29,7 +29,7 @@ AT_MOST = 100_000  # motions, whose wall time a machine may take
 class WornMachine:
     """How a machine of a study has worn; `point`: its swept values, `reason`: why it ended early.
 
-    `stages`: profiles that are stored; `life`: None where there is none.
+    `stages`: that are stored; `life`: None where there is none.
     """
 
     study: str
@@ -98,7 +98,7 @@ def run_wear(
 
     remark("")
     jobs = [(t.worn.key, t, AT_MOST * t.worn.case.solve.timeout_s) for t in missing]
-    needs = Needs.of(task.worn.case for task in missing)._replace(features=True)
+    needs = Needs.of(task.worn.case for task in missing)
     running = run_here(follow_wear, jobs, needs, workers, remark)
     with contextlib.closing(running):
         for end in running:

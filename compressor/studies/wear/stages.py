@@ -1,10 +1,13 @@
-"""How long a joint lasts: the hours until its clearance has grown to a limit."""
+"""How long a joint lasts: the hours until its clearance has grown to a limit.
+
+A stage is an ordinary run at the clearances that wear has opened. What rubs in it wears the bores
+evenly, by Archard's law, until the next stage.
+"""
 
 import hashlib
 import json
 import math
-import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,27 +15,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import interpolate_hours
-from compressor.cases import MODEL_VERSION, Case, Wear, to_si
+from compressor.analysis import interpolate_hours, rubbing_work, settled_part, settled_revolutions
+from compressor.cases import MODEL_VERSION, Case, Output, PerJoint, Wear, to_si
 from compressor.metrics import JOINTS, METRICS
 from compressor.program import PROGRAM
-from compressor.solve import (
-    Cuts,
-    Metrics,
-    Solution,
-    initial_state,
-    merge_turns,
-    metrics,
-    passed_time,
-    revolutions,
-    run_at_tolerance,
-    run_until_balanced,
-)
+from compressor.solve import simulate
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
 
 FOLDER = "wear"
 REMEDY = "delete it: the same command makes it again"
-SCHEMA = 1  # of a stage's numbers: a change of what they mean makes them again
+SCHEMA = 2  # of a stage's numbers: a change of what they mean makes them again
+MAX_STEP_DEG = 0.3  # of the crank, between the samples by which what rubs is summed
 SHOWN = (
     "rms_acceleration", "peak_acceleration", "peak_contact_force", "max_penetration",
     "contact_loss_fraction", "impact_count",
@@ -40,11 +33,9 @@ SHOWN = (
 # beside the stage: dims, unit, long name
 NUMBERS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "hours": ((), "h", "operating hours"),
-    "worn_depth": (("joint", "angle"), "m", "what is worn off the bore"),
-    "rubbing_work": (("joint", "angle"), "J", "pressing times sliding in a revolution, by sector"),
-    "rubbing_spread": (("joint",), "J", "standard deviation of it over the revolutions"),
+    "clearance": (("joint",), "m", "radial clearance"),
+    "rubbing_work": (("joint",), "J", "normal force times sliding in a revolution"),
     "turn": ((), "s", "time of a revolution"),
-    "end_state": (("number",), "1", "motion at the end, as the solver holds it, in SI"),
     **{name: (METRICS[name].dims, METRICS[name].unit, METRICS[name].phrase) for name in SHOWN},
 }
 
@@ -89,17 +80,30 @@ class Worn:
         return self.wear.hours * self.wear.coefficient_factor
 
     @property
-    def sector_area(self) -> np.ndarray:
-        """Return the area of a bore's sector, by joint (m^2)."""
+    def bore_area(self) -> np.ndarray:
+        """Return the area of each unworn bore (m^2)."""
         pins = [to_si(self.case.machine.pin_radius(joint), "mm") for joint in JOINTS]
-        radius = np.array(pins) + self.clearances
-        width = 2.0 * math.pi / self.wear.sectors * radius
-        return np.asarray(width * to_si(self.wear.bore_length_mm, "mm"))
+        around = 2.0 * math.pi * (np.array(pins) + self.clearances)
+        return np.asarray(around * to_si(self.wear.bore_length_mm, "mm"))
 
     @property
     def depth_per_work(self) -> np.ndarray:
-        """Return the depth (m) that 1 J wears off a sector, by joint: Archard's law."""
-        return to_si(self.wear.coefficient_mm3_per_N_m, "mm3/(N m)") / self.sector_area
+        """Return the depth (m) that 1 J wears off a whole bore, by joint: Archard's law."""
+        return to_si(self.wear.coefficient_mm3_per_N_m, "mm3/(N m)") / self.bore_area
+
+    def case_at(self, clearances: np.ndarray) -> Case:
+        """Return the ordinary case of its motion at clearances (m), (joint,).
+
+        It keeps time series, whose samples are no farther apart than `MAX_STEP_DEG`.
+        """
+        case, opened = self.case, PerJoint(*(1e3 * clearances).tolist())
+        solve = case.solve
+        if 360.0 * case.duration / case.turn / case.steps > MAX_STEP_DEG * (1 + 1e-9):
+            solve = replace(solve, output_step_deg=MAX_STEP_DEG, output_step_s=None)
+        return replace(
+            case, clearance_mm=opened, solve=solve, output=Output(), wear=None, body=None,
+            sensor=None,
+        )  # fmt: skip
 
     def path(self, folder: Folder) -> Path:
         """Return the path of its file."""
@@ -107,90 +111,47 @@ class Worn:
 
     def over(self, stage: Stage) -> bool:
         """Return whether a stage is the last one: worn out, at the end of its hours, or failed."""
-        opened = self.clearances + stage["worn_depth"].max(axis=1)  # m
         late = bool(stage["hours"] >= self.most_hours)
-        return bool(stage["reason"]) or late or bool((opened >= self.limit).any())
+        return bool(stage["reason"]) or late or bool((stage["clearance"] >= self.limit).any())
 
 
-class WearRun(NamedTuple):
-    """A motion on bores that are given.
-
-    `work`: pressing times sliding, J a revolution, by joint and node of the bore; `spread`: its
-    standard deviation over the revolutions, by joint; `turn`: time of a revolution, s; `state`: the
-    motion at the end; `reason`, `detail`: why it stopped early, empty if it did not.
-    """
-
-    work: np.ndarray
-    spread: np.ndarray
-    turn: float
-    metrics: Metrics
-    state: np.ndarray
-    reason: str = ""
-    detail: str = ""
-
-
-def wear_bores(case: Case, worn: np.ndarray, state: np.ndarray | None) -> WearRun:
-    """Follow a case over its span on worn bores, and measure what rubs after it has settled.
-
-    worn: (joint, sector), m; state: the motion to begin with, at top dead centre, or None for the
-    case's own. The span is in whole revolutions.
-    """
-    deadline = time.monotonic() + case.solve.timeout_s
-    ends = revolutions(case.settle, case.duration, case.turn)
-
-    def run_at(rtol: float) -> tuple[Solution, float]:
-        left = max(deadline - time.monotonic(), 0.0)
-        run = run_at_tolerance(case, rtol, left, False, Cuts(ends), state, worn)
-        return run, case.duration / case.turn
-
-    run = run_until_balanced(case.rtol, run_at)
-    p, turns = run.p, run.turns
-    if run.reason or not turns:
-        nothing = np.full((len(JOINTS), worn.shape[1]), np.nan)
-        start = initial_state(case, p) if state is None else state
-        return WearRun(nothing, nothing[:, 0], np.nan, {}, start, run.reason, run.detail)
-    slid = np.array([turn["slid"] for turn in turns])
-    whole = merge_turns(turns)
-    work = whole["worn"][:, : worn.shape[1]] / len(turns)
-    times, states = run.trajectory.times, run.trajectory.states
-    began, ended = passed_time(p, times, states)[[0, -1]]
-    turn = case.turn * float(ended - began) / case.duration
-    return WearRun(work, slid.std(axis=0), turn, metrics(p, whole), states[-1])
-
-
-def first_stage(machine: Worn) -> Stage:
-    """Return the stage of unworn bores."""
-    unworn = np.zeros((len(JOINTS), machine.wear.sectors))
-    return new_stage(0.0, unworn, wear_bores(machine.case, unworn, None))
-
-
-def new_stage(hours: float, worn: np.ndarray, motion: WearRun) -> Stage:
-    """Return the stage of a motion on bores that were worn in some hours."""
-    found = {name: motion.metrics.get(name, math.nan) for name in SHOWN}
+def follow_stage(machine: Worn, hours: float, clearances: np.ndarray) -> Stage:
+    """Return the stage at clearances (m) that were worn in some hours: a run, and what it rubs."""
+    run = simulate(machine.case_at(clearances))
+    reason = str(run["reason"].values)
     shapes = {name: [len(JOINTS)] * len(METRICS[name].dims) for name in SHOWN}
+    found = {name: run[name].values if name in run else math.nan for name in SHOWN}
+    work, turn = np.full(len(JOINTS), math.nan), math.nan
+    if not reason:
+        time = settled_part(run)["time"].values
+        work, turn = rubbing_work(run), float(np.ptp(time)) / settled_revolutions(run)
     return {
-        "hours": hours, "worn_depth": worn, "rubbing_work": motion.work,
-        "rubbing_spread": motion.spread, "turn": motion.turn, "end_state": motion.state,
-        "reason": motion.reason, "detail": motion.detail,
+        "hours": hours, "clearance": clearances, "rubbing_work": work, "turn": turn,
+        "reason": reason, "detail": str(run.attrs.get("detail", "")),
         **{name: np.broadcast_to(value, shapes[name]) for name, value in found.items()},
     }  # fmt: skip
 
 
+def first_stage(machine: Worn) -> Stage:
+    """Return the stage of unworn bores."""
+    return follow_stage(machine, 0.0, machine.clearances)
+
+
 def next_stage(machine: Worn, stage: Stage) -> Stage:
     """Return the stage after one that is not the last; by the midpoint rule."""
-    rate = machine.depth_per_work[:, np.newaxis] * stage["rubbing_work"]  # m a revolution
+    opened, rate = stage["clearance"], machine.depth_per_work * stage["rubbing_work"]
     left = (machine.most_hours - stage["hours"]) * 3600.0 / stage["turn"]
-    fastest = float(rate.max())
+    fastest = float(rate.max())  # m a revolution
     step = to_si(machine.wear.step_mm, "mm")
     span = min(step / fastest, left) if fastest > 0.0 else left  # revolutions
-    midway = wear_bores(machine.case, stage["worn_depth"] + 0.5 * span * rate, stage["end_state"])
-    if midway.reason:
-        return stage | {"reason": midway.reason, "detail": midway.detail}
-    hours = stage["hours"] + span * midway.turn / 3600.0
+    midway = follow_stage(machine, math.nan, opened + 0.5 * span * rate)
+    if midway["reason"]:
+        return stage | {"reason": midway["reason"], "detail": midway["detail"]}
+    hours = stage["hours"] + span * midway["turn"] / 3600.0
     # midway a turn may take another time, but the last stage must not end short of most_hours
     hours = machine.most_hours if span == left else hours
-    worn = stage["worn_depth"] + span * machine.depth_per_work[:, np.newaxis] * midway.work
-    return new_stage(hours, worn, wear_bores(machine.case, worn, midway.state))
+    opened = opened + span * machine.depth_per_work * midway["rubbing_work"]
+    return follow_stage(machine, hours, opened)
 
 
 def stages_dataset(machine: Worn, stages: list[Stage]) -> xr.Dataset:
@@ -202,19 +163,10 @@ def stages_dataset(machine: Worn, stages: list[Stage]) -> xr.Dataset:
     for name, (dims, unit, phrase) in NUMBERS.items():
         values = np.array([stage[name] for stage in stages], float)
         found[name] = ("stage", *dims), values, {"units": unit, "long_name": phrase}
-    worn = found["worn_depth"][1]
-    deepest = machine.clearances + worn.max(axis=2)
-    about = {"units": "m", "long_name": "clearance at the deepest place"}
-    found["clearance"] = ("stage", "joint"), np.where(machine.clearances > 0.0, deepest, 0.0), about
+    worn = found["clearance"][1] - machine.clearances
     about = {"units": "m3", "long_name": "volume that is worn off"}
-    found["worn_volume"] = ("stage", "joint"), worn.sum(axis=2) * machine.sector_area, about
-    angles = 2.0 * math.pi / machine.wear.sectors * np.arange(machine.wear.sectors)
-    about = {"units": "rad", "long_name": "of a place on the bore from the rod's axis, towards the "
-            "small end, counter-clockwise"}  # fmt: skip
-    where = {
-        "angle": ("angle", angles, about),
-        "joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"}),
-    }
+    found["worn_volume"] = ("stage", "joint"), worn * machine.bore_area, about
+    where = {"joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"})}
     attrs = {"key": machine.key, "program": PROGRAM, "model_version": MODEL_VERSION}
     attrs["case"] = machine.case.attributes()["case"]
     return xr.Dataset(found, where, attrs)
@@ -250,8 +202,8 @@ def wear_file(folder: Folder, case: Case) -> Path:
 def open_wear(folder: Folder, case: Case) -> xr.Dataset:
     """Return the wear of a case's bores from a folder of results, as far as it was run.
 
-    Dims: `stage`, `joint`, `angle` of a place on the bore; `hours` and `worn_depth` (m) by stage,
-    with the metrics of the motion on such bores. Raises StoreError where there is nothing of it.
+    Dims: `stage`, `joint`; `hours` and `clearance` (m) by stage, with the metrics of the motion at
+    such clearances. Raises StoreError where there is nothing of it.
     """
     path = wear_file(folder, case)
     if not path.exists():
@@ -263,8 +215,7 @@ class Life(NamedTuple):
     """Hours until the first joint is worn out, nan where that is after the last stage.
 
     low, high: with the greatest and the least coefficient; `joint`: that is worn out, or is the
-    nearest to it; `clearance`, `angle`: there at the end (m), and of the deepest place (rad);
-    `followed`: the hours of the last stage.
+    nearest to it; `clearance`: there at the end (m); `followed`: the hours of the last stage.
     """
 
     hours: float
@@ -272,7 +223,6 @@ class Life(NamedTuple):
     high: float
     joint: str
     clearance: float
-    angle: float
     followed: float
 
 
@@ -283,13 +233,11 @@ def life(machine: Worn, stages: xr.Dataset) -> Life:
     reached = [interpolate_hours(hours, clearance, machine.limit) for clearance in opened.T]
     worst = int(np.argmin(reached)) if np.isfinite(reached).any() else int(opened[-1].argmax())
     found, factor, most = reached[worst], machine.wear.coefficient_factor, machine.wear.hours
-    deepest = stages["worn_depth"].isel(stage=-1, joint=worst)
     return Life(
         found if found <= most else math.nan,
         found / factor if found <= factor * most else math.nan,
         found * factor if found * factor <= most else math.nan,
         str(stages["joint"].values[worst]),
         float(opened[-1, worst]),
-        float(stages["angle"].values[int(deepest.values.argmax())]),
         float(hours[-1]),
     )

@@ -14,7 +14,7 @@ from compressor.studies.wear.stages import Worn, life, stages_dataset
 
 CASE = {
     "joint": "both", "clearance_mm": 0.1,
-    "wear": {"limit_mm": 0.3, "coefficient_factor": 2, "sectors": 24},
+    "wear": {"limit_mm": 0.3, "coefficient_factor": 2},
 }  # fmt: skip
 
 
@@ -23,11 +23,10 @@ def write_run(folder, case=CASE, hours=(0.0, 400.0, 1000.0)):
     worn = Worn(Case.from_values(case))
     stages = []
     for one in hours:
-        depth = np.zeros((2, 24))
-        depth[:, 5] = 2e-4 * one / 1000.0 * np.array([1.0, 0.5])
+        opened = worn.clearances + 2e-4 * one / 1000.0 * np.array([1.0, 0.5])
         stages.append({
-            "hours": one, "worn_depth": depth, "rubbing_work": depth, "rubbing_spread": np.zeros(2),
-            "turn": 0.1, "end_state": np.zeros(3), "reason": "", "detail": "",
+            "hours": one, "clearance": opened, "rubbing_work": np.ones(2),
+            "turn": 0.1, "reason": "", "detail": "",
             "rms_acceleration": 1.0, "peak_acceleration": 1.0, "peak_contact_force": np.ones(2),
             "max_penetration": np.ones(2), "contact_loss_fraction": np.ones(2),
             "impact_count": np.ones(2),

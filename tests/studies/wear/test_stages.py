@@ -1,4 +1,4 @@
-"""Wear over hours: Archard's volume, convergence in step and sectors, and lives."""
+"""Wear over hours: Archard's volume, steps, and lives."""
 
 import itertools
 import math
@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
+from compressor.solve import simulate
 from compressor.studies.wear.stages import (
     Worn,
     first_stage,
+    follow_stage,
     life,
     next_stage,
     stages_dataset,
-    wear_bores,
 )
 
 VALUES = {"joint": "big_end", "clearance_mm": 0.2, "solve": {"accuracy": "draft"}}
@@ -34,46 +35,51 @@ def machine():
 
 
 def test_a_volume_is_the_coefficient_times_what_has_slid(machine):
-    """V = k N |v| t: by the motions midway, run again from where each began."""
+    """V = k N |v| t: by the runs midway, made again."""
     of, stages = machine
     found = stages_dataset(of, stages)
     k = 1e-8 * 1e-9  # m3/(N m)
     volume = 0.0
     for before, after in itertools.pairwise(stages):
         turns = (after["hours"] - before["hours"]) * 3600.0 / of.case.turn
-        half = 0.5 * (after["hours"] - before["hours"]) * 3600.0 / before["turn"]
-        depth = half * k * before["rubbing_work"] / of.sector_area[:, np.newaxis]
-        midway = wear_bores(of.case, before["worn_depth"] + depth, before["end_state"])
-        volume += k * midway.work.sum() * turns
+        deeper = 0.5 * turns * k * before["rubbing_work"] / of.bore_area
+        midway = follow_stage(of, 0.0, before["clearance"] + deeper)
+        volume += k * midway["rubbing_work"].sum() * turns
     assert found["worn_volume"].values[-1, 0] == pytest.approx(volume, rel=1e-9)
     assert not found["worn_volume"].values[:, 1].any()
     assert not found["clearance"].values[:, 1].any()
 
 
+def test_a_bore_wears_by_its_circumference_and_length():
+    """What is worn off evenly is the volume over 2 pi (R + c) times the length."""
+    of = Worn(Case.from_values({**VALUES, "wear": {"bore_length_mm": 30.0}}))
+    area = 2.0 * math.pi * (10e-3 + 0.2e-3) * 30e-3
+    assert of.depth_per_work[0] == pytest.approx(1e-8 * 1e-9 / area)
+
+
+def test_stages_are_ordinary_runs_at_their_clearances(machine):
+    of, stages = machine
+    stage = stages[2]
+    values = VALUES | {"clearance_mm": 1e3 * float(stage["clearance"][0])}
+    run = simulate(Case.from_values(values))
+    assert of.case_at(stage["clearance"]).key == Case.from_values(values).key
+    solve = VALUES["solve"] | {"output_step_deg": 3.6}
+    coarse = Worn(Case.from_values({**VALUES, "solve": solve, "wear": True}))
+    assert coarse.case_at(stage["clearance"]).key == Case.from_values(values).key
+    assert stage["peak_contact_force"] == pytest.approx(run["peak_contact_force"].values, rel=1e-12)
+
+
 def test_stages_grow_by_their_step_until_the_limit(machine):
     _, stages = machine
-    deepest = [1e3 * stage["worn_depth"].max() for stage in stages]
-    assert deepest[0] == 0.0
-    assert np.diff(deepest) == pytest.approx(0.01, rel=0.2)
-    assert deepest[-2] < 0.06 <= deepest[-1]
+    opened = [1e3 * stage["clearance"][0] for stage in stages]
+    assert opened[0] == 0.2
+    assert np.diff(opened) == pytest.approx(0.01, rel=0.2)
+    assert opened[-2] < 0.26 <= opened[-1]
     assert (np.diff([stage["hours"] for stage in stages]) > 0).all()
 
 
-def test_the_profile_is_smooth_and_lies_where_the_load_presses(machine):
-    """Both lobes lie along the rod; from sector to sector the depth changes by little."""
-    _, stages = machine
-    worn = stages[-1]["worn_depth"][0]
-    angles = 2 * math.pi / worn.size * np.arange(worn.size)
-    assert math.cos(angles[worn.argmax()]) > 0.9
-    second = np.where(np.cos(angles) < 0, worn, 0.0)
-    assert math.cos(angles[second.argmax()]) < -0.9
-    assert worn[np.abs(np.cos(angles)) < 0.1].max() < 0.1 * worn.max()
-    curvature = np.abs(worn - 0.5 * (np.roll(worn, 1) + np.roll(worn, -1)))
-    assert curvature.max() < 0.06 * worn.max()
-
-
 def test_a_coefficient_is_a_scale_of_hours(machine):
-    """The same profiles, a tenth of the hours: what the interval of a life rests on."""
+    """The same clearances, a tenth of the hours: what the interval of a life rests on."""
     of, stages = machine
     tenfold, faster = followed({"step_mm": 0.01, "coefficient_mm3_per_N_m": 1e-7})
     one, other = (life(*pair) for pair in (
@@ -107,7 +113,7 @@ def test_a_motion_that_fails_ends_its_machine():
 
 def test_a_speed_that_gives_way_takes_longer_for_a_revolution():
     soft = {"drive": {"slope_N_m_s": 10.0, "flywheel_kg_m2": 5.0}, "load": "gas"}
-    case = Case.from_values({**VALUES, **soft, "wear": True})
-    found = wear_bores(case, np.zeros((2, 72)), None)
-    assert not found.reason
-    assert found.turn > 1.001 * case.turn
+    of = Worn(Case.from_values({**VALUES, **soft, "wear": True}))
+    found = first_stage(of)
+    assert not found["reason"]
+    assert found["turn"] > 1.001 * of.case.turn
