@@ -30,7 +30,7 @@ class Bar(NamedTuple):
     own: float = 5.0  # share of the metric's own difference
     path: float = 0.3  # of the distance of the time series that it is taken from
     relative: bool = True  # False: of a share, a count or a mean that may be 0
-    least: float = 1e-13  # share of the metric that a relative bar has at least: rounding, or more
+    least: float = 1e-13  # share of the metric that its bar has at least: rounding, or more
 
 
 class Shown(NamedTuple):
@@ -82,8 +82,9 @@ HORIZON = "predictability_horizon"
 # of `knock`: up to it a guide's sensor reads what it does on a sound machine, to 30 %; from 0.3 on
 # twice that and more (docs/a-run.md, Knock)
 KNOCKS = 0.25
-# of the body and its sensor; rounding in spectra and splines leaves some 1e-12
-OF_BODY, OF_SEGMENT = Bar(5.0, 0.5, least=1e-9), Bar(5.0, 1.0, least=1e-9)
+# of the body and its sensor: at least what is lost between the samples of the forces, which no run
+# at these samples shows; measured against samples three times as fine
+OF_MEAN, OF_POWER, OF_PEAK = (Bar(5.0, 1.0, least=share) for share in (2e-4, 2e-3, 5e-3))
 TABLE = (
     Metric(
         "peak_acceleration", (), "m/s2", "greatest |acceleration|", "acceleration",
@@ -207,38 +208,38 @@ TABLE = (
     ),
     Metric(
         "body_velocity_rms", ("axis",), "m/s", "rms velocity of the body's mass centre, in a band",
-        bar=OF_BODY, source="body", when="body", kind="root",
+        bar=OF_MEAN, source="body", when="body", kind="root",
         shown=Shown("body velocity rms", "mm/s", 1e3),
     ),
     Metric(
         "sensor_peak", (), "m/s2", "greatest |sample| of the sensor",
-        bar=OF_BODY, source="body", when="sensor", kind="greatest",
+        bar=OF_PEAK, source="body", when="sensor", kind="greatest",
         shown=Shown("sensor peak", "m/s²"),
     ),
     Metric(
         "sensor_rms", (), "m/s2", "root mean square of the sensor's record",
-        bar=OF_BODY, source="body", when="sensor", kind="root", shown=Shown("sensor rms", "m/s²"),
+        bar=OF_MEAN, source="body", when="sensor", kind="root", shown=Shown("sensor rms", "m/s²"),
     ),
     Metric(
         "sensor_crest_factor", (), "1", "sensor_peak over sensor_rms",
-        bar=OF_BODY, source="body", when="sensor", shown=Shown("crest factor", ""),
+        bar=OF_PEAK, source="body", when="sensor", shown=Shown("crest factor", ""),
     ),
     Metric(
         "sensor_kurtosis", (), "1", "kurtosis of the sensor's record: 3 of Gaussian noise",
-        bar=OF_BODY, source="body", when="sensor", shown=Shown("kurtosis", ""),
+        bar=OF_POWER, source="body", when="sensor", shown=Shown("kurtosis", ""),
     ),
     Metric(
         "sensor_segment_peak", ("segment",), "m/s2", "greatest |sample| in 10 degrees of the crank",
-        bar=OF_SEGMENT, source="body", when="sensor", kind="greatest",
+        bar=OF_PEAK, source="body", when="sensor", kind="greatest",
     ),
     Metric(
         "sensor_segment_rms", ("segment",), "m/s2", "rms of the record in 10 degrees of the crank",
-        bar=OF_SEGMENT, source="body", when="sensor", kind="root",
+        bar=OF_POWER, source="body", when="sensor", kind="root",
     ),
     Metric(
         "sensor_counts_per_rev", ("threshold",), "1/rev",
         "peaks of the sensor's record in a revolution over a threshold",
-        bar=Bar(2.0, 0.0, False), source="body", when="threshold", kind="rate",
+        bar=Bar(2.0, 5.0, False, 0.03), source="body", when="threshold", kind="rate",
     ),
     Metric(
         "clipped_fraction", (), "1", "fraction of the sensor's samples beyond its range",

@@ -61,30 +61,10 @@ def card_nodes(angles, values):
 
     angles: degrees in [0, 360), rising; values: at them.
     """
-    x, y, slopes = closed_slopes(np.asarray(angles, float), np.asarray(values, float))
-    at = np.arange(CARD_NODES) * (360.0 / CARD_NODES)
-    place = x.searchsorted(at, side="right") - 1
-    width = x[place + 1] - x[place]
-    s = (at - x[place]) / width
-    rise = y[place + 1] - y[place]
-    here, there = slopes[place] * width - rise, rise - slopes[place + 1] * width
-    bend = (1.0 - s) * here + s * there
-    steepness = rise + (1.0 - 2.0 * s) * bend + s * (1.0 - s) * (there - here)
-    found = np.empty((CARD_NODES, 2))
-    found[:, 0] = y[place] + s * (rise + (1.0 - s) * bend)
-    found[:, 1] = steepness / width * (360.0 / CARD_NODES)
-    return found
+    from scipy.interpolate import Akima1DInterpolator  # of cases with a card alone
 
-
-def closed_slopes(angles, values):
-    """Return angles (degrees), values and Akima's slopes of a closed curve, from below 0 to 360."""
-    count = angles.size
-    around = np.arange(-3, count + 3)
-    x = angles[around % count] + 360.0 * (around // count)
-    y = values[around % count]
-    steps = np.diff(y) / np.diff(x)
-    change = np.abs(np.diff(steps))
-    before, after = change[:-2], change[2:]  # of the sides: the straighter one counts more
-    total = before + after
-    weight = np.divide(after, total, out=np.full_like(total, 0.5), where=total > 0.0)
-    return x[2:-2], y[2:-2], weight * steps[1:-2] + (1.0 - weight) * steps[2:-1]
+    around = np.concatenate([np.asarray(angles) + turn for turn in (-360.0, 0.0, 360.0)])
+    curve = Akima1DInterpolator(around, np.tile(values, 3))
+    width = 360.0 / CARD_NODES
+    at = np.arange(CARD_NODES) * width
+    return np.stack([curve(at), width * curve(at, 1)], axis=1)

@@ -1,11 +1,11 @@
 """Metrics of the body's motion and of its sensor's record, with error bars by another run.
 
 They are of whole settled revolutions. Noise and jitter of the sensor are drawn by its seed, the
-same ones for both runs: a bar measures numerics, not noise. The other run's body is moved by
-every second sample of its forces, so that what is lost between samples is in the bar, too.
+same ones for both runs: a bar measures numerics, not noise.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from compressor.cases import Case
 from compressor.metrics import NUMBERS
 from compressor.outcome import Regime
 from compressor.solve.attempts import Solution
-from compressor.solve.error_bars import LOOSER, Metrics, closeness
+from compressor.solve.error_bars import Metrics, closeness, longest_bars
 from compressor.solve.run_metrics import (
     MAX_BATCHES,
     average_bar,
@@ -24,8 +24,6 @@ from compressor.solve.run_metrics import (
 from compressor.solve.series import rows_of, signals
 from compressor.vibration import Forces, Monitored, shake_body
 
-THINNING = (2, 3, 5)  # of the other run's samples: the first that divides them, else all are taken
-
 
 def first_sample(case: Case, solution: Solution) -> int:
     """Return the sample of a run from which on it moves the body: settled where that is steady."""
@@ -34,16 +32,16 @@ def first_sample(case: Case, solution: Solution) -> int:
     return round(solution.settle / solution.trajectory.times[1]) if steady else 0
 
 
-def shake_by(case: Case, solution: Solution, rows: np.ndarray, thin: int = 1) -> Monitored:
+def shake_by(case: Case, solution: Solution, rows: np.ndarray) -> Monitored:
     """Return what a run that reached its end does to the body, from `first_sample` on.
 
-    rows: observed at all times of the run, (m, WIDE); thin: takes every second of them, and so on.
+    rows: observed at all times of the run, (m, WIDE).
     """
     assert case.body is not None
     begin, guide = first_sample(case, solution), case.machine.rod_length_mm / 1e3
-    found = {name: one[begin::thin] for name, one in signals(rows).items()}
+    found = {name: one[begin:] for name, one in signals(rows).items()}
     forces = Forces(
-        solution.trajectory.times[1] * thin, found["shaking_force"], found["guide_moment"],
+        solution.trajectory.times[1], found["shaking_force"], found["guide_moment"],
         np.stack([np.zeros(len(found["guide_force"])), found["guide_force"]], axis=1),
         found["bearing_force"],
     )  # fmt: skip
@@ -77,23 +75,14 @@ def bars(case: Case, solution: Solution, ours: Monitored, metrics: Metrics) -> M
         return {}
     if solution.regime == Regime.CHAOTIC:
         return scatter_bars(case, ours, metrics)
-    longest = {name: np.zeros(np.shape(value)) for name, value in metrics.items()}
-    times = solution.trajectory.times
-    begin = round(solution.settle / times[1])
-    companions = [
-        one for one in solution.companions
-        if not one.reason and one.trajectory.times.size == times.size
+    size = solution.trajectory.times.size
+    found = [
+        bars_by(case, metrics, ours, shake_by(case, one, rows_of(one.p, one.trajectory)),
+                closeness(one.rtol / solution.rtol))
+        for one in solution.companions if not one.reason and one.trajectory.times.size == size
     ]  # fmt: skip
-    for one in companions:
-        rows = rows_of(one.p, one.trajectory)
-        thin = next((n for n in THINNING if not ((len(rows) - 1) % n or begin % n)), 1)
-        theirs = shake_by(case, one, rows, thin)
-        share = max(closeness(one.rtol / solution.rtol), LOOSER)  # samples are lost at any rtol
-        for name, bar in bars_by(case, metrics, ours, theirs, share).items():
-            longest[name] = np.maximum(longest[name], bar)
-    if not companions:
-        return {name: np.full(np.shape(value), math.inf) for name, value in metrics.items()}
-    return longest
+    unknown = {name: np.full(np.shape(value), math.inf) for name, value in metrics.items()}
+    return longest_bars(found) if found else unknown
 
 
 def bars_by(
@@ -101,53 +90,21 @@ def bars_by(
 ) -> Metrics:
     """Return the bar of each metric by another run; share: of the difference that counts.
 
-    Of the metric's own difference, and of the distance of the signals where it is taken from: a
-    segment's in the segment or a neighbour. Counts are made again with thresholds that are as much
-    lower, and higher, as the record's peak may be wrong.
+    As `compressor.solve.error_bars` makes others: of the metric's own difference, and of what the
+    difference of the two signals measures. Of a share and of counts that is the record's distance.
     """
-    limits, found = thresholds(case), {}
-    other = theirs.measure(limits)
+    difference = replace(
+        ours, velocity=ours.velocity - theirs.velocity, record=ours.record - theirs.record
+    )
+    apart, other, found = difference.measure(()), theirs.measure(thresholds(case)), {}
     for name, value in metrics.items():
-        bar = NUMBERS[name].bar
-        apart = distance(name, ours, theirs)
-        own = bar.own * (np.asarray(value) - other.get(name, math.nan))
-        size = np.abs(value)
-        least = bar.least * size if bar.relative else 0.0
-        found[name] = np.maximum(share * np.hypot(own, bar.path * apart * size), least)
-    if "sensor_counts_per_rev" in found and metrics["sensor_peak"]:
-        wrong = found["sensor_peak"] / metrics["sensor_peak"]
-        by_run = found["sensor_counts_per_rev"]
-        for factor in (1.0 - wrong, 1.0 + wrong):
-            moved = [None if one is None else one * factor for one in limits]
-            change = np.abs(ours.counts(moved) - metrics["sensor_counts_per_rev"])
-            by_run = np.maximum(by_run, change)
-        found["sensor_counts_per_rev"] = by_run
+        metric, size = NUMBERS[name], np.abs(value)
+        path = apart.get(name, 0.0)
+        if metric.is_pure_number:
+            path = size * apart["sensor_rms"] / (metrics["sensor_rms"] or math.inf)
+        both = np.hypot(metric.bar.own * (value - other[name]), metric.bar.path * path)
+        found[name] = np.maximum(share * both, metric.bar.least * size)
     return found
-
-
-def distance(name: str, ours: Monitored, theirs: Monitored) -> np.ndarray:
-    """Return the relative distance of two runs' signals that a metric is taken from, in its shape.
-
-    The velocity's over thinned samples, by which the other one may be given.
-    """
-    if name == "body_velocity_rms":
-        thin = round(len(ours.velocity) / len(theirs.velocity))
-        count = min(len(ours.velocity[::thin]), len(theirs.velocity))
-        one = ours.velocity[::thin][:count]
-        both = one - theirs.velocity[:count], one
-        away, size = (np.sqrt(np.mean(v**2, axis=0)) for v in both)
-    else:
-        count = min(len(ours.record), len(theirs.record))
-        one = ours.record[:count]
-        both = one - theirs.record[:count], one
-        if "segment" in NUMBERS[name].dims:
-            # a peak is as wrong as the one sample, a root mean square as all of them
-            place = 0 if NUMBERS[name].kind == "greatest" else 1
-            away, size = (ours.segments(values)[place] for values in both)
-            away = np.maximum(away, np.maximum(np.roll(away, 1), np.roll(away, -1)))
-        else:
-            away, size = (np.sqrt(np.mean(v**2)) for v in both)
-    return np.divide(away, size, out=np.zeros_like(size), where=np.asarray(size) > 0.0)
 
 
 def scatter_bars(case: Case, found: Monitored, metrics: Metrics) -> Metrics:

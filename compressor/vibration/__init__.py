@@ -9,8 +9,13 @@ from compressor.vibration.envelope import (
     kurtogram,
     shape,
 )
-from compressor.vibration.monitor import Monitored, band_signal, measure_record, shake_body
+from compressor.vibration.monitor import (
+    Monitored,
+    band_signal,
+    measure_record,
+    segment_levels,
+    shake_body,
+)
 from compressor.vibration.record_files import RecordError, encode_record, record_columns
 from compressor.vibration.record_reader import MIN_REVOLUTIONS, check_record, read_record, turns_at
-from compressor.vibration.segments import segment_levels
 from compressor.vibration.spectra import line_amplitudes, resample_angle, rms_above

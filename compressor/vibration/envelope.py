@@ -7,7 +7,8 @@ at equal times or equal crank angles.
 
 Single numbers that measure how large and how impulsive a vibration is. A signal may have any unit.
 None of the functions takes its mean off, but for the kurtosis, which is about the mean. Where a
-number is not defined, as of silence, it is nan.
+number is not defined, as of silence, it is nan. All raise SignalError for a signal that is not
+finite.
 """
 
 import math
@@ -15,17 +16,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy import stats
 from scipy.fft import ifft, irfft, rfft
 from scipy.signal import hilbert
 
-from compressor.vibration.spectra import (
-    SignalError,
-    checked_count,
-    checked_positive,
-    checked_signal,
-    line_amplitudes,
-    whole_revolutions,
-)
+from compressor.vibration.spectra import SignalError, check_signal, line_amplitudes
 
 MIN_BAND = 64  # lines in the narrowest band, and so independent samples of its envelope
 BAND_EDGE = 0.25  # of a band's width: how far its gain falls off on either side of its edge
@@ -55,27 +50,21 @@ def band_envelope(values: np.ndarray, rate: float, band: tuple[float, float]) ->
 
     values: (m,) at a rate of samples a second (or a revolution); band: lower and upper edge in Hz
     (or orders), both included. Lines outside are removed without a shift of phase; then Hilbert's
-    transform. Raises SignalError if the band does not lie within 0 and rate / 2, or holds no line.
+    transform. Raises SignalError where no line lies in the band.
     """
-    found, rate = checked_signal(values), checked_positive(rate, "the rate")
-    low, high = band
-    if not 0.0 <= low < high <= rate / 2:
-        edges = f"the band from {low} to {high} is not between 0 and half the rate, {rate / 2:g}"
-        raise SignalError(f"{edges}: choose another, or sample faster")
+    found, (low, high) = check_signal(values), band
     lines = rfft(found)
     frequency = np.arange(lines.size) * rate / found.size
     inside = (frequency >= low) & (frequency <= high)
     if not inside.any():
         text = f"no line lies between {low} and {high}, which are {rate / found.size:g} apart"
-        raise SignalError(f"{text}: choose a wider band, or pass a longer signal")
+        remedy = f"choose a wider band below {rate / 2:g}, half the rate, or pass a longer signal"
+        raise SignalError(f"{text}: {remedy}")
     return np.abs(hilbert(irfft(np.where(inside, lines, 0.0), found.size)))
 
 
 def envelope_spectrum(
-    values: np.ndarray,
-    rate: float,
-    band: tuple[float, float],
-    speed: float | None = None,
+    values: np.ndarray, rate: float, band: tuple[float, float], speed: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the amplitude spectrum of the envelope in a band: (frequencies, amplitudes).
 
@@ -84,13 +73,11 @@ def envelope_spectrum(
     and frequencies are in orders anyway. Amplitudes are single-sided peak values in the unit of the
     signal; the line at zero is the mean envelope.
 
-    A carrier A (1 + d cos(2 pi f t)) has lines A at 0 and A d at f. Raises SignalError as
-    `band_envelope` does, or for a speed that is not positive.
+    A carrier A (1 + d cos(2 pi f t)) has lines A at 0 and A d at f.
     """
     envelope = band_envelope(values, rate, band)
     amplitudes = line_amplitudes(envelope, envelope.size, rms=False)
-    unit = 1.0 if speed is None else checked_positive(speed, "the speed")
-    return np.arange(amplitudes.size) * (rate / envelope.size / unit), amplitudes
+    return np.arange(amplitudes.size) * (rate / envelope.size / speed), amplitudes
 
 
 def kurtogram(values: np.ndarray, rate: float, levels: int) -> Kurtogram:
@@ -111,8 +98,7 @@ def kurtogram(values: np.ndarray, rate: float, levels: int) -> Kurtogram:
     of a signal that is not periodic is an impulse; the samples about it are left out. Raises
     SignalError if the narrowest band has less than `MIN_BAND` lines, or the signal is constant.
     """
-    found, rate = checked_signal(values), checked_positive(rate, "the rate")
-    levels = checked_count(levels, 1, "the number of levels")
+    found = check_signal(values)
     half = found.size // 2
     if half < MIN_BAND * 2**levels:
         need = f"{levels} levels need {2 * MIN_BAND * 2**levels} samples, and there are"
@@ -120,11 +106,12 @@ def kurtogram(values: np.ndarray, rate: float, levels: int) -> Kurtogram:
     if np.ptp(found) == 0.0:
         raise SignalError("the signal is constant, so that it has no kurtosis: pass another one")
     lines = rfft(found - found.mean())[: half + 1]
-    parts = [1] + [n for level in range(1, levels) for n in (2**level, 3 * 2 ** (level - 1))]
-    parts = sorted({*parts, 2**levels})
+    parts = sorted(
+        {2**level for level in range(levels + 1)} | {3 * 2**level for level in range(levels - 1)}
+    )
     kurtosis, scatter = np.hstack([_kurtosis_of_parts(lines, n) for n in parts])
-    width = np.concatenate([np.full(n, rate / 2 / n) for n in parts])
-    centre = np.concatenate([(np.arange(n) + 0.5) * (rate / 2 / n) for n in parts])
+    width = np.repeat(rate / 2 / np.array(parts), parts)
+    centre = (np.concatenate([np.arange(n) for n in parts]) + 0.5) * width
     one = int(np.nanargmax(kurtosis))
     best = (float(centre[one] - width[one] / 2), float(centre[one] + width[one] / 2))
     return Kurtogram(centre, width, kurtosis, scatter, best)
@@ -158,10 +145,7 @@ class Shape(NamedTuple):
 
 
 def shape(values: np.ndarray) -> Shape:
-    """Return the `Shape` of samples at equal intervals, (m,).
-
-    Raises SignalError as its functions do.
-    """
+    """Return the `Shape` of samples at equal intervals, (m,)."""
     return Shape(rms(values), crest_factor(values), kurtosis(values), gini(values))
 
 
@@ -170,30 +154,24 @@ def rms(values: np.ndarray) -> float:
 
     The measure of severity of ISO 20816-1 (and 10816-1) for the vibration of housings, of what a
     band-pass filter has left: for reciprocating compressors of displacement, velocity and
-    acceleration (ISO 20816-8). Raises SignalError as all here: values must be finite, in one row.
+    acceleration (ISO 20816-8).
     """
-    found, size = _scale_signal(values)
-    return size * math.sqrt(float(np.mean(found**2)))
+    return math.sqrt(float(np.mean(check_signal(values) ** 2)))
 
 
 def crest_factor(values: np.ndarray) -> float:
     """Return greatest magnitude over rms of samples (m,): sqrt(2) of a sine, 1 of a square wave."""
-    found, size = _scale_signal(values)
-    return 1.0 / math.sqrt(float(np.mean(found**2))) if size else math.nan
+    size = rms(values)
+    return float(np.max(np.abs(values))) / size if size else math.nan
 
 
 def kurtosis(values: np.ndarray) -> float:
-    """Return Pearson's kurtosis of samples (m,).
+    """Return Pearson's kurtosis of samples (m,); nan of a constant.
 
-    The fourth central moment over the square of the second: 3 of Gaussian noise, 1.5 of a sine, 1
-    of a square wave. Moments of the samples themselves, without correction of bias; nan of a
-    constant.
+    3 of Gaussian noise, 1.5 of a sine, 1 of a square wave. Without correction of bias.
     """
-    found, _ = _scale_signal(values)
-    if np.ptp(found) == 0.0:
-        return math.nan
-    square = (found - found.mean()) ** 2
-    return float(np.mean(square**2) / np.mean(square) ** 2)
+    found = check_signal(values)
+    return float(stats.kurtosis(found, fisher=False)) if np.ptp(found) else math.nan
 
 
 def gini(values: np.ndarray) -> float:
@@ -204,12 +182,10 @@ def gini(values: np.ndarray) -> float:
     Theory 55, 2009, Eq. 1). For impulses pass the squared envelope
     (`compressor.vibration.envelope.band_envelope`).
     """
-    found, size = _scale_signal(values)
-    if not size:
-        return math.nan
-    ordered = np.sort(np.abs(found))
-    share = (np.arange(found.size)[::-1] + 0.5) / found.size
-    return float(1.0 - 2.0 * np.sum(ordered * share) / np.sum(ordered))
+    ordered = np.sort(np.abs(check_signal(values)))
+    share = (np.arange(ordered.size)[::-1] + 0.5) / ordered.size
+    total = np.sum(ordered)
+    return float(1.0 - 2.0 * np.sum(ordered * share) / total) if total else math.nan
 
 
 def energy_angle(values: np.ndarray, share: float = 0.9) -> float:
@@ -217,20 +193,16 @@ def energy_angle(values: np.ndarray, share: float = 0.9) -> float:
 
     values: (m,) at equal crank angles over whole revolutions, mostly what `high_pass_orders` left.
     The energy is the sum of squares; the angles need not be neighbours, and the last sample counts
-    in part. The value is `share` of a square wave, and near 0 of short impulses. Raises SignalError
-    also if the share is not between 0 and 1.
+    in part. The value is `share` of a square wave, and near 0 of short impulses. share: above 0, 1
+    at most.
     """
-    if not 0.0 < share <= 1.0:
-        raise SignalError(f"the share is {share}: choose one above 0, and 1 at most")
-    found, size = _scale_signal(values)
-    if not size:
+    energy = np.sort(check_signal(values) ** 2)[::-1]
+    held = np.concatenate([[0.0], np.cumsum(energy)])  # by so many samples
+    target = share * held[-1]
+    if not target:
         return math.nan
-    energy = np.sort(found**2)[::-1]
-    cumulative = np.cumsum(energy)
-    target = share * cumulative[-1]
-    whole = int(np.searchsorted(cumulative, target))  # samples that hold less than is wanted
-    before = cumulative[whole - 1] if whole else 0.0
-    return float((whole + (target - before) / energy[whole]) / found.size)
+    whole = int(np.searchsorted(held[1:], target))  # samples that hold less than is wanted
+    return float((whole + (target - held[whole]) / energy[whole]) / energy.size)
 
 
 def high_pass_orders(values: np.ndarray, a_turn: int, order: float) -> np.ndarray:
@@ -238,24 +210,12 @@ def high_pass_orders(values: np.ndarray, a_turn: int, order: float) -> np.ndarra
 
     values: (m,) at a_turn equal crank angles a revolution, whole revolutions. The lines of the
     spectrum of the whole signal are removed, exactly and without a shift of phase. Raises
-    SignalError also if the revolutions are not whole, or the order is negative or not below
-    a_turn / 2, where nothing would be left.
+    SignalError where the order is negative or not below a_turn / 2, where nothing would be left.
     """
-    found = checked_signal(values)
-    revolutions = whole_revolutions(found.size, a_turn)
+    found = check_signal(values)
     if not 0.0 <= order < a_turn / 2:
         limits = f"order {order} is not from 0 to below {a_turn / 2:g}, half the samples a turn"
         raise SignalError(f"{limits}: choose a lower order, or sample more finely")
     lines = rfft(found)
-    lines[: math.floor(order * revolutions * (1.0 + 1e-12)) + 1] = 0.0
+    lines[: math.floor(order * (found.size / a_turn) * (1.0 + 1e-12)) + 1] = 0.0
     return irfft(lines, found.size)
-
-
-def _scale_signal(values: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the checked signal over its greatest magnitude, and that magnitude.
-
-    Scaled, no power of it overflows.
-    """
-    found = checked_signal(values)
-    size = float(np.max(np.abs(found)))
-    return (found / size if size else found), size

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import binned_statistic
 
 from compressor.cases import Body, Sensor
 from compressor.vibration.accelerometer import Record, listen
 from compressor.vibration.body import BodyMotion, Forces, body_motion
 from compressor.vibration.envelope import crest_factor, kurtosis, rms
-from compressor.vibration.segments import segment_levels
-from compressor.vibration.spectra import checked_positive, checked_signal
+from compressor.vibration.spectra import check_signal
 
 Thresholds = Sequence[float | None]  # m/s2, None for none
 Numbers = dict[str, float | np.ndarray]  # metrics by name, SI
@@ -46,17 +46,6 @@ class Monitored:
         if self.revolutions[1] < 1:
             return numbers
         return numbers | measure_record(self.record, self.turns, self.revolutions[1], thresholds)
-
-    def counts(self, thresholds: Thresholds) -> np.ndarray:
-        """Return the peaks of the record in a revolution over each threshold; nan of None."""
-        return count_over(self.record, self.revolutions[1], thresholds)
-
-    def segments(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the greatest magnitude and the rms in each segment, (36,) each.
-
-        values: at the samples of the record, or at the first of them, (k,).
-        """
-        return segment_levels(360.0 * self.turns[: len(values)], values)
 
     def cut(self) -> list["Monitored"]:
         """Return each revolution: of the velocity, and of the record where there is one.
@@ -119,7 +108,7 @@ def measure_record(
     """Return the metrics of a record over whole revolutions, of `compressor.metrics.TABLE`.
 
     values: m/s2, (n,); turns: of the crank there, (n,); thresholds: of any number, without which,
-    or without the first, nothing is counted.
+    or without the first, nothing is counted; None among them counts as nan.
     """
     peak, root = segment_levels(360.0 * turns, values)
     numbers: Numbers = {
@@ -131,15 +120,28 @@ def measure_record(
         "sensor_segment_rms": root,
     }
     if thresholds and thresholds[0] is not None:
-        numbers["sensor_counts_per_rev"] = count_over(values, revolutions, thresholds)
+        counts = [math.nan if one is None else count_peaks(values, one) for one in thresholds]
+        numbers["sensor_counts_per_rev"] = np.array(counts) / revolutions
     return numbers
 
 
-def count_over(values: np.ndarray, revolutions: int, thresholds: Thresholds) -> np.ndarray:
-    """Return the peaks in a revolution over each threshold; nan of None."""
-    return np.array([
-        math.nan if one is None else count_peaks(values, one) / revolutions for one in thresholds
-    ])  # fmt: skip
+def segment_levels(
+    angle_deg: np.ndarray, values: np.ndarray, count: int = 36
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the peak and the rms in equal segments of crank angle, (count,) each.
+
+    As protection systems of reciprocating machines watch them. angle_deg: of the samples, at any
+    revolution, (m,); values: (m,), in any unit. Segment k goes from 360 k / count degrees,
+    included, to the next, not included. The peak is the greatest magnitude of its samples, the rms
+    their root mean square; both nan where a segment has none.
+    """
+    # an angle that rounding has put just before a segment's begin lies in it
+    place = (angle_deg + 3.6e-7 / count) % 360.0
+    peak, square = (
+        binned_statistic(place, of, by, count, (0.0, 360.0)).statistic
+        for of, by in ((np.abs(values), "max"), (values**2, "mean"))
+    )
+    return peak, np.sqrt(square)
 
 
 def band_signal(values: np.ndarray, rate: float, low: float, high: float) -> np.ndarray:
@@ -149,11 +151,10 @@ def band_signal(values: np.ndarray, rate: float, low: float, high: float) -> np.
     spectrum outside of the band are removed, exactly and without a shift of phase. Raises
     SignalError for values that are not finite or not in a row.
     """
-    found = checked_signal(values)
+    found = check_signal(values)
     lines = np.fft.rfft(found)
-    frequency = np.fft.rfftfreq(found.size, 1.0 / checked_positive(rate, "the rate"))
-    outside = (frequency < low * (1.0 - 1e-12)) | (frequency > high * (1.0 + 1e-12))
-    lines[outside] = 0.0
+    frequency = np.fft.rfftfreq(found.size, 1.0 / rate)
+    lines[(frequency < low * (1.0 - 1e-12)) | (frequency > high * (1.0 + 1e-12))] = 0.0
     return np.fft.irfft(lines, found.size)
 
 

@@ -19,7 +19,6 @@ import numpy as np
 
 from compressor.cases import open_text_table
 from compressor.program import PROGRAM, CompsimError
-from compressor.vibration.wav_file import WavError, read_wav
 
 TIME, VALUE, TACHO = RECORD_HEADER = ("time_s", "acceleration_m_per_s2", "tacho")
 HEADER = ",".join(RECORD_HEADER)
@@ -27,14 +26,18 @@ RATE = "rate_Hz"  # in a MAT file, in place of times
 UNITS = {  # in m/s2; g is the standard acceleration (SI brochure), the inch and foot are exact
     "m/s2": 1.0, "mm/s2": 1e-3, "g": 9.80665, "in/s2": 0.0254, "ft/s2": 0.3048,
 }  # fmt: skip
-SPELLINGS = (("_per_", "/"), ("²", "2"), ("^", ""), ("**", ""), ("sec", "s"), (" ", ""))
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}  # in s
+SPELLINGS = (("_per_", "/"), ("²", "2"), ("^", ""), ("**", ""), ("seconds", "s"), ("sec", "s"),
+             ("µ", "u"), ("μ", "u"), (" ", ""))  # fmt: skip
 ACCELERATION = re.compile(r"acceleration_(\w+)")  # a column's name, with its unit
-TITLE = re.compile(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*|time_(m?s|us)", re.IGNORECASE)  # and its unit
-TIME_WORDS, TACHO_WORDS = {"time", "t", "zeit"}, {"tacho", "tach", "keyphasor", "keyphaser"}
+TITLE = re.compile(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*|(time)_(m?s|us)", re.IGNORECASE)  # and its unit
+TITLES = {
+    "time": "time", "t": "time", "zeit": "time", "tacho": "tacho", "tach": "tacho",
+    "keyphasor": "tacho", "keyphaser": "tacho", "acc": "acceleration", "accel": "acceleration",
+    "acceleration": "acceleration",
+}  # fmt: skip
 LAYOUT = "--separator, --decimal and --skip-lines say otherwise"
 TIME_RESPONSE, IS_ACCELERATION, IS_TIME = 1, 12, 17  # numbers of the universal file format 58
-NO_UFF = "pyuff is not installed; get it by pip install 'compsim[records]'"
 
 
 class RecordError(CompsimError):
@@ -81,8 +84,7 @@ class RecordFile:
         """Return what the file has, for an error that something is missing."""
         found = ", ".join(one.name for one in self.channels)
         found = f"only {found}" if found else "no signals"
-        link = "; no signals are" if self.channels else ", but"
-        left = f"{link} {'; '.join(self.unused)}" if self.unused else ""
+        left = f"; no signals are {'; '.join(self.unused)}" if self.unused else ""
         return f"{found}{left}" + (f" ({self.layout}; {LAYOUT})" if self.layout else "")
 
     def place(self, number: int, sample: int) -> str:
@@ -92,19 +94,12 @@ class RecordFile:
         return f"{self.path}: {self.channels[number].name}: sample {sample + 1}"
 
 
-def unit_name(text: str) -> str:
-    """Return the name in `UNITS` of a unit as it is written; "" of an unknown one."""
+def unit_name(text: str, units: dict[str, float] = UNITS) -> str:
+    """Return the name in a table of a unit as it is written; "" of an unknown one."""
     found = text.strip().strip("()[]").lower()
     for other, ours in SPELLINGS:
         found = found.replace(other, ours)
-    return found if found in UNITS else ""
-
-
-def time_unit_name(text: str) -> str:
-    """Return the name in `TIME_UNITS` of a unit as it is written; "" of an unknown one."""
-    found = text.strip().lower().replace("µ", "u").replace("μ", "u")
-    found = {"sec": "s", "seconds": "s", "msec": "ms"}.get(found, found)
-    return found if found in TIME_UNITS else ""
+    return found if found in units else ""
 
 
 def named_channel(name: str) -> Channel:
@@ -120,15 +115,9 @@ def titled_channel(name: str) -> Channel:
     if ours.kind:
         return ours
     found = TITLE.fullmatch(name)
-    word, unit = name.strip().lower(), ""
-    if found:
-        word, unit = ("time", found[3]) if found[3] else (found[1].strip().lower(), found[2])
-    if word in TIME_WORDS:
-        return Channel(name, "time", unit)
-    if word in TACHO_WORDS:
-        return Channel(name, "tacho", unit)
-    is_acceleration = unit_name(unit) or word in ("acc", "accel", "acceleration")
-    return Channel(name, "acceleration" if is_acceleration else "", unit)
+    word, unit = (found[1] or found[3] or "", found[2] or found[4] or "") if found else (name, "")
+    kind = TITLES.get(word.strip().lower(), "acceleration" if unit_name(unit) else "")
+    return Channel(name, kind, unit)
 
 
 def open_record_file(path: Path, **layout: Any) -> RecordFile:
@@ -138,20 +127,23 @@ def open_record_file(path: Path, **layout: Any) -> RecordFile:
     """
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        known = ", ".join(dict.fromkeys(filter(None, READERS)))
+        known = ", ".join(filter(None, READERS))
         raise RecordError(f"{path}: no records of the type {path.suffix} are read, only {known}")
+    if layout and reader is not _open_csv:
+        options = ", ".join(f"--{name.replace('_', '-')}" for name in layout)
+        raise RecordError(f"{path}: is no file of text: leave {options} out")
     try:
         with path.open("rb"):
             pass
-        if reader is _open_csv:
-            return _open_csv(path, **layout)
-        if layout:
-            options = ", ".join(f"--{name.replace('_', '-')}" for name in layout)
-            raise RecordError(f"{path}: is no file of text: leave {options} out")
-        return reader(path)
+        return reader(path, **layout)
     except OSError as error:
         remedy = f"give a CSV file with the columns {HEADER}, or a job's key"
         raise RecordError(f"{path}: cannot be read: {error.strerror or error}; {remedy}") from error
+    except CompsimError:
+        raise
+    except Exception as error:  # of many kinds, where a file is cut or of something else
+        text = f"{path}: is no {path.suffix[1:].upper()} file that can be read: {error}"
+        raise RecordError(f"{text}; write it again, whole, or as CSV") from error
 
 
 def _open_csv(path: Path, **layout: Any) -> RecordFile:
@@ -160,41 +152,38 @@ def _open_csv(path: Path, **layout: Any) -> RecordFile:
         table = open_text_table(path, **layout)
     except CompsimError as error:
         raise RecordError(f"{error} ({LAYOUT})") from error
-
-    def read(numbers: Sequence[int]) -> list[np.ndarray]:
-        try:
-            return [np.array(column) for column in table.read_columns(numbers)[1]]
-        except CompsimError as error:
-            raise RecordError(str(error)) from error
-
-    pairs = list(zip(table.names, table.numeric, strict=True))
     ours = {named_channel(name).kind for name in table.names}  # before other titles
-    channels = []
-    for name, is_number in pairs:
+    channels, unused = [], []
+    for name, is_number in zip(table.names, table.numeric, strict=True):
         one = titled_channel(name) if is_number else Channel(name)
-        if one.kind in ours and not named_channel(name).kind:
-            one = Channel(name, "", one.unit)
-        channels.append(one)
-    words = tuple(f"{name} (no numbers)" for name, is_number in pairs if not is_number)
-    first = table.rows[0][0]
+        is_second = one.kind in ours and not named_channel(name).kind
+        channels.append(Channel(name, "", one.unit) if is_second else one)
+        unused += [] if is_number else [f"{name} (no numbers)"]
     return RecordFile(
-        path, tuple(channels), read, (), first, layout=table.layout, unused=words
+        path, tuple(channels), lambda numbers: [*map(np.array, table.read_columns(numbers)[1])],
+        first_line=table.rows[0][0], layout=table.layout, unused=tuple(unused),
     )  # fmt: skip
 
 
 def _open_wav(path: Path) -> RecordFile:
     """Return what a WAV file has: channels by number, integers as shares of the full scale."""
-    try:
-        rate, columns, is_integer = read_wav(path.read_bytes())
-    except WavError as error:
-        raise RecordError(f"{path}: is no WAV file that can be read: {error}") from error
+    from scipy.io import wavfile
+
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Chunk", wavfile.WavFileWarning)
+        warnings.filterwarnings("error", "Reached EOF", wavfile.WavFileWarning)  # it is cut
+        rate, values = wavfile.read(path)
+    columns, is_integer = np.atleast_2d(values.T), values.dtype.kind != "f"
+    if not rate or not values.size:
+        raise ValueError(f"it has {columns.shape[1]} samples, {rate} a second")
+    full = 2.0 ** (8 * values.itemsize - 1) if is_integer else 1.0
+    zero = 128.0 if values.dtype == np.uint8 else 0.0  # the one format without a sign
     # of several channels nothing says which is the accelerometer
     only = "acceleration" if len(columns) == 1 else ""
     channels = tuple(Channel(str(number), only) for number in range(1, len(columns) + 1))
-    clocks = ((0.0, 1.0 / rate),) * len(channels)
     return RecordFile(
-        path, channels, lambda numbers: [columns[at].astype(float) for at in numbers], clocks,
-        is_integer=is_integer,
+        path, channels, lambda numbers: [(columns[at] - zero) / full for at in numbers],
+        ((0.0, 1.0 / rate),) * len(channels), is_integer=is_integer,
     )  # fmt: skip
 
 
@@ -206,15 +195,14 @@ def _open_mat(path: Path) -> RecordFile:
         whole = loadmat(path)
     except NotImplementedError as error:
         raise RecordError(f"{path}: is a MAT file of version 7.3: save it with -v7") from error
-    except Exception as error:  # of many kinds, where a file is cut or of something else
-        raise RecordError(f"{path}: is no MAT file that can be read: {error}") from error
     found: dict[str, np.ndarray] = {}
     unused, rate = [], math.nan
     for name, array in whole.items():
         if name.startswith("__"):
             continue
-        if why := _why_no_signal(array):
-            unused.append(f"{name} ({why})")
+        if array.dtype.kind not in "fiub" or array.ndim != 2:
+            what = "struct" if array.dtype.names else array.dtype
+            unused.append(f"{name} ({what} of shape {array.shape}: save real vectors or matrices)")
         elif name == RATE and array.size == 1:
             rate = float(array.item())
             if not (math.isfinite(rate) and rate > 0.0):
@@ -224,103 +212,72 @@ def _open_mat(path: Path) -> RecordFile:
         elif 1 in array.shape:
             found[name] = array.ravel().astype(float)
         else:
-            found |= {
-                f"{name}(:,{k + 1})": column.astype(float) for k, column in enumerate(array.T)
-            }
+            found |= {f"{name}(:,{k})": one.astype(float) for k, one in enumerate(array.T, 1)}
     arrays, channels = list(found.values()), tuple(map(named_channel, found))
-    has_times = any(one.kind == "time" for one in channels)
-    is_clock = not (math.isnan(rate) or has_times)
+    is_clock = not (math.isnan(rate) or any(one.kind == "time" for one in channels))
     return RecordFile(
         path, channels, lambda numbers: [arrays[at] for at in numbers],
         ((0.0, 1.0 / rate),) * len(arrays) if is_clock else (), rate=rate, unused=tuple(unused),
     )  # fmt: skip
 
 
-def _why_no_signal(array: Any) -> str:
-    """Return why a variable of a MAT file is no signal; "" of arrays of real numbers."""
-    kind = array.dtype.kind if isinstance(array, np.ndarray) else "?"
-    if kind in "fiub":
-        return "" if array.ndim == 2 else f"{array.ndim} dimensions"
-    if kind == "V":
-        return f"a struct with {', '.join(array.dtype.names or ('no fields',))}: save its arrays"
-    words = {"O": "a cell array or table: save its arrays", "c": "complex numbers", "U": "text"}
-    return words.get(kind, "no array of numbers")
-
-
-FUNCTIONS = {  # of data sets 58
-    0: "general or unknown", 1: "time response", 2: "auto spectrum", 3: "cross spectrum",
-    4: "frequency response", 5: "transmissibility", 6: "coherence", 7: "auto correlation",
-    8: "cross correlation", 9: "power spectral density", 10: "energy spectral density",
-    12: "spectrum",
-}  # fmt: skip
 END = re.compile(rb"    -1[ \t]*(?=[\r\n]|\Z)")  # of a data set, and its begin
 FORTRAN = re.compile(rb"(?<=\d)[dD](?=[+-]\d\d)")  # an exponent of double precision
 
 
 def _open_uff(path: Path) -> RecordFile:
     """Return what a universal file has: its time responses (data sets 58) with even steps."""
-    try:
-        import pyuff
-    except ImportError as error:
-        raise RecordError(f"{path}: {NO_UFF}") from error
     data = path.read_bytes()
     if len(END.findall(data)) % 2:
-        raise RecordError(
-            f"{path}: is no universal file that can be read: its last data set has no end, a line "
-            "with -1 in columns 5 and 6: the file is cut"
-        )
+        raise ValueError("its last data set has no end, a line with -1 in columns 5 and 6")
     data = END.sub(b"    -1", data)  # pyuff does not see a mark with blanks behind it
     if b"    58b" not in data:
         data = FORTRAN.sub(b"e", data)
     found, unused = [], []
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore", np.exceptions.ComplexWarning)
+        plain = Path(folder) / "record.uff"
+        plain.write_bytes(data)
+        file = _pyuff().UFF(str(plain))
+        for number, kind in enumerate(file.get_set_types()):
+            one = file.read_sets(number) if kind == 58 else {}
+            if why := _why_no_response(one) if one else f"type {kind:g}, not 58":
+                unused.append(f"data set {number + 1} ({why})")
+            else:
+                found.append(one)
+    return RecordFile(
+        path, tuple(_uff_channel(one, number) for number, one in enumerate(found, 1)),
+        lambda numbers: [np.asarray(found[at]["data"], float) for at in numbers],
+        tuple((float(one["abscissa_min"]), float(one["abscissa_inc"])) for one in found),
+        unused=tuple(unused),
+    )  # fmt: skip
+
+
+def _pyuff() -> Any:
     try:
-        with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-            warnings.simplefilter("ignore", np.exceptions.ComplexWarning)
-            plain = Path(folder) / "record.uff"
-            plain.write_bytes(data)
-            file = pyuff.UFF(str(plain))
-            kinds = file.get_set_types()
-            for number, kind in enumerate(kinds):
-                if kind != 58:
-                    unused.append(f"data set {number + 1} (type {kind:g}, not 58)")
-                    continue
-                one = file.read_sets(number)
-                why = _why_no_response(one)
-                if why:
-                    unused.append(f"data set {number + 1} ({why})")
-                else:
-                    found.append(one)
-    except Exception as error:  # pyuff raises no other
-        raise RecordError(f"{path}: is no universal file that can be read: {error}") from error
-    channels = tuple(_uff_channel(one, number) for number, one in enumerate(found, 1))
-    clocks = tuple((float(one["abscissa_min"]), float(one["abscissa_inc"])) for one in found)
-
-    def read(numbers: Sequence[int]) -> list[np.ndarray]:
-        return [np.asarray(found[at]["data"], float) for at in numbers]
-
-    return RecordFile(path, channels, read, clocks, unused=tuple(unused))
+        import pyuff
+    except ImportError as error:
+        remedy = "get it by pip install 'compsim[records]'"
+        raise RecordError(f"pyuff is not installed; {remedy}") from error
+    return pyuff
 
 
 def _why_no_response(one: dict[str, Any]) -> str:
     """Return why a data set 58 is no time response with even steps; "" where it is."""
-    kind = int(one["func_type"])
-    if kind != TIME_RESPONSE:
-        return f"function type {kind}, {FUNCTIONS.get(kind, 'unknown')}, not a time response"
-    if not one["abscissa_spacing"]:
-        return "uneven steps: write it with even ones"
-    if int(one["ord_data_type"]) > 4:
-        return "complex numbers, not a real time response"
-    if len(one["data"]) < one["num_pts"]:
-        return f"cut: {len(one['data'])} of {one['num_pts']} samples"
-    return ""
+    samples, kind = len(one["data"]), int(one["func_type"])
+    mistakes = {
+        f"function type {kind}, not {TIME_RESPONSE}, a time response": kind != TIME_RESPONSE,
+        "uneven steps: write it with even ones": not one["abscissa_spacing"],
+        "complex numbers, not a real time response": int(one["ord_data_type"]) > 4,
+        f"cut: {samples} of {one['num_pts']} samples": samples < one["num_pts"],
+    }
+    return next((why for why, is_so in mistakes.items() if is_so), "")
 
 
 def _uff_channel(one: dict[str, Any], number: int) -> Channel:
     """Return what a time response says of itself; `NONE` is the format's word for nothing."""
-    name, unit = (
-        "" if text.strip() == "NONE" else text.strip()
-        for text in (str(one["id1"]), str(one["ordinate_axis_units_lab"]))
-    )
+    texts = (str(one[key]).strip() for key in ("id1", "ordinate_axis_units_lab"))
+    name, unit = ("" if text == "NONE" else text for text in texts)
     is_acceleration = one["ordinate_spec_data_type"] == IS_ACCELERATION
     kind = "acceleration" if is_acceleration else "tacho" if name.lower() == TACHO else ""
     return Channel(name or str(number), kind, unit)
@@ -355,14 +312,14 @@ def encode_record(columns: Columns, suffix: str) -> bytes:
 
     Raises RecordError where the type cannot hold it.
     """
-    return ENCODERS[suffix](columns)
+    times = columns[TIME]
+    return ENCODERS[suffix](columns, (len(times) - 1) / float(times[-1] - times[0]))
 
 
-def _encode_wav(columns: Columns) -> bytes:
+def _encode_wav(columns: Columns, rate: float) -> bytes:
     """Return 32-bit floats, 1.0 being 1 m/s2, so that no full scale has to be known."""
     from scipy.io import wavfile
 
-    rate = 1.0 / _step(columns)
     if abs(rate - round(rate)) > 1e-6 * rate:
         text = f"a WAV file has a whole number of samples a second, and the record {rate:.9g}"
         raise RecordError(f"{text}: choose .mat or .csv")
@@ -372,27 +329,20 @@ def _encode_wav(columns: Columns) -> bytes:
     return file.getvalue()
 
 
-def _encode_mat(columns: Columns) -> bytes:
+def _encode_mat(columns: Columns, rate: float) -> bytes:
     """Return the columns as double variables of a MAT file of version 5, with the rate."""
     from scipy.io import savemat
 
     file = io.BytesIO()
-    savemat(file, {**columns, RATE: 1.0 / _step(columns)}, oned_as="column")
+    savemat(file, {**columns, RATE: rate}, oned_as="column")
     head = f"MATLAB 5.0 MAT-file, written by {PROGRAM}".encode().ljust(116)  # no date: same bytes
     return head[:116] + file.getvalue()[116:]
 
 
-def _encode_uff(columns: Columns) -> bytes:
-    """Return a data set 58 a signal, as text.
-
-    The format gives samples 12 digits and the time step 6.
-    """
-    try:
-        import pyuff
-    except ImportError as error:
-        raise RecordError(NO_UFF) from error
+def _encode_uff(columns: Columns, rate: float) -> bytes:
+    """Return a data set 58 a signal, as text: samples of 12 digits, and a time step of 6."""
+    pyuff, sets = _pyuff(), []
     names = {VALUE: ("acceleration", IS_ACCELERATION, "m/s2"), TACHO: (TACHO, 0, "NONE")}
-    sets = []
     for name, (title, kind, unit) in names.items():
         if name in columns:
             sets.append(pyuff.prepare_58(
@@ -408,11 +358,6 @@ def _encode_uff(columns: Columns) -> bytes:
         return path.read_bytes()
 
 
-def _step(columns: Columns) -> float:
-    times = columns[TIME]
-    return float(times[-1] - times[0]) / (len(times) - 1)
-
-
-ENCODERS: dict[str, Callable[[Columns], bytes]] = {
+ENCODERS: dict[str, Callable[[Columns, float], bytes]] = {
     ".wav": _encode_wav, ".mat": _encode_mat, ".uff": _encode_uff,
 }  # fmt: skip

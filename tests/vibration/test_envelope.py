@@ -136,14 +136,9 @@ def test_a_jump_from_end_to_begin_is_no_impulse():
 @pytest.mark.parametrize(
     ("call", "told"),
     [
-        (lambda: band_envelope(TIME, RATE, (3000.0, 2000.0)), "choose another"),
-        (lambda: band_envelope(TIME, RATE, (3000.0, 6000.0)), "sample faster"),
-        (lambda: band_envelope(TIME, RATE, (np.nan, 6000.0)), "choose another"),
         (lambda: band_envelope(TIME, RATE, (20.1, 20.2)), "choose a wider band"),
-        (lambda: band_envelope(TIME, 0.0, BAND), "above 0"),
-        (lambda: envelope_spectrum(TIME, RATE, BAND, speed=-1.0), "the speed is -1.0"),
+        (lambda: band_envelope(TIME, RATE, (6000.0, 7000.0)), "band below 5000, half the rate"),
         (lambda: kurtogram(TIME, RATE, 8), "32768 samples, and there are 30000: choose fewer"),
-        (lambda: kurtogram(TIME, RATE, 0), "pass at least 1"),
         (lambda: kurtogram(np.full(SIZE, 0.1), RATE, 3), "constant"),
     ],
 )

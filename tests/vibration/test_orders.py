@@ -91,15 +91,9 @@ def test_the_order_itself_is_left_out():
     ("call", "told"),
     [
         (lambda: resample_angle(even(0.9), even(0.9), M), "pass at least one revolution"),
-        (lambda: resample_angle(even(2) % TURN, even(2), M), "after index 359: unwrap it"),
-        (lambda: resample_angle(even(2), even(3), M), "720 angles and 1080 values"),
-        (lambda: resample_angle(even(2), np.full(2 * M, np.nan), M), "cut these samples off"),
-        (lambda: resample_angle(even(2), np.ones((2 * M, 2)), M), "pass one component"),
-        (lambda: resample_angle(even(2), 1j * even(2), M), "complex"),
-        (lambda: resample_angle(np.arange(3.0), np.arange(3.0), M), "at least 4"),
-        (lambda: resample_angle(even(2), even(2), 3.5), "pass a whole number"),
-        (lambda: resample_angle(even(2), even(2), 1), "pass at least 2"),
-        (lambda: rms_above(np.arange(3.0), np.arange(4.0), 1), "one for each"),
+        (lambda: resample_angle(even(2), np.full(2 * M, np.nan), M), "index 0: cut these off"),
+        (lambda: resample_angle(even(2), np.ones((2 * M, 2)), M), "pass one real component"),
+        (lambda: resample_angle(even(2), 1j * even(2), M), "complex128"),
     ],
 )
 def test_bad_input_is_told_with_a_remedy(call, told):
