@@ -1,7 +1,6 @@
 """The mechanics: numbers in, numbers out; only numpy and the one door to numba."""
 
 from compressor.physics._jit import uncompiled
-from compressor.physics.card import card_nodes
 from compressor.physics.contact import choose_laws, hysteresis, steepest
 from compressor.physics.contact_laws import elastic_form
 from compressor.physics.film import short_film
@@ -32,6 +31,7 @@ from compressor.physics.observe import (
 )
 from compressor.physics.onset import approach_at
 from compressor.physics.record import (
+    CARD_NODES,
     CHOICE,
     FILM_TERMS,
     Coordinate,

@@ -16,8 +16,6 @@ the worse of two shifts of the samples):
 
 import math
 
-import numpy as np
-
 from compressor.physics._jit import dispatch_on_record, inline_llvm, jit
 from compressor.physics.record import CARD_NODES, CHOICE, Load
 
@@ -54,17 +52,3 @@ def no_card(cos_theta, sin_theta, p):
 
 
 measured_force = dispatch_on_record(CHOICE, force_of_card, no_card)
-
-
-def card_nodes(angles, values):
-    """Return values, and slopes a node, of a card's curve at the table's angles: (CARD_NODES, 2).
-
-    angles: degrees in [0, 360), rising; values: at them.
-    """
-    from scipy.interpolate import Akima1DInterpolator  # of cases with a card alone
-
-    around = np.concatenate([np.asarray(angles) + turn for turn in (-360.0, 0.0, 360.0)])
-    curve = Akima1DInterpolator(around, np.tile(values, 3))
-    width = 360.0 / CARD_NODES
-    at = np.arange(CARD_NODES) * width
-    return np.stack([curve(at), width * curve(at, 1)], axis=1)

@@ -5,12 +5,13 @@ cubic least squares (SciPy's), in a window that goes round the revolution.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from compressor.cases import Case, open_card, to_si
-from compressor.physics import card_nodes, exact_motion
+from compressor.physics import CARD_NODES, exact_motion
 
 SMOOTHING_ORDER = 3  # of the polynomials in a window
 NOISE_WINDOW = 6.0  # degrees, in which noise is told from the card
@@ -32,6 +33,20 @@ def gas_nodes(case: Case, end: str) -> np.ndarray:
     if card.is_gauge:
         nodes[:, 0] += to_si(gas.ambient, "MPa")
     return smooth_nodes(nodes, gas.smooth_deg or 0.0)
+
+
+def card_nodes(angles: Sequence[float], values: Sequence[float]) -> np.ndarray:
+    """Return values, and slopes a node, of a card's curve at the table's angles: (CARD_NODES, 2).
+
+    angles: degrees in [0, 360), rising; values: at them.
+    """
+    from scipy.interpolate import Akima1DInterpolator  # of cases with a card alone
+
+    around = np.add.outer([-360.0, 0.0, 360.0], angles).ravel()
+    curve = Akima1DInterpolator(around, np.tile(values, 3))
+    width = 360.0 / CARD_NODES
+    at = np.arange(CARD_NODES) * width
+    return np.stack([curve(at), width * curve(at, 1)], axis=1)
 
 
 def smooth_nodes(nodes: np.ndarray, degrees: float) -> np.ndarray:

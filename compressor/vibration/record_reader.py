@@ -30,7 +30,6 @@ UNEVEN = 0.1  # of a time step, by which a step may differ from the mean one
 PLAIN = "separator comma, decimal point, header in line 1,"  # as our own files are
 SAME_RATE = 1e-4  # share by which times and a rate beside them may differ
 LOW, MIDDLE, HIGH = 0.25, 0.5, 0.75  # of a tacho's range: what lies between is no new level
-NEAR = 5.0  # greatest jumps of a rise from its middle, within which samples count most
 MAX_PULSE_RATIO = 1.5  # longest over shortest time between pulses, beyond which one was missed
 SAME_STEP = 1e-9  # share by which two channels' time steps may differ
 OPTIONS = {"time": "time", "acceleration": "channel", "tacho": "tacho"}  # that name a channel
@@ -276,9 +275,9 @@ def _find_pulses(what: str, times: np.ndarray, tacho: np.ndarray) -> tuple[np.nd
     for begin, end in zip(certain[rises], certain[rises + 1], strict=True):
         rise, since = share[begin : end + 1] - MIDDLE, times[begin : end + 1] - times[begin]
         jumps = np.diff(rise)
-        nearness = 1.0 / (rise**2 + (NEAR * jumps.max()) ** 2)
-        slope, at_begin = np.polyfit(since, np.arcsin(2.0 * rise), 1, w=nearness)
         longest = np.diff(np.flatnonzero(jumps), prepend=0).max()
+        nearness = 1.0 / (rise**2 + (longest * jumps.max()) ** 2)
+        slope, at_begin = np.polyfit(since, np.arcsin(2.0 * rise), 1, w=nearness)
         half = step * (longest / 2.0 if longest > 1 else jumps.max() / 2.0)
         # a record may begin at the middle of a rise, to what is known of it
         if slope > 0.0 and (place := times[begin] - at_begin / slope) > -step - half:
@@ -314,7 +313,7 @@ def check_record(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> in
          f"{len(times)} times and {len(values)} values: pass one for each"),
         (not (np.diff(tacho) > 0.0).all(),
          "the tacho pulses do not increase: sort them, and drop double ones"),
-        (not (min(tacho) > times[0] - step and max(tacho) < times[-1] + step), "tacho pulses lie "
+        (not ((tacho > times[0] - step) & (tacho < times[-1] + step)).all(), "tacho pulses lie "
          f"beyond the samples, {times[0]:g} to {times[-1]:g} s: pass those within"),
         (not np.isfinite(values).all(),
          "the record's values are not all numbers: fill or cut the gaps"),
