@@ -39,7 +39,7 @@ from compressor.cases.parameter import (
     times,
 )
 
-COMPILED = ("auto", "DOPRI5", "TSIT5", "RODAS")  # by `compressor.solve`; the others are SciPy's
+COMPILED = ("auto", "TSIT5", "RODAS")  # by `compressor.solve`; the others are SciPy's
 JUDGED_STIFFNESS = (1e8 / 1000**1.5, 1e12 / 1000**1.5)  # N/mm^1.5: judged on, 1e8 to 1e12 N/m^1.5
 METHODS = (*COMPILED, "LSODA", "Radau", "BDF", "DOP853", "RK45")
 

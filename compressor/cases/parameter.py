@@ -191,8 +191,9 @@ NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
 # metal of a bush or a pin -> which of ours to take for it, by its modulus of elasticity
 COPPER = "copper, whose modulus is nearest"
 SOFT = "copper, the softer one, or give contact.stiffness_N_per_mm15: babbitt has about 50 GPa"
-OTHER_METALS = dict.fromkeys(("bronze", "brass", "cast iron", "cast_iron"), COPPER)
-OTHER_METALS |= dict.fromkeys(("babbitt", "babbit", "white metal", "white_metal"), SOFT)
+OTHER_WORDS = dict.fromkeys(("bronze", "brass", "cast iron", "cast_iron"), COPPER)
+OTHER_WORDS |= dict.fromkeys(("babbitt", "babbit", "white metal", "white_metal"), SOFT)
+OTHER_WORDS["dopri5"] = "RK45, the same pair in SciPy, or auto"
 NO_VALUE = "has no value; leave the key out to get its default"
 # a number that is written as text, with a comma or a unit
 AS_NUMBER = re.compile(r"\s*([-+]?\d+(?:([.,])\d+)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII)
@@ -459,8 +460,8 @@ class Parameter:
             return message
         lower = dict(self.aliases)
         lower |= {choice.lower(): choice for choice in (*self.choices, "true", "false")}
-        if self.kind == "materials" and word.lower() in OTHER_METALS:
-            return f"{message}; take {OTHER_METALS[word.lower()]}"
+        if word.lower() in OTHER_WORDS:
+            return f"{message}; take {OTHER_WORDS[word.lower()]}"
         near = get_close_matches(word[:MAX_WORD].lower(), lower, n=1)
         if near and lower[near[0]] in self.needed:
             return f"{message}; did you mean {lower[near[0]]}?"

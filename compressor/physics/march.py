@@ -40,7 +40,6 @@ from compressor.physics.runge_kutta import (
     STAGES,
     A,
     P,
-    RungeKuttaPair,
     combine,
     error_norm,
     extend,
@@ -84,11 +83,9 @@ COARSE_WEIGHTS[::2] = lobatto(3)[1]
 TOP_LOOKS = 12  # at most, at a peak within a step
 PEAK_TOLERANCE = 1e-10  # of a peak: a parabola that rises above it by less is not looked at
 CROSSING_TOLERANCE = 1e-8  # of a step: as well as a change of the rod load's side is placed
-# of the stages of each explicit pair, at these nodes: (pair, node, stage)
-NODE_WEIGHTS = np.array(
-    [[P[pair] @ s ** np.arange(1, 5) for s in NODES] for pair in RungeKuttaPair]
-)
-NODE_WEIGHTS[:, -1] = A[:, -1]
+# of the stages of an explicit step, at these nodes: (node, stage)
+NODE_WEIGHTS = np.array([P @ s ** np.arange(1, 5) for s in NODES])
+NODE_WEIGHTS[-1] = A[-1]
 
 
 class Status(IntEnum):
@@ -121,7 +118,6 @@ LAST_STEPS = 16  # attempts that are kept for whoever asks why a run stopped
 
 STEPPER = np.dtype(
     [
-        ("pair", "i8"),
         ("status", "i8"),
         ("t", "f8"),
         ("h", "f8"),  # the next step's length; 0: to be chosen
@@ -212,9 +208,9 @@ def try_step(w, base, h, z, work, atol, size, phase, p):
         ):
             return math.inf
         return rosenbrock_error(z, work.new, u, w.rtol, atol)
-    take_step(w.pair, base, h, z, work.k, phase, p, work.new, work.rows[NODES.size - 1])
+    take_step(base, h, z, work.k, phase, p, work.new, work.rows[NODES.size - 1])
     w.evaluations += STAGES - 1
-    return error_norm(w.pair, h, z, work.new, work.k, w.rtol, atol)
+    return error_norm(h, z, work.new, work.k, w.rtol, atol)
 
 
 @inline_once
@@ -241,19 +237,19 @@ def observe_step(w, base, h, z, work, phase, p, tally):
         if w.stiff:
             interpolate(NODES[i], work.dense, work.y)
         elif i == MIDDLE or stride == 1:
-            combine(NODE_WEIGHTS[w.pair, i], h, z, work.k, work.y)
+            combine(NODE_WEIGHTS[i], h, z, work.k, work.y)
         else:
             break
         observe_contact(ideal_after(base, NODES[i] * h, p), work.y, phase, p, work.rows[i])
         if i == MIDDLE and not w.stiff:
             if may_change(work.rows, p):
                 stride = 1
-                extend(w.pair, h, z, work.k, work.dense)
+                extend(h, z, work.k, work.dense)
                 w.has_dense = 1
             elif w.t >= w.settle and may_beat_peaks(work.rows, MIDDLE, tally):
                 stride = 1
     if stride == 1 and not w.has_dense and may_touch(work.rows, p):
-        extend(w.pair, h, z, work.k, work.dense)
+        extend(h, z, work.k, work.dense)
         w.has_dense = 1
     return stride
 
@@ -290,7 +286,7 @@ def sample_grid(w, t_end, h, z, work, times, states):
         if w.has_dense:
             interpolate(s, work.dense, states[w.sample])
         else:
-            weights_at(w.pair, s, work.weights)
+            weights_at(s, work.weights)
             combine(work.weights, h, z, work.k, states[w.sample])
         w.sample += 1
 
@@ -330,7 +326,7 @@ def look_within(s, column, w, base, h, z, work, phase, p):
     if w.has_dense:
         interpolate(s, work.dense, work.y)
     else:
-        weights_at(w.pair, s, work.weights)
+        weights_at(s, work.weights)
         combine(work.weights, h, z, work.k, work.y)
     observe_contact(ideal_after(base, s * h, p), work.y, phase, p, work.row)
     return work.row[column]

@@ -1,12 +1,9 @@
-"""Explicit Runge-Kutta pairs as tables, one step that serves them all, and its dense output.
+"""The explicit Runge-Kutta pair TSIT5 as a table, its step, and its dense output.
 
-Both pairs have seven stages, the last being the next step's first, order 5 with an embedded
-error estimate of order 4, and a continuous extension of order 4 without further stages.
-Sources: Dormand & Prince, J. Comput. Appl. Math. 6 (1980), with Shampine's interpolant, Math.
-Comp. 46 (1986); Tsitouras, Comput. Math. Appl. 62 (2011).
+Seven stages, the last being the next step's first, order 5 with an embedded error estimate of order
+4, and a continuous extension of order 4 without further stages. Tsitouras, Comput. Math. Appl. 62
+(2011).
 """
-
-from enum import IntEnum
 
 import numpy as np
 
@@ -18,13 +15,6 @@ STAGES = 7
 FLOWS = 4
 
 
-class RungeKuttaPair(IntEnum):
-    """The explicit pairs: rows of the tables below."""
-
-    DOPRI5 = 0
-    TSIT5 = 1
-
-
 def _lower(rows):
     """Return a (STAGES, STAGES) strictly lower triangular table from its rows."""
     full = np.zeros((STAGES, STAGES))
@@ -33,17 +23,7 @@ def _lower(rows):
     return full
 
 
-_DOPRI5 = _lower(
-    [
-        [1 / 5],
-        [3 / 40, 9 / 40],
-        [44 / 45, -56 / 15, 32 / 9],
-        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729],
-        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
-        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
-    ]
-)
-_TSIT5 = _lower(
+A = _lower(
     [
         [0.161],
         [-0.008480655492356989, 0.335480655492357],
@@ -53,54 +33,36 @@ _TSIT5 = _lower(
             5.86145544294642, -12.92096931784711, 8.159367898576159, -0.071584973281401,
             -0.028269050394068383,
         ],
-        [
+        [  # the weights of the step
             0.09646076681806523, 0.01, 0.4798896504144996, 1.379008574103742,
             -3.290069515436081, 2.324710524099774,
         ],
     ]
 )  # fmt: skip
-
-A = np.array([_DOPRI5, _TSIT5])  # the last row holds the weights of the step
-C = A.sum(axis=2)
-C[:, -2:] = 1.0  # whose sums they are to rounding
+C = A.sum(axis=1)
+C[-2:] = 1.0  # whose sums they are to rounding
 E = np.array(
     [
-        [-71 / 57600, 0, 71 / 16695, -71 / 1920, 17253 / 339200, -22 / 525, 1 / 40],
-        [
-            -0.00178001105222577714, -0.0008164344596567469, 0.007880878010261995,
-            -0.1447110071732629, 0.5823571654525552, -0.45808210592918697, 1 / 66,
-        ],
+        -0.00178001105222577714, -0.0008164344596567469, 0.007880878010261995,
+        -0.1447110071732629, 0.5823571654525552, -0.45808210592918697, 1 / 66,
     ]
 )  # fmt: skip
 # dense output: y(t + s h) = y + h sum_i k_i sum_j P[i, j] s^(j + 1)
 P = np.array(
     [
-        [
-            [1, -8048581381 / 2820520608, 8663915743 / 2820520608, -12715105075 / 11282082432],
-            [0, 0, 0, 0],
-            [0, 131558114200 / 32700410799, -68118460800 / 10900136933,
-             87487479700 / 32700410799],
-            [0, -1754552775 / 470086768, 14199869525 / 1410260304, -10690763975 / 1880347072],
-            [0, 127303824393 / 49829197408, -318862633887 / 49829197408,
-             701980252875 / 199316789632],
-            [0, -282668133 / 205662961, 2019193451 / 616988883, -1453857185 / 822651844],
-            [0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423],
-        ],
-        [
-            [1, -2.763706197274826, 2.9132554618219126, -1.0530884977290216],
-            [0, 0.13169999999999998, -0.2234, 0.1017],
-            [0, 3.9302962368947516, -5.941033872131505, 2.490627285651253],
-            [0, -12.411077166933676, 30.33818863028232, -16.548102889244902],
-            [0, 37.50931341651104, -88.1789048947664, 47.37952196281928],
-            [0, -27.896526289197286, 65.09189467479366, -34.87065786149661],
-            [0, 1.5, -4, 2.5],
-        ],
+        [1, -2.763706197274826, 2.9132554618219126, -1.0530884977290216],
+        [0, 0.13169999999999998, -0.2234, 0.1017],
+        [0, 3.9302962368947516, -5.941033872131505, 2.490627285651253],
+        [0, -12.411077166933676, 30.33818863028232, -16.548102889244902],
+        [0, 37.50931341651104, -88.1789048947664, 47.37952196281928],
+        [0, -27.896526289197286, 65.09189467479366, -34.87065786149661],
+        [0, 1.5, -4, 2.5],
     ]
-)  # fmt: skip
+)
 
 
 @inline_once
-def take_step(pair, base, h, z, k, phase, p, new, row):
+def take_step(base, h, z, k, phase, p, new, row):
     """Take a step of length h from z: write stages 1 to 6 into k, and its end's state into new.
 
     base: cosine and sine of the crank angle at its begin; z and new: motion and flows, shape
@@ -110,12 +72,12 @@ def take_step(pair, base, h, z, k, phase, p, new, row):
     """
     n = z.size - FLOWS
     for stage in range(1, STAGES):
-        motion = ideal_after(base, C[pair, stage] * h, p)
+        motion = ideal_after(base, C[stage] * h, p)
         size = z.size if stage == STAGES - 1 else n
         for i in range(size):
             new[i] = z[i]
         for j in range(stage):
-            weight = h * A[pair, stage, j]
+            weight = h * A[stage, j]
             for i in range(size):
                 new[i] += weight * k[j, i]
         if stage < STAGES - 1:
@@ -125,7 +87,7 @@ def take_step(pair, base, h, z, k, phase, p, new, row):
 
 
 @inline_once
-def error_norm(pair, h, z, new, k, rtol, atol):
+def error_norm(h, z, new, k, rtol, atol):
     """Return the root mean square over the motion of the estimated error over its tolerance.
 
     The larger of a number at both ends of the step sets its tolerance.
@@ -135,18 +97,17 @@ def error_norm(pair, h, z, new, k, rtol, atol):
     for i in range(n):
         error = 0.0
         for j in range(STAGES):
-            error += E[pair, j] * k[j, i]
+            error += E[j] * k[j, i]
         share = error / (rtol * max(abs(z[i]), abs(new[i])) + atol[i])
         total += share * share
     return h * square_root(total / n)
 
 
 @inline_once
-def weights_at(pair, s, weights):
+def weights_at(s, weights):
     """Write the weights of the stages at the fraction s of a step into weights, (STAGES,)."""
     for stage in range(STAGES):
-        a, b = P[pair, stage, 0], P[pair, stage, 1]
-        c, d = P[pair, stage, 2], P[pair, stage, 3]
+        a, b, c, d = P[stage, 0], P[stage, 1], P[stage, 2], P[stage, 3]
         weights[stage] = s * (s * (s * (s * d + c) + b) + a)
 
 
@@ -162,7 +123,7 @@ def combine(weights, h, z, k, out):
 
 
 @inline_llvm
-def extend(pair, h, z, k, dense):
+def extend(h, z, k, dense):
     """Write a step's interpolant into dense, (5, n): y(s) = sum over j of dense[j] s^j."""
     n = dense.shape[1]
     for i in range(n):
@@ -171,7 +132,7 @@ def extend(pair, h, z, k, dense):
         for i in range(n):
             dense[j + 1, i] = 0.0
         for stage in range(STAGES):
-            weight = h * P[pair, stage, j]
+            weight = h * P[stage, j]
             for i in range(n):
                 dense[j + 1, i] += weight * k[stage, i]
 

@@ -22,7 +22,7 @@ MIN_STEP = 1e-13  # of the time reached plus a turn: below it steps make no way
 NON_FINITE_SHRINK = 0.1  # of a step without a finite error: the next attempt's length
 EXPLICIT_ORDER, STIFF_ORDER = 5, 4
 # stiffness: an explicit step is held by stability where h |lambda| exceeds the limit
-STABILITY_LIMIT = 3.25  # of both pairs on the negative real axis, about
+STABILITY_LIMIT = 3.25  # of the pair on the negative real axis, about
 LIMITED_REACH = 0.6  # of the limit: under PI control, steps held by stability swing around it
 TEST_INTERVAL = 4  # explicit steps from one test to the next
 STEPS_BEFORE_STIFF, STEPS_BEFORE_EXPLICIT = 15, 10  # in a row, before a change of method
@@ -51,7 +51,7 @@ def step_error(w, before, after, step):
     """
     if w.stiff:
         return after[rosenbrock.STIFF_STAGES]
-    return step * (E[w.pair] @ np.vstack((before[:1], after[1:STAGES])))
+    return step * (E @ np.vstack((before[:1], after[1:STAGES])))
 
 
 @jit
@@ -162,7 +162,7 @@ def stiff_rate(w, h, z, work, size):
     for i in range(n):
         change = work.new[i] - z[i]
         for j in range(STAGES - 2):
-            change -= h * A[w.pair, STAGES - 2, j] * work.k[j, i]
+            change -= h * A[STAGES - 2, j] * work.k[j, i]
         above += ((work.k[STAGES - 1, i] - work.k[STAGES - 2, i]) / size[i]) ** 2
         below += (change / size[i]) ** 2
     return square_root(above / below) if below > 0.0 else 0.0

@@ -11,7 +11,6 @@ from compressor.physics import (
     LAST_STEPS,
     Attempt,
     Mode,
-    RungeKuttaPair,
     Status,
     WorkArrays,
     derivative_with_flows,
@@ -36,20 +35,14 @@ from compressor.solve.request import (
 )
 from compressor.solve.si_record import contact_sizes, natural_sizes
 
-COMPILED = {
-    "auto": (Mode.AUTO, RungeKuttaPair.TSIT5),
-    "DOPRI5": (Mode.EXPLICIT, RungeKuttaPair.DOPRI5),
-    "TSIT5": (Mode.EXPLICIT, RungeKuttaPair.TSIT5),
-    "RODAS": (Mode.STIFF, RungeKuttaPair.DOPRI5),
-}
+COMPILED = {"auto": Mode.AUTO, "TSIT5": Mode.EXPLICIT, "RODAS": Mode.STIFF}
 CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
 
 
 def prepare_stepper(request: Request, size: np.ndarray) -> np.record:
     """Return a stepper at the start of a run by a compiled method; `size` as of `natural_sizes`."""
-    mode, pair = COMPILED[request.method]
-    stepper = new_stepper(mode)
-    stepper["pair"], stepper["rtol"] = pair, request.rtol
+    stepper = new_stepper(COMPILED[request.method])
+    stepper["rtol"] = request.rtol
     length, speed = contact_sizes(request.fields, size)
     stepper["watch"], stepper["contact_step"] = 1, CONTACT_STEP * length / speed
     stepper["deepest"] = greatest_depth(request.fields)[0]
@@ -64,11 +57,10 @@ WORDS = {
 
 def read_history(stepper: np.record, work: WorkArrays) -> History:
     """Return the last steps of a march, by its ring of them."""
-    history, method = History(), RungeKuttaPair(int(stepper.pair)).name
-    attempts = int(stepper.attempts)
+    history, attempts = History(), int(stepper.attempts)
     for number in range(max(0, attempts - LAST_STEPS), attempts):
         begin, length, error, code = work.last[number % LAST_STEPS].tolist()
-        name = "RODAS" if code >= Attempt.STIFF else method
+        name = "RODAS" if code >= Attempt.STIFF else "TSIT5"
         history.add(begin, length, error, f"{name} {WORDS[Attempt(int(code) % Attempt.STIFF)]}")
     return history
 

@@ -27,7 +27,7 @@ from compressor.studies.tradeoff.work_precision import (
 )
 
 SERIES = "series kinematics (Eq. 3-4)"
-COMPILED = ("auto", "DOPRI5", "RODAS")
+COMPILED = ("auto", "RODAS")
 
 
 def fingerprint():

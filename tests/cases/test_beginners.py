@@ -56,6 +56,8 @@ MISTAKES = [
      "take copper, whose modulus is nearest"),
     ("joint: big_end\nclearance_mm: 0.1\ncontact: {materials: [steel, babbitt]}", "3:22",
      "take copper, the softer one"),
+    # a method of before
+    ("solve:\n  method: DOPRI5", "2:11", "take RK45, the same pair in SciPy"),
 ]  # fmt: skip
 
 

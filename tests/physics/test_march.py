@@ -12,7 +12,7 @@ from compressor.physics.march import Status, march, new_stepper, new_work
 from compressor.physics.motion import start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import FREEDOMS
-from compressor.physics.runge_kutta import FLOWS, RungeKuttaPair
+from compressor.physics.runge_kutta import FLOWS
 from compressor.physics.step_control import Mode
 from compressor.physics.tally import new_tally
 from compressor.solve import march_driver
@@ -56,12 +56,7 @@ def test_a_corner_costs_no_step_that_is_refused():
     asked = request(1e-8, joint="both", clearance_mm=9)
     edges, phases = segments(asked.p, 0.05)
     stepper, work, size = new_stepper(Mode.EXPLICIT), new_work(8), natural_sizes(asked.p)
-    stepper.pair, stepper.rtol, stepper.deepest, stepper.settle = (
-        RungeKuttaPair.TSIT5,
-        1e-8,
-        np.inf,
-        np.inf,
-    )
+    stepper.rtol, stepper.deepest, stepper.settle = 1e-8, np.inf, np.inf
     stepper.t = edges[1] - 1e-3
     z, states, tally = np.zeros(8 + FLOWS), np.zeros((1, 8)), new_tally()
     times = np.array([edges[1] + 1e-3])

@@ -40,7 +40,7 @@ def test_a_drop_through_the_whole_solver_gives_it_back(law, asked, given):
 @pytest.mark.parametrize("law", ["flores", "hunt_crossley"])
 @pytest.mark.parametrize(
     ("speed", "mass", "exponent", "method"),
-    [(0.02, 5.0, 1.5, "auto"), (2.0, 5.0, 1.5, "DOPRI5"), (0.3, 0.5, 1.2, "auto"),
+    [(0.02, 5.0, 1.5, "auto"), (2.0, 5.0, 1.5, "TSIT5"), (0.3, 0.5, 1.2, "auto"),
      (0.3, 5.0, 1.5, "RODAS")],
 )  # fmt: skip
 def test_it_depends_on_neither_speed_nor_mass_nor_exponent(law, speed, mass, exponent, method):

@@ -1,4 +1,4 @@
-"""The explicit pairs: order conditions, order of convergence, dense output."""
+"""The explicit pair: order conditions, order of convergence, dense output."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,6 @@ from compressor.physics.runge_kutta import (
     C,
     E,
     P,
-    RungeKuttaPair,
     combine,
     error_norm,
     extend,
@@ -30,7 +29,7 @@ BEGIN, SPAN = 0.09, 0.008
 ROW = np.zeros(COLUMNS)
 
 
-def flow(pair, steps, k=None):
+def flow(steps, k=None):
     """State after `steps` equal steps of a free flight in the load's discharge phase."""
     z = np.zeros(8 + FLOWS)
     z[4:8] = 0.1, -0.2, 0.3, 0.5
@@ -38,16 +37,15 @@ def flow(pair, steps, k=None):
     h = SPAN / steps
     for i in range(steps):
         derivative_with_flows(BEGIN + i * h, z, 3, FLIGHT, k[0])
-        take_step(pair, crank_direction(BEGIN + i * h, FLIGHT), h, z, k, 3, FLIGHT, new, ROW)
+        take_step(crank_direction(BEGIN + i * h, FLIGHT), h, z, k, 3, FLIGHT, new, ROW)
         z[:] = new
     return z
 
 
-@pytest.mark.parametrize("pair", RungeKuttaPair)
-def test_order_conditions(pair):
+def test_order_conditions():
     """All eight up to order 4 and the quadrature conditions of order 5; the estimate's to 4."""
-    a, b, c = A[pair], A[pair, -1], C[pair]
-    for weights, target in ((b, 1.0), (b - E[pair], 1.0)):
+    a, b, c = A, A[-1], C
+    for weights, target in ((b, 1.0), (b - E, 1.0)):
         assert weights.sum() == pytest.approx(target)
         for power in range(1, 4):
             assert weights @ c**power == pytest.approx(1 / (power + 1), abs=2e-14)
@@ -56,71 +54,65 @@ def test_order_conditions(pair):
         assert weights @ a @ c**2 == pytest.approx(1 / 12, abs=2e-14)
         assert weights @ a @ a @ c == pytest.approx(1 / 24, abs=2e-14)
     assert b @ c**4 == pytest.approx(1 / 5)
-    assert (b - E[pair]) @ c**4 != pytest.approx(1 / 5, abs=1e-4)  # the estimate is of order 4
+    assert (b - E) @ c**4 != pytest.approx(1 / 5, abs=1e-4)  # the estimate is of order 4
 
 
-@pytest.mark.parametrize("pair", RungeKuttaPair)
 @pytest.mark.parametrize("n", [4, 8])
-def test_the_error_is_a_root_mean_square_over_the_tolerance(pair, n):
+def test_the_error_is_a_root_mean_square_over_the_tolerance(n):
     """Of every number of the motion, none of the flows."""
     rng = np.random.default_rng(n)
     z, new, k = (rng.normal(size=shape) for shape in (n + FLOWS, n + FLOWS, (STAGES, n + FLOWS)))
     atol, rtol, h = rng.uniform(0.1, 1, n), 0.3, 0.01
     scale = atol + rtol * np.maximum(np.abs(z), np.abs(new))[:n]
-    expected = np.sqrt(np.mean((h * E[pair] @ k[:, :n] / scale) ** 2))
-    assert error_norm(pair, h, z, new, k, rtol, atol) == pytest.approx(expected, rel=1e-12)
+    expected = np.sqrt(np.mean((h * E @ k[:, :n] / scale) ** 2))
+    assert error_norm(h, z, new, k, rtol, atol) == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("pair", RungeKuttaPair)
-def test_dense_output_ends_at_the_step(pair):
-    assert P[pair].sum(axis=1) == pytest.approx(A[pair, -1], abs=1e-13)
+def test_dense_output_ends_at_the_step():
+    assert P.sum(axis=1) == pytest.approx(A[-1], abs=1e-13)
 
 
 @pytest.mark.parametrize("s", [0.0, 0.1, 0.5, 0.93, 1.0])
-@pytest.mark.parametrize("pair", RungeKuttaPair)
-def test_stages_combine_to_the_interpolant(pair, s):
+def test_stages_combine_to_the_interpolant(s):
     k = np.sin(np.arange(7.0 * 12)).reshape(STAGES, 12)
     z, dense, y, combined = np.arange(12.0), np.zeros((5, 8)), np.zeros(8), np.zeros(8)
-    extend(pair, 0.3, z, k, dense)
+    extend(0.3, z, k, dense)
     interpolate(s, dense, y)
     weights = np.zeros(STAGES)
-    weights_at(pair, s, weights)
+    weights_at(s, weights)
     combine(weights, 0.3, z, k, combined)
     assert combined == pytest.approx(y, rel=1e-12)
 
 
-@pytest.mark.parametrize("pair", RungeKuttaPair)
-def test_the_weights_of_the_nodes_are_stored(pair):
+def test_the_weights_of_the_nodes_are_stored():
     weights = np.zeros(STAGES)
-    for node, stored in zip(NODES, NODE_WEIGHTS[pair], strict=True):
-        weights_at(pair, node, weights)
+    for node, stored in zip(NODES, NODE_WEIGHTS, strict=True):
+        weights_at(node, weights)
         assert stored == pytest.approx(weights, abs=1e-13)
 
 
-@pytest.mark.parametrize("pair", RungeKuttaPair)
-def test_order_of_convergence(pair):
-    exact = flow(pair, 512)
-    errors = [np.abs(flow(pair, n) - exact)[:8].max() for n in (6, 12, 24)]
+def test_order_of_convergence():
+    exact = flow(512)
+    errors = [np.abs(flow(n) - exact)[:8].max() for n in (6, 12, 24)]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert orders == pytest.approx(5, abs=0.2)
 
 
-@pytest.mark.parametrize("pair", RungeKuttaPair)
-def test_order_of_dense_output(pair):
+def test_order_of_dense_output():
     errors = []
     for h in (4e-3, 2e-3, 1e-3):
         z = np.zeros(8 + FLOWS)
         z[4:8] = 0.1, -0.2, 0.3, 0.5
         k, new, y = np.zeros((STAGES, z.size)), np.zeros(z.size), np.zeros(8)
         derivative_with_flows(BEGIN, z, 3, FLIGHT, k[0])
-        take_step(pair, crank_direction(BEGIN, FLIGHT), h, z, k, 3, FLIGHT, new, ROW)
+        take_step(crank_direction(BEGIN, FLIGHT), h, z, k, 3, FLIGHT, new, ROW)
         dense = np.zeros((5, 8))
-        extend(pair, h, z, k, dense)
+        extend(h, z, k, dense)
         interpolate(0.4, dense, y)
         exact = np.zeros(z.size)
         inner = np.zeros_like(k)
         derivative_with_flows(BEGIN, z, 3, FLIGHT, inner[0])
-        take_step(pair, crank_direction(BEGIN, FLIGHT), 0.4 * h, z, inner, 3, FLIGHT, exact, ROW)
+        take_step(crank_direction(BEGIN, FLIGHT), 0.4 * h, z, inner, 3, FLIGHT, exact, ROW)
         errors.append(np.abs(y - exact[:8]).max())
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert orders == pytest.approx(5, abs=0.35)  # the local error of an extension of order 4

@@ -9,7 +9,7 @@ from compressor.cases.case import Case
 from compressor.physics import rosenbrock
 from compressor.physics.march import new_stepper, new_work
 from compressor.physics.observe import derivative_with_flows
-from compressor.physics.runge_kutta import FLOWS, STAGES, A, RungeKuttaPair
+from compressor.physics.runge_kutta import FLOWS, STAGES, A
 from compressor.physics.step_control import (
     LIMITED_REACH,
     MAX_TEST_PAUSE,
@@ -118,26 +118,25 @@ def test_a_first_step_ends_before_the_corner_and_starts_from_rest():
     assert 0 < first_step(stepper(t=0.09, rtol=1e-3), z, work, atol, 3, p, 1.0) <= 1e-4
 
 
-def linear_step(pair, eigenvalue):
+def linear_step(eigenvalue):
     """Work and start of an explicit step of z' = eigenvalue z in every number."""
     work, z = new_work(SIZE.size), np.ones(SIZE.size + FLOWS)
     for stage in range(STAGES):
-        work.new[:] = z + H * A[pair, stage] @ work.k
+        work.new[:] = z + H * A[stage] @ work.k
         work.k[stage] = eigenvalue * work.new
     return work, z
 
 
-@pytest.mark.parametrize("pair", RungeKuttaPair)
 @pytest.mark.parametrize("eigenvalue", [-3e3, 40.0])
-def test_an_explicit_step_tells_the_eigenvalue(pair, eigenvalue):
-    work, z = linear_step(pair, eigenvalue)
-    found = stiff_rate(stepper(pair=pair), H, z, work, SIZE)
+def test_an_explicit_step_tells_the_eigenvalue(eigenvalue):
+    work, z = linear_step(eigenvalue)
+    found = stiff_rate(stepper(), H, z, work, SIZE)
     assert found == pytest.approx(abs(eigenvalue), rel=1e-9)
 
 
 def test_a_step_that_stands_still_tells_no_eigenvalue():
-    work, z = linear_step(RungeKuttaPair.TSIT5, 0.0)
-    assert stiff_rate(stepper(pair=RungeKuttaPair.TSIT5), H, z, work, SIZE) == 0.0
+    work, z = linear_step(0.0)
+    assert stiff_rate(stepper(), H, z, work, SIZE) == 0.0
 
 
 def stiff_work(eigenvalues):
@@ -161,7 +160,7 @@ def test_a_matrix_without_growth_has_no_radius():
 
 def explicit_steps(w, reach, limit=1000):
     """Steps at a reach (of the stability boundary) until the stiff partner takes over."""
-    work, z = linear_step(w.pair, -reach * STABILITY_LIMIT / H)
+    work, z = linear_step(-reach * STABILITY_LIMIT / H)
     for steps in range(1, limit):
         w.steps = steps
         choose_method(w, H, z, work, SIZE)
@@ -172,17 +171,16 @@ def explicit_steps(w, reach, limit=1000):
 
 def test_stability_that_holds_the_steps_calls_the_stiff_partner():
     looks = math.ceil(STEPS_BEFORE_STIFF / TEST_INTERVAL)
-    tsit5 = RungeKuttaPair.TSIT5
-    steps = explicit_steps(stepper(pair=tsit5), 1.05 * LIMITED_REACH)
+    steps = explicit_steps(stepper(), 1.05 * LIMITED_REACH)
     assert steps == looks * TEST_INTERVAL
-    assert explicit_steps(stepper(pair=tsit5), 0.95 * LIMITED_REACH) == 1000
+    assert explicit_steps(stepper(), 0.95 * LIMITED_REACH) == 1000
     assert explicit_steps(stepper(Mode.EXPLICIT), 1.05 * LIMITED_REACH) == 1000
 
 
 def test_a_look_without_suspicion_takes_one_back():
-    w = stepper(pair=RungeKuttaPair.TSIT5)
+    w = stepper()
     for reach, held in ((1.0, 4), (1.0, 8), (0.1, 4), (0.1, 0), (0.1, 0)):
-        work, z = linear_step(w.pair, -reach * STABILITY_LIMIT / H)
+        work, z = linear_step(-reach * STABILITY_LIMIT / H)
         w.steps = TEST_INTERVAL
         choose_method(w, H, z, work, SIZE)
         assert w.stability_limited == held

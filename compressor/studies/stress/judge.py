@@ -52,7 +52,6 @@ STATISTICS = {
 }
 STIFF = 8.0  # evaluations a step: more are the stiff partner's
 MAX_SCIPY_STEPS = 2000  # steps: such a run SciPy's methods can judge
-LOOSE_RTOL = 1e-9  # tolerance above which the stiff partner can judge an explicit run
 MORE_STEPS = 5  # times the run's budget: a judge's
 SECONDS, SCIPY_SECONDS = 30.0, 5.0  # that a judge may take, a compiled one and one of SciPy's
 
@@ -176,9 +175,10 @@ def judges(found: Solution, statistics: bool = False) -> tuple[str, ...]:
     steps = found.trajectory.steps + found.trajectory.rejected
     stiff = found.trajectory.evaluations > STIFF * steps
     if stiff:
-        return ("DOPRI5", "LSODA", "RODAS" if statistics else "Radau")
-    names = ("RODAS", "DOPRI5") if tolerance(found.rtol) >= LOOSE_RTOL else ("DOPRI5", "RODAS")
-    return ("DOP853", *names) if steps <= MAX_SCIPY_STEPS else (*names, "DOP853")
+        return ("TSIT5", "LSODA", "RODAS" if statistics else "Radau")
+    return (
+        ("DOP853", "RODAS", "TSIT5") if steps <= MAX_SCIPY_STEPS else ("RODAS", "DOP853", "TSIT5")
+    )
 
 
 def tolerance(rtol: float, share: float = TIGHTER) -> float:

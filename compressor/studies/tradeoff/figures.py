@@ -8,7 +8,6 @@ from compressor.report import (
     BLACK,
     BLUE,
     GOLD,
-    RED,
     Drawing,
     LineStyle,
     Note,
@@ -27,7 +26,6 @@ MID, LIGHT = "#7d7d7d", "#ababab"
 # compiled methods are solid and coloured, SciPy's grey and dashed
 LOOKS = {
     "auto": (LineStyle(BLUE, "-", 1.7, 3.2, "o", 3.8), "auto (TSIT5)"),
-    "DOPRI5": (LineStyle(RED, "-", 1.3, 3.1, "s", 3.8), "DOPRI5"),
     "RODAS": (LineStyle(GOLD, "-", 1.6, 3.0, "D", 3.8), "RODAS"),
     "DOP853": (LineStyle(BLACK, (0, (1, 1.2)), 1.2, 2.5, "^", 3.8), "SciPy DOP853"),
     "RK45": (LineStyle(MID, (0, (4, 1.5)), 1.1, 2.4, "v", 3.8), "SciPy RK45"),

@@ -62,7 +62,7 @@ def test_scipy_judges_laws_that_remember_a_meeting():
     assert (found.verdict, found.by[0]) == ("ok", "DOP853")
     run = solve(Case.resolve(values))
     run.trajectory.evaluations = 20 * run.trajectory.steps  # as of the stiff partner
-    assert judges(run) == ("DOPRI5", "LSODA", "Radau")
+    assert judges(run) == ("TSIT5", "LSODA", "Radau")
 
 
 @pytest.mark.compiled
