@@ -54,7 +54,6 @@ from compressor.physics.systems import (
 )
 from compressor.physics.tally import (
     add_flows,
-    contact_within,
     lobatto,
     new_tally,
     tally_energy,

@@ -246,20 +246,6 @@ def gap_fraction_between(before, after):
     return low / (low - high) if low < 0.0 else 0.0
 
 
-@jit
-def contact_within(rows, joint):
-    """Return whether contact at a joint begins and ends between a step's first and last row.
-
-    rows: (m, COLUMNS), observed within one step; joint: 0 or 1.
-    """
-    last = rows.shape[0] - 1
-    ends = in_contact(rows[0, NORMAL + joint]) or in_contact(rows[last, NORMAL + joint])
-    inside = False
-    for i in range(1, last):
-        inside = inside or in_contact(rows[i, NORMAL + joint])
-    return inside and not ends
-
-
 @inline_llvm
 def count_contacts(touching, flown, impacts, releases, normal, depth, counts):
     """Return `touching`, `flown`, `impacts` and `releases` of a joint after a node of a step.

@@ -20,16 +20,15 @@ from compressor.physics import (
     FLOWS,
     Load,
     add_flows,
-    lobatto,
     new_tally,
     observe_all,
     sample_segments,
     segments,
     state_names,
     tally_energy,
-    tally_step,
 )
 from compressor.reasons import Reason
+from compressor.solve.dense_tally import WEIGHTS, Observer, tally_steps
 from compressor.solve.error_bars import (
     Companion,
     Metrics,
@@ -47,9 +46,7 @@ from compressor.solve.run_metrics import metrics, switch_errors
 from compressor.solve.scipy_driver import step_through
 from compressor.solve.series import compared_times, distances, finer, journal_distance, take_samples
 from compressor.solve.si_record import initial_state, is_ideal, length_and_speed, record
-from compressor.solve.within_step import Observer, look_at_step
 
-NODES, WEIGHTS = lobatto(9)
 PIECES_PER_CHECK = 256  # of the quadrature between two looks at the clock
 
 
@@ -78,37 +75,33 @@ def closed_form(
     else:
         grid = fine_grid(edges, pieces, turn)
     cuts = np.unique(np.concatenate((edges, [settle], grid)))
-    owner = sample_segments((cuts[:-1] + cuts[1:]) / 2, edges)
-    states = np.zeros((NODES.size, 4))
-    rows = np.empty((NODES.size, COLUMNS))
-    flows, gaps, sides = np.zeros(FLOWS), np.zeros(2), np.zeros(4)
-    for number, (begin, end) in enumerate(itertools.pairwise(cuts)):
-        phase = phases[owner[number]]
-        if number % PIECES_PER_CHECK == 0 and time.monotonic() > deadline:
+    owner, measured = sample_segments((cuts[:-1] + cuts[1:]) / 2, edges), cuts[:-1] >= settle
+    changes = 1 + np.flatnonzero(np.diff(owner) | np.diff(measured))
+    blocks = np.union1d(np.arange(0, owner.size, PIECES_PER_CHECK), changes)
+    flows = np.zeros(FLOWS)
+    for first, last in itertools.pairwise([*blocks, owner.size]):
+        if time.monotonic() > deadline:
             result.reason = Reason.BUDGET_SECONDS
-            result.detail, result.stop_time = overdue(timeout), float(begin)
-            result.states[times >= begin] = math.nan
+            result.detail, result.stop_time = overdue(timeout), float(cuts[first])
+            result.states[times >= cuts[first]] = math.nan
             break
-        nodes = begin + (end - begin) * NODES
-        observe_all(nodes, states, np.full(NODES.size, phase), p, rows)
-        tally_energy(rows[0], flows, tally)
-        add_flows(rows, WEIGHTS, end - begin, flows)
-        tally_energy(rows[-1], flows, tally)
-        measured = begin >= settle
-        if measured:
-            look_at_step(p, ideal_observer(p, begin, end, phase), NODES, rows, tally, sides)
-        tally_step(end - begin, NODES, WEIGHTS, rows, 1, gaps, sides, measured, tally, p)
+        steps, phase = cuts[first : last + 1], int(phases[owner[first]])
+        rows = tally_steps(p, tally, steps, ideal_observer(p, phase), bool(measured[first]))
+        for span, row in zip(np.diff(steps), rows, strict=True):
+            tally_energy(row[0], flows, tally)
+            add_flows(row, WEIGHTS, span, flows)
+            tally_energy(row[-1], flows, tally)
     result.seconds = time.perf_counter() - start
     return result
 
 
-def ideal_observer(p: np.record, begin: float, end: float, phase: int) -> Observer:
-    """Return what observes an ideal machine at a fraction of the time (s) from begin to end."""
-    rows, state, phases = np.empty((1, COLUMNS)), np.zeros((1, 4)), np.array([phase])
+def ideal_observer(p: np.record, phase: int) -> Observer:
+    """Return what observes an ideal machine in a phase of its load."""
 
-    def observe(s: float) -> np.ndarray:
-        observe_all(np.array([begin + s * (end - begin)]), state, phases, p, rows)
-        return rows[0]
+    def observe(times: np.ndarray) -> np.ndarray:
+        rows = np.empty((times.size, COLUMNS))
+        observe_all(times, np.zeros((times.size, 4)), np.full(times.size, phase), p, rows)
+        return rows
 
     return observe
 

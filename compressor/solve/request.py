@@ -173,8 +173,8 @@ class History:
 class Trajectory:
     """States on the output grid, the tally of the dense solution, and how the run ended.
 
-    `states` has shape (m, k) and is nan from the sample at which an incomplete run stopped;
-    `reason` is empty when the run is complete.
+    `states` has shape (m, k) and is nan from the sample at which an incomplete run stopped, by one
+    of SciPy's methods from the last edge before; `reason` is empty when the run is complete.
     """
 
     times: np.ndarray

@@ -1,17 +1,12 @@
 """Integrate by SciPy's methods, by name: the only door to scipy.integrate.
 
-SciPy is not trusted with states that go bad: its LSODA reports success with nan, and its
-Runge-Kutta methods hang on inf.
-
-Where journal and bore meet in a step of SciPy's: laws with a restitution need its speed there.
-SciPy's methods end no step where contact begins. A step in which a gap closes is forgotten and
-taken again up to that moment, by a fresh solver; from there on the joint carries the speed at which
-it met, as after a landing of the compiled march (`physics.onset.store_approach_velocity`).
+A judge of the compiled march, with which it shares equations and accumulator: steps, events and
+dense solution are those of `solve_ivp`. SciPy is not trusted with states that go bad: its LSODA
+reports success with nan, and its Runge-Kutta methods hang on inf.
 """
 
 import math
 import time
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -21,17 +16,15 @@ from compressor.physics import (
     FLOWS,
     Column,
     approach_at,
-    contact_within,
     derivative_with_flows,
     enter_segment,
-    lobatto,
     observe_all,
-    sample_segments,
     tally_energy,
-    tally_step,
 )
 from compressor.reasons import Reason
+from compressor.solve.dense_tally import find_missed_contact, tally_steps
 from compressor.solve.request import (
+    Cuts,
     Request,
     Stop,
     Trajectory,
@@ -39,77 +32,12 @@ from compressor.solve.request import (
     greatest_depth,
     overdue,
     passed_time,
+    revolutions,
     too_deep,
     with_cuts,
+    with_edge,
 )
-from compressor.solve.si_record import absolute_tolerances, length_and_speed, natural_sizes
-from compressor.solve.within_step import find_crossings, look_at_step, share_above
-
-SAMPLES_IN_STEP = 17  # times in a step at which gaps are looked at, both ends included
-MAX_HALVINGS = 50
-LANDING_FRACTION = 1e-3  # of a step: a gap that closes nearer to its end closes at its end
-
-
-def needs_landings(p: np.record) -> bool:
-    """Return whether a record's law reads the speed at which bodies met."""
-    return bool(p["hysteresis"] != 0.0)
-
-
-class Landings:
-    """What is looked for in each step of a stretch in which the load has one phase."""
-
-    def __init__(self, p: np.record, phase: int):
-        self.p, self.phase = p, phase
-        self.joints = [joint for joint in range(2) if p["clearance"][joint] > 0.0]
-        self.landed_until = [-np.inf, -np.inf]  # s: a gap that closes before was landed on
-
-    def depths(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """Return the penetrations (m) of both joints, (m, 2), at times (s) and states (m, n)."""
-        rows = np.empty((times.size, COLUMNS))
-        observe_all(times, states, np.full(times.size, self.phase), self.p, rows)
-        return rows[:, Column.PENETRATION : Column.PENETRATION + 2]
-
-    def find_onset(self, begin: float, end: float, dense) -> float | None:
-        """Return when (s) a gap first closes within a step, or None; at its end none does."""
-
-        def depths(times: np.ndarray) -> np.ndarray:
-            return self.depths(times, np.ascontiguousarray(dense(times)[:-FLOWS].T))
-
-        times = np.linspace(begin, end, SAMPLES_IN_STEP)
-        penetration, onset = depths(times), end
-        for joint in self.joints:
-            closing = (penetration[:-1, joint] < 0.0) & (penetration[1:, joint] >= 0.0)
-            for i in np.flatnonzero(closing & (times[1:] > self.landed_until[joint])):
-                low, high = times[i], times[i + 1]
-                for _ in range(MAX_HALVINGS):
-                    middle = 0.5 * (low + high)
-                    if depths(np.array([middle]))[0, joint] >= 0.0:
-                        high = middle
-                    else:
-                        low = middle
-                if high > self.landed_until[joint]:
-                    onset = min(onset, high)
-                    break
-        return onset if end - onset > LANDING_FRACTION * (end - begin) else None
-
-    def land(self, begin: float, end: float, dense, z: np.ndarray) -> None:
-        """Write the approach speed of joints whose gaps close at the end of a step.
-
-        Of a step that they began apart. z: motion and flows, (n + 4,), written.
-        """
-        y, rates, scratch = z[:-FLOWS].copy(), np.empty(z.size - FLOWS), np.empty(z.size - FLOWS)
-        depths = self.depths(np.array([begin]), np.ascontiguousarray(dense([begin])[:-FLOWS].T))[0]
-        for joint in self.joints:
-            depth, speed = approach_at(joint, end, y, self.phase, self.p, rates, scratch)
-            if (
-                depths[joint] < 0.0 < speed
-                and abs(depth) <= LANDING_FRACTION * (end - begin) * speed
-            ):
-                place = 2 * self.p["freedoms"] + joint
-                z[place] = max(speed, self.p["least_approach"])
-                # a gap that is open by a hair closes once more soon after: that is the same contact
-                self.landed_until[joint] = end + 2.0 * max(0.0, -depth) / speed
-
+from compressor.solve.si_record import absolute_tolerances
 
 # Local errors add up in the energy: with rtol itself, these methods left residuals above 10 rtol a
 # revolution at the small end (LSODA up to 4 times, BDF 2.5, RK45 2), so they get a share of it.
@@ -117,229 +45,143 @@ LOCAL = {"LSODA": 0.1, "BDF": 0.1, "RK45": 0.3}
 MIN_RTOL = 2.3e-14  # SciPy's own floor
 BAD_EVALUATIONS = 300  # non-finite right-hand sides in a row before a run is given up
 EVALUATIONS_PER_STEP = 50  # a step that never ends is caught by its evaluations
-NODES, WEIGHTS = lobatto(9)  # SciPy's steps may be long
-SMALL_CHANGE = 1e-6  # of a state's natural size: by which a change of contact is moved
-KICK = 30.0  # tolerances of speed: what a contact within one step may add unseen
-
-
-class Derivative:
-    """The compiled right-hand side as SciPy calls it, counted, timed and guarded."""
-
-    def __init__(self, request: Request):
-        self.p = request.p
-        self.z = np.zeros(request.start.size + FLOWS)
-        self.rows = np.empty((1, COLUMNS))
-        self.phase = 0
-        self.evaluations = 0
-        self.bad = 0
-        self.limit = EVALUATIONS_PER_STEP * request.max_steps
-        self.timeout = request.timeout
-        self.deadline = time.monotonic() + request.timeout
-
-    def __call__(self, t: float, z: np.ndarray) -> np.ndarray:
-        self.z[:] = z
-        out = np.empty_like(self.z)
-        derivative_with_flows(t, self.z, self.phase, self.p, out)
-        self.evaluations += 1
-        if math.isfinite(out.sum()):
-            self.bad = 0
-        else:
-            self.bad += 1
-            if self.bad >= BAD_EVALUATIONS:
-                raise Stop(Reason.NON_FINITE, "the right-hand side stays non-finite")
-        if self.evaluations % 256 == 0:
-            self.check_budget()
-        return out
-
-    def check_budget(self) -> None:
-        """Raise Stop when evaluations or wall time have run out."""
-        if self.evaluations > self.limit:
-            raise Stop(Reason.BUDGET_STEPS, f"more than {self.limit} evaluations")
-        if time.monotonic() > self.deadline:
-            raise Stop(Reason.BUDGET_SECONDS, overdue(self.timeout))
+STEPS_AT_ONCE = 1024  # that are tallied together, to save memory
 
 
 def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
-    """Integrate by one of SciPy's methods, segment by segment."""
-    right_hand_side = Derivative(request)
+    """Integrate by one of SciPy's methods, from edge to edge. Raises Stop."""
+    # each revolution is an edge: the dense solution of a long run would fill memory
+    turns = Cuts(revolutions(0.0, request.times[-1], math.tau / float(request.p["omega"])))
+    edges, phases, settle = with_edge(edges, phases, request.settle)
+    edges, phases, _ = with_cuts(edges, phases, turns)
     edges, phases, ends = with_cuts(edges, phases, request.cuts)
-    owner, phases = sample_segments(request.times, edges), phases.copy()
-    result.segments = edges, phases
-    try:
-        for i in range(phases.size):
-            enter_segment(edges[i], z, i, phases, request.p)
-            right_hand_side.phase = int(phases[i])
-            samples = np.flatnonzero(owner == i)
-            segment = LoadStretch(request, right_hand_side, result, edges[i], edges[i + 1], samples)
-            z = segment.run(z)
-            if request.cuts and i + 1 in ends and not request.cuts.cut(result.tally, z):
-                result.stop_time = math.nan
-                break
-    finally:
-        result.evaluations = right_hand_side.evaluations
+    result.segments = edges, phases = edges, phases.copy()
+    result.states[0] = z[:-FLOWS]
+    run = ScipyRun(request, result, settle)
+    for i in range(phases.size):
+        enter_segment(edges[i], z, i, phases, request.p)
+        run.phase = int(phases[i])
+        z = run.go(edges[i], edges[i + 1], z)
+        if request.cuts and i + 1 in ends and not request.cuts.cut(result.tally, z):
+            break
 
 
-@cache
-def scipy_method(name: str) -> Any:
-    """Return SciPy's method of a name, loaded when first used.
+class ScipyRun:
+    """A run by one of SciPy's methods; `phase`: of the load, at present."""
 
-    Loading takes a third of the time of a short run.
-    """
-    from scipy import integrate as scipy_integrate
+    def __init__(self, request: Request, result: Trajectory, settle: float):
+        self.request, self.result, self.settle, self.p = request, result, settle, request.p
+        self.phase, self.bad, self.last = 0, 0, (0.0, request.start)
+        self.deadline = time.monotonic() + request.timeout
+        self.deepest = greatest_depth(request.fields)[0]
+        # by joint whose law reads the speed at which bodies meet: whether they have met
+        joints = np.flatnonzero((self.p["clearance"] > 0.0) & (self.p["hysteresis"] != 0.0))
+        self.touches = dict.fromkeys(joints.tolist(), False)
 
-    return getattr(scipy_integrate, name)
+    def differentiate(self, t: float, z: np.ndarray) -> np.ndarray:
+        """Return dz/dt by the compiled right-hand side. Raises Stop beyond a budget."""
+        out, result, request = np.empty(z.size), self.result, self.request
+        derivative_with_flows(t, np.array(z), self.phase, self.p, out)
+        result.evaluations += 1
+        self.bad = 0 if math.isfinite(out.sum()) else self.bad + 1
+        if self.bad >= BAD_EVALUATIONS:
+            raise Stop(Reason.NON_FINITE, "the right-hand side stays non-finite")
+        if result.evaluations > (limit := EVALUATIONS_PER_STEP * request.max_steps):
+            raise Stop(Reason.BUDGET_STEPS, f"more than {limit} evaluations")
+        if result.evaluations % 256 == 0 and time.monotonic() > self.deadline:
+            raise Stop(Reason.BUDGET_SECONDS, overdue(request.timeout))
+        return out
 
+    def observe(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """Return the rows at times (s), (k, COLUMNS); states: with flows, (n + 4, k)."""
+        rows, motion = np.empty((times.size, COLUMNS)), np.ascontiguousarray(states[:-FLOWS].T)
+        observe_all(times, motion, np.full(times.size, self.phase), self.p, rows)
+        return rows
 
-class LoadStretch:
-    """One stretch between load corners, stepped by a fresh SciPy solver."""
+    def watch(self, t: float, z: np.ndarray) -> float:
+        """Count and judge each step's end: an event that never comes. Raises Stop."""
+        result, last, self.last = self.result, self.last, (t, z.copy())
+        if t == last[0]:
+            return 1.0
+        if not np.isfinite(z).all():
+            result.history.dominant = int(np.flatnonzero(~np.isfinite(z))[0])
+            raise Stop(Reason.NON_FINITE, "the state is no longer finite")
+        result.stop_time, result.stop_state, result.steps = t, z[:-FLOWS].copy(), result.steps + 1
+        since, now = (float(passed_time(self.p, *at)) for at in (last, self.last))
+        result.history.add(since, now - since, math.nan, f"{self.request.method} taken")
+        row = self.observe(np.array([t]), z[:, None])[0]
+        tally_energy(row, z[-FLOWS:].copy(), result.tally)
+        self.check_depth(row[Column.PENETRATION : Column.NORMAL].max())
+        check_state(self.p, z)
+        most = self.request.max_steps
+        if result.steps + result.rejected >= most and t < self.request.times[-1]:
+            raise Stop(Reason.BUDGET_STEPS, f"more than {most} steps")
+        return 1.0
 
-    def __init__(self, request, right_hand_side, result, begin, end, samples):
-        self.request, self.right_hand_side, self.result = request, right_hand_side, result
-        self.begin, self.end = begin, end
-        self.samples = samples  # indices of this segment's samples
-        self.times = np.clip(request.times[samples], begin, end)
-        p = request.p
-        self.landings = Landings(p, right_hand_side.phase) if needs_landings(p) else None
+    def check_depth(self, depth: float) -> None:
+        """Raise Stop where a journal sinks in implausibly deep (m)."""
+        if not depth <= self.deepest:
+            raise Stop(*too_deep(float(depth), self.p))
 
-    def run(self, z: np.ndarray) -> np.ndarray:
-        """Integrate to the segment's end; return state and flows there. Raises Stop."""
-        result, t, bound = self.result, self.begin, self.end
-        result.stop_time, result.stop_state = t, z[:-FLOWS]
-        while t < self.end:
-            t, z, bound = self.go(t, z, bound)
-        if self.end == self.request.times[-1]:
-            result.stop_time = math.nan
+    def meeting(self, joint: int) -> Any:
+        """Return the event of a gap that closes, or opens again; it ends an integration."""
+
+        def depth(t: float, z: np.ndarray) -> float:
+            return float(self.observe(np.array([t]), z[:, None])[0, Column.PENETRATION + joint])
+
+        event: Any = depth
+        event.terminal, event.direction = True, -1.0 if self.touches[joint] else 1.0
+        return event
+
+    def go(self, t: float, end: float, z: np.ndarray) -> np.ndarray:
+        """Return motion and flows at an edge, from those at the edge before. Raises Stop."""
+        from scipy.integrate import solve_ivp  # a third of the time of a short run
+
+        request, result, p, bound = self.request, self.result, self.p, end
+        rtol = max(request.rtol * LOCAL.get(request.method, 1.0), MIN_RTOL)
+        meeting: list[int] = []  # joints, at `bound`
+        while t < end:
+            watched, self.last = {} if meeting else self.touches, (t, z)
+            path = solve_ivp(
+                self.differentiate, (t, bound), z, request.method, rtol=rtol,
+                atol=absolute_tolerances(p, rtol), dense_output=True,
+                events=[self.watch, *map(self.meeting, watched)],
+            )  # fmt: skip
+            met = [joint for joint, at in zip(watched, path.t_events[1:], strict=True) if at.size]
+            reached = path.t.size - 1 - bool(met)
+            self.take(np.unique(path.t[: reached + 1]), path.sol)
+            if not path.success:
+                raise Stop(Reason.STEP_UNDERFLOW, path.message)
+            t, z, bound = path.t[reached], path.y[:, reached].copy(), path.t[-1] if met else end
+            if met:  # beyond, the law has another speed: the step is taken again, up to there
+                result.steps, result.rejected = result.steps - 1, result.rejected + 1
+                result.history.words[-1] = f"{request.method} cut at an onset"
+            for joint in meeting:
+                self.touches[joint] = not self.touches[joint]
+                if self.touches[joint]:
+                    y, (rates, scratch) = z[:-FLOWS].copy(), np.empty((2, z.size - FLOWS))
+                    _, speed = approach_at(joint, t, y, self.phase, p, rates, scratch)
+                    z[2 * p["freedoms"] + joint] = max(speed, p["least_approach"])
+            meeting = met
         return z
 
-    def go(self, t: float, z: np.ndarray, bound: float) -> tuple[float, np.ndarray, float]:
-        """Integrate from (t, z) to a bound by a fresh solver, or until bodies meet within a step.
-
-        Returns the time and the state that were reached, and the next bound: the step in which they
-        met is then to be taken again.
-        """
+    def take(self, steps: np.ndarray, dense: Any) -> None:
+        """Tally steps, by their ends (s), and sample the output grid within them. Raises Stop."""
         request, result = self.request, self.result
-        rtol = max(request.rtol * LOCAL.get(request.method, 1.0), MIN_RTOL)
-        atol = absolute_tolerances(request.p, rtol)
-        solver = scipy_method(request.method)(
-            self.right_hand_side, t, z, bound, rtol=rtol, atol=atol
-        )
-        while solver.status == "running":
-            if result.steps + result.rejected >= request.max_steps:
-                raise Stop(Reason.BUDGET_STEPS, f"more than {request.max_steps} steps")
-            before = solver.y.copy()
-            message = solver.step()
-            if solver.status == "failed":
-                raise Stop(Reason.STEP_UNDERFLOW, str(message))
-            if not np.isfinite(solver.y).all():
-                result.history.dominant = int(np.flatnonzero(~np.isfinite(solver.y))[0])
-                raise Stop(Reason.NON_FINITE, "the state is no longer finite")
-            dense = solver.dense_output()
-            if self.landings:
-                onset = self.landings.find_onset(solver.t_old, solver.t, dense)
-                if onset is not None:
-                    result.rejected += 1
-                    return solver.t_old, before, onset
-            result.steps += 1
-            self.take(solver, dense)
-            self.audit(solver)
-            result.stop_time, result.stop_state = solver.t, solver.y[:-FLOWS].copy()
-            begin, end = (
-                float(passed_time(request.p, *at))
-                for at in ((solver.t_old, before), (solver.t, solver.y))
-            )
-            result.history.add(begin, end - begin, math.nan, f"{request.method} taken")
-            check_state(request.p, solver.y)
-            self.check()
-        z = solver.y.copy()
-        if self.landings and bound < self.end:
-            self.landings.land(solver.t_old, solver.t, dense, z)
-        return solver.t, z, self.end
 
-    def take(self, solver, dense) -> None:
-        """Tally the accepted step and sample the output grid within it."""
-        settle = self.request.settle
-        if solver.t_old < settle < solver.t:
-            self.tally(dense, solver.t_old, settle, False)
-            self.tally(dense, settle, solver.t, True)
-        else:
-            self.tally(dense, solver.t_old, solver.t, solver.t_old >= settle)
-        low = np.searchsorted(self.times, solver.t_old, side="right")
-        if solver.t_old == self.begin:
-            low = 0
-        high = np.searchsorted(self.times, solver.t, side="right")
-        if high > low:
-            self.result.states[self.samples[low:high]] = dense(self.times[low:high])[:-FLOWS].T
+        def observe(times: np.ndarray, moved: np.ndarray | float = 0.0) -> np.ndarray:
+            states = dense(times)
+            states[:-FLOWS] += moved
+            return self.observe(times, states)
 
-    def tally(self, dense, begin: float, end: float, measured: bool) -> None:
-        """Observe the dense solution on [begin, end] and add it to the tally."""
-        times = begin + (end - begin) * NODES
-        states = np.ascontiguousarray(dense(times)[:-FLOWS].T)
-        rows = np.empty((times.size, COLUMNS))
-        phases = np.full(times.size, self.right_hand_side.phase)
-        observe_all(times, states, phases, self.request.p, rows)
-        self.check_contact(begin, end - begin, rows)
-        tally, p = self.result.tally, self.request.p
-        gap_fraction, sides = np.zeros(2), np.zeros(4)
-        if measured:
-            self.measure_parts(dense, begin, end, rows, gap_fraction, sides)
-        tally_step(end - begin, NODES, WEIGHTS, rows, 1, gap_fraction, sides, measured, tally, p)
-
-    def measure_parts(self, dense, begin, end, rows, gap_fraction, sides) -> None:
-        """Write the shares of a step without contact, by joint, and its rod load's sides.
-
-        rows: observed at NODES; gap_fraction, (2,), and sides, (4,), as `tally_step` takes them,
-        are written. The tally takes peaks, and how far changes of contact may move.
-        """
-        request, tally, span = self.request, self.result.tally, end - begin
-        found, phase = np.empty((1, COLUMNS)), np.array([self.right_hand_side.phase])
-
-        def observe(s: float, change: np.ndarray | float = 0.0) -> np.ndarray:
-            state = np.ascontiguousarray(dense(begin + s * span)[:-FLOWS] + change)[np.newaxis]
-            observe_all(np.array([begin + s * span]), state, phase, request.p, found)
-            return found[0]
-
-        def measure_gap(joint: int) -> None:
-            column = Column.NEARNESS + joint
-            changes = find_crossings(lambda s: float(observe(s)[column]), NODES, rows[:, column])
-            gap_fraction[joint] = 1.0 - share_above(rows[0, column], changes)
-            for at, rate in changes:
-                small, here = (
-                    SMALL_CHANGE * np.diag(natural_sizes(request.fields)),
-                    observe(at)[column],
-                )
-                moved = [observe(at, one)[column] - here for one in small]
-                shift = np.linalg.norm(moved) / SMALL_CHANGE / abs(rate)
-                tally["switch_shift"][joint] += span * shift
-
-        for joint in range(2):
-            if request.p["clearance"][joint] > 0.0:
-                measure_gap(joint)
-        look_at_step(request.p, observe, NODES, rows, tally, sides)
-
-    def check_contact(self, begin: float, span: float, rows: np.ndarray) -> None:
-        """Raise Stop where a whole contact lies within a step and its impulse is no small error."""
-        whole = [joint for joint in range(2) if contact_within(rows, joint)]
-        if not whole:
-            return
-        normal = rows[:, Column.NORMAL : Column.NORMAL + 2]
-        p, force = self.request.p, normal.max()
-        kick = span * (WEIGHTS @ normal[:, whole]).max() / min(p.rod_mass, p.reciprocating_mass)
-        if kick > KICK * self.request.rtol * length_and_speed(p)[1]:
-            detail = (
-                f"a contact of {force:.2g} N within one step of {span:.2g} s from {begin:.6g} s"
-            )
-            raise Stop(Reason.CONTACT_UNDERRESOLVED, detail)
-
-    def audit(self, solver) -> None:
-        """Compare the energy at the step's end with the flows up to there."""
-        state, flows = solver.y[:-FLOWS].copy(), solver.y[-FLOWS:].copy()
-        rhs, now = self.right_hand_side, np.array([solver.t])
-        observe_all(now, state[np.newaxis], np.array([rhs.phase]), self.request.p, rhs.rows)
-        tally_energy(rhs.rows[0], flows, self.result.tally)
-
-    def check(self) -> None:
-        """Raise Stop when a journal sinks in implausibly deep."""
-        depth, p = float(self.result.tally.deepest), self.request.p
-        if not depth <= greatest_depth(p)[0]:
-            raise Stop(*too_deep(depth, p))
-        self.right_hand_side.check_budget()
+        for first in range(0, steps.size - 1, STEPS_AT_ONCE):
+            part, measured = steps[first : first + STEPS_AT_ONCE + 1], bool(steps[0] >= self.settle)
+            rows = tally_steps(self.p, result.tally, part, observe, measured)
+            self.check_depth(result.tally["deepest"])
+            if missed := find_missed_contact(self.p, request.rtol, part, rows):
+                result.stop_time, text = missed
+                result.stop_state = dense(result.stop_time)[:-FLOWS]
+                raise Stop(Reason.CONTACT_UNDERRESOLVED, text)
+        inside = slice(*np.searchsorted(request.times, (steps[0], np.nextafter(steps[-1], np.inf))))
+        if inside.start < inside.stop:
+            result.states[inside] = dense(request.times[inside])[:-FLOWS].T

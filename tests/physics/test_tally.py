@@ -7,7 +7,6 @@ from compressor.cases.case import Case
 from compressor.physics.observe import COLUMNS, Column
 from compressor.physics.tally import (
     add_flows,
-    contact_within,
     gap_fraction_between,
     lobatto,
     may_beat_peaks,
@@ -151,20 +150,3 @@ def test_energy_ledger_of_a_known_step():
     rows[-1, Column.KINETIC] = np.nan
     tally_energy(rows[-1], flows, tally)
     assert np.isnan(tally.worst_imbalance)
-
-
-@pytest.mark.parametrize(
-    ("forces", "within"),
-    [
-        ([0, 0, 5, 0, 0], True),
-        ([0, 5, 5, 5, 0], True),
-        ([5, 0, 5, 0, 0], False),
-        ([0, 0, 5, 5, 5], False),
-        ([0, 0, 0, 0, 0], False),
-    ],
-)
-def test_a_contact_that_begins_and_ends_within_a_step(forces, within):
-    rows = np.zeros((5, COLUMNS))
-    rows[:, Column.NORMAL + 1] = forces
-    assert contact_within(rows, 1) == within
-    assert not contact_within(rows, 0)

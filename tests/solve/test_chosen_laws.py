@@ -19,8 +19,6 @@ from compressor.solve.cautions import remarks
 from compressor.solve.horizon import (
     predictability_horizon,
 )
-from compressor.solve.scipy_driver import needs_landings
-from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.explain import terms, unknown_names
 
@@ -119,19 +117,9 @@ def test_a_drop_by_scipy_gives_back_what_the_closed_form_does(method, law, place
     assert approach == pytest.approx(0.3, rel=1e-5)
 
 
-def test_landings_are_for_laws_that_read_a_speed_alone():
-    def of(**contact):
-        case = {"joint": "both", "clearance_mm": 0.2, "contact": contact}
-        return record(Case.resolve(case))
-
-    assert needs_landings(of(law="flores", restitution=0.6))
-    assert not needs_landings(of(law="hertz"))
-    assert not needs_landings(of())
-
-
 @pytest.mark.parametrize("law", ["johnson", "liu"])
 def test_pins_in_bores_by_three_integrators(law):
-    """Undamped but for friction: explicit, stiff, and SciPy's DOP853, which lands on no onset."""
+    """Undamped but for friction: explicit, stiff, and by SciPy, which ends no step at an onset."""
     contact = {"law": law, "length_mm": 20, "materials": ["steel", "copper"]}
     values = {"joint": "both", "clearance_mm": 0.2, "contact": contact}
     solve = {"duration_rev": 0.06, "settle_rev": 0, "error_bars": False, "rtol": 1e-10}
@@ -141,6 +129,7 @@ def test_pins_in_bores_by_three_integrators(law):
     ]
     first = runs[0]["acceleration"].values
     assert runs[0]["impact_count"].sum() > 4
+    assert runs[2]["rejected"] == 0  # its step ends where bodies meet for their speed alone
     for run in runs:
         assert run["status"].item() == "ok"
         assert run["energy_residual"] < 1e-7

@@ -1,0 +1,175 @@
+"""Tally the steps of a solution that is known at all times: an ideal machine's, or SciPy's.
+
+Nothing here is the compiled march's but the accumulator. Between a step's nodes, peaks and
+changes of sign are looked for in windows of time: at POINTS times in each, then between the
+neighbours of what is found.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from compressor.physics import Column, lobatto, tally_step
+from compressor.solve.si_record import length_and_speed, natural_sizes
+
+# returns the rows at times (s), (k, COLUMNS), of states that may be moved, (n, k)
+Observer = Callable[..., np.ndarray]
+Look = Callable[[np.ndarray], np.ndarray]  # returns the values of a function at times (s)
+
+NODES, WEIGHTS = lobatto(9)  # steps may be long
+ROD_LOAD = int(Column.FORCE) + 2  # at the small end, along x
+PEAKED = slice(Column.ACCELERATION, Column.DEVIATION)  # columns whose greatest size is tallied
+POINTS = 17
+FOR_CHANGES, FOR_TOPS = 8, 4  # rounds: windows shrink 16-fold in each, or 8-fold
+SMALL_CHANGE = 1e-6  # of a state's natural size: by which a change of contact is moved
+KICK = 30.0  # tolerances of speed: what a contact within one step may add unseen
+NEAR_TOP = 0.99  # of the greatest value known: nodes below are under no greater top
+
+
+def narrow(
+    look: Look, low: np.ndarray, high: np.ndarray, rounds: int, pick: Callable
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return windows of time (s) after some rounds of looks into each, (k,) begins and ends.
+
+    pick: takes values (k, POINTS), returns the points at which the next windows begin and end.
+    """
+    for _ in range(rounds if low.size else 0):
+        times = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, POINTS)
+        begin, end = pick(look(times.ravel()).reshape(times.shape))
+        each = np.arange(low.size)
+        low, high = times[each, begin], times[each, end]
+    return low, high
+
+
+def pick_change(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points around the first change of sign, for `narrow`."""
+    above = values > 0.0
+    at = np.maximum((above != above[:, :1]).argmax(axis=1), 1)
+    return at - 1, at
+
+
+def pick_top(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points around the greatest value, for `narrow`."""
+    at = np.clip(values.argmax(axis=1), 1, POINTS - 2)
+    return at - 1, at + 1
+
+
+def find_changes(
+    look: Look, times: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return when (s) a function becomes positive or ceases to be so, and its rate there.
+
+    times, values: (m,), where it is known; the rate is that of a line between two of them.
+    """
+    at = np.flatnonzero(np.diff(values > 0.0))
+    low, high = narrow(look, times[at], times[at + 1], FOR_CHANGES, pick_change)
+    return 0.5 * (low + high), np.diff(values)[at] / np.diff(times)[at]
+
+
+def shares_above(steps: np.ndarray, begin: float, changes: np.ndarray) -> np.ndarray:
+    """Return the share of each step in which a function is positive, (m,).
+
+    steps: their ends, (m + 1,), s; begin: the function's value at the first; changes: s.
+    """
+    times = np.concatenate((steps[:1], changes, steps[-1:]))
+    passed = np.diff(times)
+    passed[1 if begin > 0.0 else 0 :: 2] = 0.0
+    return np.diff(np.interp(steps, times, np.append(0.0, passed.cumsum()))) / np.diff(steps)
+
+
+def find_tops(look: Look, times: np.ndarray, values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Return the greatest values of functions, (c,), at times (m,) and between them, or `known`.
+
+    look: takes (k,), returns (k, c); values: (m, c).
+    """
+    top = np.maximum(known, values.max(axis=0))
+    inner = values[1:-1]
+    high = (inner > NEAR_TOP * top) & (inner >= values[:-2]) & (inner >= values[2:])
+    at, column = np.nonzero(high)
+
+    def look_at_own(times: np.ndarray) -> np.ndarray:
+        return look(times)[np.arange(times.size), np.repeat(column, times.size // column.size)]
+
+    if at.size:
+        begin, end = narrow(look_at_own, times[at], times[at + 2], FOR_TOPS, pick_top)
+        np.maximum.at(top, column, look_at_own(0.5 * (begin + end)))
+    return top
+
+
+def tally_steps(
+    p: np.record, tally: np.record, steps: np.ndarray, observe: Observer, measured: bool
+) -> np.ndarray:
+    """Add steps of one phase of the load to a tally; measured: whether its metrics count.
+
+    steps: their ends, (m + 1,), s. Returns the rows at their NODES, (m, 9, COLUMNS).
+    """
+    spans = np.diff(steps)
+    times = np.append((steps[:-1, None] + spans[:, None] * NODES[:-1]).ravel(), steps[-1])
+    rows, gaps, sides = observe(times), np.zeros((spans.size, 2)), np.zeros((spans.size, 4))
+    if measured:
+        tally["peak"] = find_tops(
+            lambda at: np.abs(observe(at)[:, PEAKED]), times, np.abs(rows[:, PEAKED]), tally["peak"]
+        )
+        for joint in np.flatnonzero(p["clearance"] > 0.0).tolist():
+
+            def nearness(at: np.ndarray, column: int = Column.NEARNESS + joint) -> np.ndarray:
+                return observe(at)[:, column]
+
+            values = rows[:, Column.NEARNESS + joint]
+            changes, rates = find_changes(nearness, times, values)
+            gaps[:, joint] = 1.0 - shares_above(steps, values[0], changes)
+            for change in zip(changes, rates, strict=True):
+                tally["switch_shift"][joint] += shift_of_change(p, joint, observe, *change)
+    if measured and tally["has_rod_load"]:
+        loads = both_sides(rows)
+        for side in range(2):
+
+            def load(at: np.ndarray, side: int = side) -> np.ndarray:
+                return both_sides(observe(at))[:, side]
+
+            changes, _ = find_changes(load, times, loads[:, side])
+            sides[:, side] = shares_above(steps, loads[0, side], changes)
+        known = tally["side_peak"]
+        sides[:, 2:] = find_tops(lambda at: both_sides(observe(at)), times, loads, known)
+    last = NODES.size - 1
+    of_steps = rows[last * np.arange(spans.size)[:, None] + np.arange(NODES.size)]
+    for span, row, gap, load_sides in zip(spans, of_steps, gaps, sides, strict=True):
+        tally_step(span, NODES, WEIGHTS, row, 1, gap, load_sides, measured, tally, p)
+    return of_steps
+
+
+def both_sides(rows: np.ndarray) -> np.ndarray:
+    """Return the rod load and its opposite (N), (k, 2); without load it is on neither side."""
+    return rows[:, [ROD_LOAD]] * (1.0, -1.0)
+
+
+def shift_of_change(p: np.record, joint: int, observe: Observer, time: float, rate: float) -> float:
+    """Return by how much (s) a change of contact moves for a state off by its natural size.
+
+    The motion's numbers count one by one, as a root of squares. rate: of the nearness, a second.
+    """
+    small = SMALL_CHANGE * np.diag(natural_sizes(p))
+    moved = np.hstack((np.zeros((len(small), 1)), small))
+    near = observe(np.full(1 + len(small), time), moved)[:, Column.NEARNESS + joint]
+    return float(np.linalg.norm(near[1:] - near[0]) / SMALL_CHANGE / abs(rate))
+
+
+def find_missed_contact(
+    p: np.record, rtol: float, steps: np.ndarray, rows: np.ndarray
+) -> tuple[float, str] | None:
+    """Return where (s) the first step begins within which a whole contact lies, and words for it.
+
+    None where the impulses of such contacts are small errors. steps, rows: as of `tally_steps`.
+    """
+    normal, spans = rows[..., Column.NORMAL : Column.NEARNESS], np.diff(steps)
+    whole = (normal > 0.0).any(axis=1) & (normal[:, 0] <= 0.0) & (normal[:, -1] <= 0.0)
+    if not whole.any():
+        return None
+    impulse = np.where(whole, spans[:, None] * (WEIGHTS @ normal), 0.0).max(axis=1)
+    kick = impulse / min(p.rod_mass, p.reciprocating_mass)
+    missed = np.flatnonzero(kick > KICK * rtol * length_and_speed(p)[1])
+    if not missed.size:
+        return None
+    begin, span, force = steps[missed[0]], spans[missed[0]], normal[missed[0]].max()
+    text = f"a contact of {force:.2g} N within one step of {span:.2g} s from {begin:.6g} s"
+    return float(begin), text
