@@ -68,7 +68,7 @@ BUGS = [
     ("SciPy's atol is 1e-6", "solve/si_record.py",
      "return rtol * np.concatenate((natural_sizes", "return 1e-6 * np.concatenate((natural_sizes"),
     ("SciPy's phase is not changed at a corner", "solve/scipy_driver.py",
-     "right_hand_side.phase = int(phases[i])", "right_hand_side.phase = 0"),
+     "run.phase = int(phases[i])", "run.phase = 0"),
 ]  # fmt: skip
 
 
