@@ -32,7 +32,6 @@ from compressor.physics.observe import (
 from compressor.physics.onset import approach_at
 from compressor.physics.record import (
     CARD_NODES,
-    CHOICE,
     FILM_TERMS,
     Coordinate,
     Fields,

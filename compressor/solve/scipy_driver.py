@@ -18,13 +18,11 @@ from compressor.physics import (
     approach_at,
     derivative_with_flows,
     enter_segment,
-    is_featured,
     observe_all,
     tally_energy,
-    wear_all,
 )
 from compressor.reasons import Reason
-from compressor.solve.dense_tally import NODES, WEIGHTS, find_missed_contact, tally_steps
+from compressor.solve.dense_tally import find_missed_contact, tally_steps
 from compressor.solve.request import (
     Cuts,
     Request,
@@ -180,11 +178,6 @@ class ScipyRun:
             part, measured = steps[first : first + STEPS_AT_ONCE + 1], bool(steps[0] >= self.settle)
             rows = tally_steps(self.p, result.tally, part, observe, measured)
             self.check_depth(result.tally["deepest"])
-            if measured and is_featured(self.p) and self.p["sectors"]:
-                times = (part[:-1, None] + np.diff(part)[:, None] * NODES).ravel()
-                states, phases = dense(times)[:-FLOWS].T.copy(), np.full(times.size, self.phase)
-                weights = (np.diff(part)[:, None] * WEIGHTS).ravel()
-                wear_all(times, states, phases, weights, self.p, result.tally)
             if missed := find_missed_contact(self.p, request.rtol, part, rows):
                 result.stop_time, text = missed
                 result.stop_state = dense(result.stop_time)[:-FLOWS]
