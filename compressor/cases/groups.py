@@ -20,7 +20,6 @@ from compressor.cases.parameter import (
     HEAD_CLEARANCE,
     HEAD_END,
     IDEAL_JOINT,
-    LAW,
     MATERIALS,
     MEASURED,
     RUBBING,
@@ -496,7 +495,9 @@ class Contact:
     ('steel', 'copper')
     """
 
-    law: str = choice("impact", CONTACT_LAWS, "Eq. 14", "contact law (impact: ADAMS's)", read=LAW)
+    law: str = choice(
+        "impact", CONTACT_LAWS, "Eq. 14", "contact law (impact: ADAMS's)", read=CLEARANCE
+    )
     stiffness_N_per_mm15: float | None = parameter(
         3.36e5, "N/mm^p", (0, 1e15), "Table 3", "contact stiffness K, in N/mm^exponent",
         above=True, optional=True, read=STIFFNESS,

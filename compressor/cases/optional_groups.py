@@ -10,8 +10,6 @@ from compressor.cases.parameter import (
     ALONG_Y,
     CASING,
     CASING_SENSED,
-    CORNER_DAMPED,
-    CORNER_RESTITUTION,
     GUIDE_FRICTION,
     PLAY,
     RANDOM,
@@ -89,9 +87,9 @@ PROGRAM = "program"
 class Guide:
     """The crosshead's guide; a case's `guide`, by default None: ideal, without friction.
 
-    With a clearance the crosshead moves across and tilts, and its four corners meet the guide as
-    journals meet their bores: by `contact.law` where that has a restitution, else by ADAMS's
-    IMPACT. `True` stands for the defaults, an ideal guide with friction:
+    With a clearance the crosshead moves across and tilts, and its four corners meet the guide by
+    ADAMS's IMPACT, whatever the joints' `contact.law`. `True` stands for the defaults, an ideal
+    guide with friction:
 
     >>> import compressor
     >>> case = compressor.Case.from_values({"guide": {"clearance_mm": 0.1}})
@@ -138,15 +136,11 @@ class Guide:
     )
     damping_N_s_per_mm: float | None = parameter(
         None, "N s/mm", (0, 1e9), "as the joints'", "greatest contact damping of a corner",
-        optional=True, read=(PLAY, CORNER_DAMPED),
+        optional=True, read=PLAY,
     )  # fmt: skip
     full_damping_mm: float | None = parameter(
         None, "mm", (0, 1e3), "as the joints'", "penetration of full damping of a corner",
-        above=True, optional=True, read=(PLAY, CORNER_DAMPED),
-    )  # fmt: skip
-    restitution: float | None = parameter(
-        None, "", (0, 1), "as the joints'", "coefficient of restitution of a corner",
-        above=True, optional=True, read=(PLAY, CORNER_RESTITUTION),
+        above=True, optional=True, read=PLAY,
     )  # fmt: skip
 
 

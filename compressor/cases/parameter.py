@@ -60,11 +60,6 @@ def senses_casing(case: Any) -> bool:
     return bool(sensor.place == "bearing" or sensor.direction == "y")
 
 
-def damps_guide(case: Any) -> bool:
-    """Return whether the law of the joints is that of a guide's corners, too."""
-    return bool(case.contact.law == "impact" or case.contact.restitution is not None)
-
-
 GAS = Reader("load: gas", lambda case: case.load == "gas")
 CRANK_END = Reader(
     "gas.action: double or crank_end", lambda case: case.gas.action in ("double", "crank_end")
@@ -95,10 +90,6 @@ PLAY = Reader("guide.clearance_mm above 0", has_play)
 CONTACT = Reader(
     f"{CLEARANCE.words} or in the guide", lambda case: has_clearance(case) or has_play(case)
 )
-LAW = Reader(
-    f"{CLEARANCE.words}, or a guide with play and a law with a restitution",
-    lambda case: has_clearance(case) or damps_guide(case),
-)
 RUBBING = Reader(
     f"{CLEARANCE.words} or friction.ideal_joints: true",
     lambda case: has_clearance(case) or has_ideal_friction(case),
@@ -106,13 +97,6 @@ RUBBING = Reader(
 SMALL_RUBBING = Reader(
     f"{SMALL_CLEARANCE.words}, or friction.ideal_joints: true",
     lambda case: case.clearance_mm.small_end > 0 or has_ideal_friction(case),
-)
-CORNER_DAMPED = Reader(
-    "a contact.law without a restitution",
-    lambda case: case.contact.restitution is None,
-)
-CORNER_RESTITUTION = Reader(
-    "a contact.law with a restitution", lambda case: case.contact.restitution is not None
 )
 GUIDE = Reader(
     "guide.friction above 0 or guide.clearance_mm above 0",

@@ -22,9 +22,7 @@ counter-clockwise, -phi'. Rows and columns of a mechanism's bodies: `mechanism.B
 
 The crosshead's guide: friction of an ideal one, contact of the four corners in one with play. The
 crosshead is a block about its pin, `guide_length` to either side along x and `guide_height` along
-y. Each corner meets the plane of its side by ADAMS's IMPACT or, where the joints' law damps by a
-coefficient of restitution, by chi times the elastic force over the speed at which they met. A
-corner carries no such speed in the state: it follows from depth and rate (`approach_speed`).
+y. Each corner meets the plane of its side by ADAMS's IMPACT, whatever the joints' law.
 """
 
 import math
@@ -155,10 +153,6 @@ def material_work(q, other, p):
     return total
 
 
-NEWTON_ROUNDS, NEWTON_TOLERANCE = 30, 1e-14  # of Newton's method for the approach speed
-MIN_CHI = 1e-3  # chi below which damping is too weak to change the approach speed
-
-
 class Guided(NamedTuple):
     """What the guide does to the crosshead: forces (N), moment about the pin (N m), and energy."""
 
@@ -181,53 +175,15 @@ def guide_coefficient(slip, p):
 
 
 @jit
-def damped_part(u, chi):
-    """Return the integral of u / (1 + chi u) from 0 to u: how far damping has taken a strike."""
-    return (u - math.log(1.0 + chi * u) / chi) / chi
-
-
-@jit
-def approach_speed(rate, stored, mass, chi):
-    """Return the speed (m/s) at which a mass (kg) that strikes freely has met the guide.
-
-    rate: of its depth (m/s); stored: energy (J). From m delta'' = -F_e (1 + chi delta' / v) with
-    the elastic energy E: u du / (1 + chi u) from delta' / v to 1 is E / (m v^2). So a free strike
-    has the restitution of the joints' law, and no state holds its beginning.
-    """
-    speed = math.sqrt(rate * rate + 2.0 * stored / mass)
-    if chi < MIN_CHI:
-        return speed
-    total, least = damped_part(1.0, chi), max(rate, -chi * rate)  # where the strike has its end
-    speed = max(speed, 2.0 * least)
-    for _ in range(NEWTON_ROUNDS):
-        u = rate / speed
-        rest = total - damped_part(u, chi)
-        change = speed * speed * rest - stored / mass
-        change /= speed * (2.0 * rest + u * u / (1.0 + chi * u))
-        if abs(change) <= NEWTON_TOLERANCE * speed:
-            break
-        lower = speed - change
-        speed = lower if lower > least else 0.5 * (speed + least)
-    return speed
-
-
-@jit
-def corner_force(penetration, rate, lever, p):
+def corner_force(penetration, rate, p):
     """Return the normal force (N) of a corner and its elastic part.
 
-    penetration in m, rate in m/s; lever: of the force about the pin (m), by which the crosshead
-    weighs less there than as a whole.
+    penetration in m, rate in m/s.
     """
     if penetration <= 0.0:
         return 0.0, 0.0
     elastic = p.guide_stiffness * power(penetration, p.guide_exponent)
-    if p.guide_restituting:
-        mass = 1.0 / (1.0 / p.reciprocating_mass + lever * lever / p.crosshead_inertia)
-        stored = elastic * penetration / (p.guide_exponent + 1.0)
-        speed = max(approach_speed(rate, stored, mass, p.guide_hysteresis), p.least_approach)
-        damping = elastic * p.guide_hysteresis / speed
-    else:
-        damping = p.guide_damping * rise(penetration * p.per_guide_full_damping)
+    damping = p.guide_damping * rise(penetration * p.per_guide_full_damping)
     return max(0.0, damping * rate + elastic), elastic
 
 
@@ -257,7 +213,7 @@ def corners(height, tilt, rates, p):
             penetration = corner_depth(height, tilt, end, side, p)
             deepest = max(deepest, penetration)
             rate = side * (rise + spin * x)
-            normal, elastic = corner_force(penetration, rate, x, p)
+            normal, elastic = corner_force(penetration, rate, p)
             if normal > 0.0:
                 slip = v - spin * y
                 friction = -guide_coefficient(slip, p) * normal

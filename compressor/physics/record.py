@@ -186,8 +186,6 @@ FEATURES: list[tuple] = [
     ("guide_exponent", "f8"),  # p
     ("guide_damping", "f8"),  # C_max of ADAMS's IMPACT, N s/m
     ("per_guide_full_damping", "f8"),  # 1 / d_max, 1/m
-    ("guide_restituting", "i8"),  # whether corners are damped by a restitution instead
-    ("guide_hysteresis", "f8"),  # chi
     ("guide_friction", "f8"),  # coefficient
     ("guide_stiction", "f8"),  # m/s
     ("crosshead_inertia", "f8"),  # about the pin, kg m^2

@@ -27,7 +27,6 @@ from compressor.physics import (
     derivative_with_flows,
     elastic_form,
     enter_segment,
-    hysteresis,
     is_featured,
     new_record,
     start,
@@ -191,10 +190,7 @@ def _film(case: Case, p: dict[str, Any]) -> None:
 
 
 def _guide_contact(case: Case, p: dict[str, Any]) -> None:
-    """Set how a corner of the crosshead meets its guide.
-
-    As the joints do, where it has no keys of its own; without their restitution by ADAMS's IMPACT.
-    """
+    """Set how a corner of the crosshead meets its guide: by the joints' numbers or its own."""
     guide, contact = case.guide, case.contact
     if guide is None:
         return
@@ -207,9 +203,6 @@ def _guide_contact(case: Case, p: dict[str, Any]) -> None:
     p["per_guide_full_damping"] = 1.0 / to_si(
         guide.full_damping_mm or contact.full_damping_mm, "mm"
     )
-    restitution = guide.restitution or contact.restitution
-    if restitution is not None:
-        p["guide_restituting"], p["guide_hysteresis"] = 1, hysteresis(contact.law, restitution)
 
 
 def _features(case: Case, p: dict[str, Any]) -> None:

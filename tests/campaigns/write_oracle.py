@@ -56,8 +56,10 @@ def cases_by_name():
         found[f"plain {number}"] = Case.from_values(drawn)
     for kind in (LAWS, FEATURES):
         for number in range(60):
-            scene = values(number, SEED, Budget(drawn=kind))
-            found[f"{kind} {number}"] = Case.resolve(scene)
+            case = Case.resolve(values(number, SEED, Budget(drawn=kind)))
+            # corners of a guide damped by the joints' restitution once: another model
+            if not (case.guide and case.guide.clearance_mm and case.contact.restitution):
+                found[f"{kind} {number}"] = case
     for number, drawn in enumerate(strangers(SEED + 1, 20)):
         solve = {"method": SCIPY_METHODS[number % len(SCIPY_METHODS)], "duration_rev": 1,
                  "settle_rev": 0, "accuracy": "draft"}  # fmt: skip

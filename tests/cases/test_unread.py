@@ -46,7 +46,6 @@ BIG_OIL = BIG | {"lubricant": True}
 SLIDING = IDEAL | {"guide": True}
 PLAYING = IDEAL | {"guide": {"clearance_mm": 0.1}}
 SMOOTH = IDEAL | {"guide": {"clearance_mm": 0.1, "friction": 0}}
-STRUCK = PLAYING | {"contact": {"law": "hunt_crossley", "restitution": 0.5}}
 DRIVEN = IDEAL | {"drive": {"torque_N_m": 10}, "machine": {"gravity_m_per_s2": 9.81}}
 ELASTIC = IDEAL | {"rod": True}
 WEARING = BIG | {"wear": {"limit_mm": 0.205}}
@@ -154,12 +153,8 @@ ENTRIES = {
     **entries(
         PLAYING, SLIDING, guide__crosshead_length_mm=100, guide__crosshead_height_mm=70,
         guide__crosshead_inertia_kg_m2=0.05, guide__stiffness_N_per_mm15=2e5,
-        guide__exponent=1.4,
+        guide__exponent=1.4, guide__damping_N_s_per_mm=9, guide__full_damping_mm=0.01,
     ),
-    **entries(
-        PLAYING, SLIDING, STRUCK, guide__damping_N_s_per_mm=9, guide__full_damping_mm=0.01,
-    ),
-    "guide.restitution": Entry(0.9, STRUCK, (PLAYING, SLIDING)),
     **entries(
         DRIVEN, drive__flywheel_kg_m2=2, drive__torque_N_m=50, drive__slope_N_m_s=50,
         drive__unbalance_kg_mm=800,
@@ -210,7 +205,7 @@ RIVALS = {"solve.duration_s": "duration_rev", "solve.output_step_s": "output_ste
           "solve.rtol": "accuracy"}  # fmt: skip
 # refused where they cannot do what they say, though they would change numbers or last bits
 CONTRADICTING = {
-    "contact.least_approach_mm_per_s", "friction.ideal_joints", "guide.restitution",
+    "contact.least_approach_mm_per_s", "friction.ideal_joints",
     "body.frequency_x_Hz", "body.frequency_y_Hz", "sensor.speed_jitter",
     "sensor.second_threshold_m_per_s2",
 }  # fmt: skip
