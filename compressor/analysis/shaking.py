@@ -199,12 +199,12 @@ def order_lines(even: np.ndarray, a_turn: int) -> Spectrum:
 
     even: whole revolutions of `a_turn` samples each.
     """
-    from compressor.vibration import line_amplitudes, rms_above
+    from compressor.vibration import line_amplitudes
 
     amplitudes = line_amplitudes(even, a_turn, False)
-    roots = line_amplitudes(even, even.size, True)
-    fine = np.arange(roots.size) * (a_turn / even.size)
-    return Spectrum(np.arange(amplitudes.size), amplitudes, rms_above(fine, roots, ORDER))
+    fine = line_amplitudes(even, even.size, True)[ORDER * even.size // a_turn + 1 :]
+    above = math.sqrt(float(np.sum(fine**2)))  # Parseval
+    return Spectrum(np.arange(amplitudes.size), amplitudes, above)
 
 
 def deviation_spectrum(run: xr.Dataset) -> Spectrum:

@@ -8,6 +8,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfilt
 
 from compressor.cases import Body, Sensor
+from compressor.program import CompsimError
 from compressor.vibration.body import (
     BodyMotion,
     Forces,
@@ -25,6 +26,12 @@ ANALOGUE_RATE_FACTOR = 8.0
 USUAL = 2.56  # sampling rate over the highest frequency of interest
 LEAD_IN = 1  # revolutions before the record, in which the low-pass filter forgets its start
 NEIGHBOURS = 32  # samples that a spline is made of for one value between them
+
+
+class RecordError(CompsimError):
+    """A record that cannot be read or used: too short, without tacho, not finite."""
+
+    exit_code = 2
 
 
 @dataclass(frozen=True)
@@ -55,70 +62,48 @@ def analogue_rate(body: Body, sensor: Sensor) -> float:
     return ANALOGUE_RATE_FACTOR * max(sensor.rate_Hz, sensor.mounting_Hz, casing)
 
 
-def point_of(body: Body, sensor: Sensor, guide: float) -> tuple[float, float]:
-    """Return the place of a sensor from the body's mass centre, m.
-
-    guide: mid-stroke from the crank, m.
-    """
-    x, y = centre(body)
-    return {"guide": (guide - x, -y), "bearing": (-x, -y), "body": (0.0, 0.0)}[sensor.place]
-
-
 def listen(
-    body: Body,
-    sensor: Sensor,
-    forces: Forces,
-    turn: float,
-    guide: float,
-    motion: BodyMotion | None = None,
-    phase: float = 0.0,
-) -> Record:
+    body: Body, sensor: Sensor, forces: Forces, turn: float, guide: float,
+    motion: BodyMotion | None = None, phase: float = 0.0,
+) -> Record:  # fmt: skip
     """Return the record of a sensor on a body under forces.
 
-    forces: with a first and last sample a whole number of revolutions of `turn` s apart where the
-    body is steady; guide: mid-stroke from the crank, m;
-    motion: of the body under these forces, where it is known already; phase: revolutions of the
-    crank from top dead centre to the first sample.
-
-    A steady motion is repeated as often as the record is long, with each revolution at its own
-    pace where the speed jitters; the force at an angle stays what it is.
+    forces: whole revolutions of `turn` s where the body is steady; guide: mid-stroke from the
+    crank, m; motion: of the body, where it is known already; phase: revolutions of the crank from
+    top dead centre to the first sample. A steady motion is repeated as often as the record is long,
+    with each revolution at its own pace where the speed jitters; the force at an angle stays.
     """
-    steady = body.start == "steady"
+    steady, step = body.start == "steady", forces.step
     rng = np.random.default_rng(sensor.seed)
-    span = forces.step * (len(forces.shaking) - 1)
+    span = step * (len(forces.shaking) - 1)
     revolutions = sensor.length_rev or max(1, int(span / turn * (1 + 1e-9)))
-    length = revolutions * turn if steady else span
     before = LEAD_IN * turn if steady else 0.0
-    count = round((before + length) / forces.step)
-    times = forces.step * np.arange(count + 1) - before
+    count = round((before + (revolutions * turn if steady else span)) / step)
+    times = step * np.arange(count + 1) - before
     pace = paces(sensor, rng, times, turn)
+    turns = pace / turn + phase
+    x, y = centre(body)
+    point = {"guide": (guide - x, -y), "bearing": (-x, -y), "body": (0.0, 0.0)}[sensor.place]
     rigid = motion or body_motion(body, forces, steady)
-    acceleration = rigid.acceleration(sensor.direction, point_of(body, sensor, guide))
-    force = None
+    acceleration, force = rigid.acceleration(sensor.direction, point), None
     if body.casing and sensor.place != "body":
         force = getattr(forces, sensor.place)[:, AXES.index(sensor.direction)]
     if not steady:
         if force is not None:
-            acceleration = acceleration + casing_motion(body, force, forces.step).acceleration
-        return record_signal(sensor, acceleration, times, pace / turn + phase, rng)
+            acceleration = acceleration + casing_motion(body, force, step).acceleration
+        return record_signal(sensor, acceleration, times, turns, rng)
     # casing and mounting have always repeated themselves, too: a mode of low damping would take
     # many revolutions to forget a start at rest
-    repeated, acceleration = acceleration, interpolate_periodic(acceleration, forces.step, pace)
+    repeated, acceleration = acceleration, interpolate_periodic(acceleration, step, pace)
     if force is not None:
-        casing = casing_motion(body, force, forces.step, steady=True)
+        casing = casing_motion(body, force, step, steady=True)
         repeated = repeated + casing.acceleration
-        start = state_at(casing, forces.step, pace[0])
-        force = interpolate_periodic(force, forces.step, pace)
-        moved = casing_motion(body, force, forces.step, start=start)
-        acceleration = acceleration + moved.acceleration
-    mounting = oscillate(repeated, forces.step, *mode_of(sensor), steady=True)
-    start = state_at(mounting, forces.step, pace[0])
-    return record_signal(sensor, acceleration, times, pace / turn + phase, rng, start)
-
-
-def mode_of(sensor: Sensor) -> tuple[float, float]:
-    """Return frequency (Hz) and damping ratio of a sensor on its mounting."""
-    return sensor.mounting_Hz, sensor.mounting_damping_ratio
+        start = state_at(casing, step, pace[0])
+        force = interpolate_periodic(force, step, pace)
+        acceleration = acceleration + casing_motion(body, force, step, start=start).acceleration
+    mode = sensor.mounting_Hz, sensor.mounting_damping_ratio
+    mounting = oscillate(repeated, step, *mode, steady=True)
+    return record_signal(sensor, acceleration, times, turns, rng, state_at(mounting, step, pace[0]))
 
 
 def state_at(motion: OscillatorMotion, step: float, time: float) -> tuple[float, float]:
@@ -127,12 +112,10 @@ def state_at(motion: OscillatorMotion, step: float, time: float) -> tuple[float,
     By a cubic spline through its `NEIGHBOURS` samples, beyond which hardly any counts.
     """
     last = len(motion.displacement) - 1
-    first = int(time // step) - NEIGHBOURS // 2
-    where = np.arange(first, first + NEIGHBOURS)
-    place, speed = (
-        float(CubicSpline(where, values[where % last])(time / step)) for values in motion[:2]
-    )
-    return place, speed
+    where = np.arange(NEIGHBOURS) + int(time // step) - NEIGHBOURS // 2
+    near = [values[where % last] for values in motion[:2]]
+    displacement, velocity = CubicSpline(where, near, axis=1)(time / step)
+    return float(displacement), float(velocity)
 
 
 def interpolate_periodic(values: np.ndarray, step: float, times: np.ndarray) -> np.ndarray:
@@ -146,9 +129,8 @@ def paces(sensor: Sensor, rng: np.random.Generator, times: np.ndarray, turn: flo
     """Return the times (s) at which a steady crank is as far as the real one at `times`.
 
     times: of the record, (m,); turn: of a steady revolution (s). The speed's deviation is a cubic
-    spline through a Gaussian draw of `speed_jitter` rms for each revolution. Between these points
-    it is smaller: 0.93 of that rms over all times, and 0.81 of it for the mean speed of a
-    revolution.
+    spline through a Gaussian draw of `speed_jitter` rms for each revolution: of 0.93 of that rms
+    over all times, and 0.81 of it for the mean speed of a revolution.
     """
     if not sensor.speed_jitter:
         return times
@@ -159,34 +141,34 @@ def paces(sensor: Sensor, rng: np.random.Generator, times: np.ndarray, turn: flo
 
 
 def record_signal(
-    sensor: Sensor,
-    acceleration: np.ndarray,
-    times: np.ndarray,
-    turns: np.ndarray,
-    rng: np.random.Generator,
-    start: tuple[float, float] = (0.0, 0.0),
-) -> Record:
+    sensor: Sensor, acceleration: np.ndarray, times: np.ndarray, turns: np.ndarray,
+    rng: np.random.Generator, start: tuple[float, float] = (0.0, 0.0),
+) -> Record:  # fmt: skip
     """Return the record of the acceleration at a sensor's foot.
 
     The chain is the mounting's resonance, a low-pass filter, sampling, noise and clipping.
-    acceleration: m/s2 at `times`, s, (n,), the record being what is not before 0; turns:
-    revolutions; start: displacement and velocity of the sensor on its mounting, by default at rest.
+    acceleration: m/s2 at `times` and `turns`, (n,), recorded from time 0 on; start: displacement
+    and velocity of the sensor on its mounting.
     """
     step = times[1] - times[0]
-    omega = 2.0 * np.pi * sensor.mounting_Hz
     mounted = oscillate(acceleration, step, *mode_of(sensor), start=start).displacement
-    mounted = omega**2 * mounted
+    mounted *= (2.0 * np.pi * sensor.mounting_Hz) ** 2
     corner = sensor.low_pass_Hz or sensor.rate_Hz / USUAL
     filtered = sosfilt(butter(POLES, corner, fs=1.0 / step, output="sos"), mounted)
     taken = np.arange(int(times[-1] * sensor.rate_Hz * (1 + 1e-12))) / sensor.rate_Hz
     values = CubicSpline(times, filtered)(taken)
     values += rng.normal(0.0, sensor.noise_m_per_s2, values.size)
-    beyond = np.abs(values) > sensor.range_m_per_s2
+    clipped = float(np.mean(np.abs(values) > sensor.range_m_per_s2))
     values = np.clip(values, -sensor.range_m_per_s2, sensor.range_m_per_s2)
     passes = np.arange(np.ceil(max(turns[0], 0.0) - 1e-9), np.floor(turns[-1]) + 1)
     tacho = np.interp(passes, turns, times)
     tacho = tacho[(tacho > -0.5 * step) & (tacho <= taken[-1])]
-    return Record(taken, values, tacho, float(beyond.mean()), np.interp(taken, times, turns))
+    return Record(taken, values, tacho, clipped, np.interp(taken, times, turns))
+
+
+def mode_of(sensor: Sensor) -> tuple[float, float]:
+    """Return frequency (Hz) and damping ratio of a sensor on its mounting."""
+    return sensor.mounting_Hz, sensor.mounting_damping_ratio
 
 
 def find_noise_mistake(levels: Sequence[float]) -> str:
@@ -200,9 +182,6 @@ def noisy(values: np.ndarray, rms: float, seed: Sequence[int]) -> np.ndarray:
     """Return a window's samples (m/s2, (n,)) with white noise of an rms and a seed.
 
     By numpy's default generator. In a data set the seed is [its seed, the job's key as a number,
-    the window's first pulse, the number of the noise level], so that anyone can add the same noise
-    to the stored samples.
+    the window's first pulse, the number of the noise level], so that anyone can add the same noise.
     """
-    if not rms:
-        return values
-    return values + np.random.default_rng(seed).normal(0.0, rms, values.size)
+    return values + np.random.default_rng(seed).normal(0.0, rms, values.size) if rms else values

@@ -4,9 +4,8 @@ It moves along x, along y, and by rocking about its mass centre C, three oscilla
 coupling: the foundation's centre of stiffness lies at C. The casing above it has a mode at the
 crosshead guide and one at the main bearing, each driven by the force there along y and along x.
 
-Exact motion of linear oscillators under sampled forces. Between samples the force is a cubic (a
-spline through them), for which each step is exact: no integrator's error and no limit on the step,
-however stiff the oscillator is.
+Between samples a force is a cubic (a spline through them), for which each step of an oscillator is
+exact: no integrator's error and no limit on the step, however stiff it is.
 """
 
 from dataclasses import dataclass
@@ -19,8 +18,6 @@ from scipy.signal import lfilter
 
 from compressor.cases import Body
 
-DEGREE = 3
-
 
 class OscillatorMotion(NamedTuple):
     """Displacement, velocity and acceleration at the samples of the force, each (n,)."""
@@ -31,37 +28,34 @@ class OscillatorMotion(NamedTuple):
 
 
 def oscillate(
-    force: np.ndarray,
-    step: float,
-    frequency: float,
-    damping_ratio: float,
-    steady: bool = False,
+    force: np.ndarray, step: float, frequency: float, damping_ratio: float, steady: bool = False,
     start: tuple[float, float] = (0.0, 0.0),
-) -> OscillatorMotion:
+) -> OscillatorMotion:  # fmt: skip
     """Return the motion q'' + 2 zeta w q' + w^2 q = f of an oscillator.
 
     force: f, per unit of modal mass, at n >= 4 equal steps, (n,); step: s; frequency: w / 2 pi, Hz;
     damping_ratio: zeta, between 0 and 1; start: q and q' at the first sample, by default at rest;
     steady: instead the motion that repeats itself with the samples; the last one stands for the
-    first of the next period. Raises ValueError for other damping, or fewer samples.
+    first of the next period. Raises ValueError for other damping.
 
     One complex unknown, z = q' - conj(s) q with z' = s z + f and s = w (-zeta + i sqrt(1-zeta^2)),
-    carries both q = Im z / Im s and q'. Over a step, z' = s z + cubic has a closed form, taken from
-    the exponential of the matrix that generates it (Van Loan 1978).
+    carries both q = Im z / Im s and q'. Over a step, z' = s z + cubic has a closed form.
     """
     if not 0.0 < damping_ratio < 1.0:
         raise ValueError(f"a damping ratio lies between 0 and 1, not at {damping_ratio:g}")
-    if len(force) <= DEGREE:
-        raise ValueError(f"{len(force)} samples of a force are too few: at least {DEGREE + 1}")
     omega = 2.0 * np.pi * frequency
     root = omega * complex(-damping_ratio, np.sqrt(1.0 - damping_ratio**2))
-    cubics = pieces(force, step, steady)
+    around = np.append(force[:-1], force[0]) if steady else force
+    spline = CubicSpline(
+        step * np.arange(len(force)), around, bc_type="periodic" if steady else "not-a-knot"
+    )
     whole, shares = one_step(root, step)
-    # products of real matrices: the cubics have no imaginary part
-    driven = shares.real @ cubics + 1j * (shares.imag @ cubics)
+    # products of real matrices: the cubics, of rising powers, have no imaginary part
+    driven = shares.real @ spline.c[::-1] + 1j * (shares.imag @ spline.c[::-1])
     first = start[1] - root.conjugate() * start[0]
-    if steady:  # z0 = final + exp(s T) z0: the motion ends a period as it began it
-        first = final(whole, driven) / (1.0 - np.exp(root * step * (len(force) - 1)))
+    if steady:  # z0 = what the force leaves of rest + exp(s T) z0: a period ends as it began
+        left = lfilter([1.0], [1.0, -whole], driven)[-1]
+        first = left / (1.0 - np.exp(root * step * (len(force) - 1)))
     z = np.empty(len(force), complex)
     z[0] = first
     z[1:], _ = lfilter([1.0], [1.0, -whole], driven, zi=np.array([whole * first]))
@@ -71,28 +65,15 @@ def oscillate(
     return OscillatorMotion(displacement, velocity, acceleration)
 
 
-def pieces(force: np.ndarray, step: float, periodic: bool) -> np.ndarray:
-    """Return the cubic between each two samples: its coefficients of 1, s, s^2, s^3, (4, n - 1)."""
-    if periodic:
-        force = np.append(force[:-1], force[0])
-    times = step * np.arange(len(force))
-    spline = CubicSpline(times, force, bc_type="periodic" if periodic else "not-a-knot")
-    return spline.c[::-1]
-
-
 def one_step(root: complex, step: float) -> tuple[complex, np.ndarray]:
-    """Return exp(s h), and the integrals of exp(s (h - t)) t^j over a step, (4,)."""
-    matrix = np.zeros((DEGREE + 2, DEGREE + 2), complex)
-    matrix[0, 0], matrix[0, 1] = root * step, step
-    for power in range(1, DEGREE + 1):
-        matrix[power, power + 1] = power  # d(t^j)/dt = j t^(j-1), over a step of length 1
+    """Return exp(s h), and the integrals of exp(s (h - t)) t^j over a step, (4,).
+
+    From the exponential of the matrix that generates them (Van Loan 1978).
+    """
+    matrix = np.diag([root * step, 0.0, 0.0, 0.0, 0.0])
+    matrix += np.diag([step, 1.0, 2.0, 3.0], 1)  # d(t^j)/dt = j t^(j-1), over a step of length 1
     result = expm(matrix)
-    return result[0, 0], result[0, 1:] * step ** np.arange(DEGREE + 1)
-
-
-def final(whole: complex, driven: np.ndarray) -> complex:
-    """Return the state z of an oscillator after all steps, from rest."""
-    return lfilter([1.0], [1.0, -whole], driven)[-1]
+    return result[0, 0], result[0, 1:] * step ** np.arange(4)
 
 
 @dataclass(frozen=True)
@@ -134,10 +115,7 @@ def centre(body: Body) -> tuple[float, float]:
 
 
 def body_motion(body: Body, forces: Forces, steady: bool) -> BodyMotion:
-    """Return the rigid body's motion under forces, from rest or `steady` (`oscillate`).
-
-    Raises ValueError as `oscillate`.
-    """
+    """Return the rigid body's motion under forces, from rest or `steady`, as by `oscillate`."""
     x, y = centre(body)
     shaking = forces.shaking
     moment = forces.moment - x * shaking[:, 1] + y * shaking[:, 0]
@@ -147,27 +125,18 @@ def body_motion(body: Body, forces: Forces, steady: bool) -> BodyMotion:
         "rocking": (moment / body.inertia_kg_m2, body.frequency_rocking_Hz),
     }
     free = [*body.freedoms.partition("_")[0]] + ["rocking"] * body.freedoms.endswith("rocking")
-    still = OscillatorMotion(*(np.zeros(len(shaking)),) * 3)
-    motions = {
-        name: oscillate(force, forces.step, frequency, body.damping_ratio, steady)
-        if name in free
-        else still
-        for name, (force, frequency) in driven.items()
-    }
+    motions = dict.fromkeys(driven, OscillatorMotion(*np.zeros((3, len(shaking)))))
+    for name in free:
+        force, frequency = driven[name]
+        motions[name] = oscillate(force, forces.step, frequency, body.damping_ratio, steady)
     return BodyMotion(**motions)
 
 
 def casing_motion(
-    body: Body,
-    force: np.ndarray,
-    step: float,
-    steady: bool = False,
+    body: Body, force: np.ndarray, step: float, steady: bool = False,
     start: tuple[float, float] = (0.0, 0.0),
-) -> OscillatorMotion:
-    """Return a casing mode's motion against the body.
-
-    force: at its place, in N, (n,), `step` s apart; steady, start: see `oscillate`.
-    """
+) -> OscillatorMotion:  # fmt: skip
+    """Return a casing mode's motion against the body under a force (N, (n,)): see `oscillate`."""
     mode = body.casing_frequency_Hz, body.casing_damping_ratio
     assert body.casing_mass_kg is not None  # as of a Case, which fills it in
     return oscillate(force / body.casing_mass_kg, step, *mode, steady, start)

@@ -10,8 +10,7 @@ from scipy.stats import binned_statistic
 from compressor.cases import Body, Sensor
 from compressor.vibration.accelerometer import Record, listen
 from compressor.vibration.body import BodyMotion, Forces, body_motion
-from compressor.vibration.envelope import crest_factor, kurtosis, rms
-from compressor.vibration.spectra import check_signal
+from compressor.vibration.spectra import band_signal, shape
 
 Thresholds = Sequence[float | None]  # m/s2, None for none
 Numbers = dict[str, float | np.ndarray]  # metrics by name, SI
@@ -58,15 +57,10 @@ class Monitored:
         velocity = np.array_split(self.velocity, whole) if whole else []
         of_turn = [np.floor(self.turns - self.first + 1e-9) == n for n in range(count)]
         return [
-            replace(
-                self,
-                velocity=one,
-                record=self.record[mine],
-                turns=self.turns[mine],
-                revolutions=(1, min(1, recorded)),
-            )
+            replace(self, velocity=one, record=self.record[mine], turns=self.turns[mine],
+                    revolutions=(1, min(1, recorded)))
             for one, mine in zip(velocity, of_turn, strict=False)
-        ]
+        ]  # fmt: skip
 
 
 def shake_body(
@@ -74,8 +68,8 @@ def shake_body(
 ) -> Monitored:
     """Return the body's motion under forces, the sensor's record, and what is monitored.
 
-    forces, turn, guide: see `listen`; settle: s, from where revolutions count, which is the first
-    sample of the forces where the body is steady, else time after it.
+    forces, turn, guide: see `listen`; settle: s, from where revolutions count: the first sample of
+    the forces where the body is steady, else time after it.
     """
     steady = body.start == "steady"
     first = round(settle / turn, 9) % 1.0 if steady else settle / turn
@@ -88,12 +82,10 @@ def shake_body(
     whole = math.floor((len(velocity) - 1) * forces.step / turn * (1 + 1e-9))
     velocity = velocity[: round(whole * turn / forces.step)]
     if whole:
-        rate = 1.0 / forces.step
-        in_band = [band_signal(one, rate, *body.band_Hz) for one in velocity.T]
+        in_band = [band_signal(one, 1.0 / forces.step, *body.band_Hz) for one in velocity.T]
         velocity = np.stack(in_band, axis=1)
     if recorded is None:
-        nothing = np.empty(0)
-        return Monitored(motion, None, velocity, nothing, nothing, first, (whole, 0))
+        return Monitored(motion, None, velocity, np.empty(0), np.empty(0), first, (whole, 0))
     passed = recorded.turns - first
     spacing = (passed[-1] - passed[0]) / max(len(passed) - 1, 1)
     count = math.floor(passed[-1] + 2.0 * spacing)  # up to a sample may lack of the last one
@@ -107,18 +99,15 @@ def measure_record(
 ) -> Numbers:
     """Return the metrics of a record over whole revolutions, of `compressor.metrics.TABLE`.
 
-    values: m/s2, (n,); turns: of the crank there, (n,); thresholds: of any number, without which,
-    or without the first, nothing is counted; None among them counts as nan.
+    values: m/s2, (n,); turns: of the crank there, (n,); thresholds: without the first, nothing is
+    counted; None among them counts as nan.
     """
-    peak, root = segment_levels(360.0 * turns, values)
+    found, (peaks, roots) = shape(values), segment_levels(360.0 * turns, values)
     numbers: Numbers = {
-        "sensor_peak": float(np.abs(values).max()),
-        "sensor_rms": rms(values),
-        "sensor_crest_factor": crest_factor(values),
-        "sensor_kurtosis": kurtosis(values),
-        "sensor_segment_peak": peak,
-        "sensor_segment_rms": root,
-    }
+        "sensor_peak": float(np.abs(values).max()), "sensor_rms": found.rms,
+        "sensor_crest_factor": found.crest_factor, "sensor_kurtosis": found.kurtosis,
+        "sensor_segment_peak": peaks, "sensor_segment_rms": roots,
+    }  # fmt: skip
     if thresholds and thresholds[0] is not None:
         counts = [math.nan if one is None else count_peaks(values, one) for one in thresholds]
         numbers["sensor_counts_per_rev"] = np.array(counts) / revolutions
@@ -131,9 +120,8 @@ def segment_levels(
     """Return the peak and the rms in equal segments of crank angle, (count,) each.
 
     As protection systems of reciprocating machines watch them. angle_deg: of the samples, at any
-    revolution, (m,); values: (m,), in any unit. Segment k goes from 360 k / count degrees,
-    included, to the next, not included. The peak is the greatest magnitude of its samples, the rms
-    their root mean square; both nan where a segment has none.
+    revolution, (m,). Segment k goes from 360 k / count degrees, included, to the next, not
+    included. The peak is the greatest magnitude; both are nan where a segment has no sample.
     """
     # an angle that rounding has put just before a segment's begin lies in it
     place = (angle_deg + 3.6e-7 / count) % 360.0
@@ -144,26 +132,11 @@ def segment_levels(
     return peak, np.sqrt(square)
 
 
-def band_signal(values: np.ndarray, rate: float, low: float, high: float) -> np.ndarray:
-    """Return the part of a signal between two frequencies (Hz), both included, (m,).
-
-    values: (m,), at `rate` samples a second, as if they repeated themselves. The lines of the
-    spectrum outside of the band are removed, exactly and without a shift of phase. Raises
-    SignalError for values that are not finite or not in a row.
-    """
-    found = check_signal(values)
-    lines = np.fft.rfft(found)
-    frequency = np.fft.rfftfreq(found.size, 1.0 / rate)
-    lines[(frequency < low * (1.0 - 1e-12)) | (frequency > high * (1.0 + 1e-12))] = 0.0
-    return np.fft.irfft(lines, found.size)
-
-
 def count_peaks(values: np.ndarray, threshold: float) -> int:
     """Return how many peaks of |values| pass a threshold.
 
-    A peak begins where |values| rises above the threshold, and counts once it is no longer above
-    it: one that the record's end cuts off does not count, one that its begin cuts off does. Each
-    swing of a casing that rings counts, to either side, so that one impact may give several counts.
+    One counts once it is no longer above the threshold: one that the record's end cuts off does
+    not, one that its begin cuts off does. Each swing of a casing that rings counts, to either side.
     """
     above = np.abs(values) > threshold
     return int(np.count_nonzero(above[:-1] & ~above[1:]))

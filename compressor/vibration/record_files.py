@@ -13,12 +13,22 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from compressor.cases import open_text_table
-from compressor.program import PROGRAM, CompsimError
+from compressor.program import PROGRAM, CompsimError, did_you_mean
+from compressor.vibration.accelerometer import Record, RecordError
+from compressor.vibration.tacho import (
+    MIN_REVOLUTIONS,
+    find_pulses,
+    refuse,
+    shift_pulses,
+    smooth_pulses,
+    steady_pulses,
+)
 
 TIME, VALUE, TACHO = RECORD_HEADER = ("time_s", "acceleration_m_per_s2", "tacho")
 HEADER = ",".join(RECORD_HEADER)
@@ -29,55 +39,45 @@ UNITS = {  # in m/s2; g is the standard acceleration (SI brochure), the inch and
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}  # in s
 SPELLINGS = (("_per_", "/"), ("²", "2"), ("^", ""), ("**", ""), ("seconds", "s"), ("sec", "s"),
              ("µ", "u"), ("μ", "u"), (" ", ""))  # fmt: skip
-ACCELERATION = re.compile(r"acceleration_(\w+)")  # a column's name, with its unit
-TITLE = re.compile(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*|(time)_(m?s|us)", re.IGNORECASE)  # and its unit
+OURS = re.compile(r"acceleration_\w+|time_s|tacho")  # a name in our files
+TITLE = re.compile(  # and its unit
+    r"(.*?)\s*[\[(]([^\])]*)[\])]\s*|(time(?=_(?:m?s|us)$)|acceleration)_(\w+)", re.IGNORECASE
+)
 TITLES = {
-    "time": "time", "t": "time", "zeit": "time", "tacho": "tacho", "tach": "tacho",
-    "keyphasor": "tacho", "keyphaser": "tacho", "acc": "acceleration", "accel": "acceleration",
-    "acceleration": "acceleration",
+    **dict.fromkeys(("time", "t", "zeit"), "time"),
+    **dict.fromkeys(("tacho", "tach", "keyphasor", "keyphaser"), "tacho"),
+    **dict.fromkeys(("acceleration", "acc", "accel"), "acceleration"),
 }  # fmt: skip
 LAYOUT = "--separator, --decimal and --skip-lines say otherwise"
+UNEVEN = 0.1  # of a time step, by which a step may differ from the mean one
+PLAIN = "separator comma, decimal point, header in line 1,"  # as our own files are
+OPTIONS = {"time": "time", "acceleration": "channel", "tacho": "tacho"}  # that name a channel
+SCALES = (("acceleration", "unit", UNITS), ("time", "time_unit", TIME_UNITS))
+SAME_STEP = 1e-9  # share by which two channels' time steps may differ
 TIME_RESPONSE, IS_ACCELERATION, IS_TIME = 1, 12, 17  # numbers of the universal file format 58
+WANTED = "write a whole, real time response with even steps: types 58 and 1"
+VALUE_IN_UFF = "acceleration", IS_ACCELERATION, "m/s2"
 
 
-class RecordError(CompsimError):
-    """A record that cannot be read or used: too short, without tacho, not finite."""
-
-    exit_code = 2
-
-
-@dataclass(frozen=True)
-class Channel:
-    """A signal of a file: kind is time, acceleration, tacho, or "" where the file does not say.
-
-    unit: as the file writes it, "" where it does not.
-    """
+class Channel(NamedTuple):
+    """A signal of a file, with what the file says of it."""
 
     name: str
-    kind: str = ""
-    unit: str = ""
+    kind: str = ""  # time, acceleration or tacho
+    unit: str = ""  # as it is written
 
 
 @dataclass(frozen=True)
 class RecordFile:
-    """What a file has.
-
-    read: returns the samples of channels by their numbers, from 0, (m,) each; clocks: first time
-    and step (s) of each channel, () where the file has times as a channel, or none; first_line: of
-    the samples in a file of text, else 0; is_integer: whether samples are shares of a full scale;
-    rate: Hz, which the file says beside its times, nan where it does not; layout: how a text was
-    read; unused: what else the file has, and why it is no signal.
-    """
+    """What a file has."""
 
     path: Path
-    channels: tuple[Channel, ...]
-    read: Callable[[Sequence[int]], list[np.ndarray]]
-    clocks: tuple[tuple[float, float], ...] = ()
-    first_line: int = 0
-    is_integer: bool = False
-    rate: float = math.nan
-    layout: str = ""
-    unused: tuple[str, ...] = ()
+    channels: Sequence[Channel]
+    read: Callable[[Sequence[int]], list[np.ndarray]]  # samples of channels by numbers from 0
+    clock: tuple[float, float] | None = None  # first time and step, s, but where a channel has it
+    is_integer: bool = False  # whether samples are shares of a full scale
+    layout: str = ""  # how a text was read
+    unused: Sequence[str] = ()  # what else the file has, and why it is no signal
 
     @property
     def content(self) -> str:
@@ -86,12 +86,6 @@ class RecordFile:
         found = f"only {found}" if found else "no signals"
         left = f"; no signals are {'; '.join(self.unused)}" if self.unused else ""
         return f"{found}{left}" + (f" ({self.layout}; {LAYOUT})" if self.layout else "")
-
-    def place(self, number: int, sample: int) -> str:
-        """Return where a sample of a channel stands, for an error; both from 0."""
-        if self.first_line:
-            return f"{self.path}:{self.first_line + sample}: {self.channels[number].name}"
-        return f"{self.path}: {self.channels[number].name}: sample {sample + 1}"
 
 
 def unit_name(text: str, units: dict[str, float] = UNITS) -> str:
@@ -103,17 +97,7 @@ def unit_name(text: str, units: dict[str, float] = UNITS) -> str:
 
 
 def named_channel(name: str) -> Channel:
-    """Return a channel whose name alone says what it is: our names, in CSV and MAT files."""
-    if found := ACCELERATION.fullmatch(name):
-        return Channel(name, "acceleration", found[1])
-    return Channel(name, {TIME: "time", TACHO: "tacho"}.get(name, ""), "s" if name == TIME else "")
-
-
-def titled_channel(name: str) -> Channel:
-    """Return a channel by the title of a column, such as `Time [ms]`, `Acc (g)`, `Keyphasor`."""
-    ours = named_channel(name)
-    if ours.kind:
-        return ours
+    """Return a channel by its name, such as `time_s`, `Time [ms]`, `Acc (g)`, `Keyphasor`."""
     found = TITLE.fullmatch(name)
     word, unit = (found[1] or found[3] or "", found[2] or found[4] or "") if found else (name, "")
     kind = TITLES.get(word.strip().lower(), "acceleration" if unit_name(unit) else "")
@@ -133,8 +117,7 @@ def open_record_file(path: Path, **layout: Any) -> RecordFile:
         options = ", ".join(f"--{name.replace('_', '-')}" for name in layout)
         raise RecordError(f"{path}: is no file of text: leave {options} out")
     try:
-        with path.open("rb"):
-            pass
+        path.open("rb").close()
         return reader(path, **layout)
     except OSError as error:
         remedy = f"give a CSV file with the columns {HEADER}, or a job's key"
@@ -152,16 +135,11 @@ def _open_csv(path: Path, **layout: Any) -> RecordFile:
         table = open_text_table(path, **layout)
     except CompsimError as error:
         raise RecordError(f"{error} ({LAYOUT})") from error
-    ours = {named_channel(name).kind for name in table.names}  # before other titles
-    channels, unused = [], []
-    for name, is_number in zip(table.names, table.numeric, strict=True):
-        one = titled_channel(name) if is_number else Channel(name)
-        is_second = one.kind in ours and not named_channel(name).kind
-        channels.append(Channel(name, "", one.unit) if is_second else one)
-        unused += [] if is_number else [f"{name} (no numbers)"]
+    pairs = list(zip(table.names, table.numeric, strict=True))
     return RecordFile(
-        path, tuple(channels), lambda numbers: [*map(np.array, table.read_columns(numbers)[1])],
-        first_line=table.rows[0][0], layout=table.layout, unused=tuple(unused),
+        path, [named_channel(name) if is_number else Channel(name) for name, is_number in pairs],
+        lambda numbers: [*map(np.array, table.read_columns(numbers)[1])], layout=table.layout,
+        unused=[f"{name} (no numbers)" for name, is_number in pairs if not is_number],
     )  # fmt: skip
 
 
@@ -180,10 +158,10 @@ def _open_wav(path: Path) -> RecordFile:
     zero = 128.0 if values.dtype == np.uint8 else 0.0  # the one format without a sign
     # of several channels nothing says which is the accelerometer
     only = "acceleration" if len(columns) == 1 else ""
-    channels = tuple(Channel(str(number), only) for number in range(1, len(columns) + 1))
     return RecordFile(
-        path, channels, lambda numbers: [(columns[at] - zero) / full for at in numbers],
-        ((0.0, 1.0 / rate),) * len(channels), is_integer=is_integer,
+        path, [Channel(str(number), only) for number in range(1, len(columns) + 1)],
+        lambda numbers: [(columns[at] - zero) / full for at in numbers], (0.0, 1.0 / rate),
+        is_integer,
     )  # fmt: skip
 
 
@@ -191,48 +169,37 @@ def _open_mat(path: Path) -> RecordFile:
     """Return what a MAT file has: its arrays of real numbers, a matrix by columns."""
     from scipy.io import loadmat
 
-    try:
-        whole = loadmat(path)
-    except NotImplementedError as error:
-        raise RecordError(f"{path}: is a MAT file of version 7.3: save it with -v7") from error
     found: dict[str, np.ndarray] = {}
-    unused, rate = [], math.nan
-    for name, array in whole.items():
+    unused, rate = [], 0.0
+    for name, array in loadmat(path).items():  # of version 7.3 it says that it cannot
         if name.startswith("__"):
             continue
         if array.dtype.kind not in "fiub" or array.ndim != 2:
             what = "struct" if array.dtype.names else array.dtype
             unused.append(f"{name} ({what} of shape {array.shape}: save real vectors or matrices)")
-        elif name == RATE and array.size == 1:
-            rate = float(array.item())
-            if not (math.isfinite(rate) and rate > 0.0):
-                raise RecordError(f"{path}: {RATE} is {rate:g}: save a finite rate above 0")
-        elif array.size <= 1:
-            unused.append(f"{name} ({array.size} numbers)")
+        elif array.size < 2:
+            rate = float(array.sum()) if name == RATE else rate
         elif 1 in array.shape:
             found[name] = array.ravel().astype(float)
         else:
             found |= {f"{name}(:,{k})": one.astype(float) for k, one in enumerate(array.T, 1)}
-    arrays, channels = list(found.values()), tuple(map(named_channel, found))
-    is_clock = not (math.isnan(rate) or any(one.kind == "time" for one in channels))
+    arrays, channels = [*found.values()], [*map(named_channel, found)]
+    has_rate = rate and not any(one.kind == "time" for one in channels)
+    clock = (0.0, 1.0 / rate) if has_rate else None
     return RecordFile(
-        path, channels, lambda numbers: [arrays[at] for at in numbers],
-        ((0.0, 1.0 / rate),) * len(arrays) if is_clock else (), rate=rate, unused=tuple(unused),
-    )  # fmt: skip
+        path, channels, lambda numbers: [arrays[at] for at in numbers], clock, unused=unused
+    )
 
 
 END = re.compile(rb"    -1[ \t]*(?=[\r\n]|\Z)")  # of a data set, and its begin
-FORTRAN = re.compile(rb"(?<=\d)[dD](?=[+-]\d\d)")  # an exponent of double precision
 
 
 def _open_uff(path: Path) -> RecordFile:
     """Return what a universal file has: its time responses (data sets 58) with even steps."""
-    data = path.read_bytes()
-    if len(END.findall(data)) % 2:
+    # pyuff does not see a mark with blanks behind it
+    data, marks = END.subn(b"    -1", path.read_bytes())
+    if marks % 2:
         raise ValueError("its last data set has no end, a line with -1 in columns 5 and 6")
-    data = END.sub(b"    -1", data)  # pyuff does not see a mark with blanks behind it
-    if b"    58b" not in data:
-        data = FORTRAN.sub(b"e", data)
     found, unused = [], []
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore", np.exceptions.ComplexWarning)
@@ -240,17 +207,23 @@ def _open_uff(path: Path) -> RecordFile:
         plain.write_bytes(data)
         file = _pyuff().UFF(str(plain))
         for number, kind in enumerate(file.get_set_types()):
-            one = file.read_sets(number) if kind == 58 else {}
-            if why := _why_no_response(one) if one else f"type {kind:g}, not 58":
-                unused.append(f"data set {number + 1} ({why})")
-            else:
+            one: dict[str, Any] = file.read_sets(number) if kind == 58 else {"func_type": 0}
+            is_real = one["func_type"] == TIME_RESPONSE and one["ord_data_type"] <= 4
+            if is_real and one["abscissa_spacing"] and len(one["data"]) >= max(one["num_pts"], 2):
                 found.append(one)
-    return RecordFile(
-        path, tuple(_uff_channel(one, number) for number, one in enumerate(found, 1)),
-        lambda numbers: [np.asarray(found[at]["data"], float) for at in numbers],
-        tuple((float(one["abscissa_min"]), float(one["abscissa_inc"])) for one in found),
-        unused=tuple(unused),
-    )  # fmt: skip
+            else:
+                what = f"type {kind:g}, function type {one['func_type']:g}"
+                unused.append(f"data set {number + 1} ({what}: {WANTED})")
+    clocks = [(float(one["abscissa_min"]), float(one["abscissa_inc"])) for one in found]
+
+    def read(numbers: Sequence[int]) -> list[np.ndarray]:
+        one, *others = (clocks[at] for at in numbers)
+        if any(np.abs(np.subtract(one, other)).max() > SAME_STEP * one[1] for other in others):
+            raise RecordError(f"{path}: channels begin at different times or steps: {clocks} s")
+        return [np.asarray(found[at]["data"], float) for at in numbers]
+
+    channels = [_uff_channel(one, number) for number, one in enumerate(found, 1)]
+    return RecordFile(path, channels, read, clocks[0] if clocks else None, unused=unused)
 
 
 def _pyuff() -> Any:
@@ -260,18 +233,6 @@ def _pyuff() -> Any:
         remedy = "get it by pip install 'compsim[records]'"
         raise RecordError(f"pyuff is not installed; {remedy}") from error
     return pyuff
-
-
-def _why_no_response(one: dict[str, Any]) -> str:
-    """Return why a data set 58 is no time response with even steps; "" where it is."""
-    samples, kind = len(one["data"]), int(one["func_type"])
-    mistakes = {
-        f"function type {kind}, not {TIME_RESPONSE}, a time response": kind != TIME_RESPONSE,
-        "uneven steps: write it with even ones": not one["abscissa_spacing"],
-        "complex numbers, not a real time response": int(one["ord_data_type"]) > 4,
-        f"cut: {samples} of {one['num_pts']} samples": samples < one["num_pts"],
-    }
-    return next((why for why, is_so in mistakes.items() if is_so), "")
 
 
 def _uff_channel(one: dict[str, Any], number: int) -> Channel:
@@ -288,15 +249,182 @@ READERS: dict[str, Callable[..., RecordFile]] = {
     ".uff": _open_uff, ".unv": _open_uff,
 }  # fmt: skip
 
+
+@dataclass(frozen=True)
+class RecordHints:
+    """What a file does not say of its record, or says wrong."""
+
+    channel: str = ""  # of the acceleration: a name, or a number from 1
+    tacho: str = ""
+    time: str = ""
+    unit: str = ""  # one of `UNITS`, in place of what the file says
+    time_unit: str = ""  # one of `TIME_UNITS`
+    separator: str = ""  # of a text, as `open_text_table` has it, and so the next two
+    decimal: str = ""
+    skip_lines: int | None = None
+    rate: float | None = None  # Hz, of a file without times
+    full_scale: float | None = None  # of whole numbers, in the unit
+    tacho_deg: float = 0.0  # crank angle at which the tacho rises
+    rpm: float | None = None  # a steady speed, with a time (s) of top dead centre: of no tacho
+    tdc: float | None = None
+
+    @property
+    def layout(self) -> dict[str, Any]:
+        """Return what is told of a file of text, by the names of `open_text_table`."""
+        names = ("separator", "decimal", "skip_lines")
+        return {one: getattr(self, one) for one in names if getattr(self, one) not in ("", None)}
+
+
+def read_record(path: str | Path, **known: Any) -> Record:
+    """Return the record of a file whose type is one of `READERS`; known: of `RecordHints`.
+
+    The tacho is any voltage that rises once a revolution, at top dead centre or at a known angle,
+    through the middle of its range: a sine, a square or a short pulse. Without that channel, and
+    only then, `rpm` and `tdc` give it. Channels that are not chosen are ignored, and so are lines
+    at the end of a CSV file in which the others are empty. `clipped` is nan: it is not known.
+
+    Raises RecordError, or TextTableError, with file, channel and line or sample: for a missing
+    channel, an unknown unit, what is no finite number, unequal steps, few or irregular pulses.
+    """
+    path, hints = Path(path), RecordHints(**known)
+    file = open_record_file(path, **hints.layout)
+    chosen, scales = _choose_channels(file, hints)
+    names = {kind: file.channels[number].name for kind, number in chosen.items()}
+    columns = dict(zip(chosen, file.read([*chosen.values()]), strict=True))
+    _check_samples(path, names, columns)
+    remarks = []
+    if file.layout and not file.layout.startswith(PLAIN):
+        named = ", ".join(f"{kind} {name}" for kind, name in names.items())
+        remarks.append(f"{path}: {file.layout}; {named}")
+    values = columns["acceleration"] * scales["acceleration"] * (hints.full_scale or 1.0)
+    if "time" in chosen:
+        start = columns["time"][0] * scales["time"]
+        stamps = _find_times(f"{path}: {names['time']}", columns["time"], scales["time"])
+    else:
+        start, step = file.clock or (0.0, 1.0 / (hints.rate or math.nan))
+        has_step = math.isfinite(step) and step > 0.0
+        refuse(path, [(not has_step, "has no time step above 0: save it with one, or give --rate")])
+        stamps = step * np.arange(values.size)
+    times = stamps[-1] / (values.size - 1) * np.arange(values.size)
+    if (off := np.abs(stamps - times).max()) > 1e-6 * times[1]:
+        values = CubicSpline(stamps, values)(times)
+        text = f"{names['time']}: times up to {off / times[1]:.2g} steps off equal ones"
+        remarks.append(f"{text}: samples are put on equal steps by their own times")
+    if "tacho" in chosen:
+        pulses, within = find_pulses(f"{path}: {names['tacho']}", stamps, columns["tacho"])
+        if len(pulses) > MIN_REVOLUTIONS:
+            pulses = shift_pulses(smooth_pulses(pulses, within), hints.tacho_deg, times)
+            pulses = np.maximum(pulses, -0.99 * times[1])  # at the record's begin, to a sample
+        if not hints.tacho_deg and names["tacho"].lower() != TACHO:
+            text = "its rise counts as top dead centre; --tacho-deg says its angle"
+            remarks.append(f"{names['tacho']}: {text}")
+    else:
+        pulses = steady_pulses(hints.rpm, hints.tdc, start, times[-1])
+    found = f"{len(pulses)} passes of top dead centre in {times[-1]:g} s"
+    few = f"{found}: at least {MIN_REVOLUTIONS + 1}; record for longer"
+    refuse(path, [(len(pulses) <= MIN_REVOLUTIONS, few)])
+    return Record(times, values, pulses, math.nan, remarks=tuple(remarks))
+
+
+def _pick(file: RecordFile, word: str, option: str) -> int:
+    """Return the channel that a name or a number (from 1) means, from 0. Raises RecordError."""
+    names = [one.name for one in file.channels]
+    if names.count(word) == 1:
+        return names.index(word)
+    if word.isascii() and word.isdigit() and 1 <= int(word) <= len(names):
+        return int(word) - 1
+    problem = f"{names.count(word)} channels" if word in names else "no channel"
+    near = did_you_mean(word, names) or f"there are {', '.join(names) or 'no signals'}"
+    text = f"{file.path}: --{option} {word}: {problem} of this name"
+    raise RecordError(f"{text}; {near}; or give its number, 1 to {len(names)}")
+
+
+def _choose_channels(
+    file: RecordFile, hints: RecordHints
+) -> tuple[dict[str, int], dict[str, float]]:
+    """Return the channels by kind, chosen or the only ones that say so, and their units in SI.
+
+    Without times where steps are known, and without a tacho at a steady speed. Raises RecordError
+    for a channel that is missing, not the only one, or of no known unit.
+    """
+    found, scales = {}, {}
+    for kind, option in OPTIONS.items():
+        numbers = [n for n, one in enumerate(file.channels) if one.kind == kind]
+        ours = [n for n in numbers if OURS.fullmatch(file.channels[n].name)]  # before other titles
+        word = getattr(hints, option)
+        found[kind] = [_pick(file, word, option)] if word else ours or numbers
+    times, values, tachos = found.values()
+    is_steady = hints.rpm is not None or hints.tdc is not None
+    has_times, has = bool(times or file.clock), file.content
+    titles = f"write {HEADER} as titles of columns, or " if file.layout else ""
+    many = [(kind, [file.channels[n].name for n in numbers]) for kind, numbers in found.items()]
+    refuse(file.path, [
+        (not values, f"no column {VALUE}, {has}; {titles}name the channel by --channel and --unit"),
+        (not has_times and hints.rate is None,
+         f"no column {TIME}, {has}; name the times by --time and --time-unit, or give --rate"),
+        (has_times and hints.rate is not None, "says its times: leave --rate out"),
+        (not math.isfinite(hints.tacho_deg) or (is_steady and hints.tacho_deg),
+         "--tacho-deg is a finite angle of a tacho: leave it out with --rpm"),
+        (tachos and is_steady, "has a tacho column: leave --rpm and --tdc out"),
+        (not tachos and not is_steady, f"has no column {TACHO}: add it, or give --rpm and "
+         "--tdc for a steady speed, or name one by --tacho"),
+        *((len(names) > 1, f"{len(names)} channels are {kind}, {', '.join(names)}; "
+           f"choose one by --{OPTIONS[kind]}") for kind, names in many),
+        (file.is_integer and hints.full_scale is None,
+         "has whole numbers: give --full-scale, the acceleration of the greatest, in --unit"),
+        (not file.is_integer and hints.full_scale is not None,
+         "has the values themselves: leave --full-scale out"),
+    ])  # fmt: skip
+    chosen = {kind: numbers[0] for kind, numbers in found.items() if numbers}
+    for kind, option, units in SCALES:
+        if kind in chosen:
+            channel = file.channels[chosen[kind]]
+            unit = getattr(hints, option) or channel.unit
+            says = f"the unit {unit!r}" if unit else "no unit"
+            remedy = f"give --{option.replace('_', '-')}, one of {', '.join(units)}"
+            text = f"channel {channel.name} has {says} of {kind}: {remedy}"
+            refuse(file.path, [(not unit_name(unit, units), text)])
+            scales[kind] = units[unit_name(unit, units)]
+    return chosen, scales
+
+
+def _check_samples(path: Path, names: dict[str, str], columns: dict[str, np.ndarray]) -> None:
+    """Raise RecordError where channels are not finite, or not of one length."""
+    sizes = {names[kind]: column.size for kind, column in columns.items()}
+    bad = [(names[kind], one, int(np.argmin(np.isfinite(one)))) for kind, one in columns.items()]
+    refuse(path, [
+        (len({*sizes.values()}) > 1, "channels of different length: "
+         f"{', '.join(f'{name} {size}' for name, size in sizes.items())}; cut the longer one"),
+        (min(sizes.values()) < 2, f"{min(sizes.values())} samples are no record"),
+        *((not np.isfinite(one[at]), f"{name}: sample {at + 1} is {one[at]}, not finite; cut the "
+           "record") for name, one, at in bad),
+    ])  # fmt: skip
+
+
+def _find_times(what: str, written: np.ndarray, unit: float) -> np.ndarray:
+    """Return times from the first one on, s: on equal steps where they were only rounded.
+
+    unit: of the times, s. Raises RecordError for steps that differ by more than `UNEVEN`.
+    """
+    times = (written - written[0]) * unit  # steps of large times would lose digits
+    even, steps = np.linspace(0.0, times[-1], times.size), np.diff(times)
+    bad = np.flatnonzero(~(np.abs(steps - even[1]) <= UNEVEN * abs(even[1])) | (steps <= 0.0))
+    for at in bad:
+        text = f"sample {at + 2}: a step of {steps[at]:g} s, where the mean one is {even[1]:g} s"
+        raise RecordError(f"{what}: {text}; resample it, or write times with more digits")
+    # times that were rounded stay as near to equal ones as their steps to each other
+    rounding = np.ptp(steps) + 4.0 * unit * np.spacing(np.abs(written).max())
+    return even if np.abs(times - even).max() <= rounding else times
+
+
 Columns = dict[str, np.ndarray]  # by `RECORD_HEADER`; the tacho may be missing
 
 
 def record_columns(times: np.ndarray, values: np.ndarray, pulses: np.ndarray) -> Columns:
     """Return a record (s, m/s2, s) as the columns of `RECORD_HEADER`.
 
-    The tacho is a sine of the crank angle that rises through 0 at top dead centre, so that a reader
-    finds the pulses between the samples; it stays low before the first pulse and high after the
-    last. With fewer than two pulses there is no such column.
+    The tacho is a sine of the crank angle that rises through 0 at top dead centre; it stays low
+    before the first pulse and high after the last. Of fewer than two pulses there is none.
     """
     found = [times, values]
     if len(pulses) > 1:
@@ -308,10 +436,7 @@ def record_columns(times: np.ndarray, values: np.ndarray, pulses: np.ndarray) ->
 
 
 def encode_record(columns: Columns, suffix: str) -> bytes:
-    """Return a record as a file of a type of `ENCODERS`: m/s2, with a tacho where there is one.
-
-    Raises RecordError where the type cannot hold it.
-    """
+    """Return a record as a file of a type of `ENCODERS`. Raises RecordError for a WAV's rate."""
     times = columns[TIME]
     return ENCODERS[suffix](columns, (len(times) - 1) / float(times[-1] - times[0]))
 
@@ -342,16 +467,14 @@ def _encode_mat(columns: Columns, rate: float) -> bytes:
 def _encode_uff(columns: Columns, rate: float) -> bytes:
     """Return a data set 58 a signal, as text: samples of 12 digits, and a time step of 6."""
     pyuff, sets = _pyuff(), []
-    names = {VALUE: ("acceleration", IS_ACCELERATION, "m/s2"), TACHO: (TACHO, 0, "NONE")}
-    for name, (title, kind, unit) in names.items():
-        if name in columns:
-            sets.append(pyuff.prepare_58(
-                binary=0, func_type=TIME_RESPONSE, id1=title, id2=PROGRAM, rsp_node=1, rsp_dir=0,
-                ref_node=0, ref_dir=0, abscissa_spacing=1, abscissa_spec_data_type=IS_TIME,
-                abscissa_axis_units_lab="s", ordinate_spec_data_type=kind,
-                ordinate_axis_units_lab=unit, orddenom_spec_data_type=0,
-                data=columns[name], x=columns[TIME],
-            ))  # fmt: skip
+    for name, values in [*columns.items()][1:]:
+        title, kind, unit = (TACHO, 0, "NONE") if name == TACHO else VALUE_IN_UFF
+        sets.append(pyuff.prepare_58(
+            binary=0, func_type=TIME_RESPONSE, id1=title, id2=PROGRAM, rsp_node=1, rsp_dir=0,
+            ref_node=0, ref_dir=0, abscissa_spacing=1, abscissa_spec_data_type=IS_TIME,
+            abscissa_axis_units_lab="s", ordinate_spec_data_type=kind,
+            ordinate_axis_units_lab=unit, orddenom_spec_data_type=0, data=values, x=columns[TIME],
+        ))  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:  # pyuff writes to a path alone
         path = Path(folder) / "record.uff"
         pyuff.UFF(str(path)).write_sets(sets, mode="overwrite")

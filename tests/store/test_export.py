@@ -20,7 +20,7 @@ from compressor.store.export import ExportError, ExportOptions, export
 from compressor.store.files import StoreError
 from compressor.store.reader import open_study, read_job, read_store
 from compressor.store.studies import write_study
-from compressor.vibration.record_reader import read_record
+from compressor.vibration.record_files import read_record
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 GRID = {

@@ -87,5 +87,3 @@ def test_integrals_of_a_step_against_the_series():
 def test_what_no_oscillator_takes():
     with pytest.raises(ValueError, match="between 0 and 1, not at 1"):
         oscillate(np.ones(9), STEP, FREQUENCY, 1.0)
-    with pytest.raises(ValueError, match="at least 4"):
-        oscillate(np.ones(3), STEP, FREQUENCY, DAMPING)

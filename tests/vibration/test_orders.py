@@ -7,7 +7,6 @@ from compressor.vibration.spectra import (
     SignalError,
     line_amplitudes,
     resample_angle,
-    rms_above,
 )
 
 TURN = 2 * np.pi
@@ -70,21 +69,6 @@ def test_squares_of_the_spectrum_add_up_to_the_mean_square():
     for turns in (8, 1, 4):
         found = line_amplitudes(values, turns * M, rms=True)
         assert np.sum(found**2) == pytest.approx(np.mean(values**2), rel=1e-12)
-
-
-def test_rms_above_an_order():
-    angle = even(9)
-    values = 8.0 * np.cos(angle) + 2.0 * np.sin(12 * angle) + 0.6 * np.sin(30 * angle) - 0.2
-    found = line_amplitudes(values, 9 * M, rms=True)
-    orders = np.arange(found.size) / 9
-    expected = {12.0: 0.6 / np.sqrt(2), 5.0: np.hypot(0.6, 2.0) / np.sqrt(2), 100.0: 0.0}
-    for order, known in expected.items():
-        assert rms_above(orders, found, order) == pytest.approx(known, abs=1e-9)
-
-
-def test_the_order_itself_is_left_out():
-    tenths = np.arange(100) * 0.1  # three of them are a little more than 0.3
-    assert rms_above(tenths, np.ones(100), 0.3) == pytest.approx(np.sqrt(96), rel=1e-12)
 
 
 @pytest.mark.parametrize(

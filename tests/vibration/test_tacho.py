@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compressor.vibration.spectra import smooth_pulses
+from compressor.vibration.tacho import smooth_pulses
 
 RATE, TURN, TRIALS = 25600.0, 0.081, 40
 HALF = 0.5 / RATE

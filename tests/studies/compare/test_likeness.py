@@ -14,8 +14,8 @@ from compressor.studies.compare.likeness import (
     third_octaves,
     turn_record,
 )
+from compressor.vibration import RecordError
 from compressor.vibration.accelerometer import Record
-from compressor.vibration.record_files import RecordError
 
 RATE, TURN, WHOLE = 8000.0, 0.1003, 6
 FIRST = 0.01237  # s, of the first pulse: between two samples

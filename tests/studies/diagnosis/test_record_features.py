@@ -13,7 +13,7 @@ from compressor.studies.diagnosis.features import (
     SMALLEST,
     features,
 )
-from compressor.vibration.record_files import RecordError
+from compressor.vibration import RecordError
 
 RATE, SPEED, WHOLE = 25600.0, 8.0, 10  # Hz, rev/s, revolutions
 FIRST = 0.0123  # s, of the first pulse: between two samples
