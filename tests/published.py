@@ -15,7 +15,7 @@ from compressor.cases.conflicts import back_action
 from compressor.physics.observe import COLUMNS, Column, observe
 from compressor.physics.record import state_names
 from compressor.solve import simulate
-from compressor.solve.attempts import run_at_tolerance
+from compressor.solve.run import run_at_tolerance
 from compressor.solve.si_record import record
 from compressor.solve.simulate import with_series
 

@@ -63,8 +63,6 @@ def stop(found: "JobReport") -> list[Line]:
     angle = math.degrees(attributes["stop_crank_angle"]) % 360
     when = f"at {attributes['stop_time']:.9g} s, {angle:.5g} degrees of crank angle"
     lines = [("stopped", when)]
-    if attributes["stop_dominant"]:
-        lines.append(("driven by", attributes["stop_dominant"]))
     names = attributes["stop_state_names"].split("; ")
     for name, value in zip(names, attributes["stop_state"], strict=False):
         if name != "unused":

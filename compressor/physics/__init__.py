@@ -43,7 +43,7 @@ from compressor.physics.record import (
     state_names,
 )
 from compressor.physics.runge_kutta import FLOWS
-from compressor.physics.step_control import STABILITY_LIMIT, Mode, step_error
+from compressor.physics.step_control import STABILITY_LIMIT, Mode
 from compressor.physics.systems import (
     beyond_model,
     derivative_with_flows,

@@ -7,11 +7,9 @@ a stepper turns to the stiff partner and back.
 import math
 from enum import IntEnum
 
-import numpy as np
-
 from compressor.physics import rosenbrock
 from compressor.physics._jit import inline_llvm, inline_once, jit, square_root
-from compressor.physics.runge_kutta import FLOWS, STAGES, A, E
+from compressor.physics.runge_kutta import FLOWS, STAGES, A
 from compressor.physics.systems import derivative_with_flows
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
@@ -41,17 +39,6 @@ class Mode(IntEnum):
 
 # numba wants plain integers
 AUTO = int(Mode.AUTO)
-
-
-def step_error(w, before, after, step):
-    """Return the estimated error of each number of an attempted step, flows included, (n + 4,).
-
-    `w`: the stepper before it; `before` and `after`: `WorkArrays.k` then and now; `step` (s): its
-    length.
-    """
-    if w.stiff:
-        return after[rosenbrock.STIFF_STAGES]
-    return step * (E @ np.vstack((before[:1], after[1:STAGES])))
 
 
 @jit

@@ -1,21 +1,21 @@
 """A case -> its outcome: motion, metrics, error bars, reasons."""
 
-from compressor.solve.attempts import Solution, integrate, run_at_tolerance, run_until_balanced
 from compressor.solve.cautions import JointScales, cautions, expected_cost, joint_scales
-from compressor.solve.error_bars import Metrics, energy_residual
 from compressor.solve.horizon import predictability_horizon
-from compressor.solve.march_driver import COMPILED
 from compressor.solve.measured_gas import gas_nodes
 from compressor.solve.regime import find_repetition, least_promise, steady, with_settle_rev
 from compressor.solve.request import (
     Cuts,
+    Metrics,
     Request,
     Turns,
     merge_turns,
     revolutions,
 )
+from compressor.solve.run import COMPILED, Solution, integrate, run_at_tolerance, run_until_balanced
 from compressor.solve.run_metrics import (
     average_bar,
+    energy_residual,
     mean_bar,
     metrics,
     parts,

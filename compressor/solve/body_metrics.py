@@ -12,8 +12,9 @@ import numpy as np
 from compressor.cases import Case
 from compressor.metrics import NUMBERS
 from compressor.outcome import Regime
-from compressor.solve.attempts import Solution
-from compressor.solve.error_bars import Metrics, closeness, longest_bars
+from compressor.solve.error_bars import closeness, longest_bars
+from compressor.solve.request import Metrics
+from compressor.solve.run import Solution
 from compressor.solve.run_metrics import (
     MAX_BATCHES,
     average_bar,

@@ -36,10 +36,9 @@ from compressor.cases import (
 )
 from compressor.metrics import JOINTS
 from compressor.physics import STABILITY_LIMIT, Scene, elastic_form, greatest_load, steepest
-from compressor.solve.attempts import closed_form
-from compressor.solve.march_driver import COMPILED
 from compressor.solve.measured_gas import card_noise, fit_polytrope, sensed_noise
 from compressor.solve.request import greatest_depth
+from compressor.solve.run import COMPILED, closed_form
 from compressor.solve.si_record import record, scene
 
 # Attempts of a step for each radian of the contact's ringing at rtol 1; measured on random cases.

@@ -18,43 +18,21 @@ Shares stand in `compressor.metrics`; those and the ones below were chosen on ra
 judge nothing (tests/results/calibration.md).
 """
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from compressor.cases import TIGHTEST
+from compressor.cases import TIGHTEST, Case
 from compressor.metrics import NUMBERS, SERIES
+from compressor.solve.request import Metrics
+from compressor.solve.run import Solution, moves_body, run_at_tolerance
+from compressor.solve.run_metrics import energy_residual
+from compressor.solve.series import distances
+from compressor.solve.si_record import is_oiled, length_and_speed
 
-RESIDUAL_PER_REV = 10.0  # of rtol: the residual that a revolution may leave
-ROUNDING = 1e-9  # a residual below it says nothing of a run
-MAX_RESIDUAL = 0.05  # a residual above it is too large at any tolerance
-MAX_AUDIT_REPEATS = 2  # by tens of the tolerance, for a run that fails its audit to be repeated at
-
-
-def energy_residual(tally: np.record) -> float:
-    """Return the worst imbalance of energy over what contacts take: losses, and what springs hold.
-
-    That counts as at least 1e-3 of the greatest kinetic energy; where nothing is lost, as with
-    ideal joints, whose motion is not integrated, as at least the crank's work.
-    """
-    lost = tally["contact_work"] + tally["friction_loss"]
-    least = 1e-3 * tally["peak_kinetic"] if lost else abs(tally["crank_work"])
-    return float(tally["worst_imbalance"] / max(lost, least, 1e-3 * tally["peak_kinetic"]))
-
-
-def allowed_residual(rtol: float, revolutions: float) -> float:
-    """Return the greatest energy residual of a run that can be trusted at a tolerance.
-
-    The 200 random cases of tests/campaigns/random_cases.py leave a quarter of it at most at rtol
-    1e-4, a tenth at tighter ones (tests/results/accuracy.json). Runs beyond it, of extremes of
-    stiffness, stiction and mass ratio, mostly keep it at a tenth of the tolerance; those that never
-    do are far off (mu 0.5 at rtol 2e-8: 1.6e-4 of the acceleration).
-    """
-    return min(max(RESIDUAL_PER_REV * rtol * max(revolutions, 1.0), ROUNDING), MAX_RESIDUAL)
-
-
-Metrics = dict[str, Any]  # by name: a number, or an array over joints (and axes)
 SIDES = "peak_rod_load_tension", "peak_rod_load_compression"
 
 TIGHTER_DISTANCE_FACTOR = 3.0  # of the distance of a time series to a tighter run's
@@ -63,14 +41,6 @@ FLOOR = 0.1  # of the energy residual, relative to the metric
 ORDER = 0.8  # power of the tolerance with which errors fall
 # times rtol ** ORDER: a distance of accelerations beyond ten times the usual one
 AMPLIFIED_FACTOR = 50.0
-
-
-def next_audit_rtol(rtol: float, failures: int) -> float | None:
-    """Return the tolerance at which a run is tried again whose energy does not balance.
-
-    failures: runs of the case that did not, this one included. None where no more are tried.
-    """
-    return None if failures > MAX_AUDIT_REPEATS or rtol < 9.9 * TIGHTEST else rtol / 10.0
 
 
 class Companion(NamedTuple):
@@ -186,3 +156,101 @@ def relative_bar(metric: Any, bar: Any) -> float:
     size, length = np.ravel(np.abs(metric)), np.ravel(bar)
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(np.where(length > 0.0, length / size, 0.0).max())
+
+
+SWITCHING = 2.0  # times rtol ** ORDER: natural sizes of a state that it may be off by
+
+
+def switch_errors(
+    p: np.record, metrics: Mapping[str, Any], tally: np.record, rtol: float
+) -> Metrics:
+    """Return how far a run's changes of contact may move the metrics that are shares of time.
+
+    Two runs may agree in the moment of one change by chance; how far a state that is off by the
+    tolerance moves it (`physics.onset.shift_of_change`) is known of each. `SWITCHING` holds for 99
+    of 100 changes at rtol 1e-5 to 1e-8, by runs at 1e-11.
+    """
+    if not metrics:
+        return {}
+    share = SWITCHING * rtol**ORDER * tally["switch_shift"] / (tally["seconds"] or math.nan)
+    found = {"contact_loss_fraction": share}
+    if tally["has_rod_load"] and not is_oiled(p):  # whose load ends where dry contact does
+        found["rod_load_reversal_angle"] = math.tau * share[1]
+    return found
+
+
+TIGHTER_FACTOR = 2.5  # times: the run that errors are estimated by
+OVERRUN_RTOL = 2e-4  # tolerances from which on explicit steps may run over friction's fast modes
+MAX_SPEED_ERROR = 0.02  # the same, of the journals' speed, over friction's stiction velocity
+STIFF_TIGHTER = 10.0  # the same at loose tolerances
+LOOSER_FACTOR = 3.0  # times: the third run that is compared where a motion enlarges errors
+
+
+def companion_rtol(p: np.record, rtol: float) -> float | None:
+    """Return the tolerance of a run's tighter `comparison_run` by its own method, or None."""
+    fits = rtol >= 0.99 * TIGHTER_FACTOR * TIGHTEST and not overruns_friction(p, rtol)
+    return rtol / TIGHTER_FACTOR if fits else None
+
+
+def overruns_friction(p: np.record, rtol: float) -> bool:
+    """Return whether explicit steps may run over friction's fast modes or its change of sign.
+
+    Then two explicit runs may agree on a force that friction never has.
+    """
+    if rtol > OVERRUN_RTOL:
+        return True
+    rubs = bool(p["friction"]) and bool(p["clearance"].any())
+    return rubs and rtol * length_and_speed(p)[1] > MAX_SPEED_ERROR * p["stiction_velocity"]
+
+
+def comparison_run(case: Case, solution: Solution, timeout: float) -> Solution:
+    """Return another run of a case, by which a run's errors are estimated.
+
+    For a run with no looser one before it. A tighter run; at the tightest tolerance a looser one.
+    Where explicit steps may run over friction, it is a run by the stiff method.
+    """
+    tighter = companion_rtol(solution.p, solution.rtol)
+    if tighter is not None:
+        return run_at_tolerance(case, tighter, timeout, moves_body(case))
+    if overruns_friction(solution.p, solution.rtol):
+        stiff = replace(case, solve=replace(case.solve, method="RODAS"))
+        return run_at_tolerance(stiff, solution.rtol / STIFF_TIGHTER, timeout, moves_body(case))
+    return run_at_tolerance(case, 10.0 * solution.rtol, timeout, moves_body(case))
+
+
+def looser_comparison_run(
+    case: Case, solution: Solution, other: Solution, timeout: float
+) -> Solution | None:
+    """Return a looser run, by which errors are estimated as well where the motion enlarges them.
+
+    other: its `comparison_run`. None where there is no need, or the run does not reach its end.
+    """
+    if other.reason or not is_amplified(solution.rtol, distances(solution.samples, other.samples)):
+        return None
+    looser = run_at_tolerance(case, LOOSER_FACTOR * solution.rtol, timeout, moves_body(case))
+    return None if looser.reason else looser
+
+
+def estimate_errors(solution: Solution, *others: Solution) -> None:
+    """Write a run's error bars and the errors of its time series, by other runs of its case.
+
+    The longest by any of them; inf without one that reached its end.
+    """
+    for one in others:
+        one.companions = ()  # so that the runs of a long search are not all in memory
+    solution.companions = others
+    residual = energy_residual(solution.trajectory.tally)
+    switching = switch_errors(
+        solution.p, solution.metrics, solution.trajectory.tally, solution.rtol
+    )
+    companions = [compare_with_run(solution, one) for one in others if not one.reason]
+    runs: list[Companion | None] = [*companions] or [None]
+    found = [bars(solution.metrics, one, residual, switching) for one in runs]
+    solution.bars = longest_bars(found)
+    solution.series_errors = longest_bars([series_errors(one) for one in runs])
+
+
+def compare_with_run(solution: Solution, other: Solution) -> Companion:
+    """Return the `Companion` of a run: another one, which reached its end, and their distances."""
+    apart = distances(solution.samples, other.samples)
+    return Companion(other.metrics, other.rtol / solution.rtol, apart)

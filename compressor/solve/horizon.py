@@ -17,8 +17,8 @@ import numpy as np
 from compressor.cases import Case
 from compressor.physics import COLUMNS, Column, Coordinate, is_featured, observe_all
 from compressor.reasons import Reason
-from compressor.solve.attempts import integrate
 from compressor.solve.request import Request, Trajectory
+from compressor.solve.run import integrate
 from compressor.solve.si_record import initial_state, is_ideal, record
 
 SHIFT = 1e-9  # of the clearance: how far from the motion the other one starts

@@ -17,16 +17,17 @@ import numpy as np
 
 from compressor.cases import ACCURACY, Case
 from compressor.metrics import METRICS
-from compressor.solve.attempts import Solution, is_sampled, run_at_tolerance, times_of
-from compressor.solve.error_bars import Metrics, relative_bar
+from compressor.solve.error_bars import relative_bar
 from compressor.solve.horizon import Search
 from compressor.solve.request import (
     SAME_TIME,
     Cuts,
+    Metrics,
     Turns,
     merge_turns,
     revolutions,
 )
+from compressor.solve.run import Solution, is_sampled, run_at_tolerance, times_of
 from compressor.solve.run_metrics import metrics
 from compressor.solve.series import compared_per_rev, distances
 from compressor.solve.si_record import is_ideal, record

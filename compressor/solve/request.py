@@ -1,17 +1,16 @@
 """What an integration takes and gives, why it stops, and its tally by revolutions."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from compressor.cases import IMPLAUSIBLE
 from compressor.physics import (
     FLOWS,
-    LAST_STEPS,
     STALLED,
     Coordinate,
     Fields,
@@ -24,6 +23,7 @@ from compressor.physics import (
 )
 from compressor.reasons import Reason
 
+Metrics = dict[str, Any]  # by name: a number, or an array over joints (and axes)
 Turns = list[np.record]  # tallies, of one revolution each
 SUMS = (
     "seconds", "steady_seconds", "square_acceleration", "square_deviation", "crank_torque",
@@ -110,9 +110,6 @@ def with_edge(
     return edges, np.concatenate((phases[:i], phases[i - 1 : i], phases[i:])), time
 
 
-NONE = -1  # in place of a number of the state
-
-
 def passed_time(p: np.record, times: Any, states: np.ndarray) -> Any:
     """Return the time (s) that has passed when the crank is where a steady one were at these times.
 
@@ -148,25 +145,13 @@ class Request:
         return read_fields(self.p)
 
 
-@dataclass
-class History:
-    """The last steps before a stop, each attempt one entry; error: over its tolerance."""
+class LastStep(NamedTuple):
+    """An attempt of a step, of the last ones before a stop."""
 
-    times: list[float] = field(default_factory=list)  # s, where they begin
-    steps: list[float] = field(default_factory=list)  # s
-    errors: list[float] = field(default_factory=list)
-    words: list[str] = field(default_factory=list)  # method, and what became of the step
-    dominant: int = NONE  # number of the state that drove the last error, or went bad
-
-    def add(self, time: float, step: float, error: float, words: str) -> None:
-        """Append an attempt; more than LAST_STEPS push out the first."""
-        self.times.append(time)
-        self.steps.append(step)
-        self.errors.append(error)
-        self.words.append(words)
-        column: list
-        for column in (self.times, self.steps, self.errors, self.words):
-            del column[:-LAST_STEPS]
+    time: float  # s, where it begins
+    length: float  # s
+    error: float  # over its tolerance; nan where that is not known
+    words: str  # method, and what became of the step
 
 
 @dataclass
@@ -185,7 +170,7 @@ class Trajectory:
     detail: str = ""
     stop_time: float = math.nan
     stop_state: np.ndarray = field(default_factory=lambda: np.empty(0))
-    history: History = field(default_factory=History)  # the last steps before a stop
+    last_steps: Iterable[LastStep] = ()  # before a stop
     segments: tuple[np.ndarray, np.ndarray] | None = None  # edges and phases, as run through
     steps: int = 0
     rejected: int = 0

@@ -7,6 +7,7 @@ reports success with nan, and its Runge-Kutta methods hang on inf.
 
 import math
 import time
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from compressor.physics import (
     COLUMNS,
     FLOWS,
+    LAST_STEPS,
     Column,
     approach_at,
     derivative_with_flows,
@@ -25,6 +27,7 @@ from compressor.reasons import Reason
 from compressor.solve.dense_tally import find_missed_contact, tally_steps
 from compressor.solve.request import (
     Cuts,
+    LastStep,
     Request,
     Stop,
     Trajectory,
@@ -73,6 +76,7 @@ class ScipyRun:
         self.request, self.result, self.settle, self.p = request, result, settle, request.p
         self.phase, self.bad, self.last = 0, 0, (0.0, request.start)
         self.deadline = time.monotonic() + request.timeout
+        self.steps = result.last_steps = deque(maxlen=LAST_STEPS)
         self.deepest = greatest_depth(request.fields)[0]
         # by joint whose law reads the speed at which bodies meet: whether they have met
         joints = np.flatnonzero((self.p["clearance"] > 0.0) & (self.p["hysteresis"] != 0.0))
@@ -104,11 +108,10 @@ class ScipyRun:
         if t == last[0]:
             return 1.0
         if not np.isfinite(z).all():
-            result.history.dominant = int(np.flatnonzero(~np.isfinite(z))[0])
             raise Stop(Reason.NON_FINITE, "the state is no longer finite")
         result.stop_time, result.stop_state, result.steps = t, z[:-FLOWS].copy(), result.steps + 1
         since, now = (float(passed_time(self.p, *at)) for at in (last, self.last))
-        result.history.add(since, now - since, math.nan, f"{self.request.method} taken")
+        self.steps.append(LastStep(since, now - since, math.nan, f"{self.request.method} taken"))
         row = self.observe(np.array([t]), z[:, None])[0]
         tally_energy(row, z[-FLOWS:].copy(), result.tally)
         self.check_depth(row[Column.PENETRATION : Column.NORMAL].max())
@@ -155,7 +158,7 @@ class ScipyRun:
             t, z, bound = path.t[reached], path.y[:, reached].copy(), path.t[-1] if met else end
             if met:  # beyond, the law has another speed: the step is taken again, up to there
                 result.steps, result.rejected = result.steps - 1, result.rejected + 1
-                result.history.words[-1] = f"{request.method} cut at an onset"
+                self.steps[-1] = self.steps[-1]._replace(words=f"{request.method} cut at an onset")
             for joint in meeting:
                 self.touches[joint] = not self.touches[joint]
                 if self.touches[joint]:

@@ -9,12 +9,11 @@ import numpy as np
 from compressor.cases import MODEL_VERSION, Case, back_action, require_case
 from compressor.metrics import SERIES
 from compressor.outcome import DatasetParts, Outcome, row, without_run, word_variables
-from compressor.physics import FLOWS, is_featured, state_names
+from compressor.physics import is_featured, state_names
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
-from compressor.solve.attempts import Solution
-from compressor.solve.error_bars import Metrics
-from compressor.solve.request import NONE, Trajectory, last_state, passed_time
+from compressor.solve.request import Metrics, Trajectory, last_state, passed_time
+from compressor.solve.run import Solution
 from compressor.solve.run_metrics import ledger
 from compressor.solve.series import SIGNALS, block, features, finer, rows_of, signals
 from compressor.solve.solution import solve
@@ -293,18 +292,16 @@ def stop_time(p: np.record, run: Trajectory) -> float:
 def stop_attributes(case: Case, solution: Solution) -> dict[str, object]:
     """Return where a run stopped, in which state, and how its last steps went."""
     trajectory = solution.trajectory
-    history, names = trajectory.history, state_names(solution.p)
-    flows = ("energy flow, J",) * FLOWS
+    last, names = trajectory.last_steps, state_names(solution.p)
     return {
         "stop_time": stop_time(solution.p, trajectory),
         "stop_crank_angle": case.omega * trajectory.stop_time,
         "stop_state": trajectory.stop_state,
         "stop_state_names": "; ".join(names),
-        "stop_dominant": "" if history.dominant == NONE else (names + flows)[history.dominant],
-        "stop_history_time": np.array(history.times),
-        "stop_history_step": np.array(history.steps),
-        "stop_history_error": np.array(history.errors),
-        "stop_history_words": "; ".join(history.words),
+        "stop_history_time": np.array([one.time for one in last]),
+        "stop_history_step": np.array([one.length for one in last]),
+        "stop_history_error": np.array([one.error for one in last]),
+        "stop_history_words": "; ".join(one.words for one in last),
     }
 
 

@@ -5,19 +5,11 @@ import math
 from compressor.cases import TIGHTEST, Case
 from compressor.outcome import Regime
 from compressor.reasons import Reason
-from compressor.solve.attempts import (
-    Solution,
+from compressor.solve.error_bars import (
     comparison_run,
     estimate_errors,
-    is_sampled,
     looser_comparison_run,
-    run_at_tolerance,
-)
-from compressor.solve.error_bars import (
-    allowed_residual,
-    energy_residual,
     missed_targets,
-    next_audit_rtol,
     ratio_of,
     relative_bar,
 )
@@ -29,7 +21,14 @@ from compressor.solve.regime import (
     with_span,
 )
 from compressor.solve.request import Cuts, revolutions
-from compressor.solve.run_metrics import chaotic_bars, statistics
+from compressor.solve.run import Solution, is_sampled, run_at_tolerance
+from compressor.solve.run_metrics import (
+    allowed_residual,
+    chaotic_bars,
+    energy_residual,
+    next_audit_rtol,
+    statistics,
+)
 
 OUT_OF_BUDGET = (
     Reason.BUDGET_STEPS,

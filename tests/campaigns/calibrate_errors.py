@@ -18,8 +18,8 @@ from random_cases import strangers
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
-from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.error_bars import TIGHTER_DISTANCE_FACTOR, Companion, bars, closeness
+from compressor.solve.run import run_at_tolerance
 from compressor.solve.series import distances
 
 SEEDS = (101, 102, 103)

@@ -20,8 +20,8 @@ from compressor.analysis.runs import FAULTS
 from compressor.cases.case import Case
 from compressor.cases.groups import Contact
 from compressor.report.figures.pictures import render
-from compressor.solve.attempts import run_at_tolerance
-from compressor.solve.error_bars import allowed_residual
+from compressor.solve.run import run_at_tolerance
+from compressor.solve.run_metrics import allowed_residual
 from compressor.solve.simulate import simulate, with_series
 from compressor.studies.tradeoff.work_precision import (
     REFERENCES,

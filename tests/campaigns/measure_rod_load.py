@@ -19,7 +19,7 @@ import numpy as np
 from compressor.cases.case import Case
 from compressor.physics import exact_motion, segments
 from compressor.physics.tally import ROD_LOAD
-from compressor.solve.attempts import build_request, closed_form, integrate, times_of
+from compressor.solve.run import build_request, closed_form, integrate, times_of
 from compressor.solve.series import rows_of
 from compressor.solve.si_record import is_ideal, record
 from compressor.solve.simulate import measure

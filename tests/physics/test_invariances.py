@@ -20,8 +20,8 @@ from compressor.metrics import METRICS
 from compressor.physics.motion import derivative, start
 from compressor.physics.observe import COLUMNS, Column, observe_all
 from compressor.physics.record import FREEDOMS, derive
-from compressor.solve.attempts import integrate
 from compressor.solve.request import Request
+from compressor.solve.run import integrate
 from compressor.solve.si_record import offsets, record, scene
 from compressor.solve.simulate import measure
 from compressor.store.reader import read_job, read_store

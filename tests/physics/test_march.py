@@ -15,9 +15,9 @@ from compressor.physics.record import FREEDOMS
 from compressor.physics.runge_kutta import FLOWS
 from compressor.physics.step_control import Mode
 from compressor.physics.tally import new_tally
-from compressor.solve import march_driver
-from compressor.solve.attempts import integrate
+from compressor.solve import run as run_module
 from compressor.solve.request import Request
+from compressor.solve.run import integrate
 from compressor.solve.si_record import natural_sizes, offsets, record, scene
 
 PULSES = {"load": "gas", "machine": {"rod_mass_kg": 3, "reciprocating_mass_kg": 6}}
@@ -43,7 +43,7 @@ def accelerations(found, p):
 def test_chunks_change_nothing(joint, monkeypatch):
     asked = request(1e-5, 0.12, joint=joint)
     whole = integrate(asked)
-    monkeypatch.setattr(march_driver, "CHUNK", 7)
+    monkeypatch.setattr(run_module, "CHUNK", 7)
     chunked = integrate(asked)
     assert chunked.states.tobytes() == whole.states.tobytes()
     assert chunked.tally.tobytes() == whole.tally.tobytes()

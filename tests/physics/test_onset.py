@@ -48,8 +48,8 @@ from compressor.physics.onset import (
 from compressor.physics.record import FREEDOMS, SMALL_END
 from compressor.physics.runge_kutta import FLOWS, STAGES, interpolate, take_step
 from compressor.physics.tally import new_tally
-from compressor.solve.march_driver import COMPILED as METHODS
-from compressor.solve.march_driver import CONTACT_STEP
+from compressor.solve.run import COMPILED as METHODS
+from compressor.solve.run import CONTACT_STEP
 from compressor.solve.si_record import (
     initial_state,
     length_and_speed,

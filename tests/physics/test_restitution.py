@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from compressor.cases.case import Case
 from compressor.physics.contact_laws import HYSTERESIS, Law
 from compressor.physics.record import CARRIED
-from compressor.solve.attempts import run_at_tolerance
+from compressor.solve.run import run_at_tolerance
 
 EACH = [(law, e, out) for law, many in GIVEN.items() for e, out in zip(ASKED, many, strict=True)]
 pytestmark = pytest.mark.compiled

@@ -5,11 +5,11 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
-from compressor.solve import attempts
-from compressor.solve.error_bars import (
+from compressor.solve import run as run_module
+from compressor.solve.run_metrics import (
     MAX_AUDIT_REPEATS,
     MAX_RESIDUAL,
-    ROUNDING,
+    MIN_RESIDUAL,
     allowed_residual,
     energy_residual,
 )
@@ -32,7 +32,7 @@ def case(**solve):
 def unbalance(monkeypatch):
     """Runs with an energy imbalance of so many times what their case allows."""
     asked = []
-    original = attempts.integrate
+    original = run_module.integrate
 
     def made(*times):
         def run(request):
@@ -44,7 +44,7 @@ def unbalance(monkeypatch):
                 found.tally.worst_imbalance *= ratio
             return found
 
-        monkeypatch.setattr(attempts, "integrate", run)
+        monkeypatch.setattr(run_module, "integrate", run)
         return asked
 
     return made
@@ -55,7 +55,7 @@ def test_what_is_allowed_follows_the_tolerance():
     assert allowed_residual(1e-6, 0.25) == pytest.approx(
         1e-5
     )  # an impact costs as much in a short run
-    assert (allowed_residual(1e-13, 4), allowed_residual(1e-2, 4)) == (ROUNDING, MAX_RESIDUAL)
+    assert (allowed_residual(1e-13, 4), allowed_residual(1e-2, 4)) == (MIN_RESIDUAL, MAX_RESIDUAL)
 
 
 @pytest.mark.parametrize("damping", [5000, 20000])
@@ -141,15 +141,15 @@ def test_an_imbalance_that_is_not_a_number_does_not_pass(unbalance):
 )
 def test_a_repetition_that_does_not_end_says_so(solve, reason, unbalance, monkeypatch):
     unbalance(5)
-    run = attempts.integrate
+    run = run_module.integrate
 
     def slow(request):
         if request.rtol < 5e-6 and reason == "budget_seconds":
             request.max_steps, request.timeout = 10**6, 0.0
         return run(request)
 
-    monkeypatch.setattr(attempts, "integrate", slow)
-    monkeypatch.setattr("compressor.solve.march_driver.CHUNK", 100)
+    monkeypatch.setattr(run_module, "integrate", slow)
+    monkeypatch.setattr("compressor.solve.run.CHUNK", 100)
     found = measure(case(rtol=1e-5, **solve))
     assert found.reason == reason
     assert "; the next run: more than " in found.detail

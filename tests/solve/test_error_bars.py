@@ -9,7 +9,8 @@ from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.parameter import ACCURACY, first_tolerance
 from compressor.metrics import METRICS, NUMBERS, SERIES, Bar, Metric
-from compressor.solve import attempts
+from compressor.solve import error_bars
+from compressor.solve import run as run_module
 from compressor.solve.error_bars import (
     FLOOR,
     LOOSER,
@@ -191,8 +192,8 @@ def test_the_run_that_errors_are_estimated_by(rtol, other):
     """A tighter one; by the stiff method where explicit steps may mislead; looser at the end."""
     given = {"duration_rev": 0.25, "settle_rev": 0, "rtol": rtol}
     case = Case.from_values({**BOTH, "solve": given})
-    found = attempts.run_at_tolerance(case, rtol, 60.0, False)
-    assert attempts.comparison_run(case, found, 60.0).rtol == pytest.approx(other)
+    found = run_module.run_at_tolerance(case, rtol, 60.0, False)
+    assert error_bars.comparison_run(case, found, 60.0).rtol == pytest.approx(other)
 
 
 LOOSE = {
@@ -214,9 +215,9 @@ def test_where_explicit_steps_overrun_friction_the_stiff_partner_estimates_the_e
         for how in ({"rtol": rtol}, {"rtol": 1e-7, "method": "RODAS"})
     )
     found, truth = solve(case), solve(sure)
-    assert attempts.overruns_friction(found.p, rtol)
-    again = attempts.run_at_tolerance(case, rtol, 60.0, False)
-    attempts.estimate_errors(again, attempts.run_at_tolerance(case, other, 60.0, False))
+    assert error_bars.overruns_friction(found.p, rtol)
+    again = run_module.run_at_tolerance(case, rtol, 60.0, False)
+    error_bars.estimate_errors(again, run_module.run_at_tolerance(case, other, 60.0, False))
     name = "rms_acceleration_deviation"
     error = abs(found.metrics[name] - truth.metrics[name])
     assert error > 10 * again.bars[name]
@@ -229,22 +230,22 @@ def test_friction_is_overrun_by_a_tolerance_of_speeds_or_a_loose_one():
         for speed in (10, 0.1)
     )
     free = record(Case.from_values({**BOTH, "friction": False}))
-    assert [attempts.overruns_friction(p, 1e-5) for p in (usual, slow, free)] == [0, 1, 0]
-    assert [attempts.overruns_friction(p, 1e-7) for p in (usual, slow, free)] == [0, 0, 0]
-    assert [attempts.overruns_friction(p, 3e-4) for p in (usual, slow, free)] == [1, 1, 1]
+    assert [error_bars.overruns_friction(p, 1e-5) for p in (usual, slow, free)] == [0, 1, 0]
+    assert [error_bars.overruns_friction(p, 1e-7) for p in (usual, slow, free)] == [0, 0, 0]
+    assert [error_bars.overruns_friction(p, 3e-4) for p in (usual, slow, free)] == [1, 1, 1]
 
 
 def test_a_metric_added_to_the_table_has_error_bars(monkeypatch):
     """Without shares of its own it gets the default ones."""
-    given = attempts.metrics
+    given = run_module.metrics
     monkeypatch.setitem(NUMBERS, "loss", Metric("loss", (), "J", "a toy metric", "velocity"))
     monkeypatch.setattr(
-        attempts, "metrics", lambda p, tally: given(p, tally) | {"loss": tally["contact_work"]}
+        run_module, "metrics", lambda p, tally: given(p, tally) | {"loss": tally["contact_work"]}
     )
     how = {"duration_rev": 0.5, "settle_rev": 0, "rtol": 1e-5}
     case = Case.from_values({**BOTH, "solve": how})
     found = solve(case)
-    tighter = attempts.comparison_run(case, found, 60.0)
+    tighter = error_bars.comparison_run(case, found, 60.0)
     apart = abs(found.metrics["loss"] - tighter.metrics["loss"])
     assert 0 < Bar().own * apart <= found.bars["loss"] < 0.5 * found.metrics["loss"]
 
@@ -268,7 +269,7 @@ def test_a_failed_run_has_no_bars():
 @pytest.mark.parametrize("load", ["spring", "gas", "none"])
 def test_bars_of_the_ideal_machine_cover_its_quadrature(load):
     found = measure(Case.from_values({"load": load, "solve": SHORT}))
-    truth = attempts.run_at_tolerance(
+    truth = run_module.run_at_tolerance(
         Case.from_values({"load": load, "solve": SHORT}), 1e-12, 60.0, True
     ).metrics
     # means of both signs may come to nothing: sums of the forces are rounded as the BLAS likes

@@ -10,7 +10,7 @@ from compressor.cases.case import Case
 from compressor.cases.groups import METHODS
 from compressor.cases.parameter import ACCURACY
 from compressor.physics.record import FREEDOMS
-from compressor.solve.march_driver import CHUNK, COMPILED, with_edge
+from compressor.solve.run import CHUNK, COMPILED, with_edge
 from compressor.solve.si_record import absolute_tolerances, record, scene
 from compressor.solve.simulate import measure, simulate
 

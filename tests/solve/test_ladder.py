@@ -11,7 +11,8 @@ from compressor.cases.case import Case
 from compressor.cases.parameter import ACCURACY, TIGHTEST, first_tolerance
 from compressor.metrics import METRICS, SERIES
 from compressor.physics import Column
-from compressor.solve import attempts, solution
+from compressor.solve import error_bars, solution
+from compressor.solve import run as run_module
 from compressor.solve.error_bars import (
     AMPLIFIED_FACTOR,
     ORDER,
@@ -52,9 +53,9 @@ def of(values, **solve):
 def asked(monkeypatch):
     """The tolerances of the runs that are made."""
     rtols = []
-    original = attempts.integrate
+    original = run_module.integrate
     monkeypatch.setattr(
-        attempts, "integrate", lambda request: rtols.append(request.rtol) or original(request)
+        run_module, "integrate", lambda request: rtols.append(request.rtol) or original(request)
     )
     return rtols
 
@@ -70,7 +71,7 @@ def settled(found):
 def test_a_run_that_keeps_its_promise_takes_two(asked):
     found = measure(of(BOTH, accuracy="standard"))
     rtol = ACCURACY["standard"].rtol
-    assert asked == pytest.approx([rtol, rtol / attempts.TIGHTER_FACTOR])
+    assert asked == pytest.approx([rtol, rtol / error_bars.TIGHTER_FACTOR])
     assert (found.status, found.attributes["promise"]) == ("ok", "kept")
     assert found.attributes["rtol"] == rtol
     assert 0 < found.numbers["acceleration_error"] <= ACCURACY["standard"].promise
@@ -83,7 +84,7 @@ def test_an_ill_conditioned_case_is_run_tighter_until_it_keeps_its_word(word, as
     tier = ACCURACY[word]
     *_, now, beside = asked
     assert found.attrs["rtol"] == now < 0.11 * tier.rtol
-    assert beside == pytest.approx(now / attempts.TIGHTER_FACTOR)
+    assert beside == pytest.approx(now / error_bars.TIGHTER_FACTOR)
     exact = settled(simulate(of(ILL, rtol=1e-11, error_bars=False)))
     first = settled(simulate(of(ILL, rtol=tier.rtol, error_bars=False)))
     first_error, error = (
@@ -116,13 +117,13 @@ def test_where_errors_are_enlarged_a_looser_run_is_asked_as_well(asked):
     """Of both the longest bars count."""
     rtol, case = 1e-5, of(ILL, rtol=1e-5)
     found = solve(case)
-    expected = [rtol, rtol / attempts.TIGHTER_FACTOR, rtol * attempts.LOOSER_FACTOR]
+    expected = [rtol, rtol / error_bars.TIGHTER_FACTOR, rtol * error_bars.LOOSER_FACTOR]
     assert asked == pytest.approx(expected)
-    again, *others = (attempts.run_at_tolerance(case, one, 60.0, False) for one in expected)
+    again, *others = (run_module.run_at_tolerance(case, one, 60.0, False) for one in expected)
     assert is_amplified(rtol, distances(again.samples, others[0].samples))
     by_each = []
     for other in others:
-        attempts.estimate_errors(again, other)
+        error_bars.estimate_errors(again, other)
         by_each.append(again.bars | again.series_errors)
     for name, bar in (found.bars | found.series_errors).items():
         np.testing.assert_array_equal(bar, np.maximum(*(one[name] for one in by_each)))
@@ -133,8 +134,8 @@ def test_runs_that_agree_by_chance_keep_no_promise(monkeypatch, asked):
 
     def lucky(case, solution, timeout):
         if solution.rtol < ACCURACY["draft"].rtol:
-            return attempts.comparison_run(case, solution, timeout)
-        other = replace(solution, rtol=solution.rtol / attempts.TIGHTER_FACTOR)
+            return error_bars.comparison_run(case, solution, timeout)
+        other = replace(solution, rtol=solution.rtol / error_bars.TIGHTER_FACTOR)
         much = 1.2 * AMPLIFIED_FACTOR * solution.rtol**ORDER
         other.samples = solution.samples.copy()
         other.samples[:, Column.ACCELERATION] *= 1.0 + much
@@ -144,7 +145,7 @@ def test_runs_that_agree_by_chance_keep_no_promise(monkeypatch, asked):
     monkeypatch.setattr(solution, "comparison_run", lucky)
     found = solve(alone)
     first = ACCURACY["draft"].rtol
-    assert asked[:2] == pytest.approx([first, first * attempts.LOOSER_FACTOR])
+    assert asked[:2] == pytest.approx([first, first * error_bars.LOOSER_FACTOR])
     assert len(asked) > 2
     assert min(asked) < 0.11 * first
     assert found.promise == "kept"
@@ -171,14 +172,14 @@ def test_later_runs_that_agree_by_chance_keep_no_promise(
     found = solve(case)
     assert found.promise == "kept" or found.regime == "chaotic"
     if found.promise == "kept":
-        exact = attempts.run_at_tolerance(case, TIGHTEST, 60.0, False)
+        exact = run_module.run_at_tolerance(case, TIGHTEST, 60.0, False)
         assert distances(exact.samples, found.samples)["acceleration"] <= case.promise
 
 
 def test_each_run_has_a_tighter_one_beside_it_and_the_one_before(asked):
     found = solve(of(ILL, accuracy="standard"))
     pairs = np.reshape([rtol for rtol in asked if rtol <= ACCURACY["standard"].rtol], (-1, 2))
-    np.testing.assert_allclose(pairs[:, 1], pairs[:, 0] / attempts.TIGHTER_FACTOR)
+    np.testing.assert_allclose(pairs[:, 1], pairs[:, 0] / error_bars.TIGHTER_FACTOR)
     assert (pairs[1:, 0] <= pairs[:-1, 0] / MIN_TIGHTENING * 1.01).all()
     beside, before = found.companions
     assert (found.rtol, beside.rtol, before.rtol) == pytest.approx((*pairs[-1], pairs[-2, 0]))
@@ -187,19 +188,19 @@ def test_each_run_has_a_tighter_one_beside_it_and_the_one_before(asked):
 def test_a_witness_that_fails_is_not_heard(monkeypatch):
     case = of(ILL, rtol=1e-5)
     two = (
-        attempts.run_at_tolerance(case, 1e-5, 60.0, False),
-        attempts.run_at_tolerance(case, 4e-6, 60.0, False),
+        run_module.run_at_tolerance(case, 1e-5, 60.0, False),
+        run_module.run_at_tolerance(case, 4e-6, 60.0, False),
     )
-    assert attempts.looser_comparison_run(case, *two, 60.0) is not None
-    original = attempts.run_at_tolerance
+    assert error_bars.looser_comparison_run(case, *two, 60.0) is not None
+    original = error_bars.run_at_tolerance
     monkeypatch.setattr(
-        attempts,
+        error_bars,
         "run_at_tolerance",
         lambda *asked: replace(original(*asked), reason="step_underflow"),
     )
-    assert attempts.looser_comparison_run(case, *two, 60.0) is None
+    assert error_bars.looser_comparison_run(case, *two, 60.0) is None
     assert (
-        attempts.looser_comparison_run(case, two[0], replace(two[1], reason="non_finite"), 60.0)
+        error_bars.looser_comparison_run(case, two[0], replace(two[1], reason="non_finite"), 60.0)
         is None
     )
 
@@ -222,7 +223,7 @@ def test_a_budget_that_ends_a_tighter_run_is_told():
 
 
 def test_a_failed_companion_leaves_errors_unknown(monkeypatch):
-    original = attempts.integrate
+    original = run_module.integrate
 
     def failing(request):
         found = original(request)
@@ -230,7 +231,7 @@ def test_a_failed_companion_leaves_errors_unknown(monkeypatch):
             found.reason, found.detail = "step_underflow", "made to fail"
         return found
 
-    monkeypatch.setattr(attempts, "integrate", failing)
+    monkeypatch.setattr(run_module, "integrate", failing)
     found = measure(of(BOTH, **SHORT, rtol=1e-5))
     assert found.status == "ok"
     for name in (f"{one}_error" for one in (*METRICS, *SERIES)):

@@ -1,4 +1,4 @@
-"""What is kept of a run that stops: where, in which state, driven by what, and its last steps."""
+"""What is kept of a run that stops: where, in which state, and its last steps."""
 
 import math
 
@@ -8,10 +8,8 @@ import pytest
 from compressor.cases.case import Case
 from compressor.cases.groups import METHODS
 from compressor.physics import LAST_STEPS
-from compressor.physics.record import STATE_NAMES, Scene
-from compressor.solve import march_driver
-from compressor.solve.attempts import integrate
-from compressor.solve.march_driver import COMPILED
+from compressor.solve import run as run_module
+from compressor.solve.run import COMPILED, integrate
 from compressor.solve.simulate import measure, simulate
 
 BOTH = {"joint": "both", "clearance_mm": 0.3}
@@ -58,7 +56,7 @@ def test_a_history_is_that_of_the_run(method, monkeypatch):
     """Looked at step by step from the start, or only from the last chunk on: the same."""
     solve = {"max_steps": 300, "method": method}
     found = stopped(solve=solve)
-    monkeypatch.setattr(march_driver, "CHUNK", 40)
+    monkeypatch.setattr(run_module, "CHUNK", 40)
     again = stopped(solve=solve)
     for name in ("time", "step", "error"):
         assert again[f"stop_history_{name}"].tolist() == found[f"stop_history_{name}"].tolist()
@@ -71,15 +69,15 @@ def test_a_history_is_that_of_the_run(method, monkeypatch):
 def test_the_errors_are_those_that_the_control_saw(monkeypatch):
     """After a step that is taken the control remembers the logarithm of its error's norm."""
     now = []
-    original = march_driver.read_history
+    original = run_module.read_last_steps
 
     def looking(stepper, work):
         now.append(float(stepper.error))
         return original(stepper, work)
 
-    monkeypatch.setattr(march_driver, "read_history", looking)
-    history = integrate(simulate_request(max_steps=60)).history
-    last = [e for e, text in zip(history.errors, history.words, strict=True) if "taken" in text][-1]
+    monkeypatch.setattr(run_module, "read_last_steps", looking)
+    steps = integrate(simulate_request(max_steps=60)).last_steps
+    last = [one.error for one in steps if "taken" in one.words][-1]
     assert math.log(max(last, 1e-4)) == pytest.approx(now[0], abs=1e-9)
 
 
@@ -91,14 +89,13 @@ def simulate_request(max_steps):
     p, y = record(case), np.zeros(8)
     start(offsets(case), y, p)
     times = np.array([0.0, case.duration])
-    return march_driver.Request(p, y, times, 0.0, case.rtol, max_steps=max_steps)
+    return run_module.Request(p, y, times, 0.0, case.rtol, max_steps=max_steps)
 
 
-def test_what_is_not_finite_is_named():
+def test_a_step_that_leaves_the_numbers_is_refused():
     gas = {"head_clearance_mm": 0.601, "switching": "exact"}
     solve = {"duration_rev": 1.25, "accuracy": "draft"}
     found = simulate(Case.from_values({**BOTH, "load": "gas", "gas": gas, "solve": solve}))
-    assert found.attrs["stop_dominant"] in STATE_NAMES[Scene.BOTH]
     assert words(found.attrs)[-1].endswith("refused")
     assert not np.isfinite(found.attrs["stop_history_error"][-1])
 
@@ -119,7 +116,6 @@ def test_each_rate_of_a_stopped_state_has_a_name_of_its_own(values, rates):
     names = attributes["stop_state_names"].split("; ")
     assert len(names) == len(attributes["stop_state"])
     assert names[len(rates) : 2 * len(rates)] == rates
-    assert attributes["stop_dominant"] in names
 
 
 def test_a_run_that_ends_well_has_no_history():

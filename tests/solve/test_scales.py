@@ -12,7 +12,6 @@ from compressor.cases.materials import contact_stiffness
 from compressor.metrics import JOINTS
 from compressor.physics.contact_laws import Power
 from compressor.physics.step_control import STABILITY_LIMIT
-from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.cautions import (
     across,
     contact_scales,
@@ -21,6 +20,7 @@ from compressor.solve.cautions import (
     greatest_force,
 )
 from compressor.solve.request import too_deep
+from compressor.solve.run import run_at_tolerance
 from compressor.solve.si_record import record, stiffness_of
 from compressor.solve.simulate import simulate
 

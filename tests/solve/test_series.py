@@ -6,7 +6,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.metrics import NUMBERS, SERIES
 from compressor.physics import COLUMNS, Column
-from compressor.solve.attempts import run_at_tolerance
+from compressor.solve.run import run_at_tolerance
 from compressor.solve.series import (
     COMPARED_PER_REV,
     MAX_COMPARED,

@@ -9,7 +9,8 @@ from conftest import CHAOTIC
 from compressor.cases.case import Case, CaseError
 from compressor.cases.table import MAX_REV
 from compressor.metrics import METRICS
-from compressor.solve import attempts, solution
+from compressor.solve import error_bars, solution
+from compressor.solve import run as run_module
 from compressor.solve.regime import MEASURED_REV, agree, least_promise, steady
 from compressor.solve.simulate import measure, simulate
 from compressor.store.status import job_caveats
@@ -52,16 +53,16 @@ def test_a_case_settles_where_its_revolutions_agree():
 @pytest.mark.parametrize("keep", ["metrics", "series"])
 def test_no_run_is_made_twice(keep, monkeypatch):
     """The run that shows where a case settles is its first one; beside it is that of its bars."""
-    made, real = [], attempts.integrate
+    made, real = [], run_module.integrate
 
     def integrate(request):
         made.append(request.rtol)
         return real(request)
 
-    monkeypatch.setattr(attempts, "integrate", integrate)
+    monkeypatch.setattr(run_module, "integrate", integrate)
     given = Case.from_values({**PAPER, "solve": AUTO, "output": {"keep": keep}})
     assert measure(given).attributes["promise"] == "kept"
-    assert made == [given.rtol, pytest.approx(given.rtol / attempts.TIGHTER_FACTOR)]
+    assert made == [given.rtol, pytest.approx(given.rtol / error_bars.TIGHTER_FACTOR)]
 
 
 @pytest.mark.parametrize("values", [PAPER, SLOW])

@@ -5,8 +5,8 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
-from compressor.solve.attempts import run_at_tolerance
 from compressor.solve.request import Cuts, merge_turns, revolutions
+from compressor.solve.run import run_at_tolerance
 from compressor.solve.run_metrics import metrics
 
 TALLIED = ("seconds", "square_acceleration", "square_deviation", "loss_seconds", "impacts")

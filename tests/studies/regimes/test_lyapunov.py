@@ -8,9 +8,9 @@ import pytest
 from compressor.cases.case import Case
 from compressor.physics.motion import start
 from compressor.physics.record import FREEDOMS
-from compressor.solve.attempts import integrate
 from compressor.solve.horizon import PARTED_DISTANCE, SHIFT, predictability_horizon
 from compressor.solve.request import Request
+from compressor.solve.run import integrate
 from compressor.solve.si_record import natural_sizes, offsets, record, scene
 from compressor.studies.regimes import lyapunov
 from compressor.studies.regimes.lyapunov import (

@@ -9,7 +9,7 @@ from conftest import CHAOTIC
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
 from compressor.physics import Column
-from compressor.solve.attempts import run_at_tolerance
+from compressor.solve.run import run_at_tolerance
 from compressor.solve.series import rows_of
 from compressor.solve.si_record import record
 from compressor.studies.regimes.revolutions import (

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.solve.attempts import run_at_tolerance
+from compressor.solve.run import run_at_tolerance
 from compressor.solve.simulate import simulate
 from compressor.studies.regimes.group import Regimes
 from compressor.studies.regimes.revolutions import (

@@ -1,26 +1,33 @@
-"""Run a case at one tolerance, and once more to estimate its errors.
+"""Run a case at one tolerance: by the compiled march, by SciPy's methods, or in closed form.
 
-Integrate one record over time: by the compiled march, or by one of SciPy's methods. Both call the
-same right-hand side, restart at every load corner, observe each accepted step's dense solution at
-Gauss-Lobatto nodes for the metrics, and sample it on the output grid.
+All call the same right-hand side, restart at every load corner, observe each accepted step's dense
+solution at Gauss-Lobatto nodes for the metrics, and sample it on the output grid.
 """
 
 import itertools
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from compressor.cases import TIGHTEST, Case
+from compressor.cases import Case
 from compressor.physics import (
     COLUMNS,
     FLOWS,
+    LAST_STEPS,
+    Attempt,
     Load,
+    Mode,
+    Status,
+    WorkArrays,
     add_flows,
+    march,
+    new_stepper,
     new_tally,
+    new_work,
     observe_all,
     sample_segments,
     segments,
@@ -29,23 +36,31 @@ from compressor.physics import (
 )
 from compressor.reasons import Reason
 from compressor.solve.dense_tally import WEIGHTS, Observer, tally_steps
-from compressor.solve.error_bars import (
-    Companion,
+from compressor.solve.request import (
+    Cuts,
+    LastStep,
     Metrics,
-    allowed_residual,
-    bars,
-    energy_residual,
-    is_amplified,
-    longest_bars,
-    next_audit_rtol,
-    series_errors,
+    Request,
+    Stop,
+    Trajectory,
+    Turns,
+    check_state,
+    greatest_depth,
+    merge_turns,
+    overdue,
+    too_deep,
+    with_cuts,
+    with_edge,
 )
-from compressor.solve.march_driver import COMPILED, march_through
-from compressor.solve.request import Cuts, Request, Stop, Trajectory, Turns, merge_turns, overdue
-from compressor.solve.run_metrics import metrics, switch_errors
+from compressor.solve.run_metrics import (
+    allowed_residual,
+    energy_residual,
+    metrics,
+    next_audit_rtol,
+)
 from compressor.solve.scipy_driver import step_through
-from compressor.solve.series import compared_times, distances, finer, journal_distance, take_samples
-from compressor.solve.si_record import initial_state, is_ideal, length_and_speed, record
+from compressor.solve.series import compared_times, finer, journal_distance, take_samples
+from compressor.solve.si_record import contact_sizes, initial_state, is_ideal, natural_sizes, record
 
 PIECES_PER_CHECK = 256  # of the quadrature between two looks at the clock
 
@@ -118,35 +133,28 @@ def fine_grid(edges: np.ndarray, pieces: int, turn: float) -> np.ndarray:
     return np.concatenate(grids)
 
 
-def prepare_run(request: Request) -> tuple[Trajectory, np.ndarray, np.ndarray, np.ndarray]:
-    """Return what a request begins with: an empty trajectory, the load's edges and phases, z.
-
-    z: motion and flows at the start, (n + 4,).
-    """
-    edges, phases = segments(request.fields, float(request.times[-1]))
-    owner = sample_segments(request.times, edges)
-    states = np.full((request.times.size, request.start.size), math.nan)
-    tally = new_tally(request.has_rod_load)
-    result = Trajectory(request.times, states, phases[owner], tally)
-    z = np.zeros(request.start.size + FLOWS)
-    z[:-FLOWS] = request.start
-    rows = np.empty((1, COLUMNS))
-    observe_all(np.zeros(1), request.start[np.newaxis], phases[:1], request.p, rows)
-    tally_energy(rows[0], z[-FLOWS:], result.tally)
-    return result, edges, phases, z
+COMPILED = {"auto": Mode.AUTO, "TSIT5": Mode.EXPLICIT, "RODAS": Mode.STIFF}
+CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
+CHUNK = 2048  # attempts of the march between two looks at the clock: 7 ms, or stiff ones 50 ms
 
 
 def integrate(request: Request) -> Trajectory:
-    """Integrate a scene with clearance over its output grid; a run that fails is returned too."""
-    result, edges, phases, z = prepare_run(request)
+    """Integrate a motion over its output grid; a run that fails is returned too."""
+    edges, phases = segments(request.fields, float(request.times[-1]))
+    states = np.full((request.times.size, request.start.size), math.nan)
+    result = Trajectory(
+        request.times, states, phases[sample_segments(request.times, edges)],
+        new_tally(request.has_rod_load),
+    )  # fmt: skip
+    z, rows = np.append(request.start, np.zeros(FLOWS)), np.empty((1, COLUMNS))
+    observe_all(np.zeros(1), request.start[np.newaxis], phases[:1], request.p, rows)
+    tally_energy(rows[0], z[-FLOWS:], result.tally)
     began = time.perf_counter()
+    integrate_through = march_through if request.method in COMPILED else step_through
     try:
         # a trial step may leave the finite numbers; the steps taken are checked
         with np.errstate(all="ignore"):
-            if request.method in COMPILED:
-                march_through(request, result, edges, phases, z)
-            else:
-                step_through(request, result, edges, phases, z)
+            integrate_through(request, result, edges, phases, z)
     except Stop as stop:
         result.reason, result.detail = stop.reason, stop.detail
     if request.fields["load"] in (Load.GAS, Load.CYLINDER) and result.segments:
@@ -156,13 +164,84 @@ def integrate(request: Request) -> Trajectory:
     return result
 
 
+def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
+    """Integrate by the compiled loop into `result`, from motion and flows z on. Raises Stop."""
+    deadline, size = time.monotonic() + request.timeout, natural_sizes(request.fields)
+    stepper, work = prepare_stepper(request, size), new_work(size.size)
+    edges, phases, stepper["settle"] = with_edge(edges, phases, request.settle)
+    edges, phases, ends = with_cuts(edges, phases, request.cuts)
+    phases = phases.copy()  # a march writes into them where a gas is shut in
+    result.segments = edges, phases
+    while stepper.status == Status.RUNNING:
+        left = request.max_steps - result.steps - result.rejected
+        count = ends[0] if ends else phases.size
+        march(
+            stepper, request.p, z, work, request.rtol * size, size, edges[: count + 1],
+            phases[:count], request.times, result.states, result.tally, min(CHUNK, left),
+        )  # fmt: skip
+        result.steps, result.rejected = int(stepper.steps), int(stepper.rejected)
+        result.evaluations = int(stepper.evaluations)
+        if stepper.status == Status.DONE and ends and request.cuts:
+            del ends[0]
+            if request.cuts.cut(result.tally, z) and stepper.segment < phases.size:
+                stepper.status = Status.RUNNING
+        if stepper.status == Status.DONE:
+            return
+        try:
+            check_march(request, stepper, z, float(result.tally.deepest), deadline)
+        except Stop:
+            result.stop_time, result.stop_state = float(stepper.t), z[:-FLOWS].copy()
+            result.last_steps = read_last_steps(stepper, work)
+            raise
+
+
+def prepare_stepper(request: Request, size: np.ndarray) -> np.record:
+    """Return a stepper at the start of a run by a compiled method; `size` as of `natural_sizes`."""
+    stepper = new_stepper(COMPILED[request.method])
+    stepper["rtol"] = request.rtol
+    length, speed = contact_sizes(request.fields, size)
+    stepper["watch"], stepper["contact_step"] = 1, CONTACT_STEP * length / speed
+    stepper["deepest"] = greatest_depth(request.fields)[0]
+    return stepper
+
+
+WORDS = {
+    Attempt.REFUSED: "refused", Attempt.TAKEN: "taken", Attempt.TO_ONSET: "to an onset",
+    Attempt.CUT_AT_ONSET: "cut at an onset",
+}  # fmt: skip
+
+
+def read_last_steps(stepper: np.record, work: WorkArrays) -> list[LastStep]:
+    """Return the last attempts of a march, by its ring of them."""
+    found, attempts = [], int(stepper.attempts)
+    for number in range(max(0, attempts - LAST_STEPS), attempts):
+        begin, length, error, code = work.last[number % LAST_STEPS].tolist()
+        name = "RODAS" if code >= Attempt.STIFF else "TSIT5"
+        words = f"{name} {WORDS[Attempt(int(code) % Attempt.STIFF)]}"
+        found.append(LastStep(begin, length, error, words))
+    return found
+
+
+def check_march(
+    request: Request, stepper: np.record, z: np.ndarray, deepest: float, deadline: float
+) -> None:
+    """Raise Stop where a march has stopped at z, or may go no further."""
+    status = Status(int(stepper.status))
+    check_state(request.p, z)
+    if status == Status.PENETRATION_IMPLAUSIBLE:
+        raise Stop(*too_deep(deepest, request.p))
+    if status == Status.NON_FINITE:
+        raise Stop(Reason.NON_FINITE, "the state or its rates are no longer finite")
+    if status == Status.STEP_UNDERFLOW:
+        raise Stop(Reason.STEP_UNDERFLOW, f"the step has shrunk to {stepper.h:.3g} s")
+    if stepper.steps + stepper.rejected >= request.max_steps:
+        raise Stop(Reason.BUDGET_STEPS, f"more than {request.max_steps} steps")
+    if time.monotonic() > deadline:
+        raise Stop(Reason.BUDGET_SECONDS, overdue(request.timeout))
+
+
 PIECES = 32  # of the ideal scene's quadrature, a revolution
 FINER_POWER = 0.3  # power of the tolerance by which they become more
-TIGHTER_FACTOR = 2.5  # times: the run that errors are estimated by
-OVERRUN_RTOL = 2e-4  # tolerances from which on explicit steps may run over friction's fast modes
-MAX_SPEED_ERROR = 0.02  # the same, of the journals' speed, over friction's stiction velocity
-STIFF_TIGHTER = 10.0  # the same at loose tolerances
-LOOSER_FACTOR = 3.0  # times: the third run that is compared where a motion enlarges errors
 
 
 @dataclass
@@ -244,29 +323,6 @@ def run_at_tolerance(
     return solution
 
 
-def run_until_balanced(rtol: float, run_at: Callable[[float], tuple[Solution, float]]) -> Solution:
-    """Return the first run whose energy balances, or that stops, at a tolerance or at tenths of it.
-
-    run_at: takes a tolerance, returns a run and how many revolutions it went through. If no run
-    balances, the last one has `energy_audit_failed` as its reason.
-    """
-    failures, rung = 0, rtol
-    while True:
-        run, revolutions = run_at(rung)
-        residual = energy_residual(run.trajectory.tally)
-        allowed = allowed_residual(rtol, revolutions)
-        if run.reason or residual <= allowed:
-            return run
-        failures += 1
-        below = next_audit_rtol(rung, failures)
-        if below is None:
-            break
-        rung = below
-    run.reason = Reason.ENERGY_AUDIT_FAILED
-    run.detail = f"energy residual {residual:.2g}, more than {allowed:.2g}, at rtol {rung:.2g}"
-    return run
-
-
 class Times(NamedTuple):
     """Times (s) of a run: settled; its output, its comparison; all of them."""
 
@@ -321,71 +377,24 @@ def solution_of_trajectory(
     return Solution(p, trajectory, rtol, times.settle, numbers, samples, reason, detail)
 
 
-def companion_rtol(p: np.record, rtol: float) -> float | None:
-    """Return the tolerance of a run's tighter `comparison_run` by its own method, or None."""
-    fits = rtol >= 0.99 * TIGHTER_FACTOR * TIGHTEST and not overruns_friction(p, rtol)
-    return rtol / TIGHTER_FACTOR if fits else None
+def run_until_balanced(rtol: float, run_at: Callable[[float], tuple[Solution, float]]) -> Solution:
+    """Return the first run whose energy balances, or that stops, at a tolerance or at tenths of it.
 
-
-def overruns_friction(p: np.record, rtol: float) -> bool:
-    """Return whether explicit steps may run over friction's fast modes or its change of sign.
-
-    Then two explicit runs may agree on a force that friction never has.
+    run_at: takes a tolerance, returns a run and how many revolutions it went through. If no run
+    balances, the last one has `energy_audit_failed` as its reason.
     """
-    if rtol > OVERRUN_RTOL:
-        return True
-    rubs = bool(p["friction"]) and bool(p["clearance"].any())
-    return rubs and rtol * length_and_speed(p)[1] > MAX_SPEED_ERROR * p["stiction_velocity"]
-
-
-def comparison_run(case: Case, solution: Solution, timeout: float) -> Solution:
-    """Return another run of a case, by which a run's errors are estimated.
-
-    For a run with no looser one before it. A tighter run; at the tightest tolerance a looser one.
-    Where explicit steps may run over friction, it is a run by the stiff method.
-    """
-    tighter = companion_rtol(solution.p, solution.rtol)
-    if tighter is not None:
-        return run_at_tolerance(case, tighter, timeout, moves_body(case))
-    if overruns_friction(solution.p, solution.rtol):
-        stiff = replace(case, solve=replace(case.solve, method="RODAS"))
-        return run_at_tolerance(stiff, solution.rtol / STIFF_TIGHTER, timeout, moves_body(case))
-    return run_at_tolerance(case, 10.0 * solution.rtol, timeout, moves_body(case))
-
-
-def looser_comparison_run(
-    case: Case, solution: Solution, other: Solution, timeout: float
-) -> Solution | None:
-    """Return a looser run, by which errors are estimated as well where the motion enlarges them.
-
-    other: its `comparison_run`. None where there is no need, or the run does not reach its end.
-    """
-    if other.reason or not is_amplified(solution.rtol, distances(solution.samples, other.samples)):
-        return None
-    looser = run_at_tolerance(case, LOOSER_FACTOR * solution.rtol, timeout, moves_body(case))
-    return None if looser.reason else looser
-
-
-def estimate_errors(solution: Solution, *others: Solution) -> None:
-    """Write a run's error bars and the errors of its time series, by other runs of its case.
-
-    The longest by any of them; inf without one that reached its end.
-    """
-    for one in others:
-        one.companions = ()  # so that the runs of a long search are not all in memory
-    solution.companions = others
-    residual = energy_residual(solution.trajectory.tally)
-    switching = switch_errors(
-        solution.p, solution.metrics, solution.trajectory.tally, solution.rtol
-    )
-    companions = [compare_with_run(solution, one) for one in others if not one.reason]
-    runs: list[Companion | None] = [*companions] or [None]
-    found = [bars(solution.metrics, one, residual, switching) for one in runs]
-    solution.bars = longest_bars(found)
-    solution.series_errors = longest_bars([series_errors(one) for one in runs])
-
-
-def compare_with_run(solution: Solution, other: Solution) -> Companion:
-    """Return the `Companion` of a run: another one, which reached its end, and their distances."""
-    apart = distances(solution.samples, other.samples)
-    return Companion(other.metrics, other.rtol / solution.rtol, apart)
+    failures, rung = 0, rtol
+    while True:
+        run, revolutions = run_at(rung)
+        residual = energy_residual(run.trajectory.tally)
+        allowed = allowed_residual(rtol, revolutions)
+        if run.reason or residual <= allowed:
+            return run
+        failures += 1
+        below = next_audit_rtol(rung, failures)
+        if below is None:
+            break
+        rung = below
+    run.reason = Reason.ENERGY_AUDIT_FAILED
+    run.detail = f"energy residual {residual:.2g}, more than {allowed:.2g}, at rtol {rung:.2g}"
+    return run
