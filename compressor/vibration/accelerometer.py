@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import map_coordinates
 from scipy.signal import butter, sosfilt
 
 from compressor.cases import Body, Sensor
@@ -25,7 +26,6 @@ POLES = 8  # of the anti-aliasing filter, Butterworth
 ANALOGUE_RATE_FACTOR = 8.0
 USUAL = 2.56  # sampling rate over the highest frequency of interest
 LEAD_IN = 1  # revolutions before the record, in which the low-pass filter forgets its start
-NEIGHBOURS = 32  # samples that a spline is made of for one value between them
 
 
 class RecordError(CompsimError):
@@ -107,22 +107,14 @@ def listen(
 
 
 def state_at(motion: OscillatorMotion, step: float, time: float) -> tuple[float, float]:
-    """Return displacement and velocity of a motion that repeats itself, at a time (s).
-
-    By a cubic spline through its `NEIGHBOURS` samples, beyond which hardly any counts.
-    """
-    last = len(motion.displacement) - 1
-    where = np.arange(NEIGHBOURS) + int(time // step) - NEIGHBOURS // 2
-    near = [values[where % last] for values in motion[:2]]
-    displacement, velocity = CubicSpline(where, near, axis=1)(time / step)
-    return float(displacement), float(velocity)
+    """Return displacement and velocity of a motion that repeats itself, at a time (s)."""
+    place, speed = (interpolate_periodic(values, step, np.array([time])) for values in motion[:2])
+    return place.item(), speed.item()
 
 
 def interpolate_periodic(values: np.ndarray, step: float, times: np.ndarray) -> np.ndarray:
     """Return a sampled curve that repeats itself at any times (s), by a cubic spline."""
-    where = step * np.arange(len(values))
-    spline = CubicSpline(where, np.append(values[:-1], values[0]), bc_type="periodic")
-    return spline(times % where[-1])
+    return map_coordinates(values[:-1], [times / step], order=3, mode="grid-wrap")
 
 
 def paces(sensor: Sensor, rng: np.random.Generator, times: np.ndarray, turn: float) -> np.ndarray:
