@@ -1,13 +1,12 @@
 """The numbers that are known of a finished job: names, dimensions, units and phrases.
 
 The one table of results, as `compressor.cases` has one of parameters; needs no library, so that
-case files that name a metric are read at once. A new metric is a row of `TABLE` and its value in
-`compressor.solve.run_metrics`.
+case files that name a metric are read at once. A new metric is a row of `TABLE`.
 """
 
 import math
-from collections.abc import Iterator
-from typing import Literal, NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, Literal, NamedTuple
 
 JOINTS = ("big_end", "small_end")
 AXES = ("x", "y")
@@ -61,6 +60,12 @@ class Metric(NamedTuple):
     when: str = ""  # what few jobs have, others are nan: a flag of the record, or another word
     joint: int = 0  # whose part of its series counts for a metric without that dimension, in JOINTS
     limit: float = math.nan  # above which it is a fault
+    # of source "tally": its value, from a `compressor.solve.run_metrics.Tallied`
+    made: Callable[[Any], Any] | None = None
+
+    def is_given(self, values: Any) -> bool:
+        """Return whether any of some jobs has it, by an array of values, nan where one has not."""
+        return not self.when or bool((abs(values) >= 0.0).any())
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -90,14 +95,17 @@ TABLE = (
         "peak_acceleration", (), "m/s2", "greatest |acceleration|", "acceleration",
         # a parabola between the nodes of a step finds the peak to some 5e-9
         Bar(3.0, 0.2, least=5e-9), Shown("peak acceleration", "m/s²"), kind="greatest",
+        made=lambda t: t.greatest("ACCELERATION"),
     ),
     Metric(
         "rms_acceleration", (), "m/s2", "root mean square of acceleration", "acceleration",
         Bar(3.5, 0.01), Shown("rms acceleration", "m/s²"), kind="root",
+        made=lambda t: t.root_mean_square("ACCELERATION"),
     ),
     Metric(
         "rms_acceleration_deviation", (), "m/s2", "rms of acceleration less the ideal machine's",
         "acceleration", Bar(3.5, 0.17), Shown("rms acceleration deviation", "m/s²"), kind="root",
+        made=lambda t: t.root_mean_square("DEVIATION"),
     ),
     Metric(
         # journal and bore move alike in a machine without clearance, so that it is 0 there
@@ -105,63 +113,76 @@ TABLE = (
         "force of the hardest blow of a journal on its bore over the greatest joint force; above "
         f"{KNOCKS:g} the joint knocks", "contact_force", Bar(relative=False),
         shown=Shown(f"knock (above {KNOCKS:g} it knocks)", ""), contact=True, kind="greatest",
-        limit=KNOCKS,
+        limit=KNOCKS, made=lambda t: t.ratio(t.blow, t.greatest("FORCE_SIZE", 2)),
     ),
     Metric(
         "peak_contact_force", ("joint",), "N",
         "greatest joint force on the rod, with that of an oil film", "contact_force",
         Bar(4.0, 0.1), Shown("peak contact force", "kN", 1e-3), kind="greatest",
+        made=lambda t: t.greatest("FORCE_SIZE", 2),
     ),
     Metric(
         "peak_contact_force_axis", ("joint", "axis"), "N", "greatest joint force along an axis",
         "contact_force", Bar(4.2, 0.16), kind="greatest",
+        made=lambda t: t.greatest("FORCE", 2, 2),
     ),
     Metric(
         "max_penetration", ("joint",), "m", "greatest penetration; negative: never touched",
         "penetration", Bar(4.0, 0.04), Shown("max penetration", "µm", 1e6), True, "greatest",
+        made=lambda t: t.max_penetration,
     ),
     Metric(
         # an oil film bears without it: a share of 1 is a full film, and no disaster
         "contact_loss_fraction", ("joint",), "1", "share of time without dry contact (F_N = 0)",
         "penetration", Bar(1.5, 0.01, False), Shown("time without dry contact", "%", 1e2), True,
+        made=lambda t: t.loss_seconds / t.seconds,
     ),
     Metric(
         "mean_crank_torque", (), "N m", "mean torque that drives the crank against the rod",
         "acceleration", Bar(4.0, 0.02, False, 1e-12),
+        made=lambda t: t.mean("CRANK_TORQUE"),
     ),
     Metric(
         "mean_guide_moment", (), "N m",
         "mean moment of the crosshead on its guide about the crank centre",
         "acceleration", Bar(4.0, 0.15, False, 1e-12),
+        made=lambda t: t.mean("GUIDE_MOMENT"),
     ),
     Metric(
         "impact_count", ("joint",), "1", "dry contacts that began after flight",
         "penetration", Bar(1.0, 0.0, False), None, True, "count",
+        made=lambda t: t.impacts,
     ),
     Metric(
         "release_count", ("joint",), "1", "contacts that began again without flight",
         "penetration", Bar(1.0, 0.0, False), None, True, "count",
+        made=lambda t: t.releases,
     ),
     Metric(
         "impacts_per_rev", ("joint",), "1/rev",
         "dry contacts in a revolution that began after flight", "penetration",
         Bar(1.0, 0.0, False), Shown("dry contacts after flight", "per rev"), True, "rate",
+        made=lambda t: t.impacts / t.revolutions,
     ),
     Metric(
         "releases_per_rev", ("joint",), "1/rev",
         "contacts in a revolution that began again without flight", "penetration",
         Bar(1.0, 0.0, False), Shown("releases", "per rev"), True, "rate",
+        made=lambda t: t.releases / t.revolutions,
     ),
     Metric(
         "rod_load_reversal_angle", (), "rad",
         "crank angle a revolution on the smaller side of the rod load",
         "contact_force", Bar(5.0, 1.0, False), Shown("rod load reversal", "°", math.degrees(1.0)),
         when="signals", joint=1,
+        # without load, as in flight, the rod is on neither side
+        made=lambda t: math.tau * t.side_seconds.min() / t.steady_seconds,
     ),
     Metric(
         "rod_load_reversal_share", (), "1",
         "peak of the smaller side of the rod load over that of the other",
         "contact_force", Bar(10.0, 0.6, False), kind="greatest", when="signals", joint=1,
+        made=lambda t: t.ratio(t.side_peak.min(), t.side_peak.max()),
     ),
     Metric(
         "peak_rod_load_tension", (), "N", "greatest pull of the rod load at the crosshead pin",
@@ -170,11 +191,13 @@ TABLE = (
         # 0.52 bars (tests/campaigns/measure_rod_load.py --seed 2026)
         "contact_force", Bar(10.0, 0.6), Shown("peak rod load, tension", "kN", 1e-3),
         kind="greatest", when="signals", joint=1,
+        made=lambda t: t.side_peak[0],
     ),
     Metric(
         "peak_rod_load_compression", (), "N", "greatest push of the rod load at the crosshead pin",
         "contact_force", Bar(10.0, 0.6), Shown("peak rod load, compression", "kN", 1e-3),
         kind="greatest", when="signals", joint=1,
+        made=lambda t: t.side_peak[1],
     ),
     *(
         Metric(name, (), unit, phrase, source="run")
@@ -275,7 +298,7 @@ def derive(row: Metric, end: str, phrase: str, dims: tuple[str, ...] = ()) -> Me
     """
     return row._replace(
         name=f"{row.name}_{end}", dims=row.dims + dims, phrase=f"{phrase} {row.name}",
-        source="statistics", when="chaotic",
+        source="statistics", when="chaotic", made=None,
     )  # fmt: skip
 
 
@@ -319,5 +342,6 @@ def every_number() -> Iterator[Metric]:
 
 
 NUMBERS = {row.name: row for row in every_number()}
-METRICS = {row.name: row for row in of_source("tally") if not row.when}  # of every run
+ALWAYS = frozenset(name for name, row in NUMBERS.items() if not row.when)  # of every job
+METRICS = {row.name: row for row in of_source("tally") if not row.when}
 BARRED = {row.name: row for row in NUMBERS.values() if row.source in ("tally", "body")}

@@ -115,8 +115,7 @@ class Outcome:
             "reason": ((), self.reason, {"long_name": "why a run failed, by a stable name"}),
         }
         for (name, metric), value in zip(NUMBERS.items(), self.numbers.item(), strict=True):
-            is_absent = np.isnan(value).all() if metric.dims else math.isnan(value)
-            if not (metric.when and is_absent):
+            if metric.is_given(np.asarray(value)):
                 named[name] = (metric.dims, value, metric.attributes)
         return named
 

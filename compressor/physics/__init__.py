@@ -52,8 +52,13 @@ from compressor.physics.systems import (
     start,
 )
 from compressor.physics.tally import (
+    GREATEST,
+    MEANS,
+    SQUARES,
     add_flows,
+    cut_tally,
     lobatto,
+    merge_tallies,
     new_tally,
     tally_energy,
     tally_step,

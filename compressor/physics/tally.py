@@ -5,6 +5,7 @@ between two output samples counts; `tally_energy` audits the energy at every ste
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,21 +14,19 @@ from compressor.physics.contact_laws import in_contact
 from compressor.physics.observe import (
     ACCELERATION,
     CRANK_POWER,
-    CRANK_TORQUE,
     DEVIATION,
     FORCE,
-    GUIDE_MOMENT,
     KINETIC,
     NORMAL,
     PACE,
     PENETRATION,
     POTENTIAL,
+    Column,
 )
 from compressor.physics.record import CHOICE, MECHANISM, zero
 
 # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAK_NEARNESS = 0.98
-PEAKED = DEVIATION - ACCELERATION  # columns whose greatest size is tallied
 ROD_LOAD = FORCE + 2  # force on the small end along x, positive in tension
 
 
@@ -46,52 +45,98 @@ def lobatto(n):
     return nodes, weights
 
 
-TALLY = np.dtype(
-    [
-        ("seconds", "f8"),  # of machine time measured
-        ("steady_seconds", "f8"),  # that a steady crank takes for the same angle
-        ("square_acceleration", "f8"),
-        ("square_deviation", "f8"),
-        ("crank_torque", "f8"),  # integrals over time, N m s
-        ("guide_moment", "f8"),
-        ("peak", "f8", (PEAKED,)),  # of the columns from ACCELERATION to JOURNAL_ACCELERATION
-        ("top", "f8", (PEAKED,)),  # the same at the present step's nodes
-        ("max_penetration", "f8", (2,)),
-        ("loss_seconds", "f8", (2,)),
-        ("impacts", "i8", (2,)),  # contacts that began after flight, the journal being off its bore
-        ("releases", "i8", (2,)),  # and those that began inside the penetration
-        ("touching", "i8", (2,)),
-        ("flown", "i8", (2,)),  # whether the journal was off its bore since the last contact
-        ("deepest", "f8"),  # penetration over the whole run
-        ("energy", "f8"),  # at the start
-        ("crank_work", "f8"),
-        ("load_work", "f8"),
-        ("contact_work", "f8"),  # of the normal forces, springs and losses; film and rod too
-        ("friction_loss", "f8"),
-        ("worst_imbalance", "f8"),  # J
-        ("peak_kinetic", "f8"),
-        ("started", "i8"),
-        # s by which changes of contact move, in all, where the state is off by its natural size
-        ("switch_shift", "f8", (2,)),
-        ("has_rod_load", "i8"),  # whether the rod load, x of the small end's force, is tallied
-        ("side_peak", "f8", (2,)),  # its greatest tension and compression, N
-        ("side_seconds", "f8", (2,)),  # that a steady crank takes while it is above and below zero
-    ],
-    align=True,
+IN_STEPS = range(ACCELERATION, CRANK_POWER)  # columns that a march writes at each node of a step
+
+
+def require_written(*columns):
+    """Return columns that are tallied, as plain integers for numba.
+
+    Raises ValueError for one that the nodes of a march's steps do not have: it would be 0 there.
+    """
+    for column in columns:
+        if column not in IN_STEPS:
+            raise ValueError(f"{Column(column).name} is not written at each node of a step")
+    return tuple(int(column) for column in columns)
+
+
+MEANS = require_written(Column.CRANK_TORQUE, Column.GUIDE_MOMENT)
+SQUARES = require_written(Column.ACCELERATION, Column.DEVIATION)
+GREATEST = require_written(*range(ACCELERATION, DEVIATION))  # one beside the other
+PEAKED = len(GREATEST)
+SUM, PEAK, KEPT = "sum", "peak", "kept"
+
+
+class Field(NamedTuple):
+    """A number of a tally, or an array, and how parts of a run are merged.
+
+    `merge`: SUM or PEAK of what began anew at each cut, or KEPT on from the start of the run.
+    """
+
+    name: str
+    merge: str
+    shape: tuple = ()
+    kind: str = "f8"
+    begin: float = 0.0
+
+
+FIELDS = (
+    Field("seconds", SUM),  # of machine time measured
+    Field("steady_seconds", SUM),  # that a steady crank takes for the same angle
+    Field("integral", SUM, (len(MEANS),)),  # of MEANS over time
+    Field("square", SUM, (len(SQUARES),)),  # of SQUARES, their squares
+    Field("peak", PEAK, (PEAKED,)),  # of GREATEST, their sizes
+    Field("top", KEPT, (PEAKED,)),  # the same at the present step's nodes
+    Field("max_penetration", PEAK, (2,), begin=-math.inf),
+    Field("loss_seconds", SUM, (2,)),
+    # contacts that began after flight, the journal being off its bore; and inside the penetration
+    Field("impacts", SUM, (2,), "i8"),
+    Field("releases", SUM, (2,), "i8"),
+    Field("touching", KEPT, (2,), "i8", 1),  # until it is seen apart
+    Field("flown", KEPT, (2,), "i8"),  # whether the journal was off its bore since the last contact
+    Field("deepest", KEPT, begin=-math.inf),  # penetration over the whole run
+    Field("energy", KEPT),  # at the start
+    Field("crank_work", KEPT),
+    Field("load_work", KEPT),
+    Field("contact_work", KEPT),  # of the normal forces, springs and losses; film and rod too
+    Field("friction_loss", KEPT),
+    Field("worst_imbalance", KEPT),  # J
+    Field("peak_kinetic", KEPT),
+    Field("started", KEPT, (), "i8"),
+    # s by which changes of contact move, in all, where the state is off by its natural size
+    Field("switch_shift", SUM, (2,)),
+    Field("has_rod_load", KEPT, (), "i8"),  # whether the rod load, x at the small end, is tallied
+    Field("side_peak", PEAK, (2,)),  # its greatest tension and compression, N
+    Field("side_seconds", SUM, (2,)),  # that a steady crank takes while it is above and below zero
 )
+TALLY = np.dtype([(field.name, field.kind, field.shape) for field in FIELDS], align=True)
 
 
 def new_tally(has_rod_load=False):
-    """Return an empty tally; a joint counts as touching until it is seen apart.
-
-    has_rod_load: whether the rod load is tallied.
-    """
+    """Return an empty tally; has_rod_load: whether the rod load is tallied."""
     tally = zero(TALLY)
+    for field in FIELDS:
+        tally[field.name] = field.begin
     tally["has_rod_load"] = has_rod_load
-    tally["touching"] = 1
-    tally["max_penetration"] = -math.inf
-    tally["deepest"] = -math.inf
     return tally
+
+
+def cut_tally(tally):
+    """Return a copy of a tally, which begins anew but for what is KEPT."""
+    before = tally.copy()
+    for field in FIELDS:
+        if field.merge != KEPT:
+            tally[field.name] = field.begin
+    return before
+
+
+def merge_tallies(tallies):
+    """Return one tally of several parts of a run in a row."""
+    whole = tallies[-1].copy()
+    for field in FIELDS:
+        parts = [one[field.name] for one in tallies]
+        if field.merge != KEPT:
+            whole[field.name] = sum(parts) if field.merge == SUM else np.max(parts, axis=0)
+    return whole
 
 
 @jit
@@ -340,10 +385,10 @@ def tally_step(span, nodes, weights, rows, every, gap_fraction, sides, measured,
         tally.top[k] = 0.0
     for i in range(0, nodes.size, every):
         weight = span * weights[i] * pace_at(rows, i, p)
-        tally.square_acceleration += weight * rows[i, ACCELERATION] ** 2
-        tally.square_deviation += weight * rows[i, DEVIATION] ** 2
-        tally.crank_torque += weight * rows[i, CRANK_TORQUE]
-        tally.guide_moment += weight * rows[i, GUIDE_MOMENT]
+        for k in range(len(MEANS)):
+            tally.integral[k] += weight * rows[i, MEANS[k]]
+        for k in range(len(SQUARES)):
+            tally.square[k] += weight * rows[i, SQUARES[k]] ** 2
         for k in range(PEAKED):
             tally.top[k] = max(tally.top[k], abs(rows[i, ACCELERATION + k]))
     peaks_of_step(nodes, rows, every, tally, p)

@@ -9,7 +9,6 @@ from compressor.solve.request import (
     Metrics,
     Request,
     Turns,
-    merge_turns,
     revolutions,
 )
 from compressor.solve.run import COMPILED, Solution, integrate, run_at_tolerance, run_until_balanced

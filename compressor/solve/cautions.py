@@ -39,6 +39,7 @@ from compressor.physics import STABILITY_LIMIT, Scene, elastic_form, greatest_lo
 from compressor.solve.measured_gas import card_noise, fit_polytrope, sensed_noise
 from compressor.solve.request import greatest_depth
 from compressor.solve.run import COMPILED, closed_form
+from compressor.solve.run_metrics import metrics
 from compressor.solve.si_record import record, scene
 
 # Attempts of a step for each radian of the contact's ringing at rtol 1; measured on random cases.
@@ -471,7 +472,7 @@ def _drive(case: Case) -> Iterator[Remark]:
         return
     p, turn = record(with_ideal_joints(case, features=False)), case.turn
     tally = closed_form(p, np.array([0.0, turn]), 0.0, TURN_PIECES).tally
-    needed, slope = float(tally["crank_torque"]) / turn, drive.slope_N_m_s
+    needed, slope = metrics(p, tally)["mean_crank_torque"], drive.slope_N_m_s
     most = drive.torque_N_m + slope * case.omega
     if needed > 0.0 and needed > most:
         text = f"the load takes {needed:.3g} N m on average, more than the motor ever gives, "

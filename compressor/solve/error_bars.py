@@ -173,10 +173,9 @@ def switch_errors(
     if not metrics:
         return {}
     share = SWITCHING * rtol**ORDER * tally["switch_shift"] / (tally["seconds"] or math.nan)
-    found = {"contact_loss_fraction": share}
-    if tally["has_rod_load"] and not is_oiled(p):  # whose load ends where dry contact does
-        found["rod_load_reversal_angle"] = math.tau * share[1]
-    return found
+    # the load of an oiled pin does not end where dry contact does
+    reversal = 0.0 if is_oiled(p) else math.tau * share[1]
+    return {"contact_loss_fraction": share, "rod_load_reversal_angle": reversal}
 
 
 TIGHTER_FACTOR = 2.5  # times: the run that errors are estimated by

@@ -17,6 +17,7 @@ import numpy as np
 
 from compressor.cases import ACCURACY, Case
 from compressor.metrics import METRICS
+from compressor.physics import merge_tallies
 from compressor.solve.error_bars import relative_bar
 from compressor.solve.horizon import Search
 from compressor.solve.request import (
@@ -24,7 +25,6 @@ from compressor.solve.request import (
     Cuts,
     Metrics,
     Turns,
-    merge_turns,
     revolutions,
 )
 from compressor.solve.run import Solution, is_sampled, run_at_tolerance, times_of
@@ -173,7 +173,7 @@ def settled_part(run: Solution, longest: Case, case: Case, cuts: Cuts) -> Soluti
     phases[-1] = of_segments[np.searchsorted(edges, case.duration * (1.0 - SAME_TIME)) - 1]
     part = replace(
         trajectory, times=output, states=states, phases=phases,
-        tally=merge_turns(run.turns[first:last]),
+        tally=merge_tallies(run.turns[first:last]),
     )  # fmt: skip
     begin = first * per_rev
     samples = run.samples[begin : begin + times.compared.size]

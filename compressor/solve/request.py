@@ -1,7 +1,7 @@
 """What an integration takes and gives, why it stops, and its tally by revolutions."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -15,25 +15,16 @@ from compressor.physics import (
     Coordinate,
     Fields,
     beyond_model,
+    cut_tally,
     elastic_form,
     greatest_load,
     is_featured,
-    new_tally,
     read_fields,
 )
 from compressor.reasons import Reason
 
 Metrics = dict[str, Any]  # by name: a number, or an array over joints (and axes)
 Turns = list[np.record]  # tallies, of one revolution each
-SUMS = (
-    "seconds", "steady_seconds", "square_acceleration", "square_deviation", "crank_torque",
-    "guide_moment", "loss_seconds", "impacts", "releases", "switch_shift", "side_seconds",
-)  # fmt: skip
-GREATEST_FIELDS = (
-    "peak",
-    "max_penetration",
-    "side_peak",
-)  # the others go on from the start of the run
 SAME_TIME = 1e-12  # of the run: edges this near to each other are one
 
 
@@ -57,10 +48,7 @@ class Cuts:
         z: motion and flows there.
         """
         self.states.append(z[:-FLOWS].copy())
-        self.turns.append(tally.copy())
-        fresh = new_tally()
-        for name in SUMS + GREATEST_FIELDS:
-            tally[name] = fresh[name]
+        self.turns.append(cut_tally(tally))
         return not self.enough(self.turns)
 
 
@@ -70,16 +58,6 @@ def revolutions(begin: float, end: float, turn: float) -> np.ndarray:
     turn: the time of one (s).
     """
     return begin + turn * np.arange(1, int((end - begin) / turn * (1 + SAME_TIME)) + 1)
-
-
-def merge_turns(turns: Sequence[np.record]) -> np.record:
-    """Return one tally of several revolutions in a row: sums are added, peaks the greatest."""
-    whole = turns[-1].copy()
-    for name in SUMS:
-        whole[name] = sum(turn[name] for turn in turns)
-    for name in GREATEST_FIELDS:
-        whole[name] = np.max([turn[name] for turn in turns], axis=0)
-    return whole
 
 
 def with_cuts(

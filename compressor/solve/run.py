@@ -25,6 +25,7 @@ from compressor.physics import (
     WorkArrays,
     add_flows,
     march,
+    merge_tallies,
     new_stepper,
     new_tally,
     new_work,
@@ -46,7 +47,6 @@ from compressor.solve.request import (
     Turns,
     check_state,
     greatest_depth,
-    merge_turns,
     overdue,
     too_deep,
     with_cuts,
@@ -317,7 +317,7 @@ def run_at_tolerance(
     trajectory = integrate(request)
     turns = cuts.turns if cuts else []
     if turns:
-        trajectory.tally = merge_turns([*turns, trajectory.tally])
+        trajectory.tally = merge_tallies([*turns, trajectory.tally])
     solution = solution_of_trajectory(rtol, p, times, trajectory)
     solution.turns = turns
     return solution

@@ -12,74 +12,85 @@ revolutions each.
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from compressor.cases import TIGHTEST
-from compressor.metrics import METRICS, NUMBERS, QUANTILES
+from compressor.metrics import METRICS, NUMBERS, QUANTILES, of_source
 from compressor.physics import (
     COLUMNS,
+    GREATEST,
+    MEANS,
+    SQUARES,
     Column,
     elastic_form,
     is_featured,
+    merge_tallies,
     observe_all,
     read_fields,
 )
-from compressor.solve.request import Metrics, Trajectory, last_state, merge_turns
+from compressor.solve.request import Metrics, Trajectory, last_state
 
 ROUNDING = 1e-12
 
 
-def metrics(p: np.record, tallied: np.record) -> Metrics:
+class Tallied:
+    """What metrics are made from: the fields of a tally, and those of its machine's record, `p`."""
+
+    def __init__(self, p: np.record, tally: np.record):
+        self.tally = read_fields(tally)
+        self.p, crosshead = p, p["reciprocating_mass"]
+        moved = np.array([crosshead + p["rod_mass"], crosshead])  # kg, by a blow at each joint
+        self.blow = moved * self.greatest("JOURNAL_ACCELERATION", 2)  # N
+        self.seconds = tally["seconds"] or math.nan
+        self.steady_seconds = tally["steady_seconds"] or math.nan
+        # the spans of steps add up to within rounding: whole revolutions are to stay whole
+        self.revolutions = round(float(self.steady_seconds * p["omega"]) / math.tau, 9)
+
+    def __getattr__(self, field: str) -> Any:
+        """Return a field of the tally."""
+        return self.tally[field]
+
+    def mean(self, column: str) -> float:
+        """Return the mean of a column over time, of those in `physics.tally.MEANS`."""
+        return self.integral[MEANS.index(Column[column])] / self.seconds
+
+    def root_mean_square(self, column: str) -> float:
+        """Return that of a column over time, of those in `physics.tally.SQUARES`."""
+        return math.sqrt(self.square[SQUARES.index(Column[column])] / self.seconds)
+
+    def greatest(self, column: str, *shape: int) -> Any:
+        """Return the greatest sizes of a column, or from it on, of `physics.tally.GREATEST`."""
+        first = GREATEST.index(Column[column])
+        return self.peak[first : first + math.prod(shape)].reshape(shape)[()]
+
+    def ratio(self, part: Any, whole: Any) -> Any:
+        """Return a part over the whole, 0 where that is not above 0."""
+        known = np.greater(whole, 0.0)
+        return np.divide(part, whole, out=np.zeros(np.shape(whole)), where=known)[()]
+
+    def has(self, flag: str) -> bool:
+        """Return whether a run has what a metric takes: nothing, signals, a flag of its record."""
+        if flag in ("", "signals"):
+            return not flag or bool(self.has_rod_load)
+        return is_featured(self.p) and bool(self.p[flag])
+
+
+def metrics(p: np.record, tally: np.record) -> Metrics:
     """Return the metrics by name, from what was tallied after settling.
 
-    In the units and shapes of `compressor.metrics.TABLE`: (), (joint,) or (joint, axis).
+    In the units and shapes of `compressor.metrics.TABLE`: (), (joint,) or (joint, axis). Those of
+    contacts are 0 at ideal joints.
     """
-    tally = read_fields(tallied)
-    seconds = tally["seconds"] or math.nan
-    axes, sizes = Column.FORCE - Column.ACCELERATION, Column.FORCE_SIZE - Column.ACCELERATION
-    journals = Column.JOURNAL_ACCELERATION - Column.ACCELERATION
-    moved = np.array([p["reciprocating_mass"] + p["rod_mass"], p["reciprocating_mass"]])
-    force = tally["peak"][sizes:journals]
-    blow = moved * tally["peak"][journals:]
-    # the spans of steps add up to within rounding: whole revolutions are to stay whole
-    steady = tally["steady_seconds"] or math.nan
-    revolutions = round(float(steady * p["omega"]) / math.tau, 9)
-    of_joints = {
-        "knock": np.divide(blow, force, out=np.zeros(2), where=force > 0.0),
-        "max_penetration": tally["max_penetration"],
-        "contact_loss_fraction": tally["loss_seconds"] / seconds,
-        "impact_count": tally["impacts"],
-        "release_count": tally["releases"],
-        "impacts_per_rev": tally["impacts"] / revolutions,
-        "releases_per_rev": tally["releases"] / revolutions,
-    }
-    clear = np.where(p["clearance"] == 0, 0.0, [*of_joints.values()])
-    numbers = {
-        "peak_acceleration": tally["peak"][0],
-        "rms_acceleration": math.sqrt(tally["square_acceleration"] / seconds),
-        "rms_acceleration_deviation": math.sqrt(tally["square_deviation"] / seconds),
-        "peak_contact_force": force,
-        "peak_contact_force_axis": tally["peak"][axes:sizes].reshape(2, 2),
-        "mean_crank_torque": tally["crank_torque"] / seconds,
-        "mean_guide_moment": tally["guide_moment"] / seconds,
-    } | dict(zip(of_joints, clear, strict=True))
-    numbers = {name: value for name, value in numbers.items() if has_metric(p, NUMBERS[name].when)}
-    if tally["has_rod_load"]:
-        (pull, push), greater = tally["side_peak"], tally["side_peak"].max()
-        numbers |= {
-            # without load, as in flight, the rod is on neither side
-            "rod_load_reversal_angle": math.tau * tally["side_seconds"].min() / steady,
-            "rod_load_reversal_share": min(pull, push) / greater if greater else 0.0,
-            "peak_rod_load_tension": pull,
-            "peak_rod_load_compression": push,
-        }
+    run, numbers = Tallied(p, tally), {}
+    for row in of_source("tally"):
+        if row.made and run.has(row.when):
+            value = row.made(run)
+            numbers[row.name] = (
+                np.where(p["clearance"] == 0.0, 0.0, value) if row.contact else value
+            )
     return numbers
-
-
-def has_metric(p: np.record, flag: str) -> bool:
-    """Return whether a machine has what a metric needs: a flag of the record, or nothing."""
-    return not flag or (is_featured(p) and bool(p[flag]))
 
 
 def held_by_springs(p: np.record, trajectory: Trajectory) -> float:
@@ -171,9 +182,9 @@ def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
     A standard error is inf where there are too few revolutions.
     """
     estimates: Metrics = {"revolutions": float(len(turns))}
-    whole = metrics(p, merge_turns(turns))
+    whole = metrics(p, merge_tallies(turns))
     per_revolution = [metrics(p, turn) for turn in turns]
-    batches = [metrics(p, merge_turns(part)) for part in parts(turns, MAX_BATCHES, 1)]
+    batches = [metrics(p, merge_tallies(part)) for part in parts(turns, MAX_BATCHES, 1)]
     for name, row in METRICS.items():
         if row.kind == "greatest":
             estimates |= summarize_peaks(name, np.array([one[name] for one in per_revolution]))
@@ -271,18 +282,16 @@ def chaotic_bars(
     contacts at ideal joints have no error.
     """
     bars, count = {}, len(turns)
-    batches = [metrics(p, merge_turns(part)) for part in parts(turns, MAX_BATCHES, 1)]
+    batches = [metrics(p, merge_tallies(part)) for part in parts(turns, MAX_BATCHES, 1)]
     for name, value in numbers.items():
         row = NUMBERS[name]
         if row.kind == "greatest":
-            known = np.asarray(value) == 0.0 if not row.when else False
-            bars[name] = np.where(known, 0.0, math.inf)
-            continue
-        if row.when:
-            error = standard_error(np.array([one[name] for one in batches]))
+            bars[name] = np.full(np.shape(value), math.inf)
         else:
-            error = estimates[f"{name}_standard_error"]
-        bars[name] = average_bar(error, count)
+            error = estimates.get(f"{name}_standard_error")
+            if error is None:
+                error = standard_error(np.array([one[name] for one in batches]))
+            bars[name] = average_bar(error, count)
         if row.counted:
             in_all = 1 if row.kind == "count" else count
             least = count_bar(np.asarray(value) * in_all) / in_all

@@ -191,7 +191,7 @@ def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.
         metric = NUMBERS[name]
         values = np.array(rows.numbers[name][positions])
         values[positions < 0] = np.nan
-        if not metric.when or not np.isnan(values).all():
+        if metric.is_given(values):
             found[name] = xr.Variable((*layout.dims, *metric.dims), values, metric.attributes)
     return found
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from compressor.metrics import HORIZON, NUMBERS
+from compressor.metrics import ALWAYS, HORIZON, NUMBERS
 from compressor.outcome import ROW, Outcome, Regime, SeriesFile, coordinates, row
 from compressor.store.files import HEX20, pending_path
 from compressor.store.hdf5 import DamagedJob, digest, image, open_file, read_variable, storable
@@ -168,10 +168,7 @@ def encode(segment: Segment) -> bytes:
     """
     columns = segment.columns
     numbers = segment.numbers()
-    present = [
-        metric for name, metric in NUMBERS.items()
-        if not metric.when or not np.isnan(numbers[name]).all()
-    ]  # fmt: skip
+    present = [metric for name, metric in NUMBERS.items() if metric.is_given(numbers[name])]
     dims = {dim for metric in present for dim in metric.dims}
     variables: dict[str, Any] = {}
     for name, (names, values, attrs) in coordinates({"quantile", *dims}).items():
@@ -313,8 +310,7 @@ class Rows:
 
         Those fields of ROW that every job has, or some segment: `number_row` has all of a job.
         """
-        given = {name for name, row in NUMBERS.items() if not row.when}
-        given |= {name for segment in self.segments for name in segment.names}
+        given = ALWAYS.union(name for segment in self.segments for name in segment.names)
         return self._numbers(*[name for name in NUMBERS if name in given])
 
     def number_row(self, position: int) -> np.void:

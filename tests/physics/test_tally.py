@@ -4,14 +4,22 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
+from compressor.physics.kinematics import ideal
 from compressor.physics.observe import COLUMNS, Column
+from compressor.physics.record import state_names
+from compressor.physics.systems import observe_contact, start
 from compressor.physics.tally import (
+    FIELDS,
+    IN_STEPS,
     add_flows,
+    cut_tally,
     gap_fraction_between,
     lobatto,
     may_beat_peaks,
+    merge_tallies,
     new_tally,
     peak_of,
+    require_written,
     tally_energy,
     tally_step,
 )
@@ -57,7 +65,7 @@ def test_tally_of_a_known_step():
     tally = new_tally()
     tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, SIDES, True, tally, p)
     assert tally.seconds == pytest.approx(1e-4)
-    assert tally.square_acceleration == pytest.approx(9e-4)
+    assert tally.square.tolist() == [pytest.approx(9e-4), 0.0]
     assert (tally.impacts.tolist(), tally.releases.tolist()) == ([1, 0], [0, 0])
     assert tally.max_penetration[0] == pytest.approx(0.5)
     assert tally.loss_seconds.tolist() == [pytest.approx(0.25e-4), 0.0]
@@ -131,6 +139,48 @@ def test_a_step_near_a_record_is_told(node, column):
     assert not may_beat_peaks(rows, 4, tally)
     rows[node, column] = 0.99
     assert may_beat_peaks(rows, 4, tally)
+
+
+def test_a_column_that_steps_do_not_have_is_refused():
+    assert require_written(Column.ACCELERATION, Column.GUIDE_MOMENT) == (8, 25)
+    for column in (Column.VELOCITY, Column.CRANK_POWER, Column.KINETIC, Column.GUIDE_FORCE):
+        with pytest.raises(ValueError, match=f"{column.name} is not written"):
+            require_written(Column.ACCELERATION, column)
+
+
+MECHANISM = {"guide": {"clearance_mm": 0.1}, "drive": {"flywheel_kg_m2": 1}}
+
+
+@pytest.mark.parametrize("features", [{}, {"lubricant": True}, MECHANISM])
+def test_the_nodes_of_a_step_have_what_is_tallied_and_no_more(features):
+    """A column that nobody writes would be read as 0, by the march alone: as nan here."""
+    values = {"joint": "both", "clearance_mm": 0.2, **features}
+    p, nodes = record(Case.from_values(values)), lobatto(5)
+    y, rows = np.zeros(len(state_names(p))), np.full((5, COLUMNS), np.nan)
+    start(np.zeros((2, 2)), y, p)
+    for row in rows:
+        observe_contact(ideal(0.01, p), y, 0, p, row)
+    written = {*np.flatnonzero(np.isfinite(rows[0])).tolist()}
+    assert written - {Column.PACE} == {*IN_STEPS}
+    assert (Column.PACE in written) == ("drive" in features)
+    tally = new_tally(True)
+    tally_step(1e-4, *nodes, rows, 1, APART, SIDES, True, tally, p)
+    for field in FIELDS:
+        assert np.isfinite(tally[field.name]).all(), field.name
+
+
+def test_parts_of_a_run_are_merged_as_their_fields_say():
+    whole = new_tally(True)
+    for field in FIELDS:
+        whole[field.name] = 3
+    before = cut_tally(whole)
+    for field in FIELDS:
+        assert (before[field.name] == 3).all()
+        assert (whole[field.name] == (3 if field.merge == "kept" else field.begin)).all()
+        whole[field.name] = 2
+    for field in FIELDS:
+        merged = merge_tallies([before, whole])[field.name]
+        assert (merged == {"sum": 5, "peak": 3, "kept": 2}[field.merge]).all(), field.name
 
 
 def test_energy_ledger_of_a_known_step():

@@ -7,8 +7,7 @@ import pytest
 from scipy import stats
 
 from compressor.metrics import METRICS, NUMBERS, QUANTILES
-from compressor.physics import new_record, new_tally
-from compressor.solve.request import merge_turns
+from compressor.physics import merge_tallies, new_record, new_tally
 from compressor.solve.run_metrics import (
     MAX_BATCHES,
     MIN_REVOLUTIONS,
@@ -32,8 +31,7 @@ def turns(rng, count, pull=0.0):
         level = pull * level + math.sqrt(1 - pull**2) * rng.normal()
         tally = new_tally()
         tally.seconds = tally.steady_seconds = TURN
-        tally.square_acceleration = 0.1 * (100.0 + 10.0 * level)
-        tally.square_deviation = 0.1 * 25.0
+        tally.square[:] = 0.1 * (100.0 + 10.0 * level), 0.1 * 25.0
         tally.peak[:] = rng.exponential(size=tally.peak.shape)
         tally.max_penetration[:] = 1e-6
         tally.loss_seconds[:] = 0.1 * (0.3 + 0.02 * rng.normal())
@@ -64,7 +62,7 @@ def test_bars_hold_the_true_average_in_95_of_100_runs(record, count, pull):
     held = dict.fromkeys(exact, 0)
     for _ in range(200):
         each = turns(rng, count, pull)
-        found, numbers = statistics(record, each), metrics(record, merge_turns(each))
+        found, numbers = statistics(record, each), metrics(record, merge_tallies(each))
         bars = chaotic_bars(record, each, found, numbers)
         for name, value in exact.items():
             held[name] += bool((np.abs(numbers[name] - value) <= bars[name]).all())
@@ -95,7 +93,7 @@ def test_a_single_revolution_tells_no_error(record):
     for name, value in found.items():
         if name.endswith("error") or name == "revolutions_to_one_percent":
             assert np.isposinf(value).all(), name
-    bars = chaotic_bars(record, each, found, metrics(record, merge_turns(each)))
+    bars = chaotic_bars(record, each, found, metrics(record, merge_tallies(each)))
     assert bars.keys() == METRICS.keys()
     assert all(np.isposinf(bar).all() for bar in bars.values())
 
@@ -103,7 +101,7 @@ def test_a_single_revolution_tells_no_error(record):
 def test_greatest_values_have_no_bar_but_an_ideal_joint_has_none_to_err_in(record):
     record["clearance"][1] = 0.0
     each = turns(np.random.default_rng(5), 40)
-    numbers = metrics(record, merge_turns(each))
+    numbers = metrics(record, merge_tallies(each))
     bars = chaotic_bars(record, each, statistics(record, each), numbers)
     assert np.isposinf(bars["peak_acceleration"])
     assert bars["max_penetration"].tolist() == [math.inf, 0.0]
@@ -115,7 +113,7 @@ def test_batches_that_agree_by_chance_say_nothing(record):
 
     def bars_of(count):
         each = turns(np.random.default_rng(6), 1) * count
-        numbers = metrics(record, merge_turns(each))
+        numbers = metrics(record, merge_tallies(each))
         return numbers, chaotic_bars(record, each, statistics(record, each), numbers)
 
     _, few = bars_of(MIN_REVOLUTIONS - 1)

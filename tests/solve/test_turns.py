@@ -5,11 +5,12 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
-from compressor.solve.request import Cuts, merge_turns, revolutions
+from compressor.physics import merge_tallies
+from compressor.solve.request import Cuts, revolutions
 from compressor.solve.run import run_at_tolerance
 from compressor.solve.run_metrics import metrics
 
-TALLIED = ("seconds", "square_acceleration", "square_deviation", "loss_seconds", "impacts")
+TALLIED = ("seconds", "square", "integral", "loss_seconds", "impacts")
 
 
 def case(joint, method, **solve):
@@ -77,7 +78,7 @@ def test_tallies_are_merged_by_sums_and_greatest_values():
     cuts = Cuts(ends(of))
     run(of, cuts)
     one, two = cuts.turns
-    both = merge_turns(cuts.turns)
+    both = merge_tallies(cuts.turns)
     for name in TALLIED:
         np.testing.assert_allclose(both[name], one[name] + two[name])
     np.testing.assert_array_equal(both["peak"], np.maximum(one["peak"], two["peak"]))

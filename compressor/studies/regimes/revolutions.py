@@ -16,14 +16,20 @@ import numpy as np
 from compressor.cases import Case
 from compressor.metrics import AXES, JOINTS
 from compressor.outcome import DatasetParts
-from compressor.physics import COLUMNS, FLOWS, Column, derivative_with_flows, observe_all
+from compressor.physics import (
+    COLUMNS,
+    FLOWS,
+    Column,
+    derivative_with_flows,
+    merge_tallies,
+    observe_all,
+)
 from compressor.solve import (
     Cuts,
     Metrics,
     Solution,
     Turns,
     least_promise,
-    merge_turns,
     metrics,
     record,
     revolutions,
@@ -58,7 +64,7 @@ class RevolutionRun:
 
     def numbers(self, last: int) -> Metrics:
         """Return the metrics of the last so many revolutions together."""
-        return metrics(self.p, merge_turns(self.turns[-last:]))
+        return metrics(self.p, merge_tallies(self.turns[-last:]))
 
     def rms_error(self, last: int) -> float:
         """Return the standard error of rms_acceleration over the last so many revolutions (m/s2).
@@ -166,7 +172,7 @@ class PoincareRecorder:
             self.points.append(eccentricities(self.p, at, self.cuts.states[-1]))
         if count % self.step:
             return False
-        self.turns.append(merge_turns(turns[-self.step :]))
+        self.turns.append(merge_tallies(turns[-self.step :]))
         return self.enough(self.turns, np.array(self.points))
 
     def revolution_run(self, run: Solution) -> RevolutionRun:
