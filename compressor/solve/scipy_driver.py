@@ -59,7 +59,8 @@ def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndar
     edges, phases, _ = with_cuts(edges, phases, turns)
     edges, phases, ends = with_cuts(edges, phases, request.cuts)
     result.segments = edges, phases = edges, phases.copy()
-    result.states[0] = z[:-FLOWS]
+    result.stop_time, result.stop_state = float(edges[0]), z[:-FLOWS].copy()
+    result.states[0] = result.stop_state
     run = ScipyRun(request, result, settle)
     for i in range(phases.size):
         enter_segment(edges[i], z, i, phases, request.p)
@@ -67,6 +68,7 @@ def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndar
         z = run.go(edges[i], edges[i + 1], z)
         if request.cuts and i + 1 in ends and not request.cuts.cut(result.tally, z):
             break
+    result.stop_time = math.nan
 
 
 class ScipyRun:
@@ -145,11 +147,14 @@ class ScipyRun:
         meeting: list[int] = []  # joints, at `bound`
         while t < end:
             watched, self.last = {} if meeting else self.touches, (t, z)
-            path = solve_ivp(
-                self.differentiate, (t, bound), z, request.method, rtol=rtol,
-                atol=absolute_tolerances(p, rtol), dense_output=True,
-                events=[self.watch, *map(self.meeting, watched)],
-            )  # fmt: skip
+            try:
+                path = solve_ivp(
+                    self.differentiate, (t, bound), z, request.method, rtol=rtol,
+                    atol=absolute_tolerances(p, rtol), dense_output=True,
+                    events=[self.watch, *map(self.meeting, watched)],
+                )  # fmt: skip
+            except ValueError as error:  # of a matrix with nan
+                raise Stop(Reason.NON_FINITE, str(error)) from error
             met = [joint for joint, at in zip(watched, path.t_events[1:], strict=True) if at.size]
             reached = path.t.size - 1 - bool(met)
             self.take(np.unique(path.t[: reached + 1]), path.sol)

@@ -105,6 +105,23 @@ def test_the_audit_sees_a_lost_flow(monkeypatch):
     assert float(found["energy_residual"]) > 100 * residual_bound(found, revolutions=1)
 
 
+@pytest.mark.compiled
+@pytest.mark.parametrize("method", [name for name in METHODS if name not in COMPILED])
+def test_a_motion_that_is_lost_at_once_stops_where_it_began(method, monkeypatch):
+    from compressor.solve import scipy_driver
+
+    monkeypatch.setattr(
+        scipy_driver, "derivative_with_flows", lambda t, z, phase, p, out: out.fill(np.nan)
+    )
+    found = run("big_end", 0.3, duration_rev=1, settle_rev=0, rtol=1e-5, method=method)
+    assert found["reason"].item() in ("non_finite", "step_underflow")
+    assert found.attrs["stop_time"] == 0.0
+    assert found.attrs["stop_state"].size == 4
+    assert (
+        np.isfinite(found["acceleration"].values).tolist() == (found["time"] == 0.0).values.tolist()
+    )
+
+
 def test_methods_agree_beyond_a_corner():
     """With a follower that dwells for 1 mm only, so that the first corner comes after 6 degrees."""
     values = {"joint": "big_end", "clearance_mm": 0.2, "spring": {"stroke_mm": 1}}
