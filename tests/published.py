@@ -12,8 +12,9 @@ from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case
 from compressor.cases.conflicts import back_action
-from compressor.physics.observe import COLUMNS, Column, observe
+from compressor.physics.observe import COLUMNS, Column
 from compressor.physics.record import state_names
+from compressor.physics.systems import observe_at
 from compressor.solve import simulate
 from compressor.solve.run import run_at_tolerance
 from compressor.solve.si_record import record
@@ -57,7 +58,7 @@ def drop(joint, speed, method="auto", mass=5.0, rtol=1e-8, **contact):
     assert run.reason == ""
     rows = np.empty((run.trajectory.times.size, COLUMNS))
     for i, (t, y) in enumerate(zip(run.trajectory.times, run.trajectory.states, strict=True)):
-        observe(t, y, int(run.trajectory.phases[i]), p, rows[i])
+        observe_at(t, y, int(run.trajectory.phases[i]), p, rows[i])
     return run, rows
 
 

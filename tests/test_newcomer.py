@@ -280,7 +280,7 @@ def test_the_page_on_contact_laws_is_right(tmp_path):
         (indented(member + f"\nLINEAR = {number + 1}"), "    LIU = 8\n", True),
         (indented(damping), "    Law.LIU: lambda e: 0.75 * (1.0 - e**2),\n", True),
         ("LINEAR = int(Law.LINEAR)\n\n\n" + force,
-         "\n\n@inline_llvm\ndef has_chosen_laws(p)", False),
+         "\n\n@inline_llvm\ndef may_choose_laws(p)", False),
         *(first_in(name, chosen[name]) for name in
           ("normal_force", "elastic_force", "elastic_energy", "elastic_form")),
     )  # fmt: skip

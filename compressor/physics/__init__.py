@@ -37,6 +37,7 @@ from compressor.physics.record import (
     Fields,
     Load,
     Scene,
+    has_chosen_forces,
     is_featured,
     new_record,
     read_fields,

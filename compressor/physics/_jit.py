@@ -66,8 +66,8 @@ class Deferred:
         return getattr(self.target, name)
 
 
-class Intrinsic(Deferred):
-    """A Deferred that Python calls as it is written."""
+class Inlined(Deferred):
+    """A Deferred that Python calls as it is written: only its callers are compiled."""
 
     def __call__(self, *arguments: Any) -> Any:
         return vars(self)["__wrapped__"](*arguments)
@@ -75,7 +75,7 @@ class Intrinsic(Deferred):
 
 @functools.cache
 def load_numba() -> None:
-    """Set up numba: folder of machine code, types of `Deferred` and `ByKind`."""
+    """Set up numba: folder of machine code, type of `Deferred`."""
     import numba
     from numba.core import event
     from numba.core.registry import cpu_target
@@ -88,10 +88,6 @@ def load_numba() -> None:
     @typeof_impl.register(Deferred)
     def type_of(value: Deferred, _: object) -> Any:
         return cpu_target.typing_context.resolve_value_type(value.target)
-
-    @typeof_impl.register(ByKind)
-    def type_of_choice(value: ByKind, _: object) -> Any:
-        return numba.types.Dispatcher(value)
 
     event.register("numba:compile", collect_seldom())
     # to be known before anything is compiled
@@ -123,20 +119,21 @@ def collect_seldom() -> Any:
     return Seldom()
 
 
-def _compile(function: Function, **options: Any) -> Function:
-    """Return a function that numba compiles with these options when it is first called."""
+def _compile(function: Function, made: type[Deferred], **options: Any) -> Function:
+    """Return a function that numba compiles with these options when it is first needed."""
+    # wrappers for who does not call it would only take time to compile: for C, and some for Python
+    how: Any = {
+        "cache": True, "error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True,
+        "no_cpython_wrapper": made is Inlined, **options,
+    }  # fmt: skip
 
     def make() -> Any:
         import numba
 
-        # C code calls none of them: its wrappers would only take time to compile
-        how: Any = {
-            "cache": True, "error_model": "numpy", "fastmath": {"contract"},
-            "no_cfunc_wrapper": True, **options,
-        }  # fmt: skip
         return numba.njit(**how)(function)
 
-    deferred: Any = Deferred(make, function)
+    deferred: Any = made(make, function)
+    deferred.options = how
     return deferred if ENABLED else function
 
 
@@ -147,15 +144,16 @@ def jit(function: Function) -> Function:
     division by zero gives inf or nan, not an exception, so that the caller can judge a state that
     went wrong. As it is with ``COMPSIM_JIT=0``.
     """
-    return _compile(function)
+    return _compile(function, Deferred)
 
 
 def inline_llvm(function: Function) -> Function:
     """Return `jit`, written by LLVM into each caller, whatever its size.
 
-    It compiles in a small part of the time that numba's own inlining takes.
+    It compiles in a small part of the time that numba's own inlining takes. Python calls the
+    function as it is written.
     """
-    return _compile(function, forceinline=True)
+    return _compile(function, Inlined, forceinline=True)
 
 
 def inline_once(function: Function) -> Function:
@@ -163,50 +161,50 @@ def inline_once(function: Function) -> Function:
 
     So it has no machine code of its own, which is a third of what compiling it costs, and is not
     optimized again in each function above. Where a caller gets long by it, that costs more than it
-    saves: numba's passes take longer than in proportion.
+    saves: numba's passes take longer than in proportion. Python calls it as it is written.
     """
-    return _compile(function, inline="always")
+    return _compile(function, Inlined, inline="always")
 
 
-class ByKind:
-    """A function that is one of two others, by the kind of the record among its arguments.
+def dispatch_on_record(field: str, special: Function, usual: Function) -> Function:
+    """Return a function that is `special` for records that have a field, `usual` for all others.
 
-    Which one is settled when a caller is compiled, so that the other is no part of its machine
-    code, and is not compiled with it.
+    Which one is settled by types when a caller is compiled, so that the other is no part of its
+    machine code, and is not compiled with it.
     """
 
-    is_compiling = False  # numba reads this: whether it calls itself
+    def choose(*arguments: Any) -> Any:
+        records = [one.dtype.names or () for one in arguments if isinstance(one, np.record)]
+        return (special if any(field in names for names in records) else usual)(*arguments)
 
-    def __init__(self, least: int, special: Any, usual: Any):
-        self.least, self.special, self.usual = least, special, usual
+    def make() -> Any:
+        from numba.core.registry import cpu_target
+        from numba.extending import overload
 
-    def __call__(self, *arguments: Any) -> Any:
-        records = [one for one in arguments if isinstance(one, np.record)]
-        lengths = [one["laws"].size for one in records if "laws" in (one.dtype.names or ())]
-        return (self.special if max(lengths, default=0) >= self.least else self.usual)(*arguments)
+        for deferred, of_special in ((special, True), (usual, False)):
+            # the very options: its machine code on disk serves direct callers, too
+            options = vars(deferred)["options"]
+            overload(choose, options)(implementation_for(field, of_special, uncompiled(deferred)))
+        cpu_target.typing_context.refresh()
+        return choose
 
-    def of(self, arguments: Any) -> Any:
-        """Return the dispatcher for arguments of these types of numba's."""
-        for one in arguments:
-            members = getattr(one, "members", ())
-            for name, field in members:
-                if name == "laws" and field.shape[0] >= self.least:
-                    return self.special.target
-        return self.usual.target
-
-    def get_call_template(self, arguments: Any, keywords: Any) -> Any:
-        """Return numba's template of a call, of the function that is meant, which it compiles."""
-        return self.of(arguments).get_call_template(arguments, keywords)
-
-    def get_overload(self, arguments: Any) -> Any:
-        """Return what numba needs when it writes the call."""
-        return self.of(arguments).get_overload(arguments)
+    chosen: Any = Inlined(make, choose)
+    return chosen if ENABLED else choose  # type: ignore[return-value]
 
 
-def dispatch_on_record(least: int, special: Function, usual: Function) -> Function:
-    """Return `special` for records whose `laws` are at least so many, `usual` for all others."""
-    chosen: Any = ByKind(least, special, usual)
-    return chosen
+def implementation_for(field: str, wanted: bool, function: Any) -> Any:
+    """Return what numba asks: the function if types of arguments have a field as wanted, or None.
+
+    wanted: whether a record among them is to have it.
+    """
+    from numba import types
+
+    @functools.wraps(function)  # numba compares parameters
+    def implementation(*arguments: Any) -> Any:
+        fields = [one.fields for one in arguments if isinstance(one, types.Record)]
+        return function if any(field in names for names in fields) == wanted else None
+
+    return implementation
 
 
 def uncompiled(function: Function) -> Function:
@@ -274,5 +272,5 @@ def without_refcount(array: Any) -> Any:
 
 
 if ENABLED:
-    square_root = Intrinsic(_square_root, square_root)  # type: ignore[assignment]
-    without_refcount = Intrinsic(_without_refcount, without_refcount)  # type: ignore[assignment]
+    square_root = Inlined(_square_root, square_root)  # type: ignore[assignment]
+    without_refcount = Inlined(_without_refcount, without_refcount)  # type: ignore[assignment]

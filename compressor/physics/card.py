@@ -17,7 +17,7 @@ the worse of two shifts of the samples):
 import math
 
 from compressor.physics._jit import dispatch_on_record, inline_llvm, jit
-from compressor.physics.record import CARD_NODES, CHOICE, Load
+from compressor.physics.record import CARD_NODES, CHOSEN_FORCES, Load
 
 CARD = int(Load.CARD)
 PER_NODE = 2.0 * math.pi / CARD_NODES  # rad
@@ -51,4 +51,4 @@ def no_card(cos_theta, sin_theta, p):
     return 0.0
 
 
-measured_force = dispatch_on_record(CHOICE, force_of_card, no_card)
+measured_force = dispatch_on_record(CHOSEN_FORCES, force_of_card, no_card)

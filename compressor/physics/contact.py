@@ -28,7 +28,7 @@ from compressor.physics.contact_laws import (
     normal_force,
     rise,
 )
-from compressor.physics.record import CHOICE
+from compressor.physics.record import CHOSEN_FORCES
 
 SATURATED = 1.0 - math.exp(-3.0)  # Threlfall's curve at its knee
 
@@ -117,7 +117,7 @@ def default_coefficient(slip, bristle, p):
 
 
 # signed, at a slip (m/s) and a mean deflection of bristles (m)
-friction_coefficient = dispatch_on_record(CHOICE, chosen_coefficient, default_coefficient)
+friction_coefficient = dispatch_on_record(CHOSEN_FORCES, chosen_coefficient, default_coefficient)
 
 
 def steepest(p) -> float:

@@ -28,11 +28,12 @@ from enum import IntEnum
 import numpy as np
 
 from compressor.physics._jit import (
+    dispatch_on_record,
     inline_llvm,
     inline_once,
     square_root,
-    uncompiled,
 )
+from compressor.physics.record import CHOSEN_FORCES
 
 FLATTEST = 1.25  # of ln(4 S c / F) - 1: from there on Johnson's force goes on along its tangent
 JOHNSON_DEEPEST = 0.5  # of the clearance: up to which the law is meant, before that
@@ -212,9 +213,19 @@ IMPACT, JOHNSON, LIU = int(Law.IMPACT), int(Law.JOHNSON), int(Law.LIU)
 
 
 @inline_llvm
-def has_chosen_laws(p):
-    """Return whether laws other than the default ones may be a record's: a constant of its type."""
-    return len(p.laws) > 1
+def may_choose_laws(p):
+    """Return True."""
+    return True
+
+
+@inline_llvm
+def has_default_laws(p):
+    """Return False."""
+    return False
+
+
+# whether laws other than the default ones may be a record's: a constant of its type
+has_chosen_laws = dispatch_on_record(CHOSEN_FORCES, may_choose_laws, has_default_laws)
 
 
 @inline_llvm
@@ -325,7 +336,7 @@ class Power:
 
     def damping(self, depth: float) -> float:
         """Return the damping coefficient (N s/m) at a penetration (m)."""
-        return self.full_damping * uncompiled(rise)(depth * self.per_full_damping)
+        return self.full_damping * rise(depth * self.per_full_damping)
 
     def energy(self, depth: float) -> float:
         """Return the energy (J) that is stored at a penetration (m)."""

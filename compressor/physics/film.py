@@ -35,7 +35,7 @@ import math
 from compressor.physics._jit import dispatch_on_record, inline_llvm, jit
 from compressor.physics.contact import ContactState
 from compressor.physics.contact_laws import rise
-from compressor.physics.record import CHOICE, FILM_TERMS
+from compressor.physics.record import CHOSEN_FORCES, FILM_TERMS
 
 CENTRE_ECCENTRICITY = 0.1
 
@@ -182,4 +182,4 @@ def dry_contact(joint, contact, eccentricity, spins, p):
     return contact
 
 
-add_film = dispatch_on_record(CHOICE, oiled_contact, dry_contact)
+add_film = dispatch_on_record(CHOSEN_FORCES, oiled_contact, dry_contact)

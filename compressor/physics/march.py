@@ -34,7 +34,7 @@ from compressor.physics.onset import (
     shift_of_change,
     store_approach_velocity,
 )
-from compressor.physics.record import CHOICE, MECHANISM, zero
+from compressor.physics.record import CHOSEN_FORCES, MECHANISM, zero
 from compressor.physics.runge_kutta import (
     FLOWS,
     STAGES,
@@ -385,7 +385,7 @@ def raise_tops(w, base, h, stride, z, work, phase, p, tally):
         )
 
 
-look_for_peaks = dispatch_on_record(CHOICE, raise_tops, skip_tops)
+look_for_peaks = dispatch_on_record(CHOSEN_FORCES, raise_tops, skip_tops)
 
 
 @jit
@@ -470,7 +470,7 @@ def keep_velocities(w, t, work, phase, p, tally):
     return False
 
 
-store_velocities = dispatch_on_record(CHOICE, store_approach_velocity, keep_velocities)
+store_velocities = dispatch_on_record(CHOSEN_FORCES, store_approach_velocity, keep_velocities)
 
 
 @inline_once

@@ -1,13 +1,13 @@
-"""What integrators call and what is observed of the general mechanism.
+"""Rates, powers, energies and columns of the general mechanism.
 
-The same calls as `motion` and `observe` have for the scenes; `systems` chooses between them.
+`motion` and `observe` have the same calls for scenes; `systems` chooses between them.
 """
 
 import math
 
 import numpy as np
 
-from compressor.physics._jit import inline_once, jit, square_root
+from compressor.physics._jit import jit, square_root
 from compressor.physics.contact import LUGRE, bristle_rate, nearness
 from compressor.physics.kinematics import ideal
 from compressor.physics.mechanism import (
@@ -23,10 +23,8 @@ from compressor.physics.mechanism import (
     pose_of,
     unpack,
 )
-from compressor.physics.mechanism_motion import solve
 from compressor.physics.observe import (
     ACCELERATION,
-    CRANK_POWER,
     CRANK_TORQUE,
     DEVIATION,
     DISPLACEMENT,
@@ -38,13 +36,11 @@ from compressor.physics.observe import (
     KINETIC,
     NEARNESS,
     NORMAL,
-    PACE,
     PENETRATION,
     PISTON_FORCE,
     POTENTIAL,
     ROD_ANGLE,
     VELOCITY,
-    WIDE,
     Column,
     contact_power,
     write_frame_forces,
@@ -120,7 +116,7 @@ def guide_moment(now, p):
 
 
 @jit
-def write_powers(now, p, row):
+def write_powers(now, y, p, row):
     """Write four powers (W) into row, (4,): of crank and load, into contacts, lost to friction."""
     big, small, guide, pose = now.joints.big, now.joints.small, now.joints.guide, now.pose
     forces = now.reactions
@@ -137,7 +133,7 @@ def write_powers(now, p, row):
 
 
 @jit
-def write_energies(now, p, row):
+def write_energies(now, y, p, row):
     """Write kinetic and potential energy (J) into the row, without the journals' contacts."""
     pose, joints, modes = now.pose, now.joints, now.w[7:11]
     kinetic = 0.0
@@ -162,8 +158,8 @@ def ideal_acceleration(now, p):
 
 
 @jit
-def write_contact_columns(now, p, row):
-    """Write the columns from ACCELERATION to GUIDE_MOMENT, and the pace."""
+def write_contact_columns(now, y, p, row):
+    """Write the columns from ACCELERATION to GUIDE_MOMENT."""
     forces = now.reactions
     row[ACCELERATION] = now.body[8]
     row[FORCE], row[FORCE + 1] = forces.big_x, forces.big_y
@@ -179,15 +175,6 @@ def write_contact_columns(now, p, row):
     row[NEARNESS] = nearness(big, p.stiffness[0], p.clearance[0], p)
     row[NEARNESS + 1] = nearness(small, p.stiffness[1], p.clearance[1], p)
     row[CRANK_TORQUE], row[GUIDE_MOMENT] = crank_torque(now, p), guide_moment(now, p)
-    row[PACE] = pace_of(now, p)
-
-
-@jit
-def write_row(now, p, row):
-    """Write the columns from ACCELERATION on."""
-    write_contact_columns(now, p, row)
-    write_powers(now, p, row[CRANK_POWER:KINETIC])
-    write_energies(now, p, row)
 
 
 @jit
@@ -199,94 +186,31 @@ def deviation(t, y, p):
 
 
 @jit
-def derivative(t, y, phase, p, out):
-    """Write what `motion.derivative` does, of the mechanism."""
-    write_rates(solve(ideal(t, p), y, phase, p), y, p, out)
-
-
-@jit
-def write_flowing_derivative(motion, z, phase, p, out):
-    """Write what `observe.write_flowing_derivative` does, of the mechanism."""
-    n = z.size - 4
-    now = solve(motion, z[:n], phase, p)
-    write_rates(now, z[:n], p, out[:n])
-    write_powers(now, p, out[n:])
-    for i in range(n, z.size):
-        out[i] *= pace_of(now, p)
-
-
-@jit
-def derivative_with_flows(t, z, phase, p, out):
-    """Write what `observe.derivative_with_flows` does, of the mechanism."""
-    write_flowing_derivative(ideal(t, p), z, phase, p, out)
-
-
-@jit
-def derivative_and_columns(motion, z, phase, p, out, row):
-    """Write what `observe.derivative_and_columns` does, of the mechanism."""
-    n = z.size - 4
-    now = solve(motion, z[:n], phase, p)
-    write_rates(now, z[:n], p, out[:n])
-    write_row(now, p, row)
-    for i in range(4):
-        out[n + i] = row[CRANK_POWER + i] * pace_of(now, p)
-
-
-@jit
-def observe_contact(motion, y, phase, p, row):
-    """Write what `observe.observe_contact` does, of the mechanism."""
-    write_contact_columns(solve(motion, y, phase, p), p, row)
-
-
-@jit
-def observe_with_energy(motion, y, phase, p, row):
-    """Write what `observe.observe_with_energy` does, of the mechanism."""
-    write_row(solve(motion, y, phase, p), p, row)
-
-
-@inline_once
-def observe(t, y, phase, p, row):
-    """Write the row of `observe.observe`, of the mechanism: (COLUMNS,), or (WIDE,) for series."""
-    now = solve(ideal(t, p), y, phase, p)
-    pose, guide, forces = now.pose, now.joints.guide, now.reactions
-    row[DISPLACEMENT], row[VELOCITY] = pose.x, now.velocity[8]
-    row[ROD_ANGLE] = math.atan2(pose.sin_phi, pose.cos_phi)
+def write_place(now, y, p, row):
+    """Write the columns before ACCELERATION."""
+    row[DISPLACEMENT], row[VELOCITY] = now.pose.x, now.velocity[8]
+    row[ROD_ANGLE] = math.atan2(now.pose.sin_phi, now.pose.cos_phi)
     row[PISTON_FORCE] = now.joints.load
     for i in range(4):
         row[ECCENTRICITY + i] = now.w[1 + i]
-    write_row(now, p, row)
-    if row.size == WIDE:
-        row[GUIDE_GAP], row[CRANK_SPEED] = -guide.deepest, pose.speed
-        row[MOTOR_TORQUE] = motor_torque(pose, p)
-        inward, along = pose.speed * pose.speed, now.accelerations[0]
-        c, s = pose.cos_theta, pose.sin_theta
-        turning = -p.unbalance * (inward * c + along * s), -p.unbalance * (inward * s - along * c)
-        write_frame_forces((-(guide.fx + forces.rubbing), -forces.guide), turning, row)
 
 
 @jit
-def observe_all(times, states, phases, p, rows):
-    """Write the rows of `observe` at m times (s).
-
-    states: (m, k); phases: of the load, (m,) integers; rows: (m, ...).
-    """
-    for i in range(times.size):
-        observe(times[i], states[i], phases[i], p, rows[i])
-
-
-@jit
-def contact_at(joint, t, y, phase, p):
-    """Return a joint's `ContactState` at a time and state."""
-    joints = solve(ideal(t, p), y, phase, p).joints
-    return joints.big if joint == 0 else joints.small
+def write_frame(now, p, row):
+    """Write the columns behind PACE into a row that has the others."""
+    pose, guide, forces = now.pose, now.joints.guide, now.reactions
+    row[GUIDE_GAP], row[CRANK_SPEED] = -guide.deepest, pose.speed
+    row[MOTOR_TORQUE] = motor_torque(pose, p)
+    inward, along = pose.speed * pose.speed, now.accelerations[0]
+    c, s = pose.cos_theta, pose.sin_theta
+    turning = -p.unbalance * (inward * c + along * s), -p.unbalance * (inward * s - along * c)
+    write_frame_forces((-(guide.fx + forces.rubbing), -forces.guide), turning, row)
 
 
 @jit
-def write_eccentricities(t, y, p, row):
-    """Write both eccentricities (m) into the row; an ideal joint has none."""
-    for i in range(4):
-        place = p.at[1 + i]
-        row[ECCENTRICITY + i] = y[place] if place >= 0 else 0.0
+def contacts_of(now, p):
+    """Return the `ContactState` of the big end and of the small end."""
+    return now.joints.big, now.joints.small
 
 
 @jit

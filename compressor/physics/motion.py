@@ -7,7 +7,7 @@ and small end: (x, phi); both joints: (x, X, Y, phi) with (X, Y) the rod's centr
 come from difference identities, never from subtracting two cosines, so that a clearance of a
 nanometre keeps its digits.
 
-`derivative` is what integrators call; `observe` recomputes outputs by the same functions.
+`systems` has what integrators call and what is observed, of scenes and of the mechanism.
 """
 
 import math
@@ -25,7 +25,7 @@ from compressor.physics.contact import (
 )
 from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.film import add_film
-from compressor.physics.kinematics import IdealMotion, ideal, small_angle
+from compressor.physics.kinematics import IdealMotion, small_angle
 from compressor.physics.loads import piston_force
 from compressor.physics.record import BIG_END as AT_BIG_END
 from compressor.physics.record import SMALL_END as AT_SMALL_END
@@ -193,6 +193,54 @@ def ideal_centre_acceleration(motion, p):
     return -pin * motion.cos_theta - ax, ay - pin * motion.sin_theta
 
 
+@inline_once
+def centre_acceleration(accelerations, y, motion, turn, p):
+    """Return the acceleration (m/s^2), x and y, of the centre of a rod with an ideal joint.
+
+    accelerations: of the crosshead (m/s^2) and of phi (rad/s^2).
+    """
+    a, spin_up = accelerations
+    sin_phi = motion.sin_phi + turn.ds
+    cos_phi = motion.cos_phi + turn.dc
+    rate = motion.rate + y[2 * p.freedoms - 1]
+    if p.scene == BIG_END:
+        b = p.rod_length - p.rod_centre
+        ax = a + b * (cos_phi * rate * rate + sin_phi * spin_up)
+        return ax, b * (cos_phi * spin_up - sin_phi * rate * rate)
+    c = p.rod_centre
+    pin = p.crank_radius * p.omega * p.omega
+    ax = -pin * motion.cos_theta - c * (cos_phi * rate * rate + sin_phi * spin_up)
+    return ax, c * (sin_phi * rate * rate - cos_phi * spin_up) - pin * motion.sin_theta
+
+
+@inline_llvm
+def joint_forces(big, small, load, accelerations, y, motion, turn, p):
+    """Return the forces (N) on the rod: big end x and y, small end x and y.
+
+    Those of a clearance joint are the contact's. At an ideal joint they follow by inverse dynamics:
+    Newton-Euler of the rod with the crosshead's x balance. big, small: `ContactState`; load: N;
+    accelerations: as of `centre_acceleration`.
+    """
+    if p.scene == BOTH:
+        return big.fx, big.fy, small.fx, small.fy
+    ax, ay = centre_acceleration(accelerations, y, motion, turn, p)
+    across = p.rod_mass * ax
+    up = p.rod_mass * (ay + p.gravity)
+    if p.scene == SMALL_END:
+        return across - small.fx, up - small.fy, small.fx, small.fy
+    a, spin_up = accelerations
+    small_x = -load - p.reciprocating_mass * a
+    if p.scene == BIG_END:
+        return big.fx, big.fy, small_x, up - big.fy
+    big_x = across - small_x
+    sin_phi, cos_phi = motion.sin_phi, motion.cos_phi
+    c = p.rod_centre
+    b = p.rod_length - c
+    small_y = -p.rod_inertia * spin_up + c * (cos_phi * up + sin_phi * big_x)
+    small_y = (small_y - b * sin_phi * small_x) / (p.rod_length * cos_phi)
+    return big_x, up - small_y, small_x, small_y
+
+
 class Instant(NamedTuple):
     """All that the forces and accelerations at one time and state depend on, evaluated once."""
 
@@ -201,6 +249,7 @@ class Instant(NamedTuple):
     load: float
     big: ContactState
     small: ContactState
+    forces: tuple[float, float, float, float]  # on the rod: big end x and y, small end x and y, N
     a: float  # crosshead's acceleration
     spin_up: float  # second derivative of phi
     centre_x: float  # rod centre's acceleration; 0 unless it is an unknown of the scene
@@ -231,7 +280,8 @@ def evaluate(motion, y, phase, p):
     elif p.scene == BOTH:
         big, small = contacts_both(y, motion, turn, p)
         a, centre_x, centre_y, spin_up = solve_both(motion, turn, load, big, small, p)
-    return Instant(motion, turn, load, big, small, a, spin_up, centre_x, centre_y)
+    forces = joint_forces(big, small, load, (a, spin_up), y, motion, turn, p)
+    return Instant(motion, turn, load, big, small, forces, a, spin_up, centre_x, centre_y)
 
 
 @inline_once
@@ -263,7 +313,7 @@ def write_carried_rates(now, y, p, out):
 
 
 @inline_llvm
-def write_derivative(now, y, p, out):
+def write_rates(now, y, p, out):
     """Write dy/dt at an evaluated instant into out."""
     n = p.freedoms
     for i in range(n):
@@ -277,21 +327,28 @@ def write_derivative(now, y, p, out):
         write_carried_rates(now, y, p, out)
 
 
+@inline_llvm
+def pace_of(now, p):
+    """Return the time that passes over that of a steady crank, which turns a scene: 1."""
+    return 1.0
+
+
+@inline_llvm
+def contacts_of(now, p):
+    """Return the `ContactState` of the big end and of the small end."""
+    return now.big, now.small
+
+
+@inline_llvm
+def deviation(t, y, p):
+    """Return how far (m) the crosshead is from its ideal place."""
+    return y[0]
+
+
 @jit
-def derivative(t, y, phase, p, out):
-    """Write dy/dt of the record's scene into `out`.
-
-    y and out: length 4 (one clearance joint) or 8 (both), with chosen laws four more; `phase`: the
-    load's phase, 0 to 3.
-    """
-    write_derivative(evaluate(ideal(t, p), y, phase, p), y, p, out)
-
-
-@jit
-def contact_at(joint, t, y, phase, p):
-    """Return a joint's `ContactState` at a time and state."""
-    now = evaluate(ideal(t, p), y, phase, p)
-    return now.big if joint == 0 else now.small
+def is_within_model(y, p):
+    """Return 0: how deep contacts of a scene are is watched by the tally."""
+    return 0
 
 
 @jit

@@ -1,7 +1,6 @@
-"""Outputs recomputed from (t, y): what is stored, drawn, measured and audited.
+"""The columns of an observed row, and what a scene writes into them.
 
-The right-hand side records nothing. `observe` writes one row of quantities; the energy flows
-(work of crank and load, losses to damping and friction) are integrated beside the motion.
+`systems` calls these, or what `mechanism_rows` has of the same names.
 """
 
 import math
@@ -9,15 +8,11 @@ from enum import IntEnum
 
 from compressor.physics._jit import inline_llvm, inline_once, jit, square_root
 from compressor.physics.contact import nearness
-from compressor.physics.kinematics import ideal
 from compressor.physics.motion import (
     deviation_accelerations,
     eccentricities_both,
     eccentricity_big_end,
     eccentricity_small_end,
-    evaluate,
-    rod_turn,
-    write_derivative,
 )
 from compressor.physics.record import Scene
 
@@ -35,7 +30,7 @@ class Column(IntEnum):
     ROD_ANGLE = 2
     PISTON_FORCE = 3
     ECCENTRICITY = 4  # four: (joint, axis)
-    ACCELERATION = 8  # from here on: what `observe_with_energy` writes
+    ACCELERATION = 8  # from here on: what `systems.observe_with_energy` writes
     FORCE = 9  # four: (joint, axis)
     FORCE_SIZE = 13  # two
     JOURNAL_ACCELERATION = 15  # two: along x, of a journal against its bore; 0 of an ideal joint
@@ -93,13 +88,6 @@ def eccentricity_row(y, turn, p, row):
         row[ECCENTRICITY + 2], row[ECCENTRICITY + 3] = small[0], small[1]
 
 
-@jit
-def write_eccentricities(t, y, p, row):
-    """Write both eccentricities (m) at a time (s) and state into the row."""
-    n = p.freedoms
-    eccentricity_row(y, rod_turn(ideal(t, p), y[n - 1], y[2 * n - 1], p), p, row)
-
-
 @inline_once
 def centre_velocity(now, y, p):
     """Return the rod centre's velocity (m/s), x and y, and its height (m)."""
@@ -120,50 +108,6 @@ def centre_velocity(now, y, p):
     vx = -crank * motion.sin_theta - c * sin_phi * rate
     vy = crank * motion.cos_theta - c * cos_phi * rate
     return vx, vy, height - c * now.turn.ds
-
-
-@inline_once
-def centre_acceleration(now, y, p):
-    """Return the acceleration (m/s^2), x and y, of the centre of a rod with an ideal joint."""
-    motion = now.motion
-    sin_phi = motion.sin_phi + now.turn.ds
-    cos_phi = motion.cos_phi + now.turn.dc
-    rate = motion.rate + y[2 * p.freedoms - 1]
-    if p.scene == BIG_END:
-        b = p.rod_length - p.rod_centre
-        ax = now.a + b * (cos_phi * rate * rate + sin_phi * now.spin_up)
-        return ax, b * (cos_phi * now.spin_up - sin_phi * rate * rate)
-    c = p.rod_centre
-    pin = p.crank_radius * p.omega * p.omega
-    ax = -pin * motion.cos_theta - c * (cos_phi * rate * rate + sin_phi * now.spin_up)
-    return ax, c * (sin_phi * rate * rate - cos_phi * now.spin_up) - pin * motion.sin_theta
-
-
-@inline_llvm
-def joint_forces(now, y, p):
-    """Return the forces (N) on the rod: big end x and y, small end x and y.
-
-    Those of a clearance joint are the contact's. At an ideal joint they follow by inverse dynamics:
-    Newton-Euler of the rod with the crosshead's x balance.
-    """
-    big, small = now.big, now.small
-    if p.scene == BOTH:
-        return big.fx, big.fy, small.fx, small.fy
-    ax, ay = centre_acceleration(now, y, p)
-    across = p.rod_mass * ax
-    up = p.rod_mass * (ay + p.gravity)
-    if p.scene == SMALL_END:
-        return across - small.fx, up - small.fy, small.fx, small.fy
-    small_x = -now.load - p.reciprocating_mass * now.a
-    if p.scene == BIG_END:
-        return big.fx, big.fy, small_x, up - big.fy
-    big_x = across - small_x
-    sin_phi, cos_phi = now.motion.sin_phi, now.motion.cos_phi
-    c = p.rod_centre
-    b = p.rod_length - c
-    small_y = -p.rod_inertia * now.spin_up + c * (cos_phi * up + sin_phi * big_x)
-    small_y = (small_y - b * sin_phi * small_x) / (p.rod_length * cos_phi)
-    return big_x, up - small_y, small_x, small_y
 
 
 @inline_llvm
@@ -234,9 +178,9 @@ def frame_of_series(crank, friction, p, rows):
 
 
 @inline_once
-def powers(now, y, forces, p):
+def powers(now, y, p):
     """Return the four powers (W): of crank and load, into contacts, lost to friction."""
-    motion, big, small = now.motion, now.big, now.small
+    motion, big, small, forces = now.motion, now.big, now.small, now.forces
     crank = p.crank_radius * p.omega
     turning = crank * (motion.cos_theta * forces[1] - motion.sin_theta * forces[0])
     if p.clearance[0] > 0.0:
@@ -247,20 +191,20 @@ def powers(now, y, forces, p):
 
 
 @inline_llvm
-def write_powers(now, y, forces, p, out):
+def write_powers(now, y, p, out):
     """Write the four `powers` (W) into out[0:4]."""
-    out[0], out[1], out[2], out[3] = powers(now, y, forces, p)
+    out[0], out[1], out[2], out[3] = powers(now, y, p)
 
 
-@inline_once
-def energies(now, y, p):
-    """Return the kinetic and potential energy (J), the latter without the contacts' springs."""
+@inline_llvm
+def write_energies(now, y, p, row):
+    """Write the kinetic and potential energy (J), the latter without the contacts' springs."""
     v = now.motion.v + y[p.freedoms]
     rate = now.motion.rate + y[2 * p.freedoms - 1]
     kinetic = p.reciprocating_mass * v * v + p.rod_inertia * rate * rate
     vx, vy, height = centre_velocity(now, y, p)
     kinetic += p.rod_mass * (vx * vx + vy * vy)
-    return 0.5 * kinetic, p.rod_mass * p.gravity * height
+    row[KINETIC], row[POTENTIAL] = 0.5 * kinetic, p.rod_mass * p.gravity * height
 
 
 @inline_once
@@ -288,9 +232,9 @@ def journal_accelerations(now, y, p):
 
 
 @inline_once
-def observed_columns(now, y, forces, p):
+def observed_columns(now, y, p):
     """Return the columns from ACCELERATION to GUIDE_MOMENT."""
-    big, small = now.big, now.small
+    big, small, forces = now.big, now.small, now.forces
     at_big, at_small = journal_accelerations(now, y, p)
     motion, friction = now.motion, (big.friction, small.friction)
     torque, moment = torque_and_moment(
@@ -309,92 +253,25 @@ def observed_columns(now, y, forces, p):
 
 
 @inline_llvm
-def write_contact_columns(now, y, forces, p, row):
+def write_contact_columns(now, y, p, row):
     """Write the columns from ACCELERATION to GUIDE_MOMENT into the row."""
-    columns = observed_columns(now, y, forces, p)
+    columns = observed_columns(now, y, p)
     for i in range(CRANK_POWER - ACCELERATION):
         row[ACCELERATION + i] = columns[i]
 
 
 @inline_llvm
-def write_columns(now, y, forces, p, row):
-    """Write the columns from ACCELERATION on into the row."""
-    write_contact_columns(now, y, forces, p, row)
-    write_powers(now, y, forces, p, row[CRANK_POWER:KINETIC])
-    row[KINETIC], row[POTENTIAL] = energies(now, y, p)
-
-
-@inline_once
-def observe(t, y, phase, p, row):
-    """Write all quantities of `Column` at time t (s) and state y into row.
-
-    row: (COLUMNS,), or (WIDE,) for the forces on the frame as well. In the ideal scene y is four
-    zeros.
-    """
-    motion = ideal(t, p)
-    now = evaluate(motion, y, phase, p)
-    turn = now.turn
+def write_place(now, y, p, row):
+    """Write the columns before ACCELERATION."""
+    motion, turn = now.motion, now.turn
     row[DISPLACEMENT] = motion.x + y[0]
     row[VELOCITY] = motion.v + y[p.freedoms]
     row[ROD_ANGLE] = math.atan2(motion.sin_phi + turn.ds, motion.cos_phi + turn.dc)
     row[PISTON_FORCE] = now.load
     eccentricity_row(y, turn, p, row)
-    write_columns(now, y, joint_forces(now, y, p), p, row)
-    row[PACE] = 1.0
-    if row.size == WIDE:
-        write_scene_frame(motion.cos_theta, motion.sin_theta, p, row)
 
 
 @jit
-def observe_contact(motion, y, phase, p, row):
-    """Write the columns from ACCELERATION to GUIDE_MOMENT: by which a step is tallied within."""
-    now = evaluate(motion, y, phase, p)
-    write_contact_columns(now, y, joint_forces(now, y, p), p, row)
-
-
-@jit
-def observe_with_energy(motion, y, phase, p, row):
-    """Write the columns from ACCELERATION on: what a step is judged, tallied and audited by."""
-    now = evaluate(motion, y, phase, p)
-    write_columns(now, y, joint_forces(now, y, p), p, row)
-
-
-@jit
-def observe_all(times, states, phases, p, rows):
-    """Write the rows of `observe` at m times (s).
-
-    states: (m, k); phases: of the load, (m,) integers; rows: (m, COLUMNS) or (m, WIDE).
-    """
-    for i in range(times.size):
-        observe(times[i], states[i], phases[i], p, rows[i])
-
-
-@jit
-def derivative_with_flows(t, z, phase, p, out):
-    """Write dz/dt of the motion and of its four energy flows into out, z = (y, flows).
-
-    t: s, of a steady crank; z, out: (n + 4,); phase: of the load, 0 to 3.
-    """
-    write_flowing_derivative(ideal(t, p), z, phase, p, out)
-
-
-@inline_llvm
-def write_flowing_derivative(motion, z, phase, p, out):
-    """Write `derivative_with_flows` around an ideal motion that is known."""
-    n = z.size - 4
-    y = z[:n]
-    now = evaluate(motion, y, phase, p)
-    write_derivative(now, y, p, out[:n])
-    write_powers(now, y, joint_forces(now, y, p), p, out[n:])
-
-
-@jit
-def derivative_and_columns(motion, z, phase, p, out, row):
-    """Write both `derivative_with_flows` and `observe_with_energy` from one evaluation."""
-    n = z.size - 4
-    y = z[:n]
-    now = evaluate(motion, y, phase, p)
-    write_derivative(now, y, p, out[:n])
-    write_columns(now, y, joint_forces(now, y, p), p, row)
-    for i in range(4):
-        out[n + i] = row[CRANK_POWER + i]
+def write_frame(now, p, row):
+    """Write the columns behind PACE into a row that has the others."""
+    write_scene_frame(now.motion.cos_theta, now.motion.sin_theta, p, row)

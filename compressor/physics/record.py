@@ -194,12 +194,13 @@ FEATURES: list[tuple] = [
     ("rod_damping", "f8"),  # of the rod's material, over its stiffness, s
     ("rod_loss", "i8"),  # place in a state of what that has taken; -1 of a rigid rod
 ]
-# The last field's length shows compiled functions, by its type alone, the kind of a record:
-# those for the default one hold nothing of the others (`_jit.dispatch_on_record`).
-CHOICE, MECHANISM = 2, 3
-RECORD = np.dtype([*FIELDS, ("laws", "f8", (1,))], align=True)
-CHOSEN = np.dtype([*FIELDS, *FILM, *CARD, ("laws", "f8", (CHOICE,))], align=True)
-FEATURED = np.dtype([*FIELDS, *FILM, *CARD, *FEATURES, ("laws", "f8", (MECHANISM,))], align=True)
+# Three kinds of records, told by fields that only some have: compiled functions for the default one
+# hold nothing of the others (`_jit.dispatch_on_record`). What a kind adds stands before the rest:
+# to numba, a record with fields behind another's is one of those.
+CHOSEN_FORCES, MECHANISM = "viscosity", "driven"
+RECORD = np.dtype(FIELDS, align=True)
+CHOSEN = np.dtype([*FILM, *CARD, *FIELDS], align=True)
+FEATURED = np.dtype([*FEATURES, *FILM, *CARD, *FIELDS], align=True)
 
 
 def zero(kind: np.dtype) -> np.record:
@@ -245,7 +246,17 @@ Fields = np.record | dict[str, Any]  # a record, or its `read_fields`
 
 def is_featured(p: Fields) -> bool:
     """Return whether a record is that of a mechanism with features."""
-    return bool(p["laws"].size == MECHANISM)
+    return has_field(p, MECHANISM)
+
+
+def has_chosen_forces(p: Fields) -> bool:
+    """Return whether a record is one for forces but the default ones: other laws, oil, a card."""
+    return has_field(p, CHOSEN_FORCES)
+
+
+def has_field(p: Fields, name: str) -> bool:
+    """Return whether a record has a field."""
+    return name in (p if isinstance(p, dict) else p.dtype.names or ())
 
 
 def find_coordinates(p: Fields) -> list[Coordinate]:
@@ -285,7 +296,7 @@ def state_names(p: Fields) -> tuple[str, ...]:
     """
     if not is_featured(p):
         names = STATE_NAMES[Scene(int(p["scene"]))]
-        return names + CARRIED if names and p["laws"].size > 1 else names
+        return names + CARRIED if names and has_chosen_forces(p) else names
     positions = find_coordinates(p)
     coordinates = [COORDINATE_NAMES[c] for c in positions]
     names = tuple(f"{name}, {unit}" for name, unit in coordinates)
@@ -297,8 +308,7 @@ def state_names(p: Fields) -> tuple[str, ...]:
 def derive(p: np.record) -> None:
     """Fill the fields of a record that follow from its others."""
     p["freedoms"], p["wide"] = FREEDOMS[Scene(int(p["scene"]))] or 2, 1
-    fields = p if isinstance(p, dict) else p.dtype.names or ()
-    if "driven" in fields:
+    if is_featured(p):
         place_coordinates(p)
     p["crank_ratio"] = p["crank_radius"] / p["rod_length"]
     for name in ("rod_mass", "rod_inertia", "reciprocating_mass", "full_damping"):

@@ -1,31 +1,38 @@
-"""What is integrated and observed, by the kind of a record: one of the scenes, or the mechanism.
+"""What is integrated and what is observed, of one of the scenes or of the mechanism.
 
-A scene is the mechanism with clearance at its joints and no other feature, written by hand for
-speed; that both agree is a test.
+Both have a handful of functions of the same names; which are called is settled by the record. What
+integrators and observers call stands here once. A scene is the mechanism with clearance at its
+joints and no other feature, written by hand for speed; that both agree is a test.
+
+The right-hand side records nothing: outputs are recomputed from (t, y). The energy flows (work of
+crank and load, losses to damping and friction) are integrated beside the motion. Times are those
+of a steady crank: what passes in time is `pace_of` times that.
 """
 
-from compressor.physics import mechanism_rows, motion, observe
-from compressor.physics._jit import dispatch_on_record, jit
+import functools
+
+from compressor.physics import mechanism_motion, mechanism_rows, motion, observe
+from compressor.physics._jit import dispatch_on_record, inline_llvm, jit
+from compressor.physics.kinematics import ideal
 from compressor.physics.loads import CYLINDER, GAS, begin_stroke
+from compressor.physics.observe import CRANK_POWER, KINETIC, PACE, WIDE
 from compressor.physics.record import MECHANISM
 
+# of two functions, the mechanism's and a scene's, that of the record among the arguments
+choose = functools.partial(dispatch_on_record, MECHANISM)
 
-@jit
-def within_model(y, p):
-    """Return `mechanism_rows.beyond_model` of a scene, whose depths the tally watches."""
-    return 0
-
-
-beyond_model = dispatch_on_record(MECHANISM, mechanism_rows.beyond_model, within_model)
-
-
-@jit
-def scene_deviation(t, y, p):
-    """Return how far (m) the crosshead of a scene is from its ideal place."""
-    return y[0]
-
-
-deviation = dispatch_on_record(MECHANISM, mechanism_rows.deviation, scene_deviation)
+evaluate = choose(mechanism_motion.solve, motion.evaluate)
+write_rates = choose(mechanism_rows.write_rates, motion.write_rates)
+pace_of = choose(mechanism_rows.pace_of, motion.pace_of)
+contacts_of = choose(mechanism_rows.contacts_of, motion.contacts_of)
+write_place = choose(mechanism_rows.write_place, observe.write_place)
+write_contact_columns = choose(mechanism_rows.write_contact_columns, observe.write_contact_columns)
+write_powers = choose(mechanism_rows.write_powers, observe.write_powers)
+write_energies = choose(mechanism_rows.write_energies, observe.write_energies)
+write_frame = choose(mechanism_rows.write_frame, observe.write_frame)
+deviation = choose(mechanism_rows.deviation, motion.deviation)
+beyond_model = choose(mechanism_rows.beyond_model, motion.is_within_model)
+start = choose(mechanism_rows.start, motion.start)
 
 
 @jit
@@ -35,25 +42,97 @@ def enter_segment(t, y, i, phases, p):
         begin_stroke(t, deviation(t, y, p), i, phases, p)
 
 
-derivative = dispatch_on_record(MECHANISM, mechanism_rows.derivative, motion.derivative)
-derivative_with_flows = dispatch_on_record(
-    MECHANISM, mechanism_rows.derivative_with_flows, observe.derivative_with_flows
-)
-write_flowing_derivative = dispatch_on_record(
-    MECHANISM, mechanism_rows.write_flowing_derivative, observe.write_flowing_derivative
-)
-derivative_and_columns = dispatch_on_record(
-    MECHANISM, mechanism_rows.derivative_and_columns, observe.derivative_and_columns
-)
-observe_contact = dispatch_on_record(
-    MECHANISM, mechanism_rows.observe_contact, observe.observe_contact
-)
-observe_with_energy = dispatch_on_record(
-    MECHANISM, mechanism_rows.observe_with_energy, observe.observe_with_energy
-)
-observe_all = dispatch_on_record(MECHANISM, mechanism_rows.observe_all, observe.observe_all)
-contact_at = dispatch_on_record(MECHANISM, mechanism_rows.contact_at, motion.contact_at)
-write_eccentricities = dispatch_on_record(
-    MECHANISM, mechanism_rows.write_eccentricities, observe.write_eccentricities
-)
-start = dispatch_on_record(MECHANISM, mechanism_rows.start, motion.start)
+@jit
+def derivative(t, y, phase, p, out):
+    """Write dy/dt into `out`, (n,): as many numbers as `state_names` of the record has.
+
+    phase: of the load, 0 to 3.
+    """
+    write_rates(evaluate(ideal(t, p), y, phase, p), y, p, out)
+
+
+@jit
+def derivative_with_flows(t, z, phase, p, out):
+    """Write dz/dt of the motion and of its four energy flows into out, z = (y, flows).
+
+    t: s, of a steady crank; z, out: (n + 4,); phase: of the load, 0 to 3.
+    """
+    write_flowing_derivative(ideal(t, p), z, phase, p, out)
+
+
+@inline_llvm
+def write_flowing_derivative(motion, z, phase, p, out):
+    """Write `derivative_with_flows` around an ideal motion that is known."""
+    n = z.size - 4
+    y = z[:n]
+    now = evaluate(motion, y, phase, p)
+    write_rates(now, y, p, out[:n])
+    write_powers(now, y, p, out[n:])
+    for i in range(n, z.size):
+        out[i] *= pace_of(now, p)
+
+
+@jit
+def derivative_and_columns(motion, z, phase, p, out, row):
+    """Write both `derivative_with_flows` and `observe_with_energy` from one evaluation."""
+    n = z.size - 4
+    y = z[:n]
+    now = evaluate(motion, y, phase, p)
+    write_rates(now, y, p, out[:n])
+    write_row(now, y, p, row)
+    for i in range(4):
+        out[n + i] = row[CRANK_POWER + i] * row[PACE]
+
+
+@jit
+def contact_at(joint, t, y, phase, p):
+    """Return a joint's `ContactState` at a time and state."""
+    big, small = contacts_of(evaluate(ideal(t, p), y, phase, p), p)
+    return big if joint == 0 else small
+
+
+@inline_llvm
+def write_row(now, y, p, row):
+    """Write the columns from ACCELERATION to PACE."""
+    write_contact_columns(now, y, p, row)
+    write_powers(now, y, p, row[CRANK_POWER:KINETIC])
+    write_energies(now, y, p, row)
+    row[PACE] = pace_of(now, p)
+
+
+@jit
+def observe_contact(motion, y, phase, p, row):
+    """Write the columns from ACCELERATION to GUIDE_MOMENT, and PACE: by which a step is tallied."""
+    now = evaluate(motion, y, phase, p)
+    write_contact_columns(now, y, p, row)
+    row[PACE] = pace_of(now, p)
+
+
+@jit
+def observe_with_energy(motion, y, phase, p, row):
+    """Write the columns from ACCELERATION on: what a step is judged, tallied and audited by."""
+    write_row(evaluate(motion, y, phase, p), y, p, row)
+
+
+@jit
+def observe_at(t, y, phase, p, row):
+    """Write all quantities of `Column` at time t (s) and state y into row.
+
+    row: (COLUMNS,), or (WIDE,) for the forces on the frame as well. Of ideal joints y is four
+    zeros.
+    """
+    now = evaluate(ideal(t, p), y, phase, p)
+    write_place(now, y, p, row)
+    write_row(now, y, p, row)
+    if row.size == WIDE:
+        write_frame(now, p, row)
+
+
+@jit
+def observe_all(times, states, phases, p, rows):
+    """Write the rows of `observe_at` at m times (s).
+
+    states: (m, k); phases: of the load, (m,) integers; rows: (m, COLUMNS) or (m, WIDE).
+    """
+    for i in range(times.size):
+        observe_at(times[i], states[i], phases[i], p, rows[i])

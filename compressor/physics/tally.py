@@ -23,7 +23,7 @@ from compressor.physics.observe import (
     POTENTIAL,
     Column,
 )
-from compressor.physics.record import CHOICE, MECHANISM, zero
+from compressor.physics.record import CHOSEN_FORCES, MECHANISM, zero
 
 # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAK_NEARNESS = 0.98
@@ -220,7 +220,7 @@ def add_peaks_of_nodes(nodes, rows, every, tally, p):
         tally.peak[k] = max(tally.peak[k], tally.top[k])
 
 
-peaks_of_step = dispatch_on_record(CHOICE, add_peaks_of_nodes, add_peaks)
+peaks_of_step = dispatch_on_record(CHOSEN_FORCES, add_peaks_of_nodes, add_peaks)
 
 
 @inline_llvm

@@ -27,6 +27,7 @@ from compressor.physics import (
     derivative_with_flows,
     elastic_form,
     enter_segment,
+    has_chosen_forces,
     is_featured,
     new_record,
     start,
@@ -319,7 +320,7 @@ def length_and_speed(p: Fields) -> tuple[float, float]:
 
 def is_oiled(p: Fields) -> bool:
     """Return whether joints of a record have an oil film."""
-    return bool(p["laws"].size > 1 and p["viscosity"] > 0.0)
+    return has_chosen_forces(p) and bool(p["viscosity"] > 0.0)
 
 
 def film_damping(p: Fields) -> float:

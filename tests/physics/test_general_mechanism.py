@@ -9,7 +9,6 @@ import sympy
 
 from compressor.cases.case import Case
 from compressor.metrics import JOINTS
-from compressor.physics import mechanism_rows
 from compressor.physics.kinematics import ideal
 from compressor.physics.mechanism import ACROSS, BIG_SLOPE, SMALL_SLOPE, shapes
 from compressor.physics.mechanism_motion import solve
@@ -20,7 +19,6 @@ from compressor.physics.motion import (
     rod_turn,
 )
 from compressor.physics.observe import COLUMNS, WIDE, Column
-from compressor.physics.observe import observe as scene_observe
 from compressor.physics.record import (
     Coordinate,
     find_coordinates,
@@ -28,6 +26,7 @@ from compressor.physics.record import (
     place_coordinates,
     state_names,
 )
+from compressor.physics.systems import derivative, observe_at
 from compressor.solve.si_record import record
 
 SCENES = ("none", *JOINTS, "both")
@@ -55,8 +54,7 @@ def featured(joint="none", features=(), values=None, **numbers):
     usual = record(Case.from_values(clearance | (values or {})))
     p = new_record(featured=True)
     for name in usual.dtype.names:
-        if name != "laws":
-            p[name] = usual[name]
+        p[name] = usual[name]
     for name, value in {**NUMBERS, **dict.fromkeys(features, 1), **numbers}.items():
         p[name] = value
     place_coordinates(p)
@@ -175,7 +173,7 @@ def test_accelerations_are_lagranges(lagrange, joint, features):
         assert found.accelerations[moving] == pytest.approx(expected, rel=1e-9, abs=1e-7)
         kinetic = 0.5 * rates @ mass @ rates
         row = np.empty(COLUMNS)
-        mechanism_rows.observe(t, y, 1, p, row)
+        observe_at(t, y, 1, p, row)
         assert row[Column.KINETIC] == pytest.approx(kinetic, rel=1e-12)
 
 
@@ -200,7 +198,7 @@ def test_the_frame_takes_the_momentum_that_the_parts_lose(lagrange, joint, featu
         weight = np.array([0.0, p["gravity"] * (p["rod_mass"] + p["reciprocating_mass"])])
         lost = -(slope @ gained + bias + unbalance + weight)
         row = np.empty(WIDE)
-        mechanism_rows.observe(t, y, 1, p, row)
+        observe_at(t, y, 1, p, row)
         found = row[Column.SHAKING_FORCE : Column.SHAKING_FORCE + 2]
         size = np.abs(lost).max() + row[Column.FORCE_SIZE : Column.FORCE_SIZE + 2].max()
         assert found == pytest.approx(lost, abs=1e-11 * size)
@@ -236,8 +234,8 @@ def test_a_scene_is_the_mechanism_without_features(joint, gravity, forces, tmp_p
         z[:m] = np.array([one[:2] for one in off]).ravel()
         z[m : 2 * m] = np.array([one[2:] for one in off]).ravel()
         expected, found = np.empty(WIDE), np.empty(WIDE)
-        scene_observe(t, y, 1, p, expected)
-        mechanism_rows.observe(t, z, 1, q, found)
+        observe_at(t, y, 1, p, expected)
+        observe_at(t, z, 1, q, found)
         expected, found = expected[: Column.GUIDE_GAP], found[: Column.GUIDE_GAP]
         # a scene's ledger leaves out the weight of what is out of balance: nil over a revolution
         weight, angle = q["unbalance"] * gravity, q["omega"] * t
@@ -270,12 +268,12 @@ def test_energy_changes_by_the_powers(joint, features, unbalance):
             w, rates = random_motion(p, rng)
             y = state_of(p, w, rates)
         rate, row = np.zeros_like(y), np.empty(COLUMNS)
-        mechanism_rows.derivative(t, y, 1, p, rate)
-        mechanism_rows.observe(t, y, 1, p, row)
+        derivative(t, y, 1, p, rate)
+        observe_at(t, y, 1, p, row)
         h, energies = 1e-8, []
         for s in (h, -h):
             moved = np.empty(COLUMNS)
-            mechanism_rows.observe(t + s, y + s * rate, 1, p, moved)
+            observe_at(t + s, y + s * rate, 1, p, moved)
             energies.append(moved[Column.KINETIC] + moved[Column.POTENTIAL])
         power = row[Column.CRANK_POWER] + row[Column.LOAD_POWER]
         power -= row[Column.CONTACT_POWER] + row[Column.FRICTION_POWER]

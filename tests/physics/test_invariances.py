@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.metrics import METRICS
-from compressor.physics.motion import derivative, start
-from compressor.physics.observe import COLUMNS, Column, observe_all
+from compressor.physics.observe import COLUMNS, Column
 from compressor.physics.record import FREEDOMS, derive
+from compressor.physics.systems import derivative, observe_all, start
 from compressor.solve.request import Request
 from compressor.solve.run import integrate
 from compressor.solve.si_record import offsets, record, scene
@@ -145,8 +145,7 @@ DIMENSIONS = {
     "crank_clearance": (1, 0, 0),
 }  # fmt: skip
 PURE_NUMBERS = {"scene", "load", "law", "friction", "freedoms", "wide", "exponent", "static",
-                "dynamic", "corners", "crank_corners", "gas_exponent", "hysteresis",
-                "laws"}  # fmt: skip
+                "dynamic", "corners", "crank_corners", "gas_exponent", "hysteresis"}  # fmt: skip
 DERIVED = {"crank_ratio", "per_rod_mass", "per_rod_inertia", "per_reciprocating_mass",
            "per_full_damping", "per_stiction", "per_transition"}  # fmt: skip
 

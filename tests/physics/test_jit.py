@@ -24,7 +24,8 @@ import json
 import numpy as np
 from compressor import Case, simulate
 from compressor.physics import _jit
-from compressor.physics.observe import COLUMNS, observe
+from compressor.physics.observe import COLUMNS
+from compressor.physics.systems import observe_at
 from compressor.solve.si_record import record
 
 rows, runs, rng = [], [], np.random.default_rng(7)
@@ -33,7 +34,7 @@ for joint in ("big_end", "small_end", "both"):
     for phase in range(4):
         y = rng.normal(size=8 if joint == "both" else 4) * 3e-4
         row = np.empty(COLUMNS)
-        observe(0.01 + phase, y, phase, p, row)
+        observe_at(0.01 + phase, y, phase, p, row)
         rows.append(row.tolist())
 solve = {"duration_rev": 0.05, "settle_rev": 0, "output_step_deg": 1, "error_bars": False}
 for method, rtol in ("TSIT5", 1e-8), ("RODAS", 1e-6):
@@ -192,7 +193,7 @@ def of_no_field(x, p):
     return x + p.no_such_field
 
 
-either = dispatch_on_record(2, of_no_field, product)
+either = dispatch_on_record("viscosity", of_no_field, product)
 
 
 @jit
@@ -200,7 +201,7 @@ def one_more(x, p):
     return either(x, p) + 1.0
 
 
-def test_a_function_by_kind_is_that_of_the_record():
+def test_a_function_by_record_is_that_of_its_kind():
     """The other is not even compiled: it reads a field that no record has."""
     p = new_record()
     p["omega"] = 3.0

@@ -8,8 +8,8 @@ import pytest
 import reference
 
 from compressor.cases.case import Case
-from compressor.physics.motion import derivative
-from compressor.physics.observe import COLUMNS, Column, observe
+from compressor.physics.observe import COLUMNS, Column
+from compressor.physics.systems import derivative, observe_at
 from compressor.solve.si_record import record
 
 STATES = 1000
@@ -128,7 +128,7 @@ def test_random_states_agree_with_the_lagrangian(scene):
 def check_forces(scene, t, y, phase, p, absolute_state, params):
     """Forces at both joints against the reference's; True when a joint was in contact."""
     row = np.empty(COLUMNS)
-    observe(t, y, phase, p, row)
+    observe_at(t, y, phase, p, row)
     forces = reference.joint_forces(scene, *absolute_state, t, phase, params)
     expected = [float(f) for joint in reference.JOINTS for f in forces[joint]]
     found = row[Column.FORCE : Column.FORCE + 4]
@@ -143,7 +143,7 @@ def test_ideal_joint_forces_agree_with_newton_and_euler(load):
     params = reference.paper_params(load, "none", 0.0, gravity=9.81)
     row = np.empty(COLUMNS)
     for k, t in enumerate(np.linspace(0.001, 0.119, 24)):
-        observe(t, np.zeros(4), k % 4, p, row)
+        observe_at(t, np.zeros(4), k % 4, p, row)
         forces = reference.ideal_joint_forces(t, k % 4, params)
         expected = [float(f) for joint in reference.JOINTS for f in forces[joint]]
         assert row[Column.FORCE : Column.FORCE + 4] == pytest.approx(expected, rel=1e-11, abs=1e-8)
@@ -161,6 +161,6 @@ def test_a_nanometre_of_clearance_keeps_its_digits():
         rod = mpmath.mpf(params["rod_length"])
         expected = [pin[0] - q[0] + rod * mpmath.cos(q[1]), pin[1] - rod * mpmath.sin(q[1])]
     row = np.empty(COLUMNS)
-    observe(0.013, y, 0, p, row)
+    observe_at(0.013, y, 0, p, row)
     found = row[Column.ECCENTRICITY : Column.ECCENTRICITY + 2]
     assert found == pytest.approx([float(e) for e in expected], rel=1e-13)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.physics.motion import derivative, start
-from compressor.physics.observe import COLUMNS, Column, observe, observe_all
+from compressor.physics.observe import COLUMNS, Column
+from compressor.physics.systems import derivative, observe_all, observe_at, start
 from compressor.solve.si_record import offsets, record
 
 JOINTS = ("big_end", "small_end", "both")
@@ -20,7 +20,7 @@ def case(joint, **values):
 
 def row_at(p, t, y, phase=1):
     row = np.empty(COLUMNS)
-    observe(t, y, phase, p, row)
+    observe_at(t, y, phase, p, row)
     return row
 
 
@@ -136,7 +136,7 @@ def test_rows_of_a_free_flight_show_no_contact():
     assert row[Column.FORCE : Column.FORCE + 2].tolist() == [0, 0]
 
 
-def test_observe_all_is_observe_in_turn():
+def test_observe_all_is_observe_at_in_turn():
     p, rng = record(case("both")), np.random.default_rng(5)
     times = np.linspace(0, 0.1, 5)
     states = np.array([random_state("both", rng) for _ in times])

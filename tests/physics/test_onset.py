@@ -22,14 +22,7 @@ from compressor.physics.march import (
     new_stepper,
     new_work,
 )
-from compressor.physics.motion import derivative, evaluate, start
-from compressor.physics.observe import (
-    COLUMNS,
-    Column,
-    derivative_with_flows,
-    observe_all,
-    observe_contact,
-)
+from compressor.physics.observe import COLUMNS, Column
 from compressor.physics.onset import (
     CHANGE_TOLERANCE,
     INTERVALS,
@@ -47,6 +40,14 @@ from compressor.physics.onset import (
 )
 from compressor.physics.record import FREEDOMS, SMALL_END
 from compressor.physics.runge_kutta import FLOWS, STAGES, interpolate, take_step
+from compressor.physics.systems import (
+    derivative,
+    derivative_with_flows,
+    evaluate,
+    observe_all,
+    observe_contact,
+    start,
+)
 from compressor.physics.tally import new_tally
 from compressor.solve.run import COMPILED as METHODS
 from compressor.solve.run import CONTACT_STEP

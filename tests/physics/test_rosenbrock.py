@@ -7,8 +7,8 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.physics import rosenbrock
-from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, interpolate
+from compressor.physics.systems import derivative_with_flows
 from compressor.solve.run import run_at_tolerance
 from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate

@@ -6,7 +6,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.physics.kinematics import crank_direction
 from compressor.physics.march import NODE_WEIGHTS, NODES
-from compressor.physics.observe import COLUMNS, derivative_with_flows
+from compressor.physics.observe import COLUMNS
 from compressor.physics.runge_kutta import (
     FLOWS,
     STAGES,
@@ -21,6 +21,7 @@ from compressor.physics.runge_kutta import (
     take_step,
     weights_at,
 )
+from compressor.physics.systems import derivative_with_flows
 from compressor.solve.si_record import record
 
 # a wide clearance and a short flight: a smooth motion without contact

@@ -8,7 +8,6 @@ import pytest
 from compressor.cases.case import Case
 from compressor.physics import rosenbrock
 from compressor.physics.march import new_stepper, new_work
-from compressor.physics.observe import derivative_with_flows
 from compressor.physics.runge_kutta import FLOWS, STAGES, A
 from compressor.physics.step_control import (
     LIMITED_REACH,
@@ -26,6 +25,7 @@ from compressor.physics.step_control import (
     refuse,
     stiff_rate,
 )
+from compressor.physics.systems import derivative_with_flows
 from compressor.solve.si_record import record
 
 H = 1e-3

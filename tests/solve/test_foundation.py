@@ -12,7 +12,7 @@ from compressor.analysis.shaking import healthy_body_velocity_rms
 from compressor.cases.case import Case, CaseError
 from compressor.cases.load import load_studies
 from compressor.physics import COLUMNS, derivative_with_flows
-from compressor.physics.observe import observe
+from compressor.physics.systems import observe_at
 from compressor.solve.si_record import record
 from compressor.solve.simulate import BODY, measure, simulate
 from compressor.store.reader import open_study, read_store
@@ -42,7 +42,7 @@ def coupled(case, revolutions):
     masses = body.mass_kg + np.array([0.0, case.machine.reciprocating_mass_kg])
 
     def accelerations(t, z):
-        observe(t, z[:8], 0, p, row)
+        observe_at(t, z[:8], 0, p, row)
         shaking = np.array([-row[9] + row[3], -row[10] - row[12]])
         return (shaking - body.mass_kg * (stiffness * z[8:10] + damping * z[10:])) / masses
 

@@ -8,9 +8,9 @@ from conftest import CHAOTIC, keep
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
-from compressor.physics.motion import start
-from compressor.physics.observe import COLUMNS, Column, observe_all
+from compressor.physics.observe import COLUMNS, Column
 from compressor.physics.record import FREEDOMS
+from compressor.physics.systems import observe_all, start
 from compressor.solve.horizon import (
     PARTED_DISTANCE,
     SHIFT,

@@ -93,7 +93,7 @@ def test_energy_residual_of_every_method(joint, method):
 @pytest.mark.compiled
 def test_the_audit_sees_a_lost_flow(monkeypatch):
     """Without the damping loss in the ledger the energy no longer balances."""
-    from compressor.physics.observe import derivative_with_flows
+    from compressor.physics.systems import derivative_with_flows
     from compressor.solve import scipy_driver
 
     def lossless(t, z, phase, p, out):

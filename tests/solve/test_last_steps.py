@@ -82,7 +82,7 @@ def test_the_errors_are_those_that_the_control_saw(monkeypatch):
 
 
 def simulate_request(max_steps):
-    from compressor.physics.motion import start
+    from compressor.physics.systems import start
     from compressor.solve.si_record import offsets, record
 
     case = Case.from_values(BOTH)
