@@ -65,8 +65,7 @@ def stop(found: "JobReport") -> list[Line]:
     lines = [("stopped", when)]
     names = attributes["stop_state_names"].split("; ")
     for name, value in zip(names, attributes["stop_state"], strict=False):
-        if name != "unused":
-            lines.append((name, f"{value:.6g}"))
+        lines.append((name, f"{value:.6g}"))
     steps = zip(
         *(attributes[f"stop_history_{name}"] for name in ("time", "step", "error")),
         attributes["stop_history_words"].split("; "),

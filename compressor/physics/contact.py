@@ -145,6 +145,7 @@ def choose_laws(p, contact: str, restitution: float, friction: str) -> None:
     """
     law = Law[contact.upper()]
     p["law"], p["friction"] = law, FrictionLaw[friction.upper()]
+    p["carries"] = int(law in HYSTERESIS or p["friction"] == FrictionLaw.LUGRE)
     if law in HYSTERESIS:
         p["hysteresis"] = hysteresis(contact, restitution)
 
@@ -164,7 +165,7 @@ def carried_numbers(joint, y, p):
 
     The speed (m/s) at which the bodies met, and the mean deflection (m) of the bristles.
     """
-    if has_chosen_laws(p):
+    if has_chosen_laws(p) and p.carries:
         return y[2 * p.freedoms + joint], y[2 * p.freedoms + 2 + joint]
     return 0.0, 0.0
 

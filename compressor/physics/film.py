@@ -32,7 +32,7 @@ bore its load, and struck: how hard, followed from the share.
 
 import math
 
-from compressor.physics._jit import dispatch_on_record, inline_llvm, jit
+from compressor.physics._jit import dispatch_on_record, inline_llvm, jit, square_root
 from compressor.physics.contact import ContactState
 from compressor.physics.contact_laws import rise
 from compressor.physics.record import CHOSEN_FORCES, FILM_TERMS
@@ -59,13 +59,13 @@ def short_film(eps, wedge, closing):
     gap: there the integrals of sin^2, sin cos and cos^2 over h^3 have a closed form (Booker 1965),
     written so that nothing cancels at the centre.
     """
-    speed = math.sqrt(closing * closing + 0.25 * wedge * wedge)
+    speed = square_root(closing * closing + 0.25 * wedge * wedge)
     if not speed > 0.0:
         return 0.0, 0.0
     sin_begin, cos_begin = closing / speed, 0.5 * wedge / speed
     x = eps * cos_begin
     room, ends = 1.0 - eps * eps, 1.0 - x * x
-    root = math.sqrt(room)
+    root = square_root(room)
     angle = math.pi + math.atan2(2.0 * eps * root * sin_begin, 1.0 - 2.0 * eps * eps + x * x)
     first = angle / root  # integral of 1 / h
     second = (first + 2.0 * eps * sin_begin / ends) / room  # of 1 / h^2
@@ -81,21 +81,21 @@ def short_film(eps, wedge, closing):
 def short_bearing_shares(eps, constants):
     """Return a bearing's numbers over the short one's: pressed, pulled apart, turned; its attitude.
 
-    Of the attitude, tan(beta / 2) over that of Ocvirk's angle. constants: (4, FILM_TERMS), of
+    Of the attitude, tan(beta / 2) over that of Ocvirk's angle. constants: (FILM_TERMS, 4), of
     `solve.bearing.film_constants`. Those of a film at its centre are one.
     """
-    u = math.sqrt(1.0 - eps)
+    u = square_root(1.0 - eps)
     pressed, pulled, turned, further = 0.0, 0.0, 0.0, 0.0
     for i in range(FILM_TERMS - 1, -1, -1):
-        pressed = pressed * u + constants[0, i]
-        pulled = pulled * u + constants[1, i]
-        turned = turned * u + constants[2, i]
-        further = further * u + constants[3, i]
+        pressed = pressed * u + constants[i, 0]
+        pulled = pulled * u + constants[i, 1]
+        turned = turned * u + constants[i, 2]
+        further = further * u + constants[i, 3]
     pressed, pulled, turned = (1.0 - eps) / pressed, (1.0 + eps) / pulled, (1.0 - eps) / turned
     if eps < CENTRE_ECCENTRICITY:
         centre = 0.0
         for i in range(FILM_TERMS):
-            centre += constants[2, i]
+            centre += constants[i, 2]
         centre, out = 1.0 / centre, rise(eps / CENTRE_ECCENTRICITY)
         pressed = centre + (pressed - centre) * out
         pulled = centre + (pulled - centre) * out
@@ -114,15 +114,15 @@ def film_numbers_at(eps, wedge, closing, constants):
     more is added about its own direction. In these three directions the numbers are exact.
     """
     normal, across = short_film(eps, wedge, closing)
-    size = math.sqrt(normal * normal + across * across)
+    size = square_root(normal * normal + across * across)
     if not size > 0.0:
         return 0.0, 0.0
     cosine, sine = normal / size, across / size
     pressed, pulled, turned, further = short_bearing_shares(eps, constants)
     middle, slope = 0.5 * (pressed + pulled), 0.5 * (pressed - pulled)
     # the direction of a short bearing that turns: Ocvirk's attitude
-    wide, far = math.pi * math.sqrt(1.0 - eps * eps), 4.0 * eps
-    ocvirk = far / math.sqrt(wide * wide + far * far)
+    wide, far = math.pi * square_root(1.0 - eps * eps), 4.0 * eps
+    ocvirk = far / square_root(wide * wide + far * far)
     from_pressed = (1.0 - cosine) / (1.0 - ocvirk)
     near = 2.0 * from_pressed / (1.0 + from_pressed * from_pressed)
     near *= (1.0 + cosine) / (1.0 + ocvirk)
@@ -142,7 +142,7 @@ def film(joint, eccentricity, spins, p):
     """
     ex, ey, ex_rate, ey_rate = eccentricity
     pin, clearance, constants = p.pin_radius[joint], p.clearance[joint], p.film_constants[joint]
-    distance = math.sqrt(ex * ex + ey * ey)
+    distance = square_root(ex * ex + ey * ey)
     nx, ny = (ex / distance, ey / distance) if distance > 0.0 else (1.0, 0.0)
     radial, across = ex_rate * nx + ey_rate * ny, ey_rate * nx - ex_rate * ny
     eps = bounded_eccentricity(distance / clearance, p.film_share)
@@ -156,7 +156,7 @@ def film(joint, eccentricity, spins, p):
     normal, side = -size * away, size * along
     fx, fy = normal * nx - side * ny, normal * ny + side * nx
     shear = 2.0 * math.pi * p.viscosity * length * pin**3
-    shear *= (journal_spin - bore_spin) / (clearance * math.sqrt(1.0 - eps * eps))
+    shear *= (journal_spin - bore_spin) / (clearance * square_root(1.0 - eps * eps))
     half = 0.5 * distance * side
     lost = shear * (journal_spin - bore_spin) + half * (journal_spin + bore_spin)
     lost -= normal * radial + side * across

@@ -242,7 +242,8 @@ def start(offset, y, p):
     for i in range(y.size):
         y[i] = 0.0
     for joint in range(2):
-        y[2 * p.freedoms + joint] = p.least_approach
+        if p.carries:
+            y[2 * p.freedoms + joint] = p.least_approach
         place = p.at[1 + 2 * joint]
         if place >= 0:
             y[place], y[place + 1] = offset[joint, 0], offset[joint, 1]

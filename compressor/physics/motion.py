@@ -323,7 +323,7 @@ def write_rates(now, y, p, out):
     if p.scene == BOTH:
         out[n + 1], out[n + 2] = accelerations[1], accelerations[2]
     out[2 * n - 1] = accelerations[3]
-    if has_chosen_laws(p):
+    if has_chosen_laws(p) and p.carries:
         write_carried_rates(now, y, p, out)
 
 
@@ -366,7 +366,7 @@ def start(offset, y, p):
     """
     for i in range(y.size):
         y[i] = 0.0
-    if has_chosen_laws(p):
+    if p.carries:
         for joint in range(2):
             y[2 * p.freedoms + joint] = p.least_approach
     if p.scene == BIG_END:

@@ -247,7 +247,7 @@ def store_approach_velocity(w, t, work, phase, p, tally):
     """
     met = False
     n = work.y.size
-    for joint in range(2):
+    for joint in range(2 if p.carries else 0):
         begin, middle = work.rows[0], work.rows[work.rows.shape[0] // 2]
         least_depth = min(begin[PENETRATION + joint], middle[PENETRATION + joint])
         flown = tally.flown[joint] > 0 or least_depth < 0.0

@@ -142,6 +142,7 @@ FIELDS: list[tuple] = [
     ("per_stiction", "f8"),  # of friction's first rise, from -v_s to v_s, s/m
     ("per_transition", "f8"),  # of its fall, from v_s to v_d, s/m
     # laws other than the default ones
+    ("carries", "i8"),  # whether contacts carry numbers of their own: `CARRIED`
     ("hysteresis", "f8"),  # chi: damping force over elastic force at the approach speed
     ("least_approach", "f8"),  # approach speed below which chi is no longer divided by it, m/s
     ("bristle_stiffness", "f8"),  # LuGre's sigma_0 over the normal force, 1/m
@@ -153,13 +154,13 @@ FIELDS: list[tuple] = [
     ("crank_clearance", "f8"),  # m
     ("crank_corners", "f8", (2,)),  # angles at which its discharge and its suction begin, rad
 ]
-FILM_TERMS = 10  # of each polynomial of a film
+FILM_TERMS = 8  # of each polynomial of a film
 # of joints that are lubricated
 FILM: list[tuple] = [
     ("viscosity", "f8"),  # of the oil, Pa s; 0 of dry joints
     ("film_length", "f8", (2,)),  # of each joint's bearing, m
     ("film_share", "f8"),  # of the clearance: the film's last, in which it gets no thinner
-    ("film_constants", "f8", (2, 4, FILM_TERMS)),  # of each joint, `film.short_bearing_shares`
+    ("film_constants", "f8", (2, FILM_TERMS, 4)),  # of each joint, `film.short_bearing_shares`
     ("film_stiffest", "f8", (2,)),  # of each joint: the squeeze's number at the wall
 ]
 CARD_NODES = 1440  # a revolution
@@ -279,9 +280,9 @@ def place_coordinates(p: np.record) -> None:
     positions = find_coordinates(p)
     at = [positions.index(c) if c in positions else -1 for c in Coordinate]
     if p["driven"]:
-        at[Coordinate.CRANK] = 2 * len(positions) + len(CARRIED) + 1
+        at[Coordinate.CRANK] = 2 * len(positions) + len(carried_names(p)) + 1
     p["at"], p["freedoms"] = at, len(positions)
-    behind = 2 * len(positions) + len(CARRIED) + (len(CRANK) if p["driven"] else 0)
+    behind = 2 * len(positions) + len(carried_names(p)) + (len(CRANK) if p["driven"] else 0)
     p["rod_loss"] = behind if p["elastic"] else -1
     moving = [c for c in Coordinate if at[c] >= 0]
     p["degrees"], p["coordinates"] = len(moving), moving + [-1] * (len(at) - len(moving))
@@ -291,18 +292,23 @@ def state_names(p: Fields) -> tuple[str, ...]:
     """Return the names of the numbers of a record's state, each with its unit.
 
     Deviations, their rates, and what contacts carry. Of a mechanism: its coordinates and their
-    rates in place of deviations, the crank's lag and slip and the rod's loss at the end; numbers
-    that are not used fill the state up to whole fours.
+    rates in place of deviations, the crank's lag and slip and the rod's loss at the end.
     """
     if not is_featured(p):
         names = STATE_NAMES[Scene(int(p["scene"]))]
-        return names + CARRIED if names and has_chosen_forces(p) else names
+        return names + carried_names(p) if names else names
     positions = find_coordinates(p)
     coordinates = [COORDINATE_NAMES[c] for c in positions]
     names = tuple(f"{name}, {unit}" for name, unit in coordinates)
-    names += tuple(f"rate of {name}, {unit}/s" for name, unit in coordinates) + CARRIED
+    names += tuple(f"rate of {name}, {unit}/s" for name, unit in coordinates)
+    names += carried_names(p)
     names += (CRANK if p["driven"] else ()) + (ROD_LOSS if p["elastic"] else ())
-    return names + ("unused",) * (-len(names) % 4) if positions or p["driven"] else ()
+    return names if positions or p["driven"] else ()
+
+
+def carried_names(p: Fields) -> tuple[str, ...]:
+    """Return the names of what contacts carry, by laws that remember an impact or bend bristles."""
+    return CARRIED if p["carries"] else ()
 
 
 def derive(p: np.record) -> None:

@@ -111,7 +111,7 @@ def _forces(
 def film_constants(ratio: float, share: float) -> tuple[np.ndarray, float]:
     """Return what a film's numbers are made of, and the squeeze's number at the wall.
 
-    The polynomials of `physics.film.short_bearing_shares`, (4, FILM_TERMS), through Reynolds'
+    The polynomials of `physics.film.short_bearing_shares`, (FILM_TERMS, 4), through Reynolds'
     numbers at Chebyshev's points of sqrt(1 - eps) from the centre to the film's thinnest. ratio: B
     / D; share: the film's last one, of the clearance.
     """
@@ -122,7 +122,7 @@ def film_constants(ratio: float, share: float) -> tuple[np.ndarray, float]:
     near: Bearing = {}
     values = np.array([_over_short(1.0 - one * one, ratio, near) for one in u])
     fits = [np.polynomial.Chebyshev.fit(u, column, FILM_TERMS - 1) for column in values.T]
-    constants = np.array([fit.convert(kind=np.polynomial.Polynomial).coef for fit in fits])
+    constants = np.array([fit.convert(kind=np.polynomial.Polynomial).coef for fit in fits]).T
     short = uncompiled(short_film)(1.0 - thinnest, 0.0, 1.0)[0]
     return constants, float(short * thinnest / fits[0](least))
 

@@ -272,7 +272,8 @@ def mechanism_sizes(p: Fields, joints: tuple[float, float], bristle: float) -> n
         place = p["at"][coordinate]
         if place >= 0:
             sizes[place], sizes[n + place] = size, rate
-    sizes[2 * n : 2 * n + 4] = joints[1], joints[1], bristle, bristle
+    if p["carries"]:
+        sizes[2 * n : 2 * n + 4] = joints[1], joints[1], bristle, bristle
     if p["driven"]:
         place = p["at"][Coordinate.CRANK]
         moving = p["reciprocating_mass"] + p["rod_mass"]

@@ -68,7 +68,8 @@ def state_of(p, w, rates):
         y[place], y[n + place] = w[coordinate], rates[coordinate]
     if p["driven"]:
         y[p["at"][Coordinate.CRANK]] = rates[0] / p["omega"] - 1.0
-    y[2 * n : 2 * n + 2] = p["least_approach"]
+    if p["carries"]:
+        y[2 * n : 2 * n + 2] = p["least_approach"]
     return y
 
 
