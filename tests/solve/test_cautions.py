@@ -206,7 +206,7 @@ def test_wear_is_said_to_be_of_its_own_command(tmp_path):
     path.write_text("joint: big_end\nclearance_mm: 0.2\nwear: true\n")
     (found,) = cautions(*load_studies(path))
     assert (found.key, found.message) == (
-        "wear", "compsim wear alone reads it: a run has bores that are new"
+        "wear", "compsim wear alone reads it: a run has the clearances that are given"
     )  # fmt: skip
 
 
