@@ -23,7 +23,7 @@ from compressor.physics.observe import (
     POTENTIAL,
     Column,
 )
-from compressor.physics.record import CHOSEN_FORCES, MECHANISM, zero
+from compressor.physics.record import CHOSEN_FORCES, zero
 
 # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAK_NEARNESS = 0.98
@@ -45,7 +45,8 @@ def lobatto(n):
     return nodes, weights
 
 
-IN_STEPS = range(ACCELERATION, CRANK_POWER)  # columns that a march writes at each node of a step
+# columns that a march writes at each node of a step
+IN_STEPS = (*range(ACCELERATION, CRANK_POWER), PACE)
 
 
 def require_written(*columns):
@@ -325,39 +326,16 @@ def tally_contact(joint, span, nodes, rows, every, gap_fraction, measured, tally
         tally.loss_seconds[joint] += gap_fraction[joint] * span
 
 
-@jit
-def steady_pace(rows, i, p):
-    """Return the time that passes at a node of a step over that of a steady crank: 1."""
-    return 1.0
+@inline_llvm
+def pace_of_step(weights, rows, every):
+    """Return the mean over a step of the time that passes over a steady crank's, for which it is 1.
 
-
-@jit
-def crank_pace(rows, i, p):
-    """Return `steady_pace` of a crank whose speed may give way."""
-    return rows[i, PACE] if p.driven else 1.0
-
-
-pace_at = dispatch_on_record(MECHANISM, crank_pace, steady_pace)
-
-
-@jit
-def steady_pace_of_step(weights, rows, every, p):
-    """Return the mean of `pace_at` over a step: 1."""
-    return 1.0
-
-
-@jit
-def crank_pace_of_step(weights, rows, every, p):
-    """Return the mean of `pace_at` over a step; weights: of its nodes."""
-    if not p.driven:
-        return 1.0
-    pace = 0.0
+    weights: of its nodes.
+    """
+    more = 0.0
     for i in range(0, weights.size, every):
-        pace += weights[i] * rows[i, PACE]
-    return pace
-
-
-pace_of_step = dispatch_on_record(MECHANISM, crank_pace_of_step, steady_pace_of_step)
+        more += weights[i] * (rows[i, PACE] - 1.0)
+    return 1.0 + more
 
 
 @inline_llvm
@@ -373,7 +351,7 @@ def tally_step(span, nodes, weights, rows, every, gap_fraction, sides, measured,
 
     span is that of a steady crank; what is tallied are shares and means of the time that passes.
     """
-    seconds = span * pace_of_step(weights, rows, every, p)
+    seconds = span * pace_of_step(weights, rows, every)
     for joint in range(2):
         if p.clearance[joint] > 0.0:
             tally_contact(joint, seconds, nodes, rows, every, gap_fraction, measured, tally)
@@ -384,7 +362,7 @@ def tally_step(span, nodes, weights, rows, every, gap_fraction, sides, measured,
     for k in range(PEAKED):
         tally.top[k] = 0.0
     for i in range(0, nodes.size, every):
-        weight = span * weights[i] * pace_at(rows, i, p)
+        weight = span * weights[i] * rows[i, PACE]
         for k in range(len(MEANS)):
             tally.integral[k] += weight * rows[i, MEANS[k]]
         for k in range(len(SQUARES)):
