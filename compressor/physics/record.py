@@ -154,7 +154,7 @@ FIELDS: list[tuple] = [
     ("crank_clearance", "f8"),  # m
     ("crank_corners", "f8", (2,)),  # angles at which its discharge and its suction begin, rad
 ]
-FILM_TERMS = 8  # of each polynomial of a film
+FILM_TERMS = 10  # of each polynomial of a film
 # of joints that are lubricated
 FILM: list[tuple] = [
     ("viscosity", "f8"),  # of the oil, Pa s; 0 of dry joints

@@ -144,8 +144,22 @@ DIMENSIONS = {
     "crank_suction_force": (1, 1, -2), "crank_discharge_force": (1, 1, -2),
     "crank_clearance": (1, 0, 0),
 }  # fmt: skip
-PURE_NUMBERS = {"scene", "load", "law", "friction", "freedoms", "wide", "exponent", "static",
-                "dynamic", "corners", "crank_corners", "gas_exponent", "hysteresis"}  # fmt: skip
+PURE_NUMBERS = {
+    "scene",
+    "load",
+    "law",
+    "friction",
+    "freedoms",
+    "wide",
+    "exponent",
+    "static",
+    "dynamic",
+    "corners",
+    "crank_corners",
+    "gas_exponent",
+    "hysteresis",
+    "carries",
+}
 DERIVED = {"crank_ratio", "per_rod_mass", "per_rod_inertia", "per_reciprocating_mass",
            "per_full_damping", "per_stiction", "per_transition"}  # fmt: skip
 
