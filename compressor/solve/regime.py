@@ -92,7 +92,7 @@ def repeats(
 MEASURED_REV = 3  # revolutions after settling with `duration_rev: auto`: as the default's
 MAX_PERIOD_REV = 4  # rev: period that is looked for
 AGREEMENTS = 2  # revolutions in a row, at least, that are to agree with earlier ones
-SAMPLED_REV = 12.001  # rev: of a motion that settles later the run is made again, with samples
+SAMPLED_REV = 6.001  # rev: of a motion that settles later the run is made again, with samples
 LOOKED_AT = 2 * MAX_PERIOD_REV  # revolutions, the last ones, by which that is seen
 
 

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
+from scipy.ndimage import spline_filter1d
 from scipy.signal import lfilter
 
 from compressor.cases import Body
@@ -45,13 +47,12 @@ def oscillate(
         raise ValueError(f"a damping ratio lies between 0 and 1, not at {damping_ratio:g}")
     omega = 2.0 * np.pi * frequency
     root = omega * complex(-damping_ratio, np.sqrt(1.0 - damping_ratio**2))
-    around = np.append(force[:-1], force[0]) if steady else force
-    spline = CubicSpline(
-        step * np.arange(len(force)), around, bc_type="periodic" if steady else "not-a-knot"
-    )
+    cubics = periodic_cubics(force, step) if steady else CubicSpline(
+        step * np.arange(len(force)), force
+    ).c[::-1]  # fmt: skip
     whole, shares = one_step(root, step)
     # products of real matrices: the cubics, of rising powers, have no imaginary part
-    driven = shares.real @ spline.c[::-1] + 1j * (shares.imag @ spline.c[::-1])
+    driven = shares.real @ cubics + 1j * (shares.imag @ cubics)
     first = start[1] - root.conjugate() * start[0]
     if steady:  # z0 = what the force leaves of rest + exp(s T) z0: a period ends as it began
         left = lfilter([1.0], [1.0, -whole], driven)[-1]
@@ -63,6 +64,21 @@ def oscillate(
     velocity = z.real + root.real * displacement
     acceleration = force + 2.0 * root.real * velocity - omega**2 * displacement
     return OscillatorMotion(displacement, velocity, acceleration)
+
+
+# of a cubic B-spline: rising powers of the way through a piece by its four coefficients
+B_SPLINE = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6.0
+
+
+def periodic_cubics(force: np.ndarray, step: float) -> np.ndarray:
+    """Return the pieces of the cubic spline through samples that repeat themselves, (4, n - 1).
+
+    By rising powers of the time (s) since a piece's begin. The last sample stands for the first.
+    """
+    weights = spline_filter1d(force[:-1], order=3, mode="grid-wrap")
+    around = np.concatenate((weights[-1:], weights, weights[:2]))
+    pieces = B_SPLINE @ sliding_window_view(around, 4).T
+    return pieces / step ** np.arange(4.0)[:, None]
 
 
 def one_step(root: complex, step: float) -> tuple[complex, np.ndarray]:
