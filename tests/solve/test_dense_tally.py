@@ -59,6 +59,7 @@ def rows_of(times):
     rows[:, Column.NEARNESS + 1] = np.sin(20.0 * math.pi * times)
     rows[:, Column.NORMAL + 1] = np.maximum(rows[:, Column.NEARNESS + 1], 0.0)
     rows[:, Column.FORCE + 2] = -100.0 * rows[:, Column.NORMAL + 1]
+    rows[:, Column.PACE] = 1.0
     return rows
 
 

@@ -122,10 +122,10 @@ def test_of_a_periodic_motion_it_is_the_largest_floquet_multiplier(joint):
     ]
     multipliers = np.linalg.eigvals((np.subtract(*ends) / size / 2e-4).T)
     expected = math.log(np.abs(multipliers).max())
-    found = largest_exponent(made, y, 8, math.inf)
+    found = largest_exponent(made, y, 16, math.inf)
     # from other revolutions on it is 0.004 or, rarely, 0.013 off: by rounding, as steps fall
     assert found.value == pytest.approx(expected, abs=2 * OF_STEPS)
-    # of two batches of revolutions, whose scatter Student's t takes times 12.7
+    # of four batches of revolutions, whose scatter Student's t takes times 3.2
     assert abs(found.value - expected) < found.error < 0.1
     assert not found.at_most
 
