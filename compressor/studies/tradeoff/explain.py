@@ -165,7 +165,7 @@ def unknown_names(case: Case) -> tuple[str, ...]:
     found = names[:n] + tuple(
         name for name, joint in zip(bristles, JOINTS, strict=False) if joint in faulty(case)
     )
-    return found + tuple(name for name in names[2 * n + 4 :] if name.startswith("crank's lag"))
+    return found + tuple(name for name in names[2 * n :] if name.startswith("crank's lag"))
 
 
 def time_case(case: Case, repeats: int) -> tuple[xr.Dataset, float, float]:

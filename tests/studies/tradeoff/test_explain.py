@@ -152,7 +152,7 @@ def test_scales_are_those_of_the_machine_without_features():
     plain, full = Case.from_values(values), Case.from_values(values | more)
     assert [*ideal_scales(full)] == [*ideal_scales(plain)]
     names = unknown_names(full)
-    assert len(names) == 10
+    assert len(names) == 11
     assert names[4:6] == ("height in the guide, m", "tilt in the guide, rad")
     assert names[-1] == "crank's lag, s"
 
