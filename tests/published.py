@@ -51,7 +51,7 @@ def drop(joint, speed, method="auto", mass=5.0, rtol=1e-8, **contact):
     case = Case.resolve(values)
     p = record(case)
     state = np.zeros(len(state_names(p)))
-    state[p["freedoms"]] = speed if joint == "small_end" else -speed
+    state[p["freedoms"]] = speed
     if state.size > 2 * p["freedoms"]:
         state[2 * p["freedoms"] :][:2] = p["least_approach"]
     run = run_at_tolerance(case, case.rtol, 60.0, True, state=state)

@@ -142,10 +142,10 @@ def test_rows_of_a_table_have_as_many_cells_as_its_head(page):
 
 
 def test_the_trade_was_measured_with_these_numerics():
-    """The work of a few fixed runs: as measured, but for what another machine's rounding does."""
+    """The work of a few fixed runs: as measured, to what makes no difference in the table."""
     kept, now = page_tables.kept("tradeoff.json")["fingerprint"], fingerprint()
     assert now["rtol"] == kept["rtol"], "stale: run make tradeoff and make pages"
-    assert now["evaluations"] == pytest.approx(kept["evaluations"], rel=0.01), (
+    assert now["evaluations"] == pytest.approx(kept["evaluations"], rel=0.03), (
         "stale: the numerics have changed; run make tradeoff and make pages"
     )
 

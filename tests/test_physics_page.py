@@ -32,7 +32,7 @@ def test_symbols_are_named_as_in_the_program():
     keys |= {name.rpartition(".")[2] for name in table()}
     for _, key, name in SYMBOLS:
         assert {*re.findall(r"`([\w.]+)`", key)} <= keys, key
-        known = {*RECORD.names, *SERIES, "crank_angle", "eta"}
+        known = {*RECORD.names, *SERIES, "crank_angle"}
         assert {*re.findall(r"`(\w+)`", name)} <= known, name
 
 

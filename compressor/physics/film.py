@@ -33,7 +33,7 @@ bore its load, and struck: how hard, followed from the share.
 import math
 
 from compressor.physics._jit import dispatch_on_record, inline_llvm, jit, square_root
-from compressor.physics.contact import ContactState
+from compressor.physics.contact import ContactState, carried_numbers, joint_contact
 from compressor.physics.contact_laws import rise
 from compressor.physics.record import CHOSEN_FORCES, FILM_TERMS
 
@@ -183,3 +183,14 @@ def dry_contact(joint, contact, eccentricity, spins, p):
 
 
 add_film = dispatch_on_record(CHOSEN_FORCES, oiled_contact, dry_contact)
+
+
+@inline_llvm
+def oiled_joint(joint, eccentricity, spins, y, p):
+    """Return the `ContactState` of a joint in a state y, with its film where it has one.
+
+    eccentricity, spins: as of `film`.
+    """
+    bearing = p.pin_radius[joint], p.clearance[joint], p.stiffness[joint]
+    contact = joint_contact(eccentricity, spins, bearing, carried_numbers(joint, y, p), p)
+    return add_film(joint, contact, eccentricity, spins, p)

@@ -33,9 +33,9 @@ import numpy as np
 
 from compressor.physics._jit import jit, square_root
 from compressor.physics.card import measured_force
-from compressor.physics.contact import NO_CONTACT, ContactState, carried_numbers, joint_contact
+from compressor.physics.contact import NO_CONTACT, ContactState
 from compressor.physics.contact_laws import power, rise
-from compressor.physics.film import add_film
+from compressor.physics.film import oiled_joint
 from compressor.physics.loads import piston_force
 from compressor.physics.record import BIG_END, SMALL_END, Coordinate
 
@@ -363,19 +363,11 @@ def joints_of(phase, y, motion, pose, w, velocity, p):
     if p.clearance[0] > 0.0:
         place = p.at[1]
         eccentricity = y[place], y[place + 1], y[n + place], y[n + place + 1]
-        carried = carried_numbers(BIG_END, y, p)
-        spins = pose.speed, big_spin
-        bearing = p.pin_radius[0], p.clearance[0], p.stiffness[0]
-        big = joint_contact(eccentricity, spins, bearing, carried, p)
-        big = add_film(BIG_END, big, eccentricity, spins, p)
+        big = oiled_joint(BIG_END, eccentricity, (pose.speed, big_spin), y, p)
     if p.clearance[1] > 0.0:
         place = p.at[3]
         eccentricity = y[place], y[place + 1], y[n + place], y[n + place + 1]
-        carried = carried_numbers(SMALL_END, y, p)
-        spins = pin_spin, small_spin
-        bearing = p.pin_radius[1], p.clearance[1], p.stiffness[1]
-        small = joint_contact(eccentricity, spins, bearing, carried, p)
-        small = add_film(SMALL_END, small, eccentricity, spins, p)
+        small = oiled_joint(SMALL_END, eccentricity, (pin_spin, small_spin), y, p)
     guide = UNGUIDED
     if p.tilting:
         rates = velocity[8], velocity[9], velocity[10]

@@ -234,16 +234,3 @@ def beyond_model(y, p):
             if abs(y[p.at[i]]) > IMPLAUSIBLE * p.rod_length:
                 return 3
     return 0
-
-
-@jit
-def start(offset, y, p):
-    """Write the state of `motion.start`, of the mechanism, with a straight rod."""
-    for i in range(y.size):
-        y[i] = 0.0
-    for joint in range(2):
-        if p.carries:
-            y[2 * p.freedoms + joint] = p.least_approach
-        place = p.at[1 + 2 * joint]
-        if place >= 0:
-            y[place], y[place + 1] = offset[joint, 0], offset[joint, 1]

@@ -8,18 +8,6 @@ from enum import IntEnum
 
 from compressor.physics._jit import inline_llvm, inline_once, jit, square_root
 from compressor.physics.contact import nearness
-from compressor.physics.motion import (
-    deviation_accelerations,
-    eccentricities_both,
-    eccentricity_big_end,
-    eccentricity_small_end,
-)
-from compressor.physics.record import Scene
-
-IDEAL = int(Scene.IDEAL)
-BIG_END = int(Scene.BIG_END)
-SMALL_END = int(Scene.SMALL_END)
-BOTH = int(Scene.BOTH)
 
 
 class Column(IntEnum):
@@ -71,43 +59,6 @@ FRICTION_POWER = int(Column.FRICTION_POWER)
 KINETIC, POTENTIAL = int(Column.KINETIC), int(Column.POTENTIAL)
 PACE, GUIDE_FORCE = int(Column.PACE), int(Column.GUIDE_FORCE)
 SHAKING_FORCE, BEARING_FORCE = int(Column.SHAKING_FORCE), int(Column.BEARING_FORCE)
-
-
-@jit
-def eccentricity_row(y, turn, p, row):
-    """Write both eccentricities (m) into the row; an ideal joint has none."""
-    for i in range(4):
-        row[ECCENTRICITY + i] = 0.0
-    if p.scene == BIG_END:
-        row[ECCENTRICITY], row[ECCENTRICITY + 1], _, _ = eccentricity_big_end(y, turn, p)
-    elif p.scene == SMALL_END:
-        row[ECCENTRICITY + 2], row[ECCENTRICITY + 3], _, _ = eccentricity_small_end(y, turn, p)
-    elif p.scene == BOTH:
-        big, small = eccentricities_both(y, turn, p)
-        row[ECCENTRICITY], row[ECCENTRICITY + 1] = big[0], big[1]
-        row[ECCENTRICITY + 2], row[ECCENTRICITY + 3] = small[0], small[1]
-
-
-@inline_once
-def centre_velocity(now, y, p):
-    """Return the rod centre's velocity (m/s), x and y, and its height (m)."""
-    motion = now.motion
-    sin_phi = motion.sin_phi + now.turn.ds
-    cos_phi = motion.cos_phi + now.turn.dc
-    rate = motion.rate + y[2 * p.freedoms - 1]
-    crank = p.crank_radius * p.omega
-    if p.scene == BIG_END:
-        b = p.rod_length - p.rod_centre
-        return motion.v + y[2] + b * sin_phi * rate, b * cos_phi * rate, b * sin_phi
-    c = p.rod_centre
-    height = p.crank_radius * motion.sin_theta - c * motion.sin_phi
-    if p.scene == BOTH:
-        vx = -crank * motion.sin_theta - c * motion.sin_phi * motion.rate + y[5]
-        vy = crank * motion.cos_theta - c * motion.cos_phi * motion.rate + y[6]
-        return vx, vy, height + y[2]
-    vx = -crank * motion.sin_theta - c * sin_phi * rate
-    vy = crank * motion.cos_theta - c * cos_phi * rate
-    return vx, vy, height - c * now.turn.ds
 
 
 @inline_llvm
@@ -185,7 +136,7 @@ def powers(now, y, p):
     turning = crank * (motion.cos_theta * forces[1] - motion.sin_theta * forces[0])
     if p.clearance[0] > 0.0:
         turning -= p.omega * ((p.pin_radius[0] - big.penetration) * big.friction + big.film_moment)
-    pressing = -now.load * (motion.v + y[p.freedoms])
+    pressing = -now.load * now.at.v
     pressed = contact_power(big) + contact_power(small) + big.film_loss + small.film_loss
     return turning, pressing, pressed, -big.friction * big.slip - small.friction * small.slip
 
@@ -199,53 +150,32 @@ def write_powers(now, y, p, out):
 @inline_llvm
 def write_energies(now, y, p, row):
     """Write the kinetic and potential energy (J), the latter without the contacts' springs."""
-    v = now.motion.v + y[p.freedoms]
-    rate = now.motion.rate + y[2 * p.freedoms - 1]
-    kinetic = p.reciprocating_mass * v * v + p.rod_inertia * rate * rate
-    vx, vy, height = centre_velocity(now, y, p)
+    at, b = now.at, p.rod_length - p.rod_centre
+    kinetic = p.reciprocating_mass * at.v * at.v + p.rod_inertia * at.rate * at.rate
+    # the centre, from the small end's bore
+    vx = at.v - at.small[2] + b * at.sin_phi * at.rate
+    vy = b * at.cos_phi * at.rate - at.small[3]
+    height = b * at.sin_phi - at.small[1]
     kinetic += p.rod_mass * (vx * vx + vy * vy)
     row[KINETIC], row[POTENTIAL] = 0.5 * kinetic, p.rod_mass * p.gravity * height
-
-
-@inline_once
-def journal_accelerations(now, y, p):
-    """Return the accelerations (m/s^2) along x of both journals against their bores.
-
-    0 of an ideal joint. Second derivatives of `eccentricity_row`, from deviations as well.
-    """
-    motion, turn = now.motion, now.turn
-    eta_rate = y[2 * p.freedoms - 1]
-    rate = motion.rate + eta_rate
-    # of cos(phi) less that of the ideal angle, with the other sign
-    bent = turn.dc * rate * rate + motion.cos_phi * eta_rate * (motion.rate + rate)
-    bent += turn.ds * now.spin_up + motion.sin_phi * (now.spin_up - motion.spin_up)
-    away = now.a - motion.a
-    if p.scene == BIG_END:
-        return -away - p.rod_length * bent, 0.0
-    if p.scene == SMALL_END:
-        return 0.0, away + p.rod_length * bent
-    if p.scene == BOTH:
-        centre = deviation_accelerations(now, p)[1]
-        ahead = p.rod_length - p.rod_centre
-        return -centre - p.rod_centre * bent, away - centre + ahead * bent
-    return 0.0, 0.0
 
 
 @inline_once
 def observed_columns(now, y, p):
     """Return the columns from ACCELERATION to GUIDE_MOMENT."""
     big, small, forces = now.big, now.small, now.forces
-    at_big, at_small = journal_accelerations(now, y, p)
     motion, friction = now.motion, (big.friction, small.friction)
     torque, moment = torque_and_moment(
-        (motion.cos_theta, motion.sin_theta), motion.x + y[0], forces, friction,
+        (motion.cos_theta, motion.sin_theta), now.at.x, forces, friction,
         (big.penetration, small.penetration), (big.film_moment, small.film_moment), p,
     )  # fmt: skip
     return (
         now.a, forces[0], forces[1], forces[2], forces[3],
         square_root(forces[0] * forces[0] + forces[1] * forces[1]),
         square_root(forces[2] * forces[2] + forces[3] * forces[3]),
-        at_big, at_small, now.a - now.motion.a, big.penetration, small.penetration,
+        now.big_away[0] if p.clearance[0] > 0.0 else 0.0,
+        now.small_away[0] if p.clearance[1] > 0.0 else 0.0,
+        now.a - now.motion.a, big.penetration, small.penetration,
         big.normal, small.normal,
         nearness(big, p.stiffness[0], p.clearance[0], p),
         nearness(small, p.stiffness[1], p.clearance[1], p), torque, moment,
@@ -263,12 +193,12 @@ def write_contact_columns(now, y, p, row):
 @inline_llvm
 def write_place(now, y, p, row):
     """Write the columns before ACCELERATION."""
-    motion, turn = now.motion, now.turn
-    row[DISPLACEMENT] = motion.x + y[0]
-    row[VELOCITY] = motion.v + y[p.freedoms]
-    row[ROD_ANGLE] = math.atan2(motion.sin_phi + turn.ds, motion.cos_phi + turn.dc)
+    at = now.at
+    row[DISPLACEMENT], row[VELOCITY] = at.x, at.v
+    row[ROD_ANGLE] = math.atan2(at.sin_phi, at.cos_phi)
     row[PISTON_FORCE] = now.load
-    eccentricity_row(y, turn, p, row)
+    row[ECCENTRICITY], row[ECCENTRICITY + 1] = at.big[0], at.big[1]
+    row[ECCENTRICITY + 2], row[ECCENTRICITY + 3] = at.small[0], at.small[1]
 
 
 @jit

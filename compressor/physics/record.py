@@ -33,23 +33,9 @@ class Load(IntEnum):
     CARD = 4
 
 
-# the state of each scene: deviations from the ideal motion, then their rates
-ROD_AND_CROSSHEAD = (
-    "x deviation, m", "phi deviation, rad",
-    "rate of x deviation, m/s", "rate of phi deviation, rad/s",
-)  # fmt: skip
-STATE_NAMES = {
-    Scene.IDEAL: (),
-    Scene.BIG_END: ROD_AND_CROSSHEAD,
-    Scene.SMALL_END: ROD_AND_CROSSHEAD,
-    Scene.BOTH: (
-        "x deviation, m", "X deviation, m", "Y deviation, m", "phi deviation, rad",
-        "x rate, m/s", "X rate, m/s", "Y rate, m/s", "phi rate, rad/s",
-    ),
-}  # fmt: skip
-# unknowns integrated in each scene
-FREEDOMS = {scene: len(names) // 2 for scene, names in STATE_NAMES.items()}
-# what contacts carry with them behind these, where a record's laws are chosen ones
+# unknowns integrated in each scene: eccentricities
+FREEDOMS = {Scene.IDEAL: 0, Scene.BIG_END: 2, Scene.SMALL_END: 2, Scene.BOTH: 4}
+# what contacts carry with them behind coordinates and rates, where a record's laws are chosen ones
 CARRIED = (
     "approach speed at the big end, m/s", "approach speed at the small end, m/s",
     "bristles at the big end, m", "bristles at the small end, m",
@@ -57,10 +43,10 @@ CARRIED = (
 
 
 class Coordinate(IntEnum):
-    """Coordinates of the general mechanism; a feature that a case does not name leaves out its own.
+    """Coordinates; a feature that a case does not name leaves out its own.
 
-    An ideal joint has no eccentricity, an ideal guide neither height nor tilt, a rigid rod no
-    deflection, a steady crank no angle of its own.
+    Scenes have the joints' alone. An ideal joint has no eccentricity, an ideal guide neither height
+    nor tilt, a rigid rod no deflection, a steady crank no angle of its own.
     """
 
     CRANK = 0
@@ -135,6 +121,7 @@ FIELDS: list[tuple] = [
     ("spring_stroke", "f8"),  # piston travel of each dwell of the follower, m
     # what `derive` makes of these: a division takes as long as ten products
     ("crank_ratio", "f8"),  # R / L
+    ("per_rod_length", "f8"),  # 1/m
     ("per_rod_mass", "f8"),  # 1/kg
     ("per_rod_inertia", "f8"),  # 1/(kg m^2)
     ("per_reciprocating_mass", "f8"),  # 1/kg
@@ -255,21 +242,26 @@ def has_chosen_forces(p: Fields) -> bool:
     return has_field(p, CHOSEN_FORCES)
 
 
+def has_feature(p: Fields, name: str) -> bool:
+    """Return whether a record is that of a mechanism with a feature, by its field."""
+    return is_featured(p) and bool(p[name])
+
+
 def has_field(p: Fields, name: str) -> bool:
     """Return whether a record has a field."""
     return name in (p if isinstance(p, dict) else p.dtype.names or ())
 
 
 def find_coordinates(p: Fields) -> list[Coordinate]:
-    """Return the coordinates, but the crank's, of a mechanism's features and clearances."""
+    """Return the coordinates, but the crank's, of a record's clearances and features."""
     coordinates = []
     if p["clearance"][BIG_END] > 0.0:
         coordinates += [Coordinate.BIG_X, Coordinate.BIG_Y]
     if p["clearance"][SMALL_END] > 0.0:
         coordinates += [Coordinate.SMALL_X, Coordinate.SMALL_Y]
-    if p["tilting"]:
+    if has_feature(p, "tilting"):
         coordinates += [Coordinate.GUIDE, Coordinate.TILT]
-    if p["elastic"]:
+    if has_feature(p, "elastic"):
         coordinates += [Coordinate.BEND_1, Coordinate.BEND_2, Coordinate.STRETCH_MIDDLE]
         coordinates += [Coordinate.STRETCH]
     return coordinates
@@ -291,19 +283,16 @@ def place_coordinates(p: np.record) -> None:
 def state_names(p: Fields) -> tuple[str, ...]:
     """Return the names of the numbers of a record's state, each with its unit.
 
-    Deviations, their rates, and what contacts carry. Of a mechanism: its coordinates and their
-    rates in place of deviations, the crank's lag and slip and the rod's loss at the end.
+    Coordinates, their rates, what contacts carry, a crank's lag and slip, and a rod's loss.
     """
-    if not is_featured(p):
-        names = STATE_NAMES[Scene(int(p["scene"]))]
-        return names + carried_names(p) if names else names
     positions = find_coordinates(p)
     coordinates = [COORDINATE_NAMES[c] for c in positions]
     names = tuple(f"{name}, {unit}" for name, unit in coordinates)
     names += tuple(f"rate of {name}, {unit}/s" for name, unit in coordinates)
     names += carried_names(p)
-    names += (CRANK if p["driven"] else ()) + (ROD_LOSS if p["elastic"] else ())
-    return names if positions or p["driven"] else ()
+    driven = has_feature(p, "driven")
+    names += (CRANK if driven else ()) + (ROD_LOSS if has_feature(p, "elastic") else ())
+    return names if positions or driven else ()
 
 
 def carried_names(p: Fields) -> tuple[str, ...]:
@@ -317,7 +306,7 @@ def derive(p: np.record) -> None:
     if is_featured(p):
         place_coordinates(p)
     p["crank_ratio"] = p["crank_radius"] / p["rod_length"]
-    for name in ("rod_mass", "rod_inertia", "reciprocating_mass", "full_damping"):
+    for name in ("rod_length", "rod_mass", "rod_inertia", "reciprocating_mass", "full_damping"):
         p[f"per_{name}"] = 1.0 / p[name]
     if p["friction"]:
         p["per_stiction"] = 1.0 / (2.0 * p["stiction_velocity"])

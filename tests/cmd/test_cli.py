@@ -343,7 +343,7 @@ def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, capsys):
     assert max(map(len, out.splitlines())) <= 80
     assert "2 degrees of freedom\n" in out
     out = " ".join(out.split())
-    assert "x deviation; phi deviation active" in out
+    assert "big end eccentricity x; big end eccentricity y active" in out
     assert "for 2 jobs with 1 worker," in out
     assert re.search(
         r" ms of it for the solution .* the rest for the runs that its error bars", out

@@ -12,12 +12,6 @@ from compressor.metrics import JOINTS
 from compressor.physics.kinematics import ideal
 from compressor.physics.mechanism import ACROSS, BIG_SLOPE, SMALL_SLOPE, shapes
 from compressor.physics.mechanism_motion import solve
-from compressor.physics.motion import (
-    eccentricities_both,
-    eccentricity_big_end,
-    eccentricity_small_end,
-    rod_turn,
-)
 from compressor.physics.observe import COLUMNS, WIDE, Column
 from compressor.physics.record import (
     Coordinate,
@@ -223,17 +217,11 @@ def test_a_scene_is_the_mechanism_without_features(joint, gravity, forces, tmp_p
     p = record(Case.from_values(clearance | values))
     p["unbalance"] = q["unbalance"]
     rng = np.random.default_rng(1)
-    n, size = int(p["freedoms"]), 4 if joint == "both" else 2
+    n = int(p["freedoms"])
     for t in np.linspace(0.001, 0.11, 9):
-        y = rng.normal(size=2 * size) * np.repeat([2.5e-4, 0.12], size)
-        y[[size - 1, 2 * size - 1]] *= 2.0
-        if joint == "none":
-            y[:] = 0.0
-        off = scene_eccentricities(joint, t, y, n, p)
-        y = np.append(y, np.zeros(max(len(state_names(p)) - y.size, 0)))  # what contacts carry
-        z, m = np.zeros(len(state_names(q))), int(q["freedoms"])
-        z[:m] = np.array([one[:2] for one in off]).ravel()
-        z[m : 2 * m] = np.array([one[2:] for one in off]).ravel()
+        y, z = np.zeros(len(state_names(p)) or 4), np.zeros(len(state_names(q)))
+        if joint != "none":
+            y[: 2 * n] = z[: 2 * n] = rng.normal(size=2 * n) * np.repeat([2.5e-4, 0.12], n)
         expected, found = np.empty(WIDE), np.empty(WIDE)
         observe_at(t, y, 1, p, expected)
         observe_at(t, z, 1, q, found)
@@ -244,16 +232,6 @@ def test_a_scene_is_the_mechanism_without_features(joint, gravity, forces, tmp_p
         found[Column.POTENTIAL] -= weight * math.sin(angle)
         floor = 1e-12 * np.abs(expected).max()
         assert found == pytest.approx(expected, rel=1e-11, abs=floor)
-
-
-def scene_eccentricities(joint, t, y, n, p):
-    if joint == "none":
-        return []
-    turn = rod_turn(ideal(t, p), y[n - 1], y[2 * n - 1], p)
-    if joint == "both":
-        return eccentricities_both(y, turn, p)
-    one = eccentricity_big_end if joint == "big_end" else eccentricity_small_end
-    return [one(y, turn, p)]
 
 
 @pytest.mark.parametrize("unbalance", [0.3, -9.0])

@@ -64,8 +64,8 @@ def test_compiled_and_pure_agree():
     for (rtol, steps, one), (_, other_steps, other) in zip(
         compiled["runs"], pure["runs"], strict=True
     ):
-        assert steps == pytest.approx(other_steps, rel=0.01)
-        assert one == pytest.approx(other, rel=0, abs=10 * rtol * np.abs(other).max())
+        assert steps == pytest.approx(other_steps, rel=0.02)
+        assert one == pytest.approx(other, rel=0, abs=20 * rtol * np.abs(other).max())
 
 
 def test_machine_code_belongs_to_its_sources(tmp_path, monkeypatch):
@@ -85,12 +85,12 @@ def test_machine_code_belongs_to_its_sources(tmp_path, monkeypatch):
 
 HOMELESS = """
 import os
-from compressor.physics.motion import versine
+from compressor.physics.onset import sample_fraction
 from compressor.program import machine_code_folder
 
 folder = machine_code_folder()
 assert machine_code_folder() == folder
-versine(0.5)
+sample_fraction(3)
 assert [*folder.rglob("*.nbi")], "nothing was kept"
 print(folder.parent.parent, folder.is_relative_to(os.environ["NUMBA_CACHE_DIR"]))
 """

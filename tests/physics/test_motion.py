@@ -59,45 +59,60 @@ def reference_params(case):
 
 
 def random_state(scene, case, rng):
-    """Deviations that bring the journals from free flight to deep contact."""
+    """Eccentricities that bring the journals from free flight to deep contact, and their rates."""
     n = 4 if scene == "both" else 2
-    spread = np.full(n, 1.5e-3 * case.clearance_mm.big_end or 1.5e-3 * case.clearance_mm.small_end)
-    spread[-1] /= 0.6
-    return np.concatenate((rng.normal(size=n) * spread, rng.normal(size=n) * spread * 1000))
+    spread = 1.5e-3 * (case.clearance_mm.big_end or case.clearance_mm.small_end)
+    return rng.normal(size=2 * n) * np.repeat([spread, 1000 * spread], n)
+
+
+def both_joints(scene, numbers):
+    """Two vectors, of the big end and of the small end, from those of joints with clearance."""
+    pairs = [list(map(mpmath.mpf, numbers[i : i + 2])) for i in range(0, len(numbers), 2)]
+    nil = [mpmath.mpf(0)] * 2
+    return {"big_end": [*pairs, nil], "small_end": [nil, *pairs], "both": pairs}[scene]
 
 
 def absolute(scene, t, y, params):
     """The state's positions and rates in the reference's coordinates, 40 digits."""
-    x, v, _, phi, rate, _ = reference.ideal_motion(t, params)
-    q, qd = [x, phi], [v, rate]
-    if scene == "both":
-        theta = mpmath.mpf(params["omega"]) * mpmath.mpf(t)
-        r, a = mpmath.mpf(params["crank_radius"]), mpmath.mpf(params["rod_centre"])
-        turn = r * mpmath.mpf(params["omega"])
-        centre = [r * mpmath.cos(theta) + a * mpmath.cos(phi),
-                  r * mpmath.sin(theta) - a * mpmath.sin(phi)]  # fmt: skip
-        rates = [-turn * mpmath.sin(theta) - a * mpmath.sin(phi) * rate,
-                 turn * mpmath.cos(theta) - a * mpmath.cos(phi) * rate]  # fmt: skip
-        q, qd = [x, *centre, phi], [v, *rates, rate]
-    n = len(q)
-    return [a + mpmath.mpf(b) for a, b in zip(q, y[:n], strict=True)], [
-        a + mpmath.mpf(b) for a, b in zip(qd, y[n:], strict=True)
-    ]
-
-
-def ideal_accelerations(scene, t, params):
-    """The reference's ideal accelerations in the scene's coordinates."""
-    _, _, a, phi, rate, spin_up = reference.ideal_motion(t, params)
+    (bx, by), (sx, sy) = both_joints(scene, y[: len(y) // 2])
+    (bu, bv), (su, sv) = both_joints(scene, y[len(y) // 2 :])
+    r, a, length, omega = (
+        mpmath.mpf(params[name]) for name in ("crank_radius", "rod_centre", "rod_length", "omega")
+    )
+    c, s = mpmath.cos(omega * mpmath.mpf(t)), mpmath.sin(omega * mpmath.mpf(t))
+    phi = mpmath.asin((r * s - by + sy) / length)  # the loop over both joints, along y
+    cos_phi, sin_phi = mpmath.cos(phi), mpmath.sin(phi)
+    rate = (r * omega * c - bv + sv) / (length * cos_phi)
+    x = r * c - bx + length * cos_phi + sx
+    v = -r * omega * s - bu - length * sin_phi * rate + su
     if scene != "both":
-        return [a, spin_up]
-    theta = mpmath.mpf(params["omega"]) * mpmath.mpf(t)
-    pin = mpmath.mpf(params["crank_radius"]) * mpmath.mpf(params["omega"]) ** 2
-    arm = mpmath.mpf(params["rod_centre"])
+        return [x, phi], [v, rate]
+    centre = [r * c - bx + a * cos_phi, r * s - by - a * sin_phi]
+    rates = [-r * omega * s - bu - a * sin_phi * rate, r * omega * c - bv - a * cos_phi * rate]
+    return [x, *centre, phi], [v, *rates, rate]
+
+
+def away(scene, t, positions, rates, accelerations, params):
+    """Accelerations of the journals against their bores by the reference's of the bodies."""
+    r, a, length, omega = (
+        mpmath.mpf(params[name]) for name in ("crank_radius", "rod_centre", "rod_length", "omega")
+    )
+    phi, rate, spin_up = positions[-1], rates[-1], accelerations[-1]
+    along = mpmath.cos(phi) * rate**2 + mpmath.sin(phi) * spin_up
+    across = mpmath.cos(phi) * spin_up - mpmath.sin(phi) * rate**2
+    angle = omega * mpmath.mpf(t)
+    pin = [-r * omega**2 * mpmath.cos(angle), -r * omega**2 * mpmath.sin(angle)]
+    crosshead = [accelerations[0], mpmath.mpf(0)]
+    if scene == "both":
+        big = [accelerations[1] + a * along, accelerations[2] + a * across]
+        small = [accelerations[1] - (length - a) * along, accelerations[2] - (length - a) * across]
+    else:
+        big = [crosshead[0] + length * along, length * across]
+        small = [pin[0] - length * along, pin[1] - length * across]
+    found = {"big_end": [(pin, big)], "small_end": [(crosshead, small)],
+             "both": [(pin, big), (crosshead, small)]}[scene]  # fmt: skip
     return [
-        a,
-        -pin * mpmath.cos(theta) - arm * (mpmath.cos(phi) * rate**2 + mpmath.sin(phi) * spin_up),
-        -pin * mpmath.sin(theta) + arm * (mpmath.sin(phi) * rate**2 - mpmath.cos(phi) * spin_up),
-        spin_up,
+        one - other for journal, bore in found for one, other in zip(journal, bore, strict=True)
     ]
 
 
@@ -113,14 +128,14 @@ def test_random_states_agree_with_the_lagrangian(scene):
             y = random_state(scene, case, rng)
             q, qd = absolute(scene, t, y, params)
             expected = reference.accelerations(scene, q, qd, t, phase, params)
-            ideal = ideal_accelerations(scene, t, params)
+            expected = away(scene, t, q, qd, expected, params)
             found = np.empty_like(y)
             derivative(t, y, phase, p, found)
             n = len(q)
-            scale = max(abs(float(e)) for e in [*expected, *ideal])
+            scale = max(abs(float(e)) for e in [*expected, p.crank_radius * p.omega**2])
             assert found[:n].tolist() == y[n:].tolist()
-            for mine, e, i in zip(found[n:], expected, ideal, strict=True):
-                assert abs(float(mpmath.mpf(mine) - (e - i))) <= 1e-12 * scale
+            for mine, e in zip(found[n:], expected, strict=True):
+                assert abs(float(mpmath.mpf(mine) - e)) <= 1e-12 * scale
             struck += check_forces(scene, t, y, phase, p, (q, qd), params)
     assert struck > 0.2 * STATES / 3  # a good share of the states is in contact
 
@@ -150,17 +165,19 @@ def test_ideal_joint_forces_agree_with_newton_and_euler(load):
 
 
 def test_a_nanometre_of_clearance_keeps_its_digits():
+    """The force of a contact and the rates, against positions of metres with 40 digits."""
     case = Case.from_values({"joint": "big_end", "clearance_mm": 1e-6})
     p, params = record(case), reference.paper_params("spring", "big_end", 1e-9)
     y = np.array([-0.7e-9, 1.1e-9, 3e-7, -2e-7])
     with mpmath.workdps(40):
-        q, _qd = absolute("big_end", 0.013, y, params)
-        theta = mpmath.mpf(params["omega"]) * mpmath.mpf(0.013)
-        radius = mpmath.mpf(params["crank_radius"])
-        pin = [radius * mpmath.cos(theta), radius * mpmath.sin(theta)]
-        rod = mpmath.mpf(params["rod_length"])
-        expected = [pin[0] - q[0] + rod * mpmath.cos(q[1]), pin[1] - rod * mpmath.sin(q[1])]
-    row = np.empty(COLUMNS)
+        state = absolute("big_end", 0.013, y, params)
+        forces = reference.joint_forces("big_end", *state, 0.013, 0, params)["big_end"]
+        expected = reference.accelerations("big_end", *state, 0.013, 0, params)
+        expected = away("big_end", 0.013, *state, expected, params)
+    row, rates = np.empty(COLUMNS), np.empty(4)
     observe_at(0.013, y, 0, p, row)
-    found = row[Column.ECCENTRICITY : Column.ECCENTRICITY + 2]
-    assert found == pytest.approx([float(e) for e in expected], rel=1e-13)
+    derivative(0.013, y, 0, p, rates)
+    assert row[Column.NORMAL] > 0.0
+    found = row[Column.FORCE : Column.FORCE + 2]
+    assert found == pytest.approx([float(f) for f in forces], rel=1e-12)
+    assert rates[2:] == pytest.approx([float(e) for e in expected], rel=1e-12)

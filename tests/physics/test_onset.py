@@ -98,8 +98,8 @@ def small_end_only(coefficients):
 
 def both_ends(big, small):
     dense = np.zeros((5, 8))
-    dense[:, 1], dense[:, 5] = path(big)
-    dense[:, 0], dense[:, 4] = dense[:, 1] + path(small)[0], dense[:, 5] + path(small)[1]
+    dense[:, 0], dense[:, 4] = path(big)
+    dense[:, 2], dense[:, 6] = path(small)
     return dense
 
 
@@ -368,7 +368,6 @@ def construct(rng, length, clamped):
     edges, phases = segments(p, 0.12)
     phase = int(phases[np.searchsorted(edges, t) - 1])
     y = np.concatenate((rng.normal(0.0, 1e-4, n), rng.normal(0.0, 0.05, n)))
-    y[[n - 1, -1]] /= p.rod_length
     made = (release if clamped else graze)(rng, length, joint, t, y, phase, p)
     if made is None:
         return None

@@ -14,7 +14,8 @@ from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
 
 FLIGHT = record(Case.from_values({"joint": "both", "clearance_mm": 9, "load": "gas"}))
-BEGIN, SPAN, PHASE = 0.09, 0.008, 3
+FLIGHT.clearance[:] = 1.0
+BEGIN, SPAN, PHASE = 0.07, 0.03, 3
 SIZE = np.full(8, 1e-3)
 
 
@@ -40,13 +41,13 @@ def flow(steps):
 
 def test_order_of_convergence():
     exact = flow(512)
-    errors = [np.abs(flow(n) - exact)[:8].max() for n in (16, 32, 64)]
+    errors = [np.abs(flow(n) - exact)[:8].max() for n in (8, 16, 32)]
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.2)
 
 
 def test_flows_converge_with_the_motion():
     exact = flow(512)
-    errors = [np.abs(flow(n) - exact)[8:].max() for n in (2, 4, 8, 16)]
+    errors = [np.abs(flow(n) - exact)[8:].max() for n in (4, 8, 16, 32)]
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.4)
 
 

@@ -17,12 +17,7 @@ from compressor.cases import Case
 from compressor.metrics import AXES, JOINTS
 from compressor.outcome import DatasetParts
 from compressor.physics import (
-    COLUMNS,
-    FLOWS,
-    Column,
-    derivative_with_flows,
     merge_tallies,
-    observe_all,
 )
 from compressor.solve import (
     Cuts,
@@ -40,8 +35,6 @@ from compressor.solve import (
     with_series,
     with_settle_rev,
 )
-
-RATE_SHIFT_REV = 1e-6  # rev: half the span that the rate of an eccentricity is a difference over
 
 Enough = Callable[[Turns, np.ndarray], bool]  # of revolutions so far, and their Poincaré points
 
@@ -168,8 +161,7 @@ class PoincareRecorder:
         """
         count = len(turns)
         if (count - 1) % self.step == 0:
-            at = float(self.cuts.times[count - 1])
-            self.points.append(eccentricities(self.p, at, self.cuts.states[-1]))
+            self.points.append(eccentricities(self.p, self.cuts.states[-1]))
         if count % self.step:
             return False
         self.turns.append(merge_tallies(turns[-self.step :]))
@@ -185,19 +177,11 @@ class PoincareRecorder:
         return RevolutionRun(run.p, self.turns, points, state, run.reason, run.detail)
 
 
-def eccentricities(p: np.record, at: float, state: np.ndarray) -> np.ndarray:
-    """Return the eccentricity (m) and its rate (m/s) of both joints at a time (s), (joint, 4).
-
-    The rate is the central difference of the eccentricity, which is geometry alone, along the
-    motion: its error is that of the third derivative over a millionth of a revolution.
-    """
-    z = np.append(state, np.zeros(FLOWS))
-    rates = np.empty_like(z)
-    derivative_with_flows(at, z, 0, p, rates)
-    span = RATE_SHIFT_REV * 2.0 * math.pi / float(p["omega"])
-    shifts, rows = np.array([0.0, -span, span]), np.empty((3, COLUMNS))
-    states = state + shifts[:, np.newaxis] * rates[:-FLOWS]
-    observe_all(at + shifts, states, np.zeros(3, dtype=np.int64), p, rows)
-    places = rows[:, Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(3, 2, 2)
-    here, before, after = places
-    return np.concatenate((here, (after - before) / (2.0 * span)), axis=1)
+def eccentricities(p: np.record, state: np.ndarray) -> np.ndarray:
+    """Return the eccentricity (m) and its rate (m/s) of both joints, (joint, 4), from a state."""
+    n, place = int(p["freedoms"]), 0
+    found = np.zeros((len(JOINTS), 2 * len(AXES)))
+    for joint in np.flatnonzero(p["clearance"] > 0.0):
+        found[joint] = *state[place : place + 2], *state[n + place : n + place + 2]
+        place += 2
+    return found
