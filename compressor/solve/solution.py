@@ -6,6 +6,7 @@ from compressor.cases import TIGHTEST, Case
 from compressor.outcome import Regime
 from compressor.reasons import Reason
 from compressor.solve.error_bars import (
+    TIGHTER_FACTOR,
     comparison_run,
     estimate_errors,
     looser_comparison_run,
@@ -35,6 +36,7 @@ OUT_OF_BUDGET = (
     Reason.BUDGET_SECONDS,
     Reason.STEP_UNDERFLOW,
 )  # a tighter run may end so
+LAST_RTOL = TIGHTER_FACTOR * TIGHTEST  # with a tighter run to compare it with
 ERROR_AIM = 0.7  # of what is allowed: where the next run's error is aimed at
 MIN_TIGHTENING, MAX_TIGHTENING = 10.0, 1000.0  # times tighter that the next run may be
 
@@ -75,11 +77,11 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
             return now
         if before is None and looks_chaotic(now) and search.parts(whole=False):
             return now
-        if rtol < 1.01 * TIGHTEST or all(one.reason for one in others):
+        if rtol < 1.01 * LAST_RTOL or all(one.reason for one in others):
             return fail_accuracy(case, now, others[0].detail or "no run is tighter")
         before = now
         tightening = min(max(ratio_of(ERROR_AIM / excess), MIN_TIGHTENING), MAX_TIGHTENING)
-        rtol = max(float(f"{rtol / tightening:.1e}"), TIGHTEST)
+        rtol = max(float(f"{rtol / tightening:.1e}"), LAST_RTOL)
 
 
 def comparison_runs(

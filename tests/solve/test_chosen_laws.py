@@ -155,9 +155,9 @@ def test_a_pin_that_is_pressed_deeper_than_johnson_knows_is_told_of():
 def test_error_bars_hold_with_laws():
     """Of the default promise, by far tighter runs. With six restitutions each, 95 % of 500 do.
 
-    One of 174 machines like these breaks its promise, which one depends on rounding.
+    One of the eight may say that it is chaotic: its runs at 2.5e-12 and 1e-12 differ by 1 %.
     """
-    shares = []
+    shares, chaotic = [], 0
     laws = "gonthier", "flores", "lankarani_nikravesh", "hu_guo"
     for law, restitution in itertools.product(laws, (0.3, 0.6)):
         contact = {"law": law, "restitution": restitution}
@@ -166,6 +166,10 @@ def test_error_bars_hold_with_laws():
             simulate(Case.resolve({**values, "solve": solve}))
             for solve in ({}, {"rtol": 1e-10, "error_bars": False})
         )
+        if run.attrs["regime"] == "chaotic":
+            chaotic += 1
+            continue
+        assert run.attrs["promise"] == "kept"
         a, b = run["acceleration"].values, exact["acceleration"].values
         assert np.linalg.norm(a - b) < 0.005 * np.linalg.norm(b)
         for name in METRICS:
@@ -173,6 +177,7 @@ def test_error_bars_hold_with_laws():
                 away, bar = abs(run[name] - exact[name]).values, run[f"{name}_error"].values
                 known = np.isfinite(bar) & np.isfinite(away)
                 shares += (away[known] / np.maximum(bar[known], 1e-300)).tolist()
+    assert chaotic <= 1
     assert len(shares) > 150
     assert np.mean(np.array(shares) <= 1.0) > 0.85
 
