@@ -11,7 +11,7 @@ Build a case, simulate it, and read a number with its error bar:
 >>> force = run.peak_contact_force.sel(joint="big_end")
 >>> bar = run.peak_contact_force_error.sel(joint="big_end")
 >>> print(f"{force / 1e3:.2f} kN, known to {100 * bar / force:.2f} %")
-8.81 kN, known to 0.03 %
+8.81 kN, known to 0.06 %
 
 What a sweep has stored is opened by `open_study`. Case files and `Case` have the units that stand
 in the names of their keys, such as `clearance_mm`; all results are SI. Names are imported when they

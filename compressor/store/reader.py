@@ -392,7 +392,7 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     >>> study = compressor.open_study("results", "wear")
     >>> one = study.sel(clearance_mm=0.2)
     >>> print(f"{one.peak_acceleration:.0f} ± {one.peak_acceleration_error:.1f} m/s2")
-    647 ± 0.1 m/s2
+    647 ± 0.2 m/s2
     >>> surely_below = study.peak_acceleration + study.peak_acceleration_error < 700
     >>> study.clearance_mm.where(surely_below, drop=True).values.tolist()
     [0.1, 0.2]
