@@ -32,7 +32,7 @@ SMALL_END = int(Scene.SMALL_END)
 BOTH = int(Scene.BOTH)
 
 
-class Place(NamedTuple):
+class RodPlace(NamedTuple):
     """Where rod and crosshead are and how they move: SI, phi in rad; x counts from the crank."""
 
     big: tuple[float, float, float, float]  # eccentricity x and y, and its rate
@@ -62,7 +62,7 @@ def eccentricities(y, p):
 
 @inline_llvm
 def place_of(motion, y, p):
-    """Return the `Place` in a state."""
+    """Return the `RodPlace` in a state."""
     big, small = eccentricities(y, p)
     crank, length = p.crank_radius * p.omega, p.rod_length
     sin_phi = (p.crank_radius * motion.sin_theta + (small[1] - big[1])) * p.per_rod_length
@@ -71,12 +71,12 @@ def place_of(motion, y, p):
     rate = falling * p.per_rod_length / cos_phi
     x = p.crank_radius * motion.cos_theta + (small[0] - big[0]) + length * cos_phi
     v = (small[2] - big[2]) - crank * motion.sin_theta - length * sin_phi * rate
-    return Place(big, small, sin_phi, cos_phi, rate, x, v)
+    return RodPlace(big, small, sin_phi, cos_phi, rate, x, v)
 
 
 @inline_llvm
 def load_force(phase, at, motion, p):
-    """Return the piston force (N) at a `Place` around the ideal motion."""
+    """Return the piston force (N) at a `RodPlace` around the ideal motion."""
     load = piston_force(phase, at.x, at.v, at.x - motion.x, at.v - motion.v, p)
     return load + measured_force(motion.cos_theta, motion.sin_theta, p)
 
@@ -125,7 +125,7 @@ class Instant(NamedTuple):
     """All that the forces and accelerations at one time and state depend on, evaluated once."""
 
     motion: IdealMotion
-    at: Place
+    at: RodPlace
     load: float
     big: ContactState
     small: ContactState

@@ -205,7 +205,7 @@ def overruns_friction(p: np.record, rtol: float) -> bool:
 def comparison_run(case: Case, solution: Solution, timeout: float) -> Solution:
     """Return another run of a case, by which a run's errors are estimated.
 
-    For a run with no looser one before it. A tighter run; at the tightest tolerance a looser one.
+    A tighter one; a looser one only where the tolerance leaves no room below it.
     Where explicit steps may run over friction, it is a run by the stiff method.
     """
     tighter = companion_rtol(solution.p, solution.rtol)

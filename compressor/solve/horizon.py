@@ -166,9 +166,9 @@ class Search:
 
     def within_budget(self) -> Case:
         """Return the case with no more steps than the budget still allows; all for a first run."""
-        return self.limited(self.work - self.evaluations) if self.first else self.case
+        return self.limit_steps(self.work - self.evaluations) if self.first else self.case
 
-    def limited(self, evaluations: float) -> Case:
+    def limit_steps(self, evaluations: float) -> Case:
         """Return the case with no more steps than so many evaluations allow."""
         steps = min(self.case.solve.max_steps, max(1, int(evaluations / self.per_step)))
         return replace(self.case, solve=replace(self.case.solve, max_steps=steps))
@@ -208,7 +208,7 @@ class Search:
 
     def compare(self, end: float, rtol: float) -> Parting:
         """Compare the motion with a shifted one up to an end (s), within the budget."""
-        case = self.limited((self.work - self.shifted_evaluations) / 2)
+        case = self.limit_steps((self.work - self.shifted_evaluations) / 2)
         found = compare_shifted(case, end, rtol, LOOK_SHIFT, self.left)
         self.shifted_evaluations += found.evaluations
         return found

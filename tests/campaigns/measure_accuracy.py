@@ -4,8 +4,8 @@
 reference of reference.py; 1,000 random cases, of seeds that chose nothing, by our own run at rtol
 1e-12, which SciPy's DOP853 confirms on a few of them. Errors of acceleration are relative L2 errors
 after settling; energy residuals are in units of their bound, 10 rtol a revolution. Cases that say
-they are chaotic are confirmed by twins at rtol 1e-12. The figure beside the file shows what the
-words cost and keep.
+they are chaotic are confirmed by a shifted run at rtol 1e-12. The figure beside the file shows what
+the words cost and keep.
 """
 
 import argparse

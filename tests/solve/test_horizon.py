@@ -55,6 +55,7 @@ def test_a_horizon_is_that_of_tighter_runs_on_a_finer_grid():
     horizon = predictability_horizon(made)
     assert 0.9 * made.turn < horizon < made.duration
     assert horizon == pytest.approx(parted, rel=0.01)
+    assert predictability_horizon(made, rtol=1e-13) == pytest.approx(horizon, rel=0.01)
 
 
 def test_a_motion_that_starts_farther_away_parts_earlier():
