@@ -11,12 +11,14 @@ from compressor.solve.request import (
     Turns,
     revolutions,
 )
-from compressor.solve.run import COMPILED, Solution, integrate, run_at_tolerance, run_until_balanced
+from compressor.solve.run import COMPILED, Solution, integrate, run_at_tolerance
 from compressor.solve.run_metrics import (
+    allowed_residual,
     average_bar,
     energy_residual,
     mean_bar,
     metrics,
+    next_audit_rtol,
     parts,
     standard_error,
     statistics,

@@ -11,7 +11,6 @@ thin; which cells bear is found by their pressures and flows, and two grids give
 """
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,36 +20,28 @@ GRID = (96, 12)  # cells around and along half the bearing
 MAX_LOOKS = 200  # in which the cells that bear are found
 
 
-class Reynolds(NamedTuple):
-    """Force over B D eta w / psi^2, that of a film that turns over eps as well.
-
-    Along the line of centres, away from the wall, and across it, along the rotation.
-    """
-
-    normal: float
-    across: float
-
-
 Bearing = dict[tuple[float, tuple[int, int]], np.ndarray]  # by squeeze and grid: cells that bear
 
 
 def reynolds(
     eps: float, ratio: float, squeeze: int = 0, grid: tuple[int, int] = GRID,
     near: Bearing | None = None,
-) -> Reynolds:  # fmt: skip
-    """Return the Sommerfeld numbers of a film at an eccentricity, for B / D = ratio.
+) -> np.ndarray:  # fmt: skip
+    """Return the Sommerfeld numbers of a film at an eccentricity, for B / D = ratio, (2,).
 
+    Force over B D eta w / psi^2, that of a film that turns over eps as well: along the line of
+    centres, away from the wall, and across it, along the rotation.
     squeeze: 0 of a film that turns, 1 of one that is pressed, -1 of one that is pulled apart; near:
     cells that bore at an eccentricity nearby, where the search for them begins; it is written.
     """
-    return Reynolds(*forces(eps, ratio, 0.0 if squeeze else 1.0, squeeze, grid, near))
+    return forces(eps, ratio, 0.0 if squeeze else 1.0, squeeze, grid, near)
 
 
 def forces(
     eps: float, ratio: float, turning: float, squeeze: float, grid: tuple[int, int] = GRID,
     near: Bearing | None = None,
 ) -> np.ndarray:  # fmt: skip
-    """Return the numbers of `Reynolds`, (2,), of a film that turns and is squeezed at once.
+    """Return the numbers of `reynolds`, (2,), of a film that turns and is squeezed at once.
 
     turning: w eps, squeeze: eps', both over one speed.
     """
@@ -134,11 +125,11 @@ def _over_short(eps: float, ratio: float, near: Bearing) -> tuple[float, ...]:
     """
     short = uncompiled(short_film)
     turned, ocvirk = reynolds(eps, ratio, near=near), short(eps, 1.0, 0.0)
-    pressed, pulled = (abs(reynolds(eps, ratio, way, near=near).normal) for way in (1, -1))
+    pressed, pulled = (abs(reynolds(eps, ratio, way, near=near)[0]) for way in (1, -1))
     return (
         (1.0 - eps) * short(eps, 0.0, 1.0)[0] / pressed,
         (1.0 + eps) * -short(eps, 0.0, -1.0)[0] / pulled,
         (1.0 - eps) * np.hypot(*ocvirk) / np.hypot(*turned),
-        np.tan(0.5 * np.arctan2(turned.across, turned.normal))
+        np.tan(0.5 * np.arctan2(turned[1], turned[0]))
         / np.tan(0.5 * np.arctan2(ocvirk[1], ocvirk[0])),
     )

@@ -512,14 +512,15 @@ def _card_fit(case: Case, end: str, key: str) -> Iterator[Remark]:
     given = case.gas.clearance(end, stroke) / stroke
     value, row = getattr(case.gas, given_by.removeprefix("gas.")), row_of(given_by)
     is_given = row is not None and value != row.default
-    says = f"compression and expansion fit a clearance of {100 * fit.clearance:.3g} % at an "
-    says += f"exponent of {fit.exponent:.3g}"
-    if fit.misfit > MAX_MISFIT:
+    misfit, clearance, exponent = fit
+    says = f"compression and expansion fit a clearance of {100 * clearance:.3g} % at an "
+    says += f"exponent of {exponent:.3g}"
+    if misfit > MAX_MISFIT:
         text = "its compression and expansion fit no polytropic lines, whatever the clearance"
         yield Remark(key, f"{text}: {doubt}", "fit")
-    elif not EXPONENTS[0] <= fit.exponent <= EXPONENTS[1]:
+    elif not EXPONENTS[0] <= exponent <= EXPONENTS[1]:
         yield Remark(key, f"{says}: {doubt}", "fit")
-    elif is_given and abs(fit.clearance / given - 1) > MAX_UNLIKE:
+    elif is_given and abs(clearance / given - 1) > MAX_UNLIKE:
         yield Remark(key, f"{says}, and {given_by} gives {100 * given:.3g} %", "fit")
 
 

@@ -135,7 +135,9 @@ class Search:
 
     The budget counts evaluations of the equations, so that results do not depend on how busy the
     machine is. `horizon`: time (s) at which motions part; inf where they do not, nan as long as
-    that is not known; `stopped`: the budget ended the search before that was known.
+    that is not known; `stopped`: the budget ended the search before that was known. Where metrics
+    settle: `settled` (rev), nan where that was not looked for, or not found; `period` (rev), after
+    which they agree, nan where that is not known; `unsettled`: why they do not.
     """
 
     def __init__(self, case: Case):
@@ -143,6 +145,8 @@ class Search:
         self.began = time.monotonic()
         self.horizon = math.nan
         self.stopped = False
+        self.settled = self.period = math.nan
+        self.unsettled = ""
         self.first = 0  # evaluations of the first run
         self.evaluations = 0  # of all runs
         self.shifted_evaluations = 0  # of shifted runs, and those beside them

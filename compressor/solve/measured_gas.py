@@ -6,7 +6,6 @@ cubic least squares (SciPy's), in a window that goes round the revolution.
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -107,19 +106,12 @@ def sensed_noise(case: Case, end: str) -> float:
     return float(np.sqrt(np.mean(moved.acceleration[:-1] ** 2)))
 
 
-class Polytrope(NamedTuple):
-    """What an end's compression and expansion lines say together."""
+def fit_polytrope(case: Case, end: str) -> tuple[float, float, float] | None:
+    """Return what fits both lines of an end's card: misfit, clearance and exponent; None without.
 
-    clearance: float  # of the swept volume
-    exponent: float
-    misfit: float  # rms of the pressure's logarithm
-
-
-def fit_polytrope(case: Case, end: str) -> Polytrope | None:
-    """Return the clearance and the exponent that fit both lines of an end's card; None without two.
-
-    Of the lines p (c + s)^n = const, one each way, with the swept share s of the machine without
-    clearance in its joints.
+    Misfit: rms of the pressure's logarithm; clearance: of the swept volume. Of the lines
+    p (c + s)^n = const, one each way, with the swept share s of the machine without clearance in
+    its joints.
     """
     machine, pressure = case.machine, gas_nodes(case, end)[:, 0]
     angles = np.arange(pressure.size) * 2.0 * math.pi / pressure.size
@@ -134,7 +126,7 @@ def fit_polytrope(case: Case, end: str) -> Polytrope | None:
     lines = [between & side for side in (grows, ~grows)]
     if high <= low or min(line.sum() for line in lines) < MIN_FITTED:
         return None
-    best = None
+    found = []
     for clearance in CLEARANCES:
         volume = np.log(clearance + swept)
         apart = [(volume[line] - volume[line].mean(), level[line] - level[line].mean())
@@ -142,6 +134,5 @@ def fit_polytrope(case: Case, end: str) -> Polytrope | None:
         v, p = (np.concatenate(each) for each in zip(*apart, strict=True))
         exponent = -float(v @ p) / float(v @ v)
         misfit = float(np.sqrt(np.mean((p + exponent * v) ** 2)))
-        if best is None or misfit < best.misfit:
-            best = Polytrope(float(clearance), exponent, misfit)
-    return best
+        found.append((misfit, float(clearance), exponent))
+    return min(found)

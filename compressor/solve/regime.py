@@ -11,7 +11,7 @@ each with the one before, or with the one a period earlier.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,9 +27,9 @@ from compressor.solve.request import (
     Turns,
     revolutions,
 )
-from compressor.solve.run import Solution, is_sampled, run_at_tolerance, times_of
+from compressor.solve.run import Solution, is_sampled, output_times, run_at_tolerance
 from compressor.solve.run_metrics import metrics
-from compressor.solve.series import compared_per_rev, distances
+from compressor.solve.series import compared_per_rev, compared_times, distances
 from compressor.solve.si_record import is_ideal, record
 
 DOUBTFUL = 0.1  # of a number: an error from which on chaos is looked for
@@ -96,32 +96,20 @@ SAMPLED_REV = 6.001  # rev: of a motion that settles later the run is made again
 LOOKED_AT = 2 * MAX_PERIOD_REV  # revolutions, the last ones, by which that is seen
 
 
-@dataclass(frozen=True)
-class Settling:
-    """A case with numbers for its span, and what is known of where it settles.
+def find_span(search: Search) -> Solution | None:
+    """Give the search's case numbers for `settle_rev: auto` and `duration_rev: auto`.
 
-    `settled` (rev): nan where it was not looked for, or not found; `period` (rev): after which
-    metrics agree, nan where that is not known; `detail`: why it was not found; `run`: of the case,
-    by which it was found.
+    Within the case's wall time; what is known of where it settles is kept in the search. Return the
+    run of the case by which that was found, if it is one.
     """
-
-    case: Case
-    settled: float = math.nan
-    period: float = math.nan
-    detail: str = ""
-    run: Solution | None = None
-
-
-def with_span(case: Case, search: Search) -> Settling:
-    """Return a case with numbers for `settle_rev: auto` and `duration_rev: auto`, as `Settling`.
-
-    Within the case's wall time.
-    """
+    case = search.case
     if case.solve.settle_rev != "auto":
-        given = with_settle_rev(case, float(case.solve.settle_rev), 1)
-        return Settling(given, period=1.0 if is_ideal(case) else math.nan)
+        search.case = with_settle_rev(case, float(case.solve.settle_rev), 1)
+        search.period = 1.0 if is_ideal(case) else math.nan
+        return None
     if is_ideal(case):  # a function of the crank angle
-        return Settling(with_settle_rev(case, 0.0, 1), 0.0, 1.0)
+        search.case, search.settled, search.period = with_settle_rev(case, 0.0, 1), 0.0, 1.0
+        return None
     max_revolutions = int(case.duration / case.turn * (1 + 1e-12))
     ends_settled = case.solve.duration_rev == "auto"
     longest = with_settle_rev(case, 0.0, 1, float(max_revolutions) if ends_settled else None)
@@ -143,14 +131,15 @@ def with_span(case: Case, search: Search) -> Settling:
     )
     if not found:
         half = float(max_revolutions // 2)
-        text = f"in {max_revolutions} revolutions no {AGREEMENTS + 1} agree within {within:.2g}"
-        later = with_settle_rev(case, half, 1, float(max_revolutions))
-        return Settling(later, detail=text)
+        search.case = with_settle_rev(case, half, 1, float(max_revolutions))
+        search.unsettled = (
+            f"in {max_revolutions} revolutions no {AGREEMENTS + 1} agree within {within:.2g}"
+        )
+        return None
     first, period = found[0]
-    settled = with_settle_rev(case, float(first), period)
-    return Settling(
-        settled, float(first), float(period), run=settled_part(run, longest, settled, cuts)
-    )
+    search.settled, search.period = float(first), float(period)
+    search.case = with_settle_rev(case, search.settled, period)
+    return settled_part(run, longest, search.case, cuts)
 
 
 def settled_part(run: Solution, longest: Case, case: Case, cuts: Cuts) -> Solution | None:
@@ -158,11 +147,11 @@ def settled_part(run: Solution, longest: Case, case: Case, cuts: Cuts) -> Soluti
 
     cuts: into revolutions, of the run. None where it is of other times than the case's, or stopped.
     """
-    times, trajectory = times_of(case, is_sampled(case)), run.trajectory
+    times, trajectory = output_times(case, is_sampled(case)), run.trajectory
     first, last = (round(time / case.turn) for time in (case.settle, case.duration))
-    count, per_rev = times.output.size, compared_per_rev(case)
-    output = trajectory.times[:count] if is_sampled(case) else times.output
-    same = output.size == count and np.allclose(output, times.output, rtol=1e-12)
+    count, per_rev = times.size, compared_per_rev(case)
+    output = trajectory.times[:count] if is_sampled(case) else times
+    same = output.size == count and np.allclose(output, times, rtol=1e-12)
     ends_whole = abs(case.duration - last * case.turn) < SAME_TIME * case.duration
     if run.reason or not same or not ends_whole or per_rev != compared_per_rev(longest):
         return None
@@ -176,7 +165,7 @@ def settled_part(run: Solution, longest: Case, case: Case, cuts: Cuts) -> Soluti
         tally=merge_tallies(run.turns[first:last]),
     )  # fmt: skip
     begin = first * per_rev
-    samples = run.samples[begin : begin + times.compared.size]
+    samples = run.samples[begin : begin + compared_times(case).size]
     numbers = metrics(run.p, part.tally)
     return replace(
         run, trajectory=part, settle=case.settle, metrics=numbers, samples=samples, turns=[]

@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -123,21 +123,14 @@ class Request:
         return read_fields(self.p)
 
 
-class LastStep(NamedTuple):
-    """An attempt of a step, of the last ones before a stop."""
-
-    time: float  # s, where it begins
-    length: float  # s
-    error: float  # over its tolerance; nan where that is not known
-    words: str  # method, and what became of the step
-
-
 @dataclass
 class Trajectory:
     """States on the output grid, the tally of the dense solution, and how the run ended.
 
     `states` has shape (m, k) and is nan from the sample at which an incomplete run stopped, by one
-    of SciPy's methods from the last edge before; `reason` is empty when the run is complete.
+    of SciPy's methods from the last edge before; `reason` is empty when the run is complete;
+    `last_steps`: the last attempts before a stop: where each begins (s), its length (s), its error
+    over its tolerance, nan where that is not known, and what became of it.
     """
 
     times: np.ndarray
@@ -148,12 +141,17 @@ class Trajectory:
     detail: str = ""
     stop_time: float = math.nan
     stop_state: np.ndarray = field(default_factory=lambda: np.empty(0))
-    last_steps: Iterable[LastStep] = ()  # before a stop
+    last_steps: Iterable[tuple[float, float, float, str]] = ()
     segments: tuple[np.ndarray, np.ndarray] | None = None  # edges and phases, as run through
     steps: int = 0
     rejected: int = 0
     evaluations: int = 0
     seconds: float = 0.0
+
+    def at(self, times: np.ndarray) -> "Trajectory":
+        """Return the run with the samples at some of its times (s) alone."""
+        at = np.searchsorted(self.times, times)
+        return replace(self, times=times, states=self.states[at], phases=self.phases[at])
 
 
 def last_state(run: Trajectory) -> np.ndarray:

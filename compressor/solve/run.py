@@ -7,9 +7,7 @@ solution at Gauss-Lobatto nodes for the metrics, and sample it on the output gri
 import itertools
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -32,14 +30,12 @@ from compressor.physics import (
     observe_all,
     sample_segments,
     segments,
-    state_names,
     tally_energy,
 )
 from compressor.reasons import Reason
 from compressor.solve.dense_tally import WEIGHTS, Observer, tally_steps
 from compressor.solve.request import (
     Cuts,
-    LastStep,
     Metrics,
     Request,
     Stop,
@@ -52,14 +48,9 @@ from compressor.solve.request import (
     with_cuts,
     with_edge,
 )
-from compressor.solve.run_metrics import (
-    allowed_residual,
-    energy_residual,
-    metrics,
-    next_audit_rtol,
-)
+from compressor.solve.run_metrics import metrics
 from compressor.solve.scipy_driver import step_through
-from compressor.solve.series import compared_times, finer, journal_distance, take_samples
+from compressor.solve.series import compared_times, finer, journal_distance, rows_of
 from compressor.solve.si_record import contact_sizes, initial_state, is_ideal, natural_sizes, record
 
 PIECES_PER_CHECK = 256  # of the quadrature between two looks at the clock
@@ -211,14 +202,14 @@ WORDS = {
 }  # fmt: skip
 
 
-def read_last_steps(stepper: np.record, work: WorkArrays) -> list[LastStep]:
+def read_last_steps(stepper: np.record, work: WorkArrays) -> list[tuple[float, float, float, str]]:
     """Return the last attempts of a march, by its ring of them."""
     found, attempts = [], int(stepper.attempts)
     for number in range(max(0, attempts - LAST_STEPS), attempts):
         begin, length, error, code = work.last[number % LAST_STEPS].tolist()
         name = "RODAS" if code >= Attempt.STIFF else "TSIT5"
         words = f"{name} {WORDS[Attempt(int(code) % Attempt.STIFF)]}"
-        found.append(LastStep(begin, length, error, words))
+        found.append((begin, length, error, words))
     return found
 
 
@@ -305,96 +296,33 @@ def run_at_tolerance(
     `sampled_until`: the time (s) behind which a long run has no samples but its end. A run that
     stops raises nothing: its `reason` says why.
     """
-    p, times = record(case), times_of(case, sampled).until(sampled_until)
+    p, end = record(case), case.duration
+    output, compared = (
+        times[(times <= sampled_until) | (times == end)]
+        for times in (output_times(case, sampled), compared_times(case))
+    )
+    times = np.union1d(output, compared)
     if is_ideal(case):
         pieces = round(PIECES * (case.rtol / rtol) ** FINER_POWER)
-        return solution_of_trajectory(
-            rtol, p, times,
-            closed_form(p, times.all, case.settle, pieces, timeout, case.output.signals),
-        )  # fmt: skip
-    request = build_request(case, rtol, p, times, state)
-    request.timeout, request.cuts = timeout, cuts
-    trajectory = integrate(request)
+        trajectory = closed_form(p, times, case.settle, pieces, timeout, case.output.signals)
+    else:
+        start = initial_state(case, p) if state is None else state
+        trajectory = integrate(Request(
+            p, start, times, case.settle, rtol, case.solve.method, case.solve.max_steps, timeout,
+            cuts, case.output.signals,
+        ))  # fmt: skip
     turns = cuts.turns if cuts else []
     if turns:
         trajectory.tally = merge_tallies([*turns, trajectory.tally])
-    solution = solution_of_trajectory(rtol, p, times, trajectory)
-    solution.turns = turns
-    return solution
-
-
-class Times(NamedTuple):
-    """Times (s) of a run: settled; its output, its comparison; all of them."""
-
-    settle: float
-    output: np.ndarray
-    compared: np.ndarray
-    all: np.ndarray
-
-    def until(self, time: float) -> "Times":
-        """Return these times without those behind a time (s), but for the end."""
-        end = self.output[-1]
-        if time >= end:
-            return self
-        parts = (
-            one[(one <= time) | (one == end)] for one in (self.output, self.compared, self.all)
-        )
-        return Times(self.settle, *parts)
-
-
-def times_of(case: Case, sampled: bool) -> Times:
-    """Return the times at which a run of a case is sampled: its output, or both ends alone."""
-    samples = finer(case) * round(case.steps) if sampled else 1
-    output = case.duration * (np.arange(samples + 1) / samples)
-    compared = compared_times(case) if case.wants_bars else output[:0]
-    union = np.union1d(output, compared) if compared.size else output
-    return Times(case.settle, output, compared, union)
-
-
-def build_request(
-    case: Case, rtol: float, p: np.record, times: Times, state: np.ndarray | None = None
-) -> Request:
-    """Return the request that `run_at_tolerance` integrates, without a limit in wall time."""
-    settings = case.solve
-    if state is None:
-        y = initial_state(case, p)
-    else:
-        y = np.zeros(len(state_names(p)))
-        y[:] = state
-    return Request(
-        p, y, times.all, times.settle, rtol, settings.method, settings.max_steps,
-        has_rod_load=case.output.signals,
-    )  # fmt: skip
-
-
-def solution_of_trajectory(
-    rtol: float, p: np.record, times: Times, trajectory: Trajectory
-) -> Solution:
-    """Return the `Solution` of an attempt's trajectory: metrics and samples, without errors."""
-    samples = take_samples(p, trajectory, times.compared, times.output)
+    samples = rows_of(p, trajectory.at(compared), COLUMNS)
     reason, detail = trajectory.reason, trajectory.detail
     numbers = {} if reason else metrics(p, trajectory.tally)
-    return Solution(p, trajectory, rtol, times.settle, numbers, samples, reason, detail)
+    return Solution(
+        p, trajectory.at(output), rtol, case.settle, numbers, samples, reason, detail, turns=turns
+    )
 
 
-def run_until_balanced(rtol: float, run_at: Callable[[float], tuple[Solution, float]]) -> Solution:
-    """Return the first run whose energy balances, or that stops, at a tolerance or at tenths of it.
-
-    run_at: takes a tolerance, returns a run and how many revolutions it went through. If no run
-    balances, the last one has `energy_audit_failed` as its reason.
-    """
-    failures, rung = 0, rtol
-    while True:
-        run, revolutions = run_at(rung)
-        residual = energy_residual(run.trajectory.tally)
-        allowed = allowed_residual(rtol, revolutions)
-        if run.reason or residual <= allowed:
-            return run
-        failures += 1
-        below = next_audit_rtol(rung, failures)
-        if below is None:
-            break
-        rung = below
-    run.reason = Reason.ENERGY_AUDIT_FAILED
-    run.detail = f"energy residual {residual:.2g}, more than {allowed:.2g}, at rtol {rung:.2g}"
-    return run
+def output_times(case: Case, sampled: bool) -> np.ndarray:
+    """Return the times (s) at which a run of a case is kept: its output grid, or both ends."""
+    samples = finer(case) * round(case.steps) if sampled else 1
+    return case.duration * (np.arange(samples + 1) / samples)

@@ -27,7 +27,6 @@ from compressor.reasons import Reason
 from compressor.solve.dense_tally import find_missed_contact, tally_steps
 from compressor.solve.request import (
     Cuts,
-    LastStep,
     Request,
     Stop,
     Trajectory,
@@ -113,7 +112,7 @@ class ScipyRun:
             raise Stop(Reason.NON_FINITE, "the state is no longer finite")
         result.stop_time, result.stop_state, result.steps = t, z[:-FLOWS].copy(), result.steps + 1
         since, now = (float(passed_time(self.p, *at)) for at in (last, self.last))
-        self.steps.append(LastStep(since, now - since, math.nan, f"{self.request.method} taken"))
+        self.steps.append((since, now - since, math.nan, f"{self.request.method} taken"))
         row = self.observe(np.array([t]), z[:, None])[0]
         tally_energy(row, z[-FLOWS:].copy(), result.tally)
         self.check_depth(row[Column.PENETRATION : Column.NORMAL].max())
@@ -163,7 +162,7 @@ class ScipyRun:
             t, z, bound = path.t[reached], path.y[:, reached].copy(), path.t[-1] if met else end
             if met:  # beyond, the law has another speed: the step is taken again, up to there
                 result.steps, result.rejected = result.steps - 1, result.rejected + 1
-                self.steps[-1] = self.steps[-1]._replace(words=f"{request.method} cut at an onset")
+                self.steps[-1] = (*self.steps[-1][:3], f"{request.method} cut at an onset")
             for joint in meeting:
                 self.touches[joint] = not self.touches[joint]
                 if self.touches[joint]:

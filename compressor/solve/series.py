@@ -32,28 +32,13 @@ import numpy as np
 
 from compressor.cases import Case
 from compressor.metrics import SERIES, SIZES
-from compressor.physics import COLUMNS, WIDE, Column, Coordinate, frame_of_series, observe_all
+from compressor.physics import WIDE, Column, Coordinate, frame_of_series, observe_all
 from compressor.solve.request import Trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
 
-COLUMN = {
-    "displacement": Column.DISPLACEMENT,
-    "velocity": Column.VELOCITY,
-    "acceleration": Column.ACCELERATION,
-    "rod_angle": Column.ROD_ANGLE,
-    "piston_force": Column.PISTON_FORCE,
-    "contact_force": Column.FORCE,
-    "eccentricity": Column.ECCENTRICITY,
-    "penetration": Column.PENETRATION,
-    "shaking_force": Column.SHAKING_FORCE,
-    "bearing_force": Column.BEARING_FORCE,
-    "guide_force": Column.GUIDE_FORCE,
-    "guide_moment": Column.GUIDE_MOMENT,
-    "crank_torque": Column.CRANK_TORQUE,
-    "rod_load": Column.FORCE + 2,
-}
+COLUMN = {"contact_force": Column.FORCE, "rod_load": Column.FORCE + 2}  # others have its name
 COMPARED_PER_REV = 150  # times a revolution at which two runs are compared
 SAMPLES_PER_BAND = 2.56  # samples of the forces in a period of the highest frequency requested
 SAMPLES_PER_PERIOD = 24  # samples of the forces in one of the body's fastest motion
@@ -88,18 +73,25 @@ def finer(case: Case) -> int:
     return max(1, math.ceil(rate * case.duration / round(case.steps) * (1 - 1e-12)))
 
 
+def column_of(name: str) -> int:
+    """Return the first column of a time series in observed rows."""
+    return COLUMN.get(name) or Column[name.upper()]
+
+
 def block(name: str, rows: np.ndarray) -> np.ndarray:
     """Return a time series from observed rows, shape (m,), (m, joint) or (m, joint, axis)."""
-    shape = tuple(SIZES[dim] for dim in (SERIES | SIGNALS)[name][0])
-    column = COLUMN[name]
+    shape, column = tuple(SIZES[dim] for dim in (SERIES | SIGNALS)[name][0]), column_of(name)
     return rows[:, column : column + math.prod(shape)].reshape(-1, *shape)
 
 
 def compared_times(case: Case) -> np.ndarray:
     """Return the times (s) at which runs of a case are compared, from where it has settled on.
 
-    In each whole revolution at the same angles, so that revolutions can be compared, too.
+    In each whole revolution at the same angles, so that revolutions can be compared, too. None
+    where no bars are wanted.
     """
+    if not case.wants_bars:
+        return np.empty(0)
     span = case.duration - case.settle
     per_rev = compared_per_rev(case)
     step = case.turn / per_rev if per_rev else span / MIN_COMPARED
@@ -113,25 +105,6 @@ def compared_per_rev(case: Case) -> int:
     if revolutions < 1.0:
         return 0
     return round(min(COMPARED_PER_REV, max(1.0, MAX_COMPARED / revolutions)))
-
-
-def take_samples(
-    p: np.record, run: Trajectory, times: np.ndarray, remaining: np.ndarray, columns: int = COLUMNS
-) -> np.ndarray:
-    """Return the observed rows at some of a run's times; the run keeps its samples at others.
-
-    times, kept: subsets of `run.times`, s. Rows: (m, columns).
-    """
-    whole, rows = (run.times, run.states, run.phases), np.empty((0, columns))
-    if times.size:
-        at = np.searchsorted(run.times, times)
-        run.times, run.states, run.phases = (array[at] for array in whole)
-        rows = rows_of(p, run, columns)
-    if remaining.size < whole[0].size:
-        at_remaining = np.searchsorted(whole[0], remaining)
-        whole = whole[0][at_remaining], whole[1][at_remaining], whole[2][at_remaining]
-    run.times, run.states, run.phases = whole
-    return rows
 
 
 @cache
@@ -148,7 +121,7 @@ def distance_columns() -> tuple[np.ndarray, np.ndarray, dict[str, int | slice]]:
         joints = SIZES["joint"] if "joint" in dims else 1
         begin = len(starts)
         starts += range(len(columns), len(columns) + count, count // joints)
-        columns += range(COLUMN[name], COLUMN[name] + count)
+        columns += range(column_of(name), column_of(name) + count)
         sums[name] = slice(begin, begin + joints) if "joint" in dims else begin
     return np.array(columns), np.array(starts), sums
 

@@ -85,9 +85,6 @@ def sensor_variables(record: "Record") -> Variables:
             ("pulse",), record.tacho,
             {"units": "s", "long_name": "times at which the crank passes top dead centre"},
         ),
-        "clipped_share": (
-            (), record.clipped, {"units": "1", "long_name": "former name of clipped_fraction"}
-        ),
     }  # fmt: skip
 
 
@@ -292,16 +289,16 @@ def stop_time(p: np.record, run: Trajectory) -> float:
 def stop_attributes(case: Case, solution: Solution) -> dict[str, object]:
     """Return where a run stopped, in which state, and how its last steps went."""
     trajectory = solution.trajectory
-    last, names = trajectory.last_steps, state_names(solution.p)
+    last = trajectory.last_steps
     return {
         "stop_time": stop_time(solution.p, trajectory),
         "stop_crank_angle": case.omega * trajectory.stop_time,
         "stop_state": trajectory.stop_state,
-        "stop_state_names": "; ".join(names),
-        "stop_history_time": np.array([one.time for one in last]),
-        "stop_history_step": np.array([one.length for one in last]),
-        "stop_history_error": np.array([one.error for one in last]),
-        "stop_history_words": "; ".join(one.words for one in last),
+        "stop_state_names": "; ".join(state_names(solution.p)),
+        "stop_history_time": np.array([time for time, *_ in last]),
+        "stop_history_step": np.array([length for _, length, *_ in last]),
+        "stop_history_error": np.array([error for *_, error, _ in last]),
+        "stop_history_words": "; ".join(words for *_, words in last),
     }
 
 

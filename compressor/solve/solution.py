@@ -15,12 +15,7 @@ from compressor.solve.error_bars import (
     relative_bar,
 )
 from compressor.solve.horizon import Search, predictability_horizon
-from compressor.solve.regime import (
-    DOUBTFUL,
-    has_doubtful_bars,
-    repeats,
-    with_span,
-)
+from compressor.solve.regime import DOUBTFUL, find_span, has_doubtful_bars, repeats
 from compressor.solve.request import Cuts, revolutions
 from compressor.solve.run import Solution, is_sampled, run_at_tolerance
 from compressor.solve.run_metrics import (
@@ -175,19 +170,19 @@ def solve(case: Case) -> Solution:
     Raises nothing for a run that fails: its `reason` and `detail` say why.
     """
     search = Search(case)
-    settling = with_span(case, search)
-    case = search.case = settling.case
-    solution = refine_until_accurate(case, search, settling.run)
-    solution.settled = settling.settled
+    first = find_span(search)
+    case = search.case
+    solution = refine_until_accurate(case, search, first)
+    solution.settled = search.settled
     if solution.reason not in ("", Reason.ACCURACY_NOT_REACHED):
         return solution
     find_horizon(case, solution, search)
     if solution.horizon < case.duration:
         return chaotic_solution(case, solution, search)
     if case.wants_bars:
-        name_regime(case, solution, search, settling.period)
-    if settling.detail and not solution.reason:
-        solution.reason, solution.detail = Reason.NOT_SETTLED, settling.detail
+        name_regime(case, solution, search)
+    if search.unsettled and not solution.reason:
+        solution.reason, solution.detail = Reason.NOT_SETTLED, search.unsettled
     return solution
 
 
@@ -216,20 +211,15 @@ def is_in_doubt(case: Case, solution: Solution) -> bool:
     )
 
 
-def name_regime(case: Case, solution: Solution, search: Search, period: float) -> None:
-    """Set the regime of a motion that is not chaotic: predictable, periodic or undecided.
-
-    period (rev): after which the metrics agree, where that is known; else nan.
-    """
+def name_regime(case: Case, solution: Solution, search: Search) -> None:
+    """Set the regime of a motion that is not chaotic: predictable, periodic or undecided."""
     in_doubt = is_in_doubt(case, solution)
     if in_doubt and search.horizon != math.inf:
         solution.regime = Regime.UNDECIDED
         return
     shortest, since = repeats(case, solution.samples, solution.series_errors)
-    if shortest and not in_doubt:
-        period = float(shortest)
-    solution.period = period
-    solution.regime = Regime.PREDICTABLE if math.isnan(period) else Regime.PERIODIC
+    solution.period = float(shortest) if shortest and not in_doubt else search.period
+    solution.regime = Regime.PREDICTABLE if math.isnan(solution.period) else Regime.PERIODIC
     if solution.regime == Regime.PERIODIC and math.isnan(solution.settled):
         solution.settled = since if shortest else case.settle / case.turn
 

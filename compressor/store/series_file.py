@@ -164,8 +164,6 @@ def read_series(path: Path) -> "xr.Dataset":
                 raise ValueError
         if not {"status", "reason", "time"} <= set(dataset.variables):
             raise ValueError
-        if "clipped_share" in dataset and "clipped_fraction" not in dataset:  # of an older version
-            dataset["clipped_fraction"] = dataset["clipped_share"]
         return dataset
 
 

@@ -345,9 +345,6 @@ def _name_owners(found: list[Damage], studies: list[StoredStudy]) -> list[Damage
     return owned
 
 
-CLIPPED_SHARE = "clipped_share"  # older name of `clipped_fraction` in files of series
-
-
 @dataclass(frozen=True)
 class StudyProgress:
     """How many jobs of one study are done, failed or missing, and why.
@@ -453,21 +450,11 @@ def report_job(folder: Folder, *words: str) -> JobReport:
     if "case" not in attributes:
         segment = store.rows.segments[store.rows.source[position]]
         raise DamagedJob(segment.path, FOREIGN_LINES, REMEDY)
-    if path is not None and _hides_clipping(numbers, attributes):
-        with contextlib.suppress(DamagedJob):
-            numbers["clipped_fraction"] = float(
-                store.values(key, [CLIPPED_SHARE]).get(CLIPPED_SHARE, np.nan)
-            )
     file = "" if path is None else os.fspath(final_path(path))
     caveats = job_caveats(numbers, attributes) if end.status == "ok" else []
     return JobReport(
         key, end.status, end.reason, end.detail, file, mine, again, numbers, attributes, caveats
     )
-
-
-def _hides_clipping(numbers: dict[str, Any], attributes: dict[str, Any]) -> bool:
-    """Return whether an older version stored a record's clipping in the job's file alone."""
-    return math.isnan(numbers["clipped_fraction"]) and '"sensor"' in attributes.get("case", "")
 
 
 def changes(folder: Folder, studies: "Sequence[Study]") -> list[StudyChange]:

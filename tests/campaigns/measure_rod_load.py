@@ -19,9 +19,10 @@ import numpy as np
 from compressor.cases.case import Case
 from compressor.physics import exact_motion, segments
 from compressor.physics.tally import ROD_LOAD
-from compressor.solve.run import build_request, closed_form, integrate, times_of
+from compressor.solve.request import Request
+from compressor.solve.run import closed_form, integrate
 from compressor.solve.series import rows_of
-from compressor.solve.si_record import is_ideal, record
+from compressor.solve.si_record import initial_state, is_ideal, record
 from compressor.solve.simulate import measure
 
 RTOL = 1e-11
@@ -121,8 +122,7 @@ def follow(case, more=()):
     if is_ideal(case):
         run = closed_form(p, times, case.settle, 8)
     else:
-        request = build_request(case, RTOL, p, times_of(case, True)._replace(all=times))
-        run = integrate(request)
+        run = integrate(Request(p, initial_state(case, p), times, case.settle, RTOL))
         if run.reason:
             raise NoTruth(run.detail)
     settled = times >= case.settle

@@ -20,7 +20,7 @@ from compressor.studies.tradeoff.explain import body_words
 
 TURN = {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 0.3}
 LOOSE = {"joint": "big_end", "clearance_mm": 0.2, "solve": TURN}
-RECORDED = {"sensor_time", "sensor_acceleration", "tacho_time", "clipped_share"}
+RECORDED = {"sensor_time", "sensor_acceleration", "tacho_time"}
 
 
 def run(**values):

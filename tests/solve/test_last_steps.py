@@ -77,7 +77,7 @@ def test_the_errors_are_those_that_the_control_saw(monkeypatch):
 
     monkeypatch.setattr(run_module, "read_last_steps", looking)
     steps = integrate(simulate_request(max_steps=60)).last_steps
-    last = [one.error for one in steps if "taken" in one.words][-1]
+    last = [error for _, _, error, words in steps if "taken" in words][-1]
     assert math.log(max(last, 1e-4)) == pytest.approx(now[0], abs=1e-9)
 
 

@@ -17,7 +17,6 @@ from compressor.solve.series import (
     distances,
     journal_distance,
     rows_of,
-    take_samples,
 )
 from compressor.solve.simulate import simulate
 
@@ -58,15 +57,16 @@ def test_the_times_do_not_depend_on_what_is_stored():
 
 
 def test_samples_are_those_of_a_run_at_these_times():
-    """The run keeps its own, as if nothing else had been asked for."""
+    """At some of its times alone."""
     of = case(duration_rev=0.25, settle_rev=0.1)
     run = run_at_tolerance(of, 1e-5, 60.0, True)
     whole, states = run.trajectory.times, run.trajectory.states.copy()
     rows = rows_of(run.p, run.trajectory, COLUMNS)
-    taken = take_samples(run.p, run.trajectory, whole[5:9], whole[::30])
+    taken = rows_of(run.p, run.trajectory.at(whole[5:9]), COLUMNS)
     np.testing.assert_array_equal(taken, rows[5:9])
-    np.testing.assert_array_equal(run.trajectory.times, whole[::30])
-    np.testing.assert_array_equal(run.trajectory.states, states[::30])
+    some = run.trajectory.at(whole[::30])
+    np.testing.assert_array_equal(some.times, whole[::30])
+    np.testing.assert_array_equal(some.states, states[::30])
 
 
 def test_distances_are_relative_and_by_joint():

@@ -9,13 +9,10 @@ from compsim import cli
 from conftest import jobs_here
 
 from compressor.cases.case import Case
-from compressor.metrics import NUMBERS
 from compressor.outcome import REGIME_WORDS, Regime
 from compressor.report.report import write_report
 from compressor.solve.simulate import simulate
-from compressor.store import hdf5
-from compressor.store.reader import open_study, read_job, read_store
-from compressor.store.rows import Rows
+from compressor.store.reader import open_study, read_job
 from compressor.store.status import is_late, is_unrepeated, job_caveats, report_job, standings
 from compressor.studies.diagnosis.data_card import data_card
 from compressor.studies.diagnosis.data_set import make_data_set
@@ -105,22 +102,8 @@ def test_the_clipped_fraction_is_a_value_of_the_study(folder):
     for key, value in zip(study.key.values, fractions.values, strict=True):
         record = read_job(folder, key)
         beyond = np.abs(record["sensor_acceleration"].values) >= 0.05
-        assert value == record["clipped_share"] == pytest.approx(beyond.mean())
+        assert value == record["clipped_fraction"] == pytest.approx(beyond.mean())
         assert value > 0.1
-
-
-def test_a_file_of_an_older_version_has_it_by_its_new_name(folder, monkeypatch):
-    monkeypatch.setattr(hdf5, "variables", without("clipped_fraction", hdf5.variables))
-    key = open_study(folder).key.values[0]
-    old = read_store(folder).job(key)
-    assert old["clipped_fraction"] == old["clipped_share"]
-    monkeypatch.setattr(Rows, "numbers", property(lambda rows: forgotten(rows._numbers(*NUMBERS))))
-    assert report_job(folder, key).numbers["clipped_fraction"] == old["clipped_share"]
-
-
-def forgotten(numbers):
-    numbers["clipped_fraction"] = math.nan
-    return numbers
 
 
 def test_the_data_card_says_it(folder):
@@ -130,13 +113,6 @@ def test_the_data_card_says_it(folder):
     assert told in data_card(found, False)
     calm = data_card(found.assign_attrs(clipped_records=0, clipped_most=0.0), False)
     assert "No record has 0.1 % or more of its samples clipped." in calm
-
-
-def without(name, variables):
-    def read(file, data):
-        return {n: value for n, value in variables(file, data).items() if n != name}
-
-    return read
 
 
 def test_what_is_seen_to_repeat_in_time_is_no_caveat():

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 RECORD = ("sensor_time", "sensor_acceleration", "tacho_time")
-CLIPPED = "clipped_share"  # the name that files of all versions have
+CLIPPED = "clipped_fraction"
 # groups of a case
 NOT_BUILT = (
     "name", "load", "sensor", "solve", "output", "initial_offset_mm", "healthy_clearance_mm",

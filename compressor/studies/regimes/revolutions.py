@@ -6,6 +6,7 @@ end on the section and at top dead centre, so that both are the solver's own num
 is cut short and begun again at a revolution's end goes on like any other.
 """
 
+import itertools
 import math
 import time
 from collections.abc import Callable
@@ -16,20 +17,21 @@ import numpy as np
 from compressor.cases import Case
 from compressor.metrics import AXES, JOINTS
 from compressor.outcome import DatasetParts
-from compressor.physics import (
-    merge_tallies,
-)
+from compressor.physics import merge_tallies
+from compressor.reasons import Reason
 from compressor.solve import (
     Cuts,
     Metrics,
     Solution,
     Turns,
+    allowed_residual,
+    energy_residual,
     least_promise,
     metrics,
+    next_audit_rtol,
     record,
     revolutions,
     run_at_tolerance,
-    run_until_balanced,
     statistics,
     steady,
     with_series,
@@ -83,19 +85,27 @@ def follow_revolutions(
     span: RevolutionSpan,
     enough: Enough = lambda turns, points: False,
 ) -> RevolutionRun:
-    """Follow a case from a state on, or from its own start, until enough is known."""
-    deadline = time.monotonic() + span.timeout
-    of = bare_case(case, span.revolutions)
-    recorder: PoincareRecorder
+    """Follow a case from a state on, or from its own start, until enough is known.
 
-    def run_at(rtol: float) -> tuple[Solution, float]:
-        nonlocal recorder
+    A run whose energy does not balance is made again at tenths of its tolerance.
+    """
+    deadline = time.monotonic() + span.timeout
+    of, rtol = bare_case(case, span.revolutions), case.rtol
+    for failures in itertools.count(1):
         recorder = PoincareRecorder(of, span.section, enough)
         left = max(deadline - time.monotonic(), 0.0)
         run = run_at_tolerance(of, rtol, left, False, recorder.cuts, state)
-        return run, len(recorder.turns)
-
-    run = run_until_balanced(case.rtol, run_at)
+        residual = energy_residual(run.trajectory.tally)
+        allowed = allowed_residual(case.rtol, len(recorder.turns))
+        if run.reason or residual <= allowed:
+            break
+        tighter = next_audit_rtol(rtol, failures)
+        if tighter is None:
+            run.reason = Reason.ENERGY_AUDIT_FAILED
+            text = f"energy residual {residual:.2g}, more than {allowed:.2g}, at rtol {rtol:.2g}"
+            run.detail = text
+            break
+        rtol = tighter
     return recorder.revolution_run(run)
 
 
