@@ -90,7 +90,7 @@ def write_flowing_derivative(motion, z, phase, p, out):
         out[i] *= pace_of(now, p)
 
 
-@jit
+@inline_llvm
 def derivative_and_columns(motion, z, phase, p, out, row):
     """Write both `derivative_with_flows` and `observe_with_energy` from one evaluation."""
     n = z.size - 4
@@ -118,7 +118,7 @@ def write_row(now, y, p, row):
     row[PACE] = pace_of(now, p)
 
 
-@jit
+@inline_llvm
 def observe_contact(motion, y, phase, p, row):
     """Write the columns from ACCELERATION to GUIDE_MOMENT, and PACE: by which a step is tallied."""
     now = evaluate(motion, y, phase, p)
