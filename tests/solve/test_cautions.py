@@ -151,7 +151,8 @@ def test_a_unit_is_told_of_once_and_in_place_of_what_follows_from_it(tmp_path):
         "N/mm^1.5; 336 N/mm^1.5 is outside the range that the program was judged on, 3162.28 to "
         "3.16228e+07 N/mm^1.5"
     )
-    assert cautions(study(tmp_path, text)) == [Caution("contact.stiffness_N_per_mm15", told, 2, 2)]
+    stiffness = "contact.stiffness_N_per_mm15"
+    assert cautions(study(tmp_path, text)) == [Caution(stiffness, told, "slip", 2, 2)]
 
 
 def test_a_large_sweep_is_sampled_evenly_and_always_the_same(tmp_path):

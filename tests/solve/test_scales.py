@@ -15,8 +15,7 @@ from compressor.physics.step_control import STABILITY_LIMIT
 from compressor.solve.cautions import (
     across,
     contact_scales,
-    expected_seconds,
-    expected_steps,
+    expected_cost,
     greatest_force,
 )
 from compressor.solve.request import too_deep
@@ -85,7 +84,7 @@ def test_stiffness_is_given_or_of_the_materials():
 def test_the_ideal_machine_has_no_scales_and_no_cost():
     case = Case.resolve({"joint": "both", "clearance_mm": 0})
     assert list(contact_scales(case)) == []
-    assert expected_seconds(case, expected_steps(case, [])) == 0
+    assert expected_cost(case, []) == (0, 0)
 
 
 @pytest.fixture(scope="module")
@@ -102,7 +101,7 @@ def runs():
 
 def test_expected_steps_of_random_cases(runs):
     ratios = np.array([
-        (run.steps + run.rejected) / expected_steps(case, list(contact_scales(case)))
+        (run.steps + run.rejected) / expected_cost(case, list(contact_scales(case)))[0]
         for case, run in runs
     ])  # fmt: skip
     assert ((ratios > 1 / 4) & (ratios < 4)).mean() >= 0.9
