@@ -47,21 +47,26 @@ def substitute(matrix, pivots, b):
 
 @jit
 def factorize_positive(matrix, n):
-    """Write L D L' of a symmetric matrix in place, in its lower half; return False if not positive.
+    """Write L and 1 / D of L D L', a symmetric matrix's, in its lower half; or return False.
 
-    n: rows and columns that count. Needs no pivots (Golub and Van Loan, Matrix Computations, 4.1.2
-    and 4.2).
+    So it does where the matrix is not positive. n: rows and columns that count. Needs no pivots
+    (Golub and Van Loan, Matrix Computations, 4.1.2 and 4.2).
     """
-    for j in range(n):
-        for m in range(j):
-            scaled = matrix[j, m] * matrix[m, m]
-            matrix[j, j] -= scaled * matrix[j, m]
-            for i in range(j + 1, n):
-                matrix[i, j] -= matrix[i, m] * scaled
-        if not matrix[j, j] > 0.0:
+    # sums, no updates of rows: LLVM makes vector code of those, which is slower for so few numbers
+    for i in range(n):
+        for j in range(i):
+            total = matrix[i, j]
+            for m in range(j):
+                total -= matrix[i, m] * matrix[j, m]
+            matrix[i, j] = total
+        total = matrix[i, i]
+        for j in range(i):
+            scaled = matrix[i, j] * matrix[j, j]
+            total -= matrix[i, j] * scaled
+            matrix[i, j] = scaled
+        if not total > 0.0:
             return False
-        for i in range(j + 1, n):
-            matrix[i, j] /= matrix[j, j]
+        matrix[i, i] = 1.0 / total
     return True
 
 
@@ -70,9 +75,12 @@ def substitute_positive(matrix, b):
     """Solve with the factors of `factorize_positive`, b (n,) being overwritten by the solution."""
     n = b.size
     for i in range(n):
+        total = b[i]
         for m in range(i):
-            b[i] -= matrix[i, m] * b[m]
+            total -= matrix[i, m] * b[m]
+        b[i] = total
     for i in range(n - 1, -1, -1):
-        b[i] /= matrix[i, i]
+        total = b[i] * matrix[i, i]
         for m in range(i + 1, n):
-            b[i] -= matrix[m, i] * b[m]
+            total -= matrix[m, i] * b[m]
+        b[i] = total

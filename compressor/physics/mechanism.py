@@ -62,7 +62,11 @@ def integrals():
     return each @ weights, each @ (weights * s), (each * weights) @ each.T
 
 
-FIRST, MOMENT, PRODUCT = integrals()
+FIRST, MOMENT, _PRODUCT = integrals()
+_SIGNS = np.array([1.0, 1.0, -1.0, -1.0])
+_ALIKE = np.equal.outer(_SIGNS, _SIGNS)
+# of shapes in one direction, and of one across and one along, by which spin couples them
+ALIKE, CROSSED = _PRODUCT * _ALIKE, _SIGNS[:, None] * _PRODUCT * ~_ALIKE
 
 
 @jit
@@ -75,60 +79,59 @@ def dot_rows(row, begin, end, q):
 
 
 @jit
-def add_rod(axes, spin, q, rates, p, mass, force):
-    """Write the rod's mass matrix and the forces of its motion and weight; SI.
-
-    axes: u_x, u_y, v_x, v_y; spin: counter-clockwise; q, rates: of the modes, (4,), zeros of a
-    rigid rod; mass, force: of the bodies, (rows, rows) and (rows,), zeros before.
-    """
-    ux, uy, vx, vy = axes
-    m, length = p.rod_mass, p.rod_length
-    along = m * (p.rod_centre + dot_rows(FIRST, ACROSS, MODES, q))
-    across = m * dot_rows(FIRST, 0, ACROSS, q)
-    along_rate = m * dot_rows(FIRST, ACROSS, MODES, rates)
-    across_rate = m * dot_rows(FIRST, 0, ACROSS, rates)
-    polar = p.rod_inertia + m * p.rod_centre * p.rod_centre
-    polar += 2.0 * m * length * dot_rows(MOMENT, ACROSS, MODES, q)
-    swelling = m * length * dot_rows(MOMENT, ACROSS, MODES, rates)  # half the polar inertia's rate
-    for i in range(MODES):
-        begin, end = (0, ACROSS) if i < ACROSS else (ACROSS, MODES)
-        polar += m * q[i] * dot_rows(PRODUCT[i], begin, end, q)
-        swelling += m * q[i] * dot_rows(PRODUCT[i], begin, end, rates)
+def fill_rod(pose, p):
+    """Write the rod's mass matrix, and its own forces, of its motion and weight; SI."""
+    m, length, spin = p.rod_mass, p.rod_length, pose.spin
+    ux, uy, vx, vy = pose.cos_phi, -pose.sin_phi, pose.sin_phi, pose.cos_phi
+    along, across = m * p.rod_centre, 0.0
+    along_rate, across_rate = 0.0, 0.0
+    polar, swelling = p.rod_inertia + along * p.rod_centre, 0.0  # half the polar inertia's rate
+    if p.elastic:
+        q, rates = p.w[7:11], p.rates[7:11]
+        along += m * dot_rows(FIRST, ACROSS, MODES, q)
+        across = m * dot_rows(FIRST, 0, ACROSS, q)
+        along_rate = m * dot_rows(FIRST, ACROSS, MODES, rates)
+        across_rate = m * dot_rows(FIRST, 0, ACROSS, rates)
+        polar += 2.0 * m * length * dot_rows(MOMENT, ACROSS, MODES, q)
+        swelling = m * length * dot_rows(MOMENT, ACROSS, MODES, rates)
+        for i in range(MODES):
+            polar += m * q[i] * dot_rows(ALIKE[i], 0, MODES, q)
+            swelling += m * q[i] * dot_rows(ALIKE[i], 0, MODES, rates)
+        fill_modes((ux, uy, vx, vy), spin, q, rates, p)
+    mass, force = p.mass, p.own
     mass[1, 1], mass[2, 2], mass[3, 3] = m, m, polar
     mass[1, 3] = mass[3, 1] = along * vx - across * ux
     mass[2, 3] = mass[3, 2] = along * vy - across * uy
     back = 2.0 * spin * across_rate + spin * spin * along
     side = spin * spin * across - 2.0 * spin * along_rate
-    force[1] += back * ux + side * vx
-    force[2] += back * uy + side * vy - m * p.gravity
-    force[3] += -2.0 * spin * swelling - p.gravity * (along * vy - across * uy)
-    if p.elastic:
-        add_modes(axes, spin, q, rates, p, mass, force)
+    force[1] = back * ux + side * vx
+    force[2] = back * uy + side * vy - m * p.gravity
+    force[3] = -2.0 * spin * swelling - p.gravity * (along * vy - across * uy)
 
 
 @jit
-def add_modes(axes, spin, q, rates, p, mass, force):
-    """Add the rod's modes to `add_rod`: their inertia, their coupling and the material's forces."""
+def fill_modes(axes, spin, q, rates, p):
+    """Write the rod's modes' inertia, their coupling and the material's forces.
+
+    axes: u_x, u_y, v_x, v_y; q, rates: of the modes, (4,).
+    """
     ux, uy, vx, vy = axes
-    m = p.rod_mass
+    m, mass, force = p.rod_mass, p.mass, p.own
     for i in range(MODES):
+        row, straight = 4 + i, p.rod_length * MOMENT[i]
+        x, y = (vx, vy) if i < ACROSS else (ux, uy)
+        arm, centrifugal = dot_rows(CROSSED[i], 0, MODES, q), dot_rows(ALIKE[i], 0, MODES, q)
         if i < ACROSS:
-            x, y, begin, end, others, last = vx, vy, 0, ACROSS, ACROSS, MODES
-            arm = p.rod_length * MOMENT[i] + dot_rows(PRODUCT[i], others, last, q)
-            turning = spin * dot_rows(PRODUCT[i], begin, end, q)
-            turning -= 2.0 * dot_rows(PRODUCT[i], others, last, rates)
+            arm += straight
         else:
-            x, y, begin, end, others, last = ux, uy, ACROSS, MODES, 0, ACROSS
-            arm = -dot_rows(PRODUCT[i], others, last, q)
-            turning = spin * (p.rod_length * MOMENT[i] + dot_rows(PRODUCT[i], begin, end, q))
-            turning += 2.0 * dot_rows(PRODUCT[i], others, last, rates)
-        row = 4 + i
+            centrifugal += straight
+        turning = spin * centrifugal - 2.0 * dot_rows(CROSSED[i], 0, MODES, rates)
         mass[1, row] = mass[row, 1] = m * FIRST[i] * x
         mass[2, row] = mass[row, 2] = m * FIRST[i] * y
         mass[3, row] = mass[row, 3] = m * arm
-        for j in range(begin, end):
-            mass[row, 4 + j] = m * PRODUCT[i, j]
-        force[row] += m * (spin * turning - p.gravity * FIRST[i] * y)
+        for j in range(MODES):
+            mass[row, 4 + j] = m * ALIKE[i, j]
+        force[row] = m * (spin * turning - p.gravity * FIRST[i] * y)
         force[row] -= material(i, q, p) + p.rod_damping * material(i, rates, p)
 
 
@@ -188,30 +191,18 @@ def corner_force(penetration, rate, p):
 
 
 @jit
-def corner_depth(height, tilt, end, side, p):
-    """Return the penetration (m) of a corner: end and side, -1 or 1, along and across the guide."""
-    half = math.sin(0.5 * tilt)
-    depth = side * (height + end * p.guide_length * math.sin(tilt))
-    return depth - (p.guide_clearance + p.guide_height * 2.0 * half * half)
-
-
-@jit
-def corners(height, tilt, rates, p):
-    """Return what the guide does to a crosshead with play, as `Guided`.
-
-    height: of its pin (m); tilt: rad; rates: of x, height and tilt.
-    """
-    v, rise, spin = rates
+def corners(pose, p):
+    """Return what the guide does to a crosshead with play, as `Guided`."""
+    v, rise, spin = p.velocity[8], p.velocity[9], p.velocity[10]
     fx, fy, moment, stored, damped, rubbed = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    deepest = -math.inf
-    sine, half = math.sin(tilt), math.sin(0.5 * tilt)
+    sine, half = math.sin(pose.tilt), math.sin(0.5 * pose.tilt)
     drop = 2.0 * half * half  # 1 - cos(tilt)
+    room, lift = p.guide_clearance + p.guide_height * drop, p.guide_length * sine
     for end in (-1.0, 1.0):
         for side in (-1.0, 1.0):
             x = end * p.guide_length * (1.0 - drop) - side * p.guide_height * sine
-            y = end * p.guide_length * sine + side * p.guide_height * (1.0 - drop)
-            penetration = corner_depth(height, tilt, end, side, p)
-            deepest = max(deepest, penetration)
+            y = end * lift + side * p.guide_height * (1.0 - drop)
+            penetration = side * (pose.height + end * lift) - room
             rate = side * (rise + spin * x)
             normal, elastic = corner_force(penetration, rate, p)
             if normal > 0.0:
@@ -223,7 +214,7 @@ def corners(height, tilt, rates, p):
                 rubbed -= friction * slip
             stored += elastic * penetration / (p.guide_exponent + 1.0)
             damped += (normal - elastic) * rate
-    return Guided(fx, fy, moment, stored, damped, rubbed, deepest)
+    return Guided(fx, fy, moment, stored, damped, rubbed, abs(pose.height) + abs(lift) - room)
 
 
 class BodyRow(IntEnum):
@@ -252,6 +243,7 @@ class Pose(NamedTuple):
     sin_phi: float
     cos_phi: float
     length: float  # of the rod, between the bores
+    per_reach: float  # 1 over the rod's length along the cylinder
     x: float
     height: float  # of the crosshead's pin
     tilt: float
@@ -273,28 +265,23 @@ class Joints(NamedTuple):
 
 
 @jit
-def speed_of(y, p):
-    """Return the crank's speed (rad/s)."""
-    return p.omega * (1.0 + y[p.at[0]]) if p.driven else p.omega
-
-
-@jit
-def unpack(y, p, w, rates):
-    """Write the coordinates and their rates into w and rates, (11,); 0 of what is left out.
+def unpack(y, p):
+    """Write the coordinates and their rates; what is left out stays 0.
 
     The crank has its slip in place of a coordinate.
     """
     n = p.freedoms
-    w[0] = y[p.at[0]] if p.driven else 0.0
-    for i in range(1, COORDINATES):
-        place = p.at[i]
-        w[i], rates[i] = (y[place], y[n + place]) if place >= 0 else (0.0, 0.0)
-    rates[0] = speed_of(y, p)
+    p.w[0] = y[p.at[0]] if p.driven else 0.0
+    p.rates[0] = p.omega * (1.0 + p.w[0])
+    for i in range(n):
+        coordinate = p.coordinates[p.driven + i]
+        p.w[coordinate], p.rates[coordinate] = y[i], y[n + i]
 
 
 @jit
-def pose_of(motion, w, rates, p):
+def pose_of(motion, p):
     """Return the `Pose` at a crank angle, whose ideal `Motion` is given."""
+    w, rates = p.w, p.rates
     c, s = motion.cos_theta, motion.sin_theta
     length = p.rod_length + w[STRETCH]
     fall = p.crank_radius * s - w[2] + w[4] - w[5]  # from the big end's bore to the small end's
@@ -302,24 +289,28 @@ def pose_of(motion, w, rates, p):
     cos_phi = square_root((1.0 - sin_phi) * (1.0 + sin_phi))
     x = p.crank_radius * c - w[1] + w[3] + length * cos_phi
     falling = p.crank_radius * c * rates[0] - rates[2] + rates[4] - rates[5]
-    phi_rate = (falling - sin_phi * rates[STRETCH]) / (length * cos_phi)
-    return Pose(c, s, sin_phi, cos_phi, length, x, w[5], w[6], rates[0], w[0], -phi_rate)
+    per_reach = 1.0 / (length * cos_phi)
+    spin = (sin_phi * rates[STRETCH] - falling) * per_reach
+    return Pose(
+        c, s, sin_phi, cos_phi, length, per_reach, x, w[5], w[6], rates[0], w[0], spin
+    )  # fmt: skip
 
 
 @jit
 def apply_jacobian(pose, rates, p, velocity):
     """Write the bodies' velocities that follow from the coordinates' rates, (11,) both.
 
-    They are linear in the rates.
+    They are linear in the rates. Those of a rigid rod's modes stay 0.
     """
-    crank, reach = p.crank_radius * rates[0], pose.length * pose.cos_phi
+    crank = p.crank_radius * rates[0]
     velocity[0] = rates[0]
     velocity[1] = -pose.sin_theta * crank - rates[1]
     velocity[2] = pose.cos_theta * crank - rates[2]
     falling = velocity[2] + rates[4] - rates[5]
-    velocity[3] = (pose.sin_phi * rates[STRETCH] - falling) / reach
-    for i in range(MODES):
-        velocity[4 + i] = rates[FIRST_MODE + i]
+    velocity[3] = (pose.sin_phi * rates[STRETCH] - falling) * pose.per_reach
+    if p.elastic:
+        for i in range(MODES):
+            velocity[4 + i] = rates[FIRST_MODE + i]
     along = velocity[1] + rates[3] + pose.cos_phi * rates[STRETCH]
     velocity[8] = along + pose.length * pose.sin_phi * velocity[3]
     velocity[9], velocity[10] = rates[5], rates[6]
@@ -328,56 +319,66 @@ def apply_jacobian(pose, rates, p, velocity):
 @jit
 def apply_jacobian_transpose(pose, force, p, pushed):
     """Write the forces on the coordinates that follow from those on the bodies, (11,) both."""
-    along, reach = force[1] + force[8], pose.length * pose.cos_phi
-    turning = (force[3] + pose.length * pose.sin_phi * force[8]) / reach
+    along = force[1] + force[8]
+    turning = (force[3] + pose.length * pose.sin_phi * force[8]) * pose.per_reach
     across = force[2] - turning
     pushed[0] = force[0] + p.crank_radius * (pose.cos_theta * across - pose.sin_theta * along)
     pushed[1], pushed[2], pushed[3] = -along, -across, force[8]
     pushed[4], pushed[5], pushed[6] = -turning, force[9] + turning, force[10]
-    for i in range(MODES):
-        pushed[FIRST_MODE + i] = force[4 + i]
-    pushed[STRETCH] += pose.sin_phi * turning + pose.cos_phi * force[8]
+    if p.elastic:
+        for i in range(MODES):
+            pushed[FIRST_MODE + i] = force[4 + i]
+        pushed[STRETCH] += pose.sin_phi * turning + pose.cos_phi * force[8]
 
 
 @jit
-def fill_bias(pose, rates, p, bias):
-    """Write the bodies' accelerations, (11,), where the coordinates' own are zero."""
+def apply_mass(vector, p, out):
+    """Write the bodies' mass matrix times their velocities or accelerations, (11,) both."""
+    out[0] = p.crank_inertia * vector[0]
+    if p.elastic:
+        for i in range(1, 8):
+            out[i] = dot_rows(p.mass[i], 1, 8, vector)
+    else:
+        for i in range(1, 4):
+            out[i] = dot_rows(p.mass[i], 1, 4, vector)
+    out[8], out[9] = p.reciprocating_mass * vector[8], p.reciprocating_mass * vector[9]
+    out[10] = p.crosshead_inertia * vector[10]
+
+
+@jit
+def fill_bias(pose, p):
+    """Write the bodies' accelerations where the coordinates' own are zero."""
+    bias = p.bias
     inward = p.crank_radius * pose.speed * pose.speed
-    twice = 2.0 * rates[STRETCH] * pose.spin  # of Coriolis, across the rod
+    twice = 2.0 * p.rates[STRETCH] * pose.spin  # of Coriolis, across the rod
     bias[1], bias[2] = -inward * pose.cos_theta, -inward * pose.sin_theta
     lowering = bias[2] + pose.length * pose.sin_phi * pose.spin * pose.spin
-    bias[3] = -(lowering + twice * pose.cos_phi) / (pose.length * pose.cos_phi)
+    bias[3] = -(lowering + twice * pose.cos_phi) * pose.per_reach
     centripetal = pose.length * pose.cos_phi * pose.spin * pose.spin
     bias[8] = bias[1] + twice * pose.sin_phi - centripetal
     bias[8] += pose.length * pose.sin_phi * bias[3]
 
 
 @jit
-def joints_of(phase, y, motion, pose, w, velocity, p):
-    """Return the `Joints` at a state; w: coordinates, (11,); velocity: of the bodies, (11,)."""
-    n, modes = p.freedoms, velocity[4:8]
-    big_spin = pose.spin + dot_rows(BIG_SLOPE, 0, MODES, modes) / p.rod_length
-    small_spin = pose.spin + dot_rows(SMALL_SLOPE, 0, MODES, modes) / p.rod_length
-    pin_spin = velocity[10]
+def joints_of(phase, y, motion, pose, p):
+    """Return the `Joints` at a state."""
+    w, rates, velocity = p.w, p.rates, p.velocity
+    big_spin, small_spin, pin_spin = pose.spin, pose.spin, velocity[10]
+    if p.elastic:
+        big_spin += dot_rows(BIG_SLOPE, 0, ACROSS, velocity[4:8]) * p.per_rod_length
+        small_spin += dot_rows(SMALL_SLOPE, 0, ACROSS, velocity[4:8]) * p.per_rod_length
     big, small = NO_CONTACT, NO_CONTACT
     if p.clearance[0] > 0.0:
-        place = p.at[1]
-        eccentricity = y[place], y[place + 1], y[n + place], y[n + place + 1]
+        eccentricity = w[1], w[2], rates[1], rates[2]
         big = oiled_joint(BIG_END, eccentricity, (pose.speed, big_spin), y, p)
     if p.clearance[1] > 0.0:
-        place = p.at[3]
-        eccentricity = y[place], y[place + 1], y[n + place], y[n + place + 1]
+        eccentricity = w[3], w[4], rates[3], rates[4]
         small = oiled_joint(SMALL_END, eccentricity, (pin_spin, small_spin), y, p)
-    guide = UNGUIDED
-    if p.tilting:
-        rates = velocity[8], velocity[9], velocity[10]
-        guide = corners(pose.height, pose.tilt, rates, p)
-    ideal_v = motion.v * pose.speed / p.omega
+    guide = corners(pose, p) if p.tilting else UNGUIDED
+    ideal_v = motion.v * (1.0 + pose.slip)
     load = piston_force(phase, pose.x, velocity[8], pose.x - motion.x, velocity[8] - ideal_v, p)
     load += measured_force(motion.cos_theta, motion.sin_theta, p)
-    return Joints(
-        big, small, guide, load, big_spin, small_spin, pin_spin
-    )  # fmt: skip
+    return Joints(big, small, guide, load, big_spin, small_spin, pin_spin)
 
 
 @jit
@@ -404,9 +405,12 @@ def add_on_rod(pose, big, small, p, force):
     force[2] += big[1] + small[1]
     lever = pose.sin_phi * small[0] + pose.cos_phi * small[1]
     force[3] += big[2] + small[2] + pose.length * lever
-    for i in range(MODES):
-        force[4 + i] += (BIG_SLOPE[i] * big[2] + SMALL_SLOPE[i] * small[2]) / p.rod_length
-    force[7] += pose.cos_phi * small[0] - pose.sin_phi * small[1]  # the stretch moves the small end
+    if p.elastic:
+        for i in range(ACROSS):
+            turning = BIG_SLOPE[i] * big[2] + SMALL_SLOPE[i] * small[2]
+            force[4 + i] += turning * p.per_rod_length
+        # the stretch moves the small end
+        force[7] += pose.cos_phi * small[0] - pose.sin_phi * small[1]
 
 
 @jit
@@ -414,11 +418,3 @@ def motor_torque(pose, p):
     """Return the torque (N m) of the motor at the crank's speed: a line."""
     # by the slip: of a steep line the difference of two speeds would leave no digits
     return p.torque - p.torque_slope * p.omega * pose.slip
-
-
-@jit
-def add_bodies(p, mass):
-    """Write the mass matrix of crank and crosshead."""
-    mass[0, 0] = p.crank_inertia
-    mass[8, 8], mass[9, 9] = p.reciprocating_mass, p.reciprocating_mass
-    mass[10, 10] = p.crosshead_inertia

@@ -5,8 +5,6 @@
 
 import math
 
-import numpy as np
-
 from compressor.physics._jit import jit, square_root
 from compressor.physics.contact import LUGRE, bristle_rate, nearness
 from compressor.physics.kinematics import ideal
@@ -16,7 +14,7 @@ from compressor.physics.mechanism import (
     FIRST,
     MODES,
     ROWS,
-    corner_depth,
+    apply_mass,
     dot_rows,
     material_work,
     motor_torque,
@@ -56,28 +54,25 @@ IMPLAUSIBLE = 0.1  # of half the crosshead, or of the rod: more than any contact
 @jit
 def pace_of(now, p):
     """Return the time that passes over the time in which a steady crank would turn as far."""
-    return p.omega / now.pose.speed
+    return 1.0 / (1.0 + now.pose.slip)
 
 
 @jit
 def write_rates(now, y, p, out):
     """Write dy/dt, of a steady crank's t, into out."""
-    n, pace = p.freedoms, pace_of(now, p)
-    for i in range(y.size):
+    n, pace, place = p.freedoms, pace_of(now, p), 2 * p.freedoms
+    for i in range(n):
+        coordinate = p.coordinates[p.driven + i]
+        out[i], out[n + i] = p.rates[coordinate] * pace, p.accelerations[coordinate] * pace
+    for i in range(place, y.size):
         out[i] = 0.0
-    for i in range(1, COORDINATES):
-        place = p.at[i]
-        if place >= 0:
-            out[place] = now.rates[i] * pace
-            out[n + place] = now.accelerations[i] * pace
-    place = 2 * n
     if p.friction == LUGRE and p.clearance[0] > 0.0:
         out[place + 2] = bristle_rate(now.joints.big.slip, y[place + 2], p) * pace
     if p.friction == LUGRE and p.clearance[1] > 0.0:
         out[place + 3] = bristle_rate(now.joints.small.slip, y[place + 3], p) * pace
     if p.driven:
         out[p.at[0] - 1] = pace - 1.0
-        out[p.at[0]] = now.accelerations[0] / p.omega * pace
+        out[p.at[0]] = p.accelerations[0] / p.omega * pace
     if p.elastic:
         out[p.rod_loss] = rod_damping_power(now, p) * pace
 
@@ -85,7 +80,7 @@ def write_rates(now, y, p, out):
 @jit
 def rod_damping_power(now, p):
     """Return the power (W) that the rod's material takes."""
-    modes = now.rates[7:11]
+    modes = p.rates[7:11]
     return p.rod_damping * material_work(modes, modes, p)
 
 
@@ -122,27 +117,25 @@ def write_powers(now, y, p, row):
     forces = now.reactions
     torque = crank_torque(now, p) + p.unbalance * p.gravity * pose.cos_theta
     row[0] = (motor_torque(pose, p) if p.driven else torque) * pose.speed
-    row[1] = -now.joints.load * now.velocity[8]
+    row[1] = -now.joints.load * p.velocity[8]
     pressed = contact_power(big) + contact_power(small) + guide.damped
     pressed += big.film_loss + small.film_loss
     row[2] = pressed + rod_damping_power(now, p)
     friction = guide.rubbed - big.friction * big.slip - small.friction * small.slip
     friction += forces.big_torque * (pose.speed - now.joints.big_spin)
     friction += forces.small_torque * (now.joints.pin_spin - now.joints.small_spin)
-    row[3] = friction - forces.rubbing * now.velocity[8]
+    row[3] = friction - forces.rubbing * p.velocity[8]
 
 
 @jit
 def write_energies(now, y, p, row):
     """Write kinetic and potential energy (J) into the row, without the journals' contacts."""
-    pose, joints, modes = now.pose, now.joints, now.w[7:11]
-    kinetic = 0.0
-    for i in range(ROWS):
-        kinetic += 0.5 * now.velocity[i] * dot_rows(now.mass[i], 0, ROWS, now.velocity)
-    row[KINETIC] = kinetic
+    pose, joints, modes = now.pose, now.joints, p.w[7:11]
+    apply_mass(p.velocity, p, p.momentum)
+    row[KINETIC] = 0.5 * dot_rows(p.momentum, 0, ROWS, p.velocity)
     stored = joints.guide.stored + 0.5 * material_work(modes, modes, p)
     along = p.rod_centre + dot_rows(FIRST, ACROSS, MODES, modes)
-    height = p.crank_radius * pose.sin_theta - now.w[2] - along * pose.sin_phi
+    height = p.crank_radius * pose.sin_theta - p.w[2] - along * pose.sin_phi
     height += dot_rows(FIRST, 0, ACROSS, modes) * pose.cos_phi
     weight = p.rod_mass * height + p.reciprocating_mass * pose.height
     row[POTENTIAL] = stored + p.gravity * (weight + p.unbalance * pose.sin_theta)
@@ -154,21 +147,21 @@ def ideal_acceleration(now, p):
     if not p.driven:
         return now.motion.a
     speed = 1.0 + now.pose.slip
-    return now.motion.a * speed * speed + now.motion.v / p.omega * now.accelerations[0]
+    return now.motion.a * speed * speed + now.motion.v / p.omega * p.accelerations[0]
 
 
 @jit
 def write_contact_columns(now, y, p, row):
     """Write the columns from ACCELERATION to GUIDE_MOMENT."""
     forces = now.reactions
-    row[ACCELERATION] = now.body[8]
+    row[ACCELERATION] = p.body[8]
     row[FORCE], row[FORCE + 1] = forces.big_x, forces.big_y
     row[FORCE + 2], row[FORCE + 3] = forces.small_x, forces.small_y
     row[FORCE_SIZE] = square_root(forces.big_x**2 + forces.big_y**2)
     row[FORCE_SIZE + 1] = square_root(forces.small_x**2 + forces.small_y**2)
-    row[JOURNAL_ACCELERATION] = now.accelerations[1]
-    row[JOURNAL_ACCELERATION + 1] = now.accelerations[3]
-    row[DEVIATION] = now.body[8] - ideal_acceleration(now, p)
+    row[JOURNAL_ACCELERATION] = p.accelerations[1]
+    row[JOURNAL_ACCELERATION + 1] = p.accelerations[3]
+    row[DEVIATION] = p.body[8] - ideal_acceleration(now, p)
     big, small = now.joints.big, now.joints.small
     row[PENETRATION], row[PENETRATION + 1] = big.penetration, small.penetration
     row[NORMAL], row[NORMAL + 1] = big.normal, small.normal
@@ -180,19 +173,19 @@ def write_contact_columns(now, y, p, row):
 @jit
 def deviation(t, y, p):
     """Return how far (m) the crosshead is from its ideal place at the crank's angle."""
-    motion, vectors = ideal(t, p), np.zeros((2, ROWS))
-    unpack(y, p, vectors[0], vectors[1])
-    return pose_of(motion, vectors[0], vectors[1], p).x - motion.x
+    motion = ideal(t, p)
+    unpack(y, p)
+    return pose_of(motion, p).x - motion.x
 
 
 @jit
 def write_place(now, y, p, row):
     """Write the columns before ACCELERATION."""
-    row[DISPLACEMENT], row[VELOCITY] = now.pose.x, now.velocity[8]
+    row[DISPLACEMENT], row[VELOCITY] = now.pose.x, p.velocity[8]
     row[ROD_ANGLE] = math.atan2(now.pose.sin_phi, now.pose.cos_phi)
     row[PISTON_FORCE] = now.joints.load
     for i in range(4):
-        row[ECCENTRICITY + i] = now.w[1 + i]
+        row[ECCENTRICITY + i] = p.w[1 + i]
 
 
 @jit
@@ -201,7 +194,7 @@ def write_frame(now, p, row):
     pose, guide, forces = now.pose, now.joints.guide, now.reactions
     row[GUIDE_GAP], row[CRANK_SPEED] = -guide.deepest, pose.speed
     row[MOTOR_TORQUE] = motor_torque(pose, p)
-    inward, along = pose.speed * pose.speed, now.accelerations[0]
+    inward, along = pose.speed * pose.speed, p.accelerations[0]
     c, s = pose.cos_theta, pose.sin_theta
     turning = -p.unbalance * (inward * c + along * s), -p.unbalance * (inward * s - along * c)
     write_frame_forces((-(guide.fx + forces.rubbing), -forces.guide), turning, row)
@@ -224,11 +217,10 @@ def beyond_model(y, p):
         return 1
     if p.tilting:
         height, tilt = y[p.at[5]], y[p.at[6]]
-        limit = IMPLAUSIBLE * min(p.guide_length, p.guide_height)
-        for end in (-1.0, 1.0):
-            for side in (-1.0, 1.0):
-                if corner_depth(height, tilt, end, side, p) > limit:
-                    return 2
+        room = p.guide_clearance + p.guide_height * (1.0 - math.cos(tilt))
+        deepest = abs(height) + p.guide_length * abs(math.sin(tilt)) - room
+        if deepest > IMPLAUSIBLE * min(p.guide_length, p.guide_height):
+            return 2
     if p.elastic:
         for i in range(7, COORDINATES):
             if abs(y[p.at[i]]) > IMPLAUSIBLE * p.rod_length:

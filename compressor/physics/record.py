@@ -182,13 +182,30 @@ FEATURES: list[tuple] = [
     ("rod_damping", "f8"),  # of the rod's material, over its stiffness, s
     ("rod_loss", "i8"),  # place in a state of what that has taken; -1 of a rigid rod
 ]
+_EACH = (len(Coordinate),)  # the bodies have as many rows
+# What `mechanism_motion.solve` writes, so that no evaluation asks for memory. Two threads must not
+# share such a record, and what was found at one instant goes as the next is solved.
+SCRATCH: list[tuple] = [
+    ("w", "f8", _EACH),  # coordinates
+    ("rates", "f8", _EACH),
+    ("accelerations", "f8", _EACH),  # of the coordinates
+    ("velocity", "f8", _EACH),  # of the bodies: rows of `mechanism.BodyRow`
+    ("bias", "f8", _EACH),  # accelerations of the bodies where the coordinates' own are zero
+    ("body", "f8", _EACH),  # accelerations of the bodies
+    ("mass", "f8", (8, 8)),  # the rod's, in its rows and columns of the bodies
+    ("own", "f8", _EACH),  # forces of the rod's motion and weight
+    ("steady", "f8", _EACH),  # forces on the bodies but friction of what is ideal
+    ("force", "f8", _EACH),  # with it
+    *((name, "f8", _EACH) for name in ("unit", "column", "momentum", "pushed", "solution")),
+    ("matrix", "f8", 2 * _EACH),  # mass, of the coordinates that move
+]
 # Three kinds of records, told by fields that only some have: compiled functions for the default one
 # hold nothing of the others (`_jit.dispatch_on_record`). What a kind adds stands before the rest:
 # to numba, a record with fields behind another's is one of those.
 CHOSEN_FORCES, MECHANISM = "viscosity", "driven"
 RECORD = np.dtype(FIELDS, align=True)
 CHOSEN = np.dtype([*FILM, *CARD, *FIELDS], align=True)
-FEATURED = np.dtype([*FEATURES, *FILM, *CARD, *FIELDS], align=True)
+FEATURED = np.dtype([*FEATURES, *SCRATCH, *FILM, *CARD, *FIELDS], align=True)
 
 
 def zero(kind: np.dtype) -> np.record:
