@@ -72,9 +72,7 @@ def report(
     from compressor.report import write_report
 
     add = page_additions(places)
-    path = write_report(
-        folder, output, context.obj, add, None, limits, units or "usual", names, single
-    )
+    path = write_report(folder, output, context.obj, add, limits, units or "usual", names, single)
     print_text(str(path))
     if single:
         say(f"{path.stat().st_size / 1e6:.1f} MB, all in one file")

@@ -36,7 +36,7 @@ from compsim.screen import (
 
 if TYPE_CHECKING:
     from compressor.cases import Study
-    from compressor.sweep import Summary, SweepProgress
+    from compressor.sweep import Summary
 
 MAX_FAILURES = 20  # listed one by one
 
@@ -68,10 +68,6 @@ class ShardType(click.ParamType):
               show_default=True, help="Run jobs here, or on a dask cluster.")  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS",
               help="Find the dask cluster at this address, such as tcp://host:8786.")  # fmt: skip
-@click.option("--watch", is_flag=True,
-              help="Write the page of the report again and again while jobs run.")  # fmt: skip
-@click.option("--report", default="report", show_default=True, metavar="FOLDER",
-              help="Write the page of --watch into this folder.")  # fmt: skip
 @click.option("--wait", is_flag=True, help="Wait for another run on the folder to end.")
 @click.option("--quiet", is_flag=True, help="Print no progress, but errors and failed jobs.")
 @click.pass_context
@@ -87,8 +83,6 @@ def run(
     part: tuple[int, int] | None,
     backend: str,
     scheduler: str | None,
-    watch: bool,
-    report: str,
     wait: bool,
     quiet: bool,
 ) -> int:
@@ -120,11 +114,11 @@ def run(
     of_jobs = kinds.pop(None, [])
     others = [(kind.module("command"), its) for kind, its in kinds.items() if kind]
     for command, _ in others:
-        command.check_options(not of_jobs, scheduler, watch)
+        command.check_options(scheduler)
     code = DONE
     if of_jobs:
         code = run_jobs(context, of_jobs, output, jobs or cores(),
-                        (rerun, part, wait, scheduler, report if watch else "", quiet))  # fmt: skip
+                        (rerun, part, wait, scheduler, quiet))  # fmt: skip
     for command, its in others:
         if not quiet:
             report_machines(its)
@@ -138,29 +132,17 @@ def run_jobs(
     context: click.Context, studies: "list[Study]", output: str, jobs: int, options: Any
 ) -> int:
     """Run studies of jobs, and return the exit code."""
-    rerun, part, wait, scheduler, page, quiet = options
+    rerun, part, wait, scheduler, quiet = options
     report_changes(studies, output)
     from compressor.sweep import Cluster, Options, sweep
-    from compsim.watch import PageWatch
 
-    watching: Any = PageWatch(output, page, context.obj, quiet) if page else nullcontext()
-    with watching as watch:
-        cluster: Any = Cluster(scheduler) if scheduler else nullcontext()
-        opening = partial(report_machines, studies)  # where there are jobs to run
-        with (
-            ProgressReporter(quiet, "jobs", True, output, opening) as progress,
-            cluster as elsewhere,
-        ):
-
-            def show(now: "SweepProgress") -> None:
-                progress.show_sweep(now)
-                if watch:
-                    watch.update(now)
-
-            how = Options(context.obj, bool(rerun), part, wait=wait,
-                          backend=elsewhere, pulse=show)  # fmt: skip
-            summary = sweep(studies, output, jobs, progress, how)
-        report_run(summary, output, page, quiet)
+    cluster: Any = Cluster(scheduler) if scheduler else nullcontext()
+    opening = partial(report_machines, studies)  # where there are jobs to run
+    with ProgressReporter(quiet, "jobs", output, opening) as progress, cluster as elsewhere:
+        how = Options(context.obj, bool(rerun), part, wait=wait,
+                      backend=elsewhere, failed=progress.count_failed)  # fmt: skip
+        summary = sweep(studies, output, jobs, progress, how)
+    report_run(summary, output, quiet)
     return SOME_FAILED if summary.failed else DONE
 
 
@@ -177,8 +159,8 @@ def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None
         raise click.UsageError("--scheduler goes with --backend dask")
 
 
-def report_run(summary: "Summary", folder: str, page: str, quiet: bool) -> None:
-    """Report what a run did, what failed and what to do next: with a page, to look at it."""
+def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
+    """Report what a run did, what failed and what to do next."""
     width = max(len(count.study) for count in summary.counts)
     for count in summary.counts:
         where = os.path.join(folder, "studies", f"{count.study}.json")
@@ -197,8 +179,7 @@ def report_run(summary: "Summary", folder: str, page: str, quiet: bool) -> None:
     report_failures(summary)
     if not quiet:
         report_caveats([count.study for count in summary.counts], folder)
-        say(f"page: {os.path.join(page, 'index.html')}" if page
-            else f"next: compsim report -i {shlex.quote(folder)}")  # fmt: skip
+        say(f"next: compsim report -i {shlex.quote(folder)}")
 
 
 def report_caveats(names: list[str], folder: str) -> None:

@@ -48,7 +48,6 @@ from compressor.report.page import (
     Chapter,
     PageTable,
     Plate,
-    Running,
     Section,
     StudyNote,
     TableRow,
@@ -63,5 +62,5 @@ from compressor.report.plots import (
     title_figure,
     write_plots,
 )
-from compressor.report.report import restate, write_report
+from compressor.report.report import write_report
 from compressor.report.study_section import file_name

@@ -207,28 +207,6 @@ class Plate:
         return {f"{self.name}.csv": as_csv(drawing), f"{self.name}.js": script(self.name, drawing)}
 
 
-class Running(NamedTuple):
-    """How a run stands while its page is written: its jobs, and seconds, None where unknown."""
-
-    done: int  # failed ones among them
-    failed: int
-    total: int
-    eta_s: float | None = None
-    every_s: float = 5.0  # between two pages
-    at: str = ""  # the time of day
-    drawn: str = ""  # when its figures were
-
-    @property
-    def left(self) -> str:
-        """Return how long the run will still take, in words; "" where that is not known."""
-        if self.eta_s is None:
-            return ""
-        minutes = round(self.eta_s / 60)
-        if minutes < 1:
-            return "under a minute"
-        return f"about {minutes} min" if minutes < 100 else f"about {minutes / 60:.0f} h"
-
-
 class JobFacts(NamedTuple):
     """What a click on a point shows of a study's jobs: by key, in the order of the names."""
 
@@ -291,31 +269,20 @@ def template_elsewhere(name: str) -> str | None:
 def document(
     sections: Sequence[Section],
     jobs: JobsToOpen = NO_JOBS,
-    running: Running | None = None,
     title: str = "",
     units: Units = "usual",
     files: Mapping[str, bytes] | None = None,
 ) -> str:
     """Return the whole page: the first section, a list of contents, and the other sections.
 
-    running: how the run stands that the page is written beside; title: of the page, `SUBJECT` where
-    there is none; units: of its texts; files: pictures, tables and scripts that the page is to
-    hold, by name, in place of those beside it.
+    title: of the page, `SUBJECT` where there is none; units: of its texts; files: pictures, tables
+    and scripts that the page is to hold, by name, in place of those beside it.
     """
     scripts = [Markup(text.decode()) for name, text in (files or {}).items() if name.endswith("js")]
     data = jobs._asdict() | {"studies": [one._asdict() for one in jobs.studies]}
     facts = Markup(json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"))
     page = templates(units, files).get_template("page.html")
-    return page.render(
-        sections=sections, jobs=facts, running=running, title=title, subject=SUBJECT,
-        scripts=scripts,
-    )  # fmt: skip
-
-
-def restate_page(page: str, before: Running, now: Running) -> str:
-    """Return a page that was written beside a run, with how the run stands now."""
-    status = templates().get_template("status.html")
-    return page.replace(status.render(running=before), status.render(running=now))
+    return page.render(sections=sections, jobs=facts, title=title, subject=SUBJECT, scripts=scripts)
 
 
 class StudyNote(NamedTuple):

@@ -50,11 +50,9 @@ from compressor.report.page import (
     JobFacts,
     JobsToOpen,
     Plate,
-    Running,
     Section,
     StudyNote,
     document,
-    restate_page,
 )
 from compressor.report.paper_sections import (
     SET,
@@ -106,7 +104,6 @@ def write_report(
     report: Folder,
     command: str = "",
     add: Sequence[Add] = (),
-    running: Running | None = None,
     limits: Sequence[str] = (),
     units: Units = "usual",
     studies: Sequence[str] = (),
@@ -114,10 +111,9 @@ def write_report(
 ) -> Path:
     """Write figures and `index.html` about a folder of results; returns the page's path.
 
-    add: what makes more of the page, such as `compressor.studies.page_additions` gives. running:
-    how the run stands that still adds to the results; the page says so, and loads itself again.
-    limits: of metrics, whose zones tables and curves show, such as
-    `sensor_peak=20,50 m/s²`. units: of figures, tables and texts, of `compressor.units`. studies:
+    add: what makes more of the page, such as `compressor.studies.page_additions` gives. limits: of
+    metrics, whose zones tables and curves show, such as `sensor_peak=20,50 m/s²`. units: of
+    figures, tables and texts, of `compressor.units`. studies:
     names of those to tell of, in this order, by default all, those of searches last. single: report
     is a file, the page with all that it needs in it.
 
@@ -126,7 +122,7 @@ def write_report(
     """
     folder, zones = Path(report), read_limits(limits, units)
     with Painter(folder) as painter:
-        contents = build_report(results, command, add, running, painter, zones, units, studies)
+        contents = build_report(results, command, add, painter, zones, units, studies)
         files = painter.finish()
     for plate in contents.plates:
         files |= {name: text.encode() for name, text in plate.texts.items()}
@@ -151,16 +147,6 @@ def publish_changed(path: Path, content: bytes) -> None:
     publish(path, content)
 
 
-def restate(report: Folder, before: Running, now: Running) -> None:
-    """Write on a report's page how the run stands now, without drawing again.
-
-    Raises OSError where the page cannot be read, StoreError where it cannot be written.
-    """
-    path = Path(report) / "index.html"
-    text = restate_page(path.read_text(encoding="utf-8"), before, now)
-    publish(path, text.encode(errors="backslashreplace"))
-
-
 class ReportContent(NamedTuple):
     """A report that is drawn: its figures, the names of its studies, series by job, its page.
 
@@ -177,7 +163,6 @@ def build_report(
     results: Folder,
     command: str,
     add: Sequence[Add],
-    running: Running | None,
     painter: Painter,
     limits: Limits,
     units: Units = "usual",
@@ -246,7 +231,7 @@ def build_report(
     titled = [study for study in studies if study.title]
     titles = {study.title for study in titled if not study.is_trial or titled[0].is_trial}
     title = titles.pop() if len(titles) == 1 else ""  # several machines have it in their sections
-    page = partial(document, sections, jobs, running, title, units)
+    page = partial(document, sections, jobs, title, units)
     return ReportContent([*of_paper, *later], [study.name for study in studies], series, page)
 
 

@@ -4,6 +4,5 @@ from compressor.sweep.cluster import Cluster
 from compressor.sweep.execution import cores
 from compressor.sweep.plan import Forecast, forecast
 from compressor.sweep.sweep import Options, Summary, in_this_process, run_here, sweep
-from compressor.sweep.wanted import SweepProgress
 from compressor.sweep.warm_up import Needs, compile_once
 from compressor.sweep.worker import JobLost, JobResult

@@ -24,8 +24,6 @@ from compressor.sweep.wanted import (
     JobEnd,
     PendingCases,
     RequestedJobs,
-    SweepProgress,
-    SweepWork,
     stored_ends,
 )
 from compressor.sweep.warm_up import Needs, compile_once, load
@@ -58,7 +56,7 @@ class Options:
     command: what the store says that it was made by; rerun_failed: failed jobs count as missing;
     part: (i, n) for shard i of n, which other processes may run at the same time, each its own;
     wait: until another run that writes there has ended; backend: where jobs run, if not here;
-    pulse: called with the sweep's progress several times a second while jobs run.
+    failed: called with the number of failed jobs, before progress is.
     """
 
     command: str = ""
@@ -66,7 +64,7 @@ class Options:
     part: tuple[int, int] | None = None
     wait: bool = False
     backend: Backend | None = None
-    pulse: Callable[[SweepProgress], object] = lambda now: None
+    failed: Callable[[int], object] = lambda count: None
 
 
 @dataclass(frozen=True)
@@ -141,7 +139,7 @@ def sweep(
             for damage in writer.found.damaged:
                 progress(len(ends), len(cases), f"{damage.path}: {damage.problem}")
             running = options.backend or local(workers)
-            run_missing(writer, missing, running, ends, (progress, options.pulse))
+            run_missing(writer, missing, running, ends, (progress, options.failed))
     counts, failed = endings(studies, ends)
     return Summary(
         len(cases), len(cases) - len(missing), len(missing), counts, failed,
@@ -154,14 +152,14 @@ def run_missing(
     missing: Sequence[Case],
     backend: Backend,
     ends: dict[str, JobEnd],
-    watchers: tuple[Progress, Callable[[SweepProgress], object]],
+    watchers: tuple[Progress, Callable[[int], object]],
 ) -> None:
     """Run and store cases; `ends` gains how each ended.
 
-    watchers: progress, called with what is on disk, and the pulse.
+    watchers: progress, called with what is on disk, and what is called with the failed ones.
     """
-    progress, pulse = watchers
-    done, total, work = len(ends), len(ends) + len(missing), SweepWork(missing)
+    progress, tell_failed = watchers
+    done, total = len(ends), len(ends) + len(missing)
     failed = sum(end.status != "ok" for end in ends.values())
 
     def acknowledge(keys: Sequence[str]) -> None:
@@ -169,21 +167,19 @@ def run_missing(
         if keys:
             done += len(keys)
             failed += sum(ends[key].status != "ok" for key in keys)
+            tell_failed(failed)
             progress(done, total, "")
 
     def beat() -> None:
         acknowledge(writer.flush_if_due())
-        left = work.left()
-        pulse(SweepProgress(done, failed, total, *(left or ())))
 
     def store(end: JobResult | JobLost) -> None:
         outcome = outcome_of(end)
         ends[outcome.key] = JobEnd(outcome.status, outcome.reason, outcome.detail)
-        work.add(end)
         acknowledge(writer.add(outcome))
 
+    tell_failed(failed)
     progress(done, total, "")
-    pulse(SweepProgress(done, failed, total))
     running = backend(writer.place, missing, lambda text: progress(done, total, text), beat)
     try:
         for end in running:

@@ -129,7 +129,6 @@ MISTAKES = [
     ("tradeoff good.yaml --repeats 0", "0 is not in the range"),
     ("tradeoff good.yaml --budget 0", "0.0 is not in the range"),
     ("tradeoff good.yaml -o good.yaml/deeper", "good.yaml: is a file, where a folder is needed"),
-    ("run good.yaml --watch --report good.yaml", "good.yaml: is a file, where a folder is needed"),
     ("explain chain.yaml", "chain.yaml:2:1: regimes: only `compsim run`"),
     ("tradeoff chain.yaml", "chain.yaml:2:1: regimes: only `compsim run`"),
     ("find chain.yaml --over machine.speed_rpm=300:400 --greatest rms_acceleration",
@@ -149,7 +148,6 @@ MISTAKES = [
     ("dataset -o faults", "Missing argument 'STUDY'"),
     ("find typo.yaml --over clearance_mm=0.01:0.3 --first 'peak_acceleration > 1'",
      "typo.yaml:1:11: machine.sped_rpm: unknown key; did you mean machine.speed_rpm?"),
-    ("run chain.yaml --watch", "--watch shows jobs, and regimes have none"),
     ("find good.yaml --over clearance_mm=0.1:0.3 --first peak_acceleration=600", "> "),
     ("find good.yaml --over clearance_mm=0.1:0.3 --json --units plant", "--json has all numbers"),
 ]  # fmt: skip

@@ -22,7 +22,6 @@ from compressor.report.page import (
     JobsToOpen,
     PageTable,
     Plate,
-    Running,
     Section,
     StudyNote,
     TableRow,
@@ -131,7 +130,7 @@ def test_every_template_escapes_every_text():
     jobs = JobsToOpen(words, [JobFacts([words], {"key": [words]})], ["key"])
     sections = [Section(evil(), evil(), name, content) for name, content in given.items()]
     text = document(sections, jobs, title=evil())
-    own = {"page.html", "pieces.html", "status.html", "style.css", "report.js", "mechanism.svg"}
+    own = {"page.html", "pieces.html", "style.css", "report.js", "mechanism.svg"}
     assert {*PackageLoader("compressor.report").list_templates()} - {*given} == own
     scripts = re.findall("<script(.*?)>(.*?)</script>", text, re.DOTALL)
     assert [kind for kind, _ in scripts] == ["", ' type="application/json" id="jobs"']
@@ -207,20 +206,3 @@ def test_a_template_that_lacks_a_value_is_an_error():
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
 def test_no_markup_in_python(path):
     assert not markup(path.read_text(encoding="utf-8"))
-
-
-@pytest.mark.parametrize(
-    ("eta", "left"),
-    [
-        (None, "7 failed"),
-        (20.0, "7 failed, under a minute left"),
-        (125.0, "7 failed, about 2 min left"),
-        (36000.0, "7 failed, about 10 h left"),
-    ],
-)
-def test_a_page_of_a_run_that_goes_on_says_so_and_loads_itself_again(eta, left):
-    text = document([], running=Running(120, 7, 400, eta, 12.4, "12:00:05", "12:00:00"))
-    assert '<meta http-equiv="refresh" content="12">' in text
-    assert f"120 of 400 jobs done, {left}, at 12:00:05." in " ".join(text.split())
-    assert "refresh" not in document([])
-    assert "running" not in document([]).lower()

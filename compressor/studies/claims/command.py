@@ -84,11 +84,11 @@ def claims(
     found, workers = [], jobs or cores()
     for study in studies:
         say_unless(quiet, f"{study.name}: {plural(study.jobs, 'machine')} of {study.path}")
-        with ProgressReporter(quiet, "machines", alike=False) as progress:
+        with ProgressReporter(quiet, "machines") as progress:
             found.append(judge_machines(study, output, workers, progress))
     for study in searchable if generations else ():
         say_unless(quiet, f"{study.name}: {plural(generations, 'generation')} of a search")
-        with ProgressReporter(quiet, "machines", alike=False) as progress:
+        with ProgressReporter(quiet, "machines") as progress:
             found.append(least_change(study, output, workers, generations, progress))
     report_machines(found, as_json)
     beside = "" if output == "claims" else f" --claims {shlex.quote(output)}"

@@ -32,18 +32,16 @@ def run_studies(studies: "list[Study]", folder: str, workers: int, rerun: bool, 
     """Follow the chains of studies; return the exit code."""
     from compressor.studies.regimes.run import run_regimes
 
-    with ProgressReporter(quiet, "values", alike=False, folder=folder) as progress:
+    with ProgressReporter(quiet, "values", folder=folder) as progress:
         summary = run_regimes(studies, folder, workers, progress, rerun)
     report_chains(summary, folder, quiet)
     return SOME_FAILED if summary.failed else DONE
 
 
-def check_options(alone: bool, scheduler: str | None, watch: bool) -> None:
-    """Raise UsageError for options that chains of regimes, `alone` or beside jobs, do not know."""
+def check_options(scheduler: str | None) -> None:
+    """Raise UsageError for options that chains of regimes do not know."""
     if scheduler:
         raise click.UsageError("regimes run in processes here: leave --backend dask out")
-    if alone and watch:
-        raise click.UsageError("--watch shows jobs, and regimes have none: compsim plot draws them")
 
 
 def ahead(studies: "list[Study]", folder: str) -> "list[ChainProgress]":

@@ -218,10 +218,10 @@ def tradeoff(
 
     folder = Path(output)
     writable_folder(folder)  # minutes before it is needed
-    with ProgressReporter(quiet, "points", alike=False) as progress:
+    with ProgressReporter(quiet, "points") as progress:
         study = work_precision(cases, repeats=repeats, budget=budget, progress=progress)
         write_study(folder, study)
-    with ProgressReporter(quiet, "changes of the model", alike=False) as progress:
+    with ProgressReporter(quiet, "changes of the model") as progress:
         trade = feature_trade(cases, repeats=repeats, progress=progress)
     write_dataset(folder / "modelling.nc", trade)
     print_text("\n".join([*fastest_lines(study), "", *trade_lines(trade)]))
@@ -371,7 +371,7 @@ def explain(
     for study in studies:
         which = f"the first of {study.jobs} jobs" if study.jobs > 1 else "the job"
         say_job(study, 0, which, "with and without each of its features")
-        with ProgressReporter(False, "features", alike=False) as progress:
+        with ProgressReporter(False, "features") as progress:
             found.append(explained(study, jobs or cores(), progress=progress))
         if not as_json:
             print_text("\n".join(lines(found[-1])))
@@ -425,7 +425,7 @@ def explain_models(
     for study in studies:
         job, which = choose_job(study, folder)
         say_job(study, job, which, "with one thing otherwise at a time")
-        with ProgressReporter(False, "variations", alike=False) as progress:
+        with ProgressReporter(False, "variations") as progress:
             data = run_models(study, job, named, progress=progress)
         if data["status"].values[0] != "ok":
             failed = True

@@ -72,7 +72,7 @@ def wear(
     with ProgressReporter(quiet, "cases read") as progress:
         studies = load_studies(*configs, overrides=overrides, follow=False, progress=progress)
     check(studies)
-    with ProgressReporter(quiet, "machines", alike=False, folder=output) as progress:
+    with ProgressReporter(quiet, "machines", folder=output) as progress:
         summary = run_wear(studies, output, jobs or cores(), progress, rerun)
     if as_json:
         print_text(json.dumps([jsonable_wear(one, output) for one in summary.machines], indent=1))
