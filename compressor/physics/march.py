@@ -126,6 +126,7 @@ STEPPER = np.dtype(
         ("observed", "i8"),  # whether work.row holds what is observed at t, in this phase
         ("has_dense", "i8"),  # whether work.dense holds the step's interpolant
         ("landing", "f8"),  # length of the step that ends on the onset ahead, or 0
+        ("touches", "i8"),  # the joint whose onset is ahead, or was
         ("landed", "i8"),  # whether the last step ended on an onset
         ("segment", "i8"),
         ("sample", "i8"),  # next output sample
@@ -263,7 +264,7 @@ def onset_ahead(w, h, stride, work, phase, p):
     """
     must_land = False
     if w.watch and w.has_dense and may_touch(work.rows, p):
-        begin, end = first_onset(w.t, h, work.dense, phase, p, work.y)
+        begin, end, w.touches = first_onset(w.t, h, work.dense, phase, p, work.y)
         # a step that begins on an onset finds it again at its start: to land there would never end
         if begin < 1.0 and not (w.landed and begin < LANDING_FRACTION):
             must_land = True

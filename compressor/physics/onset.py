@@ -10,6 +10,7 @@ import math
 
 from compressor.physics._jit import inline_llvm, inline_once, jit
 from compressor.physics.contact import nearness
+from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.observe import NEARNESS, PENETRATION
 from compressor.physics.runge_kutta import interpolate
 from compressor.physics.systems import contact_at, derivative
@@ -59,16 +60,31 @@ def may_change(rows, p):
 
 
 @inline_llvm
+def range_of(rows, column):
+    """Return the least and the greatest value of a column."""
+    low, high = math.inf, -math.inf
+    for i in range(rows.shape[0]):
+        low = min(low, rows[i, column])
+        high = max(high, rows[i, column])
+    return low, high
+
+
+@inline_llvm
 def may_touch(rows, p):
-    """Return whether contact may begin within a step, by the rows at all its nodes."""
+    """Return whether contact may begin within a step, by the rows at all its nodes.
+
+    With chosen laws also where a journal may have flown between two nodes: the speed at which it
+    comes back counts, however short the flight was.
+    """
     for joint in range(2):
         if p.clearance[joint] > 0.0:
-            low, high = math.inf, -math.inf
-            for i in range(rows.shape[0]):
-                low = min(low, rows[i, NEARNESS + joint])
-                high = max(high, rows[i, NEARNESS + joint])
+            low, high = range_of(rows, NEARNESS + joint)
             if may_touch_in(low, high):
                 return True
+            if has_chosen_laws(p):
+                low, high = range_of(rows, PENETRATION + joint)
+                if p.hysteresis != 0.0 and low - (high - low) <= 0.0 < high:
+                    return True
     return False
 
 
@@ -169,14 +185,14 @@ def joint_onset(joint, t, h, dense, phase, p, y):
 
 @jit
 def first_onset(t, h, dense, phase, p, y):
-    """Return `joint_onset` of whichever joint with clearance touches first."""
-    begin, end = NEVER, NEVER
+    """Return `joint_onset` of whichever joint with clearance touches first, and which it is."""
+    begin, end, touches = NEVER, NEVER, -1
     for joint in range(2):
         if p.clearance[joint] > 0.0:
             first, last = joint_onset(joint, t, h, dense, phase, p, y)
             if first < begin:
-                begin, end = first, last
-    return begin, end
+                begin, end, touches = first, last, joint
+    return begin, end, touches
 
 
 @inline_once
@@ -242,8 +258,11 @@ def approach_at(joint, t, y, phase, p, rates, before):
 def store_approach_velocity(w, t, work, phase, p, tally):
     """Store the speed at which joints meet again after a flight; return whether one does.
 
-    At the time of a landing: a joint meets where its gap closes within `LANDING_FRACTION` of the
-    next step. Laws with restitution damp by this speed as long as the contact lasts.
+    At the time of a landing: the joint whose onset it is meets if its gap closes, since a force
+    that the clamp held off comes back while the bodies still part. Whether it was seen apart says
+    nothing: it may have left, flown and come back within the step. The other one meets too where it
+    was seen apart and its gap closes within `LANDING_FRACTION` of the next step. Laws with
+    restitution damp by this speed as long as the contact lasts.
     """
     met = False
     n = work.y.size
@@ -251,9 +270,11 @@ def store_approach_velocity(w, t, work, phase, p, tally):
         begin, middle = work.rows[0], work.rows[work.rows.shape[0] // 2]
         least_depth = min(begin[PENETRATION + joint], middle[PENETRATION + joint])
         flown = tally.flown[joint] > 0 or least_depth < 0.0
-        if p.clearance[joint] > 0.0 and flown and not tally.touching[joint]:
+        lands, apart = joint == w.touches, flown and not tally.touching[joint]
+        if p.clearance[joint] > 0.0 and (lands or apart):
             depth, speed = approach_at(joint, t, work.new[:n], phase, p, work.y, work.column[:n])
-            if depth + LANDING_FRACTION * w.h * speed > 0.0:
+            closes = depth + LANDING_FRACTION * w.h * speed > 0.0
+            if (lands and speed > 0.0) or (apart and closes):
                 work.new[2 * p.freedoms + joint] = max(speed, p.least_approach)
                 met = True
     return met

@@ -38,7 +38,7 @@ from compressor.physics.onset import (
     nearness_at,
     sample_fraction,
 )
-from compressor.physics.record import FREEDOMS, SMALL_END
+from compressor.physics.record import BIG_END, FREEDOMS, SMALL_END
 from compressor.physics.runge_kutta import FLOWS, STAGES, interpolate, take_step
 from compressor.physics.systems import (
     derivative,
@@ -200,26 +200,27 @@ def test_looks_stand_evenly_and_beside_both_ends():
 
 
 FIRST = {
-    "neither": (APART, APART, NEVER),
-    "big end": (hump(0.4, PULSE, WIDTH), APART, 0.4 - WIDTH),
-    "small end": (APART, hump(0.4, PULSE, WIDTH), 0.4 - WIDTH),
-    "big end first": (hump(0.4, PULSE, WIDTH), CLOSING, 0.4 - WIDTH),
-    "small end first": (CLOSING, hump(0.4, PULSE, WIDTH), 0.4 - WIDTH),
-    "one stays inside": (INSIDE, CLOSING, 0.5),
+    "neither": (APART, APART, NEVER, -1),
+    "big end": (hump(0.4, PULSE, WIDTH), APART, 0.4 - WIDTH, BIG_END),
+    "small end": (APART, hump(0.4, PULSE, WIDTH), 0.4 - WIDTH, SMALL_END),
+    "big end first": (hump(0.4, PULSE, WIDTH), CLOSING, 0.4 - WIDTH, BIG_END),
+    "small end first": (CLOSING, hump(0.4, PULSE, WIDTH), 0.4 - WIDTH, SMALL_END),
+    "one stays inside": (INSIDE, CLOSING, 0.5, SMALL_END),
 }
 
 
-@pytest.mark.parametrize(("big", "small", "begin"), FIRST.values(), ids=FIRST)
-def test_first_onset_of_both_joints(big, small, begin):
+@pytest.mark.parametrize(("big", "small", "begin", "joint"), FIRST.values(), ids=FIRST)
+def test_first_onset_of_both_joints(big, small, begin, joint):
     p = parameters("both")
-    found, _ = first_onset(0.0, H, both_ends(big, small), 0, p, np.zeros(8))
+    found, _, touches = first_onset(0.0, H, both_ends(big, small), 0, p, np.zeros(8))
     assert found == pytest.approx(begin, abs=1e-6)
+    assert touches == joint
 
 
 def test_an_ideal_joint_never_touches():
     p = parameters("both")
     p.clearance[SMALL_END] = 0.0
-    assert first_onset(0.0, H, both_ends(APART, CLOSING), 0, p, np.zeros(8)) == (NEVER, NEVER)
+    assert first_onset(0.0, H, both_ends(APART, CLOSING), 0, p, np.zeros(8))[:2] == (NEVER, NEVER)
 
 
 @pytest.mark.parametrize("late", [-2e-6, -1e-6, 1e-6, 2e-6])

@@ -155,11 +155,11 @@ def test_a_pin_that_is_pressed_deeper_than_johnson_knows_is_told_of():
 def test_error_bars_hold_with_laws():
     """Of the default promise, by far tighter runs. With six restitutions each, 95 % of 500 do.
 
-    One of the eight may say that it is chaotic: its runs at 2.5e-12 and 1e-12 differ by 1 %.
+    One of the twelve may say that it is chaotic: its runs at 2.5e-12 and 1e-12 differ by 1 %.
     """
     shares, chaotic = [], 0
     laws = "gonthier", "flores", "lankarani_nikravesh", "hu_guo"
-    for law, restitution in itertools.product(laws, (0.3, 0.6)):
+    for law, restitution in itertools.product(laws, (0.3, 0.5, 0.6)):
         contact = {"law": law, "restitution": restitution}
         values = {"joint": "both", "clearance_mm": 0.2, "contact": contact}
         run, exact = (
@@ -178,7 +178,7 @@ def test_error_bars_hold_with_laws():
                 known = np.isfinite(bar) & np.isfinite(away)
                 shares += (away[known] / np.maximum(bar[known], 1e-300)).tolist()
     assert chaotic <= 1
-    assert len(shares) > 150
+    assert len(shares) > 225
     assert np.mean(np.array(shares) <= 1.0) > 0.85
 
 
