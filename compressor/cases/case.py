@@ -10,8 +10,8 @@ import json
 import math
 import re
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Any
 
 from compressor.cases.card import CardError, open_card
@@ -22,7 +22,6 @@ from compressor.cases.checks import (
     check_part,
     expand_shorthands,
     expand_synonyms,
-    probable_keys,
     stands_for,
     value_of,
     values_given,
@@ -119,7 +118,7 @@ class Case(Settings):
 
     @classmethod
     def _of_values(cls, values: Mapping[str, Any], lenient: bool = False) -> "Case":
-        parts, given = parts_of(values, lenient)
+        parts, given = parts_of(values)
         case = cls(**parts)
         problems = [*conflicts(case, given, {} if lenient else _values_to_read(values))]
         if problems:
@@ -299,13 +298,10 @@ def require_case(value: Any) -> Case:
     )
 
 
-def parts_of(
-    values: Mapping[str, Any], lenient: bool = True
-) -> tuple[dict[str, Any], frozenset[str]]:
+def parts_of(values: Mapping[str, Any]) -> tuple[dict[str, Any], frozenset[str]]:
     """Return the fields of a case, each checked alone, and the dotted keys given.
 
-    values: nested. lenient: some of them may be unread. Raises CaseError with everything that is
-    wrong, and what does not fit together in the rest.
+    values: nested. Raises CaseError with everything that is wrong with them one by one.
     """
     problems: list[Problem] = []
     if not isinstance(values, Mapping):
@@ -314,9 +310,7 @@ def parts_of(
     whole = plain_values(values, problems)
     parts = {key: check_part(key, value, problems) for key, value in whole.items()}
     if problems:
-        to_read = {} if lenient else _values_to_read(values)
-        wrong = _everything_wrong(whole, parts, problems, to_read)
-        raise CaseError(_as_written(values, wrong))
+        raise CaseError(_as_written(values, map(partial(_refuse_sweep, whole), problems)))
     return parts, frozenset(values_given(whole))
 
 
@@ -460,31 +454,14 @@ def digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
-def _everything_wrong(
-    values: Mapping[str, Any],
-    parts: Mapping[str, Any],
-    problems: Sequence[Problem],
-    to_read: Mapping[str, Any],
-) -> Iterator[Problem]:
-    """Yield what is wrong with values one by one, and what does not fit together in the others.
-
-    The error of a value that would be swept in a case file says that one case has no sweep.
-    """
-    wrong = set()
-    for problem in problems:
-        key, _, inner = problem.key.rpartition(".")
-        wrong.add(problem.key)
-        if problem.key not in (*table(), *GROUPS):
-            wrong |= {*probable_keys(inner, key)} if key in ("", *GROUPS) else {key}
-        whole = key if inner in FORMS else problem.key
-        value = _value_at(whole, values)
-        if _is_swept(whole, value):
-            wrong.add(whole)
-            problem = Problem(whole, f"{quote_value(value)} {NO_SWEEP}")
-        yield problem
-    known = {item.name for item in fields(Case)} - wrong
-    rest = Case(**{key: part for key, part in parts.items() if key in known})
-    yield from conflicts(rest, frozenset(values_given(values)), to_read, frozenset(wrong))
+def _refuse_sweep(values: Mapping[str, Any], problem: Problem) -> Problem:
+    """Return a problem; of a value that a file would sweep, that one case has no sweep."""
+    key, _, inner = problem.key.rpartition(".")
+    whole = key if inner in FORMS else problem.key
+    value = _value_at(whole, values)
+    return (
+        Problem(whole, f"{quote_value(value)} {NO_SWEEP}") if _is_swept(whole, value) else problem
+    )
 
 
 def _value_at(key: str, values: Mapping[str, Any]) -> Any:

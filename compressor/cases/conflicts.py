@@ -12,12 +12,11 @@ import contextlib
 from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import replace
 from functools import cache, partial
-from types import FunctionType
-from typing import Any, cast
+from typing import Any
 
 from compressor.cases.card import DRIVING, CardError, open_card, taken_work
 from compressor.cases.checks import SHORTHANDS, row_of, value_in
-from compressor.cases.groups import CYLINDER_KEYS, ENDS
+from compressor.cases.groups import ENDS
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
 from compressor.cases.parameter import CRANK_END, GAS, IMPLAUSIBLE, MATERIALS, Problem, Reader
@@ -62,11 +61,6 @@ FACTS = (
 )  # fmt: skip
 # what is part of a job's key only where the job reads it: facts, and what follows from them
 IN_KEY_IF_READ = (*FACTS, "contact.modulus_GPa", "contact.stiffness_N_per_mm15", "contact.geometry")
-# what decides whether a job reads any of them
-DECIDES_READING = (
-    "joint", "clearance_mm", "load", "friction.ideal_joints", "contact.law", "contact.restitution",
-    "lubricant", "guide.clearance_mm", "gas.action", "gas.indicator", "gas.crank_indicator",
-)  # fmt: skip
 
 
 def needs_of_given(key: str, given: Container[str]) -> list[tuple[str, Reader]]:
@@ -336,102 +330,16 @@ MAX_REVOLUTIONS_TOLD = 1e9  # revolutions, more than any run has
 SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 
 
-OF_CYLINDER = tuple(f"gas.{key}" for key in CYLINDER_KEYS)
-# keys that a case fills in where others are not given or not used, and those that decide it
-FILLED_IN = {
-    "machine.rod_centre_mm": ("machine.rod_length_mm",),
-    "machine.rod_inertia_kg_m2": ("machine.rod_mass_kg", "machine.rod_length_mm"),
-    "machine.small_end_pin_radius_mm": ("machine.pin_radius_mm",),
-    "machine.balance_reciprocating": ("machine.balance",),
-    "contact.small_end_materials": ("contact.materials",),
-    "contact.small_end_length_mm": ("contact.length_mm", "contact.law"),
-    "lubricant.small_end_bearing_length_mm": ("lubricant.bearing_length_mm",),
-    "body.casing_mass_kg": ("body.mass_kg",),
-    "guide.crosshead_inertia_kg_m2": (
-        "machine.reciprocating_mass_kg", "guide.crosshead_length_mm", "guide.crosshead_height_mm",
-    ),
-    "clearance_mm.big_end": ("joint",),
-    "clearance_mm.small_end": ("joint",),
-    "lubricant": ("joint",),
-    "wear": ("joint",),
-    "wear.limit_mm": ("joint", "clearance_mm.big_end", "clearance_mm.small_end"),
-    "gas.action": OF_CYLINDER,
-    "gas.unloaded": OF_CYLINDER,
-    "gas.valve_loss_percent": OF_CYLINDER,
-    "gas.switching": OF_CYLINDER,
-    "gas.head_clearance_mm": ("gas.clearance_percent",),
-    "gas.crank_clearance_percent": ("gas.clearance_percent",),
-    "gas.discharge_loss_percent": ("gas.valve_loss_percent",),
-}  # fmt: skip
-# groups that fill in values by several of their others: each may decide all of them
-FILLING = ("contact", "friction", "solve")
-
-
-def find_misfits(case: Settings, given: frozenset[str]) -> list[Problem]:
-    """Return the values of a case that do not fit each other; given: dotted keys set by hand."""
-    return [problem for rule in RULES for problem in rule(case, given)]
-
-
 def conflicts(
-    case: Settings,
-    given: frozenset[str],
-    values: Mapping[str, Any],
-    wrong: frozenset[str] = frozenset(),
+    case: Settings, given: frozenset[str], values: Mapping[str, Any]
 ) -> Iterator[Problem]:
     """Yield everything in a case that does not fit together.
 
-    given: the dotted keys set by hand. values: those of them that the case has to read. wrong:
-    keys, or whole groups, in whose place the case holds defaults; what does not fit is found among
-    the others alone.
+    given: the dotted keys set by hand. values: those of them that the case has to read.
     """
-    if not wrong:
-        yield from find_misfits(case, given)
-        yield from unread_values(case, values, given)
-        return
-    undecided = _undecided_keys(wrong)
-
-    def refuse(key: str) -> None:
-        if key in undecided:
-            raise _Unknown(key)
-
-    known = cast(Settings, Watched(case, refuse))
     for rule in RULES:
-        with contextlib.suppress(_Unknown):
-            yield from rule(known, given)
-    for key, value in values.items():
-        if not undecided & {str(key), str(key).partition(".")[0]}:
-            with contextlib.suppress(_Unknown):
-                yield from unread_values(known, {key: value}, given)
-
-
-def _undecided_keys(wrong: frozenset[str]) -> frozenset[str]:
-    """Return the keys whose values are unknown: the wrong ones, and those that they decide."""
-    filled_in = {key for key, by in FILLED_IN.items() if wrong & {*by, "machine"}}
-    rivals = {pair[not place] for pair in IN_PLACE_OF for place in (0, 1) if pair[place] in wrong}
-    return wrong | filled_in | rivals
-
-
-class _Unknown(Exception):
-    """The end of a rule that reads a wrong value."""
-
-
-class Watched:
-    """A case, or a group of one, that passes each key that is read to a function, `note`."""
-
-    def __init__(self, values: Any, note: Callable[[str], None], prefix: str = ""):
-        self._values, self._note, self._prefix = values, note, prefix
-
-    def __getattr__(self, name: str) -> Any:
-        # properties and methods run on this view: what they read is looked up here, too
-        member = getattr(type(self._values), name, None)
-        if isinstance(member, property) and member.fget:
-            return member.fget(self)
-        if isinstance(member, FunctionType):
-            return partial(member, self)
-        key = self._prefix + name
-        self._note(key)
-        value = getattr(self._values, name)
-        return Watched(value, self._note, f"{key}.") if key in GROUPS and value else value
+        yield from rule(case, given)
+    yield from unread_values(case, values, given)
 
 
 def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:

@@ -2,8 +2,8 @@
 
 A file becomes values by dotted key (`yaml_reader`, `keys`), blocks and overrides take their places,
 and each value is checked alone against the table of parameters. The jobs are counted (`blocks`)
-before any is made. What does not fit together, and the keys, come from `bulk`; a job's case is
-built on first access.
+before any is made. Each job's case is built whole, for its key
+and for what does not fit together, and again when it is used.
 """
 
 import contextlib
@@ -16,9 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from compressor.cases import blocks
-from compressor.cases.bulk import examine_jobs
 from compressor.cases.case import Case
-from compressor.cases.checks import REPORT, SHORTHANDS, TWICE, row_of
+from compressor.cases.checks import REPORT, SHORTHANDS, TWICE, row_of, value_of
 from compressor.cases.combinations import Block, columns
 from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
 from compressor.cases.keys import (
@@ -427,15 +426,6 @@ def _fits_limit(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) ->
     return False
 
 
-def _misfits_in_words(block: Block, chosen: dict[str, Node]) -> Sequence[Problem]:
-    """Return what does not fit in a combination of values, as one that is not swept is refused."""
-    try:
-        block.resolve_case(chosen)
-    except CaseError as error:
-        return error.problems
-    raise AssertionError(f"swept values are refused that are good alone: {chosen}")
-
-
 def _check_cases(
     draft: _Draft, cases: Cases, swept: Sequence[str], progress: Progress
 ) -> tuple[tuple[str, ...], dict[str, list[Any]]]:
@@ -448,18 +438,20 @@ def _check_cases(
     values: dict[str, list[Any]] = {key: [] for key in swept}
     total = len(cases)
     progress = progress if total >= MANY_CASES else no_progress
-    jobs = ((block, job) for block in cases.parts for job in examine_jobs(block, swept))
-    for number, (block, job) in enumerate(jobs):
+    for number, (block, place) in enumerate(cases.combinations()):
         if number % 1000 == 0:
             progress(number, total, "" if number else f"{draft.name}: {total} jobs")
-        if job.problems:
-            chosen = block.chosen(job.number)
-            for problem in _misfits_in_words(block, chosen):
+        try:
+            case = block.case(place)
+        except CaseError as error:
+            chosen = block.chosen(place)
+            for problem in error.problems:
                 found.setdefault(problem, _locate_problem(problem, chosen, block, draft.path))
-        elif not found:
-            keys.append(job.key)
-            for key, value in zip(swept, job.values, strict=True):
-                values[key].append(value)
+            continue
+        if not found:
+            keys.append(case.key)
+            for key in swept:
+                values[key].append(value_of(case, key))
     progress(total, total, "")
     draft.problems.extend(itertools.islice(found.values(), MAX_CONFLICTS))
     if len(found) > MAX_CONFLICTS:

@@ -236,11 +236,11 @@ class CaseError(CompsimError, ValueError):
 
     >>> import compressor
     >>> try:
-    ...     compressor.Case.from_values({"joint": "big_end", "machine": {"speed": "700 rpm"}})
+    ...     compressor.Case.from_values({"joint": "top", "machine": {"speed": "700 rpm"}})
     ... except compressor.CaseError as error:
     ...     print(error)
+    joint: needs none, big_end, small_end or both, not 'top'
     machine.speed: unknown key; did you mean machine.speed_rpm?
-    clearance_mm.big_end: is needed with joint: big_end; give it in mm, such as 0.2
     """
 
     exit_code = 2

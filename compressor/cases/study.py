@@ -126,8 +126,8 @@ class Cases(Sequence[Case]):
             return tuple(self[number] for number in numbers)
         block, place = self._locate(numbers)
         case = self.parts[block].case(place)
-        if self.keys:  # of cases whose values fit each other
-            vars(case).update(key=self.keys[numbers], problems=())
+        if self.keys:
+            vars(case)["key"] = self.keys[numbers]
         return case
 
     def combinations(self) -> Iterator[tuple[Block, int]]:
@@ -151,7 +151,7 @@ class Cases(Sequence[Case]):
     def solver_of(self, number: int) -> Hashable:
         """Return what cases share only if their groups `solve` and `output` are equal."""
         block, place = self._locate(number)
-        return block, self.parts[block].rows_of(place, "solve")
+        return block, self.parts[block].solver_of(place)
 
     def where(self, test: Test) -> list[int]:
         """Return the numbers of the cases for which a comparison holds."""

@@ -153,7 +153,7 @@ def test_what_is_no_mapping_is_told_how_one_looks(values):
 # All at once
 
 
-def test_twelve_mistakes_are_told_at_once():
+def test_mistakes_are_told_at_once():
     assert told({
         "name": "a/b",
         "laod": "none",
@@ -173,17 +173,13 @@ def test_twelve_mistakes_are_told_at_once():
         "contact.exponent: 5 is outside [1, 3]",
         "solve.rtol: 1 is outside [1e-13, 0.1]",
         "body: needs true or a mapping of keys, such as {freedoms: xy}, not 3",
-        "clearance_mm.small_end: is needed with joint: both; give it in mm, such as 0.2",
-        "solve.duration_s: stands in place of solve.duration_rev: give one of the two",
-        "friction.friction_velocity_mm_per_s: 1 mm/s must exceed the stiction_velocity_mm_per_s, "
-        "10 mm/s",
     ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("values", "keys"),
     [
-        # what is wrong or unknown hides what would follow from it ...
+        # what does not fit together is found once the values are good
         ({"joint": "big_end", "clearance": 0.2}, ["clearance"]),
         ({"jiont": "big_end", "clearance_mm": 0.2}, ["jiont"]),
         ({"joint": "big_end", "clearance_mm": "big"}, ["clearance_mm"]),
@@ -192,11 +188,9 @@ def test_twelve_mistakes_are_told_at_once():
         ({"machine": {"crank_radius_mm": 700, "rod_length": 800}}, ["machine.rod_length"]),
         ({"solve": {"duration_s": "x", "output_step_deg": 0.7}}, ["solve.duration_s"]),
         ({"machine": 5, "spring": {"stroke_mm": 500}}, ["machine"]),
-        # ... and nothing else
-        ({"spring": {"stroke_mm": 500}, "qqq": 1}, ["qqq", "spring.stroke_mm"]),
-        ({"joint": "big_end", "solve": {"rtol": 5}}, ["solve.rtol", "clearance_mm.big_end"]),
-        ({"joint": "both", "clearance_mm": 11, "machine": {"speed_rpm": 0}},
-         ["machine.speed_rpm", "clearance_mm"]),
+        ({"spring": {"stroke_mm": 500}, "qqq": 1}, ["qqq"]),
+        ({"joint": "both", "clearance_mm": 11, "solve": {"rtol": 5}}, ["solve.rtol"]),
+        ({"joint": "both", "clearance_mm": 11}, ["clearance_mm"]),
     ],
 )  # fmt: skip
 def test_no_mistake_is_told_that_follows_from_another(values, keys):
