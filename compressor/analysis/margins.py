@@ -219,7 +219,7 @@ def continuity_of(found: Evidence, joint: str) -> Continuity:
         float((modes != FOLLOWING).mean()),
         hit_share(found.table, joint, found.revolutions),
         energy_angle(found.high, ENERGY),
-        shape(found.high).gini,
+        shape(found.high)[3],
     )
 
 

@@ -152,7 +152,7 @@ class Shaking:
 def shaking(run: xr.Dataset) -> Shaking:
     """Return the `Shaking` of a run with time series; of ideal joints there are no turns.
 
-    Raises NoSeriesError where the series hold no whole settled revolution, SignalError where they
+    Raises NoSeriesError where the series hold no whole settled revolution, RecordError where they
     are too coarse for `ORDER`.
     """
     from compressor.vibration import high_pass_orders, line_amplitudes
@@ -270,15 +270,15 @@ def sensor_envelope(run: xr.Dataset) -> SensorEnvelope | None:
         return None
     rate = (time.size - 1) / (time[-1] - time[0])
     levels = min(LEVELS, int(math.log2(values.size // MIN_LINES)))
-    found = kurtogram(values, rate, levels)
+    centre, width, kurtosis = kurtogram(values, rate, levels)
     power = line_amplitudes(values, values.size, True) ** 2
     lines = np.arange(power.size) * rate / values.size
-    edges = found.frequency - found.bandwidth / 2, found.frequency + found.bandwidth / 2
+    edges = centre - width / 2, centre + width / 2
     cumulative = np.append(0.0, np.cumsum(power))
     low, high = (np.searchsorted(lines, edge) for edge in edges)
     strong = cumulative[high] - cumulative[low] >= MIN_SHARE * power.sum()
-    best = int(np.nanargmax(np.where(strong, found.kurtosis, np.nan)))
+    best = int(np.nanargmax(np.where(strong, kurtosis, np.nan)))
     band = float(edges[0][best]), float(edges[1][best])
     speed = 1.0 / case_of(run).turn
     orders, amplitudes = envelope_spectrum(values, rate, band, speed=speed)
-    return SensorEnvelope(orders, amplitudes, band, float(found.kurtosis[best]))
+    return SensorEnvelope(orders, amplitudes, band, float(kurtosis[best]))

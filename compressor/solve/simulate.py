@@ -53,14 +53,15 @@ def foundation(case: Case, solution: Solution, rows: np.ndarray) -> tuple[Variab
         shaken = body_metrics.shake_by(case, solution, rows)
         begin = body_metrics.first_sample(case, solution)
         motion, grid = shaken.motion, slice(-begin % stride, None, stride)
-        for name, source in (("displacement", 0), ("velocity", 1), ("acceleration", 2)):
-            both = np.stack([motion.x[source], motion.y[source]], axis=1)
+        for name in ("displacement", "velocity", "acceleration"):
+            both = np.stack([getattr(motion[axis], name) for axis in "xy"], axis=1)
             values[f"body_{name}"][-len(both[grid]) :] = both[grid]
-        values["body_rocking"][-len(motion.x[0][grid]) :] = motion.rocking.displacement[grid]
+        rocking = motion["rocking"].displacement[grid]
+        values["body_rocking"][-len(rocking) :] = rocking
     for name, (dims, unit, phrase) in BODY.items():
         variables[name] = (("time", *dims), values[name], {"units": unit, "long_name": phrase})
     if shaken:
-        spectra = motion.x.velocity[:-1], motion.y.velocity[:-1]
+        spectra = tuple(motion[axis].velocity[:-1] for axis in "xy")
         phrase = "bound of the relative error of the body's velocity: it is driven one way"
         attrs = {"units": "1", "long_name": phrase}
         errors = one_way_errors(case, spectra, solution.trajectory.times[1])

@@ -2,7 +2,6 @@
 
 from compressor.vibration.accelerometer import (
     Record,
-    RecordError,
     analogue_rate,
     find_noise_mistake,
     noisy,
@@ -11,6 +10,7 @@ from compressor.vibration.body import Forces, casing_motion
 from compressor.vibration.monitor import Monitored, measure_record, segment_levels, shake_body
 from compressor.vibration.record_files import encode_record, read_record, record_columns
 from compressor.vibration.spectra import (
+    RecordError,
     band_signal,
     energy_angle,
     envelope_spectrum,

@@ -9,7 +9,6 @@ from scipy.ndimage import map_coordinates
 from scipy.signal import butter, sosfilt
 
 from compressor.cases import Body, Sensor
-from compressor.program import CompsimError
 from compressor.vibration.body import (
     BodyMotion,
     Forces,
@@ -18,6 +17,7 @@ from compressor.vibration.body import (
     casing_motion,
     centre,
     oscillate,
+    point_acceleration,
 )
 
 AXES = ("x", "y")
@@ -26,12 +26,6 @@ POLES = 8  # of the anti-aliasing filter, Butterworth
 ANALOGUE_RATE_FACTOR = 8.0
 USUAL = 2.56  # sampling rate over the highest frequency of interest
 LEAD_IN = 1  # revolutions before the record, in which the low-pass filter forgets its start
-
-
-class RecordError(CompsimError):
-    """A record that cannot be read or used: too short, without tacho, not finite."""
-
-    exit_code = 2
 
 
 @dataclass(frozen=True)
@@ -85,7 +79,7 @@ def listen(
     x, y = centre(body)
     point = {"guide": (guide - x, -y), "bearing": (-x, -y), "body": (0.0, 0.0)}[sensor.place]
     rigid = motion or body_motion(body, forces, steady)
-    acceleration, force = rigid.acceleration(sensor.direction, point), None
+    acceleration, force = point_acceleration(rigid, sensor.direction, point), None
     if body.casing and sensor.place != "body":
         force = getattr(forces, sensor.place)[:, AXES.index(sensor.direction)]
     if not steady:

@@ -29,6 +29,9 @@ class OscillatorMotion(NamedTuple):
     acceleration: np.ndarray
 
 
+BodyMotion = dict[str, OscillatorMotion]  # of the mass centre along x and y, of `rocking` (rad)
+
+
 def oscillate(
     force: np.ndarray, step: float, frequency: float, damping_ratio: float, steady: bool = False,
     start: tuple[float, float] = (0.0, 0.0),
@@ -107,22 +110,13 @@ class Forces:
     bearing: np.ndarray
 
 
-@dataclass(frozen=True)
-class BodyMotion:
-    """An `OscillatorMotion` of the mass centre along x and y, and of rocking (rad); None: held."""
+def point_acceleration(motion: BodyMotion, axis: str, point: tuple[float, float]) -> np.ndarray:
+    """Return the acceleration (m/s2, (n,)) along an axis of a point, in m from the mass centre.
 
-    x: OscillatorMotion
-    y: OscillatorMotion
-    rocking: OscillatorMotion
-
-    def acceleration(self, axis: str, point: tuple[float, float]) -> np.ndarray:
-        """Return the acceleration (m/s2, (n,)) along an axis of a point, in m from the mass centre.
-
-        Small angles: what rocking adds by its rate squared is left out, as in the equations.
-        """
-        if axis == "x":
-            return self.x.acceleration - point[1] * self.rocking.acceleration
-        return self.y.acceleration + point[0] * self.rocking.acceleration
+    Small angles: what rocking adds by its rate squared is left out, as in the equations.
+    """
+    lever = -point[1] if axis == "x" else point[0]
+    return motion[axis].acceleration + lever * motion["rocking"].acceleration
 
 
 def centre(body: Body) -> tuple[float, float]:
@@ -145,7 +139,7 @@ def body_motion(body: Body, forces: Forces, steady: bool) -> BodyMotion:
     for name in free:
         force, frequency = driven[name]
         motions[name] = oscillate(force, forces.step, frequency, body.damping_ratio, steady)
-    return BodyMotion(**motions)
+    return motions
 
 
 def casing_motion(

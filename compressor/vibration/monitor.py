@@ -77,7 +77,7 @@ def shake_body(
     if sensor is not None:
         phase = first if steady else 0.0
         recorded = listen(body, sensor, forces, turn, guide, motion, phase)
-    velocity = np.stack([motion.x.velocity, motion.y.velocity], axis=1)
+    velocity = np.stack([motion["x"].velocity, motion["y"].velocity], axis=1)
     velocity = velocity[0 if steady else round(settle / forces.step) :]
     whole = math.floor((len(velocity) - 1) * forces.step / turn * (1 + 1e-9))
     velocity = velocity[: round(whole * turn / forces.step)]
@@ -102,11 +102,11 @@ def measure_record(
     values: m/s2, (n,); turns: of the crank there, (n,); thresholds: without the first, nothing is
     counted; None among them counts as nan.
     """
-    found, (peaks, roots) = shape(values), segment_levels(360.0 * turns, values)
+    (rms, crest, kurtosis, _), levels = shape(values), segment_levels(360.0 * turns, values)
     numbers: Numbers = {
-        "sensor_peak": float(np.abs(values).max()), "sensor_rms": found.rms,
-        "sensor_crest_factor": found.crest_factor, "sensor_kurtosis": found.kurtosis,
-        "sensor_segment_peak": peaks, "sensor_segment_rms": roots,
+        "sensor_peak": float(np.abs(values).max()), "sensor_rms": rms,
+        "sensor_crest_factor": crest, "sensor_kurtosis": kurtosis,
+        "sensor_segment_peak": levels[0], "sensor_segment_rms": levels[1],
     }  # fmt: skip
     if thresholds and thresholds[0] is not None:
         counts = [math.nan if one is None else count_peaks(values, one) for one in thresholds]

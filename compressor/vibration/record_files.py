@@ -20,7 +20,8 @@ from scipy.interpolate import CubicSpline
 
 from compressor.cases import open_text_table
 from compressor.program import PROGRAM, CompsimError, did_you_mean
-from compressor.vibration.accelerometer import Record, RecordError
+from compressor.vibration.accelerometer import Record
+from compressor.vibration.spectra import RecordError
 from compressor.vibration.tacho import (
     MIN_REVOLUTIONS,
     find_pulses,

@@ -7,11 +7,10 @@ the rms amplitude A/sqrt(2). An impact rings at a frequency of the structure and
 of the machine, which the spectrum of the envelope shows (Randall and Antoni, the same 25, 2011).
 
 Signals have any unit, which their amplitudes share, and lie at equal times or angles; envelopes
-take them as periodic. All raise SignalError for one that is not finite.
+take them as periodic. All raise RecordError for one that is not finite.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -28,22 +27,22 @@ ENDS = 4  # samples of an envelope left out at either end, where it feels a jump
 SILENT_SHARE = 1e-10  # share of the signal's rms: a band below it holds rounding
 
 
-class SignalError(CompsimError):
-    """A signal, or a choice, that cannot be analysed: what is wrong and what to do about it."""
+class RecordError(CompsimError):
+    """A record or a signal that cannot be read or used: too short, without tacho, not finite."""
 
     exit_code = 2
 
 
 def check_signal(values: np.ndarray) -> np.ndarray:
-    """Return a signal as floats, (m,). Raises SignalError unless it is real, finite, in a row."""
+    """Return a signal as floats, (m,). Raises RecordError unless it is real, finite, in a row."""
     found = np.asarray(values)
     if found.ndim != 1 or not found.size or np.iscomplexobj(found):
         what = f"the signal is {found.dtype} of shape {found.shape}"
-        raise SignalError(f"{what}: pass one real component, with at least one sample")
+        raise RecordError(f"{what}: pass one real component, with at least one sample")
     bad = np.flatnonzero(~np.isfinite(found))
     if bad.size:
         where = f"at {bad.size} of {found.size} samples, first at index {bad[0]}"
-        raise SignalError(f"the signal is not finite {where}: cut these off, or fill them")
+        raise RecordError(f"the signal is not finite {where}: cut these off, or fill them")
     return found.astype(float)
 
 
@@ -69,14 +68,14 @@ def resample_angle(angle: np.ndarray, values: np.ndarray, a_turn: int) -> np.nda
 
     angle: rad, increasing, (m,). Sample i is at angle[0] + 2 pi i / a_turn. The cubic spline errs
     on a sine with s samples a cycle by about 5 / s^4 of its amplitude, near the ends by up to ten
-    times as much. Orders above a_turn / 2 are folded down. Raises SignalError for samples that do
+    times as much. Orders above a_turn / 2 are folded down. Raises RecordError for samples that do
     not reach over a revolution.
     """
     step = 2.0 * math.pi / a_turn
     count = math.floor((angle[-1] - angle[0]) / step + SAME_ANGLE) + 1  # that samples surround
     if count < a_turn:
         reach = f"the samples reach over {math.degrees(angle[-1] - angle[0]):.6g} degrees"
-        raise SignalError(f"{reach}: pass at least one revolution, {360 - 360 / a_turn:.6g}")
+        raise RecordError(f"{reach}: pass at least one revolution, {360 - 360 / a_turn:.6g}")
     points = np.arange(count - count % a_turn)
     return CubicSpline(angle, check_signal(values))(angle[0] + 2.0 * math.pi * (points / a_turn))
 
@@ -85,13 +84,13 @@ def high_pass_orders(values: np.ndarray, a_turn: int, order: float) -> np.ndarra
     """Return the signal without the orders up to and with this one, (m,).
 
     values: (m,) at a_turn equal crank angles a revolution, whole revolutions. The lines of the
-    spectrum are removed, exactly and without a shift of phase. Raises SignalError where the order
+    spectrum are removed, exactly and without a shift of phase. Raises RecordError where the order
     is negative or not below a_turn / 2, where nothing would be left.
     """
     found = check_signal(values)
     if not 0.0 <= order < a_turn / 2:
         limits = f"order {order} is not from 0 to below {a_turn / 2:g}, half the samples a turn"
-        raise SignalError(f"{limits}: choose a lower order, or sample more finely")
+        raise RecordError(f"{limits}: choose a lower order, or sample more finely")
     lines = rfft(found)
     lines[: math.floor(order * (found.size / a_turn) * (1.0 + 1e-12)) + 1] = 0.0
     return irfft(lines, found.size)
@@ -118,36 +117,28 @@ def envelope_spectrum(
     Hz, or orders if a speed in revolutions a second is given; with a rate of samples a revolution,
     band and frequencies are in orders anyway. Amplitudes are peak values; the line at zero is the
     mean envelope. A carrier A (1 + d cos(2 pi f t)) has lines A at 0 and A d at f. Raises
-    SignalError where no line of the signal lies in the band.
+    RecordError where no line of the signal lies in the band.
     """
     (low, high), apart = band, rate / len(values)
     if math.floor(min(high, rate / 2) / apart) < math.ceil(low / apart):
         text = f"no line lies between {low} and {high}, which are {apart:g} apart"
         remedy = f"choose a wider band below {rate / 2:g}, half the rate, or pass a longer signal"
-        raise SignalError(f"{text}: {remedy}")
+        raise RecordError(f"{text}: {remedy}")
     envelope = np.abs(hilbert(band_signal(values, rate, low, high)))
     amplitudes = line_amplitudes(envelope, envelope.size, rms=False)
     return np.arange(amplitudes.size) * (rate / envelope.size / speed), amplitudes
 
 
-class Kurtogram(NamedTuple):
-    """Spectral kurtosis of n bands, widest first, (n,) each.
-
-    `frequency`: centres, `bandwidth`: widths, in the unit of the rate; `kurtosis`: 0 of stationary
-    Gaussian noise, -1 of a sine, positive of impulses, nan of a band 200 dB below the signal.
-    """
-
-    frequency: np.ndarray
-    bandwidth: np.ndarray
-    kurtosis: np.ndarray
-
-
-def kurtogram(values: np.ndarray, rate: float, levels: int) -> Kurtogram:
+def kurtogram(values: np.ndarray, rate: float, levels: int) -> tuple[np.ndarray, ...]:
     """Return the spectral kurtosis over the bands of a 1/3-binary tree.
 
-    values: (m,) at a rate of samples a second, or a revolution. The range from 0 to rate / 2 is
-    divided by 1, 2, 3, 4, 6, 8, 12, ... 2^levels, as by Antoni's fast kurtogram (Mechanical Systems
-    and Signal Processing 21, 2007). The kurtosis is <|c|^4> / <|c|^2>^2 - 2 of the complex envelope
+    Centres and widths, in the unit of the rate, and kurtosis of n bands, widest first, (n,) each:
+    0 of stationary Gaussian noise, -1 of a sine, positive of impulses, nan of a band 200 dB below
+    the signal. values: (m,) at a rate of samples a second, or a revolution.
+
+    The range from 0 to rate / 2 is divided by 1, 2, 3, 4, 6, 8, 12, ... 2^levels, as by Antoni's
+    fast kurtogram (Mechanical Systems and Signal Processing 21, 2007). The kurtosis is
+    <|c|^4> / <|c|^2>^2 - 2 of the complex envelope
     c of a band. Each envelope comes from its lines in the spectrum, with a gain that falls off as a
     cosine over a quarter of the width beyond and within each edge; neighbours share the power. The
     mean is taken off first. Of noise alone it scatters by 1.7 over the root of a band's lines, and
@@ -155,21 +146,21 @@ def kurtogram(values: np.ndarray, rate: float, levels: int) -> Kurtogram:
 
     Large slow motion reaches into the lowest bands alone, but a jump from the end to the start
     of a signal that is not periodic is an impulse; the samples about it are left out. Raises
-    SignalError if the narrowest band has less than `MIN_BAND` lines, or the signal is constant.
+    RecordError if the narrowest band has less than `MIN_BAND` lines, or the signal is constant.
     """
     found = check_signal(values)
     half = found.size // 2
     if half < MIN_BAND * 2**levels:
         need = f"{levels} levels need {2 * MIN_BAND * 2**levels} samples, and there are"
-        raise SignalError(f"{need} {found.size}: choose fewer levels, or pass a longer signal")
+        raise RecordError(f"{need} {found.size}: choose fewer levels, or pass a longer signal")
     if np.ptp(found) == 0.0:
-        raise SignalError("the signal is constant, so that it has no kurtosis: pass another one")
+        raise RecordError("the signal is constant, so that it has no kurtosis: pass another one")
     lines = rfft(found - found.mean())[: half + 1]
     parts = sorted({2**n for n in range(levels + 1)} | {3 * 2**n for n in range(levels - 1)})
     kurtosis = np.concatenate([_kurtosis_of_parts(lines, n) for n in parts])
     width = np.repeat(rate / 2 / np.array(parts), parts)
     centre = (np.concatenate([np.arange(n) for n in parts]) + 0.5) * width
-    return Kurtogram(centre, width, kurtosis)
+    return centre, width, kurtosis
 
 
 def _kurtosis_of_parts(lines: np.ndarray, parts: int) -> np.ndarray:
@@ -188,34 +179,25 @@ def _kurtosis_of_parts(lines: np.ndarray, parts: int) -> np.ndarray:
     return np.where(silent, np.nan, fourth / np.where(silent, 1.0, mean**2) - 2.0)
 
 
-class Shape(NamedTuple):
-    """How large a vibration is, in its unit, and how impulsive; nan where that is not defined.
+def shape(values: np.ndarray) -> tuple[float, float, float, float]:
+    """Return how large samples, (m,), are and how impulsive: rms, crest factor, kurtosis and gini.
 
-    `rms`: root mean square, the measure of severity of ISO 20816-1 and -8 for the vibration of
-    housings, of what a band-pass filter has left. `crest_factor`: greatest magnitude over it,
-    sqrt(2) of a sine. `kurtosis`: Pearson's, of the fourth moment about the mean, without
-    correction of bias: 3 of Gaussian noise, 1.5 of a sine. `gini`: index of the magnitudes, 0 of a
-    constant and 1 - 1/m of a single value (Hurley and Rickard, IEEE Transactions on Information
-    Theory 55, 2009, Eq. 1).
+    rms: root mean square, the measure of severity of ISO 20816-1 and -8 for the vibration of
+    housings, of what a band-pass filter has left. Crest factor: greatest magnitude over it, sqrt(2)
+    of a sine. Kurtosis: Pearson's, of the fourth moment about the mean, without correction of bias:
+    3 of Gaussian noise, 1.5 of a sine. Gini: index of the magnitudes, 0 of a constant and 1 - 1/m
+    of a single value (Hurley and Rickard, IEEE Transactions on Information Theory 55, 2009, Eq. 1).
+    nan where one is not defined.
     """
-
-    rms: float
-    crest_factor: float
-    kurtosis: float
-    gini: float
-
-
-def shape(values: np.ndarray) -> Shape:
-    """Return the `Shape` of samples, (m,)."""
     found = check_signal(values)
     root = math.sqrt(float(np.mean(found**2)))
     if not root:
-        return Shape(0.0, math.nan, math.nan, math.nan)
+        return 0.0, math.nan, math.nan, math.nan
     kurtosis = float(stats.kurtosis(found, fisher=False)) if np.ptp(found) else math.nan
     ordered = np.sort(np.abs(found))
     beyond = (np.arange(found.size)[::-1] + 0.5) / found.size
     gini = float(1.0 - 2.0 * np.sum(ordered * beyond) / np.sum(ordered))
-    return Shape(root, float(ordered[-1]) / root, kurtosis, gini)
+    return root, float(ordered[-1]) / root, kurtosis, gini
 
 
 def energy_angle(values: np.ndarray, share: float = 0.9) -> float:

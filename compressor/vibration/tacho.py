@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import numpy as np
 from scipy.interpolate import make_interp_spline, make_smoothing_spline
 
-from compressor.vibration.accelerometer import RecordError
+from compressor.vibration.spectra import RecordError
 
 MIN_REVOLUTIONS = 2  # whole revolutions of a record
 MIN_SMOOTHED = 5  # pulses of a smoothing spline

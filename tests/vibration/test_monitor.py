@@ -62,7 +62,7 @@ def test_a_band_holds_its_lines_alone():
         (60, 100, 0),
         (0, 49, 9),
     ):
-        found = shape(band_signal(values + 100.0 * (low > 0), 4000.0, low, high)).rms
+        found = shape(band_signal(values + 100.0 * (low > 0), 4000.0, low, high))[0]
         assert found == pytest.approx(math.sqrt(square / 2), abs=1e-9)
 
 

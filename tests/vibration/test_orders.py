@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from compressor.vibration.spectra import (
-    SignalError,
+    RecordError,
     line_amplitudes,
     resample_angle,
 )
@@ -81,5 +81,5 @@ def test_squares_of_the_spectrum_add_up_to_the_mean_square():
     ],
 )
 def test_bad_input_is_told_with_a_remedy(call, told):
-    with pytest.raises(SignalError, match=told):
+    with pytest.raises(RecordError, match=told):
         call()
