@@ -158,7 +158,7 @@ def integrate(request: Request) -> Trajectory:
 def march_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
     """Integrate by the compiled loop into `result`, from motion and flows z on. Raises Stop."""
     deadline, size = time.monotonic() + request.timeout, natural_sizes(request.fields)
-    stepper, work = prepare_stepper(request, size), new_work(size.size)
+    stepper, work = prepare_stepper(request), new_work(size.size)
     edges, phases, stepper["settle"] = with_edge(edges, phases, request.settle)
     edges, phases, ends = with_cuts(edges, phases, request.cuts)
     phases = phases.copy()  # a march writes into them where a gas is shut in
@@ -186,11 +186,11 @@ def march_through(request: Request, result: Trajectory, edges, phases, z: np.nda
             raise
 
 
-def prepare_stepper(request: Request, size: np.ndarray) -> np.record:
-    """Return a stepper at the start of a run by a compiled method; `size` as of `natural_sizes`."""
+def prepare_stepper(request: Request) -> np.record:
+    """Return a stepper at the start of a run by a compiled method."""
     stepper = new_stepper(COMPILED[request.method])
     stepper["rtol"] = request.rtol
-    length, speed = contact_sizes(request.fields, size)
+    length, speed = contact_sizes(request.fields)
     stepper["watch"], stepper["contact_step"] = 1, CONTACT_STEP * length / speed
     stepper["deepest"] = greatest_depth(request.fields)[0]
     return stepper

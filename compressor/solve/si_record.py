@@ -246,16 +246,28 @@ MODES = {  # of the rod: stiffness over E I / L^3 or E A / L, share of its mass 
 UNCONTROLLED = 1e12
 
 
-def mechanism_sizes(p: Fields, joints: tuple[float, float], bristle: float) -> np.ndarray:
-    """Return the size of each number of a mechanism's state, (n,).
+def natural_sizes(p: Fields) -> np.ndarray:
+    """Return the size of each number of the state, (n,): coordinates, then their rates.
 
-    Deflections are those under the forces at hand. joints: length (m) and speed (m/s) of the
-    journals in their bores; bristle: of bristles (m).
+    In SI; then those of what contacts carry: speeds, bristles as they slide. Deflections are those
+    under the forces at hand.
     """
-    sizes = np.ones(len(state_names(p)))
-    n = int(p["freedoms"])
+    sizes, n = np.ones(len(state_names(p))), int(p["freedoms"])
+    length, speed = length_and_speed(p) if p["clearance"].any() else (1.0, 1.0)
+    sizes[:n], sizes[n : 2 * n] = length, speed
+    if p["carries"]:
+        stiffness, dynamic = float(p["bristle_stiffness"]), float(p["dynamic"])
+        bristle = dynamic / stiffness if stiffness and dynamic else length
+        sizes[2 * n : 2 * n + 4] = speed, speed, bristle, bristle
+    if is_featured(p):
+        _set_feature_sizes(p, sizes)
+    return sizes
+
+
+def _set_feature_sizes(p: Fields, sizes: np.ndarray) -> None:
+    """Set the sizes of what a mechanism frees beside its joints."""
+    n, sizes_of = int(p["freedoms"]), {}
     force = p["reciprocating_mass"] * p["crank_radius"] * p["omega"] ** 2 + static_load(p)
-    sizes_of = {Coordinate(one): joints for one in range(Coordinate.BIG_X, Coordinate.GUIDE)}
     if p["tilting"]:
         height = _guide_sizes(p, force)
         sizes_of[Coordinate.GUIDE] = height
@@ -270,10 +282,7 @@ def mechanism_sizes(p: Fields, joints: tuple[float, float], bristle: float) -> n
         sizes_of[mode] = size, size * math.sqrt(stiffness / (share * p["rod_mass"]))
     for coordinate, (size, rate) in sizes_of.items():
         place = p["at"][coordinate]
-        if place >= 0:
-            sizes[place], sizes[n + place] = size, rate
-    if p["carries"]:
-        sizes[2 * n : 2 * n + 4] = joints[1], joints[1], bristle, bristle
+        sizes[place], sizes[n + place] = size, rate
     if p["driven"]:
         place = p["at"][Coordinate.CRANK]
         moving = p["reciprocating_mass"] + p["rod_mass"]
@@ -284,7 +293,6 @@ def mechanism_sizes(p: Fields, joints: tuple[float, float], bristle: float) -> n
         sizes[place - 1] = sizes[place] / p["omega"]
     if p["elastic"]:
         sizes[p["rod_loss"]] = UNCONTROLLED
-    return sizes
 
 
 def _guide_sizes(p: Fields, force: float) -> tuple[float, float]:
@@ -337,35 +345,11 @@ def film_damping(p: Fields) -> float:
     return float(size * p["film_stiffest"][joint] / clearance)
 
 
-def natural_sizes(p: Fields) -> np.ndarray:
-    """Return the size of each number of the state: eccentricities, then their rates.
-
-    (2 n,), in m and m/s; then those of what contacts carry: speeds, bristles as they slide.
-    """
-    if is_featured(p):
-        joints = length_and_speed(p) if p["clearance"].any() else (1.0, 1.0)
-        return mechanism_sizes(p, joints, bristle_size(p, joints[0]))
-    length, speed = length_and_speed(p)
-    n = int(p["freedoms"])
-    sizes = [length] * n + [speed] * n
-    if len(state_names(p)) > len(sizes):
-        sizes += [speed] * 2 + [bristle_size(p, length)] * 2
-    return np.array(sizes)
-
-
-def bristle_size(p: Fields, length: float) -> float:
-    """Return the deflection (m) of bristles that slide; a length where there are none."""
-    stiffness = float(p["bristle_stiffness"])
-    return float(p["dynamic"]) / stiffness if stiffness and p["dynamic"] else length
-
-
-def contact_sizes(p: Fields, sizes: np.ndarray) -> tuple[float, float]:
+def contact_sizes(p: Fields) -> tuple[float, float]:
     """Return the length (m) and speed (m/s) of the journals in their bores.
 
-    sizes: by `natural_sizes`. Of a mechanism with ideal joints no step need be as short as theirs.
+    Of a mechanism with ideal joints no step need be as short as theirs.
     """
-    if not is_featured(p):
-        return sizes[0], sizes[sizes.size // 2]
     return length_and_speed(p) if p["clearance"].any() else (math.inf, 1.0)
 
 

@@ -162,31 +162,23 @@ def observe(case: Case) -> tuple[Outcome, DatasetParts]:
 def with_series(case: Case, solution: Solution) -> tuple[Outcome, DatasetParts]:
     """Return the `Outcome` of a solution and what its Dataset is made of.
 
-    Time series are part of it with `output.keep: series`.
+    Metrics of body and sensor are part of both, time series with `output.keep: series`.
     """
-    if case.output.keep == "metrics":
-        result = whole_outcome(case, solution)
+    result, keeps_series = outcome(case, solution), case.output.keep == "series"
+    variables: Variables = {}
+    if not (keeps_series or case.body):
         return result, result.table({})
-    result = outcome(case, solution)
-    variables, numbers = series(case, solution)
-    for name, value in numbers.items():
-        result.numbers[name] = value
-    return result, result.table(variables)
+    rows = rows_of(solution.p, solution.trajectory)
+    if case.body:
+        variables, numbers = foundation(case, solution, rows)
+        for name, value in numbers.items():
+            result.numbers[name] = value
+    return result, result.table(series(case, solution, rows) | variables if keeps_series else {})
 
 
 def measure(case: Case) -> Outcome:
-    """Simulate one case; return its `Outcome` alone: what `simulate` gives less the time series."""
-    return refused_outcome(case) or whole_outcome(case, solve(case))
-
-
-def whole_outcome(case: Case, solution: Solution) -> Outcome:
-    """Return the `outcome` of a solution with the metrics of the case's body and sensor."""
-    result = outcome(case, solution)
-    if case.body:
-        rows = rows_of(solution.p, solution.trajectory)
-        for name, value in foundation(case, solution, rows)[1].items():
-            result.numbers[name] = value
-    return result
+    """Simulate one case; return its `Outcome` alone."""
+    return observe(case)[0]
 
 
 def refused_outcome(case: Case) -> Outcome | None:
@@ -195,13 +187,12 @@ def refused_outcome(case: Case) -> Outcome | None:
     return without_run(case.attributes(), Reason.INVALID_INPUT, detail) if detail else None
 
 
-def series(case: Case, solution: Solution) -> tuple[Variables, Metrics]:
-    """Return the time series as xarray variables, with the signals, body and sensor of the case.
+def series(case: Case, solution: Solution, fine_rows: np.ndarray) -> Variables:
+    """Return the time series as xarray variables, with the signals and features of the case.
 
-    And the metrics of body and sensor, by name.
+    fine_rows: observed at all times of the run, (m, WIDE).
     """
     p, stride = solution.p, finer(case)
-    fine_rows = rows_of(p, solution.trajectory)
     rows, times = fine_rows[::stride], solution.trajectory.times[::stride]
     states = solution.trajectory.states[::stride]
     angle_attrs = {"units": "rad", "long_name": "crank angle from top dead centre"}
@@ -220,10 +211,7 @@ def series(case: Case, solution: Solution) -> tuple[Variables, Metrics]:
     if is_featured(p):
         for name, (values, unit, phrase) in features(p, states, rows).items():
             variables[name] = (("time",), values, {"units": unit, "long_name": phrase})
-    if not case.body:
-        return variables, {}
-    of_body, numbers = foundation(case, solution, fine_rows)
-    return variables | of_body, numbers
+    return variables
 
 
 def outcome(case: Case, solution: Solution) -> Outcome:

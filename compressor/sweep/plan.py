@@ -264,13 +264,9 @@ def measure_cost(case: Case) -> Cost:
 def run_timed(case: Case) -> tuple[float, int, bool]:
     """Return the seconds that a job took, its file's bytes, and whether chaos was looked for."""
     began = time.process_time()
-    from compressor.solve import measure, observe  # needs numba: only to simulate
+    from compressor.solve import observe  # needs numba: only to simulate
 
-    size = 0
-    if case.output.keep == "metrics":
-        found = measure(case)
-    else:
-        found, table = observe(case)
-        size = len(series_file(table, case.output)[1])
+    found, table = observe(case)
+    size = len(series_file(table, case.output)[1]) if case.output.keep == "series" else 0
     seconds = time.process_time() - began
     return seconds, size, not math.isnan(float(found.numbers["predictability_horizon"]))

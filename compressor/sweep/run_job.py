@@ -24,13 +24,11 @@ def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
     Without a place, what is to be stored comes back.
     A StoreError is returned, since it ends the sweep: an exception is a failure of the job alone.
     """
-    from compressor.solve import measure, observe  # needs numba: only to simulate
+    from compressor.solve import observe  # needs numba: only to simulate
 
     with ignore_warnings():  # a solver's remarks; what matters is in the result
-        if case.output.keep == "metrics":
-            return measure(case)
         found, dataset = observe(case)
-    if found.reason == Reason.INVALID_INPUT:
+    if case.output.keep == "metrics" or found.reason == Reason.INVALID_INPUT:
         return found
     if place is None:
         file, data = series_file(dataset, case.output)
