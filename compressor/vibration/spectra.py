@@ -138,11 +138,11 @@ def kurtogram(values: np.ndarray, rate: float, levels: int) -> tuple[np.ndarray,
 
     The range from 0 to rate / 2 is divided by 1, 2, 3, 4, 6, 8, 12, ... 2^levels, as by Antoni's
     fast kurtogram (Mechanical Systems and Signal Processing 21, 2007). The kurtosis is
-    <|c|^4> / <|c|^2>^2 - 2 of the complex envelope
-    c of a band. Each envelope comes from its lines in the spectrum, with a gain that falls off as a
-    cosine over a quarter of the width beyond and within each edge; neighbours share the power. The
-    mean is taken off first. Of noise alone it scatters by 1.7 over the root of a band's lines, and
-    is at most 2.5 to 4.5 times that over 220 bands, of 6 levels, in 80 % of records.
+    <|c|^4> / <|c|^2>^2 - 2 of the complex envelope c of a band. Each envelope comes from its lines
+    in the spectrum, with a gain that falls off as a cosine over a quarter of the width beyond and
+    within each edge; neighbours share the power. The mean is taken off first. Of noise alone it
+    scatters by 1.7 over the root of a band's lines, and is at most 2.5 to 4.5 times that over 220
+    bands, of 6 levels, in 80 % of records.
 
     Large slow motion reaches into the lowest bands alone, but a jump from the end to the start
     of a signal that is not periodic is an impulse; the samples about it are left out. Raises
