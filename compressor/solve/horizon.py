@@ -3,8 +3,9 @@
 Beyond it two correct solutions differ by more than any error bar, so that a number that depends on
 the course of the motion has none; statistics still have a meaning. Two runs are compared, one with
 its journals shifted, each with steps of its own, at a tolerance of their own: their errors must be
-small beside the shift that is followed. At 1e-12 a horizon is that at 1e-13 to a hundredth
-(tests/solve/test_horizon.py).
+small beside the shift that is followed. At 3e-13 the horizons of 14 of 16 clearances of the
+machine of tests/solve/test_horizon.py were those at 1e-13 to a hundredth, two others' to a tenth;
+at 1e-12 only seven were.
 """
 
 import math
@@ -23,7 +24,7 @@ from compressor.solve.si_record import initial_state, is_ideal, record
 
 SHIFT = 1e-9  # of the clearance: how far from the motion the other one starts
 PARTED_DISTANCE = 1e-2  # of the clearance: how far apart they are no longer one motion
-HORIZON_RTOL = 1e-12  # of both runs, whatever the case has
+HORIZON_RTOL = 3e-13  # of both runs, whatever the case has
 LOOKS_PER_REV = 720  # at which the two are compared
 FIRST_SPAN_REV, SPAN_GROWTH = 0.5, 4.0  # most chaotic motions part early: short runs come first
 
