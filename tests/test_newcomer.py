@@ -223,32 +223,33 @@ def test_the_page_on_figures_is_right(tmp_path, paper_store):
     assert (tmp_path / "out/figure-17.png").stat().st_size > 10_000
 
 
+def add_verb(place, name, module, line):
+    """Add a verb to a copy of the program, by its module and its line in the table of verbs."""
+    (place / f"cmd/compsim/{name}.py").write_text(module, encoding="utf-8")
+    changed(
+        place, "cmd/compsim/cli.py",
+        (f"    {name},\n", "    show,\n    status,\n", False),
+        (indented(line), "    ),\n    \"Work with measured records\"", False),
+    )  # fmt: skip
+
+
 def test_the_page_on_verbs_is_right(tmp_path):
     copy_of_the_program(tmp_path)
-    module, line = blocks("## How to add a verb", "## How to add a study")
-    (tmp_path / "cmd/compsim/size.py").write_text(module, encoding="utf-8")
-    changed(
-        tmp_path, "cmd/compsim/cli.py",
-        ("    size,\n", "    show,\n    status,\n", False),
-        (indented(line), "    show.show,\n", True),
-    )  # fmt: skip
+    add_verb(tmp_path, "size", *blocks("## How to add a verb", "## How to add a study"))
     (tmp_path / "some").mkdir()
     (tmp_path / "some/file").write_text("four", encoding="utf-8")
-    assert run_in(tmp_path, "-m", "compsim", "size", "some", cwd=tmp_path) == "4\n"
+    assert run_in(tmp_path, "-m", "compsim", "size", "-r", "some", cwd=tmp_path) == "4\n"
     assert "Print how many bytes" in run_in(tmp_path, "-m", "compsim", "--help", cwd=tmp_path)
 
 
 def test_the_page_on_studies_is_right(tmp_path, paper_store):
     copy_of_the_program(tmp_path)
-    purpose, module, line = blocks("## How to add a study", "## How to add a public name")
+    purpose, module, verb = blocks("## How to add a study", "## How to add a public name")
     folder = tmp_path / "compressor/studies/count"
     folder.mkdir()
     (folder / "__init__.py").write_text(purpose, encoding="utf-8")
-    (folder / "command.py").write_text(module, encoding="utf-8")
-    changed(
-        tmp_path, "compressor/studies/__init__.py",
-        (indented(line), "STUDIES = (\n", True),
-    )  # fmt: skip
+    (folder / "count.py").write_text(module, encoding="utf-8")
+    add_verb(tmp_path, "count", verb, "count.count,\n")
     (tmp_path / "results").symlink_to(paper_store)
     assert run_in(tmp_path, "-m", "compsim", "count", "big-end", cwd=tmp_path) == "3\n"
     assert "Print how many jobs" in run_in(tmp_path, "-m", "compsim", "--help", cwd=tmp_path)

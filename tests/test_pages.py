@@ -67,7 +67,10 @@ def test_generated_tables_are_current(page, name):
 
 SOURCES = [*ROOT.glob("compressor/**/*.py"), *ROOT.glob("cmd/**/*.py")]
 PLACES = ("", "compressor", "cmd", "tests")  # that paths on pages begin at
-EXAMPLES = ("cmd/compsim/size.py", "studies/count/", "results/", "compressor.studies.count")
+EXAMPLES = (
+    "cmd/compsim/size.py", "cmd/compsim/count.py", "studies/count/", "results/",
+    "compressor.studies.count",
+)  # fmt: skip
 
 
 def module_of(name):

@@ -69,11 +69,11 @@ def test_commands_that_run_nothing_work(elsewhere, paper_store, tmp_path):
         commands(
             ("init", "wear", "-o", "mine.yaml"),
             ("plan", "two.yaml"),
-            ("status", results),
-            ("show", "big-end", "clearance_mm=0.2", "-i", results),
-            ("export", "big-end", "-i", results, "-o", "x.csv"),
-            ("plot", "big-end", "clearance_mm=0.2", "--what", "orbits", "-i", results),
-            ("report", "part", "-o", "page"),
+            ("status", "-r", results),
+            ("show", "big-end", "clearance_mm=0.2", "-r", results),
+            ("export", "big-end", "-r", results, "-o", "x.csv"),
+            ("plot", "big-end", "clearance_mm=0.2", "--what", "orbits", "-r", results),
+            ("report", "-r", "part", "-o", "page"),
         )
     )
     assert (tmp_path / "mine.yaml").exists()

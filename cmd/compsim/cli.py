@@ -4,13 +4,13 @@ Nothing heavy is imported at the top: `compsim --help` answers at once.
 """
 
 import contextlib
+import itertools
 import os
 import platform
 import shlex
 import signal
 import sys
 import tempfile
-import threading
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
@@ -19,10 +19,15 @@ from typing import Any
 import click
 
 from compressor.program import PROGRAM, CompsimError, CompsimWarning, library_versions
-from compressor.studies import verbs_by_heading
 from compsim import (
-    completion,
+    alarms,
+    calibrate,
+    claims,
+    compare,
+    diagnosis,
+    explain,
     export,
+    find,
     init,
     plan,
     plot,
@@ -31,10 +36,12 @@ from compsim import (
     schema,
     show,
     status,
+    stress,
+    tradeoff,
     verify,
+    wear,
 )
-from compsim.screen import DONE, INTERNAL, STORE, discard_output, open_streams, say, say_wrapped
-from compsim.usage import Commands, one_line
+from compsim.screen import DONE, INTERNAL, STORE, discard_output, say, say_wrapped
 
 # of paths, that a program makes; any other error of a path is the file system's
 MISTAKES = (FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError)
@@ -44,8 +51,8 @@ if hasattr(signal, "SIGHUP"):  # not on Windows
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "xarray")
 NO_ROOM = ("failed to map segment", "Cannot allocate memory")  # as a library that is loaded says
 UNREAD = 141  # exit code, as of a program that SIGPIPE ends, which Windows does not have
+WHOLE = 1000  # characters, from which click would cut a summary
 COMPLETING = "_COMPSIM_COMPLETE"  # set by a shell that completes a word: click prints and exits
-SECONDS_TO_RESEND = 0.02  # s until a dropped signal is sent again
 
 
 class Interrupted(BaseException):
@@ -67,75 +74,62 @@ def version(context: click.Context, _: click.Parameter, is_set: bool) -> None:
         context.exit()
 
 
+class Commands(click.Group):
+    """The commands, listed by headings, each with the whole first sentence of its help."""
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands by headings."""
+        longest = max(map(len, self.commands))
+        for heading, verbs in VERBS.items():
+            with formatter.section(heading):
+                formatter.write_dl([
+                    (f"{verb.name:<{longest}}", verb.get_short_help_str(WHOLE)) for verb in verbs
+                ])  # fmt: skip
+
+
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=version,
               help="Print the versions of program, model and libraries.")  # fmt: skip
 def cli() -> None:
     """Sweep a reciprocating compressor over joint clearances, and draw what comes out.
 
-    To begin: compsim init. To let your shell complete names: compsim completion.
+    To begin: compsim init.
 
     Exit codes: 0 done, 1 internal error, 2 usage or case file, 3 some jobs failed, 5 store,
     130/143/129 interrupted, 141 where nobody reads the output.
     """
 
 
-VERBS = {  # by their headings in `compsim --help`; studies bring their own
-    "Work": (
-        init.init,
-        plan.plan,
-        run.run,
-        report.report,
+VERBS = {  # by their headings in `compsim --help`
+    "Work": (init.init, plan.plan, run.run, report.report),
+    "Read what is stored": (status.status, show.show, plot.plot, export.export, verify.verify),
+    "Study a machine or the model": (
+        claims.claims, wear.wear, tradeoff.tradeoff, explain.explain, stress.stress, find.find,
+        alarms.alarms,
     ),
-    "Read what is stored": (
-        status.status,
-        show.show,
-        plot.plot,
-        export.export,
-        verify.verify,
+    "Work with measured records": (
+        diagnosis.dataset, diagnosis.identify, compare.compare, calibrate.calibrate,
     ),
-    **verbs_by_heading(),
-    "Shell and editor": (
-        completion.completion,
-        schema.schema,
-    ),
-}
-for heading, verbs in VERBS.items():
-    cli.add_under(heading, verbs)
+    "Editor": (schema.schema,),
+}  # fmt: skip
+for verb in itertools.chain(*VERBS.values()):
+    cli.add_command(verb)
 
 
 @contextlib.contextmanager
 def interruptible() -> Iterator[None]:
-    """Turn the signals that ask a program to end into Interrupted; a second one ends it at once.
-
-    A signal that comes while a destructor runs, where Python drops every exception, comes again.
-    """
+    """Turn the signals that ask a program to end into Interrupted; a second one ends it at once."""
 
     def interrupt(number: int, frame: Any) -> None:
         for other in caught:
             signal.signal(other, signal.SIG_DFL)
         raise Interrupted(number)
 
-    def dropped(what: Any) -> None:
-        if not isinstance(what.exc_value, Interrupted):
-            hook(what)
-            return
-        number = what.exc_value.number
-        for other in caught:
-            signal.signal(other, interrupt)
-        again = threading.Timer(
-            SECONDS_TO_RESEND, signal.pthread_kill, (threading.get_ident(), number)
-        )
-        again.daemon = True
-        again.start()
-
     caught = [number for number in SIGNALS if signal.getsignal(number) != signal.SIG_IGN]
     old = {number: signal.signal(number, interrupt) for number in caught}
-    hook, sys.unraisablehook = sys.unraisablehook, dropped
     try:
         yield
     finally:
-        sys.unraisablehook = hook
         for number, handler in old.items():
             signal.signal(number, handler)
 
@@ -159,7 +153,6 @@ def report_warnings() -> Iterator[None]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code."""
-    open_streams()
     arguments = list(sys.argv[1:] if argv is None else argv)
     command = shlex.join(["compsim", *arguments])
     try:
@@ -169,10 +162,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         say(f"interrupted by {signal_sent}")
         return 128 + signal_sent.number
     except click.ClickException as error:
-        if type(error).__name__ == "NoArgsIsHelpError":  # of click 8.2 and later
-            error.show()
-        else:
-            say(one_line(error, arguments))
+        error.show()
         return error.exit_code
     except (SystemExit, BrokenPipeError):
         if COMPLETING in os.environ:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from compsim.options import FILE, quiet_option, results_option, units_option
 from compsim.progress import ProgressReporter
-from compsim.results import jobs, of_results, results_folder
-from compsim.screen import DONE, STORE, plural, print_text, say, size, units_option
+from compsim.screen import DONE, STORE, plural, print_text, say, size
 
 if TYPE_CHECKING:
     from compressor.store import Exported
@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@of_results("[STUDY|JOB]...", jobs)
-@click.option("-o", "--output", required=True, metavar="FILE|FOLDER",
+@click.argument("names", nargs=-1, metavar="[STUDY|JOB]...")
+@results_option
+@click.option("-o", "--output", required=True, metavar="FILE|FOLDER", type=FILE,
               help="Write this file: .nc or .csv, or .wav, .mat or .uff for a record; or into a "
               "folder.")  # fmt: skip
 @click.option("--format", "form", type=click.Choice(["netcdf", "csv", "wav", "mat", "uff"]),
@@ -28,10 +29,10 @@ if TYPE_CHECKING:
 @click.option("--force", is_flag=True, help="Replace files that exist.")
 @units_option("SI")
 @click.option("--json", "as_json", is_flag=True, help="Print the list of the files as JSON.")
-@click.option("--quiet", is_flag=True, help="Print no progress; damage is still reported.")
+@quiet_option
 def export(
-    given: tuple[str, ...],
-    folder: str | None,
+    names: tuple[str, ...],
+    folder: str,
     output: str,
     form: str | None,
     series: bool,
@@ -53,7 +54,6 @@ def export(
     go into one FILE together, or into a FOLDER with a file each: a name without suffix, or with a
     slash at its end. --units is of CSV alone: other files are in SI, as are records.
     """
-    folder, names = results_folder(given, folder)
     from compressor.store import ExportOptions, writable_folder
     from compressor.store import export as write
 

@@ -5,24 +5,15 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import click
-from click.shell_completion import CompletionItem
 
 from compressor.program import did_you_mean
-from compsim.results import Items, files
+from compsim.options import FILE
 from compsim.screen import DONE, print_text, say, wrap_line
-from compsim.usage import CASE_FILES
-
-
-def names(_: click.Context, __: click.Parameter, word: str) -> Items:
-    """Return the templates, for a shell."""
-    from compressor.cases import templates
-
-    return [CompletionItem(name) for name in templates() if name.startswith(word)]
 
 
 @click.command()
-@click.argument("template", required=False, shell_complete=names)
-@click.option("-o", "--output", metavar="FILE", shell_complete=files,
+@click.argument("template", required=False)
+@click.option("-o", "--output", metavar="FILE", type=FILE,
               help="Write this file, or into this folder; TEMPLATE.yaml by default.")  # fmt: skip
 def init(template: str | None, output: str | None) -> int:
     """Write a commented case file to start from.
@@ -55,8 +46,6 @@ def init(template: str | None, output: str | None) -> int:
 
 def unknown(template: str, known: Iterable[str]) -> str:
     """Return the error of a template that there is not."""
-    if template.endswith(CASE_FILES):
-        return f"a template comes first: compsim init wear -o {template}"
     near = did_you_mean(template, known) or f"there are {', '.join(known)}"
     return f"there is no template {template!r}; {near}"
 

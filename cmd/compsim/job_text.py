@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from compressor import metrics
-from compressor.digits import ROUNDING, UNKNOWN, by_bar, is_known
+from compressor.digits import ROUNDING, UNKNOWN, by_bar
 from compressor.units import Units, unit_in
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def sections(
     """
     yield "", align_lines(stop(found))
     known = numbers(found, units, "tally", "statistics", "body")
-    lines = align_lines([*known, *reversal_verdict(found, *limits), *healthy_motion(found, units)])
+    lines = align_lines([*known, *reversal_verdict(found, *limits)])
     notes = [*film(found), *cautions(found), *found.caveats]
     yield "metrics, with their error bars", [*lines, *notes]
     yield "its machine at a steady speed, with ideal joints", align_lines(machine(found, units))
@@ -56,7 +56,7 @@ def align_lines(lines: list[Line]) -> list[str]:
 
 
 def stop(found: "JobReport") -> list[Line]:
-    """Return where a job's run stopped, and its last steps, a line each; [] for one that ended."""
+    """Return where a job's run stopped, and its state there; [] for one that ended."""
     attributes = found.attributes
     if "stop_history_words" not in attributes:
         return []
@@ -66,14 +66,6 @@ def stop(found: "JobReport") -> list[Line]:
     names = attributes["stop_state_names"].split("; ")
     for name, value in zip(names, attributes["stop_state"], strict=False):
         lines.append((name, f"{value:.6g}"))
-    steps = zip(
-        *(attributes[f"stop_history_{name}"] for name in ("time", "step", "error")),
-        attributes["stop_history_words"].split("; "),
-        strict=False,
-    )
-    for time, step, error, words in steps:
-        known = "" if math.isnan(error) else f", error {error:.3g} of the tolerance"
-        lines.append(("step", f"{time:.12g} s + {step:.4g} s, {words}{known}"))
     return lines
 
 
@@ -207,42 +199,6 @@ def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list
     kind = "API 618's" if (degrees, percent) == (15.0, 3.0) else "the maker's"
     verdict = f"reversal of {texts[0]} degrees and {texts[1]} %: {word} {kind} "
     return [("rod load", f"{verdict}{degrees:g} degrees and {percent:g} %")]
-
-
-TURN_SAMPLES = 3600  # of a revolution
-
-
-def healthy_motion(found: "JobReport", units: Units) -> list[Line]:
-    """Return the crosshead's acceleration without clearance, beside that of a job with clearance.
-
-    By the closed form of a rigid slider-crank at a steady speed; [] of other machines.
-    """
-    if found.status != "ok":
-        return []
-    case = found.case
-    if case.joint == "none" or case.drive or case.rod:
-        return []
-    import numpy as np
-
-    from compressor.physics import exact_motion
-
-    angles = np.linspace(0.0, 2.0 * np.pi, TURN_SAMPLES, endpoint=False)
-    crank, rod = case.machine.crank_radius_mm / 1e3, case.machine.rod_length_mm / 1e3
-    _, _, a = exact_motion(angles, crank, rod, case.omega)
-    unit, factor = unit_in("m/s²", units)
-    lines = []
-    for name, sound in (("peak", float(np.abs(a).max())), ("rms", float(np.sqrt(np.mean(a**2))))):
-        metric = f"{name}_acceleration"
-        bar = found.numbers.get(f"{metric}_error", math.nan) / sound
-        times = found.numbers[metric] / sound
-        is_exact = math.isnan(bar) or bar < 5e-4 * times
-        text = f"{times:.4g}" if is_exact else by_bar(times, bar, bare=True)
-        is_sure = math.isnan(bar) or is_known(times, bar)
-        beside = f"; this job has {text} times as much" if is_sure else ""
-        lines.append(
-            (f"{name} acceleration without clearance", f"{factor * sound:.4g} {unit}{beside}")
-        )
-    return lines
 
 
 def film(found: "JobReport") -> list[str]:

@@ -8,26 +8,28 @@ from typing import TYPE_CHECKING
 import click
 
 from compressor.program import duration
-from compressor.studies import by_kind
-from compsim.progress import ProgressReporter
-from compsim.screen import (
-    DONE,
-    as_json,
-    caution,
+from compsim.options import (
     configs_argument,
     jobs_option,
-    jsonable,
+    json_option,
     limit,
     only_option,
-    output_option,
+    results_option,
+    setting,
+)
+from compsim.progress import ProgressReporter
+from compsim.regimes import ahead, ahead_lines
+from compsim.screen import (
+    DONE,
+    caution,
+    jsonable,
     plural,
     print_text,
     report_changes,
     report_machines,
     say,
-    setting,
     size,
-)  # fmt: skip
+)
 
 if TYPE_CHECKING:
     from compressor.sweep import Forecast
@@ -37,17 +39,17 @@ BUSY = 0.8  # of the cores: below, a machine is busy with other things
 
 @click.command()
 @configs_argument
-@output_option
+@results_option
 @jobs_option("Estimate the time with this many worker processes.")
 @setting
 @only_option
 @limit
 @click.option("--first", type=click.IntRange(min=0), default=5, show_default=True,
               help="List this many of the missing jobs.")  # fmt: skip
-@as_json
+@json_option
 def plan(
     configs: tuple[str, ...],
-    output: str,
+    folder: str,
     jobs: int | None,
     overrides: tuple[str, ...],
     only: str,
@@ -73,23 +75,22 @@ def plan(
             *configs, overrides=overrides, max_jobs=max_jobs, only=only, progress=progress
         )
     caution(studies, None)
-    kinds = by_kind(studies)
-    studies = kinds.pop(None, [])
-    ahead = {kind: kind.module("command").ahead(its, output) for kind, its in kinds.items() if kind}
-    more = {kind.group: [one._asdict() for one in found] for kind, found in ahead.items()}
-    if as_json and not studies:
-        print_text(json.dumps(more, indent=1))
+    chains = ahead([study for study in studies if study.request], folder)
+    studies = [study for study in studies if not study.request]
+    more = {"regimes": [one._asdict() for one in chains]} if chains else {}
     if not as_json:
-        for kind, standings in ahead.items():
-            print_text("\n".join(kind.module("command").ahead_lines(standings)))
+        for line in ahead_lines(chains):
+            print_text(line)
     if not studies:
+        if as_json:
+            print_text(json.dumps(more, indent=1))
         return DONE
-    report_changes(studies, output)
+    report_changes(studies, folder)
     report_machines(studies)
     from compressor.analysis import describe_machine
     from compressor.sweep import forecast
 
-    found = forecast(studies, output, first)
+    found = forecast(studies, folder, first)
     workers = jobs or cores()
     if as_json:
         machines = {one.name: dataclasses.asdict(describe_machine(one)) for one in studies}

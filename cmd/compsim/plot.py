@@ -6,8 +6,8 @@ import click
 
 from compressor.program import did_you_mean
 from compressor.studies import STUDIES, find_drawn
-from compsim.results import ONE_JOB, folders, jobs, of_results, results_folder, some_words
-from compsim.screen import DONE, print_text, units_option
+from compsim.options import job_argument, output_option, results_option, units_option
+from compsim.screen import DONE, print_text
 
 if TYPE_CHECKING:
     from compressor.units import Units
@@ -33,14 +33,14 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 
 
 @click.command()
-@of_results(ONE_JOB, jobs)
+@job_argument
+@results_option
 @click.option(
     "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
     help="Draw only these figures: of a job analyst, loads, signals, cards, spectra, orbits, "
     f"modes, impacts; of a study cycles, segments, waterfall, map{MORE}.",
 )  # fmt: skip
-@click.option("-o", "--output", default="plots", show_default=True, shell_complete=folders,
-              help="Write the figures into this folder.")  # fmt: skip
+@output_option("plots", "Write the figures into this folder.")
 @click.option("--format", "form", type=click.Choice([*KINDS]), default="png", show_default=True,
               help="Write figures as PNG, as SVG, or as both.")  # fmt: skip
 @click.option(
@@ -58,9 +58,9 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 )  # fmt: skip
 @units_option("kN, mm, µm, m/s²")
 def plot(
-    given: tuple[str, ...],
+    words: tuple[str, ...],
     what: tuple[str, ...],
-    folder: str | None,
+    folder: str,
     output: str,
     form: str,
     over: str,
@@ -87,8 +87,7 @@ def plot(
     bifurcation diagram, Poincaré sections, and a map of periods over two parameters. Nothing but
     what is stored is needed.
     """
-    folder, words = results_folder(given, folder)
-    name, *values = some_words(words)
+    name, *values = words
     from compressor.store import writable_folder
 
     writable_folder(output, make=False)

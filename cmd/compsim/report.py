@@ -1,35 +1,22 @@
 """`compsim report`: the page, figures and tables of a folder of results."""
 
 import os
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from compressor.studies import STUDIES, page_additions
-from compsim.results import folders, of_results, results_folder, studies
-from compsim.screen import DONE, print_text, say, units_option
+from compressor.studies import page_additions
+from compsim.options import FOLDER, output_option, results_option, units_option
+from compsim.screen import DONE, print_text, say
 
 if TYPE_CHECKING:
     from compressor.units import Units
 
 
-def page_folders(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a command with an option for each study whose own folder adds to the page."""
-    for kind in STUDIES:
-        if kind.page_folder:
-            text = f"Add what `compsim {kind.name}` wrote into this folder, if it is there."
-            command = click.option(
-                f"--{kind.page_folder}", default=kind.page_folder, show_default=True,
-                shell_complete=folders, help=text,
-            )(command)  # fmt: skip
-    return command
-
-
 @click.command()
-@of_results("[STUDY]...", studies)
-@click.option("-o", "--output", default="report", show_default=True, shell_complete=folders,
-              help="Write the report into this folder.")  # fmt: skip
+@click.argument("names", nargs=-1, metavar="[STUDY]...")
+@results_option
+@output_option("report", "Write the report into this folder.")
 @click.option("--single", is_flag=True, help="Write one file that can be mailed: OUTPUT.html.")
 @click.option(
     "--limit", "limits", multiple=True, metavar="'METRIC=VALUE,... UNIT'",
@@ -37,12 +24,15 @@ def page_folders(command: Callable[..., Any]) -> Callable[..., Any]:
     "unit, such as 'sensor_peak=0.5,2 g'.",
 )  # fmt: skip
 @units_option("kN, mm, µm, m/s²")
-@page_folders
+@click.option("--claims", default="claims", show_default=True, type=FOLDER,
+              help="Add what `compsim claims` wrote into this folder, if it is there.")  # fmt: skip
+@click.option("--alarms", default="alarms", show_default=True, type=FOLDER,
+              help="Add what `compsim alarms` wrote into this folder, if it is there.")  # fmt: skip
 @click.pass_context
 def report(
     context: click.Context,
-    given: tuple[str, ...],
-    folder: str | None,
+    names: tuple[str, ...],
+    folder: str,
     output: str,
     single: bool,
     limits: tuple[str, ...],
@@ -54,7 +44,7 @@ def report(
     \b
     compsim report
     compsim report bearing-wear --single -o for-the-plant
-    compsim report /data/results -o page --limit 'body_velocity_rms=2,5 mm/s'
+    compsim report -r /data/results -o page --limit 'body_velocity_rms=2,5 mm/s'
 
     Prints the path of the page, which a browser opens without a server. Named
     studies stand on it in this order; without names all do, those of compsim
@@ -62,7 +52,6 @@ def report(
     --units is of figures, tables and texts. Columns and axes with the name of a
     key keep its unit, and your own words stay as they are.
     """
-    folder, names = results_folder(given, folder)
     from compressor.store import read_studies, writable_folder
 
     read_studies(folder)  # errors come before libraries load and figures are drawn

@@ -4,39 +4,43 @@ import os
 import shlex
 from collections import Counter
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from compressor.program import duration, printable
-from compressor.studies import by_kind
+from compsim.options import (
+    configs_argument,
+    jobs_option,
+    limit,
+    only_option,
+    quiet_option,
+    results_option,
+    setting,
+)
 from compsim.progress import ProgressReporter
+from compsim.regimes import run_chains
 from compsim.screen import (
     DONE,
     SOME_FAILED,
     all_stored,
     caution,
-    configs_argument,
-    jobs_option,
-    limit,
     one_thread_each,
-    only_option,
-    output_option,
     plural,
     print_text,
     report_changes,
     report_machines,
     say,
     say_wrapped,
-    setting,
     stored_before,
     unread,
 )
 
 if TYPE_CHECKING:
     from compressor.cases import Study
-    from compressor.sweep import Summary
+    from compressor.sweep import Options, Summary
 
 MAX_FAILURES = 20  # listed one by one
 
@@ -56,8 +60,8 @@ class ShardType(click.ParamType):
 
 @click.command()
 @configs_argument
-@output_option
-@jobs_option("Run in this many worker processes.")
+@results_option
+@jobs_option()
 @setting
 @only_option
 @limit
@@ -69,12 +73,12 @@ class ShardType(click.ParamType):
 @click.option("--scheduler", metavar="ADDRESS",
               help="Find the dask cluster at this address, such as tcp://host:8786.")  # fmt: skip
 @click.option("--wait", is_flag=True, help="Wait for another run on the folder to end.")
-@click.option("--quiet", is_flag=True, help="Print no progress, but errors and failed jobs.")
+@quiet_option
 @click.pass_context
 def run(
     context: click.Context,
     configs: tuple[str, ...],
-    output: str,
+    folder: str,
     jobs: int | None,
     overrides: tuple[str, ...],
     only: str,
@@ -90,7 +94,7 @@ def run(
 
     \b
     compsim run machine.yaml
-    compsim run wear.yaml --set machine.speed_rpm=300 -o results-300
+    compsim run wear.yaml --set machine.speed_rpm=300 -r results-300
 
     A file with `regimes` is followed in chains along its key, in regimes/STUDY of the folder.
 
@@ -100,7 +104,7 @@ def run(
     check_backend(backend, scheduler, jobs)
     one_thread_each()  # before numpy loads
     from compressor.cases import load_studies
-    from compressor.sweep import cores
+    from compressor.sweep import Options, cores
 
     with ProgressReporter(quiet, "cases read") as progress:
         studies = load_studies(
@@ -110,39 +114,36 @@ def run(
         selected = sum(len(study.selected) for study in studies)
         say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
     caution(studies)
-    kinds = by_kind(studies)
-    of_jobs = kinds.pop(None, [])
-    others = [(kind.module("command"), its) for kind, its in kinds.items() if kind]
-    for command, _ in others:
-        command.check_options(scheduler)
-    code = DONE
-    if of_jobs:
-        code = run_jobs(context, of_jobs, output, jobs or cores(),
-                        (rerun, part, wait, scheduler, quiet))  # fmt: skip
-    for command, its in others:
+    chains = [study for study in studies if study.request]
+    studies = [study for study in studies if not study.request]
+    if chains and scheduler:
+        raise click.UsageError("regimes run in processes here: leave --backend dask out")
+    code, workers = DONE, jobs or cores()
+    if studies:
+        how = Options(context.obj, bool(rerun), part, wait=wait)
+        code = run_jobs(studies, folder, workers, how, scheduler, quiet)
+    if chains:
         if not quiet:
-            report_machines(its)
-        shards = [study.shard(*part) if part else study for study in its]
-        ended = command.run_studies(shards, output, jobs or cores(), bool(rerun), quiet)
-        code = max(code, ended)
+            report_machines(chains)
+        shards = [study.shard(*part) if part else study for study in chains]
+        code = max(code, run_chains(shards, folder, workers, bool(rerun), quiet))
     return code
 
 
 def run_jobs(
-    context: click.Context, studies: "list[Study]", output: str, jobs: int, options: Any
-) -> int:
+    studies: "list[Study]", folder: str, workers: int, options: "Options", scheduler: str | None,
+    quiet: bool,
+) -> int:  # fmt: skip
     """Run studies of jobs, and return the exit code."""
-    rerun, part, wait, scheduler, quiet = options
-    report_changes(studies, output)
-    from compressor.sweep import Cluster, Options, sweep
+    report_changes(studies, folder)
+    from compressor.sweep import Cluster, sweep
 
     cluster: Any = Cluster(scheduler) if scheduler else nullcontext()
     opening = partial(report_machines, studies)  # where there are jobs to run
-    with ProgressReporter(quiet, "jobs", output, opening) as progress, cluster as elsewhere:
-        how = Options(context.obj, bool(rerun), part, wait=wait,
-                      backend=elsewhere, failed=progress.count_failed)  # fmt: skip
-        summary = sweep(studies, output, jobs, progress, how)
-    report_run(summary, output, quiet)
+    with ProgressReporter(quiet, "jobs", folder, opening) as progress, cluster as elsewhere:
+        how = replace(options, backend=elsewhere, failed=progress.count_failed)
+        summary = sweep(studies, folder, workers, progress, how)
+    report_run(summary, folder, quiet)
     return SOME_FAILED if summary.failed else DONE
 
 
@@ -179,7 +180,7 @@ def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
     report_failures(summary)
     if not quiet:
         report_caveats([count.study for count in summary.counts], folder)
-        say(f"next: compsim report -i {shlex.quote(folder)}")
+        say(f"next: compsim report -r {shlex.quote(folder)}")
 
 
 def report_caveats(names: list[str], folder: str) -> None:

@@ -1,4 +1,4 @@
-"""What the commands share: exit codes, options, and how they speak on stderr."""
+"""What the commands share: exit codes, and how they print and speak on stderr."""
 
 import contextlib
 import math
@@ -7,103 +7,21 @@ import re
 import shlex
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from compressor.program import STUDY_GROUPS, THREAD_VARIABLES, printable
-from compsim.results import files, folders
+from compressor.program import THREAD_VARIABLES, printable
+from compsim.options import MAX_JOBS
 
 if TYPE_CHECKING:
     from compressor.cases import Study
     from compressor.store import Again
-    from compressor.units import Units
 
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
 WIDTH = 80  # columns of what is printed
 MAX_CAUTIONS = 5  # reported of one case file
-
-KEYS = "|".join(("joint", "clearance_mm", "load", "machine", "blocks", *STUDY_GROUPS))
-CASE_FILE = re.compile(rf"^({KEYS})\s*:", re.MULTILINE)
-PLACES = (".", "configs")  # where case files are looked for, if none is named
-MAX_NEAR = 4  # of them named
-MAX_HEAD = 100_000  # bytes of a file that are looked at
-
-
-class CaseFile(click.ParamType):
-    """The path of a case file; where none is given, the error names those nearby."""
-
-    name = "case file"
-
-    def get_missing_message(self, param: Any, ctx: Any) -> str:
-        """Return what could have been named, and how to make one."""
-        remedy = "compsim init writes one to start from"
-        near = nearby_case_files()
-        if not near:
-            return f"Name a case file; {remedy}"
-        more = f" and {len(near) - MAX_NEAR} more" if len(near) > MAX_NEAR else ""
-        return f"Name a case file, such as {', '.join(near[:MAX_NEAR])}{more}; {remedy}"
-
-
-def nearby_case_files() -> list[str]:
-    """Return the case files here and in `configs`, by their names; what cannot be read is none."""
-    found = []
-    for place in map(Path, PLACES):
-        with contextlib.suppress(OSError):
-            for path in sorted([*place.glob("*.yaml"), *place.glob("*.yml")]):
-                with contextlib.suppress(OSError):
-                    head = path.read_bytes()[:MAX_HEAD].decode(errors="replace")
-                    if CASE_FILE.search(head):
-                        found.append(str(path))
-    return found
-
-
-configs_argument = click.argument(
-    "configs", nargs=-1, required=True, metavar="CONFIG...", type=CaseFile(), shell_complete=files
-)
-output_option = click.option("-o", "--output", default="results", show_default=True,
-                             shell_complete=folders,
-                             help="Use this folder of results.")  # fmt: skip
-setting = click.option(
-    "--set", "overrides", multiple=True, metavar="KEY=VALUE",
-    help="Set a key in all case files, such as machine.speed_rpm=300.",
-)  # fmt: skip
-
-
-def jobs_option(words: str) -> Callable[..., Any]:
-    """Return the option -j, by default as many processes as this one may use cores."""
-    return click.option("-j", "--jobs", type=click.IntRange(min=1),
-                        show_default="cores available", help=words)  # fmt: skip
-
-
-only_option = click.option(
-    "--only", default="", metavar="COMPARISON",
-    help="Take only the jobs for which this holds, such as 'clearance_mm < 0.2'; the others stay "
-    "missing.",
-)  # fmt: skip
-
-
-def units_option(usual: str) -> Callable[..., Any]:
-    """Return the option --units; usual: what there is without it."""
-    return click.option(
-        "--units", type=click.Choice(["si", "plant"]), show_default=usual,
-        help="Units: SI, or those of a plant: mm, mm/s, g, kN, bar, rpm.",
-    )  # fmt: skip
-
-
-def check_json_units(as_json: bool, units: "Units | None") -> None:
-    """Raise UsageError where other units than SI are requested in JSON."""
-    if as_json and units == "plant":
-        raise click.UsageError("--json has all numbers in SI: leave out --units plant")
-
-
-MAX_JOBS = 10_000
-limit = click.option(
-    "--max-jobs", type=click.IntRange(min=1), default=MAX_JOBS, show_default=True,
-    help="Refuse a case file with more jobs than this.",
-)  # fmt: skip
 
 
 def one_thread_each() -> None:
@@ -138,23 +56,6 @@ def discard_output() -> None:
     os.close(nowhere)
 
 
-def open_streams() -> None:
-    """Open /dev/null as each of stdin, stdout and stderr that is closed.
-
-    A file of results would get its number, and what a library prints.
-    """
-    for number, name in enumerate(("stdin", "stdout", "stderr")):
-        try:
-            os.fstat(number)
-        except OSError:
-            place = os.open(os.devnull, os.O_RDWR)
-            if place != number:
-                os.dup2(place, number)
-                os.close(place)
-            os.set_inheritable(number, True)  # by workers
-            setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))
-
-
 def wrap_line(text: str, indent: int, more: int = 2) -> list[str]:
     """Return a line as lines of the width, the later ones indented by more.
 
@@ -170,7 +71,8 @@ def wrap_line(text: str, indent: int, more: int = 2) -> list[str]:
 def say(text: str, end: str = "\n") -> None:
     """Write to stderr; nobody may be there to read it."""
     with contextlib.suppress(OSError):
-        print(harmless(text), end=end, file=sys.stderr, flush=True)
+        if sys.stderr:  # not closed
+            print(harmless(text), end=end, file=sys.stderr, flush=True)
 
 
 def say_wrapped(text: str, indent: int = 0) -> None:
@@ -185,7 +87,7 @@ def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
         found.setdefault(study.overrides, []).append(study)
     commands = []
     for overrides, group in found.items():
-        words = ["compsim", "run", *(study.case_file for study in group), "-o", folder]
+        words = ["compsim", "run", *(study.case_file for study in group), "-r", folder]
         words += [word for text in overrides for word in ("--set", text)]
         jobs = max(study.jobs for study in group)
         words += ["--max-jobs", str(jobs)] if jobs > MAX_JOBS else []
@@ -251,7 +153,7 @@ def report_changes(studies: "Sequence[Study]", folder: str) -> None:
             )
         say_wrapped(text)
         if one.former:
-            say(f"  compsim export {one.former} -i {shlex.quote(folder)} -o {one.former}.csv")
+            say(f"  compsim export {one.former} -r {shlex.quote(folder)} -o {one.former}.csv")
 
 
 def plural(count: int, thing: str = "job") -> str:
@@ -268,9 +170,6 @@ def all_stored(count: int, folder: str, thing: str = "job") -> str:
 def stored_before(count: int) -> str:
     """Return how many of the jobs were stored before, in words; "" for none."""
     return f", {count} {'was' if count == 1 else 'were'} stored before" if count else ""
-
-
-as_json = click.option("--json", "as_json", is_flag=True, help="Print the same as JSON.")
 
 
 def size(count: float) -> str:

@@ -3,25 +3,23 @@
 import dataclasses
 import json
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from compressor.program import printable
-from compsim.results import ONE_JOB, jobs, of_results, results_folder, some_words
-from compsim.screen import (
-    DONE,
-    as_json,
+from compsim.options import (
     check_json_units,
-    jsonable,
-    print_text,
-    run_commands,
-    say,
+    job_argument,
+    json_option,
+    results_option,
     units_option,
-    wrap_line,
 )
+from compsim.screen import DONE, jsonable, print_text, run_commands, say, wrap_line
 
 if TYPE_CHECKING:
+    from compressor.cases import Case
     from compressor.store import JobReport
     from compressor.units import Units
 
@@ -41,7 +39,8 @@ def reversal_limits(_: click.Context, __: click.Parameter, text: str) -> tuple[f
 
 
 @click.command()
-@of_results(ONE_JOB, jobs)
+@job_argument
+@results_option
 @click.option("--case", "only_case", is_flag=True,
               help="Print the case alone, as a case file with all keys.")  # fmt: skip
 @click.option(
@@ -53,10 +52,10 @@ def reversal_limits(_: click.Context, __: click.Parameter, text: str) -> tuple[f
     help="Ask for this reversal of the rod load: degrees, and percent on its smaller side.",
 )
 @units_option("kN, mm, µm, m/s²")
-@as_json
+@json_option
 def show(
-    given: tuple[str, ...],
-    folder: str | None,
+    words: tuple[str, ...],
+    folder: str,
     only_case: bool,
     reversal: tuple[float, float],
     units: "Units | None",
@@ -71,17 +70,15 @@ def show(
     compsim show bearing-wear clearance_mm=0.2 machine.rod_mass_kg=3
 
     It prints which studies the job belongs to and where in them, how it ended and why, its numbers
-    with their error bars, how it was run, and its case as YAML, as far as it differs from the
-    defaults. Of a job that stopped, it prints where, the state, the state variable that stopped it,
-    and its last steps. Of a job with signals, it says whether the rod load at the crosshead pin
-    changes its side as API 618 requires, by 15 degrees and 3 percent, or as a maker does. --json
-    has all numbers in SI.
+    with their error bars, how it was run, and the values of its case that are not the usual ones.
+    Of a job that stopped, it prints where, and the state. Of a job with signals, it says whether
+    the rod load at the crosshead pin changes its side as API 618 requires, by 15 degrees and 3
+    percent, or as a maker does. --json has all numbers in SI.
     """
     check_json_units(as_json, units)
-    folder, words = results_folder(given, folder)
     from compressor.store import report_job
 
-    found = report_job(folder, *some_words(words))
+    found = report_job(folder, *words)
     if as_json:
         print_text(json.dumps(jsonable(dataclasses.asdict(found)), indent=1))
     elif only_case:
@@ -95,7 +92,6 @@ def print_report(
     found: "JobReport", folder: str, reversal: tuple[float, float], units: "Units" = "usual"
 ) -> None:
     """Print what is known of a job."""
-    from compressor.cases import to_yaml
     from compressor.reasons import remedy
     from compsim.job_text import sections
 
@@ -116,9 +112,28 @@ def print_report(
         for line in lines:
             print_text("\n".join(wrap_value(printable(line))))
     if "case" in found.attributes:
-        print_text("the case, as far as it differs from the defaults (--case prints it whole)")
-        for line in to_yaml(found.case, brief=True).splitlines():
+        print_text("the values of its case that are not the usual ones (--case prints it whole)")
+        for line in changed_values(found.case):
             print_text(f"  {line}")
+
+
+def changed_values(case: "Case") -> Iterator[str]:
+    """Yield the values of a case that are not the usual ones, as --set takes them."""
+    from compressor.cases import Case, table
+
+    usual, rows = dict(flat_values(Case())), table()
+    for key, value in flat_values(case):
+        if key != "name" and value != usual.get(key) and value != rows[key].default:
+            yield f"{key}={value}"
+
+
+def flat_values(case: "Case") -> Iterator[tuple[str, Any]]:
+    """Yield the keys of a case, group and name, with their values."""
+    for key, value in case.values().items():
+        if isinstance(value, Mapping):
+            yield from ((f"{key}.{name}", item) for name, item in value.items())
+        else:
+            yield key, value
 
 
 def wrap_value(line: str) -> list[str]:

@@ -5,27 +5,26 @@ import json
 
 import click
 
-from compsim.results import of_results, results_folder
-from compsim.screen import DONE, as_json, plural, print_text, run_commands, say, wrap_line
+from compsim.options import json_option, results_option
+from compsim.screen import DONE, plural, print_text, run_commands, say, wrap_line
 
 PROMISES = {"kept": "kept what accuracy promises", "none": "without a promise"}
 
 
 @click.command()
-@of_results()
-@as_json
-def status(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
+@results_option
+@json_option
+def status(folder: str, as_json: bool) -> int:
     """Count jobs that are done, failed or missing, and say why.
 
     \b
     compsim status
-    compsim status /data/results
+    compsim status -r /data/results
 
     One line a study. Of those that are ok, also how many keep what their accuracy promises, how
     many move periodically, predictably or chaotically, how many were not seen to repeat, whose
     sensor record is clipped, and which keys are outside the range that the program was judged on.
     """
-    folder, _ = results_folder(given, folder, named=False)
     from compressor.outcome import regime_words
     from compressor.reasons import remedy
     from compressor.store import standings

@@ -5,26 +5,25 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compsim.results import of_results, results_folder
-from compsim.screen import DONE, STORE, as_json, plural, print_text, run_commands, say
+from compsim.options import json_option, results_option
+from compsim.screen import DONE, STORE, plural, print_text, run_commands, say
 
 if TYPE_CHECKING:
     from compressor.store import Damage
 
 
 @click.command()
-@of_results()
-@as_json
-def verify(given: tuple[str, ...], folder: str | None, as_json: bool) -> int:
+@results_option
+@json_option
+def verify(folder: str, as_json: bool) -> int:
     """Compare every stored file with its checksum.
 
     \b
-    compsim verify results
+    compsim verify -r results
 
     Damaged files are listed with the jobs that are lost with them, by study and swept values, and
     with the command that computes them again. Exit code 5 if any is damaged.
     """
-    folder, _ = results_folder(given, folder, named=False)
     from compressor.store import verify as compare
 
     damages = compare(folder)

@@ -505,7 +505,7 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
         return
     files = case_files(paper.absent)
     texts = [f"# {name}\n{text}" for name, text in files.items()]
-    command = f"compsim run {' '.join(files)} -o {shlex.quote(str(results))}"
+    command = f"compsim run {' '.join(files)} -r {shlex.quote(str(results))}"
     content = MissingFigures(figures, texts, command)
     yield Section("missing", "Figures that could not be drawn", "missing.html", content)
 

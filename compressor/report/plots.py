@@ -223,7 +223,7 @@ def drawable(stored: Stored, studies: Sequence[StoredStudy], key: str) -> xr.Dat
     status = stored.status(key)
     if status is None:
         files = " ".join(study.case_file for study in studies if key in study.keys)
-        raise PlotError(f"job {key} was not run yet: compsim run {files} -o {stored.folder}")
+        raise PlotError(f"job {key} was not run yet: compsim run {files} -r {stored.folder}")
     if status.status != "ok":
         cure = remedy(status.reason)
         raise PlotError(f"job {key} failed: {status.reason}: {status.detail}; {cure}")
@@ -426,8 +426,8 @@ def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]
     """Return why no job of a study can be drawn, and what to do about it."""
     problems = {row.problem for row in rows}
     cures = {
-        "failed": f"compsim status -i {stored.folder} shows why",
-        "not run": f"compsim run {study.case_file} -o {stored.folder}",
+        "failed": f"compsim status -r {stored.folder} shows why",
+        "not run": f"compsim run {study.case_file} -r {stored.folder}",
         "no series": KEEP,
         "too short": "run it with a longer solve.duration_rev",
     }

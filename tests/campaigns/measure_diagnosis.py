@@ -40,7 +40,7 @@ def population(folder, count=MACHINES, seed=SEED, more=()):
     case_file.write_text(machines(count, seed), encoding="utf-8")
     results = str(Path(folder, "results"))
     sets = [word for text in more for word in ("--set", text)]
-    code = cli.main(["run", str(case_file), "-o", results, "--quiet", *sets])
+    code = cli.main(["run", str(case_file), "-r", results, "--quiet", *sets])
     if code not in (0, 3):  # 3: some failed, which the data set counts
         sys.exit(code)
     return make_data_set(results, "machines", DataSetOptions(noise=NOISE, signals=False))

@@ -169,7 +169,7 @@ def studied(folder, count, seed, jobs):
     path.write_text(json.dumps(case_file(machines(count, seed))), encoding="utf-8")
     code = "import sys; from compsim.cli import main; sys.exit(main())"
     results = os.path.join(folder, "results")
-    words = ["run", os.fspath(path), "-o", results, "-j", str(jobs), "--quiet"]
+    words = ["run", os.fspath(path), "-r", results, "-j", str(jobs), "--quiet"]
     subprocess.run([sys.executable, "-c", code, *words], check=True)
     return Identifier.fit(open_library(results, "machines"))
 

@@ -113,7 +113,7 @@ def main(target):
         for share in (None, *LAST_SHARES):
             words = [] if share is None else ["--set", f"lubricant.last_share={share}"]
             folder = str(Path(place, f"{share}"))
-            assert cli.main(["run", str(example("machine")), "-o", folder, "--quiet", *words]) == 0
+            assert cli.main(["run", str(example("machine")), "-r", folder, "--quiet", *words]) == 0
             with compressor.open_study(folder, "machine") as study:
                 found[share] = rows(study)
         films = [{"last_share": share, "rows": found[share]} for share in LAST_SHARES]

@@ -143,7 +143,8 @@ def measures(tree):
             ("sweep with bars", many(SWEPT // 3, True), ["run", "-j", str(WORKERS), "--quiet"]),
         ):
             Path(folder, "many.yaml").write_text(text, encoding="utf-8")
-            command = ["-m", "compsim", words[0], "many.yaml", *words[1:], "-o", name]
+            option = "-r" if tree == ROOT else "-o"  # of commits until 28 November 2026
+            command = ["-m", "compsim", words[0], "many.yaml", *words[1:], option, name]
             seconds = wall(command, folder, tree)
             if name == "plan":
                 found[f"plan of {PLANNED:,} jobs, s"] = seconds
@@ -165,7 +166,8 @@ def compared(commit):
                 said(["-c", CALLS], folder, tree)
                 Path(folder, "many.yaml").write_text(many(MANY), encoding="utf-8")
                 # each into a folder of its own, or the second finds all jobs stored
-                first = ["run", "many.yaml", "--quiet", "-o", "now" if tree == ROOT else "then"]
+                place = ("-r", "now") if tree == ROOT else ("-o", "then")
+                first = ["run", "many.yaml", "--quiet", *place]
                 said(["-m", "compsim", *first], folder, tree)
             pairs = []
             for turn in range(TURNS):

@@ -95,7 +95,7 @@ def figures():
     with tempfile.TemporaryDirectory() as place:
         results, report = f"{place}/results", f"{place}/report"
         configs = [str(path) for path in sorted(ROOT.glob("configs/*.yaml"))]
-        for words in (["run", *configs, "-o", results], ["report", results, "-o", report]):
+        for words in (["run", *configs, "-r", results], ["report", "-r", results, "-o", report]):
             if code := cli.main(words):
                 sys.exit(code)
         return {

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from compsim.claims import EXAMPLES
 
 from compressor.analysis.runs import FAULT_LABELS, cases_of
 from compressor.cases.case import Case
@@ -11,7 +12,6 @@ from compressor.cases.examples import FOLDER, STARTS, example, templates
 from compressor.cases.load import itself, load_studies
 from compressor.solve.cautions import cautions
 from compressor.solve.simulate import simulate
-from compressor.studies.claims.command import EXAMPLES
 from compressor.studies.claims.study import cases_judged
 
 ROOT = Path(__file__).parent.parent.parent

@@ -54,24 +54,6 @@ def test_help_is_on_stdout(arguments, capsys):
     assert "compsim" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("command", ["run", "plan"])
-def test_without_a_case_file_those_nearby_are_named(command, case_file, capsys):
-    assert cli.main([command]) == 2
-    assert "Name a case file; compsim init writes one to start from" in capsys.readouterr().err
-    case_file("wear.yaml", joint="both")
-    Path("compose.yaml").write_text("services: {}\n")
-    Path("broken.yaml").symlink_to("absent")
-    Path("configs").mkdir()
-    for letter in "abcd":
-        Path(f"configs/{letter}.yml").write_text("# mine\njoint: both\n")
-    Path("wear.yaml").write_text("load: none\n")
-    assert cli.main([command]) == 2
-    near = "wear.yaml, configs/a.yml, configs/b.yml, configs/c.yml and 1 more; compsim init "
-    assert f"Missing argument 'CONFIG...'. Name a case file, such as {near}" in (
-        capsys.readouterr().err
-    )
-
-
 def test_all_mistakes_are_told_at_once(tmp_path, capsys):
     (tmp_path / "bad.yaml").write_text("joint: knee\nload: heavy\nclearence_mm: 1\n")
     assert cli.main(["run", str(tmp_path / "bad.yaml")]) == 2
@@ -82,18 +64,18 @@ def test_all_mistakes_are_told_at_once(tmp_path, capsys):
 def test_a_run_says_what_it_did_and_what_comes_next(case_file, capsys):
     case_file("two.yaml", load=["none", "spring"])
     case_file("one.yaml", load="gas")
-    assert cli.main(["run", "two.yaml", "one.yaml", "-j", "1", "-o", "out dir"]) == 0
+    assert cli.main(["run", "two.yaml", "one.yaml", "-j", "1", "-r", "out dir"]) == 0
     out, err = capsys.readouterr()
     assert [line.split() for line in out.splitlines()] == [
         ["two", "2", "jobs", "2", "ok", "0", "failed", "out", "dir/studies/two.json"],
         ["one", "1", "job", "1", "ok", "0", "failed", "out", "dir/studies/one.json"],
     ]
     assert "3 jobs run in" in err
-    assert err.endswith("next: compsim report -i 'out dir'\n")
+    assert err.endswith("next: compsim report -r 'out dir'\n")
     assert "\r" not in err
     manifest = read_studies("out dir")[0]
-    assert manifest.command == "compsim run two.yaml one.yaml -j 1 -o 'out dir'"
-    assert cli.main(["run", "two.yaml", "one.yaml", "-o", "out dir"]) == 0
+    assert manifest.command == "compsim run two.yaml one.yaml -j 1 -r 'out dir'"
+    assert cli.main(["run", "two.yaml", "one.yaml", "-r", "out dir"]) == 0
     again = capsys.readouterr()
     assert again.out == out
     assert again.err.startswith("nothing to do: all 3 jobs are stored in out dir\n")
@@ -228,7 +210,7 @@ def test_verify_finds_damage_that_a_run_mends(case_file, capsys):
     key = file.name[:20]
     (load,) = (case.load for case in load_cases("two.yaml") if case.key == key)
     assert out == f"{file}: is damaged\n  job {key}\n    in two load={load}\n"
-    repair = f"compsim run {os.path.abspath('two.yaml')} -o results"
+    repair = f"compsim run {os.path.abspath('two.yaml')} -r results"
     assert err == f"1 damaged file, 1 job lost\nto repair: {repair}\n"
     assert cli.main(["verify", "--json"]) == 5
     out, _ = capsys.readouterr()
@@ -372,7 +354,7 @@ def test_explain_of_a_failed_job_says_so(case_file, capsys):
 
 
 def test_explain_of_an_effect_that_failed():
-    from compressor.studies.tradeoff.command import describe_advice, jsonable
+    from compsim.explain import describe_advice, jsonable
 
     effect = types.SimpleNamespace(reason="non_finite")
     told = types.SimpleNamespace(advice=[types.SimpleNamespace(name="load", effect=effect)])
@@ -402,9 +384,9 @@ def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):
     decade = 10.0 ** -(next(k for k in range(1, 9) if error.values[0] > 10.0**-k) - 1)
     assert re.search(rf"^a both +{decade:.0e}  auto +1e-0[35]", out, re.MULTILINE)
     for scene in ("a big_end", "a both"):
-        below = out.split(f"\n{scene}:\n")[1]
-        assert re.search(r"^  no friction +[+-]", below, re.MULTILINE)
-        assert re.search(r"^  no friction .* × \d", below, re.MULTILINE)
+        below = " ".join(out.split(f"\n{scene}:\n")[1].split())
+        assert re.search(r" no friction [+-]", below)
+        assert re.search(r"times over the case's own: .*no friction × \d", below)
     assert "the paper's BDF at 1e-5 takes" in out
     assert "a both: the series of Eq. 3-4 would misplace the crosshead by 61% of" in out
     assert Path("out dir/tradeoff.png").read_bytes().startswith(b"\x89PNG")
@@ -433,13 +415,13 @@ def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch
 
     without_laws(monkeypatch)
     case_file("worn.yaml", joint="big_end", clearance_mm=[0.2, 0.3], machine={"rod_mass_kg": 3})
-    assert cli.main(["run", "worn.yaml", "-o", "kept", "-j", "1"]) == 0
+    assert cli.main(["run", "worn.yaml", "-r", "kept", "-j", "1"]) == 0
     with open_study("kept", "worn") as study:
         forces = study["peak_contact_force"].max("joint")
         greatest = forces.idxmax("clearance_mm").item()
         peak = study["peak_acceleration"].sel(clearance_mm=greatest).item()
     capsys.readouterr()
-    assert cli.main(["explain", "--models", "worn.yaml", "-o", "kept"]) == 0
+    assert cli.main(["explain", "--models", "worn.yaml", "-r", "kept"]) == 0
     out, err = capsys.readouterr()
     lines = out.splitlines()
     assert lines[0] == f"worn at clearance_mm = {greatest}, one of 2 jobs:"
@@ -466,16 +448,16 @@ def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch
     assert lines[start + 1].strip().startswith(varied.removesuffix(" ×").removesuffix(" ÷"))
     assert end in lines[start + 1]
 
-    assert cli.main(["report", "kept", "-o", "page"]) == 0
+    assert cli.main(["report", "-r", "kept", "-o", "page"]) == 0
     page = Path("page/index.html").read_text(encoding="utf-8")
     assert f'<p>{found[1]}. <a href="#models-worn">' in page
     assert '<section id="models-worn">' in page
     assert f"The table is of worn at clearance_mm = {greatest}, one of 2 jobs: its metrics" in page
 
     case_file("worn.yaml", joint="big_end", clearance_mm=[0.25, 0.35], machine={"rod_mass_kg": 3})
-    assert cli.main(["run", "worn.yaml", "-o", "kept", "-j", "1"]) == 0
+    assert cli.main(["run", "worn.yaml", "-r", "kept", "-j", "1"]) == 0
     capsys.readouterr()
-    assert cli.main(["report", "kept", "-o", "page"]) == 0
+    assert cli.main(["report", "-r", "kept", "-o", "page"]) == 0
     err = " ".join(capsys.readouterr().err.split())
     assert "nc: is not shown, as worn has no such job: run the case file with the same" in err
     assert "models-worn" not in Path("page/index.html").read_text(encoding="utf-8")
@@ -610,37 +592,6 @@ def group_is_gone(group):
     return False
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_that_hits_a_destructor_is_not_lost(number, capsys):
-    class Closing:
-        def __del__(self):
-            signal.raise_signal(number)
-            time.sleep(0)
-
-    def work():
-        Closing()
-        until = time.monotonic() + PATIENCE
-        while time.monotonic() < until:
-            time.sleep(0.01)
-
-    with pytest.raises(cli.Interrupted, match=number.name), cli.interruptible():
-        work()
-    assert capsys.readouterr().err == ""
-
-
-def test_other_dropped_exceptions_are_told_as_ever(monkeypatch):
-    class Failing:
-        def __del__(self):
-            raise ValueError("of a destructor")
-
-    told = []
-    monkeypatch.setattr(sys, "unraisablehook", lambda what: told.append(what.exc_value))
-    with cli.interruptible():
-        Failing()
-    assert [str(error) for error in told] == ["of a destructor"]
-
-
 def test_a_run_that_is_told_to_end(started, tmp_path):
     os.killpg(started.pid, signal.SIGINT)  # Ctrl-C reaches the whole group
     err = started.communicate(timeout=PATIENCE)[1]
@@ -660,15 +611,15 @@ def test_a_run_says_what_the_file_means_and_what_is_odd_about_it(case_file, caps
     halved = {"stroke_mm": 120, "rod_length_mm": 600}  # R / L = 0.1
     case_file("m.yaml", load="gas", machine=halved, gas={"switching": "exact"})
     warning = "m.yaml: warning: machine.stroke_mm: rod: crank ratio 0.1, where at least 0.12 is"
-    for words in (["plan"], ["run", "-o", "a"], ["run", "-o", "b", "--quiet"], ["explain"]):
+    for words in (["plan"], ["run", "-r", "a"], ["run", "-r", "b", "--quiet"], ["explain"]):
         assert cli.main([words[0], "m.yaml", *words[1:]]) == 0
         out, err = capsys.readouterr()
         assert err.startswith(warning), words
         printed = out if words[0] == "explain" else err
         assert ("piston     mean speed 2 m/s" in printed) == ("--quiet" not in words)
-    assert cli.main(["run", "m.yaml", "-o", "a"]) == 0  # nothing to do
+    assert cli.main(["run", "m.yaml", "-r", "a"]) == 0  # nothing to do
     assert "mean speed" not in capsys.readouterr().err
-    assert cli.main(["plan", "m.yaml", "-o", "a", "--json"]) == 0
+    assert cli.main(["plan", "m.yaml", "-r", "a", "--json"]) == 0
     numbers = json.loads(capsys.readouterr().out)["machines"]["m"]["numbers"]
     (speed,) = (one for one in numbers if one["name"] == "piston, mean speed")
     assert (speed["low"], speed["unit"], speed["usual_low"]) == (2.0, "m/s", 0.5)

@@ -1,7 +1,8 @@
 """Realistic mistakes on the command line: each is answered by one line that says what to do.
 
-Exit code 2, nothing on stdout, no traceback. A folder has the case files of a careless morning, a
-store `results` with the studies `wear` (six jobs) and `big-end`, and this list.
+Click puts its usage above mistakes in the command itself. Exit code 2, nothing on stdout, no
+traceback. A folder has the case files of a careless morning, a store `results` with the studies
+`wear` (six jobs) and `big-end`, and this list.
 """
 
 import json
@@ -69,37 +70,27 @@ MISTAKES = [
      "--set load=[none, spring]: load: 2 jobs are more than 1: load (2); ask for fewer, or"),
     ("run good.yaml --only 'clearance_mm > 9'", "selects no job", "compsim plan"),
     ("run good.yaml --shard 3/2", "no I/N with 1 <= I <= N, such as 2/8"),
-    ("run good.yaml --quite", "No such option '--quite'", "did you mean --quiet"),
-    ("run good.yaml -i results", "the folder of results is -o FOLDER here"),
-    ("run good.yaml -o good.yaml", "good.yaml: is a file, where a folder is needed", "another"),
+    ("run good.yaml --quite", "No such option '--quite'"),
+    ("run good.yaml -o results", "No such option '-o'"),
+    ("run good.yaml -r good.yaml", "Directory 'good.yaml' is a file"),
+    ("run good.yaml -r ''", "'-r' / '--results'", "is a shell variable not set?"),
     # commands
-    ("good.yaml", "is a case file, and a command comes first: compsim run good.yaml"),
-    ("results", "a command comes first: compsim status results"),
-    ("rnu good.yaml", "compsim: No such command 'rnu'; did you mean run?"),
-    ("Status", "No such command 'Status'; did you mean status?"),
-    ("xyzzy", "No such command 'xyzzy'; there are init, plan, run, report, "),
-    ("help", "No such command 'help': compsim --help, or compsim COMMAND --help"),
-    ("help find", "No such command 'help': compsim find --help"),
-    ("version", "No such command 'version': compsim --version"),
-    ("'my case.yaml' -j 2", "a command comes first: compsim run 'my case.yaml' -j 2"),
-    ("status --jsn", "compsim status: No such option '--jsn'; did you mean --json?"),
-    ("find -i results", "No such option '-i': the folder of results is "),
+    ("results", "No such command 'results'"),
+    ("rnu good.yaml", "No such command 'rnu'"),
+    ("status --jsn", "No such option '--jsn'"),
     ("init waer", "there is no template 'waer'; did you mean wear or"),
     ("init xyzzy", "there is no template 'xyzzy'; there are paper, machine, "),
-    ("init mine.yaml", "a template comes first: compsim init wear -o mine.yaml"),
     ("init wear -o 'my wear.yaml'", "'my wear.yaml' gives the study no name"),
     ("init wear -o good.yaml/wear.yaml", "good.yaml: is a file, where a folder is needed"),
     ("init wear", "wear.yaml exists, and is not overwritten: compsim init wear -o OTHER.yaml"),
-    ("completion tcsh", "'tcsh' is not one of 'bash', 'zsh', 'fish'"),
     # folders of results
-    ("status resluts", "resluts: there is no such folder of results; did you mean results?"),
-    ("verify again", "again: holds no study; there are results in results"),
-    ("report results/jobs", "did you mean results?"),
-    ("status wear.yaml", "is a case file, where a folder of results is needed; compsim run wear"),
-    ("report results -i again", "two folders of results are given", "leave one out"),
-    ("report results -o READONLY", "nothing may be written to READONLY", "another folder"),
+    ("status -r resluts", "resluts: there is no such folder of results; did you mean results?"),
+    ("verify -r again", "again: holds no study; there are results in results"),
+    ("report -r results/jobs", "did you mean results?"),
+    ("status -r wear.yaml", "Directory 'wear.yaml' is a file"),
+    ("report -o READONLY", "nothing may be written to READONLY", "another folder"),
     ("export -o READONLY/all.csv", "nothing may be written to READONLY", "another folder"),
-    ("status -o results", "the folder of results is an argument, compsim status FOLDER"),
+    ("status results", "Got unexpected extra argument (results)"),
     # studies, jobs and axes
     ("show waer clearance_mm=0.1", "holds no study 'waer'; did you mean wear?"),
     ("show wear.yaml", "did you mean wear?"),
@@ -109,7 +100,6 @@ MISTAKES = [
     ("show wear clearance_mm=0.25", "no job of wear has clearance_mm=0.25; there are 0.1, 0.2"),
     ("show wear 0.1", "'0.1' is no AXIS=VALUE of wear; its axes are clearance_mm"),
     ("show ffffffff", "no job's key begins with 'ffffffff'"),
-    ("show ''", "an argument is empty", "is a shell variable not set?"),
     ("show wear --json --units plant", "--json has all numbers in SI", "leave out --units plant"),
     ("show", "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
     ("export gird -o x.csv", "holds no study 'gird'; it holds big-end, wear"),
@@ -122,7 +112,6 @@ MISTAKES = [
     ("plot wear --over sped_rpm", "wear has no axis 'sped_rpm'; its axes are clearance_mm, "),
     ("identify good.csv --study wear", "good.csv: cannot be read", "time_s,acceleration_m_per_s2"),
     # questions
-    ("explain good.yaml -o kept", "-o keeps what --models finds: add --models"),
     ("explain", "Missing argument 'CONFIG...'"),
     ("tradeoff again/wear.yaml", "again/wear.yaml: wear has no joint with clearance"),
     ("tradeoff --set load=none", "--set changes case files: name one"),
@@ -222,8 +211,10 @@ def test_a_mistake_is_answered_by_one_line_that_says_what_to_do(line, parts, say
     code, out, err = says(line)
     assert code == 2, err
     assert out == ""
-    assert err.count("\n") == 1
-    assert err.endswith("\n")
+    *usage, line = err.splitlines()
+    if usage:  # of a command that is not understood: click's own
+        assert [text.split()[0] for text in usage[:2]] == ["Usage:", "Try"]
+        assert (usage[2:], line[:7]) == ([""], "Error: ")
     assert "Traceback" not in err
     place = 0
     for part in parts:

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +55,7 @@ def plot(folder, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
 
     def run(*words):
-        code = cli.main(["plot", *words, "-i", str(folder)])
+        code = cli.main(["plot", *words, "-r", str(folder)])
         out, err = capsys.readouterr()
         lines = out.splitlines()
         paths, captions = lines[::2], [line.strip() for line in lines[1::2]]
@@ -164,25 +163,20 @@ def test_captions_of_oiled_joints_speak_of_dry_contact():
 
 def test_a_job_is_named_as_in_show(plot, folder, capsys, unpainted):
     words = ["worn", "clearance_mm=0.3", "machine.speed_rpm=500"]
-    assert cli.main(["show", *words, "-i", str(folder), "--json"]) == 0
+    assert cli.main(["show", *words, "-r", str(folder), "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)["key"]
     code, found, err = plot(*words, "--what", "orbits")
     assert (code, [*found], err) == (0, [f"plots/{shown[:10]}-orbits.png"], "")
     assert shown == key(folder, "worn", 3)
 
 
-def test_a_folder_and_a_study_of_one_name_are_told_apart(plot, folder, tmp_path, capsys, unpainted):
-    """Whatever kind of study it is: `plot -i worn worn` draws the study in the folder."""
-    shutil.copytree(folder, tmp_path / "worn")
-    for words in (["worn", "worn"], ["-i", "worn", "worn"], ["worn/", "worn"]):
-        assert cli.main(["plot", *words, "--what", "waterfall"]) == 0
-        assert capsys.readouterr().out.startswith("plots/worn-waterfall.png\n")
+def test_a_study_of_chains_has_no_jobs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "reg/regimes/reg").mkdir(parents=True)
     (tmp_path / "reg/regimes/reg/study.json").touch()
-    for words in (["reg", "reg"], ["-i", "reg", "reg"]):
-        assert cli.main(["plot", *words, "speed_rpm=400"]) == 2
-        problem = "reg is a study of regimes, without jobs: give --at speed_rpm=400"
-        assert problem in capsys.readouterr().err
+    assert cli.main(["plot", "reg", "-r", "reg", "speed_rpm=400"]) == 2
+    problem = "reg is a study of regimes, without jobs: give --at speed_rpm=400"
+    assert problem in capsys.readouterr().err
 
 
 def test_chosen_figures_in_both_formats(plot, folder):
@@ -314,7 +308,7 @@ def test_segments_of_a_study_are_drawn_beside_the_healthy_machine(tmp_path, caps
     home = tmp_path / "results"
     (study,) = store(home, tmp_path / "heard.yaml")
     sound = simulate(Case.from_values({**values, "joint": "none", "clearance_mm": 0}))
-    words = ["plot", "heard", "--what", "segments", "-i", str(home), "-o", str(tmp_path / "out")]
+    words = ["plot", "heard", "--what", "segments", "-r", str(home), "-o", str(tmp_path / "out")]
     assert cli.main([*words, "--limit", "5x"]) == 0
     told = capsys.readouterr().out
     healthy = sound["sensor_segment_rms"].values

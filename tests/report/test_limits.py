@@ -112,7 +112,7 @@ def test_the_page_and_the_curves_show_the_zones(tmp_path, capsys):
     low, high = study["sensor_peak"].values
     assert high > 1.2 * low
     middle = f"{(low + high) / 2:.6g}"
-    report = ["report", "-i", str(tmp_path / "results"), "-o", str(tmp_path / "out")]
+    report = ["report", "-r", str(tmp_path / "results"), "-o", str(tmp_path / "out")]
     assert cli.main([*report, "--limit", f"sensor_peak={middle} m/s2"]) == 0
     page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     assert re.findall(r'class="zone-(\d)">[^<]* ([A-D/]+)<', page) == [("1", "A"), ("2", "B")]

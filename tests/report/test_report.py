@@ -279,7 +279,7 @@ def test_missing_cases_are_named_with_what_gives_them(paper_store, tmp_path):
     given = {case.physics_key for case in load_cases(*paths)}
     have = {"design", "typical", "big_end 0.1", "big_end 0.3"}
     assert given == {case.physics_key for k, case in paper_cases().items() if k not in have}
-    assert command.split() == ["compsim", "run", *(p.name for p in paths), "-o", str(part)]
+    assert command.split() == ["compsim", "run", *(p.name for p in paths), "-r", str(part)]
     rows = {cells[0]: kind for kind, cells in found.rows}
     assert rows["big end, 0.2 mm"] == "missing"
     assert rows["big end, 0.1 mm"] is None
@@ -531,7 +531,7 @@ def test_studies_are_chosen_and_trials_come_last(own, tmp_path, capsys):
     assert "Study a-find-x : 4 jobs" in first
     assert first.count("Peak contact force") == 1
     assert "The last job of own" in first
-    report = ["report", str(own), "-o", str(tmp_path / "out")]
+    report = ["report", "-r", str(own), "-o", str(tmp_path / "out")]
     assert cli.main([*report, "a-find-x"]) == 0
     assert "study-own" not in read(tmp_path / "out").ids
     assert "Peak contact force" in section(tmp_path / "out", "answer")
@@ -558,7 +558,7 @@ def test_a_study_among_the_paper_s_cases_keeps_its_section_and_notes(paper_store
 
 def test_a_page_is_one_file(own, tmp_path, capsys):
     """By mail the page came without its figures."""
-    assert cli.main(["report", str(own), "--single", "-o", str(tmp_path / "mailed")]) == 0
+    assert cli.main(["report", "-r", str(own), "--single", "-o", str(tmp_path / "mailed")]) == 0
     out, err = capsys.readouterr()
     file = tmp_path / "mailed.html"
     assert out == f"{file}\n"

@@ -271,7 +271,7 @@ def test_they_are_stored_shown_and_found(tmp_path, capsys, sensed):
     for name in OF_BODY:
         np.testing.assert_array_equal(job[name], sensed[name])
         assert job[name].dims == NUMBERS[name].dims
-    assert cli.main(["show", key, "-i", str(tmp_path / "results")]) == 0
+    assert cli.main(["show", key, "-r", str(tmp_path / "results")]) == 0
     out = capsys.readouterr().out
     at = float(sensed["segment"][int(np.argmax(sensed["sensor_segment_rms"].values))])
     assert f"sensor segment rms, {at:g} to {at + 10:g} deg" in out

@@ -196,7 +196,7 @@ def test_the_command_line_warns_in_a_few_lines(tmp_path, capsys):
         "m, it is 1000 mm (2 of 2 jobs)"
     )
     assert told[-1] == f"{path}: and 3 more warnings, which compsim plan {path} lists"
-    cli.main(["plan", str(path), "-o", str(tmp_path / "results")])
+    cli.main(["plan", str(path), "-r", str(tmp_path / "results")])
     whole = [line for line in unwrapped(capsys.readouterr().err) if str(path) in line]
     assert whole[:5] == told[:5]
     assert len(whole) == 8

@@ -37,7 +37,7 @@ def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("caveats")
     (place / "k1.yaml").write_text(json.dumps(STUDY), encoding="utf-8")
     with jobs_here():
-        assert cli.main(["run", str(place / "k1.yaml"), "-j", "1", "-o", str(place / "k1")]) == 0
+        assert cli.main(["run", str(place / "k1.yaml"), "-j", "1", "-r", str(place / "k1")]) == 0
     return place / "k1"
 
 
@@ -51,8 +51,8 @@ def said(capsys, *words):
 
 
 def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder, capsys):
-    err = said(capsys, "run", folder.parent / "k1.yaml", "-j", "1", "-o", folder).err
-    out = said(capsys, "status", folder).out
+    err = said(capsys, "run", folder.parent / "k1.yaml", "-j", "1", "-r", folder).err
+    out = said(capsys, "status", "-r", folder).out
     numbers = [report_job(folder, key).numbers for key in open_study(folder).key.values]
     late = sum(numbers_["settled_rev"] > 0 for numbers_ in numbers)
     unrepeated = sum(math.isnan(numbers_["settled_rev"]) for numbers_ in numbers)
@@ -72,11 +72,11 @@ def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder
 
 def test_show_says_it_of_its_job(folder, capsys):
     light, heavy = open_study(folder).key.values
-    out = said(capsys, "show", folder, heavy).out
+    out = said(capsys, "show", heavy, "-r", folder).out
     share = 100 * report_job(folder, heavy).numbers["clipped_fraction"]
     assert f"{share:.3g} % of the sensor's samples are clipped at its range, 0.05 m/s²" in out
     assert OUTSIDE in out
-    assert OUTSIDE not in said(capsys, "show", folder, light).out
+    assert OUTSIDE not in said(capsys, "show", light, "-r", folder).out
     regime = read_job(folder, heavy).attrs["regime"]
     assert f"{regime} ({REGIME_WORDS[Regime(regime)]})" in out
 
@@ -91,7 +91,7 @@ def test_the_page_says_it(folder, tmp_path):
 
 def test_plot_says_it(folder, tmp_path, capsys):
     key = open_study(folder).key.values[0]
-    out = said(capsys, "plot", folder, key, "--what", "spectra", "-o", tmp_path).out
+    out = said(capsys, "plot", key, "-r", folder, "--what", "spectra", "-o", tmp_path).out
     assert "of the sensor's samples are clipped at its range, 0.05 m/s²" in out
 
 

@@ -166,7 +166,7 @@ def stored(results, key):
 
 def test_a_folder_gets_a_file_each(results, tmp_path, capsys):
     out = tmp_path / "out"
-    command = ["export", "-i", str(results), "-o", str(out), "--series", "--format", "csv"]
+    command = ["export", "-r", str(results), "-o", str(out), "--series", "--format", "csv"]
     assert cli.main(command) == 0
     told = capsys.readouterr().out.split("\n")
     jobs = {path.stem for path in (out / "grid").iterdir()}
@@ -198,7 +198,7 @@ def test_a_record_in_csv_is_what_identify_reads(worn, tmp_path, capsys):
     key = next(key for key in sorted(stored.keys()) if "sensor_time" in stored.job(key))
     job = stored.job(key)
     path = tmp_path / "job.csv"
-    assert cli.main(["export", key, "-i", str(worn), "-o", str(path)]) == 0
+    assert cli.main(["export", key, "-r", str(worn), "-o", str(path)]) == 0
     rows = table(path)
     assert [*rows[0]][-3:] == ["time_s", "acceleration_m_per_s2", "tacho"]
     assert len(rows) == max(job.sizes["time"], job.sizes["sensor_time"])
@@ -221,14 +221,14 @@ def test_a_record_alone_is_what_analysts_open(suffix, hints, worn, tmp_path, cap
     stored = read_store(worn)
     one, two = (key for key in sorted(stored.keys())[:2])
     job, path = stored.job(one), tmp_path / f"job{suffix}"
-    assert cli.main(["export", one, "-i", str(worn), "-o", str(path)]) == 0
+    assert cli.main(["export", one, "-r", str(worn), "-o", str(path)]) == 0
     assert f"{job.sizes['sensor_time']} samples" in capsys.readouterr().out
     found = read_record(path, **hints)
     np.testing.assert_allclose(found.times, job.sensor_time, atol=1e-5)
     np.testing.assert_allclose(found.values, job.sensor_acceleration, rtol=6e-8, atol=1e-12)
     np.testing.assert_allclose(found.tacho, job.tacho_time, atol=1e-5)
     folder, words = tmp_path / "all", ["--format", suffix[1:], "--quiet"]
-    assert cli.main(["export", one, two, "-i", str(worn), "-o", str(folder), *words]) == 0
+    assert cli.main(["export", one, two, "-r", str(worn), "-o", str(folder), *words]) == 0
     assert {file.name for file in folder.iterdir()} == {f"{one}{suffix}", f"{two}{suffix}"}
     assert (folder / f"{one}{suffix}").read_bytes() == path.read_bytes()
 
@@ -267,7 +267,7 @@ def test_what_is_not_there_is_named(results, tmp_path, capsys):
         (missing, f"job {missing} is not stored; run its case file first"),
         ("0" * 20, "no job's key begins with '00000000000000000000'"),
     ):
-        assert cli.main(["export", name, "-i", str(results), "-o", str(tmp_path / "x.csv")]) == 2
+        assert cli.main(["export", name, "-r", str(results), "-o", str(tmp_path / "x.csv")]) == 2
         assert problem in capsys.readouterr().err
     assert not any(tmp_path.iterdir())
 
@@ -280,10 +280,10 @@ def test_damaged_series_are_left_out_and_told(results, tmp_path, capsys):
     data[len(data) // 2] ^= 1
     hurt.write_bytes(data)
     out = tmp_path / "out"
-    assert cli.main(["export", "-i", str(copy), "-o", str(out), "--series"]) == 5
+    assert cli.main(["export", "-r", str(copy), "-o", str(out), "--series"]) == 5
     assert f"{hurt}: is damaged" in capsys.readouterr().err
     assert {path.stem for path in out.rglob("*/*.nc")} == {p.name[:20] for p in others}
-    assert cli.main(["export", hurt.name[:20], "-i", str(copy), "-o", str(out)]) == 5
+    assert cli.main(["export", hurt.name[:20], "-r", str(copy), "-o", str(out)]) == 5
 
 
 def test_a_disk_that_fills_up_leaves_no_part(results, tmp_path, monkeypatch):

@@ -112,6 +112,6 @@ def test_status_says_where_jobs_fail(tmp_path, capsys):
     }  # fmt: skip
     (tmp_path / "budget.yaml").write_text(json.dumps(case))
     store(tmp_path / "results", tmp_path / "budget.yaml")
-    assert cli.main(["status", "-i", str(tmp_path / "results")]) in (0, 3)
+    assert cli.main(["status", "-r", str(tmp_path / "results")]) in (0, 3)
     text = "6 of the 6 failed jobs lie where solve.max_steps < 2500000: there 6 of 6 failed"
     assert text in " ".join(capsys.readouterr().out.split())

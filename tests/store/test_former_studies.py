@@ -113,7 +113,7 @@ def test_missing_jobs_of_a_former_study_are_not_run_by_its_case_file(wear, capsy
     assert cli.main(["status"]) == 0
     out, err = capsys.readouterr()
     assert "wear~1 3 jobs 0 ok 1 failed 2 missing" in " ".join(out.split())
-    assert err == "next: compsim run " + str(Path("wear.yaml").absolute()) + " -o results\n"
+    assert err == "next: compsim run " + str(Path("wear.yaml").absolute()) + " -r results\n"
 
 
 def test_a_job_of_a_former_study_is_found(wear):
@@ -159,7 +159,7 @@ def test_run_and_plan_say_so_first(command, wear, capsys, in_process):
     assert err.startswith(
         "wear: had 3 jobs, this file has 2, 2 of them as before; 1 finished before stays\n"
         "  stored, in the study wear~1:\n"
-        "  compsim export wear~1 -i results -o wear~1.csv\n"
+        "  compsim export wear~1 -r results -o wear~1.csv\n"
     )
     assert names() == (["wear", "wear~1"] if command == "run" else ["wear"])
 

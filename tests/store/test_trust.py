@@ -153,7 +153,7 @@ def test_status_counts_by_promise_and_by_regime(ring, capsys):
     (one,) = standings(ring)
     assert one.promises == {"none": 1, "kept": 1}
     assert one.regimes == {"chaotic": 1, "periodic": 1}
-    assert cli.main(["status", "-i", str(ring)]) == 0
+    assert cli.main(["status", "-r", str(ring)]) == 0
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 80
     out = " ".join(out.split())

@@ -45,7 +45,7 @@ def test_every_flipped_bit_is_found_and_told(place, tmp_path, capsys):
     for kept in (len(whole) - 9, len(whole) // 2, 0):
         path.write_bytes(whole[:kept])
         assert len(verify(tmp_path)) == 1
-    assert cli.main(["verify", "-i", str(tmp_path)]) == 5
+    assert cli.main(["verify", "-r", str(tmp_path)]) == 5
     assert "delete it" in capsys.readouterr().out
 
 
@@ -68,8 +68,8 @@ def test_files_of_before_have_no_seal_and_are_read(tmp_path):
 
 def test_a_folder_of_worn_machines_alone_is_told(tmp_path, capsys):
     write_dataset(tmp_path / PLACES[0], KEPT)
-    assert cli.main(["verify", "-i", str(tmp_path)]) == 0
-    assert cli.main(["status", "-i", str(tmp_path)]) == 2
+    assert cli.main(["verify", "-r", str(tmp_path)]) == 0
+    assert cli.main(["status", "-r", str(tmp_path)]) == 2
     told = capsys.readouterr().err
     assert "only how machines have worn" in told
     assert "compsim wear" in told

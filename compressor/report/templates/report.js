@@ -545,7 +545,7 @@ function showJob(key) {
     list.append(term, value);
   });
   const command = box.querySelector("code");
-  command.textContent = `compsim show ${key.slice(0, 10)} -i ${told.results}`;
+  command.textContent = `compsim show ${key.slice(0, 10)} -r ${told.results}`;
   const link = box.querySelector("a");
   link.hidden = !rows.length;
   link.onclick = (event) => {

@@ -184,7 +184,7 @@ class FitJobs:
         """Run the jobs of new points, in a study with all points so far."""
         every = [*self.points, *new]
         study = self.study(every)
-        words = ["compsim", "run", self.path, "-o", str(self.folder)]
+        words = ["compsim", "run", self.path, "-r", str(self.folder)]
         for text in self.settings(every, QUIET):
             words += ["--set", text]
         few = in_this_process if len(new) < FEW else None

@@ -251,7 +251,7 @@ class SearchJobs:
         self.values |= {*arguments.values()}
         values = sorted(self.values)
         study = question.study(values)
-        words = ["compsim", "run", question.path, "-o", str(self.folder)]
+        words = ["compsim", "run", question.path, "-r", str(self.folder)]
         for text in question.settings(values):
             words += ["--set", text]
         options = Options(shlex.join(words))  # so that `status` shows how to go on

@@ -293,7 +293,7 @@ def read_models(folder: Folder, study: StoredStudy) -> list[xr.Dataset]:
     Numbers of a job that the study has not, or that are damaged, are left out with a warning. Older
     files have no key in their names.
     """
-    again = f"compsim explain --models {study.case_file} -o {folder} makes it again"
+    again = f"compsim explain --models {study.case_file} -r {folder} makes it again"
     found: dict[str, xr.Dataset] = {}  # by key: files with it in their names come first
     for path in sorted(Path(folder, "models").glob(f"{study.name}*.nc")):
         if not KEY_IN_NAME.fullmatch(path.stem.removeprefix(study.name)):

@@ -94,7 +94,7 @@ def together(folder, commands, draw, real):
             for run in runs:
                 run.read()
             time.sleep(0.002)
-        runs.append(Run(["run", *command, "-o", "out", "-j", "1"], folder, real, hurried))
+        runs.append(Run(["run", *command, "-r", "out", "-j", "1"], folder, real, hurried))
     while any(run.runs() for run in runs):
         for run in runs:
             run.read(0.002)

@@ -203,7 +203,7 @@ def damaged(complete: Path, place: Path) -> None:
 
 
 def run(folder: Path, cases: list[Path]) -> list[object]:
-    return ["run", *cases, "-o", folder, "-j", 1]
+    return ["run", *cases, "-r", folder, "-j", 1]
 
 
 def shards(folder: Path, cases: list[Path]) -> list[object]:
@@ -211,7 +211,7 @@ def shards(folder: Path, cases: list[Path]) -> list[object]:
 
 
 def inspect(*words: str) -> Callable[[Path, list[Path]], list[object]]:
-    return lambda folder, cases: [*words, "-i", folder]
+    return lambda folder, cases: [*words, "-r", folder]
 
 
 SCENES = (
@@ -222,8 +222,8 @@ SCENES = (
     Scene("status", copied, inspect("status"), reads=True),
     Scene("verify", copied, inspect("verify"), reads=True),
     Scene("show", copied, inspect("show", "KEY"), reads=True),
-    Scene("plan", copied, lambda folder, cases: ["plan", *cases, "-o", folder], reads=True),
-    Scene("report", copied, lambda folder, cases: ["report", "-i", folder, "-o", folder / "page"]),
+    Scene("plan", copied, lambda folder, cases: ["plan", *cases, "-r", folder], reads=True),
+    Scene("report", copied, lambda folder, cases: ["report", "-r", folder, "-o", folder / "page"]),
 )
 
 

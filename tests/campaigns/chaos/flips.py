@@ -94,10 +94,10 @@ class Campaign:
         if words[0] == "show":
             words.insert(1, key)
         if words[0] != "report":
-            said = command(*words, "-i", store)
+            said = command(*words, "-r", store)
             return said._replace(out=said.out.replace(str(store), "STORE"))
         page = store.parent / "page"
-        said = command(*words, "-i", store, "-o", page)
+        said = command(*words, "-r", store, "-o", page)
         text = (page / "index.html").read_text(encoding="utf-8") if said.code == 0 else ""
         shutil.rmtree(page, ignore_errors=True)
         return said._replace(out=PROVENANCE.sub("", text.replace(str(store), "STORE")))
@@ -133,7 +133,7 @@ class Campaign:
 
     def verified(self, store: Path, file: Path) -> str:
         """What is wrong with what `compsim verify` says, or ""."""
-        said = command("verify", "-i", store)
+        said = command("verify", "-r", store)
         if said.code != 5 or str(store / file) not in said.out:
             return f"not found: {said}"
         if file.parent.name != "studies" and "  job " not in said.out:
@@ -167,7 +167,7 @@ class Campaign:
 
     def mended(self, store: Path) -> str:
         """What a run of the case files leaves damaged, or ""."""
-        said = command("run", *self.cases, "-o", store, "-j", 1)
+        said = command("run", *self.cases, "-r", store, "-j", 1)
         if said.code != 3:  # one job is meant to fail
             return str(said)
         found = contents(store)

@@ -158,7 +158,7 @@ def words_of_case(trial: Path, texts: list[str], rng: random.Random) -> tuple[st
     (trial / "case").mkdir()
     path = trial / "case" / rng.choice(FILE_NAMES)
     path.write_bytes(data)
-    words: list[object] = [path, "-o", trial / "store", "--max-jobs", 30, "-j", 1]
+    words: list[object] = [path, "-r", trial / "store", "--max-jobs", 30, "-j", 1]
     if rng.random() < 0.15:
         text = rng.choice((*TOKENS, *VALUES, *LINES)).replace("\0", "\\0")
         key = rng.choice(("solve.rtol", "name", "evil", "", "clearance_mm"))
@@ -394,12 +394,12 @@ def said_of_store(reader: str, key: str, cases: list[Path], store: Path) -> Said
     undrawn()
     words: list[object] = [*reader.split()]
     if words[0] in ("run", "plan"):
-        return command(*words, *cases, "-o", store, "-j", 1)
+        return command(*words, *cases, "-r", store, "-j", 1)
     if words[0] == "show":
         words.insert(1, key)
     if words[0] == "report":
         words += ["-o", store / "page"]
-    return command(*words, "-i", store)
+    return command(*words, "-r", store)
 
 
 # ---- trials -------------------------------------------------------------------------------------

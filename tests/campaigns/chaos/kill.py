@@ -86,7 +86,7 @@ class Scene:
 
     def run(self, folder, name="killed.yaml"):
         """Start the sweep in a folder."""
-        return Run(["run", name, "-j", "2", "-o", "out"], folder, self.real, hurried)
+        return Run(["run", name, "-j", "2", "-r", "out"], folder, self.real, hurried)
 
     def complete(self, folder, name="killed.yaml"):
         """Run the sweep to its end; what went wrong."""

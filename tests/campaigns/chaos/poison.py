@@ -111,7 +111,7 @@ def trial(folder, expected, draw, counts):
     """
     names, keep, good, bad = mixed(folder, draw)
     workers = str(draw.randint(1, 3))
-    run = Run(["run", *names, "-o", "out", "-j", workers], folder, prepare=poisoned(bad))
+    run = Run(["run", *names, "-r", "out", "-j", workers], folder, prepare=poisoned(bad))
     code = run.finish()
     problems = [f"exit code {code}: {run.text()[-500:]}"] if code != SOME_FAILED else []
     found = contents(folder / "out", FOREIGN)
@@ -138,7 +138,7 @@ def undisturbed(folder, keep):
     """What is stored of the good jobs in a sweep without bad ones: key -> digest."""
     (folder / keep).mkdir(parents=True)
     case_file(folder / keep, "good", GOOD, keep)
-    run = Run(["run", "good.yaml", "-o", "out", "-j", "2"], folder / keep)
+    run = Run(["run", "good.yaml", "-r", "out", "-j", "2"], folder / keep)
     code = run.finish()
     assert code == 0, run.text()
     return contents(folder / keep / "out", FOREIGN)

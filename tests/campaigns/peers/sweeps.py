@@ -88,7 +88,7 @@ def run_ours(jobs, folder, solve):
     """The same by `compsim run`."""
     values = {"name": "swept"} | case_values(clearances(jobs).tolist(), **solve)
     Path(folder, "swept.yaml").write_text(json.dumps(values), encoding="utf-8")
-    command = ["-m", "compsim", "run", "swept.yaml", "-j", 2, "--quiet", "-o", "results"]
+    command = ["-m", "compsim", "run", "swept.yaml", "-j", 2, "--quiet", "-r", "results"]
     times = time_process(command, folder)
     with open_study(Path(folder, "results"), "swept") as study:
         study = study.sel(clearance_mm=clearances(jobs), joint="big_end")

@@ -21,7 +21,7 @@ from compressor.studies.alarms.words import list_remarks, table_rows
 
 
 def run(folder, capsys, *words, code=0):
-    assert cli.main(["alarms", *words, "-i", str(folder), "--quiet"]) == code
+    assert cli.main(["alarms", *words, "-r", str(folder), "--quiet"]) == code
     found = capsys.readouterr()
     return found.err if code else found.out
 
@@ -34,7 +34,7 @@ def written(worn_store, tmp_path_factory):
     out = place / "out.txt"
     with open(out, "w") as file, contextlib.redirect_stdout(file):
         words = [
-            "alarms", "worn", "-i", str(worn_store), "--revolutions", "2", "--quiet",
+            "alarms", "worn", "-r", str(worn_store), "--revolutions", "2", "--quiet",
             "--band", "1000-3000", "--wear", str(place / "results"), "-o", str(place / "to"),
         ]  # fmt: skip
         assert cli.main(words) == 0

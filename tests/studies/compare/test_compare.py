@@ -56,14 +56,14 @@ def folder(tmp_path_factory):
 
 
 def run(folder, capsys, *words, code=0):
-    assert cli.main(["compare", *words, "-i", str(folder[0] / "results")]) == code
+    assert cli.main(["compare", *words, "-r", str(folder[0] / "results")]) == code
     found = capsys.readouterr()
     return found.err if code else found.out
 
 
 def exported(folder, suffix=".csv"):
     path = folder[0] / f"record{suffix}"
-    out = ["-i", str(folder[0] / "results"), "-o", str(path), "--force"]
+    out = ["-r", str(folder[0] / "results"), "-o", str(path), "--force"]
     assert cli.main(["export", folder[1], *out]) == 0
     return str(path)
 
@@ -159,7 +159,7 @@ def test_the_figure_has_the_curves_of_both(folder, capsys, tmp_path):
 def test_mistakes_are_named(folder, capsys, tmp_path):
     for words, told in (
         (["absent.csv", "others"], "absent.csv: cannot be read"),
-        ([folder[1]], "Missing argument 'RECORD JOB|STUDY...'"),
+        ([folder[1]], "Missing argument 'JOB|STUDY...'"),
         ([folder[1], "othrs"], "did you mean others?"),
         (
             [folder[1], "deaf"],

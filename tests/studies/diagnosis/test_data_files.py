@@ -162,7 +162,7 @@ def test_without_pyarrow_the_rest_is_written(made, tmp_path, without_pyarrow):
 def test_a_readme_of_something_else_is_not_replaced(worn, made, tmp_path, capsys):
     card = tmp_path / "README.md"
     card.write_text("mine")
-    assert cli.main(["dataset", "worn", "-i", str(worn), "-o", str(tmp_path)]) == 2
+    assert cli.main(["dataset", "worn", "-r", str(worn), "-o", str(tmp_path)]) == 2
     assert "choose another folder" in capsys.readouterr().err
     with pytest.raises(DataSetError, match=r"README\.md of something else"):
         write_data_set(tmp_path, made)
@@ -179,7 +179,7 @@ def test_an_earlier_data_set_is_replaced(made, tmp_path):
 
 def test_the_command(worn, tmp_path, capsys):
     place = tmp_path / "inner" / "faults"
-    words = ["-i", str(worn), "-o", str(place), "--noise", "0,0.5", "--no-signals"]
+    words = ["-r", str(worn), "-o", str(place), "--noise", "0,0.5", "--no-signals"]
     assert cli.main(["dataset", "worn", *words]) == 0
     out, err = capsys.readouterr()
     assert "big_end  train         2         8\n" in out

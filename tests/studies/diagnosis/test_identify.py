@@ -36,7 +36,7 @@ def record(tmp_path):
 
 
 def test_a_record_is_explained(record, folder, capsys):
-    assert cli.main(["identify", record, "--study", "worn", "-i", folder, "--quiet"]) == 0
+    assert cli.main(["identify", record, "--study", "worn", "-r", folder, "--quiet"]) == 0
     first, head, best, *_, last = capsys.readouterr().out.splitlines()
     assert first.startswith(f"{record}: ")
     assert "revolutions at 500 rpm, 8000 Hz" in first
@@ -50,7 +50,7 @@ def test_a_record_is_explained(record, folder, capsys):
 
 
 def test_as_json(record, folder, capsys):
-    assert cli.main(["identify", record, "--study", "worn", "-i", folder, "--json"]) == 0
+    assert cli.main(["identify", record, "--study", "worn", "-r", folder, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["jobs"], found["jobs_of_study"], found["fits"]) == (240, 240, True)
     assert found["candidates"][0]["joint"] == "small_end"
@@ -59,17 +59,17 @@ def test_as_json(record, folder, capsys):
 
 def test_a_job_is_explained_by_the_others(folder, capsys):
     key = sorted(read_store(folder).keys())[0]
-    assert cli.main(["identify", key[:12], "--study", "worn", "-i", folder]) == 0
+    assert cli.main(["identify", key[:12], "--study", "worn", "-r", folder]) == 0
     assert "rests on 239 of 240 jobs of study worn" in capsys.readouterr().out
 
 
 def test_an_exported_job_is_explained_as_the_job_itself(tmp_path, folder, capsys):
     key, path = sorted(read_store(folder).keys())[5], str(tmp_path / "job.csv")
-    assert cli.main(["export", key, "-i", folder, "-o", path]) == 0
+    assert cli.main(["export", key, "-r", folder, "-o", path]) == 0
     capsys.readouterr()
     answers = []
     for record in (key, path):
-        words = ["identify", record, "--study", "worn", "-i", folder, "--quiet", "--json"]
+        words = ["identify", record, "--study", "worn", "-r", folder, "--quiet", "--json"]
         assert cli.main(words) == 0
         found = json.loads(capsys.readouterr().out)
         answers.append({one["joint"]: one["probability"] for one in found["candidates"]})
@@ -93,7 +93,7 @@ def test_the_shape_of_the_tacho_does_not_change_the_answer(joint, tmp_path, fold
         header = "time_s,acceleration_m_per_s2,tacho"
         np.savetxt(path, np.column_stack([times, values, wave]), "%.12g", ",", header=header,
                    comments="")  # fmt: skip
-        words = ["identify", path, "--study", "worn", "-i", folder, "--quiet", "--json"]
+        words = ["identify", path, "--study", "worn", "-r", folder, "--quiet", "--json"]
         assert cli.main(words) == 0
         candidates = json.loads(capsys.readouterr().out)["candidates"]
         found[name] = {one["joint"]: one["probability"] for one in candidates}[joint]
@@ -104,7 +104,7 @@ def test_the_shape_of_the_tacho_does_not_change_the_answer(joint, tmp_path, fold
 def test_a_steady_speed_stands_in_for_a_tacho(tmp_path, folder, capsys):
     path = written(tmp_path / "bare.csv", *struck("big_end", [0.3], 5002), wave=False)
     steady = ["--rpm", "500", "--tdc", "0.24"]
-    assert cli.main(["identify", path, "--study", "worn", "-i", folder, *steady]) == 0
+    assert cli.main(["identify", path, "--study", "worn", "-r", folder, *steady]) == 0
     assert capsys.readouterr().out.splitlines()[2].split()[1] == "big_end"
 
 
@@ -120,7 +120,7 @@ def test_what_a_file_does_not_say_options_do(tmp_path, folder, capsys):
              "--tacho-deg", "90"]  # fmt: skip
     chances, steady = [], ["--rpm", "500", "--tdc", "0"]
     for words in ([as_csv, *steady], [str(tmp_path / "record.wav"), *hints]):
-        assert cli.main(["identify", *words, "--study", "worn", "-i", folder, "--json"]) == 0
+        assert cli.main(["identify", *words, "--study", "worn", "-r", folder, "--json"]) == 0
         best = json.loads(capsys.readouterr().out)["candidates"][0]
         chances.append(best["probability"])
         assert best["joint"] == "big_end"
@@ -131,7 +131,7 @@ def test_what_does_not_fit_is_said_first(tmp_path, folder, capsys):
     times, values, tacho = struck("none", [], 5003)
     values += 30 * np.sin(2 * np.pi * 300 * times)
     path = written(tmp_path / "hum.csv", times, values, tacho)
-    assert cli.main(["identify", path, "--study", "worn", "-i", folder]) == 0
+    assert cli.main(["identify", path, "--study", "worn", "-r", folder]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[1].startswith("NOTHING IN THIS STUDY FITS: ")
     assert lines[2].startswith("farthest from what other features foretell: ")
@@ -158,5 +158,5 @@ def test_what_does_not_fit_is_said_first(tmp_path, folder, capsys):
 )
 def test_mistakes_are_named(arguments, code, told, record, folder, capsys):
     arguments = [record if word == "RECORD" else word for word in arguments]
-    assert cli.main(["identify", *arguments, "-i", folder]) == code
+    assert cli.main(["identify", *arguments, "-r", folder]) == code
     assert told in capsys.readouterr().err

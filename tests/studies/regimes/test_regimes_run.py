@@ -37,12 +37,12 @@ def place(tmp_path_factory):
     place = tmp_path_factory.mktemp("regimes")
     path = write(place / "wear.yaml")
     with jobs_here():
-        assert cli.main(["run", path, "-o", str(place / "r"), "-j", "2", "--quiet"]) == 0
+        assert cli.main(["run", path, "-r", str(place / "r"), "-j", "2", "--quiet"]) == 0
     return place
 
 
 def run(place, capsys, *words):
-    code = cli.main([*words[:1], str(place / "wear.yaml"), "-o", str(place / "r"), *words[1:]])
+    code = cli.main([*words[:1], str(place / "wear.yaml"), "-r", str(place / "r"), *words[1:]])
     return code, *capsys.readouterr()
 
 
@@ -139,7 +139,7 @@ def test_plan_tells_chains_and_values_as_json(place, capsys):
 
 def test_failed_values_end_with_3_and_say_why(in_process, capsys, tmp_path):
     path = write(tmp_path / "short.yaml", 60)
-    code = cli.main(["run", path, "-o", str(tmp_path), "-j", "1"])
+    code = cli.main(["run", path, "-r", str(tmp_path), "-j", "1"])
     out, said = capsys.readouterr()
     assert code == 3
     assert "0 ok    12 failed" in out
@@ -166,7 +166,7 @@ regimes: {over: machine.speed_rpm, from: 450, to: 500, n: 2, measure_rev: 8,
     path = write(tmp_path / "blocks.yaml", text=text)
     (study,) = load_studies(path)
     assert study.jobs == 2
-    assert cli.main(["run", path, "-o", str(tmp_path), "-j", "1", "--quiet"]) == 0
+    assert cli.main(["run", path, "-r", str(tmp_path), "-j", "1", "--quiet"]) == 0
     found = open_regimes(tmp_path, "blocks")
     assert found["section"].dims[:3] == ("job", "direction", "speed_rpm")
     assert found["fault"].values.tolist() == ["big_end", "both"]

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 from compsim import cli
+from compsim.find import jsonable_answer, lines, tell_ahead
 from conftest import jobs_here
 
 from compressor.cases.load import load_cases, load_studies
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
-from compressor.studies.search.command import jsonable_answer, lines, tell_ahead
 from compressor.studies.search.find import Point, interval
 from compressor.studies.search.question import JobReading, Question, comparison
 from compressor.sweep import plan

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from compsim import cli
+from compsim.stress import summary
 from conftest import jobs_here
 
 from compressor.cases.case import Case
@@ -14,7 +15,6 @@ from compressor.report.figures.pictures import render
 from compressor.solve.error_bars import bars
 from compressor.solve.solution import solve
 from compressor.store.files import StoreError
-from compressor.studies.stress.command import summary
 from compressor.studies.stress.extremes import SPANS, Budget, is_supported, place, values
 from compressor.studies.stress.figures import draw_outcomes, outcomes
 from compressor.studies.stress.judge import (

@@ -3,12 +3,12 @@
 from collections import Counter
 
 import pytest
+from compsim.stress import summary
 
 from compressor.cases.case import Case
 from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
 from compressor.solve.solution import solve
 from compressor.store.files import StoreError
-from compressor.studies.stress.command import summary
 from compressor.studies.stress.extremes import ELASTIC, FEATURES, OF_LAWS, RANGES, Budget, values
 from compressor.studies.stress.judge import judge, judges
 from compressor.studies.stress.stress import campaign

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from compsim.explain import model_lines
 
 from compressor.metrics import JOINTS, METRICS
 from compressor.report.page import document
 from compressor.store.files import StoreWarning
 from compressor.store.series_file import write_dataset
 from compressor.store.studies import StoredAxis, StoredStudy
-from compressor.studies.tradeoff.command import feature_lines, model_lines
 from compressor.studies.tradeoff.page import (
     add,
     headline,
@@ -187,21 +187,6 @@ def test_choices_are_read_where_they_are_of_a_job_of_the_study(tmp_path):
     write_dataset(path, xr.Dataset({"a": 1.0}))
     with pytest.warns(StoreWarning, match="holds no choices of the model"):
         assert len(read_models(tmp_path, study)) == 1
-
-
-def test_the_table_of_features_fits_a_terminal():
-    """The case itself, the changes that move a block's metrics or cost time, and the span."""
-    flat = made(max_penetration=([20e-6] * 7, [1e-9] * 7), rms_acceleration=(PEAK, PEAK_BAR))
-    idle = flat.isel(choice=0).assign_coords(choice="idle")
-    table = model_table(xr.concat([flat.isel(choice=[0, 2, 5]), idle], "choice"))
-    lines = [*feature_lines("worn, the only job", table)]
-    assert max(map(len, lines)) <= 80
-    assert [line.split("  ")[1] for line in lines[3:8]] == [
-        "choice of the model", "the case itself", "oil", "idle", "all of them",
-    ]  # fmt: skip
-    assert lines[8].split() == ["0", "%", "0", "%", "+99", "points"]
-    assert "  no choice is seen to move: max penetration, big end" in lines
-    assert "    impossible: needs more" in lines
 
 
 def test_what_moves_each_metric_fits_a_terminal():

@@ -10,12 +10,12 @@ import time
 import numpy as np
 import pytest
 from compsim.cli import main
+from compsim.wear import hours
 from conftest import assert_same_bits, jobs_here
 
 from compressor.cases.load import load_cases
 from compressor.store.files import StoreError
 from compressor.studies.wear import stages
-from compressor.studies.wear.command import hours
 from compressor.studies.wear.run import WearTask, follow_wear, run_wear
 from compressor.studies.wear.stages import Worn, open_wear, wear_file
 
@@ -41,18 +41,18 @@ def told(place):
     """What the command gave, and its code."""
     here, out = place / "bearing.yaml", place / "results"
     with jobs_here():
-        assert main(["wear", str(here), "-o", str(out), "-j", "2", "--quiet"]) == 0
+        assert main(["wear", str(here), "-r", str(out), "-j", "2", "--quiet"]) == 0
     return load_cases(here), out
 
 
 def test_a_line_for_each_machine_says_when_it_is_worn_out(told, place, capsys):
     cases, out = told
-    assert main(["wear", str(place / "bearing.yaml"), "-o", str(out)]) == 0
+    assert main(["wear", str(place / "bearing.yaml"), "-r", str(out)]) == 0
     said = capsys.readouterr()
     head, *lines = said.out.splitlines()
     assert "worn out after, h" in head
     assert "all 2 machines are stored" in said.err
-    assert main(["wear", str(place / "bearing.yaml"), "-o", str(out), "--json"]) == 0
+    assert main(["wear", str(place / "bearing.yaml"), "-r", str(out), "--json"]) == 0
     numbers = json.loads(capsys.readouterr().out)
     for line, one, case in zip(lines, numbers, cases, strict=True):
         assert f"machine.speed_rpm={case.machine.speed_rpm}" in line
@@ -125,7 +125,7 @@ def test_a_failed_machine_is_told_and_goes_on_when_asked(
     assert (end.reason, end.detail) == ("budget_seconds", "slow")
     again = follow_wear(WearTask(str(tmp_path), worn))
     assert (again.stages, again.reason) == (end.stages, end.reason)
-    assert main(["wear", str(file), "-o", str(tmp_path)]) == 3
+    assert main(["wear", str(file), "-r", str(tmp_path)]) == 3
     said = capsys.readouterr()
     assert "failing: budget_seconds: slow" in said.err
     assert "--rerun" in said.err
@@ -135,7 +135,7 @@ def test_a_failed_machine_is_told_and_goes_on_when_asked(
     bounds = (hours(times * last, "> ") for times in (1.0, 1.0 / factor, factor))
     mid, low, high = (re.escape(bound) for bound in bounds)
     assert re.search(rf"  {mid} +{low} to {high}  ", said.out)
-    assert main(["wear", str(file), "-o", str(tmp_path), "--rerun"]) == 0
+    assert main(["wear", str(file), "-r", str(tmp_path), "--rerun"]) == 0
     assert_same_bits(open_wear(tmp_path, case), whole(worn, tmp_path / "undisturbed"))
 
 
@@ -162,7 +162,7 @@ def whole(worn, folder):
 def test_what_cannot_wear_is_refused(text, message, tmp_path, capsys):
     file = tmp_path / "odd.yaml"
     file.write_text(text, encoding="utf-8")
-    assert main(["wear", str(file), "-o", str(tmp_path / "none")]) == 2
+    assert main(["wear", str(file), "-r", str(tmp_path / "none")]) == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
 

@@ -7,28 +7,31 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
-from compsim.progress import ProgressReporter
-from compsim.results import files
-from compsim.screen import (
-    DONE,
-    SOME_FAILED,
-    as_json,
-    caution,
-    check_json_units,
-    jobs_option,
-    jsonable,
-    one_thread_each,
-    output_option,
-    plural,
-    print_text,
-    say_wrapped,
-    setting,
-    units_option,
-    wrap_line,
-)
 
 from compressor.digits import by_bar
 from compressor.program import duration
+from compsim.options import (
+    check_json_units,
+    config_argument,
+    jobs_option,
+    json_option,
+    quiet_option,
+    results_option,
+    setting,
+    units_option,
+)
+from compsim.progress import ProgressReporter
+from compsim.screen import (
+    DONE,
+    SOME_FAILED,
+    caution,
+    jsonable,
+    one_thread_each,
+    plural,
+    print_text,
+    say_wrapped,
+    wrap_line,
+)
 
 if TYPE_CHECKING:
     from compressor.cases import Study
@@ -44,7 +47,7 @@ UNBARRED = " (no error bar was made)"
 
 
 @click.command()
-@click.argument("config", metavar="CONFIG", shell_complete=files)
+@config_argument
 @click.option("--over", required=True, metavar="KEY=LOW:HIGH",
               help="Search over this key within this range, in the case file's unit.")  # fmt: skip
 @click.option("--first", metavar="'METRIC[.JOINT] > VALUE'",
@@ -59,13 +62,13 @@ UNBARRED = " (no error bar was made)"
 @click.option("--log", "logarithmic", is_flag=True, help="Space points evenly in the logarithm.")
 @units_option("that of VALUE, else SI")
 @setting
-@output_option
+@results_option
 @jobs_option("Run in this many worker processes, as many points in one step of --first.")
-@as_json
-@click.option("--quiet", is_flag=True, help="Print no progress.")
+@json_option
+@quiet_option
 def find(
     config: str,
-    output: str,
+    folder: str,
     jobs: int | None,
     units: "Units | None",
     as_json: bool,
@@ -102,15 +105,15 @@ def find(
 
     if not quiet:
         caution([study])
-        tell_ahead(question, study, output, jobs or cores())
+        tell_ahead(question, study, folder, jobs or cores())
     with ProgressReporter(quiet, "points") as progress:
-        answer = search(question, output, jobs or cores(), progress)
+        answer = search(question, folder, jobs or cores(), progress)
     if answer.base:
         question = dataclasses.replace(question, goal=question.goal.beside(answer.base))
     if as_json:
         print_text(json.dumps(jsonable_answer(question, answer), indent=1))
     else:
-        for line in lines(question, answer, output, units):
+        for line in lines(question, answer, folder, units):
             indent = len(line) - len(line.lstrip())
             print_text("\n".join(wrap_line(line.lstrip(), indent)))
     return SOME_FAILED if answer.failed else DONE

@@ -7,25 +7,28 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from compressor.program import duration, printable
+from compsim.options import (
+    configs_argument,
+    jobs_option,
+    json_option,
+    quiet_option,
+    results_option,
+    setting,
+)
 from compsim.progress import ProgressReporter
 from compsim.screen import (
     DONE,
     SOME_FAILED,
     all_stored,
-    as_json,
-    configs_argument,
-    jobs_option,
     one_thread_each,
-    output_option,
     plural,
     print_text,
     say,
     say_wrapped,
-    setting,
     stored_before,
 )
-
-from compressor.program import duration, printable
 
 if TYPE_CHECKING:
     from compressor.cases import Study
@@ -37,15 +40,15 @@ HEAD = f"{'worn out after, h':>17}  {'from more to less wear, h':>31}  at the en
 
 @click.command()
 @configs_argument
-@output_option
-@jobs_option("Run in this many worker processes.")
+@results_option
+@jobs_option()
 @setting
 @click.option("--rerun", is_flag=True, help="Go on with machines whose motion failed.")
-@as_json
-@click.option("--quiet", is_flag=True, help="Print no progress; errors are still reported.")
+@json_option
+@quiet_option
 def wear(
     configs: tuple[str, ...],
-    output: str,
+    folder: str,
     jobs: int | None,
     overrides: tuple[str, ...],
     rerun: bool,
@@ -72,16 +75,16 @@ def wear(
     with ProgressReporter(quiet, "cases read") as progress:
         studies = load_studies(*configs, overrides=overrides, follow=False, progress=progress)
     check(studies)
-    with ProgressReporter(quiet, "machines", folder=output) as progress:
-        summary = run_wear(studies, output, jobs or cores(), progress, rerun)
+    with ProgressReporter(quiet, "machines", folder=folder) as progress:
+        summary = run_wear(studies, folder, jobs or cores(), progress, rerun)
     if as_json:
-        print_text(json.dumps([jsonable_wear(one, output) for one in summary.machines], indent=1))
+        print_text(json.dumps([jsonable_wear(one, folder) for one in summary.machines], indent=1))
     else:
         for line in table(summary.machines):
             print_text(line)
-    drawn = [*draw(summary, output, {study.name: study.title for study in studies})]
+    drawn = [*draw(summary, folder, {study.name: study.title for study in studies})]
     if not quiet:
-        report_wear(summary, output, drawn)
+        report_wear(summary, folder, drawn)
     for one in summary.failed:
         fail(one)
     return SOME_FAILED if summary.failed else DONE

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import click
+from compressor.program import duration, printable
 from compsim.progress import ProgressReporter
 from compsim.screen import (
     DONE,
@@ -19,8 +19,6 @@ from compsim.screen import (
     unread,
 )
 
-from compressor.program import duration, printable
-
 if TYPE_CHECKING:
     from compressor.cases import Study
     from compressor.studies.regimes.run import ChainProgress, RegimesSummary
@@ -28,7 +26,7 @@ if TYPE_CHECKING:
 MAX_FAILURES = 20  # listed one by one
 
 
-def run_studies(studies: "list[Study]", folder: str, workers: int, rerun: bool, quiet: bool) -> int:
+def run_chains(studies: "list[Study]", folder: str, workers: int, rerun: bool, quiet: bool) -> int:
     """Follow the chains of studies; return the exit code."""
     from compressor.studies.regimes.run import run_regimes
 
@@ -38,14 +36,10 @@ def run_studies(studies: "list[Study]", folder: str, workers: int, rerun: bool, 
     return SOME_FAILED if summary.failed else DONE
 
 
-def check_options(scheduler: str | None) -> None:
-    """Raise UsageError for options that chains of regimes do not know."""
-    if scheduler:
-        raise click.UsageError("regimes run in processes here: leave --backend dask out")
-
-
 def ahead(studies: "list[Study]", folder: str) -> "list[ChainProgress]":
     """Return the number of stored values of each study's chains."""
+    if not studies:
+        return []
     from compressor.studies.regimes.run import standing
 
     return standing(studies, folder)

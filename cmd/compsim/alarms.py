@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
+
+from compsim.options import FOLDER, quiet_option, results_option
 from compsim.progress import ProgressReporter
 from compsim.records import read_levels
-from compsim.results import of_results, one_word, results_folder, studies
 from compsim.screen import DONE, one_thread_each, print_text, say, say_wrapped
 
 if TYPE_CHECKING:
@@ -38,8 +39,9 @@ def read_bands(
 
 
 @click.command()
-@of_results("STUDY", studies)
-@click.option("-o", "--output", metavar="FOLDER",
+@click.argument("study", metavar="STUDY")
+@results_option
+@click.option("-o", "--output", metavar="FOLDER", type=FOLDER,
               help="Also write all rates as CSV and netCDF, and figures, here.")  # fmt: skip
 @click.option("--wear", "run", metavar="RUN",
               help="Print how many hours before its limit each alarm trips, by this wear run: a "
@@ -62,9 +64,9 @@ def read_bands(
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True,
               help="Draw by this seed the noise, and which draws judge by which limits.",
 )  # fmt: skip
-@click.option("--quiet", is_flag=True, help="Print no progress and no remarks.")
+@quiet_option
 def alarms(
-    given: tuple[str, ...], folder: str | None, output: str | None, run: str | None,
+    study: str, folder: str, output: str | None, run: str | None,
     false_alarms: float, factor: float | None, detected: float, bands: "tuple[Band, ...] | None",
     noise: tuple[float, ...], revolutions: int, seed: int, quiet: bool,
 ) -> int:  # fmt: skip
@@ -82,8 +84,6 @@ def alarms(
     that were counted. An interval that ends with "> 0.4" goes beyond the study's greatest
     clearance: its draws are too few to be sure.
     """
-    folder, words = results_folder(given, folder)
-    study = one_word(words, "STUDY")
     source = click.get_current_context().get_parameter_source("false_alarms")
     if factor is not None and source is ParameterSource.COMMANDLINE:
         raise click.UsageError("--factor and --false-alarms both set limits: give one of them")
@@ -109,7 +109,7 @@ def alarms(
         write_alarms(found, output, machine_title(folder, study))
         if not quiet:
             beside = "" if output == "alarms" else f" --alarms {shlex.quote(output)}"
-            say(f"next: compsim report -i {shlex.quote(folder)}{beside}")
+            say(f"next: compsim report -r {shlex.quote(folder)}{beside}")
     return DONE
 
 

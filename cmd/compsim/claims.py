@@ -6,20 +6,18 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import click
-from compsim.progress import ProgressReporter
-from compsim.results import files, folders
-from compsim.screen import (
-    DONE,
-    SOME_FAILED,
-    as_json,
+
+from compsim.options import (
+    FILE,
     jobs_option,
+    json_option,
     limit,
-    one_thread_each,
-    plural,
-    print_text,
-    say,
+    output_option,
+    quiet_option,
     setting,
 )
+from compsim.progress import ProgressReporter
+from compsim.screen import DONE, SOME_FAILED, one_thread_each, plural, print_text, say
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,17 +26,16 @@ EXAMPLES = ("claims", "assumptions")
 
 
 @click.command()
-@click.argument("configs", nargs=-1, metavar="[CONFIG...]", shell_complete=files)
-@click.option("-o", "--output", default="claims", show_default=True, shell_complete=folders,
-              help="Write the verdicts into this folder.")  # fmt: skip
+@click.argument("configs", nargs=-1, metavar="[CONFIG...]", type=FILE)
+@output_option("claims", "Write the verdicts into this folder.")
 @click.option("--search", "generations", type=click.IntRange(min=0), default=0, metavar="N",
               help="Search for the least change by which all claims hold: N generations of some "
               "50 machines, in the ranges that a CONFIG draws from.")  # fmt: skip
-@jobs_option("Run in this many worker processes.")
+@jobs_option()
 @setting
 @limit
-@as_json
-@click.option("--quiet", is_flag=True, help="Print no progress.")
+@json_option
+@quiet_option
 def claims(
     configs: tuple[str, ...],
     output: str,

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from compsim.options import FILE, json_option, quiet_option, results_option
 from compsim.progress import ProgressReporter
 from compsim.records import record_options
-from compsim.results import Items, files, jobs, of_results, results_folder
-from compsim.screen import DONE, as_json, jsonable, plural, print_text, say
+from compsim.screen import DONE, jsonable, plural, print_text, say
 
 if TYPE_CHECKING:
     from compressor.report import Drawing
@@ -22,22 +23,19 @@ KINDS = (".png", ".svg", ".csv")
 COLUMNS = ("difference, dB", "correlation", "envelope", "rms ratio", "distance, dB")
 
 
-def record_then_jobs(context: click.Context, parameter: click.Parameter, word: str) -> Items:
-    """Return what lets the shell complete a file as the first word, and jobs and studies."""
-    found = jobs(context, parameter, word)
-    return found if context.params.get("given") else [*found, *files(context, parameter, word)]
-
-
 @click.command()
-@of_results("RECORD JOB|STUDY...", record_then_jobs)
+@click.argument("record", type=FILE)
+@click.argument("names", nargs=-1, required=True, metavar="JOB|STUDY...")
+@results_option
 @record_options
-@click.option("-o", "--output", metavar="FILE",
+@click.option("-o", "--output", metavar="FILE", type=FILE,
               help="Draw this figure, .png or .svg, or write its numbers as .csv.")  # fmt: skip
-@as_json
-@click.option("--quiet", is_flag=True, help="Print no progress.")
+@json_option
+@quiet_option
 def compare(
-    given: tuple[str, ...],
-    folder: str | None,
+    record: str,
+    names: tuple[str, ...],
+    folder: str,
     hints: dict[str, Any],
     output: str | None,
     as_json: bool,
@@ -70,9 +68,6 @@ def compare(
     needs at least three. What does not fit (speed, sampling rate, length, unit, crank angle) is
     said below the table; a file does not say where its sensor was.
     """
-    folder, words = results_folder(given, folder)
-    if len(words) < 2:
-        raise click.UsageError("Missing argument 'RECORD JOB|STUDY...'")
     kind = os.path.splitext(output or "")[1]
     if output and kind not in KINDS:
         raise click.UsageError(f"-o {output}: end the name in {', '.join(KINDS)}")
@@ -82,7 +77,7 @@ def compare(
     if output:
         writable_folder(os.path.dirname(output) or os.curdir, make=False)
     with ProgressReporter(quiet) as progress:
-        found = compare_record(words[0], words[1:], folder, hints, progress)
+        found = compare_record(record, names, folder, hints, progress)
     if as_json:
         print_text(json.dumps(jsonable_comparison(found), indent=1))
     else:

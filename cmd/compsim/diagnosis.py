@@ -7,19 +7,11 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from compsim.options import FILE, FOLDER, json_option, quiet_option, results_option
 from compsim.progress import ProgressReporter
 from compsim.records import read_levels, record_options
-from compsim.results import files, of_results, one_word, results_folder, studies
-from compsim.screen import (
-    DONE,
-    as_json,
-    one_thread_each,
-    plural,
-    print_text,
-    say,
-    say_wrapped,
-    size,
-)
+from compsim.screen import DONE, one_thread_each, plural, print_text, say, say_wrapped, size
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,8 +21,9 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@of_results("STUDY", studies)
-@click.option("-o", "--output", required=True, metavar="FOLDER",
+@click.argument("study", metavar="STUDY")
+@results_option
+@click.option("-o", "--output", required=True, metavar="FOLDER", type=FOLDER,
               help="Write the data set into this folder.")  # fmt: skip
 @click.option("--revolutions", type=click.IntRange(min=2), default=5, show_default=True,
               help="Cut windows of so many whole revolutions.")  # fmt: skip
@@ -44,10 +37,10 @@ if TYPE_CHECKING:
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True,
               help="Draw noise and split by this seed.")  # fmt: skip
 @click.option("--no-signals", is_flag=True, help="Write features and labels, without samples.")
-@click.option("--quiet", is_flag=True, help="Print no progress.")
+@quiet_option
 def dataset(
-    given: tuple[str, ...],
-    folder: str | None,
+    study: str,
+    folder: str,
     output: str,
     revolutions: int,
     hop: int | None,
@@ -66,8 +59,6 @@ def dataset(
     README.md, a card of what was simulated and what is not in it, and replaces those of an earlier
     data set. The study needs a body and a sensor.
     """
-    folder, words = results_folder(given, folder)
-    study = one_word(words, "STUDY")
     from compressor.studies.diagnosis.data_set import DataSetOptions
     from compressor.studies.diagnosis.record_files import build_data_set
 
@@ -102,16 +93,17 @@ def describe_dataset(data_set: "xr.Dataset") -> list[str]:
 
 
 @click.command()
-@of_results("RECORD|JOB", files)
-@click.option("--study", required=True, shell_complete=studies,
+@click.argument("record", metavar="RECORD|JOB", type=FILE)
+@results_option
+@click.option("--study", required=True,
               help="Explain the record by the jobs of this stored study.")  # fmt: skip
 @record_options
-@as_json
-@click.option("--quiet", is_flag=True, help="Print no progress.")
+@json_option
+@quiet_option
 def identify(
-    given: tuple[str, ...],
+    record: str,
     study: str,
-    folder: str | None,
+    folder: str,
     hints: dict[str, Any],
     as_json: bool,
     quiet: bool,
@@ -132,8 +124,6 @@ def identify(
 
     Exit code 0 also where nothing fits: that is an answer.
     """
-    folder, words = results_folder(given, folder)
-    record = one_word(words, "RECORD|JOB")
     one_thread_each()  # before numpy loads
     from compressor.store import find_record
     from compressor.studies.diagnosis.identify import explain_record

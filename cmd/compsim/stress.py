@@ -7,18 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from compsim.progress import ProgressReporter
-from compsim.screen import (
-    DONE,
-    SOME_FAILED,
-    jobs_option,
-    one_thread_each,
-    plural,
-    print_text,
-    say,
-)
 
 from compressor.program import duration
+from compsim.options import jobs_option, output_option, quiet_option
+from compsim.progress import ProgressReporter
+from compsim.screen import DONE, SOME_FAILED, one_thread_each, plural, print_text, say
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,12 +34,11 @@ if TYPE_CHECKING:
     flag_value="features",
     help="Draw laws, oil, guide, drive and rod as well.",
 )
-@jobs_option("Run in this many worker processes.")
-@click.option("-o", "--output", default="stress", show_default=True,
-              help="Write the campaign into this folder.")  # fmt: skip
+@jobs_option()
+@output_option("stress", "Write the campaign into this folder.")
 @click.option("--scene", type=click.IntRange(min=0),
               help="Repeat this case of the seed alone, and store nothing.")  # fmt: skip
-@click.option("--quiet", is_flag=True, help="Print no progress.")
+@quiet_option
 def stress(
     scenes: int, seed: int, drawn: str | None, jobs: int | None, output: str, scene: int | None,
     quiet: bool,

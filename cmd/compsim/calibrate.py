@@ -5,19 +5,19 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
-from compsim.progress import ProgressReporter
-from compsim.records import record_options
-from compsim.results import files
-from compsim.screen import (
-    DONE,
-    as_json,
+
+from compsim.options import (
+    FILE,
+    config_argument,
     jobs_option,
-    one_thread_each,
-    output_option,
-    print_text,
-    say,
+    json_option,
+    quiet_option,
+    results_option,
     setting,
 )
+from compsim.progress import ProgressReporter
+from compsim.records import record_options
+from compsim.screen import DONE, one_thread_each, print_text, say
 
 if TYPE_CHECKING:
     from compressor.studies.calibrate.calibrate import Calibration
@@ -26,19 +26,19 @@ POOR_FIT = 1.3  # misfit from which on the machine is said not to be this one
 
 
 @click.command()
-@click.argument("record", metavar="RECORD|JOB", shell_complete=files)
-@click.argument("config", metavar="CONFIG", shell_complete=files)
+@click.argument("record", metavar="RECORD|JOB", type=FILE)
+@config_argument
 @click.option("--fit", "ranges", multiple=True, required=True, metavar="KEY=LOW:HIGH",
               help="Fit this key within this range, in the case file's unit.")  # fmt: skip
 @record_options
 @setting
-@output_option
-@jobs_option("Run in this many worker processes.")
-@as_json
-@click.option("--quiet", is_flag=True, help="Print no progress.")
+@results_option
+@jobs_option()
+@json_option
+@quiet_option
 def calibrate(
     record: str, config: str, ranges: tuple[str, ...], hints: dict[str, Any],
-    overrides: tuple[str, ...], output: str, jobs: int | None, as_json: bool, quiet: bool,
+    overrides: tuple[str, ...], folder: str, jobs: int | None, as_json: bool, quiet: bool,
 ) -> int:  # fmt: skip
     """Fit keys of a sound machine to its accelerometer's record.
 
@@ -63,9 +63,9 @@ def calibrate(
     from compressor.sweep import cores
 
     unknowns = [Unknown.written(text) for text in ranges]
-    _, measured = find_record(record, output, hints)
+    _, measured = find_record(record, folder, hints)
     with ProgressReporter(quiet, "points") as progress:
-        found = fit_case(measured, config, unknowns, output, overrides, jobs or cores(), progress)
+        found = fit_case(measured, config, unknowns, folder, overrides, jobs or cores(), progress)
     if as_json:
         print_text(json.dumps(jsonable(record, found), indent=1))
         return DONE
@@ -75,7 +75,7 @@ def calibrate(
         print_text(f"# read: {text}")
     for line in describe(record, config, found):
         print_text(f"# {line}".rstrip())
-    print_text(to_yaml(found.case, brief=True).rstrip("\n"))
+    print_text(to_yaml(found.case).rstrip("\n"))
     if not quiet:
         say(f"{found.jobs} points, {found.run_now} of them run now, in study {found.study}")
     return DONE
