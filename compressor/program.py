@@ -7,7 +7,6 @@ import os
 import shutil
 import tempfile
 import threading
-import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
@@ -44,22 +43,10 @@ def duration(seconds: float) -> str:
     return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60:02d} min"
 
 
-def report_progress(
-    things: Sequence[Thing],
-    name: str,
-    progress: Progress,
-    clock: Callable[[], float] = time.perf_counter,
-) -> Iterator[Thing]:
-    """Yield things and report how many are done, and early on about how long all will take.
-
-    By the time of the second one: the first one loads what all need. name: their plural.
-    """
-    remark, began = "", 0.0
+def report_progress(things: Sequence[Thing], progress: Progress) -> Iterator[Thing]:
+    """Yield things, and report how many are done."""
     for number, thing in enumerate(things):
-        if number == 2:
-            remark = f"{len(things)} {name}, about {duration((clock() - began) * len(things))}"
-        progress(number, len(things), remark)
-        remark, began = "", clock()
+        progress(number, len(things), "")
         yield thing
     progress(len(things), len(things), "")
 

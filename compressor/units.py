@@ -1,9 +1,9 @@
-"""Units that people read beside SI: of figures, tables, texts, CSV headers, limits of searches.
+"""Units that people read beside SI: of axes, tables, `show`, CSV headers, limits of searches.
 
 Files and Python have SI. Two choices are offered: `si`, and `plant` with mm, mm/s, g, kN, bar and
-rpm. Without a choice each command has what it has had: pages, figures and `show` kN, mm, µm and
-m/s², CSV and `find` SI. Angles stay in degrees in figures; what is not listed stays as it is.
-Without libraries, as `digits`.
+rpm. Without a choice pages, figures and `show` have kN, mm, µm and m/s², CSV and `find` SI; so have
+sentences, each number with its unit, whatever the choice. Angles stay in degrees in figures; what
+is not listed stays as it is. Without libraries, as `digits`.
 """
 
 import math
@@ -70,44 +70,6 @@ def read_quantity(text: str, si: str) -> float | None:
 
 
 NUMBER = re.compile(r"\s*([-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
-
-
-_NUMBER = r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?"
-_SEVERAL = rf"{_NUMBER}(?:(?:, | to | and | or | ± | × | → |–){_NUMBER})*"
-_UNIT = "|".join(sorted(map(re.escape, IN_SI), key=len, reverse=True))
-# numbers with a unit that stands alone: no N m, no N/mm, no digits of (8.2 ± 0.1)e+07 N
-QUANTITIES = re.compile(rf"(?<![\w.,+-])({_SEVERAL}) ({_UNIT})(?![\w/·]| (?:m|s|mm)\b)")
-IN_G_TOO = re.compile(rf"(?<= m/s²) \({_NUMBER} g\)")
-
-
-def convert_text(text: str, units: Units) -> str:
-    """Return a text whose numbers with units are in the chosen ones.
-
-    A list of numbers before a unit is all in that unit. Digits are as many, without zeros at the
-    end; three at least by a factor that is no power of ten. An acceleration that is given in g
-    beside m/s² is in the chosen unit alone.
-
-    >>> convert_text("from -52.91 to 108.8 kN at 0.1 mm, 5 N m", "si")
-    'from -52910 to 108800 N at 0.0001 m, 5 N m'
-    """
-    if units == "usual":
-        return text
-
-    def convert(found: re.Match[str]) -> str:
-        unit, factor = unit_in(found[2], units)
-        if unit == found[2]:
-            return found[0]
-        return f"{re.sub(_NUMBER, lambda number: _multiply(number[0], factor), found[1])} {unit}"
-
-    return QUANTITIES.sub(convert, IN_G_TOO.sub("", text))
-
-
-def _multiply(number: str, factor: float) -> str:
-    """Return a number times a factor, with its sign and digits."""
-    digits = len(re.sub(r"[eE].*|\D", "", number).lstrip("0")) or 1
-    is_shift = math.log10(factor).is_integer()
-    value = float(f"{float(number) * factor:.{digits if is_shift else max(3, digits)}g}")
-    return f"{value:{'+' if number[0] == '+' else ''}.10g}"
 
 
 def split_number(text: str) -> tuple[float | None, str]:

@@ -8,7 +8,7 @@ import pytest
 from compressor.report.figures.drawing import ColorScale, Note, make_grid, map_cells
 from compressor.report.figures.plant_units import in_units
 from compressor.report.figures.style import RED, LineStyle
-from compressor.units import convert_text, read_quantity, unit_in
+from compressor.units import read_quantity, unit_in
 
 LINE = LineStyle(RED)
 
@@ -41,26 +41,6 @@ def test_a_number_is_read_in_the_unit_that_is_chosen(unit, units, read, factor):
 )  # fmt: skip
 def test_a_text_may_have_a_unit(text, si, value):
     assert read_quantity(text, si) == (value if value is None else pytest.approx(value, rel=1e-12))
-
-
-@pytest.mark.parametrize(
-    ("text", "units", "read"),
-    [
-        ("from -52.91 to 108.8 kN at 0.1, 0.2 and 0.3 mm", "si",
-         "from -52910 to 108800 N at 0.0001, 0.0002 and 0.0003 m"),
-        ("reaches 265 m/s² (27 g) at 318°", "si", "reaches 265 m/s² at 318°"),
-        ("reaches 265 m/s² (27 g) at 318°", "plant", "reaches 27 g at 318°"),
-        ("reaches 265 m/s² (27 g) at 318°", "usual", "reaches 265 m/s² (27 g) at 318°"),
-        ("3.6 ± 0.3 m/s², 740 rpm", "plant", "0.367 ± 0.0306 g, 740 rpm"),
-        ("5 N m, 3 N/mm, 430 m³/h, 9000 kg mm, [1, 2] mm, (8.2 ± 0.1)e+07 N, 1,234 N", "plant",
-         "5 N m, 3 N/mm, 430 m³/h, 9000 kg mm, [1, 2] mm, (8.2 ± 0.1)e+07 N, 1,234 N"),
-        ("+0.30 mm, 600 × 40 × 25 mm", "si", "+0.0003 m, 0.6 × 0.04 × 0.025 m"),
-        ("a → 12 → 1234 N", "plant", "a → 0.012 → 1.234 kN"),
-    ],
-)  # fmt: skip
-def test_numbers_in_a_text_follow_the_choice(text, units, read):
-    assert convert_text(text, units) == read
-    assert convert_text(read, units) == read
 
 
 def test_a_unit_of_another_quantity_is_refused():

@@ -49,8 +49,8 @@ def report(
     Prints the path of the page, which a browser opens without a server. Named
     studies stand on it in this order; without names all do, those of compsim
     find and calibrate last.
-    --units is of figures, tables and texts. Columns and axes with the name of a
-    key keep its unit, and your own words stay as they are.
+    --units is of figures and tables. Columns and axes with the name of a key keep its unit, and
+    sentences say theirs.
     """
     from compressor.store import read_studies, writable_folder
 

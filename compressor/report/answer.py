@@ -159,9 +159,9 @@ def mechanism(case: Case, angle: float = ANGLE) -> Mechanism:
     )  # fmt: skip
 
 
-def mechanism_svg(case: Case, units: Units = "usual") -> Markup:
+def mechanism_svg(case: Case) -> Markup:
     """Return the picture as SVG that stands in a page; its colours are those of the page."""
-    text = templates(units).get_template("mechanism.svg").render(it=mechanism(case))
+    text = templates().get_template("mechanism.svg").render(it=mechanism(case))
     return Markup(text)
 
 

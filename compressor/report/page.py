@@ -25,7 +25,6 @@ from compressor.report.figures.sweep_data import Measure
 from compressor.report.interactive import describe_figure, script
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.store import Folder, StoredStudy
-from compressor.units import Units, convert_text
 
 
 @dataclass(frozen=True)
@@ -229,11 +228,10 @@ NO_JOBS = JobsToOpen("", (), ())
 SUBJECT = "Reciprocating compressor with joint clearance"
 
 
-def templates(units: Units = "usual", files: Mapping[str, bytes] | None = None) -> Environment:
+def templates(files: Mapping[str, bytes] | None = None) -> Environment:
     """Return the page's templates: they escape what they print, and what they lack is an error.
 
-    units: of numbers in what they print, but for markup and what a template escapes itself: code,
-    and words of a case file; files: of a page that holds them, by name.
+    files: of a page that holds them, by name.
     """
 
     def address(name: str) -> Markup:
@@ -243,14 +241,9 @@ def templates(units: Units = "usual", files: Mapping[str, bytes] | None = None) 
         kind = "text/csv" if name.endswith(".csv") else "image/png"
         return Markup(f"data:{kind};base64,{base64.b64encode(files[name]).decode()}")
 
-    def in_chosen_units(value: object) -> object:
-        is_text = isinstance(value, str) and not isinstance(value, Markup)
-        return convert_text(str(value), units) if is_text else value
-
     made = Environment(
         loader=ChoiceLoader([PackageLoader(__package__), FunctionLoader(template_elsewhere)]),
         autoescape=True,
-        finalize=None if units == "usual" else in_chosen_units,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -270,18 +263,17 @@ def document(
     sections: Sequence[Section],
     jobs: JobsToOpen = NO_JOBS,
     title: str = "",
-    units: Units = "usual",
     files: Mapping[str, bytes] | None = None,
 ) -> str:
     """Return the whole page: the first section, a list of contents, and the other sections.
 
-    title: of the page, `SUBJECT` where there is none; units: of its texts; files: pictures, tables
-    and scripts that the page is to hold, by name, in place of those beside it.
+    title: of the page, `SUBJECT` where there is none; files: pictures, tables and scripts that the
+    page is to hold, by name, in place of those beside it.
     """
     scripts = [Markup(text.decode()) for name, text in (files or {}).items() if name.endswith("js")]
     data = jobs._asdict() | {"studies": [one._asdict() for one in jobs.studies]}
     facts = Markup(json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"))
-    page = templates(units, files).get_template("page.html")
+    page = templates(files).get_template("page.html")
     return page.render(sections=sections, jobs=facts, title=title, subject=SUBJECT, scripts=scripts)
 
 

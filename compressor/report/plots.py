@@ -57,7 +57,7 @@ from compressor.store import (
     read_store,
     read_studies,
 )
-from compressor.units import Units, convert_text, read_quantity, split_number
+from compressor.units import Units, read_quantity, split_number
 
 
 class PlotError(CompsimError):
@@ -122,7 +122,7 @@ def publish_drawings(
         for kind, picture in zip(kinds, render_kinds(drawing, kinds), strict=True):
             paths.append(Path(output) / f"{file_name(stem, name)}.{kind}")
             publish(paths[-1], picture)
-        yield Plotted(tuple(paths), convert_text(caption, choice.units))
+        yield Plotted(tuple(paths), caption)
 
 
 JOB, STUDY = PLOT_CAPTIONS["job"], PLOT_CAPTIONS["study"]

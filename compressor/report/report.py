@@ -113,7 +113,7 @@ def write_report(
 
     add: what makes more of the page, such as `compressor.studies.page_additions` gives. limits: of
     metrics, whose zones tables and curves show, such as `sensor_peak=20,50 m/s²`. units: of
-    figures, tables and texts, of `compressor.units`. studies:
+    figures and tables, of `compressor.units`. studies:
     names of those to tell of, in this order, by default all, those of searches last. single: report
     is a file, the page with all that it needs in it.
 
@@ -231,7 +231,7 @@ def build_report(
     titled = [study for study in studies if study.title]
     titles = {study.title for study in titled if not study.is_trial or titled[0].is_trial}
     title = titles.pop() if len(titles) == 1 else ""  # several machines have it in their sections
-    page = partial(document, sections, jobs, title, units)
+    page = partial(document, sections, jobs, title)
     return ReportContent([*of_paper, *later], [study.name for study in studies], series, page)
 
 
@@ -342,7 +342,7 @@ def summarise(
         name, run = [*paper.stored.items()][-1]
         shown = [(label_in_words(name), case_of(run))]
     pictures = [
-        (mechanism_svg(case, units), f"{name[0].upper()}{name[1:]}: {mechanism_words(case)}")
+        (mechanism_svg(case), f"{name[0].upper()}{name[1:]}: {mechanism_words(case)}")
         for name, case in shown
         if case
     ]

@@ -4,7 +4,6 @@ import threading
 
 import pytest
 
-from compressor.program import report_progress
 from compressor.sweep import speed, warm_up
 
 
@@ -57,13 +56,3 @@ def test_a_set_switch_against_compiling_is_told(tmp_path, monkeypatch):
         warm_up.compile_once(warm_up.Needs(("auto",), plain=True), told.append)
     (text,) = told
     assert text.startswith("NUMBA_DISABLE_JIT is set: nothing is compiled")
-
-
-def test_the_second_thing_tells_how_long_all_take():
-    """The first one, which loads what all need, takes a hundred times as long."""
-    clock, told = Clock(0.5), []
-    for thing in report_progress("abcdefghij", "records", lambda *event: told.append(event), clock):
-        for _ in range(100 if thing == "a" else 1):
-            clock.work()
-    assert [done for done, _, _ in told] == [*range(11)]
-    assert [event for event in told if event[2]] == [(2, 10, "10 records, about 5.0 s")]

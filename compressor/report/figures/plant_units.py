@@ -1,4 +1,4 @@
-"""A figure in the units that its reader has chosen: its numbers, titles, names and notes."""
+"""A figure in the units that its reader has chosen: its numbers and the titles of its axes."""
 
 import re
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from compressor.report.figures.drawing import (
     Way,
     shared_title,
 )
-from compressor.units import Units, convert_text, unit_in
+from compressor.units import Units, unit_in
 
 UNIT = re.compile(r"\(([^(),]*)([^()]*)\)(?=[^()]*$)")  # what stands in a title's last brackets
 
@@ -27,8 +27,7 @@ def in_units(drawing: Drawing, units: Units) -> Drawing:
     if units == "usual":
         return drawing
     panels = [convert_panel(drawing, panel, units) for panel in drawing.panels]
-    legend = [rename_trace(trace, units) for trace in drawing.legend]
-    return replace(drawing, panels=panels, legend=legend)
+    return replace(drawing, panels=panels)
 
 
 def new_title(title: str, units: Units) -> tuple[str, float]:
@@ -57,9 +56,7 @@ def convert_panel(drawing: Drawing, panel: Panel, units: Units) -> Panel:
     return replace(
         panel, x=scales["x"], y=scales["y"],
         traces=[convert_trace(trace, x, y, units) for trace in panel.traces],
-        notes=[convert_note(note, x, y, units) for note in panel.notes],
-        title=convert_text(panel.title, units),
-        legend=[rename_trace(trace, units) for trace in panel.legend],
+        notes=[convert_note(note, x, y) for note in panel.notes],
     )  # fmt: skip
 
 
@@ -91,7 +88,7 @@ def convert_trace(trace: Trace, x: float, y: float, units: Units) -> Trace:
         errors = (x if trace.across else y) * errors
     is_bar = trace.kind in ("bars", "columns")
     found = replace(
-        rename_trace(trace, units), x=x * trace.x, y=y * trace.y, errors=errors,
+        trace, x=x * trace.x, y=y * trace.y, errors=errors,
         foot=None if trace.foot is None else along * trace.foot,
         thick=across * np.asarray(trace.thick) if is_bar else trace.thick,
     )  # fmt: skip
@@ -99,11 +96,6 @@ def convert_trace(trace: Trace, x: float, y: float, units: Units) -> Trace:
         return found
     scale, factor = convert_colors(trace.scale, units)
     return replace(found, z=factor * trace.z, scale=scale)
-
-
-def rename_trace(trace: Trace, units: Units) -> Trace:
-    """Return a trace whose name, such as 0.1 mm, is in chosen units."""
-    return replace(trace, name=convert_text(trace.name, units))
 
 
 def convert_colors(scale: ColorScale, units: Units) -> tuple[ColorScale, float]:
@@ -121,8 +113,8 @@ def convert_colors(scale: ColorScale, units: Units) -> tuple[ColorScale, float]:
     ), factor  # fmt: skip
 
 
-def convert_note(note: Note, x: float, y: float, units: Units) -> Note:
+def convert_note(note: Note, x: float, y: float) -> Note:
     """Return a text, arrow or line at its place in chosen units."""
     x, y = ((1.0 if way in note.inside else one) for way, one in zip(WAYS, (x, y), strict=True))
     tail = None if note.tail is None else (x * note.tail[0], y * note.tail[1])
-    return replace(note, text=convert_text(note.text, units), x=x * note.x, y=y * note.y, tail=tail)
+    return replace(note, x=x * note.x, y=y * note.y, tail=tail)

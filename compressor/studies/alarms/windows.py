@@ -109,7 +109,7 @@ def read_study(
     bands, clipped = options.bands, 0
     values: Mapping[str, Any] = {}
     own = dict(zip(source.keys, points(source), strict=True))
-    for key, point in report_progress([*own.items()], "records", progress):
+    for key, point in report_progress([*own.items()], progress):
         job = read_job(stored, key, healthy, bands, options)
         if isinstance(job, str):
             left[job] += 1

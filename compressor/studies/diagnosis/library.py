@@ -137,7 +137,7 @@ def _compute_features(stored: Stored, positions: dict[str, int], progress: Progr
     """
     rows: list[tuple[str, str, list[float], np.ndarray]] = []
     unknown = 0  # jobs whose case this version cannot read
-    for key, place in report_progress([*positions.items()], "records", progress):
+    for key, place in report_progress([*positions.items()], progress):
         record = job_record(stored, key)
         if record is None:
             continue

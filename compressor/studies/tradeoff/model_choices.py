@@ -317,9 +317,7 @@ def run_choices(
     runs = [compared(fastest_run(bare(case), max(2, repeats)))]
     if not complete(runs[0]):
         return runs
-    for one in report_progress(
-        choices, "runs", lambda done, _, remark: progress(1 + done, total, remark)
-    ):
+    for one in report_progress(choices, lambda done, _, remark: progress(1 + done, total, remark)):
         other = one.case and bare(one.case, MAX_SECONDS)
         runs.append(compared(fastest_run(other, repeats)) if other else empty_run(runs[0]))
     return runs
