@@ -55,6 +55,11 @@ def by_bar(
     return f"{text if bare else f'({text})'}e{top:+03d}"
 
 
+def plural(count: int, thing: str = "job") -> str:
+    """Return a number of things in words: 1 job, 2 jobs."""
+    return f"{count} {thing}" + ("s" if count != 1 else "")
+
+
 def setting(value: float) -> str:
     """Return a number that was given, in six digits; whole ones whole.
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from importlib import metadata
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 VERSION = "0.1.0"  # the one place; CHANGELOG.md says what has changed
 PROGRAM = f"compsim {VERSION}"  # as stored results name it
@@ -81,21 +81,6 @@ class CompsimWarning(UserWarning):
     """
 
 
-class StudyFiles(NamedTuple):
-    """What a kind of study keeps in a folder of results, beside jobs: patterns in that folder.
-
-    checked: netCDF files that `compsim verify` reads. result: files that are a result each, with
-    the study's name for the `*`; "" where there are none. A folder that has no others is said to
-    hold `content`, with these names for its `{}`; remedy: the command that reads them.
-    """
-
-    checked: str
-    result: str = ""
-    content: str = ""
-    remedy: str = ""
-
-
-STUDY_FILES: list[StudyFiles] = []  # those of the table in `compressor.studies`, which adds them
 # group of keys by which a case file requests a study -> function that imports the study's module
 # `group`; of the same table
 STUDY_GROUPS: dict[str, Callable[[], Any]] = {}

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from compsim.options import FOLDER, quiet_option, results_option
+from compsim import options, screen
 from compsim.progress import ProgressReporter
 from compsim.records import read_levels
-from compsim.screen import DONE, one_thread_each, print_text, say, say_wrapped
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,8 +39,8 @@ def read_bands(
 
 @click.command()
 @click.argument("study", metavar="STUDY")
-@results_option
-@click.option("-o", "--output", metavar="FOLDER", type=FOLDER,
+@options.results
+@click.option("-o", "--output", metavar="FOLDER", type=options.FOLDER,
               help="Also write all rates as CSV and netCDF, and figures, here.")  # fmt: skip
 @click.option("--wear", "run", metavar="RUN",
               help="Print how many hours before its limit each alarm trips, by this wear run: a "
@@ -64,7 +63,7 @@ def read_bands(
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True,
               help="Draw by this seed the noise, and which draws judge by which limits.",
 )  # fmt: skip
-@quiet_option
+@options.quiet
 def alarms(
     study: str, folder: str, output: str | None, run: str | None,
     false_alarms: float, factor: float | None, detected: float, bands: "tuple[Band, ...] | None",
@@ -87,30 +86,30 @@ def alarms(
     source = click.get_current_context().get_parameter_source("false_alarms")
     if factor is not None and source is ParameterSource.COMMANDLINE:
         raise click.UsageError("--factor and --false-alarms both set limits: give one of them")
-    one_thread_each()  # before numpy loads
+    screen.one_thread_each()  # before numpy loads
     from compressor.store import writable_folder
     from compressor.studies.alarms.alarms import judge_alarms
     from compressor.studies.alarms.lead import add_lead_times, open_run
     from compressor.studies.alarms.windows import AlarmOptions
     from compressor.studies.alarms.words import list_lines, list_remarks
 
-    options = AlarmOptions(revolutions, bands, noise, false_alarms, factor, detected, seed)
+    how = AlarmOptions(revolutions, bands, noise, false_alarms, factor, detected, seed)
     worn = open_run(run) if run else None
     if output:
         writable_folder(output, make=False)
     with ProgressReporter(quiet) as progress:
-        found = judge_alarms(folder, study, options, progress)
+        found = judge_alarms(folder, study, how, progress)
     found = add_lead_times(found, worn) if worn else found
     for line in list_lines(found):
-        print_text(line)
+        screen.print_text(line)
     for text in () if quiet else list_remarks(found):
-        say_wrapped(text)
+        screen.say_wrapped(text)
     if output:
         write_alarms(found, output, machine_title(folder, study))
         if not quiet:
             beside = "" if output == "alarms" else f" --alarms {shlex.quote(output)}"
-            say(f"next: compsim report -r {shlex.quote(folder)}{beside}")
-    return DONE
+            screen.say(f"next: compsim report -r {shlex.quote(folder)}{beside}")
+    return screen.DONE
 
 
 def machine_title(folder: str, study: str) -> str:
@@ -136,11 +135,11 @@ def write_alarms(found: "xr.Dataset", output: str, title: str) -> None:
     publish(place / FILES[0], as_rows(found).encode())
     write_dataset(place / FILES[1], found)
     for name in FILES:
-        print_text(os.path.join(output, name))
+        screen.print_text(os.path.join(output, name))
     for level, noise in enumerate(found["noise"].values.tolist()):
         path = place / (f"alarms-noise-{noise:g}.png" if noise else "alarms.png")
         drawing = draw_alarms(found, level)
         noisy = [f"noise of {noise:g} m/s²"] if noise else []
         drawing.title = title_figure(title, "alarms by clearance", noisy)
         publish(path, render(drawing, "png"))
-        print_text(f"{path}\n  {caption(found, level)}")
+        screen.print_text(f"{path}\n  {caption(found, level)}")

@@ -2,22 +2,13 @@
 
 import json
 import shlex
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import click
 
-from compsim.options import (
-    FILE,
-    jobs_option,
-    json_option,
-    limit,
-    output_option,
-    quiet_option,
-    setting,
-)
+from compressor.digits import plural
+from compsim import options, screen
 from compsim.progress import ProgressReporter
-from compsim.screen import DONE, SOME_FAILED, one_thread_each, plural, print_text, say
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,16 +17,16 @@ EXAMPLES = ("claims", "assumptions")
 
 
 @click.command()
-@click.argument("configs", nargs=-1, metavar="[CONFIG...]", type=FILE)
-@output_option("claims", "Write the verdicts into this folder.")
+@click.argument("configs", nargs=-1, metavar="[CONFIG...]", type=options.FILE)
+@options.output("claims", "Write the verdicts into this folder.")
 @click.option("--search", "generations", type=click.IntRange(min=0), default=0, metavar="N",
               help="Search for the least change by which all claims hold: N generations of some "
               "50 machines, in the ranges that a CONFIG draws from.")  # fmt: skip
-@jobs_option()
-@setting
-@limit
-@json_option
-@quiet_option
+@options.jobs()
+@options.set_keys
+@options.max_jobs
+@options.as_json
+@options.quiet
 def claims(
     configs: tuple[str, ...],
     output: str,
@@ -61,7 +52,7 @@ def claims(
 
     Exit code 3 if a machine has no verdict.
     """
-    one_thread_each()  # before numpy loads
+    screen.one_thread_each()  # before numpy loads
     from compressor.cases import load_studies, templates
     from compressor.store import writable_folder
     from compressor.studies.claims.search import least_change
@@ -91,43 +82,23 @@ def claims(
     beside = "" if output == "claims" else f" --claims {shlex.quote(output)}"
     say_unless(quiet, f"next: compsim report{beside}")
     failed = any((one["status"] == "failed").any() for one in found)
-    return SOME_FAILED if failed else DONE
+    return screen.SOME_FAILED if failed else screen.DONE
 
 
 def say_unless(quiet: bool, text: str) -> None:
     """Write text on stderr, unless quiet is wanted."""
     if not quiet:
-        say(text)
+        screen.say(text)
 
 
 def report_machines(found: "list[xr.Dataset]", as_json: bool) -> None:
     """Write files of judged machines on stdout, each with its findings."""
+    from compressor.studies.claims.findings import sentences
+
     findings = {one.encoding["source"]: [*sentences(one)] for one in found}
     if as_json:
-        print_text(json.dumps(findings, indent=1))
+        screen.print_text(json.dumps(findings, indent=1))
         return
     for path, texts in findings.items():
-        print_text(path)
-        print_text("\n".join(f"  {text}" for text in texts))
-
-
-def sentences(found: "xr.Dataset") -> Iterator[str]:
-    """Yield the findings of a file of judged machines."""
-    from compressor.studies.claims.findings import (
-        change,
-        consistency,
-        is_mass_plane,
-        rank_assumptions,
-        sensitivity,
-        summary,
-    )
-
-    if "looked" in found.attrs:
-        yield from change(found)
-        return
-    yield from summary(found)
-    if is_mass_plane(found) and min(found["status"].shape) > 2:
-        yield consistency(found)
-    table = sensitivity(found)
-    if table is not None:
-        yield from rank_assumptions(table)
+        screen.print_text(path)
+        screen.print_text("\n".join(f"  {text}" for text in texts))

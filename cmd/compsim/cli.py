@@ -34,6 +34,7 @@ from compsim import (
     report,
     run,
     schema,
+    screen,
     show,
     status,
     stress,
@@ -41,7 +42,6 @@ from compsim import (
     verify,
     wear,
 )
-from compsim.screen import DONE, INTERNAL, STORE, discard_output, say, say_wrapped
 
 # of paths, that a program makes; any other error of a path is the file system's
 MISTAKES = (FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError)
@@ -144,7 +144,7 @@ def report_warnings() -> Iterator[None]:
             show(message, category, *where, **more)
         elif str(message) not in reported:
             reported.add(str(message))
-            say_wrapped(f"compsim: {message}")
+            screen.say_wrapped(f"compsim: {message}")
 
     with warnings.catch_warnings():
         warnings.showwarning = report_once
@@ -157,9 +157,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     command = shlex.join(["compsim", *arguments])
     try:
         with interruptible(), report_warnings():
-            return cli.main(arguments, "compsim", standalone_mode=False, obj=command) or DONE
+            return cli.main(arguments, "compsim", standalone_mode=False, obj=command) or screen.DONE
     except Interrupted as signal_sent:
-        say(f"interrupted by {signal_sent}")
+        screen.say(f"interrupted by {signal_sent}")
         return 128 + signal_sent.number
     except click.ClickException as error:
         error.show()
@@ -167,7 +167,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (SystemExit, BrokenPipeError):
         if COMPLETING in os.environ:
             raise
-        discard_output()  # otherwise click exits only where nobody reads on
+        screen.discard_output()  # otherwise click exits only where nobody reads on
         return UNREAD
     except Exception as error:
         return report_error(error)
@@ -176,28 +176,28 @@ def main(argv: Sequence[str] | None = None) -> int:
 def report_error(error: Exception) -> int:
     """Report what went wrong and return the exit code; a traceback only of internal errors."""
     if isinstance(error, CompsimError):
-        say(f"{error.prefix}{error}")
+        screen.say(f"{error.prefix}{error}")
         return error.exit_code
     if isinstance(error, MemoryError) or any(words in str(error) for words in NO_ROOM):
-        say("compsim: not enough memory: allow more (ulimit -v), or use fewer workers (-j)")
-        return INTERNAL
+        screen.say("compsim: not enough memory: allow more (ulimit -v), or use fewer workers (-j)")
+        return screen.INTERNAL
     if isinstance(error, OSError) and error.filename and not isinstance(error, MISTAKES):
         from compressor.store import system_error
 
         return report_error(system_error(error.filename, error))
     # raised by click's echo: stdout does not take it, such as a full disk
     if isinstance(error, OSError) and traceback.extract_tb(error.__traceback__)[-1].name == "echo":
-        say(f"compsim: stdout: {error.strerror}; the same command prints it again")
-        discard_output()
-        return STORE
+        screen.say(f"compsim: stdout: {error.strerror}; the same command prints it again")
+        screen.discard_output()
+        return screen.STORE
     lines = traceback.format_exception(error)
     if os.environ.get("COMPSIM_DEBUG"):
-        say("".join(lines), end="")
-        return INTERNAL
+        screen.say("".join(lines), end="")
+        return screen.INTERNAL
     with tempfile.NamedTemporaryFile(
         "w", prefix="compsim-", suffix=".txt", delete=False, encoding="utf-8", errors="replace"
     ) as file:
         file.writelines(lines)
-    say(f"compsim: internal error: {type(error).__name__}: {error}")
-    say(f"please report it, with {file.name}, which holds the traceback")
-    return INTERNAL
+    screen.say(f"compsim: internal error: {type(error).__name__}: {error}")
+    screen.say(f"please report it, with {file.name}, which holds the traceback")
+    return screen.INTERNAL

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from compsim.options import FILE, quiet_option, results_option, units_option
+from compressor.digits import plural
+from compsim import options, screen
 from compsim.progress import ProgressReporter
-from compsim.screen import DONE, STORE, plural, print_text, say, size
 
 if TYPE_CHECKING:
     from compressor.store import Exported
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("names", nargs=-1, metavar="[STUDY|JOB]...")
-@results_option
-@click.option("-o", "--output", required=True, metavar="FILE|FOLDER", type=FILE,
+@options.results
+@click.option("-o", "--output", required=True, metavar="FILE|FOLDER", type=options.FILE,
               help="Write this file: .nc or .csv, or .wav, .mat or .uff for a record; or into a "
               "folder.")  # fmt: skip
 @click.option("--format", "form", type=click.Choice(["netcdf", "csv", "wav", "mat", "uff"]),
               help="Write the files of a folder in this format; netcdf by default.")  # fmt: skip
 @click.option("--series", is_flag=True, help="Also write the time series of the studies' jobs.")
 @click.option("--force", is_flag=True, help="Replace files that exist.")
-@units_option("SI")
+@options.units("SI")
 @click.option("--json", "as_json", is_flag=True, help="Print the list of the files as JSON.")
-@quiet_option
+@options.quiet
 def export(
     names: tuple[str, ...],
     folder: str,
@@ -58,17 +58,17 @@ def export(
     from compressor.store import export as write
 
     writable_folder(os.path.dirname(output) or os.curdir, make=False)
-    options = ExportOptions(form, series, force, units or "si")
+    how = ExportOptions(form, series, force, units or "si")
     with ProgressReporter(quiet, "files") as progress:
-        found, damaged = write(folder, names, output, options, progress)
+        found, damaged = write(folder, names, output, how, progress)
     if as_json:
-        print_text(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
+        screen.print_text(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
     else:
         for line in list_exported(found, output):
-            print_text(line)
+            screen.print_text(line)
     for damage in damaged:
-        say(f"{damage}: left out")
-    return STORE if damaged else DONE
+        screen.say(f"{damage}: left out")
+    return screen.STORE if damaged else screen.DONE
 
 
 def list_exported(found: "list[Exported]", output: str) -> list[str]:
@@ -80,7 +80,7 @@ def list_exported(found: "list[Exported]", output: str) -> list[str]:
         what = plural(rows, "job" if files[0].kind == "metrics" else "sample")
         if len(files) > 1 or place != files[0].path:
             what = f"{plural(len(files), 'job')}, {what}"
-        lines.append(f"{place}  {what}, {size(count)}")
+        lines.append(f"{place}  {what}, {screen.size(count)}")
     return lines
 
 

@@ -7,13 +7,12 @@ from pathlib import Path
 import click
 
 from compressor.program import did_you_mean
-from compsim.options import FILE
-from compsim.screen import DONE, print_text, say, wrap_line
+from compsim import options, screen
 
 
 @click.command()
 @click.argument("template", required=False)
-@click.option("-o", "--output", metavar="FILE", type=FILE,
+@click.option("-o", "--output", metavar="FILE", type=options.FILE,
               help="Write this file, or into this folder; TEMPLATE.yaml by default.")  # fmt: skip
 def init(template: str | None, output: str | None) -> int:
     """Write a commented case file to start from.
@@ -30,18 +29,21 @@ def init(template: str | None, output: str | None) -> int:
     if template is None:
         indent = max(map(len, known)) + 2
         for one in known.values():
-            first, *more = [*wrap_line(one.question, indent), *wrap_line(one.jobs, indent)]
-            print_text("\n".join([f"{one.name:<{indent}}{first.lstrip()}", *more]))
-        say("next: compsim init wear")
-        return DONE
+            first, *more = [
+                *screen.wrap_line(one.question, indent),
+                *screen.wrap_line(one.jobs, indent),
+            ]
+            screen.print_text("\n".join([f"{one.name:<{indent}}{first.lstrip()}", *more]))
+        screen.say("next: compsim init wear")
+        return screen.DONE
     if template not in known:
         raise click.UsageError(unknown(template, known), click.get_current_context())
     path = Path(output or known[template].path.name)
     path = path / known[template].path.name if path.is_dir() else path
     write(path, known[template].text(path), template)
-    print_text(str(path))
-    say(f"next: {known[template].commands(path).partition(';')[0]}")
-    return DONE
+    screen.print_text(str(path))
+    screen.say(f"next: {known[template].commands(path).partition(';')[0]}")
+    return screen.DONE
 
 
 def unknown(template: str, known: Iterable[str]) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from compressor import metrics
 from compressor.digits import ROUNDING, UNKNOWN, by_bar
 from compressor.units import Units, unit_in
+from compsim import screen
 
 if TYPE_CHECKING:
     from compressor.store import JobReport
@@ -36,23 +37,20 @@ def sections(
 
     limits: of the rod load's reversal, degrees and percent; units: of the numbers.
     """
-    yield "", align_lines(stop(found))
+    yield "", screen.align_lines(stop(found), WIDTH)
     known = numbers(found, units, "tally", "statistics", "body")
-    lines = align_lines([*known, *reversal_verdict(found, *limits)])
+    lines = screen.align_lines([*known, *reversal_verdict(found, *limits)], WIDTH)
     notes = [*film(found), *cautions(found), *found.caveats]
     yield "metrics, with their error bars", [*lines, *notes]
-    yield "its machine at a steady speed, with ideal joints", align_lines(machine(found, units))
+    yield (
+        "its machine at a steady speed, with ideal joints",
+        screen.align_lines(machine(found, units), WIDTH),
+    )
     yield (
         "relative errors of the time series",
-        align_lines(series_errors(found)),
+        screen.align_lines(series_errors(found), WIDTH),
     )
-    yield "the run", align_lines([*numbers(found, units, "run"), *facts(found)])
-
-
-def align_lines(lines: list[Line]) -> list[str]:
-    """Return the lines with their labels in a column."""
-    width = max((len(label) for label, _ in lines), default=0)
-    return [f"{label:<{max(width, WIDTH)}}  {text}" for label, text in lines]
+    yield "the run", screen.align_lines([*numbers(found, units, "run"), *facts(found)], WIDTH)
 
 
 def stop(found: "JobReport") -> list[Line]:

@@ -24,49 +24,43 @@ class Place(click.Path):
 
 FILE, FOLDER = Place(readable=False), Place(file_okay=False, readable=False)
 
-config_argument = click.argument("config", metavar="CONFIG", type=FILE)
-configs_argument = click.argument(
-    "configs", nargs=-1, required=True, metavar="CONFIG...", type=FILE
-)
-job_argument = click.argument(
-    "words", nargs=-1, required=True, metavar="JOB | STUDY [AXIS=VALUE]..."
-)
-results_option = click.option(
+config = click.argument("config", metavar="CONFIG", type=FILE)
+configs = click.argument("configs", nargs=-1, required=True, metavar="CONFIG...", type=FILE)
+job = click.argument("words", nargs=-1, required=True, metavar="JOB | STUDY [AXIS=VALUE]...")
+results = click.option(
     "-r", "--results", "folder", default="results", show_default=True, type=FOLDER,
     metavar="FOLDER",    help="Use this folder of results.",
 )  # fmt: skip
-setting = click.option(
+set_keys = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE",
     help="Set a key in all case files, such as machine.speed_rpm=300.",
 )  # fmt: skip
-only_option = click.option(
+only = click.option(
     "--only", default="", metavar="COMPARISON",
     help="Take only the jobs for which this holds, such as 'clearance_mm < 0.2'; the others stay "
     "missing.",
 )  # fmt: skip
-limit = click.option(
+max_jobs = click.option(
     "--max-jobs", type=click.IntRange(min=1), default=MAX_JOBS, show_default=True,
     help="Refuse a case file with more jobs than this.",
 )  # fmt: skip
-json_option = click.option("--json", "as_json", is_flag=True, help="Print the same as JSON.")
-quiet_option = click.option(
-    "--quiet", is_flag=True, help="Print no progress; errors are still reported."
-)
+as_json = click.option("--json", "as_json", is_flag=True, help="Print the same as JSON.")
+quiet = click.option("--quiet", is_flag=True, help="Print no progress; errors are still reported.")
 
 
-def output_option(default: str, text: str) -> Callable[..., Any]:
+def output(default: str, text: str) -> Callable[..., Any]:
     """Return the option -o, of a folder to write into."""
     return click.option("-o", "--output", default=default, show_default=True, type=FOLDER,
                         metavar="FOLDER", help=text)  # fmt: skip
 
 
-def jobs_option(text: str = "Run in this many worker processes.") -> Callable[..., Any]:
+def jobs(text: str = "Run in this many worker processes.") -> Callable[..., Any]:
     """Return the option -j, by default as many processes as this one may use cores."""
     return click.option("-j", "--jobs", type=click.IntRange(min=1),
                         show_default="cores available", help=text)  # fmt: skip
 
 
-def units_option(usual: str) -> Callable[..., Any]:
+def units(usual: str) -> Callable[..., Any]:
     """Return the option --units; usual: what there is without it."""
     return click.option(
         "--units", type=click.Choice(["si", "plant"]), show_default=usual,

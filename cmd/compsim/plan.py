@@ -7,29 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from compressor.digits import plural
 from compressor.program import duration
-from compsim.options import (
-    configs_argument,
-    jobs_option,
-    json_option,
-    limit,
-    only_option,
-    results_option,
-    setting,
-)
+from compsim import options, screen
 from compsim.progress import ProgressReporter
 from compsim.regimes import ahead, ahead_lines
-from compsim.screen import (
-    DONE,
-    caution,
-    jsonable,
-    plural,
-    print_text,
-    report_changes,
-    report_machines,
-    say,
-    size,
-)
 
 if TYPE_CHECKING:
     from compressor.sweep import Forecast
@@ -38,15 +20,15 @@ BUSY = 0.8  # of the cores: below, a machine is busy with other things
 
 
 @click.command()
-@configs_argument
-@results_option
-@jobs_option("Estimate the time with this many worker processes.")
-@setting
-@only_option
-@limit
+@options.configs
+@options.results
+@options.jobs("Estimate the time with this many worker processes.")
+@options.set_keys
+@options.only
+@options.max_jobs
 @click.option("--first", type=click.IntRange(min=0), default=5, show_default=True,
               help="List this many of the missing jobs.")  # fmt: skip
-@json_option
+@options.as_json
 def plan(
     configs: tuple[str, ...],
     folder: str,
@@ -74,19 +56,19 @@ def plan(
         studies = load_studies(
             *configs, overrides=overrides, max_jobs=max_jobs, only=only, progress=progress
         )
-    caution(studies, None)
+    screen.caution(studies, None)
     chains = ahead([study for study in studies if study.request], folder)
     studies = [study for study in studies if not study.request]
     more = {"regimes": [one._asdict() for one in chains]} if chains else {}
     if not as_json:
         for line in ahead_lines(chains):
-            print_text(line)
+            screen.print_text(line)
     if not studies:
         if as_json:
-            print_text(json.dumps(more, indent=1))
-        return DONE
-    report_changes(studies, folder)
-    report_machines(studies)
+            screen.print_text(json.dumps(more, indent=1))
+        return screen.DONE
+    screen.report_changes(studies, folder)
+    screen.report_machines(studies)
     from compressor.analysis import describe_machine
     from compressor.sweep import forecast
 
@@ -94,20 +76,24 @@ def plan(
     workers = jobs or cores()
     if as_json:
         machines = {one.name: dataclasses.asdict(describe_machine(one)) for one in studies}
-        whole = dataclasses.asdict(found.with_times(workers, say)) | more | {"machines": machines}
-        whole = jsonable(whole)
-        print_text(json.dumps(whole, indent=1))
-        return DONE
+        whole = (
+            dataclasses.asdict(found.with_times(workers, screen.say))
+            | more
+            | {"machines": machines}
+        )
+        whole = screen.jsonable(whole)
+        screen.print_text(json.dumps(whole, indent=1))
+        return screen.DONE
     width = max(len(part.study) for part in found.counts.studies)
     for part in found.counts.studies:
-        print_text(f"{part.study:<{width}}  {plural(part.jobs):>9}  {part.done:>4} done  "
+        screen.print_text(f"{part.study:<{width}}  {plural(part.jobs):>9}  {part.done:>4} done  "
                    f"{part.missing:>4} missing")  # fmt: skip
     if found.counts.missing:
-        print_text(cost(found.with_times(workers, say)))
+        screen.print_text(cost(found.with_times(workers, screen.say)))
     for job in found.counts.first:
         point = "".join(f" {key}={value}" for key, value in job.coordinates.items())
-        print_text(f"missing: {job.study}{point}")
-    return DONE
+        screen.print_text(f"missing: {job.study}{point}")
+    return screen.DONE
 
 
 def cost(whole: "Forecast") -> str:
@@ -125,4 +111,4 @@ def cost(whole: "Forecast") -> str:
     alone = whole.seconds * whole.cores / idle
     busy = f", or {duration(alone)} if nothing else ran" if whole.cores < BUSY * idle else ""
     taken = f"about {duration(whole.seconds)} with {workers} ({by})"
-    return f"{taken}{busy}{first}, and {size(whole.bytes)}"
+    return f"{taken}{busy}{first}, and {screen.size(whole.bytes)}"

@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING
 import click
 
 from compressor.program import did_you_mean
-from compressor.studies import STUDIES, find_drawn
-from compsim.options import job_argument, output_option, results_option, units_option
-from compsim.screen import DONE, print_text
+from compressor.studies import FOLLOWED_FIGURES, find_followed
+from compsim import options, screen
 
 if TYPE_CHECKING:
     from compressor.units import Units
@@ -15,9 +14,9 @@ if TYPE_CHECKING:
 FIGURES = (
     "analyst", "loads", "signals", "cards", "spectra", "orbits", "modes", "impacts",
     "cycles", "segments", "waterfall", "map",
-    *(name for kind in STUDIES for name in kind.figures),
+    *FOLLOWED_FIGURES,
 )  # fmt: skip
-MORE = "".join(f"; of a study of {k.name} {', '.join(k.figures)}" for k in STUDIES if k.figures)
+MORE = f"; of a machine that was followed {', '.join(FOLLOWED_FIGURES)}"
 KINDS = {"png": ("png",), "svg": ("svg",), "both": ("png", "svg")}
 
 
@@ -33,14 +32,14 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 
 
 @click.command()
-@job_argument
-@results_option
+@options.job
+@options.results
 @click.option(
     "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
     help="Draw only these figures: of a job analyst, loads, signals, cards, spectra, orbits, "
     f"modes, impacts; of a study cycles, segments, waterfall, map{MORE}.",
 )  # fmt: skip
-@output_option("plots", "Write the figures into this folder.")
+@options.output("plots", "Write the figures into this folder.")
 @click.option("--format", "form", type=click.Choice([*KINDS]), default="png", show_default=True,
               help="Write figures as PNG, as SVG, or as both.")  # fmt: skip
 @click.option(
@@ -56,7 +55,7 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
     help="Mark segments whose rms is above this: a number and its unit, such as 2g, or as 3x, "
     "times the machine without clearance.",
 )  # fmt: skip
-@units_option("kN, mm, µm, m/s²")
+@options.units("kN, mm, µm, m/s²")
 def plot(
     words: tuple[str, ...],
     what: tuple[str, ...],
@@ -94,15 +93,16 @@ def plot(
     from compressor.report import PlotChoice, write_plots
 
     choice = PlotChoice(what, over, at, limit, KINDS[form], units or "usual")
-    kind = find_drawn(folder).get(name)
-    if kind:
+    if name in find_followed(folder):
         if values:
             listed = " ".join(f"--at {value}" for value in values)
-            raise click.UsageError(f"{name} is a study of {kind.name}, without jobs: give {listed}")
-        drawn = kind.module("plots").write(folder, name, output, choice)
+            raise click.UsageError(f"{name} is a study of regimes, without jobs: give {listed}")
+        from compressor.studies.regimes.plots import write
+
+        drawn = write(folder, name, output, choice)
     else:
         drawn = write_plots(folder, output, words, choice)
     for found in drawn:
-        print_text(" ".join(map(str, found.paths)))
-        print_text(f"  {found.caption}")
-    return DONE
+        screen.print_text(" ".join(map(str, found.paths)))
+        screen.print_text(f"  {found.caption}")
+    return screen.DONE

@@ -6,8 +6,9 @@ import time
 from collections.abc import Callable
 from types import TracebackType
 
+from compressor.digits import plural
 from compressor.program import duration
-from compsim.screen import plural, say, say_wrapped
+from compsim import screen
 
 # of lines where stderr is no terminal: until the first, and between two others
 FIRST_SECONDS, QUIET_SECONDS, QUIET_SHARE = 1.0, 10.0, 0.05
@@ -63,11 +64,13 @@ class ProgressReporter:
         if self.line.live.is_started:
             self.line.stop()
         if self.logged_done not in (-1, self.done):
-            say(self.words())
+            screen.say(self.words())
         if error and self.folder and self.total:
             stored = f"{self.done} of {plural(self.total, self.things.removesuffix('s'))}"
             verb = "is" if self.total == 1 else "are"
-            say(f"{stored} {verb} stored in {self.folder}; the same command goes on from there")
+            screen.say(
+                f"{stored} {verb} stored in {self.folder}; the same command goes on from there"
+            )
 
     def __call__(self, done: int, total: int, remark: str) -> None:
         """Report progress (`compressor.program.Progress`)."""
@@ -75,7 +78,7 @@ class ProgressReporter:
         if self.quiet:
             return
         if remark:
-            say_wrapped(remark)
+            screen.say_wrapped(remark)
         elif self.open:
             self.open()
             self.open = None
@@ -106,4 +109,4 @@ class ProgressReporter:
         if self.done < self.total and now - self.logged >= wait:
             self.logged, self.logged_done = now, self.done
             left = self.line.tasks[0].time_remaining
-            say(self.words() + (f", about {duration(left)} left" if left else ""))
+            screen.say(self.words() + (f", about {duration(left)} left" if left else ""))

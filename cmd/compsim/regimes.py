@@ -5,19 +5,10 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from compressor.digits import plural
 from compressor.program import duration, printable
+from compsim import screen
 from compsim.progress import ProgressReporter
-from compsim.screen import (
-    DONE,
-    SOME_FAILED,
-    all_stored,
-    plural,
-    print_text,
-    say,
-    say_wrapped,
-    stored_before,
-    unread,
-)
 
 if TYPE_CHECKING:
     from compressor.cases import Study
@@ -33,7 +24,7 @@ def run_chains(studies: "list[Study]", folder: str, workers: int, rerun: bool, q
     with ProgressReporter(quiet, "values", folder=folder) as progress:
         summary = run_regimes(studies, folder, workers, progress, rerun)
     report_chains(summary, folder, quiet)
-    return SOME_FAILED if summary.failed else DONE
+    return screen.SOME_FAILED if summary.failed else screen.DONE
 
 
 def ahead(studies: "list[Study]", folder: str) -> "list[ChainProgress]":
@@ -71,30 +62,32 @@ def report_chains(summary: "RegimesSummary", folder: str, quiet: bool) -> None:
         where = os.path.join(folder, "regimes", count.study)
         chains = f"{plural(count.chains, 'chain')} x {plural(count.values, 'value')}"
         ok = count.done - count.failed
-        with unread():
-            print_text(f"{count.study}  {chains}  {ok:>4} ok  {count.failed:>4} failed  {where}")
-            print_text(f"{count.study}  {regimes_of(folder, count.study)}")
+        with screen.unread():
+            screen.print_text(
+                f"{count.study}  {chains}  {ok:>4} ok  {count.failed:>4} failed  {where}"
+            )
+            screen.print_text(f"{count.study}  {regimes_of(folder, count.study)}")
             if count.differ:
                 apart = plural(count.differ, "value")
-                print_text(f"{count.study}  up and down differ at {apart}; second attractors "
-                           f"confirmed at {count.confirmed}")  # fmt: skip
+                second = f"second attractors confirmed at {count.confirmed}"
+                screen.print_text(f"{count.study}  up and down differ at {apart}; {second}")
     if not quiet:
         new = summary.total - summary.done_before
         done = f"{plural(new, 'value')} run in {duration(summary.seconds)}"
-        done += stored_before(summary.done_before)
-        say(done if new else all_stored(summary.total, folder, "value"))
+        done += screen.stored_before(summary.done_before)
+        screen.say(done if new else screen.all_stored(summary.total, folder, "value"))
     if not summary.failed:
         return
     from compressor.reasons import remedy
 
     for one in summary.failed[:MAX_FAILURES]:
         point = "".join(f" {key}={value}" for key, value in one.point.items())
-        say_wrapped(
+        screen.say_wrapped(
             f"{one.study}{point} {one.direction} at {one.value:g}: {one.reason}: "
             f"{printable(one.detail)}",
             2,
         )
     if len(summary.failed) > MAX_FAILURES:
-        say(f"  and {len(summary.failed) - MAX_FAILURES} more")
+        screen.say(f"  and {len(summary.failed) - MAX_FAILURES} more")
     for reason in dict.fromkeys(one.reason for one in summary.failed):
-        say_wrapped(f"{reason}: {remedy(reason)}", 2)
+        screen.say_wrapped(f"{reason}: {remedy(reason)}", 2)

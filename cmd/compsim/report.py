@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from compressor.studies import page_additions
-from compsim.options import FOLDER, output_option, results_option, units_option
-from compsim.screen import DONE, print_text, say
+from compsim import options, screen
 
 if TYPE_CHECKING:
     from compressor.units import Units
@@ -15,18 +14,18 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("names", nargs=-1, metavar="[STUDY]...")
-@results_option
-@output_option("report", "Write the report into this folder.")
+@options.results
+@options.output("report", "Write the report into this folder.")
 @click.option("--single", is_flag=True, help="Write one file that can be mailed: OUTPUT.html.")
 @click.option(
     "--limit", "limits", multiple=True, metavar="'METRIC=VALUE,... UNIT'",
     help="Show the zones A to D of a metric in tables and curves, by up to three limits with their "
     "unit, such as 'sensor_peak=0.5,2 g'.",
 )  # fmt: skip
-@units_option("kN, mm, µm, m/s²")
-@click.option("--claims", default="claims", show_default=True, type=FOLDER,
+@options.units("kN, mm, µm, m/s²")
+@click.option("--claims", default="claims", show_default=True, type=options.FOLDER,
               help="Add what `compsim claims` wrote into this folder, if it is there.")  # fmt: skip
-@click.option("--alarms", default="alarms", show_default=True, type=FOLDER,
+@click.option("--alarms", default="alarms", show_default=True, type=options.FOLDER,
               help="Add what `compsim alarms` wrote into this folder, if it is there.")  # fmt: skip
 @click.pass_context
 def report(
@@ -62,7 +61,7 @@ def report(
 
     add = page_additions(places)
     path = write_report(folder, output, context.obj, add, limits, units or "usual", names, single)
-    print_text(str(path))
+    screen.print_text(str(path))
     if single:
-        say(f"{path.stat().st_size / 1e6:.1f} MB, all in one file")
-    return DONE
+        screen.say(f"{path.stat().st_size / 1e6:.1f} MB, all in one file")
+    return screen.DONE

@@ -10,33 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from compressor.digits import plural
 from compressor.program import duration, printable
-from compsim.options import (
-    configs_argument,
-    jobs_option,
-    limit,
-    only_option,
-    quiet_option,
-    results_option,
-    setting,
-)
+from compsim import options, screen
 from compsim.progress import ProgressReporter
 from compsim.regimes import run_chains
-from compsim.screen import (
-    DONE,
-    SOME_FAILED,
-    all_stored,
-    caution,
-    one_thread_each,
-    plural,
-    print_text,
-    report_changes,
-    report_machines,
-    say,
-    say_wrapped,
-    stored_before,
-    unread,
-)
 
 if TYPE_CHECKING:
     from compressor.cases import Study
@@ -59,12 +37,12 @@ class ShardType(click.ParamType):
 
 
 @click.command()
-@configs_argument
-@results_option
-@jobs_option()
-@setting
-@only_option
-@limit
+@options.configs
+@options.results
+@options.jobs()
+@options.set_keys
+@options.only
+@options.max_jobs
 @click.option("--rerun", type=click.Choice(["failed"]), help="Run stored jobs that failed again.")
 @click.option("--shard", "part", type=ShardType(), metavar="I/N",
               help="Run part I of N, where several computers share the folder.")  # fmt: skip
@@ -73,7 +51,7 @@ class ShardType(click.ParamType):
 @click.option("--scheduler", metavar="ADDRESS",
               help="Find the dask cluster at this address, such as tcp://host:8786.")  # fmt: skip
 @click.option("--wait", is_flag=True, help="Wait for another run on the folder to end.")
-@quiet_option
+@options.quiet
 @click.pass_context
 def run(
     context: click.Context,
@@ -102,7 +80,7 @@ def run(
     ended. A summary line for each study goes to stdout.
     """
     check_backend(backend, scheduler, jobs)
-    one_thread_each()  # before numpy loads
+    screen.one_thread_each()  # before numpy loads
     from compressor.cases import load_studies
     from compressor.sweep import Options, cores
 
@@ -112,39 +90,39 @@ def run(
         )
     if only and not quiet:
         selected = sum(len(study.selected) for study in studies)
-        say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
-    caution(studies)
+        screen.say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
+    screen.caution(studies)
     chains = [study for study in studies if study.request]
     studies = [study for study in studies if not study.request]
     if chains and scheduler:
         raise click.UsageError("regimes run in processes here: leave --backend dask out")
-    code, workers = DONE, jobs or cores()
+    code, workers = screen.DONE, jobs or cores()
     if studies:
         how = Options(context.obj, bool(rerun), part, wait=wait)
         code = run_jobs(studies, folder, workers, how, scheduler, quiet)
     if chains:
         if not quiet:
-            report_machines(chains)
+            screen.report_machines(chains)
         shards = [study.shard(*part) if part else study for study in chains]
         code = max(code, run_chains(shards, folder, workers, bool(rerun), quiet))
     return code
 
 
 def run_jobs(
-    studies: "list[Study]", folder: str, workers: int, options: "Options", scheduler: str | None,
+    studies: "list[Study]", folder: str, workers: int, how: "Options", scheduler: str | None,
     quiet: bool,
 ) -> int:  # fmt: skip
     """Run studies of jobs, and return the exit code."""
-    report_changes(studies, folder)
+    screen.report_changes(studies, folder)
     from compressor.sweep import Cluster, sweep
 
     cluster: Any = Cluster(scheduler) if scheduler else nullcontext()
-    opening = partial(report_machines, studies)  # where there are jobs to run
+    opening = partial(screen.report_machines, studies)  # where there are jobs to run
     with ProgressReporter(quiet, "jobs", folder, opening) as progress, cluster as elsewhere:
-        how = replace(options, backend=elsewhere, failed=progress.count_failed)
+        how = replace(how, backend=elsewhere, failed=progress.count_failed)
         summary = sweep(studies, folder, workers, progress, how)
     report_run(summary, folder, quiet)
-    return SOME_FAILED if summary.failed else DONE
+    return screen.SOME_FAILED if summary.failed else screen.DONE
 
 
 def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None:
@@ -166,21 +144,21 @@ def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
     for count in summary.counts:
         where = os.path.join(folder, "studies", f"{count.study}.json")
         good = count.jobs - count.failed
-        with unread():
-            print_text(
+        with screen.unread():
+            screen.print_text(
                 f"{count.study:<{width}}  {plural(count.jobs):>9}  {good:>4} ok  "
                 f"{count.failed:>4} failed  {where}"
             )
     if not quiet:
         if not summary.run_now:
-            say(all_stored(summary.total, folder))
+            screen.say(screen.all_stored(summary.total, folder))
         else:
-            again = stored_before(summary.done_before)
-            say(f"{plural(summary.run_now)} run in {duration(summary.seconds)}{again}")
+            again = screen.stored_before(summary.done_before)
+            screen.say(f"{plural(summary.run_now)} run in {duration(summary.seconds)}{again}")
     report_failures(summary)
     if not quiet:
         report_caveats([count.study for count in summary.counts], folder)
-        say(f"next: compsim report -r {shlex.quote(folder)}")
+        screen.say(f"next: compsim report -r {shlex.quote(folder)}")
 
 
 def report_caveats(names: list[str], folder: str) -> None:
@@ -190,7 +168,7 @@ def report_caveats(names: list[str], folder: str) -> None:
     rows = read_store(folder).rows
     for study in read_studies(folder):
         for text in run_caveats(rows, study) if study.name in names else ():
-            say_wrapped(f"{study.name}: {text}")
+            screen.say_wrapped(f"{study.name}: {text}")
 
 
 def report_failures(summary: "Summary") -> None:
@@ -200,15 +178,15 @@ def report_failures(summary: "Summary") -> None:
         return
     from compressor.reasons import remedy
 
-    say(f"{plural(len({failure.key for failure in failures}))} failed:")
+    screen.say(f"{plural(len({failure.key for failure in failures}))} failed:")
     for failure in failures[:MAX_FAILURES]:
         point = "".join(f" {key}={value}" for key, value in failure.coordinates.items())
         # one line each, for who searches a log
-        say(f"  {failure.study}{point}: {failure.reason}: {printable(failure.detail)}")
-        say(f"    job {failure.key}")
+        screen.say(f"  {failure.study}{point}: {failure.reason}: {printable(failure.detail)}")
+        screen.say(f"    job {failure.key}")
     if len(failures) > MAX_FAILURES:
-        say(f"  and {len(failures) - MAX_FAILURES} more")
-    say("what to do:")
+        screen.say(f"  and {len(failures) - MAX_FAILURES} more")
+    screen.say("what to do:")
     for reason, number in Counter(failure.reason for failure in failures).items():
-        say_wrapped(f"{reason} ({number}): {remedy(reason)}", 2)
-    say("--rerun failed runs failed jobs again; a changed case file makes new jobs.")
+        screen.say_wrapped(f"{reason} ({number}): {remedy(reason)}", 2)
+    screen.say("--rerun failed runs failed jobs again; a changed case file makes new jobs.")

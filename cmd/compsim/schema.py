@@ -4,7 +4,7 @@ import json
 
 import click
 
-from compsim.screen import DONE, print_text
+from compsim import screen
 
 
 @click.command()
@@ -22,5 +22,5 @@ def schema() -> int:
     """
     from compressor.cases import case_schema
 
-    print_text(json.dumps(case_schema(), indent=1))
-    return DONE
+    screen.print_text(json.dumps(case_schema(), indent=1))
+    return screen.DONE

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from compressor.digits import plural
 from compressor.program import THREAD_VARIABLES, printable
-from compsim.options import MAX_JOBS
+from compsim import options
 
 if TYPE_CHECKING:
     from compressor.cases import Study
@@ -68,6 +69,22 @@ def wrap_line(text: str, indent: int, more: int = 2) -> list[str]:
     return [line.replace("\u00a0", " ") for line in lines]
 
 
+def wrap_value(line: str) -> list[str]:
+    """Return a sentence, or a label and its value, as lines of the width that hang below it."""
+    body = line.lstrip()
+    indent = len(line) - len(body)
+    text = body.partition("  ")[2].lstrip()
+    if len(line) <= WIDTH or (text and " " not in text):  # a path
+        return [line.rstrip()]
+    return wrap_line(body, indent, len(body) - len(text) if text else 2)
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines on stdout, wrapped to the width."""
+    for line in lines:
+        print_text("\n".join(wrap_value(printable(line))))
+
+
 def say(text: str, end: str = "\n") -> None:
     """Write to stderr; nobody may be there to read it."""
     with contextlib.suppress(OSError):
@@ -90,7 +107,7 @@ def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
         words = ["compsim", "run", *(study.case_file for study in group), "-r", folder]
         words += [word for text in overrides for word in ("--set", text)]
         jobs = max(study.jobs for study in group)
-        words += ["--max-jobs", str(jobs)] if jobs > MAX_JOBS else []
+        words += ["--max-jobs", str(jobs)] if jobs > options.MAX_JOBS else []
         commands.append(shlex.join(words))
     return commands
 
@@ -123,16 +140,14 @@ def report_machines(studies: "Sequence[Study]") -> None:
 
     for study in studies:
         say(f"{study.name}: its machine, without clearance")
-        say("\n".join(machine_lines(describe_machine(study).lines())))
+        for line in align_lines(describe_machine(study).lines(), indent=2):
+            say("\n".join(wrap_value(line)))
 
 
-def machine_lines(things: Sequence[tuple[str, str]], indent: int = 2) -> Iterator[str]:
-    """Yield the names of things and what is said of each, a name in its column, wrapped."""
-    width = max((len(thing) for thing, _ in things), default=0)
-    for thing, words in things:
-        first, *more = wrap_line(words, indent + width + 2, 0)
-        yield f"{'':{indent}}{thing:<{width}}  {first.lstrip()}"
-        yield from more
+def align_lines(lines: Sequence[tuple[str, str]], least: int = 0, indent: int = 0) -> list[str]:
+    """Return labels in a column of at least so many characters, and what stands beside each."""
+    width = max((len(label) for label, _ in lines), default=0)
+    return [f"{'':{indent}}{label:<{max(width, least)}}  {text}" for label, text in lines]
 
 
 def report_changes(studies: "Sequence[Study]", folder: str) -> None:
@@ -154,11 +169,6 @@ def report_changes(studies: "Sequence[Study]", folder: str) -> None:
         say_wrapped(text)
         if one.former:
             say(f"  compsim export {one.former} -r {shlex.quote(folder)} -o {one.former}.csv")
-
-
-def plural(count: int, thing: str = "job") -> str:
-    """Return a number of things in words: 1 job, 2 jobs."""
-    return f"{count} {thing}" + ("s" if count != 1 else "")
 
 
 def all_stored(count: int, folder: str, thing: str = "job") -> str:

@@ -9,14 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from compressor.program import printable
-from compsim.options import (
-    check_json_units,
-    job_argument,
-    json_option,
-    results_option,
-    units_option,
-)
-from compsim.screen import DONE, jsonable, print_text, run_commands, say, wrap_line
+from compsim import options, screen
 
 if TYPE_CHECKING:
     from compressor.cases import Case
@@ -39,8 +32,8 @@ def reversal_limits(_: click.Context, __: click.Parameter, text: str) -> tuple[f
 
 
 @click.command()
-@job_argument
-@results_option
+@options.job
+@options.results
 @click.option("--case", "only_case", is_flag=True,
               help="Print the case alone, as a case file with all keys.")  # fmt: skip
 @click.option(
@@ -51,8 +44,8 @@ def reversal_limits(_: click.Context, __: click.Parameter, text: str) -> tuple[f
     callback=reversal_limits,
     help="Ask for this reversal of the rod load: degrees, and percent on its smaller side.",
 )
-@units_option("kN, mm, µm, m/s²")
-@json_option
+@options.units("kN, mm, µm, m/s²")
+@options.as_json
 def show(
     words: tuple[str, ...],
     folder: str,
@@ -75,17 +68,17 @@ def show(
     the rod load at the crosshead pin changes its side as API 618 requires, by 15 degrees and 3
     percent, or as a maker does. --json has all numbers in SI.
     """
-    check_json_units(as_json, units)
+    options.check_json_units(as_json, units)
     from compressor.store import report_job
 
     found = report_job(folder, *words)
     if as_json:
-        print_text(json.dumps(jsonable(dataclasses.asdict(found)), indent=1))
+        screen.print_text(json.dumps(screen.jsonable(dataclasses.asdict(found)), indent=1))
     elif only_case:
-        print_text(whole_case(found, folder).removesuffix("\n"))
+        screen.print_text(whole_case(found, folder).removesuffix("\n"))
     else:
         print_report(found, folder, reversal, units or "usual")
-    return DONE
+    return screen.DONE
 
 
 def print_report(
@@ -96,25 +89,26 @@ def print_report(
     from compsim.job_text import sections
 
     ended = {"missing": "not run yet", "failed": f"failed: {found.reason}: {found.detail}"}
-    print_text(f"job {found.key}: {printable(ended.get(found.status, found.status))}")
+    screen.print_text(f"job {found.key}: {printable(ended.get(found.status, found.status))}")
     for study, point in found.studies.items():
         values = "".join(f" {key}={value}" for key, value in point.items())
-        print_text(f"  in {study}{printable(values)}")
+        screen.print_text(f"  in {study}{printable(values)}")
     if found.status == "failed":
-        print_text(f"  what to do: {remedy(found.reason)}")
+        screen.print_text(f"  what to do: {remedy(found.reason)}")
     if found.status == "missing":
-        for command in run_commands(found.again, folder):
-            say(f"next: {command}")
+        for command in screen.run_commands(found.again, folder):
+            screen.say(f"next: {command}")
         return
     for heading, lines in sections(found, reversal, units):
         if lines and heading:
-            print_text(heading)
-        for line in lines:
-            print_text("\n".join(wrap_value(printable(line))))
+            screen.print_text(heading)
+        screen.print_lines(f"  {line}" for line in lines)
     if "case" in found.attributes:
-        print_text("the values of its case that are not the usual ones (--case prints it whole)")
+        screen.print_text(
+            "the values of its case that are not the usual ones (--case prints it whole)"
+        )
         for line in changed_values(found.case):
-            print_text(f"  {line}")
+            screen.print_text(f"  {line}")
 
 
 def changed_values(case: "Case") -> Iterator[str]:
@@ -136,21 +130,12 @@ def flat_values(case: "Case") -> Iterator[tuple[str, Any]]:
             yield key, value
 
 
-def wrap_value(line: str) -> list[str]:
-    """Return a sentence, or a label and its value, as lines of the width."""
-    _, _, text = line.partition("  ")
-    text = text.lstrip()
-    if text and " " not in text:  # a path
-        return [f"  {line}"]
-    return wrap_line(line, 2, len(line) - len(text) if text else 2)
-
-
 def whole_case(found: "JobReport", folder: str) -> str:
     """Return a job's case as a case file, under a name of its own: its study's may be taken."""
     from compressor.cases import to_yaml
 
     if "case" not in found.attributes:
-        run = "; ".join(run_commands(found.again, folder)) or "run its case file"
+        run = "; ".join(screen.run_commands(found.again, folder)) or "run its case file"
         raise click.UsageError(f"job {found.key} was not run yet: {run}")
     name = f"{found.case.name[:MAX_NAME]}-{found.key[:KEY_DIGITS]}"
     return to_yaml(dataclasses.replace(found.case, name=name))

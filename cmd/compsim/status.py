@@ -5,15 +5,15 @@ import json
 
 import click
 
-from compsim.options import json_option, results_option
-from compsim.screen import DONE, plural, print_text, run_commands, say, wrap_line
+from compressor.digits import plural
+from compsim import options, screen
 
 PROMISES = {"kept": "kept what accuracy promises", "none": "without a promise"}
 
 
 @click.command()
-@results_option
-@json_option
+@options.results
+@options.as_json
 def status(folder: str, as_json: bool) -> int:
     """Count jobs that are done, failed or missing, and say why.
 
@@ -31,11 +31,11 @@ def status(folder: str, as_json: bool) -> int:
 
     found = standings(folder)
     if as_json:
-        print_text(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
-        return DONE
+        screen.print_text(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
+        return screen.DONE
     width = max(len(one.study) for one in found)
     for one in found:
-        print_text(f"{one.study:<{width}}  {plural(one.jobs):>9}  {one.ok:>4} ok  "
+        screen.print_text(f"{one.study:<{width}}  {plural(one.jobs):>9}  {one.ok:>4} ok  "
                    f"{one.failed:>4} failed  {one.missing:>4} missing")  # fmt: skip
         remarks = []
         if one.former_of:
@@ -48,8 +48,8 @@ def status(folder: str, as_json: bool) -> int:
         remarks += one.caveats
         remarks += [f"{n} {reason}: {remedy(reason)}" for reason, n in one.reasons.items()]
         for text in remarks:
-            print_text("\n".join(wrap_line(text, 4)))
+            screen.print_text("\n".join(screen.wrap_line(text, 4)))
     wanting = [one.again for one in found if one.missing and not one.former_of]
-    for command in run_commands(wanting, folder):
-        say(f"next: {command}")
-    return DONE
+    for command in screen.run_commands(wanting, folder):
+        screen.say(f"next: {command}")
+    return screen.DONE

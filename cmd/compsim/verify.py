@@ -5,16 +5,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compsim.options import json_option, results_option
-from compsim.screen import DONE, STORE, plural, print_text, run_commands, say
+from compressor.digits import plural
+from compsim import options, screen
 
 if TYPE_CHECKING:
     from compressor.store import Damage
 
 
 @click.command()
-@results_option
-@json_option
+@options.results
+@options.as_json
 def verify(folder: str, as_json: bool) -> int:
     """Compare every stored file with its checksum.
 
@@ -28,22 +28,24 @@ def verify(folder: str, as_json: bool) -> int:
 
     damages = compare(folder)
     if as_json:
-        print_text(json.dumps([jsonable_damage(damage) for damage in damages], indent=1))
+        screen.print_text(json.dumps([jsonable_damage(damage) for damage in damages], indent=1))
     for damage in () if as_json else damages:
-        print_text(f"{damage.path}: {damage.problem}" + f"; {damage.remedy}" * bool(damage.remedy))
+        screen.print_text(
+            f"{damage.path}: {damage.problem}" + f"; {damage.remedy}" * bool(damage.remedy)
+        )
         for job, points in damage.studies.items():
-            print_text(f"  job {job}")
+            screen.print_text(f"  job {job}")
             for study, point in points.items():
                 values = "".join(f" {key}={value}" for key, value in point.items())
-                print_text(f"    in {study}{values}")
+                screen.print_text(f"    in {study}{values}")
     if not damages:
-        say("no damage")
-        return DONE
+        screen.say("no damage")
+        return screen.DONE
     lost = len({key for damage in damages for key in damage.keys})
-    say(f"{plural(len(damages), 'damaged file')}, {plural(lost)} lost")
-    for command in run_commands((one for damage in damages for one in damage.again), folder):
-        say(f"to repair: {command}")
-    return STORE
+    screen.say(f"{plural(len(damages), 'damaged file')}, {plural(lost)} lost")
+    for command in screen.run_commands((one for damage in damages for one in damage.again), folder):
+        screen.say(f"to repair: {command}")
+    return screen.STORE
 
 
 def jsonable_damage(damage: "Damage") -> dict[str, Any]:

@@ -16,7 +16,7 @@ from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
-from compressor.program import STUDY_FILES, CompsimError, CompsimWarning, did_you_mean
+from compressor.program import CompsimError, CompsimWarning, did_you_mean
 
 Folder = str | os.PathLike[str]
 
@@ -283,11 +283,17 @@ def discard_leftovers(folder: Folder) -> None:
 MAX_LOOKED_AT = 1000  # entries of a folder in which results are sought
 MAX_NAMES = 5  # that are listed
 MAKE = "make one: compsim run CONFIG..."
+# results of studies without jobs -> what they are, with names for {}, and the command that reads
+# them
+STUDY_RESULTS = {
+    "regimes/*/study.json": ("machines that were followed: {}", "compsim plot STUDY draws one"),
+    "wear/*.nc": ("how machines have worn", "compsim wear CONFIG... reports them"),
+}
 
 
 def holds_results(folder: Folder) -> bool:
     """Return whether a folder holds a study, of jobs or of another kind."""
-    patterns = ["studies/*.json", *(files.result for files in STUDY_FILES if files.result)]
+    patterns = ("studies/*.json", *STUDY_RESULTS)
     try:
         return any(any(Path(folder).glob(pattern)) for pattern in patterns)
     except OSError:
@@ -306,10 +312,10 @@ def no_results(folder: Folder) -> WrongName:
         )
     if not place.exists():
         return WrongName(folder, "there is no such folder of results", remedy_for(place))
-    for files in STUDY_FILES:
-        if files.result and (found := sorted(place.glob(files.result))):
-            content = files.content.format(list_few([path.parent.name for path in found]))
-            return WrongName(folder, f"holds no study of jobs, only {content}", files.remedy)
+    for pattern, (content, remedy) in STUDY_RESULTS.items():
+        if found := sorted(place.glob(pattern)):
+            content = content.format(list_few([path.parent.name for path in found]))
+            return WrongName(folder, f"holds no study of jobs, only {content}", remedy)
     return WrongName(folder, "holds no study", remedy_for(place))
 
 

@@ -37,7 +37,6 @@ from compressor.cases import (
 )
 from compressor.metrics import NUMBERS
 from compressor.outcome import Regime
-from compressor.program import STUDY_FILES
 from compressor.store.failures import describe_failures
 from compressor.store.files import Folder, StoreError, final_path, is_locked, no_results
 from compressor.store.hdf5 import DamagedJob
@@ -232,6 +231,7 @@ def _outside_of_study(study: StoredStudy) -> dict[str, str]:
 FORMER_REMEDY = "delete it: its jobs stay stored"
 ROWS_REMEDY = "bring the missing files of rows, or run their case files, which computes them again"
 STUDY_REMEDY = "run its case file again, which recomputes no job"
+STUDY_FILES = ("regimes/*/*.nc", "wear/*.nc", "models/*.nc")  # of studies, beside jobs
 STUDY_FILE_REMEDY = "delete it: the command that made it makes it again"
 
 
@@ -262,7 +262,7 @@ def verify(
     """
     busy = {place for place in places(folder) if is_locked(place)}
     stored = read_store(folder, DamagedJob)
-    others = [path for files in STUDY_FILES for path in sorted(Path(folder).glob(files.checked))]
+    others = [path for pattern in STUDY_FILES for path in sorted(Path(folder).glob(pattern))]
     if not (stored.segments or stored.damaged or study_paths(folder) or others):
         raise no_results(folder)
     found: list[Damage] = []

@@ -15,7 +15,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from compsim.calibrate import POOR_FIT
 from joblib import Parallel, delayed
 from measure_accuracy import provenance
 from scipy.stats import binomtest
@@ -23,6 +22,7 @@ from scipy.stats import binomtest
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 from compressor.studies.calibrate.calibrate import Unknown, calibrate
+from compressor.studies.calibrate.words import POOR_FIT
 from compressor.vibration import Record
 
 SEED, MACHINES = 3101, 34

@@ -15,11 +15,11 @@ import numpy as np
 import xarray as xr
 from compsim import cli
 from compsim.screen import DONE, SOME_FAILED
-from compsim.stress import command
 from measure_accuracy import provenance
 
 from compressor.studies.stress.extremes import SPANS
 from compressor.studies.stress.stress import FILE, counts, slowest, worst
+from compressor.studies.stress.words import command
 
 WORST = 10
 SHOWN = ("verdict", "reason", "joint", "load", "rtol", "judges", "worst_metric", "horizon",

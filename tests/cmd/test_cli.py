@@ -354,7 +354,9 @@ def test_explain_of_a_failed_job_says_so(case_file, capsys):
 
 
 def test_explain_of_an_effect_that_failed():
-    from compsim.explain import describe_advice, jsonable
+    from compsim.screen import jsonable
+
+    from compressor.studies.tradeoff.words import describe_advice
 
     effect = types.SimpleNamespace(reason="non_finite")
     told = types.SimpleNamespace(advice=[types.SimpleNamespace(name="load", effect=effect)])

@@ -3,7 +3,7 @@
 import pytest
 
 from compressor.store.files import WrongName, holds_results, no_results, writable_folder
-from compressor.studies import find_drawn
+from compressor.studies import find_followed
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def test_which_folders_hold_results(place):
     assert [p.name for p in sorted(place.iterdir()) if holds_results(p)] == [
         "chains", "results", "wear"
     ]  # fmt: skip
-    assert [*find_drawn("chains")] == ["rise"]
+    assert find_followed("chains") == ["rise"]
 
 
 def test_a_folder_that_may_not_be_written_is_found_before(tmp_path, monkeypatch):

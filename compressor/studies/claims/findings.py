@@ -291,3 +291,16 @@ def phrase(name: str) -> str:
     meanings = {"first": "by this assumption alone", "total": "with this assumption's interactions"}
     text = f"share of the margin's variance {meanings[order]}"
     return text + (f", {end[1:]} end of its 95 % interval" if end else "")
+
+
+def sentences(found: xr.Dataset) -> Iterator[str]:
+    """Yield the findings of a file of judged machines."""
+    if "looked" in found.attrs:
+        yield from change(found)
+        return
+    yield from summary(found)
+    if is_mass_plane(found) and min(found["status"].shape) > 2:
+        yield consistency(found)
+    table = sensitivity(found)
+    if table is not None:
+        yield from rank_assumptions(table)

@@ -1,12 +1,30 @@
 """Wear of a machine's bores: clearance and greatest force over hours."""
 
 import math
+import os
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
 from compressor.metrics import JOINTS
-from compressor.report import BLACK, CYCLE, GREY, Drawing, LineStyle, Note, fill, make_grid
+from compressor.report import (
+    BLACK,
+    CYCLE,
+    GREY,
+    Drawing,
+    LineStyle,
+    Note,
+    fill,
+    make_grid,
+    render,
+    title_figure,
+)
+from compressor.store import publish
+from compressor.studies.wear.run import WearSummary
+from compressor.studies.wear.stages import open_wear, wear_file
+
+MAX_DRAWN = 12  # machines that get a figure
 
 
 def draw_wear(stages: xr.Dataset, limit_mm: float, factor: float) -> Drawing:
@@ -40,3 +58,17 @@ def draw_wear(stages: xr.Dataset, limit_mm: float, factor: float) -> Drawing:
         panel.title = f"({letter})"
         panel.notes.append(Note(y=0.0, style=LineStyle(GREY, linewidth=0.5, zorder=0)))
     return figure
+
+
+def draw_machines(summary: WearSummary, folder: str, titles: dict[str, str]) -> Iterator[str]:
+    """Draw the first machines that have a life; titles: of the studies' machines, "" without."""
+    for one in [one for one in summary.machines if one.life][:MAX_DRAWN]:
+        path = wear_file(folder, one.case).with_suffix(".png")
+        wear_keys = one.case.wear
+        assert wear_keys
+        bounds = wear_keys.limit_mm or math.nan, wear_keys.coefficient_factor
+        drawing = draw_wear(open_wear(folder, one.case), *bounds)
+        point = [f"{key} {value}" for key, value in one.point.items()]
+        drawing.title = title_figure(titles[one.study] or one.study, "wear of the bores", point)
+        publish(path, render(drawing, "png"))
+        yield os.fspath(path)

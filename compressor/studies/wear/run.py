@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from compressor.cases import Case, Study, points
-from compressor.program import Progress
+from compressor.program import CompsimError, Progress
 from compressor.store import Folder, StoreError, writable_folder
 from compressor.studies.wear.stages import (
     Life,
@@ -70,6 +70,32 @@ class WearEnd(NamedTuple):
     life: Life | None
     reason: str
     detail: str
+
+
+class NoWear(CompsimError):
+    """A case that has nothing to wear."""
+
+    exit_code = 2
+
+
+def check_wear(studies: Sequence[Study]) -> None:
+    """Raise NoWear unless each case wears, and is measured over whole revolutions."""
+    for study in studies:
+        for case in study.cases:
+            if case.joint == "none":
+                raise NoWear(f"{study.path}: joint: none has no bore that wears: leave none out")
+            if not case.wear:
+                raise NoWear(
+                    f"{study.path}: has no wear: write wear: true, or keys of it (compsim schema)"
+                )
+            if case.solve.duration_rev == "auto":
+                continue
+            turns = (case.duration - case.settle) / case.turn
+            if abs(turns - round(turns)) > 1e-9 or turns < 1.0 - 1e-9:
+                raise NoWear(
+                    f"{study.path}: solve.duration_rev: {turns:g} after settle_rev must be whole "
+                    "revolutions, one at least"
+                )
 
 
 def run_wear(

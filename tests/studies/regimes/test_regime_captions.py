@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from regimes_made import failed, made, plane
 
-from compressor.studies import STUDIES
+from compressor.studies import FOLLOWED_FIGURES
 from compressor.studies.regimes.captions import (
     CAPTIONS,
     bifurcation,
@@ -32,8 +32,7 @@ def study(up, down=None, exponents=None):
 
 
 def test_the_captions_of_regimes_are_those_of_compsim_plot():
-    (kind,) = [kind for kind in STUDIES if kind.name == "regimes"]
-    assert (*CAPTIONS,) == kind.figures
+    assert (*CAPTIONS,) == FOLLOWED_FIGURES
 
 
 def test_a_period_that_is_not_known_is_no_period():

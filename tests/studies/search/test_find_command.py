@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from compsim import cli
-from compsim.find import jsonable_answer, lines, tell_ahead
+from compsim.find import tell_ahead
 from conftest import jobs_here
 
 from compressor.cases.load import load_cases, load_studies
@@ -18,6 +18,7 @@ from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
 from compressor.studies.search.find import Point, interval
 from compressor.studies.search.question import JobReading, Question, comparison
+from compressor.studies.search.words import jsonable_answer, lines
 from compressor.sweep import plan
 from compressor.sweep.wanted import revolutions
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from compsim import cli
-from compsim.stress import summary
 from conftest import jobs_here
 
 from compressor.cases.case import Case
@@ -36,6 +35,7 @@ from compressor.studies.stress.stress import (
     slowest,
     worst,
 )
+from compressor.studies.stress.words import summary
 
 SMALL = Budget(revolutions=0.125, max_steps=60_000, seconds=20.0)
 COUNT, SEED = 12, 1

@@ -3,7 +3,6 @@
 from collections import Counter
 
 import pytest
-from compsim.stress import summary
 
 from compressor.cases.case import Case
 from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS
@@ -12,6 +11,7 @@ from compressor.store.files import StoreError
 from compressor.studies.stress.extremes import ELASTIC, FEATURES, OF_LAWS, RANGES, Budget, values
 from compressor.studies.stress.judge import judge, judges
 from compressor.studies.stress.stress import campaign
+from compressor.studies.stress.words import summary
 
 SMALL = Budget(FEATURES, revolutions=0.0625, max_steps=40_000, seconds=20.0)
 COUNT, SEED = 4, 1

@@ -10,7 +10,6 @@ import time
 import numpy as np
 import pytest
 from compsim.cli import main
-from compsim.wear import hours
 from conftest import assert_same_bits, jobs_here
 
 from compressor.cases.load import load_cases
@@ -18,6 +17,7 @@ from compressor.store.files import StoreError
 from compressor.studies.wear import stages
 from compressor.studies.wear.run import WearTask, follow_wear, run_wear
 from compressor.studies.wear.stages import Worn, open_wear, wear_file
+from compressor.studies.wear.words import hours
 
 TEXT = """
 joint: both
