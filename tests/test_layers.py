@@ -61,6 +61,7 @@ LIBRARIES = {  # library -> the modules that may import it
         "compressor.vibration",
     },
     "yaml": {"compressor.cases.load", "compressor.cases.yaml_reader"},
+    "pydantic": {"compressor.cases"},
     "joblib": {"compressor.sweep"},
     "distributed": {"compressor.sweep"},
     "h5py": {"compressor.store.hdf5"},

@@ -112,15 +112,13 @@ print(json.dumps([compressor.Case.from_values(values).key for values in ({}, wor
 
 def test_the_page_on_features_is_right(tmp_path):
     copy_of_the_program(tmp_path, "tests")
-    group, of_groups, of_words, of_settings, number, value, function, call, usual, row = blocks(
+    group, of_settings, number, value, function, call, usual, row = blocks(
         "## How to add a feature", "## How to add a metric"
     )
     tests = "tests/physics/test_general_mechanism.py"
     for name, *edits in (
         ("compressor/cases/optional_groups.py", (group + "\n\n", "def fill_guide(", False)),
         ("compressor/cases/table.py", (" Damper,", "optional_groups import Body,", True),
-         (indented(of_groups), '    "rod": Rod,\n', False),
-         (indented(of_words), "WORDS = {\n", True),
          (indented(of_settings), "    rod: Rod |", False)),
         ("compressor/cases/case.py", ("self.damper or ", "return bool(self.guide or ", True)),
         ("compressor/physics/record.py", (indented(number), '    ("axial_stiffness"', False)),

@@ -14,7 +14,7 @@ from typing import Any
 from compressor.cases.checks import SWEEP, check_value, row_of, suggestion
 from compressor.cases.combinations import Block, Row
 from compressor.cases.keys import Leaves
-from compressor.cases.parameter import Problem, quote_value
+from compressor.cases.parameter import quote_value
 from compressor.cases.swept import (
     SAMPLED,
     NoComparison,
@@ -156,10 +156,9 @@ def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
         return node if key in WORDS and node.value is WORDS[key] else None
     if isinstance(node.value, dict) and any(n.value is None for n in node.value.values()):
         return None
-    wrong: list[Problem] = []
     row = row_of(key)
     assert row  # an unknown key was reported when it was read
-    value = check_value(row.key, node.plain(), wrong)
+    value, wrong = check_value(row.key, node.plain())
     parts = node.value if isinstance(node.value, dict) else {}
     for problem in wrong:
         part = parts.get(problem.key.removeprefix(f"{row.key}."))

@@ -4,29 +4,37 @@ A job's key holds the version of the model: results of one version agree within 
 error bars, and a change that moves numbers further is a new version, and so makes other jobs.
 """
 
-import contextlib
 import hashlib
 import json
 import math
 import re
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import replace
+from functools import cache, cached_property, partial
 from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
 
 from compressor.cases.card import CardError, open_card
 from compressor.cases.checks import (
     PER_PART,
     SHORTHANDS,
     SWEEP,
-    check_part,
     expand_shorthands,
     expand_synonyms,
+    problems_of_case,
     stands_for,
     value_of,
     values_given,
 )
-from compressor.cases.conflicts import IN_KEY_IF_READ, conflicts, reads, values_read
+from compressor.cases.conflicts import (
+    IN_KEY_IF_READ,
+    conflicts,
+    given_conflicts,
+    reads,
+    unread_values,
+    values_read,
+)
 from compressor.cases.groups import ATMOSPHERE_MPA, CARD_KEYS, Contact, HealthyClearance, Solve
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
 from compressor.cases.optional_groups import fill_guide, fill_wear
@@ -35,6 +43,7 @@ from compressor.cases.parameter import (
     CaseError,
     Problem,
     Targets,
+    checked,
     first_tolerance,
     quote_value,
 )
@@ -46,6 +55,8 @@ from compressor.metrics import JOINTS
 MODEL_VERSION = "3"  # of equations and of the meaning of what is stored; part of a key
 MAX_TEXTS = 4096  # groups whose texts are remembered
 SOUND = HealthyClearance()  # that no case need name
+FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder
+OWN_GAS = {key for key in table() if key.startswith("gas.")} - {*FOLLOWING}
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 # the groups with a key that results depend on; of `solve` the span and the solver are parts
@@ -62,7 +73,7 @@ NO_SWEEP = (
 )
 
 
-@dataclass(frozen=True)
+@checked
 class Case(Settings):
     """One fully resolved simulation: every value of a case file, in the case file's units.
 
@@ -81,8 +92,14 @@ class Case(Settings):
     >>> fast = replace(case, machine=replace(case.machine, speed_rpm=700))
     >>> fast.key == case.key
     False
-    >>> fast.problems  # what is made without from_values is checked on first access
-    ()
+
+    What does not fit together is refused, as by from_values:
+
+    >>> replace(case, spring=compressor.Spring(stroke_mm=300))
+    Traceback (most recent call last):
+        ...
+    compressor.cases.parameter.CaseError: spring.stroke_mm: 300 mm must be less than the piston's \
+stroke, 240 mm
     """
 
     @classmethod
@@ -118,35 +135,33 @@ class Case(Settings):
 
     @classmethod
     def _of_values(cls, values: Mapping[str, Any], lenient: bool = False) -> "Case":
-        parts, given = parts_of(values)
-        case = cls(**parts)
-        problems = [*conflicts(case, given, {} if lenient else _values_to_read(values))]
-        if problems:
+        if not isinstance(values, Mapping):
+            message = f"needs a mapping of keys, such as {EXAMPLE}, not {quote_value(values)}"
+            raise CaseError([Problem("", message)])
+        problems: list[Problem] = []
+        whole = plain_values(values, problems)
+        given = frozenset(values_given(whole))
+        case = None
+        try:
+            case = adapter_of_case().validate_python(whole)
+        except ValidationError as error:
+            problems += problems_of_case(error, whole)
+            if any(one["type"] != "value_error" or len(one["loc"]) for one in error.errors()):
+                raise CaseError(
+                    _as_written(values, map(partial(_refuse_sweep, whole), problems))
+                ) from None
+        problems += given_conflicts(str(whole.get("joint", "none")), given)
+        if case is None or problems:
             raise CaseError(_as_written(values, problems))
-        vars(case)["problems"] = ()  # known: see `problems`
+        if not lenient and (unread := [*unread_values(case, _values_to_read(values), given)]):
+            raise CaseError(_as_written(values, unread))
         return case
 
-    @cached_property
-    def problems(self) -> tuple[Problem, ...]:
-        """Return what is wrong with a case that was made without `from_values`; () for nothing.
-
-        Each problem has the dotted `key` and the `message` that `from_values` would raise. A run
-        of such a case fails as invalid_input, and simulates nothing.
-
-        >>> import compressor
-        >>> case = compressor.Case(spring=compressor.Spring(stroke_mm=300))
-        >>> for problem in case.problems:
-        ...     print(problem)
-        spring.stroke_mm: 300 mm must be less than the piston's stroke, 240 mm
-        """
-        try:
-            Case.resolve(self.values())
-        except CaseError as error:
-            return tuple(error.problems)
-        return ()
-
     def __post_init__(self) -> None:
-        """Fill in the defaults that depend on other groups; what needs a clearance goes without."""
+        """Fill in what depends on other groups; what needs a clearance goes without.
+
+        Raises CaseError with everything that does not fit together.
+        """
         values = vars(self)  # which alone can be written to: a case is frozen
         values["load"] = table()["load"].choice_of(self.load)
         if self.guide:
@@ -161,6 +176,8 @@ class Case(Settings):
             values["lubricant"] = values["wear"] = None
         if self.wear:
             values["wear"] = fill_wear(self.wear, self.clearance_mm)
+        if problems := [*conflicts(self)]:
+            raise CaseError(problems)
 
     @classmethod
     def from_attribute(cls, text: str) -> "Case":
@@ -274,19 +291,13 @@ class Case(Settings):
         return digest(join_parts(identity_parts(self)))
 
     def attributes(self) -> dict[str, Any]:
-        """Return what an outcome stores of its case: `name`, `case` (JSON), `key`, `physics_key`.
-
-        The keys of a case with values that none can be made of, such as a speed of 0, are "".
-        """
+        """Return what is stored of a case: `name`, `case` (JSON), `key` and `physics_key`."""
         texts = [
             f'"{name}": {_value_text(value) if name in GROUPS else json.dumps(value)}'
             for name, value in sorted(self._given_fields())
         ]
-        found = {"name": self.name, "case": "{" + ", ".join(texts) + "}"}
-        keys = {"key": "", "physics_key": ""}
-        with contextlib.suppress(ArithmeticError, TypeError, ValueError):
-            keys = {"key": self.key, "physics_key": self.physics_key}
-        return found | keys
+        text = "{" + ", ".join(texts) + "}"
+        return {"name": self.name, "case": text, "key": self.key, "physics_key": self.physics_key}
 
 
 def require_case(value: Any) -> Case:
@@ -298,20 +309,10 @@ def require_case(value: Any) -> Case:
     )
 
 
-def parts_of(values: Mapping[str, Any]) -> tuple[dict[str, Any], frozenset[str]]:
-    """Return the fields of a case, each checked alone, and the dotted keys given.
-
-    values: nested. Raises CaseError with everything that is wrong with them one by one.
-    """
-    problems: list[Problem] = []
-    if not isinstance(values, Mapping):
-        message = f"needs a mapping of keys, such as {EXAMPLE}, not {quote_value(values)}"
-        raise CaseError([Problem("", message)])
-    whole = plain_values(values, problems)
-    parts = {key: check_part(key, value, problems) for key, value in whole.items()}
-    if problems:
-        raise CaseError(_as_written(values, map(partial(_refuse_sweep, whole), problems)))
-    return parts, frozenset(values_given(whole))
+@cache
+def adapter_of_case() -> TypeAdapter[Case]:
+    """Return what checks the values of a case."""
+    return TypeAdapter(Case)
 
 
 def _values_to_read(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -326,8 +327,8 @@ def plain_values(values: Mapping[str, Any], problems: list[Problem]) -> dict[str
     own, which a value of it that is the paper's by chance leaves one's own.
     """
     whole = expand_shorthands(expand_synonyms(values, problems))
-    given = values_given(whole)
-    pins = given.keys() & {*PER_PART["machine.pin_radius_mm"].values()}
+    given = values_given(whole).keys()
+    pins = given & {*PER_PART["machine.pin_radius_mm"].values()}
     if pins and "contact.materials" in given and "contact.geometry" not in given:
         whole["contact"] = {**whole["contact"], "geometry": "internal"}
     group = whole.get("gas", {})
@@ -337,10 +338,9 @@ def plain_values(values: Mapping[str, Any], problems: list[Problem]) -> dict[str
     return whole
 
 
-def has_own_cylinder(values: Mapping[str, Any], given: Container[str]) -> bool:
+def has_own_cylinder(values: Mapping[str, Any], given: Set[str]) -> bool:
     """Return whether a cylinder is not the paper's; given: the dotted keys of nested values."""
-    keys = (key for key in table() if key.startswith("gas."))
-    if any(key in given and key not in FOLLOWING for key in keys):
+    if not given.isdisjoint(OWN_GAS):
         return True
     has_gas = values.get("load") in ("gas", "typical")
     return has_gas and any(
@@ -505,7 +505,6 @@ def with_ideal_joints(case: Case, features: bool = True) -> Case:
     return replace(ideal, friction=None, guide=None, drive=None, rod=None, body=None, sensor=None)
 
 
-FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder
 WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
 
 

@@ -16,17 +16,18 @@ import dataclasses
 import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from difflib import get_close_matches
-from functools import lru_cache
 from typing import Any, NamedTuple
 
-from compressor.cases.card import UNITS, mark_card
-from compressor.cases.groups import ATMOSPHERE_MPA, CARD_KEYS
+from pydantic import ValidationError
+
+from compressor.cases.card import UNITS
+from compressor.cases.groups import ATMOSPHERE_MPA
 from compressor.cases.parameter import (
     NO_VALUE,
+    CaseError,
     Parameter,
     Problem,
-    check_targets,
-    end_of_card,
+    adapter_of,
     quote_value,
 )
 from compressor.cases.table import GROUPS, WORDS, Settings, table
@@ -427,83 +428,50 @@ def _stem(name: str) -> str:
     return name
 
 
-PLAIN_TYPES = (int, float, str)
+def problems_of_case(error: ValidationError, values: Mapping[str, Any]) -> list[Problem]:
+    """Return what pydantic has found wrong with the nested values of a case, in our words."""
+    found: dict[Problem | None, None] = {}
+    for one in error.errors(include_url=False):
+        cause = one.get("ctx", {}).get("error", "")
+        if isinstance(cause, CaseError):  # of values that do not fit together
+            found |= dict.fromkeys(cause.problems)
+            continue
+        found[_problem_at([*map(str, one["loc"])], one["type"], str(cause), values)] = None
+    return [problem for problem in found if problem]
 
 
-def check_value(key: str, value: Any, problems: list[Problem]) -> Any:
-    """Return a value as its dataclass holds it; the default for a wrong one, a problem."""
-    row, before = table()[key], len(problems)
-    if value is None and row.optional:
-        return row.default
-    if row.kind == "accuracy" and isinstance(value, Mapping):
-        targets = check_targets(key, value, problems)
-        return targets if len(problems) == before else row.default
-    if not isinstance(value, PLAIN_TYPES):
-        value = _scalar(value)
-    message = row.check(value)
-    if message:
-        problems.append(Problem(key, message))
-        return row.default
-    if row.kind == "number" and not isinstance(value, str):
-        return float(value) + 0.0  # no -0.0: equal cases have one key
-    if row.kind == "integer":
-        return int(value)
-    if row.kind == "card":
-        return mark_card(value, end_of_card(row.key))
-    return tuple(value) if row.kind == "materials" else row.choice_of(value)
+def check_value(key: str, value: Any) -> tuple[Any, list[Problem]]:
+    """Return a value of a key as a case holds it, and what is wrong with it."""
+    group, _, name = key.rpartition(".")
+    try:
+        held = adapter_of(table()[key]).validate_python(value)
+    except ValidationError as error:
+        nested = {group: {name: value}} if group else {name: value}
+        found: dict[Problem, None] = {}
+        for one in error.errors(include_url=False):
+            cause = str(one.get("ctx", {}).get("error", ""))
+            path = [*key.split("."), *map(str, one["loc"])]
+            if problem := _problem_at(path, one["type"], cause, nested):
+                found.setdefault(problem)
+        return None, [*found]
+    return tuple(sorted(held.items())) if isinstance(held, dict) else held, []
 
 
-def _scalar(value: Any) -> Any:
-    """Return a scalar of numpy or xarray as Python has it; any other value as it is."""
-    return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
+def _problem_at(
+    path: list[str], kind: str, cause: str, values: Mapping[str, Any]
+) -> Problem | None:
+    """Return the problem at a path of pydantic's, behind whose key it names its own types.
 
-
-def check_part(key: str, value: Any, problems: list[Problem]) -> Any:
-    """Return the value of a key at the top of a case file as a case holds it, or None.
-
-    What is wrong with its value joins `problems`.
+    None of errors by metric that are no accuracy in a word.
     """
+    outer, name = (path[0], path[1]) if path[0] in GROUPS and path[1:] else ("", path[0])
+    key, within = f"{outer}.{name}" if outer else name, values[outer] if outer else values
+    value = next((one for known, one in within.items() if str(known) == name), None)
+    if kind in ("unexpected_keyword_argument", "invalid_key"):
+        return Problem(key, describe_unknown(name, outer, file=False, value=value))
     if key in GROUPS:
-        if key in WORDS and value is WORDS[key]:
-            return GROUPS[key]() if value else None
-        if not isinstance(value, Mapping):
-            problems.append(Problem(key, NO_VALUE if value is None else no_mapping(key, value)))
-            return None
-        try:
-            if key == "gas" and not value.keys().isdisjoint(CARD_KEYS):
-                raise TypeError  # their files may have changed since
-            found, wrong = _shared_group(key, tuple((n, v, type(v)) for n, v in value.items()))
-        except TypeError:  # a list or a mapping is in it
-            found, wrong = _group(key, value.items())
-        problems += wrong
-        return found
-    if key not in table() or "." in key:
-        message = describe_unknown(str(key), "", file=False, value=value)
-        problems.append(Problem(str(key), message))
-        return None
-    return check_value(key, value, problems)
-
-
-@lru_cache(maxsize=256)
-def _shared_group(key: str, items: tuple[tuple[str, Any, type], ...]) -> tuple[Any, list[Problem]]:
-    """Return a group from its values, and what is wrong; jobs of a sweep share equal groups.
-
-    Types are part of the values, since 1, 1.0 and true are equal.
-    """
-    return _group(key, [(name, value) for name, value, _ in items])
-
-
-def _group(key: str, items: Iterable[tuple[str, Any]]) -> tuple[Any, list[Problem]]:
-    """Return a group from its values, the defaults in place of wrong ones, and what is wrong."""
-    problems: list[Problem] = []
-    fields = {item.name for item in dataclasses.fields(GROUPS[key])}
-    good = {}
-    for name, value in items:
-        if name in fields:
-            good[name] = check_value(f"{key}.{name}", value, problems)
-        else:
-            problems.append(Problem(f"{key}.{name}", describe_unknown(str(name), key, value=value)))
-    return GROUPS[key](**good), problems
+        return Problem(key, NO_VALUE if value is None else no_mapping(key, value))
+    return table()[key].problem(key, value, path[2:], cause)
 
 
 def values_given(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -197,7 +197,7 @@ def _judged_values(values: Mapping[str, Any]) -> Iterator[tuple[str, float, tupl
         yield key, float(value), row.judged
 
 
-def law_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+def law_conflicts(case: Settings) -> Iterator[Problem]:
     """Yield what a law of contact lacks: a restitution, or what a pin in a bore needs."""
     law, restitution = case.contact.law, case.contact.restitution
     if law in CYLINDRICAL:
@@ -207,7 +207,7 @@ def law_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         yield Problem("contact.restitution", needed)
 
 
-def contact_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+def contact_conflicts(case: Settings) -> Iterator[Problem]:
     contact = case.contact
     if contact.materials is not None and contact.exponent != 1.5:
         yield Problem(
@@ -217,7 +217,7 @@ def contact_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem
         )
 
 
-def friction_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+def friction_conflicts(case: Settings) -> Iterator[Problem]:
     friction = case.friction
     if friction and friction.law == "lugre" and bool(friction.static) != bool(friction.dynamic):
         zero = "dynamic" if friction.static else "static"
@@ -249,7 +249,7 @@ def cylinder_conflicts(case: Settings) -> Iterator[Problem]:
 MIN_BAR_INERTIA = 1.0 - 1e-9  # of a uniform bar's inertia, which an elastic rod has at least
 
 
-def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+def lubricant_conflicts(case: Settings) -> Iterator[Problem]:
     """Yield a bearing for which the film's numbers do not hold."""
     if not case.lubricant:
         return
@@ -263,13 +263,13 @@ def lubricant_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
                 f"is {ratio:.3g} times the diameter of the pin, {width:g} mm; the film's numbers "
                 f"hold from {MIN_RATIO:g} to {MAX_RATIO:g} times"
             )
-            if key not in given:
+            if case.lubricant.bearing_length_mm == table()["lubricant.bearing_length_mm"].default:
                 default = f"{case.lubricant.bearing_length_mm:g} mm is the default, of the paper's"
                 text += f"; {default} pin: give the length that bears"
             yield Problem(key, text)
 
 
-def wear_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+def wear_conflicts(case: Settings) -> Iterator[Problem]:
     """Yield what a bore that wears cannot have: oil, and a limit that is reached already."""
     if not case.wear:
         return
@@ -286,7 +286,7 @@ def wear_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         )  # fmt: skip
 
 
-def mechanism_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+def mechanism_conflicts(case: Settings) -> Iterator[Problem]:
     """Yield what does not fit together in guide, drive, rod and the friction of ideal joints."""
     machine, friction = case.machine, case.friction
     if case.drive and case.body:
@@ -330,19 +330,24 @@ MAX_REVOLUTIONS_TOLD = 1e9  # revolutions, more than any run has
 SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 
 
-def conflicts(
-    case: Settings, given: frozenset[str], values: Mapping[str, Any]
-) -> Iterator[Problem]:
-    """Yield everything in a case that does not fit together.
-
-    given: the dotted keys set by hand. values: those of them that the case has to read.
-    """
+def conflicts(case: Settings) -> Iterator[Problem]:
+    """Yield everything in a case that does not fit together."""
     for rule in RULES:
-        yield from rule(case, given)
-    yield from unread_values(case, values, given)
+        yield from rule(case)
 
 
-def _body_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+def given_conflicts(joint: str, given: frozenset[str]) -> Iterator[Problem]:
+    """Yield what is missing beside a joint, and keys of which a case gives one; given: dotted."""
+    for one in JOINTS:
+        key = f"clearance_mm.{one}"
+        if joint in (one, "both") and key not in given:
+            yield Problem(key, f"is needed with joint: {joint}; give it in mm, such as 0.2")
+    for one, other in IN_PLACE_OF:
+        if one in given and other in given:
+            yield Problem(one, f"stands in place of {other}: give one of the two")
+
+
+def _body_conflicts(case: Settings) -> Iterator[Problem]:
     """Yield what a body and its sensor need; one that would move the machine back is refused."""
     body, sensor = case.body, case.sensor
     if body is None:
@@ -394,14 +399,14 @@ def _resonance_conflicts(case: Settings, axis: str) -> Iterator[Problem]:
             )
 
 
-def _inertia_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+def _inertia_conflicts(case: Settings) -> Iterator[Problem]:
     """Yield a default inertia that leaves the range which a given one must keep."""
     key, inertia = "machine.rod_inertia_kg_m2", case.machine.rod_inertia_kg_m2
-    if inertia is None or not table()[key].holds(inertia):
-        yield Problem(key, f"m L^2 / 12 of the rod: {table()[key].check(inertia)}")
+    if message := table()[key].check(inertia):
+        yield Problem(key, f"m L^2 / 12 of the rod: {message}")
 
 
-def _geometry_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+def _geometry_conflicts(case: Settings) -> Iterator[Problem]:
     machine, play = case.machine, _play(case)
     if machine.crank_radius_mm + play >= machine.rod_length_mm:
         loose = f" and {play:g} mm of clearance" if play else ""
@@ -418,12 +423,10 @@ def _geometry_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Probl
         )
 
 
-def _clearance_conflicts(case: Settings, given: frozenset[str], joint: str) -> Iterator[Problem]:
+def _clearance_conflicts(case: Settings, joint: str) -> Iterator[Problem]:
     """Yield a clearance that is missing, or does not fit the pin or its journal's start."""
     key, clearance = f"clearance_mm.{joint}", getattr(case.clearance_mm, joint)
     if not clearance:
-        if case.joint in (joint, "both") and key not in given:
-            yield Problem(key, f"is needed with joint: {case.joint}; give it in mm, such as 0.2")
         return
     pin = case.machine.pin_radius(joint)
     if clearance > pin:
@@ -438,13 +441,7 @@ def _clearance_conflicts(case: Settings, given: frozenset[str], joint: str) -> I
         )
 
 
-def _choice_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
-    for one, other in IN_PLACE_OF:
-        if one in given and other in given:
-            yield Problem(one, f"stands in place of {other}: give one of the two")
-
-
-def _load_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+def _load_conflicts(case: Settings) -> Iterator[Problem]:
     machine, gas = case.machine, case.gas
     if case.load == "spring" and case.spring.stroke_mm >= 2 * machine.crank_radius_mm:
         yield Problem(
@@ -550,7 +547,7 @@ def _gas_geometry(case: Settings) -> tuple[float | None, ...]:
     )
 
 
-def _time_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
+def _time_conflicts(case: Settings) -> Iterator[Problem]:
     solve = case.solve
     span_key = "solve.duration_s" if solve.duration_s is not None else "solve.duration_rev"
     step_key = "solve.output_step_s" if solve.output_step_s is not None else "solve.output_step_deg"
@@ -582,11 +579,11 @@ def _time_conflicts(case: Settings, given: frozenset[str]) -> Iterator[Problem]:
         )
 
 
-Rule = Callable[[Settings, frozenset[str]], Iterator[Problem]]
+Rule = Callable[[Settings], Iterator[Problem]]
 RULES: tuple[Rule, ...] = (
     _inertia_conflicts, _geometry_conflicts,
     *(partial(_clearance_conflicts, joint=joint) for joint in JOINTS),
-    _choice_conflicts, _load_conflicts, _time_conflicts, _body_conflicts,
+    _load_conflicts, _time_conflicts, _body_conflicts,
     law_conflicts, contact_conflicts, friction_conflicts, lubricant_conflicts, wear_conflicts,
     mechanism_conflicts,
 )  # fmt: skip

@@ -5,7 +5,7 @@ units, which stand in the field's name; `compressor.solve.si_record` turns them 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, fill_by_law
 from compressor.cases.parameter import (
@@ -30,6 +30,7 @@ from compressor.cases.parameter import (
     STIFFNESS,
     Plausible,
     by_law,
+    checked,
     choice,
     document_fields,
     from_to,
@@ -40,6 +41,7 @@ from compressor.cases.parameter import (
 
 COMPILED = ("auto", "TSIT5", "RODAS")  # by `compressor.solve`; the others are SciPy's
 JUDGED_STIFFNESS = (1e8 / 1000**1.5, 1e12 / 1000**1.5)  # N/mm^1.5: judged on, 1e8 to 1e12 N/m^1.5
+PAPER_STIFFNESS = 3.36e5  # N/mm^1.5
 METHODS = (*COMPILED, "LSODA", "Radau", "BDF", "DOP853", "RK45")
 
 
@@ -61,7 +63,7 @@ BEARING_LENGTH = Plausible(
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class PerJoint:
     """The radial clearance of each joint, mm; 0 where the joint is ideal.
 
@@ -84,7 +86,7 @@ class PerJoint:
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class HealthyClearance:
     """The radial clearance up to which a joint counts as sound, mm; 0: a worn one has any.
 
@@ -108,7 +110,7 @@ class HealthyClearance:
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Offset:
     """How far a journal starts from its bore's centre, mm; a case's `initial_offset_mm`.
 
@@ -139,7 +141,7 @@ class Offset:
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Machine:
     """The mechanism and its masses; a case's `machine`.
 
@@ -262,7 +264,7 @@ AS_THE_OTHER = {
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Gas:
     """The gas load, an ideal cycle (Eq. 13); a case's `gas`, read with `load: gas`.
 
@@ -453,7 +455,7 @@ class Gas:
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Spring:
     """The spring load, a spring between piston and cam follower (§2.2); a case's `spring`.
 
@@ -474,7 +476,7 @@ class Spring:
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Contact:
     """The normal contact law of both joints; a case's `contact`.
 
@@ -499,7 +501,7 @@ class Contact:
         "impact", CONTACT_LAWS, "Eq. 14", "contact law (impact: ADAMS's)", read=CLEARANCE
     )
     stiffness_N_per_mm15: float | None = parameter(
-        3.36e5, "N/mm^p", (0, 1e15), "Table 3", "contact stiffness K, in N/mm^exponent",
+        PAPER_STIFFNESS, "N/mm^p", (0, 1e15), "Table 3", "contact stiffness K, in N/mm^exponent",
         above=True, optional=True, read=STIFFNESS,
         judged=JUDGED_STIFFNESS,
         plausible=CONTACT_GUESS,
@@ -571,6 +573,8 @@ class Contact:
         """Fill in what the law reads, and leave out a stiffness where others make it."""
         if self.materials is not None or self.law in CYLINDRICAL:
             vars(self)["stiffness_N_per_mm15"] = None
+        elif self.stiffness_N_per_mm15 is None:
+            vars(self)["stiffness_N_per_mm15"] = PAPER_STIFFNESS
         if self.geometry == "external":  # as without the key
             vars(self)["geometry"] = None
         for name in ("materials", "length_mm"):
@@ -591,7 +595,7 @@ class Contact:
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Friction:
     """Friction at the joints; a case's `friction`, None without.
 
@@ -662,7 +666,7 @@ class Friction:
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Solve:
     """How far, how finely and how exactly to integrate; a case's `solve`.
 
@@ -732,14 +736,17 @@ class Solve:
         """Leave out the durations and steps in whose place others are given; sort the targets."""
         if isinstance(self.accuracy, Mapping):
             vars(self)["accuracy"] = tuple(sorted(self.accuracy.items()))
-        if self.duration_s is not None:
-            vars(self)["duration_rev"] = None
-        if self.output_step_s is not None:
-            vars(self)["output_step_deg"] = None
+        for rival, key, usual in (
+            ("duration_s", "duration_rev", 4.0), ("output_step_s", "output_step_deg", 0.3),
+        ):  # fmt: skip
+            if vars(self)[rival] is not None:
+                vars(self)[key] = None
+            elif vars(self)[key] is None:
+                vars(self)[key] = usual
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Output:
     """What is stored of a job; a case's `output`. Not part of the job's identity.
 

@@ -1,6 +1,6 @@
 """The optional groups of a case file: oil, guide, drive, rod, body, sensor and wear."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import ClassVar
 
@@ -18,6 +18,7 @@ from compressor.cases.parameter import (
     STEADY,
     THRESHOLD,
     Plausible,
+    checked,
     choice,
     document_fields,
     from_to,
@@ -29,7 +30,7 @@ MIN_RATIO, MAX_RATIO = 0.125, 1.0  # of a bearing's length and diameter
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Lubricant:
     """An oil film in the joints that have clearance; a case's `lubricant`, None: they run dry.
 
@@ -83,7 +84,7 @@ PROGRAM = "program"
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Guide:
     """The crosshead's guide; a case's `guide`, by default None: ideal, without friction.
 
@@ -145,7 +146,7 @@ class Guide:
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Drive:
     """A motor whose speed gives way; a case's `drive`, by default None: steady speed.
 
@@ -178,7 +179,7 @@ class Drive:
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Rod:
     """An elastic rod; a case's `rod`, by default None: rigid.
 
@@ -224,7 +225,7 @@ BODIES_PER_CASING = 25.0  # mass of the body over the modal mass of a casing mod
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Body:
     """The compressor's rigid body on its foundation; a case's `body`, None by default.
 
@@ -319,7 +320,7 @@ class Body:
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Sensor:
     """An accelerometer on the body, with a tacho; a case's `sensor`, None by default.
 
@@ -401,7 +402,7 @@ value = partial(parameter, identity=False)  # of no single run
 
 
 @document_fields
-@dataclass(frozen=True)
+@checked
 class Wear:
     """How the rod's bores wear in joints with clearance; a case's `wear`, None by default.
 

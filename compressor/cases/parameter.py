@@ -11,6 +11,8 @@ Accuracy as it may be requested: in words that promise, or in numbers by metric.
 from the measured trade of tests/results/accuracy.json (make accuracy), for `method: auto`.
 """
 
+import dataclasses
+import inspect
 import math
 import re
 import reprlib
@@ -18,9 +20,19 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import lru_cache, partial
 from inspect import cleandoc
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar
+
+import pydantic
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+)
 
 from compressor.cases.card import CardError, mark_card
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, READ_BY, law_of
@@ -400,39 +412,47 @@ class Parameter:
         """Return the choice that an alias stands for, and any other value as it is."""
         return next((choice for alias, choice in self.aliases if alias == value), value)
 
-    def holds(self, value: float) -> bool:
-        """Return whether a number is in range."""
-        return (value > self.low if self.above else value >= self.low) and value <= self.high
-
     def check(self, value: Any) -> str | None:
         """Return what is wrong with a scalar value of this parameter, or None."""
+        try:
+            adapter_of(self).validate_python(value)
+        except ValidationError as error:
+            cause = error.errors(include_url=False)[0].get("ctx", {}).get("error", "")
+            return self.explain(value, str(cause))
+        return None
+
+    def explain(self, value: Any, cause: str = "") -> str:
+        """Return the error of a wrong value; cause: what a check of our own has said of it."""
         if value is None:
             return NO_VALUE
-        if self.kind == "text":
-            return self._check_name(value)
-        if self.kind == "card":
-            return self._check_card(value)
-        if self.kind == "materials":
-            good = isinstance(value, tuple | list) and len(value) == 2
-            bad = [name for name in value if name not in self.choices] if good else []
-            return self._refused(value, bad[0] if bad else None) if bad or not good else None
-        if isinstance(value, str) and self.choice_of(value) in self.choices:
+        if cause:
+            return cause
+        if self.kind in ("number", "integer") and type(value) in (int, float):
+            if not _is_finite(value):
+                return f"must be finite: {self._refused(value)}"
+            if self.kind == "integer" and value != int(value):
+                return self._refused(value)
+            return f"{value:g} is outside {self.range} {self.unit}".rstrip()
+        if self.kind == "materials" and isinstance(value, tuple | list) and len(value) == 2:
+            return self._refused(value, next(name for name in value if name not in self.choices))
+        return self._refused(value, None if self.kind == "materials" else value)
+
+    def problem(self, key: str, value: Any, path: Sequence[str], cause: str) -> Problem | None:
+        """Return the problem of a wrong value at a key, whose path within it pydantic tells.
+
+        None of errors by metric that are no accuracy in a word.
+        """
+        if self.kind != "accuracy" or not isinstance(value, Mapping):
+            return Problem(key, self.explain(value, cause))
+        if not value:
+            return Problem(key, "needs a metric, such as {peak_acceleration: 0.01}")
+        metric = next((str(name) for name in value if str(name) in path), "")
+        if not metric:
             return None
-        if self.kind in ("choice", "accuracy"):
-            return self._refused(value, value)
-        if self.kind == "boolean":
-            return None if isinstance(value, bool) else self._refused(value, value)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            return self._refused(value, value)
-        if not _is_finite(value):
-            return f"must be finite: {self._refused(value)}"
-        if self.kind == "integer" and value != int(value):
-            return self._refused(value)
-        if not self.holds(value):
-            return f"{value:g} is outside {self.range}" + (f" {self.unit}" if self.unit else "")
-        if value and abs(to_si(value, self.unit)) < sys.float_info.min:
-            return f"{value:g} is too small to differ from 0: write 0, or a larger number"
-        return None
+        if metric not in METRICS:
+            hint = did_you_mean(metric, METRICS) or "metrics are " + ", ".join(METRICS)
+            return Problem(f"{key}.{metric}", f"unknown metric; {hint}")
+        return Problem(f"{key}.{metric}", TARGET.explain(value[metric], cause))
 
     def _refused(self, value: Any, word: Any = None) -> str:
         """Return the error of a value of another kind.
@@ -456,27 +476,10 @@ class Parameter:
             return f"{message}; write {plain}" + ("" if comma or unit else " without quotes")
         return message
 
-    def _check_name(self, value: Any) -> str | None:
-        if not isinstance(value, str):
-            return self._refused(value)
-        good = NAME.fullmatch(value) and not value.startswith(".")
-        return (
-            None if good else f"{quote_value(value)} is no name: use {self.range}, no leading dot"
-        )
-
-    def _check_card(self, value: Any) -> str | None:
-        if not isinstance(value, str) or not value:
-            return self._refused(value)
-        try:
-            mark_card(value, end_of_card(self.key))
-        except CardError as error:
-            return str(error)
-        return None
-
 
 def end_of_card(key: str) -> str:
     """Return the end, head or crank, of which a key gives the card."""
-    return "crank" if key == "gas.crank_indicator" else "head"
+    return "crank" if key.endswith("crank_indicator") else "head"
 
 
 def join_with_or(words: Sequence[str]) -> str:
@@ -490,6 +493,144 @@ def _is_finite(value: float) -> bool:
         return math.isfinite(value)
     except OverflowError:
         return False
+
+
+def to_python(value: Any) -> Any:
+    """Return a scalar of numpy or xarray, and a number beyond any float, as Python has it."""
+    if getattr(value, "ndim", None) == 0 and hasattr(value, "item"):
+        return value.item()
+    return value if type(value) is not int or value.bit_length() < 1000 else math.inf
+
+
+def to_whole(value: Any) -> Any:
+    """Return a whole number as an integer, and any other value as it is."""
+    value = to_python(value)
+    return int(value) if type(value) is float and value.is_integer() else value
+
+
+def refuse_tiny(unit: str, value: float) -> float:
+    """Return a number, 0 for -0. Raises ValueError for one that is 0 in SI and not in its unit."""
+    if value and abs(to_si(value, unit)) < sys.float_info.min:
+        raise ValueError(f"{value:g} is too small to differ from 0: write 0, or a larger number")
+    return value + 0.0
+
+
+def check_name(value: str) -> str:
+    """Return the name of a study. Raises ValueError for one that no file could have."""
+    if NAME.fullmatch(value) and not value.startswith("."):
+        return value
+    allowed = "[A-Za-z0-9._-], at most 64"
+    raise ValueError(f"{quote_value(value)} is no name: use {allowed}, no leading dot")
+
+
+def check_card(end: str, value: str) -> str:
+    """Return the path of a card with its digest. Raises ValueError for a file that is none."""
+    try:
+        return mark_card(value, end)
+    except CardError as error:
+        raise ValueError(str(error)) from error
+
+
+TARGET = Parameter("", "", None, 1e-9, 0.5, True, "", "", "number")
+
+
+def annotation_of(row: Parameter) -> Any:
+    """Return the type by which pydantic checks the values of a row."""
+    words: Any = Literal[row.choices] if row.choices else None
+    ends: dict[str, Any] = {"gt" if row.above else "ge": row.low, "le": row.high}
+    kinds: dict[str, Any] = {
+        "number": Annotated[
+            float, BeforeValidator(to_python), Field(strict=True, allow_inf_nan=False, **ends),
+            AfterValidator(partial(refuse_tiny, row.unit)),
+        ],
+        "integer": Annotated[int, BeforeValidator(to_whole), Field(strict=True, **ends)],
+        "boolean": Annotated[bool, BeforeValidator(to_python), Field(strict=True)],
+        "text": Annotated[str, Field(strict=True), AfterValidator(check_name)],
+        "card": Annotated[
+            str, Field(strict=True, min_length=1),
+            AfterValidator(partial(check_card, end_of_card(row.key))),
+        ],
+        "materials": tuple[words, words],
+        "accuracy": BY_METRIC,
+    }  # fmt: skip
+    found: Any = kinds.get(row.kind)
+    if words is not None and row.kind != "materials":
+        found = words if found is None else words | found
+    if row.optional:
+        found = found | None
+    return Annotated[found, BeforeValidator(row.choice_of)] if row.aliases else found
+
+
+BY_METRIC: Any = None
+BY_METRIC = Annotated[
+    dict[Literal[tuple(METRICS)], annotation_of(TARGET)],  # type: ignore[misc]
+    BeforeValidator(lambda value: dict(value) if isinstance(value, tuple) else value),
+    Field(min_length=1),
+]
+
+
+@lru_cache
+def adapter_of(row: Parameter) -> TypeAdapter[Any]:
+    """Return what checks values of a row alone."""
+    return TypeAdapter(annotation_of(row))
+
+
+def problems_of(
+    error: ValidationError, rows: Mapping[str, Parameter], values: Mapping[str, Any]
+) -> list[Problem]:
+    """Return what is wrong with the fields of a group or a case that is made in Python."""
+    found: dict[Problem | None, None] = {}
+    for one in error.errors(include_url=False):
+        cause, path = one.get("ctx", {}).get("error", ""), [*map(str, one["loc"])]
+        if isinstance(cause, CaseError):  # of values that do not fit together
+            found |= dict.fromkeys(cause.problems)
+        elif path[0] in rows:
+            name = path[0]
+            found[rows[name].problem(name, values.get(name), path[1:], str(cause))] = None
+        else:
+            found[Problem(".".join(path[:2]), one["msg"])] = None
+    return [problem for problem in found if problem]
+
+
+if TYPE_CHECKING:
+    from dataclasses import dataclass as checked
+else:
+
+    def checked(cls):
+        """Return a group of keys as a frozen dataclass that pydantic checks as it is made.
+
+        A group of wrong values raises CaseError with everything that is wrong.
+        """
+        own = {}
+        for one in reversed(cls.__mro__):
+            own |= vars(one).get("__annotations__", {})
+        rows = {}
+        for name, item in vars(cls).items():
+            if isinstance(item, dataclasses.Field) and "kind" in item.metadata:
+                rows[name] = Parameter(name, default=item.default, **item.metadata)
+                cls.__annotations__[name] = annotation_of(rows[name])
+            elif isinstance(item, dataclasses.Field) and "open" in item.metadata:
+                opened = BeforeValidator(item.metadata["open"])
+                cls.__annotations__[name] = Annotated[own[name], opened]
+        made = pydantic.dataclasses.dataclass(frozen=True, config=ConfigDict(extra="forbid"))(cls)
+        validate = made.__init__
+
+        def __init__(self, *args, **values):
+            try:
+                validate(self, *args, **values)
+            except ValidationError as error:
+                raise CaseError(problems_of(error, rows, values)) from None
+
+        made.__init__ = __init__
+        made.__signature__ = inspect.Signature(
+            inspect.Parameter(
+                item.name, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=item.default,
+                annotation=own[item.name],
+            )
+            for item in fields(made)
+        )  # fmt: skip
+        made.__annotations__ = own
+        return made
 
 
 def parameter(
@@ -573,27 +714,9 @@ LOOSEST, TIGHTEST = 2e-4, 1e-12  # of first runs for accuracy by number, and of 
 # of the error requested: the first tolerance. Bars are some 26 rtol in the median
 FIRST_TOLERANCE_FACTOR = 0.01
 
-TARGET = Parameter("", "", None, 1e-9, 0.5, True, "", "", "number")
-
 Targets = tuple[tuple[str, float], ...]  # (metric, greatest relative error), by name
 
 
 def first_tolerance(targets: Targets) -> float:
     """Return the tolerance of the first run where accuracy is given by number."""
     return min(LOOSEST, *(FIRST_TOLERANCE_FACTOR * target for _, target in targets))
-
-
-def check_targets(key: str, value: Mapping[Any, Any], problems: list[Problem]) -> Targets:
-    """Return the accuracy by number as a case holds it; what is wrong with it joins `problems`."""
-    if not value:
-        problems.append(Problem(key, "needs a metric, such as {peak_acceleration: 0.01}"))
-    good = []
-    for name, target in value.items():
-        if name not in METRICS:
-            hint = did_you_mean(str(name), METRICS) or "metrics are " + ", ".join(METRICS)
-            problems.append(Problem(f"{key}.{name}", f"unknown metric; {hint}"))
-        elif message := TARGET.check(target):
-            problems.append(Problem(f"{key}.{name}", message))
-        else:
-            good.append((name, float(target)))
-    return tuple(sorted(good))

@@ -6,9 +6,9 @@ the fields of the groups.
 
 import dataclasses
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from functools import cache
+from collections.abc import Iterator, Mapping
+from dataclasses import field
+from functools import cache, partial
 from typing import Any
 
 from compressor.cases.groups import (
@@ -35,46 +35,34 @@ from compressor.cases.parameter import (
     SPRING,
     Parameter,
     Reader,
+    checked,
     choice,
 )
 from compressor.metrics import JOINTS
 
 MAX_REV = 50.0  # with `duration_rev: auto`
 
-GROUPS: dict[str, type] = {
-    "clearance_mm": PerJoint,
-    "healthy_clearance_mm": HealthyClearance,
-    "initial_offset_mm": Offset,
-    "machine": Machine,
-    "gas": Gas,
-    "spring": Spring,
-    "contact": Contact,
-    "friction": Friction,
-    "lubricant": Lubricant,
-    "guide": Guide,
-    "drive": Drive,
-    "rod": Rod,
-    "wear": Wear,
-    "body": Body,
-    "sensor": Sensor,
-    "solve": Solve,
-    "output": Output,
-}
-# groups that a word may stand for: `false` leaves one out, `true` is one with its defaults
-WORDS = {
-    "friction": False, "lubricant": True, "guide": True, "drive": True, "rod": True, "wear": True,
-    "body": True, "sensor": True,
-}  # fmt: skip
 # groups that no joint reads with `joint: none`
 OF_JOINTS = ("clearance_mm",)
 
 
-def group(default: Any, *read: Reader) -> Any:
-    """Return the field of a group of keys; read: conditions under which a case reads any of it."""
-    return field(default=default, metadata={"read": read})
+def open_group(of: type, word: bool | None, value: Any) -> Any:
+    """Return what a group is checked by: that of its word, a mapping as a dict, else the value."""
+    if word is not None and value is word:
+        return of() if word else None
+    return dict(value) if isinstance(value, Mapping) else value
 
 
-@dataclass(frozen=True)
+def group(of: type, *read: Reader, word: bool | None = None) -> Any:
+    """Return the field of a group of keys.
+
+    read: conditions under which a case reads any of it. word: that may stand for it (`WORDS`).
+    """
+    metadata = {"read": read, "open": partial(open_group, of, word), "of": of, "word": word}
+    return field(default=None if word else of(), metadata=metadata)
+
+
+@checked
 class Settings:
     """The values of one simulation in the case file's units, and the times that follow from them.
 
@@ -91,23 +79,23 @@ class Settings:
     joint: str = choice(
         "none", ("none", "big_end", "small_end", "both"), "§3.2", "joints with clearance"
     )
-    clearance_mm: PerJoint = group(PerJoint(), A_JOINT)
-    healthy_clearance_mm: HealthyClearance = HealthyClearance()
-    initial_offset_mm: Offset = Offset()
-    machine: Machine = Machine()
-    gas: Gas = group(Gas(), GAS)
-    spring: Spring = group(Spring(), SPRING)
-    contact: Contact = group(Contact(), CONTACT)
-    friction: Friction | None = group(Friction(), RUBBING)
-    lubricant: Lubricant | None = group(None, CLEARANCE)
-    guide: Guide | None = group(None, GUIDE)
-    drive: Drive | None = None
-    rod: Rod | None = None
-    wear: Wear | None = group(None, CLEARANCE)
-    body: Body | None = None
-    sensor: Sensor | None = group(None, BODY)
-    solve: Solve = Solve()
-    output: Output = Output()
+    clearance_mm: PerJoint = group(PerJoint, A_JOINT)
+    healthy_clearance_mm: HealthyClearance = group(HealthyClearance)
+    initial_offset_mm: Offset = group(Offset)
+    machine: Machine = group(Machine)
+    gas: Gas = group(Gas, GAS)
+    spring: Spring = group(Spring, SPRING)
+    contact: Contact = group(Contact, CONTACT)
+    friction: Friction | None = group(Friction, RUBBING, word=False)
+    lubricant: Lubricant | None = group(Lubricant, CLEARANCE, word=True)
+    guide: Guide | None = group(Guide, GUIDE, word=True)
+    drive: Drive | None = group(Drive, word=True)
+    rod: Rod | None = group(Rod, word=True)
+    wear: Wear | None = group(Wear, CLEARANCE, word=True)
+    body: Body | None = group(Body, word=True)
+    sensor: Sensor | None = group(Sensor, BODY, word=True)
+    solve: Solve = group(Solve)
+    output: Output = group(Output)
 
     @property
     def omega(self) -> float:
@@ -178,6 +166,12 @@ class Settings:
         if self.solve.output_step_s is not None:
             return self.duration / self.solve.output_step_s
         return self.duration * self.machine.speed_rpm * 6.0 / (self.solve.output_step_deg or 1.0)
+
+
+_META = {item.name: item.metadata for item in dataclasses.fields(Settings)}
+GROUPS: dict[str, type] = {name: meta["of"] for name, meta in _META.items() if "of" in meta}
+# groups that a word may stand for: `false` leaves one out, `true` is one with its defaults
+WORDS = {name: meta["word"] for name, meta in _META.items() if meta.get("word") is not None}
 
 
 def name_worn_joint(joint: str, clearance_mm: PerJoint, healthy_mm: HealthyClearance) -> str:

@@ -182,8 +182,8 @@ def measure(case: Case) -> Outcome:
 
 
 def refused_outcome(case: Case) -> Outcome | None:
-    """Return the outcome of a case that no case file could ask for, or whose card is not there."""
-    detail = "; ".join(map(str, case.problems)) or case.find_changed_card()
+    """Return the outcome of a case whose card is not there, or not as it was; None of others."""
+    detail = case.find_changed_card()
     return without_run(case.attributes(), Reason.INVALID_INPUT, detail) if detail else None
 
 

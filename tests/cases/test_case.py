@@ -1,7 +1,6 @@
 """The case: what makes it the same job, what it fills in, and what it refuses."""
 
 import copy
-import json
 import pickle
 
 import pytest
@@ -9,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from compressor.cases.case import Case
-from compressor.cases.groups import Machine
 from compressor.cases.load import load_cases
 from compressor.cases.parameter import ACCURACY, CaseError, Problem, quote_value, to_si
 from compressor.cases.table import table
@@ -230,7 +228,6 @@ def test_values_that_fit(values):
 def test_what_is_not_simulated_is_not_checked(values):
     """A job of a sweep may have it, where another job reads it."""
     case = Case.resolve(values)
-    assert case.problems == ()
     assert Case.from_attribute(case.attributes()["case"]) == case
 
 
@@ -364,13 +361,6 @@ def test_a_case_tells_what_is_stored_of_it():
     assert Case.from_attribute(said["case"]) == case
 
 
-def test_a_case_without_keys_tells_its_values():
-    case = Case(machine=Machine(speed_rpm=0.0))
-    said = case.attributes()
-    assert (said["key"], said["physics_key"]) == ("", "")
-    assert json.loads(said["case"])["machine"]["speed_rpm"] == 0
-
-
 def test_the_defaults_are_valid():
     wrong = [key for key, row in table().items() if row.check(row.default) and not row.optional]
     assert wrong == []
@@ -401,15 +391,6 @@ def test_any_number_is_either_refused_or_reads_back(joint, numbers):
     except CaseError:
         return
     assert Case.from_values(case.values()) == case
-
-
-def test_groups_that_are_alike_are_shared_but_not_with_other_types():
-    values = {"machine": {"gravity_m_per_s2": 1}, "solve": {"duration_rev": 2}}
-    one, same = Case.from_values(values), Case.from_values(values)
-    assert one.solve is same.solve
-    with pytest.raises(CaseError, match=r"needs a number in .* not true"):
-        Case.from_values({"machine": {"gravity_m_per_s2": True}})
-    assert Case.from_values(values | {"machine": {"gravity_m_per_s2": 1.0}}) == one
 
 
 @pytest.mark.parametrize(

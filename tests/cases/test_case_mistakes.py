@@ -166,13 +166,13 @@ def test_mistakes_are_told_at_once():
         "body": 3,
     }) == [
         "name: 'a/b' is no name: use [A-Za-z0-9._-], at most 64, no leading dot",
-        "laod: unknown key; did you mean load?",
         "clearance_mm.big_end: -0.1 is outside [0, 1000] mm",
-        "machine.rod_mass: unknown key; did you mean machine.rod_mass_kg?",
         "machine.speed_rpm: needs a number in (0, 100000] rpm, not '500 rpm'; write 500",
+        "machine.rod_mass: unknown key; did you mean machine.rod_mass_kg?",
         "contact.exponent: 5 is outside [1, 3]",
-        "solve.rtol: 1 is outside [1e-13, 0.1]",
         "body: needs true or a mapping of keys, such as {freedoms: xy}, not 3",
+        "solve.rtol: 1 is outside [1e-13, 0.1]",
+        "laod: unknown key; did you mean load?",
     ]  # fmt: skip
 
 

@@ -32,7 +32,6 @@ def test_values_read_back(gas):
     one = case(gas)
     assert Case.from_values(one.values()) == one
     assert Case.from_attribute(one.attributes()["case"]).key == one.key
-    assert one.problems == ()
 
 
 def test_what_is_so_by_default_makes_no_other_job():

@@ -8,8 +8,9 @@ cases; `compressor.studies.tradeoff.page` compares changes with error bars.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -118,6 +119,7 @@ def vary_numbers(study: Study, job: int, named: Sequence[str] = ()) -> Iterator[
 
 def model_choices(case: Case) -> list[Choice]:
     """Return the other models of a case's machine."""
+    case = replace(case, wear=None)  # which is of no single run
     rubs = bool(case.friction)  # a case without friction has another friction law by its first row
     rows = [row for row in FEATURES if row.is_choice or (row.key == "friction" and not rubs)]
     contact = [row for row in rows if row.key == "contact.law"]
@@ -129,13 +131,14 @@ def model_choices(case: Case) -> list[Choice]:
 
 def model_variants(case: Case) -> list[Choice]:
     """Return `model_choices`, and the case with every other feature toggled, or another load."""
+    case = replace(case, wear=None)
     chosen = model_choices(case)
     others = [row for row in FEATURES if not row.is_choice and row.key != "load"]
     names = {choice.name for choice in chosen}
     found = [one for one in toggle_features(case, others) if one.name not in names]
     other = {"spring": "gas", "gas": "spring"}.get(case.load)
     if other:
-        found.append(Choice(f"{other} load", replace(case, load=other)))
+        found.append(attempt(f"{other} load", partial(replace, case, load=other)))
     return [*found, *chosen]
 
 
@@ -143,9 +146,21 @@ def toggle_features(case: Case, rows: Iterable[ModelFeature]) -> Iterator[Choice
     """Yield a case without each feature that it has, and with each that it has not."""
     for feature in rows:
         if feature.paid(case):
-            yield Choice(feature.off, feature.remove(case))
-        elif added := feature.add(case):
-            yield Choice(feature.on, added)
+            yield attempt(feature.off, partial(feature.remove, case))
+        else:
+            added = attempt(feature.on, partial(feature.add, case))
+            if added.case or added.note:
+                yield added
+
+
+def attempt(
+    name: str, change: Callable[[], Case | None], note: str = "", varied: str = ""
+) -> Choice:
+    """Return the choice of the case that a change makes, or why there can be no such case."""
+    try:
+        return Choice(name, change(), note, varied)
+    except CaseError as error:
+        return Choice(name, None, f"cannot be: {error.problems[0]}", varied)
 
 
 def scale_contact(case: Case) -> Iterator[Choice]:
@@ -157,20 +172,23 @@ def scale_contact(case: Case) -> Iterator[Choice]:
     contact = case.contact
     if SCALED[0] in paper_notes(case):
         values: dict[str, Any] = {"stiffness_N_per_mm15": None, "materials": ("steel", "steel")}
-        other = with_values(case, "contact", **values, geometry="internal")
-        yield Choice("contact stiffness of its pins (Eq. 15)", other, "steel on steel, in a bore")
+        yield attempt(
+            "contact stiffness of its pins (Eq. 15)",
+            lambda: with_values(case, "contact", **values, geometry="internal"),
+            "steel on steel, in a bore",
+        )
     for words, factor in SCALES.items():
         name = f"contact damping {words}"
         if contact.law == "impact" and contact.damping_N_s_per_mm > 0.0:
             damping = factor * contact.damping_N_s_per_mm
-            other = with_values(case, "contact", damping_N_s_per_mm=damping)
-            yield Choice(name, other, varied="contact damping")
+            change = partial(with_values, case, "contact", damping_N_s_per_mm=damping)
+            yield attempt(name, change, varied="contact damping")
         elif contact.restitution is not None and contact.restitution < 1.0:
             # such laws damp by 1 - e, to the first order
             restitution = 1.0 - factor * (1.0 - contact.restitution)
             if restitution > 0.0:
-                other = with_values(case, "contact", restitution=restitution)
-                yield Choice(name, other, varied="contact damping")
+                change = partial(with_values, case, "contact", restitution=restitution)
+                yield attempt(name, change, varied="contact damping")
             else:
                 least = 1.0 - 1.0 / factor
                 why = f"needs a restitution above {least:g}"
@@ -182,7 +200,7 @@ def widen_bearings(case: Case) -> Iterator[Choice]:
     if case.lubricant and "lubricant.bearing_length_mm" in paper_notes(case):
         big, small = (2.0 * case.machine.pin_radius(joint) for joint in JOINTS)
         lengths = {"bearing_length_mm": big, "small_end_bearing_length_mm": small}
-        yield Choice("bearings as long as wide", with_values(case, "lubricant", **lengths))
+        yield attempt("bearings as long as wide", lambda: with_values(case, "lubricant", **lengths))
 
 
 def with_stiffness(case: Case, name: str, factor: float) -> Choice:
@@ -200,7 +218,8 @@ def with_stiffness(case: Case, name: str, factor: float) -> Choice:
     values[key] = factor * (math.prod(each) ** (1.0 / len(each)) / unit)
     alike = max(each) <= SAME_STIFFNESS * min(each)
     note = "" if alike else "of both joints"
-    return Choice(name, with_values(case, "contact", **values), note, "contact stiffness")
+    change = partial(with_values, case, "contact", **values)
+    return attempt(name, change, note, "contact stiffness")
 
 
 def composite_modulus_of(contact: Contact) -> float:
@@ -213,12 +232,9 @@ def composite_modulus_of(contact: Contact) -> float:
 
 
 def check_choice(choice: Choice, case: Case) -> Choice:
-    """Return a choice with what it assumes, or with what forbids it."""
+    """Return a choice with what it assumes."""
     if choice.case is None:
         return choice
-    problems = bare(choice.case).problems
-    if problems:
-        return choice._replace(case=None, note=f"cannot be: {problems[0]}")
     notes = [*filter(None, [choice.note]), *assumed_values(case, choice.case)]
     return choice._replace(note=", ".join(notes))
 
