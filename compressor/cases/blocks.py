@@ -13,14 +13,12 @@ from typing import Any
 
 from compressor.cases.checks import SWEEP, check_value, row_of, suggestion
 from compressor.cases.combinations import Block, Row
+from compressor.cases.comparison import NoComparison, Test, comparison
 from compressor.cases.keys import Leaves
 from compressor.cases.parameter import quote_value
 from compressor.cases.swept import (
     SAMPLED,
-    NoComparison,
     SweptKey,
-    Test,
-    comparison,
     design,
     design_size,
     is_swept,

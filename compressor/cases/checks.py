@@ -436,6 +436,8 @@ def problems_of_case(error: ValidationError, values: Mapping[str, Any]) -> list[
         if isinstance(cause, CaseError):  # of values that do not fit together
             found |= dict.fromkeys(cause.problems)
             continue
+        if not one["loc"]:
+            raise cause  # an error of the program's own
         found[_problem_at([*map(str, one["loc"])], one["type"], str(cause), values)] = None
     return [problem for problem in found if problem]
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from compressor.cases.case import Case
 from compressor.cases.checks import single, stands_for
+from compressor.cases.comparison import Test
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.keys import Leaves, covers, nest_values
-from compressor.cases.swept import Test
 from compressor.cases.table import OF_JOINTS, outside_identity, table
 from compressor.cases.yaml_reader import Node
 

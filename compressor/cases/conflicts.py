@@ -16,10 +16,11 @@ from typing import Any
 
 from compressor.cases.card import DRIVING, CardError, open_card, taken_work
 from compressor.cases.checks import SHORTHANDS, row_of, value_in
+from compressor.cases.comparison import condition
 from compressor.cases.groups import ENDS
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
-from compressor.cases.parameter import CRANK_END, GAS, IMPLAUSIBLE, MATERIALS, Problem, Reader
+from compressor.cases.parameter import CRANK_END, GAS, IMPLAUSIBLE, MATERIALS, Problem
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, group_readers, table
 from compressor.metrics import AXES, JOINTS
 
@@ -63,7 +64,7 @@ FACTS = (
 IN_KEY_IF_READ = (*FACTS, "contact.modulus_GPa", "contact.stiffness_N_per_mm15", "contact.geometry")
 
 
-def needs_of_given(key: str, given: Container[str]) -> list[tuple[str, Reader]]:
+def needs_of_given(key: str, given: Container[str]) -> list[tuple[str, str]]:
     """Return which of the `conditions` must hold where a file gives one value of a key.
 
     Of a fact none but that there is gas, that a rod's single action is meant, and that the big end
@@ -74,7 +75,7 @@ def needs_of_given(key: str, given: Container[str]) -> list[tuple[str, Reader]]:
 
 
 @cache
-def conditions(key: str) -> list[tuple[str, Reader]]:
+def conditions(key: str) -> list[tuple[str, str]]:
     """Return what holds where a case reads a key, each with what is unread where it does not."""
     group = key.partition(".")[0]
     whole = group_readers(group) if group in GROUPS else ()
@@ -85,7 +86,7 @@ def conditions(key: str) -> list[tuple[str, Reader]]:
 
 def reads(case: Settings, key: str) -> bool:
     """Return whether a case reads a key."""
-    return all(reader.reads(case) for _, reader in conditions(key))
+    return all(condition(one)(case) for _, one in conditions(key))
 
 
 def is_off(key: str, value: Any) -> bool:
@@ -94,11 +95,11 @@ def is_off(key: str, value: Any) -> bool:
     return not value and not (row and row.default)
 
 
-def problem_of(key: str, reader: Reader) -> Problem:
+def problem_of(key: str, needed: str) -> Problem:
     """Return the problem of a key or group that nothing reads."""
     what = "group" if key in GROUPS and key not in SHORTHANDS else "key"
     remedy = f"set that, or leave the {what} out"
-    return Problem(key, f"nothing reads this {what}: it needs {reader.words}; {remedy}")
+    return Problem(key, f"nothing reads this {what}: it needs {needed}; {remedy}")
 
 
 def unread_values(
@@ -111,13 +112,13 @@ def unread_values(
     it is named does not, whatever its values.
     """
     for key, value in values.items():
-        for unread, reader in needs_of_given(key, given):
-            if reader.reads(case):
+        for unread, needed in needs_of_given(key, given):
+            if condition(needed)(case):
                 continue
             named = unread in WORDS and WORDS[unread]
             off = is_off(key, value) and (key == unread or not named)
             if not off and (named or value != default_in(case, key)):
-                yield problem_of(unread, reader)
+                yield problem_of(unread, needed)
             break
 
 
@@ -510,7 +511,7 @@ def _card_conflicts(case: Settings) -> Iterator[Problem]:
         with contextlib.suppress(CardError):  # of a file that is gone, which a run tells
             card = open_card(case.gas.cards[end], end)
             lengths = case.machine.crank_radius_mm, case.machine.rod_length_mm
-            if (share := taken_work(card, end, *lengths)) < DRIVING:
+            if lengths[0] < lengths[1] and (share := taken_work(card, end, *lengths)) < DRIVING:
                 yield Problem(
                     "gas.indicator" if end == "head" else "gas.crank_indicator",
                     f"the gas would drive the machine: it gives {-share:.2g} times pressure range "

@@ -515,21 +515,21 @@ class Contact:
         None, ("external", "internal"), "Eq. 15",
         "radii in the materials' stiffness: of two discs (the paper's, and the default for its "
         "pin), or of a pin in a bore (the default with a pin radius of a file's own)",
-        optional=True, read=(CLEARANCE, by_law("contact", "geometry"), MATERIALS),
+        optional=True, read=(CLEARANCE, *by_law("contact", "geometry"), MATERIALS),
     )  # fmt: skip
     exponent: float = parameter(
         1.5, "", (1, 3), "Table 3", "force exponent p",
-        read=(by_law("contact", "exponent"), or_own("exponent")), judged=(1.0, 2.2),
+        read=(*by_law("contact", "exponent"), or_own("exponent")), judged=(1.0, 2.2),
     )  # fmt: skip
     damping_N_s_per_mm: float = parameter(
         336.0, "N s/mm", (0, 1e9), "Table 3", "greatest contact damping C_max",
-        read=(by_law("contact", "damping_N_s_per_mm"), or_own("damping_N_s_per_mm")),
+        read=(*by_law("contact", "damping_N_s_per_mm"), or_own("damping_N_s_per_mm")),
         judged=(0, 33600),
         plausible=CONTACT_GUESS,
     )  # fmt: skip
     full_damping_mm: float = parameter(
         0.1, "mm", (0, 1e3), "Table 3", "penetration of full damping d_max", above=True,
-        read=(by_law("contact", "full_damping_mm"), or_own("full_damping_mm")),
+        read=(*by_law("contact", "full_damping_mm"), or_own("full_damping_mm")),
         plausible=CONTACT_GUESS._replace(given=None),
     )  # fmt: skip
     restitution: float | None = parameter(
@@ -542,20 +542,20 @@ class Contact:
         None, "mm/s", (0, 1e6), "program",
         "approach speed below which the damping stays that of this speed; 10 by default",
         above=True, optional=True,
-        read=(by_law("contact", "least_approach_mm_per_s"), DAMPED),
+        read=(*by_law("contact", "least_approach_mm_per_s"), DAMPED),
         judged=(1.0, 100.0),
         plausible=SMOOTHING,
     )  # fmt: skip
     length_mm: float | None = parameter(
         None, "mm", (0, 1e4), "program", "length of both joints, or of the big end (johnson, liu)",
         above=True, optional=True,
-        read=(CLEARANCE, by_law("contact", "length_mm")),
+        read=(CLEARANCE, *by_law("contact", "length_mm")),
         judged=(10.0, 100.0),
         plausible=BEARING_LENGTH,
     )  # fmt: skip
     modulus_GPa: float | None = parameter(
         None, "GPa", (0, 1e6), "program", "composite modulus (johnson, liu)", above=True,
-        optional=True, read=(CLEARANCE, by_law("contact", "modulus_GPa")),
+        optional=True, read=(CLEARANCE, *by_law("contact", "modulus_GPa")),
         judged=(10.0, 250.0),
     )  # fmt: skip
     small_end_materials: tuple[str, str] | None = choice(
@@ -565,7 +565,7 @@ class Contact:
     small_end_length_mm: float | None = parameter(
         None, "mm", (0, 1e4), "as the big end's", "length of the small end (johnson, liu)",
         above=True, optional=True,
-        read=(SMALL_CLEARANCE, by_law("contact", "small_end_length_mm")),
+        read=(SMALL_CLEARANCE, *by_law("contact", "small_end_length_mm")),
         plausible=BEARING_LENGTH,
     )  # fmt: skip
 

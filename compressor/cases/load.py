@@ -19,6 +19,7 @@ from compressor.cases import blocks
 from compressor.cases.case import Case
 from compressor.cases.checks import REPORT, SHORTHANDS, TWICE, row_of, value_of
 from compressor.cases.combinations import Block, columns
+from compressor.cases.comparison import NoComparison, Test, comparison, condition
 from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
 from compressor.cases.keys import (
     Leaves,
@@ -28,13 +29,10 @@ from compressor.cases.keys import (
     override_leaves,
     read_overrides,
 )
-from compressor.cases.parameter import CaseError, Problem, Reader, quote_value
+from compressor.cases.parameter import CaseError, Problem, quote_value
 from compressor.cases.study import Axis, Cases, Study, StudyRequest
 from compressor.cases.swept import (
     SAMPLED,
-    NoComparison,
-    Test,
-    comparison,
     format_count,
     is_swept,
 )
@@ -94,14 +92,14 @@ class UnreadKey:
     """A key that no case is known to read, and which of its conditions no case fulfils."""
 
     def __init__(
-        self, where: tuple[Place, str], key: str, node: Node, needed: list[tuple[str, Reader]]
+        self, where: tuple[Place, str], key: str, node: Node, needed: list[tuple[str, str]]
     ):
         self.where, self.node, self.needed = where, node, needed
         self.lacking = [*self.needed]
 
     def is_read(self, case: Case) -> bool:
         """Return whether a case reads the key, and note which of its conditions it fulfils."""
-        unmet = [one for one in self.needed if not one[1].reads(case)]
+        unmet = [one for one in self.needed if not condition(one[1])(case)]
         self.lacking = [one for one in self.lacking if one in unmet]
         return not unmet
 

@@ -1,8 +1,8 @@
 """One row of the table of parameters: its readers, and what a value of it must satisfy.
 
-Who reads a key: conditions on a case, with the words that a case file has for them. The fields of
-the groups name theirs (`read=`), and so do the groups in `compressor.cases.table`. A key without a
-reader is read by every job. `compressor.cases.conflicts` refuses what no job reads.
+Who reads a key: conditions on a case, in the language of `--only` (`compressor.cases.comparison`).
+The fields of the groups name theirs (`read=`), and so do the groups in `compressor.cases.table`. A
+key without one is read by every job. `compressor.cases.conflicts` refuses what no job reads.
 
 `compressor.cases.table` builds the whole table from these; units are those of the case file, and
 `to_si` turns a value into SI.
@@ -17,7 +17,7 @@ import math
 import re
 import reprlib
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from functools import lru_cache, partial
@@ -35,151 +35,63 @@ from pydantic import (
 )
 
 from compressor.cases.card import CardError, mark_card
-from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, READ_BY, law_of
+from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS, READ_BY
 from compressor.metrics import METRICS
 from compressor.program import CompsimError, did_you_mean
 
-
-@dataclass(frozen=True)
-class Reader:
-    """A condition under which a case reads a key; `words`: what a case file sets for it."""
-
-    words: str
-    reads: Callable[[Any], Any]
-
-
-def has_clearance(case: Any) -> bool:
-    """Return whether a joint has clearance."""
-    sizes = case.clearance_mm
-    return bool(sizes.big_end > 0) or bool(sizes.small_end > 0)
-
-
-def has_play(case: Any) -> bool:
-    """Return whether the guide has clearance."""
-    return bool(case.guide and case.guide.clearance_mm > 0)
-
-
-def has_ideal_friction(case: Any) -> bool:
-    """Return whether joints without clearance rub."""
-    return bool(case.friction and case.friction.ideal_joints)
-
-
-def senses_casing(case: Any) -> bool:
-    """Return whether a sensor hears a casing mode: the guide bears no force along x."""
-    sensor = case.sensor
-    if not case.body or not sensor or sensor.place == "body":
-        return False
-    return bool(sensor.place == "bearing" or sensor.direction == "y")
-
-
-GAS = Reader("load: gas", lambda case: case.load == "gas")
-CRANK_END = Reader(
-    "gas.action: double or crank_end", lambda case: case.gas.action in ("double", "crank_end")
+GAS = "load == gas"
+CRANK_END = "gas.action == double or gas.action == crank_end"
+HEAD_END = "gas.action != crank_end"
+CYCLE = "not gas.is_measured"  # by an indicator card of an end that presses
+MEASURED = "gas.is_measured"
+HEAD_CLEARANCE = "gas.action != crank_end or not gas.crank_clearance_percent"
+SPRING = "load == spring"
+A_JOINT = "joint != none"
+BIG_END = "joint == big_end or joint == both"
+SMALL_END = "joint == small_end or joint == both"
+CLEARANCE = "clearance_mm.big_end > 0 or clearance_mm.small_end > 0"
+BIG_CLEARANCE = "clearance_mm.big_end > 0"
+SMALL_CLEARANCE = "clearance_mm.small_end > 0"
+IDEAL_JOINT = "not (clearance_mm.big_end > 0 and clearance_mm.small_end > 0)"
+PLAY = "guide.clearance_mm > 0"
+CONTACT = f"{CLEARANCE} or {PLAY}"
+RUBBING = f"{CLEARANCE} or friction.ideal_joints == true"
+SMALL_RUBBING = f"{SMALL_CLEARANCE} or friction.ideal_joints == true"
+GUIDE = f"guide.friction > 0 or {PLAY}"
+BALANCE = "machine.balance >= 0"
+GUIDE_FRICTION = "guide.friction > 0"
+MATERIALS = "contact.materials"
+DAMPED = "contact.restitution > 0"  # which johnson and liu need not have
+STIFFNESS = (CLEARANCE, "contact.law != johnson and contact.law != liu")
+BODY = "body"
+STEADY = "body.start == steady"
+ALONG_X = ("body", "body.freedoms != y")
+ALONG_Y = ("body", "body.freedoms != x")
+ROCKING = "body.freedoms == xy_rocking"
+# the guide bears no force along x
+CASING_SENSED = (
+    "body",
+    "sensor.place == bearing or sensor.place == guide and sensor.direction == y",
 )
-HEAD_END = Reader("gas.action: single or double", lambda case: case.gas.action != "crank_end")
-CYCLE = Reader("no gas.indicator", lambda case: not case.gas.is_measured)
-MEASURED = Reader("gas.indicator", lambda case: case.gas.is_measured)
-HEAD_CLEARANCE = Reader(
-    "a head end that presses, or one gas.clearance_percent for both",
-    lambda case: case.gas.action != "crank_end" or case.gas.crank_clearance_percent is None,
-)
-SPRING = Reader("load: spring", lambda case: case.load == "spring")
-A_JOINT = Reader("joint: big_end, small_end or both", lambda case: case.joint != "none")
-BIG_END = Reader("joint: big_end or both", lambda case: case.joint in ("big_end", "both"))
-SMALL_END = Reader("joint: small_end or both", lambda case: case.joint in ("small_end", "both"))
-CLEARANCE = Reader("clearance_mm above 0 at a joint", has_clearance)
-BIG_CLEARANCE = Reader(
-    "clearance_mm above 0 at the big end", lambda case: case.clearance_mm.big_end > 0
-)
-SMALL_CLEARANCE = Reader(
-    "clearance_mm above 0 at the small end", lambda case: case.clearance_mm.small_end > 0
-)
-IDEAL_JOINT = Reader(
-    "a joint without clearance",
-    lambda case: not case.clearance_mm.big_end > 0 or not case.clearance_mm.small_end > 0,
-)
-PLAY = Reader("guide.clearance_mm above 0", has_play)
-CONTACT = Reader(
-    f"{CLEARANCE.words} or in the guide", lambda case: has_clearance(case) or has_play(case)
-)
-RUBBING = Reader(
-    f"{CLEARANCE.words} or friction.ideal_joints: true",
-    lambda case: has_clearance(case) or has_ideal_friction(case),
-)
-SMALL_RUBBING = Reader(
-    f"{SMALL_CLEARANCE.words}, or friction.ideal_joints: true",
-    lambda case: case.clearance_mm.small_end > 0 or has_ideal_friction(case),
-)
-GUIDE = Reader(
-    "guide.friction above 0 or guide.clearance_mm above 0",
-    lambda case: case.guide and (case.guide.friction > 0 or case.guide.clearance_mm > 0),
-)
-BALANCE = Reader("machine.balance", lambda case: case.machine.balance is not None)
-GUIDE_FRICTION = Reader(
-    "guide.friction above 0", lambda case: case.guide and case.guide.friction > 0
-)
-MATERIALS = Reader(
-    "contact.materials, such as [steel, steel]", lambda case: case.contact.materials is not None
-)
-DAMPED = Reader(
-    "contact.restitution", lambda case: case.contact.restitution is not None
-)  # which johnson and liu need not have
-STIFFNESS = (
-    CLEARANCE,
-    Reader(
-        f"another contact.law than {' or '.join(CYLINDRICAL)}",
-        lambda case: case.contact.law not in CYLINDRICAL,
-    ),
-)
-BODY = Reader("body: true", lambda case: case.body is not None)
-STEADY = Reader("body.start: steady", lambda case: case.body and case.body.start == "steady")
-ALONG_X = Reader(
-    "body.freedoms: x, xy or xy_rocking", lambda case: case.body and case.body.freedoms != "y"
-)
-ALONG_Y = Reader(
-    "body.freedoms: y, xy or xy_rocking", lambda case: case.body and case.body.freedoms != "x"
-)
-ROCKING = Reader(
-    "body.freedoms: xy_rocking", lambda case: case.body and case.body.freedoms == "xy_rocking"
-)
-CASING_SENSED = Reader("sensor.place: bearing, or guide with direction: y", senses_casing)
-CASING = (
-    CASING_SENSED,
-    Reader("body.casing: true", lambda case: case.body and case.body.casing),
-)
-RANDOM = Reader(
-    "sensor.noise_m_per_s2 or sensor.speed_jitter above 0",
-    lambda case: case.sensor and (case.sensor.noise_m_per_s2 > 0 or case.sensor.speed_jitter > 0),
-)
-THRESHOLD = Reader(
-    "sensor.threshold_m_per_s2", lambda case: case.sensor and case.sensor.threshold_m_per_s2
-)
-SERIES = Reader("output.keep: series", lambda case: case.output.keep == "series")
+CASING = (*CASING_SENSED, "body.casing == true")
+RANDOM = "sensor.noise_m_per_s2 > 0 or sensor.speed_jitter > 0"
+THRESHOLD = "sensor.threshold_m_per_s2 > 0"
+SERIES = "output.keep == series"
 
 
-def or_own(key: str) -> Reader:
-    """Return the reader of a key of `contact` that a guide's corner may have of its own."""
-    return Reader(
-        f"{CLEARANCE.words}, or no guide.{key}",
-        lambda case: has_clearance(case) or not case.guide or getattr(case.guide, key) is None,
-    )
+def or_own(key: str) -> str:
+    """Return who reads a key of `contact` that a guide's corner may have of its own."""
+    return f"{CLEARANCE} or not guide.{key} >= 0"
 
 
-def by_law(group: str, key: str) -> Reader:
-    """Return the reader of a key that some laws of contact or friction alone read."""
+def by_law(group: str, key: str) -> tuple[str, ...]:
+    """Return who reads a key of contact or friction that some laws alone read."""
     readers = READ_BY[group][key]
     every = CONTACT_LAWS if group == "contact" else FRICTION_LAWS
     others = [law for law in every if law not in readers]
-    if len(others) < len(readers):
-        words = f"another {group}.law than {' or '.join(others)}"
-    else:
-        words = f"{group}.law: {' or '.join(readers)}"
-
-    def reads(case: Any) -> bool:
-        chosen = getattr(case, group)
-        return bool(chosen) and law_of(chosen) in readers
-
-    return Reader(words, reads)
+    if "adams" in readers or len(others) < len(readers):  # which a file need not name
+        return group, " and ".join(f"{group}.law != {law}" for law in others)
+    return (" or ".join(f"{group}.law == {law}" for law in readers),)
 
 
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
@@ -347,7 +259,7 @@ class Parameter:
     identity: bool = True  # whether it is part of a job's identity
     aliases: tuple[tuple[str, str], ...] = ()  # other words, each with the choice it stands for
     judged: tuple[float, float] | None = None  # range that extreme scenes are drawn from
-    read: tuple[Reader, ...] = ()  # conditions that all hold where a case reads it
+    read: tuple[str, ...] = ()  # conditions that all hold where a case reads it
     plausible: Plausible | None = None  # where there is a doubt about it
 
     @property
@@ -404,9 +316,8 @@ class Parameter:
 
         Of "a" and "a or b" it is "a".
         """
-        words = dict.fromkeys(one.words for one in self.read)
-        needed = [one for one in words if not any(o != one and o in one for o in words)]
-        return "; ".join(needed)
+        needed = [one for one in self.read if not any(o != one and o in one for o in self.read)]
+        return "; ".join(dict.fromkeys(needed))
 
     def choice_of(self, value: Any) -> Any:
         """Return the choice that an alias stands for, and any other value as it is."""
@@ -650,10 +561,10 @@ def choice(default: Any, choices: tuple[str, ...], source: str, phrase: str, **m
 
 
 def _field(default: Any, row: dict[str, Any]) -> Any:
-    """Return a dataclass field with a row; its `read` may be one reader, or several."""
+    """Return a dataclass field with a row; its `read` may be one condition, or several."""
     read = row.get("read", ())
     return field(
-        default=default, metadata=row | {"read": (read,) if isinstance(read, Reader) else read}
+        default=default, metadata=row | {"read": (read,) if isinstance(read, str) else read}
     )
 
 

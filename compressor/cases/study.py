@@ -9,8 +9,8 @@ from typing import Any, Protocol, overload
 from compressor.cases.case import Case
 from compressor.cases.checks import expand_shorthands
 from compressor.cases.combinations import Block
+from compressor.cases.comparison import Test
 from compressor.cases.keys import Leaves, nest_values
-from compressor.cases.swept import Test
 from compressor.cases.yaml_reader import FileProblem, Node
 
 

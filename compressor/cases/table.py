@@ -34,7 +34,6 @@ from compressor.cases.parameter import (
     RUBBING,
     SPRING,
     Parameter,
-    Reader,
     checked,
     choice,
 )
@@ -53,7 +52,7 @@ def open_group(of: type, word: bool | None, value: Any) -> Any:
     return dict(value) if isinstance(value, Mapping) else value
 
 
-def group(of: type, *read: Reader, word: bool | None = None) -> Any:
+def group(of: type, *read: str, word: bool | None = None) -> Any:
     """Return the field of a group of keys.
 
     read: conditions under which a case reads any of it. word: that may stand for it (`WORDS`).
@@ -197,7 +196,7 @@ def parameters() -> Iterator[Parameter]:
 
 
 @cache
-def group_readers(name: str) -> tuple[Reader, ...]:
+def group_readers(name: str) -> tuple[str, ...]:
     """Return the conditions that all hold where a case reads any key of a group."""
     (item,) = (item for item in dataclasses.fields(Settings) if item.name == name)
     return tuple(item.metadata.get("read", ()))

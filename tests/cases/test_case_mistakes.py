@@ -92,10 +92,10 @@ SHARED = [
     ({"joint": "both", "clearance_mm": {"big_end": 0.2}},
      "clearance_mm.small_end: is needed with joint: both; give it in mm, such as 0.2"),
     ({"gas": {"piston_radius_mm": 110, "suction_MPa": 0.2}},
-     "gas: nothing reads this group: it needs load: gas; set that, or leave the group out"),
+     "gas: nothing reads this group: it needs load == gas; set that, or leave the group out"),
     ({"contact": {"law": "hertz", "damping_N_s_per_mm": 9}},
-     "contact.damping_N_s_per_mm: nothing reads this key: it needs contact.law: impact; set that, "
-     "or leave the key out"),
+     "contact.damping_N_s_per_mm: nothing reads this key: it needs contact.law == impact; set "
+     "that, or leave the key out"),
 ]  # fmt: skip
 
 

@@ -320,7 +320,7 @@ def test_an_unknown_key_is_told_with_what_was_meant(write, text, hint):
     ("text", "expected"),
     [
         ("clearance_mm: [1, 2, 3]\n",
-         ["1:1: clearance_mm: nothing reads this key: it needs joint: big_end, small_end or both; "
+         ["1:1: clearance_mm: nothing reads this key: it needs joint != none; "
           "set that, or leave the key out"]),
         ("joint: [none, both]\nclearance_mm: {big_end: 1}\n",
          ["2:1: clearance_mm.small_end: is needed with joint: both; "

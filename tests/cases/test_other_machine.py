@@ -30,7 +30,7 @@ gas:
 
 def test_its_gas_without_the_load_is_refused_with_the_remedy(read):
     assert refused(read, MACHINE) == [
-        "case.yaml:11:1: gas: nothing reads this group: it needs load: gas; set that, or leave "
+        "case.yaml:11:1: gas: nothing reads this group: it needs load == gas; set that, or leave "
         "the group out"
     ]
 

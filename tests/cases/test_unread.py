@@ -356,7 +356,7 @@ def test_one_file_serves_the_machine_with_clearance_and_without(tmp_path):
 
 
 GONE = "set that, or leave the {} out"
-IN_GAS = "nothing reads this group: it needs load: gas; " + GONE.format("group")
+IN_GAS = "nothing reads this group: it needs load == gas; " + GONE.format("group")
 
 
 @pytest.mark.parametrize(
@@ -371,8 +371,8 @@ IN_GAS = "nothing reads this group: it needs load: gas; " + GONE.format("group")
         ("lubricant: true\njoint: [none, big_end]\nclearance_mm: 0.1", [], []),
         ("joint: both\nclearance_mm: 0.1\nguide: {friction: [0, 0.1]}", [], []),
         ("clearance_mm: {big_end: 0.1, small_end: 0.2}\njoint: big_end", [],
-         ["case.yaml:1:30: clearance_mm.small_end: nothing reads this key: it needs joint: "
-          "small_end or both; " + GONE.format("key")]),
+         ["case.yaml:1:30: clearance_mm.small_end: nothing reads this key: it needs joint == "
+          "small_end or joint == both; " + GONE.format("key")]),
         ("{}", ["gas.exponent=1.3"], [f"--set gas.exponent=1.3: gas: {IN_GAS}"]),
         # what the command line takes the reader from is the file's, and no mistake of it
         ("load: gas\ngas: {back_pressure_MPa: 0.1}", ["load=none"], []),

@@ -202,7 +202,7 @@ def test_a_study_of_bodies_opens(tmp_path, monkeypatch, in_process):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"sensor": True}, "sensor: nothing reads this group: it needs body: true"),
+        ({"sensor": True}, "sensor: nothing reads this group: it needs body;"),
         ({"body": {"mass_kg": 100}}, "moving parts have 19 % of the body's mass"),
         ({"body": {"frequency_x_Hz": 16.5}}, r"order 2 of the speed, 16\.7 Hz, is so near"),
         ({"body": True, "solve": {"duration_rev": 2.5}}, "whole settled revolutions"),
@@ -212,11 +212,11 @@ def test_a_study_of_bodies_opens(tmp_path, monkeypatch, in_process):
         ),
         (
             {"body": {"start": "rest"}, "sensor": {"length_rev": 3}},
-            "it needs body.start: steady",
+            "it needs body.start == steady",
         ),
         (
             {"body": {"start": "rest"}, "sensor": {"speed_jitter": 0.01}},
-            "it needs body.start: steady",
+            "it needs body.start == steady",
         ),
         ({"body": True, "sensor": {"low_pass_Hz": 20000}}, "less than half of rate_Hz"),
         ({"body": {"mass_kg": -1}}, r"body.mass_kg: -1 is outside"),

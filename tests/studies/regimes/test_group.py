@@ -90,7 +90,7 @@ def test_overrides_reach_it_and_one_selects_chains(read):
         (WHOLE.replace("to: 1", "to: 11"), "2:11: clearance_mm: 11 mm exceeds the pin radius"),
         (WORN + "clearance_mm: 0.1\n" + SPEED.replace("machine.speed_rpm, from: 300, to: 700",
          "gas.back_pressure_MPa, from: 0, to: 0.1"), "3:11: gas: nothing reads this group: it needs"
-         " load: gas"),
+         " load == gas"),
     ],
 )  # fmt: skip
 def test_mistakes_are_told_with_place_key_and_remedy(read, text, message):
