@@ -1,6 +1,5 @@
 """`compsim alarms`: which alarm sees wear first, joint by joint."""
 
-import os
 import re
 import shlex
 from typing import TYPE_CHECKING
@@ -13,12 +12,9 @@ from compsim.progress import ProgressReporter
 from compsim.records import read_levels
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from compressor.studies.alarms.readings import Band
 
 FREQUENCIES = re.compile(r"([\d.]+)-([\d.]+)")
-FILES = ("alarms.csv", "alarms.nc")
 
 
 def read_bands(
@@ -105,7 +101,10 @@ def alarms(
     for text in () if quiet else list_remarks(found):
         screen.say_wrapped(text)
     if output:
-        write_alarms(found, output, machine_title(folder, study))
+        from compressor.studies.alarms.figures import write_alarms
+
+        for line in write_alarms(found, output, machine_title(folder, study)):
+            screen.print_text(line)
         if not quiet:
             beside = "" if output == "alarms" else f" --alarms {shlex.quote(output)}"
             screen.say(f"next: compsim report -r {shlex.quote(folder)}{beside}")
@@ -117,29 +116,3 @@ def machine_title(folder: str, study: str) -> str:
     from compressor.store import read_studies
 
     return next((one.title for one in read_studies(folder) if one.name == study), "") or study
-
-
-def write_alarms(found: "xr.Dataset", output: str, title: str) -> None:
-    """Write a result as CSV, netCDF, and a figure with its caption for each level of noise.
-
-    title: of the machine.
-    """
-    from pathlib import Path
-
-    from compressor.report import render, title_figure
-    from compressor.store import publish, write_dataset
-    from compressor.studies.alarms.figures import caption, draw_alarms
-    from compressor.studies.alarms.words import as_rows
-
-    place = Path(output)
-    publish(place / FILES[0], as_rows(found).encode())
-    write_dataset(place / FILES[1], found)
-    for name in FILES:
-        screen.print_text(os.path.join(output, name))
-    for level, noise in enumerate(found["noise"].values.tolist()):
-        path = place / (f"alarms-noise-{noise:g}.png" if noise else "alarms.png")
-        drawing = draw_alarms(found, level)
-        noisy = [f"noise of {noise:g} m/s²"] if noise else []
-        drawing.title = title_figure(title, "alarms by clearance", noisy)
-        publish(path, render(drawing, "png"))
-        screen.print_text(f"{path}\n  {caption(found, level)}")

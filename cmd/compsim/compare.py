@@ -2,16 +2,13 @@
 
 import json
 import os
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from compsim import options, screen
 from compsim.progress import ProgressReporter
 from compsim.records import record_options
-
-if TYPE_CHECKING:
-    from compressor.report import Drawing
 
 KINDS = (".png", ".svg", ".csv")
 
@@ -78,19 +75,8 @@ def compare(
         for line in list_comparison(found):
             screen.print_text(line)
     if output:
-        from compressor.studies.compare.figures import caption, draw_comparison
+        from compressor.studies.compare.figures import caption, draw_comparison, write_figure
 
         write_figure(draw_comparison(found), output, kind)
         screen.say(output) if as_json else screen.print_text(f"{output}\n  {caption(found)}")
     return screen.DONE
-
-
-def write_figure(drawing: "Drawing", output: str, kind: str) -> None:
-    """Write a figure as a picture, or its numbers as CSV."""
-    from pathlib import Path
-
-    from compressor.report import as_csv, render
-    from compressor.store import publish
-
-    data = as_csv(drawing).encode() if kind == ".csv" else render(drawing, kind[1:])
-    publish(Path(output), data)

@@ -2,17 +2,11 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from compsim import options, screen
 from compsim.progress import ProgressReporter
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from compressor.cases import Case
 
 
 @click.command()
@@ -42,17 +36,24 @@ def tradeoff(
     xarray and h5py read, and the figure tradeoff.png and tradeoff.svg; the fastest methods and
     the effects of the features go to stdout.
     """
-    cases = cases_of_files(configs, overrides)
+    if overrides and not configs:
+        raise click.UsageError("--set changes case files: name one, such as configs/both.yaml")
     from compressor.store import writable_folder, write_dataset
+    from compressor.studies.tradeoff.figures import write_methods
     from compressor.studies.tradeoff.model_choices import trade as feature_trade
     from compressor.studies.tradeoff.words import fastest_lines, trade_lines
-    from compressor.studies.tradeoff.work_precision import work_precision
+    from compressor.studies.tradeoff.work_precision import (
+        cases_of_files,
+        default_cases,
+        work_precision,
+    )
 
+    cases = cases_of_files(configs, overrides) if configs else default_cases()
     folder = Path(output)
     writable_folder(folder)  # minutes before it is needed
     with ProgressReporter(quiet, "points") as progress:
         study = work_precision(cases, repeats=repeats, budget=budget, progress=progress)
-        write_study(folder, study)
+        write_methods(folder, study)
     with ProgressReporter(quiet, "changes of the model") as progress:
         trade = feature_trade(cases, repeats=repeats, progress=progress)
     write_dataset(folder / "modelling.nc", trade)
@@ -62,42 +63,3 @@ def tradeoff(
             screen.say(os.path.join(output, name))
         screen.say("next: compsim explain --models CONFIG does the same for a case, in seconds")
     return screen.DONE
-
-
-def write_study(folder: Path, study: "xr.Dataset") -> None:
-    """Store a study of methods and draw it."""
-    from compressor.report import render
-    from compressor.store import publish, write_dataset
-    from compressor.studies.tradeoff.figures import draw_work_precision
-
-    write_dataset(folder / "tradeoff.nc", study)
-    drawing = draw_work_precision(study)
-    for kind in ("png", "svg"):
-        publish(folder / f"tradeoff.{kind}", render(drawing, kind))
-
-
-def format_swept(value: object) -> str:
-    """Return a swept value in few characters."""
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def cases_of_files(configs: tuple[str, ...], overrides: tuple[str, ...]) -> "dict[str, Case]":
-    """Return the cases to be studied, by label; each needs a joint with clearance."""
-    from compressor.cases import load_studies, points
-    from compressor.studies.tradeoff.work_precision import default_cases, faulty
-
-    if not configs:
-        if overrides:
-            raise click.UsageError("--set changes case files: name one, such as configs/both.yaml")
-        return default_cases()
-    cases = {}
-    for study in load_studies(*configs, overrides=overrides, follow=False):
-        for point, case in zip(points(study), study.cases, strict=True):
-            name = " ".join([study.name, *(format_swept(value) for value in point.values())])
-            if not faulty(case):
-                raise click.UsageError(
-                    f"{study.path}: {name} has no joint with clearance, so nothing is integrated: "
-                    "set joint and clearance_mm"
-                )
-            cases[name] = case
-    return cases

@@ -13,7 +13,7 @@ import types
 from pathlib import Path
 
 import pytest
-from compsim import cli, plan, run
+from compsim import cli, run, screen
 
 from compressor.analysis.runs import paper_cases
 from compressor.cases import load
@@ -172,7 +172,7 @@ def test_the_most_jobs_are_those_of_the_library():
                         (2_345_678, "2.35 MB"), (12_345_678_901, "12.35 GB")],
 )  # fmt: skip
 def test_sizes(count, text):
-    assert plan.size(count) == text
+    assert screen.size(count) == text
 
 
 def test_shards(case_file, capsys):

@@ -1,6 +1,9 @@
 """How far wear is over the limits, and what trips as a limit rises, with a caption."""
 
+import os
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -15,9 +18,14 @@ from compressor.report import (
     Panel,
     make_grid,
     palette,
+    render,
+    title_figure,
 )
+from compressor.store import publish, write_dataset
 from compressor.studies.alarms.alarms import best_of_each, rank_alarms
-from compressor.studies.alarms.words import detects_words, limit_words, rate_words
+from compressor.studies.alarms.words import as_rows, detects_words, limit_words, rate_words
+
+FILES = ("alarms.csv", "alarms.nc")
 
 MAX_KINDS = 6  # kinds of alarm that have a line: the first to see wear
 BEYOND = 3.0  # times the greatest level that half of the windows reach, to which limits are drawn
@@ -123,3 +131,23 @@ def caption(found: xr.Dataset, noise: int = 0) -> str:
         f"{'; '.join(texts)}. Below: of these, share of windows that trip as the limit rises, of "
         f"{attrs['sound_draws']} sound draws (black) and at each clearance; the line is the limit."
     )
+
+
+def write_alarms(found: xr.Dataset, output: str, title: str) -> Iterator[str]:
+    """Write a result as CSV, netCDF, and a figure for each level of noise; yield what was written.
+
+    title: of the machine.
+    """
+
+    place = Path(output)
+    publish(place / FILES[0], as_rows(found).encode())
+    write_dataset(place / FILES[1], found)
+    for name in FILES:
+        yield os.path.join(output, name)
+    for level, noise in enumerate(found["noise"].values.tolist()):
+        path = place / (f"alarms-noise-{noise:g}.png" if noise else "alarms.png")
+        drawing = draw_alarms(found, level)
+        noisy = [f"noise of {noise:g} m/s²"] if noise else []
+        drawing.title = title_figure(title, "alarms by clearance", noisy)
+        publish(path, render(drawing, "png"))
+        yield f"{path}\n  {caption(found, level)}"

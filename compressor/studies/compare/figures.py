@@ -2,10 +2,23 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from compressor.report import BLACK, CYCLE, GREY, Drawing, LineStyle, Panel, fill, make_grid
+from compressor.report import (
+    BLACK,
+    CYCLE,
+    GREY,
+    Drawing,
+    LineStyle,
+    Panel,
+    as_csv,
+    fill,
+    make_grid,
+    render,
+)
+from compressor.store import publish
 from compressor.studies.compare.comparison import Comparison
 from compressor.studies.compare.likeness import SEGMENTS, SWING, Curves
 
@@ -81,3 +94,9 @@ def caption(found: Comparison) -> str:
     if math.isnan(found.inside):
         return f"{text}."
     return f"{text}; in the range of {len(found.jobs)} jobs at {found.inside:.0%} of crank angles."
+
+
+def write_figure(drawing: Drawing, output: str, kind: str) -> None:
+    """Write a figure as a picture, or its numbers as CSV."""
+    data = as_csv(drawing).encode() if kind == ".csv" else render(drawing, kind[1:])
+    publish(Path(output), data)

@@ -1,5 +1,7 @@
 """Work and precision: error of acceleration over wall time, a panel a scene, a line a method."""
 
+from pathlib import Path
+
 import numpy as np
 import xarray as xr
 
@@ -17,8 +19,10 @@ from compressor.report import (
     fill,
     make_grid,
     mark,
+    render,
     share_scales,
 )
+from compressor.store import publish, write_dataset
 
 COLUMNS = 3
 WORDS_ROOM = 4.0  # times left of the fastest point, for the words
@@ -113,3 +117,11 @@ def limits(study: xr.Dataset) -> tuple[float, float]:
     if not found.size:
         return 1e-10, 1.0
     return float(found.min()) / 5, float(found.max()) * 3
+
+
+def write_methods(folder: Path, study: xr.Dataset) -> None:
+    """Store a study of methods and draw it."""
+    write_dataset(folder / "tradeoff.nc", study)
+    drawing = draw_work_precision(study)
+    for kind in ("png", "svg"):
+        publish(folder / f"tradeoff.{kind}", render(drawing, kind))

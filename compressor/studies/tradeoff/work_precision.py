@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import FAULTS, label, paper_cases, settled_part
-from compressor.cases import ACCURACY, METHODS, Case, Output
+from compressor.cases import ACCURACY, METHODS, Case, Output, load_studies, points
 from compressor.metrics import JOINTS
 from compressor.program import PROGRAM, CompsimError, Progress, no_progress
 from compressor.reasons import Reason
@@ -53,6 +53,32 @@ def default_cases() -> dict[str, Case]:
     """Return the paper's three faults at 0.2 mm, by label."""
     cases = paper_cases()
     return {label(fault, 0.2): cases[label(fault, 0.2)] for fault in FAULTS}
+
+
+class NothingIntegrated(CompsimError):
+    """A case without clearance, whose motion is known in closed form."""
+
+    exit_code = 2
+
+
+def format_swept(value: object) -> str:
+    """Return a swept value in few characters."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def cases_of_files(configs: Sequence[str], overrides: Sequence[str]) -> dict[str, Case]:
+    """Return the cases to be studied, by label; each needs a joint with clearance."""
+    cases = {}
+    for study in load_studies(*configs, overrides=overrides, follow=False):
+        for point, case in zip(points(study), study.cases, strict=True):
+            name = " ".join([study.name, *(format_swept(value) for value in point.values())])
+            if not faulty(case):
+                raise NothingIntegrated(
+                    f"{study.path}: {name} has no joint with clearance, so nothing is integrated: "
+                    "set joint and clearance_mm"
+                )
+            cases[name] = case
+    return cases
 
 
 def solve_by_method(case: Case, method: str, rtol: float, timeout: float | None = None) -> Case:

@@ -14,7 +14,7 @@ from test_lead import CASE, write_run
 from compressor.report.page import document
 from compressor.store import job_record, read_dataset, read_store, read_studies
 from compressor.studies.alarms import windows
-from compressor.studies.alarms.alarms import judge_alarms, rank_alarms
+from compressor.studies.alarms.alarms import rank_alarms
 from compressor.studies.alarms.figures import caption, draw_alarms
 from compressor.studies.alarms.page import add
 from compressor.studies.alarms.words import list_remarks, table_rows
@@ -39,16 +39,6 @@ def written(worn_store, tmp_path_factory):
         ]  # fmt: skip
         assert cli.main(words) == 0
     return place / "to", out.read_text()
-
-
-def test_records_and_their_time_are_told_before_they_are_read(worn_store, monkeypatch):
-    monkeypatch.setattr(windows, "read_job", lambda *_: "not read")
-    told = []
-    with pytest.raises(windows.AlarmsError):
-        judge_alarms(worn_store, "worn", None, lambda *event: told.append(event))
-    ((done, total, text),) = [event for event in told if event[2]]
-    assert done == 2
-    assert text.startswith(f"{total} records, about ")
 
 
 def test_the_table_has_the_first_alarm_of_each_joint_first(written):

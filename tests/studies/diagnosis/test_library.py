@@ -54,17 +54,6 @@ def test_kept_features_are_read_again(library, folder, monkeypatch):
     assert again.keys.tolist() == library.keys.tolist()
 
 
-def test_records_and_their_time_are_told_before_they_are_read(library, folder, monkeypatch):
-    monkeypatch.setattr(module, "vector", lambda record: library.features[0])
-    monkeypatch.setattr(module, "_read_features", lambda *_: None)
-    monkeypatch.setattr(module, "write_dataset", lambda *_: None)
-    told = []
-    open_library(folder, "worn", lambda done, total, remark: told.append((done, remark)))
-    ((done, text),) = [event for event in told if event[1]]
-    assert done == 2
-    assert text.startswith(f"{WORN_JOBS} records, about ")
-
-
 @pytest.mark.parametrize("harm", ["stale", "damaged", "other code", "another version"])
 def test_features_that_cannot_be_trusted_are_made_again(harm, library, folder, monkeypatch):
     (path,) = (folder / "features").iterdir()
