@@ -61,7 +61,8 @@ def calibrate(
         screen.print_text(f"# read: {text}")
     for line in describe(record, config, found):
         screen.print_text(f"# {line}".rstrip())
-    screen.print_text(to_yaml(found.case).rstrip("\n"))
+    _, _, values = to_yaml(found.case).partition("\n")  # without the name: copies have their own
+    screen.print_text(values.rstrip("\n"))
     if not quiet:
         screen.say(f"{found.jobs} points, {found.run_now} of them run now, in study {found.study}")
     return screen.DONE

@@ -508,44 +508,21 @@ def with_ideal_joints(case: Case, features: bool = True) -> Case:
 WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
 
 
-def to_yaml(case: Case, brief: bool = False) -> str:
+def to_yaml(case: Case) -> str:
     """Return a resolved case as the text of a case file, which reads back to an equal case.
 
     Values that the case does not read are left out. A job of a sweep over loads or laws may have
     some that are not the defaults: its text reads back to a case of the same physics and another
-    key. brief: without the name and all that is so by default; it then reads back to an equal job.
+    key.
     """
-    values = _independent_values(values_read(case)) if brief else values_read(case)
     lines = []
-    for key, value in values.items():
+    for key, value in values_read(case).items():
         if isinstance(value, Mapping):
             lines.append(f"{key}:")
             lines += [f"  {name}: {_scalar(item)}" for name, item in value.items()]
         else:
             lines.append(f"{key}: {_scalar(value)}")
     return "\n".join(lines) + "\n"
-
-
-def _independent_values(values: dict[str, Any]) -> dict[str, Any]:
-    """Return the values of a case without those that follow from the others."""
-    case, needed = Case.resolve(values), dict(values)
-    for key, value in values.items():
-        for name in value if isinstance(value, Mapping) else ():
-            rest = {inner: item for inner, item in needed[key].items() if inner != name}
-            if _is_same(needed | {key: rest or WORDS.get(key, {})}, case):
-                needed[key] = rest or WORDS.get(key, {})
-        rest = {outer: item for outer, item in needed.items() if outer != key}
-        if key == "name" or _is_same(rest, case):
-            needed = rest
-    return needed or {"load": case.load}  # a file needs a key
-
-
-def _is_same(values: Mapping[str, Any], case: Case) -> bool:
-    """Return whether values make a case."""
-    try:
-        return Case.resolve({"name": case.name, **values}) == case
-    except CaseError:
-        return False
 
 
 def _scalar(value: Any) -> str:
