@@ -6,13 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compressor.digits import plural
-from compressor.program import duration
 from compsim import options, screen
 from compsim.progress import ProgressReporter
 
 if TYPE_CHECKING:
-    from compressor.cases import Study
     from compressor.studies.search.question import Question
     from compressor.units import Units
 
@@ -79,7 +76,6 @@ def find(
 
     if not quiet:
         screen.caution([study])
-        tell_ahead(question, study, folder, jobs or cores())
     with ProgressReporter(quiet, "points") as progress:
         answer = search(question, folder, jobs or cores(), progress)
     if answer.base:
@@ -89,24 +85,6 @@ def find(
     else:
         screen.print_lines(lines(question, answer, folder, units))
     return screen.SOME_FAILED if answer.failed else screen.DONE
-
-
-def tell_ahead(question: "Question", study: "Study", folder: str, workers: int) -> None:
-    """Report how many runs a search will take, and about how long, by timing one of them."""
-    from compressor.sweep import forecast
-
-    found = forecast([study], folder, 0)
-    if missing := found.counts.missing:
-        whole = found.with_times(workers, screen.say_wrapped, 1)
-        steps, points = question.most_to_narrow(workers)
-        each = (whole.seconds - whole.loading) / missing
-        if steps == points:  # one at a time
-            each *= max(1.0, whole.cores)
-        more = steps * whole.loading + points * each  # each step starts workers of its own
-        screen.say_wrapped(
-            f"{plural(missing, 'run')} to scan, about {duration(whole.seconds)}; then up to "
-            f"{points} to narrow the answer, about {duration(more)}"
-        )
 
 
 def question_of(config: str, asked: dict[str, Any]) -> "Question":

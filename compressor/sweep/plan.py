@@ -93,19 +93,14 @@ class Ahead:
         self.missing = missing  # keys, by study
         self.cases = cases  # of some of them, by key
 
-    def with_times(
-        self, workers: int, remark: Callable[[str], None], jobs: int = TIMED_JOBS
-    ) -> Forecast:
-        """Return the whole forecast, for so many processes; `remark` is called about compiling.
-
-        jobs: how many of a study are timed at most.
-        """
+    def with_times(self, workers: int, remark: Callable[[str], None]) -> Forecast:
+        """Return the whole forecast, for so many processes; `remark` is called about compiling."""
         if not self.counts.missing:
             return self.counts
         looked_at = list(self.cases.values())
         needs = Needs.of(looked_at)
         compile_once(needs, remark)
-        drawn = {part.study: draw_cases(self.missing[part.study], self.cases)[:jobs]
+        drawn = {part.study: draw_cases(self.missing[part.study], self.cases)[:TIMED_JOBS]
                  for part in self.counts.studies if part.missing}  # fmt: skip
         costs = time_in_turn(drawn, TIMING_SECONDS)
         parts = [

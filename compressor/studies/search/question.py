@@ -222,21 +222,6 @@ class Question:
         """Return the shares of the range at which to look first: 0 to 1, evenly."""
         return [number / (self.scan - 1) for number in range(self.scan)]
 
-    def most_to_narrow(self, at_once: int) -> tuple[int, int]:
-        """Return how many steps a search may take after the scan, and how many points in all.
-
-        By sections of one interval, so many points at once, or by the golden section.
-        """
-        points, steps, width = 0, 0, 1.0 / (self.scan - 1)
-        if self.goal.sign in ("greatest", "least"):
-            points = max(0, math.ceil(math.log(2.0 * width / self.tolerance, GOLDEN)))
-            return points, points
-        while width > self.tolerance * (1.0 + 1e-9):
-            enough = math.ceil(width / self.tolerance * (1.0 - 1e-9)) - 1
-            count = min(max(1, at_once), enough)
-            points, steps, width = points + count, steps + 1, width / (count + 1)
-        return steps, points
-
     def argument(self, share: float) -> float:
         """Return the key's value at a share of the range."""
         if share in (0.0, 1.0):

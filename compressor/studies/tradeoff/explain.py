@@ -29,7 +29,7 @@ from compressor.cases import (
 )
 from compressor.metrics import JOINTS
 from compressor.physics import state_names
-from compressor.program import Progress, duration, no_progress
+from compressor.program import Progress, no_progress
 from compressor.solve import (
     JointScales,
     expected_cost,
@@ -112,10 +112,6 @@ def explain(
     run, seconds, solution_seconds = time_case(case, 1)
     repeats = repeats if seconds < SLOW_SECONDS else 1
     ended = complete(run)
-    if ended and run["steps"] > 0 and (paid := len(paid_features(case))):
-        runs = repeats + 1 + paid * (1 + 2 * repeats)
-        ahead = seconds * (repeats + 1 + paid) + solution_seconds * 2 * repeats * paid
-        progress(0, paid, f"{runs} runs, about {duration(ahead)}")
     if repeats > 1:
         run, seconds, solution_seconds = time_case(case, repeats - 1)
     active, absent = terms(case)

@@ -66,20 +66,6 @@ def test_a_threshold_is_between_the_ends(threshold, at_once):
     # so many sections as at_once points make of a step: 1/8 by 1 + at_once until 1e-3
     assert len(calls) - 1 <= math.ceil(math.log(125) / math.log(1 + at_once))
     assert max(map(len, calls[1:])) <= at_once
-    steps, points = Question("a.yaml", "b", 0.0, 1.0, ABOVE, scan=9).most_to_narrow(at_once)
-    assert len(calls) - 1 <= steps
-    assert sum(map(len, calls[1:])) in range(points - at_once, points + 1)
-
-
-@pytest.mark.parametrize("best", [0.05, 0.31, 0.5])
-def test_as_many_points_are_told_as_an_extremum_takes(best):
-    """By the golden section; parabolas need fewer."""
-    calls = []
-    find_extremum(jobs(lambda x: abs(x - best), calls=calls), False, SCAN, 1e-3)
-    goal = goal_of("peak_acceleration", "least")
-    steps, points = Question("a.yaml", "b", 0.0, 1.0, goal, scan=9).most_to_narrow(2)
-    assert steps == points
-    assert points / 2 <= len(calls) - 1 <= points + 2
 
 
 def test_no_share_is_asked_for_twice():

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 from compsim import cli
-from compsim.find import tell_ahead
 from conftest import jobs_here
 
 from compressor.cases.load import load_cases, load_studies
@@ -19,8 +18,6 @@ from compressor.store.studies import read_studies
 from compressor.studies.search.find import Point, interval
 from compressor.studies.search.question import JobReading, Question, comparison
 from compressor.studies.search.words import jsonable_answer, lines
-from compressor.sweep import plan
-from compressor.sweep.wanted import revolutions
 
 LIMIT = 0.006
 ASKED = [
@@ -155,29 +152,6 @@ def test_failed_jobs_are_no_answer(folder, capsys):
     out = capsys.readouterr().out
     assert "surely holds at none of 3 points" in out
     assert out.count("the job failed, budget_steps: more than 5 steps") == 3
-
-
-def test_runs_and_their_time_are_told_before(folder, monkeypatch, capsys):
-    """Half a core: 2 s of loading for each worker in each step, and 1 s for each job."""
-    question = Question("worn.yaml", "clearance_mm", 0.1, 0.3, comparison("peak_acceleration > 9"))
-    study = question.checked()
-    turns = revolutions(study.cases[0])
-    monkeypatch.setattr(plan, "measure_cost", lambda case: plan.Cost(1.0 / turns, 0.0, 2.0))
-    monkeypatch.setattr(plan, "cores_at_work", lambda workers: 0.5)
-    monkeypatch.setattr(plan, "compile_once", lambda *_: None)
-    tell_ahead(question, study, "new", 2)
-    # 9 jobs as long as 10, since one worker idles in the end; 1/8 by thirds and a half to 1e-3
-    scan, narrow = (4 + 10) / 0.5, 5 * 4 / 0.5 + 9 * (10 / 9) / 0.5
-    said = " ".join(capsys.readouterr().err.split())
-    assert said == (
-        f"9 runs to scan, about {scan:.0f} s; then up to 9 to narrow the answer, "
-        f"about {narrow:.0f} s"
-    )
-    goal = f"contact_loss_fraction.small_end > {LIMIT}"
-    over, more = "clearance_mm=0.002:0.2", {"scan": 5, "logarithmic": True}
-    before = Question.written("worn.yaml", over, goal, "first", tolerance=0.04, **more)
-    tell_ahead(before, before.checked(), "results", 2)
-    assert capsys.readouterr().err == ""  # all are stored
 
 
 def test_later_crossings_are_named_in_the_unit_of_the_limit():

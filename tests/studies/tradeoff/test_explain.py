@@ -8,7 +8,6 @@ import pytest
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.cases.parameter import ACCURACY
-from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.explain import (
     explain,
     ideal_scales,
@@ -44,30 +43,6 @@ def test_gravity_that_is_off_is_not_paid_for(explained):
     assert [one.name for one in told.advice] == ["friction", "spring damping", "load"]
     assert "gravity" in told.absent
     assert "gravity" not in told.active
-
-
-def test_as_many_runs_are_told_as_are_made(tmp_path, monkeypatch):
-    """Of the job by itself, and of it beside each of three features, twice in turn."""
-    path = tmp_path / "made.yaml"
-    path.write_text(json.dumps({"joint": "big_end", "clearance_mm": 0.2, "solve": SOLVE}))
-    made, told = [], []
-
-    def run(case):
-        made.append(case)
-        return simulate(case)
-
-    def progress(done, total, remark):
-        if remark:
-            told.append(remark)
-            made.clear()
-
-    for module in ("explain", "features"):
-        monkeypatch.setattr(f"compressor.studies.tradeoff.{module}.simulate", run)
-    monkeypatch.setattr("compressor.studies.tradeoff.explain.ideal_scales", lambda case: ())
-    monkeypatch.setattr("compressor.studies.tradeoff.explain.SLOW_SECONDS", 1e9)
-    explain(load_studies(path)[0], workers=2, repeats=3, progress=progress)
-    (text,) = told
-    assert text.startswith(f"{len(made)} runs, about ")
 
 
 def test_friction_that_matters_is_kept(explained):
