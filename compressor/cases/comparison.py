@@ -71,7 +71,7 @@ def _tree(text: str) -> ast.expr:
     if not BARRED.search(code):
         with contextlib.suppress(SyntaxError, MemoryError), ignore_warnings():  # of `1or`
             return ast.parse(code, mode="eval").body
-    raise NoComparison(f"cannot be read: {SUCH_AS}, and numbers without their unit")
+    raise NoComparison(f"cannot be read: {SUCH_AS}; write numbers without their unit")
 
 
 def _test(node: ast.expr, compare: Callable[[ast.expr], Callable[[Any], bool]]) -> Any:

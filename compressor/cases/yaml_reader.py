@@ -1,15 +1,15 @@
 """Strict YAML 1.2: a text -> a tree of values with their places.
 
-The only module that imports yaml, and only its parser: what a scalar means is decided here, by
-the core schema of YAML 1.2, so that `1e5` is a number and `no` is text. What a case file must not
-hold (aliases, tags, duplicate keys, ...) is noted with its place, and reading goes on;
-only broken syntax and oversized files end it.
+PyYAML's composer reads; what a scalar means is decided here, by the core schema of YAML 1.2, so
+that `1e5` is a number and `no` is text. A value that is missing, or given twice, is noted with its
+place, and reading goes on; broken syntax, aliases, tags and oversized files end it.
 """
 
+import contextlib
 import math
 import re
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -20,57 +20,30 @@ import yaml
 from compressor.cases.parameter import NO_VALUE
 from compressor.program import CompsimError, did_you_mean, printable
 
-SUFFIXES = (".yaml", ".yml")
-RESULTS = (b"\x89HDF", b"CDF\x01", b"CDF\x02", b"CDF\x05")  # how HDF5 and netCDF files begin
+MAX_LOOKED_AT = 1000  # files of a folder
 START = "compsim init writes a case file to start from"
-MAX_LOOKED_AT = 1000  # entries of a folder
-MAX_NAMES = 5
 
 
 def unreadable(path: str, error: OSError | ValueError) -> str:
-    """Return why a file cannot be read, and what to do about it."""
+    """Return why a file cannot be read, and what to give in its place."""
     message = f"cannot be read: {getattr(error, 'strerror', None) or error}"
-    if isinstance(error, FileNotFoundError):
-        return f"{message}; {_instead(Path(path))}"
     if isinstance(error, IsADirectoryError):
-        inside = case_files(Path(path))
-        line = f"compsim run {shlex.quote(path.rstrip('/'))}/*.yaml"
-        return f"{message}; {f'it holds case files: {line}' if inside else 'give a case file'}"
-    return message
-
-
-def no_text(data: bytes) -> str:
-    """Return the error of a file that is no text in UTF-8."""
-    if data.startswith(RESULTS):
-        return "is a file of results (netCDF or HDF5); a case file is YAML text"
-    return "is not UTF-8 text"
-
-
-def case_files(folder: Path) -> list[Path]:
-    """Return the case files in a folder, by their names."""
-    try:
-        entries = sorted(islice(folder.iterdir(), MAX_LOOKED_AT))
-    except OSError:
-        return []
-    return [path for path in entries if path.suffix in SUFFIXES and path.is_file()]
-
-
-def _instead(path: Path) -> str:
-    """Return what to give in place of a file that is not there."""
-    if "*" in path.name:
-        return f"no file has such a name; {START}"
-    found = {path.stem: path for path in [*case_files(Path("configs")), *case_files(path.parent)]}
-    near = did_you_mean(path.stem, found, found)
-    if near or not found:
-        return near or START
-    names = [*map(str, found.values())]
-    return f"there are {', '.join(names[:MAX_NAMES])}{', …' * (len(names) > MAX_NAMES)}"
+        return (
+            f"{message}; give the files in it, compsim run {shlex.quote(path.rstrip('/'))}/*.yaml"
+        )
+    if not isinstance(error, FileNotFoundError):
+        return message
+    with contextlib.suppress(OSError):
+        near = {one.stem: one for one in islice(Path(path).parent.glob("*.y*ml"), MAX_LOOKED_AT)}
+        return f"{message}; {did_you_mean(Path(path).stem, near, near) or START}"
+    return f"{message}; {START}"
 
 
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 20
 MAX_PARTS = 50_000  # keys, values and brackets, which take a second
 
+OTHER_YAML = re.compile(r"%YAML (?!1\.2\s)")
 NOT_ZERO = re.compile("[^eE]*[1-9]")
 ODD_BREAKS = re.compile("[\x85\u2028\u2029]")  # lines for PyYAML, not for YAML 1.2 or an editor
 
@@ -126,10 +99,6 @@ class Node:
         return self.value
 
 
-class _Unreadable(Exception):
-    """The end of the reading of a file; carries the last problem."""
-
-
 def shorten(text: str, most: int = 60) -> str:
     """Return the text of at most `most` characters."""
     return text if len(text) <= most else text[: most - 3] + "..."
@@ -150,7 +119,7 @@ def read_file(path: str, problems: list[FileProblem]) -> Node | None:
         text = data.decode().removeprefix("\ufeff")
     except UnicodeDecodeError as error:
         place = _place_at(path, data[: error.start].decode())
-        problems.append(FileProblem(place, "", no_text(data)))
+        problems.append(FileProblem(place, "", "is not UTF-8 text; a case file is YAML"))
         return None
     return read_text(text, Place(path, 1, 1), problems)
 
@@ -158,29 +127,42 @@ def read_file(path: str, problems: list[FileProblem]) -> Node | None:
 def read_text(text: str, start: Place, problems: list[FileProblem]) -> Node | None:
     """Return the value of a YAML text, or None; a `start` without a line is everything's place."""
     text = separate_by_spaces(text)
-    builder = _Builder(text, start, problems)
     if odd := ODD_BREAKS.search(text):
         problems.append(_forbidden(text, odd.start(), start))
         return None
+
+    def place(mark: Any) -> Place:
+        return Place(start.file, mark.line + 1, mark.column + 1) if mark and start.line else start
+
+    def refuse(mark: Any, key: str, message: str) -> None:
+        problems.append(FileProblem(place(mark), key, message))
+
+    if OTHER_YAML.match(text):
+        refuse(None, "", "case files are YAML 1.2")
     try:
-        return builder.document()
-    except _Unreadable as error:
-        problems.append(error.args[0])
+        loader = _Loader(text)
+        if root := loader.get_single_node():
+            for noted in loader.notes:
+                refuse(*noted)
+            return _plain_node(root, "", None, place, refuse)
+        refuse(None, "", f"is empty{f'; {START}' if start.line else ''}")
+    except _Refused as error:
+        refuse(*error.args)
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        place = builder.place(mark)
-        hint = "; indent with spaces, not tabs" if "'\\t'" in str(error.problem) else ""
+        mark, told = error.problem_mark or error.context_mark, str(error.problem)
+        if told == "but found another document":
+            refuse(mark, "", "a second document begins here; a case file holds one")
+            return None
+        hint = "; indent with spaces, not tabs" if "'\\t'" in told else ""
         slip = find_slip(text, mark.line) if mark and not hint else None
         if slip and start.line:
             problems.append(FileProblem(Place(start.file, slip[0] + 1, 1), "", slip[1]))
-            return None
-        problems.append(
-            FileProblem(place, "", f"is no YAML: {shorten(str(error.problem), 120)}{hint}")
-        )
+        else:
+            refuse(mark, "", f"is no YAML: {shorten(told, 120)}{hint}")
     except yaml.reader.ReaderError as error:
         problems.append(_forbidden(text, error.position, start))
     except (ValueError, OverflowError):  # PyYAML on "\UFFFFFFFF" or %YAML 1.999...
-        problems.append(FileProblem(builder.last, "", "is no YAML: a number is too large here"))
+        refuse(None, "", "is no YAML: a number is too large here")
     return None
 
 
@@ -263,116 +245,84 @@ def _integer(text: str) -> float:
     return int(text) if len(text) <= 300 else float(text)
 
 
-class _Builder:
-    """A builder of nodes from the parser's events; notes what a strict reader refuses."""
+class _Refused(Exception):
+    """The end of the reading of a file: a mark of PyYAML's, a key and a message."""
 
-    def __init__(self, text: str, start: Place, problems: list[FileProblem]):
-        self.start, self.last, self.problems, self.parts = start, start, problems, 0
-        self.events: Iterator[Any] = self._events(text)
 
-    def _events(self, text: str) -> Iterator[Any]:
-        for event in yaml.parse(text, Loader=yaml.SafeLoader):
-            self.parts += 1
-            self.last = self.place(event.start_mark)
-            if self.parts > MAX_PARTS:
-                raise _Unreadable(FileProblem(self.last, "", "is too long to be a case file"))
-            yield event
+REFUSED = "refused"  # tag of an alias
 
-    def place(self, mark: Any) -> Place:
-        if mark is None or not self.start.line:
-            return self.start
-        return Place(self.start.file, mark.line + 1, mark.column + 1)
 
-    def note(self, event: Any, key: str, message: str) -> None:
-        self.problems.append(FileProblem(self.place(event.start_mark), key, message))
+class _Loader(yaml.SafeLoader):
+    """PyYAML's composer, which notes what no case file has: aliases, anchors and tags."""
 
-    def document(self) -> Node | None:
-        """Return the one document of the text."""
-        next(self.events)  # the stream's start
-        opening = next(self.events)
-        if isinstance(opening, yaml.StreamEndEvent):
-            hint = f"; {START}" if self.start.line else ""
-            raise _Unreadable(FileProblem(self.start, "", f"is empty{hint}"))
-        if opening.version not in (None, (1, 2)):
-            self.note(opening, "", "case files are YAML 1.2")
-        node = self.node(next(self.events), "", 0, None)
-        next(self.events)  # the document's end
-        more = next(self.events)
-        if not isinstance(more, yaml.StreamEndEvent):
-            self.note(more, "", "a second document begins here; a case file holds one")
-        return node
+    def __init__(self, text: str):
+        super().__init__(text)
+        self.parts = 0
+        self.path: list[str] = []
+        self.notes: list[tuple[Any, str, str]] = []
 
-    def node(self, event: Any, key: str, depth: int, key_place: Place | None) -> Node:
-        """Return the value that begins with an event, and all that is in it."""
-        place = self.place(event.start_mark)
-        if depth > MAX_DEPTH:
-            message = f"nested deeper than {MAX_DEPTH} levels"
-            raise _Unreadable(FileProblem(place, key, message))
-        self.refuse_marks(event, key)
-        value: Any = None
-        if isinstance(event, yaml.MappingStartEvent):
-            value = self.mapping(key, depth)
-        elif isinstance(event, yaml.SequenceStartEvent):
-            value = self.sequence(key, depth)
-        elif isinstance(event, yaml.ScalarEvent):
-            value = self.scalar(event, key)
-        return Node(value, place, key_place or place)
-
-    def refuse_marks(self, event: Any, key: str) -> None:
-        """Note an alias, an anchor or a tag."""
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        event, name = self.peek_event(), getattr(index, "value", "")
+        self.path.append(name if isinstance(name, str) else "")
+        self.parts += 1
+        key = ".".join(filter(None, self.path))
+        if len(self.path) > MAX_DEPTH or self.parts > MAX_PARTS:
+            is_deep = len(self.path) > MAX_DEPTH
+            what = f"nested deeper than {MAX_DEPTH} levels" if is_deep else "is too long"
+            raise _Refused(event.start_mark, key, what + " to be a case file" * (not is_deep))
         if isinstance(event, yaml.AliasEvent):
             self.note(event, key, "aliases (*) are not allowed; write the value out")
-        elif event.anchor is not None:
+            self.get_event()
+            self.path.pop()
+            return yaml.ScalarNode(REFUSED, "", event.start_mark)  # type: ignore[arg-type]
+        if event.anchor is not None:
             self.note(event, key, "anchors (&) are not allowed; write the value out")
         elif event.tag is not None:
             self.note(event, key, "tags (!) are not allowed")
+        node = super().compose_node(parent, index)
+        self.path.pop()
+        return node
 
-    def scalar(self, event: Any, key: str) -> Any:
-        value = resolve_scalar(event.value) if event.style is None else event.value
-        if value is None:
-            self.note(event, key, NO_VALUE)
-        return value
+    def note(self, event: Any, key: str, message: str) -> None:
+        """Keep what is wrong with a mark on a value."""
+        self.notes.append((event.start_mark, key, message))
 
-    def sequence(self, key: str, depth: int) -> list[Node]:
-        items: list[Node] = []
-        while not isinstance(event := next(self.events), yaml.SequenceEndEvent):
-            text = getattr(event, "value", None)
-            if items and text and event.style is None and DECIMALS.fullmatch(text):
-                before = items[-1].plain()
-                message = f"a decimal comma? write {before}.{text}; commas separate values"
-                self.note(event, key, message)
-            items.append(self.node(event, key, depth + 1, None))
-        return items
 
-    def mapping(self, owner: str, depth: int) -> dict[str, Node]:
-        entries: dict[str, Node] = {}
-        while not isinstance(event := next(self.events), yaml.MappingEndEvent):
-            name = self.name(event, owner, depth)
-            key = f"{owner}.{name}" if owner and name else name or owner
-            value = self.node(next(self.events), key, depth + 1, self.place(event.start_mark))
-            if name in entries:
-                first = entries[name].key_place
-                where = f" at line {first.line}" if first.line else ""
-                self.note(event, key, f"is given twice; first{where}")
-            elif name is not None:
-                entries[name] = value
-        return entries
-
-    def name(self, event: Any, owner: str, depth: int) -> str | None:
-        """Return the text of a key, or None if it is refused."""
-        if not isinstance(event, yaml.ScalarEvent):
-            if not isinstance(event, yaml.AliasEvent):
-                self.note(event, owner, "a key must be plain text")
-            self.node(event, owner, depth + 1, None)
-            return None
-        self.refuse_marks(event, owner)
-        if event.value == "<<" and event.style is None:
-            self.note(event, owner, "merge keys (<<) are not allowed; write the values out")
-            return None
-        if not event.value:
-            self.note(event, owner, "a key is missing before the colon")
-            return None
-        return event.value
+def _plain_node(
+    node: Any, key: str, key_mark: Any, place: Callable[[Any], Place],
+    refuse: Callable[[Any, str, str], None],
+) -> Node:  # fmt: skip
+    """Return a node of PyYAML's as one of ours, with all that is in it."""
+    value: Any = None
+    if isinstance(node, yaml.MappingNode):
+        value = {}
+        for name_node, inner in node.value:
+            name, mark = name_node.value, name_node.start_mark
+            whole = f"{key}.{name}" if key else name
+            if not isinstance(name, str):
+                refuse(mark, key, "a key must be plain text")
+            elif not name:
+                refuse(mark, key, "a key is missing before the colon")
+            elif name == "<<" and name_node.style is None:
+                refuse(mark, key, "merge keys (<<) are not allowed; write the values out")
+            elif name in value:
+                line = f" at line {value[name].key_place.line}" * bool(place(mark).line)
+                refuse(mark, whole, f"is given twice; first{line}")
+            else:
+                value[name] = _plain_node(inner, whole, mark, place, refuse)
+    elif isinstance(node, yaml.SequenceNode):
+        value = []
+        for item in node.value:
+            text = item.value if isinstance(item, yaml.ScalarNode) and not item.style else ""
+            if value and DECIMALS.fullmatch(text):
+                message = f"a decimal comma? write {value[-1].plain()}.{text}"
+                refuse(item.start_mark, key, f"{message}; commas separate values")
+            value.append(_plain_node(item, key, None, place, refuse))
+    else:
+        value = resolve_scalar(node.value) if node.style is None else node.value
+        if value is None and node.tag != REFUSED:
+            refuse(node.start_mark, key, NO_VALUE)
+    return Node(value, place(node.start_mark), place(key_mark or node.start_mark))
 
 
 class CaseFileError(CompsimError, ValueError):

@@ -17,7 +17,7 @@ JOB = {
 }
 NUMBERS = ("clearance_mm", "machine.speed_rpm")
 SUCH_AS = "write such as clearance_mm > 0.2 and load == gas"
-UNREADABLE = f"cannot be read: {SUCH_AS}, and numbers without their unit"
+UNREADABLE = f"cannot be read: {SUCH_AS}; write numbers without their unit"
 NEEDS = "needs a key, a sign and a value in place of {}: " + SUCH_AS
 SIGNS = ("==", "!=", "<", "<=", ">", ">=")
 

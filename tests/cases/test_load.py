@@ -236,7 +236,8 @@ def test_mistakes_of_all_files_are_told_at_once(write):
         "--set joint=y: joint: needs none, big_end, small_end or both, not 'y'",
         "a.yaml:2:1: needs keys at the top, such as `joint: big_end`, with a space after the colon",
         "b.yaml:1:7: load: needs spring, gas or none, not 'x'",
-        "missing.yaml: cannot be read: No such file or directory; there are a.yaml, b.yaml",
+        "missing.yaml: cannot be read: No such file or directory; compsim init writes "
+        "a case file to start from",
     ]
 
 
@@ -256,8 +257,8 @@ def test_mistakes_of_all_files_are_told_at_once(write):
         ('name: "\\UFFFFFFFF"\n', "1:1: is no YAML: a number is too large here"),
         ("load: none\nname: \x07\n", "2:7: must not hold the character U+0007"),
         ("load: none # \u2028joint: both\n", "1:14: must not hold the character U+2028"),
-        (b"load: none\nname: \xff\n", "2:7: is not UTF-8 text"),
-        ("load: none\n".encode("utf-16"), "1:1: is not UTF-8 text"),
+        (b"load: none\nname: \xff\n", "2:7: is not UTF-8 text; a case file is YAML"),
+        ("load: none\n".encode("utf-16"), "1:1: is not UTF-8 text; a case file is YAML"),
         ("load: ~\n", "1:7: load: has no value; leave the key out to get its default"),
         ("load:\n", "1:6: load: has no value; leave the key out to get its default"),
         ("load: !!str none\n", "1:7: load: tags (!) are not allowed"),
