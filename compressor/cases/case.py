@@ -27,11 +27,12 @@ from compressor.cases.checks import (
     value_of,
     values_given,
 )
+from compressor.cases.comparison import condition
 from compressor.cases.conflicts import (
     IN_KEY_IF_READ,
+    conditions,
     conflicts,
     given_conflicts,
-    reads,
     unread_values,
     values_read,
 )
@@ -366,8 +367,7 @@ def identity_parts(case: Case, names: Container[str] = IDENTITY) -> dict[str, st
         accuracy = solve.rtol or targets or solve.accuracy
         texts["solver"] = KEY_TEXT.encode((accuracy, solve.method, solve.max_steps))
     if "facts" in names:
-        facts = {key: value_of(case, key) for key in IN_KEY_IF_READ if reads(case, key)}
-        texts["facts"] = KEY_TEXT.encode({k: v for k, v in facts.items() if v is not None})
+        texts["facts"] = KEY_TEXT.encode(_facts_read(case))
     for name in IDENTITY_GROUPS:
         if name not in names or (case.joint == "none" and name in OF_JOINTS):
             continue
@@ -377,6 +377,22 @@ def identity_parts(case: Case, names: Container[str] = IDENTITY) -> dict[str, st
         elif not WORDS[name]:
             texts[name] = "false"
     return texts
+
+
+def _facts_read(case: Case) -> dict[str, Any]:
+    """Return the facts that a case has and reads; each condition is tried once."""
+    found, held = {}, {}
+    for key in IN_KEY_IF_READ:
+        value = value_of(case, key)
+        for _, needed in conditions(key) if value is not None else ():
+            if needed not in held:
+                held[needed] = condition(needed)(case)
+            if not held[needed]:
+                break
+        else:
+            if value is not None:
+                found[key] = value
+    return found
 
 
 def _remember_texts(make_text: Callable[..., str]) -> Callable[..., str]:

@@ -9,7 +9,7 @@ Where a case leaves the range that the program was judged on. Extreme scenes are
 """
 
 import contextlib
-from collections.abc import Callable, Container, Iterator, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
@@ -337,15 +337,16 @@ def conflicts(case: Settings) -> Iterator[Problem]:
         yield from rule(case)
 
 
-def given_conflicts(joint: str, given: frozenset[str]) -> Iterator[Problem]:
-    """Yield what is missing beside a joint, and keys of which a case gives one; given: dotted."""
-    for one in JOINTS:
-        key = f"clearance_mm.{one}"
-        if joint in (one, "both") and key not in given:
-            yield Problem(key, f"is needed with joint: {joint}; give it in mm, such as 0.2")
-    for one, other in IN_PLACE_OF:
-        if one in given and other in given:
-            yield Problem(one, f"stands in place of {other}: give one of the two")
+@cache
+def given_conflicts(joint: str, given: frozenset[str]) -> Sequence[Problem]:
+    """Return what is missing beside a joint, and keys of which a case gives one; given: dotted."""
+    needed = [key for one in JOINTS if joint in (one, "both") and (key := f"clearance_mm.{one}")]
+    what = f"is needed with joint: {joint}; give it in mm, such as 0.2"
+    return [Problem(key, what) for key in needed if key not in given] + [
+        Problem(one, f"stands in place of {other}: give one of the two")
+        for one, other in IN_PLACE_OF
+        if one in given and other in given
+    ]
 
 
 def _body_conflicts(case: Settings) -> Iterator[Problem]:
