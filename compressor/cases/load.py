@@ -67,46 +67,32 @@ class KeysRead:
                 self._note(block)
 
     def _note(self, block: Block) -> None:
-        unread = []
+        needed, lacking = {}, {}  # conditions of each key; of those, which no case fulfils so far
+        nodes = {}
         for key, node in block.leaves.values.items():
             group = key.partition(".")[0]
             where = node.key_place, group if group in SHORTHANDS else key
             known = row_of(key) or key in WORDS
             if where not in self.read and known and not is_off(key, node.value):
-                swept = is_swept(key, node)
-                needed = conditions(key) if swept else needs_of_given(key, block.leaves.values)
-                unread.append(UnreadKey(where, key, node, needed))
+                one = is_swept(key, node)
+                needed[where] = conditions(key) if one else needs_of_given(key, block.leaves.values)
+                lacking[where], nodes[where] = needed[where], node
         for number in block.numbers:
-            if not unread:  # cases are built only until each key has a reader
+            if not lacking:  # cases are built only until each key has a reader
                 break
             for case in self.variants(block.case(number)):
-                self.read |= {one.where for one in unread if one.is_read(case)}
-            unread = [one for one in unread if one.where not in self.read]
-        for one in unread:
-            self.unread.setdefault(one.where, one.problem(block.leaves))
+                for where in lacking:
+                    unmet = [one for one in needed[where] if not condition(one[1])(case)]
+                    lacking[where] = [one for one in lacking[where] if one in unmet]
+                    self.read |= set() if unmet else {where}
+            lacking = {where: rest for where, rest in lacking.items() if where not in self.read}
+        for where, rest in lacking.items():
+            problem = problem_of(*[*rest, needed[where][-1]][0])
+            place = _place_of(problem.key, nodes[where], block.leaves)
+            found = FileProblem(place, problem.key, problem.message)
+            self.unread.setdefault(where, found)
         for where in self.read & self.unread.keys():
             del self.unread[where]
-
-
-class UnreadKey:
-    """A key that no case is known to read, and which of its conditions no case fulfils."""
-
-    def __init__(
-        self, where: tuple[Place, str], key: str, node: Node, needed: list[tuple[str, str]]
-    ):
-        self.where, self.node, self.needed = where, node, needed
-        self.lacking = [*self.needed]
-
-    def is_read(self, case: Case) -> bool:
-        """Return whether a case reads the key, and note which of its conditions it fulfils."""
-        unmet = [one for one in self.needed if not condition(one[1])(case)]
-        self.lacking = [one for one in self.lacking if one in unmet]
-        return not unmet
-
-    def problem(self, leaves: Leaves) -> FileProblem:
-        """Return the problem of the key, or of its group where no case reads any of that."""
-        missing = problem_of(*[*self.lacking, self.needed[-1]][0])
-        return FileProblem(_place_of(missing.key, self.node, leaves), missing.key, missing.message)
 
 
 def _place_of(key: str, node: Node, leaves: Leaves) -> Place:
@@ -436,7 +422,7 @@ def _check_cases(
     values: dict[str, list[Any]] = {key: [] for key in swept}
     total = len(cases)
     progress = progress if total >= MANY_CASES else no_progress
-    for number, (block, place) in enumerate(cases.combinations()):
+    for number, (block, place) in enumerate(cases.combinations):
         if number % 1000 == 0:
             progress(number, total, "" if number else f"{draft.name}: {total} jobs")
         try:
@@ -472,7 +458,7 @@ def _chains(
         draft.problems.append(FileProblem(places.get(f"{group}.n", place), f"{group}.n", message))
         return ()
     chains = []
-    for block, number in cases.combinations():
+    for block, number in cases.combinations:
         chosen = block.chosen(number)
         try:
             chain = tuple(map(block.resolve_case, request.follow(chosen)))

@@ -1,6 +1,5 @@
 """A study: the jobs of one case file, each built when it is used."""
 
-import bisect
 import itertools
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -110,11 +109,11 @@ class Cases(Sequence[Case]):
 
     def __init__(self, parts: Sequence[Block]):
         self.parts = parts
-        self.ends = list(itertools.accumulate(len(part.numbers) for part in parts))
+        self.combinations = [(part, number) for part in parts for number in part.numbers]
         self.keys: Sequence[str] = ()
 
     def __len__(self) -> int:
-        return self.ends[-1] if self.ends else 0
+        return len(self.combinations)
 
     @overload
     def __getitem__(self, index: int) -> Case: ...
@@ -124,34 +123,21 @@ class Cases(Sequence[Case]):
         numbers = range(len(self))[index]
         if isinstance(numbers, range):
             return tuple(self[number] for number in numbers)
-        block, place = self._locate(numbers)
-        case = self.parts[block].case(place)
+        block, place = self.combinations[numbers]
+        case = block.case(place)
         if self.keys:
             vars(case)["key"] = self.keys[numbers]
         return case
 
-    def combinations(self) -> Iterator[tuple[Block, int]]:
-        """Yield the block of each case, and the number of its combination there."""
-        for part in self.parts:
-            for number in part.numbers:
-                yield part, number
-
-    def _locate(self, number: int) -> tuple[int, int]:
-        """Return the number of a case's block, and of its combination there."""
-        block = bisect.bisect_right(self.ends, number)
-        numbers = self.parts[block].numbers
-        return block, numbers[number - self.ends[block] + len(numbers)]
-
     def given(self, number: int) -> dict[str, Any]:
         """Return what the file gives of a case, nested as a case file has it."""
-        block, place = self._locate(number)
-        part = self.parts[block]
-        return expand_shorthands(nest_values(part.chosen(place))) | {"name": part.name}
+        block, place = self.combinations[number]
+        return expand_shorthands(nest_values(block.chosen(place))) | {"name": block.name}
 
     def solver_of(self, number: int) -> Hashable:
         """Return what cases share only if their groups `solve` and `output` are equal."""
-        block, place = self._locate(number)
-        return block, self.parts[block].solver_of(place)
+        block, place = self.combinations[number]
+        return id(block), block.solver_of(place)
 
     def where(self, test: Test) -> list[int]:
         """Return the numbers of the cases for which a comparison holds."""
