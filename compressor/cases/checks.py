@@ -296,11 +296,6 @@ SWEEP = ("sample", "zip", "exclude", "blocks", "report", *STUDY_GROUPS)
 MAPPINGS = ("sample", "report", *STUDY_GROUPS)  # of these, those with keys of their own
 REPORT = {"title": 100, "notes": 2000}  # keys of `report`, and how many letters they may have
 MAX_MEANT = 3  # keys that an unknown one may have meant
-# keys that were, and what serves in their place
-FORMER_KEYS = {
-    "guide.restitution": "; a corner of the guide damps by damping_N_s_per_mm alone",
-    "wear.sectors": "; bores wear evenly: leave it out",
-}
 
 
 def known_keys(group: str, file: bool = True) -> list[str]:
@@ -324,8 +319,7 @@ def describe_unknown(name: str, group: str, file: bool = True, value: Any = None
     """Return the error of a key that a group does not have; value: the key's."""
     whole = group or ("a case file" if file else "a case")
     hint = (
-        FORMER_KEYS.get(f"{group}.{name}", "")
-        or in_our_unit(name, value, accepted_keys(group))
+        in_our_unit(name, value, accepted_keys(group))
         or of_percent(name, group)
         or of_diameter(name, group, value)
         or ("" if DIAMETER.fullmatch(name) else suggestion(name, group))  # of another part
