@@ -8,9 +8,9 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
-from functools import cache, cached_property, partial
+from functools import cache, cached_property, lru_cache, partial
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
@@ -67,7 +67,6 @@ IDENTITY_GROUPS = tuple(
     if name != "solve"
     and any(key.partition(".")[0] == name for key in table().keys() - outside_identity())
 )
-IDENTITY = frozenset({"joint", "load", "model", "span", "solver", "facts", *IDENTITY_GROUPS})
 NO_SWEEP = (
     "would be swept, and a case has one value of each key: build a case for each, or write a case "
     "file for load_cases"
@@ -279,7 +278,9 @@ stroke, 240 mm
     @cached_property
     def physics_key(self) -> str:
         """Return the hash of physics and span, without the solver: 20 hexadecimal digits."""
-        return digest(join_parts(identity_parts(self, IDENTITY - {"solver"})))
+        parts = identity_parts(self)
+        del parts["solver"]
+        return digest(join_parts(parts))
 
     @cached_property
     def key(self) -> str:
@@ -349,29 +350,26 @@ def has_own_cylinder(values: Mapping[str, Any], given: Set[str]) -> bool:
     )
 
 
-def identity_parts(case: Case, names: Container[str] = IDENTITY) -> dict[str, str]:
-    """Return what makes a case's results, each part as JSON text by its name; `names` of them."""
-    solve, texts = case.solve, {}
-    if "joint" in names:
-        texts["joint"] = f'"{case.joint}"'
-    if "load" in names:
-        texts["load"] = f'"{case.load}"'
-    if "model" in names:
-        texts["model"] = f'"{MODEL_VERSION}"'
-    if "span" in names:  # what is integrated and from where on it counts, however it is written
-        duration: float | str = case.duration if solve.duration_rev != "auto" else "auto"
-        settle: float | str = case.settle if solve.settle_rev != "auto" else "auto"
-        texts["span"] = KEY_TEXT.encode((duration, settle, round(case.steps)))
-    if "solver" in names:
-        targets = {} if isinstance(solve.accuracy, str) else dict(solve.accuracy)
-        accuracy = solve.rtol or targets or solve.accuracy
-        texts["solver"] = KEY_TEXT.encode((accuracy, solve.method, solve.max_steps))
-    if "facts" in names:
-        texts["facts"] = KEY_TEXT.encode(_facts_read(case))
+def identity_parts(case: Case) -> dict[str, str]:
+    """Return what makes a case's results, each part as JSON text by its name."""
+    solve = case.solve
+    # what is integrated and from where on it counts, however it is written
+    duration: float | str = case.duration if solve.duration_rev != "auto" else "auto"
+    settle: float | str = case.settle if solve.settle_rev != "auto" else "auto"
+    targets = {} if isinstance(solve.accuracy, str) else dict(solve.accuracy)
+    accuracy = solve.rtol or targets or solve.accuracy
+    texts = {
+        "joint": f'"{case.joint}"',
+        "load": f'"{case.load}"',
+        "model": f'"{MODEL_VERSION}"',
+        "span": KEY_TEXT.encode((duration, settle, round(case.steps))),
+        "solver": KEY_TEXT.encode((accuracy, solve.method, solve.max_steps)),
+        "facts": KEY_TEXT.encode(_facts_read(case)),
+    }
     for name in IDENTITY_GROUPS:
-        if name not in names or (case.joint == "none" and name in OF_JOINTS):
-            continue
         group = getattr(case, name)
+        if case.joint == "none" and name in OF_JOINTS:
+            continue
         if group is not None:
             texts[name] = _identity_text(group, name)
         elif not WORDS[name]:
@@ -395,24 +393,6 @@ def _facts_read(case: Case) -> dict[str, Any]:
     return found
 
 
-def _remember_texts(make_text: Callable[..., str]) -> Callable[..., str]:
-    """Return `make_text` that makes the text of each group once, since many cases share a group.
-
-    By the object and not by its value: 1 and 1.0 are equal, and their texts are not.
-    """
-    known: dict[int, tuple[Any, str]] = {}  # with the object, whose number is its own meanwhile
-
-    def find_text(group: Any, *name: str) -> str:
-        found = known.get(id(group))
-        if found is None:
-            if len(known) >= MAX_TEXTS:
-                known.clear()
-            found = known[id(group)] = group, make_text(group, *name)
-        return found[1]
-
-    return find_text
-
-
 def _plain_value(group: Any) -> dict[str, Any] | bool:
     """Return a group as a mapping of what it gives, as a case file has it; False for None."""
     if group is None:
@@ -434,13 +414,13 @@ def _plain_value(group: Any) -> dict[str, Any] | bool:
     return plain
 
 
-@_remember_texts
+@lru_cache(MAX_TEXTS)  # values that are equal are of one type: pydantic sees to it
 def _value_text(group: Any) -> str:
     """Return `_plain_value` of a group as JSON."""
     return json.dumps(_plain_value(group), sort_keys=True)
 
 
-@_remember_texts
+@lru_cache(MAX_TEXTS)  # values that are equal are of one type: pydantic sees to it
 def _identity_text(group: Any, name: str) -> str:
     """Return what a group gives as JSON, as `KEY_TEXT` writes it, but faster.
 
