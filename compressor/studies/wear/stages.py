@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import interpolate_hours, rubbing_work, settled_part, settled_revolutions
-from compressor.cases import MODEL_VERSION, Case, Output, PerJoint, Wear, to_si
+from compressor.cases import MODEL_VERSION, Case, CaseError, Output, PerJoint, Wear, to_si
 from compressor.metrics import JOINTS, METRICS
 from compressor.program import PROGRAM
 from compressor.solve import simulate
@@ -117,8 +117,12 @@ class Worn:
 
 def follow_stage(machine: Worn, hours: float, clearances: np.ndarray) -> Stage:
     """Return the stage at clearances (m) that were worn in some hours: a run, and what it rubs."""
-    run = simulate(machine.case_at(clearances))
-    reason = str(run["reason"].values)
+    run: Any = {}
+    try:
+        run = simulate(machine.case_at(clearances))
+        reason, detail = str(run["reason"].values), str(run.attrs.get("detail", ""))
+    except CaseError as error:  # such as clearances that exceed the pins
+        reason, detail = "invalid_input", str(error)
     shapes = {name: [len(JOINTS)] * len(METRICS[name].dims) for name in SHOWN}
     found = {name: run[name].values if name in run else math.nan for name in SHOWN}
     work, turn = np.full(len(JOINTS), math.nan), math.nan
@@ -127,7 +131,7 @@ def follow_stage(machine: Worn, hours: float, clearances: np.ndarray) -> Stage:
         work, turn = rubbing_work(run), float(np.ptp(time)) / settled_revolutions(run)
     return {
         "hours": hours, "clearance": clearances, "rubbing_work": work, "turn": turn,
-        "reason": reason, "detail": str(run.attrs.get("detail", "")),
+        "reason": reason, "detail": detail,
         **{name: np.broadcast_to(value, shapes[name]) for name, value in found.items()},
     }  # fmt: skip
 

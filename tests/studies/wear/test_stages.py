@@ -117,3 +117,11 @@ def test_a_speed_that_gives_way_takes_longer_for_a_revolution():
     found = first_stage(of)
     assert not found["reason"]
     assert found["turn"] > 1.001 * of.case.turn
+
+
+def test_a_clearance_beyond_the_pin_ends_the_study_with_a_reason():
+    worn = Worn(Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "wear": True}))
+    stage = follow_stage(worn, 0.0, np.array([0.02, 0.0]))
+    assert stage["reason"] == "invalid_input"
+    assert "exceeds the pin radius" in stage["detail"]
+    assert worn.over(stage)
