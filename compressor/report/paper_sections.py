@@ -354,7 +354,11 @@ def default_machine_runs(case: Case, paper: PaperRuns, loads: bool) -> dict[str,
     machine = replace(default.machine, **{name: getattr(case.machine, name) for name in lengths})
     unread = ["contact", "friction", "initial_offset_mm", "body", "sensor"]
     unread += [] if loads else ["gas", "spring"]
-    same = replace(case, machine=machine, **{name: getattr(default, name) for name in unread})
+    others: dict[str, Any] = {name: getattr(default, name) for name in unread}
+    try:  # its oil may not fit the default pin, nor its rod the default's mass centre
+        same = replace(case, joint="none", lubricant=None, wear=None, machine=machine, **others)
+    except CaseError:
+        return {}
     twins, defaults = cases_of(same), paper_cases()
     return {
         load: paper.usable[load]
