@@ -1,5 +1,6 @@
 """The paper's cases, and what a stored run says: its case, its load, and how it moves."""
 
+import contextlib
 import itertools
 import math
 from dataclasses import dataclass, replace
@@ -8,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 import xarray as xr
 
-from compressor.cases import Case, with_ideal_joints
+from compressor.cases import Case, CaseError, with_ideal_joints
 from compressor.metrics import JOINTS
 from compressor.physics import exact_motion, sample_segments, segments
 from compressor.solve import record
@@ -37,14 +38,18 @@ def paper_cases(**machine: float) -> dict[str, Case]:
 def cases_of(machine: Case) -> dict[str, Case]:
     """Return the paper's eleven cases by label, alike in all other assumptions of a case.
 
-    Its own load, joints and clearances are left aside. The gas load may not fit a machine of
-    other lengths: such a case has `problems`, and no run of it is ok.
+    Its own load, joints and clearances are left aside. A load or a clearance that does not fit the
+    machine, as the gas load may not fit other lengths, is left out.
     """
-    ideal = with_ideal_joints(machine)
-    cases = {name: replace(ideal, load=load) for name, load in LOADS.items()}
+    cases, ideal = {}, with_ideal_joints(machine)
+    for name, load in LOADS.items():
+        with contextlib.suppress(CaseError):
+            cases[name] = replace(ideal, load=load)
     for fault, c in itertools.product(FAULTS, CLEARANCES):
         sizes = replace(machine.clearance_mm, big_end=c, small_end=c)
-        cases[label(fault, c)] = replace(cases["design"], joint=fault, clearance_mm=sizes)
+        with contextlib.suppress(CaseError):
+            worn = replace(ideal, load=LOADS["design"], joint=fault, clearance_mm=sizes)
+            cases[label(fault, c)] = worn
     return cases
 
 

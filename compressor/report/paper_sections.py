@@ -314,6 +314,8 @@ def other_machines(stored: Stored, study: StoredStudy) -> Iterator[dict[str, Cas
         if case is None:
             continue
         cases = cases_of(case)
+        if not cases.keys() >= {"design", *WORN_LABELS}:
+            continue
         ideal = cases["design"].physics_key
         if ideal in ideals or not is_other(case):
             continue
@@ -363,7 +365,9 @@ def default_machine_runs(case: Case, paper: PaperRuns, loads: bool) -> dict[str,
     return {
         load: paper.usable[load]
         for load in IDEAL
-        if load in paper.usable and twins[load].physics_key == defaults[load].physics_key
+        if load in paper.usable
+        and load in twins
+        and twins[load].physics_key == defaults[load].physics_key
     }
 
 

@@ -53,8 +53,11 @@ def judge(machine: Case) -> Judged:
     machine: a case without clearance, whose machine, contact, friction, loads and solver settings
     count. Runs stay in memory. A machine with a failed case has no margins.
     """
-    runs, problems = {}, []
-    for name, case in cases_of(machine).items():
+    cases = cases_of(machine)
+    runs: dict[str, xr.Dataset] = {}
+    fits = len(cases) == PAPER_CASES
+    problems = [] if fits else ["a load or a clearance of the paper does not fit the machine"]
+    for name, case in cases.items():
         if name in IDEAL:
             continue
         run = simulate_quietly(case)
@@ -107,6 +110,7 @@ def ideal_runs(text: str) -> dict[str, xr.Dataset]:
     return {name: simulate_quietly(cases[name]) for name in IDEAL}
 
 
+PAPER_CASES = 11  # that a machine is judged by
 SECONDS_BETWEEN_WRITES = 3.0  # s between two writings of what is finished
 TIMEOUT = 900.0  # s that a machine may take, with all of its cases
 REMEDY = "delete it, or choose another folder"
