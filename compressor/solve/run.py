@@ -126,7 +126,7 @@ def fine_grid(edges: np.ndarray, pieces: int, turn: float) -> np.ndarray:
 
 COMPILED = {"auto": Mode.AUTO, "TSIT5": Mode.EXPLICIT, "RODAS": Mode.STIFF}
 CONTACT_STEP = 0.3  # of the contact's own time scale: the first step after an onset
-CHUNK = 8192  # attempts of the march between two looks at the clock: 20 ms, stiff ones 200 ms
+CHUNK = 2048  # attempts of the march between two looks at the clock: 5 ms, stiff ones 50 ms
 
 
 def integrate(request: Request) -> Trajectory:
