@@ -22,7 +22,15 @@ from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from functools import lru_cache, partial
 from inspect import cleandoc
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, TypeVar
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    NamedTuple,
+    TypeVar,
+    dataclass_transform,
+)
 
 import pydantic
 from pydantic import (
@@ -504,7 +512,10 @@ def problems_of(
 
 
 if TYPE_CHECKING:
-    from dataclasses import dataclass as checked
+
+    @dataclass_transform(frozen_default=True, field_specifiers=(field,))
+    def checked(cls: type[Group]) -> type[Group]: ...
+
 else:
 
     def checked(cls):

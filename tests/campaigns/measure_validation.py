@@ -182,11 +182,11 @@ def bearing():
     """Sommerfeld numbers and attitudes of the film, from Reynolds' equation."""
     source = "Butenschön 1976, DIN 31652"
     for ratio, eps, number, angle in BEARING:
-        at, found = f"B/D {ratio:g}, ε {eps:g}", reynolds(eps, ratio)
-        size = eps * math.hypot(*found)
+        at, normal, across = f"B/D {ratio:g}, ε {eps:g}", *reynolds(eps, ratio)
+        size = eps * math.hypot(normal, across)
         yield row("Journal bearing", f"So at {at}", "", number, size, 4e-3 * number, source)
         if angle:
-            turned = math.degrees(math.atan2(found.across, found.normal))
+            turned = math.degrees(math.atan2(across, normal))
             yield row("Journal bearing", f"attitude at {at}", "°", angle, turned, 0.1, source)
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from compressor.cases.case import Case, CaseError
+from compressor.cases.case import Case
 from compressor.physics.contact_laws import power, rise
 from compressor.physics.mechanism import corner_force
 from compressor.solve.si_record import record
@@ -28,11 +28,6 @@ def test_a_guide_has_keys_of_its_own_and_else_those_of_the_joints():
     assert shape["guide_stiffness"] == pytest.approx(3.36e5 * 1000.0**2)
     assert shape["exponent"] == 1.5
     assert math.isclose(corner_force(1e-3, 0.0, shape)[0], 3.36e5, rel_tol=1e-12)
-
-
-def test_a_restitution_of_the_guide_is_refused_with_what_serves_in_its_place():
-    with pytest.raises(CaseError, match=r"guide\.restitution.*damps by damping_N_s_per_mm alone"):
-        Case.from_values({"guide": {"clearance_mm": 0.1, "restitution": 0.5}})
 
 
 @pytest.mark.parametrize("law", [

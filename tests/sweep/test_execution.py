@@ -569,9 +569,9 @@ def test_helpers_of_joblib_that_are_killed_cost_nothing():
     """Beside workers, loky and Python start processes that remove what is left behind."""
     words = [sys.executable, "-c", HELPERS]
     done = subprocess.run(words, capture_output=True, text=True, timeout=120)
-    said = done.stdout.splitlines()
-    assert "True" in said, done.stderr[-2000:]
-    assert "ended" in said
+    # two threads write: one word may stand behind another in a line
+    assert "True" in done.stdout, done.stderr[-2000:]
+    assert "ended" in done.stdout
 
 
 STARTS = """

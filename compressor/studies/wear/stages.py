@@ -19,6 +19,7 @@ from compressor.analysis import interpolate_hours, rubbing_work, settled_part, s
 from compressor.cases import MODEL_VERSION, Case, CaseError, Output, PerJoint, Wear, to_si
 from compressor.metrics import JOINTS, METRICS
 from compressor.program import PROGRAM
+from compressor.reasons import Reason
 from compressor.solve import simulate
 from compressor.store import Folder, StoreError, read_dataset, write_dataset
 
@@ -122,7 +123,7 @@ def follow_stage(machine: Worn, hours: float, clearances: np.ndarray) -> Stage:
         run = simulate(machine.case_at(clearances))
         reason, detail = str(run["reason"].values), str(run.attrs.get("detail", ""))
     except CaseError as error:  # such as clearances that exceed the pins
-        reason, detail = "invalid_input", str(error)
+        reason, detail = Reason.INVALID_INPUT, str(error)
     shapes = {name: [len(JOINTS)] * len(METRICS[name].dims) for name in SHOWN}
     found = {name: run[name].values if name in run else math.nan for name in SHOWN}
     work, turn = np.full(len(JOINTS), math.nan), math.nan
