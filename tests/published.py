@@ -217,9 +217,9 @@ def rod_apart(duration):
     case = Case.resolve({**SLIDER_CRANK, "solve": solve})
     state = np.zeros(len(state_names(record(case))))
     state[:8] = np.concatenate((POSITION[2:], RATE[2:]))
-    run = with_series(case, run_at_tolerance(case, case.rtol, math.inf, True, None, state))[
-        1
-    ].variables
+    solution = run_at_tolerance(case, case.rtol, math.inf, True, None, state)
+    found, variables = with_series(case, solution)
+    run = found.table(variables).variables
 
     other = integrate_simeon(run["time"].values, 1.0, 1e-11)
     rows = {"displacement": 1, "rod_bend": 2, "rod_stretch": 5, "velocity": 7}

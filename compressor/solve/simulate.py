@@ -141,7 +141,8 @@ def simulate(case: Case) -> "xr.Dataset":
     >>> run.contact_force.dims, run.contact_force.attrs["units"]
     (('time', 'joint', 'axis'), 'N')
     """
-    table = observe(require_case(case))[1]
+    found, variables = observe(require_case(case))
+    table = found.table(variables)
     return as_dataset(DatasetParts(table.variables | word_variables(table.attrs), table.attrs))
 
 
@@ -152,28 +153,28 @@ def as_dataset(table: DatasetParts) -> "xr.Dataset":
     return xr.Dataset(dict(table.variables), attrs=dict(table.attrs))
 
 
-def observe(case: Case) -> tuple[Outcome, DatasetParts]:
-    """Simulate one case; return its `Outcome` and what its Dataset is made of (see `simulate`)."""
+def observe(case: Case) -> tuple[Outcome, Variables]:
+    """Simulate one case; return its `Outcome` and its time series (see `simulate`)."""
     if refused := refused_outcome(case):
-        return refused, refused.table({})
+        return refused, {}
     return with_series(case, solve(case))
 
 
-def with_series(case: Case, solution: Solution) -> tuple[Outcome, DatasetParts]:
-    """Return the `Outcome` of a solution and what its Dataset is made of.
+def with_series(case: Case, solution: Solution) -> tuple[Outcome, Variables]:
+    """Return the `Outcome` of a solution, with the metrics of body and sensor, and its time series.
 
-    Metrics of body and sensor are part of both, time series with `output.keep: series`.
+    There are none of a case that keeps metrics alone.
     """
     result, keeps_series = outcome(case, solution), case.output.keep == "series"
     variables: Variables = {}
     if not (keeps_series or case.body):
-        return result, result.table({})
+        return result, {}
     rows = rows_of(solution.p, solution.trajectory)
     if case.body:
         variables, numbers = foundation(case, solution, rows)
         for name, value in numbers.items():
             result.numbers[name] = value
-    return result, result.table(series(case, solution, rows) | variables if keeps_series else {})
+    return result, series(case, solution, rows) | variables if keeps_series else {}
 
 
 def measure(case: Case) -> Outcome:

@@ -261,7 +261,9 @@ def run_timed(case: Case) -> tuple[float, int, bool]:
     began = time.process_time()
     from compressor.solve import observe  # needs numba: only to simulate
 
-    found, table = observe(case)
-    size = len(series_file(table, case.output)[1]) if case.output.keep == "series" else 0
+    found, variables = observe(case)
+    size = 0
+    if case.output.keep == "series":
+        size = len(series_file(found.table(variables), case.output)[1])
     seconds = time.process_time() - began
     return seconds, size, not math.isnan(float(found.numbers["predictability_horizon"]))

@@ -27,9 +27,10 @@ def run_job(place: Path | None, case: Case) -> Outcome | Carried | StoreError:
     from compressor.solve import observe  # needs numba: only to simulate
 
     with ignore_warnings():  # a solver's remarks; what matters is in the result
-        found, dataset = observe(case)
+        found, variables = observe(case)
     if case.output.keep == "metrics" or found.reason == Reason.INVALID_INPUT:
         return found
+    dataset = found.table(variables)
     if place is None:
         file, data = series_file(dataset, case.output)
         return Carried(replace(found, series=file), data)

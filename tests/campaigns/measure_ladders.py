@@ -48,7 +48,8 @@ def alone(case):
     """The Dataset of one run at the case's own tolerance, whatever the energy audit says of it."""
     found = run_at_tolerance(case, case.rtol, case.solve.timeout_s, sampled=True)
     assert not found.reason, found.detail
-    table = with_series(case, found)[1]
+    outcome, variables = with_series(case, found)
+    table = outcome.table(variables)
     return xr.Dataset(table.variables, attrs=table.attrs)
 
 

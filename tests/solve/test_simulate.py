@@ -190,7 +190,7 @@ def test_a_dataset_is_as_xarray_makes_it_and_shares_nothing_with_the_next():
     """Also after one of the same shapes, and where only the time grid differs."""
     for values in ({}, {"machine": {"speed_rpm": 400}}, {"machine": {"speed_rpm": 400}}, {}):
         case = Case.from_values({**values, "solve": SHORT})
-        table, next_table = observe(case)[1], observe(case)[1]
+        table, next_table = (found.table(of) for found, of in (observe(case), observe(case)))
         expected = xr.Dataset(table.variables, attrs=table.attrs).copy(deep=True)
         made, other = as_dataset(table), as_dataset(next_table)
         other["peak_acceleration"][...] = math.nan

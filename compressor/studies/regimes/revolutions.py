@@ -139,7 +139,8 @@ def run_with_series(
     of = bare_case(case, span.revolutions)
     of = replace(of, solve=replace(of.solve, settle_rev=1.0))
     run = run_at_tolerance(of, case.rtol, span.timeout, True, None, state)
-    return with_series(of, run)[1], run.reason, run.detail
+    found, variables = with_series(of, run)
+    return found.table(variables), run.reason, run.detail
 
 
 def bare_case(case: Case, count: int) -> Case:
