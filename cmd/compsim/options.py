@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 MAX_JOBS = 10_000
 
 
-class Place(click.Path):
+class GivenPath(click.Path):
     """A path; an empty word, as of a shell variable that is not set, is none."""
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
@@ -22,14 +22,14 @@ class Place(click.Path):
         return super().convert(value, param, ctx)
 
 
-FILE, FOLDER = Place(readable=False), Place(file_okay=False, readable=False)
+FILE, FOLDER = GivenPath(readable=False), GivenPath(file_okay=False, readable=False)
 
 config = click.argument("config", metavar="CONFIG", type=FILE)
 configs = click.argument("configs", nargs=-1, required=True, metavar="CONFIG...", type=FILE)
 job = click.argument("words", nargs=-1, required=True, metavar="JOB | STUDY [AXIS=VALUE]...")
 results = click.option(
     "-r", "--results", "folder", default="results", show_default=True, type=FOLDER,
-    metavar="FOLDER",    help="Use this folder of results.",
+    metavar="FOLDER", help="Use this folder of results.",
 )  # fmt: skip
 set_keys = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE",

@@ -44,8 +44,8 @@ from compressor.cases.parameter import (
     CaseError,
     Problem,
     Targets,
-    checked,
     first_tolerance,
+    make_group,
     quote_value,
 )
 from compressor.cases.swept import FORMS, PAIRS
@@ -73,7 +73,7 @@ NO_SWEEP = (
 )
 
 
-@checked
+@make_group
 class Case(Settings):
     """One fully resolved simulation: every value of a case file, in the case file's units.
 

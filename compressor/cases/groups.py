@@ -30,10 +30,10 @@ from compressor.cases.parameter import (
     STIFFNESS,
     Plausible,
     by_law,
-    checked,
     choice,
     document_fields,
     from_to,
+    make_group,
     or_own,
     parameter,
     times,
@@ -63,7 +63,7 @@ BEARING_LENGTH = Plausible(
 
 
 @document_fields
-@checked
+@make_group
 class PerJoint:
     """The radial clearance of each joint, mm; 0 where the joint is ideal.
 
@@ -86,7 +86,7 @@ class PerJoint:
 
 
 @document_fields
-@checked
+@make_group
 class HealthyClearance:
     """The radial clearance up to which a joint counts as sound, mm; 0: a worn one has any.
 
@@ -110,7 +110,7 @@ class HealthyClearance:
 
 
 @document_fields
-@checked
+@make_group
 class Offset:
     """How far a journal starts from its bore's centre, mm; a case's `initial_offset_mm`.
 
@@ -141,7 +141,7 @@ class Offset:
 
 
 @document_fields
-@checked
+@make_group
 class Machine:
     """The mechanism and its masses; a case's `machine`.
 
@@ -264,7 +264,7 @@ AS_THE_OTHER = {
 
 
 @document_fields
-@checked
+@make_group
 class Gas:
     """The gas load, an ideal cycle (Eq. 13); a case's `gas`, read with `load: gas`.
 
@@ -455,7 +455,7 @@ class Gas:
 
 
 @document_fields
-@checked
+@make_group
 class Spring:
     """The spring load, a spring between piston and cam follower (§2.2); a case's `spring`.
 
@@ -476,7 +476,7 @@ class Spring:
 
 
 @document_fields
-@checked
+@make_group
 class Contact:
     """The normal contact law of both joints; a case's `contact`.
 
@@ -595,7 +595,7 @@ class Contact:
 
 
 @document_fields
-@checked
+@make_group
 class Friction:
     """Friction at the joints; a case's `friction`, None without.
 
@@ -666,7 +666,7 @@ class Friction:
 
 
 @document_fields
-@checked
+@make_group
 class Solve:
     """How far, how finely and how exactly to integrate; a case's `solve`.
 
@@ -746,7 +746,7 @@ class Solve:
 
 
 @document_fields
-@checked
+@make_group
 class Output:
     """What is stored of a job; a case's `output`. Not part of the job's identity.
 

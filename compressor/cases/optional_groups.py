@@ -18,10 +18,10 @@ from compressor.cases.parameter import (
     STEADY,
     THRESHOLD,
     Plausible,
-    checked,
     choice,
     document_fields,
     from_to,
+    make_group,
     parameter,
     times,
 )
@@ -30,7 +30,7 @@ MIN_RATIO, MAX_RATIO = 0.125, 1.0  # of a bearing's length and diameter
 
 
 @document_fields
-@checked
+@make_group
 class Lubricant:
     """An oil film in the joints that have clearance; a case's `lubricant`, None: they run dry.
 
@@ -84,7 +84,7 @@ PROGRAM = "program"
 
 
 @document_fields
-@checked
+@make_group
 class Guide:
     """The crosshead's guide; a case's `guide`, by default None: ideal, without friction.
 
@@ -146,7 +146,7 @@ class Guide:
 
 
 @document_fields
-@checked
+@make_group
 class Drive:
     """A motor whose speed gives way; a case's `drive`, by default None: steady speed.
 
@@ -179,7 +179,7 @@ class Drive:
 
 
 @document_fields
-@checked
+@make_group
 class Rod:
     """An elastic rod; a case's `rod`, by default None: rigid.
 
@@ -225,7 +225,7 @@ BODIES_PER_CASING = 25.0  # mass of the body over the modal mass of a casing mod
 
 
 @document_fields
-@checked
+@make_group
 class Body:
     """The compressor's rigid body on its foundation; a case's `body`, None by default.
 
@@ -320,7 +320,7 @@ class Body:
 
 
 @document_fields
-@checked
+@make_group
 class Sensor:
     """An accelerometer on the body, with a tacho; a case's `sensor`, None by default.
 
@@ -402,7 +402,7 @@ value = partial(parameter, identity=False)  # of no single run
 
 
 @document_fields
-@checked
+@make_group
 class Wear:
     """How the rod's bores wear in joints with clearance; a case's `wear`, None by default.
 

@@ -514,11 +514,11 @@ def problems_of(
 if TYPE_CHECKING:
 
     @dataclass_transform(frozen_default=True, field_specifiers=(field,))
-    def checked(cls: type[Group]) -> type[Group]: ...
+    def make_group(cls: type[Group]) -> type[Group]: ...
 
 else:
 
-    def checked(cls):
+    def make_group(cls):
         """Return a group of keys as a frozen dataclass that pydantic checks as it is made.
 
         A group of wrong values raises CaseError with everything that is wrong.

@@ -34,8 +34,8 @@ from compressor.cases.parameter import (
     RUBBING,
     SPRING,
     Parameter,
-    checked,
     choice,
+    make_group,
 )
 from compressor.metrics import JOINTS
 
@@ -61,7 +61,7 @@ def group(of: type, *read: str, word: bool | None = None) -> Any:
     return field(default=None if word else of(), metadata=metadata)
 
 
-@checked
+@make_group
 class Settings:
     """The values of one simulation in the case file's units, and the times that follow from them.
 
