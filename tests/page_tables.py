@@ -1211,11 +1211,11 @@ def regimes_table():
     ]  # fmt: skip
     head = ["direction", "clearance, mm", "values", "motion", "Poincaré points",
             "Lyapunov exponent, 1/rev", "its error"]  # fmt: skip
-    return markdown(head, lines)
-
-
-def regimes_words():
-    return kept("regimes.json")["said"] + "\n"
+    apart = [f"{row['value']:.4g}" for row in found["differ"]]
+    sure = [f"{row['value']:.4g}" for row in found["differ"] if row["confirmed"]]
+    words = ("Up and down differ at (mm)", apart), ("Two motions are confirmed at (mm)", sure)
+    ends = [f"{text}: {', '.join(values) or 'no value'}." for text, values in words]
+    return markdown(head, lines) + "\n" + " ".join(ends) + "\n"
 
 
 def span_of(values, form):
@@ -1297,7 +1297,7 @@ CAMPAIGNS = {
     "claims": ("Which of the paper's claims hold?",
                {"claims": claims_table, "machines": claims_words}),
     "regimes": ("How does the motion change with the clearance?",
-                {"followed": regimes_words, "regimes": regimes_table}),
+                {"regimes": regimes_table}),
     "wear": ("How accurate are hours until a limit?", {"wear": wear_table}),
     "diagnosis": ("Does a classifier find the worn joint?",
                   {"diagnosis": diagnosis_table, "confusion": confusion_table,

@@ -41,7 +41,7 @@ MAY_IMPORT = {
 PACKAGES = (
     "cases", "physics", "vibration", "solve", "store", "sweep", "analysis", "report", "studies",
 )  # fmt: skip
-OLD_PLACES = {"compressor.regimes", "compressor.wear"}  # where scripts may import from as before
+OLD_PLACES = {"compressor.wear"}  # where scripts may import from as before
 LIBRARIES = {  # library -> the modules that may import it
     "numba": {"compressor.physics._jit"},
     # designs, sparse systems, integrators, Student's t, splines, root finder and minimiser, spectra

@@ -60,9 +60,7 @@ def claims(
     from compressor.sweep import cores
 
     paths = configs or tuple(str(templates()[name].path) for name in EXAMPLES)
-    studies = load_studies(
-        *paths, overrides=overrides, max_jobs=max_jobs, follow=False, variants=cases_judged
-    )
+    studies = load_studies(*paths, overrides=overrides, max_jobs=max_jobs, variants=cases_judged)
     searchable = [study for study in studies if study.axes and all(a.spread for a in study.axes)]
     if generations and not searchable:
         raise click.UsageError(

@@ -28,6 +28,7 @@ from compsim import (
     explain,
     export,
     find,
+    follow,
     init,
     plan,
     plot,
@@ -105,7 +106,7 @@ VERBS = {  # by their headings in `compsim --help`
     "Read what is stored": (status.status, show.show, plot.plot, export.export, verify.verify),
     "Study a machine or the model": (
         claims.claims, wear.wear, tradeoff.tradeoff, explain.explain, stress.stress, find.find,
-        alarms.alarms,
+        follow.follow, alarms.alarms,
     ),
     "Work with measured records": (
         diagnosis.dataset, diagnosis.identify, compare.compare, calibrate.calibrate,

@@ -57,7 +57,7 @@ def explain(
     check_named(named)
     from compressor.cases import load_studies
 
-    studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs, follow=False)
+    studies = load_studies(*configs, overrides=overrides, max_jobs=max_jobs)
     screen.caution(studies)
     if models:
         return explain_models(studies, folder, named, overrides, as_json)

@@ -11,7 +11,6 @@ from compressor.digits import plural
 from compressor.program import duration
 from compsim import options, screen
 from compsim.progress import ProgressReporter
-from compsim.regimes import ahead, ahead_lines
 
 if TYPE_CHECKING:
     from compressor.sweep import Forecast
@@ -46,8 +45,7 @@ def plan(
     compsim plan wear.yaml --only 'clearance_mm < 0.2'
 
     Jobs that are stored already are not run again. Times up to a dozen jobs of each study, drawn
-    over its design, for some seconds; stores nothing. Of a file with `regimes` it only counts
-    chains and values.
+    over its design, for some seconds; stores nothing.
     """
     from compressor.cases import load_studies
     from compressor.sweep import cores
@@ -57,16 +55,6 @@ def plan(
             *configs, overrides=overrides, max_jobs=max_jobs, only=only, progress=progress
         )
     screen.caution(studies, None)
-    chains = ahead([study for study in studies if study.request], folder)
-    studies = [study for study in studies if not study.request]
-    more = {"regimes": [one._asdict() for one in chains]} if chains else {}
-    if not as_json:
-        for line in ahead_lines(chains):
-            screen.print_text(line)
-    if not studies:
-        if as_json:
-            screen.print_text(json.dumps(more, indent=1))
-        return screen.DONE
     screen.report_changes(studies, folder)
     screen.report_machines(studies)
     from compressor.analysis import describe_machine
@@ -76,13 +64,8 @@ def plan(
     workers = jobs or cores()
     if as_json:
         machines = {one.name: dataclasses.asdict(describe_machine(one)) for one in studies}
-        whole = (
-            dataclasses.asdict(found.with_times(workers, screen.say))
-            | more
-            | {"machines": machines}
-        )
-        whole = screen.jsonable(whole)
-        screen.print_text(json.dumps(whole, indent=1))
+        whole = dataclasses.asdict(found.with_times(workers, screen.say)) | {"machines": machines}
+        screen.print_text(json.dumps(screen.jsonable(whole), indent=1))
         return screen.DONE
     width = max(len(part.study) for part in found.counts.studies)
     for part in found.counts.studies:

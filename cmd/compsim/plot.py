@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 import click
 
 from compressor.program import did_you_mean
-from compressor.studies import FOLLOWED_FIGURES, find_followed
 from compsim import options, screen
 
 if TYPE_CHECKING:
@@ -14,9 +13,7 @@ if TYPE_CHECKING:
 FIGURES = (
     "analyst", "loads", "signals", "cards", "spectra", "orbits", "modes", "impacts",
     "cycles", "segments", "waterfall", "map",
-    *FOLLOWED_FIGURES,
 )  # fmt: skip
-MORE = f"; of a machine that was followed {', '.join(FOLLOWED_FIGURES)}"
 KINDS = {"png": ("png",), "svg": ("svg",), "both": ("png", "svg")}
 
 
@@ -37,7 +34,7 @@ def figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]
 @click.option(
     "--what", default="all", show_default=True, callback=figures, metavar="NAME,...",
     help="Draw only these figures: of a job analyst, loads, signals, cards, spectra, orbits, "
-    f"modes, impacts; of a study cycles, segments, waterfall, map{MORE}.",
+    "modes, impacts; of a study cycles, segments, waterfall, map.",
 )  # fmt: skip
 @options.output("plots", "Write the figures into this folder.")
 @click.option("--format", "form", type=click.Choice([*KINDS]), default="png", show_default=True,
@@ -82,27 +79,15 @@ def plot(
     above the rod load, with reversals, valve events and impacts), its signals over crank angle,
     spectra, orbits, contact modes and impacts, beside the same machine without clearance, and cards
     of the gas in its cylinder; a study's vibration over crank angle, order spectra and contact
-    modes over a swept axis; a machine that was followed along a parameter (`regimes:`): its
-    bifurcation diagram, Poincaré sections, and a map of periods over two parameters. Nothing but
-    what is stored is needed.
+    modes over a swept axis. Nothing but what is stored is needed.
     """
-    name, *values = words
     from compressor.store import writable_folder
 
     writable_folder(output, make=False)
     from compressor.report import PlotChoice, write_plots
 
     choice = PlotChoice(what, over, at, limit, KINDS[form], units or "usual")
-    if name in find_followed(folder):
-        if values:
-            listed = " ".join(f"--at {value}" for value in values)
-            raise click.UsageError(f"{name} is a study of regimes, without jobs: give {listed}")
-        from compressor.studies.regimes.plots import write
-
-        drawn = write(folder, name, output, choice)
-    else:
-        drawn = write_plots(folder, output, words, choice)
-    for found in drawn:
+    for found in write_plots(folder, output, words, choice):
         screen.print_text(" ".join(map(str, found.paths)))
         screen.print_text(f"  {found.caption}")
     return screen.DONE

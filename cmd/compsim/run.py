@@ -14,7 +14,6 @@ from compressor.digits import plural
 from compressor.program import duration, printable
 from compsim import options, screen
 from compsim.progress import ProgressReporter
-from compsim.regimes import run_chains
 
 if TYPE_CHECKING:
     from compressor.cases import Study
@@ -74,8 +73,6 @@ def run(
     compsim run machine.yaml
     compsim run wear.yaml --set machine.speed_rpm=300 -r results-300
 
-    A file with `regimes` is followed in chains along its key, in regimes/STUDY of the folder.
-
     Jobs that are stored already are not run again, so a run that was interrupted goes on where it
     ended. A summary line for each study goes to stdout.
     """
@@ -92,20 +89,8 @@ def run(
         selected = sum(len(study.selected) for study in studies)
         screen.say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
     screen.caution(studies)
-    chains = [study for study in studies if study.request]
-    studies = [study for study in studies if not study.request]
-    if chains and scheduler:
-        raise click.UsageError("regimes run in processes here: leave --backend dask out")
-    code, workers = screen.DONE, jobs or cores()
-    if studies:
-        how = Options(context.obj, bool(rerun), part, wait=wait)
-        code = run_jobs(studies, folder, workers, how, scheduler, quiet)
-    if chains:
-        if not quiet:
-            screen.report_machines(chains)
-        shards = [study.shard(*part) if part else study for study in chains]
-        code = max(code, run_chains(shards, folder, workers, bool(rerun), quiet))
-    return code
+    how = Options(context.obj, bool(rerun), part, wait=wait)
+    return run_jobs(studies, folder, jobs or cores(), how, scheduler, quiet)
 
 
 def run_jobs(

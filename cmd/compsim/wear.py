@@ -51,7 +51,7 @@ def wear(
     from compressor.sweep import cores
 
     with ProgressReporter(quiet, "cases read") as progress:
-        studies = load_studies(*configs, overrides=overrides, follow=False, progress=progress)
+        studies = load_studies(*configs, overrides=overrides, progress=progress)
     check_wear(studies)
     with ProgressReporter(quiet, "machines", folder=folder) as progress:
         summary = run_wear(studies, folder, jobs or cores(), progress, rerun)

@@ -7,10 +7,8 @@ from compressor.analysis.contacts import (
     MODES,
     OILED_MODES,
     angle_modes,
-    contact_modes,
     impacts,
     joints_with_clearance,
-    mode_shares,
 )
 from compressor.analysis.cycle import read_cycle, read_loads
 from compressor.analysis.cylinder import cylinder_words, end_states
@@ -26,7 +24,6 @@ from compressor.analysis.margins import mean_peak
 from compressor.analysis.plot_captions import (
     PLOT_CAPTIONS,
     SweptRow,
-    plural,
     row_modes_words,
     rows_modes,
 )

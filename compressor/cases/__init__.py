@@ -11,7 +11,6 @@ from compressor.cases.case import (
 from compressor.cases.checks import (
     DOUBLES,
     PER_PART,
-    SHORTHANDS,
     phrase_of,
     row_of,
     stands_for,
@@ -37,7 +36,6 @@ from compressor.cases.groups import (
     Spring,
 )
 from compressor.cases.json_schema import case_schema
-from compressor.cases.keys import Leaves, covers
 from compressor.cases.laws import CYLINDRICAL, READ_BY, law_of
 from compressor.cases.load import load_cases, load_studies
 from compressor.cases.materials import joint_stiffness, paper_notes
@@ -47,12 +45,10 @@ from compressor.cases.parameter import (
     IMPLAUSIBLE,
     TIGHTEST,
     CaseError,
-    Parameter,
-    quote_value,
     to_si,
 )
-from compressor.cases.study import Axis, Study, StudyRequest, points
-from compressor.cases.swept import between, design
+from compressor.cases.study import Axis, Study, points
+from compressor.cases.swept import design
 from compressor.cases.table import OF_JOINTS, name_worn_joint, table
 from compressor.cases.text_table import open_text_table
-from compressor.cases.yaml_reader import CaseFileError, FileProblem, Node, Place
+from compressor.cases.yaml_reader import CaseFileError

@@ -2,14 +2,11 @@
 
 from compressor.report.figures.contours import contour_area, contour_lines
 from compressor.report.figures.drawing import (
-    WAYS,
     ColorScale,
     Drawing,
     Note,
     Panel,
-    Scale,
     Trace,
-    Way,
     as_csv,
     box,
     entry,
@@ -19,7 +16,6 @@ from compressor.report.figures.drawing import (
     midway,
     share_scales,
 )
-from compressor.report.figures.job import MODE_COLORS, UNSEEN, mode_entries, stack_modes
 from compressor.report.figures.pictures import render
 from compressor.report.figures.style import (
     BLACK,
@@ -39,7 +35,6 @@ from compressor.report.figures.sweep_data import (
     Measure,
     measures,
     positions,
-    shown_value,
 )
 from compressor.report.page import (
     Add,
@@ -55,10 +50,6 @@ from compressor.report.page import (
 )
 from compressor.report.plots import (
     PlotChoice,
-    PlotError,
-    Plotted,
-    choose_figures,
-    publish_drawings,
     title_figure,
     write_plots,
 )

@@ -27,5 +27,5 @@ from compressor.solve.run_metrics import (
 from compressor.solve.scipy_driver import LOCAL
 from compressor.solve.series import SIGNALS, signals_of_scene
 from compressor.solve.si_record import is_ideal, natural_sizes, record, stiffness_of
-from compressor.solve.simulate import measure, observe, simulate, with_series
+from compressor.solve.simulate import measure, observe, simulate
 from compressor.solve.solution import solve

@@ -283,10 +283,9 @@ def discard_leftovers(folder: Folder) -> None:
 MAX_LOOKED_AT = 1000  # entries of a folder in which results are sought
 MAX_NAMES = 5  # that are listed
 MAKE = "make one: compsim run CONFIG..."
-# results of studies without jobs -> what they are, with names for {}, and the command that reads
-# them
+# results of studies without jobs -> what they are, and the command that reads them
 STUDY_RESULTS = {
-    "regimes/*/study.json": ("machines that were followed: {}", "compsim plot STUDY draws one"),
+    "follow/*.nc": ("how machines move along a key", "compsim follow CONFIG --over ... reports it"),
     "wear/*.nc": ("how machines have worn", "compsim wear CONFIG... reports them"),
 }
 
@@ -313,8 +312,7 @@ def no_results(folder: Folder) -> WrongName:
     if not place.exists():
         return WrongName(folder, "there is no such folder of results", remedy_for(place))
     for pattern, (content, remedy) in STUDY_RESULTS.items():
-        if found := sorted(place.glob(pattern)):
-            content = content.format(list_few([path.parent.name for path in found]))
+        if any(place.glob(pattern)):
             return WrongName(folder, f"holds no study of jobs, only {content}", remedy)
     return WrongName(folder, "holds no study", remedy_for(place))
 

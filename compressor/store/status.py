@@ -231,7 +231,12 @@ def _outside_of_study(study: StoredStudy) -> dict[str, str]:
 FORMER_REMEDY = "delete it: its jobs stay stored"
 ROWS_REMEDY = "bring the missing files of rows, or run their case files, which computes them again"
 STUDY_REMEDY = "run its case file again, which recomputes no job"
-STUDY_FILES = ("regimes/*/*.nc", "wear/*.nc", "models/*.nc")  # of studies, beside jobs
+STUDY_FILES = (
+    "follow/*.nc",
+    "follow/chains/*.nc",
+    "wear/*.nc",
+    "models/*.nc",
+)  # of studies, beside jobs
 STUDY_FILE_REMEDY = "delete it: the command that made it makes it again"
 
 

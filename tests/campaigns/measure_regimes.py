@@ -13,20 +13,17 @@ import numpy as np
 from measure_accuracy import provenance
 
 from compressor.cases.examples import example
-from compressor.cases.load import load_studies
 from compressor.report.figures.pictures import render
-from compressor.studies.regimes.captions import bifurcation
-from compressor.studies.regimes.dataset import open_regimes
-from compressor.studies.regimes.figures import draw_bifurcation
-from compressor.studies.regimes.run import run_regimes
+from compressor.studies.follow.figure import draw_followed, table
+from compressor.studies.follow.follow import follow, load_values, read_over
 
 FOLDER = "results"
+ALONG = read_over("clearance_mm=0.01:1:80", log=True, both=True)
 
 
 def main(target):
-    (study,) = load_studies(example("regimes"), follow=True)
-    run_regimes([study], FOLDER, 2, lambda *told: None)
-    data = open_regimes(FOLDER, study.name)
+    study = load_values(example("regimes"), ALONG)
+    data = follow(study, ALONG, FOLDER, 2, lambda *told: None).data.isel(job=0)
     over = data.attrs["over"]
     rows = []
     for direction in data["direction"].values.tolist():
@@ -40,23 +37,20 @@ def main(target):
             })  # fmt: skip
     found = {
         **provenance("make regimes"), "over": over, "rows": rows, "differ": differing(data),
-        "said": bifurcation(data),
     }  # fmt: skip
     Path(target).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    Path(target).with_suffix(".svg").write_bytes(render(draw_bifurcation(data), "svg"))
-    print(found["said"])
+    Path(target).with_suffix(".svg").write_bytes(render(draw_followed(data), "svg"))
+    print(*table(data), sep="\n")
 
 
 def differing(data):
-    """Where up and down differ, and how many motions further simulation reached there."""
+    """Where up and down differ, and whether further simulation reached two motions there."""
     some = data.isel({data.attrs["over"]: data["differs"].values == 1})
+    values, confirmed = some[data.attrs["over"]].values, some["confirmed"].values
     return [
-        {"value": value.item(), "confirmed": bool(yes), "motions": int(motions)}
-        for value, yes, motions in zip(
-            some[data.attrs["over"]].values, some["confirmed"].values, some["motions"].values,
-            strict=True,
-        )
-    ]  # fmt: skip
+        {"value": value.item(), "confirmed": bool(yes)}
+        for value, yes in zip(values, confirmed, strict=True)
+    ]
 
 
 def none(value):

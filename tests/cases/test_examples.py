@@ -22,7 +22,7 @@ NAMES = sorted(path.stem for path in FOLDER.glob("*.yaml"))
 def test_examples_can_be_run(name):
     (study,) = load_studies(example(name), variants=cases_judged if name in EXAMPLES else itself)
     assert study.name == name
-    (said,) = re.findall(r"^(\d+) (?:jobs|machines|chain)\b", templates()[name].jobs)
+    (said,) = re.findall(r"^(\d+) (?:jobs|machines?)\b", templates()[name].jobs)
     assert study.jobs == int(said)
 
 
@@ -45,7 +45,7 @@ def test_templates_come_first_and_say_what_they_answer():
         assert one.question.count("?") == 1
         assert re.search(r"seconds|minutes|hour|\d s\b", one.jobs)
         verb = one.next.split()[1]
-        assert verb in ("run", "claims", "wear")
+        assert verb in ("run", "claims", "wear", "follow")
         assert (verb == "wear") is ("\nwear:" in one.path.read_text())
         assert one.next.startswith(f"compsim {verb} {one.name}.yaml")
 
@@ -55,7 +55,11 @@ def test_templates_come_first_and_say_what_they_answer():
     [
         ("wear", "bearing.yaml", "compsim run bearing.yaml; compsim report"),
         ("diagnosis", "a/my.yaml", "compsim run a/my.yaml; compsim dataset my -o faults"),
-        ("regimes", "rise.yaml", "compsim run rise.yaml; compsim plot rise"),
+        (
+            "regimes",
+            "rise.yaml",
+            "compsim follow rise.yaml --over clearance_mm=0.01:1:80 --log --both",
+        ),
         ("claims", "our masses.yaml", "compsim claims 'our masses.yaml'"),
     ],
 )

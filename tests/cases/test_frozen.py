@@ -122,7 +122,7 @@ def random_values(seed):
 
 def kept_of(path):
     """Jobs, axes and keys of a file of ours."""
-    claims = path.stem in ("assumptions", "regimes") or "variants" in path.read_text("utf-8")
+    claims = path.stem == "assumptions" or "variants" in path.read_text("utf-8")
     (study,) = load_studies(path, max_jobs=10**6, **({"variants": cases_judged} if claims else {}))
     keys = hashlib.sha256("".join(study.keys).encode()).hexdigest()[:20]
     return {"axes": {axis.key: len(axis.values) for axis in study.axes},

@@ -32,7 +32,6 @@ CASES = {
     "again/wear.yaml": "load: none\n",
     "my case.yaml": "load: none\n",
     "map.yaml": "machine: {rod_mass_kg: [3, 4.7], reciprocating_mass_kg: [10, 14]}\n",
-    "chain.yaml": "joint: both\nregimes: {over: clearance_mm, from: 0.1, to: 0.2, n: 2}\n",
 }
 # a command, and what its answer must contain, in this order
 MISTAKES = [
@@ -118,14 +117,15 @@ MISTAKES = [
     ("tradeoff good.yaml --repeats 0", "0 is not in the range"),
     ("tradeoff good.yaml --budget 0", "0.0 is not in the range"),
     ("tradeoff good.yaml -o good.yaml/deeper", "good.yaml: is a file, where a folder is needed"),
-    ("explain chain.yaml", "chain.yaml:2:1: regimes: only `compsim run`"),
-    ("tradeoff chain.yaml", "chain.yaml:2:1: regimes: only `compsim run`"),
-    ("find chain.yaml --over machine.speed_rpm=300:400 --greatest rms_acceleration",
-     "regimes: only `compsim run`"),
+    ("follow good.yaml", "Missing option '--over'"),
+    ("follow good.yaml --over clearance_mm=0.1:0.2", "write KEY=LOW:HIGH:N, such as clearance_mm="),
+    ("follow good.yaml --over sped_rpm=1:2:3", "--over sped_rpm=1:2:3: sped_rpm is no key of a num",
+     "did you mean machine.speed_rpm?"),
+    ("follow again/wear.yaml --over machine.speed_rpm=300:400:3", "again/wear.yaml: no joint has",
+     "set joint and clearance_mm"),
     ("run good.yaml --backend dask", "needs --scheduler ADDRESS, such as tcp://host:8786"),
     ("run good.yaml --backend dask --scheduler tcp://a:1 -j 2", "-j counts processes here"),
     ("run good.yaml --scheduler tcp://a:1", "--scheduler goes with --backend dask"),
-    ("run chain.yaml --backend dask --scheduler tcp://x:1", "regimes run in processes here"),
     ("claims map.yaml --search 2", "--search needs a CONFIG whose keys are drawn"),
     ("claims map.yaml --set machine.rod_mas_kg=3", "did you mean"),
     ("dataset wear -o faults", "write `body: true` and `sensor: {length_rev: 11}` into"),

@@ -170,15 +170,6 @@ def test_a_job_is_named_as_in_show(plot, folder, capsys, unpainted):
     assert shown == key(folder, "worn", 3)
 
 
-def test_a_study_of_chains_has_no_jobs(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "reg/regimes/reg").mkdir(parents=True)
-    (tmp_path / "reg/regimes/reg/study.json").touch()
-    assert cli.main(["plot", "reg", "-r", "reg", "speed_rpm=400"]) == 2
-    problem = "reg is a study of regimes, without jobs: give --at speed_rpm=400"
-    assert problem in capsys.readouterr().err
-
-
 def test_chosen_figures_in_both_formats(plot, folder):
     mine = key(folder, "worn")
     code, found, _ = plot(mine, "--what", "orbits,impacts", "--format", "both", "-o", "some")

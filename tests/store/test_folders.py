@@ -3,7 +3,6 @@
 import pytest
 
 from compressor.store.files import WrongName, holds_results, no_results, writable_folder
-from compressor.studies import find_followed
 
 
 @pytest.fixture
@@ -13,8 +12,8 @@ def place(tmp_path, monkeypatch):
     for name in ("results/studies/a.json", "deep/wear/studies/b.json", "wear/studies/c.json"):
         (tmp_path / name).parent.mkdir(parents=True)
         (tmp_path / name).write_text("{}")
-    (tmp_path / "chains/regimes/rise").mkdir(parents=True)
-    (tmp_path / "chains/regimes/rise/study.json").write_text("{}")
+    (tmp_path / "chains/follow").mkdir(parents=True)
+    (tmp_path / "chains/follow/rise-clearance_mm.nc").touch()
     (tmp_path / "plots").mkdir()
     (tmp_path / "case.yaml").touch()
     (tmp_path / "notes.txt").touch()
@@ -34,7 +33,7 @@ def place(tmp_path, monkeypatch):
         ("results/studies", "did you mean results?"),
         ("results/rows", "did you mean results?"),
         ("deep", "holds no study; did you mean deep/wear?"),
-        ("chains", "holds no study of jobs, only machines that were followed: rise; compsim plot"),
+        ("chains", "holds no study of jobs, only how machines move along a key; compsim "),
         ("plots", "holds no study; there are results in"),
         ("no/where", "there is no such folder of results; choose the folder of a sweep, or make"),
     ],
@@ -53,7 +52,6 @@ def test_which_folders_hold_results(place):
     assert [p.name for p in sorted(place.iterdir()) if holds_results(p)] == [
         "chains", "results", "wear"
     ]  # fmt: skip
-    assert find_followed("chains") == ["rise"]
 
 
 def test_a_folder_that_may_not_be_written_is_found_before(tmp_path, monkeypatch):

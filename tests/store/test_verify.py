@@ -10,8 +10,8 @@ from compressor.store.hdf5 import SEAL, DamagedJob
 from compressor.store.series_file import image_of, read_dataset, write_dataset
 from compressor.store.status import verify
 
-PLACES = ("wear/0123456789abcdef0123.nc", "regimes/some/0123456789abcdef0123.nc",
-          "regimes/some/pair-0123456789abcdef0123.nc")  # fmt: skip
+PLACES = ("wear/0123456789abcdef0123.nc", "follow/chains/0123456789abcdef0123.nc",
+          "follow/some-clearance_mm.nc")  # fmt: skip
 KEPT = xr.Dataset(
     {
         "hours": ("stage", np.arange(4.0), {"units": "h"}),

@@ -8,22 +8,17 @@ from pathlib import Path
 
 import test_layers
 
-from compressor.program import STUDY_GROUPS
-from compressor.studies import find_followed, page_additions
+from compressor.studies import page_additions
 
 ROOT = Path(__file__).parent.parent.parent
 FOLDERS = sorted(path.parent.name for path in (ROOT / "compressor/studies").glob("*/__init__.py"))
 OLD_PLACES = [place.rpartition(".")[2] for place in test_layers.OLD_PLACES]
 
 
-def test_studies_have_what_others_are_promised(tmp_path):
+def test_studies_have_what_others_are_promised():
     assert [one.keywords["place"] for one in page_additions({"claims": "mine"})] == [
         "mine", "", "alarms",
     ]  # fmt: skip
-    group = STUDY_GROUPS["regimes"]()
-    assert {*group.NEEDED} <= {*group.ROWS}
-    assert group.ABOUT
-    assert find_followed(tmp_path) == []
 
 
 def copy_without_studies(folder):
@@ -35,8 +30,8 @@ def copy_without_studies(folder):
     for name in FOLDERS:
         shutil.rmtree(folder / "compressor/studies" / name)
     lines = table.read_text().splitlines(keepends=True)
-    left = [line for line in lines if not line.startswith(("STUDY_GROUPS[", "PAGES = "))]
-    assert len(left) == len(lines) - 2
+    left = [line for line in lines if not line.startswith("PAGES = ")]
+    assert len(left) == len(lines) - 1
     table.write_text("".join([*left, "PAGES: dict[str, str] = {}\n"]))
     for name in OLD_PLACES:
         (folder / f"compressor/{name}.py").unlink()
@@ -66,16 +61,6 @@ for top, root in (("compressor", "."), ("cmd/compsim", "cmd")):
 """
 
 
-ERROR = """
-from compressor import CaseFileError
-from compressor.cases.load import load_studies
-try:
-    load_studies("one.yaml")
-except CaseFileError as error:
-    print(error)
-"""
-
-
 MAIN_JOB = """
 from pathlib import Path
 from compsim import cli
@@ -94,7 +79,3 @@ assert "Study one" in Path("report/index.html").read_text()
 def test_the_program_does_without_all_of_them(tmp_path):
     copy = copy_without_studies(tmp_path)
     run_in(copy, MAIN_JOB + EVERY_MODULE)
-    (copy / "one.yaml").write_text("load: none\nregimes: {over: clearance_mm}\n")
-    error = run_in(copy, ERROR)
-    assert error.startswith("one.yaml:2:1: regimes: unknown key; a case file has name, ")
-    assert "regimes" not in error.partition(";")[2]

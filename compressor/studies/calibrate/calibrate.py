@@ -124,7 +124,7 @@ class FitJobs:
     def study(self, points: Sequence[tuple[float, ...]], extra: Sequence[str] = QUIET) -> Study:
         """Return the study of some values of the unknown keys. Raises CaseFileError."""
         texts = self.settings(points, extra)
-        (found,) = load_studies(self.path, overrides=texts, follow=False)
+        (found,) = load_studies(self.path, overrides=texts)
         if found.jobs != len(points):
             axes = ", ".join(axis.key for axis in found.axes)
             raise CalibrationError(

@@ -269,12 +269,12 @@ class Question:
 
     def study(self, values: Sequence[float]) -> Study:
         """Return the study of some values of the key, its one axis."""
-        (found,) = load_studies(self.path, overrides=self.settings(values), follow=False)
+        (found,) = load_studies(self.path, overrides=self.settings(values))
         return found
 
     def _load(self, setting: str) -> Study:
         """Return the study of the file with one more key set."""
-        (study,) = load_studies(self.path, overrides=[*self.overrides, setting], follow=False)
+        (study,) = load_studies(self.path, overrides=[*self.overrides, setting])
         return study
 
 

@@ -69,7 +69,7 @@ def format_swept(value: object) -> str:
 def cases_of_files(configs: Sequence[str], overrides: Sequence[str]) -> dict[str, Case]:
     """Return the cases to be studied, by label; each needs a joint with clearance."""
     cases = {}
-    for study in load_studies(*configs, overrides=overrides, follow=False):
+    for study in load_studies(*configs, overrides=overrides):
         for point, case in zip(points(study), study.cases, strict=True):
             name = " ".join([study.name, *(format_swept(value) for value in point.values())])
             if not faulty(case):

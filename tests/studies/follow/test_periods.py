@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.studies.regimes.values import (
+from compressor.studies.follow.motion import (
     MAX_PERIOD,
     MORE,
     TOLERANCE,

@@ -12,8 +12,8 @@ from compressor.solve.horizon import PARTED_DISTANCE, SHIFT, predictability_hori
 from compressor.solve.request import Request
 from compressor.solve.run import integrate
 from compressor.solve.si_record import natural_sizes, offsets, record, scene
-from compressor.studies.regimes import lyapunov
-from compressor.studies.regimes.lyapunov import (
+from compressor.studies.follow import lyapunov
+from compressor.studies.follow.lyapunov import (
     LOST_DISTANCE,
     OF_STEPS,
     growths,

@@ -1,0 +1,1 @@
+"""Machines followed along a parameter: regimes, Poincaré points, exponents, two motions."""

@@ -1,0 +1,216 @@
+"""The table and the figure of a machine that is followed along a key.
+
+The Dataset is that of `follow.open_followed` at one job: dims direction, the followed key, whose
+coordinate `attrs["over"]` names, and those of the variables.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from compressor.analysis import SPOKEN
+from compressor.report import (
+    BLACK,
+    BLUE,
+    FOOT,
+    MARKS,
+    RED,
+    Drawing,
+    LineStyle,
+    Note,
+    Panel,
+    entry,
+    make_grid,
+    mark,
+    midway,
+    positions,
+    share_scales,
+)
+
+# the second is smaller and lies on the first, so that both are seen where they agree
+BY_DIRECTION = {"up": (BLUE, 4.0, 2.2), "down": (RED, 2.1, 2.4)}
+# rows of the panel of periods: 1 to 4 one by one, up to 16 by octaves, and where there is none
+PERIODS = {1: 0.0, 2: 1.0, 3: 2.0, 4: 3.0, 8: 4.0, 16: 5.0}
+ROWS_OF = {"chaotic": 6.2, "undecided": 7.2}
+FAILED = replace(MARKS["failed"], color=BLACK, markersize=5, edge_width=1.3)
+FAILED_NAME = "a run failed here"
+MILLI = 1e3
+
+
+class Span(NamedTuple):
+    """Neighbouring values of one direction with the same motion, and the ends of its exponents."""
+
+    direction: str
+    first: float
+    last: float
+    values: int
+    motion: str
+    exponents: tuple[float, float]
+
+
+def find_spans(machine: xr.Dataset) -> Iterator[Span]:
+    """Yield the spans of each direction of a machine, by rising values."""
+    over = machine.attrs["over"]
+    for direction in machine["direction"].values.tolist():
+        chain = machine.sel(direction=direction)
+        values, exponents = chain[over].values, chain["lyapunov_exponent"].values
+        motions = [name_motion(chain.isel({over: n})) for n in range(values.size)]
+        for motion, group in itertools.groupby(range(values.size), motions.__getitem__):
+            at = [*group]
+            known = exponents[at][np.isfinite(exponents[at])]
+            ends = (known.min(), known.max()) if known.size else (math.nan, math.nan)
+            yield Span(direction, values[at[0]], values[at[-1]], len(at), motion, ends)
+
+
+def name_motion(one: xr.Dataset) -> str:
+    """Return the motion at one value in words: period n, chaotic, undecided, failed or missing."""
+    status, regime = str(one["status"].values), str(one["regime"].values)
+    if status != "ok":
+        return " ".join(filter(None, (status, str(one["reason"].values))))
+    return f"period {float(one['period']):g}" if regime == "periodic" else regime
+
+
+def table(machine: xr.Dataset) -> list[str]:
+    """Return the spans of a machine as lines of a table, and where up and down differ."""
+    over = machine[machine.attrs["over"]]
+    unit = f" ({over.attrs['units']})" if over.attrs.get("units", "1") != "1" else ""
+    cells = [["direction", f"{over.name}{unit}", "values", "motion", "exponent (1/rev)"]]
+    for one in find_spans(machine):
+        ends = dict.fromkeys(f"{end:.4g}" for end in (one.first, one.last))
+        rates = dict.fromkeys(f"{end:.2f}" for end in one.exponents if math.isfinite(end))
+        where, rate = " to ".join(ends), " to ".join(rates)
+        cells.append([one.direction, where, str(one.values), one.motion, rate])
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = [
+        "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in cells
+    ]
+    for name, words in (
+        ("differs", "up and down differ"),
+        ("confirmed", "two motions are confirmed"),
+    ):
+        if name in machine and (marked := machine[name].values == 1).any():
+            listed = ", ".join(f"{value:.4g}" for value in over.values[marked])
+            lines.append(f"{words} at {int(marked.sum())} of {over.size} values: {listed}")
+    return lines
+
+
+def draw_followed(machine: xr.Dataset, title: str = "") -> Drawing:
+    """Return one machine over the key: Poincaré points, period, exponent, time without contact."""
+    over, joints = machine.attrs["over"], joints_with_points(machine)
+    x, log = positions(machine, over), bool(machine.attrs["log"])
+    ratios = [2.2] * len(joints) + [1.2, 1.4] + [0.8] * len(joints)
+    figure, _ = make_grid(len(ratios), 1, 1.35 * sum(ratios) + 1.2, heights=ratios)
+    panels = figure.panels
+    for joint, panel in zip(joints, panels, strict=False):
+        plot_points(panel, machine, joint)
+    plot_periods(panels[len(joints)], machine)
+    plot_exponents(panels[len(joints) + 1], machine)
+    for joint, panel in zip(joints, panels[len(joints) + 2 :], strict=True):
+        plot_gaps(panel, machine, joint)
+    low, *_, high = midway(np.sort(x), log)
+    panels[0].x.log = panels[0].x.plain = log
+    panels[0].x.span(low, high)
+    share_scales(panels, "x")
+    has_failed = (machine["status"] == "failed").any("direction").values
+    for panel in panels if has_failed.any() else ():
+        bottom, top = panel.limits("y")
+        foot = np.full(has_failed.sum(), bottom + FOOT["failed"] * (top - bottom))
+        panel.plot(x[has_failed], foot, FAILED, FAILED_NAME)
+    attrs = machine[over].attrs
+    unit = f" ({attrs['units']})" if attrs["units"] != "1" else ""
+    panels[-1].x.title = attrs["long_name"] + unit
+    figure.legend = [entry(name, look) for name, look in direction_styles(machine, 1.6).items()]
+    figure.legend += [entry(FAILED_NAME, FAILED)] if has_failed.any() else []
+    figure.title = title
+    return figure
+
+
+def joints_with_points(machine: xr.Dataset) -> list[str]:
+    """Return the joints that have Poincaré points."""
+    known = machine["section"].notnull()
+    known = known.any([dim for dim in known.dims if dim != "joint"])
+    return [str(joint) for joint in machine["joint"].values[known.values]]
+
+
+def direction_styles(machine: xr.Dataset, times: float = 1.0) -> dict[str, LineStyle]:
+    """Return the marks of the directions that there are, so many times their size."""
+    found = {str(name): BY_DIRECTION[str(name)] for name in machine["direction"].values}
+    return {
+        name: mark(color, "o", times * size, zorder, edge_width=0.0)
+        for name, (color, size, zorder) in found.items()
+    }
+
+
+def plot_points(panel: Panel, machine: xr.Dataset, joint: str) -> None:
+    """Draw the journal's place along the cylinder, once a revolution, at each value."""
+    over = machine.attrs["over"]
+    for direction, look in direction_styles(machine, 0.7).items():
+        points = machine["section"].sel(direction=direction, joint=joint, coordinate="x")
+        points = points.transpose(over, "revolution")
+        x = np.repeat(positions(machine, over), points.sizes["revolution"])
+        panel.plot(x, MILLI * points.values.ravel(), look, direction)
+    panel.title = f"journal's place along the cylinder, {SPOKEN[joint]}, once a revolution"
+    panel.y.title = "$e_x$ (mm)"
+    leave_room(panel)
+
+
+def plot_periods(panel: Panel, machine: xr.Dataset) -> None:
+    """Draw the period at each value; above it where there is none."""
+    x = positions(machine, machine.attrs["over"])
+    for direction, look in direction_styles(machine, 1.2).items():
+        panel.plot(x, period_rows(machine.sel(direction=direction)), look, direction)
+    panel.y.words = {row: str(word) for word, row in (PERIODS | ROWS_OF).items()}
+    panel.y.span(-1.3, max(ROWS_OF.values()) + 0.6)
+    panel.title = "period (revolutions)"
+
+
+def period_rows(chain: xr.Dataset) -> np.ndarray:
+    """Return the height of each value's period in the panel; nan where it has no result."""
+    words, is_ok = chain["regime"].values, chain["status"].values == "ok"
+    period = np.where(words == "periodic", chain["period"].values, 1.0)
+    rows = np.where(period <= 4, period - 1.0, np.log2(period) + 1.0)
+    for word, row in ROWS_OF.items():
+        rows = np.where(words == word, row, rows)
+    return np.where(is_ok, rows, np.nan)
+
+
+def plot_exponents(panel: Panel, machine: xr.Dataset) -> None:
+    """Draw the largest Lyapunov exponent with its error at each value."""
+    x = positions(machine, machine.attrs["over"])
+    for direction, look in direction_styles(machine).items():
+        chain = machine.sel(direction=direction)
+        bars = chain["lyapunov_exponent_error"].values
+        bars = np.where(np.isfinite(bars), bars, np.nan)
+        exponents = chain["lyapunov_exponent"].values
+        panel.plot(x, exponents, look, direction, errors=np.stack([bars, bars]), caps=0.0)
+    panel.notes.append(Note(y=0.0, style=LineStyle(BLACK, linewidth=0.8)))
+    panel.title = "largest Lyapunov exponent, with its 95 % bar; above 0 close motions part"
+    panel.y.title = "per revolution"
+    leave_room(panel)
+
+
+def plot_gaps(panel: Panel, machine: xr.Dataset, joint: str) -> None:
+    """Draw the share of time in which a joint has no dry contact."""
+    x = positions(machine, machine.attrs["over"])
+    for direction, look in direction_styles(machine).items():
+        shares = machine["contact_loss_fraction"].sel(direction=direction, joint=joint)
+        panel.plot(x, 100.0 * shares.values, look, direction)
+    panel.title = f"time without dry contact, {SPOKEN[joint]}"
+    panel.y.title = "%"
+    leave_room(panel)
+
+
+def leave_room(panel: Panel) -> None:
+    """Leave room below the points for marks, and a little above them."""
+    values = np.concatenate([trace.extent("y") for trace in panel.traces])
+    values = values[np.isfinite(values)]
+    if values.size:
+        low, high = values.min(), values.max()
+        span = (high - low) or 0.1 * abs(high) or 1.0
+        panel.y.span(low - 0.16 * span, high + 0.08 * span)

@@ -1,0 +1,523 @@
+"""Follow each machine of a case file along a key: each value starts from the last one's end.
+
+    RESULTS/follow/chains/KEY.nc    the finished values of a chain, in the order of their running
+    RESULTS/follow/STUDY-KEY.nc     all chains of a study over a key, as one labelled Dataset
+
+A chain is named by a hash of all that decides its numbers. Its file is rewritten every few seconds
+and is whole or absent; a chain that was interrupted goes on from the last value in it, and ends in
+the same numbers to the bit. Where a machine that is followed up and down ends differently, that may
+be a transient which is not over: a chain of its own runs both motions on, and starts the machine
+from other places, too.
+"""
+
+import contextlib
+import hashlib
+import itertools
+import json
+import math
+import re
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from compressor.analysis import SPOKEN
+from compressor.cases import (
+    MODEL_VERSION,
+    OF_JOINTS,
+    Case,
+    CaseFileError,
+    Output,
+    Study,
+    load_studies,
+    points,
+    row_of,
+    suggestion,
+)
+from compressor.metrics import JOINTS
+from compressor.program import PROGRAM, CompsimError, Progress, no_progress
+from compressor.store import (
+    Folder,
+    StoreError,
+    coordinate_names,
+    read_dataset,
+    swept_column,
+    writable_folder,
+    write_dataset,
+)
+from compressor.studies.follow.motion import (
+    COORDINATES,
+    NUMBERS,
+    TEXTS,
+    HowLong,
+    Row,
+    differ,
+    empty_row,
+    run_value,
+)
+from compressor.sweep import JobLost, Needs, run_here
+
+FOLDER = "follow"
+REMEDY = "delete it: the same command makes it again"
+SCHEMA = 3  # of a row's numbers: a change of what they mean makes chains again
+SECONDS_BETWEEN_WRITES = 2.0  # s between two writings of what is finished
+RUNS = 4  # of a value, each with the case's own wall time at most, and some more
+FURTHER = 200  # rev that motions run on before they are compared again
+STARTS, SEED = 8, 13  # from other places, and of these
+START_ROOM = 0.9  # of the clearance, within which they lie
+OVER = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d+)\s*")
+FORM = "KEY=LOW:HIGH:N, such as clearance_mm=0.01:1:60"
+# groups whose keys are not followed: of the run and its start, or of what the machine shakes
+NOT_FOLLOWED = ("solve", "output", "body", "sensor", "initial_offset_mm")
+
+
+class FollowError(CompsimError, ValueError):
+    """A key that cannot be followed, or a machine that cannot be followed along it."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class Along:
+    """A key, the ends of its values and how many there are, and how they are followed.
+
+    `log`: with even ratios; `both`: up and then down, each from its own start.
+    """
+
+    key: str
+    low: float
+    high: float
+    n: int
+    log: bool = False
+    both: bool = False
+    how: HowLong = field(default_factory=HowLong)
+
+    @property
+    def ways(self) -> tuple[str, ...]:
+        """Return the ways that it is followed, each a chain."""
+        return ("up", "down") if self.both else ("up",)
+
+
+def read_over(text: str, **more: Any) -> Along:
+    """Return what a text KEY=LOW:HIGH:N asks for; more: other fields. Raises FollowError."""
+    parts = OVER.fullmatch(text)
+    try:
+        low, high = map(float, parts.groups()[1:3]) if parts else (math.nan, math.nan)
+    except ValueError:
+        low = high = math.nan
+    if parts is None or not (math.isfinite(low) and math.isfinite(high)):
+        raise FollowError(f"--over {text}: write {FORM}")
+    key, count = parts[1], int(parts[4])
+    row = row_of(key)
+    if row is None:
+        problem = f"{key} is no key of a number{suggestion(key, '') or ', such as clearance_mm'}"
+    elif row.kind != "number":
+        problem = f"{key} is no number: give a key such as clearance_mm or machine.speed_rpm"
+    elif key.partition(".")[0] in NOT_FOLLOWED:
+        problem = f"{key} is nothing of the machine: give a key such as clearance_mm"
+    elif wrong := row.check(low) or row.check(high):
+        problem = f"{key}: {wrong}"
+    elif count < 2:
+        problem = f"{count} value: give 2 at least"
+    elif low >= high:
+        problem = f"write the lower end first, and --both to go down as well: {FORM}"
+    elif more.get("log") and low <= 0.0:
+        problem = "--log needs ends above 0"
+    else:
+        return Along(key, low, high, count, **more)
+    raise FollowError(f"--over {text}: {problem}")
+
+
+def load_values(
+    path: Folder,
+    along: Along,
+    overrides: Sequence[str] = (),
+    max_jobs: int = 10_000,
+    only: str = "",
+    progress: Progress = no_progress,
+) -> Study:
+    """Return the study of a case file with a job for each machine and value of the key.
+
+    Raises CaseFileError, in which the values stand under --over.
+    """
+    form = "logspace" if along.log else "linspace"
+    values = f"{along.key}={{{form}: [{along.low!r}, {along.high!r}, {along.n}]}}"
+    try:
+        (study,) = load_studies(
+            path, overrides=[*overrides, values], max_jobs=max_jobs, only=only, progress=progress
+        )
+    except CaseFileError as error:
+        asked = f"--over {along.key}={along.low:g}:{along.high:g}:{along.n}"
+        ours = f"--set {along.key}={{{form}"
+        raise CaseFileError([
+            replace(problem, place=replace(problem.place, file=asked))
+            if problem.place.file.startswith(ours) else problem
+            for problem in error.problems
+        ]) from error  # fmt: skip
+    return study
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Cases that are run one after the other, each from the last one's end.
+
+    `values`: of the key that is followed; `states`: where the cases begin instead, if any; None is
+    a case's own start.
+    """
+
+    cases: tuple[Case, ...]
+    values: tuple[float, ...]
+    how: HowLong
+    states: tuple[np.ndarray | None, ...] = ()
+
+    @cached_property
+    def key(self) -> str:
+        """Return the hash of what decides the numbers."""
+        starts = ["" if state is None else state.tobytes().hex() for state in self.states]
+        how = [self.how.points, self.how.exponent, self.how.further]
+        identity = [[case.key for case in self.cases], how, starts, SCHEMA]
+        return hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:20]
+
+    def path(self, folder: Folder) -> Path:
+        """Return the path of its file."""
+        return Path(folder) / FOLDER / "chains" / f"{self.key}.nc"
+
+    def begin(self, rows: Sequence[Row]) -> np.ndarray | None:
+        """Return the state that the next value begins from; None: from its own start."""
+        if self.states:
+            return self.states[len(rows)]
+        state = rows[-1]["end_state"] if rows else None
+        return None if state is None or np.isnan(state).any() else state
+
+
+class Machine(NamedTuple):
+    """One machine of a study: its swept values, and its chains by the way that they go."""
+
+    point: dict[str, Any]
+    chains: tuple[Chain, ...]
+    is_selected: bool
+
+
+def machines(study: Study, along: Along) -> list[Machine]:
+    """Return the machines of a study of `load_values`. Raises FollowError."""
+    found: dict[str, tuple[dict[str, Any], list[int]]] = {}
+    jobs: list[float] = []  # their values of the key
+    for number, swept in enumerate(points(study)):
+        jobs.append(swept.pop(along.key, math.nan))  # an ideal machine has no clearance
+        found.setdefault(repr(swept), (swept, []))[1].append(number)
+    selected, listed = {*study.selected}, []
+    for point, numbers in found.values():
+        cases = {jobs[number]: bare_machine(study.cases[number]) for number in numbers}
+        is_selected = not selected.isdisjoint(numbers)
+        if problem := objection(along, [*cases.values()]):
+            if is_selected:
+                raise FollowError(f"{study.path}: {problem}{name_point(point)}")
+            continue
+        up = sorted(cases.items())
+        chains = [
+            Chain(tuple(case for _, case in one), tuple(value for value, _ in one), along.how)
+            for one in (up, up[::-1])[: len(along.ways)]
+        ]
+        listed.append(Machine(point, (*chains,), is_selected))
+    return listed
+
+
+def name_point(point: dict[str, Any]) -> str:
+    """Return the swept values of a machine in words, "" where there are none."""
+    words = ", ".join(f"{key} {value}" for key, value in point.items())
+    return f" ({words})" if words else ""
+
+
+def bare_machine(case: Case) -> Case:
+    """Return a case without what does not change how its machine moves."""
+    return replace(case, output=Output(), wear=None, body=None, sensor=None)
+
+
+def objection(along: Along, cases: Sequence[Case]) -> str:
+    """Return why a machine cannot be followed, or ""."""
+    worn = {tuple(getattr(case.clearance_mm, joint) > 0 for joint in JOINTS) for case in cases}
+    if len(worn) > 1:
+        return f"--over begins at {along.key} = {along.low:g}, where a joint is ideal: begin above"
+    if not any(*worn):
+        return f"no joint has clearance, so that nothing is to follow: set joint and {OF_JOINTS[0]}"
+    if cases[0].key == cases[-1].key:
+        return f"--over {along.key} changes nothing in this machine: follow another key"
+    return ""
+
+
+class Followed(NamedTuple):
+    """What was followed: values in all, those stored before, the Dataset and its file."""
+
+    total: int
+    done_before: int
+    data: xr.Dataset
+    path: Path
+
+
+def follow(
+    study: Study,
+    along: Along,
+    folder: Folder,
+    workers: int,
+    progress: Progress,
+    rerun: bool = False,
+) -> Followed:
+    """Run and store what is missing of the chains of a study, and write its Dataset.
+
+    study: of `load_values`; rerun: chains are run again from their first failed value on. Progress
+    counts values. Raises FollowError, StoreError and WorkersFailed; whatever ends it early, what
+    was stored stays, and the same call goes on.
+    """
+    every = machines(study, along)
+    writable_folder(folder)
+    folder = Path(folder).absolute()
+    chains = [chain for one in every if one.is_selected for chain in one.chains]
+    before = sum(len(read_rows(chain, folder)) for chain in chains)
+    lost = run_chains(chains, folder, workers, progress, rerun)
+    rows = [[read_rows(chain, folder) for chain in machine.chains] for machine in every]
+    doubts = find_doubts(every, rows)
+    if doubts:
+        text = f"up and down differ at {len(doubts)} of the values: motions are run on"
+        progress(0, len(doubts), text)
+        run_chains([*doubts.values()], folder, workers, progress, rerun)
+    confirmed = {where: has_two(doubt, folder) for where, doubt in doubts.items()}
+    data = followed_dataset(study, along, every, rows, lost, confirmed)
+    path = followed_file(folder, study.name, along.key)
+    write_dataset(path, data)
+    return Followed(sum(len(chain.cases) for chain in chains), before, data, path)
+
+
+def followed_file(folder: Folder, study: str, key: str) -> Path:
+    """Return the path of a study's Dataset over a key."""
+    return Path(folder) / FOLDER / f"{study}-{key}.nc"
+
+
+def open_followed(folder: Folder, study: str, key: str) -> xr.Dataset:
+    """Return what `compsim follow` has stored of a study over a key in a folder of results.
+
+    Dims: `job` (a machine), `direction` (up, down), the key by its coordinate's name, which stands
+    in the attribute `over`, going up, and those of the variables (`motion.NUMBERS`). `differs`: up
+    and down end differently; `confirmed`: two motions were reached by running on. A value that was
+    not run has the status `missing` and numbers of nan. Raises StoreError where there is nothing of
+    it.
+    """
+    path = followed_file(folder, study, key)
+    if not path.exists():
+        raise StoreError(path, "is not there", f"compsim follow the case file over {key}")
+    return read_dataset(path, REMEDY)
+
+
+def run_chain(chain: Chain, folder: Path, rerun: bool = False) -> StoreError | None:
+    """Run what a chain's file does not hold yet, in a worker; rerun: from its first failed value.
+
+    A StoreError is returned: it ends the run, while an exception is a failure of the chain.
+    """
+    try:
+        rows = rows_to_keep(chain, folder, rerun)
+        written = time.monotonic()
+        for number in range(len(rows), len(chain.cases)):
+            rows.append(run_value(chain.cases[number], chain.begin(rows), chain.how))
+            is_last = len(rows) == len(chain.cases)
+            if is_last or time.monotonic() - written > SECONDS_BETWEEN_WRITES:
+                write_dataset(chain.path(folder), chain_dataset(chain, rows))
+                written = time.monotonic()
+    except StoreError as error:
+        return error
+    return None
+
+
+def rows_to_keep(chain: Chain, folder: Path, rerun: bool) -> list[Row]:
+    """Return the stored rows of a chain that a run does not make again."""
+    rows = read_rows(chain, folder)
+    good = itertools.takewhile(lambda row: row["status"] == "ok", rows)
+    return [*good] if rerun else rows
+
+
+def chain_dataset(chain: Chain, rows: Sequence[Row]) -> xr.Dataset:
+    """Return the rows of a chain, with the dimension `value` in the order of running."""
+    found: dict[str, tuple] = {
+        name: (("value",), np.array([row[name] for row in rows], object)) for name in TEXTS
+    }
+    for name, (dims, unit, _) in NUMBERS.items():
+        numbers = np.array([row[name] for row in rows], float)
+        found[name] = ("value", *dims), numbers, {"units": unit}
+    attrs = {"key": chain.key, "case": chain.cases[0].attributes()["case"], "program": PROGRAM}
+    return xr.Dataset(found, {"value": ("value", list(chain.values[: len(rows)]))}, attrs)
+
+
+def read_rows(chain: Chain, folder: Folder) -> list[Row]:
+    """Return the stored rows of a chain, none where there is no file. Raises StoreError."""
+    path = chain.path(folder)
+    if not path.exists():
+        return []
+    found = read_dataset(path, REMEDY)
+    if found.attrs.get("key") != chain.key:
+        raise StoreError(path, "is not the chain that its name says", REMEDY)
+    columns = {name: found[name].values for name in (*TEXTS, *NUMBERS)}
+    return [
+        {name: str(column[n]) if name in TEXTS else column[n] for name, column in columns.items()}
+        for n in range(found.sizes["value"])
+    ]
+
+
+def run_chains(
+    chains: Sequence[Chain], folder: Path, workers: int, progress: Progress, rerun: bool
+) -> dict[str, JobLost]:
+    """Run what is missing of chains, side by side; return those that were lost, by their keys."""
+    missing = [c for c in chains if len(rows_to_keep(c, folder, rerun)) < len(c.cases)]
+    jobs = [(c.key, c, RUNS * sum(case.solve.timeout_s for case in c.cases)) for c in missing]
+    needs = Needs.of(case for chain in missing for case in chain.cases)
+    look = partial(ChainWatch(chains, folder).report, progress)
+    lost: dict[str, JobLost] = {}
+    look("")
+    work = partial(run_chain, folder=folder, rerun=rerun)
+    with contextlib.closing(run_here(work, jobs, needs, workers, look, partial(look, ""))) as ends:
+        for end in ends:
+            if isinstance(end, JobLost):
+                lost[end.id] = end
+            elif isinstance(end.result, StoreError):
+                raise end.result
+    look("")
+    return lost
+
+
+class ChainWatch:
+    """How many values of chains are stored, from their files."""
+
+    def __init__(self, chains: Iterable[Chain], folder: Path):
+        self.chains = {chain.path(folder): chain for chain in chains}
+        self.folder, self.total = folder, sum(len(chain.cases) for chain in self.chains.values())
+        self.seen: dict[Path, int] = {}
+        self.counts: dict[Path, int] = {}
+
+    def report(self, progress: Progress, remark: str) -> None:
+        """Report the number; read the files that have changed."""
+        for path, chain in self.chains.items():
+            with contextlib.suppress(OSError):
+                changed = path.stat().st_mtime_ns
+                if self.seen.get(path) != changed:
+                    self.counts[path] = len(read_rows(chain, self.folder))
+                    self.seen[path] = changed
+        progress(sum(self.counts.values()), self.total, remark)
+
+
+Where = tuple[int, float]  # the number of a machine, and a value
+
+
+def find_doubts(every: Sequence[Machine], rows: Sequence[list[list[Row]]]) -> dict[Where, Chain]:
+    """Return a chain for each value at which up and down differ: both motions and other starts."""
+    found: dict[Where, Chain] = {}
+    for number, (machine, (up, *others)) in enumerate(zip(every, rows, strict=True)):
+        down = dict(zip(machine.chains[-1].values, others[0] if others else [], strict=False))
+        chain = machine.chains[0]
+        for case, value, one in zip(chain.cases, chain.values, up, strict=False):
+            other = down.get(value)
+            if other and differ(case, one, other):
+                cases = (case, case, *other_starts(case))
+                states = (one["end_state"], other["end_state"], *[None] * STARTS)
+                how = replace(chain.how, further=FURTHER)
+                found[number, value] = Chain(cases, (value,) * len(cases), how, states)
+    return found
+
+
+def other_starts(case: Case) -> Iterator[Case]:
+    """Yield the case with its journals starting elsewhere, always at the same places.
+
+    They are evenly drawn from a disk within each clearance.
+    """
+    rng = np.random.default_rng(SEED)
+    for _ in range(STARTS):
+        shift: dict[str, float] = {}
+        for joint in JOINTS:
+            radius, angle = math.sqrt(rng.random()), 2.0 * math.pi * rng.random()
+            size = START_ROOM * getattr(case.clearance_mm, joint) * radius
+            shift[f"{joint}_x"], shift[f"{joint}_y"] = (
+                size * math.cos(angle),
+                size * math.sin(angle),
+            )
+        yield replace(case, initial_offset_mm=replace(case.initial_offset_mm, **shift))
+
+
+def has_two(doubt: Chain, folder: Folder) -> bool:
+    """Return whether two of the motions that a chain ran on are different ones."""
+    pairs = itertools.combinations(read_rows(doubt, folder), 2)
+    return any(differ(doubt.cases[0], *pair) for pair in pairs)
+
+
+def followed_dataset(
+    study: Study,
+    along: Along,
+    every: Sequence[Machine],
+    rows: Sequence[list[list[Row]]],
+    lost: dict[str, JobLost],
+    confirmed: dict[Where, bool],
+) -> xr.Dataset:
+    """Return the rows of all chains as one Dataset, as `open_followed` describes it.
+
+    rows: by machine and way; lost: chains that ended without a result, by key; confirmed: whether
+    two motions were reached, where up and down differ.
+    """
+    values = sorted({value for machine in every for value in machine.chains[0].values})
+    keys = [*dict.fromkeys(key for machine in every for key in machine.point)]
+    names = coordinate_names([*keys, along.key])
+    over = names[along.key]
+    dims, shape = ("job", "direction", over), (len(every), len(along.ways), len(values))
+    blank = empty_row(every[0].chains[0].cases[0], along.how.points)
+    texts = {name: np.full(shape, "", object) for name in TEXTS}
+    texts["status"][:] = "missing"
+    shown = {name: row for name, row in NUMBERS.items() if name != "end_state"}
+    numbers = {name: np.full((*shape, *blank[name].shape), math.nan) for name in shown}
+    for job, (machine, ways) in enumerate(zip(every, rows, strict=True)):
+        for way, (chain, found) in enumerate(zip(machine.chains, ways, strict=True)):
+            for value, row in zip(chain.values, found, strict=False):
+                for name, array in (texts | numbers).items():
+                    array[job, way, values.index(value)] = row[name]
+            if chain.key in lost:
+                end, at = lost[chain.key], (job, way, values.index(chain.values[len(found)]))
+                texts["status"][at], texts["reason"][at] = "failed", str(end.reason)
+                texts["detail"][at] = end.detail
+    variables: dict[str, tuple] = {
+        name: (dims, texts[name], {"long_name": phrase}) for name, phrase in TEXTS.items()
+    } | {
+        name: ((*dims, *inner), numbers[name], {"units": unit, "long_name": phrase})
+        for name, (inner, unit, phrase) in shown.items()
+    }
+    if along.both:
+        for name, phrase in {
+            "differs": "1: up and down end in different motions here",
+            "confirmed": "1: two different motions were reached by further simulation here",
+        }.items():
+            marks = np.zeros((len(every), len(values)), int)
+            for (job, value), is_confirmed in confirmed.items():
+                marks[job, values.index(value)] = name == "differs" or is_confirmed
+            variables[name] = ("job", over), marks, {"units": "1", "long_name": phrase}
+    column, attrs = swept_column(along.key, values)
+    attrs["long_name"] += of_joint(along.key, every)
+    coordinates = {
+        over: (over, column, attrs),
+        "direction": ("direction", [*along.ways], {"long_name": "which way it is followed"}),
+        "joint": ("joint", [*JOINTS], {"long_name": "joint of the rod"}),
+        "coordinate": ("coordinate", [*COORDINATES], {"long_name": "coordinate of a point"}),
+    }
+    for key in keys:
+        swept = swept_column(key, [machine.point.get(key) for machine in every])
+        coordinates[names[key]] = ("job", *swept)
+    about: dict[str, Any] = {
+        "study": study.name, "title": study.title, "over": over, "log": int(along.log),
+        "program": PROGRAM, "model_version": MODEL_VERSION,
+    }  # fmt: skip
+    return xr.Dataset(variables, coordinates, about)
+
+
+def of_joint(key: str, every: Sequence[Machine]) -> str:
+    """Return whose clearance is followed, " of the small end"; "" of another key or of several."""
+    joints = {one.chains[0].cases[0].joint for one in every if key in OF_JOINTS}
+    if len(joints) != 1:
+        return ""
+    joint = joints.pop()
+    return f" of {'' if joint == 'both' else 'the '}{SPOKEN[joint]}" if joint in SPOKEN else ""

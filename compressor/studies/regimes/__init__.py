@@ -1,1 +1,0 @@
-"""One machine followed along a parameter: its regimes, Poincaré points, second attractors."""

@@ -1,0 +1,161 @@
+"""Chains on disk: they go on from where they were killed, and end in the same bits."""
+
+import multiprocessing
+import os
+import signal
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import assert_same_bits
+
+from compressor.store import read_dataset
+from compressor.store.files import StoreError
+from compressor.studies.follow import follow, motion
+from compressor.studies.follow.follow import load_values, machines, read_over, read_rows, run_chain
+from compressor.studies.follow.motion import HowLong
+
+TEXT = """
+joint: big_end
+contact: {damping_N_s_per_mm: 0.336}
+solve: {accuracy: draft, output_step_deg: 2}
+"""
+ALONG = read_over("clearance_mm=0.02:0.2:6", both=True, how=HowLong(6, exponent=False))
+
+
+@pytest.fixture(autouse=True)
+def settle_soon(monkeypatch):
+    monkeypatch.setattr(motion, "SETTLE_REV", 3)
+
+
+@pytest.fixture(scope="module")
+def chains(tmp_path_factory):
+    path = tmp_path_factory.mktemp("chains") / "lively.yaml"
+    path.write_text(TEXT, encoding="utf-8")
+    (machine,) = machines(load_values(path, ALONG), ALONG)
+    return machine.chains
+
+
+@pytest.fixture(scope="module")
+def whole(chains, tmp_path_factory):
+    """The undisturbed chain, going down, and its folder."""
+    folder = tmp_path_factory.mktemp("whole")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(motion, "SETTLE_REV", 3)
+        assert run_chain(chains[1], folder) is None
+    return chains[1], folder
+
+
+def test_a_chain_has_its_values_in_the_order_of_running(chains, whole):
+    chain, folder = whole
+    found = read_dataset(chain.path(folder))
+    assert found["value"].values.tolist() == [*chain.values] == [*chains[0].values[::-1]]
+    assert (found["status"] == "ok").all()
+    assert found["section"].dims == ("value", "revolution", "joint", "coordinate")
+
+
+def wait_for_values(process, path, count):
+    """Wait until a chain's file has changed so often, or its process has ended."""
+    seen = {path.stat().st_mtime_ns if path.exists() else 0}
+    while process.is_alive() and len(seen) <= count:
+        time.sleep(0.005)
+        seen.add(path.stat().st_mtime_ns if path.exists() else 0)
+
+
+@pytest.mark.slow
+def test_a_killed_chain_goes_on_and_ends_in_the_same_bits(whole, tmp_path, monkeypatch):
+    """SIGKILL at random, until the chain is whole; each process goes on from the last value."""
+    chain, folder = whole
+    monkeypatch.setattr(follow, "SECONDS_BETWEEN_WRITES", 0.0)
+    rng, stops = np.random.default_rng(7), []
+    for _ in range(20):
+        stops.append(len(read_rows(chain, tmp_path)))
+        process = multiprocessing.get_context("fork").Process(
+            target=run_chain, args=(chain, tmp_path)
+        )
+        process.start()
+        wait_for_values(process, chain.path(tmp_path), rng.integers(1, 3))
+        time.sleep(rng.uniform(0.0, 0.03))
+        if process.is_alive():
+            os.kill(process.pid, signal.SIGKILL)
+        process.join()
+        if process.exitcode == 0:
+            break
+    assert process.exitcode == 0
+    assert len({*stops}) > 2
+    assert_same_bits(read_dataset(chain.path(tmp_path)), read_dataset(chain.path(folder)))
+
+
+def test_each_value_begins_where_the_last_one_ended(whole, monkeypatch, tmp_path):
+    chain, folder = whole
+    rows, begun = read_rows(chain, folder), []
+
+    def run(case, state, how):
+        begun.append((case, state))
+        return rows[len(begun) - 1]
+
+    monkeypatch.setattr(follow, "run_value", run)
+    run_chain(chain, tmp_path)
+    assert [case for case, _ in begun] == [*chain.cases]
+    assert begun[0][1] is None
+    for (_, state), row in zip(begun[1:], rows, strict=False):
+        np.testing.assert_array_equal(state, row["end_state"])
+    assert_same_bits(read_dataset(chain.path(tmp_path)), read_dataset(chain.path(folder)))
+
+
+def test_a_chain_goes_on_past_a_failed_value_and_is_run_again_from_there(
+    whole, monkeypatch, tmp_path
+):
+    chain, folder = whole
+    rows, states, fails = read_rows(chain, folder), [], True
+
+    def run(case, state, how):
+        number = chain.cases.index(case)
+        states.append(state)
+        bad = {"status": "failed", "reason": "budget_steps", "end_state": state}
+        return rows[number] | (bad if number == 2 and fails else {})
+
+    monkeypatch.setattr(follow, "run_value", run)
+    for _ in range(2):
+        assert run_chain(chain, tmp_path) is None
+        assert [row["status"] for row in read_rows(chain, tmp_path)].index("failed") == 2
+        assert len(states) == 6
+    np.testing.assert_array_equal(states[3], rows[1]["end_state"])
+    fails = False
+    run_chain(chain, tmp_path, rerun=True)
+    assert {row["status"] for row in read_rows(chain, tmp_path)} == {"ok"}
+    assert len(states) == 10
+
+
+def test_what_is_stored_is_not_run_again(whole, monkeypatch):
+    chain, folder = whole
+    monkeypatch.setattr(follow, "run_value", pytest.fail)
+    before = chain.path(folder).stat().st_mtime_ns
+    assert run_chain(chain, folder) is None
+    assert chain.path(folder).stat().st_mtime_ns == before
+
+
+def test_a_chain_is_named_by_all_that_decides_its_numbers(chains):
+    up, down = chains
+    states = (np.zeros(4), None)
+    others = [
+        down,
+        replace(up, cases=up.cases[:-1]),
+        replace(up, how=HowLong(6)),
+        replace(up, how=HowLong(7, exponent=False)),
+        replace(up, states=states),
+        replace(up, states=states[::-1]),
+    ]
+    assert len({up.key, *(one.key for one in others)}) == 7
+    assert replace(up, values=()).key == up.key
+
+
+def test_another_file_of_its_name_is_refused(whole, tmp_path):
+    chain, folder = whole
+    wrong = chain.path(tmp_path)
+    wrong.parent.mkdir(parents=True)
+    wrong.write_bytes(chain.path(folder).read_bytes()[:-9])
+    found = run_chain(chain, tmp_path)
+    assert isinstance(found, StoreError)
+    assert "delete it" in str(found)

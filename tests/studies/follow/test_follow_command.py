@@ -1,0 +1,242 @@
+"""`compsim follow` from a case file to a Dataset, and every mistake in what is asked for."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from compsim import cli
+from conftest import jobs_here
+
+from compressor.cases import CaseFileError
+from compressor.store import StoreError
+from compressor.studies.follow.follow import (
+    FollowError,
+    load_values,
+    machines,
+    open_followed,
+    read_over,
+)
+from compressor.studies.follow.motion import NUMBERS, TEXTS
+
+TEXT = """
+joint: big_end
+machine: {rod_mass_kg: [3, 4.7]}
+solve: {accuracy: draft}
+report: {title: Unit 3}
+"""
+OVER = "clearance_mm=0.1:0.3:3"
+WORN = "joint: big_end\nclearance_mm: 0.1\n"
+
+
+def write(path, text=TEXT):
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with the results of two machines, followed both ways."""
+    place = tmp_path_factory.mktemp("follow")
+    path = write(place / "worn.yaml")
+    words = ["follow", path, "--over", OVER, "--both", "--no-exponent", "--points", "8", "--quiet"]
+    with jobs_here():
+        assert cli.main([*words, "-r", str(place / "r"), "-j", "2"]) == 0
+    return place
+
+
+def run(place, capsys, *more):
+    words = ["--over", OVER, "--both", "--no-exponent", "--points", "8", *more]
+    code = cli.main(["follow", str(place / "worn.yaml"), "-r", str(place / "r"), *words])
+    return code, *capsys.readouterr()
+
+
+def test_the_dataset_has_machines_both_ways_and_values(place):
+    found = open_followed(place / "r", "worn", "clearance_mm")
+    assert found["period"].dims == ("job", "direction", "clearance_mm")
+    assert found["section"].dims[3:] == ("revolution", "joint", "coordinate")
+    assert found["rod_mass_kg"].values.tolist() == [3.0, 4.7]
+    assert found["clearance_mm"].values.tolist() == [0.1, 0.2, 0.3]
+    assert found["clearance_mm"].attrs["units"] == "mm"
+    assert found["clearance_mm"].attrs["long_name"] == "radial clearance of the big end"
+    assert found["direction"].values.tolist() == ["up", "down"]
+    assert found["coordinate"].values.tolist() == ["x", "y", "x_rate", "y_rate"]
+    assert (found["status"] == "ok").all()
+    assert (found["period"] == 1).all()
+    assert found["differs"].dims == ("job", "clearance_mm")
+    assert not found["differs"].any()
+    assert (found.attrs["over"], found.attrs["title"]) == ("clearance_mm", "Unit 3")
+    for name in found.data_vars:
+        assert found[name].attrs["long_name"], name
+        assert name in TEXTS or found[name].attrs["units"], name
+    assert {*NUMBERS, *TEXTS} - {*found.data_vars} == {"end_state"}
+
+
+def test_values_belong_to_the_key_whichever_way_it_is_followed(place):
+    """Of a motion that is the same both ways: its numbers stand at the same place."""
+    found = open_followed(place / "r", "worn", "clearance_mm")["rms_acceleration"]
+    np.testing.assert_allclose(found[:, 0], found[:, 1], rtol=1e-3)
+    assert (np.abs(found.diff("clearance_mm")) > 0.5).all()
+
+
+def test_a_second_run_has_nothing_to_do_and_prints_the_same(place, capsys):
+    code, out, said = run(place, capsys)
+    assert code == 0
+    assert out.splitlines()[:4] == [
+        "rod_mass_kg 3.0",
+        "direction  clearance_mm (mm)  values  motion    exponent (1/rev)",
+        "up         0.1 to 0.3         3       period 1",
+        "down       0.1 to 0.3         3       period 1",
+    ]
+    assert [line for line in out.splitlines() if line.endswith((".png", ".nc"))] == [
+        str(place / f"r/follow/worn-clearance_mm{end}") for end in ("-1.png", "-2.png", ".nc")
+    ]
+    assert (place / "r/follow/worn-clearance_mm-2.png").stat().st_size > 10_000
+    assert "nothing to do: all 12 values are stored" in said
+
+
+def test_a_chain_that_is_missing_is_run_alone_and_is_the_same(place, capsys, in_process):
+    before = open_followed(place / "r", "worn", "clearance_mm")
+    gone, *others = sorted((place / "r/follow/chains").glob("*.nc"))
+    stamps = [path.stat().st_mtime_ns for path in others]
+    gone.unlink()
+    code, _, said = run(place, capsys)
+    assert code == 0
+    assert "3 values run in" in said
+    assert "9 were stored before" in said
+    assert len(others) == 3
+    assert [path.stat().st_mtime_ns for path in others] == stamps
+    xr.testing.assert_identical(open_followed(place / "r", "worn", "clearance_mm"), before)
+
+
+def test_only_leaves_other_machines_missing(in_process, capsys, tmp_path):
+    path = write(tmp_path / "two.yaml", WORN + "machine: {rod_mass_kg: [3, 4]}\n")
+    words = ["--over", "clearance_mm=0.1:0.2:2", "--no-exponent", "--points", "6", "-j", "1"]
+    only = ["--only", "machine.rod_mass_kg > 3", "--set", "solve.accuracy=draft"]
+    assert cli.main(["follow", path, "-r", str(tmp_path), *words, *only]) == 0
+    found = open_followed(tmp_path, "two", "clearance_mm")
+    assert found["status"].values.tolist() == [[["missing"] * 2], [["ok"] * 2]]
+    assert "differs" not in found
+    assert "rod_mass_kg 3.0" not in capsys.readouterr().out
+
+
+def test_failed_values_end_with_3_and_say_why(in_process, capsys, tmp_path):
+    path = write(tmp_path / "short.yaml", WORN + "solve: {accuracy: draft, max_steps: 60}\n")
+    code = cli.main(["follow", path, "--over", OVER, "--both", "-r", str(tmp_path), "-j", "1"])
+    out, said = capsys.readouterr()
+    assert code == 3
+    assert "up         0.1 to 0.3         3       failed budget_steps" in out
+    assert "job 1 down at 0.3: budget_steps: more than 60 steps" in said
+    assert "budget_steps (6): raise solve.max_steps" in said
+    found = open_followed(tmp_path, "short", "clearance_mm")
+    assert (found["reason"] == "budget_steps").all()
+    assert [path.suffix for path in (tmp_path / "follow").iterdir() if path.is_file()] == [".nc"]
+
+
+def test_a_study_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(StoreError, match=r"is not there.*compsim follow the case file over"):
+        open_followed(tmp_path, "worn", "clearance_mm")
+
+
+def test_a_study_that_is_no_grid_has_jobs(in_process, tmp_path):
+    blocks = "blocks: [{joint: big_end, clearance_mm: 0.2}, {joint: both, clearance_mm: 0.1}]\n"
+    path = write(tmp_path / "blocks.yaml", blocks + "solve: {accuracy: draft}\n")
+    words = ["--over", "machine.speed_rpm=450:500:2", "--no-exponent", "--points", "8", "--quiet"]
+    assert cli.main(["follow", path, *words, "-r", str(tmp_path), "-j", "1"]) == 0
+    found = open_followed(tmp_path, "blocks", "machine.speed_rpm")
+    assert found["section"].dims[:3] == ("job", "direction", "speed_rpm")
+    assert found["fault"].values.tolist() == ["big_end", "both"]
+    assert found["section"].notnull().any(["direction", "speed_rpm", "revolution"]).values[
+        :, :, 0
+    ].tolist() == [[True, False], [True, True]]
+
+
+# What is asked for
+
+
+def followed(path, over, **more):
+    along = read_over(over, **more)
+    return machines(load_values(path, along), along)
+
+
+def test_each_machine_has_its_values_up_and_down(tmp_path):
+    path = write(tmp_path / "case.yaml", "joint: big_end\nmachine: {rod_mass_kg: [3, 4]}\n")
+    found = followed(path, "clearance_mm=0.01:1:3", log=True, both=True)
+    assert [one.point for one in found] == [{"machine.rod_mass_kg": mass} for mass in (3.0, 4.0)]
+    up, down = found[1].chains
+    assert up.values == (0.01, 0.1, 1.0) == down.values[::-1]
+    cases = [(case.machine.rod_mass_kg, case.clearance_mm.big_end) for case in down.cases]
+    assert cases == [(4.0, 1.0), (4.0, 0.1), (4.0, 0.01)]
+
+
+def test_what_does_not_move_the_machine_does_not_count(tmp_path):
+    path = write(tmp_path / "case.yaml", WORN)
+    more = write(tmp_path / "more.yaml", WORN + "body: true\nsensor: true\nwear: true\n")
+    (one,), (other,) = (followed(each, OVER) for each in (path, more))
+    assert one.chains[0].key == other.chains[0].key
+
+
+def test_the_file_may_sweep_or_leave_out_what_is_followed(tmp_path):
+    texts = ("joint: big_end\n", WORN, "joint: big_end\nclearance_mm: [0.3, 0.4]\n")
+    paths = [write(tmp_path / f"{n}.yaml", text) for n, text in enumerate(texts)]
+    assert len({followed(path, OVER)[0].chains[0].key for path in paths}) == 1
+
+
+def test_defaults_that_depend_on_what_is_followed_follow_it(tmp_path):
+    (one,) = followed(write(tmp_path / "case.yaml", WORN), "machine.rod_mass_kg=2:6:2")
+    inertias = [case.machine.rod_inertia_kg_m2 for case in one.chains[0].cases]
+    assert inertias == pytest.approx([0.06, 0.18])
+
+
+def test_a_chain_reads_at_its_last_value_what_it_does_not_at_its_first(tmp_path):
+    text = "joint: both\nclearance_mm: 0.1\nguide: {crosshead_length_mm: 90}\n"
+    (one,) = followed(write(tmp_path / "case.yaml", text), "guide.clearance_mm=0:0.1:3")
+    assert [case.guide.clearance_mm for case in one.chains[0].cases] == [0.0, 0.05, 0.1]
+
+
+@pytest.mark.parametrize(
+    ("over", "more", "message"),
+    [
+        ("clearance_mm=0.1:1", {}, "write KEY=LOW:HIGH:N, such as clearance_mm=0.01:1:60"),
+        ("clearance_mm=a:1:3", {}, "write KEY=LOW:HIGH:N"),
+        ("clearance_mm=0.1:inf:3", {}, "write KEY=LOW:HIGH:N"),
+        ("clearance_mm=0.1:1:2.5", {}, "write KEY=LOW:HIGH:N"),
+        ("clearance_mm=0.1:1:1", {}, "1 value: give 2 at least"),
+        ("speed_rpm=300:700:3", {}, "speed_rpm is no key of a number; did you mean machine.speed"),
+        ("foo=0.1:1:3", {}, "foo is no key of a number, such as clearance_mm"),
+        ("joint=1:2:3", {}, "joint is no number: give a key such as clearance_mm or machine."),
+        ("solve.rtol=1e-6:1e-3:3", {}, "solve.rtol is nothing of the machine: give a key such as"),
+        ("clearance_mm=0.1:2000:3", {}, "clearance_mm: 2000 is outside [0, 1000] mm"),
+        ("gas.exponent=1:6:2", {}, "gas.exponent: 6 is outside [1, 5]"),
+        ("clearance_mm=1:0.1:3", {}, "write the lower end first, and --both to go down as well"),
+        ("clearance_mm=1:1:3", {}, "write the lower end first"),
+        ("clearance_mm=0:1:3", {"log": True}, "--log needs ends above 0"),
+    ],
+)
+def test_mistakes_in_the_option_are_told(over, more, message):
+    with pytest.raises(FollowError) as caught:
+        read_over(over, **more)
+    assert str(caught.value).startswith(f"--over {over}: {message}")
+
+
+@pytest.mark.parametrize(
+    ("text", "over", "message"),
+    [
+        (WORN, "clearance_mm=0:1:3", "case.yaml: --over begins at clearance_mm = 0, where a joint"),
+        ("joint: none\n", "machine.speed_rpm=300:700:3",
+         "case.yaml: no joint has clearance, so that nothing is to follow: set joint and clear"),
+        ("joint: [none, big_end]\nclearance_mm: 0.1\n", "machine.speed_rpm=300:700:3",
+         "no joint has clearance, so that nothing is to follow: set joint and clearance_mm (joint "
+         "none)"),
+        (WORN + "load: none\nspring: {stiffness_N_per_mm: 1}\n", OVER, "case.yaml:4:1: spring: "),
+        (WORN, "clearance_mm=0.1:11:3", "--over clearance_mm=0.1:11:3: clearance_mm: 11 mm exceeds "
+         "the pin radius"),
+        (WORN, "gas.back_pressure_MPa=0:0.1:3", "--over gas.back_pressure_MPa=0:0.1:3: gas: nothing"
+         " reads this group: it needs load == gas"),
+        (WORN, "clearance_mm=0.1:0.2:20000", "--over clearance_mm=0.1:0.2:20000: clearance_mm: "
+         "20000 jobs are more than 10000: "),
+    ],
+)  # fmt: skip
+def test_mistakes_in_the_file_are_told(tmp_path, text, over, message):
+    path = write(tmp_path / "case.yaml", text)
+    with pytest.raises((FollowError, CaseFileError)) as caught:
+        followed(path, over)
+    assert message in str(caught.value)

@@ -1,0 +1,213 @@
+"""One value of a chain: revolutions that join without a seam, what they settle to, a row of it."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+from conftest import CHAOTIC
+
+from compressor.cases.case import Case
+from compressor.metrics import METRICS
+from compressor.physics import Column, merge_tallies
+from compressor.solve.run import run_at_tolerance
+from compressor.solve.run_metrics import metrics
+from compressor.solve.series import rows_of
+from compressor.solve.si_record import record
+from compressor.solve.simulate import simulate
+from compressor.studies.follow import motion
+from compressor.studies.follow.motion import (
+    NUMBERS,
+    TEXTS,
+    HowLong,
+    bare_case,
+    empty_row,
+    follow_revolutions,
+    poincare_points,
+    run_value,
+    settle_motion,
+)
+
+HOW = HowLong(points=12, exponent=False)
+DRAFT = {"accuracy": "draft"}
+
+
+def case(clearance=0.2, **more):
+    return Case.from_values({"joint": "big_end", "clearance_mm": clearance, "solve": DRAFT} | more)
+
+
+BIG_END = case()
+
+
+def soon():
+    return time.monotonic() + 60.0
+
+
+@pytest.fixture(autouse=True)
+def settle_soon(monkeypatch):
+    monkeypatch.setattr(motion, "SETTLE_REV", 12)
+
+
+@pytest.fixture(scope="module")
+def row():
+    return run_value(BIG_END, None, HOW)
+
+
+# Revolutions
+
+
+def test_revolutions_from_a_state_are_a_run_from_it():
+    first = follow_revolutions(BIG_END, None, 2, soon())
+    again = follow_revolutions(BIG_END, first.state, 1, soon())
+    run = run_at_tolerance(bare_case(BIG_END, 1), BIG_END.rtol, 60.0, False, None, first.state)
+    np.testing.assert_array_equal(run.trajectory.states[0], first.state)
+    apart = np.abs(again.state - run.trajectory.states[-1]) / np.abs(again.state)
+    assert apart.max() < 1e-12
+
+
+def test_runs_join_without_a_seam():
+    """A run of three revolutions is one of two and one, but for its steps' own errors."""
+    whole = follow_revolutions(BIG_END, None, 3, soon())
+    first = follow_revolutions(BIG_END, None, 2, soon())
+    second = follow_revolutions(BIG_END, first.state, 1, soon())
+    np.testing.assert_allclose(second.points[0], whole.points[2], rtol=1e-3, atol=1e-8)
+    np.testing.assert_allclose(first.points, whole.points[:2], rtol=1e-12)
+    one, other = (metrics(run.p, run.turns[-1]) for run in (second, whole))
+    for name, about in METRICS.items():
+        if about.bar.relative:
+            np.testing.assert_allclose(one[name], other[name], rtol=1e-3)
+
+
+def test_points_are_the_eccentricities_at_top_dead_centre():
+    found = follow_revolutions(BIG_END, None, 2, soon())
+    of = bare_case(BIG_END, 2)
+    run = run_at_tolerance(of, BIG_END.rtol, 60.0, True)
+    rows = rows_of(run.p, run.trajectory)
+    at = [1200, 2400]  # samples at 360 and 720 degrees
+    place = rows[at, Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(2, 2, 2)
+    np.testing.assert_allclose(found.points[:, :, :2], place, atol=1e-7)
+    around = rows[[1199, 1201], Column.ECCENTRICITY : Column.ECCENTRICITY + 2]
+    rate = np.subtract(*around[::-1]) / (2 * 0.3 / 360 * of.turn)
+    # across dead centre, where a segment of the load begins
+    np.testing.assert_allclose(found.points[0, 0, 2:], rate, atol=2e-3)
+    assert (found.points[:, 1] == 0).all()
+
+
+def test_a_start_has_journals_at_rest_in_their_bores():
+    offset = {"big_end_x": 0.05, "big_end_y": -0.02, "small_end_x": 0.03, "small_end_y": 0.01}
+    both = Case.from_values({"joint": "both", "clearance_mm": 0.2, "initial_offset_mm": offset})
+    states = run_at_tolerance(bare_case(both, 1), both.rtol, 60.0, False).trajectory.states
+    found = poincare_points(record(both), [*states[:1]])
+    assert found == pytest.approx(np.array([[[5e-5, -2e-5, 0, 0], [3e-5, 1e-5, 0, 0]]]), rel=1e-12)
+
+
+def test_a_run_ends_once_enough_is_known():
+    found = follow_revolutions(BIG_END, None, 9, soon(), lambda turns, points: len(points) == 2)
+    assert (len(found.turns), len(found.points), found.reason) == (2, 2, "")
+    assert found.turns[-1]["seconds"] == pytest.approx(BIG_END.turn, rel=1e-9)
+
+
+def test_settling_is_told_with_the_revolution_from_which_on(monkeypatch):
+    found, since = settle_motion(BIG_END, None, soon())
+    assert since == 1 < len(found.turns) < 6
+    later, at_once = settle_motion(BIG_END, found.state, soon())
+    assert at_once == 0
+    assert len(later.turns) == 3
+    monkeypatch.setattr(motion, "SETTLE_REV", 6)
+    lost, never = settle_motion(Case.from_values({**CHAOTIC, "solve": DRAFT}), None, soon())
+    assert (len(lost.turns), math.isnan(never)) == (6, True)
+
+
+def test_a_run_that_fails_has_the_revolutions_before():
+    short = case(solve=DRAFT | {"max_steps": 1200})
+    found = follow_revolutions(short, None, 50, soon())
+    assert found.reason == "budget_steps"
+    assert 0 < len(found.turns) == len(found.points) < 50
+    assert np.isfinite(found.state).all()
+
+
+# Rows
+
+
+def test_the_paper_s_machine_repeats_itself_once_a_revolution(row):
+    assert (row["status"], row["reason"], row["regime"]) == ("ok", "", "periodic")
+    assert (row["period"], row["revolutions"], row["settled_rev"]) == (1, 6, 1)
+    assert np.isfinite(row["section"][0, 0]).all()
+    assert np.isnan(row["section"][1:]).all()
+    assert row["contact_loss_fraction"][0] == 0
+
+
+def test_its_numbers_are_those_of_a_run_that_has_settled(row):
+    run = simulate(case(solve={"settle_rev": 2, "duration_rev": 4}))
+    for name in ("peak_acceleration", "rms_acceleration", "peak_contact_force"):
+        np.testing.assert_allclose(row[name], run[name].values, rtol=0.02)
+    place = run["eccentricity"].sel(joint="big_end").values[[1200, 2400]]
+    np.testing.assert_allclose(row["section"][[0, 0], 0, :2], place, atol=2e-6)
+
+
+def test_a_value_begins_at_the_state_that_it_is_given(row):
+    """Its first revolution is a direct run from the end of the last value, and so are the others.
+
+    Measured are six revolutions of a period of one, from where the metrics agree.
+    """
+    after, state = case(0.25), row["end_state"]
+    found = run_value(after, state, HOW)
+    settled, since = settle_motion(after, state, soon())
+    first = follow_revolutions(after, state, 1, soon())
+    run = run_at_tolerance(bare_case(after, 1), after.rtol, 60.0, False, None, state)
+    np.testing.assert_array_equal(run.trajectory.states[0], state)
+    np.testing.assert_allclose(first.state, run.trajectory.states[-1], rtol=1e-9)
+    np.testing.assert_allclose(settled.points[0], first.points[0], rtol=1e-9)
+    assert found["settled_rev"] == since == 1
+    rest = follow_revolutions(after, settled.state, 6, soon())
+    together = metrics(rest.p, merge_tallies(rest.turns))
+    np.testing.assert_allclose(found["rms_acceleration"], together["rms_acceleration"], rtol=1e-9)
+    np.testing.assert_allclose(found["end_state"], rest.state, rtol=1e-9)
+    np.testing.assert_allclose(found["section"][0, 0], rest.points[-1, 0], rtol=1e-9)
+    assert np.isnan(found["section"][0, 1]).all()  # the small end is ideal
+
+
+def test_a_lively_motion_has_impacts_and_no_period():
+    lively = case(0.3, contact={"damping_N_s_per_mm": 0.336})
+    row = run_value(lively, None, HowLong(points=12))
+    assert (row["status"], row["revolutions"]) == ("ok", 12)
+    assert math.isnan(row["period"])
+    assert math.isnan(row["settled_rev"])
+    assert row["regime"] == "chaotic"
+    assert 10.0 < row["lyapunov_exponent"] - row["lyapunov_exponent_error"] < 30.0
+    assert np.isfinite(row["section"][:, 0]).all()
+    assert 0.1 < row["contact_loss_fraction"][0] < 0.9
+    assert 0 < row["rms_acceleration_standard_error"] < row["rms_acceleration"]
+
+
+def test_a_motion_that_takes_two_revolutions_has_two_points(monkeypatch):
+    """With a seventieth of the paper's damping and 0.0776 mm (standard accuracy)."""
+    monkeypatch.setattr(motion, "SETTLE_REV", 40)
+    values = {"joint": "big_end", "clearance_mm": 0.0776, "contact": {"damping_N_s_per_mm": 5}}
+    row = run_value(Case.from_values(values), None, HOW)
+    assert (row["regime"], row["period"], row["revolutions"]) == ("periodic", 2, 8)
+    points = row["section"][:3, 0, :2]
+    assert np.linalg.norm(points[1] - points[0]) > 0.01 * 0.0776e-3
+    assert np.isnan(points[2]).all()
+
+
+def test_the_same_value_has_the_same_bits(row):
+    again = run_value(case(), None, HOW)
+    for name in (*TEXTS, *NUMBERS):
+        np.testing.assert_array_equal(again[name], row[name])
+
+
+def test_a_run_that_stops_is_a_row_with_the_state_that_it_began_from(row):
+    short = case(solve=DRAFT | {"max_steps": 50})
+    found = run_value(short, row["end_state"], HOW)
+    assert (found["status"], found["reason"]) == ("failed", "budget_steps")
+    np.testing.assert_array_equal(found["end_state"], row["end_state"])
+    assert np.isnan(run_value(short, None, HOW)["end_state"]).all()
+    assert math.isnan(found["peak_acceleration"])
+
+
+def test_a_row_has_all_that_is_named():
+    found = empty_row(case(), 12)
+    assert {*found} == {*TEXTS, *NUMBERS}
+    assert found["section"].shape == (12, 2, 4)
+    assert found["end_state"].shape == (4,)
