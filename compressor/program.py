@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from importlib import metadata
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 VERSION = "0.1.0"  # the one place; CHANGELOG.md says what has changed
 PROGRAM = f"compsim {VERSION}"  # as stored results name it
@@ -79,11 +79,6 @@ class CompsimWarning(UserWarning):
     >>> with warnings.catch_warnings():
     ...     warnings.simplefilter("error", compressor.CompsimWarning)
     """
-
-
-# group of keys by which a case file requests a study -> function that imports the study's module
-# `group`; of the same table
-STUDY_GROUPS: dict[str, Callable[[], Any]] = {}
 
 
 _FILTERS = threading.RLock()

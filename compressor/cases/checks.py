@@ -32,7 +32,6 @@ from compressor.cases.parameter import (
 )
 from compressor.cases.table import GROUPS, WORDS, Settings, table
 from compressor.metrics import JOINTS
-from compressor.program import STUDY_GROUPS
 
 
 class Shorthand(NamedTuple):
@@ -291,9 +290,9 @@ def of_percent(name: str, group: str) -> str:
 
 
 # keys of a case file that are no part of a case: how values are swept together, what the page of
-# the report says of the machine, groups of studies
-SWEEP = ("sample", "zip", "exclude", "blocks", "report", *STUDY_GROUPS)
-MAPPINGS = ("sample", "report", *STUDY_GROUPS)  # of these, those with keys of their own
+# the report says of the machine
+SWEEP = ("sample", "zip", "exclude", "blocks", "report")
+MAPPINGS = ("sample", "report")  # of these, those with keys of their own
 REPORT = {"title": 100, "notes": 2000}  # keys of `report`, and how many letters they may have
 MAX_MEANT = 3  # keys that an unknown one may have meant
 
@@ -304,8 +303,6 @@ def known_keys(group: str, file: bool = True) -> list[str]:
         return ["n", "seed"]
     if group == "report":
         return [*REPORT]
-    if group in STUDY_GROUPS:
-        return [*STUDY_GROUPS[group]().ROWS]
     names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]
     return [*names, *SWEEP] if file and not group else names
 

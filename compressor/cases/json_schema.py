@@ -14,12 +14,11 @@ from compressor.cases.parameter import NAME, TARGET, Parameter
 from compressor.cases.swept import DISTRIBUTIONS, FORMS, SAMPLED, is_number
 from compressor.cases.table import GROUPS, WORDS, outside_identity, table
 from compressor.metrics import METRICS
-from compressor.program import STUDY_GROUPS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 MAX_NUMBER = 1e300  # a bound of values that need only be finite
-WHOLE_FILE = ("name", "blocks", "report", *STUDY_GROUPS)  # what cannot stand in a block
+WHOLE_FILE = ("name", "blocks", "report")  # what cannot stand in a block
 
 Schema = dict[str, Any]
 
@@ -28,7 +27,7 @@ def case_schema() -> Schema:
     """Return the JSON Schema of a whole case file, in the dialect 2020-12."""
     keys = dict.fromkeys(key.partition(".")[0] for key in table())
     found = {key: _group(key) if key in GROUPS else _value(table()[key]) for key in keys}
-    found |= _sweeps() | {name: _study_group(load()) for name, load in STUDY_GROUPS.items()}
+    found |= _sweeps()
     in_block = {key: item for key, item in found.items() if key not in WHOLE_FILE}
     blocks = {"type": "array", "minItems": 1, "items": _mapping(in_block)}
     blocks["description"] = "sets of jobs, one after the other; each over the keys of the file"
@@ -161,12 +160,3 @@ def _sweeps() -> Schema:
             name: {**TEXT, "minLength": 1, "maxLength": most} for name, most in REPORT.items()
         })},
     }  # fmt: skip
-
-
-def _study_group(module: Any) -> Schema:
-    """Return the schema of a group that requests a study; module: the one that reads it."""
-    keys = {}
-    for name, row in module.ROWS.items():
-        default = {} if row.default is None else {"default": row.default}
-        keys[name] = {"description": row.phrase, **default, **_single_value(row)}
-    return {"description": module.ABOUT, **_mapping(keys), "required": [*module.NEEDED]}

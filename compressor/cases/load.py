@@ -17,7 +17,7 @@ from typing import Any
 
 from compressor.cases import blocks
 from compressor.cases.case import Case
-from compressor.cases.checks import REPORT, SHORTHANDS, TWICE, row_of, value_of
+from compressor.cases.checks import REPORT, SHORTHANDS, row_of, value_of
 from compressor.cases.combinations import Block, columns
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
 from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
@@ -30,7 +30,7 @@ from compressor.cases.keys import (
     read_overrides,
 )
 from compressor.cases.parameter import CaseError, Problem, quote_value
-from compressor.cases.study import Axis, Cases, Study, StudyRequest
+from compressor.cases.study import Axis, Cases, Study
 from compressor.cases.swept import (
     SAMPLED,
     format_count,
@@ -38,7 +38,7 @@ from compressor.cases.swept import (
 )
 from compressor.cases.table import WORDS, table
 from compressor.cases.yaml_reader import CaseFileError, FileProblem, Node, Place, read_file, shorten
-from compressor.program import STUDY_GROUPS, Progress, no_progress
+from compressor.program import Progress, no_progress
 
 Variants = Callable[[Any], Iterable[Any]]  # of a case: the cases that are run for it
 
@@ -117,7 +117,6 @@ class _Draft:
     leaves: Leaves
     changes: Mapping[str, Leaves]
     problems: list[FileProblem]
-    request: StudyRequest | None = None
     report: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -139,7 +138,7 @@ def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
     >>> [case.clearance_mm.big_end for case in cases]
     [0.1, 0.2, 0.3]
     """
-    return [case for study in load_studies(*paths, follow=False) for case in study.cases]
+    return [case for study in load_studies(*paths) for case in study.cases]
 
 
 def load_studies(
@@ -147,26 +146,22 @@ def load_studies(
     overrides: Sequence[str] = (),
     max_jobs: int = MAX_JOBS,
     only: str = "",
-    follow: bool = True,
     progress: Progress = no_progress,
     variants: Variants = itself,
 ) -> list[Study]:
     """Return the studies of YAML case files.
 
     Each override, `key=value`, replaces a value in all of them. A file with more than `max_jobs`
-    jobs is refused before any is made; `only`, a comparison, selects the jobs to be run. A file
-    with the group of a study is refused where the caller cannot `follow` it. `progress` is called
-    with how many of how many cases are read. `variants` gives the cases that the caller runs for
-    one; a key that none of them reads is refused. Raises CaseFileError with everything that is
-    wrong in all files, overrides and the comparison.
+    jobs is refused before any is made; `only`, a comparison, selects the jobs to be run.
+    `progress` is called with how many of how many cases are read. `variants` gives the cases that
+    the caller runs for one; a key that none of them reads is refused. Raises CaseFileError with
+    everything that is wrong in all files, overrides and the comparison.
     """
     problems: list[FileProblem] = []
     changes = read_overrides(overrides, problems)
     test = _read_only(only, problems) if only else None
     drafts = [_draft(_path_of(path), changes, problems) for path in paths]
     _refuse_shared_names(drafts)
-    if not follow:
-        _refuse_requests(drafts)
     keys = KeysRead(variants)
     studies = [_study(draft, max_jobs, test, progress, keys) for draft in drafts]
     problems += _unread(drafts, keys)
@@ -207,15 +202,13 @@ def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProbl
         problems.append(FileProblem(root.place, "", message))
     whole = override_leaves(file, changes)
     name = _study_name(path, whole, problems) if root else ""
-    request = _read_request(whole, problems)
     if "blocks" in changes:
         file = override_leaves(file, {"blocks": changes["blocks"]})
     report = _read_report(whole, problems)
-    excluded = ("blocks", "report", *STUDY_GROUPS)
+    excluded = ("blocks", "report")
     rest = {key: change for key, change in changes.items() if key.partition(".")[0] not in excluded}
-    outside = ("report", *STUDY_GROUPS)
-    values = {k: node for k, node in file.values.items() if k.partition(".")[0] not in outside}
-    return _Draft(path, name, Leaves(values, file.places), rest, problems, request, report)
+    values = {k: node for k, node in file.values.items() if k.partition(".")[0] != "report"}
+    return _Draft(path, name, Leaves(values, file.places), rest, problems, report)
 
 
 def _read_report(found: Leaves, problems: list[FileProblem]) -> dict[str, str]:
@@ -234,14 +227,6 @@ def _read_report(found: Leaves, problems: list[FileProblem]) -> dict[str, str]:
             message = f"needs {what} of up to {most} letters, not {quote_value(node.plain())}"
             problems.append(FileProblem(node.place, f"report.{name}", message))
     return texts
-
-
-def _read_request(found: Leaves, problems: list[FileProblem]) -> StudyRequest | None:
-    """Return what the group of a study requests; None without, or where it is a problem."""
-    names = [name for name in STUDY_GROUPS if name in found.places]
-    for name in names[1:]:
-        problems.append(FileProblem(found.places[name], name, TWICE.format(names[0])))
-    return STUDY_GROUPS[names[0]]().read(found, problems) if names else None
 
 
 def _study_name(path: str, found: Leaves, problems: list[FileProblem]) -> str:
@@ -272,16 +257,6 @@ def _refuse_shared_names(drafts: Sequence[_Draft]) -> None:
             draft.problems.append(FileProblem(place, "name", message))
 
 
-def _refuse_requests(drafts: Sequence[_Draft]) -> None:
-    """Refuse files with the group of a study: a chain is no case."""
-    for draft in drafts:
-        if draft.request:
-            group = draft.request.group
-            place = draft.leaves.places.get(group, Place(draft.path, 1, 1))
-            message = "only `compsim run` and `compsim plan` follow them: give a file without"
-            draft.problems.append(FileProblem(place, group, message))
-
-
 def _unread(drafts: Sequence[_Draft], keys: KeysRead) -> Iterator[FileProblem]:
     """Yield the keys of all files that no job reads.
 
@@ -295,23 +270,14 @@ def _unread(drafts: Sequence[_Draft], keys: KeysRead) -> Iterator[FileProblem]:
 
 
 def _note_read(draft: _Draft, cases: Cases | None, keys: KeysRead) -> None:
-    """Note which keys the jobs of a draft read, of a chain those at both ends."""
-    if draft.problems or cases is None:
-        return
-    keys.note(cases)
-    if draft.request:
-        last = replace(draft, request=draft.request.at_last(), problems=[])
-        _, cases = _cases(last, MAX_JOBS)
-        if cases is not None:
-            keys.note(cases)
+    """Note which keys the jobs of a draft read."""
+    if not draft.problems and cases is not None:
+        keys.note(cases)
 
 
 def _cases(draft: _Draft, max_jobs: int) -> tuple[list[blocks.Draft], Cases | None]:
     """Return the blocks of a draft, and their cases; None where they are too many to be made."""
-    every = _blocks(draft, max_jobs)
-    if draft.request:
-        every = (draft.request.at_first(leaves, draft.problems) for leaves in every)
-    drafts = [blocks.draft(leaves, draft.problems) for leaves in every]
+    drafts = [blocks.draft(leaves, draft.problems) for leaves in _blocks(draft, max_jobs)]
     if not _fits_limit(drafts, draft, max_jobs):
         return drafts, None
     return drafts, Cases([one.block(draft.name) for one in drafts])
@@ -342,13 +308,10 @@ def _study(
             if sweep.kind in SAMPLED and sweep.has_ends
         }  # fmt: skip
         axes = [Axis(key, tuple(values[key]), spreads.get(key)) for key in swept]
-    chains = _chains(draft, draft.request, cases, max_jobs) if draft.request else ()
-    if draft.problems:
-        return Study(draft.name, draft.path, (), ())
     selected = range(len(cases)) if only is None else cases.where(only)
     return Study(
         draft.name, draft.path, tuple(axes), cases, keys, is_grid, selected,
-        draft.request, chains, tuple(nest_values(block.fixed) for block in found), **draft.report,
+        tuple(nest_values(block.fixed) for block in found), **draft.report,
     )  # fmt: skip
 
 
@@ -383,7 +346,7 @@ def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
 def _block_leaves(item: Node, draft: _Draft) -> Leaves:
     """Return the leaves of a block; keys that only a file can have are problems."""
     found = leaves(item, draft.problems)
-    whole = ("name", "blocks", "report", *STUDY_GROUPS)
+    whole = ("name", "blocks", "report")
     for key in [key for key in found.values if key.partition(".")[0] in whole]:
         group, message = key.partition(".")[0], IN_BLOCK
         draft.problems.append(FileProblem(found.places[group], group, message))
@@ -442,36 +405,6 @@ def _check_cases(
         message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
         draft.problems.append(FileProblem(Place(draft.path), "", message))
     return tuple(keys), values
-
-
-def _chains(
-    draft: _Draft, request: StudyRequest, cases: Cases, max_jobs: int
-) -> tuple[tuple[Case, ...], ...]:
-    """Return the cases of each chain; too many, or such that cannot be followed, are problems."""
-    group, places = request.group, draft.leaves.places
-    place = places.get(group, Place(draft.path, 1, 1))
-    total = len(cases) * request.n * len(request.directions)
-    if total > max_jobs:
-        message = (
-            f"{format_count(total)} values are more than {max_jobs}; lower n, or raise --max-jobs"
-        )
-        draft.problems.append(FileProblem(places.get(f"{group}.n", place), f"{group}.n", message))
-        return ()
-    chains = []
-    for block, number in cases.combinations:
-        chosen = block.chosen(number)
-        try:
-            chain = tuple(map(block.resolve_case, request.follow(chosen)))
-        except CaseError as error:
-            misfits = (
-                _locate_problem(problem, chosen, block, draft.path) for problem in error.problems
-            )
-            draft.problems.extend(misfits)
-            return ()
-        if message := request.objection(chain):
-            draft.problems.append(FileProblem(place, group, message))
-        chains.append(chain)
-    return tuple(chains)
 
 
 def _locate_problem(

@@ -9,8 +9,7 @@ from compressor.cases.case import Case
 from compressor.cases.checks import expand_shorthands
 from compressor.cases.combinations import Block
 from compressor.cases.comparison import Test
-from compressor.cases.keys import Leaves, nest_values
-from compressor.cases.yaml_reader import FileProblem, Node
+from compressor.cases.keys import nest_values
 
 
 @dataclass(frozen=True)
@@ -26,34 +25,6 @@ class Axis:
     spread: Callable[[float], float] | None = field(default=None, compare=False)
 
 
-class StudyRequest(Protocol):
-    """What a file's group of a study requests: each case is followed along a key, in chains.
-
-    The study's module `group` is imported when a file has the group. It has `ROWS`, a `Parameter`
-    of each key; `NEEDED`, the keys that a file must give; `ABOUT`, their description in the JSON
-    Schema; and `read(leaves, problems)`, which returns the request, or None where it adds problems.
-    """
-
-    @property
-    def group(self) -> str: ...  # its name
-    @property
-    def n(self) -> int: ...  # number of values of the key
-    @property
-    def directions(self) -> Sequence[str]: ...  # up, down: a chain each
-
-    def at_first(self, leaves: Leaves, problems: list[FileProblem]) -> Leaves:
-        """Return a block's leaves with the key at its first value; add what is wrong."""
-
-    def at_last(self) -> "StudyRequest":
-        """Return the request that begins at the last value."""
-
-    def follow(self, chosen: Mapping[str, Node]) -> Iterable[dict[str, Node]]:
-        """Yield a combination of a file's values at each value of the key."""
-
-    def objection(self, cases: tuple[Case, ...]) -> str:
-        """Return why these cases of a chain cannot be followed, or ""."""
-
-
 @dataclass(frozen=True)
 class Study:
     """One case file. In a grid, jobs are in C order over the axes, in the file's order.
@@ -61,8 +32,6 @@ class Study:
     Otherwise every axis is a column, with a value for each job, None where the job has none.
     `title` and `notes` are what the page of the report says of the machine, "" without.
     `fixed` has the values that are not swept, group by group as each block of the file gives them.
-    With a `request` the jobs are those that chains begin at, and `chains` has the cases of each, in
-    the order of the jobs, by the values of the key that is followed.
     """
 
     name: str
@@ -72,8 +41,6 @@ class Study:
     keys: tuple[str, ...] = ()  # of the cases
     is_grid: bool = True
     selected: Sequence[int] = ()  # numbers of the jobs to be run now
-    request: StudyRequest | None = None
-    chains: tuple[tuple[Case, ...], ...] = ()
     fixed: tuple[Mapping[str, Any], ...] = ()
     title: str = ""
     notes: str = ""
