@@ -1,9 +1,10 @@
-"""Numbers as people read them: with the digits that their error bars allow.
+"""Numbers and tables as people read them: with the digits that error bars allow.
 
 Without libraries: results are read without any.
 """
 
 import math
+from collections.abc import Iterable, Sequence
 
 UNKNOWN = "unknown"  # a number whose error bar is as long as itself
 DIGITS_WITHOUT_BAR, MAX_DIGITS = 6, 12  # digits without an error bar, and with one
@@ -58,6 +59,21 @@ def by_bar(
 def plural(count: int, thing: str = "job") -> str:
     """Return a number of things in words: 1 job, 2 jobs."""
     return f"{count} {thing}" + ("s" if count != 1 else "")
+
+
+def align_columns(rows: Iterable[Sequence[str]], sides: str = "") -> list[str]:
+    """Return rows of text as lines in columns; sides: `<` or `>` of each, `<` by default.
+
+    >>> align_columns([("job", "ms"), ("3fa9", "7")], "<>")
+    ['job   ms', '3fa9   7']
+    """
+    rows = [*rows]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    sides = sides.ljust(len(widths), "<")
+    lines = (zip(row, sides, widths, strict=True) for row in rows)
+    return [
+        "  ".join(f"{text:{side}{width}}" for text, side, width in line).rstrip() for line in lines
+    ]
 
 
 def setting(value: float) -> str:

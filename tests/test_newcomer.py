@@ -224,11 +224,8 @@ def test_the_page_on_figures_is_right(tmp_path, paper_store):
 def add_verb(place, name, module, line):
     """Add a verb to a copy of the program, by its module and its line in the table of verbs."""
     (place / f"cmd/compsim/{name}.py").write_text(module, encoding="utf-8")
-    changed(
-        place, "cmd/compsim/cli.py",
-        (f"    {name},\n", "    show,\n    status,\n", False),
-        (indented(line), "    ),\n    \"Work with measured records\"", False),
-    )  # fmt: skip
+    place_of_it = '"Read what is stored": ('
+    changed(place, "cmd/compsim/cli.py", (line.strip() + " ", place_of_it, True))
 
 
 def test_the_page_on_verbs_is_right(tmp_path):
@@ -247,7 +244,7 @@ def test_the_page_on_studies_is_right(tmp_path, paper_store):
     folder.mkdir()
     (folder / "__init__.py").write_text(purpose, encoding="utf-8")
     (folder / "count.py").write_text(module, encoding="utf-8")
-    add_verb(tmp_path, "count", verb, "count.count,\n")
+    add_verb(tmp_path, "count", verb, '"count",\n')
     (tmp_path / "results").symlink_to(paper_store)
     assert run_in(tmp_path, "-m", "compsim", "count", "big-end", cwd=tmp_path) == "3\n"
     assert "Print how many jobs" in run_in(tmp_path, "-m", "compsim", "--help", cwd=tmp_path)

@@ -1,7 +1,6 @@
 """On Windows results are read, planned and drawn; only a run needs what that system lacks."""
 
 import json
-import os
 import subprocess
 import sys
 import textwrap
@@ -37,7 +36,7 @@ def elsewhere(tmp_path):
     def run(code):
         script = WITHOUT + textwrap.dedent(code)
         done = subprocess.run(
-            [sys.executable, "-c", script], cwd=tmp_path, env=os.environ | {"COMPSIM_DEBUG": "1"},
+            [sys.executable, "-c", script], cwd=tmp_path,
             capture_output=True, text=True,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr

@@ -1,30 +1,41 @@
 """`compsim calibrate`: what is not known of a sound machine, by a record of it."""
 
-import json
 from typing import Any
 
 import click
 
 from compsim import options, screen
 from compsim.progress import ProgressReporter
-from compsim.records import record_options
 
 
 @click.command()
 @click.argument("record", metavar="RECORD|JOB", type=options.FILE)
 @options.config
-@click.option("--fit", "ranges", multiple=True, required=True, metavar="KEY=LOW:HIGH",
-              help="Fit this key within this range, in the case file's unit.")  # fmt: skip
-@record_options
+@click.option(
+    "--fit",
+    "ranges",
+    multiple=True,
+    required=True,
+    metavar="KEY=LOW:HIGH",
+    help="Fit this key within this range, in the case file's unit.",
+)
+@options.record
 @options.set_keys
 @options.results
 @options.jobs()
 @options.as_json
 @options.quiet
 def calibrate(
-    record: str, config: str, ranges: tuple[str, ...], hints: dict[str, Any],
-    overrides: tuple[str, ...], folder: str, jobs: int | None, as_json: bool, quiet: bool,
-) -> int:  # fmt: skip
+    record: str,
+    config: str,
+    ranges: tuple[str, ...],
+    hints: dict[str, Any],
+    overrides: tuple[str, ...],
+    folder: str,
+    jobs: int | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
     """Fit keys of a sound machine to its accelerometer's record.
 
     \b
@@ -41,11 +52,11 @@ def calibrate(
     Every point is a job of the study CONFIG-calibrate in the folder of results: it is stored, and
     not run again. Exit code 0 also where the machine does not fit: that is an answer.
     """
-    screen.one_thread_each()  # before numpy loads
+    from compressor.cases import to_yaml
     from compressor.store import find_record
     from compressor.studies.calibrate.calibrate import Unknown
     from compressor.studies.calibrate.calibrate import calibrate as fit_case
-    from compressor.studies.calibrate.words import describe, jsonable_fit
+    from compressor.studies.calibrate.words import jsonable_fit, list_fit
     from compressor.sweep import cores
 
     unknowns = [Unknown.written(text) for text in ranges]
@@ -53,16 +64,11 @@ def calibrate(
     with ProgressReporter(quiet, "points") as progress:
         found = fit_case(measured, config, unknowns, folder, overrides, jobs or cores(), progress)
     if as_json:
-        screen.print_text(json.dumps(jsonable_fit(record, found), indent=1))
+        screen.print_json(jsonable_fit(record, found))
         return screen.DONE
-    from compressor.cases import to_yaml
-
-    for text in measured.remarks:
-        screen.print_text(f"# read: {text}")
-    for line in describe(record, config, found):
-        screen.print_text(f"# {line}".rstrip())
+    texts = [f"read: {text}" for text in measured.remarks] + [*list_fit(record, config, found)]
     _, _, values = to_yaml(found.case).partition("\n")  # without the name: copies have their own
-    screen.print_text(values.rstrip("\n"))
+    screen.print_text(*(f"# {text}" for text in texts), values.rstrip("\n"))
     if not quiet:
         screen.say(f"{found.jobs} points, {found.run_now} of them run now, in study {found.study}")
     return screen.DONE

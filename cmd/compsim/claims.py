@@ -1,8 +1,7 @@
 """`compsim claims`: in which machines the paper's claims hold, and what decides them."""
 
-import json
 import shlex
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
@@ -10,32 +9,32 @@ from compressor.digits import plural
 from compsim import options, screen
 from compsim.progress import ProgressReporter
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 EXAMPLES = ("claims", "assumptions")
 
 
 @click.command()
 @click.argument("configs", nargs=-1, metavar="[CONFIG...]", type=options.FILE)
-@options.output("claims", "Write the verdicts into this folder.")
-@click.option("--search", "generations", type=click.IntRange(min=0), default=0, metavar="N",
-              help="Search for the least change by which all claims hold: N generations of some "
-              "50 machines, in the ranges that a CONFIG draws from.")  # fmt: skip
+@options.output("Write the verdicts into this folder.", default="claims")
+@click.option(
+    "--search",
+    "generations",
+    type=options.NUMBER,
+    default=0,
+    metavar="N",
+    help="Search for the least change by which all claims hold: N generations of some 50 machines, "
+    "in the ranges that a CONFIG draws from.",
+)
 @options.jobs()
 @options.set_keys
 @options.max_jobs
-@options.as_json
 @options.quiet
 def claims(
     configs: tuple[str, ...],
     output: str,
     generations: int,
     jobs: int | None,
-    overrides: tuple[str, ...],
-    max_jobs: int,
-    as_json: bool,
     quiet: bool,
+    **how: Any,
 ) -> int:
     """Judge the paper's eight claims on many machines.
 
@@ -52,51 +51,33 @@ def claims(
 
     Exit code 3 if a machine has no verdict.
     """
-    screen.one_thread_each()  # before numpy loads
     from compressor.cases import load_studies, templates
     from compressor.store import writable_folder
+    from compressor.studies.claims.findings import sentences
     from compressor.studies.claims.search import least_change
     from compressor.studies.claims.study import cases_judged, judge_machines
     from compressor.sweep import cores
 
-    paths = configs or tuple(str(templates()[name].path) for name in EXAMPLES)
-    studies = load_studies(*paths, overrides=overrides, max_jobs=max_jobs, variants=cases_judged)
+    paths = configs or [str(templates()[name].path) for name in EXAMPLES]
+    studies = load_studies(*paths, variants=cases_judged, **how)
     searchable = [study for study in studies if study.axes and all(a.spread for a in study.axes)]
     if generations and not searchable:
-        raise click.UsageError(
-            "--search needs a CONFIG whose keys are drawn from ranges, such as {saltelli: [2, 9]}"
-        )
+        drawn = "whose keys are drawn from ranges, such as {saltelli: [2, 9]}"
+        raise click.UsageError(f"--search needs a CONFIG {drawn}")
     writable_folder(output)
+    say = (lambda text: None) if quiet else screen.say
     found, workers = [], jobs or cores()
     for study in studies:
-        say_unless(quiet, f"{study.name}: {plural(study.jobs, 'machine')} of {study.path}")
+        say(f"{study.name}: {plural(study.jobs, 'machine')} of {study.path}")
         with ProgressReporter(quiet, "machines") as progress:
             found.append(judge_machines(study, output, workers, progress))
     for study in searchable if generations else ():
-        say_unless(quiet, f"{study.name}: {plural(generations, 'generation')} of a search")
+        say(f"{study.name}: {plural(generations, 'generation')} of a search")
         with ProgressReporter(quiet, "machines") as progress:
             found.append(least_change(study, output, workers, generations, progress))
-    report_machines(found, as_json)
+    for one in found:
+        screen.print_text(one.encoding["source"], *(f"  {text}" for text in sentences(one)))
     beside = "" if output == "claims" else f" --claims {shlex.quote(output)}"
-    say_unless(quiet, f"next: compsim report{beside}")
+    say(f"next: compsim report{beside}")
     failed = any((one["status"] == "failed").any() for one in found)
     return screen.SOME_FAILED if failed else screen.DONE
-
-
-def say_unless(quiet: bool, text: str) -> None:
-    """Write text on stderr, unless quiet is wanted."""
-    if not quiet:
-        screen.say(text)
-
-
-def report_machines(found: "list[xr.Dataset]", as_json: bool) -> None:
-    """Write files of judged machines on stdout, each with its findings."""
-    from compressor.studies.claims.findings import sentences
-
-    findings = {one.encoding["source"]: [*sentences(one)] for one in found}
-    if as_json:
-        screen.print_text(json.dumps(findings, indent=1))
-        return
-    for path, texts in findings.items():
-        screen.print_text(path)
-        screen.print_text("\n".join(f"  {text}" for text in texts))

@@ -10,50 +10,40 @@ import platform
 import shlex
 import signal
 import sys
-import tempfile
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
+from importlib import import_module
 from typing import Any
 
 import click
 
 from compressor.program import PROGRAM, CompsimError, CompsimWarning, library_versions
-from compsim import (
-    alarms,
-    calibrate,
-    claims,
-    compare,
-    diagnosis,
-    explain,
-    export,
-    find,
-    follow,
-    init,
-    plan,
-    plot,
-    report,
-    run,
-    schema,
-    screen,
-    show,
-    status,
-    stress,
-    tradeoff,
-    verify,
-    wear,
-)
+from compsim import screen
 
 # of paths, that a program makes; any other error of a path is the file system's
 MISTAKES = (FileNotFoundError, FileExistsError, NotADirectoryError, IsADirectoryError)
-SIGNALS = [signal.SIGINT, signal.SIGTERM]
-if hasattr(signal, "SIGHUP"):  # not on Windows
-    SIGNALS.append(signal.SIGHUP)
-LIBRARIES = ("numpy", "scipy", "numba", "h5py", "xarray")
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")  # that ask a program to end; Windows has no SIGHUP
 NO_ROOM = ("failed to map segment", "Cannot allocate memory")  # as a library that is loaded says
+LIBRARIES = ("numpy", "scipy", "numba", "h5py", "xarray")
 UNREAD = 141  # exit code, as of a program that SIGPIPE ends, which Windows does not have
-WHOLE = 1000  # characters, from which click would cut a summary
 COMPLETING = "_COMPSIM_COMPLETE"  # set by a shell that completes a word: click prints and exits
+VERBS = {  # by their headings in `compsim --help`; each is in the module of its name
+    "Work": ("init", "plan", "run", "report"),
+    "Read what is stored": ("status", "show", "plot", "export", "verify"),
+    "Study a machine": (
+        "claims",
+        "wear",
+        "tradeoff",
+        "explain",
+        "stress",
+        "find",
+        "follow",
+        "alarms",
+    ),
+    "Work with measured records": ("dataset", "identify", "compare", "calibrate"),
+    "Editor": ("schema",),
+}
 
 
 class Interrupted(BaseException):
@@ -81,16 +71,25 @@ class Commands(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands by headings."""
         longest = max(map(len, self.commands))
-        for heading, verbs in VERBS.items():
+        for heading, names in VERBS.items():
             with formatter.section(heading):
-                formatter.write_dl([
-                    (f"{verb.name:<{longest}}", verb.get_short_help_str(WHOLE)) for verb in verbs
-                ])  # fmt: skip
+                texts = (self.commands[name].get_short_help_str(1000) for name in names)
+                padded = (f"{name:<{longest}}" for name in names)
+                formatter.write_dl([*zip(padded, texts, strict=True)])
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
-@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=version,
-              help="Print the versions of program, model and libraries.")  # fmt: skip
+@click.group(
+    cls=Commands,
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
+)
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=version,
+    help="Print the versions of program, model and libraries.",
+)
 def cli() -> None:
     """Sweep a reciprocating compressor over joint clearances, and draw what comes out.
 
@@ -101,20 +100,8 @@ def cli() -> None:
     """
 
 
-VERBS = {  # by their headings in `compsim --help`
-    "Work": (init.init, plan.plan, run.run, report.report),
-    "Read what is stored": (status.status, show.show, plot.plot, export.export, verify.verify),
-    "Study a machine or the model": (
-        claims.claims, wear.wear, tradeoff.tradeoff, explain.explain, stress.stress, find.find,
-        follow.follow, alarms.alarms,
-    ),
-    "Work with measured records": (
-        diagnosis.dataset, diagnosis.identify, compare.compare, calibrate.calibrate,
-    ),
-    "Editor": (schema.schema,),
-}  # fmt: skip
 for verb in itertools.chain(*VERBS.values()):
-    cli.add_command(verb)
+    cli.add_command(getattr(import_module(f"compsim.{verb}"), verb))
 
 
 @contextlib.contextmanager
@@ -122,12 +109,15 @@ def interruptible() -> Iterator[None]:
     """Turn the signals that ask a program to end into Interrupted; a second one ends it at once."""
 
     def interrupt(number: int, frame: Any) -> None:
-        for other in caught:
+        for other in old:
             signal.signal(other, signal.SIG_DFL)
         raise Interrupted(number)
 
-    caught = [number for number in SIGNALS if signal.getsignal(number) != signal.SIG_IGN]
-    old = {number: signal.signal(number, interrupt) for number in caught}
+    numbers = [signal.Signals[name] for name in SIGNALS if hasattr(signal, name)]
+    old = {number: signal.getsignal(number) for number in numbers}
+    old = {number: handler for number, handler in old.items() if handler != signal.SIG_IGN}
+    for number in old:  # but not what nohup ignores
+        signal.signal(number, interrupt)
     try:
         yield
     finally:
@@ -156,6 +146,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     command = shlex.join(["compsim", *arguments])
+    screen.one_thread_each()  # before numpy loads
     try:
         with interruptible(), report_warnings():
             return cli.main(arguments, "compsim", standalone_mode=False, obj=command) or screen.DONE
@@ -191,14 +182,6 @@ def report_error(error: Exception) -> int:
         screen.say(f"compsim: stdout: {error.strerror}; the same command prints it again")
         screen.discard_output()
         return screen.STORE
-    lines = traceback.format_exception(error)
-    if os.environ.get("COMPSIM_DEBUG"):
-        screen.say("".join(lines), end="")
-        return screen.INTERNAL
-    with tempfile.NamedTemporaryFile(
-        "w", prefix="compsim-", suffix=".txt", delete=False, encoding="utf-8", errors="replace"
-    ) as file:
-        file.writelines(lines)
-    screen.say(f"compsim: internal error: {type(error).__name__}: {error}")
-    screen.say(f"please report it, with {file.name}, which holds the traceback")
+    screen.say("".join(traceback.format_exception(error)), end="")
+    screen.say("compsim: internal error: please report it, with the lines above")
     return screen.INTERNAL

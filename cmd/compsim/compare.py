@@ -1,6 +1,5 @@
 """`compsim compare`: a measured record beside simulated ones."""
 
-import json
 import os
 from typing import Any
 
@@ -8,7 +7,6 @@ import click
 
 from compsim import options, screen
 from compsim.progress import ProgressReporter
-from compsim.records import record_options
 
 KINDS = (".png", ".svg", ".csv")
 
@@ -17,9 +15,8 @@ KINDS = (".png", ".svg", ".csv")
 @click.argument("record", type=options.FILE)
 @click.argument("names", nargs=-1, required=True, metavar="JOB|STUDY...")
 @options.results
-@record_options
-@click.option("-o", "--output", metavar="FILE", type=options.FILE,
-              help="Draw this figure, .png or .svg, or write its numbers as .csv.")  # fmt: skip
+@options.record
+@options.output("Draw this figure, .png or .svg, or write its numbers as .csv.", type=options.FILE)
 @options.as_json
 @options.quiet
 def compare(
@@ -54,15 +51,16 @@ def compare(
                  level, in dB: 0 is the same, 3 a factor of two in the
                  power of a band, 60 at most
 
-    A number's error, behind +-, is the standard error by the record's revolutions; it
-    needs at least three. What does not fit (speed, sampling rate, length, unit, crank angle) is
-    said below the table; a file does not say where its sensor was.
+    A number's error, behind +-, is the standard error by the record's revolutions; it needs at
+    least three. What does not fit (speed, sampling rate, length, unit, crank angle) is said below
+    the table; a file does not say where its sensor was.
     """
     kind = os.path.splitext(output or "")[1]
     if output and kind not in KINDS:
         raise click.UsageError(f"-o {output}: end the name in {', '.join(KINDS)}")
     from compressor.store import writable_folder
     from compressor.studies.compare.comparison import compare_record
+    from compressor.studies.compare.figures import caption, draw_comparison, write_figure
     from compressor.studies.compare.words import jsonable_comparison, list_comparison
 
     if output:
@@ -70,13 +68,10 @@ def compare(
     with ProgressReporter(quiet) as progress:
         found = compare_record(record, names, folder, hints, progress)
     if as_json:
-        screen.print_text(json.dumps(screen.jsonable(jsonable_comparison(found)), indent=1))
+        screen.print_json(jsonable_comparison(found))
     else:
-        for line in list_comparison(found):
-            screen.print_text(line)
+        screen.print_text(*list_comparison(found))
     if output:
-        from compressor.studies.compare.figures import caption, draw_comparison, write_figure
-
         write_figure(draw_comparison(found), output, kind)
-        screen.say(output) if as_json else screen.print_text(f"{output}\n  {caption(found)}")
+        screen.say(output) if as_json else screen.print_text(output, f"  {caption(found)}")
     return screen.DONE

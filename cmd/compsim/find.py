@@ -1,7 +1,6 @@
 """`compsim find`: where a metric first passes a value, or is greatest or least, over a key."""
 
 import dataclasses
-import json
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -10,7 +9,6 @@ from compsim import options, screen
 from compsim.progress import ProgressReporter
 
 if TYPE_CHECKING:
-    from compressor.studies.search.question import Question
     from compressor.units import Units
 
 KINDS = ("first", "greatest", "least")
@@ -18,17 +16,25 @@ KINDS = ("first", "greatest", "least")
 
 @click.command()
 @options.config
-@click.option("--over", required=True, metavar="KEY=LOW:HIGH",
-              help="Search over this key within this range, in the case file's unit.")  # fmt: skip
-@click.option("--first", metavar="'METRIC[.JOINT] > VALUE'",
-              help="Find where this becomes true going up: > >= < <=. VALUE is in SI, or has its "
-              "unit, as 166 kN, or is a factor, as 1.5 * base: of the metric at LOW.")  # fmt: skip
+@click.option(
+    "--over", required=True, metavar="KEY=LOW:HIGH", help="Search over this key, in its own unit."
+)
+@click.option(
+    "--first",
+    metavar="'METRIC[.JOINT] > VALUE'",
+    help="Find where this becomes true going up: > >= < <=.",
+)
 @click.option("--greatest", metavar="METRIC[.JOINT]", help="Find where the metric is greatest.")
 @click.option("--least", metavar="METRIC[.JOINT]", help="Find where the metric is least.")
-@click.option("--tolerance", type=click.FloatRange(1e-9, 0.5), default=1e-3, show_default=True,
-              help="Narrow the answer down to this, relative to the range.")  # fmt: skip
-@click.option("--scan", type=click.IntRange(3, 1000), default=9, show_default=True,
-              help="Run so many evenly spaced points first.")  # fmt: skip
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(1e-9, 0.5),
+    default=1e-3,
+    help="Narrow the answer down to this, relative to the range.",
+)
+@click.option(
+    "--scan", type=click.IntRange(3, 1000), default=9, help="Run so many even points first."
+)
 @click.option("--log", "logarithmic", is_flag=True, help="Space points evenly in the logarithm.")
 @options.units("that of VALUE, else SI")
 @options.set_keys
@@ -38,6 +44,7 @@ KINDS = ("first", "greatest", "least")
 @options.quiet
 def find(
     config: str,
+    over: str,
     folder: str,
     jobs: int | None,
     units: "Units | None",
@@ -55,10 +62,11 @@ def find(
     compsim find worn.yaml --over clearance_mm=0.08:0.3 \\
         --first 'peak_contact_force.small_end > 1.5 * base' --units plant
 
-    CONFIG makes one case once the key is given. The answer of --first is an interval: at its lower
-    end the comparison does not hold, at its upper end it does. Points that their error bars leave
-    open, or whose job failed, stay inside the interval and are named. Later crossings are
-    named as wide as the scan shows them; a narrower --over narrows one down. Of --greatest and
+    VALUE of --first is in SI, or has its unit, as 166 kN, or is a factor of the metric at LOW, as
+    1.5 * base. CONFIG makes one case once the key is given. The answer of --first is an interval:
+    at its lower end the comparison does not hold, at its upper end it does. Points that their error
+    bars leave open, or whose job failed, stay inside the interval and are named. Later crossings
+    are named as wide as the scan shows them; a narrower --over narrows one down. Of --greatest and
     --least it is the best point, and the points whose error bars reach its own. Structure that is
     finer than the scan may be missed. In a chaotic motion a peak stands for its mean over
     revolutions.
@@ -67,13 +75,17 @@ def find(
     not run again. --json has all numbers in SI. Exit code 3 if any point's job failed.
     """
     options.check_json_units(as_json, units)
-    screen.one_thread_each()  # before numpy loads
-    question = question_of(config, asked)
-    study = question.checked()
+    given = [(kind, text) for kind in KINDS if (text := asked.pop(kind)) is not None]
+    if len(given) != 1:
+        raise click.UsageError("give one of --first, --greatest and --least")
     from compressor.studies.search.find import find as search
-    from compressor.studies.search.words import jsonable_answer, lines
+    from compressor.studies.search.question import Question
+    from compressor.studies.search.words import jsonable_answer, list_answer
     from compressor.sweep import cores
 
+    ((kind, goal),) = given
+    question = Question.written(config, over, goal, kind, **asked)
+    study = question.checked()
     if not quiet:
         screen.caution([study])
     with ProgressReporter(quiet, "points") as progress:
@@ -81,18 +93,7 @@ def find(
     if answer.base:
         question = dataclasses.replace(question, goal=question.goal.beside(answer.base))
     if as_json:
-        screen.print_text(json.dumps(screen.jsonable(jsonable_answer(question, answer)), indent=1))
+        screen.print_json(jsonable_answer(question, answer))
     else:
-        screen.print_lines(lines(question, answer, folder, units))
+        screen.print_lines(list_answer(question, answer, folder, units))
     return screen.SOME_FAILED if answer.failed else screen.DONE
-
-
-def question_of(config: str, asked: dict[str, Any]) -> "Question":
-    """Return the question of the options; a usage error where it is none, or more than one."""
-    from compressor.studies.search.question import Question
-
-    kinds = [kind for kind in KINDS if asked[kind] is not None]
-    if len(kinds) != 1:
-        raise click.UsageError("give one of --first, --greatest and --least")
-    more = {name: asked[name] for name in ("tolerance", "scan", "logarithmic", "overrides")}
-    return Question.written(config, asked["over"], asked[kinds[0]], kinds[0], **more)

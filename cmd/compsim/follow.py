@@ -1,41 +1,41 @@
 """`compsim follow`: the motion of machines along a key, value after value."""
 
-import itertools
 import time
-from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from compressor.digits import plural
-from compressor.program import duration, printable
 from compsim import options, screen
 from compsim.progress import ProgressReporter
 
 if TYPE_CHECKING:
     import xarray as xr
 
-MAX_FAILURES = 20  # listed one by one
 MAX_DRAWN = 12  # machines that get a figure
 
 
 @click.command()
 @options.config
-@click.option("--over", required=True, metavar="KEY=LOW:HIGH:N",
-              help="Follow over N values of this key, in the case file's unit.")  # fmt: skip
+@click.option(
+    "--over", required=True, metavar="KEY=LOW:HIGH:N", help="Follow over N values of this key."
+)
 @click.option("--both", is_flag=True, help="Follow down from HIGH, too, and compare.")
 @click.option("--log", is_flag=True, help="Space values with even ratios.")
-@click.option("--points", type=click.IntRange(6, 10_000), default=64, show_default=True,
-              help="Take so many Poincaré points of a motion that does not repeat.")  # fmt: skip
-@click.option("--no-exponent", is_flag=True,
-              help="Leave out the Lyapunov exponent, which takes most of the time; nothing is "
-              "called chaotic then.")  # fmt: skip
+@click.option(
+    "--points",
+    type=click.IntRange(6, 10_000),
+    default=64,
+    help="Take so many Poincaré points of a motion that does not repeat.",
+)
+@click.option(
+    "--no-exponent", is_flag=True, help="Leave out Lyapunov exponents: faster, and without chaos."
+)
 @click.option("--rerun", is_flag=True, help="Run again from the first failed value on.")
 @options.results
 @options.jobs()
 @options.set_keys
-@click.option("--only", default="", metavar="COMPARISON",
-              help="Follow only the machines for which this holds at some value.")  # fmt: skip
+@options.only
 @options.max_jobs
 @options.quiet
 def follow(
@@ -48,10 +48,8 @@ def follow(
     rerun: bool,
     folder: str,
     jobs: int | None,
-    overrides: tuple[str, ...],
-    only: str,
-    max_jobs: int,
     quiet: bool,
+    **how: Any,
 ) -> int:
     """Follow a motion along a key: periods, chaos, bistability.
 
@@ -65,7 +63,6 @@ def follow(
     CONFIG do not count here. A table for each machine goes to stdout, a figure and one Dataset into
     follow/ of the folder; what was interrupted goes on from there.
     """
-    screen.one_thread_each()  # before numpy loads
     from compressor.report import render, title_figure
     from compressor.store import publish
     from compressor.studies.follow.figure import draw_followed, table
@@ -76,24 +73,21 @@ def follow(
 
     along = read_over(over, log=log, both=both, how=HowLong(points, not no_exponent))
     with ProgressReporter(quiet, "cases read") as progress:
-        study = load_values(config, along, overrides, max_jobs, only, progress)
+        study = load_values(config, along, progress=progress, **how)
     if not quiet:
         screen.caution([study])
     began = time.monotonic()
     with ProgressReporter(quiet, "values", folder=folder) as progress:
         found = run_chains(study, along, folder, jobs or cores(), progress, rerun)
     data, drawn = found.data, 0
+    of_job = [name for name in data.coords if data[name].dims == ("job",)]
     for number in range(data.sizes["job"]):
         machine = data.isel(job=number)
-        is_ok = (machine["status"] == "ok").any()
         if (machine["status"] == "missing").all():
             continue
-        where = [f"{name} {machine[name].item()}" for name in data.coords
-                 if data[name].dims == ("job",)]  # fmt: skip
-        if where:
-            screen.print_text(", ".join(where))
-        screen.print_text("\n".join(table(machine)))
-        if is_ok and drawn < MAX_DRAWN:
+        where = [f"{name} {machine[name].item()}" for name in of_job]
+        screen.print_text(*([", ".join(where)] if where else []), *table(machine))
+        if (machine["status"] == "ok").any() and drawn < MAX_DRAWN:
             path = found.path.with_name(f"{found.path.stem}-{number + 1}.png")
             title = title_figure(study.title or study.name, "motion", where)
             publish(path, render(draw_followed(machine, title), "png"))
@@ -101,27 +95,19 @@ def follow(
             drawn += 1
     screen.print_text(str(found.path))
     if not quiet:
-        new = found.total - found.done_before
-        done = f"{plural(new, 'value')} run in {duration(time.monotonic() - began)}"
-        done += screen.stored_before(found.done_before)
-        screen.say(done if new else screen.all_stored(found.total, folder, "value"))
-    return report_failures(data)
+        new, seconds = found.total - found.done_before, time.monotonic() - began
+        screen.say_done(new, found.done_before, seconds, folder, "value")
+    failures = [*list_failures(data)]
+    if failures:
+        screen.say_failures(failures)
+        screen.say("--rerun runs again from the first failed value on.")
+    return screen.SOME_FAILED if failures else screen.DONE
 
 
-def report_failures(data: "xr.Dataset") -> int:
-    """Write why values failed, and what to do; return the exit code."""
-    from compressor.reasons import remedy
-
-    failed = data["status"].values == "failed"
-    if not failed.any():
-        return screen.DONE
-    over, reasons = data.attrs["over"], data["reason"].values[failed].tolist()
-    places = zip(*failed.nonzero(), reasons, data["detail"].values[failed].tolist(), strict=True)
-    for job, way, at, reason, detail in itertools.islice(places, MAX_FAILURES):
-        where = f"job {job + 1} {data['direction'].values[way]} at {data[over].values[at]:g}"
-        screen.say_wrapped(f"{where}: {reason}: {printable(detail)}", 2)
-    if len(reasons) > MAX_FAILURES:
-        screen.say(f"  and {len(reasons) - MAX_FAILURES} more")
-    for reason, count in Counter(reasons).items():
-        screen.say_wrapped(f"{reason} ({count}): {remedy(reason)}; then: --rerun", 2)
-    return screen.SOME_FAILED
+def list_failures(data: "xr.Dataset") -> Iterator[tuple[str, str, str]]:
+    """Yield the place, reason and detail of each value that failed."""
+    failed, values = data["status"].values == "failed", data[data.attrs["over"]].values
+    for job, way, at in zip(*failed.nonzero(), strict=True):
+        one = data.isel(job=job, direction=way)
+        where = f"job {job + 1} {one['direction'].item()} at {values[at]:g}"
+        yield where, one["reason"].values[at], one["detail"].values[at]

@@ -4,12 +4,14 @@ import itertools
 import math
 import os
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from compressor import metrics
-from compressor.digits import ROUNDING, UNKNOWN, by_bar
+from compressor.digits import ROUNDING, UNKNOWN, align_columns, by_bar
+from compressor.outcome import regime_words
 from compressor.units import Units, unit_in
-from compsim import screen
 
 if TYPE_CHECKING:
     from compressor.store import JobReport
@@ -20,12 +22,22 @@ WIDTH = 37  # columns of a label, or more where one is longer
 SPREAD = "_standard_error"
 # unit in SI -> the unit of case files and of the report, and its factor
 UNITS = {
-    "m/s2": ("m/s²", 1.0), "N": ("kN", 1e-3), "m": ("mm", 1e3), "rad": ("deg", math.degrees(1.0)),
+    "m/s2": ("m/s²", 1.0),
+    "N": ("kN", 1e-3),
+    "m": ("mm", 1e3),
+    "rad": ("deg", math.degrees(1.0)),
     "1": ("", 1.0),
-}  # fmt: skip
+}
 LABELS = {  # of others than their names
     "contact_loss_fraction": "time without dry contact",
     "impacts_per_rev": "dry contacts after flight",
+}
+WORDS = {  # dimension -> what its places are called
+    "joint": metrics.JOINTS,
+    "axis": metrics.AXES,
+    "quantile": metrics.QUANTILES,
+    "segment": [f"{at:g} to {at + 10:g} deg" for at in metrics.SEGMENTS],
+    "threshold": metrics.THRESHOLDS,
 }
 FACTS = ("promise", "regime", "method", "rtol", "program", "libraries")
 
@@ -37,69 +49,56 @@ def sections(
 
     limits: of the rod load's reversal, degrees and percent; units: of the numbers.
     """
-    yield "", screen.align_lines(stop(found), WIDTH)
-    known = numbers(found, units, "tally", "statistics", "body")
-    lines = screen.align_lines([*known, *reversal_verdict(found, *limits)], WIDTH)
-    notes = [*film(found), *cautions(found), *found.caveats]
-    yield "metrics, with their error bars", [*lines, *notes]
-    yield (
-        "its machine at a steady speed, with ideal joints",
-        screen.align_lines(machine(found, units), WIDTH),
-    )
-    yield (
-        "relative errors of the time series",
-        screen.align_lines(series_errors(found), WIDTH),
-    )
-    yield "the run", screen.align_lines([*numbers(found, units, "run"), *facts(found)], WIDTH)
-
-
-def stop(found: "JobReport") -> list[Line]:
-    """Return where a job's run stopped, and its state there; [] for one that ended."""
     attributes = found.attributes
-    if "stop_history_words" not in attributes:
-        return []
-    angle = math.degrees(attributes["stop_crank_angle"]) % 360
-    when = f"at {attributes['stop_time']:.9g} s, {angle:.5g} degrees of crank angle"
-    lines = [("stopped", when)]
-    names = attributes["stop_state_names"].split("; ")
-    for name, value in zip(names, attributes["stop_state"], strict=False):
-        lines.append((name, f"{value:.6g}"))
-    return lines
+    if "stop_time" in attributes:
+        angle = math.degrees(attributes["stop_crank_angle"]) % 360
+        where = f"at {attributes['stop_time']:.9g} s, {angle:.5g} degrees of crank angle"
+        yield "", align([("stopped", where)])
+    known = [*numbers(found, units, "tally", "statistics", "body")]
+    lines = align([*known, *reversal_verdict(found, *limits)])
+    yield "metrics, with their error bars", [*lines, *notes(found), *found.caveats]
+    yield "relative errors of the time series", align(series_errors(found))
+    yield "the run", align([*numbers(found, units, "run"), *facts(found)])
 
 
-def numbers(found: "JobReport", units: Units, *sources: str) -> list[Line]:
-    """Return a line for each number of some sources, joint and axis, to its known digits."""
-    lines = []
+def align(lines: list[Line]) -> list[str]:
+    """Return labels and values in columns."""
+    return align_columns([(f"{label:<{WIDTH}}", text) for label, text in lines])
+
+
+def numbers(found: "JobReport", units: Units, *sources: str) -> Iterator[Line]:
+    """Yield a line for each number of some sources, joint and axis, to its known digits."""
     for name, row in metrics.NUMBERS.items():
-        if row.source not in sources or name.endswith(SPREAD) or name not in found.numbers:
-            continue
-        if row.kind == "count":  # it grows with the run: the number per revolution is shown
-            continue
-        values, (errors, relative, kind) = found.numbers[name], bar_of(found, name)
-        unit, factor = unit_of(row, units)
-        highest = max(values) if "segment" in row.dims else -math.inf
-        every = [abs(pick_value(values, place)) for place, _ in places(row)]
-        rounding = ROUNDING * max((one for one in every if not math.isnan(one)), default=0.0)
-        for place, label in places(row):
-            value = pick_value(values, place)
-            if math.isnan(value) or tells_nothing(found, row, place):
+        if name in found.numbers and row.source in sources:
+            # a count grows with the run: the number per revolution is shown
+            if row.kind == "count" or name.endswith(SPREAD):
                 continue
-            if value < highest:
-                continue  # of the segments of a revolution the one that is highest
-            error = math.nan if errors is None else pick_value(errors, place)
-            if abs(value) < rounding:  # beside the other joint or axis
-                value = error = 0.0
-            text = format_measured(value * factor, error * factor, relative)
-            if error == 0.0 and name.endswith("_per_rev"):
-                text = f"{value:.3g}"  # a mean of few whole numbers: exact of this run alone
-            if text != UNKNOWN:
-                text = " ".join(filter(None, (text, unit, "" if math.isnan(error) else kind)))
-                if name == "knock":
-                    text += f", {knock_verdict(value, error)}"
-            elif kind:
-                continue  # of the statistics of a chaotic motion only those that are known
-            lines.append((label, text))
-    return lines
+            yield from values_of(found, row, units)
+
+
+def values_of(found: "JobReport", row: metrics.Metric, units: Units) -> Iterator[Line]:
+    """Yield a line for each value of a number; of a revolution's segments for the highest."""
+    values = np.asarray(found.numbers[row.name], float)
+    if row.name in metrics.BARRED:
+        bars, relative, kind = "_error", metrics.BARRED[row.name].bar.relative, ""
+    else:
+        bars, relative, kind = SPREAD, True, " (standard error)"
+    errors = np.asarray(found.numbers.get(row.name + bars, values * math.nan), float)
+    unit, factor = unit_of(row, units)
+    greatest = max((abs(one) for one in values.flat if not math.isnan(one)), default=0.0)
+    for place, label in places(found, row):
+        value, error = float(values[place]), float(errors[place])
+        if math.isnan(value) or ("segment" in row.dims and value < greatest):
+            continue
+        if abs(value) < ROUNDING * greatest:  # beside the other joint or axis
+            value = error = 0.0
+        text = by_bar(value * factor, error * factor, relative)
+        if text != UNKNOWN:
+            text = f"{text} {unit}".rstrip() + ("" if math.isnan(error) else kind)
+            verdict = f", {knock_verdict(value, error)}" if row.name == "knock" else ""
+            yield label, text + verdict
+        elif not kind:  # of the statistics of a chaotic motion only those that are known
+            yield label, text
 
 
 def knock_verdict(value: float, error: float) -> str:
@@ -114,21 +113,12 @@ def series_errors(found: "JobReport") -> list[Line]:
     """Return how far time series may be from the exact ones, a line for each joint."""
     lines = []
     for row in map(metrics.series_error, metrics.SERIES):
-        for place, label in places(row):
-            error = pick_value(found.numbers[row.name], place)
-            if not (math.isnan(error) or tells_nothing(found, row, place)):
-                lines.append((label, UNKNOWN if math.isinf(error) else f"{error:.2g}"))
+        errors = np.asarray(found.numbers[row.name])
+        for place, label in places(found, row):
+            if not math.isnan(errors[place]):
+                known = math.isfinite(errors[place])
+                lines.append((label, f"{errors[place]:.2g}" if known else UNKNOWN))
     return lines
-
-
-def bar_of(found: "JobReport", name: str) -> tuple[Any, bool, str]:
-    """Return the errors of a number, whether they are relative, and what kind they are.
-
-    None in place of errors where there are none.
-    """
-    if name in metrics.BARRED:
-        return found.numbers.get(f"{name}_error"), metrics.BARRED[name].bar.relative, ""
-    return found.numbers.get(name + SPREAD), True, "(standard error)"
 
 
 def unit_of(row: metrics.Metric, units: Units) -> tuple[str, float]:
@@ -143,40 +133,19 @@ def unit_of(row: metrics.Metric, units: Units) -> tuple[str, float]:
     return unit, factor * more
 
 
-def places(row: metrics.Metric) -> Iterator[tuple[tuple[int, ...], str]]:
+def places(found: "JobReport", row: metrics.Metric) -> Iterator[tuple[tuple[int, ...], str]]:
     """Yield the place and label of each of a number's values: `peak contact force, big end`.
 
-    The error of a series is called after the series.
+    The error of a series is called after the series. A contact's numbers are left out at a joint
+    that has no clearance.
     """
-    words: dict[str, tuple[Any, ...]] = {
-        "joint": metrics.JOINTS,
-        "axis": metrics.AXES,
-        "quantile": metrics.QUANTILES,
-        "segment": tuple(f"{at:g} to {at + 10:g} deg" for at in metrics.SEGMENTS),
-        "threshold": metrics.THRESHOLDS,
-    }
     first = row.name.removesuffix("_error")
     first = LABELS.get(first, first.removesuffix("_rev").removesuffix("_per").replace("_", " "))
-    for choice in itertools.product(*(enumerate(words[dim]) for dim in row.dims)):
+    for choice in itertools.product(*(enumerate(WORDS[dim]) for dim in row.dims)):
+        if row.contact and found.case.joint not in (choice[0][1], "both"):
+            continue
         parts = [first, *(str(word).replace("_", " ") for _, word in choice)]
         yield tuple(number for number, _ in choice), ", ".join(parts)
-
-
-def pick_value(values: Any, place: tuple[int, ...]) -> float:
-    """Return one of a number's values."""
-    for number in place:
-        values = values[number]
-    return float(values)
-
-
-def tells_nothing(found: "JobReport", row: metrics.Metric, place: tuple[int, ...]) -> bool:
-    """Return whether a number is that of the contact in a joint that has no clearance."""
-    return row.contact and found.case.joint not in (metrics.JOINTS[place[0]], "both")
-
-
-def format_measured(value: float, error: float, relative: bool) -> str:
-    """Return a number with its error, by the digits that it allows; six digits without one."""
-    return f"{value:.6g}" if math.isnan(error) else by_bar(value, error, relative)
 
 
 def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list[Line]:
@@ -190,54 +159,43 @@ def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list
         if math.isinf(bar):
             return [("rod load", "its reversal is not known well enough to be judged")]
         bar = 0.0 if math.isnan(bar) else bar
-        texts.append(format_measured(value, bar, True) if bar else f"{value:.4g}")
+        texts.append(by_bar(value, bar) if bar else f"{value:.4g}")
         clear = value - least
-        worst = min(worst, clear / abs(clear) if abs(clear) >= bar and clear else 0.0)
+        worst = min(worst, math.copysign(1.0, clear) if clear and abs(clear) >= bar else 0.0)
     word = {1.0: "passes", 0.0: "cannot be distinguished from", -1.0: "fails"}[worst]
     kind = "API 618's" if (degrees, percent) == (15.0, 3.0) else "the maker's"
     verdict = f"reversal of {texts[0]} degrees and {texts[1]} %: {word} {kind} "
     return [("rod load", f"{verdict}{degrees:g} degrees and {percent:g} %")]
 
 
-def film(found: "JobReport") -> list[str]:
-    """Return how contact forces and counts are meant of a job that has oil."""
-    if not found.case.lubricant:
-        return []
-    return [
-        "contact forces include the force of the oil film",
-        "where the film takes a blow there is no dry contact: knock tells whether a joint knocks",
-    ]
-
-
-def cautions(found: "JobReport") -> list[str]:
-    """Return how far the numbers may be trusted, where their errors do not say it."""
-    if found.attributes.get("regime") == "undecided":
-        return ["errors are as large as numbers, and chaos could not be ruled out in the time that "
-                "was spent: ask by solve.horizon: true"]  # fmt: skip
-    if found.attributes.get("regime") != "chaotic":
-        return []
-    lines = ["the motion is chaotic: averages may be trusted, single peaks may not"]
-    wanted = found.numbers.get("revolutions_to_one_percent", math.nan)
-    if math.isfinite(wanted):
-        lines.append(f"{wanted:.0f} settled revolutions would bring the standard error of "
-                     "rms_acceleration to 1 %")  # fmt: skip
-    return lines
-
-
-def machine(found: "JobReport", units: Units) -> list[Line]:
-    """Return what the job's machine has without clearance: gas load, inertia, rod load and more."""
-    from compressor.analysis import describe_cases
-
-    return describe_cases([found.case]).lines(units) if "case" in found.attributes else []
+def notes(found: "JobReport") -> Iterator[str]:
+    """Yield how forces and counts are meant of a job that has oil, and how far to trust numbers."""
+    if found.case.lubricant:
+        yield "contact forces include the force of the oil film"
+        yield "where it takes a blow there is no dry contact: knock tells whether a joint knocks"
+    regime = found.attributes.get("regime")
+    if regime == "undecided":
+        yield (
+            "errors are as large as numbers, and chaos could not be ruled out in the time that was "
+            "spent: ask by solve.horizon: true"
+        )
+    if regime == "chaotic":
+        yield "the motion is chaotic: averages may be trusted, single peaks may not"
+        wanted = found.numbers.get("revolutions_to_one_percent", math.nan)
+        if math.isfinite(wanted):
+            yield (
+                f"{wanted:.0f} settled revolutions would bring the standard error of "
+                "rms_acceleration to 1 %"
+            )
 
 
 def facts(found: "JobReport") -> list[Line]:
-    """Return how a job was run, a line each."""
-    from compressor.outcome import regime_words
-
-    texts = {name: str(found.attributes[name]) for name in FACTS if name in found.attributes}
-    lines = [(name, regime_words(text) if name == "regime" else text)
-             for name, text in texts.items()]  # fmt: skip
+    """Return how a job was run, which joints count as worn, and its file, a line each."""
+    lines = []
+    for name in FACTS:
+        if name in found.attributes:
+            text = str(found.attributes[name])
+            lines.append((name, regime_words(text) if name == "regime" else text))
     lines += worn_joints(found)
     return [*lines, ("file", os.path.relpath(found.file))] if found.file else lines
 

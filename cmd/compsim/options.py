@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -22,53 +23,96 @@ class GivenPath(click.Path):
         return super().convert(value, param, ctx)
 
 
+COUNT, NUMBER = click.IntRange(min=1), click.IntRange(min=0)
 FILE, FOLDER = GivenPath(readable=False), GivenPath(file_okay=False, readable=False)
-
+FOLDER.name = "folder"  # as help and messages call it
 config = click.argument("config", metavar="CONFIG", type=FILE)
 configs = click.argument("configs", nargs=-1, required=True, metavar="CONFIG...", type=FILE)
 job = click.argument("words", nargs=-1, required=True, metavar="JOB | STUDY [AXIS=VALUE]...")
 results = click.option(
-    "-r", "--results", "folder", default="results", show_default=True, type=FOLDER,
-    metavar="FOLDER", help="Use this folder of results.",
-)  # fmt: skip
+    "-r", "--results", "folder", default="results", type=FOLDER, help="Use this folder of results."
+)
 set_keys = click.option(
-    "--set", "overrides", multiple=True, metavar="KEY=VALUE",
-    help="Set a key in all case files, such as machine.speed_rpm=300.",
-)  # fmt: skip
+    "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key in all case files."
+)
 only = click.option(
-    "--only", default="", metavar="COMPARISON",
-    help="Take only the jobs for which this holds, such as 'clearance_mm < 0.2'; the others stay "
-    "missing.",
-)  # fmt: skip
+    "--only", metavar="COMPARISON", help="Take only jobs such as 'clearance_mm < 0.2'."
+)
 max_jobs = click.option(
-    "--max-jobs", type=click.IntRange(min=1), default=MAX_JOBS, show_default=True,
-    help="Refuse a case file with more jobs than this.",
-)  # fmt: skip
+    "--max-jobs", type=COUNT, default=MAX_JOBS, help="Refuse a case file with more jobs than this."
+)
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the same as JSON.")
 quiet = click.option("--quiet", is_flag=True, help="Print no progress; errors are still reported.")
 
 
-def output(default: str, text: str) -> Callable[..., Any]:
-    """Return the option -o, of a folder to write into."""
-    return click.option("-o", "--output", default=default, show_default=True, type=FOLDER,
-                        metavar="FOLDER", help=text)  # fmt: skip
+def output(text: str, **how: Any) -> Callable[..., Any]:
+    """Return the option -o, of a folder to write into unless `how` says otherwise."""
+    return click.option("-o", "--output", help=text, **{"type": FOLDER, **how})
 
 
 def jobs(text: str = "Run in this many worker processes.") -> Callable[..., Any]:
     """Return the option -j, by default as many processes as this one may use cores."""
-    return click.option("-j", "--jobs", type=click.IntRange(min=1),
-                        show_default="cores available", help=text)  # fmt: skip
+    return click.option("-j", "--jobs", type=COUNT, show_default="cores available", help=text)
 
 
 def units(usual: str) -> Callable[..., Any]:
     """Return the option --units; usual: what there is without it."""
-    return click.option(
-        "--units", type=click.Choice(["si", "plant"]), show_default=usual,
-        help="Units: SI, or those of a plant: mm, mm/s, g, kN, bar, rpm.",
-    )  # fmt: skip
+    choice, text = click.Choice(["si", "plant"]), "Units: SI, or mm, mm/s, g, kN, bar, rpm."
+    return click.option("--units", type=choice, show_default=usual, help=text)
 
 
 def check_json_units(as_json: bool, units: "Units | None") -> None:
     """Raise UsageError where other units than SI are requested in JSON."""
     if as_json and units == "plant":
         raise click.UsageError("--json has all numbers in SI: leave out --units plant")
+
+
+SIGNS = {"comma": ",", "semicolon": ";", "tab": "\t", "blank": " ", "point": "."}
+SEPARATOR = click.Choice(["comma", "semicolon", "tab", "blank"])
+DECIMAL = click.Choice(["comma", "point"])
+RECORD: dict[str, tuple[Any, str | None, str]] = {  # option -> type, metavar, help
+    "channel": (str, "NAME", "Read the acceleration from this channel, a name or a number from 1."),
+    "unit": (str, "UNIT", "Take the acceleration in this unit: m/s2, mm/s2, g, in/s2 or ft/s2."),
+    "full-scale": (float, "VALUE", "Scale whole numbers in WAV so that the greatest is this."),
+    "rate": (float, "HZ", "Take so many samples a second where a file has no times."),
+    "time": (str, "NAME", "Read the times from this channel, a name or a number from 1."),
+    "time-unit": (str, "UNIT", "Take the times in this unit, whatever the file says: s, ms or us."),
+    "separator": (SEPARATOR, None, "Split lines of text at this sign; found by default."),
+    "decimal": (DECIMAL, None, "Read numbers of a text with this sign; found by default."),
+    "skip-lines": (NUMBER, "COUNT", "Skip so many lines above a text's header; found by default."),
+    "tacho": (str, "NAME", "Read the tacho from this channel, a name or a number from 1."),
+    "tacho-deg": (float, "DEG", "Set the crank angle at which the tacho rises; 0 by default."),
+    "rpm": (float, "RPM", "Take this steady speed of a record without a tacho."),
+    "tdc": (float, "SECONDS", "Take this time as a top dead centre, without a tacho."),
+}
+
+
+def record(command: Callable[..., int]) -> Callable[..., int]:
+    """Give a command the options of a record's file, as `hints`: those that are given, by name."""
+
+    @wraps(command)
+    def with_hints(**values: Any) -> int:
+        given = {name.replace("-", "_"): values.pop(name.replace("-", "_")) for name in RECORD}
+        hints = {
+            name: SIGNS.get(found, found) for name, found in given.items() if found is not None
+        }
+        if ("rpm" in hints) != ("tdc" in hints):
+            raise click.UsageError("--rpm and --tdc belong together")
+        return command(hints=hints, **values)
+
+    for name, (kind, metavar, text) in reversed(RECORD.items()):
+        with_hints = click.option(f"--{name}", type=kind, metavar=metavar, help=text)(with_hints)
+    return with_hints
+
+
+def read_levels(context: click.Context, parameter: click.Parameter, text: str) -> tuple[float, ...]:
+    """Return the numbers of a list with commas: levels of noise, m/s2."""
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r} is no list such as 0,0.1,1") from error
+
+
+def noise(text: str) -> Callable[..., Any]:
+    """Return the option --noise, a list of levels."""
+    return click.option("--noise", default="0", callback=read_levels, metavar="RMS,...", help=text)

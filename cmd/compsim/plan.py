@@ -1,20 +1,20 @@
 """`compsim plan`: what a run would do, without doing it."""
 
 import dataclasses
-import json
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from compressor.digits import plural
+from compressor.digits import align_columns, plural
 from compressor.program import duration
 from compsim import options, screen
-from compsim.progress import ProgressReporter
+from compsim.progress import read_cases
 
 if TYPE_CHECKING:
     from compressor.sweep import Forecast
 
+FIRST = 5  # missing jobs that are listed
 BUSY = 0.8  # of the cores: below, a machine is busy with other things
 
 
@@ -25,19 +25,8 @@ BUSY = 0.8  # of the cores: below, a machine is busy with other things
 @options.set_keys
 @options.only
 @options.max_jobs
-@click.option("--first", type=click.IntRange(min=0), default=5, show_default=True,
-              help="List this many of the missing jobs.")  # fmt: skip
 @options.as_json
-def plan(
-    configs: tuple[str, ...],
-    folder: str,
-    jobs: int | None,
-    overrides: tuple[str, ...],
-    only: str,
-    max_jobs: int,
-    first: int,
-    as_json: bool,
-) -> int:
+def plan(configs: tuple[str, ...], folder: str, jobs: int | None, as_json: bool, **how: Any) -> int:
     """Count the jobs of a run, and estimate its time and bytes.
 
     \b
@@ -47,35 +36,27 @@ def plan(
     Jobs that are stored already are not run again. Times up to a dozen jobs of each study, drawn
     over its design, for some seconds; stores nothing.
     """
-    from compressor.cases import load_studies
-    from compressor.sweep import cores
-
-    with ProgressReporter(False, "cases read") as progress:
-        studies = load_studies(
-            *configs, overrides=overrides, max_jobs=max_jobs, only=only, progress=progress
-        )
-    screen.caution(studies, None)
-    screen.report_changes(studies, folder)
-    screen.report_machines(studies)
     from compressor.analysis import describe_machine
-    from compressor.sweep import forecast
+    from compressor.sweep import cores, forecast
 
-    found = forecast(studies, folder, first)
-    workers = jobs or cores()
+    studies = read_cases(configs, **how)
+    screen.caution(studies, None)
+    screen.say_changes(studies, folder)
+    screen.say_machines(studies)
+    found, workers = forecast(studies, folder, FIRST), jobs or cores()
     if as_json:
         machines = {one.name: dataclasses.asdict(describe_machine(one)) for one in studies}
-        whole = dataclasses.asdict(found.with_times(workers, screen.say)) | {"machines": machines}
-        screen.print_text(json.dumps(screen.jsonable(whole), indent=1))
+        times = dataclasses.asdict(found.with_times(workers, screen.say))
+        screen.print_json(times | {"machines": machines})
         return screen.DONE
-    width = max(len(part.study) for part in found.counts.studies)
-    for part in found.counts.studies:
-        screen.print_text(f"{part.study:<{width}}  {plural(part.jobs):>9}  {part.done:>4} done  "
-                   f"{part.missing:>4} missing")  # fmt: skip
+    rows = []
+    for one in found.counts.studies:
+        rows.append((one.study, plural(one.jobs), f"{one.done} done", f"{one.missing} missing"))
+    screen.print_text(*align_columns(rows, "<>>>"))
     if found.counts.missing:
         screen.print_text(cost(found.with_times(workers, screen.say)))
     for job in found.counts.first:
-        point = "".join(f" {key}={value}" for key, value in job.coordinates.items())
-        screen.print_text(f"missing: {job.study}{point}")
+        screen.print_text(f"missing: {job.study}{screen.point_text(job.coordinates)}")
     return screen.DONE
 
 

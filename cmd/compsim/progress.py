@@ -1,14 +1,18 @@
 """Progress on stderr: rich's line on a terminal, elsewhere a line now and then."""
 
+import math
 import os
 import sys
 import time
-from collections.abc import Callable
-from types import TracebackType
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 from compressor.digits import plural
 from compressor.program import duration
 from compsim import screen
+
+if TYPE_CHECKING:
+    from compressor.cases import Study
 
 # of lines where stderr is no terminal: until the first, and between two others
 FIRST_SECONDS, QUIET_SECONDS, QUIET_SHARE = 1.0, 10.0, 0.05
@@ -24,14 +28,9 @@ class ProgressReporter:
     """
 
     def __init__(
-        self,
-        quiet: bool,
-        things: str = "jobs",
-        folder: str = "",
-        open: Callable[[], object] | None = None,
+        self, quiet: bool, things: str = "jobs", folder: str = "", open: Callable | None = None
     ):
-        # a tenth of a second
-        from rich.console import Console
+        from rich.console import Console  # a tenth of a second
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
         from rich.table import Column
 
@@ -44,33 +43,30 @@ class ProgressReporter:
         console = Console(file=sys.stderr)
         narrow = console.width <= 2 * BAR_WIDTH
         text = TextColumn("{task.description}", table_column=Column(no_wrap=True))
+        columns = [*([] if narrow else [BarColumn(BAR_WIDTH)]), text, TimeRemainingColumn()]
         self.line = Progress(
-            *([] if narrow else [BarColumn(BAR_WIDTH)]), text, TimeRemainingColumn(),
-            console=console, transient=True, refresh_per_second=4, get_time=time.monotonic,
-            speed_estimate_period=float("inf"),  # jobs may take longer than rich's half a minute
-        )  # fmt: skip
+            *columns,
+            console=console,
+            transient=True,
+            refresh_per_second=4,
+            get_time=time.monotonic,
+            speed_estimate_period=math.inf,  # jobs may take longer than rich's half a minute
+        )
         self.task = self.line.add_task("", total=None)
 
     def __enter__(self) -> "ProgressReporter":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         """Report the end, and where those done are stored if it comes early."""
         if self.line.live.is_started:
             self.line.stop()
         if self.logged_done not in (-1, self.done):
             screen.say(self.words())
         if error and self.folder and self.total:
-            stored = f"{self.done} of {plural(self.total, self.things.removesuffix('s'))}"
-            verb = "is" if self.total == 1 else "are"
-            screen.say(
-                f"{stored} {verb} stored in {self.folder}; the same command goes on from there"
-            )
+            total = plural(self.total, self.things.removesuffix("s"))
+            stored = f"{self.done} of {total} {'is' if self.total == 1 else 'are'} stored"
+            screen.say(f"{stored} in {self.folder}; the same command goes on from there")
 
     def __call__(self, done: int, total: int, remark: str) -> None:
         """Report progress (`compressor.program.Progress`)."""
@@ -110,3 +106,11 @@ class ProgressReporter:
             self.logged, self.logged_done = now, self.done
             left = self.line.tasks[0].time_remaining
             screen.say(self.words() + (f", about {duration(left)} left" if left else ""))
+
+
+def read_cases(paths: Sequence[str], quiet: bool = False, **how: Any) -> "list[Study]":
+    """Return the studies of case files, as `load_studies` does, and report its progress."""
+    from compressor.cases import load_studies
+
+    with ProgressReporter(quiet, "cases read") as progress:
+        return load_studies(*paths, progress=progress, **how)

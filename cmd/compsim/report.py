@@ -15,21 +15,32 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("names", nargs=-1, metavar="[STUDY]...")
 @options.results
-@options.output("report", "Write the report into this folder.")
+@options.output("Write the report into this folder.", default="report")
 @click.option("--single", is_flag=True, help="Write one file that can be mailed: OUTPUT.html.")
 @click.option(
-    "--limit", "limits", multiple=True, metavar="'METRIC=VALUE,... UNIT'",
+    "--limit",
+    "limits",
+    multiple=True,
+    metavar="'METRIC=VALUE,... UNIT'",
     help="Show the zones A to D of a metric in tables and curves, by up to three limits with their "
     "unit, such as 'sensor_peak=0.5,2 g'.",
-)  # fmt: skip
+)
 @options.units("kN, mm, µm, m/s²")
-@click.option("--claims", default="claims", show_default=True, type=options.FOLDER,
-              help="Add what `compsim claims` wrote into this folder, if it is there.")  # fmt: skip
-@click.option("--alarms", default="alarms", show_default=True, type=options.FOLDER,
-              help="Add what `compsim alarms` wrote into this folder, if it is there.")  # fmt: skip
-@click.pass_context
+@click.option(
+    "--claims",
+    default="claims",
+    type=options.FOLDER,
+    help="Add what `compsim claims` wrote into this folder, if it is there.",
+)
+@click.option(
+    "--alarms",
+    default="alarms",
+    type=options.FOLDER,
+    help="Add what `compsim alarms` wrote into this folder, if it is there.",
+)
+@click.pass_obj
 def report(
-    context: click.Context,
+    command: str,
     names: tuple[str, ...],
     folder: str,
     output: str,
@@ -45,11 +56,10 @@ def report(
     compsim report bearing-wear --single -o for-the-plant
     compsim report -r /data/results -o page --limit 'body_velocity_rms=2,5 mm/s'
 
-    Prints the path of the page, which a browser opens without a server. Named
-    studies stand on it in this order; without names all do, those of compsim
-    find and calibrate last.
-    --units is of figures and tables. Columns and axes with the name of a key keep its unit, and
-    sentences say theirs.
+    Prints the path of the page, which a browser opens without a server. Named studies stand on it
+    in this order; without names all do, those of compsim find and calibrate last. --units is of
+    figures and tables. Columns and axes with the name of a key keep its unit, and sentences say
+    theirs.
     """
     from compressor.store import read_studies, writable_folder
 
@@ -60,8 +70,8 @@ def report(
     from compressor.report import write_report
 
     add = page_additions(places)
-    path = write_report(folder, output, context.obj, add, limits, units or "usual", names, single)
+    path = write_report(folder, output, command, add, limits, units or "usual", names, single)
     screen.print_text(str(path))
     if single:
-        screen.say(f"{path.stat().st_size / 1e6:.1f} MB, all in one file")
+        screen.say(f"{screen.size(path.stat().st_size)}, all in one file")
     return screen.DONE

@@ -2,7 +2,6 @@
 
 import os
 import shlex
-from collections import Counter
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
@@ -10,29 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compressor.digits import plural
-from compressor.program import duration, printable
+from compressor.digits import align_columns, plural
 from compsim import options, screen
-from compsim.progress import ProgressReporter
+from compsim.progress import ProgressReporter, read_cases
 
 if TYPE_CHECKING:
     from compressor.cases import Study
     from compressor.sweep import Options, Summary
 
-MAX_FAILURES = 20  # listed one by one
 
-
-class ShardType(click.ParamType):
-    """I/N with 1 <= I <= N."""
-
-    name = "I/N"
-
-    def convert(self, value: Any, param: Any, ctx: Any) -> tuple[int, int]:
-        """Return (I, N). Raises a usage error for other text."""
-        number, _, of = str(value).partition("/")
-        if not (number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):
-            self.fail(f"{value!r} is no I/N with 1 <= I <= N, such as 2/8", param, ctx)
-        return int(number), int(of)
+def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
+    """Return (I, N) of I/N with 1 <= I <= N. Raises BadParameter for other text."""
+    number, of = (text or "1/1").partition("/")[::2]
+    if not (number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):
+        raise click.BadParameter(f"{text!r} is no I/N with 1 <= I <= N, such as 2/8")
+    return (int(number), int(of)) if text else None
 
 
 @click.command()
@@ -43,29 +34,26 @@ class ShardType(click.ParamType):
 @options.only
 @options.max_jobs
 @click.option("--rerun", type=click.Choice(["failed"]), help="Run stored jobs that failed again.")
-@click.option("--shard", "part", type=ShardType(), metavar="I/N",
-              help="Run part I of N, where several computers share the folder.")  # fmt: skip
-@click.option("--backend", type=click.Choice(["local", "dask"]), default="local",
-              show_default=True, help="Run jobs here, or on a dask cluster.")  # fmt: skip
-@click.option("--scheduler", metavar="ADDRESS",
-              help="Find the dask cluster at this address, such as tcp://host:8786.")  # fmt: skip
+@click.option(
+    "--shard", metavar="I/N", callback=read_shard, help="Run part I of N, one on each computer."
+)
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Run on this dask cluster, such as tcp://host:8786."
+)
 @click.option("--wait", is_flag=True, help="Wait for another run on the folder to end.")
 @options.quiet
-@click.pass_context
+@click.pass_obj
 def run(
-    context: click.Context,
+    command: str,
     configs: tuple[str, ...],
     folder: str,
     jobs: int | None,
-    overrides: tuple[str, ...],
-    only: str,
-    max_jobs: int,
     rerun: str | None,
-    part: tuple[int, int] | None,
-    backend: str,
+    shard: tuple[int, int] | None,
     scheduler: str | None,
     wait: bool,
     quiet: bool,
+    **how: Any,
 ) -> int:
     """Simulate what case files ask for, and store the results.
 
@@ -76,33 +64,28 @@ def run(
     Jobs that are stored already are not run again, so a run that was interrupted goes on where it
     ended. A summary line for each study goes to stdout.
     """
-    check_backend(backend, scheduler, jobs)
-    screen.one_thread_each()  # before numpy loads
-    from compressor.cases import load_studies
+    if scheduler and jobs:
+        raise click.UsageError("-j counts processes here; a dask cluster uses all its workers")
     from compressor.sweep import Options, cores
 
-    with ProgressReporter(quiet, "cases read") as progress:
-        studies = load_studies(
-            *configs, overrides=overrides, max_jobs=max_jobs, only=only, progress=progress
-        )
-    if only and not quiet:
+    studies = read_cases(configs, quiet, **how)
+    if how["only"] and not quiet:
         selected = sum(len(study.selected) for study in studies)
         screen.say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
     screen.caution(studies)
-    how = Options(context.obj, bool(rerun), part, wait=wait)
-    return run_jobs(studies, folder, jobs or cores(), how, scheduler, quiet)
+    how_run = Options(command, rerun_failed=bool(rerun), part=shard, wait=wait)
+    return run_jobs(studies, folder, jobs or cores(), how_run, scheduler, quiet)
 
 
 def run_jobs(
-    studies: "list[Study]", folder: str, workers: int, how: "Options", scheduler: str | None,
-    quiet: bool,
-) -> int:  # fmt: skip
-    """Run studies of jobs, and return the exit code."""
-    screen.report_changes(studies, folder)
+    studies: "list[Study]", folder: str, workers: int, how: "Options", dask: str | None, quiet: bool
+) -> int:
+    """Run studies of jobs, here or by dask's scheduler, and return the exit code."""
+    screen.say_changes(studies, folder)
     from compressor.sweep import Cluster, sweep
 
-    cluster: Any = Cluster(scheduler) if scheduler else nullcontext()
-    opening = partial(screen.report_machines, studies)  # where there are jobs to run
+    cluster: Any = Cluster(dask) if dask else nullcontext()
+    opening = partial(screen.say_machines, studies)  # where there are jobs to run
     with ProgressReporter(quiet, "jobs", folder, opening) as progress, cluster as elsewhere:
         how = replace(how, backend=elsewhere, failed=progress.count_failed)
         summary = sweep(studies, folder, workers, progress, how)
@@ -110,43 +93,30 @@ def run_jobs(
     return screen.SOME_FAILED if summary.failed else screen.DONE
 
 
-def check_backend(backend: str, scheduler: str | None, jobs: int | None) -> None:
-    """Raise UsageError for options that do not go together."""
-    if backend == "dask" and not scheduler:
-        raise click.UsageError(
-            "--backend dask needs --scheduler ADDRESS, such as tcp://host:8786: "
-            "what `dask scheduler` prints when it starts"
-        )
-    if backend == "dask" and jobs:
-        raise click.UsageError("-j counts processes here; a dask cluster uses all its workers")
-    if backend == "local" and scheduler:
-        raise click.UsageError("--scheduler goes with --backend dask")
-
-
 def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
     """Report what a run did, what failed and what to do next."""
-    width = max(len(count.study) for count in summary.counts)
-    for count in summary.counts:
-        where = os.path.join(folder, "studies", f"{count.study}.json")
-        good = count.jobs - count.failed
-        with screen.unread():
-            screen.print_text(
-                f"{count.study:<{width}}  {plural(count.jobs):>9}  {good:>4} ok  "
-                f"{count.failed:>4} failed  {where}"
-            )
+    rows, failures = [], []
+    for one in summary.counts:
+        ends = f"{one.jobs - one.failed} ok", f"{one.failed} failed"
+        where = os.path.join(folder, "studies", f"{one.study}.json")
+        rows.append((one.study, plural(one.jobs), *ends, where))
+    for lost in summary.failed:
+        place = lost.study + screen.point_text(lost.coordinates)
+        failures.append((place, lost.reason, f"{lost.detail}; job {lost.key}"))
+    with screen.unread():
+        screen.print_text(*align_columns(rows, "<>>>"))
     if not quiet:
-        if not summary.run_now:
-            screen.say(screen.all_stored(summary.total, folder))
-        else:
-            again = screen.stored_before(summary.done_before)
-            screen.say(f"{plural(summary.run_now)} run in {duration(summary.seconds)}{again}")
-    report_failures(summary)
+        screen.say_done(summary.run_now, summary.done_before, summary.seconds, folder)
+    if failures:
+        screen.say(f"{plural(len({lost.key for lost in summary.failed}))} failed:")
+        screen.say_failures(failures)
+        screen.say("--rerun failed runs failed jobs again; a changed case file makes new jobs.")
     if not quiet:
-        report_caveats([count.study for count in summary.counts], folder)
+        say_caveats([one.study for one in summary.counts], folder)
         screen.say(f"next: compsim report -r {shlex.quote(folder)}")
 
 
-def report_caveats(names: list[str], folder: str) -> None:
+def say_caveats(names: list[str], folder: str) -> None:
     """Report the caveats that only runs show of their numbers; `caution` reports the rest."""
     from compressor.store import read_store, read_studies, run_caveats
 
@@ -154,24 +124,3 @@ def report_caveats(names: list[str], folder: str) -> None:
     for study in read_studies(folder):
         for text in run_caveats(rows, study) if study.name in names else ():
             screen.say_wrapped(f"{study.name}: {text}")
-
-
-def report_failures(summary: "Summary") -> None:
-    """Report failed jobs, and what to do about each kind of failure."""
-    failures = summary.failed
-    if not failures:
-        return
-    from compressor.reasons import remedy
-
-    screen.say(f"{plural(len({failure.key for failure in failures}))} failed:")
-    for failure in failures[:MAX_FAILURES]:
-        point = "".join(f" {key}={value}" for key, value in failure.coordinates.items())
-        # one line each, for who searches a log
-        screen.say(f"  {failure.study}{point}: {failure.reason}: {printable(failure.detail)}")
-        screen.say(f"    job {failure.key}")
-    if len(failures) > MAX_FAILURES:
-        screen.say(f"  and {len(failures) - MAX_FAILURES} more")
-    screen.say("what to do:")
-    for reason, number in Counter(failure.reason for failure in failures).items():
-        screen.say_wrapped(f"{reason} ({number}): {remedy(reason)}", 2)
-    screen.say("--rerun failed runs failed jobs again; a changed case file makes new jobs.")

@@ -1,7 +1,5 @@
 """`compsim schema`: what editors need to know of case files."""
 
-import json
-
 import click
 
 from compsim import screen
@@ -22,5 +20,5 @@ def schema() -> int:
     """
     from compressor.cases import case_schema
 
-    screen.print_text(json.dumps(case_schema(), indent=1))
+    screen.print_json(case_schema())
     return screen.DONE

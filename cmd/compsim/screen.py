@@ -1,19 +1,22 @@
 """What the commands share: exit codes, and how they print and speak on stderr."""
 
 import contextlib
+import dataclasses
+import json
 import math
 import os
 import re
 import shlex
 import sys
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from compressor.digits import plural
-from compressor.program import THREAD_VARIABLES, printable
+from compressor.digits import align_columns, plural
+from compressor.program import THREAD_VARIABLES, duration, printable
 from compsim import options
 
 if TYPE_CHECKING:
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
 DONE, INTERNAL, USAGE, SOME_FAILED, STORE = 0, 1, 2, 3, 5  # exit codes; 128 + n: signal n
 WIDTH = 80  # columns of what is printed
 MAX_CAUTIONS = 5  # reported of one case file
+MAX_FAILURES = 20  # listed one by one
 
 
 def one_thread_each() -> None:
@@ -31,14 +35,42 @@ def one_thread_each() -> None:
         os.environ.setdefault(name, "1")
 
 
+# ---- stdout -------------------------------------------------------------------------------------
+
+
 def harmless(text: str) -> str:
     """Return lines of text in which no character can steer a terminal."""
     return "\n".join(map(printable, text.split("\n")))
 
 
-def print_text(text: str) -> None:
-    """Print lines on stdout."""
-    click.echo(harmless(text))
+def print_text(*lines: str) -> None:
+    """Print lines on stdout as they are."""
+    for text in lines:
+        click.echo(harmless(text))
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines on stdout, wrapped to the width."""
+    for line in lines:
+        print_text(*wrap_value(printable(line)))
+
+
+def print_json(value: Any) -> None:
+    """Print a value on stdout as JSON."""
+    click.echo(json.dumps(jsonable(value), indent=1))
+
+
+def jsonable(value: Any) -> Any:
+    """Return a value as JSON can hold it: null for nan, "inf" for an unknown error."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        value = dataclasses.asdict(value)
+    if isinstance(value, dict):
+        return {key: jsonable(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [*map(jsonable, value)]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return str(value) if isinstance(value, os.PathLike) else value
 
 
 @contextlib.contextmanager
@@ -79,10 +111,21 @@ def wrap_value(line: str) -> list[str]:
     return wrap_line(body, indent, len(body) - len(text) if text else 2)
 
 
-def print_lines(lines: Iterable[str]) -> None:
-    """Print lines on stdout, wrapped to the width."""
-    for line in lines:
-        print_text("\n".join(wrap_value(printable(line))))
+def point_text(point: Mapping[str, Any]) -> str:
+    """Return a job's swept values, each behind a blank: ` clearance_mm=0.2`."""
+    return "".join(f" {key}={value}" for key, value in point.items())
+
+
+def size(count: float) -> str:
+    """Return the bytes as people say them."""
+    for unit in ("B", "kB", "MB"):
+        if count < 999.5:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:.4g} GB"
+
+
+# ---- stderr -------------------------------------------------------------------------------------
 
 
 def say(text: str, end: str = "\n") -> None:
@@ -95,6 +138,33 @@ def say(text: str, end: str = "\n") -> None:
 def say_wrapped(text: str, indent: int = 0) -> None:
     """Write a remark to stderr in lines of the width; what is copied or parsed goes to `say`."""
     say("\n".join(wrap_line(text, indent)))
+
+
+def say_done(new: int, before: int, seconds: float, folder: str, thing: str = "job") -> None:
+    """Report how many things were run, or that all were stored before."""
+    be = "was" if before == 1 else "were"
+    if new:
+        stored = f", {before} {be} stored before" if before else ""
+        say(f"{plural(new, thing)} run in {duration(seconds)}{stored}")
+    else:
+        every = f"the {thing} is" if before == 1 else f"all {before} {thing}s are"
+        say(f"nothing to do: {every} stored in {folder}")
+
+
+def say_failures(failures: Sequence[tuple[str, str, str]]) -> None:
+    """Report what failed, by its place, reason and detail, and what to do about each reason."""
+    from compressor.reasons import remedy
+
+    for place, reason, detail in failures[:MAX_FAILURES]:  # a line each, for who searches a log
+        say(f"  {place}: {reason}: {printable(detail)}")
+    if len(failures) > MAX_FAILURES:
+        say(f"  and {len(failures) - MAX_FAILURES} more")
+    say("what to do:")
+    for reason, number in Counter(reason for _, reason, _ in failures).items():
+        say_wrapped(f"{reason} ({number}): {remedy(reason)}", 2)
+
+
+# ---- case files and their studies ---------------------------------------------------------------
 
 
 def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
@@ -118,85 +188,45 @@ def caution(studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS) -> None
     from compressor.solve import cautions
 
     for study in studies:
-        found, texts = cautions(study), []
+        found = cautions(study)
+        implausible = describe_machine(study).remarks({one.key for one in found})
+        texts = [f"{key}: {text}" for key, text in implausible.items()]
         for one in found:
             looked = "" if one.of == len(study.selected) else " that were looked at"
             share = "" if one.of == 1 else f" ({one.jobs} of {one.of} jobs{looked})"
             texts.append(f"{one.key}: {one.message}{share}")
-        implausible = describe_machine(study).remarks({one.key for one in found})
-        texts = [f"{key}: {text}" for key, text in implausible.items()] + texts
         for text in texts[:most]:
             say_wrapped(f"{study.path}: warning: {text}")
         if most is not None and len(texts) > most:
             more = plural(len(texts) - most, "more warning")
-            say_wrapped(
-                f"{study.path}: and {more}, which compsim plan {shlex.quote(study.path)} lists"
-            )
+            command = f"compsim plan {shlex.quote(study.path)}"
+            say_wrapped(f"{study.path}: and {more}, which {command} lists")
 
 
-def report_machines(studies: "Sequence[Study]") -> None:
+def say_machines(studies: "Sequence[Study]") -> None:
     """Report what case files say of their machines: loads, power, pressures, pins."""
     from compressor.analysis import describe_machine
 
     for study in studies:
         say(f"{study.name}: its machine, without clearance")
-        for line in align_lines(describe_machine(study).lines(), indent=2):
-            say("\n".join(wrap_value(line)))
+        for line in align_columns(describe_machine(study).lines()):
+            say("\n".join(wrap_value(f"  {line}")))
 
 
-def align_lines(lines: Sequence[tuple[str, str]], least: int = 0, indent: int = 0) -> list[str]:
-    """Return labels in a column of at least so many characters, and what stands beside each."""
-    width = max((len(label) for label, _ in lines), default=0)
-    return [f"{'':{indent}}{label:<{max(width, least)}}  {text}" for label, text in lines]
-
-
-def report_changes(studies: "Sequence[Study]", folder: str) -> None:
+def say_changes(studies: "Sequence[Study]", folder: str) -> None:
     """Report which stored studies have jobs that their case files no longer have."""
     from compressor.store import changes
 
     for one in changes(folder, studies):
-        text = (
-            f"{one.study}: had {plural(one.before)}, this file has {one.now}, {one.shared} of "
-            "them as before"
-        )
+        text = f"{one.study}: had {plural(one.before)}, this file has {one.now}, {one.shared} of "
+        text += "them as before"
         if one.older_model:
             text += f" (those were made by version {one.older_model} of the model)"
-        if one.former:
-            text += (
-                f"; {one.finished} finished before stay{'s' * (one.finished == 1)} stored, in the "
-                f"study {one.former}:"
-            )
-        say_wrapped(text)
-        if one.former:
-            say(f"  compsim export {one.former} -r {shlex.quote(folder)} -o {one.former}.csv")
-
-
-def all_stored(count: int, folder: str, thing: str = "job") -> str:
-    """Return that there is nothing to run."""
-    every = f"the {thing} is" if count == 1 else f"all {count} {thing}s are"
-    return f"nothing to do: {every} stored in {folder}"
-
-
-def stored_before(count: int) -> str:
-    """Return how many of the jobs were stored before, in words; "" for none."""
-    return f", {count} {'was' if count == 1 else 'were'} stored before" if count else ""
-
-
-def size(count: float) -> str:
-    """Return the bytes as people say them."""
-    for unit in ("B", "kB", "MB"):
-        if count < 999.5:
-            return f"{count:.3g} {unit}"
-        count /= 1000
-    return f"{count:.4g} GB"
-
-
-def jsonable(value: Any) -> Any:
-    """Return a value as JSON can hold it: null for nan, "inf" for an unknown error."""
-    if isinstance(value, dict):
-        return {key: jsonable(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [*map(jsonable, value)]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else str(value)
-    return value
+        if not one.former:
+            say_wrapped(text)
+            continue
+        stay = "stays" if one.finished == 1 else "stay"
+        say_wrapped(
+            f"{text}; {one.finished} finished before {stay} stored, in the study {one.former}:"
+        )
+        say(f"  compsim export {one.former} -r {shlex.quote(folder)} -o {one.former}.csv")

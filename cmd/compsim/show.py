@@ -1,7 +1,6 @@
 """`compsim show`: what is known of one job."""
 
 import dataclasses
-import json
 import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,7 @@ KEY_DIGITS = 8  # digits of a key in a name
 MAX_NAME = 64 - 1 - KEY_DIGITS  # characters of a study's name
 
 
-def reversal_limits(_: click.Context, __: click.Parameter, text: str) -> tuple[float, float]:
+def read_reversal(_: click.Context, __: click.Parameter, text: str) -> tuple[float, float]:
     """Return least angle (degrees) and share (percent) of a reversal, from the option's text."""
     try:
         degrees, percent = (float(part) for part in text.split(","))
@@ -34,14 +33,12 @@ def reversal_limits(_: click.Context, __: click.Parameter, text: str) -> tuple[f
 @click.command()
 @options.job
 @options.results
-@click.option("--case", "only_case", is_flag=True,
-              help="Print the case alone, as a case file with all keys.")  # fmt: skip
+@click.option("--case", is_flag=True, help="Print the case alone, as a case file with all keys.")
 @click.option(
     "--reversal",
     default="15,3",
-    show_default=True,
     metavar="DEG,PERCENT",
-    callback=reversal_limits,
+    callback=read_reversal,
     help="Ask for this reversal of the rod load: degrees, and percent on its smaller side.",
 )
 @options.units("kN, mm, µm, m/s²")
@@ -49,7 +46,7 @@ def reversal_limits(_: click.Context, __: click.Parameter, text: str) -> tuple[f
 def show(
     words: tuple[str, ...],
     folder: str,
-    only_case: bool,
+    case: bool,
     reversal: tuple[float, float],
     units: "Units | None",
     as_json: bool,
@@ -64,17 +61,16 @@ def show(
 
     It prints which studies the job belongs to and where in them, how it ended and why, its numbers
     with their error bars, how it was run, and the values of its case that are not the usual ones.
-    Of a job that stopped, it prints where, and the state. Of a job with signals, it says whether
-    the rod load at the crosshead pin changes its side as API 618 requires, by 15 degrees and 3
-    percent, or as a maker does. --json has all numbers in SI.
+    Of a job with signals, it says whether the rod load at the crosshead pin changes its side as API
+    618 requires, by 15 degrees and 3 percent, or as a maker does. --json has all numbers in SI.
     """
     options.check_json_units(as_json, units)
     from compressor.store import report_job
 
     found = report_job(folder, *words)
     if as_json:
-        screen.print_text(json.dumps(screen.jsonable(dataclasses.asdict(found)), indent=1))
-    elif only_case:
+        screen.print_json(found)
+    elif case:
         screen.print_text(whole_case(found, folder).removesuffix("\n"))
     else:
         print_report(found, folder, reversal, units or "usual")
@@ -91,24 +87,19 @@ def print_report(
     ended = {"missing": "not run yet", "failed": f"failed: {found.reason}: {found.detail}"}
     screen.print_text(f"job {found.key}: {printable(ended.get(found.status, found.status))}")
     for study, point in found.studies.items():
-        values = "".join(f" {key}={value}" for key, value in point.items())
-        screen.print_text(f"  in {study}{printable(values)}")
-    if found.status == "failed":
-        screen.print_text(f"  what to do: {remedy(found.reason)}")
+        screen.print_text(f"  in {study}{printable(screen.point_text(point))}")
     if found.status == "missing":
         for command in screen.run_commands(found.again, folder):
             screen.say(f"next: {command}")
         return
+    if found.status == "failed":
+        screen.print_text(f"  what to do: {remedy(found.reason)}")
     for heading, lines in sections(found, reversal, units):
         if lines and heading:
             screen.print_text(heading)
         screen.print_lines(f"  {line}" for line in lines)
-    if "case" in found.attributes:
-        screen.print_text(
-            "the values of its case that are not the usual ones (--case prints it whole)"
-        )
-        for line in changed_values(found.case):
-            screen.print_text(f"  {line}")
+    screen.print_text("the values of its case that are not the usual ones (--case prints it whole)")
+    screen.print_text(*(f"  {line}" for line in changed_values(found.case)))
 
 
 def changed_values(case: "Case") -> Iterator[str]:

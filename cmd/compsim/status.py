@@ -1,11 +1,8 @@
 """`compsim status`: how many jobs of each stored study are done, and how far to trust them."""
 
-import dataclasses
-import json
-
 import click
 
-from compressor.digits import plural
+from compressor.digits import align_columns, plural
 from compsim import options, screen
 
 PROMISES = {"kept": "kept what accuracy promises", "none": "without a promise"}
@@ -31,24 +28,24 @@ def status(folder: str, as_json: bool) -> int:
 
     found = standings(folder)
     if as_json:
-        screen.print_text(json.dumps([dataclasses.asdict(one) for one in found], indent=1))
+        screen.print_json(found)
         return screen.DONE
-    width = max(len(one.study) for one in found)
+    rows = []
     for one in found:
-        screen.print_text(f"{one.study:<{width}}  {plural(one.jobs):>9}  {one.ok:>4} ok  "
-                   f"{one.failed:>4} failed  {one.missing:>4} missing")  # fmt: skip
-        remarks = []
-        if one.former_of:
-            remarks.append(f"{one.former_of} as it was run on {one.written[:10]}, with finished "
-                           "jobs that it has no longer; opens by this name")  # fmt: skip
+        ends = f"{one.ok} ok", f"{one.failed} failed", f"{one.missing} missing"
+        rows.append((one.study, plural(one.jobs), *ends))
+    for line, one in zip(align_columns(rows, "<>>>>"), found, strict=True):
         promises = [f"{n} {PROMISES[word]}" for word, n in one.promises.items() if word in PROMISES]
         trusted = [", ".join(promises)] if promises else []
         trusted += [f"{n} {regime_words(word)}" for word, n in one.regimes.items() if word]
-        remarks += [f"of those ok: {text}" for text in trusted]
-        remarks += one.caveats
+        remarks = [f"of those ok: {text}" for text in trusted] + one.caveats
         remarks += [f"{n} {reason}: {remedy(reason)}" for reason, n in one.reasons.items()]
+        if one.former_of:
+            text = f"{one.former_of} as it was run on {one.written[:10]}, with finished jobs that "
+            remarks.insert(0, f"{text}it has no longer; opens by this name")
+        screen.print_text(line)
         for text in remarks:
-            screen.print_text("\n".join(screen.wrap_line(text, 4)))
+            screen.print_text(*screen.wrap_line(text, 4))
     wanting = [one.again for one in found if one.missing and not one.former_of]
     for command in screen.run_commands(wanting, folder):
         screen.say(f"next: {command}")

@@ -10,31 +10,29 @@ from compsim.progress import ProgressReporter
 
 
 @click.command()
-@click.option("-n", "--scenes", type=click.IntRange(min=1), default=2000, show_default=True,
-              help="Draw this many cases.")  # fmt: skip
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
-              help="Draw by this seed.")  # fmt: skip
+@click.option("-n", "--scenes", type=options.COUNT, default=2000, help="Draw this many cases.")
+@click.option("--seed", type=options.NUMBER, default=0, help="Draw by this seed.")
 @click.option(
-    "--laws",
-    "drawn",
-    flag_value="laws",
-    help="Draw laws of contact and friction as well, each as often as any other.",
+    "--laws", "drawn", flag_value="laws", help="Draw laws of contact and friction as well."
 )
 @click.option(
-    "--features",
-    "drawn",
-    flag_value="features",
-    help="Draw laws, oil, guide, drive and rod as well.",
+    "--features", "drawn", flag_value="features", help="Draw laws, oil, guide, drive and rod, too."
 )
 @options.jobs()
-@options.output("stress", "Write the campaign into this folder.")
-@click.option("--scene", type=click.IntRange(min=0),
-              help="Repeat this case of the seed alone, and store nothing.")  # fmt: skip
+@options.output("Write the campaign into this folder.", default="stress")
+@click.option(
+    "--scene", type=options.NUMBER, help="Repeat this case of the seed alone, and store nothing."
+)
 @options.quiet
 def stress(
-    scenes: int, seed: int, drawn: str | None, jobs: int | None, output: str, scene: int | None,
+    scenes: int,
+    seed: int,
+    drawn: str | None,
+    jobs: int | None,
+    output: str,
+    scene: int | None,
     quiet: bool,
-) -> int:  # fmt: skip
+) -> int:
     """Test numerical stability on extreme cases drawn at random.
 
     \b
@@ -50,26 +48,24 @@ def stress(
 
     Exit code 3 if a number is wrong without a warning, or more than 2 % of the cases are unjudged.
     """
-    screen.one_thread_each()  # before numpy loads
-    from compressor.studies.stress.words import summary, write_scene
-    from compressor.sweep import cores
-
-    if scene is not None:
-        screen.print_text("\n".join(write_scene(scene, seed, drawn or "")))
-        return screen.DONE
     from compressor.report import render
     from compressor.store import publish, writable_folder
     from compressor.studies.stress.extremes import Budget
     from compressor.studies.stress.figures import draw_outcomes
     from compressor.studies.stress.stress import campaign
+    from compressor.studies.stress.words import list_outcomes, list_scene
+    from compressor.sweep import cores
 
+    if scene is not None:
+        screen.print_text(*list_scene(scene, seed, drawn or ""))
+        return screen.DONE
     writable_folder(output)
     with ProgressReporter(quiet, "scenes") as progress:
         study = campaign(output, scenes, seed, jobs or cores(), progress, Budget(drawn or ""))
     drawing = draw_outcomes(study)
     for kind in ("png", "svg"):
         publish(Path(output, f"stress.{kind}"), render(drawing, kind))
-    screen.print_text("\n".join(summary(study)))
+    screen.print_text(*list_outcomes(study))
     if not quiet:
         screen.say(study.encoding["source"])
         screen.say(os.path.join(output, "stress.png"))

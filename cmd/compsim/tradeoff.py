@@ -1,6 +1,5 @@
 """`compsim tradeoff`: speed against accuracy, and what features of the model do."""
 
-import os
 from pathlib import Path
 
 import click
@@ -11,11 +10,16 @@ from compsim.progress import ProgressReporter
 
 @click.command()
 @click.argument("configs", nargs=-1, metavar="[CONFIG...]", type=options.FILE)
-@options.output("tradeoff", "Write the study into this folder.")
-@click.option("--repeats", type=click.IntRange(min=1), default=3, show_default=True,
-              help="Time all points in so many rounds; the best time counts.")  # fmt: skip
-@click.option("--budget", type=click.FloatRange(min=0, min_open=True), default=4.0,
-              show_default=True, help="Allow one point so many seconds.")  # fmt: skip
+@options.output("Write the study into this folder.", default="tradeoff")
+@click.option(
+    "--repeats", type=options.COUNT, default=3, help="Time all points so often; the best counts."
+)
+@click.option(
+    "--budget",
+    type=click.FloatRange(min=0, min_open=True),
+    default=4.0,
+    help="Allow one point so many seconds.",
+)
 @options.set_keys
 @options.quiet
 def tradeoff(
@@ -39,27 +43,23 @@ def tradeoff(
     if overrides and not configs:
         raise click.UsageError("--set changes case files: name one, such as configs/both.yaml")
     from compressor.store import writable_folder, write_dataset
+    from compressor.studies.tradeoff import work_precision as methods
     from compressor.studies.tradeoff.figures import write_methods
     from compressor.studies.tradeoff.model_choices import trade as feature_trade
-    from compressor.studies.tradeoff.words import fastest_lines, trade_lines
-    from compressor.studies.tradeoff.work_precision import (
-        cases_of_files,
-        default_cases,
-        work_precision,
-    )
+    from compressor.studies.tradeoff.words import list_fastest, list_trade
 
-    cases = cases_of_files(configs, overrides) if configs else default_cases()
+    cases = methods.cases_of_files(configs, overrides) if configs else methods.default_cases()
     folder = Path(output)
     writable_folder(folder)  # minutes before it is needed
     with ProgressReporter(quiet, "points") as progress:
-        study = work_precision(cases, repeats=repeats, budget=budget, progress=progress)
+        study = methods.work_precision(cases, repeats=repeats, budget=budget, progress=progress)
         write_methods(folder, study)
     with ProgressReporter(quiet, "changes of the model") as progress:
         trade = feature_trade(cases, repeats=repeats, progress=progress)
     write_dataset(folder / "modelling.nc", trade)
-    screen.print_lines([*fastest_lines(study), "", *trade_lines(trade)])
+    screen.print_lines([*list_fastest(study), "", *list_trade(trade)])
     if not quiet:
         for name in ("tradeoff.png", "tradeoff.nc", "modelling.nc"):
-            screen.say(os.path.join(output, name))
+            screen.say(str(folder / name))
         screen.say("next: compsim explain --models CONFIG does the same for a case, in seconds")
     return screen.DONE

@@ -1,15 +1,9 @@
 """`compsim verify`: which stored files are damaged, which jobs that costs, and how to repair it."""
 
-import json
-from typing import TYPE_CHECKING, Any
-
 import click
 
 from compressor.digits import plural
 from compsim import options, screen
-
-if TYPE_CHECKING:
-    from compressor.store import Damage
 
 
 @click.command()
@@ -28,16 +22,14 @@ def verify(folder: str, as_json: bool) -> int:
 
     damages = compare(folder)
     if as_json:
-        screen.print_text(json.dumps([jsonable_damage(damage) for damage in damages], indent=1))
+        screen.print_json(damages)
     for damage in () if as_json else damages:
-        screen.print_text(
-            f"{damage.path}: {damage.problem}" + f"; {damage.remedy}" * bool(damage.remedy)
-        )
+        remedy = f"; {damage.remedy}" if damage.remedy else ""
+        screen.print_text(f"{damage.path}: {damage.problem}{remedy}")
         for job, points in damage.studies.items():
             screen.print_text(f"  job {job}")
             for study, point in points.items():
-                values = "".join(f" {key}={value}" for key, value in point.items())
-                screen.print_text(f"    in {study}{values}")
+                screen.print_text(f"    in {study}{screen.point_text(point)}")
     if not damages:
         screen.say("no damage")
         return screen.DONE
@@ -46,15 +38,3 @@ def verify(folder: str, as_json: bool) -> int:
     for command in screen.run_commands((one for damage in damages for one in damage.again), folder):
         screen.say(f"to repair: {command}")
     return screen.STORE
-
-
-def jsonable_damage(damage: "Damage") -> dict[str, Any]:
-    """Return the damage as JSON has it."""
-    return {
-        "path": str(damage.path),
-        "problem": damage.problem,
-        "jobs": damage.keys,
-        "studies": damage.studies,
-        "case_files": [study.case_file for study in damage.again],
-        "remedy": damage.remedy,
-    }

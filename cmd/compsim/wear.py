@@ -1,17 +1,11 @@
 """`compsim wear`: how bores wear over operating hours, and when a joint is worn out."""
 
-import json
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
-from compressor.digits import plural
-from compressor.program import duration, printable
 from compsim import options, screen
-from compsim.progress import ProgressReporter
-
-if TYPE_CHECKING:
-    from compressor.studies.wear.run import WearSummary, WornMachine
+from compsim.progress import ProgressReporter, read_cases
 
 
 @click.command()
@@ -26,10 +20,10 @@ def wear(
     configs: tuple[str, ...],
     folder: str,
     jobs: int | None,
-    overrides: tuple[str, ...],
     rerun: bool,
     as_json: bool,
     quiet: bool,
+    **how: Any,
 ) -> int:
     """Wear bearings over operating hours, until one is worn out.
 
@@ -43,47 +37,28 @@ def wear(
     of the runs are kept in wear/ of the folder, with a figure; what was interrupted goes on from
     there.
     """
-    screen.one_thread_each()  # before numpy loads
-    from compressor.cases import load_studies
     from compressor.studies.wear.figures import draw_machines
     from compressor.studies.wear.run import check_wear, run_wear
-    from compressor.studies.wear.words import jsonable_wear, table
+    from compressor.studies.wear.words import jsonable_wear, list_machines
     from compressor.sweep import cores
 
-    with ProgressReporter(quiet, "cases read") as progress:
-        studies = load_studies(*configs, overrides=overrides, progress=progress)
+    studies = read_cases(configs, quiet, **how)
     check_wear(studies)
     with ProgressReporter(quiet, "machines", folder=folder) as progress:
         summary = run_wear(studies, folder, jobs or cores(), progress, rerun)
     if as_json:
-        screen.print_text(
-            json.dumps([jsonable_wear(one, folder) for one in summary.machines], indent=1)
-        )
+        screen.print_json([jsonable_wear(one, folder) for one in summary.machines])
     else:
-        for line in table(summary.machines):
-            screen.print_text(line)
-    drawn = [*draw_machines(summary, folder, {study.name: study.title for study in studies})]
+        screen.print_text(*list_machines(summary.machines))
+    drawn = draw_machines(summary, folder, {study.name: study.title for study in studies})
     if not quiet:
-        report_wear(summary, folder, drawn)
-    for one in summary.failed:
-        fail(one)
-    return screen.SOME_FAILED if summary.failed else screen.DONE
-
-
-def report_wear(summary: "WearSummary", folder: str, drawn: list[str]) -> None:
-    """Write what was done, and where figures are."""
-    total = len(summary.machines)
-    done = f"{plural(total - summary.done_before, 'machine')} in {duration(summary.seconds)}"
-    done += screen.stored_before(summary.done_before)
-    screen.say(done if summary.done_before < total else screen.all_stored(total, folder, "machine"))
-    for path in drawn:
-        screen.say(path)
-
-
-def fail(one: "WornMachine") -> None:
-    """Write why a machine ended early, and what to do."""
-    from compressor.reasons import remedy
-
-    point = "".join(f" {key}={value}" for key, value in one.point.items())
-    screen.say_wrapped(f"{one.study}{point}: {one.reason}: {printable(one.detail)}")
-    screen.say_wrapped(f"{remedy(one.reason)}; then: compsim wear --rerun", 2)
+        new = len(summary.machines) - summary.done_before
+        screen.say_done(new, summary.done_before, summary.seconds, folder, "machine")
+        screen.say("\n".join(drawn))
+    failed = [
+        (one.study + screen.point_text(one.point), one.reason, one.detail) for one in summary.failed
+    ]
+    if failed:
+        screen.say_failures(failed)
+        screen.say("--rerun goes on with machines that failed.")
+    return screen.SOME_FAILED if failed else screen.DONE

@@ -1,6 +1,6 @@
 """Outcomes on disk, and back."""
 
-from compressor.store.export import Exported, ExportOptions, export
+from compressor.store.export import ExportOptions, export
 from compressor.store.files import (
     Folder,
     StoreError,
@@ -21,7 +21,6 @@ from compressor.store.series_file import (
     write_series,
 )
 from compressor.store.status import (
-    Damage,
     JobReport,
     changes,
     report_job,

@@ -39,7 +39,7 @@ def test_every_summary_is_whole_in_one_line():
 
 
 def test_every_verb_is_under_one_heading():
-    listed = [verb.name for verbs in HEADINGS.values() for verb in verbs]
+    listed = [name for names in HEADINGS.values() for name in names]
     assert sorted(listed) == VERBS
     headings = [line.rstrip(":") for line in help_of() if re.fullmatch(r"\w.*:", line)]
     assert headings == ["Options", *HEADINGS]

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 from compsim import cli
-from compsim.job_text import film, knock_verdict, numbers
+from compsim.job_text import knock_verdict, notes, numbers
 from conftest import CHAOTIC, store
 
 from compressor.cases.case import Case
@@ -57,7 +57,7 @@ def test_numbers_have_labels_units_and_error_bars(paper_store, show):
     share = stored["contact_loss_fraction"][0]
     bar = stored["contact_loss_fraction_error"][0]
     assert told["time without dry contact, big end"] == f"{by_bar(100 * share, 100 * bar, False)} %"
-    rate = f"{stored['impacts_per_rev'][0]:.3g} per rev"
+    rate = f"{stored['impacts_per_rev'][0]:.6g} per rev"
     assert told["dry contacts after flight, big end"] == rate
     assert not any("count" in label for label in told)  # counts grow with the run
     assert float(told["acceleration"]) == pytest.approx(stored["acceleration_error"], rel=0.05)
@@ -70,7 +70,7 @@ def test_what_is_rounding_beside_the_other_axis_is_told_as_0():
         case=Case(),
         numbers={"body_velocity_rms": [9.79e-3, 1e-16], "body_velocity_rms_error": [1e-5, 8e-17]},
     )
-    assert numbers(found, "usual", "body") == [
+    assert [*numbers(found, "usual", "body")] == [
         ("body velocity rms, x", "9.79 ± 0.01 mm/s"), ("body velocity rms, y", "0 mm/s"),
     ]  # fmt: skip
 
@@ -89,7 +89,6 @@ def test_numbers_may_be_in_plant_units_or_si(paper_store, show):
         ).groups()
         assert unit == newtons
         assert float(value) == pytest.approx(force / (1e3 if unit == "kN" else 1.0), rel=1e-3)
-        assert re.search(rf"peak load [\d.]+ {newtons}\b", told["big end"])
 
 
 def test_nothing_is_an_array_and_nothing_is_said_of_a_contact_that_is_none(paper_store, show):
@@ -99,7 +98,7 @@ def test_nothing_is_an_array_and_nothing_is_said_of_a_contact_that_is_none(paper
     assert "penetration, big end" in told
     of_small_end = {label for label in told if "small end" in label}
     assert {label.split(",")[0] for label in of_small_end} == {
-        "peak contact force", "peak contact force axis", "contact force", "small end"
+        "peak contact force", "peak contact force axis", "contact force"
     }  # fmt: skip
     assert "max penetration, small end" in values(show(paper_store, "both", "clearance_mm=0.2"))
     assert not any("penetration" in label for label in values(show(paper_store, "design")))
@@ -158,8 +157,7 @@ def test_a_reversal_needs_two_numbers(text, capsys):
 @pytest.mark.parametrize("oil", [{"lubricant": True}, {}])
 def test_a_contact_force_with_oil_says_so(oil):
     case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2} | oil)
-    found = SimpleNamespace(case=case)
-    lines = film(found)
+    lines = [*notes(SimpleNamespace(case=case, attributes={}))]
     assert lines[:1] == ["contact forces include the force of the oil film"] * len(oil)
     assert (lines[1:] != []) == bool(oil)
     assert all("knock tells" in line for line in lines[1:])

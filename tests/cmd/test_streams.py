@@ -72,8 +72,7 @@ def test_a_lack_of_memory_is_told_in_one_line(error, capsys):
     assert capsys.readouterr().err.startswith("compsim: not enough memory: allow more (ulimit -v)")
 
 
-def test_a_path_that_cannot_be_read_is_named_in_one_line(capsys, monkeypatch):
-    monkeypatch.setenv("COMPSIM_DEBUG", "1")
+def test_a_path_that_cannot_be_read_is_named_in_one_line(capsys):
     for number in (errno.EACCES, errno.EIO, errno.ESTALE):
         assert cli.report_error(OSError(number, os.strerror(number), "/store/jobs")) == 5
         said = capsys.readouterr().err

@@ -173,15 +173,17 @@ def test_a_folder_gets_a_file_each(results, tmp_path, capsys):
     assert {*table(out / "grid.csv")[0]} > {"key", "clearance_mm", "max_steps", "status"}
     assert jobs == {row["key"] for row in table(out / "grid.csv") if row["status"] != "missing"}
     assert told[0].startswith(f"{out / 'grid.csv'}  4 jobs, ")
-    assert told[1].startswith(f"{out / 'grid'}  3 jobs, ")
-    assert len(told) == 5  # and two of the other study, and the end of the last line
+    assert told[1].startswith(f"{out / 'grid'}/")
+    assert len(told) == 8  # three jobs, the other study and its two, and the end of the last line
     assert cli.main(command) == 2
     assert f"{out / 'grid.csv'} exists: --force replaces it" in capsys.readouterr().err
     (out / "list.csv").write_text("old")
-    assert cli.main([*command, "--force", "--quiet", "--json"]) == 0
+    assert cli.main([*command, "--force", "--quiet"]) == 0
     found = capsys.readouterr()
     assert found.err == ""
-    assert {one["path"] for one in json.loads(found.out)} == set(map(str, out.rglob("*.csv")))
+    assert {line.split("  ")[0] for line in found.out.splitlines()} == set(
+        map(str, out.rglob("*.csv"))
+    )
     assert len(table(out / "list.csv")) == 2
 
 

@@ -439,7 +439,7 @@ def test_without_distributed_the_extra_is_named(monkeypatch):
 
 
 def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, impatient):
-    options = ["--backend", "dask", "--scheduler", "tcp://127.0.0.1:1"]
+    options = ["--scheduler", "tcp://127.0.0.1:1"]
     assert main(["run", studies[0].path, "-r", str(tmp_path / "out"), *options]) == 2
     assert "no scheduler answers" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
@@ -452,7 +452,7 @@ def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
         "output": {"keep": "metrics"}}))  # fmt: skip
     out = tmp_path / "out"
     call = [sys.executable, "-m", "compsim", "run", str(config), "-r", str(out)]
-    call += ["--backend", "dask", "--scheduler", dask.scheduler_address]
+    call += ["--scheduler", dask.scheduler_address]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     running = subprocess.Popen(call, stderr=subprocess.PIPE, text=True, env=environment)
     until = time.monotonic() + 60

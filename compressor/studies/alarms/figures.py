@@ -23,7 +23,7 @@ from compressor.report import (
 )
 from compressor.store import publish, write_dataset
 from compressor.studies.alarms.alarms import best_of_each, rank_alarms
-from compressor.studies.alarms.words import as_rows, detects_words, limit_words, rate_words
+from compressor.studies.alarms.words import csv_text, detects_words, limit_words, rate_words
 
 FILES = ("alarms.csv", "alarms.nc")
 
@@ -140,7 +140,7 @@ def write_alarms(found: xr.Dataset, output: str, title: str) -> Iterator[str]:
     """
 
     place = Path(output)
-    publish(place / FILES[0], as_rows(found).encode())
+    publish(place / FILES[0], csv_text(found).encode())
     write_dataset(place / FILES[1], found)
     for name in FILES:
         yield os.path.join(output, name)

@@ -4,47 +4,43 @@ import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
-from compressor.digits import plural
+from compressor.digits import align_columns, plural
 from compressor.studies.compare.comparison import Compared, Comparison
 from compressor.studies.compare.likeness import Measured
 
-MOST = 20  # jobs that are listed
-COLUMNS = ("difference, dB", "correlation", "envelope", "rms ratio", "distance, dB")
+MAX_LISTED = 20  # jobs
+HEAD = (
+    *("job", "what it is"),
+    *("difference, dB", "correlation", "envelope", "rms ratio", "distance, dB"),
+)
 
 
 def list_comparison(found: Comparison) -> Iterator[str]:
     """Yield the record, the table of jobs, and what does not fit."""
-    mine = found.turned
+    mine, more = found.turned, len(found.jobs) - MAX_LISTED
     rms = (found.curves.spectrum**2).sum() ** 0.5
-    yield (f"{found.name}: {plural(len(mine.spectra), 'revolution')} at {mine.rpm:.4g} rpm, "
-           f"{mine.rate:.6g} Hz, {rms:.4g} m/s2 rms up to order {found.orders}")  # fmt: skip
+    turns = f"{plural(len(mine.spectra), 'revolution')} at {mine.rpm:.4g} rpm, {mine.rate:.6g} Hz"
+    yield f"{found.name}: {turns}, {rms:.4g} m/s2 rms up to order {found.orders}"
     yield from (f"read: {text}" for text in found.remarks)
-    width = max(len("what it is"), *(len(job.what) for job in found.jobs[:MOST]))
-    yield f"{'job':<12}{'what it is':<{width}}" + "".join(f"{one:>18}" for one in COLUMNS)
-    for job in found.jobs[:MOST]:
-        yield job_line(job, width)
-    if len(found.jobs) > MOST:
-        yield f"and {len(found.jobs) - MOST} less alike, which --json lists"
+    yield from align_columns([HEAD, *map(list_cells, found.jobs[:MAX_LISTED])], "<<>>>>>")
+    if more > 0:
+        yield f"and {more} less alike, which --json lists"
     if found.left_out:
         yield f"left out: {plural(found.left_out)} without a sensor's record of two revolutions"
     if found.inside == found.inside:
-        yield (f"envelope: inside the range of the {len(found.jobs)} jobs at {found.inside:.0%} of "
-               "crank angles")  # fmt: skip
-    for text in found.misfits:
-        yield f"does not fit: {text}"
+        share = f"{found.inside:.0%} of crank angles"
+        yield f"envelope: inside the range of the {len(found.jobs)} jobs at {share}"
+    yield from (f"does not fit: {text}" for text in found.misfits)
 
 
-def job_line(job: Compared, width: int) -> str:
-    """Return a job's joint, clearance and swept values, padded to a width, and its numbers."""
+def list_cells(job: Compared) -> tuple[str, ...]:
+    """Return a job's key, joint, clearance and swept values, and its numbers."""
     like = job.likeness
-    numbers = (
-        like.difference, like.correlation, like.envelope, like.rms_ratio, like.spectral_distance,
-    )  # fmt: skip
-    columns = "".join(f"{number(one):>18}" for one in numbers)
-    return f"{job.key[:10]:<12}{job.what:<{width}}{columns}"
+    numbers = like.difference, like.correlation, like.envelope, like.rms_ratio
+    return job.key[:10], job.what, *map(format_number, (*numbers, like.spectral_distance))
 
 
-def number(found: Measured) -> str:
+def format_number(found: Measured) -> str:
     """Return a number with its standard error, where it has one."""
     error = f" +- {found.error:.2g}" if found.error == found.error else ""
     return f"{found.value:.3f}{error}"
@@ -53,20 +49,17 @@ def number(found: Measured) -> str:
 def jsonable_comparison(found: Comparison) -> dict[str, Any]:
     """Return a comparison as JSON says it."""
     mine = found.turned
-    return {
-        "record": found.name, "revolutions": len(mine.spectra), "rpm": mine.rpm,
-        "rate_Hz": mine.rate, "orders": found.orders, "left_out": found.left_out,
-        "remarks": list(found.remarks),
-        "envelope_inside": found.inside, "misfits": list(found.misfits),
-        "peak_m_per_s2": found.curves.peak.tolist(), "rms_m_per_s2": found.curves.rms.tolist(),
-        "jobs": [
-            {
-                "key": job.key, "what": job.what, "rpm": job.rpm, "orders": job.orders,
-                "sensor": job.sensor,
-                **dataclasses.asdict(job.likeness),
-                "peak_m_per_s2": job.curves.peak.tolist(),
-                "rms_m_per_s2": job.curves.rms.tolist(),
-            }
-            for job in found.jobs
-        ],
-    }  # fmt: skip
+    head = {"record": found.name, "revolutions": len(mine.spectra), "rpm": mine.rpm}
+    head |= {"rate_Hz": mine.rate, "orders": found.orders, "left_out": found.left_out}
+    head |= {"remarks": found.remarks, "envelope_inside": found.inside, "misfits": found.misfits}
+    jobs = []
+    for job in found.jobs:
+        named = {name: getattr(job, name) for name in ("key", "what", "rpm", "orders", "sensor")}
+        jobs.append(named | dataclasses.asdict(job.likeness) | curves(job))
+    return head | curves(found) | {"jobs": jobs}
+
+
+def curves(one: Comparison | Compared) -> dict[str, list[float]]:
+    """Return the peak and the rms over a revolution."""
+    peak, rms = one.curves.peak.tolist(), one.curves.rms.tolist()
+    return {"peak_m_per_s2": peak, "rms_m_per_s2": rms}

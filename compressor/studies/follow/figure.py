@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import SPOKEN
+from compressor.digits import align_columns
 from compressor.report import (
     BLACK,
     BLUE,
@@ -85,11 +86,7 @@ def table(machine: xr.Dataset) -> list[str]:
         rates = dict.fromkeys(f"{end:.2f}" for end in one.exponents if math.isfinite(end))
         where, rate = " to ".join(ends), " to ".join(rates)
         cells.append([one.direction, where, str(one.values), one.motion, rate])
-    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    lines = [
-        "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in cells
-    ]
+    lines = align_columns(cells)
     for name, words in (
         ("differs", "up and down differ"),
         ("confirmed", "two motions are confirmed"),

@@ -6,12 +6,14 @@ from typing import Any
 
 import xarray as xr
 
-from compressor.digits import plural
+from compressor.digits import align_columns, plural
 from compressor.program import duration
 from compressor.studies.stress.stress import counts, repeat, slowest, worst
 
+HEAD = ("verdict", "excess", "beyond", "error", "bar", "repeat by")
 
-def write_scene(number: int, seed: int, drawn: str) -> Iterator[str]:
+
+def list_scene(number: int, seed: int, drawn: str) -> Iterator[str]:
     """Yield a scene as a case file, and below it, as comments, how it ends."""
     values, row = repeat(number, seed, drawn)
     yield from (f"{key}: {json.dumps(value)}" for key, value in values.items())
@@ -20,7 +22,7 @@ def write_scene(number: int, seed: int, drawn: str) -> Iterator[str]:
             yield f"# {key}: {value:.3g}" if isinstance(value, float) else f"# {key}: {value}"
 
 
-def summary(study: xr.Dataset) -> Iterator[str]:
+def list_outcomes(study: xr.Dataset) -> Iterator[str]:
     """Yield shares, the worst scenes with the command that repeats each, and the slowest one."""
     for kind, ends in counts(study).items():
         total = sum(ends.values())
@@ -28,23 +30,17 @@ def summary(study: xr.Dataset) -> Iterator[str]:
         share = ends.get("ok", 0) / max(total, 1)
         yield f"{kind} range: {plural(total, 'scene')}, {share:.1%} ok: {named}"
     yield ""
-    yield f"{'verdict':<13} {'excess':>7} {'beyond':>7} {'error':>8} {'bar':>8}  repeat by"
-    most = worst(study)
+    rows, most = [HEAD], worst(study)
     for place in range(most.sizes["scene"]):
         row = most.isel(scene=place)
-        far, beyond, error, size = (
-            row[name].item() for name in ("excess", "excess_beyond", "error", "bar")
-        )
-        yield (
-            f"{row['verdict'].item():<13} {far:>7.2g} {beyond:>7.2g} {error:>8.1e} {size:>8.1e}  "
-            f"{command(row, study.attrs)}"
-        )
+        far, beyond = (f"{row[name].item():.2g}" for name in ("excess", "excess_beyond"))
+        error, bar = (f"{row[name].item():.1e}" for name in ("error", "bar"))
+        rows.append((row["verdict"].item(), far, beyond, error, bar, command(row, study.attrs)))
+    yield from align_columns(rows, "<>>>>")
     longest = slowest(study)
     if longest is not None:
-        yield (
-            f"slowest ok scene: {duration(longest['seconds'].item())}, "
-            f"{command(longest, study.attrs)}"
-        )
+        seconds = duration(longest["seconds"].item())
+        yield f"slowest ok scene: {seconds}, {command(longest, study.attrs)}"
     yield f"peak memory of a worker: {study['peak_memory'].max().item() / 2**20:.0f} MiB"
 
 

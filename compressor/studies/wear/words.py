@@ -1,54 +1,46 @@
 """How bores wear, as lines of text and as JSON."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable
 from typing import Any
 
+from compressor.digits import align_columns
 from compressor.studies.wear.run import WornMachine
 from compressor.studies.wear.stages import wear_file
 
-HEAD = f"{'worn out after, h':>17}  {'from more to less wear, h':>31}  at the end"
+HEAD = ("machine", "worn out after, h", "from more to less wear, h", "at the end")
 
 
-def table(machines: tuple[WornMachine, ...]) -> Iterator[str]:
-    """Yield a line for each machine, below a head."""
-    names = [" ".join([one.study, *(f"{k}={v}" for k, v in one.point.items())]) for one in machines]
-    width = max(map(len, names))
-    yield f"{'machine':<{width}}  {HEAD}"
-    for name, one in zip(names, machines, strict=True):
-        yield f"{name:<{width}}  {wear_ending(one)}"
+def list_machines(machines: Iterable[WornMachine]) -> list[str]:
+    """Return a line for each machine, below a head."""
+    return align_columns([HEAD, *map(list_cells, machines)], "<>><")
 
 
-def wear_ending(one: WornMachine) -> str:
-    """Return the end of a machine's wear in a line."""
-    found, wear_keys = one.life, one.case.wear
-    if not found or not wear_keys:
-        return f"failed: {one.reason}"
-    factor = wear_keys.coefficient_factor
+def list_cells(one: WornMachine) -> tuple[str, ...]:
+    """Return the name of a machine, its hours, their range, and its wear at the end."""
+    name = " ".join([one.study, *(f"{key}={value}" for key, value in one.point.items())])
+    failed = f"failed: {one.reason}" if one.reason else ""
+    found, keys = one.life, one.case.wear
+    if not found or not keys:
+        return name, "", "", failed
+    factor = keys.coefficient_factor
     low, mid, high = (
-        hours(min(times * found.followed, wear_keys.hours), "> ")
-        if math.isnan(value)
-        else hours(value)
+        # not worn out in the hours that were followed, or are followed at most
+        f"> {hours(min(times * found.followed, keys.hours))}" if math.isnan(value) else hours(value)
         for value, times in ((found.low, 1.0 / factor), (found.hours, 1.0), (found.high, factor))
     )
-    where = f"{1e3 * found.clearance:.3f} mm at {found.joint}"
-    return f"{mid:>17}  {f'{low} to {high}':>31}  {where}" + f"; failed: {one.reason}" * bool(
-        one.reason
-    )
+    end = f"{1e3 * found.clearance:.3f} mm at {found.joint}"
+    return name, mid, f"{low} to {high}", "; ".join(filter(None, (end, failed)))
 
 
-def hours(value: float, sign: str = "") -> str:
+def hours(value: float) -> str:
     """Return the hours in four digits."""
-    return f"{sign}{value:.0f}" if value >= 1000 else f"{sign}{value:.4g}"
+    return f"{value:.0f}" if value >= 1000 else f"{value:.4g}"
 
 
 def jsonable_wear(one: WornMachine, folder: str) -> dict[str, Any]:
     """Return a machine as JSON says it."""
     found: dict[str, Any] = {"study": one.study, **one.point, "reason": one.reason}
     if one.life:
-        numbers = {
-            name: None if isinstance(value, float) and math.isnan(value) else value
-            for name, value in one.life._asdict().items()
-        }
-        found |= {**numbers, "file": str(wear_file(folder, one.case))}
+        found |= {**one.life._asdict(), "file": str(wear_file(folder, one.case))}
     return found

@@ -144,7 +144,6 @@ def _received(reader: int, until: float) -> tuple[bytes, bool]:
 
 def command(*arguments: object) -> Said:
     """What a command says, run in this process, which is a forked one."""
-    os.environ["COMPSIM_DEBUG"] = "1"  # a traceback is told, not put into a file
     click.utils.should_strip_ansi = lambda *args: False  # as on a terminal
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         os.dup2(out.fileno(), 1)

@@ -27,7 +27,7 @@ from compressor.studies.alarms.windows import (
     check_draws,
     highest_passed,
 )
-from compressor.studies.alarms.words import list_lines, list_remarks, table_rows
+from compressor.studies.alarms.words import list_alarms, list_remarks, table_rows
 from compressor.vibration import Record
 
 LEVELS = {0.2: 1.5, 0.3: 2.5, 0.4: 6.0}  # clearance, mm -> rms over the sound one
@@ -112,7 +112,7 @@ def test_an_alarm_that_reads_nothing_new_never_detects(judged):
     one = judged.isel(noise=0).sel(alarm="peak, record", joint="small_end")
     assert math.isinf(float(one["first_clearance_low"]))
     (line,) = [
-        line for line in list_lines(judged.assign_attrs(study="made")) if "  peak, record" in line
+        line for line in list_alarms(judged.assign_attrs(study="made")) if "  peak, record" in line
     ]
     assert line.split()[-1] == "never"
     assert "velocity of the record" not in judged["alarm"].values  # no window has it

@@ -182,7 +182,7 @@ def test_the_command(worn, tmp_path, capsys):
     words = ["-r", str(worn), "-o", str(place), "--noise", "0,0.5", "--no-signals"]
     assert cli.main(["dataset", "worn", *words]) == 0
     out, err = capsys.readouterr()
-    assert "big_end  train         2         8\n" in out
+    assert "big_end  train         2        8\n" in out
     assert "too few machines to test on: both, none\n" in out
     assert "left out: 2 budget_steps\n" in out
     assert f"{place}/windows.nc" in out

@@ -17,7 +17,7 @@ from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
 from compressor.studies.search.find import Point, interval
 from compressor.studies.search.question import JobReading, Question, comparison
-from compressor.studies.search.words import jsonable_answer, lines
+from compressor.studies.search.words import jsonable_answer, list_answer
 
 LIMIT = 0.006
 ASKED = [
@@ -66,9 +66,9 @@ def test_direct_runs_on_both_sides_confirm_the_interval(accuracy, found, folder)
     assert 1.0 < high["argument"] / low["argument"] <= 100**0.04 * (1 + 1e-6)
     assert direct(low["argument"], accuracy) <= LIMIT < direct(high["argument"], accuracy)
     for end in (low, high):
-        difference = abs(direct(end["argument"], accuracy) - end["told"]["value"])
+        difference = abs(direct(end["argument"], accuracy) - end["reading"]["value"])
         # two runs of other tolerances, each with its bar, of which one in 30 does not hold
-        assert difference <= end["told"]["bar"] * (3 if accuracy == "standard" else 1e-6)
+        assert difference <= end["reading"]["bar"] * (3 if accuracy == "standard" else 1e-6)
 
 
 def test_a_limit_beside_the_first_point_is_said_in_plant_units(found, folder, capsys):
@@ -163,7 +163,7 @@ def test_later_crossings_are_named_in_the_unit_of_the_limit():
         for n in range(6)
     ]
     answer = interval(points, goal.holds)
-    assert [*lines(question, answer, "results", None)][:-2] == [
+    assert [*list_answer(question, answer, "results", None)][:-2] == [
         "peak_contact_force.small_end > 1 kN holds from the range's lower end on",
         "  clearance_mm = 0: yes, 1.200 ± 0.001 kN  job kkkkkkkk",
         "5 more crossings seen, not narrowed down:",

@@ -35,7 +35,7 @@ from compressor.studies.stress.stress import (
     slowest,
     worst,
 )
-from compressor.studies.stress.words import summary
+from compressor.studies.stress.words import list_outcomes
 
 SMALL = Budget(revolutions=0.125, max_steps=60_000, seconds=20.0)
 COUNT, SEED = 12, 1
@@ -223,7 +223,7 @@ def test_the_worst_come_first():
     assert worst(study)["scene"].values.tolist() == [3, 4, 2, 0]
     assert slowest(study)["scene"].item() in (0, 2)
     assert counts(study)["whole"] == {"non_finite": 1, "silent_wrong": 1}
-    text = "\n".join(summary(study))
+    text = "\n".join(list_outcomes(study))
     assert "compsim stress --scene 3 --seed 1" in text
     assert "whole range: 2 scenes, 0.0% ok: non_finite 1, silent_wrong 1" in text
 

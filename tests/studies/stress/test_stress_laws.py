@@ -11,7 +11,7 @@ from compressor.store.files import StoreError
 from compressor.studies.stress.extremes import ELASTIC, FEATURES, OF_LAWS, RANGES, Budget, values
 from compressor.studies.stress.judge import judge, judges
 from compressor.studies.stress.stress import campaign
-from compressor.studies.stress.words import summary
+from compressor.studies.stress.words import list_outcomes
 
 SMALL = Budget(FEATURES, revolutions=0.0625, max_steps=40_000, seconds=20.0)
 COUNT, SEED = 4, 1
@@ -70,7 +70,7 @@ def test_none_of_a_few_scenes_is_wrong_in_silence(tmp_path, in_process):
     study = campaign(tmp_path, COUNT, SEED, 1, budget=SMALL)
     verdicts = Counter(study["verdict"].values.tolist())
     assert verdicts["ok"] >= COUNT / 2, verdicts
-    assert not verdicts["silent_wrong"], "\n".join(summary(study))
-    assert f"--seed {SEED} --features" in "\n".join(summary(study))
+    assert not verdicts["silent_wrong"], "\n".join(list_outcomes(study))
+    assert f"--seed {SEED} --features" in "\n".join(list_outcomes(study))
     with pytest.raises(StoreError, match="with laws and features drawn"):
         campaign(tmp_path, COUNT, SEED, 1)

@@ -23,7 +23,7 @@ from compressor.studies.tradeoff.page import (
     place_text,
     read_models,
 )
-from compressor.studies.tradeoff.words import model_lines
+from compressor.studies.tradeoff.words import list_changes
 
 AXIS = StoredAxis("clearance_mm", (0.1, 0.2, 0.3), "mm")
 STUDY = StoredStudy("worn", "worn.yaml", (AXIS,), ("0" * 20, "1" * 20, "2" * 20), {}, "", {}, "")
@@ -134,7 +134,7 @@ def test_the_line_says_how_many_numbers_are_in_doubt_and_what_moves_the_sensor()
     data["varied"][5] = "impossible"
     assert ". 1 number in doubt and 2 other models, each" in headline(model_table(data))
     assert "; they move the sensor rms by -50 to +400 %, most by other law;" in headline(table)
-    text = [line for wide in model_lines("worn, the only job", table) for line in wrap_value(wide)]
+    text = [line for wide in list_changes("worn, the only job", table) for line in wrap_value(wide)]
     start = place_of(text, "peak acceleration: ")
     assert text[start + 1].split() == ["oil", "1,", "4", "+93", "%", "-66", "%"]
     start = place_of(text, "sensor rms: ")
@@ -193,7 +193,7 @@ def test_choices_are_read_where_they_are_of_a_job_of_the_study(tmp_path):
 def test_what_moves_each_metric_fits_a_terminal():
     flat = made(max_penetration=([20e-6] * 7, [1e-9] * 7), rms_acceleration=(PEAK, PEAK_BAR))
     table = model_table(flat.isel(choice=[0, 1, 2, 5]))
-    wide = model_lines("worn, the only job", table)
+    wide = list_changes("worn, the only job", table)
     lines = [line for text in wide for line in wrap_value(text)]
     assert max(map(len, lines)) <= 80
     start = place_of(lines, "time without dry contact, big end: ")

@@ -132,7 +132,7 @@ def test_a_failed_machine_is_told_and_goes_on_when_asked(
     assert "failed: budget_seconds" in said.out
     last = float(open_wear(tmp_path, case)["hours"][-1])  # no machine outlives what was not run
     factor = case.wear.coefficient_factor
-    bounds = (hours(times * last, "> ") for times in (1.0, 1.0 / factor, factor))
+    bounds = (f"> {hours(times * last)}" for times in (1.0, 1.0 / factor, factor))
     mid, low, high = (re.escape(bound) for bound in bounds)
     assert re.search(rf"  {mid} +{low} to {high}  ", said.out)
     assert main(["wear", str(file), "-r", str(tmp_path), "--rerun"]) == 0
