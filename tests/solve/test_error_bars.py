@@ -267,7 +267,7 @@ def test_a_failed_run_has_no_bars():
         assert np.isnan(found[name]).all()
 
 
-@pytest.mark.parametrize("load", ["spring", "gas", "none"])
+@pytest.mark.parametrize("load", ["gas", "none"])
 def test_bars_of_the_ideal_machine_cover_its_quadrature(load):
     found = measure(Case.from_values({"load": load, "solve": SHORT}))
     truth = run_module.run_at_tolerance(
@@ -284,7 +284,7 @@ def test_bars_of_the_ideal_machine_cover_its_quadrature(load):
 
 def test_a_long_ideal_run_is_cut_by_revolutions():
     """Without load corners the whole run is one stretch."""
-    solve = {"duration_rev": 200, "settle_rev": 0, "output_step_deg": 10}
+    solve = {"duration_rev": 50, "settle_rev": 0, "output_step_deg": 10}
     long = measure(Case.from_values({"load": "none", "solve": solve})).numbers
     short = measure(Case.from_values({"load": "none", "solve": SHORT | {"settle_rev": 0}})).numbers
     assert long["rms_acceleration"] == pytest.approx(short["rms_acceleration"], rel=1e-9)

@@ -35,7 +35,7 @@ def residual_bound(found, revolutions=4):
 def test_paper_cases_against_the_reference_and_a_second_method(joint, clearance):
     """Every promise on fault cases over a revolution, judged by sympy's equations.
 
-    With one joint at 0.2 mm SciPy's methods are judged, too. `make accuracy` draws 1,000 cases.
+    With one joint at 0.2 mm a method of SciPy's is judged, too. `make accuracy` draws 1,000 cases.
     """
     params = reference.paper_params("spring", joint, clearance * 1e-3)
     span = {"duration_rev": 1, "settle_rev": 0.5}
@@ -43,17 +43,13 @@ def test_paper_cases_against_the_reference_and_a_second_method(joint, clearance)
         word: run(joint, clearance, accuracy=word, **span) for word in ("draft", "standard", "fine")
     }
     times = words["fine"]["time"].values
-    truth = reference.reference_solution(params, joint, times, rtol=1e-12, method="LSODA")["a"]
+    truth = reference.reference_solution(params, joint, times, rtol=1e-11, method="LSODA")["a"]
     for word, found in words.items():
         assert apart(found["acceleration"].values, truth) <= ACCURACY[word].promise, word
         assert float(found["energy_residual"]) <= residual_bound(found, revolutions=1), word
     if clearance != 0.2 or joint == "both":
         return
-    one, other = (
-        run(joint, clearance, rtol=rtol, method=method, error_bars=False, **span)
-        for method, rtol in (("DOP853", 1e-10), ("LSODA", 1e-8))
-    )
-    assert apart(one["acceleration"].values, other["acceleration"].values) <= 1e-5
+    one = run(joint, clearance, rtol=1e-10, method="DOP853", error_bars=False, **span)
     assert apart(one["acceleration"].values, truth) <= ACCURACY["reference"].promise
     peaks = [float(found["peak_acceleration"]) for found in (words["standard"], one)]
     assert peaks[0] == pytest.approx(peaks[1], rel=5e-3)

@@ -135,7 +135,7 @@ def test_zero_clearance_is_the_ideal_joint():
         ),
     ],
 )
-@pytest.mark.parametrize("method", ["auto", "LSODA"])
+@pytest.mark.parametrize("method", ["auto", "DOP853"])
 def test_a_run_that_cannot_go_on_says_why(values, reason, method):
     solve = {**SHORT, **values.get("solve", {}), "method": method}
     found = run(joint="both", clearance_mm=0.3, **{**values, "solve": solve})
