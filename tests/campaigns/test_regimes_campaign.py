@@ -42,7 +42,7 @@ def test_up_and_down_differ_where_two_motions_were_confirmed():
 
 def test_the_first_value_is_as_it_was(rows):
     (machine,) = machines(load_values(example("regimes"), ALONG), ALONG)
-    found = run_value(machine.chains[0].cases[0], None, ALONG.how)
+    found = run_value(machine.chains[0].cases[0], None, ALONG.plan)
     kept_row = rows[0]
     assert found["regime"] == kept_row["regime"] == "periodic"
     assert float(found["period"]) == kept_row["period"]

@@ -79,8 +79,7 @@ def name_motion(one: xr.Dataset) -> str:
 def table(machine: xr.Dataset) -> list[str]:
     """Return the spans of a machine as lines of a table, and where up and down differ."""
     over = machine[machine.attrs["over"]]
-    unit = f" ({over.attrs['units']})" if over.attrs.get("units", "1") != "1" else ""
-    cells = [["direction", f"{over.name}{unit}", "values", "motion", "exponent (1/rev)"]]
+    cells = [["direction", title_key(over), "values", "motion", "exponent (1/rev)"]]
     for one in find_spans(machine):
         ends = dict.fromkeys(f"{end:.4g}" for end in (one.first, one.last))
         rates = dict.fromkeys(f"{end:.2f}" for end in one.exponents if math.isfinite(end))
@@ -95,6 +94,12 @@ def table(machine: xr.Dataset) -> list[str]:
             listed = ", ".join(f"{value:.4g}" for value in over.values[marked])
             lines.append(f"{words} at {int(marked.sum())} of {over.size} values: {listed}")
     return lines
+
+
+def title_key(over: xr.DataArray) -> str:
+    """Return the name of the followed key with its unit."""
+    name, unit = over.attrs["long_name"], over.attrs["units"]
+    return f"{name} ({unit})" if unit != "1" else name
 
 
 def draw_followed(machine: xr.Dataset, title: str = "") -> Drawing:
@@ -119,9 +124,7 @@ def draw_followed(machine: xr.Dataset, title: str = "") -> Drawing:
         bottom, top = panel.limits("y")
         foot = np.full(has_failed.sum(), bottom + FOOT["failed"] * (top - bottom))
         panel.plot(x[has_failed], foot, FAILED, FAILED_NAME)
-    attrs = machine[over].attrs
-    unit = f" ({attrs['units']})" if attrs["units"] != "1" else ""
-    panels[-1].x.title = attrs["long_name"] + unit
+    panels[-1].x.title = title_key(machine[over])
     figure.legend = [entry(name, look) for name, look in direction_styles(machine, 1.6).items()]
     figure.legend += [entry(FAILED_NAME, FAILED)] if has_failed.any() else []
     figure.title = title

@@ -18,7 +18,7 @@ import math
 import re
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,7 +26,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import SPOKEN
 from compressor.cases import (
     MODEL_VERSION,
     OF_JOINTS,
@@ -54,8 +53,8 @@ from compressor.studies.follow.motion import (
     COORDINATES,
     NUMBERS,
     TEXTS,
-    HowLong,
     Row,
+    ValuePlan,
     differ,
     empty_row,
     run_value,
@@ -83,7 +82,7 @@ class FollowError(CompsimError, ValueError):
 
 
 @dataclass(frozen=True)
-class Along:
+class KeyRange:
     """A key, the ends of its values and how many there are, and how they are followed.
 
     `log`: with even ratios; `both`: up and then down, each from its own start.
@@ -95,7 +94,7 @@ class Along:
     n: int
     log: bool = False
     both: bool = False
-    how: HowLong = field(default_factory=HowLong)
+    plan: ValuePlan = field(default_factory=ValuePlan)
 
     @property
     def ways(self) -> tuple[str, ...]:
@@ -103,7 +102,7 @@ class Along:
         return ("up", "down") if self.both else ("up",)
 
 
-def read_over(text: str, **more: Any) -> Along:
+def read_over(text: str, **more: Any) -> KeyRange:
     """Return what a text KEY=LOW:HIGH:N asks for; more: other fields. Raises FollowError."""
     parts = OVER.fullmatch(text)
     try:
@@ -129,13 +128,13 @@ def read_over(text: str, **more: Any) -> Along:
     elif more.get("log") and low <= 0.0:
         problem = "--log needs ends above 0"
     else:
-        return Along(key, low, high, count, **more)
+        return KeyRange(key, low, high, count, **more)
     raise FollowError(f"--over {text}: {problem}")
 
 
 def load_values(
     path: Folder,
-    along: Along,
+    along: KeyRange,
     overrides: Sequence[str] = (),
     max_jobs: int = 10_000,
     only: str = "",
@@ -172,15 +171,14 @@ class Chain:
 
     cases: tuple[Case, ...]
     values: tuple[float, ...]
-    how: HowLong
+    plan: ValuePlan
     states: tuple[np.ndarray | None, ...] = ()
 
     @cached_property
     def key(self) -> str:
         """Return the hash of what decides the numbers."""
         starts = ["" if state is None else state.tobytes().hex() for state in self.states]
-        how = [self.how.points, self.how.exponent, self.how.further]
-        identity = [[case.key for case in self.cases], how, starts, SCHEMA]
+        identity = [[case.key for case in self.cases], astuple(self.plan), starts, SCHEMA]
         return hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:20]
 
     def path(self, folder: Folder) -> Path:
@@ -203,7 +201,7 @@ class Machine(NamedTuple):
     is_selected: bool
 
 
-def machines(study: Study, along: Along) -> list[Machine]:
+def machines(study: Study, along: KeyRange) -> list[Machine]:
     """Return the machines of a study of `load_values`. Raises FollowError."""
     found: dict[str, tuple[dict[str, Any], list[int]]] = {}
     jobs: list[float] = []  # their values of the key
@@ -220,7 +218,7 @@ def machines(study: Study, along: Along) -> list[Machine]:
             continue
         up = sorted(cases.items())
         chains = [
-            Chain(tuple(case for _, case in one), tuple(value for value, _ in one), along.how)
+            Chain(tuple(case for _, case in one), tuple(value for value, _ in one), along.plan)
             for one in (up, up[::-1])[: len(along.ways)]
         ]
         listed.append(Machine(point, (*chains,), is_selected))
@@ -238,7 +236,7 @@ def bare_machine(case: Case) -> Case:
     return replace(case, output=Output(), wear=None, body=None, sensor=None)
 
 
-def objection(along: Along, cases: Sequence[Case]) -> str:
+def objection(along: KeyRange, cases: Sequence[Case]) -> str:
     """Return why a machine cannot be followed, or ""."""
     worn = {tuple(getattr(case.clearance_mm, joint) > 0 for joint in JOINTS) for case in cases}
     if len(worn) > 1:
@@ -261,7 +259,7 @@ class Followed(NamedTuple):
 
 def follow(
     study: Study,
-    along: Along,
+    along: KeyRange,
     folder: Folder,
     workers: int,
     progress: Progress,
@@ -275,18 +273,20 @@ def follow(
     """
     every = machines(study, along)
     writable_folder(folder)
-    folder = Path(folder).absolute()
     chains = [chain for one in every if one.is_selected for chain in one.chains]
     before = sum(len(read_rows(chain, folder)) for chain in chains)
     lost = run_chains(chains, folder, workers, progress, rerun)
-    rows = [[read_rows(chain, folder) for chain in machine.chains] for machine in every]
+    rows = [
+        [rows_to_show(chain, folder, lost.get(chain.key)) for chain in machine.chains]
+        for machine in every
+    ]
     doubts = find_doubts(every, rows)
     if doubts:
         text = f"up and down differ at {len(doubts)} of the values: motions are run on"
         progress(0, len(doubts), text)
         run_chains([*doubts.values()], folder, workers, progress, rerun)
     confirmed = {where: has_two(doubt, folder) for where, doubt in doubts.items()}
-    data = followed_dataset(study, along, every, rows, lost, confirmed)
+    data = followed_dataset(study, along, every, rows, confirmed)
     path = followed_file(folder, study.name, along.key)
     write_dataset(path, data)
     return Followed(sum(len(chain.cases) for chain in chains), before, data, path)
@@ -321,7 +321,7 @@ def run_chain(chain: Chain, folder: Path, rerun: bool = False) -> StoreError | N
         rows = rows_to_keep(chain, folder, rerun)
         written = time.monotonic()
         for number in range(len(rows), len(chain.cases)):
-            rows.append(run_value(chain.cases[number], chain.begin(rows), chain.how))
+            rows.append(run_value(chain.cases[number], chain.begin(rows), chain.plan))
             is_last = len(rows) == len(chain.cases)
             if is_last or time.monotonic() - written > SECONDS_BETWEEN_WRITES:
                 write_dataset(chain.path(folder), chain_dataset(chain, rows))
@@ -338,14 +338,25 @@ def rows_to_keep(chain: Chain, folder: Path, rerun: bool) -> list[Row]:
     return [*good] if rerun else rows
 
 
+def rows_to_show(chain: Chain, folder: Folder, end: JobLost | None) -> list[Row]:
+    """Return the rows of a chain, at least one; end: how it was lost, at the value after them."""
+    rows = read_rows(chain, folder)
+    blank = empty_row(chain.cases[0], chain.plan.points) | {"status": "missing"}
+    if end and len(rows) < len(chain.cases):
+        failed = {"status": "failed", "reason": str(end.reason), "detail": end.detail}
+        return [*rows, blank | failed]
+    return rows or [blank]
+
+
 def chain_dataset(chain: Chain, rows: Sequence[Row]) -> xr.Dataset:
     """Return the rows of a chain, with the dimension `value` in the order of running."""
-    found: dict[str, tuple] = {
-        name: (("value",), np.array([row[name] for row in rows], object)) for name in TEXTS
-    }
-    for name, (dims, unit, _) in NUMBERS.items():
+    found: dict[str, tuple] = {}
+    for name, phrase in TEXTS.items():
+        texts = np.array([row[name] for row in rows], object)
+        found[name] = "value", texts, {"long_name": phrase}
+    for name, (dims, unit, phrase) in NUMBERS.items():
         numbers = np.array([row[name] for row in rows], float)
-        found[name] = ("value", *dims), numbers, {"units": unit}
+        found[name] = ("value", *dims), numbers, {"units": unit, "long_name": phrase}
     attrs = {"key": chain.key, "case": chain.cases[0].attributes()["case"], "program": PROGRAM}
     return xr.Dataset(found, {"value": ("value", list(chain.values[: len(rows)]))}, attrs)
 
@@ -366,16 +377,17 @@ def read_rows(chain: Chain, folder: Folder) -> list[Row]:
 
 
 def run_chains(
-    chains: Sequence[Chain], folder: Path, workers: int, progress: Progress, rerun: bool
+    chains: Sequence[Chain], folder: Folder, workers: int, progress: Progress, rerun: bool
 ) -> dict[str, JobLost]:
     """Run what is missing of chains, side by side; return those that were lost, by their keys."""
-    missing = [c for c in chains if len(rows_to_keep(c, folder, rerun)) < len(c.cases)]
+    place = Path(folder).absolute()
+    missing = [c for c in chains if len(rows_to_keep(c, place, rerun)) < len(c.cases)]
     jobs = [(c.key, c, RUNS * sum(case.solve.timeout_s for case in c.cases)) for c in missing]
     needs = Needs.of(case for chain in missing for case in chain.cases)
-    look = partial(ChainWatch(chains, folder).report, progress)
+    look = partial(ChainWatch(chains, place).report, progress)
     lost: dict[str, JobLost] = {}
     look("")
-    work = partial(run_chain, folder=folder, rerun=rerun)
+    work = partial(run_chain, folder=place, rerun=rerun)
     with contextlib.closing(run_here(work, jobs, needs, workers, look, partial(look, ""))) as ends:
         for end in ends:
             if isinstance(end, JobLost):
@@ -420,8 +432,8 @@ def find_doubts(every: Sequence[Machine], rows: Sequence[list[list[Row]]]) -> di
             if other and differ(case, one, other):
                 cases = (case, case, *other_starts(case))
                 states = (one["end_state"], other["end_state"], *[None] * STARTS)
-                how = replace(chain.how, further=FURTHER)
-                found[number, value] = Chain(cases, (value,) * len(cases), how, states)
+                plan = replace(chain.plan, further=FURTHER)
+                found[number, value] = Chain(cases, (value,) * len(cases), plan, states)
     return found
 
 
@@ -436,10 +448,8 @@ def other_starts(case: Case) -> Iterator[Case]:
         for joint in JOINTS:
             radius, angle = math.sqrt(rng.random()), 2.0 * math.pi * rng.random()
             size = START_ROOM * getattr(case.clearance_mm, joint) * radius
-            shift[f"{joint}_x"], shift[f"{joint}_y"] = (
-                size * math.cos(angle),
-                size * math.sin(angle),
-            )
+            shift[f"{joint}_x"] = size * math.cos(angle)
+            shift[f"{joint}_y"] = size * math.sin(angle)
         yield replace(case, initial_offset_mm=replace(case.initial_offset_mm, **shift))
 
 
@@ -451,42 +461,28 @@ def has_two(doubt: Chain, folder: Folder) -> bool:
 
 def followed_dataset(
     study: Study,
-    along: Along,
+    along: KeyRange,
     every: Sequence[Machine],
     rows: Sequence[list[list[Row]]],
-    lost: dict[str, JobLost],
     confirmed: dict[Where, bool],
 ) -> xr.Dataset:
     """Return the rows of all chains as one Dataset, as `open_followed` describes it.
 
-    rows: by machine and way; lost: chains that ended without a result, by key; confirmed: whether
-    two motions were reached, where up and down differ.
+    rows: by machine and way; confirmed: whether two motions were reached, where up and down differ.
     """
-    values = sorted({value for machine in every for value in machine.chains[0].values})
-    keys = [*dict.fromkeys(key for machine in every for key in machine.point)]
-    names = coordinate_names([*keys, along.key])
-    over = names[along.key]
-    dims, shape = ("job", "direction", over), (len(every), len(along.ways), len(values))
-    blank = empty_row(every[0].chains[0].cases[0], along.how.points)
-    texts = {name: np.full(shape, "", object) for name in TEXTS}
-    texts["status"][:] = "missing"
-    shown = {name: row for name, row in NUMBERS.items() if name != "end_state"}
-    numbers = {name: np.full((*shape, *blank[name].shape), math.nan) for name in shown}
-    for job, (machine, ways) in enumerate(zip(every, rows, strict=True)):
-        for way, (chain, found) in enumerate(zip(machine.chains, ways, strict=True)):
-            for value, row in zip(chain.values, found, strict=False):
-                for name, array in (texts | numbers).items():
-                    array[job, way, values.index(value)] = row[name]
-            if chain.key in lost:
-                end, at = lost[chain.key], (job, way, values.index(chain.values[len(found)]))
-                texts["status"][at], texts["reason"][at] = "failed", str(end.reason)
-                texts["detail"][at] = end.detail
-    variables: dict[str, tuple] = {
-        name: (dims, texts[name], {"long_name": phrase}) for name, phrase in TEXTS.items()
-    } | {
-        name: ((*dims, *inner), numbers[name], {"units": unit, "long_name": phrase})
-        for name, (inner, unit, phrase) in shown.items()
-    }
+    parts = [
+        [
+            chain_dataset(*one).drop_vars("end_state")
+            for one in zip(machine.chains, ways, strict=True)
+        ]
+        for machine, ways in zip(every, rows, strict=True)
+    ]
+    missing = dict.fromkeys(TEXTS, "") | {"status": "missing"}
+    data = xr.combine_nested(
+        parts, ["job", "direction"], join="outer", fill_value=missing, combine_attrs="override"
+    )
+    data = data.sortby("value").transpose("job", "direction", "value", ...)
+    values = data["value"].values.tolist()
     if along.both:
         for name, phrase in {
             "differs": "1: up and down end in different motions here",
@@ -495,29 +491,21 @@ def followed_dataset(
             marks = np.zeros((len(every), len(values)), int)
             for (job, value), is_confirmed in confirmed.items():
                 marks[job, values.index(value)] = name == "differs" or is_confirmed
-            variables[name] = ("job", over), marks, {"units": "1", "long_name": phrase}
-    column, attrs = swept_column(along.key, values)
-    attrs["long_name"] += of_joint(along.key, every)
-    coordinates = {
-        over: (over, column, attrs),
-        "direction": ("direction", [*along.ways], {"long_name": "which way it is followed"}),
-        "joint": ("joint", [*JOINTS], {"long_name": "joint of the rod"}),
-        "coordinate": ("coordinate", [*COORDINATES], {"long_name": "coordinate of a point"}),
-    }
-    for key in keys:
-        swept = swept_column(key, [machine.point.get(key) for machine in every])
-        coordinates[names[key]] = ("job", *swept)
-    about: dict[str, Any] = {
+            data[name] = ("job", "value"), marks, {"units": "1", "long_name": phrase}
+    keys = [*dict.fromkeys(key for machine in every for key in machine.point)]
+    names = coordinate_names([*keys, along.key])
+    swept = {key: [machine.point.get(key) for machine in every] for key in keys}
+    data = data.rename(value=(over := names[along.key])).assign_coords(
+        {names[key]: ("job", *swept_column(key, column)) for key, column in swept.items()}
+        | {over: (over, *swept_column(along.key, values))}
+    )
+    data = data.assign_coords(
+        direction=("direction", [*along.ways], {"long_name": "which way it is followed"}),
+        joint=("joint", [*JOINTS], {"long_name": "joint of the rod"}),
+        coordinate=("coordinate", [*COORDINATES], {"long_name": "coordinate of a point"}),
+    )
+    data.attrs = {
         "study": study.name, "title": study.title, "over": over, "log": int(along.log),
         "program": PROGRAM, "model_version": MODEL_VERSION,
     }  # fmt: skip
-    return xr.Dataset(variables, coordinates, about)
-
-
-def of_joint(key: str, every: Sequence[Machine]) -> str:
-    """Return whose clearance is followed, " of the small end"; "" of another key or of several."""
-    joints = {one.chains[0].cases[0].joint for one in every if key in OF_JOINTS}
-    if len(joints) != 1:
-        return ""
-    joint = joints.pop()
-    return f" of {'' if joint == 'both' else 'the '}{SPOKEN[joint]}" if joint in SPOKEN else ""
+    return data

@@ -50,7 +50,7 @@ MORE = 4  # revolutions, beyond two periods, in which points are to repeat
 APART_TOLERANCES = 3.0
 APART_STANDARD_ERRORS = 3.0  # standard errors by which means of chaotic motions differ
 COORDINATES = (*AXES, *(f"{axis}_rate" for axis in AXES))
-SHOWN = (
+SPLANN = (
     "peak_acceleration", "rms_acceleration", "peak_contact_force", "contact_loss_fraction",
 )  # fmt: skip
 
@@ -73,14 +73,14 @@ NUMBERS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "lyapunov_exponent_error": ((), "1/rev", "error of the largest Lyapunov exponent"),
     "settled_rev": ((), "rev", "revolution at this value from which on metrics agree"),
     "revolutions": ((), "rev", "revolutions that the numbers are of"),
-    **{name: (METRICS[name].dims, METRICS[name].unit, METRICS[name].phrase) for name in SHOWN},
+    **{name: (METRICS[name].dims, METRICS[name].unit, METRICS[name].phrase) for name in SPLANN},
     "rms_acceleration_standard_error": ((), "m/s2", "standard error of rms_acceleration"),
     "end_state": (("number",), "1", "motion at the end, as the solver holds it, in SI"),
 }  # fmt: skip
 
 
 @dataclass(frozen=True)
-class HowLong:
+class ValuePlan:
     """How a value is run.
 
     `points`: Poincaré points of a motion that does not repeat itself; `exponent`: whether the
@@ -110,18 +110,18 @@ class RevolutionRun:
     detail: str
 
 
-def run_value(case: Case, state: np.ndarray | None, how: HowLong) -> Row:
+def run_value(case: Case, state: np.ndarray | None, plan: ValuePlan) -> Row:
     """Follow a case from a state on, or from its own start, until it settles, and measure it.
 
     The row has the names of `TEXTS` and `NUMBERS`. A run that stops is a row too, with its
     reason and the state that it began from, so that the next value can go on from there. The wall
     time is the case's own. Nothing in a row depends on how long it took.
     """
-    row, deadline = empty_row(case, how.points), time.monotonic() + case.solve.timeout_s
+    row, deadline = empty_row(case, plan.points), time.monotonic() + case.solve.timeout_s
     if state is not None:
         row["end_state"] = state
-    if how.further:
-        run, since = follow_revolutions(case, state, how.further, deadline), math.nan
+    if plan.further:
+        run, since = follow_revolutions(case, state, plan.further, deadline), math.nan
     else:
         run, since = settle_motion(case, state, deadline)
     if run.reason:
@@ -132,15 +132,15 @@ def run_value(case: Case, state: np.ndarray | None, how: HowLong) -> Row:
         return period_of(places(points, clearance), within)
 
     run = follow_revolutions(
-        case, run.state, how.points, deadline, lambda *so_far: period_in(*so_far) is not None
+        case, run.state, plan.points, deadline, lambda *so_far: period_in(*so_far) is not None
     )
     if run.reason:
         return failed_row(row, run)
     period = period_in(run.turns, run.points)
     exponent = error = math.nan
-    if how.exponent:
+    if plan.exponent:
         left = max(deadline - time.monotonic(), 0.0)
-        count = min(how.points, EXPONENT_REV) if period else how.points
+        count = min(plan.points, EXPONENT_REV) if period else plan.points
         found = largest_exponent(case, run.state, count, left)
         # a motion that contracts so fast has an exponent that is at most this, of unknown error
         exponent, error = found.value, math.nan if found.at_most else found.error
@@ -155,7 +155,7 @@ def run_value(case: Case, state: np.ndarray | None, how: HowLong) -> Row:
     row["section"][: len(points), worn] = points[:, worn]
     measured = run.turns[-count:]
     together = metrics(run.p, merge_tallies(measured))
-    known = {name: together[name] for name in SHOWN} | {
+    known = {name: together[name] for name in SPLANN} | {
         "period": float(period or math.nan),
         "lyapunov_exponent": exponent,
         "lyapunov_exponent_error": error,

@@ -14,14 +14,14 @@ from compressor.store import read_dataset
 from compressor.store.files import StoreError
 from compressor.studies.follow import follow, motion
 from compressor.studies.follow.follow import load_values, machines, read_over, read_rows, run_chain
-from compressor.studies.follow.motion import HowLong
+from compressor.studies.follow.motion import ValuePlan
 
 TEXT = """
 joint: big_end
 contact: {damping_N_s_per_mm: 0.336}
 solve: {accuracy: draft, output_step_deg: 2}
 """
-ALONG = read_over("clearance_mm=0.02:0.2:6", both=True, how=HowLong(6, exponent=False))
+ALONG = read_over("clearance_mm=0.02:0.2:6", both=True, plan=ValuePlan(6, exponent=False))
 
 
 @pytest.fixture(autouse=True)
@@ -91,7 +91,7 @@ def test_each_value_begins_where_the_last_one_ended(whole, monkeypatch, tmp_path
     chain, folder = whole
     rows, begun = read_rows(chain, folder), []
 
-    def run(case, state, how):
+    def run(case, state, plan):
         begun.append((case, state))
         return rows[len(begun) - 1]
 
@@ -110,7 +110,7 @@ def test_a_chain_goes_on_past_a_failed_value_and_is_run_again_from_there(
     chain, folder = whole
     rows, states, fails = read_rows(chain, folder), [], True
 
-    def run(case, state, how):
+    def run(case, state, plan):
         number = chain.cases.index(case)
         states.append(state)
         bad = {"status": "failed", "reason": "budget_steps", "end_state": state}
@@ -142,8 +142,8 @@ def test_a_chain_is_named_by_all_that_decides_its_numbers(chains):
     others = [
         down,
         replace(up, cases=up.cases[:-1]),
-        replace(up, how=HowLong(6)),
-        replace(up, how=HowLong(7, exponent=False)),
+        replace(up, plan=ValuePlan(6)),
+        replace(up, plan=ValuePlan(7, exponent=False)),
         replace(up, states=states),
         replace(up, states=states[::-1]),
     ]

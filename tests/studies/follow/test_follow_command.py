@@ -56,7 +56,7 @@ def test_the_dataset_has_machines_both_ways_and_values(place):
     assert found["rod_mass_kg"].values.tolist() == [3.0, 4.7]
     assert found["clearance_mm"].values.tolist() == [0.1, 0.2, 0.3]
     assert found["clearance_mm"].attrs["units"] == "mm"
-    assert found["clearance_mm"].attrs["long_name"] == "radial clearance of the big end"
+    assert found["clearance_mm"].attrs["long_name"] == "radial clearance"
     assert found["direction"].values.tolist() == ["up", "down"]
     assert found["coordinate"].values.tolist() == ["x", "y", "x_rate", "y_rate"]
     assert (found["status"] == "ok").all()
@@ -82,9 +82,9 @@ def test_a_second_run_has_nothing_to_do_and_prints_the_same(place, capsys):
     assert code == 0
     assert out.splitlines()[:4] == [
         "rod_mass_kg 3.0",
-        "direction  clearance_mm (mm)  values  motion    exponent (1/rev)",
-        "up         0.1 to 0.3         3       period 1",
-        "down       0.1 to 0.3         3       period 1",
+        "direction  radial clearance (mm)  values  motion    exponent (1/rev)",
+        "up         0.1 to 0.3             3       period 1",
+        "down       0.1 to 0.3             3       period 1",
     ]
     assert [line for line in out.splitlines() if line.endswith((".png", ".nc"))] == [
         str(place / f"r/follow/worn-clearance_mm{end}") for end in ("-1.png", "-2.png", ".nc")
@@ -123,7 +123,7 @@ def test_failed_values_end_with_3_and_say_why(in_process, capsys, tmp_path):
     code = cli.main(["follow", path, "--over", OVER, "--both", "-r", str(tmp_path), "-j", "1"])
     out, said = capsys.readouterr()
     assert code == 3
-    assert "up         0.1 to 0.3         3       failed budget_steps" in out
+    assert "up         0.1 to 0.3             3       failed budget_steps" in out
     assert "job 1 down at 0.3: budget_steps: more than 60 steps" in said
     assert "budget_steps (6): raise solve.max_steps" in said
     found = open_followed(tmp_path, "short", "clearance_mm")

@@ -191,11 +191,11 @@ def test_neighbours_with_one_motion_are_a_line():
         (0.6, 0.6, 1, "failed step_underflow"),
     ]  # fmt: skip
     assert table(machine) == [
-        "direction  clearance_mm (mm)  values  motion                 exponent (1/rev)",
-        "up         0.1 to 0.2         2       period 1               -2.00 to -1.00",
-        "up         0.3                1       period 2",
-        "up         0.4 to 0.5         2       chaotic                0.25 to 0.50",
-        "up         0.6                1       failed step_underflow",
+        "direction  radial clearance (mm)  values  motion                 exponent (1/rev)",
+        "up         0.1 to 0.2             2       period 1               -2.00 to -1.00",
+        "up         0.3                    1       period 2",
+        "up         0.4 to 0.5             2       chaotic                0.25 to 0.50",
+        "up         0.6                    1       failed step_underflow",
     ]
 
 

@@ -19,7 +19,7 @@ from compressor.studies.follow import motion
 from compressor.studies.follow.motion import (
     NUMBERS,
     TEXTS,
-    HowLong,
+    ValuePlan,
     bare_case,
     empty_row,
     follow_revolutions,
@@ -28,7 +28,7 @@ from compressor.studies.follow.motion import (
     settle_motion,
 )
 
-HOW = HowLong(points=12, exponent=False)
+PLAN = ValuePlan(points=12, exponent=False)
 DRAFT = {"accuracy": "draft"}
 
 
@@ -50,7 +50,7 @@ def settle_soon(monkeypatch):
 
 @pytest.fixture(scope="module")
 def row():
-    return run_value(BIG_END, None, HOW)
+    return run_value(BIG_END, None, PLAN)
 
 
 # Revolutions
@@ -151,7 +151,7 @@ def test_a_value_begins_at_the_state_that_it_is_given(row):
     Measured are six revolutions of a period of one, from where the metrics agree.
     """
     after, state = case(0.25), row["end_state"]
-    found = run_value(after, state, HOW)
+    found = run_value(after, state, PLAN)
     settled, since = settle_motion(after, state, soon())
     first = follow_revolutions(after, state, 1, soon())
     run = run_at_tolerance(bare_case(after, 1), after.rtol, 60.0, False, None, state)
@@ -169,7 +169,7 @@ def test_a_value_begins_at_the_state_that_it_is_given(row):
 
 def test_a_lively_motion_has_impacts_and_no_period():
     lively = case(0.3, contact={"damping_N_s_per_mm": 0.336})
-    row = run_value(lively, None, HowLong(points=12))
+    row = run_value(lively, None, ValuePlan(points=12))
     assert (row["status"], row["revolutions"]) == ("ok", 12)
     assert math.isnan(row["period"])
     assert math.isnan(row["settled_rev"])
@@ -184,7 +184,7 @@ def test_a_motion_that_takes_two_revolutions_has_two_points(monkeypatch):
     """With a seventieth of the paper's damping and 0.0776 mm (standard accuracy)."""
     monkeypatch.setattr(motion, "SETTLE_REV", 40)
     values = {"joint": "big_end", "clearance_mm": 0.0776, "contact": {"damping_N_s_per_mm": 5}}
-    row = run_value(Case.from_values(values), None, HOW)
+    row = run_value(Case.from_values(values), None, PLAN)
     assert (row["regime"], row["period"], row["revolutions"]) == ("periodic", 2, 8)
     points = row["section"][:3, 0, :2]
     assert np.linalg.norm(points[1] - points[0]) > 0.01 * 0.0776e-3
@@ -192,17 +192,17 @@ def test_a_motion_that_takes_two_revolutions_has_two_points(monkeypatch):
 
 
 def test_the_same_value_has_the_same_bits(row):
-    again = run_value(case(), None, HOW)
+    again = run_value(case(), None, PLAN)
     for name in (*TEXTS, *NUMBERS):
         np.testing.assert_array_equal(again[name], row[name])
 
 
 def test_a_run_that_stops_is_a_row_with_the_state_that_it_began_from(row):
     short = case(solve=DRAFT | {"max_steps": 50})
-    found = run_value(short, row["end_state"], HOW)
+    found = run_value(short, row["end_state"], PLAN)
     assert (found["status"], found["reason"]) == ("failed", "budget_steps")
     np.testing.assert_array_equal(found["end_state"], row["end_state"])
-    assert np.isnan(run_value(short, None, HOW)["end_state"]).all()
+    assert np.isnan(run_value(short, None, PLAN)["end_state"]).all()
     assert math.isnan(found["peak_acceleration"])
 
 

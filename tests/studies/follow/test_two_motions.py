@@ -23,7 +23,7 @@ from compressor.studies.follow.follow import (
 from compressor.studies.follow.motion import (
     APART_TOLERANCES,
     TOLERANCE,
-    HowLong,
+    ValuePlan,
     differ,
     empty_row,
     run_value,
@@ -93,7 +93,7 @@ contact: {damping_N_s_per_mm: 60}
 solve: {accuracy: draft, output_step_deg: 1}
 """)
     along = read_over(
-        "clearance_mm=0.7536:1.024:3", log=True, both=True, how=HowLong(exponent=False)
+        "clearance_mm=0.7536:1.024:3", log=True, both=True, plan=ValuePlan(exponent=False)
     )
     (machine,) = machines(load_values(path, along), along)
     return machine
@@ -156,7 +156,7 @@ def test_a_machine_with_two_motions_is_found_and_confirmed(two, tmp_path, monkey
 def test_the_paper_s_machine_has_one_motion():
     """Two far ends of it are the same motion again after some revolutions."""
     case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, **DRAFT})
-    how = HowLong(points=8, exponent=False, further=100)
-    seen = [run_value(one, None, how) for one in itertools.islice(other_starts(case), 2)]
+    plan = ValuePlan(points=8, exponent=False, further=100)
+    seen = [run_value(one, None, plan) for one in itertools.islice(other_starts(case), 2)]
     assert [one["regime"] for one in seen] == ["periodic"] * 2
     assert not differ(case, *seen)
