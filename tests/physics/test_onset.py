@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
-from compressor.physics._jit import ENABLED
+from compressor.physics._jit import ENABLED, jit
 from compressor.physics.contact import NO_CONTACT, nearness
 from compressor.physics.contact_laws import normal_force
 from compressor.physics.kinematics import crank_direction, ideal
@@ -317,15 +317,18 @@ def with_radial_rate(joint, t, y, phase, p, wanted):
 def flown(t, y, time, phase, p):
     """The state at `time`, earlier or later, of the flight that is at y at t: short RK steps."""
     count = 1 + int(abs(time - t) / 1e-4)
-    h = (time - t) / count
-    z, k = np.append(y, np.zeros(FLOWS)), np.zeros((STAGES, y.size + FLOWS))
-    row = np.zeros(COLUMNS)
+    return step_on(t, (time - t) / count, count, np.append(y, np.zeros(FLOWS)), phase, p)[: y.size]
+
+
+@jit
+def step_on(t, h, count, z, phase, p):
+    k, row = np.zeros((STAGES, z.size)), np.zeros(COLUMNS)
     for i in range(count):
         new = np.zeros(z.size)
         derivative_with_flows(t + i * h, z, phase, p, k[0])
         take_step(crank_direction(t + i * h, p), h, z, k, phase, p, new, row)
         z = new
-    return z[: y.size]
+    return z
 
 
 def graze(rng, length, joint, t, y, phase, p):
