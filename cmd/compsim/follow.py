@@ -83,8 +83,6 @@ def follow(
     of_job = [name for name in data.coords if data[name].dims == ("job",)]
     for number in range(data.sizes["job"]):
         machine = data.isel(job=number)
-        if (machine["status"] == "missing").all():
-            continue
         where = [f"{name} {machine[name].item()}" for name in of_job]
         screen.print_text(*([", ".join(where)] if where else []), *table(machine))
         if (machine["status"] == "ok").any() and drawn < MAX_DRAWN:

@@ -20,6 +20,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property, partial
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -198,37 +199,26 @@ class Machine(NamedTuple):
 
     point: dict[str, Any]
     chains: tuple[Chain, ...]
-    is_selected: bool
 
 
 def machines(study: Study, along: KeyRange) -> list[Machine]:
-    """Return the machines of a study of `load_values`. Raises FollowError."""
-    found: dict[str, tuple[dict[str, Any], list[int]]] = {}
-    jobs: list[float] = []  # their values of the key
-    for number, swept in enumerate(points(study)):
-        jobs.append(swept.pop(along.key, math.nan))  # an ideal machine has no clearance
-        found.setdefault(repr(swept), (swept, []))[1].append(number)
+    """Return the machines of the selected jobs of `load_values`. Raises FollowError."""
     selected, listed = {*study.selected}, []
-    for point, numbers in found.values():
-        cases = {jobs[number]: bare_machine(study.cases[number]) for number in numbers}
-        is_selected = not selected.isdisjoint(numbers)
-        if problem := objection(along, [*cases.values()]):
-            if is_selected:
-                raise FollowError(f"{study.path}: {problem}{name_point(point)}")
-            continue
-        up = sorted(cases.items())
-        chains = [
-            Chain(tuple(case for _, case in one), tuple(value for value, _ in one), along.plan)
-            for one in (up, up[::-1])[: len(along.ways)]
-        ]
-        listed.append(Machine(point, (*chains,), is_selected))
+    found: dict[str, tuple[dict[str, Any], list[tuple[float, Case]]]] = {}
+    for number, point in enumerate(points(study)):
+        if number in selected:
+            value = point.pop(along.key, math.nan)  # an ideal machine has no clearance
+            case = bare_machine(study.cases[number])
+            found.setdefault(repr(point), (point, []))[1].append((value, case))
+    for point, jobs in found.values():
+        if problem := objection(along, [case for _, case in jobs]):
+            where = ", ".join(f"{key} {value}" for key, value in point.items())
+            raise FollowError(f"{study.path}: {problem}{f' ({where})' if where else ''}")
+        jobs.sort(key=itemgetter(0))
+        ways = ((*zip(*one, strict=True),) for one in (jobs, jobs[::-1])[: len(along.ways)])
+        chains = (Chain(cases, values, along.plan) for values, cases in ways)
+        listed.append(Machine(point, (*chains,)))
     return listed
-
-
-def name_point(point: dict[str, Any]) -> str:
-    """Return the swept values of a machine in words, "" where there are none."""
-    words = ", ".join(f"{key} {value}" for key, value in point.items())
-    return f" ({words})" if words else ""
 
 
 def bare_machine(case: Case) -> Case:
@@ -243,6 +233,9 @@ def objection(along: KeyRange, cases: Sequence[Case]) -> str:
         return f"--over begins at {along.key} = {along.low:g}, where a joint is ideal: begin above"
     if not any(*worn):
         return f"no joint has clearance, so that nothing is to follow: set joint and {OF_JOINTS[0]}"
+    if len(cases) < 2:
+        one = f"--over {along.key} has one value of this machine"
+        return f"{one}: give more, or mend --only, exclude or zip"
     if cases[0].key == cases[-1].key:
         return f"--over {along.key} changes nothing in this machine: follow another key"
     return ""
@@ -273,7 +266,7 @@ def follow(
     """
     every = machines(study, along)
     writable_folder(folder)
-    chains = [chain for one in every if one.is_selected for chain in one.chains]
+    chains = [chain for machine in every for chain in machine.chains]
     before = sum(len(read_rows(chain, folder)) for chain in chains)
     lost = run_chains(chains, folder, workers, progress, rerun)
     rows = [
@@ -302,9 +295,9 @@ def open_followed(folder: Folder, study: str, key: str) -> xr.Dataset:
 
     Dims: `job` (a machine), `direction` (up, down), the key by its coordinate's name, which stands
     in the attribute `over`, going up, and those of the variables (`motion.NUMBERS`). `differs`: up
-    and down end differently; `confirmed`: two motions were reached by running on. A value that was
-    not run has the status `missing` and numbers of nan. Raises StoreError where there is nothing of
-    it.
+    and down end differently; `confirmed`: two motions were reached by running on. A value that a
+    machine does not have is `missing`, with numbers of nan. Raises StoreError where there is
+    nothing of it.
     """
     path = followed_file(folder, study, key)
     if not path.exists():

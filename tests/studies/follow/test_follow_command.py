@@ -107,15 +107,24 @@ def test_a_chain_that_is_missing_is_run_alone_and_is_the_same(place, capsys, in_
     xr.testing.assert_identical(open_followed(place / "r", "worn", "clearance_mm"), before)
 
 
-def test_only_leaves_other_machines_missing(in_process, capsys, tmp_path):
+def test_only_takes_machines_and_values(tmp_path):
     path = write(tmp_path / "two.yaml", WORN + "machine: {rod_mass_kg: [3, 4]}\n")
-    words = ["--over", "clearance_mm=0.1:0.2:2", "--no-exponent", "--points", "6", "-j", "1"]
-    only = ["--only", "machine.rod_mass_kg > 3", "--set", "solve.accuracy=draft"]
-    assert cli.main(["follow", path, "-r", str(tmp_path), *words, *only]) == 0
+    (one,) = followed(path, OVER, only="machine.rod_mass_kg > 3 and clearance_mm > 0.15")
+    assert one.point == {"machine.rod_mass_kg": 4.0}
+    assert one.chains[0].values == (0.2, 0.3)
+
+
+def test_values_that_a_machine_does_not_have_are_missing(in_process, tmp_path):
+    some = (
+        "machine: {rod_mass_kg: [3, 4]}\nexclude: machine.rod_mass_kg > 3 and clearance_mm > 0.25\n"
+    )
+    path = write(tmp_path / "two.yaml", WORN + some + "solve: {accuracy: draft}\n")
+    words = ["--over", OVER, "--no-exponent", "--points", "6", "--quiet", "-j", "1"]
+    assert cli.main(["follow", path, "-r", str(tmp_path), *words]) == 0
     found = open_followed(tmp_path, "two", "clearance_mm")
-    assert found["status"].values.tolist() == [[["missing"] * 2], [["ok"] * 2]]
+    assert found["status"].values.tolist() == [[["ok"] * 3], [["ok", "ok", "missing"]]]
+    assert np.isnan(found["period"].values[1, 0, 2])
     assert "differs" not in found
-    assert "rod_mass_kg 3.0" not in capsys.readouterr().out
 
 
 def test_failed_values_end_with_3_and_say_why(in_process, capsys, tmp_path):
@@ -152,9 +161,9 @@ def test_a_study_that_is_no_grid_has_jobs(in_process, tmp_path):
 # What is asked for
 
 
-def followed(path, over, **more):
+def followed(path, over, only="", **more):
     along = read_over(over, **more)
-    return machines(load_values(path, along), along)
+    return machines(load_values(path, along, only=only), along)
 
 
 def test_each_machine_has_its_values_up_and_down(tmp_path):
@@ -226,6 +235,8 @@ def test_mistakes_in_the_option_are_told(over, more, message):
         ("joint: [none, big_end]\nclearance_mm: 0.1\n", "machine.speed_rpm=300:700:3",
          "no joint has clearance, so that nothing is to follow: set joint and clearance_mm (joint "
          "none)"),
+        (WORN + "exclude: clearance_mm > 0.1\n", OVER, "case.yaml: --over clearance_mm has one "
+         "value of this machine: give more, or mend --only, exclude or zip"),
         (WORN + "load: none\nspring: {stiffness_N_per_mm: 1}\n", OVER, "case.yaml:4:1: spring: "),
         (WORN, "clearance_mm=0.1:11:3", "--over clearance_mm=0.1:11:3: clearance_mm: 11 mm exceeds "
          "the pin radius"),
