@@ -2,6 +2,7 @@
 
 import atexit
 import contextlib
+import functools
 import hashlib
 import os
 import shutil
@@ -151,13 +152,13 @@ def _machine_code_base() -> Path:
         del os.environ[CODE_VARIABLE]  # also for workers
         text = f"nothing can be written to {named} ({CODE_VARIABLE}): another folder is used"
         warnings.warn(text, CompsimWarning, stacklevel=2)
-    for find in (lambda: COMPILED / "__pycache__", _user_cache):
-        with contextlib.suppress(RuntimeError):  # a user without a home
-            if _can_write(place := find()):
-                return place
+    users = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # as it is, homeless
+    for place in (COMPILED / "__pycache__", Path(users) / "compsim"):
+        if place.is_absolute() and _can_write(place):
+            return place
     place = Path(tempfile.mkdtemp(prefix="compsim-"))
     os.environ[CODE_VARIABLE] = str(place)  # read by workers, too
-    atexit.register(_remove_own, place, os.getpid())
+    atexit.register(shutil.rmtree, place, ignore_errors=True)
     text = (
         f"nothing may be written beside {COMPILED} or in the user's cache: the equations are "
         f"compiled into {place}, and again next time; set {CODE_VARIABLE} to a folder that stays"
@@ -166,33 +167,16 @@ def _machine_code_base() -> Path:
     return place / "compsim"
 
 
-def _user_cache() -> Path:
-    """Return the user's cache folder for this program. Raises RuntimeError without a home."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "compsim"
-
-
-PROBE = bytes(100_000)  # what the machine code of a small function takes, about
-WRITABLE: set[Path] = set()  # folders in which that was tried
-
-
+@functools.cache
 def _can_write(folder: Path) -> bool:
     """Return whether files can be written to a folder, which is made; by trying it once.
 
     Permissions say nothing of a full disk, of /proc, or of a link that leads nowhere.
     """
-    if folder in WRITABLE and folder.is_dir():
-        return True
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(PROBE)
+            file.write(bytes(100_000))  # as the machine code of a small function, about
     except OSError:
         return False
-    WRITABLE.add(folder)
     return True
-
-
-def _remove_own(folder: Path, process: int) -> None:
-    """Remove a folder, but not from a child that was forked."""
-    if os.getpid() == process:
-        shutil.rmtree(folder, ignore_errors=True)

@@ -121,10 +121,3 @@ def remedy(name: str) -> str:
     """Return what to do about a stored reason, also one of another version's."""
     known = Reason.__members__.get(name.upper())
     return known.remedy if known else "compsim show JOB prints its detail"
-
-
-def reason_table() -> str:
-    """Return the reasons in Markdown, for the README."""
-    lines = ["| reason | what it means | what to do |", "|---|---|---|"]
-    lines += [f"| `{one}` | {one.meaning} | {one.remedy} |" for one in Reason]
-    return "\n".join(lines) + "\n"

@@ -12,7 +12,7 @@ import findings
 
 from compressor.cases.parameter import parameter_table
 from compressor.cases.table import table
-from compressor.reasons import reason_table
+from compressor.reasons import Reason
 
 ROOT = Path(__file__).parent.parent
 RESULTS = ROOT / "tests" / "results"
@@ -1316,7 +1316,16 @@ CAMPAIGNS = {
     "page": ("How fast is the report?", {"page": page_table}),
     "nameplate": ("What does the case file of `compsim init machine` give?", {"oils": oil_words}),
 }  # fmt: skip
+
+
 # page -> its generated blocks by name
+def reason_table():
+    """The reasons of failures, what they mean and what to do."""
+    lines = ["| reason | what it means | what to do |", "|---|---|---|"]
+    lines += [f"| `{one}` | {one.meaning} | {one.remedy} |" for one in Reason]
+    return "\n".join(lines) + "\n"
+
+
 PAGES = {
     "README.md": {"numbers": numbers_list},
     "configs/README.md": {"parameters": parameter_tables},

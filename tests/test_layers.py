@@ -41,7 +41,6 @@ MAY_IMPORT = {
 PACKAGES = (
     "cases", "physics", "vibration", "solve", "store", "sweep", "analysis", "report", "studies",
 )  # fmt: skip
-OLD_PLACES = {"compressor.wear"}  # where scripts may import from as before
 LIBRARIES = {  # library -> the modules that may import it
     "numba": {"compressor.physics._jit"},
     # designs, sparse systems, integrators, Student's t, splines, root finder and minimiser, spectra
@@ -138,7 +137,6 @@ def forbidden_imports(sources: Sources) -> list[str]:
         f"{module} imports {source}"
         for module in sources
         for source, _ in ours(sources, module)
-        if module not in OLD_PLACES
         if room(source) not in {"program", room(module), *MAY_IMPORT[room(module)]}
     ]
 
@@ -151,7 +149,7 @@ def imports_past_doors(sources: Sources) -> list[str]:
         for source, name in ours(sources, module)
         if room(source) in PACKAGES
         and room(source) != room(module)
-        and module not in {"compressor", *OLD_PLACES}
+        and module != "compressor"
         and (source != f"compressor.{room(source)}" or not name)
         and (room(module), room(source)) != ("compsim", "studies")
     ]
@@ -233,7 +231,7 @@ def studies_that_know_others(sources: Sources) -> list[str]:
         f"{module} imports {source}"
         for module in sources
         for source, _ in ours(sources, module)
-        if study(source) not in {"", study(module)} and module not in OLD_PLACES
+        if study(source) not in {"", study(module)}
         if room(module) != "compsim"
     ]
 
@@ -300,7 +298,7 @@ def floors():
     for module in SOURCES:
         for source, _ in ours(SOURCES, module):
             here, there = room(module), room(source)
-            if module not in OLD_PLACES and here not in ("", there):
+            if here not in ("", there):
                 below.setdefault(here, set()).add(there)
 
     def floor(name):

@@ -2,7 +2,6 @@
 
 import re
 import shlex
-from typing import Any
 
 import click
 from click.core import ParameterSource
@@ -52,9 +51,7 @@ def read_bands(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) ->
 @click.option("--revolutions", default=5, help="Cut windows of so many whole revolutions.")
 @click.option("--seed", type=options.NUMBER, default=1, help="Draw noise and folds by this seed.")
 @options.quiet
-def alarms(
-    study: str, folder: str, output: str | None, run: str | None, quiet: bool, **how: Any
-) -> int:
+def alarms(study, folder, output, run, quiet, **how) -> int:
     """Find which alarm sees wear first, by joint and clearance.
 
     \b

@@ -1,7 +1,5 @@
 """`compsim calibrate`: what is not known of a sound machine, by a record of it."""
 
-from typing import Any
-
 import click
 
 from compsim import options, screen
@@ -25,17 +23,7 @@ from compsim.progress import ProgressReporter
 @options.jobs()
 @options.as_json
 @options.quiet
-def calibrate(
-    record: str,
-    config: str,
-    ranges: tuple[str, ...],
-    hints: dict[str, Any],
-    overrides: tuple[str, ...],
-    folder: str,
-    jobs: int | None,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+def calibrate(record, config, ranges, hints, overrides, folder, jobs, as_json, quiet) -> int:
     """Fit keys of a sound machine to its accelerometer's record.
 
     \b

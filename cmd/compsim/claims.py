@@ -1,7 +1,6 @@
 """`compsim claims`: in which machines the paper's claims hold, and what decides them."""
 
 import shlex
-from typing import Any
 
 import click
 
@@ -28,14 +27,7 @@ EXAMPLES = ("claims", "assumptions")
 @options.set_keys
 @options.max_jobs
 @options.quiet
-def claims(
-    configs: tuple[str, ...],
-    output: str,
-    generations: int,
-    jobs: int | None,
-    quiet: bool,
-    **how: Any,
-) -> int:
+def claims(configs, output, generations, jobs, quiet, **how) -> int:
     """Judge the paper's eight claims on many machines.
 
     \b

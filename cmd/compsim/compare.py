@@ -1,7 +1,6 @@
 """`compsim compare`: a measured record beside simulated ones."""
 
 import os
-from typing import Any
 
 import click
 
@@ -19,15 +18,7 @@ KINDS = (".png", ".svg", ".csv")
 @options.output("Draw this figure, .png or .svg, or write its numbers as .csv.", type=options.FILE)
 @options.as_json
 @options.quiet
-def compare(
-    record: str,
-    names: tuple[str, ...],
-    folder: str,
-    hints: dict[str, Any],
-    output: str | None,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+def compare(record, names, folder, hints, output, as_json, quiet) -> int:
     """Compare a record with the sensor's records of stored jobs.
 
     \b

@@ -1,7 +1,6 @@
 """`compsim dataset`: labelled windows of a sensor's records, to learn diagnosis from."""
 
 import os
-from typing import Any
 
 import click
 
@@ -22,7 +21,7 @@ from compsim.progress import ProgressReporter
 @click.option("--seed", type=options.NUMBER, default=1, help="Draw noise and split by this seed.")
 @click.option("--no-signals", is_flag=True, help="Write features and labels, without samples.")
 @options.quiet
-def dataset(study: str, folder: str, output: str, no_signals: bool, quiet: bool, **how: Any) -> int:
+def dataset(study, folder, output, no_signals, quiet, **how) -> int:
     """Make labelled windows of a study's sensor records.
 
     \b

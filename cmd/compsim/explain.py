@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -25,15 +25,7 @@ if TYPE_CHECKING:
 @options.set_keys
 @options.max_jobs
 @options.as_json
-def explain(
-    configs: tuple[str, ...],
-    jobs: int | None,
-    models: bool,
-    vary: tuple[str, ...],
-    folder: str,
-    as_json: bool,
-    **how: Any,
-) -> int:
+def explain(configs, jobs, models, vary, folder, as_json, **how) -> int:
     """Estimate the cost, scales and droppable features of a case.
 
     \b

@@ -1,16 +1,12 @@
 """`compsim export`: results as netCDF or CSV, and sensors' records, for other programs."""
 
 import os
-from typing import TYPE_CHECKING
 
 import click
 
 from compressor.digits import plural
 from compsim import options, screen
 from compsim.progress import ProgressReporter
-
-if TYPE_CHECKING:
-    from compressor.units import Units
 
 
 @click.command()
@@ -32,16 +28,7 @@ if TYPE_CHECKING:
 @click.option("--force", is_flag=True, help="Replace files that exist.")
 @options.units("SI")
 @options.quiet
-def export(
-    names: tuple[str, ...],
-    folder: str,
-    output: str,
-    form: str | None,
-    series: bool,
-    force: bool,
-    units: "Units | None",
-    quiet: bool,
-) -> int:
+def export(names, folder, output, form, series, force, units, quiet) -> int:
     """Write results as files that other programs read.
 
     \b

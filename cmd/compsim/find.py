@@ -1,15 +1,11 @@
 """`compsim find`: where a metric first passes a value, or is greatest or least, over a key."""
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
 
 import click
 
 from compsim import options, screen
 from compsim.progress import ProgressReporter
-
-if TYPE_CHECKING:
-    from compressor.units import Units
 
 KINDS = ("first", "greatest", "least")
 
@@ -42,16 +38,7 @@ KINDS = ("first", "greatest", "least")
 @options.jobs("Run in this many worker processes, as many points in one step of --first.")
 @options.as_json
 @options.quiet
-def find(
-    config: str,
-    over: str,
-    folder: str,
-    jobs: int | None,
-    units: "Units | None",
-    as_json: bool,
-    quiet: bool,
-    **asked: Any,
-) -> int:
+def find(config, over, folder, jobs, units, as_json, quiet, **asked) -> int:
     """Find where a metric passes a value, or is greatest or least.
 
     \b

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -38,19 +38,7 @@ MAX_DRAWN = 12  # machines that get a figure
 @options.only
 @options.max_jobs
 @options.quiet
-def follow(
-    config: str,
-    over: str,
-    both: bool,
-    log: bool,
-    points: int,
-    no_exponent: bool,
-    rerun: bool,
-    folder: str,
-    jobs: int | None,
-    quiet: bool,
-    **how: Any,
-) -> int:
+def follow(config, over, both, log, points, no_exponent, rerun, folder, jobs, quiet, **how) -> int:
     """Follow a motion along a key: periods, chaos, bistability.
 
     \b

@@ -1,7 +1,5 @@
 """`compsim identify`: the joint and clearance that explain a sensor's record."""
 
-from typing import Any
-
 import click
 
 from compsim import options, screen
@@ -15,9 +13,7 @@ from compsim.progress import ProgressReporter
 @options.record
 @options.as_json
 @options.quiet
-def identify(
-    record: str, study: str, folder: str, hints: dict[str, Any], as_json: bool, quiet: bool
-) -> int:
+def identify(record, study, folder, hints, as_json, quiet) -> int:
     """Name the joint and clearance that explain a sensor's record.
 
     \b

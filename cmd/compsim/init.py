@@ -14,7 +14,7 @@ from compsim import options, screen
 @options.output(
     "Write this file, or into this folder; TEMPLATE.yaml by default.", type=options.FILE
 )
-def init(template: str | None, output: str | None) -> int:
+def init(template, output) -> int:
     """Write a commented case file to start from.
 
     \b

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -26,7 +26,7 @@ BUSY = 0.8  # of the cores: below, a machine is busy with other things
 @options.only
 @options.max_jobs
 @options.as_json
-def plan(configs: tuple[str, ...], folder: str, jobs: int | None, as_json: bool, **how: Any) -> int:
+def plan(configs, folder, jobs, as_json, **how) -> int:
     """Count the jobs of a run, and estimate its time and bytes.
 
     \b

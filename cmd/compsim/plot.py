@@ -1,14 +1,9 @@
 """`compsim plot`: figures of one job or of a study, as files."""
 
-from typing import TYPE_CHECKING, Any
-
 import click
 
 from compressor.program import did_you_mean
 from compsim import options, screen
-
-if TYPE_CHECKING:
-    from compressor.units import Units
 
 OF_JOB = ["analyst", "loads", "signals", "cards", "spectra", "orbits", "modes", "impacts"]
 OF_STUDY = ["cycles", "segments", "waterfall", "map"]
@@ -67,14 +62,7 @@ def read_figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str,
     "times the machine without clearance.",
 )
 @options.units("kN, mm, µm, m/s²")
-def plot(
-    words: tuple[str, ...],
-    folder: str,
-    output: str,
-    kinds: str,
-    units: "Units | None",
-    **chosen: Any,
-) -> int:
+def plot(words, folder, output, kinds, units, **chosen) -> int:
     """Draw one job, or one study.
 
     Prints the files and their captions. A job is named as in compsim show: by the beginning of its

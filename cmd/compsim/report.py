@@ -1,15 +1,11 @@
 """`compsim report`: the page, figures and tables of a folder of results."""
 
 import os
-from typing import TYPE_CHECKING
 
 import click
 
 from compressor.studies import page_additions
 from compsim import options, screen
-
-if TYPE_CHECKING:
-    from compressor.units import Units
 
 
 @click.command()
@@ -26,29 +22,10 @@ if TYPE_CHECKING:
     "unit, such as 'sensor_peak=0.5,2 g'.",
 )
 @options.units("kN, mm, µm, m/s²")
-@click.option(
-    "--claims",
-    default="claims",
-    type=options.FOLDER,
-    help="Add what `compsim claims` wrote into this folder, if it is there.",
-)
-@click.option(
-    "--alarms",
-    default="alarms",
-    type=options.FOLDER,
-    help="Add what `compsim alarms` wrote into this folder, if it is there.",
-)
+@options.addition("claims")
+@options.addition("alarms")
 @click.pass_obj
-def report(
-    command: str,
-    names: tuple[str, ...],
-    folder: str,
-    output: str,
-    single: bool,
-    limits: tuple[str, ...],
-    units: "Units | None",
-    **places: str,
-) -> int:
+def report(command, names, folder, output, single, limits, units, **places) -> int:
     """Draw stored studies as a page of figures and tables.
 
     \b

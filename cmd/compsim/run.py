@@ -43,18 +43,7 @@ def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple
 @click.option("--wait", is_flag=True, help="Wait for another run on the folder to end.")
 @options.quiet
 @click.pass_obj
-def run(
-    command: str,
-    configs: tuple[str, ...],
-    folder: str,
-    jobs: int | None,
-    rerun: str | None,
-    shard: tuple[int, int] | None,
-    scheduler: str | None,
-    wait: bool,
-    quiet: bool,
-    **how: Any,
-) -> int:
+def run(command, configs, folder, jobs, rerun, shard, scheduler, wait, quiet, **how) -> int:
     """Simulate what case files ask for, and store the results.
 
     \b

@@ -43,14 +43,7 @@ def read_reversal(_: click.Context, __: click.Parameter, text: str) -> tuple[flo
 )
 @options.units("kN, mm, µm, m/s²")
 @options.as_json
-def show(
-    words: tuple[str, ...],
-    folder: str,
-    case: bool,
-    reversal: tuple[float, float],
-    units: "Units | None",
-    as_json: bool,
-) -> int:
+def show(words, folder, case, reversal, units, as_json) -> int:
     """Print all that is known of one job.
 
     A job is named by the beginning of its key, or by its study and values of the study's axes:

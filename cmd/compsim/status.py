@@ -11,7 +11,7 @@ PROMISES = {"kept": "kept what accuracy promises", "none": "without a promise"}
 @click.command()
 @options.results
 @options.as_json
-def status(folder: str, as_json: bool) -> int:
+def status(folder, as_json) -> int:
     """Count jobs that are done, failed or missing, and say why.
 
     \b

@@ -24,15 +24,7 @@ from compsim.progress import ProgressReporter
     "--scene", type=options.NUMBER, help="Repeat this case of the seed alone, and store nothing."
 )
 @options.quiet
-def stress(
-    scenes: int,
-    seed: int,
-    drawn: str | None,
-    jobs: int | None,
-    output: str,
-    scene: int | None,
-    quiet: bool,
-) -> int:
+def stress(scenes, seed, drawn, jobs, output, scene, quiet) -> int:
     """Test numerical stability on extreme cases drawn at random.
 
     \b

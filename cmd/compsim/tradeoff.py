@@ -22,14 +22,7 @@ from compsim.progress import ProgressReporter
 )
 @options.set_keys
 @options.quiet
-def tradeoff(
-    configs: tuple[str, ...],
-    output: str,
-    repeats: int,
-    budget: float,
-    overrides: tuple[str, ...],
-    quiet: bool,
-) -> int:
+def tradeoff(configs, output, repeats, budget, overrides, quiet) -> int:
     """Measure speed against accuracy, and what model features do.
 
     \b

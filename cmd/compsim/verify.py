@@ -9,7 +9,7 @@ from compsim import options, screen
 @click.command()
 @options.results
 @options.as_json
-def verify(folder: str, as_json: bool) -> int:
+def verify(folder, as_json) -> int:
     """Compare every stored file with its checksum.
 
     \b

@@ -1,7 +1,5 @@
 """`compsim wear`: how bores wear over operating hours, and when a joint is worn out."""
 
-from typing import Any
-
 import click
 
 from compsim import options, screen
@@ -16,15 +14,7 @@ from compsim.progress import ProgressReporter, read_cases
 @click.option("--rerun", is_flag=True, help="Go on with machines whose motion failed.")
 @options.as_json
 @options.quiet
-def wear(
-    configs: tuple[str, ...],
-    folder: str,
-    jobs: int | None,
-    rerun: bool,
-    as_json: bool,
-    quiet: bool,
-    **how: Any,
-) -> int:
+def wear(configs, folder, jobs, rerun, as_json, quiet, **how) -> int:
     """Wear bearings over operating hours, until one is worn out.
 
     \b

@@ -160,11 +160,14 @@ def test_a_named_folder_that_takes_no_file_is_replaced_with_a_remark(kind, tmp_p
 
 
 def test_a_user_without_a_home_may_name_a_folder(tmp_path, monkeypatch):
-    def nobody():
-        raise RuntimeError("Could not determine home directory.")
-
-    monkeypatch.setattr(program.Path, "home", nobody)
-    assert program.machine_code_folder().parent == program.COMPILED / "__pycache__"  # not looked at
+    for name in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
+        monkeypatch.setenv(name, "")  # so that it is put back, and then gone
+        monkeypatch.delenv(name)
+    monkeypatch.setattr(os.path, "expanduser", lambda path: path)
+    monkeypatch.setattr(program, "COMPILED", Path("/proc"))  # where nothing may be written
+    with pytest.warns(program.CompsimWarning, match="again next time"):
+        assert "compsim-" in str(program.machine_code_folder())
+    assert not Path("~").exists()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert program.machine_code_folder().parent == tmp_path / "compsim"
 

@@ -6,13 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import test_layers
-
 from compressor.studies import page_additions
 
 ROOT = Path(__file__).parent.parent.parent
 FOLDERS = sorted(path.parent.name for path in (ROOT / "compressor/studies").glob("*/__init__.py"))
-OLD_PLACES = [place.rpartition(".")[2] for place in test_layers.OLD_PLACES]
 
 
 def test_studies_have_what_others_are_promised():
@@ -33,8 +30,6 @@ def copy_without_studies(folder):
     left = [line for line in lines if not line.startswith("PAGES = ")]
     assert len(left) == len(lines) - 1
     table.write_text("".join([*left, "PAGES: dict[str, str] = {}\n"]))
-    for name in OLD_PLACES:
-        (folder / f"compressor/{name}.py").unlink()
     return folder
 
 
