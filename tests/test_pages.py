@@ -1,10 +1,10 @@
 """What the README pages say is executed or compared.
 
-Commands in `console` blocks run in one folder, page by page in the order of PAGES; `yaml` blocks
-are files named in their first line; `python` blocks run there; `bash` and `py` blocks are not run.
+Commands in `console` blocks run in one folder, page by page in the order of PAGES, or are read
+alone where their own tests run them; `yaml` blocks are files named in their first line; `python`
+blocks run there; `bash` and `py` blocks are not run.
 """
 
-import contextlib
 import json
 import math
 import re
@@ -15,10 +15,7 @@ import numpy as np
 import page_tables
 import pytest
 import tutorial
-from click.testing import CliRunner
-from compsim.cli import cli
-from compsim.cli import main as cli_main
-from conftest import jobs_here, without_pictures
+from compsim.cli import VERBS, cli
 from measure_tradeoff import fingerprint
 
 from compressor.cases.checks import DOUBLES, stands_for
@@ -49,7 +46,9 @@ COMMANDS = "compressor/docs/commands.md"
 MAX_WORDS = 700  # of README.md, as `wc -w` counts them
 TEXT = "\n".join(PAGES.values())
 QUICK = ["--set", "solve.duration_rev=1", "--set", "solve.settle_rev=0"]
-MORE = {"run": QUICK, "explain": QUICK, "stress": ["-n", "1"]}  # what else a command is run with
+# commands that tests of their own run: their words are read here
+READ = {"plan", "plot", *VERBS["Study a machine"], *VERBS["Work with measured records"]}
+HALL = "hall"  # a folder that only such commands read
 
 
 def blocks(language):
@@ -252,11 +251,6 @@ def test_what_features_cost_is_what_was_measured():
         assert high / 1.25 <= max(found) <= high * 1.25, words
 
 
-def expanded(place, word):
-    """What a shell makes of a word."""
-    return sorted(map(str, place.glob(word))) if "*" in word else [word]
-
-
 def write_case_files(place):
     """Every YAML block under the name in its first line; how many jobs each says that it has."""
     jobs = {}
@@ -324,20 +318,11 @@ def blocks_and_outputs(language):
 
 def run_command(place, command, whole):
     """Run a command of a page there, in short unless `whole`, and return what it prints."""
-    if not command.startswith("compsim "):
+    _, verb, *words = shlex.split(command, comments=True)
+    if verb in READ or HALL in words:
+        assert cli.commands[verb].make_context(verb, words)
         return ""
-    command, _, target = command.partition(" > ")
-    words = shlex.split(command, comments=True)
-    words = [w for word in words for w in expanded(place, word)]
-    more = [] if whole else MORE.get(words[1], [])
-    drawn = without_pictures() if words[1] == "report" else contextlib.nullcontext()
-    isolated = CliRunner().isolation()
-    with drawn, jobs_here(), contextlib.chdir(place), isolated as (out, err, _):
-        code, said = cli_main([*words[1:], *more]), err.getvalue()
-    assert code == 0, f"{command}\n{said.decode()}"
-    if target:
-        (place / target).write_bytes(out.getvalue())
-    return out.getvalue().decode()
+    return tutorial.run_command(place, command, *(QUICK if verb == "run" and not whole else ()))
 
 
 @pytest.fixture(scope="module")

@@ -3,12 +3,17 @@
 `make pages` writes the notebook from the page; tests/test_tutorial.py runs it.
 """
 
+import contextlib
 import json
 import math
 import re
+import shlex
 from typing import NamedTuple
 
 import page_tables
+from click.testing import CliRunner
+from compsim import cli
+from conftest import jobs_here, without_pictures
 
 FOLDER = page_tables.ROOT / "compressor" / "cases" / "examples"
 PAGE, NOTEBOOK = FOLDER / "TUTORIAL.md", FOLDER / "TUTORIAL.ipynb"
@@ -96,6 +101,31 @@ def alike(want: str, line: str) -> bool:
 def small(one: float, other: float) -> bool:
     """Whether numbers are nothing but a bound: a share below a millionth of a per cent."""
     return max(abs(one), abs(other)) < 1e-5
+
+
+def run_command(place, command: str, *more: str) -> str:
+    """What a command of a page prints there: of ours, and of cat.
+
+    It runs in this process. Pictures of reports are drawn where figures are tested.
+    """
+    name, *words = shlex.split(command, comments=True)
+    words, target = (words[:-2], words[-1]) if ">" in words else (words, "")
+    if name == "cat":
+        return "".join((place / word).read_text(encoding="utf-8") for word in words)
+    assert name == "compsim"
+    words = [w for word in words for w in expanded(place, word)]
+    isolated = CliRunner().isolation()
+    with without_pictures(), jobs_here(), contextlib.chdir(place), isolated as (out, err, _):
+        code, said = cli.main([*words, *more]), err.getvalue()
+    assert code == 0, f"{command}\n{said.decode()}"
+    if target:
+        (place / target).write_bytes(out.getvalue())
+    return out.getvalue().decode()
+
+
+def expanded(place, word):
+    """What a shell makes of a word."""
+    return sorted(map(str, place.glob(word))) if "*" in word else [word]
 
 
 def main() -> None:
