@@ -1,6 +1,6 @@
 """The table and the figure of a machine that is followed along a key.
 
-The Dataset is that of `follow.open_followed` at one job: dims direction, the followed key, whose
+The Dataset is that of `follow.followed_dataset` at one job: dims direction, the followed key, whose
 coordinate `attrs["over"]` names, and those of the variables.
 """
 

@@ -280,29 +280,9 @@ def follow(
         run_chains([*doubts.values()], folder, workers, progress, rerun)
     confirmed = {where: has_two(doubt, folder) for where, doubt in doubts.items()}
     data = followed_dataset(study, along, every, rows, confirmed)
-    path = followed_file(folder, study.name, along.key)
+    path = Path(folder) / FOLDER / f"{study.name}-{along.key}.nc"
     write_dataset(path, data)
     return Followed(sum(len(chain.cases) for chain in chains), before, data, path)
-
-
-def followed_file(folder: Folder, study: str, key: str) -> Path:
-    """Return the path of a study's Dataset over a key."""
-    return Path(folder) / FOLDER / f"{study}-{key}.nc"
-
-
-def open_followed(folder: Folder, study: str, key: str) -> xr.Dataset:
-    """Return what `compsim follow` has stored of a study over a key in a folder of results.
-
-    Dims: `job` (a machine), `direction` (up, down), the key by its coordinate's name, which stands
-    in the attribute `over`, going up, and those of the variables (`motion.NUMBERS`). `differs`: up
-    and down end differently; `confirmed`: two motions were reached by running on. A value that a
-    machine does not have is `missing`, with numbers of nan. Raises StoreError where there is
-    nothing of it.
-    """
-    path = followed_file(folder, study, key)
-    if not path.exists():
-        raise StoreError(path, "is not there", f"compsim follow the case file over {key}")
-    return read_dataset(path, REMEDY)
 
 
 def run_chain(chain: Chain, folder: Path, rerun: bool = False) -> StoreError | None:
@@ -459,7 +439,12 @@ def followed_dataset(
     rows: Sequence[list[list[Row]]],
     confirmed: dict[Where, bool],
 ) -> xr.Dataset:
-    """Return the rows of all chains as one Dataset, as `open_followed` describes it.
+    """Return the rows of all chains as one Dataset.
+
+    Dims: `job` (a machine), `direction` (up, down), the key by its coordinate's name, which stands
+    in the attribute `over`, going up, and those of the variables (`motion.NUMBERS`). `differs`: up
+    and down end differently; `confirmed`: two motions were reached by running on. A value that a
+    machine does not have is `missing`, with numbers of nan.
 
     rows: by machine and way; confirmed: whether two motions were reached, where up and down differ.
     """

@@ -7,12 +7,10 @@ from compsim import cli
 from conftest import jobs_here
 
 from compressor.cases import CaseFileError
-from compressor.store import StoreError
 from compressor.studies.follow.follow import (
     FollowError,
     load_values,
     machines,
-    open_followed,
     read_over,
 )
 from compressor.studies.follow.motion import NUMBERS, TEXTS
@@ -24,6 +22,7 @@ solve: {accuracy: draft}
 report: {title: Unit 3}
 """
 OVER = "clearance_mm=0.1:0.3:3"
+FILE = "r/follow/worn-clearance_mm.nc"
 WORN = "joint: big_end\nclearance_mm: 0.1\n"
 
 
@@ -50,7 +49,7 @@ def run(place, capsys, *more):
 
 
 def test_the_dataset_has_machines_both_ways_and_values(place):
-    found = open_followed(place / "r", "worn", "clearance_mm")
+    found = xr.load_dataset(place / FILE)
     assert found["period"].dims == ("job", "direction", "clearance_mm")
     assert found["section"].dims[3:] == ("revolution", "joint", "coordinate")
     assert found["rod_mass_kg"].values.tolist() == [3.0, 4.7]
@@ -72,7 +71,7 @@ def test_the_dataset_has_machines_both_ways_and_values(place):
 
 def test_values_belong_to_the_key_whichever_way_it_is_followed(place):
     """Of a motion that is the same both ways: its numbers stand at the same place."""
-    found = open_followed(place / "r", "worn", "clearance_mm")["rms_acceleration"]
+    found = xr.load_dataset(place / FILE)["rms_acceleration"]
     np.testing.assert_allclose(found[:, 0], found[:, 1], rtol=1e-3)
     assert (np.abs(found.diff("clearance_mm")) > 0.5).all()
 
@@ -94,7 +93,7 @@ def test_a_second_run_has_nothing_to_do_and_prints_the_same(place, capsys):
 
 
 def test_a_chain_that_is_missing_is_run_alone_and_is_the_same(place, capsys, in_process):
-    before = open_followed(place / "r", "worn", "clearance_mm")
+    before = xr.load_dataset(place / FILE)
     gone, *others = sorted((place / "r/follow/chains").glob("*.nc"))
     stamps = [path.stat().st_mtime_ns for path in others]
     gone.unlink()
@@ -104,7 +103,7 @@ def test_a_chain_that_is_missing_is_run_alone_and_is_the_same(place, capsys, in_
     assert "9 were stored before" in said
     assert len(others) == 3
     assert [path.stat().st_mtime_ns for path in others] == stamps
-    xr.testing.assert_identical(open_followed(place / "r", "worn", "clearance_mm"), before)
+    xr.testing.assert_identical(xr.load_dataset(place / FILE), before)
 
 
 def test_only_takes_machines_and_values(tmp_path):
@@ -121,7 +120,7 @@ def test_values_that_a_machine_does_not_have_are_missing(in_process, tmp_path):
     path = write(tmp_path / "two.yaml", WORN + some + "solve: {accuracy: draft}\n")
     words = ["--over", OVER, "--no-exponent", "--points", "6", "--quiet", "-j", "1"]
     assert cli.main(["follow", path, "-r", str(tmp_path), *words]) == 0
-    found = open_followed(tmp_path, "two", "clearance_mm")
+    found = xr.load_dataset(tmp_path / "follow/two-clearance_mm.nc")
     assert found["status"].values.tolist() == [[["ok"] * 3], [["ok", "ok", "missing"]]]
     assert np.isnan(found["period"].values[1, 0, 2])
     assert "differs" not in found
@@ -135,14 +134,9 @@ def test_failed_values_end_with_3_and_say_why(in_process, capsys, tmp_path):
     assert "up         0.1 to 0.3             3       failed budget_steps" in out
     assert "job 1 down at 0.3: budget_steps: more than 60 steps" in said
     assert "budget_steps (6): raise solve.max_steps" in said
-    found = open_followed(tmp_path, "short", "clearance_mm")
+    found = xr.load_dataset(tmp_path / "follow/short-clearance_mm.nc")
     assert (found["reason"] == "budget_steps").all()
     assert [path.suffix for path in (tmp_path / "follow").iterdir() if path.is_file()] == [".nc"]
-
-
-def test_a_study_that_is_not_there_is_told(tmp_path):
-    with pytest.raises(StoreError, match=r"is not there.*compsim follow the case file over"):
-        open_followed(tmp_path, "worn", "clearance_mm")
 
 
 def test_a_study_that_is_no_grid_has_jobs(in_process, tmp_path):
@@ -150,7 +144,7 @@ def test_a_study_that_is_no_grid_has_jobs(in_process, tmp_path):
     path = write(tmp_path / "blocks.yaml", blocks + "solve: {accuracy: draft}\n")
     words = ["--over", "machine.speed_rpm=450:500:2", "--no-exponent", "--points", "8", "--quiet"]
     assert cli.main(["follow", path, *words, "-r", str(tmp_path), "-j", "1"]) == 0
-    found = open_followed(tmp_path, "blocks", "machine.speed_rpm")
+    found = xr.load_dataset(tmp_path / "follow/blocks-machine.speed_rpm.nc")
     assert found["section"].dims[:3] == ("job", "direction", "speed_rpm")
     assert found["fault"].values.tolist() == ["big_end", "both"]
     assert found["section"].notnull().any(["direction", "speed_rpm", "revolution"]).values[
