@@ -354,10 +354,11 @@ def test_tradeoff_stores_draws_and_tells(case_file, capsys, monkeypatch):
     from compressor.studies.tradeoff.work_precision import work_precision
 
     without_laws(monkeypatch)
-    few = {"methods": ("auto", "LSODA"), "tolerances": (1e-3, 1e-5)}
+    few = {"methods": ("auto", "RODAS"), "tolerances": (1e-3, 1e-5)}
     defaults = (*few.values(), *work_precision.__defaults__[2:])
     monkeypatch.setattr(work_precision, "__defaults__", defaults)
-    case_file("a.yaml", joint=["big_end", "both"], clearance_mm=0.2)
+    short = {"duration_rev": 0.1}
+    case_file("a.yaml", joint=["big_end", "both"], clearance_mm=0.2, solve=short)
     words = ["-o", "out dir", "--repeats", "1", "--budget", "600"]  # s: the machine may be busy
     assert cli.main(["tradeoff", "a.yaml", *words]) == 0
     out, err = capsys.readouterr()
@@ -547,7 +548,9 @@ def started(tmp_path, answering):
     answering(signal.SIGINT, signal.SIG_DFL)  # a child inherits what is ignored
     rods = [4 + number / 1000 for number in range(JOBS)]
     values = {"joint": "both", "clearance_mm": 0.1, "machine": {"rod_mass_kg": rods}}
-    (tmp_path / "many.yaml").write_text(json.dumps(values | {"solve": SOLVE | {"method": "LSODA"}}))
+    (tmp_path / "many.yaml").write_text(
+        json.dumps(values | {"solve": SOLVE | {"method": "DOP853"}})
+    )
     command = [sys.executable, "-c", "import sys; from compsim.cli import main; sys.exit(main())"]
     process = subprocess.Popen(
         [*command, "run", "many.yaml"],

@@ -14,10 +14,9 @@ import time
 from pathlib import Path
 
 import distributed
-import joblib
 import numpy as np
 import pytest
-from bad_jobs import POISON, Many, named
+from bad_jobs import Many, named
 from bad_jobs import work as poisoned
 from compsim.cli import main
 from test_execution import is_running, lost, results, wait_for
@@ -29,7 +28,6 @@ from compressor.store.files import StoreError
 from compressor.store.status import verify
 from compressor.sweep import cluster
 from compressor.sweep.cluster import Cluster, Remote
-from compressor.sweep.execution import BATCHES_AHEAD
 from compressor.sweep.sweep import Options, sweep
 from compressor.sweep.versions import ClusterError, differences, versions
 from compressor.sweep.worker import JobResult, Workers
@@ -85,7 +83,7 @@ def studies(tmp_path_factory):
     solve = {"duration_rev": 2, "accuracy": "draft", "error_bars": False, "output_step_deg": 0.9}
     many = {"joint": "big_end", "output": {"keep": "metrics"}}
     for name, values in {
-        "many": many | {"clearance_mm": {"linspace": [0.1, 0.3, 120]}},
+        "many": many | {"clearance_mm": {"linspace": [0.1, 0.3, 60]}},
         "few": {"joint": "small_end", "clearance_mm": {"linspace": [0.1, 0.3, 10]}},
     }.items():
         (folder / f"{name}.yaml").write_text(json.dumps(values | {"solve": solve}))
@@ -140,7 +138,7 @@ def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path,
     with Cluster(dask.scheduler_address) as backend:
         killing = watched(backend, 8, lambda: os.kill(victim, signal.SIGKILL))
         summary = sweep(studies, tmp_path / "out", options=Options(backend=killing))
-    assert (summary.run_now, summary.failed) == (130, ())
+    assert (summary.run_now, summary.failed) == (70, ())
     assert_same(tmp_path / "out", locally)
     with pytest.raises(ProcessLookupError):
         os.kill(victim, 0)
@@ -199,14 +197,6 @@ def run(client, work, payloads):
     return list(remote(client, work, named(payloads)))
 
 
-def test_poison_jobs_cost_themselves_only(client):
-    bad = ["crash", "leave", "hang", "bomb", "raise"]
-    ends = run(client, poisoned, [*range(40), *bad, *range(40, 80)])
-    assert results(ends) == {n: n for n in range(80)}
-    assert {end.id: end.reason for end in lost(ends).values()} == {n: POISON[n][1] for n in bad}
-    assert all(POISON[name][2] in end.detail for name, end in lost(ends).items() if name != "bomb")
-
-
 def parent_of(pid):
     return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
 
@@ -238,25 +228,6 @@ def test_a_job_that_fells_workers_is_tried_alone_then_lost(dask, client, monkeyp
     assert end.detail.endswith("also when it ran again alone")
 
 
-def fell(_):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def test_joblib_s_own_dask_backend_waits_for_ever_for_a_lost_batch(dask, client, monkeypatch):
-    """Why batches are sent by dask's own `submit`; it may go once joblib tells of the loss."""
-    monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
-
-    def lose():
-        with joblib.parallel_config("dask", client=client):
-            joblib.Parallel()(joblib.delayed(fell)(n) for n in range(2))
-
-    waiting = threading.Thread(target=lose, daemon=True)
-    waiting.start()
-    wait_for(lambda: "error" in [future.status for future in [*client.futures.values()]])
-    waiting.join(2)
-    assert waiting.is_alive()
-
-
 def test_nothing_of_a_cluster_s_worker_outlives_it(dask, client):
     """Its processes die with it, though dask does not know of them."""
     pid, *_ = results(run(client, pids, range(4))).values()
@@ -275,15 +246,6 @@ def test_threads_of_one_worker_share_its_processes():
         ends = run(backend.client, poisoned, [*range(40), "crash", *range(40, 80)])
         assert results(ends) == {n: n for n in range(80)}
         assert lost(ends)["crash"].reason == "worker_died"
-
-
-def test_many_jobs_are_never_listed(client):
-    issued = itertools.count()
-    ends = remote(client, abs, Many((n, n, 9.0) for n in issued))
-    first = [end.id for end in itertools.islice(ends, 3000)]
-    ends.close()
-    assert len(set(first)) == 3000
-    assert next(issued) < 3000 + 2 * (2 * BATCHES_AHEAD + 1) * 1000
 
 
 class DoneAtOnce:
@@ -447,7 +409,7 @@ def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, impatient):
 
 def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
     config = tmp_path / "long.yaml"
-    sizes = {"linspace": [0.1, 0.3, 5000]}
+    sizes = {"linspace": [0.1, 0.3, 2000]}
     config.write_text(json.dumps({"joint": "big_end", "clearance_mm": sizes} | {
         "output": {"keep": "metrics"}}))  # fmt: skip
     out = tmp_path / "out"
@@ -462,7 +424,7 @@ def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
     _, told = running.communicate(timeout=20)
     assert running.returncode == 143, told
     assert "interrupted by SIGTERM" in told
-    assert 0 < len(store.read_store(out).keys()) < 5000
+    assert 0 < len(store.read_store(out).keys()) < 2000
     assert not list(out.glob("jobs/.*"))
     until = time.monotonic() + 20
     while dask.scheduler.tasks and time.monotonic() < until:
