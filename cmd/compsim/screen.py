@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from compressor.digits import align_columns, plural
+from compressor.digits import align_columns, plural, setting
 from compressor.program import THREAD_VARIABLES, duration, printable
 from compsim import options
 
@@ -113,7 +113,8 @@ def wrap_value(line: str) -> list[str]:
 
 def point_text(point: Mapping[str, Any]) -> str:
     """Return a job's swept values, each behind a blank: ` clearance_mm=0.2`."""
-    return "".join(f" {key}={value}" for key, value in point.items())
+    texts = {key: setting(it) if isinstance(it, float) else it for key, it in point.items()}
+    return "".join(f" {key}={text}" for key, text in texts.items())
 
 
 def size(count: float) -> str:

@@ -35,6 +35,7 @@ from compressor.cases import (
     table,
     values_given,
 )
+from compressor.digits import setting
 from compressor.program import VERSION, did_you_mean, library_versions
 from compressor.store.files import (
     KEY,
@@ -571,5 +572,5 @@ def _some(values: Sequence[Any], near: str = "") -> str:
     numeric = all(isinstance(value, int | float) for value in found)
     if number is not None and numeric and len(found) > MAX_LIKE:
         found = sorted(sorted(found, key=lambda value: abs(value - number))[:MAX_LIKE])
-        return f"{', '.join(map(in_words, found))} next to it"
-    return list_few([*map(in_words, found)])
+        return f"{', '.join(map(setting, found))} next to it"
+    return list_few([setting(one) if isinstance(one, float) else in_words(one) for one in found])

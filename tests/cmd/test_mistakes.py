@@ -94,7 +94,7 @@ MISTAKES = [
     ("show waer clearance_mm=0.1", "holds no study 'waer'; did you mean wear?"),
     ("show wear.yaml", "did you mean wear?"),
     ("show wear", "wear is a study of 6 jobs; choose one by clearance_mm=… of 0.1, 0.2, 0.3"),
-    ("show wear clearance_mm=0.1", "2 jobs of wear", "machine.rod_mass_kg=… of 3.0, 4.7"),
+    ("show wear clearance_mm=0.1", "2 jobs of wear", "machine.rod_mass_kg=… of 3, 4.7"),
     ("show wear clearance=0.1", "wear has no axis 'clearance'; did you mean clearance_mm"),
     ("show wear clearance_mm=0.25", "no job of wear has clearance_mm=0.25; there are 0.1, 0.2"),
     ("show wear 0.1", "'0.1' is no AXIS=VALUE of wear; its axes are clearance_mm"),
