@@ -29,11 +29,7 @@ def read_bands(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) ->
 @options.results
 @options.output("Also write all rates as CSV and netCDF, and figures, here.")
 @click.option(
-    "--wear",
-    "run",
-    metavar="RUN",
-    help="Print how many hours before its limit each alarm trips, by this wear run: a file of "
-    "compsim wear, or its folder of results.",
+    "--wear", "run", metavar="RUN", help="Print hours from each alarm to the limit of a wear run."
 )
 @click.option("--false-alarms", default=0.01, help="Set limits for this rate of false alarms.")
 @click.option("--factor", type=float, help="Set limits at so many times a sound machine's reading.")
@@ -64,7 +60,8 @@ def alarms(study, folder, output, run, quiet, **how) -> int:
     and never judge their own draws. The table lists alarms, the first to see wear on top, each with
     its best filter: the clearance from which on it detects, with an interval, and the false alarms
     that were counted. An interval that ends with "> 0.4" goes beyond the study's greatest
-    clearance: its draws are too few to be sure.
+    clearance: its draws are too few to be sure. RUN is a file of compsim wear, or its folder of
+    results.
     """
     source = click.get_current_context().get_parameter_source("false_alarms")
     if how["factor"] is not None and source is ParameterSource.COMMANDLINE:

@@ -10,12 +10,7 @@ from compsim.progress import ProgressReporter
 @click.argument("record", metavar="RECORD|JOB", type=options.FILE)
 @options.config
 @click.option(
-    "--fit",
-    "ranges",
-    multiple=True,
-    required=True,
-    metavar="KEY=LOW:HIGH",
-    help="Fit this key within this range, in the case file's unit.",
+    "--fit", "ranges", multiple=True, required=True, metavar="KEY=LOW:HIGH", help="Fit this key."
 )
 @options.record
 @options.set_keys
@@ -31,11 +26,12 @@ def calibrate(record, config, ranges, hints, overrides, folder, jobs, as_json, q
         --fit machine.reciprocating_mass_kg=10:20 \\
         --fit body.frequency_y_Hz=15:30 > sound.yaml
 
-    CONFIG makes one case, with body and sensor, and joints as they are in the sound machine. It
-    runs at the record's mean speed. Compared are the orders of the mean revolution, amplitude and
-    phase, each relative to its size. What is printed is the case file with the values that fit
-    best; comments say their 95 % intervals, and what the record cannot separate. Copies of this
-    file with worn joints make a study for `compsim identify`.
+    Each key is fitted within its range, in its own unit. CONFIG makes one case, with body and
+    sensor, and joints as they are in the sound machine. It runs at the record's mean speed.
+    Compared are the orders of the mean revolution, amplitude and phase, each relative to its size.
+    What is printed is the case file with the values that fit best; comments say their 95 %
+    intervals, and what the record cannot separate. Copies of this file with worn joints make a
+    study for `compsim identify`.
 
     Every point is a job of the study CONFIG-calibrate in the folder of results: it is stored, and
     not run again. Exit code 0 also where the machine does not fit: that is an answer.

@@ -31,27 +31,15 @@ COMPLETING = "_COMPSIM_COMPLETE"  # set by a shell that completes a word: click 
 VERBS = {  # by their headings in `compsim --help`; each is in the module of its name
     "Work": ("init", "plan", "run", "report"),
     "Read what is stored": ("status", "show", "plot", "export", "verify"),
-    "Study a machine": (
-        "claims",
-        "wear",
-        "tradeoff",
-        "explain",
-        "stress",
-        "find",
-        "follow",
-        "alarms",
-    ),
+    "Study a machine": ("explain", "find", "follow", "wear", "alarms"),
+    "Study the model": ("tradeoff", "claims", "stress"),
     "Work with measured records": ("dataset", "identify", "compare", "calibrate"),
     "Editor": ("schema",),
 }
 
 
 class Interrupted(BaseException):
-    """The arrival of SIGINT, SIGTERM or SIGHUP."""
-
-    def __init__(self, number: int):
-        self.number = number
-        super().__init__(signal.Signals(number).name)
+    """The arrival of a signal, whose number it holds."""
 
 
 def version(context: click.Context, _: click.Parameter, is_set: bool) -> None:
@@ -150,9 +138,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         with interruptible(), report_warnings():
             return cli.main(arguments, "compsim", standalone_mode=False, obj=command) or screen.DONE
-    except Interrupted as signal_sent:
-        screen.say(f"interrupted by {signal_sent}")
-        return 128 + signal_sent.number
+    except Interrupted as arrival:
+        (number,) = arrival.args
+        screen.say(f"interrupted by {signal.Signals(number).name}")
+        return 128 + number
     except click.ClickException as error:
         error.show()
         return error.exit_code
@@ -182,6 +171,6 @@ def report_error(error: Exception) -> int:
         screen.say(f"compsim: stdout: {error.strerror}; the same command prints it again")
         screen.discard_output()
         return screen.STORE
-    screen.say("".join(traceback.format_exception(error)), end="")
+    screen.say("".join(traceback.format_exception(error)).rstrip())
     screen.say("compsim: internal error: please report it, with the lines above")
     return screen.INTERNAL

@@ -30,17 +30,13 @@ def compare(record, names, folder, hints, output, as_json, quiet) -> int:
     of the least difference.
 
     \b
-    difference   of all numbers together, without white noise: orders of
-                 all revolutions and of the mean one, both correlations
-                 where they fit best within 5 degrees, and the level
+    difference   of all numbers together, in dB, without white noise
     correlation  of the mean revolutions: 1 is the same shape at the same
                  crank angles, whatever the size; -1 the opposite sign
     envelope     correlation of the envelopes above order 12: 1 is the
-                 same bursts at the same angles, whatever rings in them
+                 same bursts at the same angles
     rms ratio    of the record over the job: 1 is as strong
-    distance     of the spectra in third octaves of orders, scaled to one
-                 level, in dB: 0 is the same, 3 a factor of two in the
-                 power of a band, 60 at most
+    distance     of the spectra in third octaves, scaled to one level, in dB
 
     A number's error, behind +-, is the standard error by the record's revolutions; it needs at
     least three. What does not fit (speed, sampling rate, length, unit, crank angle) is said below

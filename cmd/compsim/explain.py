@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @options.jobs("Estimate the sweep's cost with this many worker processes.")
 @click.option("--models", is_flag=True, help="Measure what moves each metric, numbers or models.")
 @click.option(
-    "--vary", multiple=True, metavar="KEY", help="With --models: also this number of the file's."
+    "--vary", multiple=True, metavar="KEY", help="With --models: vary this number of the file, too."
 )
 @options.results
 @options.set_keys

@@ -29,7 +29,9 @@ MAX_DRAWN = 12  # machines that get a figure
     help="Take so many Poincaré points of a motion that does not repeat.",
 )
 @click.option(
-    "--no-exponent", is_flag=True, help="Leave out Lyapunov exponents: faster, and without chaos."
+    "--no-exponent",
+    is_flag=True,
+    help="Leave out Lyapunov exponents; nothing is called chaotic then.",
 )
 @click.option("--rerun", is_flag=True, help="Run again from the first failed value on.")
 @options.results

@@ -21,13 +21,8 @@ Line = tuple[str, str]  # a label and what stands beside it
 WIDTH = 37  # columns of a label, or more where one is longer
 SPREAD = "_standard_error"
 # unit in SI -> the unit of case files and of the report, and its factor
-UNITS = {
-    "m/s2": ("m/s²", 1.0),
-    "N": ("kN", 1e-3),
-    "m": ("mm", 1e3),
-    "rad": ("deg", math.degrees(1.0)),
-    "1": ("", 1.0),
-}
+UNITS = {"m/s2": ("m/s²", 1.0), "N": ("kN", 1e-3), "m": ("mm", 1e3), "1": ("", 1.0)}
+UNITS["rad"] = "deg", math.degrees(1.0)
 LABELS = {  # of others than their names
     "contact_loss_fraction": "time without dry contact",
     "impacts_per_rev": "dry contacts after flight",

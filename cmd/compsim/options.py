@@ -25,7 +25,8 @@ class GivenPath(click.Path):
 
 COUNT, NUMBER = click.IntRange(min=1), click.IntRange(min=0)
 FILE, FOLDER = GivenPath(readable=False), GivenPath(file_okay=False, readable=False)
-FOLDER.name = "folder"  # as help and messages call it
+# as help and messages call them
+COUNT.name, NUMBER.name, FILE.name, FOLDER.name = "number", "number", "file", "folder"
 config = click.argument("config", metavar="CONFIG", type=FILE)
 configs = click.argument("configs", nargs=-1, required=True, metavar="CONFIG...", type=FILE)
 job = click.argument("words", nargs=-1, required=True, metavar="JOB | STUDY [AXIS=VALUE]...")
@@ -36,7 +37,7 @@ set_keys = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key in all case files."
 )
 only = click.option(
-    "--only", metavar="COMPARISON", help="Take only jobs such as 'clearance_mm < 0.2'."
+    "--only", metavar="COMPARISON", help="Take only jobs with this, as 'clearance_mm < 0.2'."
 )
 max_jobs = click.option(
     "--max-jobs", type=COUNT, default=MAX_JOBS, help="Refuse a case file with more jobs than this."
@@ -79,15 +80,15 @@ DECIMAL = click.Choice(["comma", "point"])
 RECORD: dict[str, tuple[Any, str | None, str]] = {  # option -> type, metavar, help
     "channel": (str, "NAME", "Read the acceleration from this channel, a name or a number from 1."),
     "unit": (str, "UNIT", "Take the acceleration in this unit: m/s2, mm/s2, g, in/s2 or ft/s2."),
-    "full-scale": (float, "VALUE", "Scale whole numbers in WAV so that the greatest is this."),
+    "full_scale": (float, "VALUE", "Scale whole numbers in WAV so that the greatest is this."),
     "rate": (float, "HZ", "Take so many samples a second where a file has no times."),
     "time": (str, "NAME", "Read the times from this channel, a name or a number from 1."),
-    "time-unit": (str, "UNIT", "Take the times in this unit, whatever the file says: s, ms or us."),
+    "time_unit": (str, "UNIT", "Take the times in this unit, whatever the file says: s, ms or us."),
     "separator": (SEPARATOR, None, "Split lines of text at this sign; found by default."),
     "decimal": (DECIMAL, None, "Read numbers of a text with this sign; found by default."),
-    "skip-lines": (NUMBER, "COUNT", "Skip so many lines above a text's header; found by default."),
+    "skip_lines": (NUMBER, "COUNT", "Skip so many lines above a text's header; found by default."),
     "tacho": (str, "NAME", "Read the tacho from this channel, a name or a number from 1."),
-    "tacho-deg": (float, "DEG", "Set the crank angle at which the tacho rises; 0 by default."),
+    "tacho_deg": (float, "DEG", "Set the crank angle at which the tacho rises; 0 by default."),
     "rpm": (float, "RPM", "Take this steady speed of a record without a tacho."),
     "tdc": (float, "SECONDS", "Take this time as a top dead centre, without a tacho."),
 }
@@ -98,16 +99,15 @@ def record(command: Callable[..., int]) -> Callable[..., int]:
 
     @wraps(command)
     def with_hints(**values: Any) -> int:
-        given = {name.replace("-", "_"): values.pop(name.replace("-", "_")) for name in RECORD}
-        hints = {
-            name: SIGNS.get(found, found) for name, found in given.items() if found is not None
-        }
+        given = {name: values.pop(name) for name in RECORD}
+        hints = {name: SIGNS.get(it, it) for name, it in given.items() if it is not None}
         if ("rpm" in hints) != ("tdc" in hints):
             raise click.UsageError("--rpm and --tdc belong together")
         return command(hints=hints, **values)
 
     for name, (kind, metavar, text) in reversed(RECORD.items()):
-        with_hints = click.option(f"--{name}", type=kind, metavar=metavar, help=text)(with_hints)
+        option = click.option("--" + name.replace("_", "-"), type=kind, metavar=metavar, help=text)
+        with_hints = option(with_hints)
     return with_hints
 
 

@@ -3,7 +3,6 @@
 import os
 import shlex
 from contextlib import nullcontext
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +13,7 @@ from compsim import options, screen
 from compsim.progress import ProgressReporter, read_cases
 
 if TYPE_CHECKING:
-    from compressor.cases import Study
-    from compressor.sweep import Options, Summary
+    from compressor.sweep import Summary
 
 
 def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
@@ -35,7 +33,10 @@ def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple
 @options.max_jobs
 @click.option("--rerun", type=click.Choice(["failed"]), help="Run stored jobs that failed again.")
 @click.option(
-    "--shard", metavar="I/N", callback=read_shard, help="Run part I of N, one on each computer."
+    "--shard",
+    metavar="I/N",
+    callback=read_shard,
+    help="Run part I of N; others run the rest.",
 )
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Run on this dask cluster, such as tcp://host:8786."
@@ -55,29 +56,19 @@ def run(command, configs, folder, jobs, rerun, shard, scheduler, wait, quiet, **
     """
     if scheduler and jobs:
         raise click.UsageError("-j counts processes here; a dask cluster uses all its workers")
-    from compressor.sweep import Options, cores
+    from compressor.sweep import Cluster, Options, cores, sweep
 
     studies = read_cases(configs, quiet, **how)
     if how["only"] and not quiet:
         selected = sum(len(study.selected) for study in studies)
         screen.say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
     screen.caution(studies)
-    how_run = Options(command, rerun_failed=bool(rerun), part=shard, wait=wait)
-    return run_jobs(studies, folder, jobs or cores(), how_run, scheduler, quiet)
-
-
-def run_jobs(
-    studies: "list[Study]", folder: str, workers: int, how: "Options", dask: str | None, quiet: bool
-) -> int:
-    """Run studies of jobs, here or by dask's scheduler, and return the exit code."""
     screen.say_changes(studies, folder)
-    from compressor.sweep import Cluster, sweep
-
-    cluster: Any = Cluster(dask) if dask else nullcontext()
+    cluster: Any = Cluster(scheduler) if scheduler else nullcontext()
     opening = partial(screen.say_machines, studies)  # where there are jobs to run
     with ProgressReporter(quiet, "jobs", folder, opening) as progress, cluster as elsewhere:
-        how = replace(how, backend=elsewhere, failed=progress.count_failed)
-        summary = sweep(studies, folder, workers, progress, how)
+        asked = Options(command, bool(rerun), shard, wait, elsewhere, progress.count_failed)
+        summary = sweep(studies, folder, jobs or cores(), progress, asked)
     report_run(summary, folder, quiet)
     return screen.SOME_FAILED if summary.failed else screen.DONE
 

@@ -129,11 +129,11 @@ def size(count: float) -> str:
 # ---- stderr -------------------------------------------------------------------------------------
 
 
-def say(text: str, end: str = "\n") -> None:
+def say(text: str) -> None:
     """Write to stderr; nobody may be there to read it."""
     with contextlib.suppress(OSError):
         if sys.stderr:  # not closed
-            print(harmless(text), end=end, file=sys.stderr, flush=True)
+            print(harmless(text), file=sys.stderr, flush=True)
 
 
 def say_wrapped(text: str, indent: int = 0) -> None:

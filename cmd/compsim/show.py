@@ -2,8 +2,8 @@
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from compressor.cases import Case
     from compressor.store import JobReport
     from compressor.units import Units
-
-KEY_DIGITS = 8  # digits of a key in a name
-MAX_NAME = 64 - 1 - KEY_DIGITS  # characters of a study's name
 
 
 def read_reversal(_: click.Context, __: click.Parameter, text: str) -> tuple[float, float]:
@@ -97,21 +94,13 @@ def print_report(
 
 def changed_values(case: "Case") -> Iterator[str]:
     """Yield the values of a case that are not the usual ones, as --set takes them."""
-    from compressor.cases import Case, table
+    from compressor.cases import Case, table, value_in
 
-    usual, rows = dict(flat_values(Case())), table()
-    for key, value in flat_values(case):
-        if key != "name" and value != usual.get(key) and value != rows[key].default:
+    values, usual = case.values(), Case().values()
+    for key, row in table().items():
+        value = value_in(values, key)
+        if key != "name" and value not in (None, value_in(usual, key), row.default):
             yield f"{key}={value}"
-
-
-def flat_values(case: "Case") -> Iterator[tuple[str, Any]]:
-    """Yield the keys of a case, group and name, with their values."""
-    for key, value in case.values().items():
-        if isinstance(value, Mapping):
-            yield from ((f"{key}.{name}", item) for name, item in value.items())
-        else:
-            yield key, value
 
 
 def whole_case(found: "JobReport", folder: str) -> str:
@@ -121,5 +110,5 @@ def whole_case(found: "JobReport", folder: str) -> str:
     if "case" not in found.attributes:
         run = "; ".join(screen.run_commands(found.again, folder)) or "run its case file"
         raise click.UsageError(f"job {found.key} was not run yet: {run}")
-    name = f"{found.case.name[:MAX_NAME]}-{found.key[:KEY_DIGITS]}"
+    name = f"{found.case.name[:55]}-{found.key[:8]}"  # at most 64 characters
     return to_yaml(dataclasses.replace(found.case, name=name))

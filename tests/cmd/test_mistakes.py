@@ -60,7 +60,7 @@ MISTAKES = [
     ("run good.yaml --set speed_rpm=700", "unknown key; did you mean machine.speed_rpm?"),
     ("run good.yaml --set clearance_mm=wide", "--set clearance_mm=wide", "a number"),
     ("run good.yaml -j -2", "'-j' / '--jobs'", "-2", "x>=1"),
-    ("run good.yaml -j all", "'-j' / '--jobs'", "'all' is not a valid integer"),
+    ("run good.yaml -j all", "'-j' / '--jobs'", "'all' is not a valid number"),
     ("run good.yaml --only 'clearance_mm = 0.2'", "write == for equal"),
     ("run good.yaml --only 'clearence_mm < 0.2'", "unknown key", "did you mean clearance_mm?"),
     ("run good.yaml --only 'clearance_mm < 0.2mm'", "write numbers without their unit"),
