@@ -168,14 +168,6 @@ def test_the_most_jobs_are_those_of_the_library():
     assert {*defaults} == {MAX_JOBS}
 
 
-@pytest.mark.parametrize(
-    ("count", "text"), [(0, "0 B"), (999, "999 B"), (1000, "1 kB"), (681_000, "681 kB"),
-                        (2_345_678, "2.35 MB"), (12_345_678_901, "12.35 GB")],
-)  # fmt: skip
-def test_sizes(count, text):
-    assert screen.size(count) == text
-
-
 def test_shards(case_file, capsys):
     case_file("two.yaml", load=["none", "spring", "gas"])
     ran = 0
@@ -187,13 +179,6 @@ def test_shards(case_file, capsys):
     assert ran == 3
     assert cli.main(["run", "two.yaml", "-j", "1"]) == 0
     assert "nothing to do: all 3 jobs" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("part", ["0/2", "3/2", "2", "a/b", "1/-2"])
-def test_what_is_no_shard_is_a_usage_error(part, case_file, capsys):
-    case_file("one.yaml")
-    assert cli.main(["run", "one.yaml", "--shard", part]) == 2
-    assert "such as 2/8" in capsys.readouterr().err
 
 
 def test_verify_finds_damage_that_a_run_mends(case_file, capsys):
@@ -288,11 +273,16 @@ def test_the_unforeseen_is_told_with_its_traceback(case_file, capsys, monkeypatc
 
 
 @pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(0.04, "0.0 s"), (9.9, "9.9 s"), (99, "99 s"), (101, "2 min"), (7200, "2 h 00 min")],
-)
-def test_durations(seconds, text):
-    assert duration(seconds) == text
+    ("say", "number", "text"),
+    [
+        (duration, 0.04, "0.0 s"), (duration, 9.9, "9.9 s"), (duration, 99, "99 s"),
+        (duration, 101, "2 min"), (duration, 7200, "2 h 00 min"),
+        (screen.size, 0, "0 B"), (screen.size, 999, "999 B"), (screen.size, 1000, "1 kB"),
+        (screen.size, 2_345_678, "2.35 MB"), (screen.size, 12_345_678_901, "12.35 GB"),
+    ],
+)  # fmt: skip
+def test_durations_and_sizes(say, number, text):
+    assert say(number) == text
 
 
 # ---- explain and tradeoff -----------------------------------------------------------------------
@@ -448,20 +438,6 @@ def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch
     err = " ".join(capsys.readouterr().err.split())
     assert "nc: is not shown, as worn has no such job: run the case file with the same" in err
     assert "models-worn" not in Path("page/index.html").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--vary", "machine.rod_mass_kg"], "--vary names what --models varies: add --models"),
-        (["--models", "--vary", "machine.rod_mas_kg"], "did you mean machine.rod_mass_kg?"),
-        (["--models", "--vary", "solve.max_steps"], "has no plausible range of it: sweep it"),
-    ],
-)
-def test_what_explain_cannot_vary_is_told(case_file, capsys, words, said):
-    case_file("a.yaml", joint="both", clearance_mm=0.1)
-    assert cli.main(["explain", "a.yaml", *words]) == 2
-    assert said in " ".join(capsys.readouterr().err.split())
 
 
 def test_explain_models_as_json_and_of_a_job_that_fails(case_file, capsys, monkeypatch):

@@ -1,12 +1,16 @@
-"""Help: whole summaries under headings, an example a verb, options in sentences."""
+"""Help, versions, and what a shell completes."""
 
 import re
 import shlex
+from importlib import metadata
 
 import click
 import pytest
+from click.shell_completion import BashComplete
 from compsim.cli import VERBS as HEADINGS
-from compsim.cli import cli
+from compsim.cli import cli, main
+
+from compressor.cases import MODEL_VERSION
 
 WIDTH = 78  # columns that click fills on a terminal of 80
 VERBS = sorted(cli.commands)
@@ -63,3 +67,37 @@ def test_every_option_says_in_a_sentence_what_it_does(name):
             assert re.fullmatch(r"[A-Z].*\.", text), f"{parameter.opts}: {text!r}"
             assert text.split()[0] not in FRAGMENTS, f"{parameter.opts}: {text!r}"
             assert len(text.split()) > 2, f"{parameter.opts}: {text!r}"
+
+
+def test_alone_the_program_says_what_it_can_do(capsys):
+    main([])
+    said = "".join(capsys.readouterr())
+    assert "Work:" in said
+    assert "To begin: compsim init." in said
+
+
+def test_versions_are_one_line(capsys):
+    assert main(["--version"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("\n") == 1
+    assert re.match(rf"compsim \d+\.\d+\.\d+, model {re.escape(MODEL_VERSION)} \(Python 3", out)
+    assert f"numba {metadata.version('numba')}" in out
+
+
+@pytest.fixture
+def complete(monkeypatch):
+    """What bash is offered for the last of some words."""
+
+    def run(*words):
+        monkeypatch.setenv("COMP_WORDS", " ".join(["compsim", *words]))
+        monkeypatch.setenv("COMP_CWORD", str(len(words)))
+        return BashComplete(cli, {}, "compsim", "_COMPSIM_COMPLETE").complete().splitlines()
+
+    return run
+
+
+def test_commands_choices_files_and_folders_are_completed(complete):
+    assert complete("sta") == ["plain,status"]
+    assert complete("plot", "--format", "s") == ["plain,svg"]
+    assert complete("run", "conf") == ["file,conf"]  # the shell goes on
+    assert complete("status", "-r", "res") == ["dir,res"]

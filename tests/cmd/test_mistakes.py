@@ -68,7 +68,8 @@ MISTAKES = [
     ("run good.yaml --set 'load=[none, spring]' --max-jobs 1",
      "--set load=[none, spring]: load: 2 jobs are more than 1: load (2); ask for fewer, or"),
     ("run good.yaml --only 'clearance_mm > 9'", "selects no job", "compsim plan"),
-    ("run good.yaml --shard 3/2", "no I/N with 1 <= I <= N, such as 2/8"),
+    *((f"run good.yaml --shard {part}", "no I/N with 1 <= I <= N, such as 2/8")
+      for part in ("0/2", "3/2", "2", "a/b", "1/-2")),
     ("run good.yaml --quite", "No such option '--quite'"),
     ("run good.yaml -o results", "No such option '-o'"),
     ("run good.yaml -r good.yaml", "Folder 'good.yaml' is a file"),
@@ -100,6 +101,8 @@ MISTAKES = [
     ("show wear 0.1", "'0.1' is no AXIS=VALUE of wear; its axes are clearance_mm"),
     ("show ffffffff", "no job's key begins with 'ffffffff'"),
     ("show wear --json --units plant", "--json has all numbers in SI", "leave out --units plant"),
+    *((f"show ab --reversal {text}", "give degrees and percent, such as 30,25")
+      for text in ("15", "a,b", "200,3", "15,-1")),
     ("show", "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
     ("export gird -o x.csv", "holds no study 'gird'; it holds big-end, wear"),
     ("export wear -o k.xlsx", "k.xlsx: no files of the type .xlsx are written: end the"),
@@ -111,6 +114,9 @@ MISTAKES = [
     ("plot wear --over sped_rpm", "wear has no axis 'sped_rpm'; its axes are clearance_mm, "),
     ("identify good.csv --study wear", "good.csv: cannot be read", "time_s,acceleration_m_per_s2"),
     # questions
+    ("explain good.yaml --vary machine.rod_mass_kg", "--vary names what --models varies: add"),
+    ("explain good.yaml --models --vary machine.rod_mas_kg", "did you mean machine.rod_mass_kg?"),
+    ("explain good.yaml --models --vary solve.max_steps", "has no plausible range of it: sweep it"),
     ("explain", "Missing argument 'CONFIG...'"),
     ("tradeoff again/wear.yaml", "again/wear.yaml: wear has no joint with clearance"),
     ("tradeoff --set load=none", "--set changes case files: name one"),

@@ -148,12 +148,6 @@ def test_of_a_chaotic_job_averages_are_told_and_peaks_are_not(show, tmp_path):
     assert "the motion is chaotic: averages may be trusted, single peaks may not" in out
 
 
-@pytest.mark.parametrize("text", ["15", "a,b", "200,3", "15,-1"])
-def test_a_reversal_needs_two_numbers(text, capsys):
-    assert cli.main(["show", "ab", "--reversal", text]) == 2
-    assert "give degrees and percent, such as 30,25" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("oil", [{"lubricant": True}, {}])
 def test_a_contact_force_with_oil_says_so(oil):
     case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2} | oil)
