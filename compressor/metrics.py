@@ -90,6 +90,21 @@ KNOCKS = 0.25
 # of the body and its sensor: at least what is lost between the samples of the forces, which no run
 # at these samples shows; measured against samples three times as fine
 OF_MEAN, OF_POWER, OF_PEAK = (Bar(5.0, 1.0, least=share) for share in (2e-4, 2e-3, 5e-3))
+RUN = {  # numbers of a run without error bars: their units and phrases
+    "crank_work": ("J", "work put in by the crank, or by its motor, over the run"),
+    "load_work": ("J", "work put in by the piston force over the run"),
+    "contact_damping_loss": ("J", "energy lost to damping of contacts and oil over the run"),
+    "rod_damping_loss": ("J", "energy lost in the material of an elastic rod over the run"),
+    "friction_loss": ("J", "energy lost to joint friction over the run"),
+    "energy_residual": ("1", "worst energy imbalance relative to the contact's losses"),
+    "steps": ("1", "accepted integration steps"),
+    "rejected": ("1", "rejected steps; SciPy's methods do not count them"),
+    "evaluations": ("1", "evaluations of the right-hand side"),
+    "seconds": ("s", "wall time of the solution, without that of its error bars"),
+    HORIZON: ("s", "time for which neighbouring motions stay together; inf: to the end"),
+    "period_rev": ("rev", "period of a motion that repeats itself within its errors"),
+    "settled_rev": ("rev", "revolutions until a motion repeats itself, or metrics settle"),
+}
 TABLE = (
     Metric(
         "peak_acceleration", (), "m/s2", "greatest |acceleration|", "acceleration",
@@ -199,27 +214,7 @@ TABLE = (
         kind="greatest", when="signals", joint=1,
         made=lambda t: t.side_peak[1],
     ),
-    *(
-        Metric(name, (), unit, phrase, source="run")
-        for name, unit, phrase in (
-            ("crank_work", "J", "work put in by the crank, or by its motor, over the run"),
-            ("load_work", "J", "work put in by the piston force over the run"),
-            (
-                "contact_damping_loss", "J",
-                "energy lost to damping of contacts and oil over the run",
-            ),
-            ("rod_damping_loss", "J", "energy lost in the material of an elastic rod over the run"),
-            ("friction_loss", "J", "energy lost to joint friction over the run"),
-            ("energy_residual", "1", "worst energy imbalance relative to the contact's losses"),
-            ("steps", "1", "accepted integration steps"),
-            ("rejected", "1", "rejected steps; SciPy's methods do not count them"),
-            ("evaluations", "1", "evaluations of the right-hand side"),
-            ("seconds", "s", "wall time of the solution, without that of its error bars"),
-            (HORIZON, "s", "time for which neighbouring motions stay together; inf: to the end"),
-            ("period_rev", "rev", "period of a motion that repeats itself within its errors"),
-            ("settled_rev", "rev", "revolutions until a motion repeats itself, or metrics settle"),
-        )
-    ),
+    *(Metric(name, (), unit, phrase, source="run") for name, (unit, phrase) in RUN.items()),
     Metric(
         "revolutions", (), "1", "settled revolutions that statistics are taken over",
         source="statistics", when="chaotic",

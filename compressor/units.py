@@ -27,11 +27,12 @@ IN_SI = {
 PLANT = {
     "m": "mm", "m/s": "mm/s", "m/s2": "g", "N": "kN", "Pa": "bar", "rad/s": "rpm", "rad": "°",
 }  # fmt: skip
-# units that a text may give for a number of these SI units, beside those above
-ANGLES = {"deg": ("rad", math.pi / 180.0), "°": ("rad", math.pi / 180.0)}
-SHARES = {"%": ("1", 1e-2), "percent": ("1", 1e-2), "1": ("1", 1.0)}
-OTHERS = {"J": ("J", 1.0), "s": ("s", 1.0), "ms": ("s", 1e-3), "N m": ("N m", 1.0)}
-READABLE = IN_SI | ANGLES | SHARES | OTHERS
+# units that a text may give for a number, beside those above
+READABLE = IN_SI | {
+    "deg": ("rad", math.pi / 180.0), "°": ("rad", math.pi / 180.0),
+    "%": ("1", 1e-2), "percent": ("1", 1e-2), "1": ("1", 1.0),
+    "J": ("J", 1.0), "s": ("s", 1.0), "ms": ("s", 1e-3), "N m": ("N m", 1.0),
+}  # fmt: skip
 
 
 def unit_in(unit: str, units: Units) -> tuple[str, float]:

@@ -15,19 +15,13 @@ EXAMPLES = ("claims", "assumptions")
 @click.argument("configs", nargs=-1, metavar="[CONFIG...]", type=options.FILE)
 @options.output("Write the verdicts into this folder.", default="claims")
 @click.option(
-    "--search",
-    "generations",
-    type=options.NUMBER,
-    default=0,
-    metavar="N",
-    help="Search for the least change by which all claims hold: N generations of some 50 machines, "
-    "in the ranges that a CONFIG draws from.",
+    "--search", type=options.NUMBER, default=0, help="Search so many generations for all claims."
 )
 @options.jobs()
 @options.set_keys
 @options.max_jobs
 @options.quiet
-def claims(configs, output, generations, jobs, quiet, **how) -> int:
+def claims(configs, output, search, jobs, quiet, **how) -> int:
     """Judge the paper's eight claims on many machines.
 
     \b
@@ -39,7 +33,9 @@ def claims(configs, output, generations, jobs, quiet, **how) -> int:
     in memory. NAME.nc in the folder has the margin of each claim, 0 at its threshold, with its
     error; the same command goes on from it. Without CONFIG, the map over rod and reciprocating mass
     (claims.nc), and all assumptions drawn for a variance-based sensitivity (assumptions.nc), by the
-    examples that come with the program. `compsim report` draws them.
+    examples that come with the program. `compsim report` draws them. --search looks for the least
+    change by which all claims hold, by generations of some 50 machines, in the ranges that a CONFIG
+    draws from.
 
     Exit code 3 if a machine has no verdict.
     """
@@ -53,7 +49,7 @@ def claims(configs, output, generations, jobs, quiet, **how) -> int:
     paths = configs or [str(templates()[name].path) for name in EXAMPLES]
     studies = load_studies(*paths, variants=cases_judged, **how)
     searchable = [study for study in studies if study.axes and all(a.spread for a in study.axes)]
-    if generations and not searchable:
+    if search and not searchable:
         drawn = "whose keys are drawn from ranges, such as {saltelli: [2, 9]}"
         raise click.UsageError(f"--search needs a CONFIG {drawn}")
     writable_folder(output)
@@ -63,10 +59,10 @@ def claims(configs, output, generations, jobs, quiet, **how) -> int:
         say(f"{study.name}: {plural(study.jobs, 'machine')} of {study.path}")
         with ProgressReporter(quiet, "machines") as progress:
             found.append(judge_machines(study, output, workers, progress))
-    for study in searchable if generations else ():
-        say(f"{study.name}: {plural(generations, 'generation')} of a search")
+    for study in searchable if search else ():
+        say(f"{study.name}: {plural(search, 'generation')} of a search")
         with ProgressReporter(quiet, "machines") as progress:
-            found.append(least_change(study, output, workers, generations, progress))
+            found.append(least_change(study, output, workers, search, progress))
     for one in found:
         screen.print_text(one.encoding["source"], *(f"  {text}" for text in sentences(one)))
     beside = "" if output == "claims" else f" --claims {shlex.quote(output)}"

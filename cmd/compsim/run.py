@@ -75,32 +75,28 @@ def run(command, configs, folder, jobs, rerun, shard, scheduler, wait, quiet, **
 
 def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
     """Report what a run did, what failed and what to do next."""
-    rows, failures = [], []
+    lines, failures = [], []
     for one in summary.counts:
         ends = f"{one.jobs - one.failed} ok", f"{one.failed} failed"
         where = os.path.join(folder, "studies", f"{one.study}.json")
-        rows.append((one.study, plural(one.jobs), *ends, where))
+        lines.append((one.study, plural(one.jobs), *ends, where))
     for lost in summary.failed:
         place = lost.study + screen.point_text(lost.coordinates)
         failures.append((place, lost.reason, f"{lost.detail}; job {lost.key}"))
     with screen.unread():
-        screen.print_text(*align_columns(rows, "<>>>"))
+        screen.print_text(*align_columns(lines, "<>>>"))
     if not quiet:
         screen.say_done(summary.run_now, summary.done_before, summary.seconds, folder)
     if failures:
         screen.say(f"{plural(len({lost.key for lost in summary.failed}))} failed:")
         screen.say_failures(failures)
         screen.say("--rerun failed runs failed jobs again; a changed case file makes new jobs.")
-    if not quiet:
-        say_caveats([one.study for one in summary.counts], folder)
-        screen.say(f"next: compsim report -r {shlex.quote(folder)}")
-
-
-def say_caveats(names: list[str], folder: str) -> None:
-    """Report the caveats that only runs show of their numbers; `caution` reports the rest."""
+    if quiet:
+        return
     from compressor.store import read_store, read_studies, run_caveats
 
-    rows = read_store(folder).rows
-    for study in read_studies(folder):
-        for text in run_caveats(rows, study) if study.name in names else ():
+    ran, rows = {one.study for one in summary.counts}, read_store(folder).rows
+    for study in read_studies(folder):  # what only runs show: `caution` has said the rest
+        for text in run_caveats(rows, study) if study.name in ran else ():
             screen.say_wrapped(f"{study.name}: {text}")
+    screen.say(f"next: compsim report -r {shlex.quote(folder)}")

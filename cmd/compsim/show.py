@@ -13,7 +13,6 @@ from compsim import options, screen
 if TYPE_CHECKING:
     from compressor.cases import Case
     from compressor.store import JobReport
-    from compressor.units import Units
 
 
 def read_reversal(_: click.Context, __: click.Parameter, text: str) -> tuple[float, float]:
@@ -55,25 +54,17 @@ def show(words, folder, case, reversal, units, as_json) -> int:
     618 requires, by 15 degrees and 3 percent, or as a maker does. --json has all numbers in SI.
     """
     options.check_json_units(as_json, units)
+    from compressor.reasons import remedy
     from compressor.store import report_job
+    from compsim.job_text import sections
 
     found = report_job(folder, *words)
     if as_json:
         screen.print_json(found)
-    elif case:
+        return screen.DONE
+    if case:
         screen.print_text(whole_case(found, folder).removesuffix("\n"))
-    else:
-        print_report(found, folder, reversal, units or "usual")
-    return screen.DONE
-
-
-def print_report(
-    found: "JobReport", folder: str, reversal: tuple[float, float], units: "Units" = "usual"
-) -> None:
-    """Print what is known of a job."""
-    from compressor.reasons import remedy
-    from compsim.job_text import sections
-
+        return screen.DONE
     ended = {"missing": "not run yet", "failed": f"failed: {found.reason}: {found.detail}"}
     screen.print_text(f"job {found.key}: {printable(ended.get(found.status, found.status))}")
     for study, point in found.studies.items():
@@ -81,15 +72,16 @@ def print_report(
     if found.status == "missing":
         for command in screen.run_commands(found.again, folder):
             screen.say(f"next: {command}")
-        return
+        return screen.DONE
     if found.status == "failed":
         screen.print_text(f"  what to do: {remedy(found.reason)}")
-    for heading, lines in sections(found, reversal, units):
+    for heading, lines in sections(found, reversal, units or "usual"):
         if lines and heading:
             screen.print_text(heading)
         screen.print_lines(f"  {line}" for line in lines)
     screen.print_text("the values of its case that are not the usual ones (--case prints it whole)")
     screen.print_text(*(f"  {line}" for line in changed_values(found.case)))
+    return screen.DONE
 
 
 def changed_values(case: "Case") -> Iterator[str]:
