@@ -1,4 +1,4 @@
-"""A sample of the campaigns on files: refused calls, damage, hostile files, power cuts."""
+"""A sample of the campaigns on files: refused calls, hostile files, power cuts."""
 
 import faulthandler
 import json
@@ -8,11 +8,9 @@ import pytest
 from chaos import common, faults, hostile
 from page_tables import kept
 
-from compressor.store.reader import read_store
-
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["faults", "flips", "hostile"])
+@pytest.mark.parametrize("name", ["faults", "hostile"])
 def test_nothing_fails_in_a_sample(name):
     found = measure_chaos.run(name, sample=True)
     assert found["failures"] == []
@@ -58,18 +56,6 @@ def test_hostile_screens_are_seen():
     assert hostile.problem_of(common.Said(1, "", "Traceback"), "", (0, 1))
     assert hostile.problem_of(None, "SIGSEGV", (0,)) == "SIGSEGV"
     assert not hostile.problem_of(common.Said(0, "all is well\n", ""), "", (0,))
-
-
-@pytest.mark.slow
-def test_commands_accept_an_unharmed_store(tmp_path):
-    """What a campaign finds of harmed files is then not of its own making."""
-    store, cases = common.complete_store(tmp_path), common.case_files(tmp_path / "cases")
-    key = min(read_store(store).keys())
-    for reader in hostile.READERS:
-        ended = common.forked(
-            lambda reader=reader: hostile.said_of_store(reader, key, cases, store)
-        )
-        assert not hostile.problem_of(ended.result, ended.death, (0, 3)), reader
 
 
 def test_a_partial_driver_keeps_the_other_campaigns(tmp_path, monkeypatch):

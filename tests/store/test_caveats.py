@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from compsim import cli
-from conftest import jobs_here
+from conftest import jobs_here, without_pictures
 
 from compressor.cases.case import Case
 from compressor.outcome import REGIME_WORDS, Regime
@@ -82,7 +82,8 @@ def test_show_says_it_of_its_job(folder, capsys):
 
 
 def test_the_page_says_it(folder, tmp_path):
-    page = write_report(folder, tmp_path).read_text(encoding="utf-8")
+    with without_pictures():
+        page = write_report(folder, tmp_path).read_text(encoding="utf-8")
     assert OUTSIDE in page
     assert "2 of 2 sensor records are clipped" in page
     seen = {*open_study(folder)["regime"].values.tolist()}
