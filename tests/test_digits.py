@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from compressor.digits import by_bar, is_known
+from compressor.digits import align_columns, by_bar, is_known
 
 INF, NAN = math.inf, math.nan
 
@@ -75,3 +75,9 @@ def test_what_is_known_is_larger_than_its_bar():
     for value, bar in ((1.0, 1.0), (1.0, INF), (1.0, NAN), (NAN, 0.1)):
         assert not is_known(value, bar)
     assert not is_known(0.0, INF, relative=False)
+
+
+def test_columns_are_as_wide_as_what_stands_in_them():
+    rows = [("job", "ms", "end"), ("3fa9", "12.5", ""), ("b", "7", "late")]
+    assert align_columns(rows, "<>") == ["job     ms  end", "3fa9  12.5", "b        7  late"]
+    assert align_columns([]) == []

@@ -6,7 +6,7 @@ import click
 
 from compressor.digits import plural
 from compsim import options, screen
-from compsim.progress import ProgressReporter
+from compsim.progress import ProgressReporter, read_cases
 
 EXAMPLES = ("claims", "assumptions")
 
@@ -39,7 +39,7 @@ def claims(configs, output, search, jobs, quiet, **how) -> int:
 
     Exit code 3 if a machine has no verdict.
     """
-    from compressor.cases import load_studies, templates
+    from compressor.cases import templates
     from compressor.store import writable_folder
     from compressor.studies.claims.findings import sentences
     from compressor.studies.claims.search import least_change
@@ -47,7 +47,7 @@ def claims(configs, output, search, jobs, quiet, **how) -> int:
     from compressor.sweep import cores
 
     paths = configs or [str(templates()[name].path) for name in EXAMPLES]
-    studies = load_studies(*paths, variants=cases_judged, **how)
+    studies = read_cases(paths, quiet, variants=cases_judged, **how)
     searchable = [study for study in studies if study.axes and all(a.spread for a in study.axes)]
     if search and not searchable:
         drawn = "whose keys are drawn from ranges, such as {saltelli: [2, 9]}"

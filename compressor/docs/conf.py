@@ -167,8 +167,19 @@ def write_index(app, error):
         (Path(app.outdir) / "index.html").write_text(page, encoding="utf-8")
 
 
+def show_defaults():
+    """Let options say their defaults, which sphinx-click does not take from the group."""
+    from click import Option
+    from compsim.cli import cli
+
+    for option in (one for verb in cli.commands.values() for one in verb.params):
+        if isinstance(option, Option) and not option.is_flag and option.show_default is None:
+            option.show_default = isinstance(option.default, str | int | float)
+
+
 def setup(app):
     """Connect the above with Sphinx."""
+    show_defaults()
     app.connect("config-inited", add_font)
     app.connect("source-read", add_contents)
     app.connect("sphinx-click-process-description", show_blocks)

@@ -273,16 +273,17 @@ def test_the_unforeseen_is_told_with_its_traceback(case_file, capsys, monkeypatc
 
 
 @pytest.mark.parametrize(
-    ("say", "number", "text"),
+    ("say", "thing", "text"),
     [
         (duration, 0.04, "0.0 s"), (duration, 9.9, "9.9 s"), (duration, 99, "99 s"),
         (duration, 101, "2 min"), (duration, 7200, "2 h 00 min"),
         (screen.size, 0, "0 B"), (screen.size, 999, "999 B"), (screen.size, 1000, "1 kB"),
+        (screen.point_text, {"a": 0.56 / 3, "b": "gas", "c": 700.0}, " a=0.186667 b=gas c=700"),
         (screen.size, 2_345_678, "2.35 MB"), (screen.size, 12_345_678_901, "12.35 GB"),
     ],
 )  # fmt: skip
-def test_durations_and_sizes(say, number, text):
-    assert say(number) == text
+def test_durations_points_and_sizes(say, thing, text):
+    assert say(thing) == text
 
 
 # ---- explain and tradeoff -----------------------------------------------------------------------
