@@ -100,25 +100,24 @@ def test_the_cases_are_those_that_were_run(tmp_path):
 
 
 def test_rows_are_what_the_command_judges(worn_store, monkeypatch):
-    """By the made-up records of the command's own tests, at two levels of noise."""
+    """By the made-up records of the command's own tests."""
     monkeypatch.setattr(measure_alarms, "AlarmOptions", partial(AlarmOptions, 2))
-    monkeypatch.setattr(measure_alarms, "NOISE", (0.0, 1.0))
+    monkeypatch.setattr(measure_alarms, "NOISE", (1.0,))
     monkeypatch.setattr(measure_alarms, "peaks", lambda folder, study: {})
     hours, clearances = np.array([0.0, 1000.0]), np.array([[0.1, 0.1], [0.3, 0.2]])
     run = WearHistory("run", hours, clearances, limit=0.3, factor=2.0, span=5e4, values={})
     found = measure_alarms.judge(worn_store, "worn", run)
     json.dumps(found, allow_nan=False)
     assert (found["jobs"], found["sound_draws"], found["worn_jobs"]) == (240, 60, 180)
-    whole = judge_alarms(worn_store, "worn", AlarmOptions(2, noise=(0.0, 1.0)))
+    whole = judge_alarms(worn_store, "worn", AlarmOptions(2, noise=(1.0,)))
     for joint in ("big_end", "small_end", "both"):
-        for level, noise in enumerate((0.0, 1.0)):
-            row = next(r for r in found["rows"] if (r["joint"], r["noise"]) == (joint, noise))
-            best = whole.isel(alarm=rank_alarms(whole, joint, level)[0], noise=level)
-            assert (row["alarm"], row["filter"]) == (best["title"].item(), best["filter"].item())
-            mine = best["worn_joint"].values == joint
-            assert row["detection"] == pytest.approx(best["detection"].values[mine], abs=5e-3)
-            assert row["limits"][1] == pytest.approx(float(best["limit_high"]), rel=5e-3)
-            assert (row["lead_hours"] is None) == (joint == "both")  # no run wears both as one
+        row = next(r for r in found["rows"] if (r["joint"], r["noise"]) == (joint, 1.0))
+        best = whole.isel(alarm=rank_alarms(whole, joint)[0], noise=0)
+        assert (row["alarm"], row["filter"]) == (best["title"].item(), best["filter"].item())
+        mine = best["worn_joint"].values == joint
+        assert row["detection"] == pytest.approx(best["detection"].values[mine], abs=5e-3)
+        assert row["limits"][1] == pytest.approx(float(best["limit_high"]), rel=5e-3)
+        assert (row["lead_hours"] is None) == (joint == "both")  # no run wears both as one
     first, last = found["rows"][0], found["at_looser"][0]
     assert first["first"] == last["first"] is not None  # strokes are far above either limit
     assert max(last["limits"]) <= max(first["limits"])

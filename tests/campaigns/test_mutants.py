@@ -15,8 +15,6 @@ from page_tables import kept
 
 # the least environment: nothing says that output is not to be buffered
 BARE = {"PATH": os.defpath, "PYTHONPATH": f"{mutation.ROOT}/tests:{mutation.ROOT}/tests/campaigns"}
-SCRIPT = "tests/campaigns/measure_mutants.py"
-SAMPLE = "a wrong term of the series of cosine"
 
 
 def test_thirty_bugs_can_be_planted():
@@ -78,17 +76,6 @@ def test_what_was_measured_reaches_the_aims():
     assert all("::" in row["caught_by"] for row in rows if row["caught_by"])
     assert sum(bool(row["caught_by"]) for row in planted_rows) >= 29
     assert sum(bool(row["caught_by"]) for row in others) >= 0.9 * len(others)
-
-
-@pytest.mark.slow
-def test_a_planted_bug_is_caught(tmp_path):
-    target = tmp_path / "mutants.json"
-    call = [sys.executable, SCRIPT, str(target), "--jobs", "1", "--compiled"]
-    call += ["--pure", "kinematics", "--only", SAMPLE]
-    done = subprocess.run(call, cwd=mutation.ROOT, env=BARE, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    (row,) = json.loads(target.read_text())["mutants"]
-    assert row["caught_by"].startswith("physics/test_kinematics.py::")
 
 
 TINY = {

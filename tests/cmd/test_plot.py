@@ -96,7 +96,7 @@ def test_cards_are_of_the_gas(plot, folder, unpainted):
     assert said == pytest.approx(power, rel=5e-3)
 
 
-def test_a_job_is_drawn_with_its_numbers(plot, folder):
+def test_a_job_is_drawn_with_its_numbers(plot, folder, unpainted):
     mine = key(folder, "worn", 3)  # 0.3 mm, 500 rpm
     code, found, err = plot(mine[:8])
     assert (code, err) == (0, "")

@@ -36,7 +36,7 @@ for joint in ("big_end", "small_end", "both"):
         row = np.empty(COLUMNS)
         observe_at(0.01 + phase, y, phase, p, row)
         rows.append(row.tolist())
-solve = {"duration_rev": 0.05, "settle_rev": 0, "output_step_deg": 1, "error_bars": False}
+solve = {"duration_rev": 0.025, "settle_rev": 0, "output_step_deg": 1, "error_bars": False}
 for method, rtol in ("TSIT5", 1e-8), ("RODAS", 1e-6):
     how = {**solve, "method": method, "rtol": rtol}
     values = {"joint": "both", "clearance_mm": 0.2, "solve": how}

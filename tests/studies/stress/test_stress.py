@@ -38,7 +38,7 @@ from compressor.studies.stress.stress import (
 from compressor.studies.stress.words import list_outcomes
 
 SMALL = Budget(revolutions=0.125, max_steps=60_000, seconds=20.0)
-COUNT, SEED = 12, 1
+COUNT, SEED = 8, 4
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +135,7 @@ def test_a_campaign_goes_on_and_scenes_repeat_their_verdicts(study, tmp_path, in
             np.testing.assert_array_equal(again[name].values, first[name].values, name)
     assert told[0][:2] == (2, 4)
     assert told[-1][:2] == (4, 4)
-    with pytest.raises(StoreError, match="holds scenes of seed 1"):
+    with pytest.raises(StoreError, match=f"holds scenes of seed {SEED}"):
         campaign(tmp_path, 2, SEED + 1, 1, budget=SMALL)
     kept = xr.load_dataset(tmp_path / FILE, engine="h5netcdf")
     assert kept["scene"].values.tolist() == [*range(4)]
@@ -224,7 +224,7 @@ def test_the_worst_come_first():
     assert slowest(study)["scene"].item() in (0, 2)
     assert counts(study)["whole"] == {"non_finite": 1, "silent_wrong": 1}
     text = "\n".join(list_outcomes(study))
-    assert "compsim stress --scene 3 --seed 1" in text
+    assert f"compsim stress --scene 3 --seed {SEED}" in text
     assert "whole range: 2 scenes, 0.0% ok: non_finite 1, silent_wrong 1" in text
 
 
@@ -262,7 +262,7 @@ def test_a_scene_is_repeated_as_a_case_file(capsys, tmp_path):
 
 
 def test_the_command_writes_data_and_map(capsys, tmp_path, in_process):
-    assert cli.main(["stress", "-n", "2", "--seed", "1", "-j", "1", "-o", str(tmp_path)]) == 0
+    assert cli.main(["stress", "-n", "1", "--seed", "4", "-j", "1", "-o", str(tmp_path)]) == 0
     out = capsys.readouterr().out
     assert out.startswith("supported range: 1 scene,")
     assert "peak memory of a worker: " in out
