@@ -66,38 +66,72 @@ def listen(
     crank, m; motion: of the body, where it is known already; phase: revolutions of the crank from
     top dead centre to the first sample. A steady motion is repeated as often as the record is long,
     with each revolution at its own pace where the speed jitters; the force at an angle stays.
+
+    The chain is the mounting's resonance, a low-pass filter, sampling, noise and clipping. Casing
+    and mounting have always repeated themselves, too, where the body is steady: a mode of low
+    damping would take many revolutions to forget a start at rest.
     """
     steady, step = body.start == "steady", forces.step
     rng = np.random.default_rng(sensor.seed)
-    span = step * (len(forces.shaking) - 1)
-    revolutions = sensor.length_rev or max(1, int(span / turn * (1 + 1e-9)))
-    before = LEAD_IN * turn if steady else 0.0
-    count = round((before + (revolutions * turn if steady else span)) / step)
-    times = step * np.arange(count + 1) - before
-    pace = paces(sensor, rng, times, turn)
-    turns = pace / turn + phase
+    length = step * (len(forces.shaking) - 1)
+    before = LEAD_IN * turn
+    if steady:
+        length = turn * (sensor.length_rev or max(1, int(length / turn * (1 + 1e-9))))
     x, y = centre(body)
     point = {"guide": (guide - x, -y), "bearing": (-x, -y), "body": (0.0, 0.0)}[sensor.place]
     rigid = motion or body_motion(body, forces, steady)
     acceleration, force = point_acceleration(rigid, sensor.direction, point), None
+    foot, casing = acceleration, None
     if body.casing and sensor.place != "body":
         force = getattr(forces, sensor.place)[:, AXES.index(sensor.direction)]
-    if not steady:
-        if force is not None:
-            acceleration = acceleration + casing_motion(body, force, step).acceleration
-        return record_signal(sensor, acceleration, times, turns, rng)
-    # casing and mounting have always repeated themselves, too: a mode of low damping would take
-    # many revolutions to forget a start at rest
-    repeated, acceleration = acceleration, interpolate_periodic(acceleration, step, pace)
-    if force is not None:
-        casing = casing_motion(body, force, step, steady=True)
-        repeated = repeated + casing.acceleration
-        start = state_at(casing, step, pace[0])
-        force = interpolate_periodic(force, step, pace)
-        acceleration = acceleration + casing_motion(body, force, step, start=start).acceleration
-    mode = sensor.mounting_Hz, sensor.mounting_damping_ratio
-    mounting = oscillate(repeated, step, *mode, steady=True)
-    return record_signal(sensor, acceleration, times, turns, rng, state_at(mounting, step, pace[0]))
+        casing = casing_motion(body, force, step, steady)
+        foot = acceleration + casing.acceleration
+    mounted = oscillate(foot, step, *mode_of(sensor), steady)
+    times = pace = np.array([0.0, length])
+    jitters = bool(steady and sensor.speed_jitter)
+    if jitters:
+        times = step * np.arange(round((before + length) / step) + 1) - before
+        pace = paces(sensor, rng, times, turn)
+        foot = interpolate_periodic(acceleration, step, pace)
+        if force is not None and casing is not None:
+            start = state_at(casing, step, pace[0])
+            force = interpolate_periodic(force, step, pace)
+            foot += casing_motion(body, force, step, start=start).acceleration
+        mounted = oscillate(foot, step, *mode_of(sensor), start=state_at(mounted, step, pace[0]))
+    signal = mounted.displacement * (2.0 * np.pi * sensor.mounting_Hz) ** 2
+    taken = np.arange(int(length * sensor.rate_Hz * (1 + 1e-12))) / sensor.rate_Hz
+    if steady and not jitters:
+        lead = round(before / step)
+        filtered = low_pass(sensor, np.concatenate((signal[-1 - lead : -1], signal)), step)[lead:]
+        values = interpolate_periodic(filtered, step, taken)
+    else:
+        grid = times if jitters else step * np.arange(len(signal))
+        values = CubicSpline(grid, low_pass(sensor, signal, step))(taken)
+    return with_noise(sensor, values, taken, (times, pace / turn + phase), rng)
+
+
+def with_noise(
+    sensor: Sensor, values: np.ndarray, taken: np.ndarray, course: tuple[np.ndarray, np.ndarray],
+    rng: np.random.Generator,
+) -> Record:  # fmt: skip
+    """Return the record of filtered samples: with noise, clipped, and with its tacho.
+
+    taken: times (s) of the samples; course: times, and revolutions of the crank there.
+    """
+    values = values + rng.normal(0.0, sensor.noise_m_per_s2, values.size)
+    clipped = float(np.mean(np.abs(values) > sensor.range_m_per_s2))
+    values = np.clip(values, -sensor.range_m_per_s2, sensor.range_m_per_s2)
+    times, turns = course
+    passes = np.arange(np.ceil(max(turns[0], 0.0) - 1e-9), np.floor(turns[-1]) + 1)
+    tacho = np.interp(passes, turns, times)
+    tacho = tacho[(tacho > -1e-3 / sensor.rate_Hz) & (tacho <= taken[-1])]
+    return Record(taken, values, tacho, clipped, np.interp(taken, times, turns))
+
+
+def low_pass(sensor: Sensor, signal: np.ndarray, step: float) -> np.ndarray:
+    """Return what a sensor's anti-aliasing filter leaves of a signal at steps (s), from rest on."""
+    corner = sensor.low_pass_Hz or sensor.rate_Hz / USUAL
+    return sosfilt(butter(POLES, corner, fs=1.0 / step, output="sos"), signal)
 
 
 def state_at(motion: OscillatorMotion, step: float, time: float) -> tuple[float, float]:
@@ -118,38 +152,10 @@ def paces(sensor: Sensor, rng: np.random.Generator, times: np.ndarray, turn: flo
     spline through a Gaussian draw of `speed_jitter` rms for each revolution: of 0.93 of that rms
     over all times, and 0.81 of it for the mean speed of a revolution.
     """
-    if not sensor.speed_jitter:
-        return times
     knots = np.arange(np.floor(times[0] / turn) - 1, np.ceil(times[-1] / turn) + 2)
     deviations = rng.normal(0.0, sensor.speed_jitter, knots.size)
     course = CubicSpline(knots * turn, deviations).antiderivative()
     return times + course(times) - course(0.0)
-
-
-def record_signal(
-    sensor: Sensor, acceleration: np.ndarray, times: np.ndarray, turns: np.ndarray,
-    rng: np.random.Generator, start: tuple[float, float] = (0.0, 0.0),
-) -> Record:  # fmt: skip
-    """Return the record of the acceleration at a sensor's foot.
-
-    The chain is the mounting's resonance, a low-pass filter, sampling, noise and clipping.
-    acceleration: m/s2 at `times` and `turns`, (n,), recorded from time 0 on; start: displacement
-    and velocity of the sensor on its mounting.
-    """
-    step = times[1] - times[0]
-    mounted = oscillate(acceleration, step, *mode_of(sensor), start=start).displacement
-    mounted *= (2.0 * np.pi * sensor.mounting_Hz) ** 2
-    corner = sensor.low_pass_Hz or sensor.rate_Hz / USUAL
-    filtered = sosfilt(butter(POLES, corner, fs=1.0 / step, output="sos"), mounted)
-    taken = np.arange(int(times[-1] * sensor.rate_Hz * (1 + 1e-12))) / sensor.rate_Hz
-    values = CubicSpline(times, filtered)(taken)
-    values += rng.normal(0.0, sensor.noise_m_per_s2, values.size)
-    clipped = float(np.mean(np.abs(values) > sensor.range_m_per_s2))
-    values = np.clip(values, -sensor.range_m_per_s2, sensor.range_m_per_s2)
-    passes = np.arange(np.ceil(max(turns[0], 0.0) - 1e-9), np.floor(turns[-1]) + 1)
-    tacho = np.interp(passes, turns, times)
-    tacho = tacho[(tacho > -0.5 * step) & (tacho <= taken[-1])]
-    return Record(taken, values, tacho, clipped, np.interp(taken, times, turns))
 
 
 def mode_of(sensor: Sensor) -> tuple[float, float]:
