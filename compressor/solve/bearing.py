@@ -54,8 +54,7 @@ def _forces(
     eps: float, ratio: float, turning: float, squeeze: float, grid: tuple[int, int], near: Bearing
 ) -> np.ndarray:
     """Return both numbers on one grid, (2,)."""
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.linalg import spsolve
+    from scipy.linalg import solveh_banded
 
     around, along = grid
     finer = eps if squeeze >= 0 else 0.0  # a film that is pulled apart bears where it is wide
@@ -65,36 +64,44 @@ def _forces(
     cosine, at_wall = ((np.cos(a) - finer) / (1.0 - finer * np.cos(a)) for a in (xi, wall))
     width = root / (1.0 - finer * np.cos(xi)) * step  # of a cell in theta
     sine = np.sin(xi) * width / step
-    conductance = (1.0 + eps * at_wall) ** 3 * (1.0 - finer * np.cos(wall)) / root / step
+    ahead = (1.0 + eps * at_wall) ** 3 * (1.0 - finer * np.cos(wall)) / root / step
     side = (1.0 + eps * cosine) ** 3 * width * (along / ratio) ** 2
     # of the wedge over eps, which stays finite
     source = 12.0 * squeeze * cosine * width + 6.0 * turning * (at_wall - np.roll(at_wall, 1))
-    i, j = (index.ravel() for index in np.mgrid[:around, :along])
-    cell = i * along + j
-    ahead, behind = conductance[i], np.roll(conductance, 1)[i]
-    out, inside = side[i] * (j < along - 1), side[i] * (j > 0)
-    diagonal = -(ahead + behind + out + inside + 2.0 * side[i] * (j == along - 1))
-    rows = np.tile(cell, 5)
-    columns = np.concatenate(
-        (cell, (i + 1) % around * along + j, (i - 1) % around * along + j,
-         np.minimum(cell + 1, cell.size - 1), np.maximum(cell - 1, 0))
-    )  # fmt: skip
-    values = np.concatenate((diagonal, ahead, behind, out, inside))
-    matrix = csr_matrix((values, (rows, columns)), shape=(cell.size, cell.size))
-    right = np.repeat(source, along)
-    open_end = np.zeros(cell.size, bool) if squeeze else i == 0
-    bears, pressure = near.get((squeeze, grid), ~open_end), np.zeros(cell.size)
+    # the first row bears nothing: there a film that turns begins, and where the gap widens fastest
+    # none bears
+    first = int(source.argmax()) if squeeze else 0
+    cosine, width, sine, ahead, side, source = (
+        np.roll(one, -first) for one in (cosine, width, sine, ahead, side, source)
+    )
+    across = np.repeat(side[:, None], along, axis=1)  # to the next cell along the bearing
+    own = (ahead + np.roll(ahead, 1))[:, None] + across
+    own[:, 1:] += across[:, 1:]
+    own[:, -1] += side  # whose end is half a cell away
+    across[:, -1] = 0.0
+    allowed = np.ones(grid, bool)
+    allowed[0] = False
+    bears, pressure = near.get((squeeze, grid), allowed), np.zeros(grid)
+    band = np.zeros((along + 1, own.size))
     for _ in range(MAX_LOOKS):
-        pressure[:] = 0.0
-        cells = np.flatnonzero(bears)
-        pressure[cells] = spsolve(matrix[cells][:, cells].tocsc(), right[cells])
-        missing = matrix @ pressure - right > 1e-12 * np.abs(right).max()
-        now = np.where(bears, pressure > 0.0, missing) & ~open_end
+        flat = bears.ravel()
+        band[0] = np.where(bears, own, 1.0).ravel()
+        band[1, :-1] = -across.ravel()[:-1] * (flat[:-1] & flat[1:])
+        band[along, :-along] = -np.repeat(ahead[:-1], along) * (flat[:-along] & flat[along:])
+        pressure = solveh_banded(
+            band, np.where(bears, -source[:, None], 0.0).ravel(), lower=True
+        ).reshape(grid)
+        flow = -own * pressure - source[:, None]
+        flow[:-1] += ahead[:-1, None] * pressure[1:]
+        flow[1:] += ahead[:-1, None] * pressure[:-1]
+        flow[:, :-1] += across[:, :-1] * pressure[:, 1:]
+        flow[:, 1:] += across[:, :-1] * pressure[:, :-1]
+        now = np.where(bears, pressure > 0.0, flow > 1e-12 * np.abs(source).max()) & allowed
         if (now == bears).all():
             break
         bears = now
     near[squeeze, grid] = bears
-    summed = pressure.reshape(grid).sum(axis=1) * width * 2.0 / along
+    summed = pressure.sum(axis=1) * width * 2.0 / along
     return np.array([-(summed @ cosine), summed @ sine]) / 4.0
 
 
