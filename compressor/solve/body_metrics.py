@@ -33,14 +33,11 @@ def first_sample(case: Case, solution: Solution) -> int:
     return round(solution.settle / solution.trajectory.times[1]) if steady else 0
 
 
-def shake_by(case: Case, solution: Solution, rows: np.ndarray) -> Monitored:
-    """Return what a run that reached its end does to the body, from `first_sample` on.
-
-    rows: observed at all times of the run, (m, WIDE).
-    """
+def shake_by(case: Case, solution: Solution) -> Monitored:
+    """Return what a run that reached its end does to the body, from `first_sample` on."""
     assert case.body is not None
     begin, guide = first_sample(case, solution), case.machine.rod_length_mm / 1e3
-    found = {name: one[begin:] for name, one in signals(rows).items()}
+    found = signals(rows_of(solution.p, solution.trajectory, part=slice(begin, None)))
     forces = Forces(
         solution.trajectory.times[1], found["shaking_force"], found["guide_moment"],
         np.stack([np.zeros(len(found["guide_force"])), found["guide_force"]], axis=1),
@@ -78,8 +75,7 @@ def bars(case: Case, solution: Solution, ours: Monitored, metrics: Metrics) -> M
         return scatter_bars(case, ours, metrics)
     size = solution.trajectory.times.size
     found = [
-        bars_by(case, metrics, ours, shake_by(case, one, rows_of(one.p, one.trajectory)),
-                closeness(one.rtol / solution.rtol))
+        bars_by(case, metrics, ours, shake_by(case, one), closeness(one.rtol / solution.rtol))
         for one in solution.companions if not one.reason and one.trajectory.times.size == size
     ]  # fmt: skip
     unknown = {name: np.full(np.shape(value), math.inf) for name, value in metrics.items()}

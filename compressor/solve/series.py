@@ -45,12 +45,20 @@ SAMPLES_PER_PERIOD = 24  # samples of the forces in one of the body's fastest mo
 MIN_COMPARED, MAX_COMPARED = 64, 20_000  # of these times over a settled part
 
 
-def rows_of(p: np.record, run: Trajectory, columns: int = WIDE) -> np.ndarray:
-    """Return the observed rows of a run at its times, (m, columns); nan from where it stopped."""
-    rows = np.empty((run.times.size, columns))
-    observe_all(run.times, run.states, run.phases, p, rows)
+def rows_of(
+    p: np.record, run: Trajectory, columns: int = WIDE, part: slice = slice(None)
+) -> np.ndarray:
+    """Return the observed rows of a run at a part of its times, by default all: (m, columns).
+
+    nan from where it stopped.
+    """
+    times, states, phases = (  # in one piece: to numba another layout is another type
+        np.ascontiguousarray(whole[part]) for whole in (run.times, run.states, run.phases)
+    )
+    rows = np.empty((times.size, columns))
+    observe_all(times, states, phases, p, rows)
     if run.reason:
-        rows[np.isnan(run.states).any(axis=1)] = math.nan
+        rows[np.isnan(states).any(axis=1)] = math.nan
     return rows
 
 

@@ -33,24 +33,24 @@ BODY = {  # over time and these dimensions: (dimensions, unit, long name)
 }
 
 
-def foundation(case: Case, solution: Solution, rows: np.ndarray) -> tuple[Variables, Metrics]:
+def foundation(case: Case, solution: Solution) -> tuple[Variables, Metrics]:
     """Return the body's motion on the output grid, the sensor's record in time of its own, metrics.
 
-    rows: observed at the grid that is `finer`, (m, WIDE). A steady body is nan before the
-    machine has settled; all is nan, and there is no record and no metric, of a run that did not
-    reach its end. `one_way_error`: bound of the relative L2 error of the body's velocity by leaving
-    out what its motion does to the machine: of the order m / M away from resonances. A journal's
-    chatter may come at other moments on a body that gives way, so that no bound is stated of
-    accelerations. Metrics have their error bars beside them (`compressor.solve.body_metrics`).
+    A steady body is nan before the machine has settled; all is nan, and there is no record and no
+    metric, of a run that did not reach its end. `one_way_error`: bound of the relative L2 error of
+    the body's velocity by leaving out what its motion does to the machine: of the order m / M away
+    from resonances. A journal's chatter may come at other moments on a body that gives way, so that
+    no bound is stated of accelerations. Metrics have their error bars beside them
+    (`compressor.solve.body_metrics`).
     """
     from compressor.solve import body_metrics
 
     stride, numbers, shaken = finer(case), {}, None
     variables: Variables = {}
-    samples = (len(rows) - 1) // stride + 1
+    samples = (solution.trajectory.times.size - 1) // stride + 1
     values = {name: np.full((samples, 2)[: 1 + len(BODY[name][0])], math.nan) for name in BODY}
     if not solution.trajectory.reason:
-        shaken = body_metrics.shake_by(case, solution, rows)
+        shaken = body_metrics.shake_by(case, solution)
         begin = body_metrics.first_sample(case, solution)
         motion, grid = shaken.motion, slice(-begin % stride, None, stride)
         for name in ("displacement", "velocity", "acceleration"):
@@ -169,12 +169,11 @@ def with_series(case: Case, solution: Solution) -> tuple[Outcome, Variables]:
     variables: Variables = {}
     if not (keeps_series or case.body):
         return result, {}
-    rows = rows_of(solution.p, solution.trajectory)
     if case.body:
-        variables, numbers = foundation(case, solution, rows)
+        variables, numbers = foundation(case, solution)
         for name, value in numbers.items():
             result.numbers[name] = value
-    return result, series(case, solution, rows) | variables if keeps_series else {}
+    return result, series(case, solution) | variables if keeps_series else {}
 
 
 def measure(case: Case) -> Outcome:
@@ -188,14 +187,11 @@ def refused_outcome(case: Case) -> Outcome | None:
     return without_run(case.attributes(), Reason.INVALID_INPUT, detail) if detail else None
 
 
-def series(case: Case, solution: Solution, fine_rows: np.ndarray) -> Variables:
-    """Return the time series as xarray variables, with the signals and features of the case.
-
-    fine_rows: observed at all times of the run, (m, WIDE).
-    """
-    p, stride = solution.p, finer(case)
-    rows, times = fine_rows[::stride], solution.trajectory.times[::stride]
-    states = solution.trajectory.states[::stride]
+def series(case: Case, solution: Solution) -> Variables:
+    """Return the time series as xarray variables, with the signals and features of the case."""
+    p, on_grid = solution.p, slice(None, None, finer(case))
+    rows = rows_of(p, solution.trajectory, part=on_grid)
+    times, states = solution.trajectory.times[on_grid], solution.trajectory.states[on_grid]
     angle_attrs = {"units": "rad", "long_name": "crank angle from top dead centre"}
     time = passed_time(p, times, states)
     angles = np.where(np.isnan(time), np.nan, p.omega * times)  # a stalled crank turns no further
