@@ -119,20 +119,20 @@ class FileTemplate:
 
     def __init__(self, layout: tuple[Entry, ...]):
         with TURN, h5py.File(_new_file()) as file:
-            for entry in layout:
-                _lay_out(file, entry)
+            # held by name: to open one again takes as long as to write it
+            stored = {entry.name: _lay_out(file, entry) for entry in layout}
             for entry in layout:
                 for number, dim in enumerate(entry.dims):
-                    if dim not in file:  # takes no space: nothing is written to it
-                        bare = file.create_dataset(dim, (entry.shape[number],), ">f4")
-                        bare.make_scale(f"{BARE}{entry.shape[number]:10}")
+                    if dim not in stored:  # takes no space: nothing is written to it
+                        stored[dim] = file.create_dataset(dim, (entry.shape[number],), ">f4")
+                        stored[dim].make_scale(f"{BARE}{entry.shape[number]:10}")
                     if dim != entry.name:
-                        file[entry.name].dims[number].attach_scale(file[dim])
+                        stored[entry.name].dims[number].attach_scale(stored[dim])
             file.flush()
             self.data = bytearray(file.id.get_file_image())
             self.deflated = [entry.name for entry in layout if entry.deflated]
             self.places = {
-                entry.name: ArrayPlace(file[entry.name].id.get_offset(), entry.dtype, entry.shape)
+                entry.name: ArrayPlace(stored[entry.name].id.get_offset(), entry.dtype, entry.shape)
                 for entry in layout
                 if not entry.deflated and entry.texts is None and 0 not in entry.shape
             }
@@ -276,8 +276,8 @@ def _new_file() -> h5f.FileID:
     return h5f.create(uuid.uuid4().hex.encode(), h5f.ACC_TRUNC, new, access)
 
 
-def _lay_out(file: h5py.File, entry: Entry) -> None:
-    """Create a dataset with its attributes; its numbers, unless compressed, have their place."""
+def _lay_out(file: h5py.File, entry: Entry) -> h5py.Dataset:
+    """Return a new dataset with its attributes; numbers, unless compressed, have their place."""
     how: dict[str, Any] = {"dtype": entry.dtype}
     if entry.texts is not None:
         how = {"data": np.array(entry.texts, object).reshape(entry.shape), "dtype": TEXT}
@@ -289,6 +289,7 @@ def _lay_out(file: h5py.File, entry: Entry) -> None:
     _write_attributes(stored.id, {name: _encode(value) for name, value in entry.attributes})
     if entry.dims == (entry.name,):
         stored.make_scale(entry.name)
+    return stored
 
 
 def _encode(value: Any) -> np.ndarray:
