@@ -83,6 +83,7 @@ def init_worker(work: Callable[[Any], Any], rules: Workers, parent: int) -> None
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     with contextlib.suppress(OSError):  # there may be no stderr
         os.dup2(2, 1)  # stdout is for data
+    gc.disable()  # until it is prepared: what is loaded is no garbage, and much to look at
     HERE.update(work=work, rules=rules, prepared=False)
 
 
@@ -94,6 +95,7 @@ def prepare() -> str:
     except BaseException as error:
         return describe_error(error)[0][:MAX_PROBLEM]
     gc.freeze()  # what is there by now stays: looking at it took a thirtieth of short jobs' time
+    gc.enable()
     limit(rules.memory)
     HERE["prepared"] = True
     return ""
