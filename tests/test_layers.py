@@ -323,7 +323,16 @@ def test_the_drawing_of_the_house_is_right():
 @pytest.mark.parametrize("module", [m for m in SOURCES if room(m) == "physics"])
 def test_physics_needs_numpy_alone(module):
     outside = {source.partition(".")[0] for source, _ in imports(SOURCES[module])}
-    allowed = {"numpy", "math", "enum", "typing", "dataclasses", "collections", "functools"}
+    allowed = {
+        "numpy",
+        "math",
+        "enum",
+        "typing",
+        "types",
+        "dataclasses",
+        "collections",
+        "functools",
+    }
     allowed |= {"compressor"}
     door = {"numba", "gc", "os", "shutil", "pathlib", "threading"}
     assert outside - allowed <= (door if module == "compressor.physics._jit" else set())

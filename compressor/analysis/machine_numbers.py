@@ -18,7 +18,7 @@ import numpy as np
 from compressor.analysis.cylinder import card_works, ideal_cycles
 from compressor.cases import Case, Study, joint_stiffness, row_of, value_in, with_ideal_joints
 from compressor.metrics import JOINTS
-from compressor.physics import WIDE, Column, observe_all, segments
+from compressor.physics import ideal_forces, segments
 from compressor.solve import record
 from compressor.units import Units, unit_in
 
@@ -271,12 +271,9 @@ def revolution_loads(sound: Case) -> RevolutionLoads:
     p = record(sound)
     edges, phases = segments(p, sound.turn)
     times = np.concatenate([np.linspace(*ends, PIECES + 1) for ends in itertools.pairwise(edges)])
-    rows = np.empty((times.size, WIDE))
-    states = np.zeros((times.size, 4))
-    observe_all(times, states, np.repeat(phases, PIECES + 1), p, rows)
-    gas, rod = -rows[:, Column.PISTON_FORCE], rows[:, Column.FORCE + 2]
-    sizes = rows[:, Column.FORCE_SIZE : Column.FORCE_SIZE + 2]
-    return RevolutionLoads(times * sound.omega, gas, rod - gas, rod, sizes)
+    load, *forces = ideal_forces(times, np.repeat(phases, PIECES + 1), p).T
+    sizes = np.stack([np.hypot(*forces[:2]), np.hypot(*forces[2:])], axis=1)
+    return RevolutionLoads(times * sound.omega, -load, forces[2] + load, forces[2], sizes)
 
 
 def tension_fraction(angle: np.ndarray, load: np.ndarray) -> float:

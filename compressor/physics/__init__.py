@@ -49,6 +49,7 @@ from compressor.physics.systems import (
     beyond_model,
     derivative_with_flows,
     enter_segment,
+    ideal_forces,
     observe_all,
     start,
 )

@@ -16,8 +16,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
-
 from compressor.program import machine_code_folder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -173,8 +171,7 @@ def dispatch_on_record(field: str, special: Function, usual: Function) -> Functi
     """
 
     def choose(*arguments: Any) -> Any:
-        records = [one.dtype.names or () for one in arguments if isinstance(one, np.record)]
-        return (special if any(field in names for names in records) else usual)(*arguments)
+        return (special if any(hasattr(one, field) for one in arguments) else usual)(*arguments)
 
     def make() -> Any:
         from numba.core.registry import cpu_target

@@ -16,14 +16,14 @@ the worse of two shifts of the samples):
 
 import math
 
-from compressor.physics._jit import dispatch_on_record, inline_llvm, jit
+from compressor.physics._jit import dispatch_on_record, inline_llvm
 from compressor.physics.record import CARD_NODES, CHOSEN_FORCES, Load
 
 CARD = int(Load.CARD)
 PER_NODE = 2.0 * math.pi / CARD_NODES  # rad
 
 
-@jit
+@inline_llvm
 def card_force(cos_theta, sin_theta, p):
     """Return the force (N) of the gas, less the back pressure's, at a crank angle."""
     place = math.atan2(sin_theta, cos_theta) / PER_NODE
@@ -39,7 +39,7 @@ def card_force(cos_theta, sin_theta, p):
     return p.card[node, 0] + s * (rise + (1.0 - s) * bend)
 
 
-@jit
+@inline_llvm
 def force_of_card(cos_theta, sin_theta, p):
     """Return `card_force` of a load that was measured, 0 of any other."""
     return card_force(cos_theta, sin_theta, p) if p.load == CARD else 0.0

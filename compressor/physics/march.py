@@ -562,7 +562,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         without_refcount(work.jacobian), without_refcount(work.dense),
         without_refcount(work.weights), without_refcount(work.y), without_refcount(work.rows),
         without_refcount(work.gap_fraction), without_refcount(work.sides),
-        without_refcount(work.row), work.last,
+        without_refcount(work.row), without_refcount(work.last),
     )  # fmt: skip
     z, atol, size = without_refcount(z), without_refcount(atol), without_refcount(size)
     times, states = without_refcount(times), without_refcount(states)

@@ -61,6 +61,29 @@ P = np.array(
 )
 
 
+@inline_llvm
+def add_stages(weights, count, h, z, k, out):
+    """Write z plus h times the first stages, `count` of them, by their weights into out, (m,).
+
+    Four numbers at a time, which LLVM makes vectors of: scenes have a multiple of four.
+    """
+    whole = out.size // 4 * 4
+    for i in range(0, whole, 4):
+        a, b, c, d = z[i], z[i + 1], z[i + 2], z[i + 3]
+        for j in range(count):
+            weight = h * weights[j]
+            a += weight * k[j, i]
+            b += weight * k[j, i + 1]
+            c += weight * k[j, i + 2]
+            d += weight * k[j, i + 3]
+        out[i], out[i + 1], out[i + 2], out[i + 3] = a, b, c, d
+    for i in range(whole, out.size):
+        a = z[i]
+        for j in range(count):
+            a += h * weights[j] * k[j, i]
+        out[i] = a
+
+
 @inline_once
 def take_step(base, h, z, k, phase, p, new, row):
     """Take a step of length h from z: write stages 1 to 6 into k, and its end's state into new.
@@ -74,12 +97,7 @@ def take_step(base, h, z, k, phase, p, new, row):
     for stage in range(1, STAGES):
         motion = ideal_after(base, C[stage] * h, p)
         size = z.size if stage == STAGES - 1 else n
-        for i in range(size):
-            new[i] = z[i]
-        for j in range(stage):
-            weight = h * A[stage, j]
-            for i in range(size):
-                new[i] += weight * k[j, i]
+        add_stages(A[stage], stage, h, z, k, new[:size])
         if stage < STAGES - 1:
             write_flowing_derivative(motion, new, phase, p, k[stage])
         else:
@@ -114,12 +132,7 @@ def weights_at(s, weights):
 @inline_llvm
 def combine(weights, h, z, k, out):
     """Write the motion for these weights of the stages into out, (n,), without the interpolant."""
-    for i in range(out.size):
-        out[i] = z[i]
-    for stage in range(STAGES):
-        weight = h * weights[stage]
-        for i in range(out.size):
-            out[i] += weight * k[stage, i]
+    add_stages(weights, STAGES, h, z, k, out)
 
 
 @inline_llvm

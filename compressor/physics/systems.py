@@ -10,13 +10,16 @@ of a steady crank: what passes in time is `pace_of` times that.
 """
 
 import functools
+from types import SimpleNamespace
+
+import numpy as np
 
 from compressor.physics import mechanism_motion, mechanism_rows, motion, observe
-from compressor.physics._jit import dispatch_on_record, inline_llvm, jit
-from compressor.physics.kinematics import ideal
+from compressor.physics._jit import dispatch_on_record, inline_llvm, jit, without_refcount
+from compressor.physics.kinematics import crank_direction, ideal, ideal_at
 from compressor.physics.loads import CYLINDER, GAS, begin_stroke
 from compressor.physics.observe import CRANK_POWER, KINETIC, PACE, WIDE
-from compressor.physics.record import MECHANISM
+from compressor.physics.record import MECHANISM, read_fields
 
 # of two functions, the mechanism's and a scene's, that of the record among the arguments
 choose = functools.partial(dispatch_on_record, MECHANISM)
@@ -152,5 +155,22 @@ def observe_all(times, states, phases, p, rows):
 
     states: (m, k); phases: of the load, (m,) integers; rows: (m, COLUMNS) or (m, WIDE).
     """
+    states, rows = without_refcount(states), without_refcount(rows)
     for i in range(times.size):
         observe_at(times[i], states[i], phases[i], p, rows[i])
+
+
+def ideal_forces(times, phases, p):
+    """Return the piston force and the joints' forces on the rod (N) of ideal joints, (m, 5).
+
+    Big end x and y, small end x and y. By plain Python: what is asked for one revolution need not
+    wait for machine code, which takes ten times as long to load. times: s, (m,); phases: of the
+    load, (m,) integers.
+    """
+    fields, still = SimpleNamespace(**read_fields(p)), np.zeros(4)
+    found = []
+    for t, phase in zip(times.tolist(), phases.tolist(), strict=True):
+        cosine, sine = crank_direction(t, fields)
+        now = evaluate(ideal_at(cosine, sine, fields), still, phase, fields)
+        found.append((now.load, *now.forces))
+    return np.array(found)

@@ -1,6 +1,9 @@
 """What a file means, before it runs: hand numbers of a nameplate, and mistakes that they show."""
 
+import json
 import math
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -15,8 +18,9 @@ from compressor.analysis.machine_numbers import (
 )
 from compressor.cases.case import Case, with_ideal_joints
 from compressor.cases.load import load_studies
-from compressor.physics import exact_motion
+from compressor.physics import COLUMNS, Column, exact_motion, observe_all, segments
 from compressor.solve.cautions import cautions
+from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
 
 EXAMPLES = ROOT / "compressor" / "cases" / "examples"
@@ -218,6 +222,41 @@ def test_loads_are_those_of_a_run_without_clearance(load):
     assert np.abs(loads.rod).max() == pytest.approx(peak, rel=1e-5)
     found = by_name(machine_numbers([case]))
     assert (f"{load} load, compression" in found) == (load != "none")
+
+
+@pytest.mark.parametrize(
+    "gas",
+    [{}, {"action": "double", "rod_diameter_mm": 40},
+     {"action": "double", "rod_diameter_mm": 40, "indicator": {"head": "c.csv", "crank": "c.csv"}}],
+)  # fmt: skip
+def test_loads_in_plain_python_are_those_of_the_machine_code(gas, read, tmp_path):
+    """The program reads them without it: to load it took ten times as long."""
+    (tmp_path / "c.csv").write_text(CARDS, encoding="utf-8")
+    case = with_ideal_joints(read(json.dumps({"load": "gas", "gas": gas})).cases[0])
+    p, loads = record(case), revolution_loads(case)
+    _, phases = segments(p, case.turn)
+    times = loads.angle / case.omega
+    rows = np.empty((times.size, COLUMNS))
+    every = np.repeat(phases, times.size // phases.size)
+    observe_all(times, np.zeros((times.size, 4)), every, p, rows)
+    np.testing.assert_allclose(loads.gas, -rows[:, Column.PISTON_FORCE], atol=1e-6)
+    np.testing.assert_allclose(loads.rod, rows[:, Column.FORCE + 2], atol=1e-6)
+    sizes = rows[:, Column.FORCE_SIZE : Column.FORCE_SIZE + 2]
+    np.testing.assert_allclose(loads.sizes, sizes, atol=1e-6)
+
+
+def test_a_case_file_is_looked_at_without_machine_code_or_xarray(tmp_path):
+    """The program does it before each run; numba and xarray took it 0.8 s."""
+    path = tmp_path / "machine.yaml"
+    path.write_text(NAMEPLATE, encoding="utf-8")
+    code = (
+        "import sys; from compressor.analysis import describe_machine\n"
+        "from compressor.cases import load_studies; from compressor.solve import cautions\n"
+        f"study = load_studies({str(path)!r})[0]; cautions(study); describe_machine(study)\n"
+        "print([name for name in ('numba', 'scipy', 'xarray') if name in sys.modules])"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout == "[]\n"
 
 
 def test_features_and_clearance_leave_the_sound_machine_as_it_is():
