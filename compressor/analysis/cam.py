@@ -6,14 +6,17 @@ falls by 81.3 mm. Here the follower dwells for the spring's stroke of piston tra
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from compressor.analysis.runs import record_of
 from compressor.cases import Case
 from compressor.physics import exact_motion, gas_corners
 from compressor.solve import record
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Table 1 of the paper
 BASE_RADIUS = 0.200
@@ -82,7 +85,7 @@ def contour(p, angles, base_radius):
 class Cam:
     """The cam of a run's spring load, in m over cam angles (rad, any shape)."""
 
-    run: xr.Dataset
+    run: "xr.Dataset"
     base_radius: float = BASE_RADIUS
 
     @property

@@ -12,9 +12,9 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from compressor.analysis.cam import Cam
 from compressor.analysis.contacts import MODES, contact_modes, mode_shares
@@ -34,7 +34,10 @@ from compressor.analysis.runs import (
 )
 from compressor.analysis.shaking import AFTER, BEFORE, ORDER, Shaking
 
-Runs = Mapping[str, xr.Dataset]
+if TYPE_CHECKING:
+    import xarray as xr
+
+Runs = Mapping[str, "xr.Dataset"]
 
 ENLARGED_VIEWS = (
     "Left, the last revolution, acceleration in a row a clearance, with the motion without "
@@ -125,7 +128,7 @@ def response(runs: Runs, fault: str) -> str:
     return " ".join(sentences)
 
 
-def deviations(worn_runs: Sequence[xr.Dataset]) -> str:
+def deviations(worn_runs: "Sequence[xr.Dataset]") -> str:
     """Describe how far the motion leaves that of the machine without clearance."""
     greatest = np.zeros(3)
     for run in worn_runs:
@@ -179,7 +182,7 @@ def rings(courses: Sequence[JournalMotion]) -> list[str]:
     return [f"After the first change acceleration rings at {list_by_clearance(found, 0)} Hz."]
 
 
-def peaks(worn_runs: Sequence[xr.Dataset]) -> str:
+def peaks(worn_runs: "Sequence[xr.Dataset]") -> str:
     """Describe the greatest accelerations, and whether they grow with clearance."""
     greatest = [float(run["peak_acceleration"]) for run in worn_runs]
     grows = all(b > a for a, b in itertools.pairwise(greatest))

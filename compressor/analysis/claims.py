@@ -9,9 +9,9 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from compressor.analysis.margins import (
     BarredNumber,
@@ -47,7 +47,10 @@ from compressor.analysis.runs import (
 )
 from compressor.metrics import JOINTS
 
-Runs = Mapping[str, xr.Dataset]
+if TYPE_CHECKING:
+    import xarray as xr
+
+Runs = Mapping[str, "xr.Dataset"]
 MOTION = ("displacement", "velocity", "acceleration")  # in the order of `ideal_motion`
 # how far each measure is from its threshold, and what is shown, made when it is looked at: a claim
 # holds where no margin is negative
@@ -101,7 +104,7 @@ def acceleration_alone(runs: Runs) -> Verdict:
             spread = float(np.std(ideal))
             error = series_error(settled, series, settled[series].values) / spread
 
-            def away(part: xr.Dataset, series: str = series, spread: float = spread) -> float:
+            def away(part: "xr.Dataset", series: str = series, spread: float = spread) -> float:
                 motion = dict(zip(MOTION, ideal_motion(part), strict=True))[series]
                 return float(np.sqrt(np.mean((part[series].values - motion) ** 2))) / spread
 
@@ -145,19 +148,19 @@ def horizontal_force(runs: Runs) -> Verdict:
     return margins, rows
 
 
-def across_over_up(run: xr.Dataset, joint: str) -> BarredNumber:
+def across_over_up(run: "xr.Dataset", joint: str) -> BarredNumber:
     """Return the ratio of horizontal to vertical contact force, weighted by the force.
 
     Both forces are at the same times: the mean of |F| |F_x| over that of |F| |F_y|. Its error is
     what the force's one allows by Cauchy's inequality.
     """
 
-    def means(part: xr.Dataset) -> tuple[float, float]:
+    def means(part: "xr.Dataset") -> tuple[float, float]:
         force = part["contact_force"].sel(joint=joint).values
         across, up = (np.linalg.norm(force, axis=1)[:, None] * np.abs(force)).mean(axis=0)
         return float(across), float(up)
 
-    def ratio(part: xr.Dataset) -> float:
+    def ratio(part: "xr.Dataset") -> float:
         across, up = means(part)
         return across / up if up else math.inf
 
@@ -194,7 +197,7 @@ def proportional_force(runs: Runs) -> Verdict:
     return margins, rows
 
 
-def correlation(run: xr.Dataset, joint: str) -> BarredNumber:
+def correlation(run: "xr.Dataset", joint: str) -> BarredNumber:
     """Return r² of a joint's horizontal force and acceleration.
 
     A correlation changes by at most the sum of the errors' shares of the standard deviations.
@@ -240,7 +243,7 @@ def impact_rows(runs: Runs) -> Iterator[tuple[str, str]]:
         )
 
 
-def per_revolution(run: xr.Dataset, count: str, joint: str) -> float:
+def per_revolution(run: "xr.Dataset", count: str, joint: str) -> float:
     """Return a count of a joint's contacts by the revolutions that it was counted over."""
     return float(run[count].sel(joint=joint)) / settled_revolutions(run)
 

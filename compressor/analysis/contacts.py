@@ -20,14 +20,17 @@ modes are told apart in samples:
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.polynomial import Polynomial
 
 from compressor.analysis.runs import record_of, settled_part
 from compressor.metrics import JOINTS
 from compressor.physics import elastic_form
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class ContactSpan:
     after_flight: bool
 
 
-def joints_with_clearance(run: xr.Dataset) -> dict[str, float]:
+def joints_with_clearance(run: "xr.Dataset") -> dict[str, float]:
     """Return the joints of a run that have clearance, with it, m.
 
     Raises ValueError where the run has no time series or no joint has clearance.
@@ -74,7 +77,7 @@ def joints_with_clearance(run: xr.Dataset) -> dict[str, float]:
     return found
 
 
-def contact_series(run: xr.Dataset, joint: str) -> ContactSeries:
+def contact_series(run: "xr.Dataset", joint: str) -> ContactSeries:
     """Return a joint's samples, up to where the run stopped."""
     # arrays one by one: cutting the whole Dataset takes ten times as long
     depth = run["penetration"].sel(joint=joint).values.astype(float)
@@ -161,7 +164,7 @@ class Impact:
     follows: int
 
 
-def impacts(run: xr.Dataset) -> xr.Dataset:
+def impacts(run: "xr.Dataset") -> "xr.Dataset":
     """Return the impacts after settling, by time: `COLUMNS` over the dim `impact`.
 
     An impact is a contact (F_N > 0) that begins after the journal was off its bore, as in
@@ -171,6 +174,8 @@ def impacts(run: xr.Dataset) -> xr.Dataset:
     taken from it. Integrals run over the whole contact, which may go on as following contact.
     Raises ValueError for a run without time series or clearance.
     """
+    import xarray as xr
+
     found = [one for joint in joints_with_clearance(run) for one in impacts_of(run, joint)]
     found = [one for one in found if one.time >= run.attrs["settle"] * (1 - 1e-12)]
     found.sort(key=lambda one: one.time)
@@ -187,7 +192,7 @@ def impacts(run: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(variables)
 
 
-def impacts_of(run: xr.Dataset, joint: str) -> list[Impact]:
+def impacts_of(run: "xr.Dataset", joint: str) -> list[Impact]:
     """Return the impacts at one joint over the whole run, start-up included."""
     series = contact_series(run, joint)
     p = record_of(run)
@@ -331,12 +336,14 @@ FLIGHT, IMPACT, FOLLOWING = range(len(MODES))
 UNKNOWN = -1  # of a bin without samples
 
 
-def contact_modes(run: xr.Dataset) -> xr.Dataset:
+def contact_modes(run: "xr.Dataset") -> "xr.Dataset":
     """Return the mode of each joint with clearance after settling: `mode` over (time, joint).
 
     Integers with their meanings in `flag_values` and `flag_meanings`; `time` has the crank angle
     (rad) as a coordinate. Raises ValueError for a run without time series or clearance.
     """
+    import xarray as xr
+
     joints = [*joints_with_clearance(run)]
     columns = [modes_of(run, joint) for joint in joints]
     one = contact_series(run, joints[0])
@@ -359,7 +366,7 @@ def contact_modes(run: xr.Dataset) -> xr.Dataset:
     return settled_part(whole)
 
 
-def modes_of(run: xr.Dataset, joint: str) -> np.ndarray:
+def modes_of(run: "xr.Dataset", joint: str) -> np.ndarray:
     """Return the mode of a joint at each sample of the whole run, (m,) integers."""
     series = contact_series(run, joint)
     modes = np.where(flights(series), FLIGHT, FOLLOWING).astype(np.int8)
@@ -368,12 +375,14 @@ def modes_of(run: xr.Dataset, joint: str) -> np.ndarray:
     return modes
 
 
-def mode_shares(modes: xr.Dataset) -> xr.Dataset:
+def mode_shares(modes: "xr.Dataset") -> "xr.Dataset":
     """Return the shares of time in each contact mode, from `contact_modes`.
 
     `share` over (joint, mode), and with two joints `combination_share` over (big_end_mode,
     small_end_mode), nine numbers. Samples stand for the step that they begin.
     """
+    import xarray as xr
+
     mode = modes["mode"].isel(time=slice(None, -1)).values
     each = mode[:, :, None] == np.arange(len(MODES))
     attrs = {"units": "1", "long_name": "share of time in a contact mode"}
@@ -390,7 +399,7 @@ def mode_shares(modes: xr.Dataset) -> xr.Dataset:
     return found
 
 
-def angle_modes(run: xr.Dataset) -> xr.Dataset:
+def angle_modes(run: "xr.Dataset") -> "xr.Dataset":
     """Return `mode_map` of a run's `contact_modes`, in bins of 1 degree.
 
     Raises ValueError as they do.
@@ -398,7 +407,7 @@ def angle_modes(run: xr.Dataset) -> xr.Dataset:
     return mode_map(contact_modes(run))
 
 
-def mode_map(modes: xr.Dataset, width_deg: float = 1.0) -> xr.Dataset:
+def mode_map(modes: "xr.Dataset", width_deg: float = 1.0) -> "xr.Dataset":
     """Return the shares of each contact mode over the crank angle, all revolutions together.
 
     modes: of `contact_modes`. Over bins of `width_deg`, with `angle` (deg, 0 to 360) the middle of
@@ -406,6 +415,8 @@ def mode_map(modes: xr.Dataset, width_deg: float = 1.0) -> xr.Dataset:
     greatest share, the first of equals. A bin without samples has shares of nan and the majority
     -1. Raises ValueError where the width is no whole part of a revolution.
     """
+    import xarray as xr
+
     count = round(360.0 / width_deg) if width_deg > 0 else 0
     if count < 1 or abs(count * width_deg - 360.0) > 1e-6:
         raise ValueError(f"width_deg = {width_deg:g} is no whole part of 360")

@@ -5,14 +5,17 @@ The vibration is the sensor's record where a case has one, else the acceleration
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from compressor.analysis.contacts import impacts, joints_with_clearance
 from compressor.analysis.runs import case_of, record_of
 from compressor.analysis.shaking import NoSeriesError, last_revolution, whole_revolutions
 from compressor.physics import segments
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # what begins at a corner of the load, by the phase that it leads to
 VALVES = ("discharge closes", "suction opens", "suction closes", "discharge opens")
@@ -46,7 +49,7 @@ class Cycle:
         return np.where(np.isinf(peaks), np.nan, peaks)
 
 
-def read_cycle(run: xr.Dataset) -> Cycle:
+def read_cycle(run: "xr.Dataset") -> Cycle:
     """Return the `Cycle` of a run with time series.
 
     Of a record that is shorter than the settled revolutions its own last revolution, with the load
@@ -72,7 +75,7 @@ def read_cycle(run: xr.Dataset) -> Cycle:
     )  # fmt: skip
 
 
-def read_loads(run: xr.Dataset) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def read_loads(run: "xr.Dataset") -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return crank angles (degrees) of the last settled revolution, and the loads there, N.
 
     By name, (m,) each, along the cylinder and positive in tension: `gas` on the piston (or the
@@ -94,7 +97,7 @@ def _sort_by_angle(degrees: np.ndarray, values: np.ndarray) -> tuple[np.ndarray,
     return degrees[order], values[order]
 
 
-def _read_sensor(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, int] | None:
+def _read_sensor(run: "xr.Dataset") -> tuple[np.ndarray, np.ndarray, int] | None:
     """Return the crank's revolutions at the samples of a record, these, and how many are settled.
 
     Revolutions count from the run's begin. By the tacho, at a steady pace before the first pulse
@@ -140,7 +143,7 @@ def _reversals(turns: np.ndarray, load: np.ndarray) -> tuple[float, ...]:
     return tuple(sorted(float(one) for one in 360.0 * (at % 1.0)))
 
 
-def _events(run: xr.Dataset, begin: float) -> tuple[tuple[float, str], ...]:
+def _events(run: "xr.Dataset", begin: float) -> tuple[tuple[float, str], ...]:
     """Return the angles (degrees) and names of the load's corners in a revolution.
 
     They are the same in each: those of the next one are read, which has one before it.
@@ -166,7 +169,7 @@ def _events(run: xr.Dataset, begin: float) -> tuple[tuple[float, str], ...]:
     return tuple(sorted(found))
 
 
-def _struck(run: xr.Dataset, begin: float) -> dict[str, np.ndarray]:
+def _struck(run: "xr.Dataset", begin: float) -> dict[str, np.ndarray]:
     """Return the angles (degrees) of the impacts in a revolution by joint with clearance."""
     try:
         joints = joints_with_clearance(run)

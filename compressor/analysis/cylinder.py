@@ -13,15 +13,17 @@ temperature, so that the capacity falls with the pressure behind it.
 """
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from compressor.analysis.runs import case_of, record_of
 from compressor.cases import Case, to_si
 from compressor.physics import exact_motion, sample_segments, segments
 from compressor.solve import gas_nodes
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class IdealCycle(NamedTuple):
@@ -94,7 +96,7 @@ class EndState(NamedTuple):
         return -1e3 * float(mean @ np.diff(self.volume))
 
 
-def end_states(run: xr.Dataset) -> dict[str, EndState]:
+def end_states(run: "xr.Dataset") -> dict[str, EndState]:
     """Return the gas in each end, head or crank, that presses; run: of the gas load, or a part."""
     case, p = case_of(run), record_of(run)
     gas, machine = case.gas, case.machine

@@ -8,15 +8,17 @@ own unit.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from compressor.analysis.contacts import FOLLOWING, contact_modes, impacts
 from compressor.analysis.runs import settled_part
 from compressor.analysis.shaking import ORDER, evenly, whole_revolutions
 from compressor.solve import average_bar, mean_bar
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class BarredNumber(NamedTuple):
@@ -86,12 +88,12 @@ def exceeds(one: BarredNumber, other: BarredNumber, by: float) -> Margin:
     return Margin(one.value - other.value - by, one.error + other.error)
 
 
-def is_chaotic(run: xr.Dataset) -> bool:
+def is_chaotic(run: "xr.Dataset") -> bool:
     """Return whether a run's motion cannot be foretold, so that only averages count."""
     return run.attrs.get("regime") == "chaotic"
 
 
-def revolutions(run: xr.Dataset) -> Iterator[xr.Dataset]:
+def revolutions(run: "xr.Dataset") -> "Iterator[xr.Dataset]":
     """Yield the whole settled revolutions of a run, both ends included."""
     settled = settled_part(run)
     turns = (settled["crank_angle"].values - settled["crank_angle"].values[0]) / (2.0 * math.pi)
@@ -100,7 +102,7 @@ def revolutions(run: xr.Dataset) -> Iterator[xr.Dataset]:
         yield settled.isel(time=inside)
 
 
-def by_revolution(run: xr.Dataset, value: Callable[[xr.Dataset], float]) -> float:
+def by_revolution(run: "xr.Dataset", value: "Callable[[xr.Dataset], float]") -> float:
     """Return half of the 95 % interval of a value's mean over revolutions, by their scatter.
 
     inf of too few revolutions.
@@ -108,13 +110,15 @@ def by_revolution(run: xr.Dataset, value: Callable[[xr.Dataset], float]) -> floa
     return mean_bar(np.array([value(turn) for turn in revolutions(run)]))
 
 
-def measure(run: xr.Dataset, value: Callable[[xr.Dataset], float], error: float) -> BarredNumber:
+def measure(
+    run: "xr.Dataset", value: "Callable[[xr.Dataset], float]", error: float
+) -> BarredNumber:
     """Return a value of a run's settled part with an error; of a chaotic run by its revolutions."""
     settled = settled_part(run)
     return BarredNumber(value(settled), by_revolution(settled, value) if is_chaotic(run) else error)
 
 
-def peak(run: xr.Dataset, name: str, **where: str) -> BarredNumber:
+def peak(run: "xr.Dataset", name: str, **where: str) -> BarredNumber:
     """Return a greatest value of a run with its error bar; where: its joint.
 
     Of a chaotic run it is `mean_peak`, since that of the whole run grows with its length.
@@ -122,7 +126,7 @@ def peak(run: xr.Dataset, name: str, **where: str) -> BarredNumber:
     return mean_peak(run, name, **where) if is_chaotic(run) else metric(run, name, **where)
 
 
-def mean_peak(run: xr.Dataset, name: str, **where: str) -> BarredNumber:
+def mean_peak(run: "xr.Dataset", name: str, **where: str) -> BarredNumber:
     """Return the mean over a chaotic run's revolutions of each one's greatest value, with its bar.
 
     where: its joint.
@@ -133,13 +137,13 @@ def mean_peak(run: xr.Dataset, name: str, **where: str) -> BarredNumber:
     return BarredNumber(value, float(average_bar(np.array(error), int(run["revolutions"]))))
 
 
-def metric(run: xr.Dataset, name: str, **where: str) -> BarredNumber:
+def metric(run: "xr.Dataset", name: str, **where: str) -> BarredNumber:
     """Return a metric of a run with its error bar; where: its joint and axis."""
     value, error = (float(run[n].sel(where)) for n in (name, f"{name}_error"))
     return BarredNumber(value, error)
 
 
-def series_error(run: xr.Dataset, name: str, values: np.ndarray, **where: str) -> float:
+def series_error(run: "xr.Dataset", name: str, values: np.ndarray, **where: str) -> float:
     """Return the rms error of a settled time series, in its unit.
 
     It is the stored relative error times the rms of the series.
@@ -184,13 +188,13 @@ class Shares(NamedTuple):
 class Evidence(NamedTuple):
     """What is looked at: whole revolutions of a run, a joint's impacts, its force above `ORDER`."""
 
-    settled: xr.Dataset
+    settled: "xr.Dataset"
     revolutions: int
-    table: xr.Dataset
+    table: "xr.Dataset"
     high: np.ndarray  # (m,), N, along the cylinder
 
 
-def evidence(run: xr.Dataset, joint: str) -> Evidence:
+def evidence(run: "xr.Dataset", joint: str) -> Evidence:
     """Return the `Evidence` of a joint. Raises as `continuity`."""
     from compressor.vibration import high_pass_orders
 
@@ -201,7 +205,7 @@ def evidence(run: xr.Dataset, joint: str) -> Evidence:
     )
 
 
-def continuity(run: xr.Dataset, joint: str, start_up: bool = False) -> Continuity:
+def continuity(run: "xr.Dataset", joint: str, start_up: bool = False) -> Continuity:
     """Return the `Continuity` of a joint with clearance, over settled whole revolutions of a run.
 
     `start_up`: over whole revolutions from the run's begin. Raises NoSeriesError where there is
@@ -223,7 +227,7 @@ def continuity_of(found: Evidence, joint: str) -> Continuity:
     )
 
 
-def measured_shares(run: xr.Dataset, joint: str) -> Shares:
+def measured_shares(run: "xr.Dataset", joint: str) -> Shares:
     """Return the settled shares of a joint with clearance.
 
     The errors follow from the run's error bars. That of `apart` is the bar of the share of time
@@ -236,7 +240,7 @@ def measured_shares(run: xr.Dataset, joint: str) -> Shares:
     found = continuity_of(by, joint)
     if is_chaotic(run):
 
-        def share(name: str) -> Callable[[xr.Dataset], float]:
+        def share(name: str) -> "Callable[[xr.Dataset], float]":
             return lambda turn: getattr(continuity(turn, joint), name)
 
         errors = [by_revolution(by.settled, share(name)) for name in Shares._fields]
@@ -291,7 +295,7 @@ def compare_continuity(big: Continuity, small: Continuity) -> str:
     )
 
 
-def hit_share(table: xr.Dataset, joint: str, revolutions: int) -> float:
+def hit_share(table: "xr.Dataset", joint: str, revolutions: int) -> float:
     """Return the share of crank-angle windows (`WINDOW` degrees) in which a joint hits."""
     counts = (table["joint"].values == joint) & (table["approach_speed"].values > SLOWEST)
     angle = 360.0 * table["revolution"].values[counts] + table["crank_angle"].values[counts]

@@ -2,9 +2,9 @@
 
 import itertools
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from compressor.analysis.contacts import (
     ContactSeries,
@@ -13,6 +13,9 @@ from compressor.analysis.contacts import (
     joints_with_clearance,
 )
 from compressor.analysis.runs import case_of, ideal_motion, settled_part
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SAME_TURN_DEGREES = 20.0  # degrees: changes of sign nearer to each other are one turn
 AFTER, SPAN = 5.0, 90.0  # degrees after a turn, and how long its ringing is looked at
@@ -40,7 +43,7 @@ class JournalMotion:
     rings: float
 
 
-def course(run: xr.Dataset, joint: str) -> JournalMotion:
+def course(run: "xr.Dataset", joint: str) -> JournalMotion:
     """Return the course of a joint with clearance, from a run with time series."""
     settled = settled_part(run)
     angle = np.degrees(settled["crank_angle"].values)
@@ -78,7 +81,7 @@ def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
     return tuple(sorted(float(np.mean(group)) % 360.0 for group in groups))
 
 
-def ringing(settled: xr.Dataset, turn: float) -> float:
+def ringing(settled: "xr.Dataset", turn: float) -> float:
     """Return the strongest frequency (Hz) in the acceleration after a turn (degrees).
 
     Of the deviation from the ideal acceleration, without its slow drift; nan where the samples
@@ -118,7 +121,7 @@ NUMBERS = {  # over joint
 }
 
 
-def orbit(run: xr.Dataset) -> xr.Dataset:
+def orbit(run: "xr.Dataset") -> "xr.Dataset":
     """Return the orbit of each journal with clearance after settling.
 
     Over (time, joint): `SERIES`; over joint: `NUMBERS`; `time` has the crank angle (rad) as a
@@ -127,6 +130,8 @@ def orbit(run: xr.Dataset) -> xr.Dataset:
     that `laps` is sure where `least_ratio` is not small. Raises ValueError for a run without time
     series or clearance.
     """
+    import xarray as xr
+
     joints = [*joints_with_clearance(run)]
     settled = settled_part(run)
     found = [orbit_of(contact_series(settled, joint)) for joint in joints]

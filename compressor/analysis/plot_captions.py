@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-import xarray as xr
 
 from compressor.analysis.contacts import (
     MODES,
@@ -31,6 +31,9 @@ from compressor.analysis.shaking import (
 )
 from compressor.metrics import JOINTS
 from compressor.units import unit_in
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def plural(count: int, thing: str) -> str:
@@ -79,7 +82,7 @@ class SweptRow:
 
     value: str
     shaking: Shaking | None = None
-    modes: xr.Dataset | None = None
+    modes: "xr.Dataset | None" = None
     cycle: Cycle | None = None
     segments: Segments | None = None
     problem: str = ""
@@ -87,7 +90,7 @@ class SweptRow:
     lubricated: bool = False
 
     def with_segments(
-        self, run: xr.Dataset, healthy: np.ndarray, limit: tuple[float, bool] | None
+        self, run: "xr.Dataset", healthy: np.ndarray, limit: tuple[float, bool] | None
     ) -> "SweptRow":
         """Return the row with the segments of a run that has a sensor.
 
@@ -125,7 +128,7 @@ def rows_modes(rows: Sequence[SweptRow]) -> dict[str, np.ndarray]:
 
 
 _, G = unit_in("m/s²", "plant")  # from m/s2 to g
-Twin = xr.Dataset | None  # the same machine without clearance
+Twin: TypeAlias = "xr.Dataset | None"  # the same machine without clearance
 
 CHAOTIC = (
     " The motion is chaotic: another correct solution has other peaks and lines; more settled "
@@ -138,17 +141,17 @@ FILM = (
 MIN_FORCE = 0.05  # N: below it a force is given as less than 0.1
 
 
-def caution(run: xr.Dataset) -> str:
+def caution(run: "xr.Dataset") -> str:
     """Return the sentence that captions of a chaotic run add, else nothing."""
     return CHAOTIC if run.attrs.get("regime") == "chaotic" else ""
 
 
-def film(run: xr.Dataset) -> str:
+def film(run: "xr.Dataset") -> str:
     """Return the sentence that captions of contacts add for joints with oil, else nothing."""
     return FILM if case_of(run).lubricant else ""
 
 
-def signals(run: xr.Dataset, twin: Twin) -> str:
+def signals(run: "xr.Dataset", twin: Twin) -> str:
     """Describe the last revolution: the greatest and least of what is drawn."""
     _, revolution = last_revolution(run)
     _, count = whole_revolutions(run)
@@ -169,7 +172,7 @@ def signals(run: xr.Dataset, twin: Twin) -> str:
     )
 
 
-def cards(run: xr.Dataset, twin: Twin) -> str:
+def cards(run: "xr.Dataset", twin: Twin) -> str:
     """Describe the gas in the cylinder: its indicated power, and that of the ideal cycle."""
     _, revolution = last_revolution(run)
     seconds = float(revolution["time"][-1] - revolution["time"][0])
@@ -182,7 +185,7 @@ def cards(run: xr.Dataset, twin: Twin) -> str:
     )
 
 
-def spectra(run: xr.Dataset, twin: Twin) -> str:
+def spectra(run: "xr.Dataset", twin: Twin) -> str:
     """Describe the order spectra: what lies above `ORDER`."""
     found = shaking(run)
     sentences = [
@@ -214,7 +217,7 @@ def spectra(run: xr.Dataset, twin: Twin) -> str:
     return " ".join(sentences) + caution(run)
 
 
-def analyst(run: xr.Dataset, twin: Twin) -> str:
+def analyst(run: "xr.Dataset", twin: Twin) -> str:
     """Describe a revolution as an analyst reads it: peaks, reversals, valve events, impacts."""
     found, case = read_cycle(run), case_of(run)
     kind = "The acceleration of the crosshead"
@@ -259,7 +262,7 @@ def loudest(found: Cycle) -> tuple[float, float]:
     return float(np.abs(found.vibration[place])), float(found.angle[place])
 
 
-def orbits(run: xr.Dataset, twin: Twin) -> str:
+def orbits(run: "xr.Dataset", twin: Twin) -> str:
     """Describe the orbits: how far out the journals are, and whether they leave the wall."""
     found = orbit(run)
     _, revolution = last_revolution(run)
@@ -281,7 +284,7 @@ def orbits(run: xr.Dataset, twin: Twin) -> str:
     return " ".join(sentences) + film(run) + caution(run)
 
 
-def modes(run: xr.Dataset, twin: Twin) -> str:
+def modes(run: "xr.Dataset", twin: Twin) -> str:
     """Describe the contact modes: their shares of the time."""
     shares = mode_shares(contact_modes(run))["share"]
     sentences = []
@@ -298,7 +301,7 @@ def modes(run: xr.Dataset, twin: Twin) -> str:
     return " ".join(["Shares of the settled time.", *sentences]) + film(run) + caution(run)
 
 
-def struck(run: xr.Dataset, twin: Twin) -> str:
+def struck(run: "xr.Dataset", twin: Twin) -> str:
     """Describe the impacts: how many, the hardest, and what they lost; with oil: dry contacts."""
     found, oil = impacts(run), film(run)
     if not found.sizes["impact"]:
@@ -438,7 +441,7 @@ def span(values: np.ndarray, form: str = ".2f") -> str:
     return f"{values.min():{form}} to {values.max():{form}}"
 
 
-def loads(run: xr.Dataset, twin: Twin) -> str:
+def loads(run: "xr.Dataset", twin: Twin) -> str:
     """Describe the loads of the last revolution: their greatest tension and compression."""
     sentences = ["Tension is positive."]
     for one, where in ((twin, ", without clearance"), (run, "")):

@@ -5,14 +5,17 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from compressor.cases import Case, CaseError, with_ideal_joints
 from compressor.metrics import JOINTS
 from compressor.physics import exact_motion, sample_segments, segments
 from compressor.solve import record
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 CLEARANCES = (0.1, 0.2, 0.3)
 FAULTS = ("big_end", "small_end", "both")
@@ -59,7 +62,7 @@ FAULT_LABELS = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)
 ACTIVE = 0.1  # of the ideal peak acceleration: where a machine is said to vibrate
 
 
-def settled_part(run: xr.Dataset) -> xr.Dataset:
+def settled_part(run: "xr.Dataset") -> "xr.Dataset":
     """Return the samples from `settle_rev` on, since start-up is not the machine."""
     time, begin = run["time"].values, run.attrs["settle"] * (1 - 1e-12)
     if time[0] >= begin:
@@ -67,7 +70,7 @@ def settled_part(run: xr.Dataset) -> xr.Dataset:
     return run.isel(time=slice(int(np.searchsorted(time, begin)), None))  # views, no copies
 
 
-def settled_revolutions(run: xr.Dataset) -> float:
+def settled_revolutions(run: "xr.Dataset") -> float:
     """Return the number of revolutions over which a run's metrics are taken."""
     return float(np.ptp(settled_part(run)["crank_angle"].values)) / math.tau
 
@@ -81,7 +84,7 @@ class Relation:
     r2: float
 
 
-def force_relation(run: xr.Dataset, joint: str) -> Relation:
+def force_relation(run: "xr.Dataset", joint: str) -> Relation:
     """Return `Relation` of a joint's settled horizontal force (N, on the rod) to acceleration."""
     settled = settled_part(run)
     a = settled["acceleration"].values
@@ -90,7 +93,7 @@ def force_relation(run: xr.Dataset, joint: str) -> Relation:
     return Relation(float(slope), float(intercept), float(np.corrcoef(a, force)[0, 1] ** 2))
 
 
-def ideal_motion(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def ideal_motion(run: "xr.Dataset") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return displacement, velocity and acceleration (SI) of the ideal machine.
 
     (m,) each, at the run's own crank angles.
@@ -100,22 +103,22 @@ def ideal_motion(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return exact_motion(run["crank_angle"].values, *lengths, case.omega)
 
 
-def case_of(run: xr.Dataset) -> Case:
+def case_of(run: "xr.Dataset") -> Case:
     """Return the case that a stored run belongs to, from its attributes."""
     return _case(run.attrs["case"])
 
 
-def record_of(run: xr.Dataset) -> np.record:
+def record_of(run: "xr.Dataset") -> np.record:
     """Return the record (SI) of the case that a stored run belongs to; not to be written."""
     return _record(run.attrs["case"])
 
 
-def load_corners(run: xr.Dataset) -> np.ndarray:
+def load_corners(run: "xr.Dataset") -> np.ndarray:
     """Return crank angles (rad) at which the phases of a run's load change, three a revolution."""
     return np.array(record_of(run).corners)
 
 
-def load_phases(run: xr.Dataset) -> np.ndarray:
+def load_phases(run: "xr.Dataset") -> np.ndarray:
     """Return the phase of the load at each sample as an integer.
 
     In order: expansion, suction, compression, discharge.
@@ -135,7 +138,7 @@ def _record(text: str) -> np.record:
     return record(_case(text))
 
 
-def active_share(run: xr.Dataset, window_deg: float = 6.0, level: float = ACTIVE) -> float:
+def active_share(run: "xr.Dataset", window_deg: float = 6.0, level: float = ACTIVE) -> float:
     """Return the share of the settled time in which the machine vibrates.
 
     It vibrates where the rms over `window_deg` of crank angle of the acceleration's deviation

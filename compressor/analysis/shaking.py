@@ -8,9 +8,9 @@ the other lies elsewhere.
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from compressor.analysis.contacts import joints_with_clearance
 from compressor.analysis.orbit import turning_points
@@ -18,12 +18,15 @@ from compressor.analysis.runs import case_of, ideal_motion, record_of, settled_p
 from compressor.cases import Case, with_ideal_joints
 from compressor.solve import SIGNALS, signals_of_scene, simulate
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 class NoSeriesError(ValueError):
     """A run without stored series, or with too few to be read."""
 
 
-def frame_forces(run: xr.Dataset) -> dict[str, np.ndarray]:
+def frame_forces(run: "xr.Dataset") -> dict[str, np.ndarray]:
     """Return the signals of `compressor.solve.series` by name, at all samples of a run; SI.
 
     They are those that the run has stored, or follow from its time series. A machine with features
@@ -50,7 +53,7 @@ def frame_forces(run: xr.Dataset) -> dict[str, np.ndarray]:
     )
 
 
-def whole_revolutions(run: xr.Dataset) -> tuple[xr.Dataset, int]:
+def whole_revolutions(run: "xr.Dataset") -> "tuple[xr.Dataset, int]":
     """Return the settled samples up to the last whole revolution's end, and how many they are.
 
     Raises NoSeriesError for a run without time series, or that settles within less than one.
@@ -66,7 +69,7 @@ def whole_revolutions(run: xr.Dataset) -> tuple[xr.Dataset, int]:
     return settled.isel(time=slice(beyond)), count  # views, no copies
 
 
-def last_revolution(run: xr.Dataset) -> tuple[np.ndarray, xr.Dataset]:
+def last_revolution(run: "xr.Dataset") -> "tuple[np.ndarray, xr.Dataset]":
     """Return the last whole settled revolution, both ends included, and its crank angles (degrees).
 
     The first angle lies from 0 to 360. Raises NoSeriesError as `whole_revolutions`.
@@ -78,7 +81,7 @@ def last_revolution(run: xr.Dataset) -> tuple[np.ndarray, xr.Dataset]:
     return angle - 360.0 * np.floor(angle[0] / 360.0 + 1e-9), settled.isel(time=slice(first, None))
 
 
-def healthy_twin(run: xr.Dataset, sensed: bool = False) -> xr.Dataset:
+def healthy_twin(run: "xr.Dataset", sensed: bool = False) -> "xr.Dataset":
     """Return the run of the same machine with ideal joints, on the run's output grid.
 
     From closed forms, or simulated where a feature leaves none: it may then fail. Without error
@@ -149,7 +152,7 @@ class Shaking:
         return near_a_turn(angle, self.turns)
 
 
-def shaking(run: xr.Dataset) -> Shaking:
+def shaking(run: "xr.Dataset") -> Shaking:
     """Return the `Shaking` of a run with time series; of ideal joints there are no turns.
 
     Raises NoSeriesError where the series hold no whole settled revolution, RecordError where they
@@ -182,7 +185,7 @@ def shaking(run: xr.Dataset) -> Shaking:
     )
 
 
-def evenly(settled: xr.Dataset, revolutions: int, values: np.ndarray) -> tuple[np.ndarray, int]:
+def evenly(settled: "xr.Dataset", revolutions: int, values: np.ndarray) -> tuple[np.ndarray, int]:
     """Return a signal resampled at equal crank angles, and their even number a turn.
 
     values: a signal of `whole_revolutions`.
@@ -207,7 +210,7 @@ def order_lines(even: np.ndarray, a_turn: int) -> Spectrum:
     return Spectrum(np.arange(amplitudes.size), amplitudes, above)
 
 
-def deviation_spectrum(run: xr.Dataset) -> Spectrum:
+def deviation_spectrum(run: "xr.Dataset") -> Spectrum:
     """Return the order spectrum of the acceleration less the ideal machine's, m/s2.
 
     Of the crosshead, over whole settled revolutions. Raises NoSeriesError where there is none.
@@ -217,7 +220,7 @@ def deviation_spectrum(run: xr.Dataset) -> Spectrum:
     return order_lines(*evenly(settled, revolutions, deviation))
 
 
-def directions_change(settled: xr.Dataset) -> tuple[float, ...]:
+def directions_change(settled: "xr.Dataset") -> tuple[float, ...]:
     """Return the crank angles (degrees) at which forces along the cylinder change sign.
 
     Of all joints with clearance, in rising order.
@@ -256,7 +259,7 @@ class SensorEnvelope:
     kurtosis: float
 
 
-def sensor_envelope(run: xr.Dataset) -> SensorEnvelope | None:
+def sensor_envelope(run: "xr.Dataset") -> SensorEnvelope | None:
     """Return the envelope spectrum of a run's sensor.
 
     None where it has none, or too short a record.

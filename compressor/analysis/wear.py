@@ -1,16 +1,19 @@
 """What rubs in a joint during a run, and when a clearance that wear opens reaches a value."""
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from compressor.analysis.contacts import contact_series, joints_with_clearance
 from compressor.analysis.runs import record_of, settled_part, settled_revolutions
 from compressor.metrics import JOINTS
 
+if TYPE_CHECKING:
+    import xarray as xr
 
-def rubbing_work(run: xr.Dataset) -> np.ndarray:
+
+def rubbing_work(run: "xr.Dataset") -> np.ndarray:
     """Return normal force times sliding (J a revolution) at each joint of a run, (joint,).
 
     Archard's wear is in proportion to it. Over the settled revolutions, by the samples of the time
@@ -34,7 +37,7 @@ def rubbing_work(run: xr.Dataset) -> np.ndarray:
     return found
 
 
-def tilt_of(run: xr.Dataset) -> np.ndarray:
+def tilt_of(run: "xr.Dataset") -> np.ndarray:
     """Return the crosshead's tilt (rad, counter-clockwise) at a run's samples; 0 without play."""
     return run["guide_tilt"].values if "guide_tilt" in run else np.zeros(run.sizes["time"])
 
