@@ -204,16 +204,16 @@ def joint_contact(eccentricity, spins, bearing, carried, p):
     pin, clearance, stiffness = bearing
     distance = square_root(ex * ex + ey * ey)
     penetration = distance - clearance
-    if distance == 0.0:
-        return ContactState(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    per_distance = 1.0 / distance
-    nx = ex * per_distance
-    ny = ey * per_distance
-    rate = ex_rate * nx + ey_rate * ny
     bore = pin + clearance
     arm = pin - penetration
     journal_spin, rod_spin = spins
     turning = journal_spin * arm - rod_spin * bore
+    if distance == 0.0:  # surfaces slip all the same: what bends by that must not start with a jump
+        return ContactState(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, turning, 0.0, 0.0, 0.0, 0.0)
+    per_distance = 1.0 / distance
+    nx = ex * per_distance
+    ny = ey * per_distance
+    rate = ex_rate * nx + ey_rate * ny
     slip = ey_rate * nx + (turning - ex_rate * ny)
     approach, bristle = carried
     normal, elastic, unclamped = normal_force(penetration, rate, approach, stiffness, clearance, p)

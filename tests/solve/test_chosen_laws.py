@@ -19,6 +19,7 @@ from compressor.solve.cautions import remarks
 from compressor.solve.horizon import (
     predictability_horizon,
 )
+from compressor.solve.run import run_at_tolerance
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.explain import terms, unknown_names
 
@@ -200,3 +201,12 @@ def test_explain_names_laws_and_bristles():
     one = Case.resolve({**values, "joint": "big_end"})
     assert unknown_names(one)[2:] == ("bristles at the big end, m",)
     assert len(unknown_names(Case.resolve({"joint": "both", "clearance_mm": 0.2}))) == 4
+
+
+def test_bristles_start_without_a_jump():
+    """Concentric circles had no slip, and a moment later 0.6 m/s: at 1e-12 no step was accepted."""
+    case = Case.from_values({
+        "joint": "big_end", "clearance_mm": 0.2, "friction": {"law": "lugre"},
+        "solve": {"duration_rev": 0.02, "settle_rev": 0},
+    })  # fmt: skip
+    assert run_at_tolerance(case, 1e-12, 60.0, False).reason == ""
