@@ -52,7 +52,7 @@ STATISTICS = {
 }
 STIFF = 8.0  # evaluations a step: more are the stiff partner's
 MAX_SCIPY_STEPS = 2000  # steps: such a run SciPy's methods can judge
-MORE_STEPS = 5  # times the run's budget: a judge's
+MORE_STEPS, MOST_STEPS = 5, 10**12  # times the run's budget: a judge's, and what a case may have
 SECONDS, SCIPY_SECONDS = 30.0, 5.0  # that a judge may take, a compiled one and one of SciPy's
 
 
@@ -186,12 +186,17 @@ def tolerance(rtol: float, share: float = TIGHTER) -> float:
     return max(share * rtol, TIGHTEST)
 
 
+def judge_steps(case: Case) -> int:
+    """Return the budget of steps of who judges a run of a case."""
+    return min(MORE_STEPS * case.solve.max_steps, MOST_STEPS)
+
+
 def run_judge(case: Case, method: str, rtol: float, result: StressFinding) -> Solution | None:
     """Return a judge's run of a case, if it reaches its end."""
     seconds = SECONDS if method in COMPILED else SCIPY_SECONDS
     settings = replace(
         case.solve, method=method, rtol=rtol, accuracy="standard",
-        max_steps=MORE_STEPS * case.solve.max_steps,
+        max_steps=judge_steps(case),
     )  # fmt: skip
     other = run_at_tolerance(replace(case, solve=settings), rtol, seconds, True)
     result.by.append(f"({method})" if other.reason else method)
@@ -238,6 +243,6 @@ def size(name: str, metrics: dict[str, Any]) -> float:
 
 def horizon(case: Case) -> int:
     """Return the parts of the span in which a shifted run stays close, as far as known."""
-    patient = replace(case, solve=replace(case.solve, max_steps=MORE_STEPS * case.solve.max_steps))
+    patient = replace(case, solve=replace(case.solve, max_steps=judge_steps(case)))
     seconds = predictability_horizon(patient, SECONDS)
     return PARTS if seconds == math.inf else int(PARTS * seconds / case.duration)
