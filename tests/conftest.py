@@ -76,12 +76,12 @@ TOGETHER = {
 # once: the march, chosen laws, mechanisms
 LONG = (
     "physics/test_march", "physics/test_contact_laws", "solve/test_chosen_laws",
-    "campaigns/test_chaos_processes", "solve/test_feature_runs", "sweep/test_execution",
-    "campaigns/test_chaos_files", "cases/test_load", "studies/stress/test_stress",
-    "solve/test_integrate", "test_pages", "test_tutorial", "sweep/test_cluster",
-    "sweep/test_sweep", "report/test_report", "cmd/test_cli", "store/test_writer",
-    "store/test_threads", "test_newcomer", "studies/test_studies", "test_systems",
-    "campaigns/test_mutants",
+    "solve/test_feature_runs", "sweep/test_cluster", "sweep/test_execution",
+    "report/test_report", "cases/test_card", "campaigns/test_chaos_files", "cmd/test_cli",
+    "sweep/test_sweep", "solve/test_integrate", "test_newcomer", "store/test_writer",
+    "studies/follow/test_lyapunov", "test_systems", "studies/compare/test_compare",
+    "studies/calibrate/test_calibrate_command", "campaigns/test_calibrate_campaign",
+    "test_tutorial", "studies/stress/test_stress", "report/test_second_sets",
 )  # fmt: skip
 
 

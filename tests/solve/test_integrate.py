@@ -80,7 +80,7 @@ def test_every_compiled_method_is_in_the_table():
     ],
 )
 def test_energy_residual_of_every_method(joint, method):
-    span = 0.5 if method in COMPILED else 0.2  # SciPy's methods step in Python
+    span = 0.5 if method in COMPILED else 0.1  # SciPy's methods step in Python
     found = run(joint, 0.3, duration_rev=span, settle_rev=0, rtol=1e-5, method=method)
     assert str(found["status"].values) == "ok"
     assert 0 < float(found["energy_residual"]) <= residual_bound(found, revolutions=1)

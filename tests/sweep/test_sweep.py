@@ -23,7 +23,7 @@ SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides 
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 BOTH = {"joint": "both", "clearance_mm": 0.1}
-LATE = {**BOTH, "solve": {"method": "LSODA", "timeout_s": 1e-9}}  # out of time at its first step
+LATE = {**BOTH, "solve": {"method": "DOP853", "timeout_s": 1e-9}}  # out of time at its first step
 
 
 @pytest.fixture
@@ -112,7 +112,7 @@ def flipped(data):
     return data[:-9] + bytes([data[-9] ^ 1]) + data[-8:]
 
 
-@pytest.mark.parametrize("damage", [lambda _: b"", lambda _: b"not a job", flipped])
+@pytest.mark.parametrize("damage", [lambda _: b"", flipped])
 @pytest.mark.parametrize("kind", ["jobs", "rows", "studies"])
 def test_damage_is_mended_by_the_same_run(kind, damage, studies, tmp_path, in_process):
     made = studies(one={"load": ["none", "spring"]})
@@ -365,7 +365,7 @@ def test_a_copied_folder_compiles_again(tmp_path, monkeypatch):
     assert len(loaded) == 2
 
 
-def test_a_job_that_cannot_be_stored_ends_the_sweep(studies, tmp_path):
+def test_a_job_that_cannot_be_stored_ends_the_sweep(studies, tmp_path, in_process):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/jobs").symlink_to("nowhere")
     with pytest.raises(store.StoreError, match=r"out/jobs: is a link that leads nowhere"):
