@@ -12,9 +12,9 @@ import compressor
 
 PAGE = Path(__file__).parent.parent / "compressor" / "API.md"
 SECTIONS = {
-    "Cases": ("load_cases", "Case"),
+    "Cases": ("load_cases", "Case", "PerJoint"),
     "Groups of a case": (
-        "PerJoint", "HealthyClearance", "Offset", "Machine", "Gas", "Spring", "Contact", "Friction",
+        "Offset", "Machine", "Gas", "Spring", "Contact", "Friction",
         "Lubricant", "Guide", "Drive", "Rod", "Wear", "Body", "Sensor", "Solve", "Output",
     ),
     "Runs": ("simulate",),

@@ -69,11 +69,11 @@ def explain(configs, jobs, models, vary, folder, as_json, **how) -> int:
 
 def check_varied(keys: Sequence[str]) -> None:
     """Raise UsageError for a key that has no plausible range."""
-    from compressor.cases import PER_PART, suggestion, table
+    from compressor.cases import row_of, suggestion
 
     for key in keys:
         whole, _, part = key.rpartition(".")
-        row = table().get(PER_PART.get(whole, {}).get(part, key))
+        row = row_of(key)
         if row is None:
             raise click.UsageError(f"--vary {key}: unknown key{suggestion(part, whole)}")
         if row.plausible is None:

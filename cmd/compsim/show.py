@@ -86,12 +86,15 @@ def show(words, folder, case, reversal, units, as_json) -> int:
 
 def changed_values(case: "Case") -> Iterator[str]:
     """Yield the values of a case that are not the usual ones, as --set takes them."""
-    from compressor.cases import Case, table, value_in
+    from functools import partial
+
+    from compressor.cases import Case, keys_of, row_of, value_in
 
     values, usual = case.values(), Case().values()
-    for key, row in table().items():
-        value = value_in(values, key)
-        if key != "name" and value not in (None, value_in(usual, key), row.default):
+    for key in keys_of(partial(value_in, values)):
+        value, row = value_in(values, key), row_of(key)
+        default = row.default if row else None
+        if key != "name" and value not in (None, value_in(usual, key), default):
             yield f"{key}={value}"
 
 

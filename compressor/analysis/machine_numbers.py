@@ -16,7 +16,15 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.analysis.cylinder import card_works, ideal_cycles
-from compressor.cases import Case, Study, joint_stiffness, row_of, value_in, with_ideal_joints
+from compressor.cases import (
+    Case,
+    Study,
+    joint_stiffness,
+    row_of,
+    stands_for,
+    value_of,
+    with_ideal_joints,
+)
 from compressor.metrics import JOINTS
 from compressor.physics import ideal_forces, segments
 from compressor.solve import record
@@ -85,7 +93,7 @@ USUAL = {
         below=("gas.clearance_percent", "it is in per cent of the swept volume: 17, not 0.17"),
     ),
     "cylinder, clearance at the crank": Usual(
-        1.0, math.inf, ("gas.clearance_percent", "gas.crank_clearance_percent"),
+        1.0, math.inf, ("gas.clearance_percent",),
         below=("gas.clearance_percent", "it is in per cent of the swept volume: 17, not 0.17"),
     ),
     # 0.3 to 3; plungers of the highest pressures have less
@@ -129,7 +137,7 @@ USUAL |= {
     for name, usual in {
         # new bushes: 0.5 to 1.5; a bush is scrapped at two to three times that
         "clearance over pin": Usual(
-            0.0, 5.0, ("machine.pin_radius_mm", "machine.small_end_pin_radius_mm"),
+            0.0, 5.0, ("machine.pin_radius_mm",),
             above=("clearance_mm", "it is radial, half of the diametral clearance: far worn, or "
                    "the diametral one is given"),
         ),
@@ -198,7 +206,7 @@ class MachineDescription:
         return found
 
 
-LOADS = ("gas.discharge_MPa", "gas.indicator", "gas.crank_indicator")
+LOADS = ("gas.discharge_MPa", "gas.indicator.head", "gas.indicator.crank")
 # key that a caution or a remark is about -> keys of others that it explains, too
 EXPLAINED = {
     "machine.speed_rpm": ("machine.stroke_mm", "gas.bore_mm"),
@@ -301,7 +309,7 @@ def _numbers_of_sound(sound: Case) -> Named:
         yield "cylinder, bore over stroke", (bore_ratio, "")
     centre = (machine.rod_centre_mm or 0.0) / machine.rod_length_mm
     yield "rod, mass centre over length", (centre, "")
-    pins = sum(machine.pin_radius(joint) for joint in JOINTS)
+    pins = sum(machine.pin_radius_mm.at(joint) for joint in JOINTS)
     yield "rod, both pins over length", (pins / machine.rod_length_mm, "")
     if sound.load != "none":
         yield from _both_sides(f"{sound.load} load", loads.gas)
@@ -324,7 +332,7 @@ def _numbers_of_sound(sound: Case) -> Named:
         yield "piston rod, stress", (peak / (math.pi / 4.0 * rod**2), "MPa")
     for joint, peak in zip(JOINTS, loads.sizes.max(axis=0), strict=True):
         name = joint.replace("_", " ")
-        yield f"{name}, pin diameter", (2.0 * machine.pin_radius(joint), "mm")
+        yield f"{name}, pin diameter", (2.0 * machine.pin_radius_mm.at(joint), "mm")
         yield f"{name}, peak load", (1e-3 * float(peak), "kN")
 
 
@@ -364,19 +372,20 @@ def _numbers_of_pins(case: Case, sound: dict[str, tuple[float, str]]) -> Named:
         clearance, name = getattr(case.clearance_mm, joint), joint.replace("_", " ")
         if not clearance:
             continue
-        pin = 2.0 * case.machine.pin_radius(joint)
+        pin = 2.0 * case.machine.pin_radius_mm.at(joint)
         yield f"{name}, diametral clearance", (2.0 * clearance, "mm")
         yield f"{name}, clearance over pin", (2e3 * clearance / pin, "‰")
-        length = case.contact.at(joint).length_mm
+        length = case.contact.length_mm.at(joint) if case.contact.length_mm else 0.0
         if case.lubricant:
-            length = case.lubricant.bearing_length(joint)
+            length = case.lubricant.bearing_length_mm.at(joint)
         if length:
             peak = 1e3 * sound[f"{name}, peak load"][0]
             yield f"{name}, length over pin", (length / pin, "")
             yield f"{name}, pressure", (peak / (pin * length), "MPa")
         if case.contact.law not in ("johnson", "liu"):
-            contact, exponent = case.contact.at(joint), case.contact.exponent
-            stiffness = joint_stiffness(contact, pin / 2.0, clearance) / 1000.0**exponent
+            exponent = case.contact.exponent
+            stiffness = joint_stiffness(case.contact, joint, pin / 2.0, clearance)
+            stiffness /= 1000.0**exponent
             yield f"{name}, K", (float(f"{stiffness:.3g}"), f"N/mm^{exponent:g}")
 
 
@@ -398,7 +407,7 @@ def _over_cases(
         key = "lubricant.bearing_length_mm" if cases[0].lubricant else "contact.length_mm"
         hint = hint.rpartition("; or ")[2]
     if gas and gas.is_measured and key == "gas.discharge_MPa":
-        key = "gas.indicator" if "head" in gas.cards else "gas.crank_indicator"
+        key = f"gas.indicator.{next(iter(gas.cards))}"
         hint = hint.replace(IN_MPA, OF_CARD)
     if name == "rod, crank ratio" and plain.high < LONG_ROD:
         key, hint = "machine.rod_length_mm", f"it is in mm; or the stroke is too short: {STROKE}"
@@ -414,8 +423,9 @@ GAS_KEYS = ("gas.suction_MPa", "gas.discharge_MPa")
 
 def _is_own(case: Case, keys: Sequence[str]) -> bool:
     """Return whether any of some keys differs from the paper's machine."""
-    values, rows = case.values(), [row for key in keys if (row := row_of(key))]
-    return any(value_in(values, row.key) not in (None, row.default) for row in rows)
+    parts = [part for key in keys for part in stands_for(key) or (key,)]
+    rows = [row for part in parts if (row := row_of(part))]
+    return any(value_of(case, row.key) not in (None, row.default) for row in rows)
 
 
 def _format(value: float) -> str:

@@ -10,7 +10,7 @@ from compressor.cases.case import (
 )
 from compressor.cases.checks import (
     DOUBLES,
-    PER_PART,
+    keys_of,
     phrase_of,
     row_of,
     stands_for,
@@ -18,7 +18,6 @@ from compressor.cases.checks import (
     value_in,
     value_of,
     values_given,
-    written_key,
 )
 from compressor.cases.conflicts import back_action, judged_range, outside_judged, reads
 from compressor.cases.examples import templates
@@ -27,15 +26,14 @@ from compressor.cases.groups import (
     Contact,
     Friction,
     Gas,
-    HealthyClearance,
     Machine,
     Offset,
     Output,
-    PerJoint,
     Solve,
     Spring,
 )
 from compressor.cases.json_schema import case_schema
+from compressor.cases.keys import path_of, put
 from compressor.cases.laws import CYLINDRICAL, READ_BY, law_of
 from compressor.cases.load import load_cases, load_studies
 from compressor.cases.materials import joint_stiffness, paper_notes
@@ -45,6 +43,7 @@ from compressor.cases.parameter import (
     IMPLAUSIBLE,
     TIGHTEST,
     CaseError,
+    PerJoint,
     to_si,
 )
 from compressor.cases.study import Axis, Study, points

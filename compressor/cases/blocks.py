@@ -1,248 +1,385 @@
 """A block of a case file: fixed values, and factors of swept ones that multiply.
 
 A factor is one key, or several whose values advance together: a `zip` group, or the keys of a
-sampling design. Counts are known first (`draft`); values are made when the counts are bearable
-(`Draft.block`), and a combination of them on access (`Block.chosen`).
+sampling design. Counts are known first (`plan_block`); values are made when the counts are bearable
+(`Plan.block`), and each job's on access (`Block.values_of`).
 """
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from compressor.cases.checks import SWEEP, check_value, row_of, suggestion
-from compressor.cases.combinations import Block, Row
+from compressor.cases.case import Case
+from compressor.cases.checks import hold, row_of, stands_for, suggestion, value_in
 from compressor.cases.comparison import NoComparison, Test, comparison
-from compressor.cases.keys import Leaves
-from compressor.cases.parameter import quote_value
-from compressor.cases.swept import (
-    SAMPLED,
-    SweptKey,
-    design,
-    design_size,
-    is_swept,
-    sweep_of,
-)
-from compressor.cases.table import WORDS, outside_identity, table
-from compressor.cases.yaml_reader import FileProblem, Node
+from compressor.cases.conflicts import IN_PLACE_OF
+from compressor.cases.keys import dotted, drop, leaves, path_of, put
+from compressor.cases.parameter import CaseError, quote_value
+from compressor.cases.swept import FORMS, NoSweep, Sweep, design, design_size, sweep_of
+from compressor.cases.table import OF_JOINTS, WORDS, outside_identity
+from compressor.cases.yaml_reader import FileProblem, Path, Place, Tree
 
 MAX_EXCLUSIONS = 20
 MAX_SEED = 2**63
+NUMBERS = ("number", "integer")  # kinds of keys that forms sweep
+RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
+
+Row = tuple[Any, ...]
 
 
-@dataclass
-class Draft:
-    """A block that is being read: what is swept, how, and what is wrong with it."""
+@dataclass(frozen=True)
+class Block:
+    """The jobs of a block: every combination of its factors' values, but for those left out.
 
-    leaves: Leaves
-    problems: list[FileProblem]
-    fixed: dict[str, Node] = field(default_factory=dict)
-    sweeps: dict[str, SweptKey] = field(default_factory=dict)
-    factors: list[tuple[str, ...]] = field(default_factory=list)  # keys that advance together
+    name: of the study. `given` has what is given by dotted key, `fixed` what is not swept of it,
+    nested, and `sweeps` how the rest is; a factor has keys, and the rows of their values together.
+    """
+
+    name: str
+    tree: Tree
+    fixed: dict[str, Any]
+    sweeps: dict[str, Sweep]
+    given: dict[str, Any]
+    factors: tuple[tuple[tuple[str, ...], list[Row]], ...] = ()
+    numbers: Sequence[int] = ()  # of the combinations that are not excluded, in C order
+    is_grid: bool = False  # whether every key is an axis of its own, and no combination is left out
+
+    def places(self, number: int) -> list[int]:
+        """Return which of its rows each factor has in one combination."""
+        found = []
+        for _, rows in reversed(self.factors):
+            number, place = divmod(number, len(rows))
+            found.append(place)
+        return found[::-1]
+
+    def swept(self, number: int) -> dict[str, Any]:
+        """Return the swept values of one combination by dotted key."""
+        found: dict[str, Any] = {}
+        for (keys, rows), place in zip(self.factors, self.places(number), strict=True):
+            found.update(zip(keys, rows[place], strict=True))
+        return found
+
+    def values_of(self, number: int) -> dict[str, Any]:
+        """Return the values of one combination, nested as a case file has them."""
+        values, swept = self.fixed, self.swept(number)
+        for key, value in swept.items():
+            values = put(values, self.sweeps[key].path, value)
+        if swept.get("joint") == "none":
+            for key in OF_JOINTS:
+                values = drop(values, (key,))
+        return values
+
+    def case(self, number: int) -> Case:
+        """Return the case of one combination. Raises CaseError where its values do not fit."""
+        return Case.resolve({"name": self.name or "case", **self.values_of(number)})
+
+    def solver_of(self, number: int) -> tuple[int, ...]:
+        """Return the places of the factors by which cases differ in `solve` or `output`."""
+        pairs = zip(self.factors, self.places(number), strict=True)
+        groups = ("solve", "output")
+        return tuple(place for (keys, _), place in pairs if any(k.startswith(groups) for k in keys))
+
+    def where(self, test: Test) -> list[bool]:
+        """Return whether a comparison holds, of each job."""
+        return [test(reader(self.values_of(number))) for number in self.numbers]
+
+    def each_value(self) -> Iterator[tuple[dict[str, Any], dict[str, int]]]:
+        """Yield values of jobs, with rows by key, in which each value stands once at least."""
+        for number in range(max((len(rows) for _, rows in self.factors), default=1)):
+            values, found = dict(self.fixed), {}
+            for keys, rows in self.factors:
+                for key, value in zip(keys, rows[number % len(rows)] if rows else (), strict=False):
+                    values = put(values, self.sweeps[key].path, value)
+                    found[key] = number % len(rows)
+            yield values, found
+
+    def rows_of(self, number: int) -> dict[str, int]:
+        """Return which row each swept key has in one combination."""
+        pairs = zip(self.factors, self.places(number), strict=True)
+        return {key: place for (keys, _), place in pairs for key in keys}
+
+    def locate(
+        self, error: CaseError, rows: Mapping[str, int], path: str
+    ) -> dict[Any, FileProblem]:
+        """Return a case's problems at the values that they are about, by what tells them apart.
+
+        Of wrong values that a form has made that is their key: the first is enough. rows: which
+        row each swept key has in the case; path: of the file.
+        """
+        found: dict[Any, FileProblem] = {}
+        for problem in error.problems:
+            parts = problem.key.split(".")
+            above = (".".join(parts[:n]) for n in range(len(parts), 0, -1))
+            key = next((one for one in above if one in rows), None)
+            if key is None:
+                found[problem] = FileProblem(
+                    self._place_of(problem.key, path), problem.key, problem.message
+                )
+                continue
+            sweep, message = self.sweeps[key], problem.message
+            if not sweep.has_ends:
+                of = next(len(found) for keys, found in self.factors if key in keys)
+                message = tell_draw(rows[key] + 1, of, message)
+            once = key if sweep.kind != "list" and not error.is_misfit else problem
+            place = self.place(sweep.place_of(rows[key]))
+            found.setdefault(once, FileProblem(place, problem.key, message))
+        return found
+
+    def _place_of(self, key: str, path: str) -> Place:
+        """Return where a key stands, or its group, or the block; path: of the file."""
+        places = self.tree.places
+        if path_of(key) in places:
+            return places[path_of(key)][1]
+        spots = places.get((key.partition(".")[0],), places.get(()))
+        return spots[0] if spots else Place(path, 1, 1)
+
+    def place(self, path: Path) -> Place:
+        """Return where the value at a path stands, or what it is in."""
+        return self.tree.places[self.nearest(path)][1]
+
+    def key_place(self, path: Path) -> Place:
+        """Return where the key at a path stands, or what it is in."""
+        return self.tree.places[self.nearest(path)][0]
+
+    def nearest(self, path: Path) -> Path:
+        """Return a path, or that of the nearest thing that holds it and stands in the file."""
+        while path and path not in self.tree.places:
+            path = path[:-1]
+        return path
+
+
+def tell_draw(number: int, of: int, message: str) -> str:
+    """Return what is wrong with a value drawn from a distribution without ends."""
+    return (
+        f"draw {number} of {of}: {message}: a normal distribution has no ends; give it a smaller "
+        "sd, or draw from {triangular: [least, likeliest, greatest]}"
+    )
+
+
+def reader(values: Mapping[str, Any]) -> Callable[[str], Any]:
+    """Return the function that gives the value of a key in nested ones, or its default, or None."""
+
+    def value(key: str) -> Any:
+        found = value_in(values, key)
+        row = row_of(key)
+        if found is not None:
+            return found
+        if RIVALS.get(key) and value_in(values, RIVALS[key]) is not None:
+            return None
+        return row.default if row and not stands_for(key) else None
+
+    return value
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A block whose jobs are counted and not yet made; `samples` and `seed` are those of a design.
+
+    `factors` has the keys that advance together.
+    """
+
+    tree: Tree
+    given: dict[str, Any]
+    fixed: dict[str, Any]
+    sweeps: dict[str, Sweep]
+    factors: list[tuple[str, ...]] = field(default_factory=list)
     samples: int = 0
     seed: int = 0
     exclusions: list[Test] = field(default_factory=list)
 
-    def refuse(self, node: Node, key: str, message: str) -> None:
-        self.problems.append(FileProblem(node.place, key, message))
-
-    @property
-    def is_sampled(self) -> bool:
-        """Return whether any key is drawn by a design."""
-        return any(sweep.kind in SAMPLED for sweep in self.sweeps.values())
-
     def sizes(self) -> dict[str, int]:
         """Return how many values each factor has, by its keys."""
-        return {" with ".join(keys): self.size(keys[0]) for keys in self.factors}
+        return {" with ".join(keys): self.size(keys) for keys in self.factors}
 
-    def size(self, key: str) -> int:
-        together = next((keys for keys in self.factors if key in keys), (key,))
-        return self.sweeps[key].count or design_size(
-            self.sweeps[key].kind, self.samples, len(together)
-        )
-
-    def block(self, name: str) -> Block:
-        """Return the block with all its values; name: of the study.
-
-        Wrong values join `problems`, and leave the block without jobs.
-        """
-        factors = tuple((keys, self.rows(keys)) for keys in self.factors)
-        count = math.prod(len(rows) for _, rows in factors)
-        if self.problems:
-            count = 0
-        is_grid = not self.exclusions and not self.is_sampled and len(factors) == len(self.sweeps)
-        block = Block(name, self.leaves, self.fixed, factors, range(count), is_grid)
-        if not self.exclusions:
-            return block
-        selected = block.where(lambda value: not any(test(value) for test in self.exclusions))
-        if count and not any(selected):
-            self.refuse(self.leaves.values["exclude"], "exclude", "leaves no job")
-        return replace(block, numbers=[*itertools.compress(range(count), selected)])
+    def size(self, keys: tuple[str, ...]) -> int:
+        """Return how many values keys that advance together have."""
+        sweep = self.sweeps[keys[0]]
+        return sweep.count or design_size(sweep.kind, self.samples, len(keys))
 
     def rows(self, keys: tuple[str, ...]) -> list[Row]:
-        """Return the values of keys that advance together; [] where any is wrong.
+        """Return the values of keys that advance together."""
+        sweeps = [self.sweeps[key] for key in keys]
+        columns: list[list[Any]] = [sweep.make() for sweep in sweeps]
+        if sweeps[0].is_drawn and self.samples:
+            points = design(sweeps[0].kind, self.samples, len(keys), self.seed)
+            shares = zip(*points, strict=True)
+            columns = [[*map(one.spread, of)] for one, of in zip(sweeps, shares, strict=True)]
+        held = [[hold(key, one) for one in of] for key, of in zip(keys, columns, strict=True)]
+        return list(zip(*held, strict=True))
 
-        Wrong values and repetitions join `problems`.
-        """
-        points: list[list[float]] = []
-        if self.sweeps[keys[0]].kind in SAMPLED:
-            points = design(self.sweeps[keys[0]].kind, self.samples, len(keys), self.seed)
-        columns = []
-        for number, key in enumerate(keys):
-            sweep = self.sweeps[key]
-            drawn = sweep.placed([sweep.spread(point[number]) for point in points])
-            columns.append(self.checked(sweep, drawn or sweep.nodes()))
-        if len({len(column) for column in columns}) > 1:
-            return []  # a value is wrong
-        rows = list(zip(*columns, strict=True))
-        seen: set[tuple[Any, ...]] = set()
-        for row in rows:
-            values = tuple(node.value for node in row)
-            if values in seen:
-                where = "in the list" if self.sweeps[keys[0]].kind == "list" else "among its values"
-                listed = ", ".join(map(quote_value, values))
-                self.refuse(row[0], " with ".join(keys), f"{listed} is {where} twice")
-            seen.add(values)
-        return rows
-
-    def checked(self, sweep: SweptKey, nodes: Sequence[Node]) -> list[Node]:
-        """Return the valid ones of a key's values; the others join `problems`.
-
-        Of wrong values that a form such as `linspace` has made, the first alone.
-        """
-        valid = []
-        for number, node in enumerate(nodes, 1):
-            value = check(sweep.key, node, self.problems)
-            if value is None and not sweep.has_ends:
-                wrong = self.problems.pop()
-                ends = "{triangular: [least, likeliest, greatest]}"
-                text = f"draw {number} of {len(nodes)}: {wrong.message}: a normal distribution has"
-                text += f" no ends; give it a smaller sd, or draw from {ends}"
-                self.problems.append(replace(wrong, message=text))
-            if value:
-                valid.append(value)
-            elif sweep.kind != "list":
-                break
-        return valid
+    def block(self, name: str) -> tuple[Block, list[FileProblem]]:
+        """Return the block with all its values, and those that it has twice; name: of the study."""
+        factors = tuple((keys, self.rows(keys)) for keys in self.factors)
+        single_keys = not self.exclusions and all(len(keys) == 1 for keys in self.factors)
+        is_grid = single_keys and not any(sweep.is_drawn for sweep in self.sweeps.values())
+        numbers = range(math.prod(len(rows) for _, rows in factors))
+        block = Block(
+            name, self.tree, self.fixed, self.sweeps, self.given, factors, numbers, is_grid
+        )
+        problems = [*find_repeated(block)]
+        if self.exclusions and not problems:
+            kept = block.where(lambda value: not any(test(value) for test in self.exclusions))
+            block = replace(block, numbers=[*itertools.compress(numbers, kept)])
+            if not block.numbers:
+                place = block.place(("exclude",))
+                problems.append(FileProblem(place, "exclude", "leaves no job"))
+        return block, problems
 
 
-def draft(leaves: Leaves, problems: list[FileProblem]) -> Draft:
-    """Return a block as far as it is known before any value is made."""
-    block = Draft(leaves, problems)
-    for key, node in leaves.values.items():
-        if key.partition(".")[0] in SWEEP:
+def find_repeated(block: Block) -> Iterator[FileProblem]:
+    """Yield the values that keys have twice."""
+    for keys, rows in block.factors:
+        seen: set[str] = set()
+        sweep = block.sweeps[keys[0]]
+        where = "in the list" if sweep.kind == "list" else "among its values"
+        for number, row in enumerate(rows):
+            text = repr(row)
+            if text in seen:
+                listed = ", ".join(map(quote_value, row))
+                place = block.place(sweep.place_of(number))
+                yield FileProblem(place, " with ".join(keys), f"{listed} is {where} twice")
+            seen.add(text)
+
+
+def plan_block(tree: Tree) -> tuple[Plan, list[FileProblem]]:
+    """Return a block as far as it is known before any value is made, and what is wrong with it."""
+    fixed: dict[str, Any] = {}
+    sweeps: dict[str, Sweep] = {}
+    problems = []
+    for path, value in leaves(tree.values):
+        key = dotted(path)
+        row = row_of(key)
+        if not is_swept(key, value):
+            fixed = put(fixed, path, hold(key, value))
             continue
-        if not is_swept(key, node):
-            if good := check(key, node, problems):
-                block.fixed[key] = good
-        elif key in outside_identity():
-            block.refuse(node, key, "cannot be swept: it does not change what a job computes")
-        elif sweep := sweep_of(key, node, problems):
-            block.sweeps[key] = sweep
-    sampled = _sampled_keys(block)
-    groups = [*([sampled] if sampled else []), *_zip_groups(block)]
-    first = {key: group for group in groups for key in group}
-    block.factors = list(dict.fromkeys(first.get(key, (key,)) for key in block.sweeps))
-    block.exclusions = list(_exclusions(block))
-    return block
-
-
-def check(key: str, node: Node, problems: list[FileProblem]) -> Node | None:
-    """Return a node with its value as the case holds it; None for a wrong one, a problem."""
-    if node.value is None or key in WORDS:  # reported before; or its word, which is valid
-        return node if key in WORDS and node.value is WORDS[key] else None
-    if isinstance(node.value, dict) and any(n.value is None for n in node.value.values()):
-        return None
-    row = row_of(key)
-    assert row  # an unknown key was reported when it was read
-    value, wrong = check_value(row.key, node.plain())
-    parts = node.value if isinstance(node.value, dict) else {}
-    for problem in wrong:
-        part = parts.get(problem.key.removeprefix(f"{row.key}."))
-        place, about = (part.place, problem.key) if part else (node.place, key)
-        problems.append(FileProblem(place, about, problem.message))
-    return None if wrong else replace(node, value=value)
-
-
-def _sampled_keys(block: Draft) -> tuple[str, ...]:
-    """Return the keys that one sampling design draws together, in the order of the file."""
-    keys = tuple(key for key, sweep in block.sweeps.items() if sweep.kind in SAMPLED)
-    for name, least, most in (("n", 1, math.inf), ("seed", 0, MAX_SEED)):
-        node = block.leaves.values.get(f"sample.{name}")
-        if node and not (type(node.value) is int and least <= node.value <= most):
-            block.refuse(node, f"sample.{name}", f"needs a whole number from {least}")
-        elif node and name == "n":
-            block.samples = node.value
-        elif node:
-            block.seed = node.value
-    kinds = list(dict.fromkeys(block.sweeps[key].kind for key in keys))
-    for key in keys:
-        sweep = block.sweeps[key]
-        if sweep.kind != kinds[0]:
-            message = f"one design draws all sampled keys: {kinds[0]} or {sweep.kind}, not both"
-            block.refuse(sweep.node, key, message)
-    if kinds == ["saltelli"] and len(keys) == 1:
-        message = "saltelli exchanges keys one by one: draw two or more, or draw this one by sobol"
-        block.refuse(block.sweeps[keys[0]].node, keys[0], message)
-        block.samples = 0  # their repetition is no second mistake
-    if keys and "sample.n" not in block.leaves.values:
-        message = "needs a number of samples: add `sample: {n: 64, seed: 1}` to the file"
-        block.refuse(block.sweeps[keys[0]].node, keys[0], message)
-    return keys
-
-
-def _zip_groups(block: Draft) -> Iterable[tuple[str, ...]]:
-    """Yield the good groups of `zip`: swept keys, each in one group, with equally many values."""
-    node = block.leaves.values.get("zip")
-    taken: set[str] = set()
-    for keys, group in _words(block, node) if node else ():
-        swept = [key for key in keys if key in block.sweeps]
-        sizes = {key: block.sweeps[key].count for key in swept}
-        unswept = [key for key in keys if key not in swept]
-        if any(block.sweeps[key].kind in SAMPLED for key in swept):
-            block.refuse(group, "zip", "sampled keys go together by their design already")
-        elif unswept and unswept[0] in block.leaves.values and unswept[0] not in block.fixed:
-            pass  # how it is swept is wrong, and reported
-        elif unswept:
-            hint = "" if unswept[0] in table() else suggestion(unswept[0], "")
-            block.refuse(group, "zip", f"{quote_value(unswept[0])} is not swept here{hint}")
-        elif taken & {*keys} or len({*keys}) < len(keys):
-            twice = next(key for key in keys if key in taken or keys.count(key) > 1)
-            block.refuse(group, "zip", f"{twice} is named twice")
-        elif len({*sizes.values()}) > 1:
-            listed = ", ".join(f"{key} has {size}" for key, size in sizes.items())
-            block.refuse(group, "zip", f"needs equally many values of each key: {listed}")
-        else:
-            taken |= {*keys}
-            yield tuple(sorted(keys, key=[*block.sweeps].index))
-
-
-def _words(block: Draft, node: Node) -> Iterable[tuple[list[str], Node]]:
-    """Yield the groups of keys that `zip` lists."""
-    groups = node.value if isinstance(node.value, list) else [node]
-    for group in groups:
-        items = group.value if isinstance(group.value, list) else []
-        if len(items) > 1 and all(isinstance(item.value, str) for item in items):
-            yield [item.value for item in items], group
-        else:
-            message = "needs a list of groups of keys, such as [[machine.speed_rpm, clearance_mm]]"
-            block.refuse(group, "zip", message)
-
-
-def _exclusions(block: Draft) -> Iterable[Test]:
-    """Yield the comparisons of `exclude`; where one holds, a combination is left out."""
-    node = block.leaves.values.get("exclude")
-    if not node:
-        return
-    texts = node.value if isinstance(node.value, list) else [node]
-    if len(texts) > MAX_EXCLUSIONS:
-        block.refuse(node, "exclude", f"has more than {MAX_EXCLUSIONS} comparisons: join by `or`")
-    for text in texts[:MAX_EXCLUSIONS]:
-        if not isinstance(text.value, str):
-            block.refuse(text, "exclude", "needs comparisons, such as clearance_mm > 0.2")
+        place = tree.places.get(path, tree.places.get(path[:1]))
+        assert place
+        if key in outside_identity():
+            text = "cannot be swept: it does not change what a job computes"
+            problems.append(FileProblem(place[1], key, text))
             continue
+        kind = row.kind if row else ""
         try:
-            yield comparison(text.value)
+            if isinstance(value, dict) and FORMS.keys() & value and kind not in NUMBERS:
+                raise NoSweep(
+                    f"is no number, so that {next(iter(value))} cannot sweep it: give a list"
+                )
+            sweeps[key] = sweep_of(path, value, kind == "integer")
+        except NoSweep as error:
+            place = tree.places.get(path + error.path, place)
+            problems.append(FileProblem(place[1], key, str(error)))
+    wrong = {problem.key for problem in problems}
+    given = {dotted(path): value for path, value in leaves(tree.values)}
+    plan = Plan(tree, given, fixed, sweeps)
+    samples, seed, faults = _design_of(plan)
+    problems += faults
+    groups, faults = _zip_groups(plan, wrong)
+    problems += faults
+    drawn = tuple(key for key, sweep in sweeps.items() if sweep.is_drawn)
+    together = {key: group for group in [drawn, *groups] for key in group}
+    factors = list(dict.fromkeys(together.get(key, (key,)) for key in sweeps))
+    exclusions, faults = _exclusions(tree)
+    return Plan(tree, given, fixed, sweeps, factors, samples, seed, exclusions), problems + faults
+
+
+def is_swept(key: str, value: Any) -> bool:
+    """Return whether a value stands for many, unlike a pair of materials or an accuracy."""
+    if key in WORDS:
+        return False
+    if isinstance(value, dict):
+        return key != "solve.accuracy"
+    row = row_of(key)
+    is_pair = row is not None and row.kind == "materials"
+    return isinstance(value, list) and (not is_pair or any(isinstance(n, list) for n in value))
+
+
+def _design_of(plan: Plan) -> tuple[int, int, list[FileProblem]]:
+    """Return how many samples from which seed a block draws, and what is wrong with that."""
+    problems = []
+
+    def refuse(path: Path, message: str) -> None:
+        place = plan.tree.places.get(path, plan.tree.places.get(path[:1]))
+        assert place
+        problems.append(FileProblem(place[1], dotted(path), message))
+
+    drawn = [sweep for sweep in plan.sweeps.values() if sweep.is_drawn]
+    found = {"n": 0, "seed": 0}
+    given = plan.tree.values.get("sample", {})
+    for name, least, most in (("n", 1, math.inf), ("seed", 0, MAX_SEED)):
+        value = given.get(name, found[name])
+        if name in given and not (type(value) is int and least <= value <= most):
+            refuse(("sample", name), f"needs a whole number from {least}")
+        else:
+            found[name] = value
+    for sweep in drawn:
+        if sweep.kind != drawn[0].kind:
+            kinds = f"{drawn[0].kind} or {sweep.kind}"
+            refuse(sweep.path, f"one design draws all sampled keys: {kinds}, not both")
+    if len(drawn) == 1 and drawn[0].kind == "saltelli":
+        text = "saltelli exchanges keys one by one: draw two or more, or draw this one by sobol"
+        refuse(drawn[0].path, text)
+        found["n"] = 0  # their repetition is no second mistake
+    if drawn and "n" not in given:
+        text = "needs a number of samples: add `sample: {n: 64, seed: 1}` to the file"
+        refuse(drawn[0].path, text)
+    return found["n"], found["seed"], problems
+
+
+def _zip_groups(plan: Plan, wrong: set[str]) -> tuple[list[tuple[str, ...]], list[FileProblem]]:
+    """Return the groups of `zip`, swept keys with equally many values, and what is wrong with them.
+
+    wrong: keys whose sweep is wrong, which is reported already.
+    """
+    value = plan.tree.values.get("zip", [])
+    found: list[tuple[str, ...]] = []
+    problems = []
+    for number, keys in enumerate(value if isinstance(value, list) else [value]):
+        path = ("zip", number) if isinstance(value, list) else ("zip",)
+        message = _tell_zip(plan, keys, [key for group in found for key in group])
+        if message and not (isinstance(keys, list) and wrong.intersection(map(str, keys))):
+            place = plan.tree.places.get(path, plan.tree.places["zip",])
+            problems.append(FileProblem(place[1], "zip", message))
+        elif not message:
+            found.append(tuple(sorted(keys, key=[*plan.sweeps].index)))
+    return found, problems
+
+
+def _tell_zip(plan: Plan, keys: Any, taken: Sequence[str]) -> str:
+    """Return what is wrong with a group of keys that advance together; taken: by other groups."""
+    if not isinstance(keys, list) or len(keys) < 2 or not all(isinstance(k, str) for k in keys):
+        return "needs a list of groups of keys, such as [[machine.speed_rpm, clearance_mm]]"
+    swept = {key: plan.sweeps[key] for key in keys if key in plan.sweeps}
+    if any(sweep.is_drawn for sweep in swept.values()):
+        return "sampled keys go together by their design already"
+    for key in keys:
+        if key not in swept:
+            hint = "" if row_of(key) else suggestion(key, "")
+            return f"{quote_value(key)} is not swept here{hint}"
+    for number, key in enumerate(keys):
+        if key in taken or key in keys[:number]:
+            return f"{key} is named twice"
+    if len({sweep.count for sweep in swept.values()}) > 1:
+        listed = ", ".join(f"{key} has {sweep.count}" for key, sweep in swept.items())
+        return f"needs equally many values of each key: {listed}"
+    return ""
+
+
+def _exclusions(tree: Tree) -> tuple[list[Test], list[FileProblem]]:
+    """Return the comparisons of `exclude`; where one holds, a combination is left out."""
+    value = tree.values.get("exclude", [])
+    texts = value if isinstance(value, list) else [value]
+    tests, problems = [], []
+    if len(texts) > MAX_EXCLUSIONS:
+        text = f"has more than {MAX_EXCLUSIONS} comparisons: join by `or`"
+        return [], [FileProblem(tree.places["exclude",][1], "exclude", text)]
+    for number, text in enumerate(texts):
+        try:
+            if not isinstance(text, str):
+                raise NoComparison("needs comparisons, such as clearance_mm > 0.2")
+            tests.append(comparison(text))
         except NoComparison as error:
-            block.refuse(text, "exclude", str(error))
+            spots = tree.places.get(("exclude", number), tree.places["exclude",])
+            problems.append(FileProblem(spots[1], "exclude", str(error)))
+    return tests, problems

@@ -4,25 +4,24 @@ A job's key holds the version of the model: results of one version agree within 
 error bars, and a change that moves numbers further is a new version, and so makes other jobs.
 """
 
+import dataclasses
 import hashlib
 import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
-from functools import cache, cached_property, lru_cache, partial
+from functools import cache, cached_property, lru_cache
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
 from compressor.cases.card import CardError, open_card
 from compressor.cases.checks import (
-    PER_PART,
-    SHORTHANDS,
     SWEEP,
-    expand_shorthands,
     expand_synonyms,
     problems_of_case,
+    row_of,
     stands_for,
     value_of,
     values_given,
@@ -30,34 +29,47 @@ from compressor.cases.checks import (
 from compressor.cases.comparison import condition
 from compressor.cases.conflicts import (
     IN_KEY_IF_READ,
+    LED,
     conditions,
     conflicts,
     given_conflicts,
     unread_values,
     values_read,
 )
-from compressor.cases.groups import ATMOSPHERE_MPA, CARD_KEYS, Contact, HealthyClearance, Solve
+from compressor.cases.groups import ATMOSPHERE_MPA, Contact, Solve
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
 from compressor.cases.optional_groups import fill_guide, fill_wear
 from compressor.cases.parameter import (
     ACCURACY,
     CaseError,
+    PerEnd,
+    PerJoint,
+    PerMotion,
+    PerValve,
     Problem,
     Targets,
     first_tolerance,
     make_group,
     quote_value,
 )
-from compressor.cases.swept import FORMS, PAIRS
-from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, outside_identity, table
+from compressor.cases.swept import FORMS
+from compressor.cases.table import (
+    GROUPS,
+    OF_JOINTS,
+    WORDS,
+    Settings,
+    outside_identity,
+    parts_by_key,
+    table,
+)
 from compressor.cases.yaml_reader import resolve_scalar
 from compressor.metrics import JOINTS
 
 MODEL_VERSION = "3"  # of equations and of the meaning of what is stored; part of a key
 MAX_TEXTS = 4096  # groups whose texts are remembered
-SOUND = HealthyClearance()  # that no case need name
+SOUND = PerJoint(0.0, 0.0)  # a healthy clearance that no case need name
 FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder
-OWN_GAS = {key for key in table() if key.startswith("gas.")} - {*FOLLOWING}
+OWN_GAS = {key for key in (*table(), *parts_by_key()) if key.startswith("gas.")} - {*FOLLOWING}
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 # the groups with a key that results depend on; of `solve` the span and the solver are parts
@@ -78,11 +90,11 @@ class Case(Settings):
     """One fully resolved simulation: every value of a case file, in the case file's units.
 
     `Case.from_values` makes a valid one. `name` (of the study), `load` (spring, gas or none)
-    and `joint` (none, big_end, small_end or both) are words. The groups are `clearance_mm`
-    (PerJoint), `healthy_clearance_mm` (HealthyClearance), `initial_offset_mm` (Offset), `machine`,
-    `gas`, `spring`, `contact`, `friction`, `lubricant`, `guide`, `drive`, `rod`, `wear`, `body`,
-    `sensor`, `solve` and `output`, each of the class of that name; friction and the seven after it
-    may be None. A case never changes; `dataclasses.replace` makes another:
+    and `joint` (none, big_end, small_end or both) are words; `clearance_mm` and
+    `healthy_clearance_mm` have a value of each joint (PerJoint). The groups are `initial_offset_mm`
+    (Offset), `machine`, `gas`, `spring`, `contact`, `friction`, `lubricant`, `guide`, `drive`,
+    `rod`, `wear`, `body`, `sensor`, `solve` and `output`, each of the class of that name; friction
+    and the seven after it may be None. A case never changes; `dataclasses.replace` makes another:
 
     >>> from dataclasses import replace
     >>> import compressor
@@ -138,23 +150,23 @@ stroke, 240 mm
         if not isinstance(values, Mapping):
             message = f"needs a mapping of keys, such as {EXAMPLE}, not {quote_value(values)}"
             raise CaseError([Problem("", message)])
-        problems: list[Problem] = []
-        whole = plain_values(values, problems)
-        given = frozenset(values_given(whole))
+        whole, problems = plain_values(values)
+        given = find_given(whole)
         case = None
         try:
             case = adapter_of_case().validate_python(whole)
         except ValidationError as error:
             problems += problems_of_case(error, whole)
             if any(one["type"] != "value_error" or len(one["loc"]) for one in error.errors()):
-                raise CaseError(
-                    _as_written(values, map(partial(_refuse_sweep, whole), problems))
-                ) from None
+                found = problems if lenient else [_refuse_sweep(whole, one) for one in problems]
+                raise CaseError(name_as_written(whole, found)) from None
         problems += given_conflicts(str(whole.get("joint", "none")), given)
         if case is None or problems:
-            raise CaseError(_as_written(values, problems))
-        if not lenient and (unread := [*unread_values(case, _values_to_read(values), given)]):
-            raise CaseError(_as_written(values, unread))
+            raise CaseError(name_as_written(whole, problems), is_misfit=True)
+        if not lenient:
+            values = values_given(expand_synonyms(values)[0])
+            if unread := [*unread_values(case, values, given)]:
+                raise CaseError(name_as_written(whole, unread))
         return case
 
     def __post_init__(self) -> None:
@@ -217,11 +229,11 @@ stroke, 240 mm
 
     def _given_fields(self) -> Iterator[tuple[str, Any]]:
         """Yield the words and groups that make the case, by name; None of a group that is off."""
-        for name in ("name", "load", "joint", *GROUPS):
+        for name in ("name", "load", "joint", *OF_JOINTS, "healthy_clearance_mm", *GROUPS):
             value = getattr(self, name)
             is_default = (value is None and WORDS[name]) or value == SOUND
             if not (is_default or (self.joint == "none" and name in OF_JOINTS)):
-                yield name, value
+                yield name, value if isinstance(value, str) or name in GROUPS else dict(vars(value))
 
     @property
     def rtol(self) -> float:
@@ -317,27 +329,41 @@ def adapter_of_case() -> TypeAdapter[Case]:
     return TypeAdapter(Case)
 
 
-def _values_to_read(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values given, by dotted key, synonyms as the keys that they stand for."""
-    return values_given(expand_synonyms(values, []))
-
-
-def plain_values(values: Mapping[str, Any], problems: list[Problem]) -> dict[str, Any]:
-    """Return nested values without shorthands and synonyms, and with what follows from others.
+def plain_values(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
+    """Return nested values without synonyms, and with what follows from others; and problems.
 
     That is the geometry of materials, and the corners and the back pressure of a cylinder of one's
     own, which a value of it that is the paper's by chance leaves one's own.
     """
-    whole = expand_shorthands(expand_synonyms(values, problems))
-    given = values_given(whole).keys()
-    pins = given & {*PER_PART["machine.pin_radius_mm"].values()}
-    if pins and "contact.materials" in given and "contact.geometry" not in given:
+    whole, problems = expand_synonyms(values)
+    given = find_given(whole)
+    own_pin = {"machine.pin_radius_mm", "contact.materials"} <= given
+    if own_pin and "contact.geometry" not in given and isinstance(whole.get("contact"), Mapping):
         whole["contact"] = {**whole["contact"], "geometry": "internal"}
     group = whole.get("gas", {})
     if has_own_cylinder(whole, given) and isinstance(group, Mapping):
         followed = {"switching": "exact", "back_pressure_MPa": ATMOSPHERE_MPA}
         whole["gas"] = followed | dict(group)
-    return whole
+    return whole, problems
+
+
+def find_given(values: Mapping[str, Any]) -> frozenset[str]:
+    """Return the keys that nested values give, of parts both their own and that of the whole."""
+    keys = values_given(values).keys()
+    above = {str(key).rpartition(".")[0] for key in keys} & parts_by_key().keys()
+    return frozenset(keys | above | {part for key in keys for part in stands_for(key)})
+
+
+def name_as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> list[Problem]:
+    """Return the problems of parts that one value stands for as problems of that, each once."""
+    found: dict[Problem, None] = {}
+    for one in problems:
+        whole = one.key.rpartition(".")[0]
+        value = _value_at(whole, values) if whole in parts_by_key() else {}
+        by_part = isinstance(value, Mapping) or (value is None and whole in OF_JOINTS)
+        by_part |= whole == LED and one.key != stands_for(whole)[0]
+        found[one if by_part else Problem(whole, one.message)] = None
+    return [*found]
 
 
 def has_own_cylinder(values: Mapping[str, Any], given: Set[str]) -> bool:
@@ -366,10 +392,10 @@ def identity_parts(case: Case) -> dict[str, str]:
         "solver": KEY_TEXT.encode((accuracy, solve.method, solve.max_steps)),
         "facts": KEY_TEXT.encode(_facts_read(case)),
     }
+    if case.joint != "none":
+        texts["clearance_mm"] = KEY_TEXT.encode(vars(case.clearance_mm))
     for name in IDENTITY_GROUPS:
         group = getattr(case, name)
-        if case.joint == "none" and name in OF_JOINTS:
-            continue
         if group is not None:
             texts[name] = _identity_text(group, name)
         elif not WORDS[name]:
@@ -380,7 +406,7 @@ def identity_parts(case: Case) -> dict[str, str]:
 def _facts_read(case: Case) -> dict[str, Any]:
     """Return the facts that a case has and reads; each condition is tried once."""
     found, held = {}, {}
-    for key in IN_KEY_IF_READ:
+    for key in (part for one in IN_KEY_IF_READ for part in stands_for(one) or (one,)):
         value = value_of(case, key)
         for _, needed in conditions(key) if value is not None else ():
             if needed not in held:
@@ -393,19 +419,28 @@ def _facts_read(case: Case) -> dict[str, Any]:
     return found
 
 
+def _plain_parts(value: Any) -> Any:
+    """Return a value by part as a case file has it: one for all, or one of each that there is."""
+    if not isinstance(value, PerJoint | PerEnd | PerValve | PerMotion):
+        return value
+    each = {*vars(value).values()}
+    found = {
+        part: [*one] if isinstance(one, tuple) else one  # two materials
+        for part, one in vars(value).items()
+        if one is not None
+    }
+    return next(iter(found.values())) if len(each) == 1 else found
+
+
 def _plain_value(group: Any) -> dict[str, Any] | bool:
     """Return a group as a mapping of what it gives, as a case file has it; False for None."""
     if group is None:
         return False
     # `vars` has the fields in their order, since a group has nothing but fields
-    plain = {key: value for key, value in vars(group).items() if value is not None}
-    if isinstance(group, Contact) and group.materials:
-        plain["materials"] = list(group.materials)
-        if group.small_end_materials:
-            plain["small_end_materials"] = list(group.small_end_materials)
-        if group.law not in CYLINDRICAL:
-            # also the default: that of a file depends on whether it gives a pin radius
-            plain.setdefault("geometry", "external")
+    plain = {key: _plain_parts(one) for key, one in vars(group).items() if one is not None}
+    if isinstance(group, Contact) and group.materials and group.law not in CYLINDRICAL:
+        # also the default: that of a file depends on whether it gives a pin radius
+        plain.setdefault("geometry", "external")
     if isinstance(group, Solve):
         if group.rtol is not None:
             del plain["accuracy"]
@@ -434,8 +469,10 @@ def _identity_text(group: Any, name: str) -> str:
         if type(value) is float and math.isfinite(value):
             texts.append(f'"{key}":{value!r}')
         elif value is not None:
-            if key in CARD_KEYS:  # the digest counts, wherever the file is
-                value = value.rpartition("@")[2]
+            if key == "indicator":  # the digest counts, wherever the file is
+                value = {end: card and card.rpartition("@")[2] for end, card in vars(value).items()}
+            elif dataclasses.is_dataclass(value):
+                value = vars(value)
             texts.append(f'"{key}":{KEY_TEXT.encode(value)}')
     return "{" + ",".join(texts) + "}"
 
@@ -474,19 +511,9 @@ def _is_swept(key: str, value: Any) -> bool:
     if isinstance(value, Mapping):
         return bool({*value} & {*FORMS})
     many = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-    return (many and key not in PAIRS) or getattr(value, "ndim", 0) > 0
-
-
-def _as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> list[Problem]:
-    """Return the problems of a shorthand's parts as problems of the shorthand, each once."""
-    short = {
-        part: key
-        for key in SHORTHANDS
-        if key in values and not isinstance(values[key], Mapping)
-        for part in stands_for(key)
-    }
-    found = (Problem(short.get(one.key, one.key), one.message) for one in problems)
-    return [*dict.fromkeys(found)]
+    row = row_of(key)
+    many = many and not (row and row.kind == "materials")
+    return many or getattr(value, "ndim", 0) > 0
 
 
 def with_ideal_joints(case: Case, features: bool = True) -> Case:

@@ -1,12 +1,8 @@
-"""Which keys and values a case file may have: shorthands, synonyms, what was meant instead.
+"""Which keys and values a case file may have: parts, words of the trade, what was meant instead.
 
-Shorthands: a group's name with one value for several of its keys, as in `clearance_mm: 0.2`. The
-one place that knows which there are. A shorthand is an axis of a sweep like any key, so that it
-stays one until a case is built.
-
-Words of the trade: keys that are twice one of ours, and other units that are answered. A synonym is
-written out as its key when values are read, so that nothing else knows it; so is a value that a key
-has for each part, such as `pin_radius_mm: {big_end: 60, small_end: 35}`.
+A key may have a value for each part of a thing, such as `pin_radius_mm: {big_end: 60, small_end:
+35}`, or one for all; then its name is an axis of a sweep like any key. Words of the trade: keys
+that are twice one of ours, and other units that are answered.
 
 Keys that are not there, and groups that are none: their errors, in files and values alike. That of
 an unknown key names what was probably meant, or else what there is.
@@ -14,9 +10,9 @@ an unknown key names what was probably meant, or else what there is.
 
 import dataclasses
 import re
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
-from typing import Any, NamedTuple
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -24,76 +20,60 @@ from compressor.cases.card import UNITS
 from compressor.cases.groups import ATMOSPHERE_MPA
 from compressor.cases.parameter import (
     NO_VALUE,
+    PART_WORDS,
     CaseError,
     Parameter,
     Problem,
     adapter_of,
     quote_value,
 )
-from compressor.cases.table import GROUPS, WORDS, Settings, table
-from compressor.metrics import JOINTS
-
-
-class Shorthand(NamedTuple):
-    """The keys that a group's name stands for, what their value is, and a name for each of it."""
-
-    keys: tuple[str, ...]
-    phrase: str
-    each: str
-
-
-SHORTHANDS = {
-    "clearance_mm": Shorthand(
-        tuple(f"clearance_mm.{joint}" for joint in JOINTS),
-        "radial clearance, of both joints or each",
-        "radial clearance",
-    ),
-    "healthy_clearance_mm": Shorthand(
-        tuple(f"healthy_clearance_mm.{joint}" for joint in JOINTS),
-        "radial clearance up to which a joint counts as sound, of both joints or each",
-        "healthy clearance",
-    ),
-}
+from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, parts_by_key, table
 
 
 def stands_for(key: str) -> tuple[str, ...]:
-    """Return the keys that a shorthand sets; none where a key is no shorthand."""
-    return SHORTHANDS[key].keys if key in SHORTHANDS else ()
+    """Return the keys of the parts that a key may have a value for; none of another key."""
+    return tuple(f"{key}.{part}" for part in parts_by_key().get(key, ()))
 
 
 def row_of(key: str) -> Parameter | None:
-    """Return the table's row of a key, of a shorthand that of its first key; None for no key."""
+    """Return the table's row of a key, of one by part that of its first; None for no key."""
     return table().get(next(iter(stands_for(key)), key))
 
 
 def phrase_of(key: str) -> str:
     """Return the phrase of a key's values, such as "crank radius"; an unknown key as it is."""
     row = row_of(key)
-    return SHORTHANDS[key].each if key in SHORTHANDS else row.label if row else key
+    if row is None:
+        return key
+    first = next(iter(parts_by_key().get(key, ())), "")
+    return row.label.removesuffix(PART_WORDS.get(first, "")).rstrip()
 
 
-def expand_shorthands(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the nested values with every shorthand written out as the group that it stands for."""
-    return {
-        key: {name.rpartition(".")[2]: value for name in stands_for(key)}
-        if key in SHORTHANDS and not isinstance(value, Mapping)
-        else value
-        for key, value in values.items()
-    }
-
-
-def single(values: Iterable[Any]) -> Any:
-    """Return the one value that all are equal to, or None."""
-    found = {*values}
+def single(key: str, values: Iterable[Any]) -> Any:
+    """Return the one value that all parts of a key have, but for ideal joints; or None."""
+    found = {value for value in values if value is not None and (value or key not in OF_JOINTS)}
     return found.pop() if len(found) == 1 else None
+
+
+def keys_of(value: Callable[[str], Any]) -> Iterator[str]:
+    """Yield the keys of the table; of parts with one value in common the key of all of them.
+
+    value: the function that gives a key's value.
+    """
+    for key in table():
+        whole = key.rpartition(".")[0]
+        if whole not in parts_by_key() or value(whole) is None:
+            yield key
+        elif key == stands_for(whole)[0]:
+            yield whole
 
 
 def value_of(case: Settings, key: str) -> Any:
     """Return a case's value of a dotted key; None where it has none, or no single one."""
     if key in WORDS:
         return getattr(case, key) is not None
-    if key in SHORTHANDS:
-        return single(size for part in stands_for(key) if (size := value_of(case, part)) > 0)
+    if parts := stands_for(key):
+        return single(key, (value_of(case, part) for part in parts))
     value: Any = case
     for part in key.split("."):
         value = getattr(value, part, None)
@@ -103,11 +83,16 @@ def value_of(case: Settings, key: str) -> Any:
 def value_in(values: Mapping[str, Any], key: str) -> Any:
     """Return the value of a dotted key in nested values; None where it is not one value."""
     value: Any = values
-    for part in key.split("."):
+    *above, last = key.split(".")
+    for part in above:
         value = value.get(part) if isinstance(value, Mapping) else None
+    if isinstance(value, Mapping):
+        value = value.get(last)
+    elif ".".join(above) not in parts_by_key():
+        return None
     if not isinstance(value, Mapping):
         return value
-    return single(size for size in value.values() if size > 0) if key in SHORTHANDS else None
+    return single(key, value.values()) if key in parts_by_key() else None
 
 
 # key -> the key whose double it is; a file gives one of the two
@@ -115,34 +100,6 @@ DOUBLES = {
     "machine.stroke_mm": "machine.crank_radius_mm",
     "gas.bore_mm": "gas.piston_radius_mm",
 }
-# key that may have a value for each part of a thing -> the keys that these are of
-PER_PART = {
-    "machine.pin_radius_mm": {
-        "big_end": "machine.pin_radius_mm", "small_end": "machine.small_end_pin_radius_mm",
-    },
-    "gas.clearance_percent": {
-        "head": "gas.clearance_percent", "crank": "gas.crank_clearance_percent",
-    },
-    "gas.valve_loss_percent": {
-        "suction": "gas.valve_loss_percent", "discharge": "gas.discharge_loss_percent",
-    },
-    "contact.materials": {
-        "big_end": "contact.materials", "small_end": "contact.small_end_materials",
-    },
-    "contact.length_mm": {
-        "big_end": "contact.length_mm", "small_end": "contact.small_end_length_mm",
-    },
-    "lubricant.bearing_length_mm": {
-        "big_end": "lubricant.bearing_length_mm",
-        "small_end": "lubricant.small_end_bearing_length_mm",
-    },
-    "machine.balance": {
-        "rotating": "machine.balance", "reciprocating": "machine.balance_reciprocating",
-    },
-    "gas.indicator": {"head": "gas.indicator", "crank": "gas.crank_indicator"},
-}  # fmt: skip
-# parts that may stand alone: the gas may press on one face
-ONE_SUFFICES = {"gas.indicator": ("head", "crank"), "gas.clearance_percent": ("crank",)}
 # unit at the end of an unknown key -> the unit of ours, and what one of it is there
 OTHER_UNITS = {
     **{f"{unit}{end}": ("MPa", UNITS[unit]) for unit in ("bar", "psi") for end in ("", "a", "g")},
@@ -176,32 +133,14 @@ def check_double(key: str, value: Any) -> str | None:
     return dataclasses.replace(row, key=key, low=2 * row.low, high=2 * row.high).check(value)
 
 
-def by_part(key: str, value: Any) -> Mapping[str, str]:
-    """Return the keys that a value for each part is of, by part; none of any other value."""
-    keys = PER_PART.get(key, {})
-    return keys if isinstance(value, Mapping) and {*value} & {*keys} else {}
+def has_parts(key: str, value: Any) -> bool:
+    """Return whether a value is one for each part of a thing."""
+    return isinstance(value, Mapping) and bool({*value} & {*parts_by_key().get(key, ())})
 
 
-def written_key(key: str, known: Container[str]) -> str:
-    """Return a key as a case file has it: that of a part where each part's key is known."""
-    for whole, parts in PER_PART.items():
-        if key in parts.values() and all(one in known for one in parts.values()):
-            return f"{whole}.{next(part for part, one in parts.items() if one == key)}"
-    return key
-
-
-def lacking_part(key: str, value: Mapping[str, Any]) -> str:
-    """Return what is wrong with the parts of a value for each; "" if nothing is."""
-    parts = [*PER_PART[key]]
-    if {*value} == {*parts} or [*value] in [[one] for one in ONE_SUFFICES.get(key, ())]:
-        return ""
-    given = ", ".join(map(str, value))
-    return f"needs both, {' and '.join(parts)}, not {given}; or one number for both"
-
-
-def expand_synonyms(values: Mapping[str, Any], problems: list[Problem]) -> dict[str, Any]:
+def expand_synonyms(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
     """Return nested values with each synonym as its key; both at once are a problem."""
-    whole = dict(values)
+    whole, problems = dict(values), []
     for synonym, key in DOUBLES.items():
         group, _, name = synonym.partition(".")
         within, own = whole.get(group), key.rpartition(".")[2]
@@ -214,19 +153,7 @@ def expand_synonyms(values: Mapping[str, Any], problems: list[Problem]) -> dict[
         if message:
             problems.append(Problem(synonym, message))
         whole[group] = rest if message else {own: halve(within[name])} | rest
-    for key in PER_PART:
-        group, _, name = key.partition(".")
-        within = whole.get(group)
-        value: Any = within.get(name) if isinstance(within, Mapping) else None
-        keys = by_part(key, value)
-        if not keys or not isinstance(within, Mapping):
-            continue
-        if message := lacking_part(key, value):
-            problems.append(Problem(key, message))
-        rest = {inner: one for inner, one in within.items() if inner != name}
-        each = {keys[part].rpartition(".")[2]: value[part] for part in keys if part in value}
-        whole[group] = each | rest
-    return whole
+    return whole, problems
 
 
 def synonyms_of(group: str) -> list[str]:
@@ -345,10 +272,6 @@ def _example(group: str) -> str:
 
 def suggestion(name: str, group: str) -> str:
     """Return the end of an error about an unknown key: what was probably meant, if anything."""
-    whole, _, part = ".".join(filter(None, (group, name))).rpartition(".")
-    if part in PER_PART.get(whole, ()):
-        parts = ", ".join(f"{one}: ..." for one in PER_PART[whole])
-        return f"; write {whole} with {{{parts}}}, in --set too"
     if name in table() and "." in name:
         outer, _, inner = name.partition(".")
         return f"; write {inner} inside {outer}"
@@ -433,21 +356,14 @@ def problems_of_case(error: ValidationError, values: Mapping[str, Any]) -> list[
     return [problem for problem in found if problem]
 
 
-def check_value(key: str, value: Any) -> tuple[Any, list[Problem]]:
-    """Return a value of a key as a case holds it, and what is wrong with it."""
-    group, _, name = key.rpartition(".")
+def hold(key: str, value: Any) -> Any:
+    """Return a value of a key as a case holds it; one that no case can hold as it is."""
+    row = row_of(key)
     try:
-        held = adapter_of(table()[key]).validate_python(value)
-    except ValidationError as error:
-        nested = {group: {name: value}} if group else {name: value}
-        found: dict[Problem, None] = {}
-        for one in error.errors(include_url=False):
-            cause = str(one.get("ctx", {}).get("error", ""))
-            path = [*key.split("."), *map(str, one["loc"])]
-            if problem := _problem_at(path, one["type"], cause, nested):
-                found.setdefault(problem)
-        return None, [*found]
-    return tuple(sorted(held.items())) if isinstance(held, dict) else held, []
+        held = adapter_of(row).validate_python(value) if row else value
+    except ValidationError:
+        return value
+    return tuple(sorted(held.items())) if isinstance(held, dict) else held
 
 
 def _problem_at(
@@ -460,19 +376,45 @@ def _problem_at(
     outer, name = (path[0], path[1]) if path[0] in GROUPS and path[1:] else ("", path[0])
     key, within = f"{outer}.{name}" if outer else name, values[outer] if outer else values
     value = next((one for known, one in within.items() if str(known) == name), None)
-    if kind in ("unexpected_keyword_argument", "invalid_key"):
+    is_unknown = kind in ("unexpected_keyword_argument", "invalid_key")
+    if is_unknown and key not in parts_by_key():
         return Problem(key, describe_unknown(name, outer, file=False, value=value))
     if key in GROUPS:
         return Problem(key, NO_VALUE if value is None else no_mapping(key, value))
-    return table()[key].problem(key, value, path[2:], cause)
+    rest = path[len(key.split(".")) :]
+    if parts := parts_by_key().get(key):
+        within = [one for one in rest if one in parts]
+        return _problem_of_parts(key, value, within, cause, kind)
+    return table()[key].problem(key, value, rest, cause)
 
 
-def values_given(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the values that are set in nested values, by dotted key."""
+def _problem_of_parts(
+    key: str, value: Any, within: list[str], cause: str, kind: str
+) -> Problem | None:
+    """Return the problem of a key by part: of the part that a path names, or of the whole."""
+    parts = parts_by_key()[key]
+    if not isinstance(value, Mapping):
+        return table()[f"{key}.{parts[0]}"].problem(key, value, within[1:], cause)
+    if kind in ("missing", "unexpected_keyword_argument"):
+        given = ", ".join(map(str, value))
+        needed = f"needs both, {' and '.join(parts)}, not {given}"
+        return Problem(key, f"{needed}; or one number for both")
+    if not within:
+        return Problem(key, cause)
+    part = within[0]
+    return table()[f"{key}.{part}"].problem(f"{key}.{part}", value[part], within[1:], cause)
+
+
+def values_given(values: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return the values that are set in nested values, by dotted key, of a key by part by part."""
     found: dict[str, Any] = {}
     for key, value in values.items():
-        if isinstance(value, Mapping):
-            found |= {f"{key}.{name}": item for name, item in value.items() if item is not None}
-        else:
+        if not isinstance(value, Mapping):
             found[key] = value
+            continue
+        for name, item in value.items():
+            if has_parts(f"{key}.{name}", item):
+                found |= {f"{key}.{name}.{part}": one for part, one in item.items()}
+            elif item is not None:
+                found[f"{key}.{name}"] = item
     return found

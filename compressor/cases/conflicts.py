@@ -15,12 +15,12 @@ from functools import cache, partial
 from typing import Any
 
 from compressor.cases.card import DRIVING, CardError, open_card, taken_work
-from compressor.cases.checks import SHORTHANDS, row_of, value_in
+from compressor.cases.checks import row_of, stands_for, value_in
 from compressor.cases.comparison import condition
 from compressor.cases.groups import ENDS
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
-from compressor.cases.parameter import CRANK_END, GAS, IMPLAUSIBLE, MATERIALS, Problem
+from compressor.cases.parameter import CRANK_END, GAS, IMPLAUSIBLE, Problem
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, group_readers, table
 from compressor.metrics import AXES, JOINTS
 
@@ -48,17 +48,14 @@ def moving_mass(case: Settings) -> float:
     return case.machine.rod_mass_kg + case.machine.reciprocating_mass_kg
 
 
+LED = "gas.indicator"  # key whose one value is that of its first part alone
 # Facts of a machine, which a file may give though no job of it reads them, so that one file serves
 # the machine with clearance and without. Of the gas those of a cylinder that is there.
 FACTS = (
-    "machine.pin_radius_mm", "machine.small_end_pin_radius_mm",
-    "contact.materials", "contact.small_end_materials",
-    "contact.length_mm", "contact.small_end_length_mm",
+    "machine.pin_radius_mm", "contact.materials", "contact.length_mm",
     "lubricant.viscosity_mPa_s", "lubricant.bearing_length_mm",
-    "lubricant.small_end_bearing_length_mm",
     "gas.suction_MPa", "gas.discharge_MPa", "gas.exponent", "gas.head_clearance_mm",
-    "gas.clearance_percent", "gas.crank_clearance_percent", "gas.rod_diameter_mm",
-    "gas.valve_loss_percent", "gas.discharge_loss_percent",
+    "gas.clearance_percent", "gas.rod_diameter_mm", "gas.valve_loss_percent",
 )  # fmt: skip
 # what is part of a job's key only where the job reads it: facts, and what follows from them
 IN_KEY_IF_READ = (*FACTS, "contact.modulus_GPa", "contact.stiffness_N_per_mm15", "contact.geometry")
@@ -67,21 +64,30 @@ IN_KEY_IF_READ = (*FACTS, "contact.modulus_GPa", "contact.stiffness_N_per_mm15",
 def needs_of_given(key: str, given: Container[str]) -> list[tuple[str, str]]:
     """Return which of the `conditions` must hold where a file gives one value of a key.
 
-    Of a fact none but that there is gas, that a rod's single action is meant, and that the big end
-    has materials where the small end has some. given: the dotted keys of the file.
+    Of a fact none but that there is gas, and that a rod's single action is meant. given: the dotted
+    keys of the file.
     """
-    strict = [GAS, MATERIALS] if "gas.action" in given else [GAS, MATERIALS, CRANK_END]
-    return [one for one in conditions(key) if key not in FACTS or one[1] in strict]
+    strict = [GAS] if "gas.action" in given else [GAS, CRANK_END]
+    is_fact = key in FACTS or key.rpartition(".")[0] in FACTS
+    return [one for one in conditions(key) if not is_fact or one[1] in strict]
 
 
 @cache
 def conditions(key: str) -> list[tuple[str, str]]:
-    """Return what holds where a case reads a key, each with what is unread where it does not."""
+    """Return what holds where a case reads a key, each with what is unread where it does not.
+
+    A key by part is read where one of the parts is.
+    """
     group = key.partition(".")[0]
     whole = group_readers(group) if group in GROUPS else ()
-    row = table().get(key)  # a group's name has none
-    own = row.read[len(whole) :] if row else ()
-    return [*((group, one) for one in whole), *((key, one) for one in own)]
+    if key in GROUPS:
+        return [(key, one) for one in whole]
+    rows = [table()[part] for part in stands_for(key) or (key,)]
+    rows = rows[:1] if key == LED else rows
+    shared = [one for one in rows[0].read if all(one in row.read for row in rows)]
+    own = [" and ".join(f"({one})" for one in row.read if one not in shared) for row in rows]
+    either = [" or ".join(own)] if all(own) else []
+    return [(group if one in whole else key, one) for one in (*shared, *either)]
 
 
 def reads(case: Settings, key: str) -> bool:
@@ -97,7 +103,7 @@ def is_off(key: str, value: Any) -> bool:
 
 def problem_of(key: str, needed: str) -> Problem:
     """Return the problem of a key or group that nothing reads."""
-    what = "group" if key in GROUPS and key not in SHORTHANDS else "key"
+    what = "group" if key in GROUPS else "key"
     remedy = f"set that, or leave the {what} out"
     return Problem(key, f"nothing reads this {what}: it needs {needed}; {remedy}")
 
@@ -147,7 +153,7 @@ def default_in(case: Settings, key: str) -> Any:
 OF_CONTACT = ("contact.", "friction.")  # keys that ideal joints do not read
 # keys that leave a thing out at 0, as a case without the group does
 ABSENT_AT_ZERO = (
-    "clearance_mm.big_end", "clearance_mm.small_end", "guide.clearance_mm", "guide.friction",
+    "guide.clearance_mm", "guide.friction",
 )  # fmt: skip
 
 
@@ -156,7 +162,8 @@ def judged_range(key: str) -> tuple[float, float]:
 
     Raises KeyError for a key without one.
     """
-    found = table()[key].judged
+    row = row_of(key)
+    found = row.judged if row else None
     if found is None:
         raise KeyError(key)
     return found
@@ -172,9 +179,9 @@ def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
     for key, value, (low, high) in _judged_values(values):
         if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
             unit = f" {table()[key].unit}".replace("^p", "^1.5").rstrip()
-            group = key.partition(".")[0]
-            shared = group if group in OF_JOINTS else key
-            found[shared] = (
+            whole = key.rpartition(".")[0]
+            is_shared = whole in OF_JOINTS or (stands_for(whole) and value_in(values, whole))
+            found[whole if is_shared else key] = (
                 f"{value:g}{unit} is outside the range that the program was judged on, "
                 f"{low:g} to {high:g}{unit}"
             )
@@ -189,7 +196,7 @@ def _judged_values(values: Mapping[str, Any]) -> Iterator[tuple[str, float, tupl
         value = value_in(values, key) if row.judged else None
         if row.judged is None or not isinstance(value, int | float) or isinstance(value, bool):
             continue
-        if value == 0.0 and key in ABSENT_AT_ZERO:
+        if value == 0.0 and (key in ABSENT_AT_ZERO or key.rpartition(".")[0] in OF_JOINTS):
             continue
         if ideal and key.startswith(OF_CONTACT):
             continue
@@ -255,17 +262,17 @@ def lubricant_conflicts(case: Settings) -> Iterator[Problem]:
     if not case.lubricant:
         return
     for joint in JOINTS:
-        width = 2.0 * case.machine.pin_radius(joint)
-        ratio = case.lubricant.bearing_length(joint) / width
-        own = joint == "small_end" and case.lubricant.small_end_bearing_length_mm
+        width = 2.0 * getattr(case.machine.pin_radius_mm, joint)
+        length = getattr(case.lubricant.bearing_length_mm, joint)
+        ratio = length / width
         if case.joint in (joint, "both") and not MIN_RATIO <= ratio <= MAX_RATIO:
-            key = f"lubricant.{'small_end_' if own else ''}bearing_length_mm"
+            key = f"lubricant.bearing_length_mm.{joint}"
             text = (
                 f"is {ratio:.3g} times the diameter of the pin, {width:g} mm; the film's numbers "
                 f"hold from {MIN_RATIO:g} to {MAX_RATIO:g} times"
             )
-            if case.lubricant.bearing_length_mm == table()["lubricant.bearing_length_mm"].default:
-                default = f"{case.lubricant.bearing_length_mm:g} mm is the default, of the paper's"
+            if length == table()[key].default:
+                default = f"{length:g} mm is the default, of the paper's"
                 text += f"; {default} pin: give the length that bears"
             yield Problem(key, text)
 
@@ -321,9 +328,8 @@ IN_PLACE_OF = (
     ("solve.rtol", "solve.accuracy"),
     ("contact.materials", "contact.stiffness_N_per_mm15"),
     ("contact.materials", "contact.modulus_GPa"),
-    ("gas.clearance_percent", "gas.head_clearance_mm"),
+    ("gas.clearance_percent.head", "gas.head_clearance_mm"),
     ("machine.balance", "machine.counterweight_kg_mm"),
-    ("machine.balance_reciprocating", "machine.counterweight_kg_mm"),
 )
 MAX_MOVING_SHARE = 0.1  # the moving parts' share of a body's mass
 MAX_BACK_ACTION = 0.3  # of a force that a body's motion may change at the speed's first two orders
@@ -430,7 +436,7 @@ def _clearance_conflicts(case: Settings, joint: str) -> Iterator[Problem]:
     key, clearance = f"clearance_mm.{joint}", getattr(case.clearance_mm, joint)
     if not clearance:
         return
-    pin = case.machine.pin_radius(joint)
+    pin = getattr(case.machine.pin_radius_mm, joint)
     if clearance > pin:
         yield Problem(key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm: lower it")
     x, y = (getattr(case.initial_offset_mm, f"{joint}_{axis}") for axis in "xy")
@@ -460,11 +466,14 @@ def _load_conflicts(case: Settings) -> Iterator[Problem]:
         return
     play, stroke = _play(case), 2 * machine.crank_radius_mm
     for end in filter(gas.presses, ENDS):
-        clearance = gas.clearance(end, stroke)
-        if clearance <= play:
+        clearance, each = gas.clearance(end, stroke), gas.clearance_percent
+        if each and end == "crank" and each.crank is None:
+            text = f"is needed with action: {gas.action} and a clearance of the head"
+            yield Problem("gas.clearance_percent.crank", text)
+        elif clearance <= play:
             cover = "head" if end == "head" else "cover at the crank end"
             key, remedy = gas.clearance_key(end), "raise it"
-            if key.endswith("percent") and clearance < 0.01 * stroke:
+            if "percent" in key and clearance < 0.01 * stroke:
                 remedy += "; it is in per cent of the swept volume: 17, not 0.17"
             yield Problem(
                 key,
@@ -503,10 +512,9 @@ def _card_conflicts(case: Settings) -> Iterator[Problem]:
     """Yield a card that is missing: each end in which gas presses has one."""
     for end in filter(case.gas.presses, ENDS):
         if end not in case.gas.cards:
-            key = "gas.indicator" if end == "head" else "gas.crank_indicator"
             yield Problem(
-                key, f"is needed with action: {case.gas.action}, the other end being measured; "
-                "write indicator: {head: head.csv, crank: crank.csv}",
+                f"gas.indicator.{end}", f"is needed with action: {case.gas.action}, the other end "
+                "being measured; write indicator: {head: head.csv, crank: crank.csv}",
             )  # fmt: skip
             continue
         with contextlib.suppress(CardError):  # of a file that is gone, which a run tells
@@ -514,7 +522,7 @@ def _card_conflicts(case: Settings) -> Iterator[Problem]:
             lengths = case.machine.crank_radius_mm, case.machine.rod_length_mm
             if lengths[0] < lengths[1] and (share := taken_work(card, end, *lengths)) < DRIVING:
                 yield Problem(
-                    "gas.indicator" if end == "head" else "gas.crank_indicator",
+                    f"gas.indicator.{end}",
                     f"the gas would drive the machine: it gives {-share:.2g} times pressure range "
                     f"and stroke in a revolution; is it the {'crank' if end == 'head' else 'head'} "
                     "end's card, or its angle not 0 at top dead centre?",

@@ -5,14 +5,12 @@ units, which stand in the field's name; `compressor.solve.si_record` turns them 
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, fill_by_law
 from compressor.cases.parameter import (
     ACCURACY,
-    BALANCE,
+    AT_JOINTS,
     BIG_CLEARANCE,
-    BIG_END,
     CLEARANCE,
     CRANK_END,
     CYCLE,
@@ -22,14 +20,17 @@ from compressor.cases.parameter import (
     IDEAL_JOINT,
     MATERIALS,
     MEASURED,
-    RUBBING,
+    RUBBING_AT,
     SERIES,
     SMALL_CLEARANCE,
-    SMALL_END,
-    SMALL_RUBBING,
     STIFFNESS,
+    PerEnd,
+    PerJoint,
+    PerMotion,
+    PerValve,
     Plausible,
     by_law,
+    by_part,
     choice,
     document_fields,
     from_to,
@@ -60,53 +61,6 @@ HALF_BALANCED = from_to(0, 0.5)
 BEARING_LENGTH = Plausible(
     "grooves and holes shorten what bears", times(0.5, 1.25), times(0.5, 1.25)
 )  # fmt: skip
-
-
-@document_fields
-@make_group
-class PerJoint:
-    """The radial clearance of each joint, mm; 0 where the joint is ideal.
-
-    A case's `clearance_mm`. In values and case files one number stands for the joints that have
-    clearance:
-
-    >>> import compressor
-    >>> compressor.Case.from_values({"joint": "both", "clearance_mm": 0.2}).clearance_mm
-    PerJoint(big_end=0.2, small_end=0.2)
-    """
-
-    big_end: float = parameter(
-        0.0, "mm", (0, 1000), "§3.2", "radial clearance of the big end", read=BIG_END,
-        judged=(1e-3, 1.0),
-    )  # fmt: skip
-    small_end: float = parameter(
-        0.0, "mm", (0, 1000), "§3.2", "radial clearance of the small end", read=SMALL_END,
-        judged=(1e-3, 1.0),
-    )  # fmt: skip
-
-
-@document_fields
-@make_group
-class HealthyClearance:
-    """The radial clearance up to which a joint counts as sound, mm; 0: a worn one has any.
-
-    A case's `healthy_clearance_mm`. It moves nothing, and is no part of a job's identity: it says
-    which joints are called worn.
-
-    >>> import compressor
-    >>> values = {"joint": "both", "clearance_mm": {"big_end": 0.08, "small_end": 0.25}}
-    >>> compressor.Case.from_values(values | {"healthy_clearance_mm": 0.1}).worn_joint
-    'small_end'
-    """
-
-    big_end: float = parameter(
-        0.0, "mm", (0, 1000), "program", "clearance up to which the big end is sound",
-        identity=False,
-    )  # fmt: skip
-    small_end: float = parameter(
-        0.0, "mm", (0, 1000), "program", "clearance up to which the small end is sound",
-        identity=False,
-    )  # fmt: skip
 
 
 @document_fields
@@ -183,34 +137,30 @@ class Machine:
         judged=(0.1, 200),
         plausible=NO_MASS,
     )  # fmt: skip
-    pin_radius_mm: float = parameter(
-        10.0, "mm", (0, 1e4), "inferred from Eq. 15 and Table 3",
-        "journal radius R_j of both joints, or of the big end", above=True,
-        read=RUBBING, judged=(10, 100),
-        plausible=Plausible("the paper does not print it", times(0.7, 1.5)),
+    pin_radius_mm: PerJoint[float] = by_part(
+        PerJoint, 10.0,
+        parameter(
+            10.0, "mm", (0, 1e4), "inferred from Eq. 15 and Table 3", "journal radius R_j",
+            above=True, judged=(10, 100),
+            plausible=Plausible("the paper does not print it", times(0.7, 1.5)),
+        ),
+        RUBBING_AT,
     )  # fmt: skip
     gravity_m_per_s2: float = parameter(
         0.0, "m/s2", (0, 1000), "assumed", "gravity, along -y",
         plausible=Plausible("it acts on a horizontal machine", from_to(0, 9.81)),
     )  # fmt: skip
-    small_end_pin_radius_mm: float | None = parameter(
-        None, "mm", (0, 1e4), "as the big end's", "journal radius of the small end",
-        above=True, optional=True, read=SMALL_RUBBING,
-    )  # fmt: skip
     counterweight_kg_mm: float | None = parameter(
         None, "kg mm", (0, 1e9), "none", "counterweight on the crank, opposite to its pin: mass "
         "times its centre's distance from the axis", optional=True,
     )  # fmt: skip
-    balance: float | None = parameter(
-        None, "", (0, 1), "none", "share of what turns with the crank pin that a "
-        "counterweight balances; one number is also that of what reciprocates; in place of "
-        "counterweight_kg_mm",
-        optional=True,
-    )  # fmt: skip
-    balance_reciprocating: float | None = parameter(
-        None, "", (0, 1), "as balance", "share of what reciprocates that a counterweight balances",
-        optional=True, read=BALANCE,
-        plausible=Plausible("no nameplate has it", HALF_BALANCED, HALF_BALANCED),
+    balance: PerMotion[float] | None = by_part(
+        PerMotion, None,
+        parameter(
+            None, "", (0, 1), "none", "share that a counterweight balances; in place of "
+            "counterweight_kg_mm",
+            plausible=Plausible("no nameplate has it", HALF_BALANCED, HALF_BALANCED),
+        ),
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -221,17 +171,8 @@ class Machine:
             values["rod_centre_mm"] = length / 2
         if self.rod_inertia_kg_m2 is None:
             values["rod_inertia_kg_m2"] = mass * (length / 1000) ** 2 / 12
-        if self.small_end_pin_radius_mm == self.pin_radius_mm:  # as without the key
-            values["small_end_pin_radius_mm"] = None
         if not self.counterweight_kg_mm:  # as without the key
             values["counterweight_kg_mm"] = None
-        if self.balance_reciprocating == self.balance:  # as without the key
-            values["balance_reciprocating"] = None
-
-    def pin_radius(self, joint: str) -> float:
-        """Return the journal radius of a joint, mm."""
-        own = self.small_end_pin_radius_mm if joint == "small_end" else None
-        return self.pin_radius_mm if own is None else own
 
 
 # ends of a cylinder, and the actions by which the gas in them presses
@@ -239,14 +180,10 @@ ENDS = {"head": ("single", "double"), "crank": ("double", "crank_end")}
 ATMOSPHERE_MPA = 0.101325
 # what the paper's gas load has not; any of them makes a cylinder of one's own
 CYLINDER_KEYS = (
-    "action", "rod_diameter_mm", "clearance_percent", "crank_clearance_percent",
-    "valve_loss_percent", "discharge_loss_percent", "unloaded", "indicator", "crank_indicator",
-    "ambient_MPa", "smooth_deg",
+    "action", "rod_diameter_mm", "clearance_percent", "valve_loss_percent", "unloaded",
+    "indicator", "ambient_MPa", "smooth_deg",
 )  # fmt: skip
-OF_CRANK_END = (
-    "rod_diameter_mm",
-    "crank_clearance_percent",
-)  # facts of a single-acting machine, too
+NO_LOSS = PerValve(0.0, 0.0)
 # what the paper prints of its cylinder: another value makes one of one's own, too
 PAPER_CYLINDER = {
     "piston_radius_mm": 50.0, "head_clearance_mm": 20.0, "suction_MPa": 0.105,
@@ -256,11 +193,6 @@ OWN_CYLINDER = (
     "a cylinder of one's own: any key of `gas` but this one and {other}, the stroke or the rod's "
     "length is given"
 )
-CARD_KEYS = ("indicator", "crank_indicator")  # paths of files, with digests of what they hold
-# key of its own -> the key whose value it has without
-AS_THE_OTHER = {
-    "crank_clearance_percent": "clearance_percent", "discharge_loss_percent": "valve_loss_percent",
-}  # fmt: skip
 
 
 @document_fields
@@ -330,27 +262,20 @@ class Gas:
         "diameter of the piston rod, whose section the crank end lacks",
         above=True, optional=True, read=CRANK_END,
     )  # fmt: skip
-    clearance_percent: float | None = parameter(
-        None, "%", (0, 1000), "program",
-        "clearance volume over swept volume of each end, or of the head's; in place of "
-        "head_clearance_mm", above=True, optional=True, read=(CYCLE, HEAD_CLEARANCE),
-        plausible=CYLINDER_CLEARANCE,
+    clearance_percent: PerEnd[float | None] | None = by_part(
+        PerEnd, None,
+        parameter(
+            None, "%", (0, 1000), "program", "clearance volume over swept volume; in place of "
+            "head_clearance_mm", above=True, optional=True, plausible=CYLINDER_CLEARANCE,
+        ),
+        {"head": (CYCLE, HEAD_CLEARANCE), "crank": (CYCLE, CRANK_END)}, fill=None,
     )  # fmt: skip
-    crank_clearance_percent: float | None = parameter(
-        None, "%", (0, 1000), "as the head's", "clearance volume over swept volume, crank end",
-        above=True, optional=True, read=(CYCLE, CRANK_END),
-        plausible=CYLINDER_CLEARANCE,
-    )  # fmt: skip
-    valve_loss_percent: float | None = parameter(
-        None, "%", (0, 90), "program",
-        "loss of absolute pressure while a valve is open, of both or of the suction's; 0 without",
-        optional=True, read=CYCLE,
-        plausible=VALVE_LOSS,
-    )  # fmt: skip
-    discharge_loss_percent: float | None = parameter(
-        None, "%", (0, 90), "as the suction's",
-        "loss of absolute pressure while the discharge valve is open", optional=True, read=CYCLE,
-        plausible=VALVE_LOSS,
+    valve_loss_percent: PerValve[float] | None = by_part(
+        PerValve, None,
+        parameter(
+            None, "%", (0, 90), "program", "loss of absolute pressure while open; 0 without",
+            read=CYCLE, plausible=VALVE_LOSS,
+        ),
     )  # fmt: skip
     unloaded: str | None = choice(
         None, ("none", "head", "crank"), "program",
@@ -358,14 +283,13 @@ class Gas:
         "default",
         optional=True, read=CYCLE,
     )  # fmt: skip
-    indicator: str | None = choice(
-        None, (), "measured",
-        "card of the head end in place of pressures, exponent and clearance; {head: ..., crank: "
-        "...} of both ends", kind="card", optional=True, read=HEAD_END,
-    )  # fmt: skip
-    crank_indicator: str | None = choice(
-        None, (), "measured", "card of the crank end, over the crank's angle too", kind="card",
-        optional=True, read=CRANK_END,
+    indicator: PerEnd[str | None] | None = by_part(
+        PerEnd, None,
+        choice(
+            None, (), "measured", "card; in place of pressures, exponent and clearance",
+            kind="card", optional=True,
+        ),
+        {"head": HEAD_END, "crank": CRANK_END}, fill=None, first=True,
     )  # fmt: skip
     ambient_MPa: float | None = parameter(
         None, "MPa", (0, 1e3), "standard",
@@ -382,7 +306,7 @@ class Gas:
         """Fill in what a cylinder's keys leave open; what is as without a key goes without it."""
         values = vars(self)
         if self.is_cylinder:
-            filled = {"action": "single", "unloaded": "none", "valve_loss_percent": 0.0}
+            filled = {"action": "single", "unloaded": "none", "valve_loss_percent": NO_LOSS}
             values.update({key: value for key, value in filled.items() if values[key] is None})
         is_own = self.is_cylinder or any(
             values[key] != printed for key, printed in PAPER_CYLINDER.items()
@@ -391,16 +315,13 @@ class Gas:
             values["switching"] = "exact" if is_own else "paper"
         if self.back_pressure_MPa is None:
             values["back_pressure_MPa"] = ATMOSPHERE_MPA if is_own else 0.0
-        if self.clearance_percent is not None:
+        if self.clearance_percent and self.clearance_percent.head is not None:
             values["head_clearance_mm"] = None
-        for own, shared in AS_THE_OTHER.items():
-            if values[own] == values[shared]:
-                values[own] = None
 
     @property
     def is_cylinder(self) -> bool:
         """Return whether any key beyond the paper's gas load is given, of an end that presses."""
-        unread = () if self.presses("crank") else OF_CRANK_END
+        unread = () if self.presses("crank") else ("rod_diameter_mm",)
         return any(getattr(self, key) is not None for key in CYLINDER_KEYS if key not in unread)
 
     @property
@@ -411,7 +332,7 @@ class Gas:
     @property
     def cards(self) -> dict[str, str]:
         """Return the cards of the ends that press, by end, head or crank."""
-        given = {"head": self.indicator, "crank": self.crank_indicator}
+        given = vars(self.indicator) if self.indicator else {}
         return {end: card for end, card in given.items() if card is not None and self.presses(end)}
 
     @property
@@ -422,10 +343,9 @@ class Gas:
     @property
     def open_pressures(self) -> tuple[float, float]:
         """Return the pressures (MPa) while the suction and the discharge valve is open."""
-        loss = self.valve_loss_percent or 0.0
-        own = self.discharge_loss_percent
-        raised = 1.0 + (loss if own is None else own) / 100
-        return self.suction_MPa * (1.0 - loss / 100), self.discharge_MPa * raised
+        loss = self.valve_loss_percent or NO_LOSS
+        lowered, raised = 1.0 - loss.suction / 100, 1.0 + loss.discharge / 100
+        return self.suction_MPa * lowered, self.discharge_MPa * raised
 
     def presses(self, end: str) -> bool:
         """Return whether an end, head or crank, holds gas that presses on the piston."""
@@ -442,16 +362,15 @@ class Gas:
 
     def clearance_key(self, end: str) -> str:
         """Return the key that gives the clearance of an end, head or crank."""
-        if end == "crank" and self.crank_clearance_percent is not None:
-            return "gas.crank_clearance_percent"
-        percent = self.clearance_percent is not None
-        return "gas.clearance_percent" if percent else "gas.head_clearance_mm"
+        each = self.clearance_percent
+        is_percent = each and (end == "crank" or each.head is not None)
+        return f"gas.clearance_percent.{end}" if is_percent else "gas.head_clearance_mm"
 
     def clearance(self, end: str, stroke: float) -> float:
         """Return the clearance (mm) of an end, head or crank, at a stroke (mm)."""
-        key = self.clearance_key(end).removeprefix("gas.")
-        value = float(getattr(self, key) or 0.0)
-        return value if key == "head_clearance_mm" else value / 100 * stroke
+        if self.clearance_key(end) == "gas.head_clearance_mm":
+            return self.head_clearance_mm or 0.0
+        return (getattr(self.clearance_percent, end) or 0.0) / 100 * stroke
 
 
 @document_fields
@@ -493,7 +412,7 @@ class Contact:
     Two materials may stand in place of the stiffness K (Eq. 15, Table 2):
 
     >>> values = worn | {"contact": {"materials": ["steel", "copper"]}}
-    >>> compressor.Case.from_values(values).contact.materials
+    >>> compressor.Case.from_values(values).contact.materials.big_end
     ('steel', 'copper')
     """
 
@@ -506,10 +425,13 @@ class Contact:
         judged=JUDGED_STIFFNESS,
         plausible=CONTACT_GUESS,
     )  # fmt: skip
-    materials: tuple[str, str] | None = choice(
-        None, ("steel", "copper"), "Table 2, Eq. 15", "two materials in place of a stiffness, of "
-        "both joints or of the big end",
-        kind="materials", optional=True, read=CLEARANCE,
+    materials: PerJoint[tuple[str, str]] | None = by_part(
+        PerJoint, None,
+        choice(
+            None, ("steel", "copper"), "Table 2, Eq. 15", "two materials; in place of a stiffness",
+            kind="materials",
+        ),
+        AT_JOINTS,
     )  # fmt: skip
     geometry: str | None = choice(
         None, ("external", "internal"), "Eq. 15",
@@ -546,27 +468,18 @@ class Contact:
         judged=(1.0, 100.0),
         plausible=SMOOTHING,
     )  # fmt: skip
-    length_mm: float | None = parameter(
-        None, "mm", (0, 1e4), "program", "length of both joints, or of the big end (johnson, liu)",
-        above=True, optional=True,
-        read=(CLEARANCE, *by_law("contact", "length_mm")),
-        judged=(10.0, 100.0),
-        plausible=BEARING_LENGTH,
+    length_mm: PerJoint[float] | None = by_part(
+        PerJoint, None,
+        parameter(
+            None, "mm", (0, 1e4), "program", "length (johnson, liu)", above=True,
+            judged=(10.0, 100.0), plausible=BEARING_LENGTH,
+        ),
+        {joint: (own, *by_law("contact", "length_mm")) for joint, own in AT_JOINTS.items()},
     )  # fmt: skip
     modulus_GPa: float | None = parameter(
         None, "GPa", (0, 1e6), "program", "composite modulus (johnson, liu)", above=True,
         optional=True, read=(CLEARANCE, *by_law("contact", "modulus_GPa")),
         judged=(10.0, 250.0),
-    )  # fmt: skip
-    small_end_materials: tuple[str, str] | None = choice(
-        None, ("steel", "copper"), "as the big end's", "two materials of the small end",
-        kind="materials", optional=True, read=(SMALL_CLEARANCE, MATERIALS),
-    )  # fmt: skip
-    small_end_length_mm: float | None = parameter(
-        None, "mm", (0, 1e4), "as the big end's", "length of the small end (johnson, liu)",
-        above=True, optional=True,
-        read=(SMALL_CLEARANCE, *by_law("contact", "small_end_length_mm")),
-        plausible=BEARING_LENGTH,
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -577,21 +490,7 @@ class Contact:
             vars(self)["stiffness_N_per_mm15"] = PAPER_STIFFNESS
         if self.geometry == "external":  # as without the key
             vars(self)["geometry"] = None
-        for name in ("materials", "length_mm"):
-            # as without the key, which stands beside the big end's alone
-            if vars(self)[name] in (None, vars(self)[f"small_end_{name}"]):
-                vars(self)[f"small_end_{name}"] = None
         fill_by_law("contact", self)
-
-    def at(self, joint: str) -> "Contact":
-        """Return the contact of a joint: with the small end's own materials and length there."""
-        if joint != "small_end" or not (self.small_end_materials or self.small_end_length_mm):
-            return self
-        return replace(
-            self,
-            materials=self.small_end_materials or self.materials,
-            length_mm=self.small_end_length_mm or self.length_mm,
-        )
 
 
 @document_fields

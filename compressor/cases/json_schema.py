@@ -8,16 +8,18 @@ from dataclasses import replace
 from typing import Any
 
 from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED
-from compressor.cases.checks import DOUBLES, PER_PART, REPORT, SHORTHANDS, row_of
+from compressor.cases.checks import DOUBLES, REPORT, phrase_of, row_of
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.parameter import NAME, TARGET, Parameter
-from compressor.cases.swept import DISTRIBUTIONS, FORMS, SAMPLED, is_number
-from compressor.cases.table import GROUPS, WORDS, outside_identity, table
+from compressor.cases.swept import DISTRIBUTIONS, FORMS, SAMPLED
+from compressor.cases.table import GROUPS, WORDS, outside_identity, parts_by_key, table
 from compressor.metrics import METRICS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 MAX_NUMBER = 1e300  # a bound of values that need only be finite
+# keys of which one part may be given alone
+MAY_LACK = ("clearance_mm", "healthy_clearance_mm", "gas.indicator", "gas.clearance_percent")
 WHOLE_FILE = ("name", "blocks", "report")  # what cannot stand in a block
 
 Schema = dict[str, Any]
@@ -26,7 +28,7 @@ Schema = dict[str, Any]
 def case_schema() -> Schema:
     """Return the JSON Schema of a whole case file, in the dialect 2020-12."""
     keys = dict.fromkeys(key.partition(".")[0] for key in table())
-    found = {key: _group(key) if key in GROUPS else _value(table()[key]) for key in keys}
+    found = {key: _group(key) if key in GROUPS else _value_or_parts(key) for key in keys}
     found |= _sweeps()
     in_block = {key: item for key, item in found.items() if key not in WHOLE_FILE}
     blocks = {"type": "array", "minItems": 1, "items": _mapping(in_block)}
@@ -42,23 +44,22 @@ def _mapping(properties: Schema) -> Schema:
 
 def _group(name: str) -> Schema:
     """Return the schema of a group of keys."""
-    rows = [row for row in table().values() if row.key.startswith(f"{name}.")]
-    rows += [
-        _synonym_row(word, key) for word, key in DOUBLES.items() if word.startswith(f"{name}.")
-    ]
-    mapping = _mapping({row.key.removeprefix(f"{name}."): _value_or_parts(row) for row in rows})
+    keys = dict.fromkeys(
+        ".".join(key.split(".")[:2]) for key in table() if key.startswith(f"{name}.")
+    )
+    found = {key.partition(".")[2]: _value_or_parts(key) for key in keys}
+    for word, key in DOUBLES.items():
+        if word.startswith(f"{name}."):
+            found[word.partition(".")[2]] = _value(_synonym_row(word, key))
+    mapping = _mapping(found)
     pairs = (*IN_PLACE_OF, *DOUBLES.items())
     rivals = [pair for pair in pairs if pair[0].startswith(f"{name}.")]
     if rivals:
-        inner = ([key.removeprefix(f"{name}.") for key in pair] for pair in rivals)
+        inner = ([key.split(".")[1] for key in pair] for pair in rivals)
         mapping["allOf"] = [{"not": {"required": pair}} for pair in inner]
     about = (GROUPS[name].__doc__ or "").partition("\n")[0]
     if name in WORDS:
         return {"description": about, "anyOf": [{"const": WORDS[name]}, mapping]}
-    row = row_of(name)
-    if row:
-        short = _value(row).get("anyOf") or [_single_value(row)]
-        return {"description": SHORTHANDS[name].phrase, "anyOf": [*short, mapping]}
     return {"description": about, **mapping}
 
 
@@ -69,13 +70,21 @@ def _synonym_row(word: str, key: str) -> Parameter:
     return replace(row, key=word, phrase=f"twice {key}, in its place", **span)
 
 
-def _value_or_parts(row: Parameter) -> Schema:
-    """Return the schema of a parameter that may have a value for each part."""
-    found = _value(row)
-    if parts := PER_PART.get(row.key):
-        each = _mapping({part: _value(table()[key]) for part, key in parts.items()})
-        found["anyOf"] = [*found["anyOf"], each | {"required": [*parts]}]
-    return found
+def _value_or_parts(key: str) -> Schema:
+    """Return the schema of a key, which may have a value for each part."""
+    row = row_of(key)
+    assert row
+    if key not in parts_by_key():
+        return _value(row)
+    found = _value(replace(row, phrase=phrase_of(key)))
+    parts = parts_by_key()[key]
+    each = _mapping({part: _value(table()[f"{key}.{part}"]) for part in parts})
+    each |= {} if key in MAY_LACK else {"required": [*parts]}
+    one = found.pop("anyOf", None) or [_single_value(row)]
+    return {
+        **{k: v for k, v in found.items() if k in ("description", "default")},
+        "anyOf": [*one, each],
+    }
 
 
 def _value(row: Parameter) -> Schema:
@@ -88,7 +97,7 @@ def _value(row: Parameter) -> Schema:
     if not row.identity:
         return found | single
     listed = {"type": "array", "items": single, "minItems": 1, "uniqueItems": True}
-    forms = [{"$ref": "#/$defs/made"}] if is_number(row) else []
+    forms = [{"$ref": "#/$defs/made"}] if row.kind in ("number", "integer") else []
     return found | {"anyOf": [single, listed, *forms]}
 
 
@@ -147,7 +156,7 @@ def _sweeps() -> Schema:
     """Return the schemas of the keys that say how values are swept together."""
     whole = {"type": "integer", "minimum": 1}
     sample = _mapping({"n": whole, "seed": {"type": "integer", "minimum": 0, "maximum": MAX_SEED}})
-    keys = {"enum": [key for key in (*SHORTHANDS, *table()) if key not in outside_identity()]}
+    keys = {"enum": [key for key in (*parts_by_key(), *table()) if key not in outside_identity()]}
     group = {"type": "array", "items": keys, "minItems": 2, "uniqueItems": True}
     texts = {"type": "array", "items": TEXT, "maxItems": MAX_EXCLUSIONS}
     return {

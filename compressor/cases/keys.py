@@ -1,150 +1,231 @@
-"""Values by dotted key: of a case file's tree, of `key=value` texts, of blocks, one over another.
+"""Values of a file, a block or a `key=value`: in one form, and one over another.
 
-The error of an unknown key says what was probably meant (`describe_unknown`).
+In that form there is no key that is unknown, a group's word and a key's double are written out, and
+cards have the path as seen from the file that names them.
 """
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
 
 from compressor.cases.checks import (
     DOUBLES,
     MAPPINGS,
-    SHORTHANDS,
+    SWEEP,
     TWICE,
     accepted_keys,
-    by_part,
     check_double,
     describe_unknown,
     halve,
-    lacking_part,
     no_mapping,
     stands_for,
 )
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.groups import CARD_KEYS
-from compressor.cases.parameter import NO_VALUE
 from compressor.cases.swept import FORMS
-from compressor.cases.table import GROUPS, OF_JOINTS, WORDS
-from compressor.cases.yaml_reader import FileProblem, Node, Place, read_text, shorten
+from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, parts_by_key
+from compressor.cases.yaml_reader import FileProblem, Path, Place, Tree, read_text, shorten
 
-MAX_SUGGESTIONS = 100  # keeps a hostile file from taking long
-
-
-@dataclass(frozen=True)
-class Leaves:
-    """The values of a case file by dotted key, and where each known key and group stands.
-
-    A block has its own place at "".
-    """
-
-    values: dict[str, Node]
-    places: dict[str, Place]
+Written = tuple[Tree, list[FileProblem]]
 
 
-def leaves(root: Node, problems: list[FileProblem]) -> Leaves:
-    """Return the leaves of a tree; unknown keys, and values in place of groups, are problems."""
-    found = Leaves({}, {})
-    for name, node in _known_entries("", root, problems):
-        found.places[name] = node.key_place
-        mapping = isinstance(node.value, dict)
-        if mapping and not node.value and WORDS.get(name):
-            found.values[name] = replace(node, value=True)  # all of its defaults
-        elif (name in GROUPS or name in MAPPINGS) and mapping and not _is_sweep(name, node):
-            for inner, item in _known_entries(name, node, problems):
-                _add_leaf(found, f"{name}.{inner}", item, problems)
-        elif name in SHORTHANDS or (name in WORDS and node.value is WORDS[name]):
-            found.values[name] = node
-        elif name in GROUPS or name in MAPPINGS:
-            problems.append(FileProblem(node.place, name, no_mapping(name, node.plain())))
+def write_out(tree: Tree) -> Written:
+    """Return the values of a file or a block in the one form, and what is wrong with its keys."""
+    tree, problems = _drop_unknown(tree)
+    tree, wrong = _halve_doubles(tree)
+    values = {
+        name: True if value == {} and WORDS.get(name) else value  # all of its defaults
+        for name, value in tree.values.items()
+    }
+    if isinstance(gas := values.get("gas"), dict) and "indicator" in gas:
+        folder = os.path.dirname(tree.places["gas", "indicator"][1].file)
+        if os.path.isdir(folder):
+            values["gas"] = gas | {"indicator": _beside(folder, gas["indicator"])}
+    return Tree(values, tree.places), problems + wrong
+
+
+def _drop_unknown(tree: Tree) -> Written:
+    """Return the values of the keys that there are, and a problem for each other one."""
+    values: dict[str, Any] = {}
+    problems = []
+
+    def refuse(path: Path, value: Any) -> None:
+        *group, name = map(str, path)
+        message = describe_unknown(name, "".join(group), value=value)
+        problems.append(FileProblem(tree.places[path][0], ".".join(map(str, path)), message))
+
+    for name, value in tree.values.items():
+        if name not in accepted_keys(""):
+            refuse((name,), value)
+        elif value is None:  # which is reported
+            continue
+        elif _is_group(name, value):
+            known = accepted_keys(name)
+            values[name] = {
+                inner: one for inner, one in value.items() if inner in known and one is not None
+            }
+            for inner in value.keys() - {*known}:
+                refuse((name, inner), value[inner])
+        elif name in MAPPINGS:
+            problems.append(FileProblem(tree.places[name,][1], name, no_mapping(name, value)))
         else:
-            found.values[name] = node
-    return found
+            values[name] = value
+    return Tree(values, tree.places), problems
 
 
-def _add_leaf(found: Leaves, key: str, node: Node, problems: list[FileProblem]) -> None:
-    """Add a leaf of a group to those found: a synonym as its key, a value by part as several."""
-    if keys := by_part(key, node.value):
-        if message := lacking_part(key, node.value):
-            problems.append(FileProblem(node.place, key, message))
-        for part, one in keys.items():
-            if part in node.value:
-                own = node.value[part]
-                found.values[one] = _beside_file(own) if one in CARDS else own
-                found.places[one] = node.value[part].key_place
-        return
-    if key in CARDS:
-        node = _beside_file(node)
-    own = DOUBLES.get(key, key)
-    doubled = next((word for word, half in DOUBLES.items() if half == own), own)
-    if own in found.values and own != doubled:
-        problems.append(FileProblem(node.key_place, doubled, TWICE.format(own)))
-    wrong = check_double(key, node.value) if own != key else None
-    if wrong:
-        problems.append(FileProblem(node.place, key, wrong))
-        node = replace(node, value=None)
-    found.values[own] = node if own == key else _halve_node(node)
-    found.places[own] = node.key_place
+def _is_group(name: str, value: Any) -> bool:
+    """Return whether a value is a group's keys."""
+    return (name in GROUPS or name in MAPPINGS) and isinstance(value, dict)
 
 
-CARDS = tuple(f"gas.{key}" for key in CARD_KEYS)
+def _is_by_part(key: str, value: Any) -> bool:
+    """Return whether a value is one for each part, and no sweep of one for all."""
+    parts = parts_by_key().get(key)
+    if parts is None or not isinstance(value, dict):
+        return False
+    is_form = len(value) <= 2 and any(get_close_matches(word, FORMS, n=1) for word in value)
+    return not is_form or not value.keys().isdisjoint(parts)
 
 
-def _beside_file(node: Node) -> Node:
-    """Return a node with the paths of cards in it as seen from the file that names them."""
-    if isinstance(node.value, list):
-        return replace(node, value=[*map(_beside_file, node.value)])
-    folder = os.path.dirname(node.place.file)
-    if not isinstance(node.value, str) or not os.path.isdir(folder):
-        return node
-    return replace(node, value=os.path.join(folder, node.value))
+def _halve_doubles(tree: Tree) -> Written:
+    """Return the values with each double as the key that it is twice of."""
+    values, places, problems = dict(tree.values), dict(tree.places), []
+    for double, key in DOUBLES.items():
+        old, new = tuple(double.split(".")), tuple(key.split("."))
+        group = values.get(old[0])
+        if not isinstance(group, dict) or old[1] not in group:
+            continue
+        if new[1] in group:
+            place = max(places[old], places[new])[0]
+            problems.append(FileProblem(place, double, TWICE.format(key)))
+        elif message := check_double(double, group[old[1]]):
+            problems.append(FileProblem(places[old][1], double, message))
+        else:
+            group = {new[1] if n == old[1] else n: v for n, v in group.items()}
+            group[new[1]] = _halve_swept(group[new[1]])
+            places |= {new + path[2:]: p for path, p in places.items() if path[:2] == old}
+            values[old[0]] = group
+            continue
+        values[old[0]] = {name: value for name, value in group.items() if name != old[1]}
+    return Tree(values, places), problems
 
 
-def _halve_node(node: Node, first: int | None = None) -> Node:
-    """Return a node with its numbers halved, of a list the `first` ones; None: all.
+def _halve_swept(value: Any, first: int | None = None) -> Any:
+    """Return a value with its numbers halved, of a list the `first` ones; None: all.
 
     A form such as `{linspace: [160, 200, 5]}` has two ends and a count, a range a step.
     """
-    if isinstance(node.value, dict):
-        inner = {
-            word: _halve_node(item, None if word in ("range", "triangular") else 2)
-            for word, item in node.value.items()
+    if isinstance(value, dict):
+        return {
+            word: _halve_swept(item, None if word in ("range", "triangular") else 2)
+            for word, item in value.items()
         }
-        return replace(node, value=inner)
-    if isinstance(node.value, list):
-        items = node.value[:first]
-        return replace(node, value=[*map(_halve_node, items), *node.value[len(items) :]])
-    return replace(node, value=halve(node.value))
+    if isinstance(value, list):
+        return [*map(_halve_swept, value[:first]), *(value[first:] if first else [])]
+    return halve(value)
 
 
-def _is_sweep(name: str, node: Node) -> bool:
-    """Return whether a group's mapping sweeps a value that stands for the whole group."""
-    few = name in SHORTHANDS and len(node.value) <= 2  # a word of FORMS, and `log`
-    return few and any(get_close_matches(word, FORMS, n=1) for word in node.value)
+def _beside(folder: str, value: Any) -> Any:
+    """Return the paths of cards, one, in a list or by end, as seen from another folder."""
+    if isinstance(value, list):
+        return [_beside(folder, item) for item in value]
+    if isinstance(value, dict):
+        return {end: _beside(folder, item) for end, item in value.items()}
+    return os.path.join(folder, value) if isinstance(value, str) else value
 
 
-def _known_entries(
-    group: str, node: Node, problems: list[FileProblem]
-) -> Iterable[tuple[str, Node]]:
-    """Yield the entries of a group (for "", of a file) that are known and have a value."""
-    for name, item in node.value.items():
-        if name not in accepted_keys(group):
-            message = "unknown key"
-            if len(problems) < MAX_SUGGESTIONS:
-                message = describe_unknown(name, group, value=item.plain())
-                empty = item.place, NO_VALUE  # an unknown key has no default
-                problems[:] = [one for one in problems if (one.place, one.message) != empty]
-            key = f"{group}.{name}" if group else name
-            problems.append(FileProblem(item.key_place, key, message))
-        elif item.value is not None:
-            yield name, item
+def leaves(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[Path, Any]]:
+    """Yield the path and the value, or the sweep, of each key; of a value by part each part's."""
+    for name, value in values.items():
+        key = f"{above}{name}"
+        if name in SWEEP and not above:
+            continue
+        if (not above and _is_group(name, value)) or _is_by_part(key, value):
+            yield from leaves(value, f"{key}.")
+        else:
+            yield path_of(key), value
 
 
-def read_overrides(texts: Sequence[str], problems: list[FileProblem]) -> dict[str, Leaves]:
-    """Return the leaves of each `key=value` of the command line, by its key."""
-    found: dict[str, Leaves] = {}
+def path_of(key: str) -> Path:
+    """Return the path of a dotted key."""
+    return tuple(key.split("."))
+
+
+def dotted(path: Path) -> str:
+    """Return the dotted key of a path."""
+    return ".".join(map(str, path))
+
+
+def put(values: Mapping[str, Any], path: Path, value: Any, above: str = "") -> dict[str, Any]:
+    """Return nested values with another one at a path; above: the dotted key that holds them.
+
+    What stood for several parts, one of which the path names, stands for the others.
+    """
+    first, *rest = map(str, path)
+    if not rest:
+        return {**values, first: value}
+    whole, inner = f"{above}.{first}".strip("."), values.get(first)
+    parts = parts_by_key().get(whole, ())
+    if not isinstance(inner, dict) or (parts and not _is_by_part(whole, inner)):
+        inner = dict.fromkeys(parts, inner) if first in values else {}
+    return {**values, first: put(inner, tuple(rest), value, whole)}
+
+
+def drop(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """Return nested values without the one at a path."""
+    first, *rest = map(str, path)
+    inner = values.get(first)
+    if rest and isinstance(inner, dict):
+        return {**values, first: drop(inner, tuple(rest))}
+    return {key: value for key, value in values.items() if rest or key != first}
+
+
+def override(file: Tree, key: str, change: Tree) -> Tree:
+    """Return a file's values with the one that a change has at a dotted key."""
+    value: Any = change.values
+    for name in path_of(key):
+        value = value.get(name) if isinstance(value, dict) else None
+    return _replace(file, {path_of(key): value} if value is not None else {}, change)
+
+
+def merge_block(file: Tree, block: Tree) -> Tree:
+    """Return a file's values with all those of one of its blocks."""
+    changes = dict(leaves(block.values))
+    for key in SWEEP:
+        value = block.values.get(key)
+        if isinstance(value, dict):
+            changes |= {(key, inner): one for inner, one in value.items()}
+        elif value is not None:
+            changes[key,] = value
+    return _replace(file, changes, block)
+
+
+def _replace(file: Tree, changes: Mapping[Path, Any], source: Tree) -> Tree:
+    """Return a file's values with others, and without what these stand in place of."""
+    values = dict(file.values)
+    for path, value in changes.items():
+        values = put(values, path, value)
+    given = {dotted(path) for path in changes}
+    given |= {part for key in given for part in stands_for(key)}
+    gone = [pair[pair[0] in given] for pair in IN_PLACE_OF if len(given.intersection(pair)) == 1]
+    gone += OF_JOINTS if changes.get(("joint",)) == "none" else ()
+    for key in gone:
+        if not any(covers(key, one) for one in given):
+            values = drop(values, path_of(key))
+    above = {path[:n] for path in changes for n in range(1, len(path))}
+    places = {
+        path: spots
+        for path, spots in file.places.items()
+        if not any(path[:n] in changes for n in range(1, len(path) + 1))
+    }
+    new = {path: spots for path, spots in source.places.items() if path not in above & {*places}}
+    return Tree(values, places | new)
+
+
+def read_overrides(texts: Sequence[str]) -> tuple[dict[str, Tree], list[FileProblem]]:
+    """Return the values of each `key=value` of the command line, by its key, and their problems."""
+    found: dict[str, Tree] = {}
+    problems: list[FileProblem] = []
     for text in texts:
         key, equals, value = (part.strip() for part in text.partition("="))
         place, own = Place(f"--set {shorten(text)}"), DOUBLES.get(key, key)
@@ -153,58 +234,27 @@ def read_overrides(texts: Sequence[str], problems: list[FileProblem]) -> dict[st
             problems.append(FileProblem(place, "", message))
         elif any(covers(own, other) or covers(other, own) for other in found):
             problems.append(FileProblem(place, key, "is set twice"))
-        elif node := read_text(value, place, problems):
-            group, dot, inner = key.partition(".")
-            node = Node({inner: node}, place, place) if dot else node
-            whole = leaves(Node({group: node}, place, place), problems)
-            found[own] = whole
-    return found
+        else:
+            tree, wrong = read_text(value, place)
+            problems += wrong
+            if tree is not None and tree.values is not None:
+                whole, wrong = write_out(_under(key, tree, place))
+                problems += wrong
+                found[own] = whole
+    return found, problems
 
 
-def override_leaves(file: Leaves, overrides: Mapping[str, Leaves]) -> Leaves:
-    """Return a file's leaves with every override in place of the leaves at or under its key."""
-    new = {key: node for change in overrides.values() for key, node in change.values.items()}
-    places = {key: place for change in overrides.values() for key, place in change.places.items()}
-    replaced = [*overrides]
-    for one, other in IN_PLACE_OF:
-        replaced += [other] * (one in new) + [one] * (other in new)
-    if "joint" in new and new["joint"].value == "none":
-        replaced += OF_JOINTS
-    remaining = {
-        key: node
-        for outer, value in file.values.items()
-        for key, node in _open_group(outer, value, new).items()
-        if key in new or not any(covers(other, key) for other in replaced)
-    }
-    return Leaves(remaining | new, places | file.places)
-
-
-def merge_leaves(file: Leaves, block: Leaves) -> Leaves:
-    """Return a file's leaves with every leaf of one of its blocks in place of the file's."""
-    changes = {key: Leaves({key: node}, {}) for key, node in block.values.items()}
-    merged = override_leaves(file, changes)
-    return Leaves(merged.values, file.places | block.places)
-
-
-def _open_group(key: str, node: Node, new: Mapping[str, Node]) -> dict[str, Node]:
-    """Return a leaf by key; one of a whole group is split where an override sets a part of it."""
-    if not any(other.startswith(f"{key}.") for other in new):
-        return {key: node}
-    return dict.fromkeys(stands_for(key), node)
+def _under(key: str, tree: Tree, place: Place) -> Tree:
+    """Return a tree under a dotted key; a part's name is the third."""
+    whole, _, part = key.rpartition(".")
+    path = path_of(key) if part in parts_by_key().get(whole, ()) else tuple(key.split(".", 1))
+    values = tree.values
+    for one in reversed(path):
+        values = {str(one): values}
+    places = {path + inner: spot for inner, spot in tree.places.items()}
+    return Tree(values, places | {path[:n]: (place, place) for n in range(1, len(path))})
 
 
 def covers(outer: str, key: str) -> bool:
     """Return whether a key is another one, or in the group that the other names."""
     return f"{key}.".startswith(f"{outer}.")
-
-
-def nest_values(chosen: Mapping[str, Node]) -> dict[str, Any]:
-    """Return the values by dotted key as a case file has them, group by group."""
-    values: dict[str, Any] = {}
-    for key, node in chosen.items():
-        group, _, name = key.rpartition(".")
-        value = node.value
-        if key == "solve.accuracy" and isinstance(value, tuple):
-            value = dict(value)  # as a case file has it
-        (values.setdefault(group, {}) if group else values)[name] = value
-    return values

@@ -16,7 +16,6 @@ READ_BY = {
         "exponent": tuple(law for law in CONTACT_LAWS if law not in CYLINDRICAL),
         "geometry": tuple(law for law in CONTACT_LAWS if law not in CYLINDRICAL),
         "length_mm": CYLINDRICAL,
-        "small_end_length_mm": CYLINDRICAL,
         "modulus_GPa": CYLINDRICAL,
     },
     "friction": {

@@ -1,123 +1,48 @@
 """Case files to studies: what is swept multiplies, and all errors are reported at once.
 
-A file becomes values by dotted key (`yaml_reader`, `keys`), blocks and overrides take their places,
-and each value is checked alone against the table of parameters. The jobs are counted (`blocks`)
-before any is made. Each job's case is built whole, for its key
-and for what does not fit together, and again when it is used.
+A file becomes nested values with their places (`yaml_reader`, `keys`), blocks and overrides take
+their places, and the jobs are counted (`blocks`) before any is made. Each job's case is then built
+whole, for its key and for what is wrong with its values, and again when it is used.
 """
 
-import contextlib
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
-from compressor.cases import blocks
+from compressor.cases.blocks import Block, Plan, plan_block
 from compressor.cases.case import Case
-from compressor.cases.checks import REPORT, SHORTHANDS, row_of, value_of
-from compressor.cases.combinations import Block, columns
+from compressor.cases.checks import REPORT, row_of, value_of
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
 from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
-from compressor.cases.keys import (
-    Leaves,
-    leaves,
-    merge_leaves,
-    nest_values,
-    override_leaves,
-    read_overrides,
-)
-from compressor.cases.parameter import CaseError, Problem, quote_value
+from compressor.cases.keys import dotted, merge_block, override, path_of, read_overrides, write_out
+from compressor.cases.parameter import NO_VALUE, CaseError, quote_value
 from compressor.cases.study import Axis, Cases, Study
-from compressor.cases.swept import (
-    SAMPLED,
-    format_count,
-    is_swept,
+from compressor.cases.table import WORDS, outside_identity, table
+from compressor.cases.yaml_reader import (
+    CaseFileError,
+    FileProblem,
+    Place,
+    Tree,
+    read_file,
+    shorten,
 )
-from compressor.cases.table import WORDS, table
-from compressor.cases.yaml_reader import CaseFileError, FileProblem, Node, Place, read_file, shorten
 from compressor.program import Progress, no_progress
 
 Variants = Callable[[Any], Iterable[Any]]  # of a case: the cases that are run for it
-
-
-def itself(case: Any) -> Iterable[Any]:
-    """Return the cases that are run for a case: itself."""
-    return (case,)
-
-
-@dataclass
-class KeysRead:
-    """The keys that files give, by place, and which of them any job reads.
-
-    A key that stands in a file once may be given for several blocks, and one of the command line
-    for several files: it is enough that one job reads it.
-    """
-
-    variants: Variants = itself
-    read: set[tuple[Place, str]] = field(default_factory=set)
-    unread: dict[tuple[Place, str], FileProblem] = field(default_factory=dict)
-
-    def note(self, cases: Cases) -> None:
-        """Note which keys of its blocks the cases of a study read, unless they cannot be built."""
-        with contextlib.suppress(CaseError):  # which is reported elsewhere
-            for block in cases.parts:
-                self._note(block)
-
-    def _note(self, block: Block) -> None:
-        needed, lacking = {}, {}  # conditions of each key; of those, which no case fulfils so far
-        nodes = {}
-        for key, node in block.leaves.values.items():
-            group = key.partition(".")[0]
-            where = node.key_place, group if group in SHORTHANDS else key
-            known = row_of(key) or key in WORDS
-            if where not in self.read and known and not is_off(key, node.value):
-                one = is_swept(key, node)
-                needed[where] = conditions(key) if one else needs_of_given(key, block.leaves.values)
-                lacking[where], nodes[where] = needed[where], node
-        for number in block.numbers:
-            if not lacking:  # cases are built only until each key has a reader
-                break
-            for case in self.variants(block.case(number)):
-                for where in lacking:
-                    unmet = [one for one in needed[where] if not condition(one[1])(case)]
-                    lacking[where] = [one for one in lacking[where] if one in unmet]
-                    self.read |= set() if unmet else {where}
-            lacking = {where: rest for where, rest in lacking.items() if where not in self.read}
-        for where, rest in lacking.items():
-            problem = problem_of(*[*rest, needed[where][-1]][0])
-            place = _place_of(problem.key, nodes[where], block.leaves)
-            found = FileProblem(place, problem.key, problem.message)
-            self.unread.setdefault(where, found)
-        for where in self.read & self.unread.keys():
-            del self.unread[where]
-
-
-def _place_of(key: str, node: Node, leaves: Leaves) -> Place:
-    """Return the place of an unread key or group; of a group, that in the key's own file."""
-    place = leaves.places.get(key, node.key_place)
-    return place if place.file == node.key_place.file else node.key_place
-
-
 MAX_JOBS = 10_000
 NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
 MANY_CASES = 20_000  # cases of a study that take seconds to be read
 MAX_CONFLICTS = 20  # reported of one file; a sweep can have another in every job
 IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
+AT_TOP = "needs keys at the top, such as `joint: big_end`, with a space after the colon"
 
 
-@dataclass(frozen=True)
-class _Draft:
-    """A study that is being read; `name` is empty where the file gives no valid one."""
-
-    path: str
-    name: str
-    leaves: Leaves
-    changes: Mapping[str, Leaves]
-    problems: list[FileProblem]
-    report: Mapping[str, str] = field(default_factory=dict)
+def itself(case: Any) -> Iterable[Any]:
+    """Return the cases that are run for a case: itself."""
+    return (case,)
 
 
 def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
@@ -152,24 +77,38 @@ def load_studies(
     """Return the studies of YAML case files.
 
     Each override, `key=value`, replaces a value in all of them. A file with more than `max_jobs`
-    jobs is refused before any is made; `only`, a comparison, selects the jobs to be run.
-    `progress` is called with how many of how many cases are read. `variants` gives the cases that
-    the caller runs for one; a key that none of them reads is refused. Raises CaseFileError with
-    everything that is wrong in all files, overrides and the comparison.
+    jobs is refused before any is made; `only`, a comparison, selects the jobs to be run. `progress`
+    is called with how many of how many cases are read. `variants` gives the cases that the caller
+    runs for one; a key that none of them reads is refused. Raises CaseFileError with everything
+    that is wrong in all files, overrides and the comparison.
     """
-    problems: list[FileProblem] = []
-    changes = read_overrides(overrides, problems)
-    test = _read_only(only, problems) if only else None
-    drafts = [_draft(_path_of(path), changes, problems) for path in paths]
-    _refuse_shared_names(drafts)
-    keys = KeysRead(variants)
-    studies = [_study(draft, max_jobs, test, progress, keys) for draft in drafts]
-    problems += _unread(drafts, keys)
-    problems += [problem for draft in drafts for problem in draft.problems]
+    changes, problems = read_overrides(overrides)
+    test = None
+    if only:
+        try:
+            test = comparison(only)
+        except NoComparison as error:
+            problems.append(FileProblem(Place(f"--only {shorten(only)}"), "", str(error)))
+    files = [_read(_path_of(path), {} if problems else changes) for path in paths]
+    mistaken = bool(problems)
+    problems += [problem for file in files for problem in file.problems]
+    problems += _find_shared_names(files)
+    studies, blocks = [], []
+    for file in files if not mistaken else ():
+        study, found, wrong = _study(file, max_jobs, test, progress)
+        problems += wrong
+        studies += [study] if study else []
+        blocks.append((file, found))
+    problems += _find_unread(blocks, variants)
     if not problems and not any(study.selected for study in studies):
         problems.append(FileProblem(Place(f"--only {shorten(only)}"), "", NONE_SELECTED))
     if problems:
-        raise CaseFileError(problems)
+        unknown = {one.place.line for one in problems if one.message.startswith("unknown key")}
+        raise CaseFileError(
+            [  # an unknown key has no default
+                one for one in problems if one.message != NO_VALUE or one.place.line not in unknown
+            ]
+        )
     return studies
 
 
@@ -182,241 +121,300 @@ def _path_of(path: Any) -> str:
         raise CaseFileError([FileProblem(Place("load_cases"), "", message)]) from error
 
 
-def _read_only(text: str, problems: list[FileProblem]) -> Test | None:
-    """Return the comparison of the command line."""
-    try:
-        return comparison(text)
-    except NoComparison as error:
-        problems.append(FileProblem(Place(f"--only {shorten(text)}"), "", str(error)))
-        return None
+@dataclass(frozen=True)
+class CaseFile:
+    """A case file that was read, and what the command line changes of it, by dotted key.
+
+    `name` is empty where it gives no valid one; a file that cannot be read has no tree.
+    """
+
+    path: str
+    problems: list[FileProblem]
+    tree: Tree | None = None
+    changes: Mapping[str, Tree] = field(default_factory=dict)
+    name: str = ""
+    name_place: Place = field(default_factory=lambda: Place(""))
+    report: Mapping[str, str] = field(default_factory=dict)
 
 
-def _draft(path: str, changes: Mapping[str, Leaves], earlier: Sequence[FileProblem]) -> _Draft:
-    problems = list(earlier)
-    root = read_file(path, problems)
-    file = Leaves({}, {})
-    if root and isinstance(root.value, dict):
-        file = leaves(root, problems)
-    elif root and root.value is not None:
-        message = "needs keys at the top, such as `joint: big_end`, with a space after the colon"
-        problems.append(FileProblem(root.place, "", message))
-    whole = override_leaves(file, changes)
-    name = _study_name(path, whole, problems) if root else ""
-    if "blocks" in changes:
-        file = override_leaves(file, {"blocks": changes["blocks"]})
-    report = _read_report(whole, problems)
-    excluded = ("blocks", "report")
-    rest = {key: change for key, change in changes.items() if key.partition(".")[0] not in excluded}
-    values = {k: node for k, node in file.values.items() if k.partition(".")[0] != "report"}
-    return _Draft(path, name, Leaves(values, file.places), rest, problems, report)
+def _read(path: str, changes: Mapping[str, Tree]) -> CaseFile:
+    """Return a case file, and what is wrong with it as far as no job is made."""
+    tree, problems = read_file(path)
+    if tree is None or not isinstance(tree.values, dict):
+        problems += [FileProblem(tree.places[()][1], "", AT_TOP)] if tree else []
+        return CaseFile(path, problems)
+    tree, wrong = write_out(tree)
+    whole = tree
+    for key, change in changes.items():
+        whole = override(whole, key, change)
+    name, unnamed = _study_name(path, whole)
+    report, untold = _read_report(whole)
+    place = whole.places.get(("name",), (None, Place(path, 1, 1)))[1]
+    problems += [*wrong, *unnamed, *untold]
+    return CaseFile(path, problems, tree, changes, name, place, report)
 
 
-def _read_report(found: Leaves, problems: list[FileProblem]) -> dict[str, str]:
+def _read_report(tree: Tree) -> tuple[dict[str, str], list[FileProblem]]:
     """Return the title and the notes that a file gives for the page of the report."""
-    texts = {}
-    for name, most in REPORT.items():
-        node = found.values.get(f"report.{name}")
-        if node is None:
-            continue
-        text = node.value.strip() if isinstance(node.value, str) else ""
+    texts, problems = {}, []
+    for name, value in tree.values.get("report", {}).items():
+        text = value.strip() if isinstance(value, str) else ""
         lines = text.split("\n") if name == "notes" else [text]
-        if text and len(text) <= most and all(line.isprintable() for line in lines):
+        if text and len(text) <= REPORT[name] and all(line.isprintable() for line in lines):
             texts[name] = text
         else:
             what = "lines of text" if name == "notes" else "a line of text"
-            message = f"needs {what} of up to {most} letters, not {quote_value(node.plain())}"
-            problems.append(FileProblem(node.place, f"report.{name}", message))
-    return texts
+            message = f"needs {what} of up to {REPORT[name]} letters, not {quote_value(value)}"
+            place = tree.places["report", name][1]
+            problems.append(FileProblem(place, f"report.{name}", message))
+    return texts, problems
 
 
-def _study_name(path: str, found: Leaves, problems: list[FileProblem]) -> str:
-    """Return the study's name: the file's value, else the file's stem; "" for a wrong one.
+def _study_name(path: str, tree: Tree) -> tuple[str, list[FileProblem]]:
+    """Return the study's name, the file's value or its stem, "" for a wrong one; and its problems.
 
     What is wrong with the value is reported later, with all others.
     """
-    if "name" in found.values:
-        name = found.values["name"].value
-        return "" if table()["name"].check(name) else name
-    name = Path(path).stem
-    message = table()["name"].check(name)
-    if message:
+    row, stem = table()["name"], os.path.splitext(os.path.basename(path))[0]
+    if "name" in tree.values:
+        name = tree.values["name"]
+        return ("" if row.check(name) else name), []
+    if message := row.check(stem):
         message = f"the file's name gives none: {message}; set name"
-        problems.append(FileProblem(Place(path, 1, 1), "name", message))
-    return "" if message else name
+        return "", [FileProblem(Place(path, 1, 1), "name", message)]
+    return stem, []
 
 
-def _refuse_shared_names(drafts: Sequence[_Draft]) -> None:
-    """Refuse studies that would be stored under one name; on some disks `A` and `a` are one."""
-    first: dict[str, _Draft] = {}
-    for draft in drafts:
-        other = first.setdefault(draft.name.casefold(), draft)
-        if draft.name and other is not draft:
-            given = override_leaves(draft.leaves, draft.changes).values.get("name")
-            place = given.place if given else Place(draft.path, 1, 1)
-            message = f"{other.path} and {draft.path} would be stored under one name, {draft.name}"
-            draft.problems.append(FileProblem(place, "name", message))
-
-
-def _unread(drafts: Sequence[_Draft], keys: KeysRead) -> Iterator[FileProblem]:
-    """Yield the keys of all files that no job reads.
-
-    A key that a file's own jobs read stands there rightly, whatever the command line changes.
-    """
-    for draft in drafts:
-        if draft.changes and any(place.file == draft.path for place, _ in keys.unread):
-            own = replace(draft, changes={}, problems=[])
-            _note_read(own, _cases(own, MAX_JOBS)[1], keys)
-    yield from keys.unread.values()
-
-
-def _note_read(draft: _Draft, cases: Cases | None, keys: KeysRead) -> None:
-    """Note which keys the jobs of a draft read."""
-    if not draft.problems and cases is not None:
-        keys.note(cases)
-
-
-def _cases(draft: _Draft, max_jobs: int) -> tuple[list[blocks.Draft], Cases | None]:
-    """Return the blocks of a draft, and their cases; None where they are too many to be made."""
-    drafts = [blocks.draft(leaves, draft.problems) for leaves in _blocks(draft, max_jobs)]
-    if not _fits_limit(drafts, draft, max_jobs):
-        return drafts, None
-    return drafts, Cases([one.block(draft.name) for one in drafts])
+def _find_shared_names(files: Sequence[CaseFile]) -> list[FileProblem]:
+    """Return studies that would be stored under one name; on some disks `A` and `a` are one."""
+    first: dict[str, CaseFile] = {}
+    problems = []
+    for file in files:
+        other = first.setdefault(file.name.casefold(), file)
+        if file.name and other is not file:
+            message = f"{other.path} and {file.path} would be stored under one name, {file.name}"
+            problems.append(FileProblem(file.name_place, "name", message))
+    return problems
 
 
 def _study(
-    draft: _Draft, max_jobs: int, only: Test | None, progress: Progress, read: KeysRead
-) -> Study:
-    """Return the study of a draft; without cases if the draft has problems, its own among them."""
-    drafts, cases = _cases(draft, max_jobs)
-    if cases is None:
-        return Study(draft.name, draft.path, (), ())
-    found = cases.parts
-    _note_read(draft, cases, read)
-    if not draft.problems and not draft.changes:
-        _refuse_idle_sample(drafts, draft)
-    is_grid = len(found) == 1 and found[0].is_grid
-    swept = [] if is_grid else columns(found)
-    keys, values = _check_cases(draft, cases, swept, progress)
-    if draft.problems:
-        return Study(draft.name, draft.path, (), ())
+    file: CaseFile, max_jobs: int, only: Test | None, progress: Progress
+) -> tuple[Study | None, list[Block], list[FileProblem]]:
+    """Return the study of a file with its blocks, or what is wrong with it."""
+    plans, blocks, problems = _blocks(file, file.changes, max_jobs)
+    is_drawn = any(one.is_drawn for plan in plans for one in plan.sweeps.values())
+    sample = plans[0].tree.places.get(("sample",)) if plans else None
+    if sample and not (problems or file.problems or file.changes or is_drawn):
+        text = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
+        problems.append(FileProblem(sample[0], "sample", text))
+    if problems or not blocks:
+        return None, [], problems
+    is_grid = len(blocks) == 1 and blocks[0].is_grid
+    cases, columns = Cases(blocks), [] if is_grid else _columns(blocks)
+    keys, values, problems = _check_cases(file, cases, columns, progress)
+    if problems:
+        return None, [], problems
     cases.keys = keys
     if is_grid:
-        axes = [Axis(k[0], tuple(n.value for (n,) in rows)) for k, rows in found[0].factors]
+        axes = [Axis(keys[0], tuple(one for (one,) in rows)) for keys, rows in blocks[0].factors]
     else:
-        spreads = {
-            key: sweep.spread for one in drafts for key, sweep in one.sweeps.items()
-            if sweep.kind in SAMPLED and sweep.has_ends
-        }  # fmt: skip
-        axes = [Axis(key, tuple(values[key]), spreads.get(key)) for key in swept]
+        spreads = {key: sweep.spread for one in blocks for key, sweep in one.sweeps.items()
+                   if sweep.is_drawn and sweep.has_ends}  # fmt: skip
+        axes = [Axis(key, tuple(values[key]), spreads.get(key)) for key in columns]
     selected = range(len(cases)) if only is None else cases.where(only)
-    return Study(
-        draft.name, draft.path, tuple(axes), cases, keys, is_grid, selected,
-        tuple(nest_values(block.fixed) for block in found), **draft.report,
-    )  # fmt: skip
+    fixed = tuple(block.fixed for block in blocks)
+    study = Study(
+        file.name, file.path, tuple(axes), cases, keys, is_grid, selected, fixed, **file.report
+    )
+    return study, blocks, []
 
 
-def _blocks(draft: _Draft, max_jobs: int) -> Iterator[Leaves]:
-    """Yield the leaves of each block over those of the file; the file's alone without blocks."""
-    node = draft.leaves.values.get("blocks")
-    own = {key: item for key, item in draft.leaves.values.items() if key != "blocks"}
-    file = Leaves(own, draft.leaves.places)
-    if node is None:
-        yield override_leaves(file, draft.changes)
-        return
-    items = node.value if isinstance(node.value, list) else []
-    if not items or not all(isinstance(item.value, dict) for item in items):
+def _blocks(
+    file: CaseFile, changes: Mapping[str, Tree], max_jobs: int
+) -> tuple[list[Plan], list[Block], list[FileProblem]]:
+    """Return the blocks of a file as plans and with their jobs; no jobs where anything is wrong."""
+    trees, problems = _block_trees(file, changes, max_jobs) if file.tree else ([], [])
+    pairs = [plan_block(one) for one in trees]
+    plans = [plan for plan, _ in pairs]
+    problems += [problem for _, wrong in pairs for problem in wrong]
+    if too_many := _find_too_many(plans, max_jobs):
+        return plans, [], [*problems, too_many]
+    made = [plan.block(file.name) for plan in plans]
+    blocks = [block for block, _ in made]
+    problems += [problem for _, wrong in made for problem in wrong]
+    if not problems and not file.problems:
+        return plans, blocks, []
+    found: dict[Any, FileProblem] = {}  # what is wrong with single values is told in the same run
+    for block in blocks:
+        for values, rows in block.each_value():
+            try:
+                Case.resolve(values)
+            except CaseError as error:
+                found |= {} if error.is_misfit else block.locate(error, rows, file.path)
+    return plans, [], [*problems, *found.values()]
+
+
+def _block_trees(
+    file: CaseFile, changes: Mapping[str, Tree], max_jobs: int
+) -> tuple[list[Tree], list[FileProblem]]:
+    """Return the values of each block over those of the file; the file's alone without blocks."""
+    tree = file.tree
+    assert tree
+    rest = {key: change for key, change in changes.items() if key != "blocks"}
+    if "blocks" in changes:
+        tree = override(tree, "blocks", changes["blocks"])
+
+    def changed(whole: Tree) -> Tree:
+        for key, change in rest.items():
+            whole = override(whole, key, change)
+        return whole
+
+    if "blocks" not in tree.values:
+        return [changed(tree)], []
+    items, place = tree.values["blocks"], tree.places["blocks",][1]
+    values = {key: value for key, value in tree.values.items() if key != "blocks"}
+    whole = Tree(values, tree.places)
+    if not isinstance(items, list) or not items or not all(isinstance(i, dict) for i in items):
         message = "needs a list of mappings, such as [{load: none}, {joint: both}]"
-        draft.problems.append(FileProblem(node.place, "blocks", message))
-    elif len(items) > max_jobs:
+        return [], [FileProblem(place, "blocks", message)]
+    if len(items) > max_jobs:
         message = f"{len(items)} blocks are more jobs than {max_jobs}; raise --max-jobs"
-        draft.problems.append(FileProblem(node.place, "blocks", message))
-    else:
-        for item in items:
-            yield override_leaves(merge_leaves(file, _block_leaves(item, draft)), draft.changes)
+        return [], [FileProblem(place, "blocks", message)]
+    found, problems = [], []
+    within = [path for path in tree.places if path[:1] == ("blocks",) and len(path) > 1]
+    for number, item in enumerate(items):
+        places = {path[2:]: tree.places[path] for path in within if path[1] == number}
+        block, wrong = write_out(Tree(item, places))
+        problems += wrong
+        for key in ("name", "blocks", "report"):
+            if key in block.values:
+                problems.append(FileProblem(block.places[key,][0], key, IN_BLOCK))
+                del block.values[key]
+        found.append(changed(merge_block(whole, block)))
+    return found, problems
 
 
-def _refuse_idle_sample(drafts: Sequence[blocks.Draft], draft: _Draft) -> None:
-    """Refuse a `sample` where no key is sampled: a mistake."""
-    place = draft.leaves.places.get("sample")
-    if place and not any(one.samples and one.is_sampled for one in drafts):
-        message = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
-        draft.problems.append(FileProblem(place, "sample", message))
-
-
-def _block_leaves(item: Node, draft: _Draft) -> Leaves:
-    """Return the leaves of a block; keys that only a file can have are problems."""
-    found = leaves(item, draft.problems)
-    whole = ("name", "blocks", "report")
-    for key in [key for key in found.values if key.partition(".")[0] in whole]:
-        group, message = key.partition(".")[0], IN_BLOCK
-        draft.problems.append(FileProblem(found.places[group], group, message))
-        del found.values[key]
-    found.places[""] = item.place
-    return found
-
-
-def _fits_limit(drafts: Sequence[blocks.Draft], draft: _Draft, max_jobs: int) -> bool:
-    """Return whether there are few enough jobs to make their values; too many are a problem."""
-    sizes = [one.sizes() for one in drafts]
+def _find_too_many(plans: Sequence[Plan], max_jobs: int) -> FileProblem | None:
+    """Return the problem of more jobs than may be made."""
+    sizes = [plan.sizes() for plan in plans]
     total = sum(math.prod(one.values()) for one in sizes)
     if total <= max_jobs:
-        return True
-    largest = max(drafts, key=lambda one: math.prod(one.sizes().values()))
-    keys = max(largest.factors, key=lambda keys: largest.size(keys[0]))
+        return None
+    largest = max(plans, key=lambda plan: math.prod(plan.sizes().values()))
+    keys = max(largest.factors, key=largest.size)
     counts = [" x ".join(f"{name} ({format_count(n)})" for name, n in one.items()) for one in sizes]
     message = (
         f"{format_count(total)} jobs are more than {max_jobs}: {shorten(' + '.join(counts), 300)}; "
         "ask for fewer, or raise --max-jobs"
     )
-    place = largest.sweeps[keys[0]].node.place
-    draft.problems.append(FileProblem(place, keys[0], message))
-    return False
+    place = largest.tree.places[largest.sweeps[keys[0]].path][1]
+    return FileProblem(place, keys[0], message)
+
+
+def format_count(count: int) -> str:
+    """Return a number of jobs as messages write it, however large."""
+    return str(count) if count < 10**100 else f"over 10^{int(count.bit_length() * 0.30103) - 1}"
+
+
+def _columns(blocks: Sequence[Block]) -> list[str]:
+    """Return the keys by which the jobs of blocks differ: swept in one, or not the same in all."""
+    found = dict.fromkeys(key for block in blocks for key in block.sweeps)
+    for key in dict.fromkeys(key for block in blocks for key in block.given):
+        differs = len({repr(block.given.get(key)) for block in blocks}) > 1
+        if differs and key not in outside_identity():
+            found[key] = None
+    return [*found]
 
 
 def _check_cases(
-    draft: _Draft, cases: Cases, swept: Sequence[str], progress: Progress
-) -> tuple[tuple[str, ...], dict[str, list[Any]]]:
-    """Return the key of each case, and its value of each swept key.
-
-    Values that are good alone and do not fit each other are problems, each once.
-    """
-    found: dict[Problem, FileProblem] = {}
+    file: CaseFile, cases: Cases, columns: Sequence[str], progress: Progress
+) -> tuple[tuple[str, ...], dict[str, list[Any]], list[FileProblem]]:
+    """Return the key of each case, its value of each swept key, and what is wrong with values."""
+    found: dict[Any, FileProblem] = {}
     keys: list[str] = []
-    values: dict[str, list[Any]] = {key: [] for key in swept}
+    values: dict[str, list[Any]] = {key: [] for key in columns}
     total = len(cases)
     progress = progress if total >= MANY_CASES else no_progress
     for number, (block, place) in enumerate(cases.combinations):
         if number % 1000 == 0:
-            progress(number, total, "" if number else f"{draft.name}: {total} jobs")
+            progress(number, total, "" if number else f"{file.name}: {total} jobs")
         try:
             case = block.case(place)
         except CaseError as error:
-            chosen = block.chosen(place)
-            for problem in error.problems:
-                found.setdefault(problem, _locate_problem(problem, chosen, block, draft.path))
+            found = block.locate(error, block.rows_of(place), file.path) | found
             continue
         if not found:
             keys.append(case.key)
-            for key in swept:
+            for key in columns:
                 values[key].append(value_of(case, key))
     progress(total, total, "")
-    draft.problems.extend(itertools.islice(found.values(), MAX_CONFLICTS))
+    problems = [*itertools.islice(dict.fromkeys(found.values()), MAX_CONFLICTS)]
     if len(found) > MAX_CONFLICTS:
         message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
-        draft.problems.append(FileProblem(Place(draft.path), "", message))
-    return tuple(keys), values
+        problems.append(FileProblem(Place(file.path), "", message))
+    return tuple(keys), values, problems
 
 
-def _locate_problem(
-    problem: Problem, chosen: Mapping[str, Node], block: Block, path: str
-) -> FileProblem:
-    """Return a case's problem at the value it is about, or at the nearest key, group or block."""
-    group = problem.key.partition(".")[0]
-    for key in (problem.key, group):
-        if key in chosen:
-            return FileProblem(chosen[key].place, key, problem.message)
-    for key in (problem.key, group):
-        if key in block.leaves.places:
-            return FileProblem(block.leaves.places[key], problem.key, problem.message)
-    place = block.leaves.places.get("", Place(path, 1, 1))
-    return FileProblem(place, problem.key, problem.message)
+Where = tuple[Place, str]  # a key of a file, which may be given for several blocks or files
+
+
+def _find_unread(
+    found: Sequence[tuple[CaseFile, list[Block]]], variants: Variants
+) -> list[FileProblem]:
+    """Return the keys that no job reads of those that they are given for.
+
+    A key that a file's own jobs read stands there rightly, whatever the command line changes.
+    """
+    read: set[Where] = set()
+    unread: dict[Where, FileProblem] = {}
+    for _, blocks in found:
+        for block in blocks:
+            some, none = _read_in(block, variants, read)
+            read |= some
+            unread |= none
+    for file, _ in found:
+        lacking = [where for where in unread.keys() - read if where[0].file == file.path]
+        if lacking and file.changes:
+            _, blocks, problems = _blocks(file, {}, MAX_JOBS)
+            for block in blocks if not problems else ():
+                read |= _read_in(block, variants, read)[0]
+    return [problem for where, problem in unread.items() if where not in read]
+
+
+def _read_in(
+    block: Block, variants: Variants, known: set[Where]
+) -> tuple[set[Where], dict[Where, FileProblem]]:
+    """Return which keys of a block its jobs read, and a problem for each other one.
+
+    known: those of which it is known already. Cases are built only until each key has a reader.
+    """
+    needed, lacking, places = {}, {}, {}
+    for key, value in block.given.items():
+        path = block.nearest(path_of(key))  # of a part, the key that gives all of them
+        place = block.key_place(path)
+        where = place, dotted(path)
+        if where not in known and (row_of(key) or key in WORDS) and not is_off(key, value):
+            one = key in block.sweeps
+            needed[where] = conditions(key) if one else needs_of_given(key, block.given)
+            lacking[where], places[where] = needed[where], place
+    read: set[Where] = set()
+    for number in block.numbers:
+        if not lacking:
+            break
+        try:
+            cases = [*variants(block.case(number))]
+        except CaseError:  # of a file without what the command line changes
+            continue
+        for case in cases:
+            for where in lacking:
+                unmet = [one for one in needed[where] if not condition(one[1])(case)]
+                lacking[where] = [one for one in lacking[where] if one in unmet]
+                read |= set() if unmet else {where}
+        lacking = {where: rest for where, rest in lacking.items() if where not in read}
+    unread = {}
+    for where, rest in lacking.items():
+        problem = problem_of(*[*rest, needed[where][-1]][0])
+        at = block.key_place(path_of(problem.key))
+        place = at if at.file == where[0].file else where[0]
+        unread[where] = FileProblem(place, problem.key, problem.message)
+    return read, unread

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from compressor.cases.checks import row_of
 from compressor.cases.laws import CYLINDRICAL
 from compressor.cases.parameter import to_si
 from compressor.cases.table import table
@@ -50,7 +51,9 @@ def composite_modulus(first, second):
     return 1.0 / compliance
 
 
-def joint_stiffness(contact: "Contact", pin_radius_mm: float, clearance_mm: float) -> float:
+def joint_stiffness(
+    contact: "Contact", joint: str, pin_radius_mm: float, clearance_mm: float
+) -> float:
     """Return the stiffness that scales a joint's law: K (N/m^p), or pi E* L (N/m) with johnson.
 
     K is the case's, or Eq. 15's of the materials (`contact_stiffness`). With liu it is K (N/m^1.5)
@@ -60,14 +63,15 @@ def joint_stiffness(contact: "Contact", pin_radius_mm: float, clearance_mm: floa
     if contact.law in CYLINDRICAL:
         modulus = to_si(contact.modulus_GPa or 0.0, "GPa")
         if contact.materials:
-            modulus = composite_modulus(*contact.materials)
-        line = math.pi * modulus * to_si(contact.length_mm or 0.0, "mm")
+            modulus = composite_modulus(*contact.materials.at(joint))
+        length = contact.length_mm.at(joint) if contact.length_mm else 0.0
+        line = math.pi * modulus * to_si(length, "mm")
         if contact.law == "johnson":
             return line
         return line / (2.0 * math.sqrt(2.0 * clearance)) if clearance > 0.0 else 0.0
     if contact.materials:
         internal = contact.geometry == "internal" and clearance > 0.0  # an ideal joint has none
-        return contact_stiffness(*contact.materials, pin, pin + clearance, internal)
+        return contact_stiffness(*contact.materials.at(joint), pin, pin + clearance, internal)
     return (contact.stiffness_N_per_mm15 or 0.0) * 1000.0**contact.exponent
 
 
@@ -77,11 +81,11 @@ def paper_stiffness_note(case: "Case") -> str:
     Names Eq. 15's stiffness for each of those pins; "" where no joint has such a pin and stiffness.
     """
     contact, key = case.contact, "contact.stiffness_N_per_mm15"
-    usual, radius = table()[key].default, table()["machine.pin_radius_mm"].default
+    usual, radius = table()[key].default, table()["machine.pin_radius_mm.big_end"].default
     if contact.law in CYLINDRICAL or contact.stiffness_N_per_mm15 != usual:
         return ""
     pins = {
-        case.machine.pin_radius(joint): getattr(case.clearance_mm, joint)
+        case.machine.pin_radius_mm.at(joint): getattr(case.clearance_mm, joint)
         for joint in JOINTS
         if getattr(case.clearance_mm, joint) > 0
     }
@@ -113,7 +117,7 @@ def paper_notes(case: "Case") -> dict[str, str]:
     found = {"contact.stiffness_N_per_mm15": paper_stiffness_note(case)}
     if film := case.lubricant:
         why = "a film bears about as the cube of it"
-        found |= _paper_length("lubricant.bearing_length_mm", case, film.bearing_length, why)
+        found |= _paper_length("lubricant.bearing_length_mm", case, film.bearing_length_mm.at, why)
     if wear := case.wear:
         why = "the same wear is half as deep in a bore of twice the length"
         found |= _paper_length("wear.bore_length_mm", case, lambda joint: wear.bore_length_mm, why)
@@ -124,9 +128,10 @@ def _paper_length(
     key: str, case: "Case", length: Callable[[str], float], why: str
 ) -> dict[str, str]:
     """Return what to know of a default length (mm) of joints with clearance, by its key."""
-    usual, radius = table()[key].default, table()["machine.pin_radius_mm"].default
+    row, radius = row_of(key), table()["machine.pin_radius_mm.big_end"].default
+    usual = row.default if row else 0.0
     worn = [joint for joint in JOINTS if getattr(case.clearance_mm, joint) > 0]
-    pins = {case.machine.pin_radius(joint) for joint in worn if length(joint) == usual}
+    pins = {case.machine.pin_radius_mm.at(joint) for joint in worn if length(joint) == usual}
     pins.discard(radius)
     if not pins:
         return {}

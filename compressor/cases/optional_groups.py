@@ -4,20 +4,22 @@ from dataclasses import replace
 from functools import partial
 from typing import ClassVar
 
-from compressor.cases.groups import BEARING_LENGTH, SMOOTHING, PerJoint
+from compressor.cases.groups import BEARING_LENGTH, SMOOTHING
 from compressor.cases.parameter import (
     ALONG_X,
     ALONG_Y,
+    AT_JOINTS,
     CASING,
     CASING_SENSED,
     GUIDE_FRICTION,
     PLAY,
     RANDOM,
     ROCKING,
-    SMALL_CLEARANCE,
     STEADY,
     THRESHOLD,
+    PerJoint,
     Plausible,
+    by_part,
     choice,
     document_fields,
     from_to,
@@ -53,31 +55,19 @@ class Lubricant:
             times(0.5, 2), times(0.5, 2),
         ),
     )  # fmt: skip
-    bearing_length_mm: float = parameter(
-        20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of both bearings, or of the big "
-        "end's", above=True,
-        plausible=BEARING_LENGTH,
+    bearing_length_mm: PerJoint[float] = by_part(
+        PerJoint, 20.0,
+        parameter(
+            20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of the bearing", above=True,
+            plausible=BEARING_LENGTH,
+        ),
+        AT_JOINTS,
     )  # fmt: skip
     last_share: float = parameter(
         0.02, "", (0.001, 0.5), "program",
         "share of the clearance below which the film gets no thinner", judged=(0.01, 0.1),
         plausible=Plausible("nobody knows the roughness", times(0.5, 2), times(0.5, 2)),
     )  # fmt: skip
-    small_end_bearing_length_mm: float | None = parameter(
-        None, "mm", (0, 1e4), "as the big end's", "length of the small end's bearing",
-        above=True, optional=True, read=SMALL_CLEARANCE,
-        plausible=BEARING_LENGTH,
-    )  # fmt: skip
-
-    def __post_init__(self) -> None:
-        """Leave out a length that is the big end's."""
-        if self.small_end_bearing_length_mm == self.bearing_length_mm:  # as without the key
-            vars(self)["small_end_bearing_length_mm"] = None
-
-    def bearing_length(self, joint: str) -> float:
-        """Return the length of a joint's bearing, mm."""
-        own = self.small_end_bearing_length_mm if joint == "small_end" else None
-        return self.bearing_length_mm if own is None else own
 
 
 PROGRAM = "program"
@@ -442,7 +432,7 @@ class Wear:
     )
 
 
-def fill_wear(wear: Wear, clearance_mm: PerJoint) -> Wear:
+def fill_wear(wear: Wear, clearance_mm: PerJoint[float]) -> Wear:
     """Return the wear with its limit, by the clearances of both joints."""
     most = max(clearance_mm.big_end, clearance_mm.small_end)
     return wear if wear.limit_mm or not most else replace(wear, limit_mm=2.0 * most)

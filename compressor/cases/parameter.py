@@ -17,7 +17,7 @@ import math
 import re
 import reprlib
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from functools import lru_cache, partial
@@ -26,6 +26,7 @@ from typing import (
     TYPE_CHECKING,
     Annotated,
     Any,
+    Generic,
     Literal,
     NamedTuple,
     TypeVar,
@@ -52,7 +53,7 @@ CRANK_END = "gas.action == double or gas.action == crank_end"
 HEAD_END = "gas.action != crank_end"
 CYCLE = "not gas.is_measured"  # by an indicator card of an end that presses
 MEASURED = "gas.is_measured"
-HEAD_CLEARANCE = "gas.action != crank_end or not gas.crank_clearance_percent"
+HEAD_CLEARANCE = "gas.action != crank_end or not gas.clearance_percent.crank"
 SPRING = "load == spring"
 A_JOINT = "joint != none"
 BIG_END = "joint == big_end or joint == both"
@@ -64,9 +65,12 @@ IDEAL_JOINT = "not (clearance_mm.big_end > 0 and clearance_mm.small_end > 0)"
 PLAY = "guide.clearance_mm > 0"
 CONTACT = f"{CLEARANCE} or {PLAY}"
 RUBBING = f"{CLEARANCE} or friction.ideal_joints == true"
-SMALL_RUBBING = f"{SMALL_CLEARANCE} or friction.ideal_joints == true"
+RUBBING_AT = {
+    "big_end": f"{BIG_CLEARANCE} or friction.ideal_joints == true",
+    "small_end": f"{SMALL_CLEARANCE} or friction.ideal_joints == true",
+}
+AT_JOINTS = {"big_end": BIG_CLEARANCE, "small_end": SMALL_CLEARANCE}
 GUIDE = f"guide.friction > 0 or {PLAY}"
-BALANCE = "machine.balance >= 0"
 GUIDE_FRICTION = "guide.friction > 0"
 MATERIALS = "contact.materials"
 DAMPED = "contact.restitution > 0"  # which johnson and liu need not have
@@ -146,6 +150,62 @@ UNITS = {
 }
 
 Group = TypeVar("Group")
+Value = TypeVar("Value")
+PARTS = ConfigDict(extra="forbid", revalidate_instances="always")
+
+
+@pydantic.dataclasses.dataclass(frozen=True, config=PARTS)
+class PerJoint(Generic[Value]):
+    """A value of each joint, such as a case's `clearance_mm`, mm: 0 where a joint is ideal.
+
+    In values and case files one number stands for both:
+
+    >>> import compressor
+    >>> compressor.Case.from_values({"joint": "both", "clearance_mm": 0.2}).clearance_mm
+    PerJoint(big_end=0.2, small_end=0.2)
+    >>> pins = {"pin_radius_mm": {"big_end": 60, "small_end": 35}}
+    >>> compressor.Case.from_values({"machine": pins}).machine.pin_radius_mm.small_end
+    35.0
+    """
+
+    big_end: Value
+    small_end: Value
+
+    def at(self, joint: str) -> Value:
+        """Return the value of a joint, big_end or small_end."""
+        return self.big_end if joint == "big_end" else self.small_end
+
+
+@pydantic.dataclasses.dataclass(frozen=True, config=PARTS)
+class PerEnd(Generic[Value]):
+    """A value of each end of a cylinder; one number in a case file stands for both."""
+
+    head: Value
+    crank: Value
+
+
+@pydantic.dataclasses.dataclass(frozen=True, config=PARTS)
+class PerValve(Generic[Value]):
+    """A value of the suction and of the discharge valves; one number stands for both."""
+
+    suction: Value
+    discharge: Value
+
+
+@pydantic.dataclasses.dataclass(frozen=True, config=PARTS)
+class PerMotion(Generic[Value]):
+    """A value of what rotates and of what reciprocates; one number stands for both."""
+
+    rotating: Value
+    reciprocating: Value
+
+
+PART_WORDS = {
+    "big_end": "of the big end", "small_end": "of the small end", "head": "of the head end",
+    "crank": "of the crank end", "suction": "of the suction valves",
+    "discharge": "of the discharge valves", "rotating": "of what rotates",
+    "reciprocating": "of what reciprocates",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -177,8 +237,9 @@ class CaseError(CompsimError, ValueError):
 
     exit_code = 2
 
-    def __init__(self, problems: Sequence[Problem]):
+    def __init__(self, problems: Sequence[Problem], is_misfit: bool = False):
         self.problems = problems
+        self.is_misfit = is_misfit  # of values that are good alone and do not fit each other
         super().__init__(problems)
 
     def __str__(self) -> str:
@@ -396,11 +457,6 @@ class Parameter:
         return message
 
 
-def end_of_card(key: str) -> str:
-    """Return the end, head or crank, of which a key gives the card."""
-    return "crank" if key.endswith("crank_indicator") else "head"
-
-
 def join_with_or(words: Sequence[str]) -> str:
     """Return the words as a sentence lists them: a, b or c."""
     return " or ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
@@ -442,12 +498,15 @@ def check_name(value: str) -> str:
     raise ValueError(f"{quote_value(value)} is no name: use {allowed}, no leading dot")
 
 
-def check_card(end: str, value: str) -> str:
-    """Return the path of a card with its digest. Raises ValueError for a file that is none."""
+def check_cards(value: PerEnd[str | None] | None) -> PerEnd[str | None] | None:
+    """Return the paths of cards with their digests. Raises ValueError for a file that is none."""
+    if value is None:
+        return None
     try:
-        return mark_card(value, end)
+        marked = {end: card and mark_card(card, end) for end, card in vars(value).items()}
     except CardError as error:
         raise ValueError(str(error)) from error
+    return PerEnd(**marked)
 
 
 TARGET = Parameter("", "", None, 1e-9, 0.5, True, "", "", "number")
@@ -465,10 +524,7 @@ def annotation_of(row: Parameter) -> Any:
         "integer": Annotated[int, BeforeValidator(to_whole), Field(strict=True, **ends)],
         "boolean": Annotated[bool, BeforeValidator(to_python), Field(strict=True)],
         "text": Annotated[str, Field(strict=True), AfterValidator(check_name)],
-        "card": Annotated[
-            str, Field(strict=True, min_length=1),
-            AfterValidator(partial(check_card, end_of_card(row.key))),
-        ],
+        "card": Annotated[str, Field(strict=True, min_length=1)],
         "materials": tuple[words, words],
         "accuracy": BY_METRIC,
     }  # fmt: skip
@@ -531,6 +587,16 @@ else:
             if isinstance(item, dataclasses.Field) and "kind" in item.metadata:
                 rows[name] = Parameter(name, default=item.default, **item.metadata)
                 cls.__annotations__[name] = annotation_of(rows[name])
+            elif isinstance(item, dataclasses.Field) and "parts" in item.metadata:
+                parts = [*rows_of(name, item)]
+                rows |= {row.key: row for row in parts}
+                one = item.metadata["of"][annotation_of(parts[0])]
+                one = one | None if item.default is None else one
+                if parts[0].kind == "card":
+                    one = Annotated[one, AfterValidator(check_cards)]
+                cls.__annotations__[name] = Annotated[
+                    one, BeforeValidator(partial(spread, item.metadata))
+                ]
             elif isinstance(item, dataclasses.Field) and "open" in item.metadata:
                 opened = BeforeValidator(item.metadata["open"])
                 cls.__annotations__[name] = Annotated[own[name], opened]
@@ -553,6 +619,55 @@ else:
         )  # fmt: skip
         made.__annotations__ = own
         return made
+
+
+def by_part(
+    of: type,
+    default: Any,
+    row: Any,
+    read: Mapping[str, Any] | None = None,
+    fill: Any = ...,
+    first: bool = False,
+) -> Any:
+    """Return the field of a key that has a value for each part of a thing, or one for all.
+
+    of: the class of its values, such as PerJoint. row: the field, by `parameter` or `choice`, of
+    one part. fill: what a part has that is not given beside another one; without, it is needed.
+    first: whether one value is that of the first part alone. read: the conditions of each part.
+    """
+    parts = {}
+    for name in (item.name for item in fields(of)):
+        own = dict(row.metadata)
+        conditions: Any = (read or {}).get(name, own["read"])
+        own["read"] = (conditions,) if isinstance(conditions, str) else tuple(conditions)
+        head = re.split(r"[:;,]| \(", own["phrase"])[0]
+        own["phrase"] = f"{head} {PART_WORDS[name]}{own['phrase'][len(head) :]}"
+        parts[name] = own
+    whole = None if default is None else of(*[default] * len(parts))
+    return field(default=whole, metadata={"of": of, "parts": parts, "fill": fill, "first": first})
+
+
+def rows_of(key: str, item: Any, above: tuple[str, ...] = ()) -> Iterator[Parameter]:
+    """Yield the rows of a field, of one by part those of the parts; above: conditions of its group.
+
+    Of a field of another kind none.
+    """
+    whole = {"": item.metadata} if "kind" in item.metadata else {}
+    for part, row in item.metadata.get("parts", whole).items():
+        default = getattr(item.default, part, None) if part else item.default
+        name = f"{key}.{part}" if part else key
+        yield Parameter(name, default=default, **{**row, "read": (*above, *row["read"])})
+
+
+def spread(metadata: Mapping[str, Any], value: Any) -> Any:
+    """Return a value by part: one that stands for all parts, or one of some with the others."""
+    parts = metadata["parts"]
+    if isinstance(value, metadata["of"]) or value is None:
+        return value
+    if not isinstance(value, Mapping):
+        value = {next(iter(parts)): value} if metadata["first"] else dict.fromkeys(parts, value)
+    filled = {} if metadata["fill"] is ... else dict.fromkeys(parts, metadata["fill"])
+    return {**filled, **value}
 
 
 def parameter(
@@ -583,14 +698,19 @@ def document_fields(group: type[Group]) -> type[Group]:
     """Return a group's dataclass with its fields in the docstring: range, unit, default, source."""
     lines = []
     for item in fields(group):  # type: ignore[arg-type]
-        row = Parameter(item.name, default=item.default, **item.metadata)
+        rows = [*rows_of(item.name, item)]
+        row, names = rows[0], [*item.metadata.get("parts", ())]
+        phrase = row.phrase.replace(f" {PART_WORDS[names[0]]}", "") if names else row.phrase
         default = f"{row.default:g}" if isinstance(row.default, float) else repr(row.default)
         needed = row.needed.replace("true or false", "True or False")
+        needed += f", or one for each: {', '.join(names)}" if names else ""
         notes = f" Judged on {row.judged_on}." if row.judged else ""
-        notes += f" Read with {row.readers}." if row.read else ""
+        readers = [one.readers for one in rows if one.read]
+        notes += f" Read with {'; or '.join(dict.fromkeys(readers))}." if readers else ""
         notes += f" Plausible: {row.plausible} ({row.plausible.why})." if row.plausible else ""
-        needs = f"Needs {needed}; default {default} ({row.source})."
-        lines.append(f"- `{row.key}`: {row.phrase}. {needs}{notes}")
+        lines.append(
+            f"- `{item.name}`: {phrase}. Needs {needed}; default {default} ({row.source}).{notes}"
+        )
     text = cleandoc(group.__doc__ or "")
     group.__doc__ = f"{text}\n\nFields, with the sources of their defaults:\n\n" + "\n".join(lines)
     return group

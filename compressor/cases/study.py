@@ -5,11 +5,9 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, overload
 
+from compressor.cases.blocks import Block
 from compressor.cases.case import Case
-from compressor.cases.checks import expand_shorthands
-from compressor.cases.combinations import Block
 from compressor.cases.comparison import Test
-from compressor.cases.keys import nest_values
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ class Cases(Sequence[Case]):
     def given(self, number: int) -> dict[str, Any]:
         """Return what the file gives of a case, nested as a case file has it."""
         block, place = self.combinations[number]
-        return expand_shorthands(nest_values(block.chosen(place))) | {"name": block.name}
+        return {**block.values_of(place), "name": block.name}
 
     def solver_of(self, number: int) -> Hashable:
         """Return what cases share only if their groups `solve` and `output` are equal."""

@@ -15,27 +15,31 @@ from compressor.cases.groups import (
     Contact,
     Friction,
     Gas,
-    HealthyClearance,
     Machine,
     Offset,
     Output,
-    PerJoint,
     Solve,
     Spring,
 )
 from compressor.cases.optional_groups import Body, Drive, Guide, Lubricant, Rod, Sensor, Wear
 from compressor.cases.parameter import (
     A_JOINT,
+    BIG_END,
     BODY,
     CLEARANCE,
     CONTACT,
     GAS,
     GUIDE,
     RUBBING,
+    SMALL_END,
     SPRING,
     Parameter,
+    PerJoint,
+    by_part,
     choice,
     make_group,
+    parameter,
+    rows_of,
 )
 from compressor.metrics import JOINTS
 
@@ -78,8 +82,19 @@ class Settings:
     joint: str = choice(
         "none", ("none", "big_end", "small_end", "both"), "§3.2", "joints with clearance"
     )
-    clearance_mm: PerJoint = group(PerJoint, A_JOINT)
-    healthy_clearance_mm: HealthyClearance = group(HealthyClearance)
+    clearance_mm: PerJoint[float] = by_part(
+        PerJoint, 0.0,
+        parameter(0.0, "mm", (0, 1000), "§3.2", "radial clearance", judged=(1e-3, 1.0)),
+        {"big_end": (A_JOINT, BIG_END), "small_end": (A_JOINT, SMALL_END)}, fill=0.0,
+    )  # fmt: skip
+    healthy_clearance_mm: PerJoint[float] = by_part(
+        PerJoint, 0.0,
+        parameter(
+            0.0, "mm", (0, 1000), "program", "clearance up to which a joint counts as sound; it "
+            "moves nothing, and 0 calls any worn", identity=False,
+        ),
+        fill=0.0,
+    )  # fmt: skip
     initial_offset_mm: Offset = group(Offset)
     machine: Machine = group(Machine)
     gas: Gas = group(Gas, GAS)
@@ -130,10 +145,9 @@ class Settings:
         unbalance, if a drive names one; the rest of the rod reciprocates.
         """
         machine = self.machine
-        rotating, reciprocating = machine.balance, machine.balance_reciprocating
-        if rotating is None:
+        if machine.balance is None:
             return machine.counterweight_kg_mm or 0.0
-        reciprocating = rotating if reciprocating is None else reciprocating
+        rotating, reciprocating = machine.balance.rotating, machine.balance.reciprocating
         at_crosshead = machine.rod_mass_kg * (machine.rod_centre_mm or 0.0) / machine.rod_length_mm
         at_pin = machine.rod_mass_kg - at_crosshead
         turning = at_pin * machine.crank_radius_mm + self._own_unbalance
@@ -168,12 +182,12 @@ class Settings:
 
 
 _META = {item.name: item.metadata for item in dataclasses.fields(Settings)}
-GROUPS: dict[str, type] = {name: meta["of"] for name, meta in _META.items() if "of" in meta}
+GROUPS: dict[str, type] = {name: meta["of"] for name, meta in _META.items() if "open" in meta}
 # groups that a word may stand for: `false` leaves one out, `true` is one with its defaults
 WORDS = {name: meta["word"] for name, meta in _META.items() if meta.get("word") is not None}
 
 
-def name_worn_joint(joint: str, clearance_mm: PerJoint, healthy_mm: HealthyClearance) -> str:
+def name_worn_joint(joint: str, clearance_mm: PerJoint[float], healthy_mm: PerJoint[float]) -> str:
     """Return which of the joints that `joint` names are worn: beyond a healthy clearance."""
     named = JOINTS if joint == "both" else (joint,)
     healthy = [
@@ -184,15 +198,25 @@ def name_worn_joint(joint: str, clearance_mm: PerJoint, healthy_mm: HealthyClear
 
 
 def parameters() -> Iterator[Parameter]:
-    """Yield the rows of the table, in the order of the case file."""
+    """Yield the rows of the table, in the order of the case file; a key by part has several."""
     for item in dataclasses.fields(Settings):
-        if item.name not in GROUPS:
-            yield Parameter(key=item.name, default=item.default, **item.metadata)
-            continue
-        for inner in dataclasses.fields(GROUPS[item.name]):
-            key, row = f"{item.name}.{inner.name}", dict(inner.metadata)
-            row["read"] = (*group_readers(item.name), *row["read"])
-            yield Parameter(key=key, default=inner.default, **row)
+        if item.name in GROUPS:
+            for inner in dataclasses.fields(GROUPS[item.name]):
+                yield from rows_of(f"{item.name}.{inner.name}", inner, group_readers(item.name))
+        else:
+            yield from rows_of(item.name, item)
+
+
+@cache
+def parts_by_key() -> dict[str, tuple[str, ...]]:
+    """Return the parts of each key that may have a value for each, such as big_end, small_end."""
+    found: dict[str, tuple[str, ...]] = {}
+    for item in dataclasses.fields(Settings):
+        within = dataclasses.fields(GROUPS[item.name]) if item.name in GROUPS else (item,)
+        above = f"{item.name}." if item.name in GROUPS else ""
+        found |= {f"{above}{one.name}": (*one.metadata["parts"],) for one in within
+                  if "parts" in one.metadata}  # fmt: skip
+    return found
 
 
 @cache
@@ -211,8 +235,8 @@ def table() -> dict[str, Parameter]:
 @cache
 def outside_identity() -> frozenset[str]:
     """Return the keys that no result depends on, so that no study can sweep them."""
-    keys = [row.key for row in parameters() if not row.identity]
-    groups = {key.partition(".")[0] for key in keys} - {
-        row.key.partition(".")[0] for row in parameters() if row.identity
+    keys = {row.key for row in parameters() if not row.identity}
+    above = {key.rpartition(".")[0] for key in keys} - {
+        row.key.rpartition(".")[0] for row in parameters() if row.identity
     }
-    return frozenset([*keys, *groups])
+    return frozenset(keys | above - {""})

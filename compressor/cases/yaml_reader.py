@@ -1,18 +1,18 @@
-"""Strict YAML 1.2: a text -> a tree of values with their places.
+"""Strict YAML 1.2: a text -> plain values, and where each of them stands.
 
 PyYAML's composer reads; what a scalar means is decided here, by the core schema of YAML 1.2, so
 that `1e5` is a number and `no` is text. A value that is missing, or given twice, is noted with its
-place, and reading goes on; broken syntax, aliases, tags and oversized files end it.
+place, and reading goes on; broken syntax, aliases, anchors, tags and oversized files end it.
 """
 
 import contextlib
+import itertools
 import math
+import pathlib
 import re
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -20,33 +20,15 @@ import yaml
 from compressor.cases.parameter import NO_VALUE
 from compressor.program import CompsimError, did_you_mean, printable
 
-MAX_LOOKED_AT = 1000  # files of a folder
 START = "compsim init writes a case file to start from"
-
-
-def unreadable(path: str, error: OSError | ValueError) -> str:
-    """Return why a file cannot be read, and what to give in its place."""
-    message = f"cannot be read: {getattr(error, 'strerror', None) or error}"
-    if isinstance(error, IsADirectoryError):
-        return (
-            f"{message}; give the files in it, compsim run {shlex.quote(path.rstrip('/'))}/*.yaml"
-        )
-    if not isinstance(error, FileNotFoundError):
-        return message
-    with contextlib.suppress(OSError):
-        near = {one.stem: one for one in islice(Path(path).parent.glob("*.y*ml"), MAX_LOOKED_AT)}
-        return f"{message}; {did_you_mean(Path(path).stem, near, near) or START}"
-    return f"{message}; {START}"
-
-
 MAX_BYTES = 1 << 20
+MAX_LOOKED_AT = 1000  # files of a folder
 MAX_DEPTH = 20
 MAX_PARTS = 50_000  # keys, values and brackets, which take a second
 
 OTHER_YAML = re.compile(r"%YAML (?!1\.2\s)")
 NOT_ZERO = re.compile("[^eE]*[1-9]")
 ODD_BREAKS = re.compile("[\x85\u2028\u2029]")  # lines for PyYAML, not for YAML 1.2 or an editor
-
 DECIMALS = re.compile(r"0\d+")  # behind a decimal comma, as in [0,05]
 NULLS = {"", "~", "null", "Null", "NULL"}
 BOOLEANS = {"true": True, "True": True, "TRUE": True}
@@ -54,6 +36,8 @@ BOOLEANS |= {"false": False, "False": False, "FALSE": False}
 INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 REAL = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+
+Path = tuple[str | int, ...]  # of a value: the keys and the numbers in lists that lead to it
 
 
 @dataclass(frozen=True, order=True)
@@ -83,20 +67,17 @@ class FileProblem:
 
 
 @dataclass(frozen=True)
-class Node:
-    """A value and its place: a scalar, a list of nodes or a dict of them; None if refused."""
+class Tree:
+    """The plain values of a text, and where they stand: by path the place of a key and its value.
 
-    value: Any
-    place: Place
-    key_place: Place  # of the key that the value belongs to
+    An item of a list has its own place twice.
+    """
 
-    def plain(self) -> Any:
-        """Return the value without places."""
-        if isinstance(self.value, list):
-            return [item.plain() for item in self.value]
-        if isinstance(self.value, dict):
-            return {key: item.plain() for key, item in self.value.items()}
-        return self.value
+    values: Any
+    places: Mapping[Path, tuple[Place, Place]]
+
+
+Read = tuple[Tree | None, list[FileProblem]]  # None where nothing could be read
 
 
 def shorten(text: str, most: int = 60) -> str:
@@ -104,66 +85,166 @@ def shorten(text: str, most: int = 60) -> str:
     return text if len(text) <= most else text[: most - 3] + "..."
 
 
-def read_file(path: str, problems: list[FileProblem]) -> Node | None:
-    """Return the content of a case file, or None; what is wrong with it joins `problems`."""
+def read_file(path: str) -> Read:
+    """Return the content of a case file, and what is wrong with it."""
     try:
         with open(path, "rb") as file:
             data = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
-        problems.append(FileProblem(Place(path), "", unreadable(path, error)))
-        return None
+        return None, [FileProblem(Place(path), "", _tell_unreadable(path, error))]
     if len(data) > MAX_BYTES:
-        problems.append(FileProblem(Place(path), "", "is larger than 1 MiB: no case file"))
-        return None
+        return None, [FileProblem(Place(path), "", "is larger than 1 MiB: no case file")]
     try:
         text = data.decode().removeprefix("\ufeff")
     except UnicodeDecodeError as error:
-        place = _place_at(path, data[: error.start].decode())
-        problems.append(FileProblem(place, "", "is not UTF-8 text; a case file is YAML"))
-        return None
-    return read_text(text, Place(path, 1, 1), problems)
+        place = _place_after(path, data[: error.start].decode())
+        return None, [FileProblem(place, "", "is not UTF-8 text; a case file is YAML")]
+    return read_text(text, Place(path, 1, 1))
 
 
-def read_text(text: str, start: Place, problems: list[FileProblem]) -> Node | None:
-    """Return the value of a YAML text, or None; a `start` without a line is everything's place."""
-    text = separate_by_spaces(text)
+def _tell_unreadable(path: str, error: OSError | ValueError) -> str:
+    """Return why a file cannot be read, and what to give in its place."""
+    message = f"cannot be read: {getattr(error, 'strerror', None) or error}"
+    if isinstance(error, IsADirectoryError):
+        files = f"{shlex.quote(path.rstrip('/'))}/*.yaml"
+        return f"{message}; give the files in it, compsim run {files}"
+    if not isinstance(error, FileNotFoundError):
+        return message
+    near = {}
+    with contextlib.suppress(OSError):
+        found = pathlib.Path(path).parent.glob("*.y*ml")
+        near = {one.stem: one for one in itertools.islice(found, MAX_LOOKED_AT)}
+    return f"{message}; {did_you_mean(pathlib.Path(path).stem, near, near) or START}"
+
+
+def read_text(text: str, start: Place) -> Read:
+    """Return the values of a YAML text, and its problems.
+
+    A `start` without a line is everything's place.
+    """
+    text = _separate_by_spaces(text)
     if odd := ODD_BREAKS.search(text):
-        problems.append(_forbidden(text, odd.start(), start))
-        return None
-
-    def place(mark: Any) -> Place:
-        return Place(start.file, mark.line + 1, mark.column + 1) if mark and start.line else start
-
-    def refuse(mark: Any, key: str, message: str) -> None:
-        problems.append(FileProblem(place(mark), key, message))
-
+        return None, [_forbid(text, odd.start(), start)]
     if OTHER_YAML.match(text):
-        refuse(None, "", "case files are YAML 1.2")
+        return None, [FileProblem(start, "", "case files are YAML 1.2")]
     try:
-        loader = _Loader(text)
-        if root := loader.get_single_node():
-            for noted in loader.notes:
-                refuse(*noted)
-            return _plain_node(root, "", None, place, refuse)
-        refuse(None, "", f"is empty{f'; {START}' if start.line else ''}")
-    except _Refused as error:
-        refuse(*error.args)
+        root = _Loader(text).get_single_node()
     except yaml.MarkedYAMLError as error:
-        mark, told = error.problem_mark or error.context_mark, str(error.problem)
-        if told == "but found another document":
-            refuse(mark, "", "a second document begins here; a case file holds one")
-            return None
-        hint = "; indent with spaces, not tabs" if "'\\t'" in told else ""
-        slip = find_slip(text, mark.line) if mark and not hint else None
-        if slip and start.line:
-            problems.append(FileProblem(Place(start.file, slip[0] + 1, 1), "", slip[1]))
-        else:
-            refuse(mark, "", f"is no YAML: {shorten(told, 120)}{hint}")
+        return None, [_tell_syntax(text, error, start)]
     except yaml.reader.ReaderError as error:
-        problems.append(_forbidden(text, error.position, start))
+        return None, [_forbid(text, error.position, start)]
     except (ValueError, OverflowError):  # PyYAML on "\UFFFFFFFF" or %YAML 1.999...
-        refuse(None, "", "is no YAML: a number is too large here")
-    return None
+        return None, [FileProblem(start, "", "is no YAML: a number is too large here")]
+    if root is None:
+        return None, [FileProblem(start, "", f"is empty{f'; {START}' if start.line else ''}")]
+    reader = _Reader(start)
+    values = reader.plain(root, (), reader.place(root))
+    return Tree(values, reader.places), reader.problems
+
+
+class _Loader(yaml.SafeLoader):
+    """PyYAML's composer; what no case file has ends it."""
+
+    depth = parts = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        event = self.peek_event()
+        self.parts, self.depth = self.parts + 1, self.depth + 1
+        wrong = {
+            f"nested deeper than {MAX_DEPTH} levels": self.depth > MAX_DEPTH,
+            "is too long to be a case file": self.parts > MAX_PARTS,
+            "aliases (*) are not allowed; write the value out": isinstance(event, yaml.AliasEvent),
+            "anchors (&) are not allowed; write the value out": event.anchor is not None,
+            "tags (!) are not allowed": getattr(event, "tag", None) is not None,
+        }
+        for message, holds in wrong.items():
+            if holds:
+                raise _Refused(None, None, message, event.start_mark)
+        node = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
+
+
+class _Refused(yaml.MarkedYAMLError):
+    """What is YAML, but no case file's."""
+
+
+class _Reader:
+    """Nodes of PyYAML's to plain values, with their places and what is wrong with them."""
+
+    def __init__(self, start: Place):
+        self.start = start
+        self.places: dict[Path, tuple[Place, Place]] = {}
+        self.problems: list[FileProblem] = []
+
+    def place(self, node: Any) -> Place:
+        """Return where a node stands."""
+        mark, start = node.start_mark, self.start
+        return Place(start.file, mark.line + 1, mark.column + 1) if start.line else start
+
+    def note(self, node: Any, path: Path, message: str) -> None:
+        """Note what is wrong with a node."""
+        key = ".".join(str(name) for name in path if isinstance(name, str))
+        self.problems.append(FileProblem(self.place(node), key, message))
+
+    def plain(self, node: Any, path: Path, key_place: Place) -> Any:
+        """Return the value of a node, and keep where it stands."""
+        self.places[path] = key_place, self.place(node)
+        if isinstance(node, yaml.MappingNode):
+            return self.mapping(node, path)
+        if isinstance(node, yaml.SequenceNode):
+            return self.items(node, path)
+        value = resolve_scalar(node.value) if node.style is None else node.value
+        if value is None:
+            self.note(node, path, NO_VALUE)
+        return value
+
+    def mapping(self, node: Any, path: Path) -> dict[str, Any]:
+        """Return the values of a mapping by key."""
+        found: dict[str, Any] = {}
+        for name_node, inner in node.value:
+            name = name_node.value
+            whole = (*path, name)
+            if not isinstance(name, str):
+                self.note(name_node, path, "a key must be plain text")
+            elif not name:
+                self.note(name_node, path, "a key is missing before the colon")
+            elif name == "<<" and name_node.style is None:
+                self.note(name_node, path, "merge keys (<<) are not allowed; write the values out")
+            elif whole in self.places:
+                first = self.places[whole][0]
+                line = f" at line {first.line}" if first.line else ""
+                self.note(name_node, whole, f"is given twice; first{line}")
+            else:
+                found[name] = self.plain(inner, whole, self.place(name_node))
+        return found
+
+    def items(self, node: Any, path: Path) -> list[Any]:
+        """Return the values of a list."""
+        found: list[Any] = []
+        for number, item in enumerate(node.value):
+            text = item.value if isinstance(item, yaml.ScalarNode) and not item.style else ""
+            if found and DECIMALS.fullmatch(text):
+                hint = f"a decimal comma? write {found[-1]}.{text}; commas separate values"
+                self.note(item, path, hint)
+            found.append(self.plain(item, (*path, number), self.place(item)))
+        return found
+
+
+def _tell_syntax(text: str, error: yaml.MarkedYAMLError, start: Place) -> FileProblem:
+    """Return what is wrong with the syntax of a text; a beginner's slip at its own line."""
+    mark, told = error.problem_mark or error.context_mark, str(error.problem)
+    line, column = (mark.line, mark.column) if mark else (0, 0)
+    place = Place(start.file, line + 1, column + 1) if start.line and mark else start
+    if isinstance(error, _Refused):
+        return FileProblem(place, "", told)
+    if told == "but found another document":
+        return FileProblem(place, "", "a second document begins here; a case file holds one")
+    if "'\\t'" in told:
+        return FileProblem(place, "", f"is no YAML: {told}; indent with spaces, not tabs")
+    if mark and start.line and (slip := find_slip(text, line)):
+        return FileProblem(Place(start.file, slip[0] + 1, 1), "", slip[1])
+    return FileProblem(place, "", f"is no YAML: {shorten(told, 120)}")
 
 
 def find_slip(text: str, last: int) -> tuple[int, str] | None:
@@ -199,7 +280,7 @@ GROUP = re.compile(r"\s*[A-Za-z]\w*\s*:\s*(#.*)?$")
 TABS = re.compile(r"""^([ ]*[^\s'"][^'"\n]*?)\t""", re.MULTILINE)
 
 
-def separate_by_spaces(text: str) -> str:
+def _separate_by_spaces(text: str) -> str:
     """Return a text with a space for each tab behind a line's first word and before any quote.
 
     YAML 1.2 has tabs there, PyYAML none; places stay.
@@ -209,12 +290,12 @@ def separate_by_spaces(text: str) -> str:
     return text
 
 
-def _forbidden(text: str, position: int, start: Place) -> FileProblem:
-    place = _place_at(start.file, text[:position]) if start.line else start
+def _forbid(text: str, position: int, start: Place) -> FileProblem:
+    place = _place_after(start.file, text[:position]) if start.line else start
     return FileProblem(place, "", f"must not hold the character U+{ord(text[position]):04X}")
 
 
-def _place_at(path: str, before: str) -> Place:
+def _place_after(path: str, before: str) -> Place:
     """Return the place that follows the text `before`."""
     return Place(path, before.count("\n") + 1, len(before) - before.rfind("\n"))
 
@@ -243,86 +324,6 @@ def _integer(text: str) -> float:
         value = int(text, 0)
         return value if value.bit_length() < 1000 else math.inf
     return int(text) if len(text) <= 300 else float(text)
-
-
-class _Refused(Exception):
-    """The end of the reading of a file: a mark of PyYAML's, a key and a message."""
-
-
-REFUSED = "refused"  # tag of an alias
-
-
-class _Loader(yaml.SafeLoader):
-    """PyYAML's composer, which notes what no case file has: aliases, anchors and tags."""
-
-    def __init__(self, text: str):
-        super().__init__(text)
-        self.parts = 0
-        self.path: list[str] = []
-        self.notes: list[tuple[Any, str, str]] = []
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        event, name = self.peek_event(), getattr(index, "value", "")
-        self.path.append(name if isinstance(name, str) else "")
-        self.parts += 1
-        key = ".".join(filter(None, self.path))
-        if len(self.path) > MAX_DEPTH or self.parts > MAX_PARTS:
-            is_deep = len(self.path) > MAX_DEPTH
-            what = f"nested deeper than {MAX_DEPTH} levels" if is_deep else "is too long"
-            raise _Refused(event.start_mark, key, what + " to be a case file" * (not is_deep))
-        if isinstance(event, yaml.AliasEvent):
-            self.note(event, key, "aliases (*) are not allowed; write the value out")
-            self.get_event()
-            self.path.pop()
-            return yaml.ScalarNode(REFUSED, "", event.start_mark)  # type: ignore[arg-type]
-        if event.anchor is not None:
-            self.note(event, key, "anchors (&) are not allowed; write the value out")
-        elif event.tag is not None:
-            self.note(event, key, "tags (!) are not allowed")
-        node = super().compose_node(parent, index)
-        self.path.pop()
-        return node
-
-    def note(self, event: Any, key: str, message: str) -> None:
-        """Keep what is wrong with a mark on a value."""
-        self.notes.append((event.start_mark, key, message))
-
-
-def _plain_node(
-    node: Any, key: str, key_mark: Any, place: Callable[[Any], Place],
-    refuse: Callable[[Any, str, str], None],
-) -> Node:  # fmt: skip
-    """Return a node of PyYAML's as one of ours, with all that is in it."""
-    value: Any = None
-    if isinstance(node, yaml.MappingNode):
-        value = {}
-        for name_node, inner in node.value:
-            name, mark = name_node.value, name_node.start_mark
-            whole = f"{key}.{name}" if key else name
-            if not isinstance(name, str):
-                refuse(mark, key, "a key must be plain text")
-            elif not name:
-                refuse(mark, key, "a key is missing before the colon")
-            elif name == "<<" and name_node.style is None:
-                refuse(mark, key, "merge keys (<<) are not allowed; write the values out")
-            elif name in value:
-                line = f" at line {value[name].key_place.line}" * bool(place(mark).line)
-                refuse(mark, whole, f"is given twice; first{line}")
-            else:
-                value[name] = _plain_node(inner, whole, mark, place, refuse)
-    elif isinstance(node, yaml.SequenceNode):
-        value = []
-        for item in node.value:
-            text = item.value if isinstance(item, yaml.ScalarNode) and not item.style else ""
-            if value and DECIMALS.fullmatch(text):
-                message = f"a decimal comma? write {value[-1].plain()}.{text}"
-                refuse(item.start_mark, key, f"{message}; commas separate values")
-            value.append(_plain_node(item, key, None, place, refuse))
-    else:
-        value = resolve_scalar(node.value) if node.style is None else node.value
-        if value is None and node.tag != REFUSED:
-            refuse(node.start_mark, key, NO_VALUE)
-    return Node(value, place(node.start_mark), place(key_mark or node.start_mark))
 
 
 class CaseFileError(CompsimError, ValueError):

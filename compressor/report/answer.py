@@ -168,7 +168,7 @@ def mechanism_svg(case: Case) -> Markup:
 def mechanism_words(case: Case) -> str:
     """Return the data that the picture does not show: speed, masses and the pin."""
     machine = case.machine
-    pins = " and ".join(dict.fromkeys(f"{machine.pin_radius(joint):g}" for joint in JOINTS))
+    pins = " and ".join(dict.fromkeys(f"{machine.pin_radius_mm.at(joint):g}" for joint in JOINTS))
     return (
         f"{machine.speed_rpm:.4g} rpm; rod {machine.rod_mass_kg:.4g} kg, crosshead with piston "
         f"{machine.reciprocating_mass_kg:.4g} kg; pins of {pins} mm radius"

@@ -3,10 +3,11 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from compressor.analysis import describe_cases
-from compressor.cases import DOUBLES, reads, stands_for, table, value_in
+from compressor.cases import DOUBLES, keys_of, reads, row_of, stands_for, value_in
 from compressor.digits import setting
 from compressor.report.figures.sweep_data import name_in_words
 from compressor.store import Stored, StoredStudy
@@ -46,12 +47,12 @@ def find_inputs(stored: Stored, study: StoredStudy) -> Inputs | None:
     swept = {part for axis in study.axes for part in (axis.key, *stands_for(axis.key))}
     fixed = {
         key: value
-        for key, row in table().items()
+        for key in keys_of(partial(value_in, study.fixed))
         if key not in swept and (value := value_in(study.fixed, key)) is not None
     }
-    # one number of a group such as clearance_mm is that of the joints that have any
-    parts = {part for key in study.given for part in stands_for(key) if fixed.get(part)}
-    given = {key: value for key, value in fixed.items() if key in parts.union(study.given)}
+    named = {part for key in study.given for part in (key, *stands_for(key))}
+    named |= {key.rpartition(".")[0] for key in named}
+    given = {key: value for key, value in fixed.items() if key in named}
     assumed = {
         key: value
         for key, value in fixed.items()
@@ -70,12 +71,14 @@ def by_group(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return a line for each group of keys: its name, and its keys with values and units."""
     found: dict[str, list[str]] = {}
     for key, value in values.items():
-        group, _, name = key.rpartition(".")
-        row = table().get(key)
+        group, _, name = key.partition(".") if "." in key else ("", "", key)
+        name, _, part = name.partition(".")  # such as pin_radius_mm.small_end
+        row = row_of(key)
         unit = (row.unit or "") if row else ""
         if key in HALVES and isinstance(value, int | float):
             name, value = HALVES[key].rpartition(".")[2], 2.0 * value
         words = name_in_words(re.sub("_(N_per_mm15|percent)$", "", name), unit)
+        words = f"{words} {part.replace('_', ' ')}".rstrip()
         text = f"{words} {spell_values(value, unit)}"
         found.setdefault(name_in_words(group, "mm") or "scene", []).append(text)
     return [(group, "; ".join(words)) for group, words in found.items()]

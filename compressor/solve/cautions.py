@@ -31,7 +31,9 @@ from compressor.cases import (
     paper_notes,
     reads,
     row_of,
+    stands_for,
     to_si,
+    value_of,
     with_ideal_joints,
 )
 from compressor.metrics import JOINTS
@@ -224,16 +226,12 @@ def slips(cases: Sequence[Case]) -> list[Caution]:
 
 def values_of(case: Case, key: str) -> list[float]:
     """Return the values of a key that a simulation reads; of clearances, those of worn joints."""
-    group, _, name = key.partition(".")
     if not reads(case, key):
         return []
-    if not name:  # what both joints share
-        worn = (getattr(getattr(case, group), joint) for joint in JOINTS)
-        return [value for value in worn if value]
-    if name == "stiffness_N_per_mm15" and case.contact.exponent != 1.5:
+    if key == "contact.stiffness_N_per_mm15" and case.contact.exponent != 1.5:
         return []  # its unit depends on the exponent
-    value = getattr(getattr(case, group), name, None)
-    return [] if value is None else [float(value)]
+    found = [value_of(case, part) for part in stands_for(key) or (key,)]
+    return [float(value) for value in dict.fromkeys(found) if value]
 
 
 def other_unit(key: str, values: Sequence[float]) -> str:
@@ -403,14 +401,13 @@ def _of_load(case: Case) -> Remarks:
             yield "drive.torque_N_m", "load", f"{text}{most:.3g} N m: the crank will stall"
     if case.load != "gas":
         return
-    for end, key in (("head", "gas.indicator"), ("crank", "gas.crank_indicator")):
-        if end in gas.cards:
-            for kind, text in (*_of_card(case, end), *_of_fit(case, end), *_of_noise(case, end)):
-                yield key, kind, text
-    alone = gas.crank_clearance_percent is not None and gas.clearance_percent is None
+    for end in gas.cards:
+        for kind, text in (*_of_card(case, end), *_of_fit(case, end), *_of_noise(case, end)):
+            yield f"gas.indicator.{end}", kind, text
+    alone = gas.clearance_percent is not None and gas.clearance_percent.head is None
     if alone and gas.action == "double" and not gas.is_measured:
         text = f"of the crank end alone: the head end has {gas.head_clearance_mm:g} mm"
-        yield "gas.crank_clearance_percent", "clearance", text
+        yield "gas.clearance_percent.crank", "clearance", text
 
 
 def _of_card(case: Case, end: str) -> Iterator[tuple[str, str]]:
@@ -445,7 +442,7 @@ def _of_fit(case: Case, end: str) -> Iterator[tuple[str, str]]:
     )
     stroke, given_by = 2 * case.machine.crank_radius_mm, case.gas.clearance_key(end)
     given = case.gas.clearance(end, stroke) / stroke
-    value, row = getattr(case.gas, given_by.removeprefix("gas.")), row_of(given_by)
+    value, row = value_of(case, given_by), row_of(given_by)
     is_given = row is not None and value != row.default
     says = (
         f"compression and expansion fit a clearance of {100 * clearance:.3g} % at an exponent of "

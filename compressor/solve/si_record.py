@@ -84,7 +84,7 @@ def offsets(case: Case) -> np.ndarray:
 def stiffness_of(case: Case, joint: str) -> float:
     """Return the contact stiffness (N/m^p) of a joint, as of `joint_stiffness`."""
     clearance = getattr(case.clearance_mm, joint)
-    return joint_stiffness(case.contact.at(joint), case.machine.pin_radius(joint), clearance)
+    return joint_stiffness(case.contact, joint, case.machine.pin_radius_mm.at(joint), clearance)
 
 
 def _machine(case: Case, p: dict[str, Any]) -> None:
@@ -99,7 +99,7 @@ def _machine(case: Case, p: dict[str, Any]) -> None:
     p["reciprocating_mass"] = machine.reciprocating_mass_kg
     p["gravity"] = machine.gravity_m_per_s2
     p["unbalance"] = to_si(case.unbalance, "kg mm")
-    p["pin_radius"] = [to_si(machine.pin_radius(joint), "mm") for joint in JOINTS]
+    p["pin_radius"] = [to_si(machine.pin_radius_mm.at(joint), "mm") for joint in JOINTS]
 
 
 def _contact(case: Case, p: dict[str, Any]) -> None:
@@ -178,7 +178,7 @@ def _film(case: Case, p: dict[str, Any]) -> None:
         return
     from compressor.solve.bearing import film_constants
 
-    lengths = [to_si(lubricant.bearing_length(joint), "mm") for joint in JOINTS]
+    lengths = [to_si(lubricant.bearing_length_mm.at(joint), "mm") for joint in JOINTS]
     p["viscosity"] = to_si(lubricant.viscosity_mPa_s, "mPa s")
     p["film_length"], p["film_share"] = lengths, lubricant.last_share
     p["film_constants"], p["film_stiffest"] = zip(

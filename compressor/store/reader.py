@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.cases import Case, CaseError, HealthyClearance
+from compressor.cases import Case, CaseError, PerJoint
 from compressor.outcome import Outcome, word_variables
 from compressor.reasons import Reason
 from compressor.store.files import (
@@ -213,7 +213,7 @@ class Stored:
         numbers = self.rows.number_row(position)
         return Outcome(words["status"], words["reason"], numbers, attributes)
 
-    def find_ok(self, key: str, healthy: HealthyClearance) -> tuple[Case, Outcome] | str:
+    def find_ok(self, key: str, healthy: PerJoint) -> tuple[Case, Outcome] | str:
         """Return the case and outcome of a job that is ok, else why there are none, in a word.
 
         healthy: the clearance up to which a joint of the case counts as sound.

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from compressor.cases import (
     MODEL_VERSION,
-    HealthyClearance,
+    PerJoint,
     Study,
     phrase_of,
     points,
@@ -144,8 +144,8 @@ def in_words(value: Any) -> str:
 
 
 def coordinate_names(keys: Sequence[str]) -> dict[str, str]:
-    """Return what swept keys are called as coordinates: their last part, where that is enough."""
-    last = [key.rpartition(".")[2] for key in keys]
+    """Return what swept keys are called as coordinates: without the group, where that is enough."""
+    last = ["_".join(key.split(".")[1:]) or key for key in keys]
     return {
         key: RENAMED.get(key, short)
         if last.count(short) == 1 and key.partition(".")[0] not in UNIT_IN_GROUP
@@ -154,13 +154,14 @@ def coordinate_names(keys: Sequence[str]) -> dict[str, str]:
     }
 
 
-def healthy_clearance(study: StoredStudy) -> HealthyClearance:
+def healthy_clearance(study: StoredStudy) -> PerJoint:
     """Return the clearance up to which a joint counts as sound, by the study.
 
     Its jobs have no say: a job may have been stored by another study, which holds another
     clearance to be healthy.
     """
-    return HealthyClearance(**(study.fixed.get("healthy_clearance_mm") or {}))
+    given = study.fixed.get("healthy_clearance_mm")
+    return PerJoint(**given) if given else PerJoint(0.0, 0.0)
 
 
 def owners(

@@ -142,8 +142,8 @@ CARDS = "\n".join(["crank_angle_deg,head_pressure_bar,crank_pressure_bar", *(
 
 @pytest.mark.parametrize(
     ("action", "card", "key"),
-    [("double", "{head: c.csv, crank: c.csv}", "gas.indicator"),
-     ("crank_end", "{crank: c.csv}", "gas.crank_indicator")],
+    [("double", "{head: c.csv, crank: c.csv}", "gas.indicator.head"),
+     ("crank_end", "{crank: c.csv}", "gas.indicator.crank")],
 )  # fmt: skip
 def test_a_remark_on_a_measured_cylinder_names_its_card(action, card, key, read, tmp_path):
     """It named gas.discharge_MPa, which nothing reads beside a card."""

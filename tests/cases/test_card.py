@@ -64,7 +64,7 @@ def test_revolutions_are_averaged_on_the_first_one_s_angles(tmp_path, card):
     assert found.pressures == pytest.approx(read_card(card, "head").pressures, rel=1e-12)
     assert found.scatter == pytest.approx(0.01 * math.sqrt(2), rel=1e-9)
     (told,) = (one for one in remarks(measured(str(tmp_path / "two.csv"))) if one.kind == "scatter")
-    assert told.key == "gas.indicator"
+    assert told.key == "gas.indicator.head"
     assert told.message.startswith("2 revolutions were averaged; they scatter by 0.014 MPa (rms)")
 
 
@@ -124,7 +124,7 @@ def test_the_key_has_the_numbers_and_not_the_place(tmp_path, card):
     assert measured(same).key == one.key
     other = write(tmp_path / "other" / "y.csv", [(a, pressure(a) + 1e-6) for a in ANGLES])
     assert measured(other).key != one.key
-    assert one.gas.indicator == mark_card(card, "head")
+    assert one.gas.indicator.head == mark_card(card, "head")
     assert Case.from_values(one.values()) == one
     assert Case.from_attribute(one.attributes()["case"]).key == one.key
 
@@ -139,7 +139,7 @@ def test_a_file_that_has_changed_is_not_run(tmp_path, card):
     os.remove(card)
     assert "cannot be read" in measure(case).attributes["detail"]
     with pytest.raises(CardError):
-        open_card(case.gas.indicator, "head")
+        open_card(case.gas.indicator.head, "head")
     assert measured(write(tmp_path / "head.csv", [(a, 0.2) for a in ANGLES])).key != case.key
 
 
@@ -155,9 +155,12 @@ def test_pressures_and_clearances_beside_a_card_make_no_other_job(card):
     ("gas", "words"),
     [
         ({"switching": "paper"}, "gas.switching: nothing reads this key"),
-        ({"action": "double", "rod_diameter_mm": 30}, "gas.crank_indicator: is needed with action"),
+        ({"action": "double", "rod_diameter_mm": 30}, "gas.indicator.crank: is needed with action"),
         ({"action": "crank_end", "rod_diameter_mm": 30}, "gas.indicator: nothing reads"),
-        ({"action": "double", "crank_indicator": "head.csv"}, "gas.rod_diameter_mm: is needed"),
+        (
+            {"action": "double", "indicator": {"crank": "head.csv"}},
+            "gas.rod_diameter_mm: is needed",
+        ),
         ({"indicator": {"head": "head.csv", "tail": "x"}}, "gas.indicator"),
         ({"indicator": 5}, "gas.indicator: needs the path of a CSV file with columns"),
     ],
@@ -246,11 +249,11 @@ def test_an_analyser_s_file_has_both_ends_header_lines_and_decimal_commas(tmp_pa
     for end in ("head", "crank"):
         nodes = gas_nodes(ours, end)[:, 0]
         assert nodes == pytest.approx(gas_nodes(theirs, end)[:, 0], rel=1e-6)
-    assert ours.gas.indicator != ours.gas.crank_indicator
+    assert ours.gas.indicator != ours.gas.indicator.crank
     with pytest.raises(CaseError) as caught:
         measured({"head": crank, "crank": head(tmp_path / "he.csv")}, **ROD)
     told = [str(one) for one in caught.value.problems]
-    assert [one.partition(":")[0] for one in told] == ["gas.indicator", "gas.crank_indicator"]
+    assert [one.partition(":")[0] for one in told] == ["gas.indicator.head", "gas.indicator.crank"]
     assert "is it the crank end's card" in told[0]
     assert "is it the head end's card" in told[1]
 
@@ -288,11 +291,11 @@ def test_a_card_is_held_against_its_own_lines(tmp_path, how, words):
 def test_gauge_pressures_that_are_called_absolute_are_told(tmp_path, low, high, kinds):
     """The less pressure there is, the worse is the fit: where none was, nothing was told."""
     case = measured(head(tmp_path / "a.csv", 10, -1.01325, "pressure_bar", low=low, high=high))
-    told = {one.kind: one.message for one in remarks(case) if one.key == "gas.indicator"}
+    told = {one.kind: one.message for one in remarks(case) if one.key == "gas.indicator.head"}
     assert told.keys() == kinds.keys()
     assert all(words in told[kind] for kind, words in kinds.items())
     right = measured(head(tmp_path / "b.csv", 10, -1.01325, "pressure_barg", low=low, high=high))
-    assert [one.kind for one in remarks(right) if one.key == "gas.indicator"] == ["gauge"]
+    assert [one.kind for one in remarks(right) if one.key == "gas.indicator.head"] == ["gauge"]
 
 
 @pytest.mark.parametrize(
@@ -301,8 +304,12 @@ def test_gauge_pressures_that_are_called_absolute_are_told(tmp_path, low, high, 
         ("head", {"head_clearance_mm": 24}, "and gas.head_clearance_mm gives 10 %"),
         ("head", {"bore_mm": 90}, None),  # the paper's 20 mm, which nobody gave
         ("head", {"clearance_percent": 20}, None),
-        ("crank", {"crank_clearance_percent": 9}, "and gas.crank_clearance_percent gives 9 %"),
-        ("crank", {"clearance_percent": {"head": 20, "crank": 9}}, "clearance_percent gives 9 %"),
+        ("crank", {"clearance_percent": {"crank": 9}}, "and gas.clearance_percent.crank gives 9 %"),
+        (
+            "crank",
+            {"clearance_percent": {"head": 20, "crank": 9}},
+            "clearance_percent.crank gives 9 %",
+        ),
         ("crank", {"clearance_percent": {"head": 9, "crank": 20}}, None),
     ],
 )
@@ -313,7 +320,7 @@ def test_whatever_key_gives_a_clearance_is_held_against_the_card(tmp_path, end, 
         other = head(tmp_path / "b.csv", clearance=0.09)
         more = ROD | {"indicator": {"head": other, "crank": path}}
     case = Case.from_values({"load": "gas", "gas": more | gas, **SHORT})
-    key = "gas.indicator" if end == "head" else "gas.crank_indicator"
+    key = f"gas.indicator.{end}"
     told = [one.message for one in remarks(case) if one.kind == "fit" and one.key == key]
     assert [words in one for one in told] == ([True] if words else [])
 

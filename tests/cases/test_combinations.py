@@ -7,11 +7,11 @@ import random
 import pytest
 
 from compressor.cases.case import Case
-from compressor.cases.checks import value_of, values_given
+from compressor.cases.checks import row_of, value_of, values_given
 from compressor.cases.conflicts import reads
 from compressor.cases.load import MAX_CONFLICTS, CaseFileError, load_studies
 from compressor.cases.parameter import CaseError
-from compressor.cases.table import GROUPS, outside_identity, table
+from compressor.cases.table import GROUPS, outside_identity, parts_by_key, table
 
 
 def drawn(row, draw):
@@ -33,8 +33,10 @@ def drawn(row, draw):
 
 SWEPT = [
     key
-    for key, row in table().items()
-    if key not in outside_identity() and row.kind not in ("text", "card")
+    for key in (*table(), *parts_by_key())
+    if key not in outside_identity()
+    and row_of(key).kind not in ("text", "card")
+    and key.rpartition(".")[0] not in parts_by_key()
 ]
 
 
@@ -45,9 +47,9 @@ def random_file(seed):
     if draw.random() < 0.3:
         found["joint"] = ["none", "both"]
     for key in draw.sample(SWEPT, draw.randint(2, 4)):
-        values = drawn(table()[key], draw)
+        values = drawn(row_of(key), draw)
         group, _, name = key.rpartition(".")
-        if not values or group == "clearance_mm":
+        if not values or key == "clearance_mm":
             found["clearance_mm"] = [0.1, 0.25]
         elif not group:
             found[name] = values

@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from compressor.cases.case import Case, CaseError
+from compressor.cases.checks import row_of
 from compressor.cases.load import CaseFileError, load_studies
-from compressor.cases.table import outside_identity, table
+from compressor.cases.table import outside_identity, parts_by_key, table
 from compressor.studies.claims.study import cases_judged
 
 ROOT = Path(__file__).parents[2]
@@ -21,8 +22,10 @@ KEPT = Path(__file__).with_name("frozen.json")
 FILES = [*(ROOT / "configs").glob("*.yaml"), *(ROOT / "compressor/cases/examples").glob("*.yaml")]
 SWEPT = [
     key
-    for key, row in table().items()
-    if key not in outside_identity() and row.kind not in ("text", "card")
+    for key in (*table(), *parts_by_key())
+    if key not in outside_identity()
+    and row_of(key).kind not in ("text", "card")
+    and key.rpartition(".")[0] not in parts_by_key()
 ]
 # what a plant engineer writes at first, and the mistakes of a day, each a file
 MISTAKES = [
@@ -114,9 +117,9 @@ def random_values(seed):
     for key in draw.sample(SWEPT, 4):
         group, _, name = key.rpartition(".")
         if not group:
-            found.setdefault(name, drawn(table()[key], draw))
-        elif group != "clearance_mm":
-            found.setdefault(group, {})[name] = drawn(table()[key], draw)
+            found.setdefault(name, drawn(row_of(key), draw))
+        elif key != "clearance_mm":
+            found.setdefault(group, {})[name] = drawn(row_of(key), draw)
     return found
 
 

@@ -11,9 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from compressor.cases.case import Case, to_yaml
-from compressor.cases.checks import known_keys
+from compressor.cases.checks import known_keys, row_of
 from compressor.cases.conflicts import values_read
-from compressor.cases.groups import CARD_KEYS, CYLINDER_KEYS
+from compressor.cases.groups import CYLINDER_KEYS
 from compressor.cases.laws import USUAL
 from compressor.cases.load import CaseFileError, load_cases, load_studies
 from compressor.cases.parameter import parameter_table
@@ -179,7 +179,8 @@ def test_ten_thousand_jobs_are_the_most(write):
 
 
 def test_jobs_beyond_counting_are_refused_at_once(write):
-    keys = [k for k, row in table().items() if k.startswith(("machine.", "initial_offset_mm."))]
+    keys = [k for k in table() if k.startswith(("machine.", "initial_offset_mm."))]
+    keys = [k for k in keys if k.count(".") == 1]
     groups: dict[str, list[str]] = {}
     for key in keys:
         group, _, name = key.partition(".")
@@ -201,7 +202,7 @@ def test_cases_that_fit_are_not_looked_at_one_by_one(write, monkeypatch):
 # Mistakes
 
 
-def test_ten_mistakes_are_ten_messages(write):
+def test_nine_mistakes_are_nine_messages(write):
     text = """\
 name: two words
 load: sprnig
@@ -211,7 +212,7 @@ machine:
   rod_mass: 5
   speed_rpm: fast
   speed_rpm: 500
-spring: &soft {stiffness_N_per_mm: .inf}
+spring: {stiffness_N_per_mm: .inf}
 qqq: wet
 """
     assert mistakes(write(text)) == [
@@ -223,8 +224,7 @@ qqq: wet
         "case.yaml:6:3: machine.rod_mass: unknown key; did you mean machine.rod_mass_kg?",
         "case.yaml:7:14: machine.speed_rpm: needs a number in (0, 100000] rpm, not 'fast'",
         "case.yaml:8:3: machine.speed_rpm: is given twice; first at line 7",
-        "case.yaml:9:9: spring: anchors (&) are not allowed; write the value out",
-        "case.yaml:9:36: spring.stiffness_N_per_mm: must be finite: "
+        "case.yaml:9:30: spring.stiffness_N_per_mm: must be finite: "
         "needs a number in [0, 1e+06] N/mm, not inf",
         f"case.yaml:10:1: qqq: unknown key; a case file has {', '.join(known_keys(''))}",
     ]
@@ -261,13 +261,13 @@ def test_mistakes_of_all_files_are_told_at_once(write):
         ("load: none\n".encode("utf-16"), "1:1: is not UTF-8 text; a case file is YAML"),
         ("load: ~\n", "1:7: load: has no value; leave the key out to get its default"),
         ("load:\n", "1:6: load: has no value; leave the key out to get its default"),
-        ("load: !!str none\n", "1:7: load: tags (!) are not allowed"),
-        ("load: ! none\n", "1:7: load: tags (!) are not allowed"),
+        ("load: !!str none\n", "1:7: tags (!) are not allowed"),
+        ("load: ! none\n", "1:7: tags (!) are not allowed"),
         ("<<: {load: none}\n", "1:1: merge keys (<<) are not allowed; write the values out"),
         ("? [load]\n: none\n", "1:3: a key must be plain text"),
         ('"": none\n', "1:1: a key is missing before the colon"),
         ("load: none\nload: none\n", "2:1: load: is given twice; first at line 1"),
-        ("{load: *a}\n", "1:8: load: aliases (*) are not allowed; write the value out"),
+        ("{load: *a}\n", "1:8: aliases (*) are not allowed; write the value out"),
         ("load: {linspace: [1, 2, 3]}\n", "1:7: load: is no number, so that linspace cannot "
          "sweep it: give a list"),
         ("load: []\n", "1:7: load: is an empty list"),
@@ -326,9 +326,9 @@ def test_an_unknown_key_is_told_with_what_was_meant(write, text, hint):
         ("joint: [none, both]\nclearance_mm: {big_end: 1}\n",
          ["2:1: clearance_mm.small_end: is needed with joint: both; "
           "give it in mm, such as 0.2"]),
-        ("\njoint: both\n", ["1:1: clearance_mm.big_end: is needed with joint: both; "
+        ("\njoint: both\n", ["2:1: clearance_mm.big_end: is needed with joint: both; "
           "give it in mm, such as 0.2",
-                             "1:1: clearance_mm.small_end: is needed with joint: both; "
+                             "2:1: clearance_mm.small_end: is needed with joint: both; "
           "give it in mm, such as 0.2"]),
         ("joint: both\nclearance_mm: [9, 11, 12]\n",
          ["2:19: clearance_mm: 11 mm exceeds the pin radius, 10 mm: lower it",
@@ -458,8 +458,9 @@ def test_a_hostile_file_is_refused_soon(write, text, end):
 
 def test_an_alias_bomb_does_not_unfold(write):
     text = "a0: &a0 x\n" + "".join(f"a{i}: &a{i} [*a{i - 1}, *a{i - 1}]\n" for i in range(1, 60))
-    found = mistakes(write(text))
-    assert len([line for line in found if "aliases (*)" in line]) == 2 * 59
+    assert mistakes(write(text)) == [
+        "case.yaml:1:5: anchors (&) are not allowed; write the value out"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -537,14 +538,14 @@ def near(row):
 
 
 def group(name: str, *left_out: str):
-    rows = {k.partition(".")[2]: row for k, row in table().items() if k.startswith(f"{name}.")}
-    optional = {key: near(row) for key, row in rows.items() if key not in left_out}
+    keys = dict.fromkeys(k.split(".")[1] for k in table() if k.startswith(f"{name}."))
+    optional = {key: near(row_of(f"{name}.{key}")) for key in keys if key not in left_out}
     return st.fixed_dictionaries({}, optional=optional)
 
 
 # keys that need the name of a law beside them; the law itself
-OF_LAWS = ["law", "restitution", "length_mm", "small_end_length_mm", "modulus_GPa", *USUAL]
-OF_MATERIALS = ["materials", "small_end_materials", "geometry"]
+OF_LAWS = ["law", "restitution", "length_mm", "modulus_GPa", *USUAL]
+OF_MATERIALS = ["materials", "geometry"]
 
 
 def as_hertz(values):
@@ -565,7 +566,7 @@ SOLVES = [{"accuracy": "draft"}, {"rtol": 1e-7}, {"method": "BDF", "max_steps": 
 EXACT = {"switching": "exact"}
 CYLINDERS = st.fixed_dictionaries(
     {"action": st.just("double"), "rod_diameter_mm": st.floats(20, 40)},
-    optional={"crank_clearance_percent": st.floats(5, 14)},
+    optional={"clearance_percent": st.fixed_dictionaries({"crank": st.floats(5, 14)})},
 )
 CASES = st.fixed_dictionaries(
     {"name": st.from_regex(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}", fullmatch=True)},
@@ -575,9 +576,9 @@ CASES = st.fixed_dictionaries(
         "initial_offset_mm": group("initial_offset_mm").map(
             lambda offsets: {key: 0.6 * mm for key, mm in offsets.items()}
         ),
-        "machine": group("machine", "small_end_pin_radius_mm", "balance", "balance_reciprocating"),
+        "machine": group("machine", "balance"),
         "gas": group("gas", "switching", *CYLINDER_KEYS).map(lambda gas: gas | EXACT)
-        | st.tuples(group("gas", "switching", *CYLINDER_KEYS[:4], *CARD_KEYS), CYLINDERS).map(
+        | st.tuples(group("gas", "switching", *CYLINDER_KEYS[:3], "indicator"), CYLINDERS).map(
             lambda parts: parts[0] | parts[1]
         ),
         "spring": group("spring"),

@@ -40,8 +40,8 @@ def test_with_the_load_it_is_the_machine_that_was_meant(read):
     assert case == Case.from_values({
         "name": "case", "load": "gas", "joint": "small_end", "clearance_mm": 0.2,
         "machine": {"crank_radius_mm": 90, "rod_length_mm": 450, "speed_rpm": 740,
-                    "reciprocating_mass_kg": 85, "rod_mass_kg": 62, "pin_radius_mm": 60,
-                    "small_end_pin_radius_mm": 35},
+                    "reciprocating_mass_kg": 85, "rod_mass_kg": 62, 
+                    "pin_radius_mm": {"big_end": 60, "small_end": 35}},
         "gas": {"piston_radius_mm": 110, "suction_MPa": 0.2, "discharge_MPa": 0.7,
                 "switching": "exact"},
     })  # fmt: skip

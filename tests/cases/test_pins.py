@@ -8,6 +8,7 @@ import pytest
 from compressor.cases.case import Case, CaseError
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.materials import composite_modulus, contact_stiffness
+from compressor.cases.parameter import PerJoint
 from compressor.physics.film import film
 from compressor.solve.cautions import remarks
 from compressor.solve.si_record import record
@@ -38,7 +39,7 @@ def test_a_file_gives_one_radius_or_one_for_each_joint():
     [
         ({"big_end": 60}, "machine.pin_radius_mm", "needs both, big_end and small_end"),
         ({"big_end": 60, "small": 5}, "machine.pin_radius_mm", "big_end"),
-        ({"big_end": 60, "small_end": -5}, "machine.small_end_pin_radius_mm", "outside"),
+        ({"big_end": 60, "small_end": -5}, "machine.pin_radius_mm.small_end", "outside"),
         ({"big_end": 60, "small_end": 0.1}, "clearance_mm", "exceeds the pin radius"),
     ],
 )
@@ -48,19 +49,20 @@ def test_what_is_wrong_with_two_radii_is_told_of_the_one_it_is(pin, key, words):
     assert any(one.key == key and words in one.message for one in error.value.problems)
 
 
-def test_a_part_of_a_key_says_how_to_set_it(tmp_path):
-    """The hint named the key itself, which would have set both pins."""
+def test_a_part_is_set_by_its_path_beside_the_other(tmp_path):
     path = tmp_path / "worn.yaml"
     path.write_text("joint: both\nclearance_mm: 0.1\n", encoding="utf-8")
     with pytest.raises(CaseFileError) as error:
         load_studies(path, overrides=["machine.pin_radius_mm.small_end=90"])
-    remedy = (
-        "unknown key; write machine.pin_radius_mm with {big_end: ..., small_end: ...}, in --set"
-    )
-    assert remedy in str(error.value)
-    pins = "machine.pin_radius_mm={big_end: 60, small_end: 90}"
-    (study,) = load_studies(path, overrides=[pins])
-    assert study.cases[0].machine.pin_radius("small_end") == 90
+    assert "needs both, big_end and small_end, not small_end" in str(error.value)
+    small = "machine.pin_radius_mm.small_end=90"
+    for pins in (["machine.pin_radius_mm.big_end=60", small],
+                 ["machine.pin_radius_mm={big_end: 60, small_end: 90}"]):  # fmt: skip
+        (study,) = load_studies(path, overrides=pins)
+        assert study.cases[0].machine.pin_radius_mm == PerJoint(60, 90)
+    path.write_text("joint: both\nclearance_mm: 0.1\nmachine: {pin_radius_mm: 60}\n")
+    (study,) = load_studies(path, overrides=[small])
+    assert study.cases[0].machine.pin_radius_mm == PerJoint(60, 90)
 
 
 def test_a_pin_of_a_file_s_own_lies_in_its_bore():
@@ -88,7 +90,7 @@ def test_each_bearing_has_a_length_of_its_own():
     assert record(two)["film_length"].tolist() == [0.06, 0.04]
     for number, length in enumerate(LENGTHS.values()):
         one = case(machine=PINS, lubricant={"bearing_length_mm": length})
-        assert one.lubricant.small_end_bearing_length_mm is None
+        assert one.lubricant.bearing_length_mm == PerJoint(length, length)
         forces = [
             film(number, (1e-4, -5e-5, 0.02, 0.01), (52.0, -8.0), record(both))
             for both in (two, one)
@@ -131,15 +133,14 @@ def test_files_have_a_pair_for_each_pin_and_sweep_lengths(tmp_path):
     }
     (tmp_path / "s.yaml").write_text(json.dumps(values))
     (study,) = load_studies(tmp_path / "s.yaml")
-    assert [axis.key for axis in study.axes] == ["contact.length_mm"]
-    assert [one.contact.length_mm for one in study.cases] == [50, 60]
-    assert {one.contact.at("small_end").materials for one in study.cases} == {("steel", "copper")}
-    assert {one.contact.at("small_end").length_mm for one in study.cases} == {40}
+    assert [axis.key for axis in study.axes] == ["contact.length_mm.big_end"]
+    assert [one.contact.length_mm for one in study.cases] == [PerJoint(50, 40), PerJoint(60, 40)]
+    assert {one.contact.materials.small_end for one in study.cases} == {("steel", "copper")}
 
 
 def test_what_is_wrong_with_one_bearing_is_told_of_it():
     lengths = {"big_end": 60, "small_end": 80}  # beyond the pin's diameter
-    with pytest.raises(CaseError, match=r"small_end_bearing_length_mm: is 1\.14 times"):
+    with pytest.raises(CaseError, match=r"bearing_length_mm.small_end: is 1\.14 times"):
         case(machine=PINS, lubricant={"bearing_length_mm": lengths})
 
 

@@ -7,29 +7,26 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.cases.checks import (
-    SHORTHANDS,
-    expand_shorthands,
     row_of,
     single,
     stands_for,
     value_in,
     value_of,
 )
-from compressor.cases.table import GROUPS, table
+from compressor.cases.table import GROUPS, parts_by_key, table
 
 ROOT = Path(__file__).parents[2]
-BOTH = {"big_end": 0.1, "small_end": 0.1}
 
 
-def test_a_shorthand_stands_for_every_key_of_its_group():
-    for name in SHORTHANDS:
-        assert name in GROUPS
+def test_a_key_by_part_stands_for_the_key_of_each():
+    for name in parts_by_key():
+        assert name not in GROUPS
         assert [*stands_for(name)] == [key for key in table() if key.startswith(f"{name}.")]
     assert stands_for("machine") == stands_for("machine.speed_rpm") == ()
 
 
-def test_a_shorthand_has_the_row_of_the_keys_that_it_stands_for():
-    for name in SHORTHANDS:
+def test_a_key_by_part_has_the_row_of_the_keys_that_it_stands_for():
+    for name in parts_by_key():
         kept = {(r.kind, r.low, r.high, r.unit) for r in map(row_of, stands_for(name)) if r}
         row = row_of(name)
         assert row
@@ -38,15 +35,9 @@ def test_a_shorthand_has_the_row_of_the_keys_that_it_stands_for():
     assert row_of("machine") is row_of("nonsense") is None
 
 
-def test_a_shorthand_is_written_out_and_all_else_is_left():
-    other = {"joint": "both", "machine": {"speed_rpm": 1}, "friction": False}
-    assert expand_shorthands({"clearance_mm": 0.1} | other) == {"clearance_mm": BOTH} | other
-    assert expand_shorthands({"clearance_mm": {"big_end": 1}}) == {"clearance_mm": {"big_end": 1}}
-
-
 @pytest.mark.parametrize(("values", "one"), [([1, 1.0], 1), ([1, 2], None), ([], None)])
 def test_a_single_value_is_one_that_all_share(values, one):
-    assert single(values) == one
+    assert single("clearance_mm", values) == one
 
 
 @pytest.mark.parametrize(

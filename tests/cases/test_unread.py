@@ -9,10 +9,11 @@ from typing import NamedTuple
 import pytest
 
 from compressor.cases.case import Case
+from compressor.cases.checks import value_of
 from compressor.cases.conflicts import FACTS
 from compressor.cases.load import CaseFileError, load_cases, load_studies
 from compressor.cases.parameter import CaseError
-from compressor.cases.table import table
+from compressor.cases.table import parts_by_key, table
 from compressor.solve import simulate
 from compressor.store.series_file import series_image
 from compressor.studies.wear.stages import Worn, first_stage, life, next_stage, stages_dataset
@@ -26,8 +27,9 @@ SMALL = WORN | {"joint": "small_end", "clearance_mm": {"small_end": 0.2}}
 FREE = WORN | {"load": "none"}
 GAS = WORN | {"load": "gas", "gas": {"switching": "exact", "back_pressure_MPa": 0.1}}
 DOUBLE = WORN | {"load": "gas", "gas": {"action": "double", "rod_diameter_mm": 30}}
+PERCENT = WORN | {"load": "gas", "gas": DOUBLE["gas"] | {"clearance_percent": 14}}
 CRANK_END = WORN | {"load": "gas", "gas": {"action": "crank_end", "rod_diameter_mm": 30,
-                                           "crank_clearance_percent": 12}}  # fmt: skip
+                                           "clearance_percent": {"crank": 12}}}  # fmt: skip
 SINGLE = WORN | {"load": "gas", "gas": {"action": "single"}}
 CRANK_ALONE = WORN | {"load": "gas", "gas": {"action": "crank_end", "rod_diameter_mm": 30}}
 CARD, GAUGE = (str(Path(__file__).parent / name) for name in ("card.csv", "gauge_card.csv"))
@@ -93,23 +95,24 @@ ENTRIES = {
         machine__reciprocating_mass_kg=15, machine__gravity_m_per_s2=9.81,
         machine__counterweight_kg_mm=500,
     ),
-    "machine.balance": Entry(0.5, WORN),
-    "machine.balance_reciprocating": Entry(
-        0.25, IDEAL | {"machine": {"balance": 0.5}}, (IDEAL, WORN)
-    ),
-    "machine.pin_radius_mm": Entry(12, WORN, (IDEAL,)),
-    "machine.small_end_pin_radius_mm": Entry(12, WORN, (IDEAL, BIG)),
+    "machine.balance.rotating": Entry(0.5, WORN),
+    "machine.balance.reciprocating": Entry(0.25, IDEAL | {"machine": {"balance": 0.5}}),
+    "machine.pin_radius_mm.big_end": Entry(12, WORN, (IDEAL, SMALL)),
+    "machine.pin_radius_mm.small_end": Entry(12, WORN, (IDEAL, BIG)),
     **entries(
         GAS, WORN, FREE, gas__piston_radius_mm=60, gas__suction_MPa=0.11,
         gas__discharge_MPa=0.5, gas__exponent=1.3, gas__back_pressure_MPa=0.2,
-        gas__valve_loss_percent=5, gas__discharge_loss_percent=5, gas__unloaded="head",
+        gas__valve_loss_percent__suction=5, gas__valve_loss_percent__discharge=5,
+        gas__unloaded="head",
     ),
     "gas.head_clearance_mm": Entry(25, GAS, (WORN, FREE, CRANK_END)),
     "gas.action": Entry("crank_end", DOUBLE, (WORN, FREE)),
-    "gas.clearance_percent": Entry(10, DOUBLE, (WORN, CRANK_END)),
-    "gas.indicator": Entry(CARD, SINGLE, (WORN, FREE)),
-    "gas.crank_indicator": Entry(CARD, CRANK_ALONE, (WORN, GAS)),
-    **entries(DOUBLE, GAS, SINGLE, WORN, gas__rod_diameter_mm=40, gas__crank_clearance_percent=12),
+    "gas.clearance_percent.head": Entry(10, PERCENT, (WORN, CRANK_END)),
+    "gas.indicator.head": Entry(CARD, SINGLE, (WORN, FREE)),
+    "gas.indicator.crank": Entry(CARD, CRANK_ALONE, (WORN, GAS)),
+    **entries(
+        DOUBLE, GAS, SINGLE, WORN, gas__rod_diameter_mm=40, gas__clearance_percent__crank=12
+    ),
     **entries(MEASURED, GAS, WORN, gas__ambient_MPa=0.09, gas__smooth_deg=30),
     "gas.switching": Entry("exact", WORN | {"load": "gas"}, (WORN, FREE)),
     **entries(
@@ -118,12 +121,10 @@ ENTRIES = {
     ),
     "contact.law": Entry("hertz", WORN, (IDEAL, PLAYING)),
     "contact.stiffness_N_per_mm15": Entry(4e5, WORN, (IDEAL, JOHNSON)),
-    "contact.materials": Entry(["steel", "copper"], WORN, (IDEAL,)),
-    "contact.small_end_materials": Entry(
-        ["steel", "steel"], COPPER, (WORN, BIG_COPPER, JOHNSON)
-    ),
-    "contact.small_end_length_mm": Entry(15, JOHNSON, (WORN, BIG_JOHNSON)),
-    "lubricant.small_end_bearing_length_mm": Entry(15, OIL, (BIG_OIL, IDEAL)),
+    "contact.materials.big_end": Entry(["steel", "copper"], WORN, (IDEAL,)),
+    "contact.materials.small_end": Entry(["steel", "steel"], COPPER, (BIG_COPPER, IDEAL)),
+    "contact.length_mm.small_end": Entry(15, JOHNSON, (WORN, BIG_JOHNSON)),
+    "lubricant.bearing_length_mm.small_end": Entry(15, OIL, (BIG_OIL, IDEAL)),
     "contact.geometry": Entry("internal", COPPER, (WORN, JOHNSON)),
     "contact.exponent": Entry(1.4, WORN, (IDEAL, JOHNSON, OWN_CORNER)),
     **entries(
@@ -132,7 +133,8 @@ ENTRIES = {
     ),
     "contact.restitution": Entry(0.8, DAMPED, (WORN, HERTZ)),
     "contact.least_approach_mm_per_s": Entry(500, DAMPED, (WORN, HERTZ, JOHNSON)),
-    **entries(JOHNSON, WORN, IDEAL, contact__length_mm=30, contact__modulus_GPa=90),
+    "contact.length_mm.big_end": Entry(30, JOHNSON, (WORN, IDEAL)),
+    "contact.modulus_GPa": Entry(90, JOHNSON, (WORN, IDEAL)),
     "friction.static": Entry(0.3, WORN, (IDEAL, TANH)),
     "friction.dynamic": Entry(0.1, WORN, (IDEAL,)),
     "friction.stiction_velocity_mm_per_s": Entry(20, WORN, (IDEAL,)),
@@ -144,7 +146,7 @@ ENTRIES = {
     ),
     "friction.ideal_joints": Entry(True, BIG, (WORN,)),
     **entries(
-        OIL, IDEAL, lubricant__viscosity_mPa_s=50, lubricant__bearing_length_mm=15,
+        OIL, IDEAL, lubricant__viscosity_mPa_s=50, lubricant__bearing_length_mm__big_end=15,
         lubricant__last_share=0.1,
     ),
     "guide.clearance_mm": Entry(0.1, SLIDING),
@@ -210,19 +212,27 @@ CONTRADICTING = {
     "sensor.second_threshold_m_per_s2",
 }  # fmt: skip
 UNREAD = [(key, where) for key, entry in ENTRIES.items() for where in entry.unread]
-# of the gas those of a cylinder that is there, and of the small end those beside the big end's
-OF_ACTION = ("gas.rod_diameter_mm", "gas.crank_clearance_percent")  # which a file has named
+# of the gas those of a cylinder that is there
+OF_ACTION = ("gas.rod_diameter_mm", "gas.clearance_percent.crank")  # which a file has named
 UNREAD_FACTS = [
     (key, where) for key, where in UNREAD
-    if key in FACTS and (where.get("load") == "gas" or not key.startswith("gas."))
+    if {key, key.rpartition(".")[0]} & {*FACTS}
+    and (where.get("load") == "gas" or not key.startswith("gas."))
     and (key not in OF_ACTION or "action" in where["gas"])
-    and (key != "contact.small_end_materials" or "materials" in where.get("contact", {}))
 ]  # fmt: skip
 
 
 def with_value(where: dict, key: str, value: object) -> dict:
-    """Return nested values with one more."""
+    """Return nested values with one more; beside one of a part the others are as they are."""
     values = copy.deepcopy(where)
+    whole, _, part = key.rpartition(".")
+    if whole in parts_by_key():
+        case = Case.from_values(where)
+        each = {one: value_of(case, f"{whole}.{one}") for one in parts_by_key()[whole]}
+        if whole not in ("gas.indicator", "gas.clearance_percent"):
+            each = {one: value if old is None else old for one, old in each.items()}
+        value = {one: old for one, old in each.items() if old is not None} | {part: value}
+        key = whole
     group, _, name = key.rpartition(".")
     within = values if not group else values.setdefault(group, {})
     if within is True:
@@ -349,7 +359,7 @@ def test_one_file_serves_the_machine_with_clearance_and_without(tmp_path):
         path.write_text(json.dumps(machine | worn | {"joint": joint}))
         (case,) = load_cases(path)
         keys[joint] = case.key
-        assert case.machine.pin_radius("small_end") == 35
+        assert case.machine.pin_radius_mm.at("small_end") == 35
     assert len({*keys.values()}) == 4
     plain = {"load": "gas", "gas": {"bore_mm": 220, "action": "single"}}
     assert keys["none"] == Case.from_values(plain).key

@@ -516,7 +516,7 @@ def test_a_study_says_what_was_given_swept_and_assumed(own, tmp_path):
     assumed, _ = text.split(" Without clearance and worn ")
     assert "rod load tension" in told
     # the stroke and the pin are the program's own values, too, but the file gives them
-    for words in ("load gas", "big end 0.2 mm", "stroke 240 mm", "pin radius 10 mm"):
+    for words in ("load gas", "clearance 0.2 mm", "stroke 240 mm", "pin radius 10 mm"):
         assert words in given
         assert words not in assumed
     assert swept == "machine rod mass 3, 5 kg"

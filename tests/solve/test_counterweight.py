@@ -153,7 +153,6 @@ def test_what_turns_with_the_pin_has_the_crank_s_own_unbalance():
     [
         ({"balance": {"rotating": 1}}, "machine.balance", "needs both, rotating and reciprocating"),
         ({"balance": 1, "counterweight_kg_mm": 9}, "machine.balance", "give one of the two"),
-        ({"balance_reciprocating": 1}, "machine.balance_reciprocating", "needs machine.balance"),
         ({"balance": 1.5}, "machine.balance", "outside"),
     ],
 )

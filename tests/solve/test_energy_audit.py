@@ -20,7 +20,7 @@ BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
 FLYING = {"stroke_mm": 180, "rod_length_mm": 450, "speed_rpm": 571, "reciprocating_mass_kg": 24,
           "pin_radius_mm": 35}  # fmt: skip
 CRANK_END = {"action": "crank_end", "bore_mm": 220, "rod_diameter_mm": 60,
-             "crank_clearance_percent": 14, "suction_MPa": 0.2, "discharge_MPa": 0.55,
+             "clearance_percent": {"crank": 14}, "suction_MPa": 0.2, "discharge_MPa": 0.55,
              "exponent": 1.3, "back_pressure_MPa": 0.1}  # fmt: skip
 
 

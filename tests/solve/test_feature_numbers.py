@@ -138,21 +138,24 @@ def test_what_no_guide_or_rod_bears_ends_a_run(values, reason, words, method):
     assert words in found.attrs["detail"]
 
 
+PINS = {"big_end": 60, "small_end": 35}
+
+
 def test_pins_of_two_radii_are_each_joint_s_own():
     """As with one radius at the joint that has clearance; both matter where both have."""
     fast = {"duration_rev": 1, "settle_rev": 0.25, "accuracy": "fine"}
     contact = {"materials": ["steel", "copper"], "geometry": "internal"}
 
     def found(joint, **machine):
-        machine["pin_radius_mm"] = machine.pop("big")
+        machine["pin_radius_mm"] = machine.pop("pins")
         values = {"joint": joint, "clearance_mm": 0.2, "contact": contact, "machine": machine}
         return run(**values, solve=fast)
 
     for joint, own in (("big_end", 60.0), ("small_end", 35.0)):
-        two = found(joint, big=60, small_end_pin_radius_mm=35)
-        one = found(joint, big=own)
+        two = found(joint, pins=PINS)
+        one = found(joint, pins=own)
         assert two["peak_contact_force"].equals(one["peak_contact_force"])
-    both = found("both", big=60, small_end_pin_radius_mm=35)
+    both = found("both", pins=PINS)
     for radius in (60, 35):
-        one = found("both", big=radius)
+        one = found("both", pins=radius)
         assert (both["peak_contact_force"] != one["peak_contact_force"]).all()

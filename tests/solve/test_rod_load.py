@@ -27,7 +27,7 @@ FLIES = {
                 "reciprocating_mass_kg": 24, "pin_radius_mm": 35},
     "contact": {"materials": ["steel", "copper"], "damping_N_s_per_mm": 3000},
     "gas": {"action": "crank_end", "bore_mm": 220, "rod_diameter_mm": 60,
-            "crank_clearance_percent": 14, "suction_MPa": 0.2, "discharge_MPa": 0.55,
+            "clearance_percent": {"crank": 14}, "suction_MPa": 0.2, "discharge_MPa": 0.55,
             "exponent": 1.3, "back_pressure_MPa": 0.1},
     "solve": {"duration_rev": 4, "settle_rev": 2, "output_step_deg": 0.05},
 }  # fmt: skip
@@ -71,7 +71,7 @@ def test_of_a_machine_turned_round(joint):
     gas = {"bore_mm": 220, "suction_MPa": 0.2, "discharge_MPa": 0.55, "back_pressure_MPa": 0.1}
     ends = (
         {"clearance_percent": 14, "switching": "exact"},
-        {"action": "crank_end", "crank_clearance_percent": 14, "rod_diameter_mm": 1e-6},
+        {"action": "crank_end", "clearance_percent": {"crank": 14}, "rod_diameter_mm": 1e-6},
     )
     machine = {"stroke_mm": 180, "rod_length_mm": 100_000, "rod_inertia_kg_m2": 1000,
                "speed_rpm": 571, "reciprocating_mass_kg": 24}  # fmt: skip

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import HealthyClearance, Sensor, points
+from compressor.cases import PerJoint, Sensor, points
 from compressor.program import CompsimError, Progress, report_progress
 from compressor.store import (
     DamagedJob,
@@ -127,7 +127,7 @@ def read_study(
 def read_job(
     stored: Stored,
     key: str,
-    healthy: HealthyClearance,
+    healthy: PerJoint,
     bands: tuple[Band, ...] | None,
     options: AlarmOptions,
 ) -> dict[str, Any] | str:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from compressor.cases import Case, HealthyClearance, Sensor
+from compressor.cases import Case, PerJoint, Sensor
 from compressor.outcome import Regime, regime_words
 from compressor.program import PROGRAM, CompsimError, Progress, no_progress
 from compressor.store import (
@@ -239,7 +239,7 @@ def _record(stored: Stored, key: str) -> dict[str, np.ndarray]:
 
 
 def job_rows(
-    stored: Stored, key: str, options: DataSetOptions, healthy: HealthyClearance
+    stored: Stored, key: str, options: DataSetOptions, healthy: PerJoint
 ) -> list[dict[str, Any]] | str:
     """Return the windows of a job, each with labels and features; or why there are none.
 

@@ -193,7 +193,7 @@ def place(case: Case) -> dict[str, float]:
         "rod_mass": case.machine.rod_mass_kg,
         "reciprocating_mass": case.machine.reciprocating_mass_kg,
         "speed": case.machine.speed_rpm,
-        "pin_radius": case.machine.pin_radius_mm / 1e3,
+        "pin_radius": case.machine.pin_radius_mm.big_end / 1e3,
         "rtol": case.rtol,
     }
 

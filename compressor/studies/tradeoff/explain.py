@@ -242,20 +242,20 @@ def counterweight_words(case: Case) -> str:
     """Return what a counterweight comes to in words, and by how much it lowers order 1."""
     force = to_si(case.counterweight, "kg mm") * case.omega**2
     words = f"{case.counterweight:g} kg mm opposite to the crank pin, {force:.4g} N"
-    rotating, reciprocating = case.machine.balance, case.machine.balance_reciprocating
-    if rotating is None:
+    share = case.machine.balance
+    if share is None:
         return words
-    reciprocating = rotating if reciprocating is None else reciprocating
     return (
-        f"{words}: {rotating:g} of what turns with the pin and {reciprocating:g} of what "
-        "reciprocates"
+        f"{words}: {share.rotating:g} of what turns with the pin and {share.reciprocating:g} of "
+        "what reciprocates"
     )
 
 
 def material_words(case: Case) -> str:
     """Return the materials of the joints with clearance in words; "" without any."""
-    pairs = dict.fromkeys(case.contact.at(joint).materials for joint in faulty(case))
-    return " and ".join(" on ".join(pair) for pair in pairs if pair)
+    materials = case.contact.materials
+    pairs = dict.fromkeys(materials.at(joint) for joint in faulty(case)) if materials else ()
+    return " and ".join(" on ".join(pair) for pair in pairs)
 
 
 def contact_words(case: Case) -> str:
@@ -264,7 +264,9 @@ def contact_words(case: Case) -> str:
     shape = f"p = {contact.exponent:g}"
     if contact.law in CYLINDRICAL:
         material = material_words(case) or f"E* = {contact.modulus_GPa:g} GPa"
-        lengths = dict.fromkeys(contact.at(joint).length_mm for joint in faulty(case))
+        lengths = dict.fromkeys(
+            contact.length_mm.at(joint) for joint in faulty(case) if contact.length_mm
+        )
         shape = f"{' and '.join(f'{length:g}' for length in lengths)} mm long"
     elif contact.materials:
         where = "in their bores" if contact.geometry == "internal" else "as of two discs"

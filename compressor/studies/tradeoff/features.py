@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.cases import ACCURACY, Case, Output
+from compressor.cases import ACCURACY, Case, Output, PerJoint
 from compressor.metrics import JOINTS, METRICS
 from compressor.physics import exact_motion, series_motion
 from compressor.solve import simulate
@@ -131,8 +131,6 @@ def with_contact(case: Case, law: str) -> Case | None:
     known = contact.materials or contact.modulus_GPa
     if law in ("johnson", "liu"):
         values["length_mm"] = contact.length_mm or bearing_length(case)
-        if case.lubricant and not contact.length_mm:
-            values["small_end_length_mm"] = case.lubricant.small_end_bearing_length_mm
         if not known:
             values |= {"materials": STEEL, "stiffness_N_per_mm15": None}
     elif not (contact.materials or contact.stiffness_N_per_mm15):
@@ -140,11 +138,11 @@ def with_contact(case: Case, law: str) -> Case | None:
     return with_values(case, "contact", **values)
 
 
-def bearing_length(case: Case) -> float:
+def bearing_length(case: Case) -> PerJoint[float] | float:
     """Return the length of a case's bearings (mm): of its oil film, or as long as wide."""
     if case.lubricant:
         return case.lubricant.bearing_length_mm
-    return 2.0 * min(case.machine.pin_radius(joint) for joint in JOINTS)
+    return 2.0 * min(case.machine.pin_radius_mm.at(joint) for joint in JOINTS)
 
 
 def friction_feature(law: str) -> ModelFeature:

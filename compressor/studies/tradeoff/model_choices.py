@@ -22,16 +22,19 @@ from compressor.cases import (
     CaseError,
     Contact,
     Output,
+    PerJoint,
     Study,
     joint_stiffness,
+    keys_of,
     law_of,
     paper_notes,
+    path_of,
+    put,
     reads,
-    table,
+    row_of,
     value_in,
     value_of,
     values_given,
-    written_key,
 )
 from compressor.metrics import BARRED, JOINTS, METRICS
 from compressor.program import PROGRAM, Progress, no_progress, report_progress
@@ -87,12 +90,12 @@ def vary_numbers(study: Study, job: int, named: Sequence[str] = ()) -> Iterator[
     """
     case, nested = study.cases[job], study.given(job)
     given, swept = values_given(nested), {axis.key for axis in study.axes}
-    known = {key for key in table() if key in given or value_of(case, key) is not None}
-    for key, row in table().items():
-        doubt, written = row.plausible, written_key(key, known)
+    for key in keys_of(partial(value_of, case)):
+        row = row_of(key)
+        doubt = row.plausible if row else None
         if doubt is None or key in SCALED or not reads(case, key):
             continue
-        is_named = bool({key, written} & {*named})
+        is_named = key in named
         value = value_in(nested, key) if key in given else value_of(case, key)
         span = doubt.given if key in given else doubt.left_out
         span = span or (doubt.left_out if is_named else None)
@@ -101,20 +104,20 @@ def vary_numbers(study: Study, job: int, named: Sequence[str] = ()) -> Iterator[
         group, _, name = key.partition(".")
         of_gas = key.startswith("gas.")
         if of_gas and case.gas.switching == "paper" and name != "back_pressure_MPa":
-            yield Choice(written, None, OWN_CORNERS, written)
+            yield Choice(key, None, OWN_CORNERS, key)
             continue
         # which follow from what else is given of a cylinder, and are to stay
         held = {own: getattr(case.gas, own) for own in FOLLOWING} if of_gas else {}
+        if held:
+            nested = nested | {group: held | nested.get(group, {})}
         for end in span.ends(value):
-            within = nested.get(group)
-            changed = {**held, **(within if isinstance(within, Mapping) else {}), name: end}
-            label = f"{written} {end:.4g}"
+            label = f"{key} {end:.4g}"
             try:
-                other = Case.resolve(nested | {group: changed})
+                other = Case.resolve(put(nested, path_of(key), end))
             except CaseError as error:
-                yield Choice(label, None, f"cannot be: {error.problems[0]}", written)
+                yield Choice(label, None, f"cannot be: {error.problems[0]}", key)
             else:
-                yield Choice(label, other, doubt.why, written)
+                yield Choice(label, other, doubt.why, key)
 
 
 def model_choices(case: Case) -> list[Choice]:
@@ -198,22 +201,22 @@ def scale_contact(case: Case) -> Iterator[Choice]:
 def widen_bearings(case: Case) -> Iterator[Choice]:
     """Yield a case with bearings as long as wide, where theirs are as long as the paper's pin."""
     if case.lubricant and "lubricant.bearing_length_mm" in paper_notes(case):
-        big, small = (2.0 * case.machine.pin_radius(joint) for joint in JOINTS)
-        lengths = {"bearing_length_mm": big, "small_end_bearing_length_mm": small}
-        yield attempt("bearings as long as wide", lambda: with_values(case, "lubricant", **lengths))
+        wide = PerJoint(*(2.0 * case.machine.pin_radius_mm.at(joint) for joint in JOINTS))
+        change = partial(with_values, case, "lubricant", bearing_length_mm=wide)
+        yield attempt("bearings as long as wide", change)
 
 
 def with_stiffness(case: Case, name: str, factor: float) -> Choice:
     """Return a case with its contact stiffness, or the modulus that it follows from, scaled."""
-    values: dict[str, Any] = {"materials": None, "small_end_materials": None}
+    values: dict[str, Any] = {"materials": None}
     contact, worn = case.contact, faulty(case)
     if contact.law in ("johnson", "liu"):
         key, unit = "modulus_GPa", 1.0
-        each = [composite_modulus_of(contact.at(joint)) for joint in worn]
+        each = [composite_modulus_of(contact, joint) for joint in worn]
     else:
         key, unit, values["geometry"] = "stiffness_N_per_mm15", 1000.0**contact.exponent, None
-        sizes = [(case.machine.pin_radius(j), getattr(case.clearance_mm, j)) for j in worn]
-        each = [joint_stiffness(contact.at(j), *at) for j, at in zip(worn, sizes, strict=True)]
+        sizes = [(case.machine.pin_radius_mm.at(j), getattr(case.clearance_mm, j)) for j in worn]
+        each = [joint_stiffness(contact, j, *at) for j, at in zip(worn, sizes, strict=True)]
     # one key serves both joints: materials may give each a stiffness of its own
     values[key] = factor * (math.prod(each) ** (1.0 / len(each)) / unit)
     alike = max(each) <= SAME_STIFFNESS * min(each)
@@ -222,13 +225,15 @@ def with_stiffness(case: Case, name: str, factor: float) -> Choice:
     return attempt(name, change, note, "contact stiffness")
 
 
-def composite_modulus_of(contact: Contact) -> float:
+def composite_modulus_of(contact: Contact, joint: str) -> float:
     """Return the composite modulus E* (GPa) of a joint's contact, as given or of its materials."""
     if contact.modulus_GPa is not None:
         return contact.modulus_GPa
     # from the stiffness pi E* L of johnson, which reads no radius
-    length = (contact.length_mm or math.nan) / 1000
-    return joint_stiffness(replace(contact, law="johnson"), 1.0, 0.1) / (math.pi * length) / 1e9
+    length = (contact.length_mm.at(joint) if contact.length_mm else math.nan) / 1000
+    return (
+        joint_stiffness(replace(contact, law="johnson"), joint, 1.0, 0.1) / (math.pi * length) / 1e9
+    )
 
 
 def check_choice(choice: Choice, case: Case) -> Choice:

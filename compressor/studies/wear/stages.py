@@ -83,7 +83,7 @@ class Worn:
     @property
     def bore_area(self) -> np.ndarray:
         """Return the area of each unworn bore (m^2)."""
-        pins = [to_si(self.case.machine.pin_radius(joint), "mm") for joint in JOINTS]
+        pins = [to_si(self.case.machine.pin_radius_mm.at(joint), "mm") for joint in JOINTS]
         around = 2.0 * math.pi * (np.array(pins) + self.clearances)
         return np.asarray(around * to_si(self.wear.bore_length_mm, "mm"))
 

@@ -11,7 +11,7 @@ import pytest
 from compsim import cli
 from test_lead import CASE, write_run
 
-from compressor.cases import HealthyClearance
+from compressor.cases import PerJoint
 from compressor.report.page import document
 from compressor.store import job_record, read_dataset, read_store, read_studies
 from compressor.studies.alarms import windows
@@ -171,7 +171,7 @@ def test_a_record_that_cannot_be_read_says_why(
         windows, "job_record", lambda *_: dataclasses.replace(record, **change(record))
     )
     options = windows.AlarmOptions(revolutions)
-    assert windows.read_job(stored, key, HealthyClearance(), None, options) == reason
+    assert windows.read_job(stored, key, PerJoint(0.0, 0.0), None, options) == reason
 
 
 def test_no_fewer_revolutions_are_proposed_than_a_record_needs(worn_store):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.cases.groups import HealthyClearance
+from compressor.cases.groups import PerJoint
 from compressor.store.files import WrongName
 from compressor.store.reader import read_store
 from compressor.studies.diagnosis.data_set import (
@@ -54,7 +54,7 @@ def test_no_record_is_kept_in_memory(worn):
     stored = read_store(worn)
     key = make_data_set(worn, "worn")["key"].values[0]
     for signals in (True, False):
-        for row in job_rows(stored, key, replace(OPTIONS, signals=signals), HealthyClearance()):
+        for row in job_rows(stored, key, replace(OPTIONS, signals=signals), PerJoint(0.0, 0.0)):
             kept = row["window"]
             assert all(part.base is None for part in (kept.times, kept.values, kept.tacho))
             assert kept.values.dtype == np.float32

@@ -8,6 +8,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.cases.groups import Friction
 from compressor.cases.optional_groups import Rod
+from compressor.cases.parameter import PerJoint
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.features import (
     CONTACT_LAWS,
@@ -145,10 +146,10 @@ def test_each_contact_law_may_stand_in_place_of_each_other(law, other):
 def test_a_law_takes_over_restitution_materials_and_length():
     given = {"law": "flores", "restitution": 0.7, "materials": ["steel", "copper"]}
     contact = with_contact(case(contact=given), "liu").contact
-    assert (contact.restitution, contact.materials) == (0.7, ("steel", "copper"))
-    assert contact.length_mm == 20.0  # as long as wide
+    assert (contact.restitution, contact.materials) == (0.7, PerJoint(*[("steel", "copper")] * 2))
+    assert contact.length_mm == PerJoint(20.0, 20.0)  # as long as wide
     oiled = case(contact=given, lubricant={"bearing_length_mm": 15})
-    assert with_contact(oiled, "liu").contact.length_mm == 15.0
+    assert with_contact(oiled, "liu").contact.length_mm == PerJoint(15.0, 15.0)
 
 
 def test_a_modulus_alone_gives_other_laws_the_default_stiffness():

@@ -103,7 +103,7 @@ def test_pins_that_are_not_the_paper_s_have_a_choice_of_their_own_stiffness():
     assert name not in {one.name for one in model_choices(Case.from_values(values))}
     odd = Case.from_values(values | {"machine": {"pin_radius_mm": 35}})
     (one,) = (choice for choice in model_choices(odd) if choice.name == name)
-    assert one.case.contact.materials == ("steel", "steel")
+    assert one.case.contact.materials.small_end == ("steel", "steel")
     expected = contact_stiffness("steel", "steel", 0.035, 0.0352, internal=True)
     assert stiffness_of(one.case, "small_end") == pytest.approx(expected)
 
@@ -159,7 +159,7 @@ def test_bearings_of_the_default_length_are_tried_as_long_as_wide():
     oiled = {"joint": "both", "clearance_mm": 0.1, "lubricant": True}
     assert "bearings as long as wide" not in by_name(case(**oiled))
     one = by_name(case(**oiled, machine={"pin_radius_mm": pins}))["bearings as long as wide"]
-    assert [one.case.lubricant.bearing_length(joint) for joint in JOINTS] == [120, 70]
+    assert [one.case.lubricant.bearing_length_mm.at(joint) for joint in JOINTS] == [120, 70]
 
 
 # ---- numbers in doubt ---------------------------------------------------------------------------
@@ -257,7 +257,7 @@ def test_an_end_that_cannot_be_says_why(tmp_path):
     study = read_study(tmp_path, PLANT.replace("big_end: 70", "big_end: 110"))
     (one,) = (x for x in vary_numbers(study, 1) if x.name.endswith(".big_end 137.5"))
     assert one.case is None
-    assert one.note.startswith("cannot be: lubricant.bearing_length_mm: is 1.15 times the diameter")
+    assert one.note.startswith("cannot be: lubricant.bearing_length_mm.big_end: is 1.15 times")
 
 
 def test_every_plausible_range_lies_within_what_its_key_allows():
