@@ -70,6 +70,7 @@ MAX_TEXTS = 4096  # groups whose texts are remembered
 SOUND = PerJoint(0.0, 0.0)  # a healthy clearance that no case need name
 FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder
 OWN_GAS = {key for key in (*table(), *parts_by_key()) if key.startswith("gas.")} - {*FOLLOWING}
+FACT_KEYS = tuple(part for key in IN_KEY_IF_READ for part in stands_for(key) or (key,))
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 # the groups with a key that results depend on; of `solve` the span and the solver are parts
@@ -406,7 +407,7 @@ def identity_parts(case: Case) -> dict[str, str]:
 def _facts_read(case: Case) -> dict[str, Any]:
     """Return the facts that a case has and reads; each condition is tried once."""
     found, held = {}, {}
-    for key in (part for one in IN_KEY_IF_READ for part in stands_for(one) or (one,)):
+    for key in FACT_KEYS:
         value = value_of(case, key)
         for _, needed in conditions(key) if value is not None else ():
             if needed not in held:

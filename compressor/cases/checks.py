@@ -12,6 +12,7 @@ import dataclasses
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
+from functools import lru_cache
 from typing import Any
 
 from pydantic import ValidationError
@@ -30,6 +31,7 @@ from compressor.cases.parameter import (
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, parts_by_key, table
 
 
+@lru_cache(1024)  # asked for of each key of each job
 def stands_for(key: str) -> tuple[str, ...]:
     """Return the keys of the parts that a key may have a value for; none of another key."""
     return tuple(f"{key}.{part}" for part in parts_by_key().get(key, ()))
