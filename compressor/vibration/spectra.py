@@ -16,7 +16,7 @@ import numpy as np
 from scipy import stats
 from scipy.fft import ifft, irfft, rfft
 from scipy.interpolate import CubicSpline
-from scipy.signal import hilbert, welch
+from scipy.signal import hilbert
 
 from compressor.program import CompsimError
 
@@ -54,12 +54,10 @@ def line_amplitudes(values: np.ndarray, block: int, rms: bool) -> np.ndarray:
     their samples weigh alike, so that a sine of a whole number of cycles a block has its own
     amplitude; samples after the last whole block are left. No mean is taken off.
     """
-    _, squares = welch(
-        values, window="boxcar", nperseg=block, noverlap=0, detrend=False, scaling="spectrum"
-    )
-    found = np.sqrt(squares)
-    if not rms:  # zero and, of an even block, the highest line have no partner that is folded in
-        found[1 : (block + 1) // 2] *= np.sqrt(2.0)
+    whole = values[: len(values) // block * block].reshape(-1, block)
+    found = np.sqrt(np.mean(np.abs(rfft(whole)) ** 2, axis=0)) / block
+    # zero and, of an even block, the highest line have no partner that is folded in
+    found[1 : (block + 1) // 2] *= math.sqrt(2.0) if rms else 2.0
     return found
 
 
