@@ -204,16 +204,19 @@ def joint_contact(eccentricity, spins, bearing, carried, p):
     pin, clearance, stiffness = bearing
     distance = square_root(ex * ex + ey * ey)
     penetration = distance - clearance
-    bore = pin + clearance
-    arm = pin - penetration
-    journal_spin, rod_spin = spins
-    turning = journal_spin * arm - rod_spin * bore
-    if distance == 0.0:  # surfaces slip all the same: what bends by that must not start with a jump
-        return ContactState(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, turning, 0.0, 0.0, 0.0, 0.0)
+    if distance == 0.0:
+        slip = 0.0
+        if has_chosen_laws(p):  # bristles, which bend by the slip, must not start with a jump
+            slip = spins[0] * (pin - penetration) - spins[1] * (pin + clearance)
+        return ContactState(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, slip, 0.0, 0.0, 0.0, 0.0)
     per_distance = 1.0 / distance
     nx = ex * per_distance
     ny = ey * per_distance
     rate = ex_rate * nx + ey_rate * ny
+    bore = pin + clearance
+    arm = pin - penetration
+    journal_spin, rod_spin = spins
+    turning = journal_spin * arm - rod_spin * bore
     slip = ey_rate * nx + (turning - ex_rate * ny)
     approach, bristle = carried
     normal, elastic, unclamped = normal_force(penetration, rate, approach, stiffness, clearance, p)
