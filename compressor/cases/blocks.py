@@ -119,7 +119,7 @@ class Block:
                 )
                 continue
             sweep, message = self.sweeps[key], problem.message
-            if not sweep.has_ends:
+            if not sweep.has_ends and not error.is_misfit:
                 of = next(len(found) for keys, found in self.factors if key in keys)
                 message = tell_draw(rows[key] + 1, of, message)
             once = key if sweep.kind != "list" and not error.is_misfit else problem
@@ -129,11 +129,10 @@ class Block:
 
     def _place_of(self, key: str, path: str) -> Place:
         """Return where a key stands, or its group, or the block; path: of the file."""
-        places = self.tree.places
-        if path_of(key) in places:
-            return places[path_of(key)][1]
-        spots = places.get((key.partition(".")[0],), places.get(()))
-        return spots[0] if spots else Place(path, 1, 1)
+        own = path_of(key)
+        found = self.nearest(own)
+        spots = self.tree.places.get(found)
+        return spots[found == own] if spots else Place(path, 1, 1)
 
     def place(self, path: Path) -> Place:
         """Return where the value at a path stands, or what it is in."""
@@ -266,6 +265,11 @@ def plan_block(tree: Tree) -> tuple[Plan, list[FileProblem]]:
                 raise NoSweep(
                     f"is no number, so that {next(iter(value))} cannot sweep it: give a list"
                 )
+            parts = stands_for(key)
+            if parts and isinstance(value, list) and any(isinstance(one, dict) for one in value):
+                first, *_, last = (part.rpartition(".")[2] for part in parts)
+                form = f"{{{first}: [...], {last}: ...}}"
+                raise NoSweep(f"a list has values of all parts alike: sweep each part, {form}")
             sweeps[key] = sweep_of(path, value, kind == "integer")
         except NoSweep as error:
             place = tree.places.get(path + error.path, place)

@@ -41,11 +41,9 @@ from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
 from compressor.cases.optional_groups import fill_guide, fill_wear
 from compressor.cases.parameter import (
     ACCURACY,
+    BY_PART,
     CaseError,
-    PerEnd,
     PerJoint,
-    PerMotion,
-    PerValve,
     Problem,
     Targets,
     first_tolerance,
@@ -361,7 +359,7 @@ def name_as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> l
     for one in problems:
         whole = one.key.rpartition(".")[0]
         value = _value_at(whole, values) if whole in parts_by_key() else {}
-        by_part = isinstance(value, Mapping) or (value is None and whole in OF_JOINTS)
+        by_part = isinstance(value, Mapping | BY_PART) or (value is None and whole in OF_JOINTS)
         by_part |= whole == LED and one.key != stands_for(whole)[0]
         found[one if by_part else Problem(whole, one.message)] = None
     return [*found]
@@ -422,7 +420,7 @@ def _facts_read(case: Case) -> dict[str, Any]:
 
 def _plain_parts(value: Any) -> Any:
     """Return a value by part as a case file has it: one for all, or one of each that there is."""
-    if not isinstance(value, PerJoint | PerEnd | PerValve | PerMotion):
+    if not isinstance(value, BY_PART):
         return value
     each = {*vars(value).values()}
     found = {

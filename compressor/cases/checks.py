@@ -26,6 +26,7 @@ from compressor.cases.parameter import (
     Parameter,
     Problem,
     adapter_of,
+    problem_of_parts,
     quote_value,
 )
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, parts_by_key, table
@@ -308,7 +309,7 @@ def _holding(name: str, within: str = "") -> list[str]:
     found = [
         key
         for key in table()
-        if key.startswith(within) and words and words <= {*_leaf(key).lower().split("_")}
+        if key.startswith(within) and words and words <= {*re.split("[_.]", key.lower())}
     ]
     return found if len(found) <= MAX_MEANT else []
 
@@ -384,27 +385,10 @@ def _problem_at(
     if key in GROUPS:
         return Problem(key, NO_VALUE if value is None else no_mapping(key, value))
     rest = path[len(key.split(".")) :]
-    if parts := parts_by_key().get(key):
-        within = [one for one in rest if one in parts]
-        return _problem_of_parts(key, value, within, cause, kind)
+    if key in parts_by_key():
+        rows = {part: table()[f"{key}.{part}"] for part in parts_by_key()[key]}
+        return problem_of_parts(key, value, rows, rest, kind, cause)
     return table()[key].problem(key, value, rest, cause)
-
-
-def _problem_of_parts(
-    key: str, value: Any, within: list[str], cause: str, kind: str
-) -> Problem | None:
-    """Return the problem of a key by part: of the part that a path names, or of the whole."""
-    parts = parts_by_key()[key]
-    if not isinstance(value, Mapping):
-        return table()[f"{key}.{parts[0]}"].problem(key, value, within[1:], cause)
-    if kind in ("missing", "unexpected_keyword_argument"):
-        given = ", ".join(map(str, value))
-        needed = f"needs both, {' and '.join(parts)}, not {given}"
-        return Problem(key, f"{needed}; or one number for both")
-    if not within:
-        return Problem(key, cause)
-    part = within[0]
-    return table()[f"{key}.{part}"].problem(f"{key}.{part}", value[part], within[1:], cause)
 
 
 def values_given(values: Mapping[Any, Any]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from compressor.cases.checks import (
     stands_for,
 )
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.swept import FORMS
+from compressor.cases.swept import DISTRIBUTIONS, FORMS
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, parts_by_key
 from compressor.cases.yaml_reader import FileProblem, Path, Place, Tree, read_text, shorten
 
@@ -81,9 +81,10 @@ def _is_group(name: str, value: Any) -> bool:
 def _is_by_part(key: str, value: Any) -> bool:
     """Return whether a value is one for each part, and no sweep of one for all."""
     parts = parts_by_key().get(key)
-    if parts is None or not isinstance(value, dict):
+    if parts is None or not isinstance(value, dict) or not value:
         return False
-    is_form = len(value) <= 2 and any(get_close_matches(word, FORMS, n=1) for word in value)
+    words = [*FORMS, *DISTRIBUTIONS]
+    is_form = len(value) <= 2 and any(get_close_matches(word, words, n=1) for word in value)
     return not is_form or not value.keys().isdisjoint(parts)
 
 
@@ -232,8 +233,10 @@ def read_overrides(texts: Sequence[str]) -> tuple[dict[str, Tree], list[FileProb
         if not key or not equals:
             message = "needs the form key=value, such as joint=both"
             problems.append(FileProblem(place, "", message))
-        elif any(covers(own, other) or covers(other, own) for other in found):
+        elif any(meet(own, other) for other in found):
             problems.append(FileProblem(place, key, "is set twice"))
+        elif rival := next((one for one in found if _are_rivals(own, one)), None):
+            problems.append(FileProblem(place, key, TWICE.format(rival)))
         else:
             tree, wrong = read_text(value, place)
             problems += wrong
@@ -253,6 +256,20 @@ def _under(key: str, tree: Tree, place: Place) -> Tree:
         values = {str(one): values}
     places = {path + inner: spot for inner, spot in tree.places.items()}
     return Tree(values, places | {path[:n]: (place, place) for n in range(1, len(path))})
+
+
+def _are_rivals(key: str, other: str) -> bool:
+    """Return whether one of two keys stands in place of the other."""
+    return any(
+        meet(key, one) and meet(other, rival)
+        for pair in IN_PLACE_OF
+        for one, rival in (pair, pair[::-1])
+    )
+
+
+def meet(key: str, other: str) -> bool:
+    """Return whether one of two keys is the other, or in the group that the other names."""
+    return covers(key, other) or covers(other, key)
 
 
 def covers(outer: str, key: str) -> bool:

@@ -17,7 +17,15 @@ from compressor.cases.case import Case
 from compressor.cases.checks import REPORT, row_of, value_of
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
 from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
-from compressor.cases.keys import dotted, merge_block, override, path_of, read_overrides, write_out
+from compressor.cases.keys import (
+    covers,
+    dotted,
+    merge_block,
+    override,
+    path_of,
+    read_overrides,
+    write_out,
+)
 from compressor.cases.parameter import NO_VALUE, CaseError, quote_value
 from compressor.cases.study import Axis, Cases, Study
 from compressor.cases.table import WORDS, outside_identity, table
@@ -203,15 +211,15 @@ def _study(
     """Return the study of a file with its blocks, or what is wrong with it."""
     plans, blocks, problems = _blocks(file, file.changes, max_jobs)
     is_drawn = any(one.is_drawn for plan in plans for one in plan.sweeps.values())
-    sample = plans[0].tree.places.get(("sample",)) if plans else None
-    if sample and not (problems or file.problems or file.changes or is_drawn):
-        text = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
-        problems.append(FileProblem(sample[0], "sample", text))
     if problems or not blocks:
         return None, [], problems
     is_grid = len(blocks) == 1 and blocks[0].is_grid
     cases, columns = Cases(blocks), [] if is_grid else _columns(blocks)
     keys, values, problems = _check_cases(file, cases, columns, progress)
+    sample = plans[0].tree.places.get(("sample",))
+    if sample and not (problems or file.changes or is_drawn):
+        text = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
+        problems.append(FileProblem(sample[0], "sample", text))
     if problems:
         return None, [], problems
     cases.keys = keys
@@ -251,7 +259,14 @@ def _blocks(
                 Case.resolve(values)
             except CaseError as error:
                 found |= {} if error.is_misfit else block.locate(error, rows, file.path)
-    return plans, [], [*problems, *found.values()]
+    keys = {one.key for one in problems}
+    texts = {(one.place, one.message) for one in [*problems, *file.problems]}
+    more = [  # but what follows from a sweep or a null that is told
+        one
+        for one in found.values()
+        if (one.place, one.message) not in texts and not any(covers(one.key, key) for key in keys)
+    ]
+    return plans, [], problems + more
 
 
 def _block_trees(
@@ -331,6 +346,7 @@ def _check_cases(
 ) -> tuple[tuple[str, ...], dict[str, list[Any]], list[FileProblem]]:
     """Return the key of each case, its value of each swept key, and what is wrong with values."""
     found: dict[Any, FileProblem] = {}
+    misfits: dict[Any, FileProblem] = {}  # told once each value is good
     keys: list[str] = []
     values: dict[str, list[Any]] = {key: [] for key in columns}
     total = len(cases)
@@ -341,13 +357,18 @@ def _check_cases(
         try:
             case = block.case(place)
         except CaseError as error:
-            found = block.locate(error, block.rows_of(place), file.path) | found
+            located = block.locate(error, block.rows_of(place), file.path)
+            if error.is_misfit:
+                misfits = located | misfits
+            else:
+                found = located | found
             continue
-        if not found:
+        if not (found or misfits):
             keys.append(case.key)
             for key in columns:
                 values[key].append(value_of(case, key))
     progress(total, total, "")
+    found = found or misfits
     problems = [*itertools.islice(dict.fromkeys(found.values()), MAX_CONFLICTS)]
     if len(found) > MAX_CONFLICTS:
         message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"

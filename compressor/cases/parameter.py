@@ -200,6 +200,7 @@ class PerMotion(Generic[Value]):
     reciprocating: Value
 
 
+BY_PART = PerJoint | PerEnd | PerValve | PerMotion
 PART_WORDS = {
     "big_end": "of the big end", "small_end": "of the small end", "head": "of the head end",
     "crank": "of the crank end", "suction": "of the suction valves",
@@ -562,9 +563,42 @@ def problems_of(
         elif path[0] in rows:
             name = path[0]
             found[rows[name].problem(name, values.get(name), path[1:], str(cause))] = None
+        elif parts := {key.partition(".")[2]: row for key, row in rows.items()
+                       if key.startswith(f"{path[0]}.")}:  # fmt: skip
+            value = values.get(path[0])
+            told = problem_of_parts(path[0], value, parts, path[1:], one["type"], str(cause))
+            found[told] = None
         else:
             found[Problem(".".join(path[:2]), one["msg"])] = None
     return [problem for problem in found if problem]
+
+
+def problem_of_parts(
+    key: str,
+    value: Any,
+    rows: Mapping[str, Parameter],
+    path: Sequence[str],
+    kind: str,
+    cause: str,
+) -> Problem | None:
+    """Return the problem of a key by part: of the part that a path names, or of the whole."""
+    if isinstance(value, BY_PART) and vars(value).keys() == rows.keys():
+        value = vars(value)
+    within = [one for one in path if one in rows]
+    if not isinstance(value, Mapping):
+        return next(iter(rows.values())).problem(key, value, within[1:], cause)
+    unknown = [str(name) for name in value if name not in rows]
+    if unknown and kind in ("missing", "unexpected_keyword_argument", "invalid_key"):
+        hint = did_you_mean(unknown[0], rows, {part: f"{key}.{part}" for part in rows})
+        named = hint or f"{key} has {', '.join(rows)}"
+        return Problem(f"{key}.{unknown[0]}", f"unknown key; {named}")
+    if kind == "missing":
+        needed = f"needs both, {' and '.join(rows)}, not {', '.join(value) or 'none'}"
+        return Problem(key, f"{needed}; or one number for both")
+    if not within:
+        return Problem(key, cause)
+    part = within[0]
+    return rows[part].problem(f"{key}.{part}", value[part], within[1:], cause)
 
 
 if TYPE_CHECKING:
@@ -582,14 +616,12 @@ else:
         own = {}
         for one in reversed(cls.__mro__):
             own |= vars(one).get("__annotations__", {})
-        rows = {}
         for name, item in vars(cls).items():
             if isinstance(item, dataclasses.Field) and "kind" in item.metadata:
-                rows[name] = Parameter(name, default=item.default, **item.metadata)
-                cls.__annotations__[name] = annotation_of(rows[name])
+                (row,) = rows_of(name, item)
+                cls.__annotations__[name] = annotation_of(row)
             elif isinstance(item, dataclasses.Field) and "parts" in item.metadata:
                 parts = [*rows_of(name, item)]
-                rows |= {row.key: row for row in parts}
                 one = item.metadata["of"][annotation_of(parts[0])]
                 one = one | None if item.default is None else one
                 if parts[0].kind == "card":
@@ -601,6 +633,7 @@ else:
                 opened = BeforeValidator(item.metadata["open"])
                 cls.__annotations__[name] = Annotated[own[name], opened]
         made = pydantic.dataclasses.dataclass(frozen=True, config=ConfigDict(extra="forbid"))(cls)
+        rows = {row.key: row for item in fields(made) for row in rows_of(item.name, item)}
         validate = made.__init__
 
         def __init__(self, *args, **values):

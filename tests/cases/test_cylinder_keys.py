@@ -71,7 +71,7 @@ def test_clearances_are_of_the_stroke():
         (DOUBLE | {"clearance_percent": 90}, "gas.clearance_percent: the gas left at the head"),
         (DOUBLE | {"clearance_percent": 25, "valve_loss_percent": 60}, "never expands"),
         ({"action": "doubel"}, "did you mean double?"),
-        (DOUBLE | {"valve_loss_percent": {"suction": 4, "exhaust": 5}}, "needs both, suction and"),
+        (DOUBLE | {"valve_loss_percent": {"suction": 4, "exhaust": 5}}, "has suction, discharge"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_told(gas, words):

@@ -18,10 +18,13 @@ from compressor.cases.laws import USUAL
 from compressor.cases.load import CaseFileError, load_cases, load_studies
 from compressor.cases.parameter import parameter_table
 from compressor.cases.study import Axis
+from compressor.cases.swept import FORMS
 from compressor.cases.table import table
 from compressor.cases.yaml_reader import MAX_BYTES, resolve_scalar
+from compressor.metrics import METRICS
 
 BIG_END = "joint: big_end\nclearance_mm: 0.1\n"
+NEEDS_FORM = f"needs a value, a list of values or a mapping with one of {' '.join(FORMS)}"
 one_file = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=3000)
 
 
@@ -288,6 +291,22 @@ def test_mistakes_of_all_files_are_told_at_once(write):
         ("solve: {max_steps: [1, 1.0]}\n", "1:24: solve.max_steps: 1 is in the list twice"),
         ("machine: {speed_rpm: " + "9" * 5000 + "}\n", "1:22: machine.speed_rpm: must be "
          "finite: needs a number in (0, 100000] rpm, not inf"),
+        ("machine: {pin_radius_mm: {}}\n", f"1:26: machine.pin_radius_mm: {NEEDS_FORM}"),
+        ("machine: {pin_radius_mm: {normal: {mean: 60, sd: 1}}}\n",
+         f"1:26: machine.pin_radius_mm: {NEEDS_FORM}"),
+        ("machine: {pin_radius_mm: {big_end: [], small_end: 40}}\n",
+         "1:36: machine.pin_radius_mm.big_end: is an empty list"),
+        ("machine: {pin_radius_mm: [40, {big_end: 60, small_end: 40}]}\n",
+         "1:26: machine.pin_radius_mm: a list has values of all parts alike: sweep each part, "
+         "{big_end: [...], small_end: ...}"),
+        ("clearance_mm: {big_end: 0.1, small_ends: 0.1}\n",
+         "1:42: clearance_mm.small_ends: unknown key; did you mean clearance_mm.small_end?"),
+        ("machine: {stroke_mm: [240, ~]}\n", "1:28: machine.stroke_mm: has no value; "
+         "leave the key out to get its default"),
+        ("solve: {accuracy: {sobol: [1, 2]}}\nsample: {n: 4}\n",
+         f"1:27: solve.accuracy.sobol: unknown metric; metrics are {', '.join(METRICS)}"),
+        ("spring: {stroke_mm: [250, -1]}\n", "1:27: spring.stroke_mm: -1 is outside "
+         f"{row_of('spring.stroke_mm').range} mm"),
     ],
 )  # fmt: skip
 def test_one_mistake_is_one_message(write, text, expected):
@@ -304,6 +323,7 @@ def test_one_mistake_is_one_message(write, text, expected):
         ("spring: {stiffness: 1}", "; did you mean spring.stiffness_N_per_mm?"),
         ("solve: {duration: 1}", "; did you mean solve.duration_rev?"),
         ("accuracy: fine", "; did you mean solve.accuracy?"),
+        ("small_end_pin_radius_mm: 1", "; did you mean machine.pin_radius_mm.small_end?"),
         ("rod_mass: 1", "; did you mean machine.rod_mass_kg?"),
         ("exponent: 1", "; did you mean gas.exponent or contact.exponent or guide.exponent?"),
         ("solve.accuracy: fine", "; write accuracy inside solve"),
@@ -339,6 +359,16 @@ def test_an_unknown_key_is_told_with_what_was_meant(write, text, hint):
         ("load: gas\ngas: {exponent: 1.3, switching: paper}\n",
          ["2:33: gas.switching: the printed corners hold for the paper's geometry and pressures "
           "only; set switching: exact"]),
+        ("load: gas\ngas:\n  action: double\n  rod_diameter_mm: 30\n"
+         "  clearance_percent: {head: 12}\n",
+         ["5:3: gas.clearance_percent.crank: is needed with action: double and a clearance of the "
+          "head"]),
+        ("machine: {pin_radius_mm: [40, 50]}\n",
+         ["1:11: machine.pin_radius_mm: nothing reads this key: it needs clearance_mm.big_end > 0 "
+          "or friction.ideal_joints == true or clearance_mm.small_end > 0; set that, or leave the "
+          "key out"]),
+        ("joint: big_end\nclearance_mm: {lhs: {normal: {mean: 40, sd: 1e-9}}}\nsample: {n: 1}\n",
+         ["2:15: clearance_mm: 40 mm exceeds the pin radius, 10 mm: lower it"]),
     ],
 )  # fmt: skip
 def test_values_that_do_not_fit_are_told_once_where_they_stand(write, text, expected):
@@ -413,6 +443,12 @@ def test_an_override_stands_in_place_of_the_files_value(write, text, overrides, 
         (["gas.exponent=1", "gas={exponent: 1}"], "--set gas={exponent: 1}: gas: is set twice"),
         (["clearance_mm=[1, 11]"], "--set clearance_mm=[1, 11]: clearance_mm: "
          "11 mm exceeds the pin radius, 10 mm: lower it"),
+        (["solve.duration_s=1", "solve.duration_rev=2"], "--set solve.duration_rev=2: "
+         "solve.duration_rev: stands in place of solve.duration_s: give one of the two"),
+        (["gas.clearance_percent=9", "gas.head_clearance_mm=9"], "--set gas.head_clearance_mm=9: "
+         "gas.head_clearance_mm: stands in place of gas.clearance_percent: give one of the two"),
+        (["clearance_mm.top=3"], "--set clearance_mm.top=3: clearance_mm.top: unknown key; "
+         "clearance_mm has big_end, small_end"),
         (["name=x"], "--set name=x: name: a.yaml and b.yaml would be stored under one name, x"),
     ],
 )  # fmt: skip

@@ -2,13 +2,14 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 
 from compressor.cases.case import Case, CaseError
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.materials import composite_modulus, contact_stiffness
-from compressor.cases.parameter import PerJoint
+from compressor.cases.parameter import PerEnd, PerJoint
 from compressor.physics.film import film
 from compressor.solve.cautions import remarks
 from compressor.solve.si_record import record
@@ -38,7 +39,7 @@ def test_a_file_gives_one_radius_or_one_for_each_joint():
     ("pin", "key", "words"),
     [
         ({"big_end": 60}, "machine.pin_radius_mm", "needs both, big_end and small_end"),
-        ({"big_end": 60, "small": 5}, "machine.pin_radius_mm", "big_end"),
+        ({"big_end": 60, "small_ends": 5}, "machine.pin_radius_mm.small_ends", "mm.small_end?"),
         ({"big_end": 60, "small_end": -5}, "machine.pin_radius_mm.small_end", "outside"),
         ({"big_end": 60, "small_end": 0.1}, "clearance_mm", "exceeds the pin radius"),
     ],
@@ -47,6 +48,31 @@ def test_what_is_wrong_with_two_radii_is_told_of_the_one_it_is(pin, key, words):
     with pytest.raises(CaseError) as error:
         case(machine={"pin_radius_mm": pin})
     assert any(one.key == key and words in one.message for one in error.value.problems)
+
+
+@pytest.mark.parametrize(
+    "pin",
+    ["30", None, -1, True, {}, {1: 2}, {"big_end": 30}, {"big_end": 30, "small_end": None},
+     {"big_end": 30, "small_end": 20, "top": 3}, PerJoint(30, "x"), PerEnd(1, 2)],
+)  # fmt: skip
+def test_a_machine_of_python_is_refused_in_the_words_of_a_case(pin):
+    with pytest.raises(CaseError) as alone:
+        replace(case().machine, pin_radius_mm=pin)
+    with pytest.raises(CaseError) as whole:
+        case(machine={"pin_radius_mm": pin})
+    own = str(alone.value).replace("pin_radius_mm", "machine.pin_radius_mm")
+    assert own == str(whole.value)
+
+
+@pytest.mark.parametrize(
+    "values", [{"joint": "top"}, {"clearance_mm": "0.1"}, {"clearance_mm": {"top": 1}}]
+)
+def test_a_case_is_replaced_in_the_words_of_a_case(values):
+    with pytest.raises(CaseError) as replaced:
+        replace(case(), **values)
+    with pytest.raises(CaseError) as made:
+        case(**values)
+    assert str(replaced.value) == str(made.value)
 
 
 def test_a_part_is_set_by_its_path_beside_the_other(tmp_path):
