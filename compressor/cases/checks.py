@@ -233,6 +233,8 @@ def known_keys(group: str, file: bool = True) -> list[str]:
         return ["n", "seed"]
     if group == "report":
         return [*REPORT]
+    if group and group not in GROUPS:
+        return [*parts_by_key().get(group, ())]
     names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]
     return [*names, *SWEEP] if file and not group else names
 

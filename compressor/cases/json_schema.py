@@ -79,7 +79,7 @@ def _value_or_parts(key: str) -> Schema:
     found = _value(replace(row, phrase=phrase_of(key)))
     parts = parts_by_key()[key]
     each = _mapping({part: _value(table()[f"{key}.{part}"]) for part in parts})
-    each |= {} if key in MAY_LACK else {"required": [*parts]}
+    each |= {"minProperties": 1} if key in MAY_LACK else {"required": [*parts]}
     one = found.pop("anyOf", None) or [_single_value(row)]
     return {
         **{k: v for k, v in found.items() if k in ("description", "default")},

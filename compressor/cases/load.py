@@ -14,7 +14,7 @@ from typing import Any
 
 from compressor.cases.blocks import Block, Plan, plan_block
 from compressor.cases.case import Case
-from compressor.cases.checks import REPORT, row_of, value_of
+from compressor.cases.checks import REPORT, row_of, stands_for, value_of
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
 from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
 from compressor.cases.keys import (
@@ -338,7 +338,10 @@ def _columns(blocks: Sequence[Block]) -> list[str]:
         differs = len({repr(block.given.get(key)) for block in blocks}) > 1
         if differs and key not in outside_identity():
             found[key] = None
-    return [*found]
+    swept = {key for block in blocks for key in block.sweeps}
+    whole = {key for key in found if key not in swept and any(p in found for p in stands_for(key))}
+    parts = (part for key in found for part in (stands_for(key) if key in whole else (key,)))
+    return [*dict.fromkeys(parts)]
 
 
 def _check_cases(

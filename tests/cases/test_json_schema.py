@@ -49,6 +49,7 @@ WRONG = [
     "machine: {rod_mass_kg: {linspace: {triangular: [3, 4, 6]}}}",
     "machine: {rod_mass_kg: [4, 4]}",
     "joint: both\nclearance_mm: 0.1\nmachine: {pin_radius_mm: {big_end: 60}}",
+    "joint: big_end\nclearance_mm: {}",
     "output: {keep: [series, metrics]}",
     "name: ../x",
     "name: .x",

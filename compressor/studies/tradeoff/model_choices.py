@@ -9,7 +9,7 @@ cases; `compressor.studies.tradeoff.page` compares changes with error bars.
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -32,6 +32,7 @@ from compressor.cases import (
     put,
     reads,
     row_of,
+    stands_for,
     value_in,
     value_of,
     values_given,
@@ -90,16 +91,17 @@ def vary_numbers(study: Study, job: int, named: Sequence[str] = ()) -> Iterator[
     """
     case, nested = study.cases[job], study.given(job)
     given, swept = values_given(nested), {axis.key for axis in study.axes}
-    for key in keys_of(partial(value_of, case)):
-        row = row_of(key)
+    for key in _doubted_keys(case, named):
+        row, whole = row_of(key), key.rpartition(".")[0]
+        names = {key, whole, *stands_for(key)} if stands_for(whole) else {key, *stands_for(key)}
         doubt = row.plausible if row else None
         if doubt is None or key in SCALED or not reads(case, key):
             continue
-        is_named = key in named
-        value = value_in(nested, key) if key in given else value_of(case, key)
-        span = doubt.given if key in given else doubt.left_out
+        is_named, is_given = not names.isdisjoint(named), not names.isdisjoint(given)
+        value = value_in(nested, key) if is_given else value_of(case, key)
+        span = doubt.given if is_given else doubt.left_out
         span = span or (doubt.left_out if is_named else None)
-        if span is None or value is None or (key in swept and not is_named):
+        if span is None or value is None or (not names.isdisjoint(swept) and not is_named):
             continue
         group, _, name = key.partition(".")
         of_gas = key.startswith("gas.")
@@ -110,14 +112,24 @@ def vary_numbers(study: Study, job: int, named: Sequence[str] = ()) -> Iterator[
         held = {own: getattr(case.gas, own) for own in FOLLOWING} if of_gas else {}
         if held:
             nested = nested | {group: held | nested.get(group, {})}
+        base = nested
+        if stands_for(whole) and not is_given:  # the other parts stay
+            base = put(nested, path_of(whole), value)
         for end in span.ends(value):
             label = f"{key} {end:.4g}"
             try:
-                other = Case.resolve(put(nested, path_of(key), end))
+                other = Case.resolve(put(base, path_of(key), end))
             except CaseError as error:
                 yield Choice(label, None, f"cannot be: {error.problems[0]}", key)
             else:
                 yield Choice(label, other, doubt.why, key)
+
+
+def _doubted_keys(case: Case, named: Sequence[str]) -> Iterator[str]:
+    """Yield the keys of a case; of parts with one value in common each where one is named."""
+    for key in keys_of(partial(value_of, case)):
+        parts = stands_for(key)
+        yield from parts if {*parts}.intersection(named) else (key,)
 
 
 def model_choices(case: Case) -> list[Choice]:
@@ -270,6 +282,10 @@ def shown_words(value: Any) -> str:
     """Return a value of a case file as text: a number in six digits, a word, or two materials."""
     if isinstance(value, float):
         return f"{value:g}"
+    if is_dataclass(value):  # of parts, told apart where they differ
+        each = {part: shown_words(one) for part, one in vars(value).items()}
+        alike = len({*each.values()}) == 1
+        return next(iter(each.values())) if alike else ", ".join(map(" ".join, each.items()))
     return " on ".join(value) if isinstance(value, tuple) else str(value)
 
 
