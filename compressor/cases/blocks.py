@@ -221,7 +221,7 @@ class Plan:
         if self.exclusions and not problems:
             kept = block.where(lambda value: not any(test(value) for test in self.exclusions))
             block = replace(block, numbers=[*itertools.compress(numbers, kept)])
-            if not block.numbers:
+            if numbers and not block.numbers:
                 place = block.place(("exclude",))
                 problems.append(FileProblem(place, "exclude", "leaves no job"))
         return block, problems

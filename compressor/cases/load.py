@@ -333,7 +333,7 @@ def format_count(count: int) -> str:
 
 def _columns(blocks: Sequence[Block]) -> list[str]:
     """Return the keys by which the jobs of blocks differ: swept in one, or not the same in all."""
-    found = dict.fromkeys(key for block in blocks for key in block.sweeps)
+    found = dict.fromkeys(key for one in blocks for keys, _ in one.factors for key in keys)
     for key in dict.fromkeys(key for block in blocks for key in block.given):
         differs = len({repr(block.given.get(key)) for block in blocks}) > 1
         if differs and key not in outside_identity():

@@ -179,6 +179,15 @@ def test_blocks_that_differ_in_a_part_have_axes_of_the_parts(tmp_path):
     }
 
 
+def test_keys_that_are_drawn_together_are_axes_side_by_side(tmp_path):
+    path = tmp_path / "drawn.yaml"
+    drawn = "{lhs: [1, 2]}"
+    text = f"gas: {{exponent: {drawn}}}\nload: [gas]\nmachine: {{rod_mass_kg: {drawn}}}\n"
+    path.write_text(f"{text}sample: {{n: 2}}\n", encoding="utf-8")
+    (study,) = load_studies(str(path))
+    assert [axis.key for axis in study.axes] == ["gas.exponent", "machine.rod_mass_kg", "load"]
+
+
 def test_a_comparison_selects_as_job_by_job(tmp_path):
     path = tmp_path / "case.yaml"
     path.write_text(TOGETHER)

@@ -305,6 +305,9 @@ def test_mistakes_of_all_files_are_told_at_once(write):
          "leave the key out to get its default"),
         ("solve: {accuracy: {sobol: [1, 2]}}\nsample: {n: 4}\n",
          f"1:27: solve.accuracy.sobol: unknown metric; metrics are {', '.join(METRICS)}"),
+        ("load: spring\nmachine: {rod_mass_kg: {lhs: [3, 4]}}\nexclude: load == gas\n",
+         "2:24: machine.rod_mass_kg: needs a number of samples: add `sample: {n: 64, seed: 1}` to "
+         "the file"),
         ("spring: {stroke_mm: [250, -1]}\n", "1:27: spring.stroke_mm: -1 is outside "
          f"{row_of('spring.stroke_mm').range} mm"),
     ],
