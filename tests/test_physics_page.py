@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ElementTree
 
 import page_tables
 
-from compressor.cases.table import table
+from compressor.cases.table import parts_by_key, table
 from compressor.metrics import SERIES
 from compressor.physics.record import RECORD
 
@@ -28,7 +28,7 @@ def test_the_drawing_names_what_the_page_names():
 
 def test_symbols_are_named_as_in_the_program():
     assert len(SYMBOLS) > 20
-    keys = {name.partition(".")[0] for name in table()} | {*table()}
+    keys = {name.partition(".")[0] for name in table()} | {*table(), *parts_by_key()}
     keys |= {name.rpartition(".")[2] for name in table()}
     for _, key, name in SYMBOLS:
         assert {*re.findall(r"`([\w.]+)`", key)} <= keys, key

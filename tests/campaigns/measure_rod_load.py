@@ -73,20 +73,15 @@ def draw_machine(rng, folder):
     if action != "single":
         gas |= {"action": action, "rod_diameter_mm": rng.uniform(30.0, 70.0)}
     if rng.random() < 0.3:
-        keys = {"head": "indicator", "crank": "crank_indicator"}
         cards = {
-            keys[end]: write_card(folder / f"{rng.integers(1 << 40)}.csv", rng, gas, machine,
-                                  end == "crank") for end in ends
+            end: write_card(folder / f"{rng.integers(1 << 40)}.csv", rng, gas, machine,
+                            end == "crank") for end in ends
         }  # fmt: skip
         for name in ("suction_MPa", "discharge_MPa", "exponent"):
             del gas[name]
-        gas |= cards
+        gas["indicator"] = cards
     else:
-        for end in ends:
-            name = "clearance_percent" if action == "single" else f"{end}_clearance_percent"
-            gas[name] = rng.uniform(8.0, 20.0)
-        if action == "double":
-            gas["clearance_percent"] = {end: gas.pop(f"{end}_clearance_percent") for end in ends}
+        gas["clearance_percent"] = {end: rng.uniform(8.0, 20.0) for end in ends}
         if action == "single":
             gas["switching"] = "exact"
     values = {

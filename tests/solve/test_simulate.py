@@ -162,7 +162,7 @@ def test_a_run_that_cannot_go_on_says_why(values, reason, method):
         (lambda: Machine(rod_mass_kg=-1.0), "rod_mass_kg: -1 is outside (0, 1e+06]"),
         (lambda: Machine(speed_rpm=0.0), "speed_rpm: 0 is outside"),
         (lambda: Machine(rod_length_mm=math.nan), "rod_length_mm: must be finite"),
-        (lambda: Case(joint="big_end", clearance_mm=PerJoint(11.0)), "exceeds the pin radius"),
+        (lambda: Case(joint="big_end", clearance_mm=PerJoint(11.0, 0.0)), "exceeds the pin radius"),
         (lambda: replace(Case(), solve=Solve(settle_rev=9.0)), "leave nothing of a run"),
     ],
 )
@@ -173,7 +173,7 @@ def test_a_case_in_python_is_made_whole_or_not_at_all(make, told):
 
 
 def test_a_case_made_in_python_of_good_values_runs():
-    made = Case(joint="big_end", clearance_mm=PerJoint(0.2), solve=Solve(**SHORT))
+    made = Case(joint="big_end", clearance_mm=PerJoint(0.2, 0.0), solve=Solve(**SHORT))
     assert measure(made).numbers["peak_acceleration"] == run(
         joint="big_end", clearance_mm=0.2
     ).peak_acceleration  # fmt: skip
