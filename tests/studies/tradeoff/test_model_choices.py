@@ -12,6 +12,7 @@ from compressor.cases import Lubricant
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.cases.materials import contact_stiffness
+from compressor.cases.parameter import PerJoint
 from compressor.cases.table import table
 from compressor.metrics import JOINTS, METRICS
 from compressor.solve.si_record import stiffness_of
@@ -29,6 +30,7 @@ from compressor.studies.tradeoff.model_choices import (
     model_choices,
     model_variants,
     run_choices,
+    shown_words,
     tabulate,
     trade,
     vary_numbers,
@@ -439,3 +441,15 @@ def test_a_trade_has_a_row_for_each_change_of_each_scene(few, monkeypatch):
         assert abs(one.sel(choice="no friction")["peak_acceleration"] / itself - 1) > 1e-3
         assert one.sel(choice=GRID)["peak_acceleration"] < itself
     assert found["place_error"].values == pytest.approx(0.6123, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (PerJoint(70.0, 70.0), "70"),
+        (PerJoint(120.0, 70.0), "big_end 120, small_end 70"),
+        (PerJoint(("steel", "steel"), ("steel", "steel")), "steel on steel"),
+    ],
+)
+def test_values_of_parts_are_told_as_one_where_they_are(value, words):
+    assert shown_words(value) == words
