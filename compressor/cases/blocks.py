@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from compressor.cases.case import Case
-from compressor.cases.checks import hold, row_of, stands_for, suggestion, value_in
+from compressor.cases.checks import DOUBLES, hold, row_of, stands_for, suggestion, value_in
 from compressor.cases.comparison import NoComparison, Test, comparison
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.keys import dotted, drop, leaves, path_of, put
@@ -114,9 +114,8 @@ class Block:
             above = (".".join(parts[:n]) for n in range(len(parts), 0, -1))
             key = next((one for one in above if one in rows), None)
             if key is None:
-                found[problem] = FileProblem(
-                    self._place_of(problem.key, path), problem.key, problem.message
-                )
+                place = self._place_of(problem.key, path)
+                found[problem] = FileProblem(place, self._name(problem.key), problem.message)
                 continue
             sweep, message = self.sweeps[key], problem.message
             if not sweep.has_ends and not error.is_misfit:
@@ -124,8 +123,13 @@ class Block:
                 message = tell_draw(rows[key] + 1, of, message)
             once = key if sweep.kind != "list" and not error.is_misfit else problem
             place = self.place(sweep.place_of(rows[key]))
-            found.setdefault(once, FileProblem(place, problem.key, message))
+            found.setdefault(once, FileProblem(place, self._name(problem.key), message))
         return found
+
+    def _name(self, key: str) -> str:
+        """Return a key as the file has it: its double's where that is given."""
+        given = (word for word, half in DOUBLES.items() if half == key)
+        return next((word for word in given if path_of(word) in self.tree.places), key)
 
     def _place_of(self, key: str, path: str) -> Place:
         """Return where a key stands, or its group, or the block; path: of the file."""

@@ -422,7 +422,8 @@ def _inertia_conflicts(case: Settings) -> Iterator[Problem]:
 def _geometry_conflicts(case: Settings) -> Iterator[Problem]:
     machine, play = case.machine, _play(case)
     if machine.crank_radius_mm + play >= machine.rod_length_mm:
-        loose = f" and {play:g} mm of clearance" if play else ""
+        is_play = machine.crank_radius_mm < machine.rod_length_mm
+        loose = f" and {play:g} mm of clearance" if is_play else ""
         yield Problem(
             "machine.crank_radius_mm",
             f"the crank, {machine.crank_radius_mm:g} mm{loose}, must be shorter than the rod, "

@@ -454,7 +454,10 @@ class Parameter:
             plain, comma, unit = number[1].replace(",", "."), number[2] == ",", number[3]
             if unit and unit != self.unit:
                 return f"{message}; write a number alone" + (self.unit and f", in {self.unit}")
-            return f"{message}; write {plain}" + ("" if comma or unit else " without quotes")
+            text = f"{message}; write {plain}" + ("" if comma or unit else " without quotes")
+            first, _, second = number[1].partition(",")
+            several = len(first) == len(second) > 1  # 700,800 is no decimal comma
+            return f"{text}, or [{number[1].replace(',', ', ')}]" if several else text
         return message
 
 

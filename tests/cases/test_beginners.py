@@ -11,6 +11,9 @@ MISTAKES = [
     ("machine:\n  stroke_mm: 127 mm", "2:14: machine.stroke_mm: needs a number", "write 127"),
     ("load: gas\ngas: {bore_mm: 267 mm}", "2:16: gas.bore_mm: needs a number", "write 267"),
     ("machine: {stroke_mm: -3}", "1:22: machine.stroke_mm: -3 is outside", "(0, 200000] mm"),
+    ("joint: big_end\nclearance_mm: [0.1, 0.2]\nmachine: {stroke_mm: 1400}",
+     "3:22: machine.stroke_mm: the crank, 700 mm, must be shorter", "the rod, 600 mm"),
+    ("machine: {speed_rpm: '700,800'}", "1:22", "write 700.800, or [700, 800]"),
     # diameters
     ("machine: {pin_diameter_mm: 102}", "1:11", "write machine.pin_radius_mm: 51, half of it"),
     ("clearance_diametral_mm: 0.35", "1:1", "radial, half of it: write clearance_mm: 0.175"),
