@@ -12,10 +12,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from compressor.cases.case import Case
-from compressor.cases.checks import DOUBLES, hold, row_of, stands_for, suggestion, value_in
+from compressor.cases.checks import DOUBLES, hold_value, row_of, stands_for, suggestion, value_in
 from compressor.cases.comparison import NoComparison, Test, comparison
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.keys import dotted, drop, leaves, path_of, put
+from compressor.cases.keys import drop, key_of, leaves, path_of, put
 from compressor.cases.parameter import CaseError, quote_value
 from compressor.cases.swept import FORMS, NoSweep, Sweep, design, design_size, sweep_of
 from compressor.cases.table import OF_JOINTS, WORDS, outside_identity
@@ -54,7 +54,7 @@ class Block:
             found.append(place)
         return found[::-1]
 
-    def swept(self, number: int) -> dict[str, Any]:
+    def choose_swept(self, number: int) -> dict[str, Any]:
         """Return the swept values of one combination by dotted key."""
         found: dict[str, Any] = {}
         for (keys, rows), place in zip(self.factors, self.places(number), strict=True):
@@ -63,7 +63,7 @@ class Block:
 
     def values_of(self, number: int) -> dict[str, Any]:
         """Return the values of one combination, nested as a case file has them."""
-        values, swept = self.fixed, self.swept(number)
+        values, swept = self.fixed, self.choose_swept(number)
         for key, value in swept.items():
             values = put(values, self.sweeps[key].path, value)
         if swept.get("joint") == "none":
@@ -209,7 +209,7 @@ class Plan:
             points = design(sweeps[0].kind, self.samples, len(keys), self.seed)
             shares = zip(*points, strict=True)
             columns = [[*map(one.spread, of)] for one, of in zip(sweeps, shares, strict=True)]
-        held = [[hold(key, one) for one in of] for key, of in zip(keys, columns, strict=True)]
+        held = [[hold_value(key, one) for one in of] for key, of in zip(keys, columns, strict=True)]
         return list(zip(*held, strict=True))
 
     def block(self, name: str) -> tuple[Block, list[FileProblem]]:
@@ -252,10 +252,10 @@ def plan_block(tree: Tree) -> tuple[Plan, list[FileProblem]]:
     sweeps: dict[str, Sweep] = {}
     problems = []
     for path, value in leaves(tree.values):
-        key = dotted(path)
+        key = key_of(path)
         row = row_of(key)
         if not is_swept(key, value):
-            fixed = put(fixed, path, hold(key, value))
+            fixed = put(fixed, path, hold_value(key, value))
             continue
         place = tree.places.get(path, tree.places.get(path[:1]))
         assert place
@@ -279,7 +279,7 @@ def plan_block(tree: Tree) -> tuple[Plan, list[FileProblem]]:
             place = tree.places.get(path + error.path, place)
             problems.append(FileProblem(place[1], key, str(error)))
     wrong = {problem.key for problem in problems}
-    given = {dotted(path): value for path, value in leaves(tree.values)}
+    given = {key_of(path): value for path, value in leaves(tree.values)}
     plan = Plan(tree, given, fixed, sweeps)
     samples, seed, faults = _design_of(plan)
     problems += faults
@@ -310,7 +310,7 @@ def _design_of(plan: Plan) -> tuple[int, int, list[FileProblem]]:
     def refuse(path: Path, message: str) -> None:
         place = plan.tree.places.get(path, plan.tree.places.get(path[:1]))
         assert place
-        problems.append(FileProblem(place[1], dotted(path), message))
+        problems.append(FileProblem(place[1], key_of(path), message))
 
     drawn = [sweep for sweep in plan.sweeps.values() if sweep.is_drawn]
     found = {"n": 0, "seed": 0}

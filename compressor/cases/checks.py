@@ -361,7 +361,7 @@ def problems_of_case(error: ValidationError, values: Mapping[str, Any]) -> list[
     return [problem for problem in found if problem]
 
 
-def hold(key: str, value: Any) -> Any:
+def hold_value(key: str, value: Any) -> Any:
     """Return a value of a key as a case holds it; one that no case can hold as it is."""
     row = row_of(key)
     try:

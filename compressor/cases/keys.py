@@ -152,7 +152,7 @@ def path_of(key: str) -> Path:
     return tuple(key.split("."))
 
 
-def dotted(path: Path) -> str:
+def key_of(path: Path) -> str:
     """Return the dotted key of a path."""
     return ".".join(map(str, path))
 
@@ -206,7 +206,7 @@ def _replace(file: Tree, changes: Mapping[Path, Any], source: Tree) -> Tree:
     values = dict(file.values)
     for path, value in changes.items():
         values = put(values, path, value)
-    given = {dotted(path) for path in changes}
+    given = {key_of(path) for path in changes}
     given |= {part for key in given for part in stands_for(key)}
     gone = [pair[pair[0] in given] for pair in IN_PLACE_OF if len(given.intersection(pair)) == 1]
     gone += OF_JOINTS if changes.get(("joint",)) == "none" else ()

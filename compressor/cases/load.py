@@ -19,7 +19,7 @@ from compressor.cases.comparison import NoComparison, Test, comparison, conditio
 from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
 from compressor.cases.keys import (
     covers,
-    dotted,
+    key_of,
     merge_block,
     override,
     path_of,
@@ -111,13 +111,16 @@ def load_studies(
     if not problems and not any(study.selected for study in studies):
         problems.append(FileProblem(Place(f"--only {shorten(only)}"), "", NONE_SELECTED))
     if problems:
-        unknown = {one.place.line for one in problems if one.message.startswith("unknown key")}
-        raise CaseFileError(
-            [  # an unknown key has no default
-                one for one in problems if one.message != NO_VALUE or one.place.line not in unknown
-            ]
+        unknown = {_spot(one) for one in problems if one.message.startswith("unknown key")}
+        raise CaseFileError(  # an unknown key has no default
+            [one for one in problems if one.message != NO_VALUE or _spot(one) not in unknown]
         )
     return studies
+
+
+def _spot(problem: FileProblem) -> tuple[str, int, str]:
+    """Return the file, the line and the last name of the key that a problem is about."""
+    return problem.place.file, problem.place.line, problem.key.rpartition(".")[2]
 
 
 def _path_of(path: Any) -> str:
@@ -279,13 +282,13 @@ def _block_trees(
     if "blocks" in changes:
         tree = override(tree, "blocks", changes["blocks"])
 
-    def changed(whole: Tree) -> Tree:
+    def apply_changes(whole: Tree) -> Tree:
         for key, change in rest.items():
             whole = override(whole, key, change)
         return whole
 
     if "blocks" not in tree.values:
-        return [changed(tree)], []
+        return [apply_changes(tree)], []
     items, place = tree.values["blocks"], tree.places["blocks",][1]
     values = {key: value for key, value in tree.values.items() if key != "blocks"}
     whole = Tree(values, tree.places)
@@ -305,7 +308,7 @@ def _block_trees(
             if key in block.values:
                 problems.append(FileProblem(block.places[key,][0], key, IN_BLOCK))
                 del block.values[key]
-        found.append(changed(merge_block(whole, block)))
+        found.append(apply_changes(merge_block(whole, block)))
     return found, problems
 
 
@@ -416,7 +419,7 @@ def _read_in(
     for key, value in block.given.items():
         path = block.nearest(path_of(key))  # of a part, the key that gives all of them
         place = block.key_place(path)
-        where = place, dotted(path)
+        where = place, key_of(path)
         if where not in known and (row_of(key) or key in WORDS) and not is_off(key, value):
             one = key in block.sweeps
             needed[where] = conditions(key) if one else needs_of_given(key, block.given)

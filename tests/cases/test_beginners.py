@@ -103,6 +103,11 @@ def test_an_unknown_key_without_a_value_has_no_default(tmp_path):
     assert told("machine:\n  rod_mass_kg:\n", tmp_path) == [
         "has no value; leave the key out to get its default"
     ]
+    beside = told("machine: {rod_mass_kg: , rod_mas: 3}", tmp_path)
+    assert beside == [
+        "has no value; leave the key out to get its default",
+        "unknown key; did you mean machine.rod_mass_kg?",
+    ]
 
 
 def test_tabs_separate_as_yaml_1_2_has_them(tmp_path):

@@ -43,7 +43,7 @@ FAILED_NAME = "a run failed here"
 MILLI = 1e3
 
 
-class Span(NamedTuple):
+class Stretch(NamedTuple):
     """Neighbouring values of one direction with the same motion, and the ends of its exponents."""
 
     direction: str
@@ -54,7 +54,7 @@ class Span(NamedTuple):
     exponents: tuple[float, float]
 
 
-def find_spans(machine: xr.Dataset) -> Iterator[Span]:
+def find_spans(machine: xr.Dataset) -> Iterator[Stretch]:
     """Yield the spans of each direction of a machine, by rising values."""
     over = machine.attrs["over"]
     for direction in machine["direction"].values.tolist():
@@ -65,7 +65,7 @@ def find_spans(machine: xr.Dataset) -> Iterator[Span]:
             at = [*group]
             known = exponents[at][np.isfinite(exponents[at])]
             ends = (known.min(), known.max()) if known.size else (math.nan, math.nan)
-            yield Span(direction, values[at[0]], values[at[-1]], len(at), motion, ends)
+            yield Stretch(direction, values[at[0]], values[at[-1]], len(at), motion, ends)
 
 
 def name_motion(one: xr.Dataset) -> str:

@@ -194,14 +194,14 @@ class Chain:
         return None if state is None or np.isnan(state).any() else state
 
 
-class Machine(NamedTuple):
+class FollowedMachine(NamedTuple):
     """One machine of a study: its swept values, and its chains by the way that they go."""
 
     point: dict[str, Any]
     chains: tuple[Chain, ...]
 
 
-def machines(study: Study, along: KeyRange) -> list[Machine]:
+def machines(study: Study, along: KeyRange) -> list[FollowedMachine]:
     """Return the machines of the selected jobs of `load_values`. Raises FollowError."""
     selected, listed = {*study.selected}, []
     found: dict[str, tuple[dict[str, Any], list[tuple[float, Case]]]] = {}
@@ -217,7 +217,7 @@ def machines(study: Study, along: KeyRange) -> list[Machine]:
         jobs.sort(key=itemgetter(0))
         ways = ((*zip(*one, strict=True),) for one in (jobs, jobs[::-1])[: len(along.ways)])
         chains = (Chain(cases, values, along.plan) for values, cases in ways)
-        listed.append(Machine(point, (*chains,)))
+        listed.append(FollowedMachine(point, (*chains,)))
     return listed
 
 
@@ -394,7 +394,9 @@ class ChainWatch:
 Where = tuple[int, float]  # the number of a machine, and a value
 
 
-def find_doubts(every: Sequence[Machine], rows: Sequence[list[list[Row]]]) -> dict[Where, Chain]:
+def find_doubts(
+    every: Sequence[FollowedMachine], rows: Sequence[list[list[Row]]]
+) -> dict[Where, Chain]:
     """Return a chain for each value at which up and down differ: both motions and other starts."""
     found: dict[Where, Chain] = {}
     for number, (machine, (up, *others)) in enumerate(zip(every, rows, strict=True)):
@@ -435,7 +437,7 @@ def has_two(doubt: Chain, folder: Folder) -> bool:
 def followed_dataset(
     study: Study,
     along: KeyRange,
-    every: Sequence[Machine],
+    every: Sequence[FollowedMachine],
     rows: Sequence[list[list[Row]]],
     confirmed: dict[Where, bool],
 ) -> xr.Dataset:
