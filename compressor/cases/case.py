@@ -19,8 +19,8 @@ from pydantic import TypeAdapter, ValidationError
 from compressor.cases.card import CardError, open_card
 from compressor.cases.checks import (
     SWEEP,
+    describe_wrong,
     expand_synonyms,
-    problems_of_case,
     row_of,
     stands_for,
     value_of,
@@ -48,6 +48,7 @@ from compressor.cases.parameter import (
     Targets,
     first_tolerance,
     make_group,
+    problems_of,
     quote_value,
 )
 from compressor.cases.swept import FORMS
@@ -155,7 +156,7 @@ stroke, 240 mm
         try:
             case = adapter_of_case().validate_python(whole)
         except ValidationError as error:
-            problems += problems_of_case(error, whole)
+            problems += problems_of(error, whole, table(), describe_wrong)
             if any(one["type"] != "value_error" or len(one["loc"]) for one in error.errors()):
                 found = problems if lenient else [_refuse_sweep(whole, one) for one in problems]
                 raise CaseError(name_as_written(whole, found)) from None

@@ -20,14 +20,12 @@ from pydantic import ValidationError
 from compressor.cases.card import UNITS
 from compressor.cases.groups import ATMOSPHERE_MPA
 from compressor.cases.parameter import (
-    NO_VALUE,
     PART_WORDS,
-    CaseError,
     Parameter,
     Problem,
     adapter_of,
-    problem_of_parts,
     quote_value,
+    split_unit,
 )
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, parts_by_key, table
 
@@ -257,6 +255,11 @@ def describe_unknown(name: str, group: str, file: bool = True, value: Any = None
     return f"unknown key{hint}"
 
 
+def describe_wrong(group: str, name: str, value: Any) -> str:
+    """Return the error of an unknown key of a case's group, or without a name of what is none."""
+    return describe_unknown(name, group, False, value) if name else no_mapping(group, value)
+
+
 def no_mapping(key: str, value: Any) -> str:
     """Return the error of a value that stands where a group's keys are due."""
     word = f"{quote_value(WORDS[key])} or " if key in WORDS else ""
@@ -332,33 +335,7 @@ def _nearest(name: str, allowed: Sequence[str], cutoff: float) -> str | None:
 
 
 def _stem(name: str) -> str:
-    """Return a key's name without its unit."""
-    if name in map(_leaf, DOUBLES):
-        return name.removesuffix("_mm")
-    for row in table().values():
-        if _leaf(row.key) == name and row.unit:
-            unit = (
-                row.unit.replace(" ", "_")
-                .replace("/", "_per_")
-                .replace("^p", "15")
-                .replace("%", "percent")
-            )
-            return name.removesuffix(f"_{unit}")
-    return name
-
-
-def problems_of_case(error: ValidationError, values: Mapping[str, Any]) -> list[Problem]:
-    """Return what pydantic has found wrong with the nested values of a case, in our words."""
-    found: dict[Problem | None, None] = {}
-    for one in error.errors(include_url=False):
-        cause = one.get("ctx", {}).get("error", "")
-        if isinstance(cause, CaseError):  # of values that do not fit together
-            found |= dict.fromkeys(cause.problems)
-            continue
-        if not one["loc"]:
-            raise cause  # an error of the program's own
-        found[_problem_at([*map(str, one["loc"])], one["type"], str(cause), values)] = None
-    return [problem for problem in found if problem]
+    return split_unit(name)[0]
 
 
 def hold_value(key: str, value: Any) -> Any:
@@ -369,28 +346,6 @@ def hold_value(key: str, value: Any) -> Any:
     except ValidationError:
         return value
     return tuple(sorted(held.items())) if isinstance(held, dict) else held
-
-
-def _problem_at(
-    path: list[str], kind: str, cause: str, values: Mapping[str, Any]
-) -> Problem | None:
-    """Return the problem at a path of pydantic's, behind whose key it names its own types.
-
-    None of errors by metric that are no accuracy in a word.
-    """
-    outer, name = (path[0], path[1]) if path[0] in GROUPS and path[1:] else ("", path[0])
-    key, within = f"{outer}.{name}" if outer else name, values[outer] if outer else values
-    value = next((one for known, one in within.items() if str(known) == name), None)
-    is_unknown = kind in ("unexpected_keyword_argument", "invalid_key")
-    if is_unknown and key not in parts_by_key():
-        return Problem(key, describe_unknown(name, outer, file=False, value=value))
-    if key in GROUPS:
-        return Problem(key, NO_VALUE if value is None else no_mapping(key, value))
-    rest = path[len(key.split(".")) :]
-    if key in parts_by_key():
-        rows = {part: table()[f"{key}.{part}"] for part in parts_by_key()[key]}
-        return problem_of_parts(key, value, rows, rest, kind, cause)
-    return table()[key].problem(key, value, rest, cause)
 
 
 def values_given(values: Mapping[Any, Any]) -> dict[str, Any]:

@@ -17,10 +17,10 @@ from typing import Any
 from compressor.cases.card import DRIVING, CardError, open_card, taken_work
 from compressor.cases.checks import row_of, stands_for, value_in
 from compressor.cases.comparison import condition
-from compressor.cases.groups import ENDS
+from compressor.cases.groups import CRANK_END, ENDS
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
-from compressor.cases.parameter import CRANK_END, GAS, IMPLAUSIBLE, Problem
+from compressor.cases.parameter import IMPLAUSIBLE, Problem
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, group_readers, table
 from compressor.metrics import AXES, JOINTS
 
@@ -67,7 +67,7 @@ def needs_of_given(key: str, given: Container[str]) -> list[tuple[str, str]]:
     Of a fact none but that there is gas, and that a rod's single action is meant. given: the dotted
     keys of the file.
     """
-    strict = [GAS] if "gas.action" in given else [GAS, CRANK_END]
+    strict = ["load == gas"] if "gas.action" in given else ["load == gas", CRANK_END]
     is_fact = key in FACTS or key.rpartition(".")[0] in FACTS
     return [one for one in conditions(key) if not is_fact or one[1] in strict]
 

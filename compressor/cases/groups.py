@@ -5,40 +5,39 @@ units, which stand in the field's name; `compressor.solve.si_record` turns them 
 """
 
 from collections.abc import Mapping
+from functools import partial
 
-from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL, FRICTION_LAWS, fill_by_law
+from compressor.cases.laws import (
+    CLEARANCE,
+    CONTACT_LAWS,
+    CYLINDRICAL,
+    FRICTION_LAWS,
+    by_law,
+    fill_by_law,
+    or_own,
+)
 from compressor.cases.parameter import (
     ACCURACY,
-    AT_JOINTS,
-    BIG_CLEARANCE,
-    CLEARANCE,
-    CRANK_END,
-    CYCLE,
-    DAMPED,
-    HEAD_CLEARANCE,
-    HEAD_END,
-    IDEAL_JOINT,
-    MATERIALS,
-    MEASURED,
-    RUBBING_AT,
-    SERIES,
-    SMALL_CLEARANCE,
-    STIFFNESS,
     PerEnd,
     PerJoint,
     PerMotion,
     PerValve,
     Plausible,
-    by_law,
     by_part,
     choice,
-    document_fields,
+    flag,
     from_to,
+    integer,
     make_group,
-    or_own,
-    parameter,
+    number,
     times,
 )
+
+# conditions under which a case reads a key; others stand beside their only key
+AT_JOINTS = {"big_end": "clearance_mm.big_end > 0", "small_end": "clearance_mm.small_end > 0"}
+CRANK_END = "gas.action == double or gas.action == crank_end"
+CYCLE = "not gas.is_measured"  # by an indicator card of an end that presses
+HEAD_CLEARANCE = "gas.action != crank_end or not gas.clearance_percent.crank"
 
 COMPILED = ("auto", "TSIT5", "RODAS")  # by `compressor.solve`; the others are SciPy's
 JUDGED_STIFFNESS = (1e8 / 1000**1.5, 1e12 / 1000**1.5)  # N/mm^1.5: judged on, 1e8 to 1e12 N/m^1.5
@@ -63,7 +62,9 @@ BEARING_LENGTH = Plausible(
 )  # fmt: skip
 
 
-@document_fields
+shift = partial(number, 0.0, "[-1000, 1000]", unit="mm")
+
+
 @make_group
 class Offset:
     """How far a journal starts from its bore's centre, mm; a case's `initial_offset_mm`.
@@ -76,25 +77,22 @@ class Offset:
     0.1
     """
 
-    big_end_x: float = parameter(
-        0.0, "mm", (-1000, 1000), "program", "start of the big end's journal along x",
-        read=BIG_CLEARANCE,
-    )  # fmt: skip
-    big_end_y: float = parameter(
-        0.0, "mm", (-1000, 1000), "program", "start of the big end's journal along y",
-        read=BIG_CLEARANCE,
-    )  # fmt: skip
-    small_end_x: float = parameter(
-        0.0, "mm", (-1000, 1000), "program", "start of the small end's journal along x",
-        read=SMALL_CLEARANCE,
-    )  # fmt: skip
-    small_end_y: float = parameter(
-        0.0, "mm", (-1000, 1000), "program", "start of the small end's journal along y",
-        read=SMALL_CLEARANCE,
-    )  # fmt: skip
+    big_end_x: float = shift("start of the big end's journal along x", read=AT_JOINTS["big_end"])
+    big_end_y: float = shift("start of the big end's journal along y", read=AT_JOINTS["big_end"])
+    small_end_x: float = number(
+        0.0,
+        "[-1000, 1000]",
+        "start of the small end's journal along x",
+        read=AT_JOINTS["small_end"],
+    )
+    small_end_y: float = number(
+        0.0,
+        "[-1000, 1000]",
+        "start of the small end's journal along y",
+        read=AT_JOINTS["small_end"],
+    )
 
 
-@document_fields
 @make_group
 class Machine:
     """The mechanism and its masses; a case's `machine`.
@@ -108,58 +106,50 @@ class Machine:
     0.18
     """
 
-    crank_radius_mm: float = parameter(
-        120.0, "mm", (0, 1e5), "Table 1", "crank radius R", above=True
-    )
-    rod_length_mm: float = parameter(600.0, "mm", (0, 1e6), "Table 1", "rod length L", above=True)
-    speed_rpm: float = parameter(
-        500.0, "rpm", (0, 1e5), "Table 1", "crank speed", above=True, judged=(50, 6000)
-    )
-    rod_mass_kg: float = parameter(
-        4.7, "kg", (0, 1e6), "assumed: a 600 x 40 x 25 mm steel bar", "rod mass", above=True,
-        judged=(0.1, 200),
+    crank_radius_mm: float = number(120.0, "(0, 1e5]", "crank radius R", "Table 1")
+    rod_length_mm: float = number(600.0, "(0, 1e6]", "rod length L", "Table 1")
+    speed_rpm: float = number(500.0, "(0, 1e5]", "crank speed", "Table 1", judged=(50, 6000))
+    rod_mass_kg: float = number(
+        4.7, "(0, 1e6]", "rod mass", "assumed: a 600 x 40 x 25 mm steel bar", judged=(0.1, 200),
         plausible=NO_MASS,
     )  # fmt: skip
-    rod_centre_mm: float | None = parameter(
-        None, "mm", (0, 1e6), "assumed: half the rod", "rod's mass centre, from the big end",
-        optional=True,
+    rod_centre_mm: float | None = number(
+        None, "[0, 1e6]", "rod's mass centre, from the big end", "assumed: half the rod",
         plausible=Plausible("a rod is heavier at its big end", times(0.6, 1), times(0.9, 1.1)),
     )  # fmt: skip
-    rod_inertia_kg_m2: float | None = parameter(
-        None, "kg m2", (0, 1e9), "assumed: m L^2 / 12", "rod's inertia about its mass centre",
-        above=True, optional=True,
+    rod_inertia_kg_m2: float | None = number(
+        None, "(0, 1e9]", "rod's inertia about its mass centre", "assumed: m L^2 / 12",
         plausible=Plausible(
             "drawn rods have 1.2 to 2 times that of a uniform bar", times(1, 2.5), times(0.8, 1.25)
         ),
     )  # fmt: skip
-    reciprocating_mass_kg: float = parameter(
-        14.0, "kg", (0, 1e6), "assumed", "crosshead, piston rod and piston", above=True,
-        judged=(0.1, 200),
+    reciprocating_mass_kg: float = number(
+        14.0, "(0, 1e6]", "crosshead, piston rod and piston", "assumed", judged=(0.1, 200),
         plausible=NO_MASS,
     )  # fmt: skip
     pin_radius_mm: PerJoint[float] = by_part(
         PerJoint, 10.0,
-        parameter(
-            10.0, "mm", (0, 1e4), "inferred from Eq. 15 and Table 3", "journal radius R_j",
-            above=True, judged=(10, 100),
-            plausible=Plausible("the paper does not print it", times(0.7, 1.5)),
+        number(
+            10.0, "(0, 1e4]", "journal radius R_j", "inferred from Eq. 15 and Table 3",
+            judged=(10, 100), plausible=Plausible("the paper does not print it", times(0.7, 1.5)),
         ),
-        RUBBING_AT,
+        {joint: f"{own} or friction.ideal_joints == true" for joint, own in AT_JOINTS.items()},
     )  # fmt: skip
-    gravity_m_per_s2: float = parameter(
-        0.0, "m/s2", (0, 1000), "assumed", "gravity, along -y",
+    gravity_m_per_s2: float = number(
+        0.0, "[0, 1000]", "gravity, along -y", "assumed",
         plausible=Plausible("it acts on a horizontal machine", from_to(0, 9.81)),
     )  # fmt: skip
-    counterweight_kg_mm: float | None = parameter(
-        None, "kg mm", (0, 1e9), "none", "counterweight on the crank, opposite to its pin: mass "
-        "times its centre's distance from the axis", optional=True,
+    counterweight_kg_mm: float | None = number(
+        None, "[0, 1e9]",
+        "counterweight on the crank, opposite to its pin: mass times its centre's distance from "
+        "the axis",
+        "none",
     )  # fmt: skip
     balance: PerMotion[float] | None = by_part(
         PerMotion, None,
-        parameter(
-            None, "", (0, 1), "none", "share that a counterweight balances; in place of "
-            "counterweight_kg_mm",
-            plausible=Plausible("no nameplate has it", HALF_BALANCED, HALF_BALANCED),
+        number(
+            None, "[0, 1]", "share that a counterweight balances; in place of counterweight_kg_mm",
+            "none", plausible=Plausible("no nameplate has it", HALF_BALANCED, HALF_BALANCED),
         ),
     )  # fmt: skip
 
@@ -195,7 +185,6 @@ OWN_CYLINDER = (
 )
 
 
-@document_fields
 @make_group
 class Gas:
     """The gas load, an ideal cycle (Eq. 13); a case's `gas`, read with `load: gas`.
@@ -217,89 +206,83 @@ class Gas:
     'exact'
     """
 
-    piston_radius_mm: float = parameter(
-        50.0, "mm", (0, 1e4), "Table 1", "piston radius", above=True
+    piston_radius_mm: float = number(50.0, "(0, 1e4]", "piston radius", "Table 1")
+    head_clearance_mm: float | None = number(
+        20.0, "(0, 1e5]", "clearance of the cylinder head s0", "Eq. 13",
+        read=(CYCLE, HEAD_CLEARANCE), plausible=CYLINDER_CLEARANCE,
+    )  # fmt: skip
+    suction_MPa: float = number(
+        0.105, "(0, 1e3]", "suction pressure (absolute)", "Table 1", read=CYCLE, plausible=PRESSURE
     )
-    head_clearance_mm: float | None = parameter(
-        20.0, "mm", (0, 1e5), "Eq. 13", "clearance of the cylinder head s0", above=True,
-        optional=True, read=(CYCLE, HEAD_CLEARANCE),
-        plausible=CYLINDER_CLEARANCE,
-    )  # fmt: skip
-    suction_MPa: float = parameter(
-        0.105, "MPa", (0, 1e3), "Table 1", "suction pressure (absolute)", above=True, read=CYCLE,
+    discharge_MPa: float = number(
+        0.393, "(0, 1e3]", "discharge pressure (absolute)", "Table 1", read=CYCLE,
         plausible=PRESSURE,
     )  # fmt: skip
-    discharge_MPa: float = parameter(
-        0.393, "MPa", (0, 1e3), "Table 1", "discharge pressure (absolute)", above=True, read=CYCLE,
-        plausible=PRESSURE,
-    )  # fmt: skip
-    exponent: float = parameter(
-        1.4, "", (1, 5), "Eq. 13", "isentropic exponent", read=CYCLE,
+    exponent: float = number(
+        1.4, "[1, 5]", "isentropic exponent", "Eq. 13", read=CYCLE,
         plausible=Plausible("moist gas and cooled walls lower it", from_to(1.15, 1.4)),
     )  # fmt: skip
-    back_pressure_MPa: float | None = parameter(
-        None, "MPa", (0, 1e3), "assumed",
+    back_pressure_MPa: float | None = number(
+        None, "[0, 1e3]",
         "pressure on what no gas cycle presses: the piston's other face, or the rod's "
         "cross-section in a double-acting cylinder; 0 in the paper's rig, and the atmosphere, "
-        f"{ATMOSPHERE_MPA:g}, in {OWN_CYLINDER.format(other='switching')}",
-        optional=True, plausible=Plausible(
+        f"{ATMOSPHERE_MPA:g}, in {OWN_CYLINDER.format(other='switching')}", "assumed",
+        plausible=Plausible(
             "a crankcase has the atmosphere's, or a little more", from_to(0.09, 0.15)
         ),
     )  # fmt: skip
     switching: str | None = choice(
-        None, ("paper", "exact"), "Eq. 13",
+        None, ("paper", "exact"),
         "corners of the cycle: as the paper prints them for its rig, or where the pressures meet, "
-        f"the default of {OWN_CYLINDER.format(other='back_pressure_MPa')}",
-        optional=True, read=CYCLE,
+        f"the default of {OWN_CYLINDER.format(other='back_pressure_MPa')}", "Eq. 13", read=CYCLE,
     )  # fmt: skip
     action: str | None = choice(
-        None, ("single", "double", "crank_end"), "program",
+        None, ("single", "double", "crank_end"),
         "ends in which the gas has a cycle: the head's (the default), both, the crank's",
-        optional=True,
     )  # fmt: skip
-    rod_diameter_mm: float | None = parameter(
-        None, "mm", (0, 1e4), "program",
-        "diameter of the piston rod, whose section the crank end lacks",
-        above=True, optional=True, read=CRANK_END,
+    rod_diameter_mm: float | None = number(
+        None, "(0, 1e4]", "diameter of the piston rod, whose section the crank end lacks",
+        read=CRANK_END,
     )  # fmt: skip
     clearance_percent: PerEnd[float | None] | None = by_part(
         PerEnd, None,
-        parameter(
-            None, "%", (0, 1000), "program", "clearance volume over swept volume; in place of "
-            "head_clearance_mm", above=True, optional=True, plausible=CYLINDER_CLEARANCE,
+        number(
+            None, "(0, 1000]", "clearance volume over swept volume; in place of head_clearance_mm",
+            optional=True, plausible=CYLINDER_CLEARANCE,
         ),
         {"head": (CYCLE, HEAD_CLEARANCE), "crank": (CYCLE, CRANK_END)}, fill=None,
     )  # fmt: skip
     valve_loss_percent: PerValve[float] | None = by_part(
         PerValve, None,
-        parameter(
-            None, "%", (0, 90), "program", "loss of absolute pressure while open; 0 without",
-            read=CYCLE, plausible=VALVE_LOSS,
+        number(
+            None, "[0, 90]", "loss of absolute pressure while open; 0 without", read=CYCLE,
+            plausible=VALVE_LOSS,
         ),
     )  # fmt: skip
     unloaded: str | None = choice(
-        None, ("none", "head", "crank"), "program",
+        None, ("none", "head", "crank"),
         "unloaded end, whose valves are held open: its gas stays at suction pressure; none by "
         "default",
-        optional=True, read=CYCLE,
+        read=CYCLE,
     )  # fmt: skip
     indicator: PerEnd[str | None] | None = by_part(
         PerEnd, None,
         choice(
-            None, (), "measured", "card; in place of pressures, exponent and clearance",
+            None, (), "card; in place of pressures, exponent and clearance", "measured",
             kind="card", optional=True,
         ),
-        {"head": HEAD_END, "crank": CRANK_END}, fill=None, first=True,
+        {"head": "gas.action != crank_end", "crank": CRANK_END}, fill=None, first=True,
     )  # fmt: skip
-    ambient_MPa: float | None = parameter(
-        None, "MPa", (0, 1e3), "standard",
+    ambient_MPa: float | None = number(
+        None, "(0, 1e3]",
         f"pressure from which a card's gauge pressures count; {ATMOSPHERE_MPA:g} by default",
-        above=True, optional=True, read=MEASURED,
+        "standard", read="gas.is_measured",
     )  # fmt: skip
-    smooth_deg: float | None = parameter(
-        None, "deg", (0, 60), "program",
+    smooth_deg: float | None = number(
+        None, "[0, 60]",
         "width of the window in which noise of a card is smoothed, by cubic least squares; 0 by "
-        "default: none", optional=True, read=MEASURED,
+        "default: none",
+        read="gas.is_measured",
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -373,7 +356,6 @@ class Gas:
         return (getattr(self.clearance_percent, end) or 0.0) / 100 * stroke
 
 
-@document_fields
 @make_group
 class Spring:
     """The spring load, a spring between piston and cam follower (§2.2); a case's `spring`.
@@ -385,16 +367,14 @@ class Spring:
     600.0
     """
 
-    stiffness_N_per_mm: float = parameter(20.0, "N/mm", (0, 1e6), "Table 1", "spring stiffness k")
-    damping_N_s_per_mm: float = parameter(0.023, "N s/mm", (0, 1e6), "Table 1", "spring damping c")
-    preload_N: float = parameter(800.0, "N", (0, 1e8), "Table 1", "preload of the spring")
-    stroke_mm: float = parameter(
-        120.0, "mm", (0, 1e5), "Table 1", "piston travel of each dwell of the cam follower",
-        above=True,
-    )  # fmt: skip
+    stiffness_N_per_mm: float = number(20.0, "[0, 1e6]", "spring stiffness k", "Table 1")
+    damping_N_s_per_mm: float = number(0.023, "[0, 1e6]", "spring damping c", "Table 1")
+    preload_N: float = number(800.0, "[0, 1e8]", "preload of the spring", "Table 1")
+    stroke_mm: float = number(
+        120.0, "(0, 1e5]", "piston travel of each dwell of the cam follower", "Table 1"
+    )
 
 
-@document_fields
 @make_group
 class Contact:
     """The normal contact law of both joints; a case's `contact`.
@@ -417,69 +397,62 @@ class Contact:
     """
 
     law: str = choice(
-        "impact", CONTACT_LAWS, "Eq. 14", "contact law (impact: ADAMS's)", read=CLEARANCE
+        "impact", CONTACT_LAWS, "contact law (impact: ADAMS's)", "Eq. 14", read=CLEARANCE
     )
-    stiffness_N_per_mm15: float | None = parameter(
-        PAPER_STIFFNESS, "N/mm^p", (0, 1e15), "Table 3", "contact stiffness K, in N/mm^exponent",
-        above=True, optional=True, read=STIFFNESS,
-        judged=JUDGED_STIFFNESS,
+    stiffness_N_per_mm15: float | None = number(
+        PAPER_STIFFNESS, "(0, 1e15]", "contact stiffness K, in N/mm^exponent", "Table 3",
+        read=(CLEARANCE, "contact.law != johnson and contact.law != liu"), judged=JUDGED_STIFFNESS,
         plausible=CONTACT_GUESS,
     )  # fmt: skip
     materials: PerJoint[tuple[str, str]] | None = by_part(
         PerJoint, None,
         choice(
-            None, ("steel", "copper"), "Table 2, Eq. 15", "two materials; in place of a stiffness",
+            None, ("steel", "copper"), "two materials; in place of a stiffness", "Table 2, Eq. 15",
             kind="materials",
         ),
         AT_JOINTS,
     )  # fmt: skip
     geometry: str | None = choice(
-        None, ("external", "internal"), "Eq. 15",
+        None, ("external", "internal"),
         "radii in the materials' stiffness: of two discs (the paper's, and the default for its "
         "pin), or of a pin in a bore (the default with a pin radius of a file's own)",
-        optional=True, read=(CLEARANCE, *by_law("contact", "geometry"), MATERIALS),
+        "Eq. 15", read=(CLEARANCE, *by_law("contact", "geometry"), "contact.materials"),
     )  # fmt: skip
-    exponent: float = parameter(
-        1.5, "", (1, 3), "Table 3", "force exponent p",
+    exponent: float = number(
+        1.5, "[1, 3]", "force exponent p", "Table 3",
         read=(*by_law("contact", "exponent"), or_own("exponent")), judged=(1.0, 2.2),
     )  # fmt: skip
-    damping_N_s_per_mm: float = parameter(
-        336.0, "N s/mm", (0, 1e9), "Table 3", "greatest contact damping C_max",
+    damping_N_s_per_mm: float = number(
+        336.0, "[0, 1e9]", "greatest contact damping C_max", "Table 3",
         read=(*by_law("contact", "damping_N_s_per_mm"), or_own("damping_N_s_per_mm")),
-        judged=(0, 33600),
-        plausible=CONTACT_GUESS,
+        judged=(0, 33600), plausible=CONTACT_GUESS,
     )  # fmt: skip
-    full_damping_mm: float = parameter(
-        0.1, "mm", (0, 1e3), "Table 3", "penetration of full damping d_max", above=True,
+    full_damping_mm: float = number(
+        0.1, "(0, 1e3]", "penetration of full damping d_max", "Table 3",
         read=(*by_law("contact", "full_damping_mm"), or_own("full_damping_mm")),
         plausible=CONTACT_GUESS._replace(given=None),
     )  # fmt: skip
-    restitution: float | None = parameter(
-        None, "", (0, 1), "program", "coefficient of restitution, in laws that damp by it",
-        above=True, optional=True,
-        read=by_law("contact", "restitution"),
-        judged=(0.3, 0.95),
+    restitution: float | None = number(
+        None, "(0, 1]", "coefficient of restitution, in laws that damp by it",
+        read=by_law("contact", "restitution"), judged=(0.3, 0.95),
     )  # fmt: skip
-    least_approach_mm_per_s: float | None = parameter(
-        None, "mm/s", (0, 1e6), "program",
+    least_approach_mm_per_s: float | None = number(
+        None, "(0, 1e6]",
         "approach speed below which the damping stays that of this speed; 10 by default",
-        above=True, optional=True,
-        read=(*by_law("contact", "least_approach_mm_per_s"), DAMPED),
-        judged=(1.0, 100.0),
-        plausible=SMOOTHING,
+        read=(*by_law("contact", "least_approach_mm_per_s"), "contact.restitution > 0"),
+        judged=(1.0, 100.0), plausible=SMOOTHING,
     )  # fmt: skip
     length_mm: PerJoint[float] | None = by_part(
         PerJoint, None,
-        parameter(
-            None, "mm", (0, 1e4), "program", "length (johnson, liu)", above=True,
-            judged=(10.0, 100.0), plausible=BEARING_LENGTH,
+        number(
+            None, "(0, 1e4]", "length (johnson, liu)", judged=(10.0, 100.0),
+            plausible=BEARING_LENGTH,
         ),
         {joint: (own, *by_law("contact", "length_mm")) for joint, own in AT_JOINTS.items()},
     )  # fmt: skip
-    modulus_GPa: float | None = parameter(
-        None, "GPa", (0, 1e6), "program", "composite modulus (johnson, liu)", above=True,
-        optional=True, read=(CLEARANCE, *by_law("contact", "modulus_GPa")),
-        judged=(10.0, 250.0),
+    modulus_GPa: float | None = number(
+        None, "(0, 1e6]", "composite modulus (johnson, liu)",
+        read=(CLEARANCE, *by_law("contact", "modulus_GPa")), judged=(10.0, 250.0),
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -493,7 +466,6 @@ class Contact:
         fill_by_law("contact", self)
 
 
-@document_fields
 @make_group
 class Friction:
     """Friction at the joints; a case's `friction`, None without.
@@ -512,47 +484,44 @@ class Friction:
     True
     """
 
-    static: float = parameter(
-        0.23, "", (0, 10), "Table 3", "static coefficient", read=by_law("friction", "static"),
+    static: float = number(
+        0.23, "[0, 10]", "static coefficient", "Table 3", read=by_law("friction", "static"),
         judged=(0, 0.5),
         plausible=Plausible("metals scatter, and oil lowers it", times(0.7, 1.5), times(0.7, 1.5)),
     )  # fmt: skip
-    dynamic: float = parameter(
-        0.15, "", (0, 10), "Table 3", "dynamic coefficient", judged=(0, 0.5),
+    dynamic: float = number(
+        0.15, "[0, 10]", "dynamic coefficient", "Table 3", judged=(0, 0.5),
         plausible=Plausible("metals scatter, and oil lowers it", times(0.5, 1.5), times(0.5, 1.5)),
     )  # fmt: skip
-    stiction_velocity_mm_per_s: float = parameter(
-        10.0, "mm/s", (0, 1e6), "Table 3", "stiction transition velocity", above=True,
-        judged=(0.1, 100),
+    stiction_velocity_mm_per_s: float = number(
+        10.0, "(0, 1e6]", "stiction transition velocity", "Table 3", judged=(0.1, 100),
         plausible=SMOOTHING,
     )  # fmt: skip
-    friction_velocity_mm_per_s: float = parameter(
-        100.0, "mm/s", (0, 1e6), "Table 3", "friction transition velocity", above=True,
+    friction_velocity_mm_per_s: float = number(
+        100.0, "(0, 1e6]", "friction transition velocity", "Table 3",
         read=by_law("friction", "friction_velocity_mm_per_s"),
         plausible=SMOOTHING._replace(left_out=times(0.5, 2)),
     )  # fmt: skip
     law: str | None = choice(
-        None, FRICTION_LAWS, "Eq. 16", "friction law (adams where none is named)", optional=True
+        None, FRICTION_LAWS, "friction law (adams where none is named)", "Eq. 16"
     )
-    bristle_stiffness_per_mm: float | None = parameter(
-        None, "1/mm", (0, 1e9), "program", "LuGre's sigma_0 over the normal force; 100 by default",
-        above=True, optional=True, read=by_law("friction", "bristle_stiffness_per_mm"),
-        judged=(10.0, 1e4),
+    bristle_stiffness_per_mm: float | None = number(
+        None, "(0, 1e9]", "LuGre's sigma_0 over the normal force; 100 by default",
+        read=by_law("friction", "bristle_stiffness_per_mm"), judged=(10.0, 1e4),
         plausible=SMOOTHING,
     )  # fmt: skip
-    bristle_damping_s_per_mm: float | None = parameter(
-        None, "s/mm", (0, 1e6), "program", "LuGre's sigma_1 over the normal force; 0.03 by default",
-        optional=True, read=by_law("friction", "bristle_damping_s_per_mm"),
-        judged=(1e-3, 0.1),
+    bristle_damping_s_per_mm: float | None = number(
+        None, "[0, 1e6]", "LuGre's sigma_1 over the normal force; 0.03 by default",
+        read=by_law("friction", "bristle_damping_s_per_mm"), judged=(1e-3, 0.1),
         plausible=SMOOTHING,
     )  # fmt: skip
-    viscous_s_per_mm: float | None = parameter(
-        None, "s/mm", (0, 1e6), "program", "LuGre's sigma_2 over the normal force; 0 by default",
-        optional=True, read=by_law("friction", "viscous_s_per_mm"),
+    viscous_s_per_mm: float | None = number(
+        None, "[0, 1e6]", "LuGre's sigma_2 over the normal force; 0 by default",
+        read=by_law("friction", "viscous_s_per_mm"),
     )  # fmt: skip
-    ideal_joints: bool | None = choice(
-        None, (), "program", "friction in joints without clearance, too", kind="boolean",
-        optional=True, read=IDEAL_JOINT,
+    ideal_joints: bool | None = flag(
+        None, "friction in joints without clearance, too",
+        read="not (clearance_mm.big_end > 0 and clearance_mm.small_end > 0)",
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -564,7 +533,6 @@ class Friction:
             vars(self)["ideal_joints"] = None
 
 
-@document_fields
 @make_group
 class Solve:
     """How far, how finely and how exactly to integrate; a case's `solve`.
@@ -581,55 +549,45 @@ class Solve:
     (('peak_contact_force', 0.01),)
     """
 
-    duration_rev: float | str | None = parameter(
-        4.0, "rev", (0, 1e5), "§3.1: 0.48 s",
-        "duration in revolutions; auto: three after settling", above=True, optional=True,
+    duration_rev: float | str | None = number(
+        4.0, "(0, 1e5]", "duration in revolutions; auto: three after settling", "§3.1: 0.48 s",
         choices=("auto",),
     )  # fmt: skip
-    duration_s: float | None = parameter(
-        None, "s", (0, 1e5), "§3.1", "duration in seconds, in place of duration_rev",
-        above=True, optional=True,
-    )  # fmt: skip
-    settle_rev: float | str = parameter(
-        1.0, "rev", (0, 1e5), "program",
-        "start-up left out of metrics and figures; auto: until revolutions agree",
-        choices=("auto",),
-    )  # fmt: skip
-    output_step_deg: float | None = parameter(
-        0.3, "deg", (0, 360), "§3.1: 0.1 ms", "output step in degrees of crank angle",
-        above=True, optional=True,
-    )  # fmt: skip
-    output_step_s: float | None = parameter(
-        None, "s", (0, 10), "§3.1", "output step in seconds, in place of output_step_deg",
-        above=True, optional=True,
-    )  # fmt: skip
-    accuracy: str | tuple[tuple[str, float], ...] = choice(
-        "standard", tuple(ACCURACY), "measured",
-        "promised relative error of acceleration, or the greatest one of each metric named",
-        kind="accuracy",
-    )  # fmt: skip
-    rtol: float | None = parameter(
-        None, "", (1e-13, 0.1), "program", "relative tolerance, in place of accuracy", optional=True
+    duration_s: float | None = number(
+        None, "(0, 1e5]", "duration in seconds, in place of duration_rev", "§3.1"
     )
-    error_bars: bool = choice(
-        True, (), "program", "errors of metrics, from a second run; not part of a "
-        "job's identity", kind="boolean", identity=False,
+    settle_rev: float | str = number(
+        1.0, "[0, 1e5]", "start-up left out of metrics and figures; auto: until revolutions agree",
+        choices=("auto",),
     )  # fmt: skip
-    horizon: bool | str = choice(
-        "auto", ("auto",), "program", "time for which the motion can be predicted: auto measures "
-        "it where errors are large, true always; not part of a job's identity",
-        kind="boolean", identity=False,
+    output_step_deg: float | None = number(
+        0.3, "(0, 360]", "output step in degrees of crank angle", "§3.1: 0.1 ms"
+    )
+    output_step_s: float | None = number(
+        None, "(0, 10]", "output step in seconds, in place of output_step_deg", "§3.1"
+    )
+    accuracy: str | tuple[tuple[str, float], ...] = choice(
+        "standard", tuple(ACCURACY),
+        "promised relative error of acceleration, or the greatest one of each metric named",
+        "measured", kind="accuracy",
+    )  # fmt: skip
+    rtol: float | None = number(None, "[1e-13, 0.1]", "relative tolerance, in place of accuracy")
+    error_bars: bool = flag(
+        True, "errors of metrics, from a second run; not part of a job's identity", identity=False
+    )
+    horizon: bool | str = flag(
+        "auto",
+        "time for which the motion can be predicted: auto measures it where errors are large, true "
+        "always; not part of a job's identity",
+        choices=("auto",), identity=False,
     )  # fmt: skip
     method: str = choice(
-        "auto", METHODS, "program", "integrator: compiled (auto is TSIT5 and RODAS), or SciPy's"
+        "auto", METHODS, "integrator: compiled (auto is TSIT5 and RODAS), or SciPy's"
     )
-    max_steps: int = parameter(
-        5_000_000, "", (1, 10**12), "program", "budget of integration steps", kind="integer"
+    max_steps: int = integer(5_000_000, "[1, 1e12]", "budget of integration steps")
+    timeout_s: float = number(
+        600.0, "(0, 1e7]", "budget of wall time; not part of a job's identity", identity=False
     )
-    timeout_s: float = parameter(
-        600.0, "s", (0, 1e7), "program", "budget of wall time; not part of a job's identity",
-        above=True, identity=False,
-    )  # fmt: skip
 
     def __post_init__(self) -> None:
         """Leave out the durations and steps in whose place others are given; sort the targets."""
@@ -644,7 +602,6 @@ class Solve:
                 vars(self)[key] = usual
 
 
-@document_fields
 @make_group
 class Output:
     """What is stored of a job; a case's `output`. Not part of the job's identity.
@@ -656,21 +613,21 @@ class Output:
     """
 
     keep: str = choice(
-        "series", ("series", "metrics"), "program",
-        "stored results: time series too, or metrics only", identity=False,
+        "series", ("series", "metrics"), "stored results: time series too, or metrics only",
+        identity=False,
     )  # fmt: skip
     precision: str = choice(
-        "double",
-        ("double", "single"),
-        "program",
-        "precision of the time series; time and crank angle are double",
-        identity=False, read=SERIES,
+        "double", ("double", "single"),
+        "precision of the time series; time and crank angle are double", identity=False,
+        read="output.keep == series",
     )  # fmt: skip
-    signals: bool = choice(
-        False, (), "program", "metrics of the rod load, and more time series: forces on frame, "
-        "bearing and guide, torque and rod load", kind="boolean", identity=False,
+    signals: bool = flag(
+        False,
+        "metrics of the rod load, and more time series: forces on frame, bearing and guide, torque "
+        "and rod load",
+        identity=False,
     )  # fmt: skip
-    compress: bool = choice(
-        False, (), "program", "compression of the time series: shuffled and gzipped",
-        kind="boolean", identity=False, read=SERIES,
+    compress: bool = flag(
+        False, "compression of the time series: shuffled and gzipped", identity=False,
+        read="output.keep == series",
     )  # fmt: skip

@@ -1,4 +1,9 @@
-"""The laws of contact and friction that a case chooses from, and the keys that each reads."""
+"""The laws of contact and friction that a case chooses from, and the keys that each reads.
+
+Who reads a key: conditions on a case, in the language of `--only` (`compressor.cases.comparison`).
+The fields of the groups name theirs (`read=`), and so do the groups in `compressor.cases.table`. A
+key without one is read by every job. `compressor.cases.conflicts` refuses what no job reads.
+"""
 
 from typing import Any
 
@@ -48,3 +53,21 @@ def fill_by_law(name: str, group: Any) -> None:
             values[key] = type(group).__dataclass_fields__[key].default
         elif values[key] is None and key in USUAL:
             values[key] = USUAL[key]
+
+
+CLEARANCE = "clearance_mm.big_end > 0 or clearance_mm.small_end > 0"
+
+
+def or_own(key: str) -> str:
+    """Return who reads a key of `contact` that a guide's corner may have of its own."""
+    return f"{CLEARANCE} or not guide.{key} >= 0"
+
+
+def by_law(group: str, key: str) -> tuple[str, ...]:
+    """Return who reads a key of contact or friction that some laws alone read."""
+    readers = READ_BY[group][key]
+    every = CONTACT_LAWS if group == "contact" else FRICTION_LAWS
+    others = [law for law in every if law not in readers]
+    if "adams" in readers or len(others) < len(readers):  # which a file need not name
+        return group, " and ".join(f"{group}.law != {law}" for law in others)
+    return (" or ".join(f"{group}.law == {law}" for law in readers),)

@@ -4,34 +4,33 @@ from dataclasses import replace
 from functools import partial
 from typing import ClassVar
 
-from compressor.cases.groups import BEARING_LENGTH, SMOOTHING
+from compressor.cases.groups import AT_JOINTS, BEARING_LENGTH, SMOOTHING
 from compressor.cases.parameter import (
-    ALONG_X,
-    ALONG_Y,
-    AT_JOINTS,
-    CASING,
-    CASING_SENSED,
-    GUIDE_FRICTION,
-    PLAY,
-    RANDOM,
-    ROCKING,
-    STEADY,
-    THRESHOLD,
     PerJoint,
     Plausible,
     by_part,
     choice,
-    document_fields,
+    flag,
     from_to,
+    integer,
     make_group,
-    parameter,
+    number,
     times,
 )
+
+# conditions under which a case reads a key; others stand beside their only key
+PLAY = "guide.clearance_mm > 0"
+ROCKING = "body.freedoms == xy_rocking"
+# the guide bears no force along x
+CASING_SENSED = (
+    "body",
+    "sensor.place == bearing or sensor.place == guide and sensor.direction == y",
+)
+CASING = (*CASING_SENSED, "body.casing == true")
 
 MIN_RATIO, MAX_RATIO = 0.125, 1.0  # of a bearing's length and diameter
 
 
-@document_fields
 @make_group
 class Lubricant:
     """An oil film in the joints that have clearance; a case's `lubricant`, None: they run dry.
@@ -47,9 +46,9 @@ class Lubricant:
     30.0
     """
 
-    viscosity_mPa_s: float = parameter(
-        30.0, "mPa s", (0, 1e6), "ISO VG 100 at about 65 °C (ISO 3448)", "dynamic viscosity",
-        above=True, judged=(3.0, 300.0),
+    viscosity_mPa_s: float = number(
+        30.0, "(0, 1e6]", "dynamic viscosity", "ISO VG 100 at about 65 °C (ISO 3448)",
+        judged=(3.0, 300.0),
         plausible=Plausible(
             "it halves in 15 degrees, and a bearing's temperature is a guess",
             times(0.5, 2), times(0.5, 2),
@@ -57,23 +56,19 @@ class Lubricant:
     )  # fmt: skip
     bearing_length_mm: PerJoint[float] = by_part(
         PerJoint, 20.0,
-        parameter(
-            20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of the bearing", above=True,
+        number(
+            20.0, "(0, 1e4]", "length of the bearing", "assumed: as long as wide",
             plausible=BEARING_LENGTH,
         ),
         AT_JOINTS,
     )  # fmt: skip
-    last_share: float = parameter(
-        0.02, "", (0.001, 0.5), "program",
-        "share of the clearance below which the film gets no thinner", judged=(0.01, 0.1),
+    last_share: float = number(
+        0.02, "[0.001, 0.5]", "share of the clearance below which the film gets no thinner",
+        judged=(0.01, 0.1),
         plausible=Plausible("nobody knows the roughness", times(0.5, 2), times(0.5, 2)),
     )  # fmt: skip
 
 
-PROGRAM = "program"
-
-
-@document_fields
 @make_group
 class Guide:
     """The crosshead's guide; a case's `guide`, by default None: ideal, without friction.
@@ -88,54 +83,46 @@ class Guide:
     0.0243
     """
 
-    clearance_mm: float = parameter(
-        0.0, "mm", (0, 100), PROGRAM, "clearance of the guide, on each side of the crosshead",
-        judged=(0.01, 0.2),
-    )  # fmt: skip
-    friction: float = parameter(
-        0.05, "", (0, 10), PROGRAM, "friction coefficient of the oiled guide", judged=(0.01, 0.2),
+    clearance_mm: float = number(
+        0.0, "[0, 100]", "clearance of the guide, on each side of the crosshead", judged=(0.01, 0.2)
+    )
+    friction: float = number(
+        0.05, "[0, 10]", "friction coefficient of the oiled guide", judged=(0.01, 0.2),
         plausible=Plausible("well oiled, or nearly dry", times(0.5, 3)),
     )  # fmt: skip
-    stiction_velocity_mm_per_s: float = parameter(
-        10.0, "mm/s", (0, 1e6), "Table 3, of the joints", "speed at which friction is three "
-        "quarters of its greatest", above=True, read=GUIDE_FRICTION,
-        plausible=SMOOTHING,
+    stiction_velocity_mm_per_s: float = number(
+        10.0, "(0, 1e6]", "speed at which friction is three quarters of its greatest",
+        "Table 3, of the joints", read="guide.friction > 0", plausible=SMOOTHING,
     )  # fmt: skip
-    crosshead_length_mm: float = parameter(
-        120.0, "mm", (0.001, 1e4), PROGRAM, "length of the crosshead", read=PLAY,
-        judged=(60.0, 250.0),
+    crosshead_length_mm: float = number(
+        120.0, "[0.001, 1e4]", "length of the crosshead", read=PLAY, judged=(60.0, 250.0),
         plausible=Plausible("the default's is of no machine", times(0.7, 1.5)),
     )  # fmt: skip
-    crosshead_height_mm: float = parameter(
-        80.0, "mm", (0.001, 1e4), PROGRAM, "height of the crosshead", read=PLAY,
-        judged=(40.0, 150.0),
+    crosshead_height_mm: float = number(
+        80.0, "[0.001, 1e4]", "height of the crosshead", read=PLAY, judged=(40.0, 150.0),
         plausible=Plausible("the default's is of no machine", times(0.7, 1.5)),
     )  # fmt: skip
-    crosshead_inertia_kg_m2: float | None = parameter(
-        None, "kg m2", (0, 1e9), "assumed: of a uniform block, m (l^2 + h^2) / 12",
-        "inertia of the crosshead about its pin", above=True, optional=True, read=PLAY,
+    crosshead_inertia_kg_m2: float | None = number(
+        None, "(0, 1e9]", "inertia of the crosshead about its pin",
+        "assumed: of a uniform block, m (l^2 + h^2) / 12", read=PLAY,
         plausible=Plausible("a crosshead is no block", times(0.5, 2)),
     )  # fmt: skip
-    stiffness_N_per_mm15: float = parameter(
-        3.36e5, "N/mm^p", (0, 1e15), "Table 3, of the joints",
-        "contact stiffness of a corner, in N/mm^exponent", above=True, read=PLAY,
-        judged=(3e4, 3e6),
+    stiffness_N_per_mm15: float = number(
+        3.36e5, "(0, 1e15]", "contact stiffness of a corner, in N/mm^exponent",
+        "Table 3, of the joints", read=PLAY, judged=(3e4, 3e6),
         plausible=Plausible("no contact of a guide is known better", times(0.3, 3)),
     )  # fmt: skip
-    exponent: float | None = parameter(
-        None, "", (1, 3), "as the joints'", "force exponent of a corner", optional=True, read=PLAY
+    exponent: float | None = number(
+        None, "[1, 3]", "force exponent of a corner", "as the joints'", read=PLAY
     )
-    damping_N_s_per_mm: float | None = parameter(
-        None, "N s/mm", (0, 1e9), "as the joints'", "greatest contact damping of a corner",
-        optional=True, read=PLAY,
-    )  # fmt: skip
-    full_damping_mm: float | None = parameter(
-        None, "mm", (0, 1e3), "as the joints'", "penetration of full damping of a corner",
-        above=True, optional=True, read=PLAY,
-    )  # fmt: skip
+    damping_N_s_per_mm: float | None = number(
+        None, "[0, 1e9]", "greatest contact damping of a corner", "as the joints'", read=PLAY
+    )
+    full_damping_mm: float | None = number(
+        None, "(0, 1e3]", "penetration of full damping of a corner", "as the joints'", read=PLAY
+    )
 
 
-@document_fields
 @make_group
 class Drive:
     """A motor whose speed gives way; a case's `drive`, by default None: steady speed.
@@ -150,25 +137,22 @@ class Drive:
     0.0
     """
 
-    flywheel_kg_m2: float = parameter(
-        5.0, "kg m2", (0, 1e9), PROGRAM, "inertia of crank, flywheel and motor", above=True,
-        judged=(1.0, 100.0),
+    flywheel_kg_m2: float = number(
+        5.0, "(0, 1e9]", "inertia of crank, flywheel and motor", judged=(1.0, 100.0),
         plausible=Plausible("the default's is of no machine", times(0.5, 2)),
     )  # fmt: skip
-    torque_N_m: float = parameter(0.0, "N m", (-1e9, 1e9), PROGRAM, "torque at machine.speed_rpm")
-    slope_N_m_s: float = parameter(
-        100.0, "N m s", (0, 1e9), PROGRAM, "torque added for each rad/s that the speed falls",
-        judged=(10.0, 1e4),
+    torque_N_m: float = number(0.0, "[-1e9, 1e9]", "torque at machine.speed_rpm")
+    slope_N_m_s: float = number(
+        100.0, "[0, 1e9]", "torque added for each rad/s that the speed falls", judged=(10.0, 1e4),
         plausible=Plausible("motors differ by their size", times(0.3, 3)),
     )  # fmt: skip
-    unbalance_kg_mm: float = parameter(
-        0.0, "kg mm", (0, 1e9), PROGRAM,
+    unbalance_kg_mm: float = number(
+        0.0, "[0, 1e9]",
         "unbalance of the crank towards its pin: mass times its centre's distance from the axis. "
         "Gravity acts on it; machine.counterweight_kg_mm is opposite",
     )  # fmt: skip
 
 
-@document_fields
 @make_group
 class Rod:
     """An elastic rod; a case's `rod`, by default None: rigid.
@@ -181,22 +165,20 @@ class Rod:
     40.0
     """
 
-    youngs_modulus_GPa: float = parameter(
-        207.0, "GPa", (0, 1e6), "Table 2, steel", "modulus of elasticity", above=True,
-        judged=(70.0, 250.0),
-    )  # fmt: skip
-    depth_mm: float = parameter(
-        40.0, "mm", (0, 1e4), "assumed: a 600 x 40 x 25 mm bar",
-        "depth of the rod, in the plane of motion", above=True, judged=(20.0, 80.0),
+    youngs_modulus_GPa: float = number(
+        207.0, "(0, 1e6]", "modulus of elasticity", "Table 2, steel", judged=(70.0, 250.0)
+    )
+    depth_mm: float = number(
+        40.0, "(0, 1e4]", "depth of the rod, in the plane of motion",
+        "assumed: a 600 x 40 x 25 mm bar", judged=(20.0, 80.0),
         plausible=Plausible("a rod is no bar", times(0.8, 1.25)),
     )  # fmt: skip
-    width_mm: float = parameter(
-        25.0, "mm", (0, 1e4), "assumed: a 600 x 40 x 25 mm bar",
-        "width of the rod, across that plane", above=True, judged=(10.0, 50.0),
-        plausible=Plausible("a rod is no bar", times(0.8, 1.25)),
+    width_mm: float = number(
+        25.0, "(0, 1e4]", "width of the rod, across that plane", "assumed: a 600 x 40 x 25 mm bar",
+        judged=(10.0, 50.0), plausible=Plausible("a rod is no bar", times(0.8, 1.25)),
     )  # fmt: skip
-    damping_ratio: float = parameter(
-        0.005, "", (0, 1), PROGRAM, "damping ratio of the first bending mode; others by stiffness",
+    damping_ratio: float = number(
+        0.005, "[0, 1]", "damping ratio of the first bending mode; others by stiffness",
         judged=(2e-3, 0.1),
         plausible=Plausible("bolts and bushes damp more than steel", times(0.4, 4)),
     )  # fmt: skip
@@ -214,7 +196,6 @@ BOLTED = "assumed: bolted to a block on firm ground"
 BODIES_PER_CASING = 25.0  # mass of the body over the modal mass of a casing mode
 
 
-@document_fields
 @make_group
 class Body:
     """The compressor's rigid body on its foundation; a case's `body`, None by default.
@@ -229,73 +210,68 @@ class Body:
     """
 
     freedoms: str = choice(
-        "xy", ("x", "y", "xy", "xy_rocking"), PROGRAM, "directions in which the rigid body may move"
+        "xy", ("x", "y", "xy", "xy_rocking"), "directions in which the rigid body may move"
     )
-    mass_kg: float = parameter(
-        500.0, "kg", (0, 1e7), PROGRAM, "mass of the body", above=True,
+    mass_kg: float = number(
+        500.0, "(0, 1e7]", "mass of the body",
         plausible=Plausible("the default's is of no machine", times(0.5, 2)),
     )  # fmt: skip
-    inertia_kg_m2: float = parameter(
-        40.0, "kg m2", (0, 1e9), PROGRAM, "inertia of the body about its mass centre", above=True,
-        read=ROCKING,
+    inertia_kg_m2: float = number(
+        40.0, "(0, 1e9]", "inertia of the body about its mass centre", read=ROCKING,
         plausible=Plausible("the default's is of no machine", times(0.5, 2)),
     )  # fmt: skip
-    centre_x_mm: float = parameter(
-        300.0, "mm", (-1e5, 1e5), PROGRAM, "x of the body's mass centre, from the crank's",
-        read=ROCKING,
+    centre_x_mm: float = number(
+        300.0, "[-1e5, 1e5]", "x of the body's mass centre, from the crank's", read=ROCKING,
         plausible=Plausible("the default's is of no machine", times(0.5, 1.5)),
     )  # fmt: skip
-    centre_y_mm: float = parameter(
-        -200.0, "mm", (-1e5, 1e5), PROGRAM, "y of the body's mass centre, from the crank's",
-        read=ROCKING,
+    centre_y_mm: float = number(
+        -200.0, "[-1e5, 1e5]", "y of the body's mass centre, from the crank's", read=ROCKING,
         plausible=Plausible("the default's is of no machine", times(0.5, 1.5)),
     )  # fmt: skip
-    frequency_x_Hz: float = parameter(
-        60.0, "Hz", (0, 1e5), BOLTED, "natural frequency along x", above=True, read=ALONG_X,
+    frequency_x_Hz: float = number(
+        60.0, "(0, 1e5]", "natural frequency along x", BOLTED, read=("body", "body.freedoms != y"),
         plausible=Plausible("30 on a skid to 80 on rock", from_to(30, 80), times(0.7, 1.4)),
     )  # fmt: skip
-    frequency_y_Hz: float = parameter(
-        60.0, "Hz", (0, 1e5), BOLTED, "natural frequency along y", above=True, read=ALONG_Y,
+    frequency_y_Hz: float = number(
+        60.0, "(0, 1e5]", "natural frequency along y", BOLTED, read=("body", "body.freedoms != x"),
         plausible=Plausible("30 on a skid to 80 on rock", from_to(30, 80), times(0.7, 1.4)),
     )  # fmt: skip
-    frequency_rocking_Hz: float = parameter(
-        20.0, "Hz", (0, 1e5), PROGRAM, "natural frequency of rocking", above=True, read=ROCKING,
+    frequency_rocking_Hz: float = number(
+        20.0, "(0, 1e5]", "natural frequency of rocking", read=ROCKING,
         plausible=Plausible("nobody computes it well", times(0.7, 1.4), times(0.7, 1.4)),
     )  # fmt: skip
-    damping_ratio: float = parameter(
-        0.03, "", (0, 0.99), PROGRAM, "damping ratio of the foundation", above=True,
+    damping_ratio: float = number(
+        0.03, "(0, 0.99]", "damping ratio of the foundation",
         plausible=Plausible("soil damps more than steel", times(0.3, 3)),
     )  # fmt: skip
-    casing: bool = choice(
-        True, (), PROGRAM, "casing modes, one at the guide and one at the main bearing, "
-        "which sensors feel", kind="boolean", read=CASING_SENSED,
+    casing: bool = flag(
+        True, "casing modes, one at the guide and one at the main bearing, which sensors feel",
+        read=CASING_SENSED,
     )  # fmt: skip
-    casing_mass_kg: float | None = parameter(
-        None, "kg", (0, 1e6), "program: a 25th of the body's mass", "modal mass of a casing mode; "
-        "the sensor's level goes as its inverse", above=True, optional=True, read=CASING,
+    casing_mass_kg: float | None = number(
+        None, "(0, 1e6]", "modal mass of a casing mode; the sensor's level goes as its inverse",
+        "program: a 25th of the body's mass", read=CASING,
         plausible=Plausible("nobody weighs what a mode moves", times(0.2, 2), times(0.5, 2)),
     )  # fmt: skip
-    casing_frequency_Hz: float = parameter(
-        2000.0, "Hz", (0, 1e5), PROGRAM, "natural frequency of a casing mode", above=True,
-        read=CASING,
+    casing_frequency_Hz: float = number(
+        2000.0, "(0, 1e5]", "natural frequency of a casing mode", read=CASING,
         plausible=Plausible("a hammer finds it", times(0.5, 2)),
     )  # fmt: skip
-    casing_damping_ratio: float = parameter(
-        0.02, "", (0, 0.99), PROGRAM, "damping ratio of a casing mode", above=True, read=CASING,
+    casing_damping_ratio: float = number(
+        0.02, "(0, 0.99]", "damping ratio of a casing mode", read=CASING,
         plausible=Plausible("a hammer finds it", times(0.5, 2)),
     )  # fmt: skip
     start: str = choice(
-        "steady", ("steady", "rest"), PROGRAM,
+        "steady", ("steady", "rest"),
         "start of the body; steady: as if the settled revolutions had always repeated; rest: at "
         "rest at time 0",
     )  # fmt: skip
-    band_low_Hz: float | None = parameter(
-        None, "Hz", (0, 1e5), "program: 2", "lowest frequency of body_velocity_rms", optional=True
+    band_low_Hz: float | None = number(
+        None, "[0, 1e5]", "lowest frequency of body_velocity_rms", "program: 2"
     )
-    band_high_Hz: float | None = parameter(
-        None, "Hz", (0, 1e5), "program: 1000", "highest frequency of body_velocity_rms", above=True,
-        optional=True,
-    )  # fmt: skip
+    band_high_Hz: float | None = number(
+        None, "(0, 1e5]", "highest frequency of body_velocity_rms", "program: 1000"
+    )
 
     @property
     def band_Hz(self) -> tuple[float, float]:
@@ -309,7 +285,6 @@ class Body:
             vars(self)["casing_mass_kg"] = self.mass_kg / BODIES_PER_CASING
 
 
-@document_fields
 @make_group
 class Sensor:
     """An accelerometer on the body, with a tacho; a case's `sensor`, None by default.
@@ -326,51 +301,54 @@ class Sensor:
     REPORTED: ClassVar[float] = 1e-3  # of a record's samples: clipping is reported from here on
 
     place: str = choice(
-        "guide", ("guide", "bearing", "body"), PROGRAM,
+        "guide", ("guide", "bearing", "body"),
         "place of the sensor: crosshead guide at mid-stroke, main bearing, or the body's mass "
         "centre",
     )  # fmt: skip
-    direction: str = choice("y", ("x", "y"), PROGRAM, "direction of the sensor")
-    rate_Hz: float = parameter(25600.0, "Hz", (0, 1e6), PROGRAM, "sampling rate", above=True)
-    low_pass_Hz: float | None = parameter(
-        None, "Hz", (0, 1e6), "usual: rate_Hz / 2.56", "anti-aliasing filter's corner",
-        above=True, optional=True,
-    )  # fmt: skip
-    mounting_Hz: float = parameter(
-        25000.0, "Hz", (0, 1e6), "usual: on a stud", "mounting resonance", above=True,
+    direction: str = choice("y", ("x", "y"), "direction of the sensor")
+    rate_Hz: float = number(25600.0, "(0, 1e6]", "sampling rate")
+    low_pass_Hz: float | None = number(
+        None, "(0, 1e6]", "anti-aliasing filter's corner", "usual: rate_Hz / 2.56"
+    )
+    mounting_Hz: float = number(
+        25000.0, "(0, 1e6]", "mounting resonance", "usual: on a stud",
         plausible=Plausible("a magnet, or a hand, in place of a stud", times(0.2, 1)),
     )  # fmt: skip
-    mounting_damping_ratio: float = parameter(
-        0.03, "", (0, 0.99), PROGRAM, "damping ratio of the mounting", above=True
+    mounting_damping_ratio: float = number(0.03, "(0, 0.99]", "damping ratio of the mounting")
+    range_m_per_s2: float = number(
+        490.0, "(0, 1e6]", "range of the sensor; the signal is clipped beyond it", "usual: 50 g"
     )
-    range_m_per_s2: float = parameter(
-        490.0, "m/s2", (0, 1e6), "usual: 50 g",
-        "range of the sensor; the signal is clipped beyond it", above=True,
-    )  # fmt: skip
-    noise_m_per_s2: float = parameter(
-        0.0015, "m/s2", (0, 1e6), "usual: piezoelectric", "rms of white noise up to half the rate",
+    noise_m_per_s2: float = number(
+        0.0015, "[0, 1e6]", "rms of white noise up to half the rate", "usual: piezoelectric",
         plausible=Plausible("cables, and a plant's own noise", times(1, 30)),
     )  # fmt: skip
-    speed_jitter: float = parameter(
-        0.0, "", (0, 0.1), PROGRAM,
+    speed_jitter: float = number(
+        0.0, "[0, 0.1]",
         "rms of the speed's relative deviation; drawn once a revolution and smooth between: 0.93 "
-        "of it at all times, 0.81 of it in a revolution's mean speed", read=STEADY,
+        "of it at all times, 0.81 of it in a revolution's mean speed",
+        read="body.start == steady",
     )  # fmt: skip
-    seed: int = parameter(
-        1, "", (0, 2**31), PROGRAM, "seed of noise and jitter", kind="integer", read=RANDOM
+    seed: int = integer(
+        1,
+        "[0, 2147483648]",
+        "seed of noise and jitter",
+        read="sensor.noise_m_per_s2 > 0 or sensor.speed_jitter > 0",
     )
-    length_rev: int | None = parameter(
-        None, "", (1, 10_000), "the settled ones", "revolutions of the record; more of them repeat",
-        kind="integer", optional=True, read=STEADY,
+    length_rev: int | None = integer(
+        None, "[1, 10000]", "revolutions of the record; more of them repeat", "the settled ones",
+        read="body.start == steady",
     )  # fmt: skip
-    threshold_m_per_s2: float | None = parameter(
-        None, "m/s2", (0, 1e6), "none: no peaks are counted", "level over which a peak of the "
-        "record counts (sensor_counts_per_rev)", above=True, optional=True,
+    threshold_m_per_s2: float | None = number(
+        None, "(0, 1e6]", "level over which a peak of the record counts (sensor_counts_per_rev)",
+        "none: no peaks are counted",
     )  # fmt: skip
-    second_threshold_m_per_s2: float | None = parameter(
-        None, "m/s2", (0, 1e6), "none", "second level over which a peak counts", above=True,
-        optional=True, read=THRESHOLD,
-    )  # fmt: skip
+    second_threshold_m_per_s2: float | None = number(
+        None,
+        "(0, 1e6]",
+        "second level over which a peak counts",
+        "none",
+        read="sensor.threshold_m_per_s2 > 0",
+    )
 
     @property
     def thresholds(self) -> tuple[float | None, float | None]:
@@ -388,10 +366,9 @@ class Sensor:
         )
 
 
-value = partial(parameter, identity=False)  # of no single run
+value = partial(number, identity=False)  # of no single run
 
 
-@document_fields
 @make_group
 class Wear:
     """How the rod's bores wear in joints with clearance; a case's `wear`, None by default.
@@ -406,29 +383,25 @@ class Wear:
     """
 
     coefficient_mm3_per_N_m: float = value(
-        1e-8, "mm3/(N m)", (0, 1.0),
+        1e-8, "(0, 1.0]",
+        "wear coefficient: volume lost for each N m of normal force times sliding",
         "assumed: of oiled metals, for which tables give 1e-9 to 1e-6 (Archard, J. Appl. Phys. 24, "
         "1953, defines it)",
-        "wear coefficient: volume lost for each N m of normal force times sliding", above=True,
     )  # fmt: skip
     coefficient_factor: float = value(
-        2.0, "", (1, 1e6), "assumed", "factor by which the coefficient may be smaller or greater"
+        2.0, "[1, 1e6]", "factor by which the coefficient may be smaller or greater", "assumed"
     )
     limit_mm: float | None = value(
-        None, "mm", (0, 1e4), "assumed: twice the greater clearance",
-        "radial clearance at which a joint counts as worn out", above=True,
-        optional=True,
+        None, "(0, 1e4]", "radial clearance at which a joint counts as worn out",
+        "assumed: twice the greater clearance",
     )  # fmt: skip
-    hours: float = value(
-        50000.0, "h", (0, 1e9), "program", "operating hours after which the study ends",
-        above=True,
-    )  # fmt: skip
+    hours: float = value(50000.0, "(0, 1e9]", "operating hours after which the study ends")
     step_mm: float = value(
-        0.02, "mm", (0, 1e4), "program: tests/results/wear.md",
-        "growth of a clearance after which the motion is computed again", above=True,
+        0.02, "(0, 1e4]", "growth of a clearance after which the motion is computed again",
+        "program: tests/results/wear.md",
     )  # fmt: skip
     bore_length_mm: float = value(
-        20.0, "mm", (0, 1e4), "assumed: as long as wide", "length of the bores", above=True
+        20.0, "(0, 1e4]", "length of the bores", "assumed: as long as wide"
     )
 
 

@@ -1,11 +1,7 @@
-"""One row of the table of parameters: its readers, and what a value of it must satisfy.
+"""One row of the table of parameters, and what a value of it must satisfy.
 
-Who reads a key: conditions on a case, in the language of `--only` (`compressor.cases.comparison`).
-The fields of the groups name theirs (`read=`), and so do the groups in `compressor.cases.table`. A
-key without one is read by every job. `compressor.cases.conflicts` refuses what no job reads.
-
-`compressor.cases.table` builds the whole table from these; units are those of the case file, and
-`to_si` turns a value into SI.
+`compressor.cases.table` builds the whole table from the fields of the groups; units are those of
+the case file, which stand at the end of a key's name, and `to_si` turns a value into SI.
 
 Accuracy as it may be requested: in words that promise, or in numbers by metric. Tolerances come
 from the measured trade of tests/results/accuracy.json (make accuracy), for `method: auto`.
@@ -17,11 +13,12 @@ import math
 import re
 import reprlib
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from functools import lru_cache, partial
 from inspect import cleandoc
+from types import NoneType
 from typing import (
     TYPE_CHECKING,
     Annotated,
@@ -31,6 +28,7 @@ from typing import (
     NamedTuple,
     TypeVar,
     dataclass_transform,
+    get_args,
 )
 
 import pydantic
@@ -44,67 +42,8 @@ from pydantic import (
 )
 
 from compressor.cases.card import CardError, mark_card
-from compressor.cases.laws import CONTACT_LAWS, FRICTION_LAWS, READ_BY
 from compressor.metrics import METRICS
 from compressor.program import CompsimError, did_you_mean
-
-GAS = "load == gas"
-CRANK_END = "gas.action == double or gas.action == crank_end"
-HEAD_END = "gas.action != crank_end"
-CYCLE = "not gas.is_measured"  # by an indicator card of an end that presses
-MEASURED = "gas.is_measured"
-HEAD_CLEARANCE = "gas.action != crank_end or not gas.clearance_percent.crank"
-SPRING = "load == spring"
-A_JOINT = "joint != none"
-BIG_END = "joint == big_end or joint == both"
-SMALL_END = "joint == small_end or joint == both"
-CLEARANCE = "clearance_mm.big_end > 0 or clearance_mm.small_end > 0"
-BIG_CLEARANCE = "clearance_mm.big_end > 0"
-SMALL_CLEARANCE = "clearance_mm.small_end > 0"
-IDEAL_JOINT = "not (clearance_mm.big_end > 0 and clearance_mm.small_end > 0)"
-PLAY = "guide.clearance_mm > 0"
-CONTACT = f"{CLEARANCE} or {PLAY}"
-RUBBING = f"{CLEARANCE} or friction.ideal_joints == true"
-RUBBING_AT = {
-    "big_end": f"{BIG_CLEARANCE} or friction.ideal_joints == true",
-    "small_end": f"{SMALL_CLEARANCE} or friction.ideal_joints == true",
-}
-AT_JOINTS = {"big_end": BIG_CLEARANCE, "small_end": SMALL_CLEARANCE}
-GUIDE = f"guide.friction > 0 or {PLAY}"
-GUIDE_FRICTION = "guide.friction > 0"
-MATERIALS = "contact.materials"
-DAMPED = "contact.restitution > 0"  # which johnson and liu need not have
-STIFFNESS = (CLEARANCE, "contact.law != johnson and contact.law != liu")
-BODY = "body"
-STEADY = "body.start == steady"
-ALONG_X = ("body", "body.freedoms != y")
-ALONG_Y = ("body", "body.freedoms != x")
-ROCKING = "body.freedoms == xy_rocking"
-# the guide bears no force along x
-CASING_SENSED = (
-    "body",
-    "sensor.place == bearing or sensor.place == guide and sensor.direction == y",
-)
-CASING = (*CASING_SENSED, "body.casing == true")
-RANDOM = "sensor.noise_m_per_s2 > 0 or sensor.speed_jitter > 0"
-THRESHOLD = "sensor.threshold_m_per_s2 > 0"
-SERIES = "output.keep == series"
-
-
-def or_own(key: str) -> str:
-    """Return who reads a key of `contact` that a guide's corner may have of its own."""
-    return f"{CLEARANCE} or not guide.{key} >= 0"
-
-
-def by_law(group: str, key: str) -> tuple[str, ...]:
-    """Return who reads a key of contact or friction that some laws alone read."""
-    readers = READ_BY[group][key]
-    every = CONTACT_LAWS if group == "contact" else FRICTION_LAWS
-    others = [law for law in every if law not in readers]
-    if "adams" in readers or len(others) < len(readers):  # which a file need not name
-        return group, " and ".join(f"{group}.law != {law}" for law in others)
-    return (" or ".join(f"{group}.law == {law}" for law in readers),)
-
 
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
@@ -118,40 +57,37 @@ NO_VALUE = "has no value; leave the key out to get its default"
 # a number that is written as text, with a comma or a unit
 AS_NUMBER = re.compile(r"\s*([-+]?\d+(?:([.,])\d+)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII)
 
-# case-file unit -> (SI unit, numerator, denominator): SI value = value * numerator / denominator
+# case-file unit -> numerator and denominator of its SI value
 UNITS = {
-    "": ("1", 1, 1),
-    "%": ("1", 1, 100),
-    "mm": ("m", 1, 1000),
-    "m": ("m", 1, 1),
-    "kg": ("kg", 1, 1),
-    "kg m2": ("kg m2", 1, 1),
-    "m/s2": ("m/s2", 1, 1),
-    "rpm": ("rad/s", math.pi, 30),
-    "MPa": ("Pa", 1_000_000, 1),
-    "GPa": ("Pa", 1_000_000_000, 1),
-    "N": ("N", 1, 1),
-    "mPa s": ("Pa s", 1, 1000),
-    "N m": ("N m", 1, 1),
-    "N m s": ("N m s", 1, 1),
-    "kg mm": ("kg m", 1, 1000),
-    "mm3/(N m)": ("m3/(N m)", 1, 1_000_000_000),
-    "h": ("s", 3600, 1),
-    "N/mm": ("N/m", 1000, 1),
-    "N/mm^p": ("N/m^p", 1, 1),  # times 1000^exponent: see compressor.solve.si_record
-    "N s/mm": ("N s/m", 1000, 1),
-    "mm/s": ("m/s", 1, 1000),
-    "1/mm": ("1/m", 1000, 1),
-    "s/mm": ("s/m", 1000, 1),
-    "s": ("s", 1, 1),
-    "deg": ("rad", math.pi, 180),
-    "Hz": ("Hz", 1, 1),
-    "rev": ("rev", 1, 1),
-}
+    "": (1, 1), "%": (1, 100), "mm": (1, 1000), "m": (1, 1), "kg": (1, 1), "kg m2": (1, 1),
+    "m/s2": (1, 1), "rpm": (math.pi, 30), "MPa": (1_000_000, 1), "GPa": (1_000_000_000, 1),
+    "N": (1, 1), "mPa s": (1, 1000), "N m": (1, 1), "N m s": (1, 1), "kg mm": (1, 1000),
+    "mm3/(N m)": (1, 1_000_000_000), "h": (3600, 1), "N/mm": (1000, 1),
+    "N/mm^p": (1, 1),  # times 1000^exponent: see compressor.solve.si_record
+    "N s/mm": (1000, 1), "mm/s": (1, 1000), "1/mm": (1000, 1), "s/mm": (1000, 1), "s": (1, 1),
+    "deg": (math.pi, 180), "Hz": (1, 1), "rev": (1, 1),
+}  # fmt: skip
+# how a unit is written at the end of a key
+WRITTEN = {"%": "percent", "N/mm^p": "N_per_mm15", "1/mm": "per_mm", "h": "hours",
+           "mm3/(N m)": "mm3_per_N_m"}  # fmt: skip
+ENDS = {
+    WRITTEN.get(unit) or unit.replace(" ", "_").replace("/", "_per_"): unit for unit in UNITS
+}  # fmt: skip
 
 Group = TypeVar("Group")
 Value = TypeVar("Value")
 PARTS = ConfigDict(extra="forbid", revalidate_instances="always")
+
+
+@lru_cache
+def split_unit(name: str) -> tuple[str, str]:
+    """Return a key's name without its unit, and the unit; "" for a name that ends in none.
+
+    >>> split_unit("damping_N_s_per_mm"), split_unit("exponent")
+    (('damping', 'N s/mm'), ('exponent', ''))
+    """
+    end = max((one for one in ENDS if f"_{name}".endswith(f"_{one}")), key=len, default="")
+    return name.removesuffix(f"_{end}" if end else ""), ENDS[end]
 
 
 @pydantic.dataclasses.dataclass(frozen=True, config=PARTS)
@@ -265,7 +201,7 @@ def to_si(value: float, unit: str) -> float:
 
     Powers of ten are divided, so that 0.1 mm is exactly 1e-4 m.
     """
-    _, numerator, denominator = UNITS[unit]
+    numerator, denominator = UNITS[unit]
     return value * numerator / denominator
 
 
@@ -285,14 +221,8 @@ class Span(NamedTuple):
         return f"{self.low:g} to {self.high:g}" + " times" * self.are_factors
 
 
-def times(low: float, high: float) -> Span:
-    """Return a span of factors."""
-    return Span(low, high)
-
-
-def from_to(low: float, high: float) -> Span:
-    """Return a span of values in the case file's unit."""
-    return Span(low, high, are_factors=False)
+times = Span  # a span of factors
+from_to = partial(Span, are_factors=False)  # a span of values in the case file's unit
 
 
 class Plausible(NamedTuple):
@@ -309,6 +239,19 @@ class Plausible(NamedTuple):
     def __str__(self) -> str:
         also = f"; given, {self.given}" if self.given else ""
         return f"{self.left_out}{', given or not' if self.given == self.left_out else also}"
+
+
+# kind -> what it may be beside the words of its row: for a table, and in an error
+OTHERWISE = {
+    "accuracy": (
+        "{metric: relative error}", "errors by metric such as {peak_acceleration: 0.01}"
+    ),
+    "text": ("[A-Za-z0-9._-], at most 64", "text"),
+    "card": (
+        "path of a CSV file",
+        "the path of a CSV file with columns crank_angle_deg and pressure_bar",
+    ),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -338,42 +281,38 @@ class Parameter:
         return re.split(r"[:;]| \(", self.phrase)[0]
 
     @property
+    def is_number(self) -> bool:
+        """Return whether its values are numbers, beside words."""
+        return self.kind in ("number", "integer")
+
+    @property
+    def words(self) -> list[str]:
+        """Return the words that it may be."""
+        return [*self.choices, *["true", "false"] * (self.kind == "boolean")]
+
+    @property
+    def span(self) -> str:
+        """Return the least and the greatest number, such as (0, 5]."""
+        return f"{'(' if self.above else '['}{self.low:g}, {self.high:g}]"
+
+    @property
     def range(self) -> str:
         """Return the allowed values, for a table or an error."""
-        if self.kind == "choice":
-            return " | ".join(self.choices)
-        if self.kind == "boolean":
-            return " | ".join([*self.choices, "true", "false"])
-        if self.kind == "accuracy":
-            return " | ".join(self.choices) + " | {metric: relative error}"
         if self.kind == "materials":
             return "two of " + ", ".join(self.choices)
-        if self.kind == "text":
-            return "[A-Za-z0-9._-], at most 64"
-        if self.kind == "card":
-            return "path of a CSV file"
-        opening = "(" if self.above else "["
-        return " | ".join([*self.choices, f"{opening}{self.low:g}, {self.high:g}]"])
+        more = self.span if self.is_number else OTHERWISE.get(self.kind, ("", ""))[0]
+        return " | ".join([*self.words, *filter(None, [more])])
 
     @property
     def needed(self) -> str:
         """Return the allowed values in words, with their unit."""
-        words = join_with_or(self.choices)
-        if self.kind == "choice":
-            return words
-        if self.kind == "boolean":
-            return join_with_or([*self.choices, "true", "false"])
-        if self.kind == "accuracy":
-            return f"{words}, or errors by metric such as {{peak_acceleration: 0.01}}"
+        if self.is_number:
+            number = "a whole number" if self.kind == "integer" else "a number"
+            return " or ".join([*self.choices, f"{number} in {self.span} {self.unit}".strip()])
+        words = join_with_or(self.words)
         if self.kind == "materials":
             return f"a pair of materials, {words}, such as [steel, steel]"
-        if self.kind == "text":
-            return "text"
-        if self.kind == "card":
-            return "the path of a CSV file with columns crank_angle_deg and pressure_bar"
-        span = f"{'(' if self.above else '['}{self.low:g}, {self.high:g}]"
-        number = "a whole number" if self.kind == "integer" else "a number"
-        return " or ".join([*self.choices, f"{number} in {span} {self.unit}".strip()])
+        return ", or ".join(filter(None, [words, OTHERWISE.get(self.kind, ("", ""))[1]]))
 
     @property
     def judged_on(self) -> str:
@@ -404,19 +343,17 @@ class Parameter:
 
     def explain(self, value: Any, cause: str = "") -> str:
         """Return the error of a wrong value; cause: what a check of our own has said of it."""
-        if value is None:
-            return NO_VALUE
-        if cause:
-            return cause
-        if self.kind in ("number", "integer") and type(value) in (int, float):
+        if value is None or cause:
+            return cause or NO_VALUE
+        if self.is_number and type(value) in (int, float):
             if not _is_finite(value):
-                return f"must be finite: {self._refused(value)}"
-            if self.kind == "integer" and value != int(value):
-                return self._refused(value)
-            return f"{value:g} is outside {self.range} {self.unit}".rstrip()
-        if self.kind == "materials" and isinstance(value, tuple | list) and len(value) == 2:
-            return self._refused(value, next(name for name in value if name not in self.choices))
-        return self._refused(value, None if self.kind == "materials" else value)
+                return f"must be finite: {self._refuse(value)}"
+            if self.kind == "number" or value == int(value):
+                return f"{value:g} is outside {self.range} {self.unit}".rstrip()
+        if self.kind != "materials":
+            return self._refuse(value, value)
+        pair = value if isinstance(value, tuple | list) and len(value) == 2 else ()
+        return self._refuse(value, *(one for one in pair if one not in self.choices))
 
     def problem(self, key: str, value: Any, path: Sequence[str], cause: str) -> Problem | None:
         """Return the problem of a wrong value at a key, whose path within it pydantic tells.
@@ -435,14 +372,10 @@ class Parameter:
             return Problem(f"{key}.{metric}", f"unknown metric; {hint}")
         return Problem(f"{key}.{metric}", TARGET.explain(value[metric], cause))
 
-    def _refused(self, value: Any, word: Any = None) -> str:
-        """Return the error of a value of another kind.
-
-        `word`: what may be a choice that is misspelt.
-        """
+    def _refuse(self, value: Any, *words: Any) -> str:
+        """Return the error of a value of another kind; words: of these one may be misspelt."""
         message = f"needs {self.needed}, not {quote_value(value)}"
-        if not isinstance(word, str):
-            return message
+        word = words[0] if words and isinstance(words[0], str) else ""
         lower = dict(self.aliases)
         lower |= {choice.lower(): choice for choice in (*self.choices, "true", "false")}
         if word.lower() in OTHER_WORDS:
@@ -450,15 +383,16 @@ class Parameter:
         near = get_close_matches(word[:MAX_WORD].lower(), lower, n=1)
         if near and lower[near[0]] in self.needed:
             return f"{message}; did you mean {lower[near[0]]}?"
-        if self.kind in ("number", "integer") and (number := AS_NUMBER.fullmatch(word[:MAX_WORD])):
-            plain, comma, unit = number[1].replace(",", "."), number[2] == ",", number[3]
-            if unit and unit != self.unit:
-                return f"{message}; write a number alone" + (self.unit and f", in {self.unit}")
-            text = f"{message}; write {plain}" + ("" if comma or unit else " without quotes")
-            first, _, second = number[1].partition(",")
-            several = len(first) == len(second) > 1  # 700,800 is no decimal comma
-            return f"{text}, or [{number[1].replace(',', ', ')}]" if several else text
-        return message
+        number = AS_NUMBER.fullmatch(word[:MAX_WORD]) if self.is_number else None
+        if not number:
+            return message
+        plain, comma, unit = number[1].replace(",", "."), number[2] == ",", number[3]
+        if unit and unit != self.unit:
+            return f"{message}; write a number alone" + (self.unit and f", in {self.unit}")
+        text = f"{message}; write {plain}" + ("" if comma or unit else " without quotes")
+        first, _, second = number[1].partition(",")
+        several = len(first) == len(second) > 1  # 700,800 is no decimal comma
+        return f"{text}, or [{number[1].replace(',', ', ')}]" if several else text
 
 
 def join_with_or(words: Sequence[str]) -> str:
@@ -554,54 +488,70 @@ def adapter_of(row: Parameter) -> TypeAdapter[Any]:
     return TypeAdapter(annotation_of(row))
 
 
+Describe = Callable[[str, str, Any], str]
+
+
 def problems_of(
-    error: ValidationError, rows: Mapping[str, Parameter], values: Mapping[str, Any]
+    error: ValidationError,
+    values: Mapping[str, Any],
+    rows: Mapping[str, Parameter],
+    describe: Describe = lambda group, name, value: "unknown key",
 ) -> list[Problem]:
-    """Return what is wrong with the fields of a group or a case that is made in Python."""
+    """Return what pydantic has found wrong with nested values, in our words.
+
+    rows: by dotted key. describe: a function of a group, a name and its value, which returns the
+    error of a key that the group has not, or of a value that is no group (name "").
+    """
+    known = {key[:end] for key in rows for end, c in enumerate(f"{key}.") if c == "."}
     found: dict[Problem | None, None] = {}
     for one in error.errors(include_url=False):
-        cause, path = one.get("ctx", {}).get("error", ""), [*map(str, one["loc"])]
+        cause, kind = one.get("ctx", {}).get("error", ""), one["type"]
         if isinstance(cause, CaseError):  # of values that do not fit together
             found |= dict.fromkeys(cause.problems)
-        elif path[0] in rows:
-            name = path[0]
-            found[rows[name].problem(name, values.get(name), path[1:], str(cause))] = None
-        elif parts := {key.partition(".")[2]: row for key, row in rows.items()
-                       if key.startswith(f"{path[0]}.")}:  # fmt: skip
-            value = values.get(path[0])
-            told = problem_of_parts(path[0], value, parts, path[1:], one["type"], str(cause))
-            found[told] = None
+            continue
+        if not one["loc"]:
+            raise cause  # an error of the program's own
+        key, named, value, rest = "", "", values, [*map(str, one["loc"])]
+        while rest and (inner := f"{key}.{rest[0]}".lstrip(".")) in known:
+            if kind in NAMED_WRONGLY and not rest[1:]:
+                break
+            if isinstance(value, Mapping | BY_PART):  # no value that stands for all parts
+                named = inner
+            key, value, rest = inner, _value_under(value, rest[0]), rest[1:]
+        if key in rows:
+            found[rows[key].problem(named, value, rest, str(cause))] = None
+        elif parts := {name: row for name in PART_WORDS if (row := rows.get(f"{key}.{name}"))}:
+            found[_problem_of_parts(key, value, parts, str(cause))] = None
+        elif kind in NAMED_WRONGLY:
+            message = describe(key, rest[0], _value_under(value, rest[0]))
+            found[Problem(f"{key}.{rest[0]}".lstrip("."), message)] = None
         else:
-            found[Problem(".".join(path[:2]), one["msg"])] = None
+            found[Problem(key, NO_VALUE if value is None else describe(key, "", value))] = None
     return [problem for problem in found if problem]
 
 
-def problem_of_parts(
-    key: str,
-    value: Any,
-    rows: Mapping[str, Parameter],
-    path: Sequence[str],
-    kind: str,
-    cause: str,
-) -> Problem | None:
-    """Return the problem of a key by part: of the part that a path names, or of the whole."""
-    if isinstance(value, BY_PART) and vars(value).keys() == rows.keys():
+NAMED_WRONGLY = ("unexpected_keyword_argument", "invalid_key", "missing")  # kinds of pydantic's
+
+
+def _problem_of_parts(key: str, value: Any, parts: Mapping[str, Parameter], cause: str) -> Problem:
+    """Return the problem of a value by part as a whole: of another kind, or of other parts."""
+    if cause or not isinstance(value, Mapping):
+        return Problem(key, next(iter(parts.values())).explain(value, cause))
+    for name in (str(one) for one in value if one not in parts):
+        known = f"{key} has {', '.join(parts)}"
+        hint = did_you_mean(name, parts, {part: f"{key}.{part}" for part in parts})
+        return Problem(f"{key}.{name}", f"unknown key; {hint or known}")
+    needed = f"needs both, {' and '.join(parts)}, not {', '.join(value) or 'none'}"
+    return Problem(key, f"{needed}; or one number for both")
+
+
+def _value_under(value: Any, name: str) -> Any:
+    """Return the value of a name in a value by name; one that stands for all parts as it is."""
+    if isinstance(value, BY_PART):
         value = vars(value)
-    within = [one for one in path if one in rows]
     if not isinstance(value, Mapping):
-        return next(iter(rows.values())).problem(key, value, within[1:], cause)
-    unknown = [str(name) for name in value if name not in rows]
-    if unknown and kind in ("missing", "unexpected_keyword_argument", "invalid_key"):
-        hint = did_you_mean(unknown[0], rows, {part: f"{key}.{part}" for part in rows})
-        named = hint or f"{key} has {', '.join(rows)}"
-        return Problem(f"{key}.{unknown[0]}", f"unknown key; {named}")
-    if kind == "missing":
-        needed = f"needs both, {' and '.join(rows)}, not {', '.join(value) or 'none'}"
-        return Problem(key, f"{needed}; or one number for both")
-    if not within:
-        return Problem(key, cause)
-    part = within[0]
-    return rows[part].problem(f"{key}.{part}", value[part], within[1:], cause)
+        return value
+    return next((inner for known, inner in value.items() if str(known) == name), None)
 
 
 if TYPE_CHECKING:
@@ -614,27 +564,15 @@ else:
     def make_group(cls):
         """Return a group of keys as a frozen dataclass that pydantic checks as it is made.
 
-        A group of wrong values raises CaseError with everything that is wrong.
+        A group of wrong values raises CaseError with everything that is wrong. Its docstring has
+        its fields.
         """
         own = {}
         for one in reversed(cls.__mro__):
             own |= vars(one).get("__annotations__", {})
         for name, item in vars(cls).items():
-            if isinstance(item, dataclasses.Field) and "kind" in item.metadata:
-                (row,) = rows_of(name, item)
-                cls.__annotations__[name] = annotation_of(row)
-            elif isinstance(item, dataclasses.Field) and "parts" in item.metadata:
-                parts = [*rows_of(name, item)]
-                one = item.metadata["of"][annotation_of(parts[0])]
-                one = one | None if item.default is None else one
-                if parts[0].kind == "card":
-                    one = Annotated[one, AfterValidator(check_cards)]
-                cls.__annotations__[name] = Annotated[
-                    one, BeforeValidator(partial(spread, item.metadata))
-                ]
-            elif isinstance(item, dataclasses.Field) and "open" in item.metadata:
-                opened = BeforeValidator(item.metadata["open"])
-                cls.__annotations__[name] = Annotated[own[name], opened]
+            if isinstance(item, dataclasses.Field):
+                cls.__annotations__[name] = annotation_of_field(name, item, own[name])
         made = pydantic.dataclasses.dataclass(frozen=True, config=ConfigDict(extra="forbid"))(cls)
         rows = {row.key: row for item in fields(made) for row in rows_of(item.name, item)}
         validate = made.__init__
@@ -643,7 +581,7 @@ else:
             try:
                 validate(self, *args, **values)
             except ValidationError as error:
-                raise CaseError(problems_of(error, rows, values)) from None
+                raise CaseError(problems_of(error, values, rows)) from None
 
         made.__init__ = __init__
         made.__signature__ = inspect.Signature(
@@ -654,7 +592,22 @@ else:
             for item in fields(made)
         )  # fmt: skip
         made.__annotations__ = own
+        made.__doc__ = describe_fields(made)
         return made
+
+
+def annotation_of_field(name: str, item: Any, own: Any) -> Any:
+    """Return the type by which pydantic checks a field; own: the one that it was written with."""
+    if "open" in item.metadata:  # a group
+        return Annotated[own, BeforeValidator(item.metadata["open"])]
+    rows = [*rows_of(name, item, annotation=own)]
+    if "parts" not in item.metadata:
+        return annotation_of(rows[0])
+    one = item.metadata["of"][annotation_of(rows[0])]
+    one = one | None if item.default is None else one
+    if rows[0].kind == "card":
+        one = Annotated[one, AfterValidator(check_cards)]
+    return Annotated[one, BeforeValidator(partial(spread, item.metadata))]
 
 
 def by_part(
@@ -667,15 +620,14 @@ def by_part(
 ) -> Any:
     """Return the field of a key that has a value for each part of a thing, or one for all.
 
-    of: the class of its values, such as PerJoint. row: the field, by `parameter` or `choice`, of
+    of: the class of its values, such as PerJoint. row: the field, by `number` or `choice`, of
     one part. fill: what a part has that is not given beside another one; without, it is needed.
     first: whether one value is that of the first part alone. read: the conditions of each part.
     """
     parts = {}
     for name in (item.name for item in fields(of)):
         own = dict(row.metadata)
-        conditions: Any = (read or {}).get(name, own["read"])
-        own["read"] = (conditions,) if isinstance(conditions, str) else tuple(conditions)
+        own["read"] = _all_of((read or {}).get(name, own["read"]))
         head = re.split(r"[:;,]| \(", own["phrase"])[0]
         own["phrase"] = f"{head} {PART_WORDS[name]}{own['phrase'][len(head) :]}"
         parts[name] = own
@@ -683,16 +635,21 @@ def by_part(
     return field(default=whole, metadata={"of": of, "parts": parts, "fill": fill, "first": first})
 
 
-def rows_of(key: str, item: Any, above: tuple[str, ...] = ()) -> Iterator[Parameter]:
+def rows_of(
+    key: str, item: Any, above: tuple[str, ...] = (), annotation: Any = None
+) -> Iterator[Parameter]:
     """Yield the rows of a field, of one by part those of the parts; above: conditions of its group.
 
-    Of a field of another kind none.
+    Of a field of another kind none. annotation: that of a field which no dataclass has yet.
     """
     whole = {"": item.metadata} if "kind" in item.metadata else {}
+    optional = NoneType in get_args(annotation or item.type)
+    units = [unit for name in key.split(".") if (unit := split_unit(name)[1])]
+    shared = {"optional": optional and bool(whole), "unit": units[-1] if units else ""}
     for part, row in item.metadata.get("parts", whole).items():
         default = getattr(item.default, part, None) if part else item.default
         name = f"{key}.{part}" if part else key
-        yield Parameter(name, default=default, **{**row, "read": (*above, *row["read"])})
+        yield Parameter(name, default=default, **{**shared, **row, "read": (*above, *row["read"])})
 
 
 def spread(metadata: Mapping[str, Any], value: Any) -> Any:
@@ -706,50 +663,64 @@ def spread(metadata: Mapping[str, Any], value: Any) -> Any:
     return {**filled, **value}
 
 
-def parameter(
-    default: Any, unit: str, span: tuple[float, float], source: str, phrase: str, **more: Any
+def number(default: Any, span: str, phrase: str, source: str = "program", **more: Any) -> Any:
+    """Return a dataclass field that is also a row of the table, of a number within a span.
+
+    span: such as "(0, 1e5]", in the unit that stands at the end of the key; source: of the default;
+    more: of `Parameter`.
+    """
+    low, high = map(float, span.strip("([]").split(","))
+    row = {"low": low, "high": high, "above": span[0] == "(", "kind": "number"}
+    return _field(default, phrase, source, row | more)
+
+
+def choice(
+    default: Any, choices: tuple[str, ...], phrase: str, source: str = "program", **more: Any
 ) -> Any:
-    """Return a dataclass field that is also a row of the table; more: of `Parameter`."""
-    row = {"unit": unit, "low": span[0], "high": span[1], "above": False, "source": source}
-    row |= {"phrase": phrase, "kind": "number"}
-    return _field(default, row | more)
-
-
-def choice(default: Any, choices: tuple[str, ...], source: str, phrase: str, **more: Any) -> Any:
     """Return a field whose value is one of a few words, or of another `kind` that is given."""
-    row = {"unit": "", "low": 0.0, "high": 0.0, "above": False, "source": source}
-    row |= {"phrase": phrase, "kind": "choice", "choices": choices}
-    return _field(default, row | more)
+    row = {"low": 0.0, "high": 0.0, "above": False, "kind": "choice", "choices": choices}
+    return _field(default, phrase, source, row | more)
 
 
-def _field(default: Any, row: dict[str, Any]) -> Any:
+def flag(default: Any, phrase: str, **more: Any) -> Any:
+    """Return a field whose value is true or false."""
+    return choice(default, **{"choices": (), "phrase": phrase, "kind": "boolean", **more})
+
+
+integer = partial(number, kind="integer")
+
+
+def _field(default: Any, phrase: str, source: str, row: dict[str, Any]) -> Any:
     """Return a dataclass field with a row; its `read` may be one condition, or several."""
-    read = row.get("read", ())
-    return field(
-        default=default, metadata=row | {"read": (read,) if isinstance(read, str) else read}
-    )
+    row |= {"phrase": phrase, "source": source, "read": _all_of(row.get("read", ()))}
+    return field(default=default, metadata=row)
 
 
-def document_fields(group: type[Group]) -> type[Group]:
-    """Return a group's dataclass with its fields in the docstring: range, unit, default, source."""
+def _all_of(read: str | Sequence[str]) -> tuple[str, ...]:
+    return (read,) if isinstance(read, str) else tuple(read)
+
+
+def describe_fields(group: type) -> str:
+    """Return a group's docstring with its fields: range, unit, default and its source."""
     lines = []
-    for item in fields(group):  # type: ignore[arg-type]
-        rows = [*rows_of(item.name, item)]
-        row, names = rows[0], [*item.metadata.get("parts", ())]
+    for item in fields(group):
+        names, rows = [*item.metadata.get("parts", ())], [*rows_of(item.name, item)]
+        if not rows:
+            continue
+        row = rows[0]
         phrase = row.phrase.replace(f" {PART_WORDS[names[0]]}", "") if names else row.phrase
         default = f"{row.default:g}" if isinstance(row.default, float) else repr(row.default)
         needed = row.needed.replace("true or false", "True or False")
         needed += f", or one for each: {', '.join(names)}" if names else ""
+        readers = dict.fromkeys(one.readers for one in rows if one.read)
         notes = f" Judged on {row.judged_on}." if row.judged else ""
-        readers = [one.readers for one in rows if one.read]
-        notes += f" Read with {'; or '.join(dict.fromkeys(readers))}." if readers else ""
+        notes += f" Read with {'; or '.join(readers)}." if readers else ""
         notes += f" Plausible: {row.plausible} ({row.plausible.why})." if row.plausible else ""
         lines.append(
             f"- `{item.name}`: {phrase}. Needs {needed}; default {default} ({row.source}).{notes}"
         )
     text = cleandoc(group.__doc__ or "")
-    group.__doc__ = f"{text}\n\nFields, with the sources of their defaults:\n\n" + "\n".join(lines)
-    return group
+    return f"{text}\n\nFields, with the sources of their defaults:\n\n" + "\n".join(lines)
 
 
 def parameter_table(rows: Iterable[Parameter]) -> str:

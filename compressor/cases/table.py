@@ -21,24 +21,15 @@ from compressor.cases.groups import (
     Solve,
     Spring,
 )
+from compressor.cases.laws import CLEARANCE
 from compressor.cases.optional_groups import Body, Drive, Guide, Lubricant, Rod, Sensor, Wear
 from compressor.cases.parameter import (
-    A_JOINT,
-    BIG_END,
-    BODY,
-    CLEARANCE,
-    CONTACT,
-    GAS,
-    GUIDE,
-    RUBBING,
-    SMALL_END,
-    SPRING,
     Parameter,
     PerJoint,
     by_part,
     choice,
     make_group,
-    parameter,
+    number,
     rows_of,
 )
 from compressor.metrics import JOINTS
@@ -73,41 +64,45 @@ class Settings:
     """
 
     name: str = choice(
-        "case", (), "program", "name of the study; default: the file's", kind="text", identity=False
+        "case", (), "name of the study; default: the file's", kind="text", identity=False
     )
     load: str = choice(
-        "spring", ("spring", "gas", "none"), "§2.2-2.4", "load on the piston",
+        "spring", ("spring", "gas", "none"), "load on the piston", "§2.2-2.4",
         aliases=(("design", "spring"), ("typical", "gas")),
     )  # fmt: skip
     joint: str = choice(
-        "none", ("none", "big_end", "small_end", "both"), "§3.2", "joints with clearance"
+        "none", ("none", "big_end", "small_end", "both"), "joints with clearance", "§3.2"
     )
     clearance_mm: PerJoint[float] = by_part(
         PerJoint, 0.0,
-        parameter(0.0, "mm", (0, 1000), "§3.2", "radial clearance", judged=(1e-3, 1.0)),
-        {"big_end": (A_JOINT, BIG_END), "small_end": (A_JOINT, SMALL_END)}, fill=0.0,
+        number(0.0, "[0, 1000]", "radial clearance", "§3.2", judged=(1e-3, 1.0)),
+        {joint: ("joint != none", f"joint == {joint} or joint == both") for joint in JOINTS},
+        fill=0.0,
     )  # fmt: skip
     healthy_clearance_mm: PerJoint[float] = by_part(
         PerJoint, 0.0,
-        parameter(
-            0.0, "mm", (0, 1000), "program", "clearance up to which a joint counts as sound; it "
-            "moves nothing, and 0 calls any worn", identity=False,
+        number(
+            0.0, "[0, 1000]",
+            "clearance up to which a joint counts as sound; it moves nothing, and 0 calls any worn",
+            identity=False,
         ),
         fill=0.0,
     )  # fmt: skip
     initial_offset_mm: Offset = group(Offset)
     machine: Machine = group(Machine)
-    gas: Gas = group(Gas, GAS)
-    spring: Spring = group(Spring, SPRING)
-    contact: Contact = group(Contact, CONTACT)
-    friction: Friction | None = group(Friction, RUBBING, word=False)
+    gas: Gas = group(Gas, "load == gas")
+    spring: Spring = group(Spring, "load == spring")
+    contact: Contact = group(Contact, f"{CLEARANCE} or guide.clearance_mm > 0")
+    friction: Friction | None = group(
+        Friction, f"{CLEARANCE} or friction.ideal_joints == true", word=False
+    )
     lubricant: Lubricant | None = group(Lubricant, CLEARANCE, word=True)
-    guide: Guide | None = group(Guide, GUIDE, word=True)
+    guide: Guide | None = group(Guide, "guide.friction > 0 or guide.clearance_mm > 0", word=True)
     drive: Drive | None = group(Drive, word=True)
     rod: Rod | None = group(Rod, word=True)
     wear: Wear | None = group(Wear, CLEARANCE, word=True)
     body: Body | None = group(Body, word=True)
-    sensor: Sensor | None = group(Sensor, BODY, word=True)
+    sensor: Sensor | None = group(Sensor, "body", word=True)
     solve: Solve = group(Solve)
     output: Output = group(Output)
 
