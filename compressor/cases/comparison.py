@@ -61,8 +61,10 @@ def condition(text: str) -> Callable[[Any], bool]:
     return _test(_tree(text), compare)
 
 
-def _tree(text: str) -> ast.expr:
+def _tree(text: Any) -> ast.expr:
     """Return the tree of a text; it may still hold what is no comparison."""
+    if not isinstance(text, str):
+        raise NoComparison("needs comparisons, such as clearance_mm > 0.2")
     if len(text) > MAX_LENGTH:
         raise NoComparison(f"is longer than {MAX_LENGTH} characters")
     code = re.sub(r"\s", " ", text).strip()

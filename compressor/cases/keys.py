@@ -24,53 +24,37 @@ from compressor.cases.checks import (
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.swept import DISTRIBUTIONS, FORMS
 from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, parts_by_key
-from compressor.cases.yaml_reader import FileProblem, Path, Place, Tree, read_text, shorten
+from compressor.cases.yaml_reader import FileProblem, Path, Place, Places, Tree, read_text, shorten
 
 Written = tuple[Tree, list[FileProblem]]
 
 
 def write_out(tree: Tree) -> Written:
     """Return the values of a file or a block in the one form, and what is wrong with its keys."""
-    tree, problems = _drop_unknown(tree)
-    tree, wrong = _halve_doubles(tree)
-    values = {
-        name: True if value == {} and WORDS.get(name) else value  # all of its defaults
-        for name, value in tree.values.items()
-    }
-    if isinstance(gas := values.get("gas"), dict) and "indicator" in gas:
-        folder = os.path.dirname(tree.places["gas", "indicator"][1].file)
-        if os.path.isdir(folder):
-            values["gas"] = gas | {"indicator": _beside(folder, gas["indicator"])}
-    return Tree(values, tree.places), problems + wrong
-
-
-def _drop_unknown(tree: Tree) -> Written:
-    """Return the values of the keys that there are, and a problem for each other one."""
     values: dict[str, Any] = {}
     problems = []
-
-    def refuse(path: Path, value: Any) -> None:
-        *group, name = map(str, path)
-        message = describe_unknown(name, "".join(group), value=value)
-        problems.append(FileProblem(tree.places[path][0], ".".join(map(str, path)), message))
-
     for name, value in tree.values.items():
         if name not in accepted_keys(""):
-            refuse((name,), value)
-        elif value is None:  # which is reported
-            continue
+            problems.append(tree.problem((name,), describe_unknown(name, "", value=value), True))
         elif _is_group(name, value):
             known = accepted_keys(name)
-            values[name] = {
-                inner: one for inner, one in value.items() if inner in known and one is not None
-            }
-            for inner in value.keys() - {*known}:
-                refuse((name, inner), value[inner])
-        elif name in MAPPINGS:
-            problems.append(FileProblem(tree.places[name,][1], name, no_mapping(name, value)))
-        else:
+            within = {key: one for key, one in value.items() if key in known and one is not None}
+            values[name] = (
+                True if value == {} and WORDS.get(name) else within
+            )  # all of its defaults
+            for key in value.keys() - {*known}:
+                message = describe_unknown(key, name, value=value[key])
+                problems.append(tree.problem((name, key), message, True))
+        elif name in MAPPINGS and value is not None:
+            problems.append(tree.problem((name,), no_mapping(name, value)))
+        elif value is not None:  # which is reported
             values[name] = value
-    return Tree(values, tree.places), problems
+    tree, wrong = _halve_doubles(Tree(values, tree.places))
+    if isinstance(gas := tree.values.get("gas"), dict) and "indicator" in gas:
+        folder = os.path.dirname(tree.at("gas", "indicator")[1].file)
+        if os.path.isdir(folder):
+            tree.values["gas"] = gas | {"indicator": _beside(folder, gas["indicator"])}
+    return tree, problems + wrong
 
 
 def _is_group(name: str, value: Any) -> bool:
@@ -92,22 +76,21 @@ def _halve_doubles(tree: Tree) -> Written:
     """Return the values with each double as the key that it is twice of."""
     values, places, problems = dict(tree.values), dict(tree.places), []
     for double, key in DOUBLES.items():
-        old, new = tuple(double.split(".")), tuple(key.split("."))
+        old, new = path_of(double), path_of(key)
         group = values.get(old[0])
         if not isinstance(group, dict) or old[1] not in group:
             continue
+        rest = {name: value for name, value in group.items() if name != old[1]}
         if new[1] in group:
-            place = max(places[old], places[new])[0]
-            problems.append(FileProblem(place, double, TWICE.format(key)))
+            later = max(old, new, key=lambda path: tree.at(*path)[0])
+            problems.append(FileProblem(tree.at(*later)[0], double, TWICE.format(key)))
         elif message := check_double(double, group[old[1]]):
-            problems.append(FileProblem(places[old][1], double, message))
+            problems.append(tree.problem(old, message))
         else:
-            group = {new[1] if n == old[1] else n: v for n, v in group.items()}
-            group[new[1]] = _halve_swept(group[new[1]])
-            places |= {new + path[2:]: p for path, p in places.items() if path[:2] == old}
-            values[old[0]] = group
-            continue
-        values[old[0]] = {name: value for name, value in group.items() if name != old[1]}
+            rest = {new[1] if name == old[1] else name: value for name, value in group.items()}
+            rest[new[1]] = _halve_swept(group[old[1]])
+            places |= {new + path[2:]: spot for path, spot in places.items() if path[:2] == old}
+        values[old[0]] = rest
     return Tree(values, places), problems
 
 
@@ -181,14 +164,6 @@ def drop(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
     return {key: value for key, value in values.items() if rest or key != first}
 
 
-def override(file: Tree, key: str, change: Tree) -> Tree:
-    """Return a file's values with the one that a change has at a dotted key."""
-    value: Any = change.values
-    for name in path_of(key):
-        value = value.get(name) if isinstance(value, dict) else None
-    return _replace(file, {path_of(key): value} if value is not None else {}, change)
-
-
 def merge_block(file: Tree, block: Tree) -> Tree:
     """Return a file's values with all those of one of its blocks."""
     changes = dict(leaves(block.values))
@@ -198,10 +173,10 @@ def merge_block(file: Tree, block: Tree) -> Tree:
             changes |= {(key, inner): one for inner, one in value.items()}
         elif value is not None:
             changes[key,] = value
-    return _replace(file, changes, block)
+    return override(file, changes, block.places)
 
 
-def _replace(file: Tree, changes: Mapping[Path, Any], source: Tree) -> Tree:
+def override(file: Tree, changes: Mapping[Path, Any], places: Places) -> Tree:
     """Return a file's values with others, and without what these stand in place of."""
     values = dict(file.values)
     for path, value in changes.items():
@@ -214,18 +189,22 @@ def _replace(file: Tree, changes: Mapping[Path, Any], source: Tree) -> Tree:
         if not any(covers(key, one) for one in given):
             values = drop(values, path_of(key))
     above = {path[:n] for path in changes for n in range(1, len(path))}
-    places = {
+    kept = {
         path: spots
         for path, spots in file.places.items()
         if not any(path[:n] in changes for n in range(1, len(path) + 1))
     }
-    new = {path: spots for path, spots in source.places.items() if path not in above & {*places}}
-    return Tree(values, places | new)
+    new = {path: spots for path, spots in places.items() if path not in above & {*kept}}
+    return Tree(values, kept | new)
 
 
-def read_overrides(texts: Sequence[str]) -> tuple[dict[str, Tree], list[FileProblem]]:
-    """Return the values of each `key=value` of the command line, by its key, and their problems."""
-    found: dict[str, Tree] = {}
+def read_overrides(
+    texts: Sequence[str],
+) -> tuple[dict[Path, Any], dict[Path, tuple[Place, Place]], list[FileProblem]]:
+    """Return the values of each `key=value` of the command line, their places and problems."""
+    keys: list[str] = []
+    values: dict[Path, Any] = {}
+    places: dict[Path, tuple[Place, Place]] = {}
     problems: list[FileProblem] = []
     for text in texts:
         key, equals, value = (part.strip() for part in text.partition("="))
@@ -233,9 +212,9 @@ def read_overrides(texts: Sequence[str]) -> tuple[dict[str, Tree], list[FileProb
         if not key or not equals:
             message = "needs the form key=value, such as joint=both"
             problems.append(FileProblem(place, "", message))
-        elif any(meet(own, other) for other in found):
+        elif any(meet(own, other) for other in keys):
             problems.append(FileProblem(place, key, "is set twice"))
-        elif rival := next((one for one in found if _are_rivals(own, one)), None):
+        elif rival := next((one for one in keys if _are_rivals(own, one)), None):
             problems.append(FileProblem(place, key, TWICE.format(rival)))
         else:
             tree, wrong = read_text(value, place)
@@ -243,8 +222,13 @@ def read_overrides(texts: Sequence[str]) -> tuple[dict[str, Tree], list[FileProb
             if tree is not None and tree.values is not None:
                 whole, wrong = write_out(_under(key, tree, place))
                 problems += wrong
-                found[own] = whole
-    return found, problems
+                keys.append(own)
+                places |= {path: spots for path, spots in whole.places.items() if path}
+                found: Any = whole.values
+                for name in path_of(own):
+                    found = found.get(name) if isinstance(found, dict) else None
+                values |= {path_of(own): found} if found is not None else {}
+    return values, places, problems
 
 
 def _under(key: str, tree: Tree, place: Place) -> Tree:
@@ -255,7 +239,7 @@ def _under(key: str, tree: Tree, place: Place) -> Tree:
     for one in reversed(path):
         values = {str(one): values}
     places = {path + inner: spot for inner, spot in tree.places.items()}
-    return Tree(values, places | {path[:n]: (place, place) for n in range(1, len(path))})
+    return Tree(values, places | {path[:n]: (place, place) for n in range(len(path))})
 
 
 def _are_rivals(key: str, other: str) -> bool:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from compressor.cases.blocks import Block, Plan, plan_block
+from compressor.cases.blocks import Block, plan_block
 from compressor.cases.case import Case
 from compressor.cases.checks import REPORT, row_of, stands_for, value_of
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
@@ -32,7 +32,9 @@ from compressor.cases.table import WORDS, outside_identity, table
 from compressor.cases.yaml_reader import (
     CaseFileError,
     FileProblem,
+    Path,
     Place,
+    Places,
     Tree,
     read_file,
     shorten,
@@ -40,12 +42,15 @@ from compressor.cases.yaml_reader import (
 from compressor.program import Progress, no_progress
 
 Variants = Callable[[Any], Iterable[Any]]  # of a case: the cases that are run for it
+Changes = tuple[Mapping[Path, Any], Places]  # values of the command line, and their places
 MAX_JOBS = 10_000
 NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
 MANY_CASES = 20_000  # cases of a study that take seconds to be read
 MAX_CONFLICTS = 20  # reported of one file; a sweep can have another in every job
 IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
 AT_TOP = "needs keys at the top, such as `joint: big_end`, with a space after the colon"
+NO_BLOCKS = "needs a list of mappings, such as [{load: none}, {joint: both}]"
+NO_DRAWS = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
 
 
 def itself(case: Any) -> Iterable[Any]:
@@ -90,15 +95,16 @@ def load_studies(
     runs for one; a key that none of them reads is refused. Raises CaseFileError with everything
     that is wrong in all files, overrides and the comparison.
     """
-    changes, problems = read_overrides(overrides)
+    values, places, problems = read_overrides(overrides)
     test = None
+    selection = Place(f"--only {shorten(only or '')}")
     if only:
         try:
             test = comparison(only)
         except NoComparison as error:
-            problems.append(FileProblem(Place(f"--only {shorten(only)}"), "", str(error)))
-    files = [_read(_path_of(path), {} if problems else changes) for path in paths]
+            problems.append(FileProblem(selection, "", str(error)))
     mistaken = bool(problems)
+    files = [_read(_path_of(path), ({}, {}) if mistaken else (values, places)) for path in paths]
     problems += [problem for file in files for problem in file.problems]
     problems += _find_shared_names(files)
     studies, blocks = [], []
@@ -109,7 +115,7 @@ def load_studies(
         blocks.append((file, found))
     problems += _find_unread(blocks, variants)
     if not problems and not any(study.selected for study in studies):
-        problems.append(FileProblem(Place(f"--only {shorten(only)}"), "", NONE_SELECTED))
+        problems.append(FileProblem(selection, "", NONE_SELECTED))
     if problems:
         unknown = {_spot(one) for one in problems if one.message.startswith("unknown key")}
         raise CaseFileError(  # an unknown key has no default
@@ -134,7 +140,7 @@ def _path_of(path: Any) -> str:
 
 @dataclass(frozen=True)
 class CaseFile:
-    """A case file that was read, and what the command line changes of it, by dotted key.
+    """A case file that was read, and what the command line changes of it.
 
     `name` is empty where it gives no valid one; a file that cannot be read has no tree.
     """
@@ -142,27 +148,28 @@ class CaseFile:
     path: str
     problems: list[FileProblem]
     tree: Tree | None = None
-    changes: Mapping[str, Tree] = field(default_factory=dict)
+    changes: Changes = ({}, {})
     name: str = ""
     name_place: Place = field(default_factory=lambda: Place(""))
     report: Mapping[str, str] = field(default_factory=dict)
 
 
-def _read(path: str, changes: Mapping[str, Tree]) -> CaseFile:
+def _read(path: str, changes: Changes) -> CaseFile:
     """Return a case file, and what is wrong with it as far as no job is made."""
     tree, problems = read_file(path)
     if tree is None or not isinstance(tree.values, dict):
-        problems += [FileProblem(tree.places[()][1], "", AT_TOP)] if tree else []
-        return CaseFile(path, problems)
+        return CaseFile(path, problems + ([tree.problem((), AT_TOP)] if tree else []))
     tree, wrong = write_out(tree)
-    whole = tree
-    for key, change in changes.items():
-        whole = override(whole, key, change)
-    name, unnamed = _study_name(path, whole)
+    whole = override(tree, *changes)
+    name, stem = whole.values.get("name"), os.path.splitext(os.path.basename(path))[0]
+    place = whole.at("name")[1] if "name" in whole.values else Place(path, 1, 1)
+    message = table()["name"].check(stem if name is None else name)
+    if message and name is None:
+        message = f"the file's name gives none: {message}; set name"
+        problems.append(FileProblem(place, "name", message))
     report, untold = _read_report(whole)
-    place = whole.places.get(("name",), (None, Place(path, 1, 1)))[1]
-    problems += [*wrong, *unnamed, *untold]
-    return CaseFile(path, problems, tree, changes, name, place, report)
+    name = "" if message else name or stem
+    return CaseFile(path, [*problems, *wrong, *untold], tree, changes, name, place, report)
 
 
 def _read_report(tree: Tree) -> tuple[dict[str, str], list[FileProblem]]:
@@ -176,24 +183,8 @@ def _read_report(tree: Tree) -> tuple[dict[str, str], list[FileProblem]]:
         else:
             what = "lines of text" if name == "notes" else "a line of text"
             message = f"needs {what} of up to {REPORT[name]} letters, not {quote_value(value)}"
-            place = tree.places["report", name][1]
-            problems.append(FileProblem(place, f"report.{name}", message))
+            problems.append(tree.problem(("report", name), message))
     return texts, problems
-
-
-def _study_name(path: str, tree: Tree) -> tuple[str, list[FileProblem]]:
-    """Return the study's name, the file's value or its stem, "" for a wrong one; and its problems.
-
-    What is wrong with the value is reported later, with all others.
-    """
-    row, stem = table()["name"], os.path.splitext(os.path.basename(path))[0]
-    if "name" in tree.values:
-        name = tree.values["name"]
-        return ("" if row.check(name) else name), []
-    if message := row.check(stem):
-        message = f"the file's name gives none: {message}; set name"
-        return "", [FileProblem(Place(path, 1, 1), "name", message)]
-    return stem, []
 
 
 def _find_shared_names(files: Sequence[CaseFile]) -> list[FileProblem]:
@@ -212,121 +203,109 @@ def _study(
     file: CaseFile, max_jobs: int, only: Test | None, progress: Progress
 ) -> tuple[Study | None, list[Block], list[FileProblem]]:
     """Return the study of a file with its blocks, or what is wrong with it."""
-    plans, blocks, problems = _blocks(file, file.changes, max_jobs)
-    is_drawn = any(one.is_drawn for plan in plans for one in plan.sweeps.values())
+    blocks, problems = _blocks(file, file.changes, max_jobs)
     if problems or not blocks:
         return None, [], problems
     is_grid = len(blocks) == 1 and blocks[0].is_grid
-    cases, columns = Cases(blocks), [] if is_grid else _columns(blocks)
-    keys, values, problems = _check_cases(file, cases, columns, progress)
-    sample = plans[0].tree.places.get(("sample",))
-    if sample and not (problems or file.changes or is_drawn):
-        text = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
-        problems.append(FileProblem(sample[0], "sample", text))
+    cases = Cases(blocks)
+    columns = [*blocks[0].columns] if is_grid else _columns(blocks)
+    keys, values, problems = _check_cases(file, cases, [] if is_grid else columns, progress)
+    is_drawn = any(sweep.is_drawn for block in blocks for sweep in block.sweeps.values())
+    if "sample" in blocks[0].tree.values and not (problems or file.changes[0] or is_drawn):
+        problems = [blocks[0].tree.problem(("sample",), NO_DRAWS, True)]
     if problems:
         return None, [], problems
     cases.keys = keys
-    if is_grid:
-        axes = [Axis(keys[0], tuple(one for (one,) in rows)) for keys, rows in blocks[0].factors]
-    else:
-        spreads = {key: sweep.spread for one in blocks for key, sweep in one.sweeps.items()
-                   if sweep.is_drawn and sweep.has_ends}  # fmt: skip
-        axes = [Axis(key, tuple(values[key]), spreads.get(key)) for key in columns]
+    spreads = {key: sweep.spread for block in blocks for key, sweep in block.sweeps.items()
+               if sweep.is_drawn and sweep.has_ends}  # fmt: skip
+    values = blocks[0].columns if is_grid else values
+    axes = tuple(Axis(key, tuple(values[key]), spreads.get(key)) for key in columns)
     selected = range(len(cases)) if only is None else cases.where(only)
     fixed = tuple(block.fixed for block in blocks)
-    study = Study(
-        file.name, file.path, tuple(axes), cases, keys, is_grid, selected, fixed, **file.report
-    )
+    study = Study(file.name, file.path, axes, cases, keys, is_grid, selected, fixed, **file.report)
     return study, blocks, []
 
 
 def _blocks(
-    file: CaseFile, changes: Mapping[str, Tree], max_jobs: int
-) -> tuple[list[Plan], list[Block], list[FileProblem]]:
-    """Return the blocks of a file as plans and with their jobs; no jobs where anything is wrong."""
+    file: CaseFile, changes: Changes, max_jobs: int
+) -> tuple[list[Block], list[FileProblem]]:
+    """Return the blocks of a file, or what is wrong with them, and with any single value."""
     trees, problems = _block_trees(file, changes, max_jobs) if file.tree else ([], [])
-    pairs = [plan_block(one) for one in trees]
-    plans = [plan for plan, _ in pairs]
-    problems += [problem for _, wrong in pairs for problem in wrong]
-    if too_many := _find_too_many(plans, max_jobs):
-        return plans, [], [*problems, too_many]
-    made = [plan.block(file.name) for plan in plans]
-    blocks = [block for block, _ in made]
-    problems += [problem for _, wrong in made for problem in wrong]
+    plans = [plan_block(tree, file.name) for tree in trees]
+    blocks = [block for block, _ in plans]
+    problems += [problem for _, wrong in plans for problem in wrong]
+    if too_many := _find_too_many(blocks, max_jobs):
+        return [], [*problems, too_many]
+    for block in blocks:
+        repeated = [*block.find_repeated()]
+        problems += repeated
+        if math.prod(block.sizes().values()) and not (repeated or block.numbers):
+            problems.append(block.tree.problem(("exclude",), "leaves no job"))
     if not problems and not file.problems:
-        return plans, blocks, []
+        return blocks, []
     found: dict[Any, FileProblem] = {}  # what is wrong with single values is told in the same run
     for block in blocks:
-        for values, rows in block.each_value():
+        for rows in block.each_value():
             try:
-                Case.resolve(values)
+                Case.resolve(block.values_at(rows))
             except CaseError as error:
-                found |= {} if error.is_misfit else block.locate(error, rows, file.path)
+                found |= {} if error.is_misfit else block.locate(error, rows)
     keys = {one.key for one in problems}
     texts = {(one.place, one.message) for one in [*problems, *file.problems]}
-    more = [  # but what follows from a sweep or a null that is told
+    return [], problems + [  # but for what follows from a sweep or a null that is told
         one
         for one in found.values()
         if (one.place, one.message) not in texts and not any(covers(one.key, key) for key in keys)
     ]
-    return plans, [], problems + more
 
 
 def _block_trees(
-    file: CaseFile, changes: Mapping[str, Tree], max_jobs: int
+    file: CaseFile, changes: Changes, max_jobs: int
 ) -> tuple[list[Tree], list[FileProblem]]:
     """Return the values of each block over those of the file; the file's alone without blocks."""
-    tree = file.tree
+    tree, (values, places) = file.tree, changes
     assert tree
-    rest = {key: change for key, change in changes.items() if key != "blocks"}
-    if "blocks" in changes:
-        tree = override(tree, "blocks", changes["blocks"])
-
-    def apply_changes(whole: Tree) -> Tree:
-        for key, change in rest.items():
-            whole = override(whole, key, change)
-        return whole
-
+    if ("blocks",) in values:
+        tree = override(tree, {("blocks",): values["blocks",]}, places)
+        values = {path: value for path, value in values.items() if path != ("blocks",)}
     if "blocks" not in tree.values:
-        return [apply_changes(tree)], []
-    items, place = tree.values["blocks"], tree.places["blocks",][1]
-    values = {key: value for key, value in tree.values.items() if key != "blocks"}
-    whole = Tree(values, tree.places)
+        return [override(tree, values, places)], []
+    items = tree.values["blocks"]
     if not isinstance(items, list) or not items or not all(isinstance(i, dict) for i in items):
-        message = "needs a list of mappings, such as [{load: none}, {joint: both}]"
-        return [], [FileProblem(place, "blocks", message)]
+        return [], [tree.problem(("blocks",), NO_BLOCKS)]
     if len(items) > max_jobs:
         message = f"{len(items)} blocks are more jobs than {max_jobs}; raise --max-jobs"
-        return [], [FileProblem(place, "blocks", message)]
+        return [], [tree.problem(("blocks",), message)]
+    whole = Tree({key: v for key, v in tree.values.items() if key != "blocks"}, tree.places)
+    within: list[dict[Path, tuple[Place, Place]]] = [{} for _ in items]
+    for (first, *rest), spots in ((path, spots) for path, spots in tree.places.items() if path):
+        if first == "blocks" and rest:
+            within[int(rest[0])][tuple(rest[1:])] = spots
     found, problems = [], []
-    within = [path for path in tree.places if path[:1] == ("blocks",) and len(path) > 1]
-    for number, item in enumerate(items):
-        places = {path[2:]: tree.places[path] for path in within if path[1] == number}
-        block, wrong = write_out(Tree(item, places))
+    for item, own in zip(items, within, strict=True):
+        block, wrong = write_out(Tree(item, own))
         problems += wrong
-        for key in ("name", "blocks", "report"):
-            if key in block.values:
-                problems.append(FileProblem(block.places[key,][0], key, IN_BLOCK))
-                del block.values[key]
-        found.append(apply_changes(merge_block(whole, block)))
+        for key in {"name", "blocks", "report"} & {*block.values}:
+            problems.append(block.problem((key,), IN_BLOCK, True))
+            del block.values[key]
+        found.append(override(merge_block(whole, block), values, places))
     return found, problems
 
 
-def _find_too_many(plans: Sequence[Plan], max_jobs: int) -> FileProblem | None:
+def _find_too_many(blocks: Sequence[Block], max_jobs: int) -> FileProblem | None:
     """Return the problem of more jobs than may be made."""
-    sizes = [plan.sizes() for plan in plans]
+    sizes = [block.sizes() for block in blocks]
     total = sum(math.prod(one.values()) for one in sizes)
     if total <= max_jobs:
         return None
-    largest = max(plans, key=lambda plan: math.prod(plan.sizes().values()))
-    keys = max(largest.factors, key=largest.size)
+    largest = max(blocks, key=lambda block: math.prod(block.sizes().values()))
+    key = max(largest.factors, key=largest.size)[0]
     counts = [" x ".join(f"{name} ({format_count(n)})" for name, n in one.items()) for one in sizes]
     message = (
         f"{format_count(total)} jobs are more than {max_jobs}: {shorten(' + '.join(counts), 300)}; "
         "ask for fewer, or raise --max-jobs"
     )
-    place = largest.tree.places[largest.sweeps[keys[0]].path][1]
-    return FileProblem(place, keys[0], message)
+    return FileProblem(largest.tree.at(*largest.sweeps[key].path)[1], key, message)
 
 
 def format_count(count: int) -> str:
@@ -336,12 +315,15 @@ def format_count(count: int) -> str:
 
 def _columns(blocks: Sequence[Block]) -> list[str]:
     """Return the keys by which the jobs of blocks differ: swept in one, or not the same in all."""
-    found = dict.fromkeys(key for one in blocks for keys, _ in one.factors for key in keys)
-    for key in dict.fromkeys(key for block in blocks for key in block.given):
-        differs = len({repr(block.given.get(key)) for block in blocks}) > 1
-        if differs and key not in outside_identity():
-            found[key] = None
-    swept = {key for block in blocks for key in block.sweeps}
+    swept = dict.fromkeys(key for block in blocks for keys in block.factors for key in keys)
+    given = dict.fromkeys(key for block in blocks for key in block.given)
+    differing = dict.fromkeys(
+        key
+        for key in given
+        if key not in outside_identity()
+        and len({repr(block.given.get(key)) for block in blocks}) > 1
+    )
+    found = swept | differing
     whole = {key for key in found if key not in swept and any(p in found for p in stands_for(key))}
     parts = (part for key in found for part in (stands_for(key) if key in whole else (key,)))
     return [*dict.fromkeys(parts)]
@@ -363,7 +345,7 @@ def _check_cases(
         try:
             case = block.case(place)
         except CaseError as error:
-            located = block.locate(error, block.rows_of(place), file.path)
+            located = block.locate(error, block.rows_of(place))
             if error.is_misfit:
                 misfits = located | misfits
             else:
@@ -394,16 +376,14 @@ def _find_unread(
     """
     read: set[Where] = set()
     unread: dict[Where, FileProblem] = {}
-    for _, blocks in found:
-        for block in blocks:
-            some, none = _read_in(block, variants, read)
-            read |= some
-            unread |= none
+    for block in (block for _, blocks in found for block in blocks):
+        some, none = _read_in(block, variants, read)
+        read |= some
+        unread |= none
     for file, _ in found:
         lacking = [where for where in unread.keys() - read if where[0].file == file.path]
-        if lacking and file.changes:
-            _, blocks, problems = _blocks(file, {}, MAX_JOBS)
-            for block in blocks if not problems else ():
+        if lacking and file.changes[0]:
+            for block in _blocks(file, ({}, {}), MAX_JOBS)[0]:
                 read |= _read_in(block, variants, read)[0]
     return [problem for where, problem in unread.items() if where not in read]
 
@@ -415,16 +395,16 @@ def _read_in(
 
     known: those of which it is known already. Cases are built only until each key has a reader.
     """
-    needed, lacking, places = {}, {}, {}
+    tree, needed = block.tree, {}
     for key, value in block.given.items():
-        path = block.nearest(path_of(key))  # of a part, the key that gives all of them
-        place = block.key_place(path)
-        where = place, key_of(path)
+        path = path_of(key)
+        while path not in tree.places:  # of a part, the key that gives all of them
+            path = path[:-1]
+        where = tree.at(*path)[0], key_of(path)
         if where not in known and (row_of(key) or key in WORDS) and not is_off(key, value):
-            one = key in block.sweeps
-            needed[where] = conditions(key) if one else needs_of_given(key, block.given)
-            lacking[where], places[where] = needed[where], place
-    read: set[Where] = set()
+            is_swept = key in block.sweeps
+            needed[where] = conditions(key) if is_swept else needs_of_given(key, block.given)
+    lacking, read = dict(needed), set()
     for number in block.numbers:
         if not lacking:
             break
@@ -432,16 +412,15 @@ def _read_in(
             cases = [*variants(block.case(number))]
         except CaseError:  # of a file without what the command line changes
             continue
-        for case in cases:
-            for where in lacking:
-                unmet = [one for one in needed[where] if not condition(one[1])(case)]
-                lacking[where] = [one for one in lacking[where] if one in unmet]
-                read |= set() if unmet else {where}
+        for case, where in itertools.product(cases, lacking):
+            unmet = [one for one in needed[where] if not condition(one[1])(case)]
+            lacking[where] = [one for one in lacking[where] if one in unmet]
+            read |= set() if unmet else {where}
         lacking = {where: rest for where, rest in lacking.items() if where not in read}
     unread = {}
     for where, rest in lacking.items():
         problem = problem_of(*[*rest, needed[where][-1]][0])
-        at = block.key_place(path_of(problem.key))
+        at = tree.at(*path_of(problem.key))[0]
         place = at if at.file == where[0].file else where[0]
         unread[where] = FileProblem(place, problem.key, problem.message)
     return read, unread

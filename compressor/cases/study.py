@@ -5,7 +5,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, overload
 
-from compressor.cases.blocks import Block
+from compressor.cases.blocks import Block, reader
 from compressor.cases.case import Case
 from compressor.cases.comparison import Test
 
@@ -106,8 +106,8 @@ class Cases(Sequence[Case]):
 
     def where(self, test: Test) -> list[int]:
         """Return the numbers of the cases for which a comparison holds."""
-        holds = itertools.chain.from_iterable(part.where(test) for part in self.parts)
-        return [number for number, held in enumerate(holds) if held]
+        jobs = (reader(block.values_of(place)) for block, place in self.combinations)
+        return [number for number, job in enumerate(jobs) if test(job)]
 
 
 class StudyJobs(Protocol):

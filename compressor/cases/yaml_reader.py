@@ -66,15 +66,25 @@ class FileProblem:
         return ": ".join(part for part in parts if part)
 
 
+Places = Mapping[Path, tuple[Place, Place]]  # by path the place of a key and its value
+
+
 @dataclass(frozen=True)
 class Tree:
-    """The plain values of a text, and where they stand: by path the place of a key and its value.
-
-    An item of a list has its own place twice.
-    """
+    """The plain values of a text, and where they stand; an item of a list has its place twice."""
 
     values: Any
-    places: Mapping[Path, tuple[Place, Place]]
+    places: Places
+
+    def at(self, *path: str | int) -> tuple[Place, Place]:
+        """Return where the key and the value at a path stand, or what holds them."""
+        while path and path not in self.places:
+            path = path[:-1]
+        return self.places[path]
+
+    def problem(self, path: Path, message: str, of_key: bool = False) -> FileProblem:
+        """Return what is wrong with the value at a path, or with its key."""
+        return FileProblem(self.at(*path)[not of_key], ".".join(map(str, path)), message)
 
 
 Read = tuple[Tree | None, list[FileProblem]]  # None where nothing could be read
