@@ -217,7 +217,7 @@ def rod_apart(duration):
     case = Case.resolve({**SLIDER_CRANK, "solve": solve})
     state = np.zeros(len(state_names(record(case))))
     state[:8] = np.concatenate((POSITION[2:], RATE[2:]))
-    solution = run_at_tolerance(case, case.rtol, math.inf, True, None, state)
+    solution = run_at_tolerance(case, case.rtol, math.inf, True, state)
     found, variables = with_series(case, solution)
     run = found.table(variables).variables
 

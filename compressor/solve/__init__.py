@@ -4,13 +4,7 @@ from compressor.solve.cautions import JointScales, cautions, expected_cost, join
 from compressor.solve.horizon import predictability_horizon
 from compressor.solve.measured_gas import gas_nodes
 from compressor.solve.regime import find_repetition, least_promise, steady, with_settle_rev
-from compressor.solve.request import (
-    Cuts,
-    Metrics,
-    Request,
-    Turns,
-    revolutions,
-)
+from compressor.solve.request import Metrics, Request, Trajectory, revolutions
 from compressor.solve.run import COMPILED, Solution, integrate, run_at_tolerance
 from compressor.solve.run_metrics import (
     allowed_residual,

@@ -38,9 +38,10 @@ from compressor.cases import (
 )
 from compressor.metrics import JOINTS
 from compressor.physics import STABILITY_LIMIT, Scene, elastic_form, greatest_load, steepest
+from compressor.solve.dense_tally import closed_form
 from compressor.solve.measured_gas import card_noise, fit_polytrope, sensed_noise
 from compressor.solve.request import greatest_depth
-from compressor.solve.run import COMPILED, closed_form
+from compressor.solve.run import COMPILED
 from compressor.solve.run_metrics import metrics
 from compressor.solve.si_record import record, scene
 

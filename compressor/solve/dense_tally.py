@@ -5,11 +5,29 @@ changes of sign are looked for in windows of time: at POINTS times in each, then
 neighbours of what is found.
 """
 
+import itertools
+import math
+import time
 from collections.abc import Callable
 
 import numpy as np
 
-from compressor.physics import Column, lobatto, tally_step
+from compressor.physics import (
+    COLUMNS,
+    FLOWS,
+    Column,
+    Load,
+    add_flows,
+    lobatto,
+    new_tally,
+    observe_all,
+    sample_segments,
+    segments,
+    tally_energy,
+    tally_step,
+)
+from compressor.reasons import Reason
+from compressor.solve.request import Trajectory, overdue
 from compressor.solve.si_record import length_and_speed, natural_sizes
 
 # returns the rows at times (s), (k, COLUMNS), of states that may be moved, (n, k)
@@ -24,6 +42,7 @@ FOR_CHANGES, FOR_TOPS = 8, 4  # rounds: windows shrink 16-fold in each, or 8-fol
 SMALL_CHANGE = 1e-6  # of a state's natural size: by which a change of contact is moved
 KICK = 30.0  # tolerances of speed: what a contact within one step may add unseen
 NEAR_TOP = 0.99  # of the greatest value known: nodes below are under no greater top
+PIECES_PER_CHECK = 256  # of an ideal machine's quadrature between two looks at the clock
 
 
 def narrow(
@@ -121,26 +140,24 @@ def tally_steps(
             for change in zip(changes, rates, strict=True):
                 tally["switch_shift"][joint] += shift_of_change(p, joint, observe, *change)
     if measured and tally["has_rod_load"]:
-        loads = both_sides(rows)
+
+        def loads(at: np.ndarray) -> np.ndarray:  # without load the rod is on neither side
+            return observe(at)[:, [ROD_LOAD]] * (1.0, -1.0)
+
+        both = rows[:, [ROD_LOAD]] * (1.0, -1.0)
         for side in range(2):
 
             def load(at: np.ndarray, side: int = side) -> np.ndarray:
-                return both_sides(observe(at))[:, side]
+                return loads(at)[:, side]
 
-            changes, _ = find_changes(load, times, loads[:, side])
-            sides[:, side] = shares_above(steps, loads[0, side], changes)
-        known = tally["side_peak"]
-        sides[:, 2:] = find_tops(lambda at: both_sides(observe(at)), times, loads, known)
+            changes, _ = find_changes(load, times, both[:, side])
+            sides[:, side] = shares_above(steps, both[0, side], changes)
+        sides[:, 2:] = find_tops(loads, times, both, tally["side_peak"])
     last = NODES.size - 1
     of_steps = rows[last * np.arange(spans.size)[:, None] + np.arange(NODES.size)]
     for span, row, gap, load_sides in zip(spans, of_steps, gaps, sides, strict=True):
         tally_step(span, NODES, WEIGHTS, row, 1, gap, load_sides, measured, tally, p)
     return of_steps
-
-
-def both_sides(rows: np.ndarray) -> np.ndarray:
-    """Return the rod load and its opposite (N), (k, 2); without load it is on neither side."""
-    return rows[:, [ROD_LOAD]] * (1.0, -1.0)
 
 
 def shift_of_change(p: np.record, joint: int, observe: Observer, time: float, rate: float) -> float:
@@ -173,3 +190,55 @@ def find_missed_contact(
     begin, span, force = steps[missed[0]], spans[missed[0]], normal[missed[0]].max()
     text = f"a contact of {force:.2g} N within one step of {span:.2g} s from {begin:.6g} s"
     return float(begin), text
+
+
+def closed_form(
+    p: np.record, times: np.ndarray, settle: float, pieces: int, timeout: float = math.inf,
+    has_rod_load: bool = False,
+) -> Trajectory:  # fmt: skip
+    """Return the trajectory of ideal joints over an output grid, without integration.
+
+    `pieces`: into which each stretch between load corners, or each revolution in it, is cut, but a
+    card's, which is cut at its nodes; `timeout`: wall time (s) that it may take; `has_rod_load`:
+    whether the rod load is tallied.
+    """
+    deadline, began = time.monotonic() + timeout, time.perf_counter()
+    edges, phases = segments(p, float(times[-1]))
+    result = Trajectory(
+        times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)],
+        new_tally(has_rod_load),
+    )  # fmt: skip
+    turn = 2.0 * math.pi / p.omega
+    if p["load"] == Load.CARD:  # whose curve is of pieces between its nodes
+        edges = np.arange(0.0, edges[-1] / turn, 1.0 / len(p["card"])) * turn
+        edges, phases = np.append(edges, times[-1]), np.zeros(edges.size, dtype=np.int64)
+        pieces = 1
+    grids = [
+        np.linspace(begin, end, pieces * math.ceil((end - begin) / turn - 1e-9) + 1)
+        for begin, end in itertools.pairwise(edges)
+    ]
+    cuts = np.unique(np.concatenate((edges, [settle], *grids)))
+    owner, measured = sample_segments((cuts[:-1] + cuts[1:]) / 2, edges), cuts[:-1] >= settle
+    changes = 1 + np.flatnonzero(np.diff(owner) | np.diff(measured))
+    blocks = np.union1d(np.arange(0, owner.size, PIECES_PER_CHECK), changes)
+    flows, phase = np.zeros(FLOWS), 0
+
+    def observe(times: np.ndarray) -> np.ndarray:
+        rows = np.empty((times.size, COLUMNS))
+        observe_all(times, np.zeros((times.size, 4)), np.full(times.size, phase), p, rows)
+        return rows
+
+    for first, last in itertools.pairwise([*blocks, owner.size]):
+        if time.monotonic() > deadline:
+            result.reason = Reason.BUDGET_SECONDS
+            result.detail, result.stop_time = overdue(timeout), float(cuts[first])
+            result.states[times >= cuts[first]] = math.nan
+            break
+        steps, phase = cuts[first : last + 1], int(phases[owner[first]])
+        rows = tally_steps(p, result.tally, steps, observe, bool(measured[first]))
+        for span, row in zip(np.diff(steps), rows, strict=True):
+            tally_energy(row[0], flows, result.tally)
+            add_flows(row, WEIGHTS, span, flows)
+            tally_energy(row[-1], flows, result.tally)
+    result.seconds = time.perf_counter() - began
+    return result

@@ -28,7 +28,7 @@ import numpy as np
 from compressor.cases import TIGHTEST, Case
 from compressor.metrics import NUMBERS, SERIES
 from compressor.solve.request import Metrics
-from compressor.solve.run import Solution, moves_body, run_at_tolerance
+from compressor.solve.run import Solution, run_at_tolerance
 from compressor.solve.run_metrics import energy_residual
 from compressor.solve.series import distances
 from compressor.solve.si_record import is_oiled, length_and_speed
@@ -208,13 +208,13 @@ def comparison_run(case: Case, solution: Solution, timeout: float) -> Solution:
     A tighter one; a looser one only where the tolerance leaves no room below it.
     Where explicit steps may run over friction, it is a run by the stiff method.
     """
-    tighter = companion_rtol(solution.p, solution.rtol)
+    tighter, sampled = companion_rtol(solution.p, solution.rtol), case.body is not None
     if tighter is not None:
-        return run_at_tolerance(case, tighter, timeout, moves_body(case))
+        return run_at_tolerance(case, tighter, timeout, sampled)
     if overruns_friction(solution.p, solution.rtol):
         stiff = replace(case, solve=replace(case.solve, method="RODAS"))
-        return run_at_tolerance(stiff, solution.rtol / STIFF_TIGHTER, timeout, moves_body(case))
-    return run_at_tolerance(case, 10.0 * solution.rtol, timeout, moves_body(case))
+        return run_at_tolerance(stiff, solution.rtol / STIFF_TIGHTER, timeout, sampled)
+    return run_at_tolerance(case, 10.0 * solution.rtol, timeout, sampled)
 
 
 def looser_comparison_run(
@@ -226,7 +226,7 @@ def looser_comparison_run(
     """
     if other.reason or not is_amplified(solution.rtol, distances(solution.samples, other.samples)):
         return None
-    looser = run_at_tolerance(case, LOOSER_FACTOR * solution.rtol, timeout, moves_body(case))
+    looser = run_at_tolerance(case, LOOSER_FACTOR * solution.rtol, timeout, case.body is not None)
     return None if looser.reason else looser
 
 

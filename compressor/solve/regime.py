@@ -20,13 +20,7 @@ from compressor.metrics import METRICS
 from compressor.physics import merge_tallies
 from compressor.solve.error_bars import relative_bar
 from compressor.solve.horizon import Search
-from compressor.solve.request import (
-    SAME_TIME,
-    Cuts,
-    Metrics,
-    Turns,
-    revolutions,
-)
+from compressor.solve.request import SAME_TIME, Metrics, Trajectory, revolutions
 from compressor.solve.run import Solution, is_sampled, output_times, run_at_tolerance
 from compressor.solve.run_metrics import metrics
 from compressor.solve.series import compared_per_rev, compared_times, distances
@@ -117,18 +111,18 @@ def find_span(search: Search) -> Solution | None:
     turns: list[Metrics] = []
     found: list[tuple[int, int]] = []
 
-    def is_settled(tallies: Turns) -> bool:
+    def is_settled(run: Trajectory) -> bool:
         """Note the revolution that has ended, and where the last ones agree for the first time."""
-        turns.append(metrics(p, tallies[-1]))
+        turns.append(metrics(p, run.turns[-1]))
         if not found and (last := steady(turns[-LOOKED_AT:], within)):
             found.append((last[0] + max(0, len(turns) - LOOKED_AT), last[1]))
         return bool(found) and ends_settled
 
-    cuts = Cuts(revolutions(0.0, longest.duration, case.turn), is_settled)
-    within_samples = SAMPLED_REV * case.turn if ends_settled else math.inf
     run = run_at_tolerance(
-        longest, case.rtol, search.left, is_sampled(case), cuts, sampled_until=within_samples
-    )
+        longest, case.rtol, search.left, is_sampled(case),
+        cuts=revolutions(0.0, longest.duration, case.turn), enough=is_settled,
+        sampled_until=SAMPLED_REV * case.turn if ends_settled else math.inf,
+    )  # fmt: skip
     if not found:
         half = float(max_revolutions // 2)
         search.case = with_settle_rev(case, half, 1, float(max_revolutions))
@@ -139,13 +133,13 @@ def find_span(search: Search) -> Solution | None:
     first, period = found[0]
     search.settled, search.period = float(first), float(period)
     search.case = with_settle_rev(case, search.settled, period)
-    return settled_part(run, longest, search.case, cuts)
+    return settled_part(run, longest, search.case)
 
 
-def settled_part(run: Solution, longest: Case, case: Case, cuts: Cuts) -> Solution | None:
+def settled_part(run: Solution, longest: Case, case: Case) -> Solution | None:
     """Return a run of the longest span as that of a case whose metrics count later.
 
-    cuts: into revolutions, of the run. None where it is of other times than the case's, or stopped.
+    None where it is of other times than the case's, or stopped.
     """
     times, trajectory = output_times(case, is_sampled(case)), run.trajectory
     first, last = (round(time / case.turn) for time in (case.settle, case.duration))
@@ -155,21 +149,16 @@ def settled_part(run: Solution, longest: Case, case: Case, cuts: Cuts) -> Soluti
     ends_whole = abs(case.duration - last * case.turn) < SAME_TIME * case.duration
     if run.reason or not same or not ends_whole or per_rev != compared_per_rev(longest):
         return None
-    assert trajectory.segments is not None
     states, phases = trajectory.states[:count].copy(), trajectory.phases[:count].copy()
-    edges, of_segments = trajectory.segments
-    states[-1] = cuts.states[last - 1]
-    phases[-1] = of_segments[np.searchsorted(edges, case.duration * (1.0 - SAME_TIME)) - 1]
-    part = replace(
-        trajectory, times=output, states=states, phases=phases,
-        tally=merge_tallies(run.turns[first:last]),
-    )  # fmt: skip
+    states[-1] = trajectory.turn_states[last - 1]
+    segment = np.searchsorted(trajectory.edges, case.duration * (1.0 - SAME_TIME)) - 1
+    phases[-1] = trajectory.edge_phases[segment]
+    tally = merge_tallies(trajectory.turns[first:last])
+    part = replace(trajectory, times=output, states=states, phases=phases, tally=tally, turns=[])
     begin = first * per_rev
     samples = run.samples[begin : begin + compared_times(case).size]
-    numbers = metrics(run.p, part.tally)
-    return replace(
-        run, trajectory=part, settle=case.settle, metrics=numbers, samples=samples, turns=[]
-    )
+    numbers = metrics(run.p, tally)
+    return replace(run, trajectory=part, settle=case.settle, metrics=numbers, samples=samples)
 
 
 def with_settle_rev(case: Case, settle: float, period: int, duration: float | None = None) -> Case:

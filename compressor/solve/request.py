@@ -1,7 +1,7 @@
 """What an integration takes and gives, why it stops, and its tally by revolutions."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -24,86 +24,16 @@ from compressor.physics import (
 from compressor.reasons import Reason
 
 Metrics = dict[str, Any]  # by name: a number, or an array over joints (and axes)
-Turns = list[np.record]  # tallies, of one revolution each
 SAME_TIME = 1e-12  # of the run: edges this near to each other are one
 
 
 @dataclass
-class Cuts:
-    """Times (s) at which a run's tally is cut.
-
-    `enough`: called at each of them with the tallies so far; once it is true, the run ends there.
-    `turns`: those tallies, of what lies before each cut and after the one before it. `states`: the
-    motion at each cut.
-    """
-
-    times: np.ndarray
-    enough: Callable[[Turns], bool] = lambda turns: False
-    turns: Turns = field(default_factory=list)
-    states: list[np.ndarray] = field(default_factory=list)
-
-    def cut(self, tally: np.record, z: np.ndarray) -> bool:
-        """Append the tally since the last cut to `turns`, clear it, and return whether to go on.
-
-        z: motion and flows there.
-        """
-        self.states.append(z[:-FLOWS].copy())
-        self.turns.append(cut_tally(tally))
-        return not self.enough(self.turns)
-
-
-def revolutions(begin: float, end: float, turn: float) -> np.ndarray:
-    """Return the ends (s) of the whole revolutions between two times, (m,).
-
-    turn: the time of one (s).
-    """
-    return begin + turn * np.arange(1, int((end - begin) / turn * (1 + SAME_TIME)) + 1)
-
-
-def with_cuts(
-    edges: np.ndarray, phases: np.ndarray, cuts: Cuts | None
-) -> tuple[np.ndarray, np.ndarray, list[int]]:
-    """Return segments that end at all cuts as well, and their number up to each cut."""
-    times = []
-    for time in cuts.times if cuts else ():
-        edges, phases, edge = with_edge(edges, phases, time)
-        times.append(edge)
-    return edges, phases, [int(np.searchsorted(edges, edge)) for edge in times]
-
-
-def with_edge(
-    edges: np.ndarray, phases: np.ndarray, time: float
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return segments that end at a time as well, and that time.
-
-    Where an edge lies there already, the segments are the same, and the time is that edge's.
-    """
-    edge = edges[np.abs(edges - time).argmin()]
-    if abs(edge - time) <= SAME_TIME * edges[-1]:
-        return edges, phases, float(edge)
-    i = int(np.searchsorted(edges, time))
-    if i == edges.size:
-        return edges, phases, time
-    edges = np.concatenate((edges[:i], (time,), edges[i:]))
-    return edges, np.concatenate((phases[:i], phases[i - 1 : i], phases[i:])), time
-
-
-def passed_time(p: np.record, times: Any, states: np.ndarray) -> Any:
-    """Return the time (s) that has passed when the crank is where a steady one were at these times.
-
-    times: (...) in s; states: (..., n). Of rates in place of states, and of 1 in place of times, it
-    is how fast time passes there.
-    """
-    driven = is_featured(p) and p["driven"]
-    return times + states[..., p["at"][Coordinate.CRANK] - 1] if driven else times
-
-
-@dataclass
 class Request:
-    """What to integrate: a record (SI), the initial state, samples, span, settings and budgets.
+    """What to integrate: a record (SI), the motion at the start, samples, settings and budgets.
 
-    `cuts`: where the tally is cut into revolutions, if it is; the run's own tally is then of what
-    follows the last one. `has_rod_load`: whether the rod load is tallied.
+    `cuts`: times (s) at which the tally is cut; the run's own one is then of what follows the last.
+    `enough`: called at each of them with the run so far, which ends there once that is true.
+    `has_rod_load`: whether the rod load is tallied.
     """
 
     p: np.record
@@ -114,11 +44,12 @@ class Request:
     method: str = "auto"
     max_steps: int = 5_000_000
     timeout: float = math.inf  # s
-    cuts: Cuts | None = None
     has_rod_load: bool = False
+    cuts: Sequence[float] | np.ndarray = ()
+    enough: "Callable[[Trajectory], bool] | None" = None
 
     @cached_property
-    def fields(self) -> dict[str, Any]:
+    def fields(self) -> Fields:
         """Return `read_fields` of the record, for functions that read many of them."""
         return read_fields(self.p)
 
@@ -128,9 +59,10 @@ class Trajectory:
     """States on the output grid, the tally of the dense solution, and how the run ended.
 
     `states` has shape (m, k) and is nan from the sample at which an incomplete run stopped, by one
-    of SciPy's methods from the last edge before; `reason` is empty when the run is complete;
-    `last_steps`: the last attempts before a stop: where each begins (s), its length (s), its error
-    over its tolerance, nan where that is not known, and what became of it.
+    of the named reasons; `stop_time` and `stop_state` are where. `phases`: of the load, by sample.
+    `turns`: tallies of what lies before each cut and after the one before it; `turn_states`: the
+    motion at each. `last_steps`: of each of the last attempts of a step, begin and length (s),
+    error over its tolerance, nan where that is not known, and what became of it.
     """
 
     times: np.ndarray
@@ -142,21 +74,64 @@ class Trajectory:
     stop_time: float = math.nan
     stop_state: np.ndarray = field(default_factory=lambda: np.empty(0))
     last_steps: Iterable[tuple[float, float, float, str]] = ()
-    segments: tuple[np.ndarray, np.ndarray] | None = None  # edges and phases, as run through
+    edges: np.ndarray = field(default_factory=lambda: np.empty(0))  # of segments, s, with cuts
+    edge_phases: np.ndarray = field(default_factory=lambda: np.empty(0))  # as run through
+    turns: list[np.record] = field(default_factory=list)
+    turn_states: list[np.ndarray] = field(default_factory=list)
     steps: int = 0
     rejected: int = 0
     evaluations: int = 0
     seconds: float = 0.0
+
+    @property
+    def last_state(self) -> np.ndarray:
+        """Return the motion, (k,), where the run ended or stopped."""
+        return self.stop_state if self.reason and self.stop_state.size else self.states[-1]
 
     def at(self, times: np.ndarray) -> "Trajectory":
         """Return the run with the samples at some of its times (s) alone."""
         at = np.searchsorted(self.times, times)
         return replace(self, times=times, states=self.states[at], phases=self.phases[at])
 
+    def cut(self, z: np.ndarray) -> None:
+        """Put the tally since the last cut aside, and begin another; z: motion and flows there."""
+        self.turn_states.append(z[:-FLOWS].copy())
+        self.turns.append(cut_tally(self.tally))
 
-def last_state(run: Trajectory) -> np.ndarray:
-    """Return the motion, (k,), where a run ended or stopped."""
-    return run.stop_state if run.reason and run.stop_state.size else run.states[-1]
+
+def revolutions(begin: float, end: float, turn: float) -> np.ndarray:
+    """Return the ends (s) of the whole revolutions between two times, (m,).
+
+    turn: the time of one (s).
+    """
+    return begin + turn * np.arange(1, int((end - begin) / turn * (1 + SAME_TIME)) + 1)
+
+
+def split_segments(
+    edges: np.ndarray, phases: np.ndarray, times: Sequence[float]
+) -> tuple[np.ndarray, np.ndarray, list[float]]:
+    """Return segments that end at some times (s), too, and these times.
+
+    Where an edge lies already there is no other, and the time is that edge's.
+    """
+    exact = []
+    for time in times:
+        edge = float(edges[np.abs(edges - time).argmin()])
+        exact.append(edge if abs(edge - time) <= SAME_TIME * edges[-1] else time)
+        i = int(np.searchsorted(edges, exact[-1]))
+        if i < edges.size and edges[i] != exact[-1]:
+            edges = np.insert(edges, i, exact[-1])
+            phases = np.insert(phases, i, phases[i - 1])
+    return edges, phases, exact
+
+
+def passed_time(p: np.record, times: Any, states: np.ndarray) -> Any:
+    """Return the time (s) that has passed when the crank is where a steady one were at these times.
+
+    times: (...) in s; states: (..., n).
+    """
+    driven = is_featured(p) and p["driven"]
+    return times + states[..., p["at"][Coordinate.CRANK] - 1] if driven else times
 
 
 class Stop(Exception):

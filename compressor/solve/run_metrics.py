@@ -30,7 +30,7 @@ from compressor.physics import (
     observe_all,
     read_fields,
 )
-from compressor.solve.request import Metrics, Trajectory, last_state
+from compressor.solve.request import Metrics, Trajectory
 
 ROUNDING = 1e-12
 
@@ -97,7 +97,7 @@ def held_by_springs(p: np.record, trajectory: Trajectory) -> float:
     """Return by how much more energy (J) the contacts' springs hold at a run's end than before."""
     if not p["clearance"].any() or not trajectory.states[0].size:
         return 0.0
-    states = np.stack([trajectory.states[0], last_state(trajectory)])
+    states = np.stack([trajectory.states[0], trajectory.last_state])
     rows = np.empty((2, COLUMNS))
     end = trajectory.stop_time if trajectory.reason else trajectory.times[-1]
     times, phases = np.array([trajectory.times[0], end]), trajectory.phases[[0, -1]]
@@ -150,7 +150,7 @@ def next_audit_rtol(rtol: float, failures: int) -> float | None:
 
 def ledger(p: np.record, trajectory: Trajectory) -> dict[str, float]:
     """Return the energy flows and counts by name."""
-    tally, state = trajectory.tally, last_state(trajectory)
+    tally, state = trajectory.tally, trajectory.last_state
     elastic = is_featured(p) and p["elastic"]
     lost = float(state[p["rod_loss"]]) if elastic else 0.0
     # both are integrated by the same stages: without a contact they are equal but for rounding

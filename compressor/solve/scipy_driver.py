@@ -26,7 +26,6 @@ from compressor.physics import (
 from compressor.reasons import Reason
 from compressor.solve.dense_tally import find_missed_contact, tally_steps
 from compressor.solve.request import (
-    Cuts,
     Request,
     Stop,
     Trajectory,
@@ -34,10 +33,7 @@ from compressor.solve.request import (
     greatest_depth,
     overdue,
     passed_time,
-    revolutions,
     too_deep,
-    with_cuts,
-    with_edge,
 )
 from compressor.solve.si_record import absolute_tolerances
 
@@ -50,14 +46,14 @@ EVALUATIONS_PER_STEP = 50  # a step that never ends is caught by its evaluations
 STEPS_AT_ONCE = 1024  # that are tallied together, to save memory
 
 
-def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndarray) -> None:
-    """Integrate by one of SciPy's methods, from edge to edge. Raises Stop."""
-    # each revolution is an edge: the dense solution of a long run would fill memory
-    turns = Cuts(revolutions(0.0, request.times[-1], math.tau / float(request.p["omega"])))
-    edges, phases, settle = with_edge(edges, phases, request.settle)
-    edges, phases, _ = with_cuts(edges, phases, turns)
-    edges, phases, ends = with_cuts(edges, phases, request.cuts)
-    result.segments = edges, phases = edges, phases.copy()
+def step_through(
+    request: Request, result: Trajectory, settle: float, ends: list[int], z: np.ndarray
+) -> None:
+    """Integrate by one of SciPy's methods, from edge to edge. Raises Stop.
+
+    As `run.march_through` by the compiled ones.
+    """
+    edges, phases = result.edges, result.edge_phases
     result.stop_time, result.stop_state = float(edges[0]), z[:-FLOWS].copy()
     result.states[0] = result.stop_state
     run = ScipyRun(request, result, settle)
@@ -65,8 +61,10 @@ def step_through(request: Request, result: Trajectory, edges, phases, z: np.ndar
         enter_segment(edges[i], z, i, phases, request.p)
         run.phase = int(phases[i])
         z = run.go(edges[i], edges[i + 1], z)
-        if request.cuts and i + 1 in ends and not request.cuts.cut(result.tally, z):
-            break
+        if i + 1 in ends:
+            result.cut(z)
+            if request.enough and request.enough(result):
+                break
     result.stop_time = math.nan
 
 

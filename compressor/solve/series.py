@@ -147,19 +147,6 @@ def distances(ours: np.ndarray, theirs: np.ndarray) -> dict[str, np.ndarray]:
     return {name: relative[place] for name, place in sums.items()}
 
 
-def journal_distance(p: np.record, ours: np.ndarray, theirs: np.ndarray) -> float:
-    """Return the greatest distance of the eccentricities of two runs, over the journals' room.
-
-    ours, theirs: observed rows at the same times. A journal's room is its clearance, or how far it
-    came if that is more. 0 for ideal joints.
-    """
-    one, other = block("eccentricity", ours), block("eccentricity", theirs)
-    has_clearance = p["clearance"] > 0
-    distance = np.linalg.norm(one - other, axis=2).max(axis=0)
-    room = np.maximum(p["clearance"], np.linalg.norm(one, axis=2).max(axis=0))
-    return float((distance[has_clearance] / room[has_clearance]).max(initial=0.0))
-
-
 # over time and these dimensions: (dimensions, unit, long name)
 SIGNALS = {
     "shaking_force": (("axis",), "N", "force of the machine on its foundation"),

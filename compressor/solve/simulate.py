@@ -12,7 +12,7 @@ from compressor.outcome import DatasetParts, Outcome, row, without_run, word_var
 from compressor.physics import is_featured, state_names
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
-from compressor.solve.request import Metrics, Trajectory, last_state, passed_time
+from compressor.solve.request import Metrics, Trajectory, passed_time
 from compressor.solve.run import Solution
 from compressor.solve.run_metrics import ledger
 from compressor.solve.series import SIGNALS, block, features, finer, rows_of, signals
@@ -269,7 +269,7 @@ def settle_time(solution: Solution) -> float:
 def stop_time(p: np.record, run: Trajectory) -> float:
     """Return the time (s) at which a run stopped or ended."""
     at = run.stop_time if run.reason else float(run.times[-1])
-    return float(passed_time(p, np.array([at]), last_state(run)[np.newaxis])[0])
+    return float(passed_time(p, np.array([at]), run.last_state[np.newaxis])[0])
 
 
 def stop_attributes(case: Case, solution: Solution) -> dict[str, object]:

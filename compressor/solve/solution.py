@@ -16,7 +16,7 @@ from compressor.solve.error_bars import (
 )
 from compressor.solve.horizon import Search, predictability_horizon
 from compressor.solve.regime import DOUBTFUL, find_span, has_doubtful_bars, repeats
-from compressor.solve.request import Cuts, revolutions
+from compressor.solve.request import revolutions
 from compressor.solve.run import Solution, is_sampled, run_at_tolerance
 from compressor.solve.run_metrics import (
     allowed_residual,
@@ -232,7 +232,7 @@ def chaotic_solution(case: Case, solution: Solution, search: Search) -> Solution
     horizon, ends = search.horizon, revolutions(case.settle, case.duration, case.turn)
     loosest = min(CHAOTIC_RTOL, case.rtol)
     for rtol in sorted({loosest, min(loosest, solution.rtol)}, reverse=True):
-        now = run_at_tolerance(case, rtol, search.left, is_sampled(case), Cuts(ends))
+        now = run_at_tolerance(case, rtol, search.left, is_sampled(case), cuts=ends)
         now.horizon, now.settled, now.regime = horizon, solution.settled, Regime.CHAOTIC
         if now.reason or energy_balances(case, now):
             break
@@ -242,9 +242,9 @@ def chaotic_solution(case: Case, solution: Solution, search: Search) -> Solution
         return fail_energy_audit(case, now, f"at rtol {now.rtol:.2g}")
     if case.wants_bars:
         estimate_errors(now)
-        if now.turns:
-            now.statistics = statistics(now.p, now.turns)
-            now.bars |= chaotic_bars(now.p, now.turns, now.statistics, now.metrics)
+        if turns := now.trajectory.turns:
+            now.statistics = statistics(now.p, turns)
+            now.bars |= chaotic_bars(now.p, turns, now.statistics, now.metrics)
         if excess_over_promise(case, now) > 1.0 and case.targets:
             reason = f"the motion is chaotic from {horizon / case.turn:.3g} revolutions on"
             return fail_accuracy(case, now, reason)

@@ -25,7 +25,7 @@ from compressor.cases.case import Case
 from compressor.metrics import JOINTS
 from compressor.outcome import Regime
 from compressor.solve.horizon import predictability_horizon
-from compressor.solve.request import Cuts, revolutions
+from compressor.solve.request import revolutions
 from compressor.solve.run import run_at_tolerance
 from compressor.solve.run_metrics import metrics
 from compressor.solve.simulate import measure, simulate
@@ -161,11 +161,12 @@ def told(values, method):
         return row
     how = {**RANDOM, "method": method, "rtol": OTHER_RTOL, "error_bars": False}
     other = Case.from_values({**values, "solve": how})
-    cuts = Cuts(revolutions(of.settle, of.duration, of.turn))
-    run = run_at_tolerance(other, OTHER_RTOL, how["timeout_s"], False, cuts)
+    ends = revolutions(of.settle, of.duration, of.turn)
+    run = run_at_tolerance(other, OTHER_RTOL, how["timeout_s"], False, cuts=ends)
     if run.reason:
         return {**row, "other": run.reason}
-    squares = np.array([metrics(run.p, turn)["rms_acceleration"] ** 2 for turn in cuts.turns])
+    turns = run.trajectory.turns
+    squares = np.array([metrics(run.p, turn)["rms_acceleration"] ** 2 for turn in turns])
     mean, error = batch_mean(squares)
     rms, theirs = float(found.numbers["rms_acceleration"]), math.sqrt(mean)
     ours = float(found.numbers["rms_acceleration_standard_error"])

@@ -19,8 +19,9 @@ import numpy as np
 from compressor.cases.case import Case
 from compressor.physics import exact_motion, segments
 from compressor.physics.tally import ROD_LOAD
+from compressor.solve.dense_tally import closed_form
 from compressor.solve.request import Request
-from compressor.solve.run import closed_form, integrate
+from compressor.solve.run import integrate
 from compressor.solve.series import rows_of
 from compressor.solve.si_record import initial_state, is_ideal, record
 from compressor.solve.simulate import measure

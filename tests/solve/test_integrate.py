@@ -10,7 +10,7 @@ from compressor.cases.case import Case
 from compressor.cases.groups import METHODS
 from compressor.cases.parameter import ACCURACY
 from compressor.physics.record import FREEDOMS
-from compressor.solve.run import CHUNK, COMPILED, with_edge
+from compressor.solve.run import CHUNK, COMPILED, split_segments
 from compressor.solve.si_record import absolute_tolerances, record, scene
 from compressor.solve.simulate import measure, simulate
 
@@ -182,10 +182,10 @@ def test_tolerances_scale_with_the_clearance(joint):
 
 def test_settling_at_a_corner_makes_no_segment_of_rounding():
     edges, phases = np.array([0.0, 0.1, 0.2, 0.4]), np.array([0, 1, 2])
-    assert with_edge(edges, phases, 0.1 + 1e-17)[2] == 0.1
+    assert split_segments(edges, phases, [0.1 + 1e-17])[2] == [0.1]
     for at in (0.1, np.nextafter(0.1, 1), 0.0, 0.4, 0.9):
-        assert with_edge(edges, phases, at)[0] is edges
-    found = with_edge(edges, phases, 0.3)
+        assert split_segments(edges, phases, [at])[0] is edges
+    found = split_segments(edges, phases, [0.3])
     assert [part.tolist() for part in found[:2]] == [[0, 0.1, 0.2, 0.3, 0.4], [0, 1, 2, 2]]
 
 

@@ -15,7 +15,6 @@ from compressor.solve.series import (
     compared_per_rev,
     compared_times,
     distances,
-    journal_distance,
     rows_of,
 )
 from compressor.solve.simulate import simulate
@@ -92,15 +91,3 @@ def test_a_block_is_what_is_stored():
     rows = rows_of(run.p, run.trajectory)
     for name in SERIES:
         np.testing.assert_array_equal(stored[name].values, block(name, rows))
-
-
-def test_journals_part_by_their_distance_over_their_room():
-    p = np.array((np.array([1e-4, 0.0]),), dtype=[("clearance", "f8", 2)])[()]
-    ours, theirs = np.zeros((3, COLUMNS)), np.zeros((3, COLUMNS))
-    big, small = Column.ECCENTRICITY, Column.ECCENTRICITY + 2
-    assert journal_distance(p, ours, theirs) == 0.0
-    theirs[1, big : big + 2] = 3e-5, 4e-5
-    theirs[1, small : small + 2] = 1.0  # of a joint without clearance
-    assert journal_distance(p, ours, theirs) == pytest.approx(0.5)
-    ours[2, big : big + 2] = theirs[2, big : big + 2] = 0.0, 2e-4  # as far as it came
-    assert journal_distance(p, ours, theirs) == pytest.approx(0.25)

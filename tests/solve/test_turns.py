@@ -6,7 +6,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
 from compressor.physics import merge_tallies
-from compressor.solve.request import Cuts, revolutions
+from compressor.solve.request import revolutions
 from compressor.solve.run import run_at_tolerance
 from compressor.solve.run_metrics import metrics
 
@@ -18,9 +18,9 @@ def case(joint, method, **solve):
     return Case.from_values({"joint": joint, "clearance_mm": 0.2, "solve": solve})
 
 
-def run(of, cuts=None):
+def run(of, cuts=(), enough=None):
     rtol = 1e-7 if of.solve.method == "DOP853" else 1e-8  # which steps in Python
-    return run_at_tolerance(of, rtol, 60.0, False, cuts)
+    return run_at_tolerance(of, rtol, 60.0, False, cuts=cuts, enough=enough)
 
 
 def ends(of):
@@ -33,10 +33,9 @@ def ends(of):
 )
 def test_revolutions_add_up_to_the_whole_run(joint, method):
     of = case(joint, method)
-    cuts = Cuts(ends(of))
-    whole, parted = run(of), run(of, cuts)
-    assert len(parted.turns) == 2
-    for turn in parted.turns:
+    whole, parted = run(of), run(of, ends(of))
+    assert len(parted.trajectory.turns) == 2
+    for turn in parted.trajectory.turns:
         assert turn["seconds"] == pytest.approx(of.turn, rel=1e-9)
     tally = parted.trajectory.tally
     assert tally["seconds"] == pytest.approx(of.duration - of.settle, rel=1e-9)
@@ -49,9 +48,7 @@ def test_revolutions_add_up_to_the_whole_run(joint, method):
 def test_a_revolution_has_its_own_peaks():
     """The start-up's are greater than those of a settled one."""
     of = case("big_end", "auto", settle_rev=0)
-    cuts = Cuts(ends(of))
-    run(of, cuts)
-    each = [metrics(run(of).p, turn) for turn in cuts.turns]
+    each = [metrics(run(of).p, turn) for turn in run(of, ends(of)).trajectory.turns]
     assert each[0]["peak_acceleration"] > 1.01 * each[1]["peak_acceleration"]
     alone = run(case("big_end", "auto", settle_rev=1, duration_rev=2))
     for name in METRICS:
@@ -60,9 +57,9 @@ def test_a_revolution_has_its_own_peaks():
 
 def test_a_run_ends_where_enough_is_known():
     of = case("big_end", "auto", settle_rev=0, duration_rev=2)
-    found = run(of, Cuts(ends(of), lambda turns: len(turns) == 1))
+    found = run(of, ends(of), lambda run: len(run.turns) == 1)
     assert not found.reason
-    assert len(found.turns) == 1
+    assert len(found.trajectory.turns) == 1
     assert found.trajectory.tally["seconds"] == pytest.approx(of.turn, rel=1e-9)
     assert found.trajectory.steps < 0.6 * run(of).trajectory.steps
 
@@ -75,10 +72,8 @@ def test_cuts_are_whole_revolutions_from_settling_on():
 
 def test_tallies_are_merged_by_sums_and_greatest_values():
     of = case("both", "auto")
-    cuts = Cuts(ends(of))
-    run(of, cuts)
-    one, two = cuts.turns
-    both = merge_tallies(cuts.turns)
+    one, two = turns = run(of, ends(of)).trajectory.turns
+    both = merge_tallies(turns)
     for name in TALLIED:
         np.testing.assert_allclose(both[name], one[name] + two[name])
     np.testing.assert_array_equal(both["peak"], np.maximum(one["peak"], two["peak"]))

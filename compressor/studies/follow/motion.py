@@ -10,7 +10,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,9 +20,8 @@ from compressor.outcome import Regime
 from compressor.physics import merge_tallies, state_names
 from compressor.reasons import Reason
 from compressor.solve import (
-    Cuts,
     Metrics,
-    Turns,
+    Trajectory,
     allowed_residual,
     energy_residual,
     find_repetition,
@@ -55,7 +53,8 @@ SPLANN = (
 )  # fmt: skip
 
 Row = dict[str, Any]
-Enough = Callable[[Turns, np.ndarray], bool]  # of revolutions so far, and their Poincaré points
+# of the tallies of revolutions so far, and their Poincaré points
+Enough = Callable[[list[np.record], np.ndarray], bool]
 TEXTS = {
     "status": "ok or failed",
     "reason": "why the value failed, by a stable name",
@@ -103,7 +102,7 @@ class RevolutionRun:
     """
 
     p: np.record
-    turns: Turns
+    turns: list[np.record]
     points: np.ndarray
     state: np.ndarray
     reason: str
@@ -128,7 +127,7 @@ def run_value(case: Case, state: np.ndarray | None, plan: ValuePlan) -> Row:
         return failed_row(row, run)
     within, clearance = tolerance(case), record(case)["clearance"].copy()
 
-    def period_in(turns: Turns, points: np.ndarray) -> int | None:
+    def period_in(turns: list[np.record], points: np.ndarray) -> int | None:
         return period_of(places(points, clearance), within)
 
     run = follow_revolutions(
@@ -200,7 +199,7 @@ def settle_motion(
     p, within = record(case), least_promise(case)
     each: list[Metrics] = []
 
-    def enough(turns: Turns, points: np.ndarray) -> bool:
+    def enough(turns: list[np.record], points: np.ndarray) -> bool:
         each.append(metrics(p, turns[-1]))
         return steady(each, within) is not None
 
@@ -223,16 +222,15 @@ def follow_revolutions(
     bare, rtol = bare_case(case, most), case.rtol
     p, ends = record(bare), revolutions(0.0, bare.duration, bare.turn)
 
-    def is_enough(states: list[np.ndarray], turns: Turns) -> bool:
-        return enough(turns, poincare_points(p, states))
+    def is_enough(run: Trajectory) -> bool:
+        return enough(run.turns, poincare_points(p, run.turn_states))
 
     for failures in itertools.count(1):
-        cuts = Cuts(ends)
-        cuts.enough = partial(is_enough, cuts.states)
         left = max(deadline - time.monotonic(), 0.0)
-        run = run_at_tolerance(bare, rtol, left, False, cuts, state)
-        residual = energy_residual(run.trajectory.tally)
-        allowed = allowed_residual(case.rtol, len(cuts.turns))
+        run = run_at_tolerance(bare, rtol, left, False, state, ends, is_enough)
+        trajectory = run.trajectory
+        residual = energy_residual(trajectory.tally)
+        allowed = allowed_residual(case.rtol, len(trajectory.turns))
         if run.reason or residual <= allowed:
             break
         tighter = next_audit_rtol(rtol, failures)
@@ -242,10 +240,10 @@ def follow_revolutions(
             run.detail = text
             break
         rtol = tighter
-    nothing = np.full(run.trajectory.states.shape[1], math.nan)
-    end = cuts.states[-1] if cuts.states else nothing
-    points = poincare_points(p, cuts.states)
-    return RevolutionRun(p, cuts.turns, points, end, run.reason, run.detail)
+    states = trajectory.turn_states
+    end = states[-1] if states else np.full(trajectory.states.shape[1], math.nan)
+    points = poincare_points(p, states)
+    return RevolutionRun(p, trajectory.turns, points, end, run.reason, run.detail)
 
 
 def bare_case(case: Case, count: int) -> Case:

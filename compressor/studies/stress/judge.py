@@ -28,6 +28,7 @@ import numpy as np
 
 from compressor.cases import TIGHTEST, Case
 from compressor.metrics import METRICS
+from compressor.physics import Column
 from compressor.solve import (
     COMPILED,
     Solution,
@@ -125,9 +126,23 @@ def by_numbers(case: Case, result: StressFinding) -> None:
         if other is not None:
             result.verdict, result.judged = verdict, parts
             result.reason = "judges_disagree" if verdict == "unjudged" else ""
-            result.apart = found.journals_apart(other)
+            result.apart = journal_distance(found.p, found.samples, other.samples)
             return
     result.reason = "judges_fail"
+
+
+def journal_distance(p: np.record, ours: np.ndarray, theirs: np.ndarray) -> float:
+    """Return the greatest distance of the eccentricities of two runs, over the journals' room.
+
+    ours, theirs: observed rows at the same times. A journal's room is its clearance, or how far it
+    came if that is more. 0 for ideal joints.
+    """
+    places = slice(Column.ECCENTRICITY, Column.ECCENTRICITY + 4)
+    one, other = (rows[:, places].reshape(-1, 2, 2) for rows in (ours, theirs))
+    has_clearance = p["clearance"] > 0
+    distance = np.linalg.norm(one - other, axis=2).max(axis=0)
+    room = np.maximum(p["clearance"], np.linalg.norm(one, axis=2).max(axis=0))
+    return float((distance[has_clearance] / room[has_clearance]).max(initial=0.0))
 
 
 def by_statistics(case: Case, result: StressFinding) -> None:

@@ -59,7 +59,7 @@ def row():
 def test_revolutions_from_a_state_are_a_run_from_it():
     first = follow_revolutions(BIG_END, None, 2, soon())
     again = follow_revolutions(BIG_END, first.state, 1, soon())
-    run = run_at_tolerance(bare_case(BIG_END, 1), BIG_END.rtol, 60.0, False, None, first.state)
+    run = run_at_tolerance(bare_case(BIG_END, 1), BIG_END.rtol, 60.0, False, first.state)
     np.testing.assert_array_equal(run.trajectory.states[0], first.state)
     apart = np.abs(again.state - run.trajectory.states[-1]) / np.abs(again.state)
     assert apart.max() < 1e-12
@@ -154,7 +154,7 @@ def test_a_value_begins_at_the_state_that_it_is_given(row):
     found = run_value(after, state, PLAN)
     settled, since = settle_motion(after, state, soon())
     first = follow_revolutions(after, state, 1, soon())
-    run = run_at_tolerance(bare_case(after, 1), after.rtol, 60.0, False, None, state)
+    run = run_at_tolerance(bare_case(after, 1), after.rtol, 60.0, False, state)
     np.testing.assert_array_equal(run.trajectory.states[0], state)
     np.testing.assert_allclose(first.state, run.trajectory.states[-1], rtol=1e-9)
     np.testing.assert_allclose(settled.points[0], first.points[0], rtol=1e-9)

@@ -10,6 +10,7 @@ from compsim import cli
 from conftest import jobs_here
 
 from compressor.cases.case import Case
+from compressor.physics import COLUMNS, Column
 from compressor.report.figures.pictures import render
 from compressor.solve.error_bars import bars
 from compressor.solve.solution import solve
@@ -23,6 +24,7 @@ from compressor.studies.stress.judge import (
     compare,
     compare_statistics,
     excess,
+    journal_distance,
     judge,
     judges,
     shorten_case,
@@ -267,3 +269,15 @@ def test_the_command_writes_data_and_map(capsys, tmp_path, in_process):
     assert out.startswith("supported range: 1 scene,")
     assert "peak memory of a worker: " in out
     assert {path.name for path in tmp_path.iterdir()} == {FILE, "stress.png", "stress.svg"}
+
+
+def test_journals_part_by_their_distance_over_their_room():
+    p = np.array((np.array([1e-4, 0.0]),), dtype=[("clearance", "f8", 2)])[()]
+    ours, theirs = np.zeros((3, COLUMNS)), np.zeros((3, COLUMNS))
+    big, small = Column.ECCENTRICITY, Column.ECCENTRICITY + 2
+    assert journal_distance(p, ours, theirs) == 0.0
+    theirs[1, big : big + 2] = 3e-5, 4e-5
+    theirs[1, small : small + 2] = 1.0  # of a joint without clearance
+    assert journal_distance(p, ours, theirs) == pytest.approx(0.5)
+    ours[2, big : big + 2] = theirs[2, big : big + 2] = 0.0, 2e-4  # as far as it came
+    assert journal_distance(p, ours, theirs) == pytest.approx(0.25)
