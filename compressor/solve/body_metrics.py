@@ -78,8 +78,7 @@ def bars(case: Case, solution: Solution, ours: Monitored, metrics: Metrics) -> M
         bars_by(case, metrics, ours, shake_by(case, one), closeness(one.rtol / solution.rtol))
         for one in solution.companions if not one.reason and one.trajectory.times.size == size
     ]  # fmt: skip
-    unknown = {name: np.full(np.shape(value), math.inf) for name, value in metrics.items()}
-    return longest_bars(found) if found else unknown
+    return longest_bars(found, {name: np.shape(value) for name, value in metrics.items()})
 
 
 def bars_by(

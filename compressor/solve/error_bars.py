@@ -21,7 +21,7 @@ judge nothing (tests/results/calibration.md).
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -37,27 +37,11 @@ SIDES = "peak_rod_load_tension", "peak_rod_load_compression"
 
 TIGHTER_DISTANCE_FACTOR = 3.0  # of the distance of a time series to a tighter run's
 LOOSER, TEN, FALL = 0.37, 10.0, 0.65  # share of a run TEN times looser, and how it falls beyond
+NOTHING: Metrics = {}
 FLOOR = 0.1  # of the energy residual, relative to the metric
 ORDER = 0.8  # power of the tolerance with which errors fall
 # times rtol ** ORDER: a distance of accelerations beyond ten times the usual one
 AMPLIFIED_FACTOR = 50.0
-
-
-class Companion(NamedTuple):
-    """Another run of a case, by which a run's errors are estimated.
-
-    `ratio`: its tolerance over the run's; `apart`: the distance of each time series of the two
-    (`compressor.solve.series.distances`).
-    """
-
-    metrics: Mapping[str, Any]
-    ratio: float
-    apart: Mapping[str, Any]
-
-    @property
-    def closeness(self) -> float:
-        """Return the share of the difference from this run that counts; 1 of a tighter run."""
-        return closeness(self.ratio)
 
 
 def closeness(ratio: float) -> float:
@@ -73,66 +57,48 @@ def is_amplified(rtol: float, apart: Mapping[str, Any]) -> bool:
     return bool(apart["acceleration"] > AMPLIFIED_FACTOR * rtol**ORDER)
 
 
-def longest_bars(found: Sequence[Metrics]) -> Metrics:
-    """Return the greatest of several bars or errors of each name."""
-    return {name: np.maximum.reduce([one[name] for one in found]) for name in found[0]}
-
-
 def ratio_of(share: float) -> float:
     """Return the ratio of tolerances with a closeness."""
     return TEN * (LOOSER / share) ** (1.0 / FALL)
 
 
 def bars(
-    metrics: Mapping[str, Any],
-    other: Companion | None,
-    residual: float,
-    switching: Metrics | None = None,
-) -> Metrics:
-    """Return the error bar of each metric of a run's tally, in its unit and shape.
+    metrics: Mapping[str, Any], theirs: Mapping[str, Any], ratio: float, apart: Mapping[str, Any],
+    residual: float, switching: Mapping[str, Any] = NOTHING,
+) -> Metrics:  # fmt: skip
+    """Return the error bar of each metric of a run's tally, in its unit and shape, by another run.
 
-    residual: energy imbalance relative to what the contacts lose; switching: how far some of them
-    move with changes of contact (`run_metrics.switch_errors`). All are inf without another run,
-    and those of metrics with a unit also where their series, or the acceleration, may be wrong by
-    all of itself.
+    theirs: its metrics; ratio: its tolerance over the run's; apart: the distance of each time
+    series of the two; residual: energy imbalance relative to what the contacts lose; switching: how
+    far some metrics move with changes of contact (`switch_errors`). Those of metrics with a unit
+    are inf where their series, or the acceleration, may be wrong by all of itself.
     """
-    if other is None:
-        return {name: np.full(np.shape(value), np.inf) for name, value in metrics.items()}
-    errors = {}
+    errors, share = {}, closeness(ratio)
     for name, value in metrics.items():
-        metric = NUMBERS[name]
+        metric, ndim = NUMBERS[name], np.ndim(value)
         bar, size = metric.bar, np.ones(np.shape(value)) if metric.is_pure_number else np.abs(value)
         if name in SIDES:  # a small peak is as wrong as the force is
             size = max(metrics[side] for side in SIDES)
-        apart = other.apart[metric.series]
-        if np.ndim(apart) and "joint" not in metric.dims:
-            apart = apart[metric.joint]
+        distance = apart[metric.series]
+        if np.ndim(distance):  # by joint
+            shape = (-1,) + (1,) * (ndim - 1)
+            distance = distance.reshape(shape) if "joint" in metric.dims else distance[metric.joint]
         # a metric's own difference may be small by chance, that of its series is not
-        difference = bar.own * np.abs(np.asarray(value) - other.metrics[name])
-        series_part = bar.path * to_metric_shape(apart, np.ndim(value)) * size
-        errors[name] = other.closeness * np.hypot(difference, series_part)
-        errors[name] = errors[name] + (switching or {}).get(name, 0.0)
+        difference = bar.own * np.abs(np.asarray(value) - theirs[name])
+        error = share * np.hypot(difference, bar.path * distance * size) + switching.get(name, 0.0)
         if not metric.is_pure_number:
-            errors[name] = np.maximum(errors[name], max(FLOOR * residual, bar.least) * size)
-            farthest = np.maximum(apart, other.apart["acceleration"])
-            lost = TIGHTER_DISTANCE_FACTOR * other.closeness * farthest >= 1.0
-            errors[name] = np.where(to_metric_shape(lost, np.ndim(value)), np.inf, errors[name])
+            error = np.maximum(error, max(FLOOR * residual, bar.least) * size)
+            farthest = np.maximum(distance, apart["acceleration"])
+            lost = TIGHTER_DISTANCE_FACTOR * share * farthest >= 1.0
+            error = np.where(lost, np.inf, error)
+        errors[name] = error
     return errors
 
 
-def to_metric_shape(apart: Any, ndim: int) -> np.ndarray:
-    """Return a number, or one of each joint, in the shape of a metric over joints, and axes."""
-    return np.reshape(apart, np.shape(apart) + (1,) * (ndim - np.ndim(apart)))
-
-
-def series_errors(other: Companion | None) -> Metrics:
-    """Return the relative L2 error of each time series of a run; inf without another run."""
-    if other is None:
-        shape = {name: (2,) if "joint" in dims else () for name, (dims, _, _) in SERIES.items()}
-        return {name: np.full(shape[name], np.inf) for name in SERIES}
+def series_errors(ratio: float, apart: Mapping[str, Any]) -> Metrics:
+    """Return the relative L2 error of each time series of a run by another: see `bars`."""
     return {
-        name: TIGHTER_DISTANCE_FACTOR * other.closeness * value
-        for name, value in other.apart.items()
+        name: TIGHTER_DISTANCE_FACTOR * closeness(ratio) * value for name, value in apart.items()
     }
 
 
@@ -143,12 +109,11 @@ def missed_targets(
 
     A metric of 0, such as the penetration of an ideal joint, is met by a bar of 0 alone.
     """
-    messages = []
-    for name, target in targets:
-        long = relative_bar(metrics[name], error[name])
-        if long > target:
-            messages.append(f"{name}: its error bar is {long:.2g} of it, not {target:g}")
-    return messages
+    return [
+        f"{name}: its error bar is {long:.2g} of it, not {target:g}"
+        for name, target in targets
+        if (long := relative_bar(metrics[name], error[name])) > target
+    ]
 
 
 def relative_bar(metric: Any, bar: Any) -> float:
@@ -185,12 +150,6 @@ STIFF_TIGHTER = 10.0  # the same at loose tolerances
 LOOSER_FACTOR = 3.0  # times: the third run that is compared where a motion enlarges errors
 
 
-def companion_rtol(p: np.record, rtol: float) -> float | None:
-    """Return the tolerance of a run's tighter `comparison_run` by its own method, or None."""
-    fits = rtol >= 0.99 * TIGHTER_FACTOR * TIGHTEST and not overruns_friction(p, rtol)
-    return rtol / TIGHTER_FACTOR if fits else None
-
-
 def overruns_friction(p: np.record, rtol: float) -> bool:
     """Return whether explicit steps may run over friction's fast modes or its change of sign.
 
@@ -208,13 +167,14 @@ def comparison_run(case: Case, solution: Solution, timeout: float) -> Solution:
     A tighter one; a looser one only where the tolerance leaves no room below it.
     Where explicit steps may run over friction, it is a run by the stiff method.
     """
-    tighter, sampled = companion_rtol(solution.p, solution.rtol), case.body is not None
-    if tighter is not None:
-        return run_at_tolerance(case, tighter, timeout, sampled)
-    if overruns_friction(solution.p, solution.rtol):
-        stiff = replace(case, solve=replace(case.solve, method="RODAS"))
-        return run_at_tolerance(stiff, solution.rtol / STIFF_TIGHTER, timeout, sampled)
-    return run_at_tolerance(case, 10.0 * solution.rtol, timeout, sampled)
+    rtol = solution.rtol
+    if overruns_friction(solution.p, rtol):
+        case, rtol = replace(case, solve=replace(case.solve, method="RODAS")), rtol / STIFF_TIGHTER
+    elif rtol >= 0.99 * TIGHTER_FACTOR * TIGHTEST:
+        rtol /= TIGHTER_FACTOR
+    else:
+        rtol *= 10.0
+    return run_at_tolerance(case, rtol, timeout, case.body is not None)
 
 
 def looser_comparison_run(
@@ -238,18 +198,22 @@ def estimate_errors(solution: Solution, *others: Solution) -> None:
     for one in others:
         one.companions = ()  # so that the runs of a long search are not all in memory
     solution.companions = others
-    residual = energy_residual(solution.trajectory.tally)
-    switching = switch_errors(
-        solution.p, solution.metrics, solution.trajectory.tally, solution.rtol
-    )
-    companions = [compare_with_run(solution, one) for one in others if not one.reason]
-    runs: list[Companion | None] = [*companions] or [None]
-    found = [bars(solution.metrics, one, residual, switching) for one in runs]
-    solution.bars = longest_bars(found)
-    solution.series_errors = longest_bars([series_errors(one) for one in runs])
+    numbers, tally, rtol = solution.metrics, solution.trajectory.tally, solution.rtol
+    residual, switching = energy_residual(tally), switch_errors(solution.p, numbers, tally, rtol)
+    found, errors = [], []
+    for other in others:
+        if not other.reason:
+            ratio, apart = other.rtol / rtol, distances(solution.samples, other.samples)
+            found.append(bars(numbers, other.metrics, ratio, apart, residual, switching))
+            errors.append(series_errors(ratio, apart))
+    shapes = {name: (2,) if "joint" in dims else () for name, (dims, _, _) in SERIES.items()}
+    solution.bars = longest_bars(found, {name: np.shape(one) for name, one in numbers.items()})
+    solution.series_errors = longest_bars(errors, shapes)
 
 
-def compare_with_run(solution: Solution, other: Solution) -> Companion:
-    """Return the `Companion` of a run: another one, which reached its end, and their distances."""
-    apart = distances(solution.samples, other.samples)
-    return Companion(other.metrics, other.rtol / solution.rtol, apart)
+def longest_bars(found: Sequence[Metrics], shapes: Mapping[str, tuple[int, ...]]) -> Metrics:
+    """Return the greatest of several bars of each name, inf where there is none."""
+    return {
+        name: np.maximum.reduce([one[name] for one in found]) if found else np.full(shape, np.inf)
+        for name, shape in shapes.items()
+    }

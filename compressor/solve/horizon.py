@@ -16,10 +16,11 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.cases import Case
-from compressor.physics import COLUMNS, Column, Coordinate, is_featured, observe_all
+from compressor.physics import COLUMNS, Coordinate, is_featured
 from compressor.reasons import Reason
 from compressor.solve.request import Request, Trajectory
 from compressor.solve.run import integrate
+from compressor.solve.series import block, rows_of
 from compressor.solve.si_record import initial_state, is_ideal, record
 
 SHIFT = 1e-9  # of the clearance: how far from the motion the other one starts
@@ -41,24 +42,20 @@ def predictability_horizon(
     there: no more is known.
     The case's own method and tolerance do not count: the horizon belongs to the motion.
     """
-    return compare_shifted(case, case.duration, rtol, shift, timeout).horizon
+    found = compare_shifted(case, case.duration, rtol, shift, timeout)
+    return math.inf if found.whole else found.time
 
 
 class Parting(NamedTuple):
     """Up to when (s) two motions were compared, whether they parted there, or came to the end.
 
-    `evaluations`: of both runs.
+    `evaluations`: of all runs.
     """
 
     time: float
     parted: bool
     whole: bool
     evaluations: int = 0
-
-    @property
-    def horizon(self) -> float:
-        """Return the time (s) up to which they stayed together; inf to the end."""
-        return math.inf if self.whole else self.time
 
 
 def compare_shifted(case: Case, end: float, rtol: float, shift: float, timeout: float) -> Parting:
@@ -68,41 +65,30 @@ def compare_shifted(case: Case, end: float, rtol: float, shift: float, timeout: 
     """
     if is_ideal(case):
         return Parting(end, False, True)
-    deadline, evaluations = time.monotonic() + timeout, 0
-    span = FIRST_SPAN_REV * case.turn
-    while True:
-        span = min(span, end)
-        found = compare_over(case, span, rtol, shift, deadline - time.monotonic())
-        evaluations += found.evaluations
-        if not found.whole or span == end:
-            return found._replace(evaluations=evaluations)
-        span *= SPAN_GROWTH
-
-
-def compare_over(case: Case, span: float, rtol: float, shift: float, timeout: float) -> Parting:
-    """Compare both runs over one span (s), as `compare_shifted` does."""
-    deadline = time.monotonic() + timeout
-    p = record(case)
+    p, evaluations, deadline = record(case), 0, time.monotonic() + timeout
     starts = [
         initial_state(case, p, part * p["clearance"][:, None] / math.sqrt(2.0))
         for part in (0.0, shift)
     ]
     if is_featured(p) and p["tilting"]:
         starts[1][p["at"][Coordinate.GUIDE]] += shift * p["guide_clearance"]
-    times = np.linspace(0.0, span, math.ceil(LOOKS_PER_REV * span / case.turn) + 1)
-
-    def run(start: np.ndarray) -> Trajectory:
-        left, most = deadline - time.monotonic(), case.solve.max_steps
-        return integrate(Request(p, start, times, 0.0, rtol, "auto", most, left))
-
-    one, other = map(run, starts)
-    ends = [run.stop_time if run.reason else span for run in (one, other)]
-    apart = distance_over_clearance(p, one, other)
-    evaluations = one.evaluations + other.evaluations
-    parted = np.flatnonzero(apart > PARTED_DISTANCE)
-    if parted.size:
-        return Parting(float(times[parted[0]]), True, False, evaluations)
-    return Parting(min(ends), False, not (one.reason or other.reason), evaluations)
+    span = min(FIRST_SPAN_REV * case.turn, end)
+    while True:
+        times = np.linspace(0.0, span, math.ceil(LOOKS_PER_REV * span / case.turn) + 1)
+        runs = []
+        for start in starts:
+            left, most = deadline - time.monotonic(), case.solve.max_steps
+            runs.append(integrate(Request(p, start, times, 0.0, rtol, "auto", most, left)))
+        evaluations += sum(run.evaluations for run in runs)
+        parted = np.flatnonzero(distance_over_clearance(p, *runs) > PARTED_DISTANCE)
+        if parted.size:
+            return Parting(float(times[parted[0]]), True, False, evaluations)
+        if any(run.reason for run in runs):
+            reached = min(run.stop_time if run.reason else span for run in runs)
+            return Parting(reached, False, False, evaluations)
+        if span == end:
+            return Parting(end, False, True, evaluations)
+        span = min(SPAN_GROWTH * span, end)
 
 
 def distance_over_clearance(p: np.record, one: Trajectory, other: Trajectory) -> np.ndarray:
@@ -110,13 +96,9 @@ def distance_over_clearance(p: np.record, one: Trajectory, other: Trajectory) ->
 
     At the worst joint, or in the guide where it has play; nan where one of them has stopped.
     """
-    found = []
-    for run in (one, other):
-        rows = np.empty((run.times.size, COLUMNS))
-        observe_all(run.times, run.states, run.phases, p, rows)
-        found.append(rows[:, Column.ECCENTRICITY : Column.ACCELERATION].reshape(-1, 2, 2))
+    places = [block("eccentricity", rows_of(p, run, COLUMNS)) for run in (one, other)]
     worn = p["clearance"] > 0.0
-    apart = np.linalg.norm(found[1] - found[0], axis=2)[:, worn] / p["clearance"][worn]
+    apart = np.linalg.norm(places[1] - places[0], axis=2)[:, worn] / p["clearance"][worn]
     if is_featured(p) and p["tilting"]:
         guide = p["at"][Coordinate.GUIDE]
         across = np.abs(other.states[:, guide] - one.states[:, guide]) / p["guide_clearance"]
@@ -199,21 +181,20 @@ class Search:
             if self.left <= 0.0:
                 self.stopped = True
                 return False
+
+            def compare(end: float, rtol: float) -> Parting:
+                limited = self.limit_steps((self.work - self.shifted_evaluations) / 2)
+                found = compare_shifted(limited, end, rtol, LOOK_SHIFT, self.left)
+                self.shifted_evaluations += found.evaluations
+                return found
+
             end = case.duration if whole else min(FIRST_SPAN_REV * case.turn, case.duration)
-            found = self.compare(end, LOOK_RTOL)
+            found = compare(end, LOOK_RTOL)
             if found.parted:
-                found = self.compare(
-                    min(LATER_FACTOR * found.time, case.duration), LOOK_RTOL / SURE_FACTOR
-                )
+                end = min(LATER_FACTOR * found.time, case.duration)
+                found = compare(end, LOOK_RTOL / SURE_FACTOR)
                 self.horizon = found.time if found.parted else math.nan
             elif found.whole and end == case.duration:
                 self.horizon = math.inf
             self.stopped = not (found.parted or found.whole)
         return self.horizon < case.duration
-
-    def compare(self, end: float, rtol: float) -> Parting:
-        """Compare the motion with a shifted one up to an end (s), within the budget."""
-        case = self.limit_steps((self.work - self.shifted_evaluations) / 2)
-        found = compare_shifted(case, end, rtol, LOOK_SHIFT, self.left)
-        self.shifted_evaluations += found.evaluations
-        return found

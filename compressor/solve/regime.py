@@ -18,7 +18,6 @@ import numpy as np
 from compressor.cases import ACCURACY, Case
 from compressor.metrics import METRICS
 from compressor.physics import merge_tallies
-from compressor.solve.error_bars import relative_bar
 from compressor.solve.horizon import Search
 from compressor.solve.request import SAME_TIME, Metrics, Trajectory, revolutions
 from compressor.solve.run import Solution, is_sampled, output_times, run_at_tolerance
@@ -26,17 +25,7 @@ from compressor.solve.run_metrics import metrics
 from compressor.solve.series import compared_per_rev, compared_times, distances
 from compressor.solve.si_record import is_ideal, record
 
-DOUBTFUL = 0.1  # of a number: an error from which on chaos is looked for
 SAME_REVOLUTION = 1e-9  # relative distance of revolutions that rounding makes
-
-
-def has_doubtful_bars(metrics: Metrics, bars: Metrics) -> bool:
-    """Return whether a metric's error bar reaches a tenth of it; shares and counts are left out."""
-    return any(
-        relative_bar(metrics[name], bars[name]) >= DOUBTFUL
-        for name, row in METRICS.items()
-        if row.bar.relative
-    )
 
 
 def find_repetition(

@@ -97,18 +97,15 @@ def held_by_springs(p: np.record, trajectory: Trajectory) -> float:
     """Return by how much more energy (J) the contacts' springs hold at a run's end than before."""
     if not p["clearance"].any() or not trajectory.states[0].size:
         return 0.0
-    states = np.stack([trajectory.states[0], trajectory.last_state])
-    rows = np.empty((2, COLUMNS))
     end = trajectory.stop_time if trajectory.reason else trajectory.times[-1]
-    times, phases = np.array([trajectory.times[0], end]), trajectory.phases[[0, -1]]
-    observe_all(times, states, phases, p, rows)
+    times, states = [trajectory.times[0], end], [trajectory.states[0], trajectory.last_state]
+    rows = np.empty((2, COLUMNS))
+    observe_all(np.array(times), np.stack(states), trajectory.phases[[0, -1]], p, rows)
     held = np.zeros(2)
-    for joint, (stiffness, clearance) in enumerate(
-        zip(p["stiffness"], p["clearance"], strict=True)
-    ):
-        for k, depth in enumerate(rows[:, Column.PENETRATION + joint].tolist()):
-            if depth > 0.0 and clearance > 0.0:
-                held[k] += elastic_form(stiffness, clearance, p).energy(depth)
+    for joint, (k, c) in enumerate(zip(p["stiffness"], p["clearance"], strict=True)):
+        for which, depth in enumerate(rows[:, Column.PENETRATION + joint].tolist()):
+            if depth > 0.0 and c > 0.0:
+                held[which] += elastic_form(k, c, p).energy(depth)
     return float(held[1] - held[0])
 
 
@@ -176,28 +173,38 @@ MIN_REVOLUTIONS = 10  # settled ones, below which an average's bar is not known
 RMS_ERROR_AIM = 0.01  # of rms_acceleration: its standard error that revolutions are counted for
 
 
+def batch_errors(p: np.record, turns: Sequence[np.record]) -> Metrics:
+    """Return the standard error of each average over revolutions, by name, from their tallies.
+
+    inf where there are too few revolutions.
+    """
+    whole, errors = metrics(p, merge_tallies(turns)), {}
+    batches = [metrics(p, merge_tallies(part)) for part in parts(turns, MAX_BATCHES, 1)]
+    for name, value in whole.items():
+        kind, averages = NUMBERS[name].kind, np.array([one[name] for one in batches])
+        if kind == "root":  # the mean square is what is averaged
+            errors[name] = standard_error(averages**2) / (2.0 * value or math.nan)
+        elif kind == "count":  # in so many batches
+            errors[name] = len(batches) * standard_error(averages)
+        elif kind != "greatest":
+            errors[name] = standard_error(averages)
+    return errors
+
+
 def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
     """Return `compressor.metrics.statistics_of` all metrics by name, from the revolutions' tallies.
 
     A standard error is inf where there are too few revolutions.
     """
     estimates: Metrics = {"revolutions": float(len(turns))}
-    whole = metrics(p, merge_tallies(turns))
-    per_revolution = [metrics(p, turn) for turn in turns]
-    batches = [metrics(p, merge_tallies(part)) for part in parts(turns, MAX_BATCHES, 1)]
-    for name, row in METRICS.items():
-        if row.kind == "greatest":
-            estimates |= summarize_peaks(name, np.array([one[name] for one in per_revolution]))
-            continue
-        averages = np.array([one[name] for one in batches])
-        if row.kind == "root":  # the mean square is what is averaged
-            error = standard_error(averages**2) / (2.0 * whole[name] or math.nan)
-        elif row.kind == "count":  # in so many batches
-            error = len(batches) * standard_error(averages)
+    errors, per_revolution = batch_errors(p, turns), [metrics(p, turn) for turn in turns]
+    for name in METRICS:
+        if name in errors:
+            estimates[f"{name}_standard_error"] = errors[name]
         else:
-            error = standard_error(averages)
-        estimates[f"{name}_standard_error"] = error
-    share = estimates["rms_acceleration_standard_error"] / whole["rms_acceleration"]
+            estimates |= summarize_peaks(name, np.array([one[name] for one in per_revolution]))
+    whole = metrics(p, merge_tallies(turns))["rms_acceleration"]
+    share = errors["rms_acceleration"] / whole
     estimates["revolutions_to_one_percent"] = max(
         1.0, np.ceil(len(turns) * (share / RMS_ERROR_AIM) ** 2)
     )
@@ -273,29 +280,18 @@ def mean_bar(values: np.ndarray) -> float:
     return float(average_bar(standard_error(means), len(values)))
 
 
-def chaotic_bars(
-    p: np.record, turns: Sequence[np.record], estimates: Metrics, numbers: Metrics
-) -> Metrics:
+def chaotic_bars(p: np.record, turns: Sequence[np.record], numbers: Metrics) -> Metrics:
     """Return the error bars of a chaotic run's metrics: of averages; greatest values have inf.
 
-    turns: tallies of its revolutions; estimates: their `statistics`; numbers: the metrics. Those of
-    contacts at ideal joints have no error.
+    turns: tallies of its revolutions; numbers: the metrics. Those of contacts at ideal joints have
+    no error.
     """
-    bars, count = {}, len(turns)
-    batches = [metrics(p, merge_tallies(part)) for part in parts(turns, MAX_BATCHES, 1)]
+    bars, count, errors = {}, len(turns), batch_errors(p, turns)
     for name, value in numbers.items():
         row = NUMBERS[name]
-        if row.kind == "greatest":
-            bars[name] = np.full(np.shape(value), math.inf)
-        else:
-            error = estimates.get(f"{name}_standard_error")
-            if error is None:
-                error = standard_error(np.array([one[name] for one in batches]))
-            bars[name] = average_bar(error, count)
+        bar = average_bar(errors.get(name, np.full(np.shape(value), math.inf)), count)
         if row.counted:
             in_all = 1 if row.kind == "count" else count
-            least = count_bar(np.asarray(value) * in_all) / in_all
-            bars[name] = np.maximum(bars[name], least)
-        if row.contact:
-            bars[name] = np.where(p["clearance"] == 0.0, 0.0, bars[name])
+            bar = np.maximum(bar, count_bar(np.asarray(value) * in_all) / in_all)
+        bars[name] = np.where(p["clearance"] == 0.0, 0.0, bar) if row.contact else bar
     return bars

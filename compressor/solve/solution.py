@@ -3,6 +3,7 @@
 import math
 
 from compressor.cases import TIGHTEST, Case
+from compressor.metrics import METRICS
 from compressor.outcome import Regime
 from compressor.reasons import Reason
 from compressor.solve.error_bars import (
@@ -15,7 +16,7 @@ from compressor.solve.error_bars import (
     relative_bar,
 )
 from compressor.solve.horizon import Search, predictability_horizon
-from compressor.solve.regime import DOUBTFUL, find_span, has_doubtful_bars, repeats
+from compressor.solve.regime import find_span, repeats
 from compressor.solve.request import revolutions
 from compressor.solve.run import Solution, is_sampled, run_at_tolerance
 from compressor.solve.run_metrics import (
@@ -32,6 +33,7 @@ OUT_OF_BUDGET = (
     Reason.STEP_UNDERFLOW,
 )  # a tighter run may end so
 LAST_RTOL = TIGHTER_FACTOR * TIGHTEST  # with a tighter run to compare it with
+DOUBTFUL = 0.1  # of a number: an error from which on chaos is looked for
 ERROR_AIM = 0.7  # of what is allowed: where the next run's error is aimed at
 MIN_TIGHTENING, MAX_TIGHTENING = 10.0, 1000.0  # times tighter that the next run may be
 
@@ -70,7 +72,8 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
         if excess <= 1.0:
             now.promise = "kept" if has_promise(case) else "none"
             return now
-        if before is None and looks_chaotic(now) and search.parts(whole=False):
+        is_far = now.series_errors["acceleration"] >= DOUBTFUL
+        if before is None and is_far and search.parts(whole=False):
             return now
         if rtol < 1.01 * LAST_RTOL or all(one.reason for one in others):
             return fail_accuracy(case, now, others[0].detail or "no run is tighter")
@@ -109,11 +112,6 @@ def excess_over_promise(case: Case, solution: Solution) -> float:
             for name, target in case.targets
         )
     return solution.series_errors["acceleration"] / case.promise if has_promise(case) else 0.0
-
-
-def looks_chaotic(solution: Solution) -> bool:
-    """Return whether a run's acceleration is as far from another's as chaotic motions are."""
-    return solution.series_errors["acceleration"] >= DOUBTFUL
 
 
 def energy_balances(case: Case, solution: Solution) -> bool:
@@ -198,16 +196,18 @@ def find_horizon(case: Case, solution: Solution, search: Search) -> None:
 
 
 def is_in_doubt(case: Case, solution: Solution) -> bool:
-    """Return whether a motion may be chaotic, by its errors.
+    """Return whether a motion may be chaotic, by its errors; shares and counts are left out.
 
     Not where the promise of a word is kept: two motions, a tolerance apart, stayed together.
     """
     if math.isfinite(case.promise) and solution.promise == "kept":
         return False
-    return (
-        bool(solution.reason)
-        or looks_chaotic(solution)
-        or has_doubtful_bars(solution.metrics, solution.bars)
+    if solution.reason or solution.series_errors["acceleration"] >= DOUBTFUL:
+        return True
+    return any(
+        relative_bar(solution.metrics[name], solution.bars[name]) >= DOUBTFUL
+        for name, row in METRICS.items()
+        if row.bar.relative
     )
 
 
@@ -244,7 +244,7 @@ def chaotic_solution(case: Case, solution: Solution, search: Search) -> Solution
         estimate_errors(now)
         if turns := now.trajectory.turns:
             now.statistics = statistics(now.p, turns)
-            now.bars |= chaotic_bars(now.p, turns, now.statistics, now.metrics)
+            now.bars |= chaotic_bars(now.p, turns, now.metrics)
         if excess_over_promise(case, now) > 1.0 and case.targets:
             reason = f"the motion is chaotic from {horizon / case.turn:.3g} revolutions on"
             return fail_accuracy(case, now, reason)

@@ -18,7 +18,7 @@ from random_cases import strangers
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
-from compressor.solve.error_bars import TIGHTER_DISTANCE_FACTOR, Companion, bars, closeness
+from compressor.solve.error_bars import TIGHTER_DISTANCE_FACTOR, bars, closeness
 from compressor.solve.run import run_at_tolerance
 from compressor.solve.series import distances
 
@@ -49,7 +49,7 @@ def one_case(values):
                 continue
             here, other = run(rtol), run(other_rtol)
             apart = distances(here.samples, other.samples)
-            found = bars(here.metrics, Companion(other.metrics, ratio, apart), 0.0)
+            found = bars(here.metrics, other.metrics, ratio, apart, 0.0)
             rows.append({
                 "rtol": rtol,
                 "ratio": ratio,

@@ -16,7 +16,6 @@ from compressor.solve.error_bars import (
     LOOSER,
     TEN,
     TIGHTER_DISTANCE_FACTOR,
-    Companion,
     bars,
     closeness,
     ratio_of,
@@ -69,7 +68,7 @@ def test_a_bar_is_made_of_its_own_difference_and_the_series_distance(ratio):
     metrics = {"peak_acceleration": 100.0, "max_penetration": np.array([2e-6, 0.0])}
     others = {"peak_acceleration": 101.0, "max_penetration": np.array([2.5e-6, 0.0])}
     apart = APART | {"acceleration": 0.03, "penetration": np.array([0.2, 0.0])}
-    found = bars(metrics, Companion(others, ratio, apart), 0.0)
+    found = bars(metrics, others, ratio, apart, 0.0)
     peak, depth = METRICS["peak_acceleration"].bar, METRICS["max_penetration"].bar
     expected = closeness(ratio) * np.hypot(peak.own * 1.0, peak.path * 0.03 * 100.0)
     assert found["peak_acceleration"] == pytest.approx(expected)
@@ -80,7 +79,7 @@ def test_a_bar_is_made_of_its_own_difference_and_the_series_distance(ratio):
 def test_runs_that_agree_by_chance_have_bars_by_their_series():
     metrics = {name: np.ones([2] * len(row.dims)) for name, row in METRICS.items()}
     apart = APART | {"acceleration": 0.1, "contact_force": np.array([0.1, 0.0])}
-    found = bars(metrics, Companion(metrics, 0.5, apart), 0.0)
+    found = bars(metrics, metrics, 0.5, apart, 0.0)
     for name in ("peak_acceleration", "rms_acceleration"):
         assert found[name] == pytest.approx(METRICS[name].bar.path * 0.1)
     axis = METRICS["peak_contact_force_axis"].bar.path * 0.1
@@ -91,14 +90,14 @@ def test_runs_that_agree_by_chance_have_bars_by_their_series():
 def test_of_a_series_that_may_be_all_wrong_no_metric_is_known(apart, known):
     metrics = {"max_penetration": np.ones(2), "impact_count": np.ones(2)}
     distances = APART | {"penetration": np.array([0.0, apart])}
-    found = bars(metrics, Companion(metrics, 0.5, distances), 0.0)
+    found = bars(metrics, metrics, 0.5, distances, 0.0)
     assert np.isfinite(found["max_penetration"]).tolist() == [True, known]
     assert np.isfinite(found["impact_count"]).all()  # a count has no unit: a bar of its own
 
 
 def test_where_the_acceleration_is_all_wrong_no_metric_with_a_unit_is_known():
     metrics = {"peak_contact_force": np.ones(2), "impact_count": np.ones(2)}
-    found = bars(metrics, Companion(metrics, 0.5, APART | {"acceleration": 0.34}), 0.0)
+    found = bars(metrics, metrics, 0.5, APART | {"acceleration": 0.34}, 0.0)
     assert np.isinf(found["peak_contact_force"]).all()
     assert np.isfinite(found["impact_count"]).all()
 
@@ -106,7 +105,7 @@ def test_where_the_acceleration_is_all_wrong_no_metric_with_a_unit_is_known():
 def test_a_peak_is_known_no_closer_than_it_is_found():
     """Between the nodes of a step; the parabola's error does not fall with the tolerance."""
     metrics = {"peak_acceleration": 100.0, "rms_acceleration": 100.0}
-    found = bars(metrics, Companion(metrics, 0.5, APART | {"acceleration": 0.0}), 0.0)
+    found = bars(metrics, metrics, 0.5, APART | {"acceleration": 0.0}, 0.0)
     assert found["peak_acceleration"] == pytest.approx(
         100.0 * METRICS["peak_acceleration"].bar.least
     )
@@ -116,14 +115,14 @@ def test_a_peak_is_known_no_closer_than_it_is_found():
 
 def test_the_energy_residual_is_a_floor():
     metrics = {"rms_acceleration": 100.0, "impact_count": np.array([3.0, 0.0])}
-    found = bars(metrics, Companion(metrics, 0.5, APART), 1e-3)
+    found = bars(metrics, metrics, 0.5, APART, 1e-3)
     assert found["rms_acceleration"] == pytest.approx(FLOOR * 1e-3 * 100.0)
     assert found["impact_count"].tolist() == [0.0, 0.0]
 
 
 def test_an_error_of_each_series_follows_from_its_distance():
     apart = APART | {"acceleration": 1e-3, "contact_force": np.array([2e-3, 4e-3])}
-    tighter, looser = (series_errors(Companion({}, ratio, apart)) for ratio in (0.5, 10.0))
+    tighter, looser = (series_errors(ratio, apart) for ratio in (0.5, 10.0))
     assert tighter["acceleration"] == pytest.approx(TIGHTER_DISTANCE_FACTOR * 1e-3)
     assert tighter["contact_force"].tolist() == pytest.approx(
         [TIGHTER_DISTANCE_FACTOR * 2e-3, TIGHTER_DISTANCE_FACTOR * 4e-3]
@@ -132,10 +131,12 @@ def test_an_error_of_each_series_follows_from_its_distance():
 
 
 def test_without_another_run_nothing_is_known():
-    metrics = {"rms_acceleration": 1.0, "impact_count": np.zeros(2)}
-    assert all(np.isinf(bar).all() for bar in bars(metrics, None, 0.0).values())
-    unknown = series_errors(None)
-    for name, value in unknown.items():
+    case = Case.from_values({**BOTH, "solve": SHORT})
+    found = run_module.run_at_tolerance(case, 1e-5, 60.0, False)
+    error_bars.estimate_errors(found)
+    assert found.bars.keys() == found.metrics.keys()
+    assert all(np.isinf(bar).all() for bar in found.bars.values())
+    for name, value in found.series_errors.items():
         assert np.shape(value) == np.shape(APART[name])
         assert np.isinf(value).all()
 

@@ -62,8 +62,8 @@ def test_bars_hold_the_true_average_in_95_of_100_runs(record, count, pull):
     held = dict.fromkeys(exact, 0)
     for _ in range(200):
         each = turns(rng, count, pull)
-        found, numbers = statistics(record, each), metrics(record, merge_tallies(each))
-        bars = chaotic_bars(record, each, found, numbers)
+        numbers = metrics(record, merge_tallies(each))
+        bars = chaotic_bars(record, each, numbers)
         for name, value in exact.items():
             held[name] += bool((np.abs(numbers[name] - value) <= bars[name]).all())
     assert all(180 <= number <= 198 for number in held.values()), held
@@ -93,7 +93,7 @@ def test_a_single_revolution_tells_no_error(record):
     for name, value in found.items():
         if name.endswith("error") or name == "revolutions_to_one_percent":
             assert np.isposinf(value).all(), name
-    bars = chaotic_bars(record, each, found, metrics(record, merge_tallies(each)))
+    bars = chaotic_bars(record, each, metrics(record, merge_tallies(each)))
     assert bars.keys() == METRICS.keys()
     assert all(np.isposinf(bar).all() for bar in bars.values())
 
@@ -102,7 +102,7 @@ def test_greatest_values_have_no_bar_but_an_ideal_joint_has_none_to_err_in(recor
     record["clearance"][1] = 0.0
     each = turns(np.random.default_rng(5), 40)
     numbers = metrics(record, merge_tallies(each))
-    bars = chaotic_bars(record, each, statistics(record, each), numbers)
+    bars = chaotic_bars(record, each, numbers)
     assert np.isposinf(bars["peak_acceleration"])
     assert bars["max_penetration"].tolist() == [math.inf, 0.0]
     assert 0 < bars["rms_acceleration"] < 1
@@ -114,7 +114,7 @@ def test_batches_that_agree_by_chance_say_nothing(record):
     def bars_of(count):
         each = turns(np.random.default_rng(6), 1) * count
         numbers = metrics(record, merge_tallies(each))
-        return numbers, chaotic_bars(record, each, statistics(record, each), numbers)
+        return numbers, chaotic_bars(record, each, numbers)
 
     _, few = bars_of(MIN_REVOLUTIONS - 1)
     assert all(np.isposinf(bar).all() for bar in few.values())
