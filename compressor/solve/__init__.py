@@ -1,9 +1,7 @@
 """A case -> its outcome: motion, metrics, error bars, reasons."""
 
 from compressor.solve.cautions import JointScales, cautions, expected_cost, joint_scales
-from compressor.solve.horizon import predictability_horizon
 from compressor.solve.measured_gas import gas_nodes
-from compressor.solve.regime import find_repetition, least_promise, steady, with_settle_rev
 from compressor.solve.request import Metrics, Request, Trajectory, revolutions
 from compressor.solve.run import COMPILED, Solution, integrate, run_at_tolerance
 from compressor.solve.run_metrics import (
@@ -19,6 +17,13 @@ from compressor.solve.run_metrics import (
     sure,
 )
 from compressor.solve.scipy_driver import LOCAL
+from compressor.solve.search import (
+    find_repetition,
+    least_promise,
+    predictability_horizon,
+    steady,
+    with_settle_rev,
+)
 from compressor.solve.series import SIGNALS, signals_of_scene
 from compressor.solve.si_record import is_ideal, natural_sizes, record, stiffness_of
 from compressor.solve.simulate import measure, observe, simulate

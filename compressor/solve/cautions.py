@@ -1,17 +1,16 @@
 """Cautions about a case before it runs: natural scales, slips of units, laws left behind.
 
-Natural scales of a case before it runs: depths, times and steps, from its parameters alone. Closed
-formulas, tens of microseconds a case. Forces are the sum of the greatest load and inertia, hence
-bounds; the deepest contact of the random cases (tests/campaigns/random_cases.py) is 0.6 to 1.6
-times as deep as they say in nine of ten (tests/solve/test_scales.py).
+Natural scales are closed formulas of a case's parameters alone. Forces are the sum of the greatest
+load and inertia, hence bounds; the deepest contact of the random cases
+(tests/campaigns/random_cases.py) is 0.6 to 1.6 times as deep as they say in nine of ten
+(tests/solve/test_scales.py).
 
-Numbers that look as if they were given in another unit than their key's. The rule: a key is
-reported where every value that it has in a study lies outside its usual range, and another unit of
-the same quantity would bring all of them inside. A sweep that reaches into the usual range is meant
-as it stands, however odd its ends are.
+A key looks as if it were given in another unit where every value that it has in a study lies
+outside its usual range, and that unit would bring all of them inside. A sweep that reaches into the
+usual range is meant as it stands, however odd its ends are.
 
-Nothing here is refused: an oddity is reported once a study, before it runs. What
-cannot be simulated at all is refused by `compressor.cases.conflicts`.
+An oddity is reported once a study. What cannot be simulated at all is refused by
+`compressor.cases.conflicts`.
 """
 
 import itertools
@@ -37,13 +36,13 @@ from compressor.cases import (
     with_ideal_joints,
 )
 from compressor.metrics import JOINTS
-from compressor.physics import STABILITY_LIMIT, Scene, elastic_form, greatest_load, steepest
+from compressor.physics import STABILITY_LIMIT, elastic_form, greatest_load, steepest
 from compressor.solve.dense_tally import closed_form
 from compressor.solve.measured_gas import card_noise, fit_polytrope, sensed_noise
 from compressor.solve.request import greatest_depth
 from compressor.solve.run import COMPILED
 from compressor.solve.run_metrics import metrics
-from compressor.solve.si_record import record, scene
+from compressor.solve.si_record import record
 
 # Attempts of a step for each radian of the contact's ringing at rtol 1; measured on random cases.
 PER_RADIAN = {"big_end": 0.3, "small_end": 0.5, "both": 0.7}
@@ -94,34 +93,31 @@ def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
 
     p: the case's record; joint: `big_end` or `small_end`. A journal that the force holds against
     its bore can roll to and fro on the wall, on a circle of radius e, clearance and penetration. It
-    swings like a pendulum, at sqrt(F / (m e)); m is what the rod's end weighs across the force, the
-    other end being held: (J + m_r l^2) / L^2, l from the mass centre to the other end.
+    swings like a pendulum, at sqrt(F / (m e)); m is what the rod's end weighs `across` the rod.
     """
     number = JOINTS.index(joint)
     clearance, stiffness = p["clearance"][number].item(), p["stiffness"][number].item()
     contact = elastic_form(stiffness, clearance, p)
     mass = min(p["rod_mass"], p["reciprocating_mass"]).item()
     depth = float(contact.static_depth(force))
-    natural = math.sqrt(contact.tangent(depth) / mass)
-    friction = 0.0
-    if p["friction"]:
-        friction = steepest(p) * force / mass
+    natural, damping = math.sqrt(contact.tangent(depth) / mass), contact.damping(depth)
+    friction = steepest(p) * force / mass if p["friction"] else 0.0
     rates = {
-        "contact stiffness": natural,
-        "contact damping": contact.damping(depth) / mass,
-        "friction": friction,
-    }
+        "contact stiffness": natural, "contact damping": damping / mass, "friction": friction,
+    }  # fmt: skip
     fastest = max(rates, key=rates.__getitem__)
     swing = math.sqrt(force / (across(p, joint) * (clearance + depth)))
     return JointScales(
-        joint, clearance, force, depth, contact.damping(depth) / (2.0 * mass * natural),
-        swing / (2.0 * math.pi), friction, STABILITY_LIMIT / rates[fastest], fastest,
-        1.0 / natural,
+        joint, clearance, force, depth, damping / (2.0 * mass * natural), swing / (2.0 * math.pi),
+        friction, STABILITY_LIMIT / rates[fastest], fastest, 1.0 / natural,
     )  # fmt: skip
 
 
 def across(p: np.record, joint: str) -> float:
-    """Return the mass (kg) of a rod's end that moves across the rod, the other end being held."""
+    """Return the mass (kg) of a rod's end that moves across the rod, the other end being held.
+
+    (J + m_r l^2) / L^2, l from the mass centre to the other end.
+    """
     centre, length = p["rod_centre"].item(), p["rod_length"].item()
     lever = length - centre if joint == "big_end" else centre
     return (p["rod_inertia"].item() + p["rod_mass"].item() * lever**2) / length**2
@@ -134,12 +130,10 @@ def dry_record(case: Case) -> np.record:
 
 def contact_scales(case: Case) -> Iterator[JointScales]:
     """Yield the scales of each joint with clearance under its greatest force."""
-    if scene(case) == Scene.IDEAL:
-        return
-    p = dry_record(case)
-    for joint, clearance in zip(JOINTS, p["clearance"], strict=True):
-        if clearance > 0:
-            yield joint_scales(p, joint, greatest_force(p, joint))
+    worn = [joint for joint in JOINTS if getattr(case.clearance_mm, joint) > 0]
+    if worn:
+        p = dry_record(case)
+        yield from (joint_scales(p, joint, greatest_force(p, joint)) for joint in worn)
 
 
 def expected_cost(case: Case, joints: Sequence[JointScales]) -> tuple[float, float]:
@@ -215,14 +209,24 @@ def is_usual(key: str, value: float) -> bool:
 
 def slips(cases: Sequence[Case]) -> list[Caution]:
     """Return the keys of a study's cases whose values all look like another unit's."""
-    look_alikes = []
-    for key in USUAL:
+    found = []
+    for key, (usual_low, usual_high, units) in USUAL.items():
         read = [values for case in cases if (values := values_of(case, key))]
         values = sorted({value for several in read for value in several})
-        if unit := other_unit(key, values):
-            text = describe_slip(key, values, unit)
-            look_alikes.append(Caution(key, text, "slip", len(read), len(cases)))
-    return look_alikes
+        if not (other := other_unit(key, values)):
+            continue
+        row, low, high = row_of(key), values[0], values[-1]
+        unit, factor = (row.unit if row else "").replace("^p", "^1.5"), units[other]
+        given, is_, they_are = f"{low:g} to {high:g}", "are", "they are"
+        meant = f"{low * factor:.4g} to {high * factor:.4g}"
+        if low == high:
+            given, is_, they_are, meant = f"{low:g}", "is", "it is", f"{low * factor:.4g}"
+        text = (
+            f"{given} {unit} {is_} unusual ({usual_low:g} to {usual_high:g} is usual); read as "
+            f"{other}, {they_are} {meant} {unit}"
+        )
+        found.append(Caution(key, text, "slip", len(read), len(cases)))
+    return found
 
 
 def values_of(case: Case, key: str) -> list[float]:
@@ -250,20 +254,6 @@ def other_unit(key: str, values: Sequence[float]) -> str:
         key=lambda name: abs(middle + math.log(units[name] / default)),
         default="",
     )
-
-
-def describe_slip(key: str, values: Sequence[float], other: str) -> str:
-    """Return the caution about values that look like another unit's."""
-    (usual_low, usual_high, units), row = USUAL[key], row_of(key)
-    unit = (row.unit if row else "").replace("^p", "^1.5")
-    low, high = values[0], values[-1]
-    if low == high:
-        given, verb, them = f"{low:g} {unit}", "is", f"it is {low * units[other]:.4g} {unit}"
-    else:
-        given, verb = f"{low:g} to {high:g} {unit}", "are"
-        them = f"they are {low * units[other]:.4g} to {high * units[other]:.4g} {unit}"
-    range_ = f"{usual_low:g} to {usual_high:g}"
-    return f"{given} {verb} unusual ({range_} is usual); read as {other}, {them}"
 
 
 SHALLOW_CLEARANCES = 2.0  # clearances: forces are bounds, and the paper's 0.1 mm is not meant

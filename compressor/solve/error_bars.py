@@ -1,21 +1,12 @@
-"""Energy audit and error bars: how far the numbers of a run may lie from the exact ones.
-
-The energy audit: whether a run's energy balances as well as its tolerance lets one expect. The
-flows (work of crank and load, losses of the contacts) are integrated beside the motion, so that
-what they miss of the energy's change is error of the run itself, whatever its cause.
+"""Error bars: how far the numbers of a run may lie from the exact ones.
 
 The difference from a tighter run is mostly the run's own error, and a little more than it bounds
 that; of the difference from a looser run, which is mostly the looser one's error, a share does
-(`closeness`). A metric's own difference may be small by chance: the distance of the time series
-that it is taken from stands beside it. So may the moment of a change of contact: how far a state
-that is wrong by some tolerances moves it is added to shares of time. The energy residual is a
-floor. Where a motion enlarges the
-errors of its steps (`is_amplified`), two runs may agree by chance in all numbers; there a third one
-is made, and the longest bars count. Where a series or the acceleration may be wrong by all of
-itself, no metric with a unit that is taken from it is known.
-
-Shares stand in `compressor.metrics`; those and the ones below were chosen on random cases that
-judge nothing (tests/results/calibration.md).
+(`closeness`). A metric's own difference may be small by chance, as may the moment of a change of
+contact: the distance of the time series that it is taken from, and how far a state that is wrong by
+some tolerances moves it, stand beside it. The rules are those of solve/README.md; shares stand in
+`compressor.metrics`. Those and the ones below were chosen on random cases that judge nothing
+(tests/results/calibration.md).
 """
 
 import math

@@ -4,20 +4,9 @@ Two runs are compared at the same times, whatever is stored of either: `COMPARED
 revolution. Their distance is a relative L2 norm over the settled part,
 sqrt(sum |a - b|^2 / sum |a|^2); of a vector its length counts.
 
-Forces that the machine puts on its frame, of `physics.observe.write_frame_forces`. With F_b
-and F_s the joint forces on the rod at the big and the small end, F_load the piston force, positive
-towards the crank, and g gravity against y:
-
-- what acts on the rod's big end acts on the main bearing: -F_b; beside it the force of a crank that
-  is out of balance, U (omega^2 e_r - alpha e_t) with e_r along the crank and e_t a quarter turn on.
-  A counterweight makes U less, or negative. The crank's weight is not known and left out;
-- the crosshead does not move along y: the guide bears -F_sy - m_p g, and the couple that friction
-  puts on the crosshead's pin, (R_j - delta) F_t;
-- the gas, or the spring, pushes the cylinder as it pushes the piston: F_load along x;
-- so the frame feels X = -F_bx + F_load and Y = -F_by - F_sy - m_p g, and what is out of balance.
-  Both are the loss of momentum of all moving parts a second, less their weight;
-- the crank is driven by the torque that the rod needs, R (cos theta F_by - sin theta F_bx) -
-  (R_j - delta) F_t. A drive's motor gives another: what is between them turns the flywheel.
+Forces that the machine puts on its frame are those of `physics.observe.write_frame_forces`; what
+each is made of stands in docs/a-run.md. A drive's motor gives another torque than the rod needs:
+what is between them turns the flywheel.
 
 Contacts last less than a crank angle of 0.3 degrees, and so do the couples of their friction:
 values of a stored series are exact, means over one are not. `mean_crank_torque` and

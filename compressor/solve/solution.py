@@ -15,8 +15,6 @@ from compressor.solve.error_bars import (
     ratio_of,
     relative_bar,
 )
-from compressor.solve.horizon import Search, predictability_horizon
-from compressor.solve.regime import find_span, repeats
 from compressor.solve.request import revolutions
 from compressor.solve.run import Solution, is_sampled, run_at_tolerance
 from compressor.solve.run_metrics import (
@@ -26,6 +24,7 @@ from compressor.solve.run_metrics import (
     next_audit_rtol,
     statistics,
 )
+from compressor.solve.search import Search, find_span, predictability_horizon, repeats
 
 OUT_OF_BUDGET = (
     Reason.BUDGET_STEPS,

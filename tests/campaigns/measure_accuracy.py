@@ -30,7 +30,7 @@ from compressor.cases.parameter import ACCURACY
 from compressor.metrics import METRICS
 from compressor.outcome import Regime
 from compressor.report.figures.pictures import render
-from compressor.solve.horizon import LOOK_SHIFT, predictability_horizon
+from compressor.solve.search import LOOK_SHIFT, predictability_horizon
 from compressor.solve.simulate import simulate
 
 SEEDS = (911, 912, 913)

@@ -24,10 +24,10 @@ from random_cases import strangers
 from compressor.cases.case import Case
 from compressor.metrics import JOINTS
 from compressor.outcome import Regime
-from compressor.solve.horizon import predictability_horizon
 from compressor.solve.request import revolutions
 from compressor.solve.run import run_at_tolerance
 from compressor.solve.run_metrics import metrics
+from compressor.solve.search import predictability_horizon
 from compressor.solve.simulate import measure, simulate
 
 REVOLUTIONS, SETTLE = 200, 8

@@ -16,10 +16,10 @@ from compressor.cases.materials import contact_stiffness
 from compressor.metrics import METRICS
 from compressor.physics.record import CARRIED
 from compressor.solve.cautions import remarks
-from compressor.solve.horizon import (
+from compressor.solve.run import run_at_tolerance
+from compressor.solve.search import (
     predictability_horizon,
 )
-from compressor.solve.run import run_at_tolerance
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.explain import terms, unknown_names
 

@@ -7,7 +7,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.solve import measure, simulate
-from compressor.solve.horizon import predictability_horizon
+from compressor.solve.search import predictability_horizon
 
 BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
 GUIDE, RUBBING = {"guide": {"clearance_mm": 0.1}}, {"friction": {"ideal_joints": True}}

@@ -13,8 +13,9 @@ from compressor.cases.case import Case
 from compressor.metrics import METRICS, SERIES
 from compressor.outcome import Regime
 from compressor.physics import COLUMNS, Column
-from compressor.solve import horizon
-from compressor.solve.horizon import (
+from compressor.solve import search as search_module
+from compressor.solve.request import Trajectory
+from compressor.solve.search import (
     FIRST_SPAN_REV,
     LOOK_RTOL,
     LOOK_SHIFT,
@@ -24,9 +25,8 @@ from compressor.solve.horizon import (
     Parting,
     Search,
     predictability_horizon,
+    repeats,
 )
-from compressor.solve.regime import repeats
-from compressor.solve.request import Trajectory
 from compressor.solve.series import compared_per_rev, compared_times
 from compressor.solve.simulate import measure
 
@@ -131,7 +131,7 @@ def compared(monkeypatch, *found, needs=1000):
         one = next(ends) if needs <= allowed else Parting(0.0, False, False)
         return one._replace(evaluations=min(needs, allowed))
 
-    monkeypatch.setattr(horizon, "compare_shifted", compare)
+    monkeypatch.setattr(search_module, "compare_shifted", compare)
     return asked
 
 
@@ -214,8 +214,8 @@ def test_a_run_that_the_budget_ended_says_so():
 
 def test_a_case_that_needs_more_than_its_budget_is_refused_in_these_words(monkeypatch):
     """However fast the clock runs: the budget counts evaluations."""
-    monkeypatch.setattr(horizon, "MIN_WORK", 0)
-    monkeypatch.setattr(horizon, "WORK", 4.0)
+    monkeypatch.setattr(search_module, "MIN_WORK", 0)
+    monkeypatch.setattr(search_module, "WORK", 4.0)
     machine = {"rod_mass_kg": 6.276, "reciprocating_mass_kg": 11.54, "speed_rpm": 190.1}
     values = {"joint": "big_end", "clearance_mm": 0.06779, "machine": machine}  # ill-conditioned
     found = measure(case(values, accuracy="fine"))

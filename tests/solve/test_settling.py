@@ -11,7 +11,7 @@ from compressor.cases.table import MAX_REV
 from compressor.metrics import METRICS
 from compressor.solve import error_bars, solution
 from compressor.solve import run as run_module
-from compressor.solve.regime import MEASURED_REV, agree, least_promise, steady
+from compressor.solve.search import MEASURED_REV, agree, least_promise, steady
 from compressor.solve.simulate import measure, simulate
 from compressor.store.status import job_caveats
 

@@ -8,9 +8,9 @@ import pytest
 from compressor.cases.case import Case
 from compressor.physics.record import FREEDOMS
 from compressor.physics.systems import start
-from compressor.solve.horizon import PARTED_DISTANCE, SHIFT, predictability_horizon
 from compressor.solve.request import Request
 from compressor.solve.run import integrate
+from compressor.solve.search import PARTED_DISTANCE, SHIFT, predictability_horizon
 from compressor.solve.si_record import natural_sizes, offsets, record, scene
 from compressor.studies.follow import lyapunov
 from compressor.studies.follow.lyapunov import (

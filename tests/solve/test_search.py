@@ -11,13 +11,13 @@ from compressor.metrics import METRICS
 from compressor.physics.observe import COLUMNS, Column
 from compressor.physics.record import FREEDOMS
 from compressor.physics.systems import observe_all, start
-from compressor.solve.horizon import (
+from compressor.solve.request import Request
+from compressor.solve.run import integrate
+from compressor.solve.search import (
     PARTED_DISTANCE,
     SHIFT,
     predictability_horizon,
 )
-from compressor.solve.request import Request
-from compressor.solve.run import integrate
 from compressor.solve.si_record import offsets, record, scene
 from compressor.solve.simulate import measure, simulate
 from compressor.store.reader import read_store
