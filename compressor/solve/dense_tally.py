@@ -13,14 +13,12 @@ from collections.abc import Callable
 import numpy as np
 
 from compressor.physics import (
-    COLUMNS,
     FLOWS,
     Column,
     Load,
     add_flows,
     lobatto,
     new_tally,
-    observe_all,
     sample_segments,
     segments,
     tally_energy,
@@ -28,6 +26,7 @@ from compressor.physics import (
 )
 from compressor.reasons import Reason
 from compressor.solve.request import Trajectory, overdue
+from compressor.solve.series import rows_at
 from compressor.solve.si_record import length_and_speed, natural_sizes
 
 # returns the rows at times (s), (k, COLUMNS), of states that may be moved, (n, k)
@@ -224,9 +223,7 @@ def closed_form(
     flows, phase = np.zeros(FLOWS), 0
 
     def observe(times: np.ndarray) -> np.ndarray:
-        rows = np.empty((times.size, COLUMNS))
-        observe_all(times, np.zeros((times.size, 4)), np.full(times.size, phase), p, rows)
-        return rows
+        return rows_at(p, times, np.zeros((times.size, 4)), phase)
 
     for first, last in itertools.pairwise([*blocks, owner.size]):
         if time.monotonic() > deadline:

@@ -183,9 +183,11 @@ def greatest_depth(p: Fields) -> tuple[float, str]:
 MAX_ENERGY = 100.0  # times the machine's: no motion brings a contact so far, a step too long does
 
 
-def too_deep(depth: float, p: np.record) -> tuple[Reason, str]:
-    """Return the reason for a penetration (m) beyond `greatest_depth`, and its detail."""
+def check_depth(depth: float, p: np.record) -> None:
+    """Raise Stop for a penetration (m) beyond `greatest_depth`, by what let it come so far."""
     most, words = greatest_depth(p)
+    if depth <= most:
+        return
     speed = p["crank_radius"] * p["omega"]
     kinetic = 0.5 * (p["rod_mass"] + p["reciprocating_mass"]) * speed**2
     present = kinetic + 2.0 * p["crank_radius"] * greatest_load(p)
@@ -193,5 +195,5 @@ def too_deep(depth: float, p: np.record) -> tuple[Reason, str]:
     needed = min(elastic_form(k, c, p).energy(most) for k, c in joints if c > 0.0)
     if needed > MAX_ENERGY * present:
         text = "a step went into a contact that is too stiff for it at this tolerance"
-        return Reason.CONTACT_UNDERRESOLVED, f"{depth * 1e3:.3g} mm: {text}"
-    return Reason.PENETRATION_IMPLAUSIBLE, f"{depth * 1e3:.3g} mm, more than {words}"
+        raise Stop(Reason.CONTACT_UNDERRESOLVED, f"{depth * 1e3:.3g} mm: {text}")
+    raise Stop(Reason.PENETRATION_IMPLAUSIBLE, f"{depth * 1e3:.3g} mm, more than {words}")

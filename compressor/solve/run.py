@@ -26,7 +26,6 @@ from compressor.physics import (
     new_stepper,
     new_tally,
     new_work,
-    observe_all,
     sample_segments,
     segments,
     tally_energy,
@@ -38,16 +37,16 @@ from compressor.solve.request import (
     Request,
     Stop,
     Trajectory,
+    check_depth,
     check_state,
     greatest_depth,
     overdue,
     revolutions,
     split_segments,
-    too_deep,
 )
 from compressor.solve.run_metrics import metrics
 from compressor.solve.scipy_driver import step_through
-from compressor.solve.series import compared_times, finer, rows_of
+from compressor.solve.series import compared_times, finer, rows_at, rows_of
 from compressor.solve.si_record import contact_sizes, initial_state, is_ideal, natural_sizes, record
 
 COMPILED = {"auto": Mode.AUTO, "TSIT5": Mode.EXPLICIT, "RODAS": Mode.STIFF}
@@ -63,9 +62,9 @@ def integrate(request: Request) -> Trajectory:
     result = Trajectory(
         times, states, phases[sample_segments(times, edges)], new_tally(request.has_rod_load)
     )
-    z, rows = np.append(request.start, np.zeros(FLOWS)), np.empty((1, COLUMNS))
-    observe_all(np.zeros(1), request.start[np.newaxis], phases[:1], p, rows)
-    tally_energy(rows[0], z[-FLOWS:], result.tally)
+    z = np.append(request.start, np.zeros(FLOWS))
+    row = rows_at(p, np.zeros(1), request.start[np.newaxis], phases[0])[0]
+    tally_energy(row, z[-FLOWS:], result.tally)
     is_compiled = request.method in COMPILED
     # SciPy's dense solution of a long run would fill memory: each revolution ends an integration
     turn = math.tau / float(p["omega"])
@@ -150,7 +149,7 @@ def check_march(
     status = Status(int(stepper.status))
     check_state(request.p, z)
     if status == Status.PENETRATION_IMPLAUSIBLE:
-        raise Stop(*too_deep(deepest, request.p))
+        check_depth(deepest, request.p)
     if status == Status.NON_FINITE:
         raise Stop(Reason.NON_FINITE, "the state or its rates are no longer finite")
     if status == Status.STEP_UNDERFLOW:

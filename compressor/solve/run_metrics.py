@@ -19,7 +19,6 @@ import numpy as np
 from compressor.cases import TIGHTEST
 from compressor.metrics import METRICS, NUMBERS, QUANTILES, of_source
 from compressor.physics import (
-    COLUMNS,
     GREATEST,
     MEANS,
     SQUARES,
@@ -27,10 +26,10 @@ from compressor.physics import (
     elastic_form,
     is_featured,
     merge_tallies,
-    observe_all,
     read_fields,
 )
 from compressor.solve.request import Metrics, Trajectory
+from compressor.solve.series import rows_at
 
 ROUNDING = 1e-12
 
@@ -98,9 +97,9 @@ def held_by_springs(p: np.record, trajectory: Trajectory) -> float:
     if not p["clearance"].any() or not trajectory.states[0].size:
         return 0.0
     end = trajectory.stop_time if trajectory.reason else trajectory.times[-1]
-    times, states = [trajectory.times[0], end], [trajectory.states[0], trajectory.last_state]
-    rows = np.empty((2, COLUMNS))
-    observe_all(np.array(times), np.stack(states), trajectory.phases[[0, -1]], p, rows)
+    times = np.array([trajectory.times[0], end])
+    states = np.stack([trajectory.states[0], trajectory.last_state])
+    rows = rows_at(p, times, states, trajectory.phases[[0, -1]])
     held = np.zeros(2)
     for joint, (k, c) in enumerate(zip(p["stiffness"], p["clearance"], strict=True)):
         for which, depth in enumerate(rows[:, Column.PENETRATION + joint].tolist()):

@@ -13,14 +13,12 @@ from typing import Any
 import numpy as np
 
 from compressor.physics import (
-    COLUMNS,
     FLOWS,
     LAST_STEPS,
     Column,
     approach_at,
     derivative_with_flows,
     enter_segment,
-    observe_all,
     tally_energy,
 )
 from compressor.reasons import Reason
@@ -29,12 +27,12 @@ from compressor.solve.request import (
     Request,
     Stop,
     Trajectory,
+    check_depth,
     check_state,
-    greatest_depth,
     overdue,
     passed_time,
-    too_deep,
 )
+from compressor.solve.series import rows_at
 from compressor.solve.si_record import absolute_tolerances
 
 # Local errors add up in the energy: with rtol itself, these methods left residuals above 10 rtol a
@@ -76,7 +74,6 @@ class ScipyRun:
         self.phase, self.bad, self.last = 0, 0, (0.0, request.start)
         self.deadline = time.monotonic() + request.timeout
         self.steps = result.last_steps = deque(maxlen=LAST_STEPS)
-        self.deepest = greatest_depth(request.fields)[0]
         # by joint whose law reads the speed at which bodies meet: whether they have met
         joints = np.flatnonzero((self.p["clearance"] > 0.0) & (self.p["hysteresis"] != 0.0))
         self.touches = dict.fromkeys(joints.tolist(), False)
@@ -97,9 +94,7 @@ class ScipyRun:
 
     def observe(self, times: np.ndarray, states: np.ndarray) -> np.ndarray:
         """Return the rows at times (s), (k, COLUMNS); states: with flows, (n + 4, k)."""
-        rows, motion = np.empty((times.size, COLUMNS)), np.ascontiguousarray(states[:-FLOWS].T)
-        observe_all(times, motion, np.full(times.size, self.phase), self.p, rows)
-        return rows
+        return rows_at(self.p, times, states[:-FLOWS].T, self.phase)
 
     def watch(self, t: float, z: np.ndarray) -> float:
         """Count and judge each step's end: an event that never comes. Raises Stop."""
@@ -113,17 +108,12 @@ class ScipyRun:
         self.steps.append((since, now - since, math.nan, f"{self.request.method} taken"))
         row = self.observe(np.array([t]), z[:, None])[0]
         tally_energy(row, z[-FLOWS:].copy(), result.tally)
-        self.check_depth(row[Column.PENETRATION : Column.NORMAL].max())
+        check_depth(float(row[Column.PENETRATION : Column.NORMAL].max()), self.p)
         check_state(self.p, z)
         most = self.request.max_steps
         if result.steps + result.rejected >= most and t < self.request.times[-1]:
             raise Stop(Reason.BUDGET_STEPS, f"more than {most} steps")
         return 1.0
-
-    def check_depth(self, depth: float) -> None:
-        """Raise Stop where a journal sinks in implausibly deep (m)."""
-        if not depth <= self.deepest:
-            raise Stop(*too_deep(float(depth), self.p))
 
     def meeting(self, joint: int) -> Any:
         """Return the event of a gap that closes, or opens again; it ends an integration."""
@@ -182,7 +172,7 @@ class ScipyRun:
         for first in range(0, steps.size - 1, STEPS_AT_ONCE):
             part, measured = steps[first : first + STEPS_AT_ONCE + 1], bool(steps[0] >= self.settle)
             rows = tally_steps(self.p, result.tally, part, observe, measured)
-            self.check_depth(result.tally["deepest"])
+            check_depth(float(result.tally["deepest"]), self.p)
             if missed := find_missed_contact(self.p, request.rtol, part, rows):
                 result.stop_time, text = missed
                 result.stop_state = dense(result.stop_time)[:-FLOWS]

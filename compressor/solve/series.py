@@ -21,17 +21,34 @@ import numpy as np
 
 from compressor.cases import Case
 from compressor.metrics import SERIES, SIZES
-from compressor.physics import WIDE, Column, Coordinate, frame_of_series, observe_all
+from compressor.physics import COLUMNS, WIDE, Column, Coordinate, frame_of_series, observe_all
 from compressor.solve.request import Trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
 
+Variables = dict[str, tuple]  # as xarray has them
 COLUMN = {"contact_force": Column.FORCE, "rod_load": Column.FORCE + 2}  # others have its name
 COMPARED_PER_REV = 150  # times a revolution at which two runs are compared
 SAMPLES_PER_BAND = 2.56  # samples of the forces in a period of the highest frequency requested
 SAMPLES_PER_PERIOD = 24  # samples of the forces in one of the body's fastest motion
 MIN_COMPARED, MAX_COMPARED = 64, 20_000  # of these times over a settled part
+
+
+def variable(dims: tuple[str, ...], values: np.ndarray, unit: str, phrase: str) -> tuple:
+    """Return a variable as xarray has them."""
+    return dims, values, {"units": unit, "long_name": phrase}
+
+
+def rows_at(
+    p: np.record, times: np.ndarray, states: np.ndarray, phases: np.ndarray | int,
+    columns: int = COLUMNS,
+) -> np.ndarray:  # fmt: skip
+    """Return the observed rows of states, (m, n), at times (s), (m,), by phases: (m, columns)."""
+    rows, numbers = np.empty((times.size, columns)), np.full(times.size, phases)
+    # in one piece: to numba another layout is another type
+    observe_all(np.ascontiguousarray(times), np.ascontiguousarray(states), numbers, p, rows)
+    return rows
 
 
 def rows_of(
@@ -41,13 +58,9 @@ def rows_of(
 
     nan from where it stopped.
     """
-    times, states, phases = (  # in one piece: to numba another layout is another type
-        np.ascontiguousarray(whole[part]) for whole in (run.times, run.states, run.phases)
-    )
-    rows = np.empty((times.size, columns))
-    observe_all(times, states, phases, p, rows)
+    rows = rows_at(p, run.times[part], run.states[part], run.phases[part], columns)
     if run.reason:
-        rows[np.isnan(states).any(axis=1)] = math.nan
+        rows[np.isnan(run.states[part]).any(axis=1)] = math.nan
     return rows
 
 

@@ -11,6 +11,7 @@ from conftest import CHAOTIC, keep, store
 
 from compressor.cases.case import Case, CaseError
 from compressor.metrics import NUMBERS, of_source
+from compressor.solve import body
 from compressor.solve import run as run_module
 from compressor.solve.series import finer
 from compressor.solve.simulate import measure, observe, simulate
@@ -90,7 +91,7 @@ def test_bars_hold_the_error(joint, place, monkeypatch):
     sensor = {"place": place[0], "direction": place[1], "threshold_m_per_s2": 15.0}
     values = {**SENSED, "joint": joint, "sensor": sensor}
     ours, real = measured(values), finer
-    for module in (sys.modules["compressor.solve.simulate"], run_module):
+    for module in (sys.modules["compressor.solve.simulate"], body, run_module):
         monkeypatch.setattr(module, "finer", lambda case: 3 * real(case))
     exact = measured({**values, "solve": {"duration_rev": 3, "settle_rev": 1, "rtol": 1e-11}})
     for name in OF_BODY:
@@ -131,7 +132,7 @@ def test_bars_hold_the_errors_of_random_cases(monkeypatch):
         values, accuracy = random_case(random)
         ours = measured({**values, "solve": {**span, "accuracy": accuracy}})
         with monkeypatch.context() as patch:
-            for module in (sys.modules["compressor.solve.simulate"], run_module):
+            for module in (sys.modules["compressor.solve.simulate"], body, run_module):
                 patch.setattr(module, "finer", lambda case: 3 * real(case))
             exact = measured({**values, "solve": {**span, "rtol": 1e-11}})
         for name in OF_BODY:

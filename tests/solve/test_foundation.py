@@ -13,8 +13,9 @@ from compressor.cases.case import Case, CaseError
 from compressor.cases.load import load_studies
 from compressor.physics import COLUMNS, derivative_with_flows
 from compressor.physics.systems import observe_at
+from compressor.solve.body import BODY
 from compressor.solve.si_record import record
-from compressor.solve.simulate import BODY, measure, simulate
+from compressor.solve.simulate import measure, simulate
 from compressor.store.reader import open_study, read_store
 from compressor.studies.tradeoff.explain import body_words
 

@@ -18,7 +18,7 @@ from compressor.solve.cautions import (
     expected_cost,
     greatest_force,
 )
-from compressor.solve.request import too_deep
+from compressor.solve.request import Stop, check_depth
 from compressor.solve.run import run_at_tolerance
 from compressor.solve.si_record import record, stiffness_of
 from compressor.solve.simulate import simulate
@@ -171,4 +171,5 @@ def test_a_journal_too_deep_is_soft_or_stepped_over(stiffness, reason):
     """No motion of the machine has the energy to go so deep into a stiff contact: a step has."""
     values = {"joint": "big_end", "clearance_mm": 0.2, "load": "gas"}
     p = record(Case.from_values({**values, "contact": {"stiffness_N_per_mm15": stiffness}}))
-    assert too_deep(1.38, p)[0] == reason
+    with pytest.raises(Stop, match=f"^{reason}"):
+        check_depth(1.38, p)
