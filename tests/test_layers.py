@@ -70,7 +70,6 @@ LIBRARIES = {  # library -> the modules that may import it
     "click": {"compsim"},
     "rich": {"compsim.progress"},
     "pyarrow": {"compressor.studies.diagnosis"},
-    "pyuff": {"compressor.vibration.record_files"},
     "sklearn": set(),  # of campaigns alone
 }  # fmt: skip
 MAX_NAMES = 30  # on average, of those that other rooms import

@@ -13,7 +13,7 @@ from compsim.progress import ProgressReporter
 @click.argument("names", nargs=-1, metavar="[STUDY|JOB]...")
 @options.results
 @options.output(
-    "Write this file: .nc or .csv, or .wav, .mat or .uff for a record; or into a folder.",
+    "Write this file: .nc or .csv, or .wav or .mat for a record; or into a folder.",
     required=True,
     metavar="FILE|FOLDER",
     type=options.FILE,
@@ -21,7 +21,7 @@ from compsim.progress import ProgressReporter
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["netcdf", "csv", "wav", "mat", "uff"]),
+    type=click.Choice(["netcdf", "csv", "wav", "mat"]),
     help="Write the files of a folder in this format; netcdf by default.",
 )
 @click.option("--series", is_flag=True, help="Also write the time series of the studies' jobs.")
@@ -36,8 +36,8 @@ def export(names, folder, output, form, series, force, units, quiet) -> int:
     compsim export 3fa9c2 -o job.wav
 
     A STUDY becomes a table of its jobs, failed and missing ones included. A JOB, named by the
-    beginning of its key, becomes a table of samples, in CSV with its sensor's record; as .wav,
-    .mat or .uff it becomes that record alone: acceleration in m/s2 and a tacho (a .wav has 32-bit
+    beginning of its key, becomes a table of samples, in CSV with its sensor's record; as .wav
+    or .mat it becomes that record alone: acceleration in m/s2 and a tacho (a .wav has 32-bit
     floats; 1.0 is 1 m/s2). Without either, all studies are written. Several studies go into one
     FILE together, or into a FOLDER with a file each: a name without suffix, or with a slash at its
     end. --units is of CSV alone: other files and records are in SI.

@@ -20,7 +20,7 @@ def identify(record, study, folder, hints, as_json, quiet) -> int:
     compsim identify record.csv --study machines
     compsim identify record.wav --study machines --channel 1 --unit g --tacho 2
 
-    The record is a file, .csv, .wav, .mat or .uff. The simplest is a CSV file with the columns
+    The record is a file, .csv, .wav or .mat. The simplest is a CSV file with the columns
     time_s, acceleration_m_per_s2 and tacho, a signal that rises at each top dead centre; or without
     tacho, with --rpm and --tdc. Text as analysers write it is read, too, with decimal commas and
     titles such as Acc [g]. What a file does not say, options do. Or it is a stored job with a

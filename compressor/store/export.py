@@ -1,6 +1,6 @@
 """Results for other programs: metrics of studies and time series of jobs, as netCDF or as CSV.
 
-Records of sensors, as programs that analyse vibration open them, are WAV, MAT and UFF files too.
+Records of sensors, as programs that analyse vibration open them, are WAV and MAT files too.
 
 A CSV file has one header line, units in brackets where a name does not end in its unit, and
 numbers that read back to the bit; an empty cell is a number that there is not. A sensor's record
@@ -33,7 +33,7 @@ from compressor.units import Units, unit_in
 if TYPE_CHECKING:
     import xarray as xr
 
-RECORD_SUFFIXES = {"wav": ".wav", "mat": ".mat", "uff": ".uff"}  # of a sensor's record alone
+RECORD_SUFFIXES = {"wav": ".wav", "mat": ".mat"}  # of a sensor's record alone
 SUFFIXES = {"netcdf": ".nc", "csv": ".csv", **RECORD_SUFFIXES}
 BLOCK = 4096  # rows of a CSV file that are text at the same time
 HEXADECIMAL = re.compile("[0-9a-f]{1,20}")
@@ -91,8 +91,8 @@ def export(
 ) -> tuple[list[Exported], list[DamagedJob]]:
     """Write what `names` name, studies and jobs by the beginning of their keys, else all studies.
 
-    output: a file, .nc or .csv, for the studies together as one table, or for one job; or .wav,
-    .mat or .uff for the sensor's record of one job; or a folder, in which each gets a file: a name
+    output: a file, .nc or .csv, for the studies together as one table, or for one job; or .wav
+    or .mat for the sensor's record of one job; or a folder, in which each gets a file: a name
     without a suffix, with a slash at its end, or of a folder.
 
     Returns what was written, and damage that was met, which costs the jobs in it alone. Raises

@@ -1,14 +1,12 @@
-"""Files of an accelerometer's record: CSV, WAV, MATLAB's MAT and universal file format 58.
+"""Files of an accelerometer's record: CSV, WAV and MATLAB's MAT.
 
 A file's ending names its format: `READERS` and `ENCODERS` are the tables. What a file says of its
 channels is read; what it does not say, such as the unit of a WAV file, is never guessed.
-UFF needs pyuff, which `pip install 'compsim[records]'` brings.
 """
 
 import io
 import math
 import re
-import tempfile
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -54,10 +52,6 @@ UNEVEN = 0.1  # of a time step, by which a step may differ from the mean one
 PLAIN = "separator comma, decimal point, header in line 1,"  # as our own files are
 OPTIONS = {"time": "time", "acceleration": "channel", "tacho": "tacho"}  # that name a channel
 SCALES = (("acceleration", "unit", UNITS), ("time", "time_unit", TIME_UNITS))
-SAME_STEP = 1e-9  # share by which two channels' time steps may differ
-TIME_RESPONSE, IS_ACCELERATION, IS_TIME = 1, 12, 17  # numbers of the universal file format 58
-WANTED = "write a whole, real time response with even steps: types 58 and 1"
-VALUE_IN_UFF = "acceleration", IS_ACCELERATION, "m/s2"
 
 
 class Channel(NamedTuple):
@@ -192,62 +186,8 @@ def _open_mat(path: Path) -> RecordFile:
     )
 
 
-END = re.compile(rb"    -1[ \t]*(?=[\r\n]|\Z)")  # of a data set, and its begin
-
-
-def _open_uff(path: Path) -> RecordFile:
-    """Return what a universal file has: its time responses (data sets 58) with even steps."""
-    # pyuff does not see a mark with blanks behind it
-    data, marks = END.subn(b"    -1", path.read_bytes())
-    if marks % 2:
-        raise ValueError("its last data set has no end, a line with -1 in columns 5 and 6")
-    found, unused = [], []
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
-        warnings.simplefilter("ignore", np.exceptions.ComplexWarning)
-        plain = Path(folder) / "record.uff"
-        plain.write_bytes(data)
-        file = _pyuff().UFF(str(plain))
-        for number, kind in enumerate(file.get_set_types()):
-            one: dict[str, Any] = file.read_sets(number) if kind == 58 else {"func_type": 0}
-            is_real = one["func_type"] == TIME_RESPONSE and one["ord_data_type"] <= 4
-            if is_real and one["abscissa_spacing"] and len(one["data"]) >= max(one["num_pts"], 2):
-                found.append(one)
-            else:
-                what = f"type {kind:g}, function type {one['func_type']:g}"
-                unused.append(f"data set {number + 1} ({what}: {WANTED})")
-    clocks = [(float(one["abscissa_min"]), float(one["abscissa_inc"])) for one in found]
-
-    def read(numbers: Sequence[int]) -> list[np.ndarray]:
-        one, *others = (clocks[at] for at in numbers)
-        if any(np.abs(np.subtract(one, other)).max() > SAME_STEP * one[1] for other in others):
-            raise RecordError(f"{path}: channels begin at different times or steps: {clocks} s")
-        return [np.asarray(found[at]["data"], float) for at in numbers]
-
-    channels = [_uff_channel(one, number) for number, one in enumerate(found, 1)]
-    return RecordFile(path, channels, read, clocks[0] if clocks else None, unused=unused)
-
-
-def _pyuff() -> Any:
-    try:
-        import pyuff
-    except ImportError as error:
-        remedy = "get it by pip install 'compsim[records]'"
-        raise RecordError(f"pyuff is not installed; {remedy}") from error
-    return pyuff
-
-
-def _uff_channel(one: dict[str, Any], number: int) -> Channel:
-    """Return what a time response says of itself; `NONE` is the format's word for nothing."""
-    texts = (str(one[key]).strip() for key in ("id1", "ordinate_axis_units_lab"))
-    name, unit = ("" if text == "NONE" else text for text in texts)
-    is_acceleration = one["ordinate_spec_data_type"] == IS_ACCELERATION
-    kind = "acceleration" if is_acceleration else "tacho" if name.lower() == TACHO else ""
-    return Channel(name or str(number), kind, unit)
-
-
 READERS: dict[str, Callable[..., RecordFile]] = {
     "": _open_csv, ".csv": _open_csv, ".txt": _open_csv, ".wav": _open_wav, ".mat": _open_mat,
-    ".uff": _open_uff, ".unv": _open_uff,
 }  # fmt: skip
 
 
@@ -465,23 +405,6 @@ def _encode_mat(columns: Columns, rate: float) -> bytes:
     return head[:116] + file.getvalue()[116:]
 
 
-def _encode_uff(columns: Columns, rate: float) -> bytes:
-    """Return a data set 58 a signal, as text: samples of 12 digits, and a time step of 6."""
-    pyuff, sets = _pyuff(), []
-    for name, values in [*columns.items()][1:]:
-        title, kind, unit = (TACHO, 0, "NONE") if name == TACHO else VALUE_IN_UFF
-        sets.append(pyuff.prepare_58(
-            binary=0, func_type=TIME_RESPONSE, id1=title, id2=PROGRAM, rsp_node=1, rsp_dir=0,
-            ref_node=0, ref_dir=0, abscissa_spacing=1, abscissa_spec_data_type=IS_TIME,
-            abscissa_axis_units_lab="s", ordinate_spec_data_type=kind,
-            ordinate_axis_units_lab=unit, orddenom_spec_data_type=0, data=values, x=columns[TIME],
-        ))  # fmt: skip
-    with tempfile.TemporaryDirectory() as folder:  # pyuff writes to a path alone
-        path = Path(folder) / "record.uff"
-        pyuff.UFF(str(path)).write_sets(sets, mode="overwrite")
-        return path.read_bytes()
-
-
 ENCODERS: dict[str, Callable[[Columns, float], bytes]] = {
-    ".wav": _encode_wav, ".mat": _encode_mat, ".uff": _encode_uff,
+    ".wav": _encode_wav, ".mat": _encode_mat,
 }  # fmt: skip

@@ -215,12 +215,10 @@ def test_a_record_in_csv_is_what_identify_reads(worn, tmp_path, capsys):
 
 @pytest.mark.parametrize(
     ("suffix", "hints"),
-    [(".wav", {"channel": "1", "tacho": "2", "unit": "m/s2"}), (".mat", {}), (".uff", {})],
+    [(".wav", {"channel": "1", "tacho": "2", "unit": "m/s2"}), (".mat", {})],
 )
 def test_a_record_alone_is_what_analysts_open(suffix, hints, worn, tmp_path, capsys):
     """Values to the digits of the type, whatever the job's own samples are."""
-    if suffix == ".uff":
-        pytest.importorskip("pyuff")
     stored = read_store(worn)
     recorded = (key for key in sorted(stored.keys()) if "sensor_time" in stored.job(key))
     one, two = itertools.islice(recorded, 2)

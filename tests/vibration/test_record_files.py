@@ -2,8 +2,6 @@
 
 import math
 import struct
-import sys
-import warnings
 import wave
 
 import numpy as np
@@ -176,8 +174,6 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path):
 
 def encoded(folder, suffix):
     """Writes the record to a file of a type."""
-    if suffix == ".uff":
-        pytest.importorskip("pyuff")
     path = folder / f"record{suffix}"
     path.write_bytes(encode_record(COLUMNS, suffix))
     return path
@@ -188,7 +184,6 @@ def encoded(folder, suffix):
     [
         (".wav", {"channel": "1", "tacho": "2", "unit": "m/s2"}, 6e-8),  # of 32-bit floats
         (".mat", {}, 0.0),
-        (".uff", {}, 5e-12),  # of 12 digits
     ],
 )
 def test_every_type_that_is_written_is_read(suffix, hints, error, tmp_path):
@@ -209,81 +204,6 @@ def test_other_programs_find_what_the_page_says(tmp_path):
     assert {*found} >= {"time_s", "acceleration_m_per_s2", "tacho", "rate_Hz"}
     assert found["rate_Hz"].item() == pytest.approx(RATE, rel=1e-12)
     assert found["acceleration_m_per_s2"].shape == (TIMES.size, 1)
-
-
-def test_a_universal_file_says_what_its_signals_are(tmp_path):
-    pyuff = pytest.importorskip("pyuff")
-    value, tacho = pyuff.UFF(str(encoded(tmp_path, ".uff"))).read_sets()
-    assert (value["type"], value["func_type"]) == (58, 1)  # a time response
-    assert (value["abscissa_spec_data_type"], value["abscissa_spacing"]) == (17, 1)  # even times
-    assert value["ordinate_spec_data_type"] == 12  # an acceleration
-    assert value["ordinate_axis_units_lab"].strip() == "m/s2"
-    assert tacho["id1"].strip() == "tacho"
-
-
-def laid_out(samples, step, title="point 7", unit="g", kind=12):
-    """A data set 58 by the published layout: real, single precision, even steps, 6E13.5."""
-    rows = [samples[k : k + 6] for k in range(0, len(samples), 6)]
-    return "\n".join([
-        f"{-1:6d}", f"{58:6d}", title, "NONE", "NONE", "NONE", "NONE",
-        f"{1:5d}{0:10d}{0:5d}{0:10d} {'NONE':<10}{7:10d}{2:4d} {'NONE':<10}{0:10d}{0:4d}",
-        f"{2:10d}{len(samples):10d}{1:10d}{0.0:13.5e}{step:13.5e}{0.0:13.5e}",
-        f"{17:10d}{0:5d}{0:5d}{0:5d} {'Time':<20} {'s':<20}",
-        f"{kind:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {unit:<20}",
-        f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
-        f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':<20} {'NONE':<20}",
-        *("".join(f"{value:13.5e}" for value in row) for row in rows), f"{-1:6d}", "",
-    ])  # fmt: skip
-
-
-def test_a_universal_file_of_the_published_layout_is_read(tmp_path):
-    """By columns of characters, as its specification has them, without pyuff's writer."""
-    pytest.importorskip("pyuff")
-    path = tmp_path / "x.unv"
-    path.write_text(laid_out(VALUES, 1 / RATE) + laid_out(voltage(), 1 / RATE, "Tacho", "V", 0))
-    found = read_record(path)
-    np.testing.assert_allclose(found.values, 9.80665 * VALUES, rtol=1e-5, atol=1e-6)
-    np.testing.assert_allclose(found.tacho, PULSES, atol=1e-5)
-    path.write_text(laid_out(VALUES, 1 / RATE, unit="furlong/s2"))
-    with pytest.raises(RecordError, match=r"channel point 7 has the unit 'furlong/s2' of accel"):
-        read_record(path, **STEADY)
-    assert read_record(path, unit="mm/s2", **STEADY).values[3] == pytest.approx(1e-3 * VALUES[3])
-    path.write_text(laid_out(VALUES, 1 / RATE) + laid_out(voltage(), 2 / RATE, "tacho", "V", 0))
-    with pytest.raises(RecordError, match="channels begin at different times or steps"):
-        read_record(path)
-    path.write_text("nothing of the kind")
-    with pytest.raises(RecordError, match="no column acceleration_m_per_s2, no signals"):
-        read_record(path, **STEADY)
-
-
-@pytest.mark.parametrize("binary", [0, 1])
-def test_universal_files_of_others_are_read(binary, tmp_path):
-    """Text and binary, the record at an offset, beside a spectrum, which is no time response."""
-    pyuff = pytest.importorskip("pyuff")
-    path = tmp_path / "x.uff"
-    of_all = {"binary": binary, "rsp_node": 1, "rsp_dir": 2, "ref_node": 0, "ref_dir": 0,
-              "abscissa_spacing": 1, "orddenom_spec_data_type": 0}  # fmt: skip
-    spectrum = {"func_type": 4, "ordinate_spec_data_type": 12, "data": VALUES + 0j, "x": TIMES}
-    value = {"func_type": 1, "ordinate_spec_data_type": 12, "ordinate_axis_units_lab": "m/s^2",
-             "data": VALUES, "x": 2.0 + TIMES}  # fmt: skip
-    tacho = {"func_type": 1, "ordinate_spec_data_type": 0, "id1": "TACHO", "data": voltage(),
-             "x": 2.0 + TIMES}  # fmt: skip
-    for one in (value, tacho):  # pyuff's mode "overwrite" cuts off the head of a binary set
-        pyuff.UFF(str(path)).write_sets([pyuff.prepare_58(**of_all, **one)], mode="add")
-    spectrum = pyuff.prepare_58(**(of_all | {"binary": 0}), **spectrum)
-    pyuff.UFF(str(path)).write_sets([spectrum], mode="add")
-    found = read_record(path)
-    np.testing.assert_allclose(found.values, VALUES, rtol=0 if binary else 5e-12)
-    np.testing.assert_allclose(found.times, TIMES, atol=1e-9)  # from the record's begin
-    np.testing.assert_allclose(found.tacho, PULSES, atol=1e-5)
-
-
-def test_without_pyuff_the_remedy_is_named(monkeypatch, tmp_path):
-    (tmp_path / "x.uff").touch()
-    monkeypatch.setitem(sys.modules, "pyuff", None)
-    for act in (lambda: read_record(tmp_path / "x.uff"), lambda: encode_record(COLUMNS, ".uff")):
-        with pytest.raises(RecordError, match=r"pyuff is not installed; get it by pip install 'co"):
-            act()
 
 
 @pytest.mark.parametrize(
@@ -353,7 +273,7 @@ def test_a_matlab_file_may_hold_a_matrix_and_a_rate(tmp_path):
         read_record(path)
 
 
-@pytest.mark.parametrize("suffix", [".wav", ".mat", ".uff"])
+@pytest.mark.parametrize("suffix", [".wav", ".mat"])
 def test_a_file_that_is_cut_or_of_something_else_is_named(suffix, tmp_path):
     """Also a text that is cut between two lines, or between two data sets."""
     whole = encoded(tmp_path, suffix).read_bytes()
@@ -586,32 +506,3 @@ def test_a_matlab_file_says_what_is_no_signal(tmp_path):
     for told in ("no signals; no signals are ", "data (struct of shape (1, 1): save real vectors",
                  "z (complex128 of shape", "c (object of shape"):  # fmt: skip
         assert told in str(found.value)
-
-
-def test_a_universal_file_says_what_is_no_signal(tmp_path):
-    pyuff = pytest.importorskip("pyuff")
-    path = tmp_path / "x.uff"
-    common = {"binary": 0, "rsp_node": 1, "rsp_dir": 2, "ref_node": 0, "ref_dir": 0, "x": TIMES,
-              "orddenom_spec_data_type": 0, "ordinate_spec_data_type": 12}  # fmt: skip
-    for kind, spacing, data in ((0, 1, VALUES), (4, 1, VALUES + 1j), (9, 1, VALUES),
-                                (1, 0, VALUES), (1, 1, VALUES + 1j)):  # fmt: skip
-        one = pyuff.prepare_58(**common, func_type=kind, abscissa_spacing=spacing, data=data)
-        pyuff.UFF(str(path)).write_sets([one], mode="add")
-    warnings.simplefilter("error")  # within this test
-    with pytest.raises(RecordError) as found:
-        read_record(path)
-    for number, kind in enumerate((0, 4, 9, 1, 1), 1):
-        told = f"data set {number} (type 58, function type {kind}: write a whole, real time resp"
-        assert told in str(found.value)
-
-
-def test_a_universal_file_may_have_blanks_and_no_end(tmp_path):
-    path = encoded(tmp_path, ".uff")
-    text = path.read_text()
-    path.write_text(text.replace("    -1\n", "    -1   \n"))
-    np.testing.assert_allclose(read_record(path).values, VALUES, atol=1e-11)
-    path.write_text(text.rstrip().removesuffix("-1"))
-    with pytest.raises(
-        RecordError, match=r"its last data set has no end, .* write it again, whole"
-    ):
-        read_record(path)
