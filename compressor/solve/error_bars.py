@@ -93,20 +93,6 @@ def series_errors(ratio: float, apart: Mapping[str, Any]) -> Metrics:
     }
 
 
-def missed_targets(
-    targets: Sequence[tuple[str, float]], metrics: Mapping[str, Any], error: Mapping[str, Any]
-) -> list[str]:
-    """Return a message for each metric whose relative bar, at its worst joint, exceeds its target.
-
-    A metric of 0, such as the penetration of an ideal joint, is met by a bar of 0 alone.
-    """
-    return [
-        f"{name}: its error bar is {long:.2g} of it, not {target:g}"
-        for name, target in targets
-        if (long := relative_bar(metrics[name], error[name])) > target
-    ]
-
-
 def relative_bar(metric: Any, bar: Any) -> float:
     """Return the relative length of a metric's error bar at its worst joint; 0 where both are 0."""
     size, length = np.ravel(np.abs(metric)), np.ravel(bar)

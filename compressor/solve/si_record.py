@@ -66,7 +66,10 @@ def record(case: Case) -> np.record:
     _machine(case, p)
     _contact(case, p)
     _gas(case, p)
-    _spring(case, p)
+    spring = case.spring
+    p["spring_stiffness"] = to_si(spring.stiffness_N_per_mm, "N/mm")
+    p["spring_damping"] = to_si(spring.damping_N_s_per_mm, "N s/mm")
+    p["preload"], p["spring_stroke"] = spring.preload_N, to_si(spring.stroke_mm, "mm")
     _film(case, p)
     if case.needs_mechanism:
         _features(case, p)
@@ -126,6 +129,7 @@ def _gas(case: Case, p: dict[str, Any]) -> None:
     """Set the forces of the gas on the piston, and its cycle."""
     gas, stroke = case.gas, 2 * case.machine.crank_radius_mm
     area = math.pi * to_si(gas.piston_radius_mm, "mm") ** 2
+    rod = math.pi * to_si((gas.rod_diameter_mm or 0.0) / 2, "mm") ** 2
     suction, discharge = (to_si(pressure, "MPa") for pressure in gas.open_pressures)
     p["suction_force"], p["discharge_force"] = suction * area, discharge * area
     back = to_si(gas.back_pressure_MPa or 0.0, "MPa")
@@ -133,9 +137,11 @@ def _gas(case: Case, p: dict[str, Any]) -> None:
     p["head_clearance"] = to_si(gas.clearance("head", stroke), "mm")
     p["gas_exponent"] = gas.exponent
     if gas.is_measured and case.load == "gas":
-        _cards(case, area, back, p)
+        faces = {"head": area, "crank": rod - area}
+        table = sum((faces[end] * gas_nodes(case, end) for end in gas.cards), np.zeros(()))
+        table[:, 0] -= back * sum(faces[end] for end in gas.cards)
+        p["card"], p["discharge_force"] = table, np.abs(table[:, 0]).max()
     elif gas.switching == "exact":
-        rod = math.pi * to_si((gas.rod_diameter_mm or 0.0) / 2, "mm") ** 2
         areas = {"head": area * gas.presses("head"), "crank": (area - rod) * gas.presses("crank")}
         for end, prefix in (("head", ""), ("crank", "crank_")):
             idle = to_si(gas.suction_MPa, "MPa")
@@ -144,31 +150,6 @@ def _gas(case: Case, p: dict[str, Any]) -> None:
             p[f"{prefix}discharge_force"] = open_at[1] * areas[end]
         p["crank_clearance"] = to_si(gas.clearance("crank", stroke), "mm")
         p["back_force"] = back * (areas["head"] - areas["crank"])
-
-
-def _cards(case: Case, area: float, back: float, p: dict[str, Any]) -> None:
-    """Set the force of measured gas over the crank's angle.
-
-    area: of the head's face (m2); back: pressure (Pa) on the faces' other side.
-    """
-    gas = case.gas
-    rod = math.pi * to_si((gas.rod_diameter_mm or 0.0) / 2, "mm") ** 2
-    faces = {"head": area, "crank": rod - area}
-    nodes: Any = 0.0
-    for end in gas.cards:
-        nodes = nodes + faces[end] * gas_nodes(case, end)
-    table = np.array(nodes)
-    table[:, 0] -= back * sum(faces[end] for end in gas.cards)
-    p["card"], p["discharge_force"] = table, np.abs(table[:, 0]).max()
-
-
-def _spring(case: Case, p: dict[str, Any]) -> None:
-    """Set the numbers of the spring between piston and cam."""
-    spring = case.spring
-    p["spring_stiffness"] = to_si(spring.stiffness_N_per_mm, "N/mm")
-    p["spring_damping"] = to_si(spring.damping_N_s_per_mm, "N s/mm")
-    p["preload"] = spring.preload_N
-    p["spring_stroke"] = to_si(spring.stroke_mm, "mm")
 
 
 def _film(case: Case, p: dict[str, Any]) -> None:
@@ -190,34 +171,25 @@ def _film(case: Case, p: dict[str, Any]) -> None:
     )
 
 
-def _guide_contact(case: Case, p: dict[str, Any]) -> None:
-    """Set how a corner of the crosshead meets its guide: by the joints' numbers or its own."""
-    guide, contact = case.guide, case.contact
-    if guide is None:
-        return
-    exponent = guide.exponent or contact.exponent
-    damping = guide.damping_N_s_per_mm
-    damping = contact.damping_N_s_per_mm if damping is None else damping
-    p["guide_stiffness"] = guide.stiffness_N_per_mm15 * 1000.0**exponent
-    p["guide_exponent"] = exponent
-    p["guide_damping"] = to_si(damping, "N s/mm")
-    p["per_guide_full_damping"] = 1.0 / to_si(
-        guide.full_damping_mm or contact.full_damping_mm, "mm"
-    )
-
-
 def _features(case: Case, p: dict[str, Any]) -> None:
     """Set what frees more than the joints: guide, drive, rod, friction of ideal joints."""
     p["rubbing"] = int(bool(case.friction and case.friction.ideal_joints))
     p["driven"], p["elastic"] = int(case.drive is not None), int(case.rod is not None)
     p["tilting"] = int(case.guide is not None and case.guide.clearance_mm > 0)
-    guide, drive, rod = case.guide, case.drive, case.rod
+    guide, drive, rod, contact = case.guide, case.drive, case.rod, case.contact
     p["guide_stiction"] = p["crosshead_inertia"] = 1.0  # where nothing reads them
     if guide:
         p["guide_clearance"] = to_si(guide.clearance_mm, "mm")
         p["guide_length"] = to_si(guide.crosshead_length_mm, "mm") / 2
         p["guide_height"] = to_si(guide.crosshead_height_mm, "mm") / 2
-        _guide_contact(case, p)
+        # a corner of the crosshead meets its guide by the joints' numbers, or its own
+        damping, full = guide.damping_N_s_per_mm, guide.full_damping_mm or contact.full_damping_mm
+        p["guide_exponent"] = guide.exponent or contact.exponent
+        p["guide_stiffness"] = guide.stiffness_N_per_mm15 * 1000.0 ** p["guide_exponent"]
+        p["guide_damping"] = to_si(
+            contact.damping_N_s_per_mm if damping is None else damping, "N s/mm"
+        )
+        p["per_guide_full_damping"] = 1.0 / to_si(full, "mm")
         p["guide_friction"] = guide.friction
         p["guide_stiction"] = to_si(guide.stiction_velocity_mm_per_s, "mm/s")
         p["crosshead_inertia"] = guide.crosshead_inertia_kg_m2 or 0.0

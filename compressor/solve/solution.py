@@ -11,7 +11,6 @@ from compressor.solve.error_bars import (
     comparison_run,
     estimate_errors,
     looser_comparison_run,
-    missed_targets,
     ratio_of,
     relative_bar,
 )
@@ -26,11 +25,8 @@ from compressor.solve.run_metrics import (
 )
 from compressor.solve.search import Search, find_span, predictability_horizon, repeats
 
-OUT_OF_BUDGET = (
-    Reason.BUDGET_STEPS,
-    Reason.BUDGET_SECONDS,
-    Reason.STEP_UNDERFLOW,
-)  # a tighter run may end so
+# a tighter run may end so
+OUT_OF_BUDGET = Reason.BUDGET_STEPS, Reason.BUDGET_SECONDS, Reason.STEP_UNDERFLOW
 LAST_RTOL = TIGHTER_FACTOR * TIGHTEST  # with a tighter run to compare it with
 DOUBTFUL = 0.1  # of a number: an error from which on chaos is looked for
 ERROR_AIM = 0.7  # of what is allowed: where the next run's error is aimed at
@@ -52,7 +48,10 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
         now = first or run_at_tolerance(search.within_budget(), rtol, search.left, is_sampled(case))
         first = None
         if now.reason:
-            return end_early(case, best, now, search)
+            if best is None or now.reason not in OUT_OF_BUDGET:
+                return now
+            words = search.limit_of(now.trajectory) or now.detail
+            return fail(case, best, f"the next run: {words}", now)
         search.count(now.trajectory)
         best = now
         if not energy_balances(case, now):
@@ -60,7 +59,7 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
             unsound += 1
             tighter = next_audit_rtol(rtol, unsound)
             if tighter is None:
-                return fail_energy_audit(case, now, f"at rtol {rtol:.2g}")
+                return fail(case, now, f"at rtol {rtol:.2g}")
             rtol = tighter
             continue
         if not case.wants_bars:
@@ -75,7 +74,7 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
         if before is None and is_far and search.parts(whole=False):
             return now
         if rtol < 1.01 * LAST_RTOL or all(one.reason for one in others):
-            return fail_accuracy(case, now, others[0].detail or "no run is tighter")
+            return fail(case, now, others[0].detail or "no run is tighter")
         before = now
         tightening = min(max(ratio_of(ERROR_AIM / excess), MIN_TIGHTENING), MAX_TIGHTENING)
         rtol = max(float(f"{rtol / tightening:.1e}"), LAST_RTOL)
@@ -120,44 +119,42 @@ def energy_balances(case: Case, solution: Solution) -> bool:
     )
 
 
-def end_early(case: Case, best: Solution | None, now: Solution, search: Search) -> Solution:
-    """Return what is left of a case whose present run did not reach its end."""
-    if best is None or now.reason not in OUT_OF_BUDGET:
-        return now
-    detail = f"the next run: {search.limit_of(now.trajectory) or now.detail}"
-    if not energy_balances(case, best):
-        return fail_energy_audit(case, best, detail, now.reason)
-    return fail_accuracy(case, best, detail, now.reason)
+def fail(case: Case, best: Solution, detail: str, now: Solution | None = None) -> Solution:
+    """Return a whole run as a failed job; now: the run that was stopped after it, if one was.
 
-
-def fail_energy_audit(case: Case, best: Solution, detail: str, reason: str = "") -> Solution:
-    """Return a whole run as a failed job: its series and energies are kept, its metrics are not."""
-    residual = energy_residual(best.trajectory.tally)
-    allowed = allowed_residual(case.rtol, case.duration / case.turn)
-    best.metrics, best.bars, best.series_errors = {}, {}, {}
-    timed_out = reason == Reason.BUDGET_SECONDS
-    best.reason = reason if timed_out else Reason.ENERGY_AUDIT_FAILED
-    best.detail = f"energy residual {residual:.2g}, more than {allowed:.2g}; {detail}"
-    return best
-
-
-def fail_accuracy(case: Case, best: Solution, detail: str, reason: str = "") -> Solution:
-    """Return a run with its errors as a failed job, since they are larger than promised."""
-    timed_out = reason == Reason.BUDGET_SECONDS
-    best.reason = reason if timed_out else Reason.ACCURACY_NOT_REACHED
-    best.detail = "; ".join([*missed_promises(case, best), f"at rtol {best.rtol:.2g}", detail])
+    Where its energy does not balance its series and energies are kept, its metrics are not; else it
+    keeps its errors, which are larger than promised.
+    """
+    if energy_balances(case, best):
+        best.reason = Reason.ACCURACY_NOT_REACHED
+        told = [*missed_promises(case, best), f"at rtol {best.rtol:.2g}"]
+    else:
+        best.reason = Reason.ENERGY_AUDIT_FAILED
+        best.metrics, best.bars, best.series_errors = {}, {}, {}
+        residual = energy_residual(best.trajectory.tally)
+        allowed = allowed_residual(case.rtol, case.duration / case.turn)
+        told = [f"energy residual {residual:.2g}, more than {allowed:.2g}"]
+    if now and now.reason == Reason.BUDGET_SECONDS:
+        best.reason = now.reason
+    best.detail = "; ".join([*told, detail])
     return best
 
 
 def missed_promises(case: Case, solution: Solution) -> list[str]:
-    """Return a message for each promise that a run does not keep."""
-    if case.targets:
-        return missed_targets(case.targets, solution.metrics, solution.bars)
-    error = solution.series_errors["acceleration"]
-    return [f"acceleration: its error may be {error:.2g} of it, not {case.promise:g}"]
+    """Return a message for each promise that a run does not keep, of a metric at its worst joint.
+
+    A metric of 0, such as the penetration of an ideal joint, is met by a bar of 0 alone.
+    """
+    if not case.targets:
+        error = solution.series_errors["acceleration"]
+        return [f"acceleration: its error may be {error:.2g} of it, not {case.promise:g}"]
+    return [
+        f"{name}: its error bar is {long:.2g} of it, not {target:g}"
+        for name, target in case.targets
+        if (long := relative_bar(solution.metrics[name], solution.bars[name])) > target
+    ]
 
 
-SEARCH_ENDED = "the search for chaos came to its limit"
 CHAOTIC_RTOL = 1e-6  # at the loosest, of the run that statistics are taken from
 
 
@@ -190,7 +187,7 @@ def find_horizon(case: Case, solution: Solution, search: Search) -> None:
     elif case.wants_bars and is_in_doubt(case, solution):
         search.parts(whole=True)
         if solution.reason and search.stopped:
-            solution.detail += f"; {SEARCH_ENDED}"
+            solution.detail += "; the search for chaos came to its limit"
     solution.horizon = search.horizon
 
 
@@ -238,7 +235,7 @@ def chaotic_solution(case: Case, solution: Solution, search: Search) -> Solution
     if now.reason:
         return now
     if not energy_balances(case, now):
-        return fail_energy_audit(case, now, f"at rtol {now.rtol:.2g}")
+        return fail(case, now, f"at rtol {now.rtol:.2g}")
     if case.wants_bars:
         estimate_errors(now)
         if turns := now.trajectory.turns:
@@ -246,5 +243,5 @@ def chaotic_solution(case: Case, solution: Solution, search: Search) -> Solution
             now.bars |= chaotic_bars(now.p, turns, now.metrics)
         if excess_over_promise(case, now) > 1.0 and case.targets:
             reason = f"the motion is chaotic from {horizon / case.turn:.3g} revolutions on"
-            return fail_accuracy(case, now, reason)
+            return fail(case, now, reason)
     return now

@@ -1,6 +1,7 @@
 """What accuracy promises is kept run by run, or the job says that it is not."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,6 @@ from compressor.solve.error_bars import (
     ORDER,
     closeness,
     is_amplified,
-    missed_targets,
     ratio_of,
 )
 from compressor.solve.series import distances
@@ -27,6 +27,7 @@ from compressor.solve.solution import (
     ERROR_AIM,
     MAX_TIGHTENING,
     MIN_TIGHTENING,
+    missed_promises,
     solve,
 )
 
@@ -319,8 +320,10 @@ def test_ideal_joints_meet_any_number():
 
 
 def test_unmet_names_the_worst_joint():
-    found = {"max_penetration": np.array([2.0, 0.0]), "impact_count": np.array([0.0, 0.0])}
-    error = {"max_penetration": np.array([0.1, 0.0]), "impact_count": np.array([0.0, 1.0])}
-    assert missed_targets((("max_penetration", 0.1),), found, error) == []
-    (said,) = missed_targets((("max_penetration", 0.01),), found, error)
+    found = SimpleNamespace(
+        metrics={"max_penetration": np.array([2.0, 0.0])},
+        bars={"max_penetration": np.array([0.1, 0.0])},
+    )
+    assert missed_promises(of(BOTH, accuracy={"max_penetration": 0.1}), found) == []
+    (said,) = missed_promises(of(BOTH, accuracy={"max_penetration": 0.01}), found)
     assert said == "max_penetration: its error bar is 0.05 of it, not 0.01"
