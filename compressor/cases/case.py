@@ -9,7 +9,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import replace
 from functools import cache, cached_property, lru_cache
 from typing import Any
@@ -18,10 +18,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from compressor.cases.card import CardError, open_card
 from compressor.cases.checks import (
-    SWEEP,
     describe_wrong,
     expand_synonyms,
-    row_of,
     stands_for,
     value_of,
     values_given,
@@ -51,7 +49,6 @@ from compressor.cases.parameter import (
     problems_of,
     quote_value,
 )
-from compressor.cases.swept import FORMS
 from compressor.cases.table import (
     GROUPS,
     OF_JOINTS,
@@ -78,10 +75,6 @@ IDENTITY_GROUPS = tuple(
     for name in GROUPS
     if name != "solve"
     and any(key.partition(".")[0] == name for key in table().keys() - outside_identity())
-)
-NO_SWEEP = (
-    "would be swept, and a case has one value of each key: build a case for each, or write a case "
-    "file for load_cases"
 )
 
 
@@ -158,8 +151,7 @@ stroke, 240 mm
         except ValidationError as error:
             problems += problems_of(error, whole, table(), describe_wrong)
             if any(one["type"] != "value_error" or len(one["loc"]) for one in error.errors()):
-                found = problems if lenient else [_refuse_sweep(whole, one) for one in problems]
-                raise CaseError(name_as_written(whole, found)) from None
+                raise CaseError(name_as_written(whole, problems)) from None
         problems += given_conflicts(str(whole.get("joint", "none")), given)
         if case is None or problems:
             raise CaseError(name_as_written(whole, problems), is_misfit=True)
@@ -487,33 +479,11 @@ def digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
-def _refuse_sweep(values: Mapping[str, Any], problem: Problem) -> Problem:
-    """Return a problem; of a value that a file would sweep, that one case has no sweep."""
-    key, _, inner = problem.key.rpartition(".")
-    whole = key if inner in FORMS else problem.key
-    value = _value_at(whole, values)
-    return (
-        Problem(whole, f"{quote_value(value)} {NO_SWEEP}") if _is_swept(whole, value) else problem
-    )
-
-
 def _value_at(key: str, values: Mapping[str, Any]) -> Any:
     """Return the value of a dotted key in nested values; None where there is none."""
     group, _, name = key.rpartition(".")
     within = values.get(group) if group else values
     return within.get(name) if isinstance(within, Mapping) else None
-
-
-def _is_swept(key: str, value: Any) -> bool:
-    """Return whether a case file would sweep a key by this value, or by what stands under it."""
-    if key in SWEEP:
-        return True
-    if isinstance(value, Mapping):
-        return bool({*value} & {*FORMS})
-    many = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-    row = row_of(key)
-    many = many and not (row and row.kind == "materials")
-    return many or getattr(value, "ndim", 0) > 0
 
 
 def with_ideal_joints(case: Case, features: bool = True) -> Case:

@@ -249,7 +249,7 @@ def describe_unknown(name: str, group: str, file: bool = True, value: Any = None
         in_our_unit(name, value, accepted_keys(group))
         or of_percent(name, group)
         or of_diameter(name, group, value)
-        or ("" if DIAMETER.fullmatch(name) else suggestion(name, group))  # of another part
+        or ("" if DIAMETER.fullmatch(name) or name in SWEEP else suggestion(name, group))
         or f"; {whole} has {', '.join(known_keys(group, file))}"
     )
     return f"unknown key{hint}"
@@ -285,7 +285,7 @@ def suggestion(name: str, group: str) -> str:
         return f"; write {inner} inside {outer}"
     if group and name in known_keys(""):
         return f"; write {name} at the top, outside {group}"
-    if name.partition(":")[0] in known_keys(group):
+    if ":" in name and name.partition(":")[0] in known_keys(group):
         return "; put a space after the colon"
     if name in DOUBLES:
         return f"; write {DOUBLES[name]}, which is half of it"

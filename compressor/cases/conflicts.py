@@ -9,13 +9,15 @@ Where a case leaves the range that the program was judged on. Extreme scenes are
 """
 
 import contextlib
+import itertools
+import math
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 from compressor.cases.card import DRIVING, CardError, open_card, taken_work
-from compressor.cases.checks import row_of, stands_for, value_in
+from compressor.cases.checks import TWICE, row_of, stands_for, value_in
 from compressor.cases.comparison import condition
 from compressor.cases.groups import CRANK_END, ENDS
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
@@ -155,23 +157,20 @@ def default_in(case: Settings, key: str) -> Any:
     return getattr(getattr(replace(case, **without), group), name)
 
 
-OF_CONTACT = ("contact.", "friction.")  # keys that ideal joints do not read
-# keys that leave a thing out at 0, as a case without the group does
-ABSENT_AT_ZERO = (
-    "guide.clearance_mm", "guide.friction",
-)  # fmt: skip
-
-
 def judged_range(key: str) -> tuple[float, float]:
     """Return the range of a key, in its unit, that the program was judged on.
 
     Raises KeyError for a key without one.
     """
     row = row_of(key)
-    found = row.judged if row else None
-    if found is None:
+    if row is None or row.judged is None:
         raise KeyError(key)
-    return found
+    return row.judged
+
+
+OF_CONTACT = ("contact.", "friction.")  # keys that ideal joints do not read
+# keys that leave a thing out at 0, as a case without the group does
+ABSENT_AT_ZERO = ("guide.clearance_mm", "guide.friction")
 
 
 def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
@@ -181,10 +180,19 @@ def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
     the range that the program was judged on, 0.1 to 200 kg". Clearances of both joints are one key.
     """
     found = {}
-    for key, value, (low, high) in _judged_values(values):
+    ideal = values.get("joint") == "none"
+    for key, row in table().items():
+        value, whole = value_in(values, key), key.rpartition(".")[0]
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if row.judged is None or not is_number or (ideal and key.startswith(OF_CONTACT)):
+            continue
+        if not value and (key in ABSENT_AT_ZERO or whole in OF_JOINTS):
+            continue
+        if key == "contact.stiffness_N_per_mm15" and value_in(values, "contact.exponent") != 1.5:
+            continue  # the stiffness has another unit
+        low, high = row.judged
         if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
-            unit = f" {table()[key].unit}".replace("^p", "^1.5").rstrip()
-            whole = key.rpartition(".")[0]
+            unit = f" {row.unit}".replace("^p", "^1.5").rstrip()
             is_shared = whole in OF_JOINTS or (stands_for(whole) and value_in(values, whole))
             found[whole if is_shared else key] = (
                 f"{value:g}{unit} is outside the range that the program was judged on, "
@@ -193,139 +201,8 @@ def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
     return found
 
 
-def _judged_values(values: Mapping[str, Any]) -> Iterator[tuple[str, float, tuple[float, float]]]:
-    """Yield the keys with a judged range that a case reads, their values, and the ranges."""
-    ideal = values.get("joint") == "none"
-    other_exponent = value_in(values, "contact.exponent") != 1.5  # the stiffness has another unit
-    for key, row in table().items():
-        value = value_in(values, key) if row.judged else None
-        if row.judged is None or not isinstance(value, int | float) or isinstance(value, bool):
-            continue
-        if value == 0.0 and (key in ABSENT_AT_ZERO or key.rpartition(".")[0] in OF_JOINTS):
-            continue
-        if ideal and key.startswith(OF_CONTACT):
-            continue
-        if key == "contact.stiffness_N_per_mm15" and other_exponent:
-            continue
-        yield key, float(value), row.judged
-
-
-def law_conflicts(case: Settings) -> Iterator[Problem]:
-    """Yield what a law of contact lacks: a restitution, or what a pin in a bore needs."""
-    law, restitution = case.contact.law, case.contact.restitution
-    if law in CYLINDRICAL:
-        yield from cylinder_conflicts(case)
-    if law in RESTITUTING and restitution is None:
-        needed = f"is needed with contact.law: {law}; give it, such as 0.9"
-        yield Problem("contact.restitution", needed)
-
-
-def contact_conflicts(case: Settings) -> Iterator[Problem]:
-    contact = case.contact
-    if contact.materials is not None and contact.exponent != 1.5:
-        yield Problem(
-            "contact.exponent",
-            f"is {contact.exponent:g}, but Eq. 15's stiffness from materials needs exponent 1.5: "
-            "leave it out, or give stiffness_N_per_mm15 in place of materials",
-        )
-
-
-def friction_conflicts(case: Settings) -> Iterator[Problem]:
-    friction = case.friction
-    if friction and friction.law == "lugre" and bool(friction.static) != bool(friction.dynamic):
-        zero = "dynamic" if friction.static else "static"
-        yield Problem(
-            f"friction.{zero}",
-            "is 0 and the other coefficient is not: LuGre's bristles divide by it; give more than "
-            "0, or 0 for both",
-        )
-    if not friction or law_of(friction) not in READ_BY["friction"]["friction_velocity_mm_per_s"]:
-        return
-    if friction.friction_velocity_mm_per_s <= friction.stiction_velocity_mm_per_s:
-        yield Problem(
-            "friction.friction_velocity_mm_per_s",
-            f"{friction.friction_velocity_mm_per_s:g} mm/s must exceed the "
-            f"stiction_velocity_mm_per_s, {friction.stiction_velocity_mm_per_s:g} mm/s",
-        )
-
-
-def cylinder_conflicts(case: Settings) -> Iterator[Problem]:
-    """Yield what a pin in a bore lacks: its length, or what both are made of."""
-    contact = case.contact
-    needed = f"is needed with contact.law: {contact.law}; give it, such as"
-    if contact.length_mm is None:
-        yield Problem("contact.length_mm", f"{needed} 20")
-    if contact.materials is None and contact.modulus_GPa is None:
-        yield Problem("contact.materials", f"{needed} [steel, copper], or give modulus_GPa")
-
-
+Rules = Iterator[tuple[str, str]]  # of a case: a key, and what does not fit of it
 MIN_BAR_INERTIA = 1.0 - 1e-9  # of a uniform bar's inertia, which an elastic rod has at least
-
-
-def lubricant_conflicts(case: Settings) -> Iterator[Problem]:
-    """Yield a bearing for which the film's numbers do not hold."""
-    if not case.lubricant:
-        return
-    for joint in JOINTS:
-        width = 2.0 * getattr(case.machine.pin_radius_mm, joint)
-        length = getattr(case.lubricant.bearing_length_mm, joint)
-        ratio = length / width
-        if case.joint in (joint, "both") and not MIN_RATIO <= ratio <= MAX_RATIO:
-            key = f"lubricant.bearing_length_mm.{joint}"
-            text = (
-                f"is {ratio:.3g} times the diameter of the pin, {width:g} mm; the film's numbers "
-                f"hold from {MIN_RATIO:g} to {MAX_RATIO:g} times"
-            )
-            if length == table()[key].default:
-                default = f"{length:g} mm is the default, of the paper's"
-                text += f"; {default} pin: give the length that bears"
-            yield Problem(key, text)
-
-
-def wear_conflicts(case: Settings) -> Iterator[Problem]:
-    """Yield what a bore that wears cannot have: oil, and a limit that is reached already."""
-    if not case.wear:
-        return
-    if case.lubricant:
-        yield Problem(
-            "wear", "of a bore that runs dry is known, not that of one whose film parts journal "
-            "and bore: leave out lubricant or wear",
-        )  # fmt: skip
-    most = max(case.clearance_mm.big_end, case.clearance_mm.small_end)
-    if case.wear.limit_mm is not None and case.wear.limit_mm <= most:
-        yield Problem(
-            "wear.limit_mm", f"{case.wear.limit_mm:g} mm must be more than the clearance, {most:g} "
-            "mm: it is what the clearance grows to",
-        )  # fmt: skip
-
-
-def mechanism_conflicts(case: Settings) -> Iterator[Problem]:
-    """Yield what does not fit together in guide, drive, rod and the friction of ideal joints."""
-    machine, friction = case.machine, case.friction
-    if case.drive and case.body:
-        yield Problem(
-            "body", "moves in equal steps of time, which a drive whose speed gives way has not: "
-            "leave out body or drive",
-        )  # fmt: skip
-    if case.rod:
-        if machine.rod_centre_mm != machine.rod_length_mm / 2:
-            yield Problem(
-                "machine.rod_centre_mm", "an elastic rod is a uniform bar: leave the key out"
-            )
-        least = machine.rod_mass_kg * (machine.rod_length_mm / 1000) ** 2 / 12
-        if (machine.rod_inertia_kg_m2 or 0.0) < MIN_BAR_INERTIA * least:
-            yield Problem(
-                "machine.rod_inertia_kg_m2",
-                f"an elastic rod is a uniform bar, which has {least:.4g} kg m2 at least: leave "
-                "the key out",
-            )
-    if friction and friction.ideal_joints and friction.law == "lugre":
-        yield Problem(
-            "friction.ideal_joints", "have no bristles, as friction.law: lugre needs: choose "
-            "another law, or leave the key out",
-        )  # fmt: skip
-
-
 # One key, and the other whose place it takes; a case gives one of the two.
 IN_PLACE_OF = (
     ("solve.duration_s", "solve.duration_rev"),
@@ -345,189 +222,147 @@ SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 def conflicts(case: Settings) -> Iterator[Problem]:
     """Yield everything in a case that does not fit together."""
     for rule in RULES:
-        yield from rule(case)
+        for key, message in rule(case):
+            yield Problem(key, message)
 
 
 @cache
 def given_conflicts(joint: str, given: frozenset[str]) -> Sequence[Problem]:
     """Return what is missing beside a joint, and keys of which a case gives one; given: dotted."""
-    needed = [key for one in JOINTS if joint in (one, "both") and (key := f"clearance_mm.{one}")]
+    needed = [f"clearance_mm.{one}" for one in JOINTS if joint in (one, "both")]
     what = f"is needed with joint: {joint}; give it in mm, such as 0.2"
     return [Problem(key, what) for key in needed if key not in given] + [
-        Problem(one, f"stands in place of {other}: give one of the two")
+        Problem(one, TWICE.format(other))
         for one, other in IN_PLACE_OF
         if one in given and other in given
     ]
 
 
-def _body_conflicts(case: Settings) -> Iterator[Problem]:
-    """Yield what a body and its sensor need; one that would move the machine back is refused."""
-    body, sensor = case.body, case.sensor
-    if body is None:
-        return
-    share = moving_mass(case) / body.mass_kg
-    if share > MAX_MOVING_SHARE:
-        much = f"{share:.3g} times" if share >= 1 else f"{100 * share:.2g} % of"
-        yield Problem(
-            "body.mass_kg",
-            f"the moving parts have {much} the body's mass; it is driven one way, which holds up "
-            f"to {100 * MAX_MOVING_SHARE:g} %: give a heavier body, in kg",
-        )
-    for axis in sorted({*body.freedoms[:2]} & {*AXES}):
-        yield from _resonance_conflicts(case, axis)
-    # `auto` settles at a whole revolution, and measures whole ones from there on
-    span = (case.duration - case.settle) / case.turn
-    whole = abs(span) < MAX_REVOLUTIONS_TOLD and abs(span - round(span)) <= 1e-9
-    if body.start == "steady" and not whole:
-        yield Problem(
-            "body.start",
-            "steady repeats whole settled revolutions: give duration_rev and settle_rev as whole "
-            "numbers or auto, or set start: rest",
-        )
-    low, high = body.band_Hz
-    if low >= high:
-        key = "band_high_Hz" if body.band_low_Hz is None else "band_low_Hz"
-        yield Problem(
-            f"body.{key}", f"the band of body_velocity_rms would be {low:g} to {high:g} Hz: give "
-            "band_low_Hz less than band_high_Hz",
-        )  # fmt: skip
-    if sensor is None:
-        return
-    if sensor.low_pass_Hz is not None and sensor.low_pass_Hz >= sensor.rate_Hz / 2:
-        yield Problem("sensor.low_pass_Hz", "must be less than half of rate_Hz")
-
-
-def _resonance_conflicts(case: Settings, axis: str) -> Iterator[Problem]:
-    """Yield a resonance near the speed's first two orders, which carry most of the force."""
-    for order in (1, 2):
-        frequency = order * case.machine.speed_rpm / 60.0
-        back = abs(back_action(case, axis, frequency))
-        if back > MAX_BACK_ACTION:
-            key = f"frequency_{axis}_Hz"
-            yield Problem(
-                f"body.{key}",
-                f"order {order} of the speed, {frequency:.3g} Hz, is so near that the "
-                f"body would change the force that drives it by {100 * back:.0f} %; "
-                f"move {key}, or give a heavier body",
-            )
-
-
-def _inertia_conflicts(case: Settings) -> Iterator[Problem]:
-    """Yield a default inertia that leaves the range which a given one must keep."""
-    key, inertia = "machine.rod_inertia_kg_m2", case.machine.rod_inertia_kg_m2
-    if message := table()[key].check(inertia):
-        yield Problem(key, f"m L^2 / 12 of the rod: {message}")
-
-
-def _geometry_conflicts(case: Settings) -> Iterator[Problem]:
+def machine_rules(case: Settings) -> Rules:
+    """Yield a default inertia out of its range, and lengths with which the mechanism locks."""
     machine, play = case.machine, _play(case)
+    key, inertia = "machine.rod_inertia_kg_m2", machine.rod_inertia_kg_m2
+    if message := table()[key].check(inertia):
+        yield key, f"m L^2 / 12 of the rod: {message}"
     if machine.crank_radius_mm + play >= machine.rod_length_mm:
         is_play = machine.crank_radius_mm < machine.rod_length_mm
         loose = f" and {play:g} mm of clearance" if is_play else ""
-        yield Problem(
+        yield (
             "machine.crank_radius_mm",
             f"the crank, {machine.crank_radius_mm:g} mm{loose}, must be shorter than the rod, "
             f"{machine.rod_length_mm:g} mm, or the mechanism locks",
         )
     if (machine.rod_centre_mm or 0) > machine.rod_length_mm:
-        yield Problem(
+        yield (
             "machine.rod_centre_mm",
             f"{machine.rod_centre_mm:g} mm: the mass centre lies beyond the rod's small end, at "
             f"{machine.rod_length_mm:g} mm",
         )
 
 
-def _clearance_conflicts(case: Settings, joint: str) -> Iterator[Problem]:
-    """Yield a clearance that is missing, or does not fit the pin or its journal's start."""
-    key, clearance = f"clearance_mm.{joint}", getattr(case.clearance_mm, joint)
-    if not clearance:
-        return
-    pin = getattr(case.machine.pin_radius_mm, joint)
-    if clearance > pin:
-        yield Problem(key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm: lower it")
-    x, y = (getattr(case.initial_offset_mm, f"{joint}_{axis}") for axis in "xy")
-    shift = (x * x + y * y) ** 0.5
-    if clearance < shift - IMPLAUSIBLE * pin:
-        yield Problem(
-            f"initial_offset_mm.{joint}_x",
-            f"shifts the journal by {shift:g} mm, {shift - clearance:.3g} mm into its bearing, "
-            f"more than a tenth of the pin radius; lower it, or raise {key}",
-        )
+def clearance_rules(case: Settings) -> Rules:
+    """Yield clearances that do not fit the pin or its journal's start."""
+    for joint in JOINTS:
+        key, clearance = f"clearance_mm.{joint}", getattr(case.clearance_mm, joint)
+        if not clearance:
+            continue
+        pin = case.machine.pin_radius_mm.at(joint)
+        if clearance > pin:
+            yield key, f"{clearance:g} mm exceeds the pin radius, {pin:g} mm: lower it"
+        shift = math.hypot(*(getattr(case.initial_offset_mm, f"{joint}_{axis}") for axis in AXES))
+        if clearance < shift - IMPLAUSIBLE * pin:
+            yield (
+                f"initial_offset_mm.{joint}_x",
+                f"shifts the journal by {shift:g} mm, {shift - clearance:.3g} mm into its bearing, "
+                f"more than a tenth of the pin radius; lower it, or raise {key}",
+            )
 
 
-def _load_conflicts(case: Settings) -> Iterator[Problem]:
-    machine, gas = case.machine, case.gas
-    if case.load == "spring" and case.spring.stroke_mm >= 2 * machine.crank_radius_mm:
-        yield Problem(
+def load_rules(case: Settings) -> Rules:
+    """Yield what does not fit the stroke, or together in a cylinder."""
+    gas, stroke = case.gas, 2 * case.machine.crank_radius_mm
+    if case.load == "spring" and case.spring.stroke_mm >= stroke:
+        yield (
             "spring.stroke_mm",
-            f"{case.spring.stroke_mm:g} mm must be less than the piston's stroke, "
-            f"{2 * machine.crank_radius_mm:g} mm",
+            f"{case.spring.stroke_mm:g} mm must be less than the piston's stroke, {stroke:g} mm",
         )
     if case.load != "gas":
         return
     if gas.presses("crank"):
-        yield from _rod_conflicts(case)
-    if gas.is_measured:
-        yield from _card_conflicts(case)
-        return
-    play, stroke = _play(case), 2 * machine.crank_radius_mm
+        rod, bore = gas.rod_diameter_mm, 2 * gas.piston_radius_mm
+        if rod is None:
+            text = f"is needed with action: {gas.action}; give it in mm, such as {bore / 4:g}"
+            yield "gas.rod_diameter_mm", text
+        elif rod >= bore:
+            yield "gas.rod_diameter_mm", f"{rod:g} mm must be less than the bore, {bore:g} mm"
+    yield from card_rules(case) if gas.is_measured else cycle_rules(case)
+
+
+def cycle_rules(case: Settings) -> Rules:
+    """Yield clearances and pressures with which an ideal cycle has no corners."""
+    gas, play, stroke = case.gas, _play(case), 2 * case.machine.crank_radius_mm
     for end in filter(gas.presses, ENDS):
         clearance, each = gas.clearance(end, stroke), gas.clearance_percent
         if each and end == "crank" and each.crank is None:
             text = f"is needed with action: {gas.action} and a clearance of the head"
-            yield Problem("gas.clearance_percent.crank", text)
+            yield "gas.clearance_percent.crank", text
         elif clearance <= play:
             cover = "head" if end == "head" else "cover at the crank end"
             key, remedy = gas.clearance_key(end), "raise it"
             if "percent" in key and clearance < 0.01 * stroke:
                 remedy += "; it is in per cent of the swept volume: 17, not 0.17"
-            yield Problem(
+            yield (
                 key,
                 f"{clearance:g} mm does not exceed the clearances, {play:g} mm in all: the piston "
                 f"would reach the cylinder {cover}, where the gas force has no bound; {remedy}",
             )
     if gas.unloaded not in (None, "none") and not gas.presses(gas.unloaded):
-        yield Problem(
-            "gas.unloaded", f"no gas presses in the {gas.unloaded} end with action: {gas.action}"
-        )
+        text = f"no gas presses in the {gas.unloaded} end with action: {gas.action}"
+        yield "gas.unloaded", text
     if gas.discharge_MPa <= gas.suction_MPa:
-        yield Problem(
-            "gas.discharge_MPa",
-            f"{gas.discharge_MPa:g} MPa must exceed suction_MPa, {gas.suction_MPa:g} MPa",
-        )
+        text = f"{gas.discharge_MPa:g} MPa must exceed suction_MPa, {gas.suction_MPa:g} MPa"
+        yield "gas.discharge_MPa", text
     elif gas.switching == "exact":
         suction, discharge = gas.open_pressures
         growth = (discharge / suction) ** (1 / gas.exponent)
         for end in gas.compressing_ends:
             clearance = gas.clearance(end, stroke)
             if clearance * growth >= stroke + clearance:
-                yield Problem(
+                yield (
                     gas.clearance_key(end),
                     f"the gas left at the {end} never expands to the suction pressure; "
                     "lower it, or the pressure ratio",
                 )
-    elif gas.is_cylinder or _gas_geometry(case) != _gas_geometry(Settings()):
-        yield Problem(
+    elif gas.is_cylinder or _corners(case) != _corners(Settings()):
+        yield (
             "gas.switching",
             "the printed corners hold for the paper's geometry and pressures only; "
             "set switching: exact",
         )
 
 
-def _card_conflicts(case: Settings) -> Iterator[Problem]:
-    """Yield a card that is missing: each end in which gas presses has one."""
+def _corners(case: Settings) -> tuple[float | None, ...]:
+    """Return what decides where the gas cycle's corners lie."""
+    gas, machine = case.gas, case.machine
+    lengths = machine.crank_radius_mm, machine.rod_length_mm, gas.head_clearance_mm
+    return (*lengths, gas.suction_MPa, gas.discharge_MPa, gas.exponent)
+
+
+def card_rules(case: Settings) -> Rules:
+    """Yield a card that is missing, or of an engine: each end in which gas presses has one."""
     for end in filter(case.gas.presses, ENDS):
         if end not in case.gas.cards:
-            yield Problem(
-                f"gas.indicator.{end}", f"is needed with action: {case.gas.action}, the other end "
-                "being measured; write indicator: {head: head.csv, crank: crank.csv}",
-            )  # fmt: skip
+            yield (
+                f"gas.indicator.{end}",
+                f"is needed with action: {case.gas.action}, the other end being measured; write "
+                "indicator: {head: head.csv, crank: crank.csv}",
+            )
             continue
         with contextlib.suppress(CardError):  # of a file that is gone, which a run tells
             card = open_card(case.gas.cards[end], end)
             lengths = case.machine.crank_radius_mm, case.machine.rod_length_mm
             if lengths[0] < lengths[1] and (share := taken_work(card, end, *lengths)) < DRIVING:
-                yield Problem(
+                yield (
                     f"gas.indicator.{end}",
                     f"the gas would drive the machine: it gives {-share:.2g} times pressure range "
                     f"and stroke in a revolution; is it the {'crank' if end == 'head' else 'head'} "
@@ -535,14 +370,175 @@ def _card_conflicts(case: Settings) -> Iterator[Problem]:
                 )
 
 
-def _rod_conflicts(case: Settings) -> Iterator[Problem]:
-    """Yield a piston rod that is missing, or fills the cylinder."""
-    rod, bore = case.gas.rod_diameter_mm, 2 * case.gas.piston_radius_mm
-    if rod is None:
-        needed = f"is needed with action: {case.gas.action}; give it in mm, such as {bore / 4:g}"
-        yield Problem("gas.rod_diameter_mm", needed)
-    elif rod >= bore:
-        yield Problem("gas.rod_diameter_mm", f"{rod:g} mm must be less than the bore, {bore:g} mm")
+def time_rules(case: Settings) -> Rules:
+    """Yield durations, output steps and settling times that do not divide each other."""
+    solve = case.solve
+    span_key = "solve.duration_s" if solve.duration_s is not None else "solve.duration_rev"
+    step_key = "solve.output_step_s" if solve.output_step_s is not None else "solve.output_step_deg"
+    steps, duration = case.steps, case.duration
+    if not steps <= 1e8:  # which may be inf, or nan
+        yield step_key, f"makes {steps:.3g} samples; at most 1e8: lengthen it"
+    elif round(steps) < 1:
+        yield step_key, f"is longer than the duration, {duration:g} s: shorten it"
+    elif abs(steps - round(steps)) > 1e-6 * max(1.0, 1e-3 * steps):
+        yield (
+            step_key,
+            f"the duration is {steps:.6g} output steps, not a whole number of them: "
+            "choose a step that divides it",
+        )
+    if solve.settle_rev == "auto" and duration < SETTLING_REV * case.turn * (1 - 1e-12):
+        text = f"auto compares {SETTLING_REV:g} revolutions; lengthen {span_key}"
+        yield "solve.settle_rev", text
+    if solve.duration_rev == "auto" or (solve.settle_rev == "auto" and solve.duration_s is None):
+        each = steps * case.turn / duration
+        if abs(each - round(each)) > 1e-6:
+            text = f"a revolution is {each:.6g} output steps; auto needs a whole number of them"
+            yield step_key, text
+    if case.settle >= duration * (1 - 1e-12):
+        yield (
+            "solve.settle_rev",
+            f"{solve.settle_rev:g} revolutions leave nothing of a run of "
+            f"{duration / case.turn:g}; lengthen {span_key}, or shorten settle_rev",
+        )
+
+
+def body_rules(case: Settings) -> Rules:
+    """Yield what a body and its sensor need; one that would move the machine back is refused."""
+    body, sensor = case.body, case.sensor
+    if body is None:
+        return
+    share = moving_mass(case) / body.mass_kg
+    if share > MAX_MOVING_SHARE:
+        much = f"{share:.3g} times" if share >= 1 else f"{100 * share:.2g} % of"
+        yield (
+            "body.mass_kg",
+            f"the moving parts have {much} the body's mass; it is driven one way, which holds up "
+            f"to {100 * MAX_MOVING_SHARE:g} %: give a heavier body, in kg",
+        )
+    for axis, order in itertools.product(sorted({*body.freedoms[:2]} & {*AXES}), (1, 2)):
+        frequency, key = order * case.machine.speed_rpm / 60.0, f"frequency_{axis}_Hz"
+        back = abs(back_action(case, axis, frequency))
+        if back > MAX_BACK_ACTION:
+            yield (
+                f"body.{key}",
+                f"order {order} of the speed, {frequency:.3g} Hz, is so near that the body would "
+                f"change the force that drives it by {100 * back:.0f} %; move {key}, or give a "
+                "heavier body",
+            )
+    # `auto` settles at a whole revolution, and measures whole ones from there on
+    span = (case.duration - case.settle) / case.turn
+    whole = abs(span) < MAX_REVOLUTIONS_TOLD and abs(span - round(span)) <= 1e-9
+    if body.start == "steady" and not whole:
+        yield (
+            "body.start",
+            "steady repeats whole settled revolutions: give duration_rev and settle_rev as whole "
+            "numbers or auto, or set start: rest",
+        )
+    low, high = body.band_Hz
+    if low >= high:
+        yield (
+            "body.band_high_Hz" if body.band_low_Hz is None else "body.band_low_Hz",
+            f"the band of body_velocity_rms would be {low:g} to {high:g} Hz: give band_low_Hz less "
+            "than band_high_Hz",
+        )
+    if case.drive:
+        yield (
+            "body",
+            "moves in equal steps of time, which a drive whose speed gives way has not: leave out "
+            "body or drive",
+        )
+    if sensor and sensor.low_pass_Hz is not None and sensor.low_pass_Hz >= sensor.rate_Hz / 2:
+        yield "sensor.low_pass_Hz", "must be less than half of rate_Hz"
+
+
+def contact_rules(case: Settings) -> Rules:
+    """Yield what a law of contact lacks, or cannot have."""
+    contact = case.contact
+    needed = f"is needed with contact.law: {contact.law}; give it, such as"
+    if contact.law in CYLINDRICAL and contact.length_mm is None:
+        yield "contact.length_mm", f"{needed} 20"
+    if contact.law in CYLINDRICAL and contact.materials is None and contact.modulus_GPa is None:
+        yield "contact.materials", f"{needed} [steel, copper], or give modulus_GPa"
+    if contact.law in RESTITUTING and contact.restitution is None:
+        yield "contact.restitution", f"{needed} 0.9"
+    if contact.materials is not None and contact.exponent != 1.5:
+        yield (
+            "contact.exponent",
+            f"is {contact.exponent:g}, but Eq. 15's stiffness from materials needs exponent 1.5: "
+            "leave it out, or give stiffness_N_per_mm15 in place of materials",
+        )
+
+
+def friction_rules(case: Settings) -> Rules:
+    """Yield coefficients and speeds with which a law of friction has no value."""
+    friction = case.friction
+    if not friction:
+        return
+    if friction.law == "lugre" and bool(friction.static) != bool(friction.dynamic):
+        yield (
+            f"friction.{'dynamic' if friction.static else 'static'}",
+            "is 0 and the other coefficient is not: LuGre's bristles divide by it; give more than "
+            "0, or 0 for both",
+        )
+    if friction.law == "lugre" and friction.ideal_joints:
+        yield (
+            "friction.ideal_joints",
+            "have no bristles, as friction.law: lugre needs: choose another law, or leave the key "
+            "out",
+        )
+    slow, fast = friction.stiction_velocity_mm_per_s, friction.friction_velocity_mm_per_s
+    if law_of(friction) in READ_BY["friction"]["friction_velocity_mm_per_s"] and fast <= slow:
+        yield (
+            "friction.friction_velocity_mm_per_s",
+            f"{fast:g} mm/s must exceed the stiction_velocity_mm_per_s, {slow:g} mm/s",
+        )
+
+
+def bore_rules(case: Settings) -> Rules:
+    """Yield bearings for which the film's numbers do not hold, and bores that cannot wear."""
+    film, wear = case.lubricant, case.wear
+    for joint in JOINTS:
+        width = 2.0 * case.machine.pin_radius_mm.at(joint)
+        length = film.bearing_length_mm.at(joint) if film else width
+        if case.joint in (joint, "both") and not MIN_RATIO <= length / width <= MAX_RATIO:
+            key = f"lubricant.bearing_length_mm.{joint}"
+            text = (
+                f"is {length / width:.3g} times the diameter of the pin, {width:g} mm; the film's "
+                f"numbers hold from {MIN_RATIO:g} to {MAX_RATIO:g} times"
+            )
+            if length == table()[key].default:
+                default = f"{length:g} mm is the default, of the paper's"
+                text += f"; {default} pin: give the length that bears"
+            yield key, text
+    if wear and film:
+        yield (
+            "wear",
+            "of a bore that runs dry is known, not that of one whose film parts journal and bore: "
+            "leave out lubricant or wear",
+        )
+    most = max(case.clearance_mm.big_end, case.clearance_mm.small_end)
+    if wear and wear.limit_mm is not None and wear.limit_mm <= most:
+        yield (
+            "wear.limit_mm",
+            f"{wear.limit_mm:g} mm must be more than the clearance, {most:g} mm: it is what the "
+            "clearance grows to",
+        )
+
+
+def rod_rules(case: Settings) -> Rules:
+    """Yield numbers of an elastic rod that no uniform bar has."""
+    machine = case.machine
+    if not case.rod:
+        return
+    if machine.rod_centre_mm != machine.rod_length_mm / 2:
+        yield "machine.rod_centre_mm", "an elastic rod is a uniform bar: leave the key out"
+    least = machine.rod_mass_kg * (machine.rod_length_mm / 1000) ** 2 / 12
+    if (machine.rod_inertia_kg_m2 or 0.0) < MIN_BAR_INERTIA * least:
+        yield (
+            "machine.rod_inertia_kg_m2",
+            f"an elastic rod is a uniform bar, which has {least:.4g} kg m2 at least: leave the key "
+            "out",
+        )
 
 
 def _play(case: Settings) -> float:
@@ -550,56 +546,7 @@ def _play(case: Settings) -> float:
     return case.clearance_mm.big_end + case.clearance_mm.small_end
 
 
-def _gas_geometry(case: Settings) -> tuple[float | None, ...]:
-    """Return what decides where the gas cycle's corners lie."""
-    gas, machine = case.gas, case.machine
-    return (
-        machine.crank_radius_mm,
-        machine.rod_length_mm,
-        gas.head_clearance_mm,
-        gas.suction_MPa,
-        gas.discharge_MPa,
-        gas.exponent,
-    )
-
-
-def _time_conflicts(case: Settings) -> Iterator[Problem]:
-    solve = case.solve
-    span_key = "solve.duration_s" if solve.duration_s is not None else "solve.duration_rev"
-    step_key = "solve.output_step_s" if solve.output_step_s is not None else "solve.output_step_deg"
-    steps, duration = case.steps, case.duration
-    if not steps <= 1e8:  # which may be inf, or nan
-        yield Problem(step_key, f"makes {steps:.3g} samples; at most 1e8: lengthen it")
-    elif round(steps) < 1:
-        yield Problem(step_key, f"is longer than the duration, {duration:g} s: shorten it")
-    elif abs(steps - round(steps)) > 1e-6 * max(1.0, 1e-3 * steps):
-        yield Problem(
-            step_key,
-            f"the duration is {steps:.6g} output steps, not a whole number of them: "
-            "choose a step that divides it",
-        )
-    if solve.settle_rev == "auto" and duration < SETTLING_REV * case.turn * (1 - 1e-12):
-        text = f"auto compares {SETTLING_REV:g} revolutions; lengthen {span_key}"
-        yield Problem("solve.settle_rev", text)
-    if solve.duration_rev == "auto" or (solve.settle_rev == "auto" and solve.duration_s is None):
-        each = steps * case.turn / duration
-        if abs(each - round(each)) > 1e-6:
-            text = f"a revolution is {each:.6g} output steps; auto needs a whole number of them"
-            yield Problem(step_key, text)
-    if case.settle >= duration * (1 - 1e-12):
-        revolutions = duration / case.turn
-        yield Problem(
-            "solve.settle_rev",
-            f"{solve.settle_rev:g} revolutions leave nothing of a run of {revolutions:g}; "
-            f"lengthen {span_key}, or shorten settle_rev",
-        )
-
-
-Rule = Callable[[Settings], Iterator[Problem]]
-RULES: tuple[Rule, ...] = (
-    _inertia_conflicts, _geometry_conflicts,
-    *(partial(_clearance_conflicts, joint=joint) for joint in JOINTS),
-    _load_conflicts, _time_conflicts, _body_conflicts,
-    law_conflicts, contact_conflicts, friction_conflicts, lubricant_conflicts, wear_conflicts,
-    mechanism_conflicts,
+RULES: tuple[Callable[[Settings], Rules], ...] = (
+    machine_rules, clearance_rules, load_rules, time_rules, body_rules, contact_rules,
+    friction_rules, bore_rules, rod_rules,
 )  # fmt: skip

@@ -1,7 +1,8 @@
 """The JSON Schema of case files, so that editors complete their keys and mark mistakes.
 
-It comes from the table of parameters. What it cannot check, such as whether values fit each other,
-reading the file does (`compressor.cases.load`).
+Pydantic writes that of one value, and the table of parameters has the rest: here a key may also be
+swept. What it cannot check, such as whether values fit each other, reading the file does
+(`compressor.cases.load`).
 """
 
 from dataclasses import replace
@@ -10,14 +11,12 @@ from typing import Any
 from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED
 from compressor.cases.checks import DOUBLES, REPORT, phrase_of, row_of
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.parameter import NAME, TARGET, Parameter
+from compressor.cases.parameter import NAME, Parameter, adapter_of
 from compressor.cases.swept import DISTRIBUTIONS, FORMS, SAMPLED
 from compressor.cases.table import GROUPS, WORDS, outside_identity, parts_by_key, table
-from compressor.metrics import METRICS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
-MAX_NUMBER = 1e300  # a bound of values that need only be finite
 # keys of which one part may be given alone
 MAY_LACK = ("clearance_mm", "healthy_clearance_mm", "gas.indicator", "gas.clearance_percent")
 WHOLE_FILE = ("name", "blocks", "report")  # what cannot stand in a block
@@ -38,36 +37,31 @@ def case_schema() -> Schema:
     return {"$schema": DIALECT, "title": "compsim case file", **top, "$defs": made}
 
 
-def _mapping(properties: Schema) -> Schema:
-    return {"type": "object", "properties": properties, "additionalProperties": False}
+def _mapping(properties: Schema, *required: str) -> Schema:
+    needed = {"required": [*required]} if required else {}
+    return {"type": "object", "properties": properties, "additionalProperties": False} | needed
 
 
 def _group(name: str) -> Schema:
     """Return the schema of a group of keys."""
-    keys = dict.fromkeys(
-        ".".join(key.split(".")[:2]) for key in table() if key.startswith(f"{name}.")
-    )
+    own = [key for key in table() if key.startswith(f"{name}.")]
+    keys = dict.fromkeys(".".join(key.split(".")[:2]) for key in own)
     found = {key.partition(".")[2]: _value_or_parts(key) for key in keys}
-    for word, key in DOUBLES.items():
-        if word.startswith(f"{name}."):
-            found[word.partition(".")[2]] = _value(_synonym_row(word, key))
+    doubles = [pair for pair in DOUBLES.items() if pair[0].startswith(f"{name}.")]
+    for word, key in doubles:
+        row = table()[key]
+        span = {"default": 2 * row.default, "low": 2 * row.low, "high": 2 * row.high}
+        row = replace(row, key=word, phrase=f"twice {key}, in its place", **span)
+        found[word.partition(".")[2]] = _value(row)
     mapping = _mapping(found)
-    pairs = (*IN_PLACE_OF, *DOUBLES.items())
-    rivals = [pair for pair in pairs if pair[0].startswith(f"{name}.")]
-    if rivals:
-        inner = ([key.split(".")[1] for key in pair] for pair in rivals)
-        mapping["allOf"] = [{"not": {"required": pair}} for pair in inner]
+    pairs = [pair for pair in IN_PLACE_OF if pair[0].startswith(f"{name}.")] + doubles
+    if pairs:
+        rivals = ([key.split(".")[1] for key in pair] for pair in pairs)
+        mapping["allOf"] = [{"not": {"required": pair}} for pair in rivals]
     about = (GROUPS[name].__doc__ or "").partition("\n")[0]
     if name in WORDS:
         return {"description": about, "anyOf": [{"const": WORDS[name]}, mapping]}
     return {"description": about, **mapping}
-
-
-def _synonym_row(word: str, key: str) -> Parameter:
-    """Return the row of a word of the trade, whose values are twice those of a key."""
-    row = table()[key]
-    span = {"default": 2 * row.default, "low": 2 * row.low, "high": 2 * row.high}
-    return replace(row, key=word, phrase=f"twice {key}, in its place", **span)
 
 
 def _value_or_parts(key: str) -> Schema:
@@ -76,15 +70,12 @@ def _value_or_parts(key: str) -> Schema:
     assert row
     if key not in parts_by_key():
         return _value(row)
-    found = _value(replace(row, phrase=phrase_of(key)))
     parts = parts_by_key()[key]
     each = _mapping({part: _value(table()[f"{key}.{part}"]) for part in parts})
     each |= {"minProperties": 1} if key in MAY_LACK else {"required": [*parts]}
-    one = found.pop("anyOf", None) or [_single_value(row)]
-    return {
-        **{k: v for k, v in found.items() if k in ("description", "default")},
-        "anyOf": [*one, each],
-    }
+    found = _value(replace(row, phrase=phrase_of(key)))
+    about = {word: found.pop(word) for word in ("description", "default") if word in found}
+    return about | {"anyOf": [*found.get("anyOf", [found]), each]}
 
 
 def _value(row: Parameter) -> Schema:
@@ -97,30 +88,15 @@ def _value(row: Parameter) -> Schema:
     if not row.identity:
         return found | single
     listed = {"type": "array", "items": single, "minItems": 1, "uniqueItems": True}
-    forms = [{"$ref": "#/$defs/made"}] if row.kind in ("number", "integer") else []
-    return found | {"anyOf": [single, listed, *forms]}
+    return found | {"anyOf": [single, listed, *[{"$ref": "#/$defs/made"}] * row.is_number]}
 
 
 def _single_value(row: Parameter) -> Schema:
-    """Return the schema of one value of a parameter, as `Parameter.check` has it."""
-    words = {"enum": [*row.choices, *(alias for alias, _ in row.aliases)]}
-    if row.kind in ("number", "integer"):
-        ends = {"exclusiveMinimum" if row.above else "minimum": row.low, "maximum": row.high}
-        bounds = {word: end for word, end in ends.items() if abs(end) < MAX_NUMBER}
-        number = {"type": row.kind, **bounds}
-        return {"anyOf": [words, number]} if row.choices else number
-    if row.kind == "materials":
-        return {"type": "array", "items": words, "minItems": 2, "maxItems": 2}
-    if row.kind == "accuracy":
-        targets = _mapping(dict.fromkeys(METRICS, _single_value(TARGET)))
-        return {"anyOf": [words, targets | {"minProperties": 1}]}
-    kinds: dict[str, Schema] = {
-        "boolean": {"enum": [*row.choices, True, False]},
-        "choice": words,
-        "card": {"type": "string", "minLength": 1},
-        "text": {"type": "string", "pattern": rf"^(?!\.){NAME.pattern}$"},
-    }
-    return kinds[row.kind]
+    """Return the schema of one value of a parameter."""
+    if row.kind == "text":
+        return {**TEXT, "pattern": rf"^(?!\.){NAME.pattern}$"}
+    words = (*row.choices, *(alias for alias, _ in row.aliases))
+    return adapter_of(replace(row, optional=False, choices=words)).json_schema()
 
 
 def _forms() -> Schema:
@@ -131,25 +107,24 @@ def _forms() -> Schema:
         items = [counted if part.strip(" []") == "count" else NUMBER for part in inside.split(",")]
         numbers = {"type": "array", "prefixItems": items, "items": False, "minItems": len(items)}
         more = {"log": {"type": "boolean"}} if word in SAMPLED else {}
-        forms.append(_mapping({word: numbers | {"description": inside}} | more))
-        forms[-1]["required"] = [word]
+        forms.append(_mapping({word: numbers | {"description": inside}} | more, word))
         if word in SAMPLED:
-            forms.append(_mapping({word: {"$ref": "#/$defs/distribution"}}))
-            forms[-1]["required"] = [word]
+            forms.append(_mapping({word: {"$ref": "#/$defs/distribution"}}, word))
     return {"anyOf": forms}
 
 
 def _distributions() -> Schema:
     """Return the schema of what designs draw from, such as {normal: {mean: 0.2, sd: 0.02}}."""
-    normal = _mapping({"mean": NUMBER, "sd": {**NUMBER, "exclusiveMinimum": 0}})
-    normal["required"] = ["mean", "sd"]
-    ends = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}
-    shapes = {"normal": normal, "triangular": ends}
-    forms = []
-    for name, inside in DISTRIBUTIONS.items():
-        forms.append(_mapping({name: shapes[name] | {"description": inside}}))
-        forms[-1]["required"] = [name]
-    return {"anyOf": forms}
+    shapes = {
+        "normal": _mapping({"mean": NUMBER, "sd": {**NUMBER, "exclusiveMinimum": 0}}, "mean", "sd"),
+        "triangular": {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3},
+    }
+    return {
+        "anyOf": [
+            _mapping({name: shapes[name] | {"description": inside}}, name)
+            for name, inside in DISTRIBUTIONS.items()
+        ]
+    }
 
 
 def _sweeps() -> Schema:
@@ -159,13 +134,11 @@ def _sweeps() -> Schema:
     keys = {"enum": [key for key in (*parts_by_key(), *table()) if key not in outside_identity()]}
     group = {"type": "array", "items": keys, "minItems": 2, "uniqueItems": True}
     texts = {"type": "array", "items": TEXT, "maxItems": MAX_EXCLUSIONS}
-    return {
-        "sample": {"description": "how many samples, and from which seed", **sample},
-        "zip": {"description": "keys whose values advance together", "type": "array",
-                "items": group},
-        "exclude": {"description": "comparisons; jobs for which one holds are left out",
-                    "anyOf": [TEXT, texts]},
-        "report": {"description": "what the page of the report says of the machine", **_mapping({
-            name: {**TEXT, "minLength": 1, "maxLength": most} for name, most in REPORT.items()
-        })},
-    }  # fmt: skip
+    report = {name: {**TEXT, "minLength": 1, "maxLength": most} for name, most in REPORT.items()}
+    about = {
+        "sample": ("how many samples, and from which seed", sample),
+        "zip": ("keys whose values advance together", {"type": "array", "items": group}),
+        "exclude": ("comparisons; jobs for which one holds are left out", {"anyOf": [TEXT, texts]}),
+        "report": ("what the page of the report says of the machine", _mapping(report)),
+    }
+    return {key: {"description": phrase, **schema} for key, (phrase, schema) in about.items()}

@@ -456,11 +456,11 @@ def annotation_of(row: Parameter) -> Any:
     ends: dict[str, Any] = {"gt" if row.above else "ge": row.low, "le": row.high}
     kinds: dict[str, Any] = {
         "number": Annotated[
-            float, BeforeValidator(to_python), Field(strict=True, allow_inf_nan=False, **ends),
+            float, Field(strict=True, allow_inf_nan=False, **ends), BeforeValidator(to_python),
             AfterValidator(partial(refuse_tiny, row.unit)),
         ],
-        "integer": Annotated[int, BeforeValidator(to_whole), Field(strict=True, **ends)],
-        "boolean": Annotated[bool, BeforeValidator(to_python), Field(strict=True)],
+        "integer": Annotated[int, Field(strict=True, **ends), BeforeValidator(to_whole)],
+        "boolean": Annotated[bool, Field(strict=True), BeforeValidator(to_python)],
         "text": Annotated[str, Field(strict=True), AfterValidator(check_name)],
         "card": Annotated[str, Field(strict=True, min_length=1)],
         "materials": tuple[words, words],
@@ -477,8 +477,8 @@ def annotation_of(row: Parameter) -> Any:
 BY_METRIC: Any = None
 BY_METRIC = Annotated[
     dict[Literal[tuple(METRICS)], annotation_of(TARGET)],  # type: ignore[misc]
-    BeforeValidator(lambda value: dict(value) if isinstance(value, tuple) else value),
     Field(min_length=1),
+    BeforeValidator(lambda value: dict(value) if isinstance(value, tuple) else value),
 ]
 
 

@@ -5,10 +5,7 @@ that `1e5` is a number and `no` is text. A value that is missing, or given twice
 place, and reading goes on; broken syntax, aliases, anchors, tags and oversized files end it.
 """
 
-import contextlib
-import itertools
 import math
-import pathlib
 import re
 import shlex
 from collections.abc import Mapping, Sequence
@@ -18,11 +15,10 @@ from typing import Any
 import yaml
 
 from compressor.cases.parameter import NO_VALUE
-from compressor.program import CompsimError, did_you_mean, printable
+from compressor.program import CompsimError, printable
 
 START = "compsim init writes a case file to start from"
 MAX_BYTES = 1 << 20
-MAX_LOOKED_AT = 1000  # files of a folder
 MAX_DEPTH = 20
 MAX_PARTS = 50_000  # keys, values and brackets, which take a second
 
@@ -118,13 +114,7 @@ def _tell_unreadable(path: str, error: OSError | ValueError) -> str:
     if isinstance(error, IsADirectoryError):
         files = f"{shlex.quote(path.rstrip('/'))}/*.yaml"
         return f"{message}; give the files in it, compsim run {files}"
-    if not isinstance(error, FileNotFoundError):
-        return message
-    near = {}
-    with contextlib.suppress(OSError):
-        found = pathlib.Path(path).parent.glob("*.y*ml")
-        near = {one.stem: one for one in itertools.islice(found, MAX_LOOKED_AT)}
-    return f"{message}; {did_you_mean(pathlib.Path(path).stem, near, near) or START}"
+    return f"{message}; {START}" if isinstance(error, FileNotFoundError) else message
 
 
 def read_text(text: str, start: Place) -> Read:
@@ -132,7 +122,6 @@ def read_text(text: str, start: Place) -> Read:
 
     A `start` without a line is everything's place.
     """
-    text = _separate_by_spaces(text)
     if odd := ODD_BREAKS.search(text):
         return None, [_forbid(text, odd.start(), start)]
     if OTHER_YAML.match(text):
@@ -262,42 +251,25 @@ def find_slip(text: str, last: int) -> tuple[int, str] | None:
 
     last: the line that a parser stopped at, often the one behind the mistake.
     """
-    lines = text.split("\n")[: last + 1]
-    filled = [(n, line) for n, line in enumerate(lines) if line.strip() and line.strip()[0] != "#"]
-    for number, line in filled[-2:]:
+    lines = enumerate(text.split("\n")[: last + 1])
+    filled = [(n, line) for n, line in lines if line.strip() and line.strip()[0] != "#"][-2:]
+    for number, line in filled:
         if found := NO_SPACE.match(line):
             return number, f"put a space after the colon: {found[1]}: {found[2]}"
         if found := EQUALS.match(line):
             return number, f"write a colon and a space in place of =: {found[1]}: {found[2]}"
-    if len(filled) < 2:
+    first, second = (len(line) - len(line.lstrip()) for _, line in [*filled, *filled][:2])
+    if first == second or not KEY.match(filled[-1][1]):
         return None
-    earlier, (at_before, before), (number, line) = [(-1, ""), *filled][-3:]
-    first, second, last_one = (len(one) - len(one.lstrip()) for one in (earlier[1], before, line))
-    if second == last_one or not KEY.match(line):
-        return None
-    rule = "keys of one group stand in one column, and a group's own line ends in its colon"
-    opens = first == second and GROUP.match(earlier[1])
-    if second < last_one and (first == last_one or opens):  # it alone stands out of its group
-        text = f"is indented by {second} columns, the line after it by {last_one}"
-        return at_before, f"{text}: {rule}"
-    return number, f"is indented by {last_one} columns, the line before by {second}: {rule}"
+    return filled[-1][0], (
+        f"is indented by {second} columns, the line before by {first}: keys of one group stand in "
+        "one column, and a group's own line ends in its colon"
+    )
 
 
 NO_SPACE = re.compile(r"\s*([A-Za-z]\w*):([^\s:/][^:]*?)\s*(?:#.*)?$")
 EQUALS = re.compile(r"\s*([A-Za-z]\w*)\s*=\s*(.*?)\s*(?:#.*)?$")
 KEY = re.compile(r"\s*[A-Za-z]\w*\s*:(\s|$)")
-GROUP = re.compile(r"\s*[A-Za-z]\w*\s*:\s*(#.*)?$")
-TABS = re.compile(r"""^([ ]*[^\s'"][^'"\n]*?)\t""", re.MULTILINE)
-
-
-def _separate_by_spaces(text: str) -> str:
-    """Return a text with a space for each tab behind a line's first word and before any quote.
-
-    YAML 1.2 has tabs there, PyYAML none; places stay.
-    """
-    while (changed := TABS.sub(r"\1 ", text)) != text:
-        text = changed
-    return text
 
 
 def _forbid(text: str, position: int, start: Place) -> FileProblem:

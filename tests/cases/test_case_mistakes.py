@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from compressor.cases.case import NO_SWEEP, Case
+from compressor.cases.case import Case
 from compressor.cases.checks import known_keys
 from compressor.cases.load import CaseFileError, load_cases
 from compressor.cases.parameter import CaseError
@@ -114,20 +114,21 @@ def test_values_and_files_are_told_alike(values, message, tmp_path):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"clearance_mm": [0.1, 0.2]}, f"clearance_mm: [0.1, 0.2] {NO_SWEEP}"),
+        ({"clearance_mm": [0.1, 0.2]},
+         "clearance_mm: needs a number in [0, 1000] mm, not [0.1, 0.2]"),
         ({"machine": {"speed_rpm": np.array([300.0, 500.0])}},
-         f"machine.speed_rpm: array([300., 500.]) {NO_SWEEP}"),
-        ({"clearance_mm": {"linspace": [0.1, 0.3, 5]}},
-         f"clearance_mm: {{'linspace': [0.1, 0.3, 5]}} {NO_SWEEP}"),
+         "machine.speed_rpm: needs a number in (0, 100000] rpm, not array([300., 500.])"),
         ({"machine": {"speed_rpm": {"range": [300, 500, 50]}}},
-         f"machine.speed_rpm: {{'range': [300, 500, 50]}} {NO_SWEEP}"),
-        ({"sample": {"n": 64}}, f"sample: {{'n': 64}} {NO_SWEEP}"),
+         "machine.speed_rpm: needs a number in (0, 100000] rpm, not {'range': [300, 500, 50]}"),
+        ({"sample": {"n": 64}}, f"sample: unknown key; a case has {AT_TOP}"),
         ({"qqq": 1}, f"qqq: unknown key; a case has {AT_TOP}"),
         ({1: 2}, f"1: unknown key; a case has {AT_TOP}"),
         ({"machine": {1: 2}}, f"machine.1: unknown key; machine has {IN_MACHINE}"),
         ({"machine": None}, "machine: has no value; leave the key out to get its default"),
         ({"name": 5}, "name: needs text, not 5"),
-        ({"solve": {"accuracy": []}}, f"solve.accuracy: [] {NO_SWEEP}"),
+        ({"solve": {"accuracy": []}},
+         "solve.accuracy: needs draft, standard, fine or reference, or errors by metric such as "
+         "{peak_acceleration: 0.01}, not []"),
         ({"solve": {"max_steps": float("inf")}},
          "solve.max_steps: must be finite: needs a whole number in [1, 1e+12], not inf"),
         ({"machine": {"rod_mass_kg": 10**400}},
