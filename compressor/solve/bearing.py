@@ -24,33 +24,22 @@ Bearing = dict[tuple[float, tuple[int, int]], np.ndarray]  # by squeeze and grid
 
 
 def reynolds(
-    eps: float, ratio: float, squeeze: int = 0, grid: tuple[int, int] = GRID,
-    near: Bearing | None = None,
+    eps: float, ratio: float, turning: float = 1.0, squeeze: float = 0.0,
+    grid: tuple[int, int] = GRID, near: Bearing | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Return the Sommerfeld numbers of a film at an eccentricity, for B / D = ratio, (2,).
 
-    Force over B D eta w / psi^2, that of a film that turns over eps as well: along the line of
-    centres, away from the wall, and across it, along the rotation.
-    squeeze: 0 of a film that turns, 1 of one that is pressed, -1 of one that is pulled apart; near:
-    cells that bore at an eccentricity nearby, where the search for them begins; it is written.
-    """
-    return forces(eps, ratio, 0.0 if squeeze else 1.0, squeeze, grid, near)
-
-
-def forces(
-    eps: float, ratio: float, turning: float, squeeze: float, grid: tuple[int, int] = GRID,
-    near: Bearing | None = None,
-) -> np.ndarray:  # fmt: skip
-    """Return the numbers of `reynolds`, (2,), of a film that turns and is squeezed at once.
-
-    turning: w eps, squeeze: eps', both over one speed.
+    Force over B D eta times a speed over psi^2: along the line of centres, away from the wall, and
+    across it, along the rotation. turning: w eps, squeeze: eps', both over that speed; where it
+    turns alone the numbers are over eps as well. near: cells that bore at an eccentricity nearby,
+    where the search for them begins; it is written.
     """
     near = {} if near is None else near
-    coarse = _forces(eps, ratio, turning, squeeze, (grid[0] // 2, grid[1] // 2), near)
-    return (4.0 * _forces(eps, ratio, turning, squeeze, grid, near) - coarse) / 3.0
+    coarse = _reynolds(eps, ratio, turning, squeeze, (grid[0] // 2, grid[1] // 2), near)
+    return (4.0 * _reynolds(eps, ratio, turning, squeeze, grid, near) - coarse) / 3.0
 
 
-def _forces(
+def _reynolds(
     eps: float, ratio: float, turning: float, squeeze: float, grid: tuple[int, int], near: Bearing
 ) -> np.ndarray:
     """Return both numbers on one grid, (2,)."""
@@ -132,7 +121,7 @@ def _over_short(eps: float, ratio: float, near: Bearing) -> tuple[float, ...]:
     """
     short = uncompiled(short_film)
     turned, ocvirk = reynolds(eps, ratio, near=near), short(eps, 1.0, 0.0)
-    pressed, pulled = (abs(reynolds(eps, ratio, way, near=near)[0]) for way in (1, -1))
+    pressed, pulled = (abs(reynolds(eps, ratio, 0.0, way, near=near)[0]) for way in (1, -1))
     return (
         (1.0 - eps) * short(eps, 0.0, 1.0)[0] / pressed,
         (1.0 + eps) * -short(eps, 0.0, -1.0)[0] / pulled,

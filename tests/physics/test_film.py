@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case
 from compressor.physics.film import film, film_numbers_at, short_film
-from compressor.solve.bearing import film_constants, forces, reynolds
+from compressor.solve.bearing import film_constants, reynolds
 from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
 
@@ -85,7 +85,7 @@ def test_a_short_bearing_is_ocvirk_s(eps):
         math.atan(math.pi * math.sqrt(room) / (4 * eps)), abs=0.01
     )
     half = (math.pi / 2 - math.acos(eps) / 2) * (1 + 2 * eps**2) + 1.5 * eps * math.sqrt(room)
-    assert reynolds(eps, b, 1)[0] == pytest.approx(4 * b**2 * half / room**2.5, rel=0.01)
+    assert reynolds(eps, b, 0.0, 1)[0] == pytest.approx(4 * b**2 * half / room**2.5, rel=0.01)
 
 
 def test_polynomials_keep_reynolds_numbers():
@@ -94,7 +94,7 @@ def test_polynomials_keep_reynolds_numbers():
     assert stiffest == pytest.approx(squeeze(0.99, constants), rel=1e-9)
     for eps in np.linspace(-0.98, 0.98, 15):
         way = 1 if eps >= 0 else -1
-        exact = way * reynolds(abs(eps), 0.5, way)[0]
+        exact = way * reynolds(abs(eps), 0.5, 0.0, way)[0]
         if abs(eps) > 0.1:
             assert squeeze(eps, constants) == pytest.approx(exact, rel=1e-3)
         if eps > 0.1:
@@ -204,7 +204,7 @@ def both_at_once(p, eps, angle):
         size * abs(turning) * math.cos(beta) + pressed,
         size * turning * math.sin(beta),
     )
-    return ours, np.array(holland), forces(eps, ratio, turning, closing)
+    return ours, np.array(holland), reynolds(eps, ratio, turning, closing)
 
 
 @pytest.mark.parametrize(
@@ -218,8 +218,8 @@ def test_a_journal_that_leaves_the_wall_has_the_force_of_one_reynolds_field(eps,
     """Of the load of the film that only turns: what an opening takes away, to 5 % of that."""
     b = 100.0 / 102.0
     constants, _ = film_constants(b, 0.02)
-    exact = forces(eps, b, wedge, closing)
-    turning = np.linalg.norm(forces(eps, b, wedge, 0.0))
+    exact = reynolds(eps, b, wedge, closing)
+    turning = np.linalg.norm(reynolds(eps, b, wedge, 0.0))
     found = np.array(film_numbers_at(eps, wedge, closing, constants))
     assert np.linalg.norm(found - exact) < 0.05 * turning
     assert np.linalg.norm(found) == pytest.approx(np.linalg.norm(exact), rel=0.25)
@@ -230,7 +230,7 @@ def test_a_short_bearing_that_turns_and_is_squeezed_is_the_closed_form():
     for eps in (0.2, 0.9):
         for angle in np.arange(0.0, 6.2, 0.4):
             turning, squeeze = math.cos(angle), math.sin(angle)
-            exact = forces(eps, 0.01, turning, squeeze) * 1e4
+            exact = reynolds(eps, 0.01, turning, squeeze) * 1e4
             found = np.array(short_film(eps, turning, squeeze))
             assert np.linalg.norm(found - exact) < 0.02 * np.linalg.norm(exact), (eps, angle)
 
@@ -246,7 +246,7 @@ def test_the_film_in_all_directions_is_as_near_to_reynolds_as_the_page_says(row)
     errors = {"ours": ([], []), "holland": ([], [])}
     for ratio in (0.25, 1.0):
         p = record_of(ratio)
-        turning = np.linalg.norm(forces(eps, ratio, 1.0, 0.0))
+        turning = np.linalg.norm(reynolds(eps, ratio, 1.0, 0.0))
         for angle in np.radians([*np.arange(0.0, 360.0, 22.5), 350.0, 355.0, 357.5]):
             ours, other, exact = both_at_once(p, eps, angle)
             back = int(angle > 3.15)
