@@ -59,19 +59,6 @@ def narrow(
     return low, high
 
 
-def pick_change(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points around the first change of sign, for `narrow`."""
-    above = values > 0.0
-    at = np.maximum((above != above[:, :1]).argmax(axis=1), 1)
-    return at - 1, at
-
-
-def pick_top(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points around the greatest value, for `narrow`."""
-    at = np.clip(values.argmax(axis=1), 1, POINTS - 2)
-    return at - 1, at + 1
-
-
 def find_changes(
     look: Look, times: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -79,8 +66,14 @@ def find_changes(
 
     times, values: (m,), where it is known; the rate is that of a line between two of them.
     """
+
+    def pick(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # around the first change
+        above = values > 0.0
+        at = np.maximum((above != above[:, :1]).argmax(axis=1), 1)
+        return at - 1, at
+
     at = np.flatnonzero(np.diff(values > 0.0))
-    low, high = narrow(look, times[at], times[at + 1], FOR_CHANGES, pick_change)
+    low, high = narrow(look, times[at], times[at + 1], FOR_CHANGES, pick)
     return 0.5 * (low + high), np.diff(values)[at] / np.diff(times)[at]
 
 
@@ -105,11 +98,15 @@ def find_tops(look: Look, times: np.ndarray, values: np.ndarray, known: np.ndarr
     high = (inner > NEAR_TOP * top) & (inner >= values[:-2]) & (inner >= values[2:])
     at, column = np.nonzero(high)
 
+    def pick(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # around the greatest
+        at = np.clip(values.argmax(axis=1), 1, POINTS - 2)
+        return at - 1, at + 1
+
     def look_at_own(times: np.ndarray) -> np.ndarray:
         return look(times)[np.arange(times.size), np.repeat(column, times.size // column.size)]
 
     if at.size:
-        begin, end = narrow(look_at_own, times[at], times[at + 2], FOR_TOPS, pick_top)
+        begin, end = narrow(look_at_own, times[at], times[at + 2], FOR_TOPS, pick)
         np.maximum.at(top, column, look_at_own(0.5 * (begin + end)))
     return top
 

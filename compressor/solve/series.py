@@ -14,7 +14,6 @@ values of a stored series are exact, means over one are not. `mean_crank_torque`
 """
 
 import math
-from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +21,7 @@ import numpy as np
 from compressor.cases import Case
 from compressor.metrics import SERIES, SIZES
 from compressor.physics import COLUMNS, WIDE, Column, Coordinate, frame_of_series, observe_all
-from compressor.solve.request import Trajectory
+from compressor.solve.request import Metrics, Trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -117,36 +116,22 @@ def compared_per_rev(case: Case) -> int:
     return round(min(COMPARED_PER_REV, max(1.0, MAX_COMPARED / revolutions)))
 
 
-@cache
-def distance_columns() -> tuple[np.ndarray, np.ndarray, dict[str, int | slice]]:
-    """Return where `distances` finds what it sums: columns, begins of sums, and sums by name.
-
-    A vector's squares are one sum; a series over joints has two.
-    """
-    columns: list[int] = []
-    starts: list[int] = []
-    sums: dict[str, int | slice] = {}
-    for name, (dims, _, _) in SERIES.items():
-        count = math.prod(SIZES[dim] for dim in dims)
-        joints = SIZES["joint"] if "joint" in dims else 1
-        begin = len(starts)
-        starts += range(len(columns), len(columns) + count, count // joints)
-        columns += range(column_of(name), column_of(name) + count)
-        sums[name] = slice(begin, begin + joints) if "joint" in dims else begin
-    return np.array(columns), np.array(starts), sums
-
-
-def distances(ours: np.ndarray, theirs: np.ndarray) -> dict[str, np.ndarray]:
+def distances(ours: np.ndarray, theirs: np.ndarray) -> Metrics:
     """Return the relative L2 distance of each time series of two runs, by joint where it has one.
 
-    ours, theirs: observed rows at the same times, (m, COLUMNS). 0 where both are 0.
+    ours, theirs: observed rows at the same times, (m, COLUMNS). A vector's squares are one sum; 0
+    where both are 0.
     """
-    columns, starts, sums = distance_columns()
-    difference = ours - theirs
-    error = np.add.reduceat(np.einsum("ij,ij->j", difference, difference)[columns], starts)
-    size = np.add.reduceat(np.einsum("ij,ij->j", ours, ours)[columns], starts)
-    relative = np.sqrt(np.divide(error, size, out=np.zeros_like(error), where=size > 0.0))
-    return {name: relative[place] for name, place in sums.items()}
+    error, size = (np.einsum("ij,ij->j", rows, rows).tolist() for rows in (ours - theirs, ours))
+    found = {}
+    for name, (dims, _, _) in SERIES.items():
+        first, count = column_of(name), math.prod(SIZES[dim] for dim in dims)
+        each = count // SIZES["joint"] if "joint" in dims else count
+        parts = [slice(k, k + each) for k in range(first, first + count, each)]
+        sums = [(sum(error[part]), sum(size[part])) for part in parts]
+        shares = [math.sqrt(apart / whole) if whole > 0.0 else 0.0 for apart, whole in sums]
+        found[name] = np.array(shares) if "joint" in dims else np.float64(shares[0])
+    return found
 
 
 # over time and these dimensions: (dimensions, unit, long name)

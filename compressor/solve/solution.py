@@ -170,18 +170,6 @@ def solve(case: Case) -> Solution:
     solution.settled = search.settled
     if solution.reason not in ("", Reason.ACCURACY_NOT_REACHED):
         return solution
-    find_horizon(case, solution, search)
-    if solution.horizon < case.duration:
-        return chaotic_solution(case, solution, search)
-    if case.wants_bars:
-        name_regime(case, solution, search)
-    if search.unsettled and not solution.reason:
-        solution.reason, solution.detail = Reason.NOT_SETTLED, search.unsettled
-    return solution
-
-
-def find_horizon(case: Case, solution: Solution, search: Search) -> None:
-    """Find a motion's horizon, where it is requested, or where errors are as large as numbers."""
     if case.solve.horizon is True:
         search.horizon = predictability_horizon(case, search.left)
     elif case.wants_bars and is_in_doubt(case, solution):
@@ -189,6 +177,13 @@ def find_horizon(case: Case, solution: Solution, search: Search) -> None:
         if solution.reason and search.stopped:
             solution.detail += "; the search for chaos came to its limit"
     solution.horizon = search.horizon
+    if solution.horizon < case.duration:
+        return chaotic_solution(case, solution, search)
+    if case.wants_bars:
+        name_regime(case, solution, search)
+    if search.unsettled and not solution.reason:
+        solution.reason, solution.detail = Reason.NOT_SETTLED, search.unsettled
+    return solution
 
 
 def is_in_doubt(case: Case, solution: Solution) -> bool:
