@@ -4,12 +4,11 @@ A job's key holds the version of the model: results of one version agree within 
 error bars, and a change that moves numbers further is a new version, and so makes other jobs.
 """
 
-import dataclasses
 import hashlib
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Set
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import replace
 from functools import cache, cached_property, lru_cache
 from typing import Any
@@ -62,7 +61,7 @@ from compressor.cases.yaml_reader import resolve_scalar
 from compressor.metrics import JOINTS
 
 MODEL_VERSION = "3"  # of equations and of the meaning of what is stored; part of a key
-MAX_TEXTS = 4096  # groups whose texts are remembered
+MAX_GROUPS = 4096  # whose identities are remembered
 SOUND = PerJoint(0.0, 0.0)  # a healthy clearance that no case need name
 FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder
 OWN_GAS = {key for key in (*table(), *parts_by_key()) if key.startswith("gas.")} - {*FOLLOWING}
@@ -214,18 +213,17 @@ stroke, 240 mm
         >>> compressor.Case.from_values(case.values()) == case
         True
         """
-        return {
-            name: _plain_value(value) if name in GROUPS else value
-            for name, value in self._given_fields()
-        }
-
-    def _given_fields(self) -> Iterator[tuple[str, Any]]:
-        """Yield the words and groups that make the case, by name; None of a group that is off."""
+        found: dict[str, Any] = {}
         for name in ("name", "load", "joint", *OF_JOINTS, "healthy_clearance_mm", *GROUPS):
             value = getattr(self, name)
             is_default = (value is None and WORDS[name]) or value == SOUND
-            if not (is_default or (self.joint == "none" and name in OF_JOINTS)):
-                yield name, value if isinstance(value, str) or name in GROUPS else dict(vars(value))
+            if is_default or (self.joint == "none" and name in OF_JOINTS):
+                continue
+            if name in GROUPS:
+                found[name] = _plain_value(value)
+            else:
+                found[name] = value if isinstance(value, str) else dict(vars(value))
+        return found
 
     @property
     def rtol(self) -> float:
@@ -282,9 +280,7 @@ stroke, 240 mm
     @cached_property
     def physics_key(self) -> str:
         """Return the hash of physics and span, without the solver: 20 hexadecimal digits."""
-        parts = identity_parts(self)
-        del parts["solver"]
-        return digest(join_parts(parts))
+        return digest({k: part for k, part in identity_of(self).items() if k != "solver"})
 
     @cached_property
     def key(self) -> str:
@@ -294,15 +290,11 @@ stroke, 240 mm
         error bars, and a store holds each once. Name, output, time limit and error bars are no part
         of it.
         """
-        return digest(join_parts(identity_parts(self)))
+        return digest(identity_of(self))
 
     def attributes(self) -> dict[str, Any]:
         """Return what is stored of a case: `name`, `case` (JSON), `key` and `physics_key`."""
-        texts = [
-            f'"{name}": {_value_text(value) if name in GROUPS else json.dumps(value)}'
-            for name, value in sorted(self._given_fields())
-        ]
-        text = "{" + ", ".join(texts) + "}"
+        text = json.dumps(self.values(), sort_keys=True)
         return {"name": self.name, "case": text, "key": self.key, "physics_key": self.physics_key}
 
 
@@ -368,31 +360,43 @@ def has_own_cylinder(values: Mapping[str, Any], given: Set[str]) -> bool:
     )
 
 
-def identity_parts(case: Case) -> dict[str, str]:
-    """Return what makes a case's results, each part as JSON text by its name."""
+def identity_of(case: Case) -> dict[str, Any]:
+    """Return what makes a case's results, of which its key is the hash."""
     solve = case.solve
     # what is integrated and from where on it counts, however it is written
     duration: float | str = case.duration if solve.duration_rev != "auto" else "auto"
     settle: float | str = case.settle if solve.settle_rev != "auto" else "auto"
     targets = {} if isinstance(solve.accuracy, str) else dict(solve.accuracy)
-    accuracy = solve.rtol or targets or solve.accuracy
-    texts = {
-        "joint": f'"{case.joint}"',
-        "load": f'"{case.load}"',
-        "model": f'"{MODEL_VERSION}"',
-        "span": KEY_TEXT.encode((duration, settle, round(case.steps))),
-        "solver": KEY_TEXT.encode((accuracy, solve.method, solve.max_steps)),
-        "facts": KEY_TEXT.encode(_facts_read(case)),
+    found: dict[str, Any] = {
+        "joint": case.joint,
+        "load": case.load,
+        "model": MODEL_VERSION,
+        "span": (duration, settle, round(case.steps)),
+        "solver": (solve.rtol or targets or solve.accuracy, solve.method, solve.max_steps),
+        "facts": _facts_read(case),
     }
     if case.joint != "none":
-        texts["clearance_mm"] = KEY_TEXT.encode(vars(case.clearance_mm))
+        found["clearance_mm"] = vars(case.clearance_mm)
     for name in IDENTITY_GROUPS:
         group = getattr(case, name)
         if group is not None:
-            texts[name] = _identity_text(group, name)
+            found[name] = _identity_of_group(name, group)
         elif not WORDS[name]:
-            texts[name] = "false"
-    return texts
+            found[name] = False
+    return found
+
+
+@lru_cache(MAX_GROUPS)  # values that are equal are of one type: pydantic sees to it
+def _identity_of_group(name: str, group: Any) -> dict[str, Any]:
+    """Return what a group gives, without facts: those that are read are a part of their own."""
+    given = {
+        key: vars(value) if isinstance(value, BY_PART) else value
+        for key, value in vars(group).items()
+        if value is not None and f"{name}.{key}" not in IN_KEY_IF_READ
+    }
+    if cards := given.get("indicator"):  # the digest counts, wherever the file is
+        given["indicator"] = {end: card and card.rpartition("@")[2] for end, card in cards.items()}
+    return given
 
 
 def _facts_read(case: Case) -> dict[str, Any]:
@@ -441,42 +445,9 @@ def _plain_value(group: Any) -> dict[str, Any] | bool:
     return plain
 
 
-@lru_cache(MAX_TEXTS)  # values that are equal are of one type: pydantic sees to it
-def _value_text(group: Any) -> str:
-    """Return `_plain_value` of a group as JSON."""
-    return json.dumps(_plain_value(group), sort_keys=True)
-
-
-@lru_cache(MAX_TEXTS)  # values that are equal are of one type: pydantic sees to it
-def _identity_text(group: Any, name: str) -> str:
-    """Return what a group gives as JSON, as `KEY_TEXT` writes it, but faster.
-
-    Without facts, of which those that are read are a part of their own. name: the group's.
-    """
-    values, texts = vars(group), []
-    for key in sorted(values):
-        value = values[key]
-        if f"{name}.{key}" in IN_KEY_IF_READ:
-            continue
-        if type(value) is float and math.isfinite(value):
-            texts.append(f'"{key}":{value!r}')
-        elif value is not None:
-            if key == "indicator":  # the digest counts, wherever the file is
-                value = {end: card and card.rpartition("@")[2] for end, card in vars(value).items()}
-            elif dataclasses.is_dataclass(value):
-                value = vars(value)
-            texts.append(f'"{key}":{KEY_TEXT.encode(value)}')
-    return "{" + ",".join(texts) + "}"
-
-
-def join_parts(texts: Mapping[str, str]) -> str:
-    """Return the text, in JSON, that a key is the hash of, from the parts of an identity."""
-    return "{" + ",".join([f'"{name}":{texts[name]}' for name in sorted(texts)]) + "}"
-
-
-def digest(text: str) -> str:
-    """Return the hash of a text: 20 hexadecimal digits."""
-    return hashlib.sha256(text.encode()).hexdigest()[:20]
+def digest(identity: Mapping[str, Any]) -> str:
+    """Return the hash of an identity, as JSON: 20 hexadecimal digits."""
+    return hashlib.sha256(KEY_TEXT.encode(identity).encode()).hexdigest()[:20]
 
 
 def _value_at(key: str, values: Mapping[str, Any]) -> Any:

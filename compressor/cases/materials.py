@@ -4,7 +4,7 @@ Needs no compiler.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from compressor.cases.checks import row_of
@@ -19,6 +19,15 @@ if TYPE_CHECKING:
 
 # Table 2 of the paper: density (kg/m^3), Young's modulus (Pa), Poisson's ratio
 MATERIALS = {"steel": (7801.0, 2.07e11, 0.29), "copper": (8906.0, 1.19e11, 0.326)}
+
+
+def composite_modulus(first, second):
+    """Return the composite modulus E* (Pa) of two materials by name.
+
+    1 / E* is the sum of (1 - nu^2) / E (Hertz). Raises KeyError for one that is not in Table 2.
+    """
+    pair = (MATERIALS[first], MATERIALS[second])
+    return 1.0 / sum((1.0 - poisson**2) / modulus for _, modulus, poisson in pair)
 
 
 def contact_stiffness(first, second, journal_radius, bearing_radius, internal=False):
@@ -37,18 +46,6 @@ def contact_stiffness(first, second, journal_radius, bearing_radius, internal=Fa
     sign = -1.0 if internal else 1.0
     radius = journal_radius * bearing_radius / (bearing_radius + sign * journal_radius)
     return 4.0 / (3.0 * math.pi * compliance) * math.sqrt(radius)
-
-
-def composite_modulus(first, second):
-    """Return the composite modulus E* (Pa) of two materials by name.
-
-    1 / E* is the sum of (1 - nu^2) / E (Hertz). Raises KeyError for one that is not in Table 2.
-    """
-    compliance = 0.0
-    for name in (first, second):
-        _, modulus, poisson = MATERIALS[name]
-        compliance += (1.0 - poisson**2) / modulus
-    return 1.0 / compliance
 
 
 def joint_stiffness(
@@ -75,68 +72,56 @@ def joint_stiffness(
     return (contact.stiffness_N_per_mm15 or 0.0) * 1000.0**contact.exponent
 
 
-def paper_stiffness_note(case: "Case") -> str:
-    """Return what to know of the paper's contact stiffness at pins that are not the paper's.
-
-    Names Eq. 15's stiffness for each of those pins; "" where no joint has such a pin and stiffness.
-    """
-    contact, key = case.contact, "contact.stiffness_N_per_mm15"
-    usual, radius = table()[key].default, table()["machine.pin_radius_mm.big_end"].default
-    if contact.law in CYLINDRICAL or contact.stiffness_N_per_mm15 != usual:
-        return ""
-    pins = {
-        case.machine.pin_radius_mm.at(joint): getattr(case.clearance_mm, joint)
-        for joint in JOINTS
-        if getattr(case.clearance_mm, joint) > 0
-    }
-    texts = []
-    for pin, clearance in pins.items():
-        if pin != radius:
-            radii = to_si(pin, "mm"), to_si(pin + clearance, "mm")
-            inside, outside = (
-                contact_stiffness("steel", "steel", *radii, internal=internal) / 1000.0**1.5
-                for internal in (True, False)
-            )
-            texts.append(f"{inside:.3g} for one of {pin:g} mm in its bore ({outside:.3g} as of two "
-                         "discs)")  # fmt: skip
-    if not texts:
-        return ""
-    return (
-        f"{usual:g} N/mm^1.5 is the paper's, of a pin of {radius:g} mm radius; of steel on steel "
-        f"Eq. 15 gives {' and '.join(texts)}: give contact.materials, such as [steel, steel], or "
-        "the stiffness"
-    )
-
-
 def paper_notes(case: "Case") -> dict[str, str]:
     """Return what to know of the numbers of the paper's pin that a case has at other pins, by key.
 
     They are defaults: the contact stiffness, the length of an oiled bearing, that of a bore that
     wears.
     """
-    found = {"contact.stiffness_N_per_mm15": paper_stiffness_note(case)}
-    if film := case.lubricant:
+    contact, film, wear = case.contact, case.lubricant, case.wear
+    found, lengths = {}, {}
+    pins = {
+        joint: case.machine.pin_radius_mm.at(joint)
+        for joint in JOINTS
+        if getattr(case.clearance_mm, joint) > 0
+    }
+    radius = table()["machine.pin_radius_mm.big_end"].default
+    others = {joint: pin for joint, pin in pins.items() if pin != radius}
+    key = "contact.stiffness_N_per_mm15"
+    if contact.stiffness_N_per_mm15 == table()[key].default and contact.law not in CYLINDRICAL:
+        found[key] = _tell_stiffness(case, others, radius)
+    if film:
         why = "a film bears about as the cube of it"
-        found |= _paper_length("lubricant.bearing_length_mm", case, film.bearing_length_mm.at, why)
-    if wear := case.wear:
+        lengths["lubricant.bearing_length_mm"] = film.bearing_length_mm.at, why
+    if wear:
         why = "the same wear is half as deep in a bore of twice the length"
-        found |= _paper_length("wear.bore_length_mm", case, lambda joint: wear.bore_length_mm, why)
+        lengths["wear.bore_length_mm"] = (lambda joint: wear.bore_length_mm), why
+    for key, (length, why) in lengths.items():
+        row = row_of(key)
+        usual = row.default if row else 0.0
+        own = {pin for joint, pin in others.items() if length(joint) == usual}
+        given = " and ".join(f"{pin:g}" for pin in sorted(own, reverse=True))
+        found[key] = given and (
+            f"{usual:g} mm is the default, for the paper's pin of {radius:g} mm radius, and yours "
+            f"has {given} mm: {why}; give the length that bears, without grooves and holes"
+        )
     return {key: note for key, note in found.items() if note}
 
 
-def _paper_length(
-    key: str, case: "Case", length: Callable[[str], float], why: str
-) -> dict[str, str]:
-    """Return what to know of a default length (mm) of joints with clearance, by its key."""
-    row, radius = row_of(key), table()["machine.pin_radius_mm.big_end"].default
-    usual = row.default if row else 0.0
-    worn = [joint for joint in JOINTS if getattr(case.clearance_mm, joint) > 0]
-    pins = {case.machine.pin_radius_mm.at(joint) for joint in worn if length(joint) == usual}
-    pins.discard(radius)
-    if not pins:
-        return {}
-    given = " and ".join(f"{pin:g}" for pin in sorted(pins, reverse=True))
-    return {
-        key: f"{usual:g} mm is the default, for the paper's pin of {radius:g} mm radius, and yours "
-        f"has {given} mm: {why}; give the length that bears, without grooves and holes"
-    }
+def _tell_stiffness(case: "Case", pins: Mapping[str, float], radius: float) -> str:
+    """Return Eq. 15's stiffness for pins (mm) by joint, beside the paper's; "" without any."""
+    gaps = {pin: getattr(case.clearance_mm, joint) for joint, pin in pins.items()}
+    texts = []
+    for pin, clearance in gaps.items():
+        radii = to_si(pin, "mm"), to_si(pin + clearance, "mm")
+        inside, outside = (
+            contact_stiffness("steel", "steel", *radii, internal=internal) / 1000.0**1.5
+            for internal in (True, False)
+        )
+        text = f"{inside:.3g} for one of {pin:g} mm in its bore ({outside:.3g} as of two discs)"
+        texts.append(text)
+    return bool(texts) * (
+        f"{case.contact.stiffness_N_per_mm15:g} N/mm^1.5 is the paper's, of a pin of {radius:g} mm "
+        f"radius; of steel on steel Eq. 15 gives {' and '.join(texts)}: give contact.materials, "
+        "such as [steel, steel], or the stiffness"
+    )

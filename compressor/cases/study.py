@@ -50,11 +50,15 @@ class Study:
     def given(self, number: int) -> dict[str, Any]:
         """Return what the file gives of a job, nested as a case file has it."""
         assert isinstance(self.cases, Cases)
-        return self.cases.given(number)
+        block, place = self.cases.combinations[number]
+        return {**block.values_of(place), "name": block.name}
 
     def solver_of(self, number: int) -> Hashable:
         """Return what jobs share only if their cases have equal groups `solve` and `output`."""
-        return self.cases.solver_of(number) if isinstance(self.cases, Cases) else number
+        if not isinstance(self.cases, Cases):
+            return number
+        block, place = self.cases.combinations[number]
+        return id(block), block.solver_of(place)
 
     def shard(self, number: int, of: int) -> "Study":
         """Return the study with the jobs of one shard selected, 1 <= number <= of.
@@ -93,16 +97,6 @@ class Cases(Sequence[Case]):
         if self.keys:
             vars(case)["key"] = self.keys[numbers]
         return case
-
-    def given(self, number: int) -> dict[str, Any]:
-        """Return what the file gives of a case, nested as a case file has it."""
-        block, place = self.combinations[number]
-        return {**block.values_of(place), "name": block.name}
-
-    def solver_of(self, number: int) -> Hashable:
-        """Return what cases share only if their groups `solve` and `output` are equal."""
-        block, place = self.combinations[number]
-        return id(block), block.solver_of(place)
 
     def where(self, test: Test) -> list[int]:
         """Return the numbers of the cases for which a comparison holds."""

@@ -56,18 +56,9 @@ class Sweep:
     has_ends: bool = True
 
     @property
-    def key(self) -> str:
-        """Return the dotted key that is swept."""
-        return ".".join(map(str, self.path))
-
-    @property
     def is_drawn(self) -> bool:
         """Return whether a design draws the values."""
         return self.kind in SAMPLED
-
-    def place_of(self, number: int) -> Path:
-        """Return the path of a value: that of an item, or of the form that makes all."""
-        return (*self.path, number) if self.kind == "list" else self.path
 
 
 def sweep_of(path: Path, value: Any, is_whole: bool = False) -> Sweep:
@@ -117,33 +108,29 @@ def is_finite(value: object) -> bool:
 def _made_sweep(path: Path, word: str, numbers: list[Fraction]) -> Sweep:
     """Return the sweep of linspace, logspace or range."""
     first, last, third = numbers
+    low, high = float(first), float(last)
     if word == "range":
         if not third or (last - first) / third < 0:
-            text = f"range never gets from {float(first):g} to {float(last):g} by this step"
-            raise NoSweep(text, word)
-        count = (last - first) // third + 1
-        return Sweep(path, word, count, between(word, first, first + (count - 1) * third, count))
-    if first == last:
+            raise NoSweep(f"range never gets from {low:g} to {high:g} by this step", word)
+        step, count = third, (last - first) // third + 1
+    elif first == last:
         raise NoSweep(f"{word} needs two different ends", word)
-    if word == "logspace" and min(first, last) <= 0:
+    elif word == "logspace" and min(first, last) <= 0:
         raise NoSweep("logspace needs ends above 0", word)
-    if third < 2 or third != int(third):
+    elif third < 2 or third != int(third):
         raise NoSweep(f"{word} needs a whole count of 2 or more", word)
-    return Sweep(path, word, int(third), between(word, first, last, int(third)))
-
-
-def between(word: str, first: Fraction, last: Fraction, count: int) -> Callable[[], list[float]]:
-    """Return the function that makes `count` values from first to last, in even steps or ratios."""
-    low, high = float(first), float(last)
+    else:
+        count = int(third)
+        step = (last - first) / (count - 1)
 
     def even() -> list[float]:
-        return [float(first + (last - first) * i / max(count - 1, 1)) for i in range(count)]
+        return [float(first + step * i) for i in range(count)]
 
     def geometric() -> list[float]:
         inner = (low * (high / low) ** (i / (count - 1)) for i in range(1, count - 1))
         return [low, *map(round_made_value, inner), high]
 
-    return geometric if word == "logspace" else even
+    return Sweep(path, word, count, geometric if word == "logspace" else even)
 
 
 def _range(word: str, least: Fraction, greatest: Fraction, log: bool) -> Spread:
@@ -173,15 +160,15 @@ def _distribution(word: str, body: dict[str, Any], log: bool | None) -> Spread:
     (name,), inside = names, body[names[0]]
     if log is not None:
         raise NoSweep(f"log is for {FORMS[word]}, not for {name}", "log")
+    whole = isinstance(inside, dict) and {*inside} == {"mean", "sd"}
     if name == "normal":
-        whole = isinstance(inside, dict) and {*inside} == {"mean", "sd"}
         numbers = [inside["mean"], inside["sd"]] if whole else []
-        good = whole and all(map(is_finite, numbers)) and numbers[1] > 0
+        good = all(map(is_finite, numbers)) and bool(numbers) and numbers[1] > 0
         needs = "sd above 0"
     else:
         numbers = inside if isinstance(inside, list) and len(inside) == 3 else []
-        good = bool(numbers) and all(map(is_finite, numbers))
-        good = good and numbers == sorted(numbers) and numbers[0] < numbers[2]
+        good = all(map(is_finite, numbers)) and numbers == sorted(numbers)
+        good = good and bool(numbers) and numbers[0] < numbers[2]
         needs = "in rising order, the ends different"
     if not good:
         raise NoSweep(f"{name} needs {DISTRIBUTIONS[name]}, finite numbers, {needs}", word, name)
@@ -205,7 +192,7 @@ def _triangular(low: float, middle: float, high: float) -> Spread:
             value = low + math.sqrt(share * (high - low) * (middle - low))
         else:
             value = high - math.sqrt((1.0 - share) * (high - low) * (high - middle))
-        return float(min(max(round_made_value(value), low), high))
+        return min(max(round_made_value(value), float(low)), float(high))
 
     return spread
 

@@ -6,7 +6,7 @@ the fields of the groups.
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import field
 from functools import cache, partial
 from typing import Any
@@ -24,6 +24,7 @@ from compressor.cases.groups import (
 from compressor.cases.laws import CLEARANCE
 from compressor.cases.optional_groups import Body, Drive, Guide, Lubricant, Rod, Sensor, Wear
 from compressor.cases.parameter import (
+    PART_WORDS,
     Parameter,
     PerJoint,
     by_part,
@@ -192,46 +193,38 @@ def name_worn_joint(joint: str, clearance_mm: PerJoint[float], healthy_mm: PerJo
     return "both" if len(worn) > 1 else worn[0] if worn else "none"
 
 
-def parameters() -> Iterator[Parameter]:
-    """Yield the rows of the table, in the order of the case file; a key by part has several."""
+@cache
+def table() -> dict[str, Parameter]:
+    """Return the table of parameters by dotted key, such as `machine.rod_mass_kg`.
+
+    It is in the order of the case file; a key by part has several rows.
+    """
+    rows: list[Parameter] = []
     for item in dataclasses.fields(Settings):
-        if item.name in GROUPS:
-            for inner in dataclasses.fields(GROUPS[item.name]):
-                yield from rows_of(f"{item.name}.{inner.name}", inner, group_readers(item.name))
-        else:
-            yield from rows_of(item.name, item)
+        rows += rows_of(item.name, item)
+        for inner in dataclasses.fields(GROUPS[item.name]) if item.name in GROUPS else ():
+            rows += rows_of(f"{item.name}.{inner.name}", inner, group_readers(item.name))
+    return {row.key: row for row in rows}
 
 
 @cache
 def parts_by_key() -> dict[str, tuple[str, ...]]:
     """Return the parts of each key that may have a value for each, such as big_end, small_end."""
     found: dict[str, tuple[str, ...]] = {}
-    for item in dataclasses.fields(Settings):
-        within = dataclasses.fields(GROUPS[item.name]) if item.name in GROUPS else (item,)
-        above = f"{item.name}." if item.name in GROUPS else ""
-        found |= {f"{above}{one.name}": (*one.metadata["parts"],) for one in within
-                  if "parts" in one.metadata}  # fmt: skip
+    for whole, _, part in (key.rpartition(".") for key in table()):
+        if part in PART_WORDS:
+            found[whole] = (*found.get(whole, ()), part)
     return found
 
 
-@cache
 def group_readers(name: str) -> tuple[str, ...]:
     """Return the conditions that all hold where a case reads any key of a group."""
-    (item,) = (item for item in dataclasses.fields(Settings) if item.name == name)
-    return tuple(item.metadata.get("read", ()))
-
-
-@cache
-def table() -> dict[str, Parameter]:
-    """Return the table of parameters by dotted key, such as `machine.rod_mass_kg`."""
-    return {row.key: row for row in parameters()}
+    return tuple(_META[name]["read"])
 
 
 @cache
 def outside_identity() -> frozenset[str]:
     """Return the keys that no result depends on, so that no study can sweep them."""
-    keys = {row.key for row in parameters() if not row.identity}
-    above = {key.rpartition(".")[0] for key in keys} - {
-        row.key.rpartition(".")[0] for row in parameters() if row.identity
-    }
-    return frozenset(keys | above - {""})
+    keys = {row.key for row in table().values() if not row.identity}
+    inside = {row.key.rpartition(".")[0] for row in table().values() if row.identity}
+    return frozenset(keys | {key.rpartition(".")[0] for key in keys} - inside - {""})

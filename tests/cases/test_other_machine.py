@@ -7,7 +7,7 @@ from compsim import cli
 from conftest import refused
 
 from compressor.cases.case import Case
-from compressor.cases.materials import contact_stiffness, paper_stiffness_note
+from compressor.cases.materials import contact_stiffness, paper_notes
 
 # single throw, stroke 180 mm, rod 450 mm, 740 rpm, bore 220 mm, 2 to 7 bar
 MACHINE = """
@@ -60,13 +60,13 @@ def test_other_units_of_it_are_answered_with_the_numbers(read):
 
 def test_its_contact_is_told_to_be_of_another_pin(read):
     (case,) = read("load: gas" + MACHINE).cases
-    note = paper_stiffness_note(case)
+    note = paper_notes(case)["contact.stiffness_N_per_mm15"]
     inside = contact_stiffness("steel", "steel", 0.035, 0.0352, internal=True) / 1000**1.5
     assert note.startswith("336000 N/mm^1.5 is the paper's, of a pin of 10 mm radius; of steel on")
     assert f"Eq. 15 gives {inside:.3g} for one of 35 mm in its bore" in note
     assert "60 mm" not in note  # its big end is ideal
     given = replace(case, contact=replace(case.contact, stiffness_N_per_mm15=5e6))
-    assert paper_stiffness_note(given) == ""
+    assert paper_notes(given) == {}
 
 
 def test_its_page_and_its_status_tell_that_too(read, tmp_path, capsys, in_process):
@@ -74,7 +74,7 @@ def test_its_page_and_its_status_tell_that_too(read, tmp_path, capsys, in_proces
     (tmp_path / "nl.yaml").write_text("load: gas" + MACHINE + "solve: {duration_rev: 2}\n")
     for words in (["run", "nl.yaml", "-j", "1"], ["report"], ["status"]):
         assert cli.main(words) == 0
-    note = paper_stiffness_note(case)
+    note = paper_notes(case)["contact.stiffness_N_per_mm15"]
     assert note in html.unescape((tmp_path / "report/index.html").read_text())
     assert note in " ".join(capsys.readouterr().out.split())
     assert cli.main(["show", "nl"]) == 0
