@@ -25,7 +25,7 @@ from compressor.cases.checks import (
 )
 from compressor.cases.comparison import condition
 from compressor.cases.conflicts import (
-    IN_KEY_IF_READ,
+    FACT_KEYS,
     LED,
     conditions,
     conflicts,
@@ -65,7 +65,7 @@ MAX_GROUPS = 4096  # whose identities are remembered
 SOUND = PerJoint(0.0, 0.0)  # a healthy clearance that no case need name
 FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder
 OWN_GAS = {key for key in (*table(), *parts_by_key()) if key.startswith("gas.")} - {*FOLLOWING}
-FACT_KEYS = tuple(part for key in IN_KEY_IF_READ for part in stands_for(key) or (key,))
+IN_KEY_IF_READ = {".".join(key.split(".")[:2]) for key in FACT_KEYS}
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
 KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
 # the groups with a key that results depend on; of `solve` the span and the solver are parts

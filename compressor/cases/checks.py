@@ -139,21 +139,26 @@ def has_parts(key: str, value: Any) -> bool:
     return isinstance(value, Mapping) and bool({*value} & {*parts_by_key().get(key, ())})
 
 
-def expand_synonyms(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
-    """Return nested values with each synonym as its key; both at once are a problem."""
+def expand_synonyms(
+    values: Mapping[str, Any], halved: Callable[[Any], Any] = halve
+) -> tuple[dict[str, Any], list[Problem]]:
+    """Return nested values with each synonym as its key; both at once are a problem.
+
+    halved: the function that halves a value, or a sweep.
+    """
     whole, problems = dict(values), []
     for synonym, key in DOUBLES.items():
-        group, _, name = synonym.partition(".")
-        within, own = whole.get(group), key.rpartition(".")[2]
+        group, name, own = *synonym.split("."), key.rpartition(".")[2]
+        within = whole.get(group)
         if not isinstance(within, Mapping) or name not in within:
             continue
-        if own in within:
-            problems.append(Problem(synonym, TWICE.format(key)))
-        rest = {inner: value for inner, value in within.items() if inner != name}
-        message = check_double(synonym, within[name])
+        message = TWICE.format(key) if own in within else check_double(synonym, within[name])
         if message:
             problems.append(Problem(synonym, message))
-        whole[group] = rest if message else {own: halve(within[name])} | rest
+            whole[group] = {one: value for one, value in within.items() if one != name}
+        else:
+            renamed = {own if one == name else one: value for one, value in within.items()}
+            whole[group] = renamed | {own: halved(within[name])}
     return whole, problems
 
 

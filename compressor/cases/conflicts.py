@@ -51,16 +51,9 @@ def moving_mass(case: Settings) -> float:
 
 
 LED = "gas.indicator"  # key whose one value is that of its first part alone
-# Facts of a machine, which a file may give though no job of it reads them, so that one file serves
-# the machine with clearance and without. Of the gas those of a cylinder that is there.
-FACTS = (
-    "machine.pin_radius_mm", "contact.materials", "contact.length_mm",
-    "lubricant.viscosity_mPa_s", "lubricant.bearing_length_mm",
-    "gas.suction_MPa", "gas.discharge_MPa", "gas.exponent", "gas.head_clearance_mm",
-    "gas.clearance_percent", "gas.rod_diameter_mm", "gas.valve_loss_percent",
-)  # fmt: skip
+FOLLOWING = ("contact.modulus_GPa", "contact.stiffness_N_per_mm15", "contact.geometry")  # facts
 # what is part of a job's key only where the job reads it: facts, and what follows from them
-IN_KEY_IF_READ = (*FACTS, "contact.modulus_GPa", "contact.stiffness_N_per_mm15", "contact.geometry")
+FACT_KEYS = [key for key, row in table().items() if row.fact or key in FOLLOWING]
 
 
 def needs_of_given(key: str, given: Container[str]) -> list[tuple[str, str]]:
@@ -70,8 +63,8 @@ def needs_of_given(key: str, given: Container[str]) -> list[tuple[str, str]]:
     keys of the file.
     """
     strict = ["load == gas"] if "gas.action" in given else ["load == gas", CRANK_END]
-    is_fact = key in FACTS or key.rpartition(".")[0] in FACTS
-    return [one for one in conditions(key) if not is_fact or one[1] in strict]
+    row = row_of(key)
+    return [one for one in conditions(key) if not (row and row.fact) or one[1] in strict]
 
 
 @cache

@@ -131,7 +131,8 @@ class Machine:
         PerJoint, 10.0,
         number(
             10.0, "(0, 1e4]", "journal radius R_j", "inferred from Eq. 15 and Table 3",
-            judged=(10, 100), plausible=Plausible("the paper does not print it", times(0.7, 1.5)),
+            judged=(10, 100), fact=True,
+            plausible=Plausible("the paper does not print it", times(0.7, 1.5)),
         ),
         {joint: f"{own} or friction.ideal_joints == true" for joint, own in AT_JOINTS.items()},
     )  # fmt: skip
@@ -209,17 +210,18 @@ class Gas:
     piston_radius_mm: float = number(50.0, "(0, 1e4]", "piston radius", "Table 1")
     head_clearance_mm: float | None = number(
         20.0, "(0, 1e5]", "clearance of the cylinder head s0", "Eq. 13",
-        read=(CYCLE, HEAD_CLEARANCE), plausible=CYLINDER_CLEARANCE,
+        read=(CYCLE, HEAD_CLEARANCE), fact=True, plausible=CYLINDER_CLEARANCE,
     )  # fmt: skip
     suction_MPa: float = number(
-        0.105, "(0, 1e3]", "suction pressure (absolute)", "Table 1", read=CYCLE, plausible=PRESSURE
-    )
+        0.105, "(0, 1e3]", "suction pressure (absolute)", "Table 1", read=CYCLE, fact=True,
+        plausible=PRESSURE,
+    )  # fmt: skip
     discharge_MPa: float = number(
-        0.393, "(0, 1e3]", "discharge pressure (absolute)", "Table 1", read=CYCLE,
+        0.393, "(0, 1e3]", "discharge pressure (absolute)", "Table 1", read=CYCLE, fact=True,
         plausible=PRESSURE,
     )  # fmt: skip
     exponent: float = number(
-        1.4, "[1, 5]", "isentropic exponent", "Eq. 13", read=CYCLE,
+        1.4, "[1, 5]", "isentropic exponent", "Eq. 13", read=CYCLE, fact=True,
         plausible=Plausible("moist gas and cooled walls lower it", from_to(1.15, 1.4)),
     )  # fmt: skip
     back_pressure_MPa: float | None = number(
@@ -242,13 +244,13 @@ class Gas:
     )  # fmt: skip
     rod_diameter_mm: float | None = number(
         None, "(0, 1e4]", "diameter of the piston rod, whose section the crank end lacks",
-        read=CRANK_END,
+        read=CRANK_END, fact=True,
     )  # fmt: skip
     clearance_percent: PerEnd[float | None] | None = by_part(
         PerEnd, None,
         number(
             None, "(0, 1000]", "clearance volume over swept volume; in place of head_clearance_mm",
-            optional=True, plausible=CYLINDER_CLEARANCE,
+            optional=True, fact=True, plausible=CYLINDER_CLEARANCE,
         ),
         {"head": (CYCLE, HEAD_CLEARANCE), "crank": (CYCLE, CRANK_END)}, fill=None,
     )  # fmt: skip
@@ -256,7 +258,7 @@ class Gas:
         PerValve, None,
         number(
             None, "[0, 90]", "loss of absolute pressure while open; 0 without", read=CYCLE,
-            plausible=VALVE_LOSS,
+            fact=True, plausible=VALVE_LOSS,
         ),
     )  # fmt: skip
     unloaded: str | None = choice(
@@ -408,7 +410,7 @@ class Contact:
         PerJoint, None,
         choice(
             None, ("steel", "copper"), "two materials; in place of a stiffness", "Table 2, Eq. 15",
-            kind="materials",
+            kind="materials", fact=True,
         ),
         AT_JOINTS,
     )  # fmt: skip
@@ -445,7 +447,7 @@ class Contact:
     length_mm: PerJoint[float] | None = by_part(
         PerJoint, None,
         number(
-            None, "(0, 1e4]", "length (johnson, liu)", judged=(10.0, 100.0),
+            None, "(0, 1e4]", "length (johnson, liu)", judged=(10.0, 100.0), fact=True,
             plausible=BEARING_LENGTH,
         ),
         {joint: (own, *by_law("contact", "length_mm")) for joint, own in AT_JOINTS.items()},

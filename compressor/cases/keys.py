@@ -15,8 +15,8 @@ from compressor.cases.checks import (
     SWEEP,
     TWICE,
     accepted_keys,
-    check_double,
     describe_unknown,
+    expand_synonyms,
     halve,
     no_mapping,
     stands_for,
@@ -74,23 +74,17 @@ def _is_by_part(key: str, value: Any) -> bool:
 
 def _halve_doubles(tree: Tree) -> Written:
     """Return the values with each double as the key that it is twice of."""
-    values, places, problems = dict(tree.values), dict(tree.places), []
+    values, wrong = expand_synonyms(tree.values, _halve_swept)
+    places, problems = dict(tree.places), []
     for double, key in DOUBLES.items():
         old, new = path_of(double), path_of(key)
-        group = values.get(old[0])
-        if not isinstance(group, dict) or old[1] not in group:
-            continue
-        rest = {name: value for name, value in group.items() if name != old[1]}
-        if new[1] in group:
-            later = max(old, new, key=lambda path: tree.at(*path)[0])
-            problems.append(FileProblem(tree.at(*later)[0], double, TWICE.format(key)))
-        elif message := check_double(double, group[old[1]]):
-            problems.append(tree.problem(old, message))
-        else:
-            rest = {new[1] if name == old[1] else name: value for name, value in group.items()}
-            rest[new[1]] = _halve_swept(group[old[1]])
+        if new not in places:
             places |= {new + path[2:]: spot for path, spot in places.items() if path[:2] == old}
-        values[old[0]] = rest
+    for problem in wrong:
+        key_place, place = places[path_of(problem.key)]
+        if rival := tree.places.get(path_of(DOUBLES[problem.key])):
+            place = max(key_place, rival[0])
+        problems.append(FileProblem(place, problem.key, problem.message))
     return Tree(values, places), problems
 
 

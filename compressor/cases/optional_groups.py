@@ -48,7 +48,7 @@ class Lubricant:
 
     viscosity_mPa_s: float = number(
         30.0, "(0, 1e6]", "dynamic viscosity", "ISO VG 100 at about 65 °C (ISO 3448)",
-        judged=(3.0, 300.0),
+        judged=(3.0, 300.0), fact=True,
         plausible=Plausible(
             "it halves in 15 degrees, and a bearing's temperature is a guess",
             times(0.5, 2), times(0.5, 2),
@@ -57,7 +57,7 @@ class Lubricant:
     bearing_length_mm: PerJoint[float] = by_part(
         PerJoint, 20.0,
         number(
-            20.0, "(0, 1e4]", "length of the bearing", "assumed: as long as wide",
+            20.0, "(0, 1e4]", "length of the bearing", "assumed: as long as wide", fact=True,
             plausible=BEARING_LENGTH,
         ),
         AT_JOINTS,

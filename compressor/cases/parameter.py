@@ -273,6 +273,9 @@ class Parameter:
     aliases: tuple[tuple[str, str], ...] = ()  # other words, each with the choice it stands for
     judged: tuple[float, float] | None = None  # range that extreme scenes are drawn from
     read: tuple[str, ...] = ()  # conditions that all hold where a case reads it
+    # whether it is of the machine: a file may give it though no job reads it, so that one file
+    # serves the machine with clearance and without; of the gas, of a cylinder that is there
+    fact: bool = False
     plausible: Plausible | None = None  # where there is a doubt about it
 
     @property

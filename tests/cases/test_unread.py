@@ -10,7 +10,6 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.cases.checks import value_of
-from compressor.cases.conflicts import FACTS
 from compressor.cases.load import CaseFileError, load_cases, load_studies
 from compressor.cases.parameter import CaseError
 from compressor.cases.table import parts_by_key, table
@@ -216,7 +215,7 @@ UNREAD = [(key, where) for key, entry in ENTRIES.items() for where in entry.unre
 OF_ACTION = ("gas.rod_diameter_mm", "gas.clearance_percent.crank")  # which a file has named
 UNREAD_FACTS = [
     (key, where) for key, where in UNREAD
-    if {key, key.rpartition(".")[0]} & {*FACTS}
+    if table()[key].fact
     and (where.get("load") == "gas" or not key.startswith("gas."))
     and (key not in OF_ACTION or "action" in where["gas"])
 ]  # fmt: skip
