@@ -8,7 +8,6 @@ swept. What it cannot check, such as whether values fit each other, reading the 
 from dataclasses import replace
 from typing import Any
 
-from compressor.cases.blocks import MAX_EXCLUSIONS, MAX_SEED
 from compressor.cases.checks import DOUBLES, REPORT, phrase_of, row_of
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.parameter import NAME, Parameter, adapter_of
@@ -130,10 +129,10 @@ def _distributions() -> Schema:
 def _sweeps() -> Schema:
     """Return the schemas of the keys that say how values are swept together."""
     whole = {"type": "integer", "minimum": 1}
-    sample = _mapping({"n": whole, "seed": {"type": "integer", "minimum": 0, "maximum": MAX_SEED}})
+    sample = _mapping({"n": whole, "seed": {"type": "integer", "minimum": 0}})
     keys = {"enum": [key for key in (*parts_by_key(), *table()) if key not in outside_identity()]}
     group = {"type": "array", "items": keys, "minItems": 2, "uniqueItems": True}
-    texts = {"type": "array", "items": TEXT, "maxItems": MAX_EXCLUSIONS}
+    texts = {"type": "array", "items": TEXT}
     report = {name: {**TEXT, "minLength": 1, "maxLength": most} for name, most in REPORT.items()}
     about = {
         "sample": ("how many samples, and from which seed", sample),

@@ -505,7 +505,7 @@ def problems_of(
     rows: by dotted key. describe: a function of a group, a name and its value, which returns the
     error of a key that the group has not, or of a value that is no group (name "").
     """
-    known = {key[:end] for key in rows for end, c in enumerate(f"{key}.") if c == "."}
+    known = _keys_and_above(tuple(rows))
     found: dict[Problem | None, None] = {}
     for one in error.errors(include_url=False):
         cause, kind = one.get("ctx", {}).get("error", ""), one["type"]
@@ -531,6 +531,13 @@ def problems_of(
         else:
             found[Problem(key, NO_VALUE if value is None else describe(key, "", value))] = None
     return [problem for problem in found if problem]
+
+
+@lru_cache
+def _keys_and_above(keys: tuple[str, ...]) -> frozenset[str]:
+    """Return dotted keys, and those of what holds them."""
+    ends = ((key, end) for key in keys for end, sign in enumerate(f"{key}.") if sign == ".")
+    return frozenset(key[:end] for key, end in ends)
 
 
 NAMED_WRONGLY = ("unexpected_keyword_argument", "invalid_key", "missing")  # kinds of pydantic's
