@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from compressor.program import CompsimError, printable
 
@@ -138,36 +139,28 @@ def open_text_table(
     """
     text, encoding = decode_text(path, Path(path).read_bytes())
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    found = None
-    for mark in [separator] if separator else SEPARATORS:
-        try:
-            rows = list(_split(lines[:SAMPLED_LINES], mark))
-        except csv.Error as error:
-            if separator:
-                raise TextTableError(f"{path}: is no table: {error}") from error
-            continue
-        for sign in [decimal] if decimal else DECIMALS:
-            block = _find_block(rows, sign, skip_lines)
-            if block and mark == " " and not all(block.numeric):
-                continue  # words that are apart by blanks are text
-            if block and (found is None or block.merit > found[0].merit):
-                found = block, mark, sign
-    if found is None:
+    marks, signs = [separator] if separator else SEPARATORS, [decimal] if decimal else DECIMALS
+    blocks: list[_Block] = []
+    for mark in marks:
+        with contextlib.suppress(csv.Error):
+            rows = [*_split(lines[:SAMPLED_LINES], mark)]
+            blocks += filter(None, (_find_block(rows, mark, sign, skip_lines) for sign in signs))
+    if not blocks:
         first = next((line for line in lines if line.strip()), "")
-        tried = ", ".join([SEPARATORS[separator]] if separator else SEPARATORS.values())
+        tried = ", ".join(SEPARATORS[mark] for mark in marks)
         raise TextTableError(
             f"{path}: holds no rows of numbers (its first line: {printable(first[:60])!r}; "
             f"separators tried: {tried}; decimal point and comma)"
         )
-    block, mark, sign = found
-    if mark == "," and 2 * len(block.header) == block.width and sign == ".":
+    block = max(blocks, key=lambda one: one.merit)
+    if block.separator == "," and block.decimal == "." and 2 * len(block.header) == block.width:
         raise TextTableError(
             f"{path}:{block.first_line}: {block.width} cells below a header of "
             f"{len(block.header)}: commas separate cells and decimals; "
             "write the file with another separator"
         )
     try:
-        rows = [row for row in _split(lines, mark) if row[0] >= block.first_line]
+        rows = [row for row in _split(lines, block.separator) if row[0] >= block.first_line]
     except csv.Error as error:
         raise TextTableError(f"{path}: is no table: {error}") from error
     names, header_line = tuple(str(k + 1) for k in range(block.width)), 0
@@ -176,7 +169,9 @@ def open_text_table(
         while len(names) > block.width and not names[-1]:
             names = names[:-1]
     numeric = (*block.numeric, *[False] * (len(names) - block.width))
-    return TextTable(str(path), encoding, mark, sign, names, header_line, numeric, rows)
+    return TextTable(
+        str(path), encoding, block.separator, block.decimal, names, header_line, numeric, rows
+    )
 
 
 def decode_text(path: str | Path, data: bytes) -> tuple[str, str]:
@@ -198,20 +193,20 @@ def decode_text(path: str | Path, data: bytes) -> tuple[str, str]:
 def _split(lines: Sequence[str], separator: str) -> Iterator[Row]:
     """Yield the rows of lines, blank ones too."""
     if separator == " ":
-        rows = ((number, line.lstrip("#% ").split()) for number, line in enumerate(lines, 1))
+        yield from ((number, line.lstrip("#% ").split()) for number, line in enumerate(lines, 1))
     else:
         reader = csv.reader(lines, delimiter=separator)
-        rows = ((reader.line_num, cells) for cells in reader)
-    yield from rows
+        yield from ((reader.line_num, cells) for cells in reader)
 
 
-@dataclass(frozen=True)
-class _Block:
+class _Block(NamedTuple):
     """Where the rows of numbers begin by one separator and decimal sign.
 
     merit: the greater, the more likely; width: columns up to the last that holds numbers.
     """
 
+    separator: str
+    decimal: str
     merit: tuple[bool, int]
     header: list[str]
     header_line: int
@@ -220,7 +215,9 @@ class _Block:
     numeric: tuple[bool, ...]
 
 
-def _find_block(rows: list[Row], decimal: str, skip_lines: int | None) -> _Block | None:
+def _find_block(
+    rows: Sequence[Row], separator: str, decimal: str, skip_lines: int | None
+) -> _Block | None:
     """Return where the rows of numbers begin; None where there are none.
 
     Rows have a shape: which of their cells are numbers. The shape that holds most numbers is the
@@ -239,17 +236,18 @@ def _find_block(rows: list[Row], decimal: str, skip_lines: int | None) -> _Block
         first = min(first, 1)
     while first > 0 and skip_lines is None and _is_damaged(kinds[first - 1], shape):
         first -= 1
-    columns = list(itertools.zip_longest(*kinds[first:], fillvalue=EMPTY))
-    numeric = tuple(one.count(DIGITS) > one.count(WORDS) for one in columns)
+    columns = itertools.zip_longest(*kinds[first:], fillvalue=EMPTY)
+    numeric = [one.count(DIGITS) > one.count(WORDS) for one in columns]
     width = max((k + 1 for k, is_number in enumerate(numeric) if is_number), default=0)
-    if not width:
-        return None
-    numeric = numeric[:width]
-    header_line, header = 0, []
-    if first:
-        header_line, header = rows[first - 1][0], _names(rows[:first])
-    fits = sum(map(bool, header)) == width and WORDS not in shape
-    return _Block((fits, merits[shape]), header, header_line, rows[first][0], width, numeric)
+    if not width or (separator == " " and not all(numeric[:width])):
+        return None  # words that are apart by blanks are text
+    header = _names(rows[:first]) if first else []
+    header_line = rows[first - 1][0] if first else 0
+    merit = sum(map(bool, header)) == width and WORDS not in shape, merits[shape]
+    return _Block(
+        separator, decimal, merit, header, header_line, rows[first][0], width,
+        tuple(numeric[:width]),
+    )  # fmt: skip
 
 
 DIGITS, WORDS, EMPTY = "0", "w", " "  # what a cell is
