@@ -6,7 +6,7 @@ So that results are read without loading either; the numbers' names and units ar
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
@@ -19,6 +19,7 @@ from compressor.program import PROGRAM
 ROW = np.dtype(
     [(name, "f8", tuple(SIZES[dim] for dim in row.dims)) for name, row in NUMBERS.items()]
 )
+ABSCISSAE = ("time", "crank_angle")  # stay double: their steps are what matters
 NOTHING = np.full(1, math.nan, ROW).tobytes()
 
 
@@ -55,29 +56,19 @@ def regime_words(regime: str) -> str:
 
 
 @dataclass(frozen=True)
-class SeriesFile:
-    """The file that holds a job's time series."""
-
-    samples: int
-    end: float  # last time, s
-    precision: str  # double | single
-    digest: str  # of the file's bytes, part of its name
-
-
-@dataclass(frozen=True)
 class Outcome:
-    """How a job ended, without its time series.
+    """How a job ended.
 
     `numbers`: a scalar of dtype ROW, metrics nan where the run did not reach its end; `reason`: a
     stable name, empty when ok; `attributes`: those of the job's Dataset, its `key` among them;
-    `series`: where the time series are stored, if they are.
+    `series`: the time series that are to be stored, {} where none are.
     """
 
     status: str
     reason: str
     numbers: np.void
     attributes: dict[str, Any]
-    series: SeriesFile | None = None
+    series: "dict[str, Variable]" = field(default_factory=dict)
 
     def __reduce__(self) -> Any:
         """Return the pickled form without the names of all numbers, whose sending costs most."""
@@ -94,9 +85,17 @@ class Outcome:
         """Return what is known of a failure beyond its reason."""
         return str(self.attributes.get("detail", ""))
 
-    def table(self, more: dict[str, tuple]) -> "DatasetParts":
+    def with_series(self, variables: Mapping[str, tuple], precision: str) -> "Outcome":
+        """Return this outcome with time series to be stored, in single or double precision."""
+        series = {}
+        for name, (dims, values, attrs) in variables.items():
+            is_exact = precision == "double" or "time" not in dims or name in ABSCISSAE
+            series[name] = Variable(dims, np.asarray(values, float if is_exact else "f4"), attrs)
+        return replace(self, series=series)
+
+    def table(self, more: Mapping[str, tuple]) -> "DatasetParts":
         """Return what the job's Dataset is made of: its own variables, and more of them."""
-        variables = self.variables() | more
+        variables = {**self.variables(), **more}
         variables |= coordinates(dim for dims, _, _ in variables.values() for dim in dims)
         named = {
             name: Variable(dims, np.asarray(values), attrs)

@@ -41,7 +41,6 @@ def plan(configs, folder, jobs, as_json, **how) -> int:
 
     studies = read_cases(configs, **how)
     screen.caution(studies, None)
-    screen.say_changes(studies, folder)
     screen.say_machines(studies)
     found, workers = forecast(studies, folder, FIRST), jobs or cores()
     if as_json:

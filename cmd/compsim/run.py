@@ -63,7 +63,6 @@ def run(command, configs, folder, jobs, rerun, shard, scheduler, wait, quiet, **
         selected = sum(len(study.selected) for study in studies)
         screen.say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
     screen.caution(studies)
-    screen.say_changes(studies, folder)
     cluster: Any = Cluster(scheduler) if scheduler else nullcontext()
     opening = partial(screen.say_machines, studies)  # where there are jobs to run
     with ProgressReporter(quiet, "jobs", folder, opening) as progress, cluster as elsewhere:

@@ -212,22 +212,3 @@ def say_machines(studies: "Sequence[Study]") -> None:
         say(f"{study.name}: its machine, without clearance")
         for line in align_columns(describe_machine(study).lines()):
             say("\n".join(wrap_value(f"  {line}")))
-
-
-def say_changes(studies: "Sequence[Study]", folder: str) -> None:
-    """Report which stored studies have jobs that their case files no longer have."""
-    from compressor.store import changes
-
-    for one in changes(folder, studies):
-        text = f"{one.study}: had {plural(one.before)}, this file has {one.now}, {one.shared} of "
-        text += "them as before"
-        if one.older_model:
-            text += f" (those were made by version {one.older_model} of the model)"
-        if not one.former:
-            say_wrapped(text)
-            continue
-        stay = "stays" if one.finished == 1 else "stay"
-        say_wrapped(
-            f"{text}; {one.finished} finished before {stay} stored, in the study {one.former}:"
-        )
-        say(f"  compsim export {one.former} -r {shlex.quote(folder)} -o {one.former}.csv")

@@ -40,13 +40,10 @@ def status(folder, as_json) -> int:
         trusted += [f"{n} {regime_words(word)}" for word, n in one.regimes.items() if word]
         remarks = [f"of those ok: {text}" for text in trusted] + one.caveats
         remarks += [f"{n} {reason}: {remedy(reason)}" for reason, n in one.reasons.items()]
-        if one.former_of:
-            text = f"{one.former_of} as it was run on {one.written[:10]}, with finished jobs that "
-            remarks.insert(0, f"{text}it has no longer; opens by this name")
         screen.print_text(line)
         for text in remarks:
             screen.print_text(*screen.wrap_line(text, 4))
-    wanting = [one.again for one in found if one.missing and not one.former_of]
+    wanting = [one.again for one in found if one.missing]
     for command in screen.run_commands(wanting, folder):
         screen.say(f"next: {command}")
     return screen.DONE

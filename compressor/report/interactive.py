@@ -38,7 +38,7 @@ from compressor.report.figures.drawing import (
 from compressor.report.figures.job import BY_JOINT
 from compressor.report.figures.plant_units import in_units
 from compressor.report.figures.style import BLACK, LineStyle
-from compressor.store import DamagedJob, Stored, publish
+from compressor.store import DamagedFile, Stored, publish
 from compressor.units import Units
 
 LIBRARY = "plotly.min.js"
@@ -271,14 +271,14 @@ def job_scripts(
             continue
         try:
             drawing = in_units(draw_job(read_shown(stored, key)), units)
-        except (NoSeriesError, DamagedJob):
+        except (NoSeriesError, DamagedFile):
             continue  # shorter than a revolution, or its file is damaged: others report it
         found += 1
         yield key, script(series_name(key), drawing)
 
 
 def read_shown(stored: Stored, key: str) -> xr.Dataset:
-    """Return the series of a stored job that its figure shows. Raises DamagedJob.
+    """Return the series of a stored job that its figure shows. Raises DamagedFile.
 
     A tenth of the time that all of the job takes.
     """
@@ -291,9 +291,9 @@ def read_shown(stored: Stored, key: str) -> xr.Dataset:
         settle = stored.rows.attributes(position)["settle"]
         return xr.Dataset(variables, attrs={"settle": settle})
     except (KeyError, ValueError) as error:
-        path = stored.rows.path(position) or stored.folder
+        path = stored.rows.path(position)
         problem = "holds time series of different lengths, or no end of settling"
-        raise DamagedJob(path, problem, "run its study again") from error
+        raise DamagedFile(path, problem, "run its study again") from error
 
 
 def series_name(key: str) -> str:

@@ -55,7 +55,7 @@ from compressor.report.page import (
     value_cell,
 )
 from compressor.report.study_section import KEY_DIGITS, file_name
-from compressor.store import DamagedJob, Folder, Stored, StoredStudy, StoreWarning
+from compressor.store import DamagedFile, Folder, Stored, StoredStudy, StoreWarning
 from compressor.units import Units
 
 
@@ -100,10 +100,10 @@ def find_runs(
     found: dict[str, xr.Dataset] = {}
     damaged = set()
     for key in paper_candidates(stored, studies, labels):
-        name = labels[stored.physics_key(key)]
+        name = labels[str(stored.rows.words["physics_key"][stored.position(key)])]
         try:
             run = stored.job(key)
-        except DamagedJob as error:
+        except DamagedFile as error:
             warnings.warn(str(error), StoreWarning, stacklevel=2)
             damaged.add(name)
             continue
@@ -124,7 +124,7 @@ def paper_candidates(
     keys = list(dict.fromkeys(key for study in studies for key in study.keys))
     positions = stored.rows.find(keys)
     physics_keys = np.array([*physics], "S")
-    same = np.isin(stored.rows.columns["physics_key"], physics_keys)
+    same = np.isin(stored.rows.bytes_of["physics_key"], physics_keys)
     return [key for key, at in zip(keys, positions, strict=True) if at >= 0 and same[at]]
 
 
@@ -304,7 +304,7 @@ def other_machines(stored: Stored, study: StoredStudy) -> Iterator[dict[str, Cas
     if not swept >= {*FAULTS, *CLEARANCES}:
         return
     positions = stored.rows.find(study.keys)
-    stored_keys = {*stored.rows.columns["physics_key"][positions[positions >= 0]].tolist()}
+    stored_keys = {*stored.rows.bytes_of["physics_key"][positions[positions >= 0]].tolist()}
     ideals = set()
     for position, point in zip(positions, points(study), strict=True):
         # the first of the nine stands for all

@@ -45,7 +45,7 @@ from compressor.report.figures.plant_units import in_units
 from compressor.report.figures.sweep_data import name_in_words
 from compressor.report.study_section import file_name
 from compressor.store import (
-    DamagedJob,
+    DamagedFile,
     Folder,
     Stored,
     StoredStudy,
@@ -171,7 +171,7 @@ def write_plots(
     PlotError where it cannot be drawn; StoreError where the store cannot be read or the files not
     be written.
     """
-    stored, studies = read_store(results).warned(), read_studies(results, former=True)
+    stored, studies = read_store(results).warned(), read_studies(results)
     named = {study.name: study for study in studies}
     of_job = bool(choice.what) and {*choice.what} <= {*JOB}
     if len(words) == 1 and words[0] in named and not (of_job and named[words[0]].jobs == 1):
@@ -489,7 +489,7 @@ def swept_row(stored: Stored, value: Any, key: str, brief: bool = False) -> Swep
         return SweptRow(name, problem=problem)
     try:
         run = stored.job(key)
-    except DamagedJob:
+    except DamagedFile:
         if brief:
             return SweptRow(name, problem="damaged")
         raise

@@ -242,7 +242,7 @@ def choose_studies(results: Folder, names: Sequence[str]) -> list[StoredStudy]:
     """
     if not names:
         return sorted(read_studies(results), key=lambda study: study.is_trial)
-    known = read_studies(results, former=True)
+    known = read_studies(results)
     return [find_study(results, name, known) for name in dict.fromkeys(names)]
 
 

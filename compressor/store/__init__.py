@@ -1,28 +1,21 @@
 """Outcomes on disk, and back."""
 
+from compressor.store.batch import encode_batch, publish_batch, write_batch
 from compressor.store.export import ExportOptions, export
 from compressor.store.files import (
     Folder,
     StoreError,
     StoreWarning,
     publish,
-    sync_later,
     system_error,
     writable_folder,
 )
-from compressor.store.hdf5 import DamagedJob
+from compressor.store.merge import merge_batches, set_aside
+from compressor.store.netcdf import DamagedFile, read_dataset, write_dataset
 from compressor.store.reader import Stored, open_study, read_job, read_store
 from compressor.store.sensor_records import find_record, job_record
-from compressor.store.series_file import (
-    read_dataset,
-    series_file,
-    store_series,
-    write_dataset,
-    write_series,
-)
 from compressor.store.status import (
     JobReport,
-    changes,
     report_job,
     run_caveats,
     standings,
@@ -42,4 +35,3 @@ from compressor.store.studies import (
     swept_column,
     write_study,
 )
-from compressor.store.writer import Writer

@@ -1,11 +1,7 @@
-"""Jobs as one labelled Dataset: metrics in memory, series read when they are used.
-
-How a job's file is read is handed in by `compressor.store.reader`.
-"""
+"""Jobs as one labelled Dataset: metrics in memory, series read when they are used."""
 
 import warnings
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,15 +13,12 @@ from xarray.core import indexing
 from compressor.cases import phrase_of, points, table, value_in
 from compressor.digits import is_known
 from compressor.metrics import BARRED, NUMBERS, SIZES
-from compressor.outcome import coordinates, word_variables
+from compressor.outcome import Variable, coordinates, word_variables
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
-from compressor.store.hdf5 import DamagedJob
+from compressor.store.netcdf import DamagedFile
 from compressor.store.rows import Rows
 from compressor.store.studies import StoredStudy, coordinate_names
-
-# a job's key, names of variables -> those that its file holds
-Values = Callable[[str, Sequence[str]], dict[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -88,24 +81,26 @@ def outcomes(layout: Layout, rows: Rows) -> xr.Dataset:
     positions = rows.find(layout.keys)
     variables = _outcomes(layout, rows, positions)
     found = positions[positions >= 0]
-    if (rows.words["reason"][found] != Reason.INTERNAL_ERROR).any():
+    if (rows.bytes_of["reason"][found] != Reason.INTERNAL_ERROR.encode()).any():
         variables |= _metrics(layout, rows, positions)
         axes = coordinates(dim for one in variables.values() for dim in one.dims)
         variables |= {n: xr.Variable(*parts) for n, parts in axes.items()}
     return _with_coordinates(variables, layout)
 
 
-def label_dataset(
-    layout: Layout, rows: Rows, job: Callable[[str], xr.Dataset], values: Values
-) -> xr.Dataset:
-    """Return the Dataset of a layout, from the rows of a store and its jobs with time series."""
+def label_dataset(layout: Layout, rows: Rows, read_again: Callable[[], Rows]) -> xr.Dataset:
+    """Return the Dataset of a layout, from the rows of a store and its jobs with time series.
+
+    read_again: returns the rows of the store as it is when series are read, if their batches have
+    been merged with others by then.
+    """
     dataset = outcomes(layout, rows)
     positions = rows.find(layout.keys)
     found = np.unique(positions[positions >= 0])
-    whole = found[rows.columns["samples"][found] > 0]
+    whole = found[rows.samples[found] > 0]
     if not whole.size:
         return dataset
-    series = _series(layout, rows, positions, whole, job, values)
+    series = _series(layout, rows, positions, whole, read_again)
     return _with_coordinates(dict(dataset.variables) | series, layout)
 
 
@@ -187,10 +182,8 @@ def _values_at(values: np.ndarray, positions: np.ndarray) -> np.ndarray:
 def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
     """Return all numbers of the rows, nan where a job has none, but for those that no job has."""
     found = {}
-    for name in rows.numbers.dtype.names or ():
+    for name, values in rows.numbers(positions).items():
         metric = NUMBERS[name]
-        values = np.array(rows.numbers[name][positions])
-        values[positions < 0] = np.nan
         if metric.is_given(values):
             found[name] = xr.Variable((*layout.dims, *metric.dims), values, metric.attributes)
     return found
@@ -201,44 +194,48 @@ def _series(
     rows: Rows,
     positions: np.ndarray,
     whole: np.ndarray,
-    job: Callable[[str], xr.Dataset],
-    values: Values,
+    read_again: Callable[[], Rows],
 ) -> dict[str, xr.Variable]:
-    """Return the time series of all jobs; none but one of the longest is read yet."""
-    samples, ends = rows.columns["samples"], rows.columns["end"]
-    template = _first_readable(rows.columns["key"][whole[np.argsort(-samples[whole])]], job)
+    """Return the time series of all jobs; none but those of one of the longest are read yet."""
+    template = _first_readable(rows, whole[np.argsort(-rows.samples[whole], kind="stable")])
     if not template:
         return {}
-    shared = len({*zip(samples[whole].tolist(), ends[whole].tolist(), strict=True)}) == 1
+    lengths = {*zip(rows.samples[whole].tolist(), rows.ends[whole].tolist(), strict=True)}
     keys = np.where(np.isin(positions, whole), layout.keys, "").astype(object)
-    found = {"time": template["time"].variable} if shared else {}
-    for name, item in template.variables.items():
+    dim = "time" if len(lengths) == 1 else "sample"
+    found = {"time": xr.Variable(*template["time"])} if dim == "time" else {}
+    for name, item in template.items():
         if "time" in item.dims and name not in found:
-            dims = (*layout.dims, "time" if shared else "sample", *item.dims[1:])
-            lazy = indexing.LazilyIndexedArray(StudySeries(values, str(name), keys, item.shape))
-            found[str(name)] = xr.Variable(dims, lazy, item.attrs)
+            lazy = StudySeries(rows, read_again, name, keys, item.values.shape)
+            dims = (*layout.dims, dim, *item.dims[1:])
+            found[name] = xr.Variable(dims, indexing.LazilyIndexedArray(lazy), item.attrs)
     return found
 
 
-def _first_readable(keys: np.ndarray, job: Callable[[str], xr.Dataset]) -> xr.Dataset:
-    """Return the first of some jobs that is not damaged; without any an empty Dataset, and warn."""
-    for key in keys:
+def _first_readable(rows: Rows, positions: np.ndarray) -> dict[str, Variable]:
+    """Return the series of the first of some jobs that is not damaged; {} without one, and warn."""
+    for position in positions.tolist():
         try:
-            return job(key.decode())
-        except DamagedJob as error:
+            return rows.series(position)
+        except DamagedFile as error:
             damage = error
     warnings.warn(f"{damage}: no time series can be read", StoreWarning, stacklevel=2)
-    return xr.Dataset()
-
-
-READERS = 4  # threads: reading a file and comparing its digest, two thirds of the time, run at once
+    return {}
 
 
 class StudySeries(BackendArray):
-    """One series of all jobs of a study; indexing reads the files of those jobs alone."""
+    """One series of all jobs of a study; indexing reads the batches of those jobs alone."""
 
-    def __init__(self, values: Values, name: str, keys: np.ndarray, longest: tuple[int, ...]):
-        self.values, self.name, self.keys, self.longest = values, name, keys, longest
+    def __init__(
+        self,
+        rows: Rows,
+        read_again: Callable[[], Rows],
+        name: str,
+        keys: np.ndarray,
+        longest: tuple[int, ...],
+    ):
+        self.rows, self.read_again, self.name = rows, read_again, name
+        self.keys, self.longest = keys, longest
         self.shape = (*keys.shape, *longest)
         self.dtype = np.dtype(float)
 
@@ -249,15 +246,18 @@ class StudySeries(BackendArray):
     def _read(self, index: tuple[Any, ...]) -> np.ndarray:
         jobs, samples = index[: self.keys.ndim], index[self.keys.ndim :]
         keys = np.asarray(self.keys[jobs], dtype=object)
-        with ThreadPoolExecutor(READERS) as pool:
-            blocks = [block[samples] for block in pool.map(self._block, keys.flat)]
-        inner = np.empty(self.longest)[samples].shape
-        return np.array(blocks).reshape((*keys.shape, *inner))
+        try:
+            blocks = self._blocks(self.rows, keys, samples)
+        except FileNotFoundError:  # merged with others since
+            blocks = self._blocks(self.read_again(), keys, samples)
+        return blocks.reshape((*keys.shape, *blocks.shape[1:]))
 
-    def _block(self, key: str) -> np.ndarray:
-        """Return a job's series, nan beyond its end."""
-        block = np.full(self.longest, np.nan)
-        if key:
-            values = self.values(key, [self.name])[self.name]
+    def _blocks(self, rows: Rows, keys: np.ndarray, samples: tuple[Any, ...]) -> np.ndarray:
+        """Return a series of jobs, (jobs, samples, ...), nan beyond the end of each."""
+        found = np.full((keys.size, *np.empty(self.longest)[samples].shape), np.nan)
+        positions = rows.find(keys.ravel())
+        for place, values in rows.series_of_jobs(self.name, positions):
+            block = np.full(self.longest, np.nan)
             block[: len(values)] = values
-        return block
+            found[place] = block[samples]
+        return found

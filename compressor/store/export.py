@@ -23,10 +23,9 @@ import numpy as np
 
 from compressor.program import PROGRAM, CompsimError, Progress, no_progress
 from compressor.store.files import Folder, WrongName, publish, publishing
-from compressor.store.hdf5 import DamagedJob
+from compressor.store.netcdf import DamagedFile, encode_dataset
 from compressor.store.reader import Stored, read_store
 from compressor.store.sensor_records import NEEDS_SENSOR
-from compressor.store.series_file import image_of, read_bytes, read_series
 from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
 from compressor.units import Units, unit_in
 
@@ -88,7 +87,7 @@ def export(
     output: Folder,
     options: ExportOptions | None = None,
     progress: Progress = no_progress,
-) -> tuple[list[Exported], list[DamagedJob]]:
+) -> tuple[list[Exported], list[DamagedFile]]:
     """Write what `names` name, studies and jobs by the beginning of their keys, else all studies.
 
     output: a file, .nc or .csv, for the studies together as one table, or for one job; or .wav
@@ -98,7 +97,7 @@ def export(
     Returns what was written, and damage that was met, which costs the jobs in it alone. Raises
     ExportError before anything is written, StoreError where the store or the disk gives way.
     """
-    stored, known = read_store(folder), read_studies(folder, former=True)
+    stored, known = read_store(folder), read_studies(folder)
     studies, keys = _named_jobs(folder, names, stored, known)
     target = Path(output)
     options = options or ExportOptions()
@@ -120,7 +119,7 @@ def export(
         try:
             write = _metrics if task.studies else _series
             found.append(write(task, stored, form, options.units))
-        except DamagedJob as error:
+        except DamagedFile as error:
             if task.named:
                 raise
             damaged.append(error)
@@ -133,7 +132,7 @@ def _named_jobs(
     """Return the studies and the keys of jobs that are named, each once; by default all studies."""
     by_name = {study.name for study in known}
     if not names:
-        return [study for study in known if not study.former_of], []
+        return [*known], []
     studies, keys = [], []
     for name in dict.fromkeys(names):
         if name not in by_name and HEXADECIMAL.fullmatch(name):
@@ -185,7 +184,7 @@ def _files(
         yield _Task(target / f"{study.name}{suffix}", (study,))
         if series:
             positions = stored.rows.find(study.keys)
-            has_series = (positions >= 0) & (stored.rows.columns["samples"][positions] > 0)
+            has_series = (positions >= 0) & (stored.rows.samples[positions] > 0)
             for key in dict.fromkeys(itertools.compress(study.keys, has_series.tolist())):
                 yield _Task(target / study.name / f"{key}{suffix}", key=key, named=False)
     for key in keys:
@@ -214,7 +213,7 @@ def _metrics(task: _Task, stored: Stored, form: str, units: Units) -> Exported:
         is_grid = len(studies) == 1 and studies[0].is_grid
         layout = grid(studies[0]) if is_grid else table_of_jobs(studies)
         table = outcomes(layout, stored.rows).assign_attrs(_attributes(studies))
-        data = image_of(_link_coordinates(table))
+        data = encode_dataset(_link_coordinates(table))
         publish(task.path, data)
         size = len(data)
     jobs = sum(study.jobs for study in studies)
@@ -223,29 +222,27 @@ def _metrics(task: _Task, stored: Stored, form: str, units: Units) -> Exported:
 
 
 def _series(task: _Task, stored: Stored, form: str, units: Units) -> Exported:
-    """Write the time series of one job; in netCDF it is the stored file, to the byte."""
+    """Write the time series of one job."""
     position = stored.position(task.key)
     if position is None:
         raise WrongName(stored.folder, f"job {task.key} is not stored", "run its case file first")
-    source, samples = stored.rows.path(position), int(stored.rows.columns["samples"][position])
-    if source is None:
+    if not (samples := int(stored.rows.samples[position])):
         remedy = "run its case file with --set output.keep=series, or export its study"
         raise WrongName(stored.folder, f"job {task.key} has no time series", remedy)
-    kind = "series"
+    kind, dataset = "series", stored.job(task.key)
     if form == "csv":
-        dataset = read_series(source)
         size = write_csv(task.path, columns(dataset, "time", units) | _record(dataset))
-    elif form in RECORD_SUFFIXES:
-        from compressor.vibration import encode_record  # loads parts of SciPy
-
-        record = _record(read_series(source))
-        if not record:
-            raise WrongName(stored.folder, f"job {task.key} has no sensor's record", NEEDS_SENSOR)
-        data = encode_record(record, SUFFIXES[form])
-        publish(task.path, data)
-        kind, samples, size = "record", len(next(iter(record.values()))), len(data)
     else:
-        data = read_bytes(source)
+        data = encode_dataset(dataset)
+        if form in RECORD_SUFFIXES:
+            from compressor.vibration import encode_record  # loads parts of SciPy
+
+            record = _record(dataset)
+            if not record:
+                problem = f"job {task.key} has no sensor's record"
+                raise WrongName(stored.folder, problem, NEEDS_SENSOR)
+            data = encode_record(record, SUFFIXES[form])
+            kind, samples = "record", len(next(iter(record.values())))
         publish(task.path, data)
         size = len(data)
     return Exported(os.fspath(task.path), kind, task.key, samples, size)

@@ -1,19 +1,13 @@
 """The store: a folder of finished jobs and of the studies they belong to.
 
-    <folder>/rows/<number>-<digest>.h5   how many jobs ended, and their numbers: `rows`
-    <folder>/jobs/<key>-<digest>.h5      one job with its time series, where kept: `series_file`
-    <folder>/studies/<name>.json         one study: axes, keys of its jobs in C order: `studies`
-    <folder>/former/<name>~<n>.json      the same of a study that another of its name has replaced
-    <folder>/shards/<shard>/{rows,jobs}  the same of a run that is one of several
+    <folder>/batches/<name>.h5      some jobs each, with their time series where kept: `batch`
+    <folder>/studies/<name>.json    one study: axes, keys of its jobs in C order: `studies`
 
-A job is stored when it has a row. Where the file of time series that a row names is gone, as in a
-copy without `jobs`, the job has its metrics, and no series. Every file
-appears under its name only when all of it is on disk, and carries a digest of its bytes. There is
-no index: what is stored is read from the rows. `compressor.store.writer` writes them.
+Every file appears under its name only when all of it is on disk. There is no index: what is stored
+is read from the batches.
 """
 
 import os
-import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,18 +20,10 @@ import numpy as np
 from compressor.cases import Case, CaseError, PerJoint
 from compressor.outcome import Outcome, word_variables
 from compressor.reasons import Reason
-from compressor.store.files import (
-    HEX20,
-    KEY,
-    Folder,
-    StoreError,
-    StoreWarning,
-    pending_path,
-    system_error,
-)
-from compressor.store.hdf5 import DamagedJob
-from compressor.store.rows import NAME, Cut, Rows, Segment, read_segment
-from compressor.store.series_file import read_series, read_values
+from compressor.store.batch import Batch, batch_paths, read_batch
+from compressor.store.files import KEY, Folder, StoreError, StoreWarning, system_error
+from compressor.store.netcdf import DamagedFile, check_file
+from compressor.store.rows import Rows
 from compressor.store.studies import StoredStudy, find_study, read_studies
 
 if TYPE_CHECKING:
@@ -56,8 +42,7 @@ RERUN_REASONS = {
     Reason.OUT_OF_MEMORY,
     Reason.INVALID_INPUT,
 }
-NAMED = re.compile(rf"{HEX20}-{HEX20}\.h5")  # a file of time series that waits no longer
-ATTEMPTS = 100  # at reading segments that a writer replaces meanwhile
+ATTEMPTS = 100  # at reading batches that a run merges meanwhile
 
 
 @dataclass(frozen=True)
@@ -72,14 +57,7 @@ class JobStatus:
     precision: str  # of the time series: double | single
     signals: bool  # whether there are metrics of them, and they are among any time series
     bars: bool  # whether metrics have error bars
-    has_horizon: bool  # whether it is known how long the motion can be foretold
-    rows: Rows
-    position: int
-
-    @property
-    def numbers(self) -> np.void:
-        """Return the job's numbers, dtype ROW."""
-        return self.rows.number_row(self.position)
+    has_horizon: bool  # whether it is known how long the motion is predictable
 
     def satisfies(self, case: Case) -> bool:
         """Return whether a case needs no new run.
@@ -122,11 +100,12 @@ class JobStatus:
 
 
 class Stored:
-    """What a folder held when it was read: `rows`, and the segments that are `damaged`."""
+    """What a folder held when it was read: `rows`, and the batches that are `damaged`."""
 
-    def __init__(self, folder: Path, segments: Sequence[Segment], damaged: Sequence[DamagedJob]):
-        self.folder, self.segments, self.damaged = folder, segments, damaged
-        self.rows = Rows.of(segments, _has_files)
+    def __init__(self, folder: Path, batches: Sequence[Batch], damaged: Sequence[DamagedFile]):
+        self.folder, self.damaged = folder, damaged
+        self.rows = Rows.of(batches)
+        self.checked: dict[Path, bool] = {}
 
     def warned(self) -> "Stored":
         """Return this store, after a StoreWarning of each damage, whose jobs count as missing."""
@@ -135,18 +114,23 @@ class Stored:
             warnings.warn(text, StoreWarning, stacklevel=3)
         return self
 
+    def without(self, damage: DamagedFile) -> "Stored":
+        """Return this store less a damaged batch, after a StoreWarning. Raises other damage."""
+        left = [batch for batch in self.rows.batches if os.fspath(batch.path) != damage.path]
+        if len(left) == len(self.rows.batches):
+            raise damage
+        text = f"{damage}: its jobs count as missing"
+        warnings.warn(text, StoreWarning, stacklevel=3)
+        return Stored(self.folder, left, [*self.damaged, damage])
+
     def keys(self) -> set[str]:
         """Return the keys of all stored jobs, failed ones included."""
-        return {key.decode() for key in self.rows.columns["key"]}
+        return {key.decode() for key in self.rows.keys}
 
     def position(self, key: str) -> int | None:
         """Return the position of a job in `rows`; None where it is not stored."""
         position = int(self.rows.find([key])[0])
         return position if position >= 0 else None
-
-    def physics_key(self, key: str) -> str:
-        """Return what a stored job simulates, by its hash."""
-        return bytes(self.rows.columns["physics_key"][self.position(key)]).decode()
 
     def status(self, key: str) -> JobStatus | None:
         """Return how a stored job ended; None where it is not stored."""
@@ -155,20 +139,18 @@ class Stored:
 
     def status_at(self, position: int) -> JobStatus:
         """Return how the job at a position of `rows` ended."""
-        rows = self.rows
-        words = {name: str(values[position]) for name, values in rows.words.items()}
+        words = {name: values[position].decode() for name, values in self.rows.bytes_of.items()}
+        is_ok = words["status"] == "ok"
         return JobStatus(
-            rows.columns["key"][position].decode(),
+            self.rows.keys[position].decode(),
             words["status"],
             words["reason"],
-            rows.detail(position) if words["status"] != "ok" else "",
-            int(rows.columns["samples"][position]),
+            "" if is_ok else str(self.rows.attributes(position).get("detail", "")),
+            int(self.rows.samples[position]),
             words["precision"],
             words["signals"] == "yes",
-            bool(rows.has_bars[position]),
-            bool(rows.has_horizon[position]),
-            rows,
-            position,
+            words["bars"] == "yes",
+            words["horizon"] == "yes",
         )
 
     def case_at(self, position: int) -> Case | None:
@@ -195,20 +177,26 @@ class Stored:
     @cached_property
     def _kinds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the position of the first job of each kind, and the kind of each job, (jobs,)."""
-        rows, columns = self.rows, self.rows.columns
-        _, code = np.unique(columns["reason"], return_inverse=True)
-        code = 3 * code + np.unique(columns["precision"], return_inverse=True)[1]
-        for flag in (
-            columns["status"] == b"ok", columns["signals"] == b"yes", columns["samples"] > 0,
-            rows.has_bars, rows.has_horizon,
-        ):  # fmt: skip
-            code = 2 * code + flag
-        _, first, kinds = np.unique(code, return_index=True, return_inverse=True)
-        return first, kinds
+        names = ("status", "reason", "precision", "signals", "bars", "horizon")
+        columns = [self.rows.bytes_of[name] for name in names]
+        kinds = np.rec.fromarrays([*columns, self.rows.samples > 0])
+        _, first, kind = np.unique(kinds, return_index=True, return_inverse=True)
+        return first, kind
+
+    def intact(self, position: int) -> bool:
+        """Return whether the batch of a job is there, and as it was written."""
+        path = self.rows.path(position)
+        if path not in self.checked:
+            try:
+                check_file(path)
+                self.checked[path] = True
+            except (FileNotFoundError, DamagedFile):
+                self.checked[path] = False
+        return self.checked[path]
 
     def outcome(self, position: int) -> Outcome:
-        """Return the outcome of the job at a position of `rows`."""
-        words = {name: str(values[position]) for name, values in self.rows.words.items()}
+        """Return the outcome of the job at a position of `rows`, without its time series."""
+        words = {name: values[position].decode() for name, values in self.rows.bytes_of.items()}
         attributes = self.rows.attributes(position)
         numbers = self.rows.number_row(position)
         return Outcome(words["status"], words["reason"], numbers, attributes)
@@ -231,19 +219,15 @@ class Stored:
 
     def job(self, key: str) -> "xr.Dataset":
         """Return a stored job's Dataset. Raises StoreError where it is missing or damaged."""
+        import xarray as xr
+
         if not KEY.fullmatch(key):
             raise StoreError(self.folder, f"{key!r} is no key", "a key is 20 hexadecimal digits")
         position = self.position(key)
         if position is None:
             raise StoreError(self.folder, f"job {key} is not stored", "run its study first")
-        path = self.rows.path(position)
-        if path is not None:
-            return read_series(path)
-        import xarray as xr
-
-        found = self.outcome(position)
-        table = found.table({})
-        return xr.Dataset(table.variables, attrs=table.attrs)
+        found = self.outcome(position).table(self.rows.series(position))
+        return xr.Dataset(found.variables, attrs=found.attrs)
 
     def label(self, studies: Sequence[StoredStudy], trusted: bool = False) -> "xr.Dataset":
         """Return studies of this store as one Dataset, as `open_study` does."""
@@ -251,7 +235,7 @@ class Stored:
 
         is_grid = len(studies) == 1 and studies[0].is_grid
         layout = datasets.grid(studies[0]) if is_grid else datasets.table_of_jobs(studies)
-        dataset = datasets.label_dataset(layout, self.rows, self.job, self.values)
+        dataset = datasets.label_dataset(layout, self.rows, lambda: read_store(self.folder).rows)
         if trusted:
             dataset = datasets.mask_untrusted(dataset)
         dataset = dataset.assign(datasets.machine_constants(studies, layout))
@@ -262,84 +246,29 @@ class Stored:
     def values(self, key: str, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return some variables of a stored job's time series."""
         position = self.position(key)
-        path = None if position is None else self.rows.path(position)
-        return {} if path is None else read_values(path, names)
+        found = {} if position is None else self.rows.series(position, names)
+        return {name: one.values for name, one in found.items()}
 
 
-def _has_files(segment: Segment) -> np.ndarray:
-    """Return which rows of a segment have the file of time series that they name, if they do."""
-    columns = segment.columns
-    has_series = columns["samples"] > 0
-    if not has_series.any():
-        return ~has_series
-    listed = _names(segment.place / "jobs")
-    names = np.array([name.removeprefix(".").removesuffix(".tmp") for name in listed], "S")
-    wanted = np.char.add(np.char.add(np.char.add(columns["key"], b"-"), columns["digest"]), b".h5")
-    usable = ~has_series | np.isin(wanted, names)
-    for position in np.flatnonzero(~usable):  # a listing may miss what gets its name meanwhile
-        path = segment.place / "jobs" / wanted[position].decode()
-        # looked for twice: it may get its name while it is looked for under the pending one
-        usable[position] = path.exists() or pending_path(path).exists() or path.exists()
-    return usable
+def read_store(folder: Folder) -> Stored:
+    """Return what a folder holds; damaged batches are listed in `damaged`.
 
-
-def _names(folder: Path) -> list[str]:
-    """Return the files of a folder that may not be there."""
-    try:
-        return os.listdir(folder)
-    except FileNotFoundError:
-        return []
-    except OSError as error:
-        raise system_error(folder, error) from error
-
-
-def unowned_series(place: Path, rows: Rows) -> list[str]:
-    """Return the names of files of time series in a place whose jobs no row knows.
-
-    A run that ends leaves none: rows are gone, or have not been copied yet. Where `jobs` is a link,
-    others may store there.
-    """
-    if (place / "jobs").is_symlink():
-        return []
-    names = [name for name in _names(place / "jobs") if NAMED.fullmatch(name)]
-    keys = {name[:20] for name in names}
-    known = {key for key, at in zip(keys, rows.find([*keys]).tolist(), strict=True) if at >= 0}
-    return sorted(name for name in names if name[:20] not in known)
-
-
-def places(folder: Folder) -> list[Path]:
-    """Return the folders that hold `rows` and `jobs`: the store's own, and its shards'.
-
-    A link among the shards may lead out of the store, or back: it is none of them.
-    """
-    shards = (Path(folder) / "shards" / name for name in sorted(_names(Path(folder) / "shards")))
-    return [Path(folder), *(place for place in shards if not place.is_symlink())]
-
-
-def segment_paths(place: Path) -> list[Path]:
-    """Return the segments of one place, in the order of their numbers."""
-    return [place / "rows" / n for n in sorted(_names(place / "rows")) if NAME.fullmatch(n)]
-
-
-def read_store(folder: Folder, bearable: type[DamagedJob] = Cut) -> Stored:
-    """Return what a folder holds; `bearable` damage is listed in `damaged`, other is raised.
-
-    Raises StoreError, also where writers change the folder faster than it can be read.
+    Raises StoreError, also where runs change the folder faster than it can be read.
     """
     folder = Path(os.path.abspath(folder))
     for _ in range(ATTEMPTS):
-        segments, damaged = [], []
+        batches, damaged = [], []
         try:
-            for path in (path for place in places(folder) for path in segment_paths(place)):
+            for path in batch_paths(folder):
                 try:
-                    segments.append(read_segment(path))
-                except bearable as error:
+                    batches.append(read_batch(path))
+                except DamagedFile as error:
                     damaged.append(error)
         except FileNotFoundError:
             continue  # merged with others meanwhile
         except OSError as error:
             raise system_error(folder, error) from error
-        return Stored(folder, segments, damaged)
+        return Stored(folder, batches, damaged)
     raise StoreError(folder, "changes faster than it can be read", "try again")
 
 
@@ -400,10 +329,16 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     ('time',)
     """
     folder = os.path.abspath(folder)
-    studies = read_studies(folder, former=name is not None)
+    studies = read_studies(folder)
     if name is not None:
         studies = [find_study(folder, name, studies)]
-    dataset = read_store(folder).warned().label(studies, trusted)
+    stored = read_store(folder).warned()
+    while True:
+        try:
+            dataset = stored.label(studies, trusted)
+            break
+        except DamagedFile as damage:
+            stored = stored.without(damage)
     if "fault" in dataset.dims and "joint" in dataset.dims:
         warnings.warn(BOTH_JOINTS, StoreWarning, stacklevel=2)
     return dataset

@@ -2,14 +2,11 @@
 
 Caveats are what stored numbers cannot say of themselves: motions that were not seen to repeat, or
 settled after metrics began to count, clipped sensor records, cases outside the range that the
-program was judged on. They come from stored values alone, so that older stores answer as far as
-they have them. Studies and rows are read only, so that 100,000 jobs answer at once; of one job that
-an older version has stored perhaps its file. Jobs whose row is damaged count as missing, with a
-StoreWarning.
+program was judged on. They come from stored values alone. Jobs in a damaged batch count as missing,
+with a StoreWarning.
 
-`verify` compares every file with its digest, and names the jobs that damage costs. There is no
-index, so that a file that is gone is known by those that speak of it: rows of their files of time
-series and of their study, studies and files of time series of their rows.
+`verify` reads every file, whose values HDF5 compares with their checksums, and names the jobs that
+damage costs. There is no index: jobs whose batch is gone are missing.
 """
 
 import contextlib
@@ -17,11 +14,11 @@ import copy
 import math
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -37,17 +34,14 @@ from compressor.cases import (
 )
 from compressor.metrics import NUMBERS
 from compressor.outcome import Regime
-from compressor.store.failures import describe_failures
-from compressor.store.files import Folder, StoreError, final_path, is_locked, no_results
-from compressor.store.hdf5 import DamagedJob
-from compressor.store.reader import places, read_store, unowned_series
-from compressor.store.rows import FOREIGN_LINES, REMEDY, Cut, Rows
-from compressor.store.series_file import read_dataset
+from compressor.store.batch import batch_paths
+from compressor.store.files import Folder, StoreError, no_results, refusals
+from compressor.store.netcdf import DamagedFile, check_file
+from compressor.store.reader import read_store
+from compressor.store.rows import Rows
 from compressor.store.studies import (
     Again,
     StoredStudy,
-    StudyChange,
-    change_of,
     find_job,
     owners,
     read_studies,
@@ -56,9 +50,8 @@ from compressor.store.studies import (
     swept_column,
 )
 
-if TYPE_CHECKING:
-    from compressor.cases import Study
-
+MIN_FAILED = 3  # failed jobs, and good ones, for a tree of where jobs fail
+MIN_GAIN = 0.02  # of impurity that a split must bring
 MAX_LOOKED_AT = 16  # stored jobs of a study, for what only their cases show
 AUTO = "solve: {settle_rev: auto, duration_rev: auto} waits for that"
 LONGER_REMEDY = "a longer run may give other numbers, or be chaotic"
@@ -74,34 +67,47 @@ def study_caveats(rows: Rows, study: StoredStudy) -> list[str]:
 
 
 def _of_failures(rows: Rows, study: StoredStudy) -> list[str]:
-    """Return where in a study jobs fail, a sentence a region."""
+    """Return where in a study jobs fail: a decision tree, where scikit-learn is installed."""
     positions = rows.find(study.keys)
     there = positions >= 0
-    failed = rows.words["status"][positions[there]] == "failed"
-    if not failed.any() or not study.axes:
+    failed = rows.bytes_of["status"][positions[there]] == b"failed"
+    if min(failed.sum(), (~failed).sum()) < MIN_FAILED or not study.axes:
+        return []
+    try:
+        from sklearn.tree import DecisionTreeClassifier, export_text
+    except ImportError:
         return []
     swept = [*points(study)]
-    columns = {
-        axis.key: swept_column(axis.key, [point.get(axis.key) for point in swept])[0][there]
-        for axis in study.axes
-    }
-    return describe_failures(columns, failed)
+    columns: dict[str, np.ndarray] = {}
+    for axis in study.axes:
+        values = swept_column(axis.key, [point.get(axis.key) for point in swept])[0][there]
+        if values.dtype.kind == "f":
+            columns[axis.key] = values
+        else:  # of words a column each
+            columns |= {f"{axis.key} is {word}": values == word for word in np.unique(values)}
+    tree = DecisionTreeClassifier(
+        max_depth=2, min_samples_leaf=MIN_FAILED, min_impurity_decrease=MIN_GAIN, random_state=0
+    ).fit(np.array([*columns.values()], float).T, np.where(failed, "failed", "ok"))
+    if tree.get_depth() == 0:
+        return []
+    text = export_text(tree, feature_names=[*columns], decimals=4, show_weights=True)
+    return [f"where jobs fail (jobs of each class in weights):\n{text.rstrip()}"]
 
 
 def run_caveats(rows: Rows, study: StoredStudy) -> list[str]:
     """Return a sentence for each caveat of runs: series gone, no repetition, clipped records."""
     positions = rows.find(study.keys)
     there = positions >= 0
-    there[there] = rows.words["status"][positions[there]] == "ok"
+    there[there] = rows.bytes_of["status"][positions[there]] == b"ok"
     positions = positions[there]
     if not positions.size:
         return []
-    numbers, regimes = rows.course[positions], rows.words["regime"][positions]
+    numbers = rows.numbers(positions, ("settled_rev", "clipped_fraction"))
+    regimes = rows.words["regime"][positions]
     settle = np.array(_settle_revs(study), float)[there]
     unrepeated = is_unrepeated(regimes, numbers["settled_rev"])
     late = is_late(regimes, numbers["settled_rev"], settle)
     return [
-        *_of_files(int(rows.gone[positions].sum()), positions.size),
         *_of_repetition(int(unrepeated.sum()), int(late.sum()), positions.size),
         *_of_clipping(numbers["clipped_fraction"]),
     ]
@@ -147,15 +153,6 @@ def job_caveats(numbers: Mapping[str, Any], attributes: Mapping[str, Any]) -> li
         found.append(text)
     found += [f"{key}: {note}" for key, note in paper_notes(case).items()]
     return [*found, *(f"{key}: {text}" for key, text in outside_judged(case.values()).items())]
-
-
-def _of_files(gone: int, jobs: int) -> Iterator[str]:
-    """Yield a sentence about jobs whose time series are gone, as in a copy without them."""
-    if gone:
-        yield (
-            f"{gone} of {jobs} jobs have metrics alone: the files of their time series are gone; "
-            "bring the folder jobs, or run the case file again"
-        )
 
 
 def _of_repetition(unrepeated: int, late: int, jobs: int) -> Iterator[str]:
@@ -228,18 +225,6 @@ def _outside_of_study(study: StoredStudy) -> dict[str, str]:
     return found
 
 
-FORMER_REMEDY = "delete it: its jobs stay stored"
-ROWS_REMEDY = "bring the missing files of rows, or run their case files, which computes them again"
-STUDY_REMEDY = "run its case file again, which recomputes no job"
-STUDY_FILES = (
-    "follow/*.nc",
-    "follow/chains/*.nc",
-    "wear/*.nc",
-    "models/*.nc",
-)  # of studies, beside jobs
-STUDY_FILE_REMEDY = "delete it: the command that made it makes it again"
-
-
 @dataclass(frozen=True)
 class Damage:
     """A file of a store that is gone or not what was written, and the jobs that are lost with it.
@@ -259,82 +244,41 @@ class Damage:
 def verify(
     folder: Folder, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> list[Damage]:
-    """Return all damage to a store: to segments, files of time series, studies and their files.
+    """Return all damage to a store: to batches, studies and the files of studies.
 
-    Jobs that a study has and no row knows are damage, too, unless a run is at work there: they have
-    not run, or their row is gone. `progress` is called with how many files of time series, of how
-    many, were read. Raises StoreError for a folder that cannot be read.
+    `progress` is called with how many files, of how many, were read. Raises StoreError for a folder
+    that cannot be read.
     """
-    busy = {place for place in places(folder) if is_locked(place)}
-    stored = read_store(folder, DamagedJob)
-    others = [path for pattern in STUDY_FILES for path in sorted(Path(folder).glob(pattern))]
-    if not (stored.segments or stored.damaged or study_paths(folder) or others):
+    with refusals(folder):
+        paths, others = batch_paths(folder), sorted(Path(folder).glob("**/*.nc"))
+    if not (paths or others or study_paths(folder)):
         raise no_results(folder)
     found: list[Damage] = []
-    for path in others:
-        try:
-            read_dataset(path, STUDY_FILE_REMEDY)
-        except StoreError as error:
-            found.append(Damage(path, error.problem, (), error.remedy))
     studies: list[StoredStudy] = []
-    for where, remedy in (("studies", "run its case file again"), ("former", FORMER_REMEDY)):
-        for path in study_paths(folder, where):
-            try:
-                studies.append(read_study(path))
-            except StoreError as error:
-                found.append(Damage(path, error.problem, (), remedy))
-    rows = Rows.of(stored.segments)
-    keys = [key.decode() for key in rows.columns["key"]]
-    absent = {key for study in studies for key in study.keys}.difference(keys)
-    for damage in stored.damaged:
-        inside = damage.possible_keys() if isinstance(damage, Cut) else set()
-        lost = absent & {key.decode() for key in inside} or absent
-        remedy = "" if isinstance(damage, Cut) else damage.remedy
-        found.append(Damage(Path(damage.path), damage.problem, tuple(sorted(lost)), remedy))
-    for position, key in enumerate(keys):
-        if not rows.intact(position):
-            place = rows.path(position)
-            assert place is not None
-            problem = "is damaged" if place.exists() else "is missing"
-            found.append(Damage(place, problem, (key,)))
-        progress(position + 1, len(rows))
-    busy |= {place for place in places(folder) if is_locked(place)}
-    found += _gone(folder, rows, studies, {key for damage in found for key in damage.keys}, busy)
+    for path in study_paths(folder):
+        try:
+            studies.append(read_study(path))
+        except StoreError as error:
+            found.append(Damage(path, error.problem, (), "run its case file again"))
+    stored = read_store(folder)
+    rows = stored.rows
+    absent = {key for study in studies for key in study.keys} - stored.keys()
+    for damage in stored.damaged:  # of which even the keys cannot be read
+        found.append(Damage(Path(damage.path), damage.problem, tuple(sorted(absent))))
+    broken = [Path(damage.path) for damage in stored.damaged]
+    whole = [path for path in (*paths, *others) if path not in broken]
+    for number, path in enumerate(whole):
+        try:
+            check_file(path)
+        except FileNotFoundError:
+            pass  # merged with others meanwhile
+        except DamagedFile as error:
+            mine = [at for at, batch in enumerate(rows.batches) if batch.path == path]
+            keys = rows.keys[np.isin(rows.source, mine)].tolist()
+            remedy = "" if keys else "delete it: the command that made it makes it again"
+            found.append(Damage(path, error.problem, tuple(k.decode() for k in keys), remedy))
+        progress(number + 1, len(whole))
     return _name_owners(found, studies)
-
-
-def _gone(
-    folder: Folder, rows: Rows, studies: list[StoredStudy], lost: set[str], busy: set[Path]
-) -> Iterator[Damage]:
-    """Yield what the files of a store show to be gone, but for jobs known to be lost.
-
-    busy: the places that a run was at work in, whose rows may have come since they were read.
-    """
-    stored = {key.decode() for key in rows.columns["key"]}
-    for place in (place for place in places(folder) if place not in busy):
-        series = unowned_series(place, rows)
-        if keys := {name[:20] for name in series} - lost:
-            problem = f"no row knows the jobs of {len(series)} of its files"
-            yield Damage(place / "jobs", problem, tuple(sorted(keys)), ROWS_REMEDY)
-            lost = lost | keys
-    for study in () if busy else studies:
-        absent = {*study.keys} - stored - lost
-        if absent and not study.former_of:
-            problem = f"no row knows {len(absent)} of its {study.jobs} jobs: not run yet, or gone"
-            path = Path(folder) / "studies" / f"{study.name}.json"
-            yield Damage(path, problem, tuple(sorted(absent)))
-    known = {key for study in studies for key in study.keys}
-    strays = [
-        at for at, key in enumerate(rows.columns["key"].tolist()) if key.decode() not in known
-    ]
-    strays.sort(key=rows.source.__getitem__)  # attributes are read by segment
-    names = Counter(str(rows.attributes(at).get("name", "")) for at in strays)
-    for name, count in sorted(names.items()):
-        path = Path(folder) / "studies" / f"{name}.json"
-        if name and not path.exists():
-            yield Damage(
-                path, f"is gone, and {count} stored jobs were run for it", (), STUDY_REMEDY
-            )
 
 
 def _name_owners(found: list[Damage], studies: list[StoredStudy]) -> list[Damage]:
@@ -344,8 +288,7 @@ def _name_owners(found: list[Damage], studies: list[StoredStudy]) -> list[Damage
     for damage in found:
         mine = {key: belong[key] for key in damage.keys}
         names = {name for points in mine.values() for name in points}
-        present = (study for study in studies if not study.former_of)
-        again = tuple(study.again for study in present if study.name in names)
+        again = tuple(study.again for study in studies if study.name in names)
         owned.append(replace(damage, studies=mine, again=again))
     return owned
 
@@ -370,7 +313,6 @@ class StudyProgress:
     regimes: dict[str, int]
     caveats: list[str]
     again: Again
-    former_of: str = ""  # the study that has replaced this one; "" where none has
     written: str = ""  # when it was first run (UTC)
 
 
@@ -382,7 +324,8 @@ class JobReport:
     status: str  # ok | failed | missing
     reason: str
     detail: str
-    file: str  # with its time series; "" where none are kept
+    file: str  # its batch; "" where it is missing
+    samples: int  # of its time series, 0 where none are kept
     studies: dict[str, dict[str, Any]]  # name -> swept values
     again: tuple[Again, ...]  # of the studies
     numbers: dict[str, Any]  # SI; a joint's or an axis's in lists
@@ -396,21 +339,13 @@ class JobReport:
 
 
 def standings(folder: Folder) -> list[StudyProgress]:
-    """Return the progress of each study of a folder. Raises WrongName where there is none.
-
-    Former studies come last, those that have finished jobs which the present one lacks.
-    """
-    studies = read_studies(folder, former=True)
+    """Return the progress of each study of a folder. Raises WrongName where there is none."""
+    studies = read_studies(folder)
     rows = read_store(folder).warned().rows
     found = []
-    present = {study.name: {*study.keys} for study in studies}
     for study in studies:
         positions = rows.find(study.keys)
         stored = positions[positions >= 0]
-        if study.former_of:
-            more = {*study.keys}.difference(present.get(study.former_of, ()))
-            if (rows.find(sorted(more)) < 0).all():
-                continue
         is_ok = rows.words["status"][stored] == "ok"
 
         def counts(word: str, which: np.ndarray) -> dict[str, int]:
@@ -423,7 +358,7 @@ def standings(folder: Folder) -> list[StudyProgress]:
             StudyProgress(
                 study.name, study.case_file, study.jobs, ok, failed, missing,
                 counts("reason", stored[~is_ok]), counts("promise", done), counts("regime", done),
-                study_caveats(rows, study), study.again, study.former_of, study.written,
+                study_caveats(rows, study), study.again, study.written,
             )
         )  # fmt: skip
     return found
@@ -433,36 +368,36 @@ def report_job(folder: Folder, *words: str) -> JobReport:
     """Return what is known of one job.
 
     words: the beginning of its key; or its study, and values of axes such as `clearance_mm=0.2`
-    until one job is left. Raises WrongName where they name none or several, DamagedJob where its
-    row holds no case.
+    until one job is left. Raises WrongName where they name none or several, DamagedFile where its
+    batch is damaged.
     """
-    studies = read_studies(folder, former=True)
+    studies = read_studies(folder)
     store = read_store(folder).warned()
     key = find_job(folder, words, studies, store.keys())
     position = store.position(key)
     mine = owners(studies, [key])[key]
-    present = (study for study in studies if not study.former_of)  # whose case file has the job
-    again = tuple(study.again for study in present if study.name in mine)
+    again = tuple(study.again for study in studies if study.name in mine)
     if position is None:
-        return JobReport(key, "missing", "", "", "", mine, again, {}, {}, [])
-    end, path = store.status_at(position), store.rows.path(position)
-    known = end.numbers
-    numbers = {name: np.asarray(known[name]).tolist() for name in NUMBERS}
+        return JobReport(key, "missing", "", "", "", 0, mine, again, {}, {}, [])
+    end = store.status_at(position)
+    row = store.rows.number_row(position)
+    numbers = {name: row[name].tolist() for name in NUMBERS}
     attributes = {
         name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in store.rows.attributes(position).items()
     }
-    if "case" not in attributes:
-        segment = store.rows.segments[store.rows.source[position]]
-        raise DamagedJob(segment.path, FOREIGN_LINES, REMEDY)
-    file = "" if path is None else os.fspath(final_path(path))
+    file = os.fspath(store.rows.path(position))
     caveats = job_caveats(numbers, attributes) if end.status == "ok" else []
     return JobReport(
-        key, end.status, end.reason, end.detail, file, mine, again, numbers, attributes, caveats
+        key,
+        end.status,
+        end.reason,
+        end.detail,
+        file,
+        end.samples,
+        mine,
+        again,
+        numbers,
+        attributes,
+        caveats,
     )
-
-
-def changes(folder: Folder, studies: "Sequence[Study]") -> list[StudyChange]:
-    """Return what a run of studies would take out of the stored ones. Raises StoreError."""
-    found = (change_of(folder, study, lambda: read_store(folder).keys()) for study in studies)
-    return [change for change in found if change]

@@ -1,26 +1,20 @@
 """The studies of a store: one JSON file each, with its axes and the keys of its jobs in C order.
 
-A study whose case file has other jobs than before is replaced. Where finished jobs are no
-longer in it, the former one stays as `former/NAME~1.json`, and opens under that name; the next is
-NAME~2.
+A study whose case file has other jobs than before is replaced; its finished jobs stay stored.
 
 What studies and jobs are called: the error of a wrong name has the nearest ones. A job is named by
 the beginning of its key, or by its study and values of the study's axes, such as `wear
 clearance_mm=0.2`.
 """
 
-import argparse
-import bisect
 import contextlib
 import datetime
-import itertools
+import hashlib
 import json
 import math
 import os
-import re
 import shlex
-import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -32,16 +26,13 @@ from compressor.cases import (
     phrase_of,
     points,
     row_of,
-    table,
     values_given,
 )
 from compressor.digits import setting
 from compressor.program import VERSION, did_you_mean, library_versions
 from compressor.store.files import (
-    KEY,
     Folder,
     StoreError,
-    StoreWarning,
     WrongName,
     list_few,
     no_results,
@@ -49,14 +40,12 @@ from compressor.store.files import (
     refusals,
     system_error,
 )
-from compressor.store.hdf5 import digest
 
 if TYPE_CHECKING:
     import numpy as np
 
 RENAMED = {"joint": "fault"}  # `joint` is a dimension of every dataset
 UNIT_IN_GROUP = ("clearance_mm", "initial_offset_mm")
-FORMER = re.compile(r"(.+)~([1-9][0-9]{0,8})")  # no name of a case file has a ~
 
 
 @dataclass(frozen=True)
@@ -87,16 +76,11 @@ class StoredStudy:
     title: str = ""  # what the page of the report says of the machine
     notes: str = ""
     given: tuple[str, ...] = ()  # keys that the file gives, and does not sweep
+    overrides: tuple[str, ...] = ()  # KEY=VALUE that the command line set in the file
 
     @property
     def jobs(self) -> int:
         return len(self.keys)
-
-    @property
-    def former_of(self) -> str:
-        """Return the name of the study that has replaced this one; "" where none has."""
-        named = FORMER.fullmatch(self.name)
-        return named[1] if named else ""
 
     @property
     def is_trial(self) -> bool:
@@ -106,11 +90,7 @@ class StoredStudy:
     @property
     def again(self) -> "Again":
         """Return what a run of the same jobs needs."""
-        options = argparse.ArgumentParser(allow_abbrev=False, add_help=False)
-        options.add_argument("--set", action="append", default=[])
-        options.add_argument("--max-jobs", default="0")
-        given, _ = options.parse_known_args(shlex.split(self.command))
-        return Again(self.case_file, tuple(given.set), max(self.jobs, int(given.max_jobs)))
+        return Again(self.case_file, self.overrides, self.jobs)
 
 
 class Again(NamedTuple):
@@ -177,41 +157,6 @@ def owners(
     return found
 
 
-class StudyChange(NamedTuple):
-    """How a study takes jobs out of the stored study of its name.
-
-    `before`, `now`: their jobs; `shared`: those in both; `finished`: stored jobs that are in the
-    former one alone, which stays under the name `former`, "" where there are none; `older_model`:
-    the version of the model that the former one was made by, "" where it is the present one.
-    """
-
-    study: str
-    before: int  # jobs
-    now: int
-    shared: int
-    finished: int
-    former: str
-    older_model: str
-
-
-def change_of(folder: Folder, study: "Study", stored: Callable[[], set[str]]) -> StudyChange | None:
-    """Return what writing a study would take out of the stored one; None where nothing.
-
-    stored: returns the keys of all stored jobs; called only where they matter.
-    """
-    old = _present(folder, study.name)
-    removed = {*old.keys}.difference(study.keys) if old else set()
-    if old is None or not removed:
-        return None
-    finished = len(removed & stored())
-    former = _former_name(folder, old) if finished else ""
-    model = str(old.versions.get("model", ""))
-    return StudyChange(
-        study.name, old.jobs, study.jobs, len({*old.keys}) - len(removed), finished, former,
-        "" if model == MODEL_VERSION else model,
-    )  # fmt: skip
-
-
 def _present(folder: Folder, name: str) -> StoredStudy | None:
     """Return the stored study of a name; None where there is none, or a damaged one."""
     with contextlib.suppress(StoreError, FileNotFoundError):
@@ -219,26 +164,12 @@ def _present(folder: Folder, name: str) -> StoredStudy | None:
     return None
 
 
-def _former_name(folder: Folder, old: StoredStudy) -> str:
-    """Return the name that a replaced study gets: a new one, or that of an equal former study."""
-    mine = [study for study in former_studies(folder) if study.former_of == old.name]
-    for study in mine:
-        if (study.axes, study.keys) == (old.axes, old.keys):
-            return study.name
-    numbers = [int(study.name.rpartition("~")[2]) for study in mine]
-    return f"{old.name}~{max(numbers, default=0) + 1}"
-
-
 def write_study(
-    folder: Folder,
-    study: "Study",
-    command: str = "",
-    stored: Callable[[], set[str]] = set,
+    folder: Folder, study: "Study", command: str = "", overrides: Sequence[str] = ()
 ) -> None:
     """Write which jobs a study has; a study that is stored already is left as it is.
 
-    One that is replaced stays as a former study where finished jobs, of those that `stored` gives,
-    are no longer in the new one. Raises StoreError where the disk refuses.
+    Raises StoreError where the disk refuses.
     """
     axes = [StoredAxis(axis.key, tuple(axis.values), _unit(axis.key)) for axis in study.axes]
     new = StoredStudy(
@@ -255,60 +186,37 @@ def write_study(
         study.title,
         study.notes,
         tuple(dict.fromkeys(key for block in study.fixed for key in values_given(block))),
+        tuple(overrides),
     )
     old = _present(folder, study.name)
     if old:
         same = replace(new, command=old.command, versions=old.versions, written=old.written)
         if same == old:
             return
-        change = change_of(folder, study, stored)
-        if change and change.former:
-            former = Path(folder) / "former" / f"{change.former}.json"
-            if not former.exists():
-                publish(former, encode(replace(old, name=change.former)))
     publish(Path(folder) / "studies" / f"{study.name}.json", encode(new))
 
 
 def encode(study: StoredStudy) -> bytes:
     """Return the text of a study's file; its last entry is the digest of what stands before it."""
     plain = vars(study) | {"axes": [vars(axis) for axis in study.axes]}
-    if study.is_grid:  # as in files that are older than other studies
-        del plain["is_grid"]
-    for name in ("title", "notes"):
-        if not plain[name]:
-            del plain[name]
     text = json.dumps(plain, indent=1)
     head = text.removesuffix("\n}").encode()
-    return head + f',\n "digest": "{digest(head)}"\n}}\n'.encode()
+    digest = hashlib.blake2b(head, digest_size=10).hexdigest()
+    return head + f',\n "digest": "{digest}"\n}}\n'.encode()
 
 
-def study_paths(folder: Folder, where: str = "studies") -> list[Path]:
-    """Return the files of all studies of a store, or of the `former` ones. Raises StoreError."""
+def study_paths(folder: Folder) -> list[Path]:
+    """Return the files of all studies of a store. Raises StoreError."""
     with refusals(folder):
-        return sorted(Path(folder).glob(f"{where}/*.json"))
+        return sorted(Path(folder).glob("studies/*.json"))
 
 
-def former_studies(folder: Folder) -> list[StoredStudy]:
-    """Return the studies that others have replaced, by name, and warn of damaged ones."""
-    found = []
-    for path in study_paths(folder, "former"):
-        try:
-            found.append(read_study(path))
-        except StoreError as error:
-            text = f"{path}: {error.problem}; delete it: its jobs are stored all the same"
-            warnings.warn(text, StoreWarning, stacklevel=2)
-    return found
-
-
-def read_studies(folder: Folder, former: bool = False) -> list[StoredStudy]:
-    """Return all studies of a store, by name; with `former`, then those that others have replaced.
-
-    Raises WrongName where there is none.
-    """
+def read_studies(folder: Folder) -> list[StoredStudy]:
+    """Return all studies of a store, by name. Raises WrongName where there is none."""
     paths = study_paths(folder)
     if not paths:
         raise no_results(folder)
-    return [read_study(path) for path in paths] + (former_studies(folder) if former else [])
+    return [read_study(path) for path in paths]
 
 
 def read_study(path: Path) -> StoredStudy:
@@ -318,19 +226,12 @@ def read_study(path: Path) -> StoredStudy:
         plain = json.loads(data)
         del plain["digest"]
         axes = (StoredAxis(a["key"], _frozen(a["values"]), a["units"]) for a in plain["axes"])
-        study = StoredStudy(
-            **plain
-            | {"axes": tuple(axes), "keys": tuple(plain["keys"]), "given": tuple(plain["given"])}
-        )
-        sizes = [len(axis.values) for axis in study.axes]
-        if study.is_grid and study.jobs != math.prod(sizes):
-            raise ValueError
-        if not study.is_grid and {*sizes} - {study.jobs}:
-            raise ValueError
+        more = {"axes": tuple(axes), "keys": tuple(plain["keys"])}
+        more |= {name: tuple(plain[name]) for name in ("given", "overrides")}
+        study = StoredStudy(**plain | more)
         # a sound file is what would be written of it again, its digest included
-        if encode(study) != data or not _is_sound(study, path):
+        if encode(study) != data or study.name != path.stem:
             raise ValueError
-        study = _in_present_words(study)
     except FileNotFoundError:
         raise
     except OSError as error:
@@ -339,50 +240,6 @@ def read_study(path: Path) -> StoredStudy:
         problem = "is damaged, or of another version of compsim"
         raise StoreError(path, problem, "delete it and run its case file again") from error
     return study
-
-
-def _in_present_words(study: StoredStudy) -> StoredStudy:
-    """Return a study whose words are today's; of older versions a choice may have another."""
-    axes = [
-        replace(axis, values=tuple(map(row.choice_of, axis.values)))
-        if (row := row_of(axis.key)) and row.aliases
-        else axis
-        for axis in study.axes
-    ]
-    fixed = {
-        key: row.choice_of(value) if (row := row_of(key)) else value
-        for key, value in study.fixed.items()
-    }
-    return replace(study, axes=tuple(axes), fixed=fixed)
-
-
-def _is_sound(study: StoredStudy, path: Path) -> bool:
-    """Return whether a study's entries have the types that we write, and its name is its file's."""
-    swept = {key for name in table() for key in (name, name.rpartition(".")[0])}
-    texts = (
-        study.case_file, study.command, study.written, study.title, study.notes,
-        *study.versions.values(),
-    )  # fmt: skip
-    return (
-        study.name == path.stem
-        and bool(study.former_of) == (path.parent.name == "former")
-        and not table()["name"].check(study.former_of or study.name)
-        and all(isinstance(text, str) for text in (*texts, *study.versions, *study.given))
-        and all(KEY.fullmatch(key) for key in study.keys)
-        and isinstance(study.fixed, dict)
-        and len({axis.key for axis in study.axes} & swept) == len(study.axes)
-        and all(axis.units.isprintable() for axis in study.axes)
-        and all(_is_plain(value) for axis in study.axes for value in axis.values)
-    )
-
-
-def _is_plain(value: Any) -> bool:
-    """Return whether a value is one that a case file can sweep: a number, a word, none, or some."""
-    if isinstance(value, tuple):
-        return all(map(_is_plain, value))
-    if isinstance(value, str):
-        return value.isprintable()
-    return value is None or isinstance(value, int | float)
 
 
 def _frozen(values: Sequence[Any]) -> tuple[Any, ...]:
@@ -408,7 +265,7 @@ def find_study(
     Raises WrongName with the nearest names where there is none, or without a name several.
     """
     if known is None:
-        known = read_studies(folder, former=name is not None)
+        known = read_studies(folder)
     studies = {one.name: one for one in known}
     if name is None and len(studies) == 1:
         return next(iter(studies.values()))
@@ -446,30 +303,10 @@ def whole_key(
     if matches:
         problem = f"{len(matches)} jobs' keys begin with {beginning!r}: {list_few(matches)}"
         raise WrongName(folder, problem, "give more of the key")
-    hint = did_you_mean(beginning, [study.name for study in studies]) or _near_keys(
-        beginning, known
-    )
+    hint = did_you_mean(beginning, [study.name for study in studies])
     problem = f"no job's key begins with {beginning!r}, and no study is called so"
     remedy = hint or "compsim status lists the studies, and a job is named by STUDY AXIS=VALUE, too"
     raise WrongName(folder, problem, remedy)
-
-
-def _near_keys(beginning: str, known: Sequence[str]) -> str:
-    """Return a hint at the keys nearest to a beginning; "" where they share less than half of it.
-
-    known: sorted.
-    """
-    at = bisect.bisect(known, beginning)
-    shared = {key: _in_common(key, beginning) for key in known[max(at - 1, 0) : at + 1]}
-    most = max(shared.values(), default=0)
-    near = [key for key, count in shared.items() if count == most]
-    return f"the nearest is {' or '.join(near)}" if 2 * most >= max(len(beginning), 4) else ""
-
-
-def _in_common(one: str, other: str) -> int:
-    """Return with how many equal characters two texts begin."""
-    pairs = zip(one, other, strict=False)
-    return sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
 def _job_at(folder: Folder, study: StoredStudy, words: Sequence[str]) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from compressor.cases import PerJoint, Sensor, points
 from compressor.program import CompsimError, Progress, report_progress
 from compressor.store import (
-    DamagedJob,
+    DamagedFile,
     Folder,
     Stored,
     StoredStudy,
@@ -138,7 +138,7 @@ def read_job(
     case, outcome = found
     try:
         record = job_record(stored, key)
-    except DamagedJob:
+    except DamagedFile:
         return "damaged"
     if record is None:
         return "without_record"

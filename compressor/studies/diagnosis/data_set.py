@@ -19,7 +19,7 @@ from compressor.cases import Case, PerJoint, Sensor
 from compressor.outcome import Regime, regime_words
 from compressor.program import PROGRAM, CompsimError, Progress, no_progress
 from compressor.store import (
-    DamagedJob,
+    DamagedFile,
     Folder,
     Stored,
     StoredStudy,
@@ -251,7 +251,7 @@ def job_rows(
     case, outcome = found
     try:
         record = _record(stored, key)
-    except DamagedJob:
+    except DamagedFile:
         return "damaged"
     if not record:
         return "without_record"

@@ -108,14 +108,14 @@ def _place(stored: Stored, key: str) -> int | None:
     place = stored.position(key)
     if place is None or stored.rows.words["status"][place] != "ok":
         return None
-    return place if stored.rows.path(place) is not None else None
+    return place if stored.rows.samples[place] else None
 
 
 def _digest(stored: Stored, positions: dict[str, int]) -> str:
-    """Return the hash of the files from which features are made, of their code and the version."""
-    parts = (stored.rows.columns[name] for name in ("key", "digest"))
-    keys, digests = (column[[*positions.values()]].tolist() for column in parts)
-    names = [f"{k.decode()}-{d.decode()}.h5" for k, d in zip(keys, digests, strict=True)]
+    """Return the hash of the jobs from which features are made, of their code and the version."""
+    places = [*positions.values()]
+    kept = zip(stored.rows.keys[places], stored.rows.bytes_of["precision"][places], strict=True)
+    names = [f"{key.decode()} {precision.decode()}" for key, precision in kept]
     return hashlib.sha256(
         "\n".join([PROGRAM, inspect.getsource(table), *names]).encode()
     ).hexdigest()

@@ -268,6 +268,8 @@ class SearchJobs:
             if end.status != "ok":
                 reading = JobReading(reason=f"the job failed, {end.reason}: {end.detail}")
             else:
-                reading = question.goal.read(end.numbers, str(store.rows.words["regime"][position]))
+                reading = question.goal.read(
+                    store.rows.number_row(position), str(store.rows.words["regime"][position])
+                )
             found.append(Point(share, value, reading, key, end.status != "ok"))
         return found

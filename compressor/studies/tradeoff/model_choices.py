@@ -312,7 +312,9 @@ def choose_job(study: Study, folder: Folder) -> tuple[int, str]:
     positions = rows.find(study.keys)
     stored = np.flatnonzero(positions >= 0)
     if stored.size:
-        numbers = rows.numbers[positions[stored]]
+        numbers = rows.numbers(
+            positions[stored], ("peak_contact_force", "peak_contact_force_error")
+        )
         known = np.isfinite(numbers["peak_contact_force_error"])
         forces = np.where(known, numbers["peak_contact_force"], -1.0).max(axis=1)
         if forces.max() > 0.0:
