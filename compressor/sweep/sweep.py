@@ -1,52 +1,36 @@
 """Run the jobs of studies that the store does not hold yet, in worker processes.
 
-Workers (`execution`, or those of a `cluster`) store the time series that are
-kept and send home the outcomes; this process alone writes the rows that make them stored
-(`Writer`). A run that fails, breaks, or takes its worker with it, is a result with a
-named reason.
+A worker writes the batch of jobs that it has run, which makes them stored, and sends home how they
+ended. A run that fails, breaks, or takes its worker with it, is a result with a named reason.
 """
 
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Collection, Generator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
-from compressor.program import Progress, no_progress
+from compressor.program import Progress, ignore_warnings, no_progress
 from compressor.reasons import Reason
-from compressor.store import Folder, StoreError, Writer, write_study
-from compressor.sweep.execution import Input, drain, require_posix, run_batches
-from compressor.sweep.run_job import run_job
-from compressor.sweep.wanted import (
-    JobEnd,
-    PendingCases,
-    RequestedJobs,
-    stored_ends,
-)
+from compressor.store import Folder, merge_batches, read_store, write_batch, write_study
+from compressor.sweep.pool import Input, Workers, require_posix, run_batches
+from compressor.sweep.wanted import JobEnd, PendingJobs, RequestedJobs, stored_ends
 from compressor.sweep.warm_up import Needs, compile_once, load
-from compressor.sweep.worker import JobLost, JobResult, Workers, describe_error
+from compressor.sweep.worker import End, JobLost, JobResult, attempt, describe_error
 
 MANY_JOBS = 100_000  # jobs whose cases take a while to be made
 GRACE = 5.0  # s beyond its time in which a job may end by itself, before its worker is killed
+REPORT_SECONDS = 0.1  # s between two reports of progress, or more
 
-
-class Backend(Protocol):
-    """Where jobs run: runs cases whose time series belong in a place, yields how each one ended.
-
-    `remark` is called with what takes time, `pulse` several times a second. An exception that
-    is thrown in ends the jobs, and is raised again after the results that had arrived.
-    """
-
-    def __call__(
-        self,
-        place: Path,
-        cases: Sequence[Case],
-        remark: Callable[[str], None],
-        pulse: Callable[[], object],
-    ) -> Generator[JobResult | JobLost, None, None]: ...
+# Where jobs run: runs cases, the payloads of jobs, stores their outcomes in a folder of results,
+# and yields how each job ended, with a JobEnd as its result; but lost ones are stored by the sweep.
+# The last argument is called with what takes time.
+Backend = Callable[
+    [Path, Collection[Input], Callable[[str], None]], Generator[End, None, None]
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -54,15 +38,13 @@ class Options:
     """How to sweep.
 
     command: what the store says that it was made by; rerun_failed: failed jobs count as missing;
-    part: (i, n) for shard i of n, which other processes may run at the same time, each its own;
-    wait: until another run that writes there has ended; backend: where jobs run, if not here;
-    failed: called with the number of failed jobs, before progress is.
+    part: (i, n) for shard i of n, of which other processes may run the rest; backend: where jobs
+    run, if not here; failed: called with the number of failed jobs, before progress is.
     """
 
     command: str = ""
     rerun_failed: bool = False
     part: tuple[int, int] | None = None
-    wait: bool = False
     backend: Backend | None = None
     failed: Callable[[int], object] = lambda count: None
 
@@ -115,129 +97,131 @@ def sweep(
     options = options or Options()
     began = time.monotonic()
     folder = Path(folder).absolute()
-    name = ""
     if options.part is not None:
         studies = [study.shard(*options.part) for study in studies]
-        name = "{}-of-{}".format(*options.part)
     jobs = sum(len(study.selected) for study in studies)
     if jobs > MANY_JOBS:
         progress(0, jobs, f"preparing {jobs} jobs")
-    cases = RequestedJobs(studies)
-    with Writer(folder, name, options.wait, options.command) as writer:
-        if writer.unowned:
-            files = (
-                f"{writer.place / 'jobs'}: no row knows the jobs of {writer.unowned} of its files"
-            )
-            progress(0, len(cases), f"{files}; they stay, and compsim verify shows what to do")
-        ends = stored_ends(writer.found, cases)
-        if options.rerun_failed:
-            ends = {key: end for key, end in ends.items() if end.status == "ok"}
-        missing = PendingCases(cases, [key for key in cases if key not in ends])
-        for study in studies:
-            write_study(folder, study, options.command, writer.found.keys)
-        if missing:
-            for damage in writer.found.damaged:
-                progress(len(ends), len(cases), f"{damage.path}: {damage.problem}")
-            running = options.backend or local(workers)
-            run_missing(writer, missing, running, ends, (progress, options.failed))
+    wanted, stored = RequestedJobs(studies), read_store(folder)
+    ends = stored_ends(stored, wanted)
+    if options.rerun_failed:
+        ends = {key: end for key, end in ends.items() if end.status == "ok"}
+    missing = [key for key in wanted if key not in ends]
+    for study in studies:
+        write_study(folder, study, options.command)
+    if missing:
+        for damage in stored.damaged:
+            progress(len(ends), len(wanted), f"{damage}: its jobs count as missing")
+        run_missing(folder, PendingJobs(wanted, missing), ends, workers, progress, options)
+        merge_batches(folder)
     counts, failed = endings(studies, ends)
     return Summary(
-        len(cases), len(cases) - len(missing), len(missing), counts, failed,
+        len(wanted), len(wanted) - len(missing), len(missing), counts, failed,
         time.monotonic() - began,
     )  # fmt: skip
 
 
 def run_missing(
-    writer: Writer,
-    missing: Sequence[Case],
-    backend: Backend,
+    folder: Path,
+    jobs: PendingJobs,
     ends: dict[str, JobEnd],
-    watchers: tuple[Progress, Callable[[int], object]],
+    workers: int,
+    progress: Progress,
+    options: Options,
 ) -> None:
-    """Run and store cases; `ends` gains how each ended.
-
-    watchers: progress, called with what is on disk, and what is called with the failed ones.
-    """
-    progress, tell_failed = watchers
-    done, total = len(ends), len(ends) + len(missing)
+    """Run and store jobs; `ends` gains how each ended. Progress counts those that are stored."""
+    total = len(ends) + len(jobs)
     failed = sum(end.status != "ok" for end in ends.values())
-
-    def acknowledge(keys: Sequence[str]) -> None:
-        nonlocal done, failed
-        if keys:
-            done += len(keys)
-            failed += sum(ends[key].status != "ok" for key in keys)
-            tell_failed(failed)
-            progress(done, total, "")
-
-    def beat() -> None:
-        acknowledge(writer.flush_if_due())
-
-    def store(end: JobResult | JobLost) -> None:
-        outcome = outcome_of(end)
-        ends[outcome.key] = JobEnd(outcome.status, outcome.reason, outcome.detail)
-        acknowledge(writer.add(outcome))
-
-    tell_failed(failed)
-    progress(done, total, "")
-    running = backend(writer.place, missing, lambda text: progress(done, total, text), beat)
+    options.failed(failed)
+    progress(len(ends), total, "")
+    told = time.monotonic()
+    backend = options.backend or partial(run_locally, workers)
+    running = backend(folder, jobs, lambda text: progress(len(ends), total, text))
     try:
         for end in running:
-            store(end)
-    except BaseException as error:
-        for end in drain(running, error):  # which raises it again
-            store(end)
+            ends[end.id] = store_lost(folder, jobs.wanted[end.id], end)
+            failed += ends[end.id].status != "ok"
+            if time.monotonic() - told > REPORT_SECONDS or len(ends) == total:
+                options.failed(failed)
+                progress(len(ends), total, "")
+                told = time.monotonic()
     finally:
         running.close()
-        acknowledge(writer.flush())
 
 
-def local(workers: int) -> Backend:
-    """Return the worker processes of this machine."""
+def store_lost(folder: Path, case: Case, end: End) -> JobEnd:
+    """Return how a job ended that has been stored; store it first if it has no result."""
+    if isinstance(end, JobResult):
+        return end.result
+    more = {"traceback": end.traceback} if end.traceback else {}
+    outcome = without_run(case.attributes(), end.reason, end.detail, **more)
+    write_batch(folder, [outcome])
+    return JobEnd.of(outcome)
 
-    def run(
-        place: Path,
-        cases: Sequence[Case],
-        remark: Callable[[str], None],
-        pulse: Callable[[], object],
-    ) -> Generator[JobResult | JobLost, None, None]:
-        needs, work = Needs.of(cases), partial(run_job, place)
-        return run_here(work, LazyCases(cases), needs, workers, remark, pulse)
 
-    return run
+Ran = tuple[Outcome, bool]  # and whether its time series are to be compressed
+
+
+def run_job(case: Case) -> Ran:
+    """Simulate a case, in a worker; an exception is a failure of the job."""
+    from compressor.solve import observe  # needs numba: only to simulate
+
+    try:
+        with ignore_warnings():  # a solver's remarks; what matters is in the result
+            outcome, variables = observe(case)
+        if case.output.keep == "series" and outcome.reason != Reason.INVALID_INPUT:
+            outcome = outcome.with_series(variables, case.output.precision)
+    except MemoryError:
+        raise
+    except Exception as error:
+        detail, traceback = describe_error(error)
+        more = {"traceback": traceback}
+        outcome = without_run(case.attributes(), Reason.INTERNAL_ERROR, detail, **more)
+    return outcome, case.output.compress
+
+
+def store_outcomes(folder: Path, ran: Sequence[Ran]) -> list[JobEnd]:
+    """Store the outcomes of a batch of jobs; return how each ended. Raises StoreError."""
+    outcomes = [outcome for outcome, _ in ran]
+    write_batch(folder, outcomes, any(compress for _, compress in ran))
+    return [JobEnd.of(outcome) for outcome in outcomes]
+
+
+def run_locally(
+    workers: int, folder: Path, jobs: Collection[Input], remark: Callable[[str], None]
+) -> Generator[End, None, None]:
+    """Run jobs in the worker processes of this machine: a Backend, but for its first argument."""
+    needs = Needs.of(case for _, case, _ in jobs)
+    return run_here(run_job, jobs, needs, workers, remark, partial(store_outcomes, folder))
 
 
 def in_this_process(
-    place: Path,
-    cases: Sequence[Case],
-    remark: Callable[[str], None],
-    pulse: Callable[[], object],
-) -> Generator[JobResult | JobLost, None, None]:
+    folder: Path, jobs: Collection[Input], remark: Callable[[str], None]
+) -> Generator[End, None, None]:
     """Yield how jobs end in this process, one after the other; the backend for a few short ones.
 
     Starting workers takes longer than they do. A job that ends its process ends the sweep; one that
     raises an exception is lost, as in a worker.
     """
-    compile_once(Needs.of(cases), remark)
-    for case in cases:
-        began = time.monotonic()
-        try:
-            result = run_job(place, case)
-        except Exception as error:
-            yield JobLost(case, Reason.INTERNAL_ERROR, *describe_error(error))
+    compile_once(Needs.of(case for _, case, _ in jobs), remark)
+    ran = [(key, attempt(run_job, case)) for key, case, _ in jobs]
+    results = [end.result for _, end in ran if isinstance(end, JobResult)]
+    kept = iter(store_outcomes(folder, results) if results else [])
+    for key, end in ran:
+        if isinstance(end, JobLost):
+            yield JobLost(key, end.reason, end.detail, end.traceback)
         else:
-            yield JobResult(case, result, time.monotonic() - began)
-        pulse()
+            yield JobResult(key, next(kept), end.seconds)
 
 
 def run_here(
     work: Callable[[Any], Any],
-    jobs: Sequence[Input],
+    jobs: Collection[Input],
     needs: Needs,
     workers: int,
     remark: Callable[[str], None],
-    pulse: Callable[[], object] = lambda: None,
-) -> Generator[JobResult | JobLost, None, None]:
+    store: Callable[[list[Any]], list[Any]] | None = None,
+) -> Generator[End, None, None]:
     """Return the generator of how jobs end in processes here, which load the equations first.
 
     They are compiled before, if there is a job. Raises what `run_batches` raises, and
@@ -246,21 +230,7 @@ def run_here(
     require_posix()
     if jobs:
         compile_once(needs, remark)
-    return run_batches(work, jobs, Workers(workers, partial(load, needs), grace=GRACE), pulse)
-
-
-class LazyCases(Sequence[Any]):
-    """Cases as workers take them, each made when it is taken."""
-
-    def __init__(self, cases: Sequence[Case]):
-        self.cases = cases
-
-    def __len__(self) -> int:
-        return len(self.cases)
-
-    def __getitem__(self, index: Any) -> Any:
-        case = self.cases[index]
-        return case, case, case.solve.timeout_s
+    return run_batches(work, jobs, Workers(workers, partial(load, needs), grace=GRACE), store)
 
 
 def endings(
@@ -278,13 +248,3 @@ def endings(
         counts.append(JobCount(study.name, len(selected), len(failed)))
         failures += failed
     return tuple(counts), tuple(failures)
-
-
-def outcome_of(end: JobResult | JobLost) -> Outcome:
-    """Return the outcome of a job, also of one that raised an exception or lost its worker."""
-    if isinstance(end, JobResult):
-        if isinstance(end.result, StoreError):
-            raise end.result
-        return end.result
-    more = {"traceback": end.traceback} if end.traceback else {}
-    return without_run(end.id.attributes(), end.reason, end.detail, **more)

@@ -6,20 +6,10 @@ import platform
 import sys
 
 from compressor.cases import MODEL_VERSION
-from compressor.program import COMPILED, VERSION, CompsimError, library_versions, sources_hash
+from compressor.program import COMPILED, VERSION, library_versions, sources_hash
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
 REMEDY = "have the same programs on all machines, then start the cluster's workers again"
-
-
-class ClusterError(CompsimError):
-    """A cluster that cannot be used: which, why, and what to do about it."""
-
-    exit_code = 2
-
-
-class Unfit(Exception):
-    """A machine where jobs cannot run, or would not end in the same bits: which, and why."""
 
 
 @functools.cache
@@ -44,12 +34,3 @@ def differences(ours: dict[str, str], theirs: dict[str, str]) -> str:
         if ours.get(name) != theirs.get(name)
     )
     return f"has {different}; {REMEDY}" if different else ""
-
-
-def unfitness(error: BaseException) -> str:
-    """Return why a worker's error means that none of its jobs can run; empty if it does not."""
-    if isinstance(error, Unfit):
-        return str(error).removeprefix("worker ")
-    if isinstance(error, ImportError | AttributeError):
-        return f"has no compsim, or an old one ({error}); {REMEDY}"
-    return ""

@@ -1,24 +1,30 @@
 """The jobs that studies want, each once, and how those stored ended."""
 
-from collections.abc import Container, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Hashable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple, overload
+from typing import NamedTuple
 
 import numpy as np
 
 from compressor.cases import Case, Study
+from compressor.outcome import Outcome
 from compressor.store import Stored
+from compressor.sweep.pool import Input
 
 
 class JobEnd(NamedTuple):
     """How a job ended."""
 
     status: str
-    reason: str
-    detail: str
+    reason: str = ""
+    detail: str = ""
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> "JobEnd":
+        return cls(outcome.status, outcome.reason, outcome.detail)
 
 
-OK_END = JobEnd("ok", "", "")
+OK_END = JobEnd("ok")
 
 
 class RequestedJobs(Mapping[str, Case]):
@@ -66,8 +72,11 @@ class RequestedJobs(Mapping[str, Case]):
             yield self[keys[0]], keys
 
 
-class PendingCases(Sequence[Case]):
-    """The cases of some requested jobs, each built when it is used: many take much memory."""
+class PendingJobs(Collection[Input]):
+    """Some requested jobs as workers take them; cases are built one by one: many take much memory.
+
+    A job's id is its key, its payload the case.
+    """
 
     def __init__(self, wanted: RequestedJobs, keys: Sequence[str]):
         self.wanted, self.keys = wanted, keys
@@ -75,14 +84,13 @@ class PendingCases(Sequence[Case]):
     def __len__(self) -> int:
         return len(self.keys)
 
-    @overload
-    def __getitem__(self, index: int) -> Case: ...
-    @overload
-    def __getitem__(self, index: slice) -> "PendingCases": ...
-    def __getitem__(self, index: int | slice) -> "Case | PendingCases":
-        if isinstance(index, slice):
-            return PendingCases(self.wanted, self.keys[index])
-        return self.wanted[self.keys[index]]
+    def __contains__(self, job: object) -> bool:
+        return any(job == one for one in self)
+
+    def __iter__(self) -> Iterator[Input]:
+        for key in self.keys:
+            case = self.wanted[key]
+            yield key, case, case.solve.timeout_s
 
 
 def serving_both(first: Case, second: Case) -> Case:
@@ -103,31 +111,24 @@ def serving_both(first: Case, second: Case) -> Case:
 
 
 def stored_ends(store: Stored, wanted: RequestedJobs) -> dict[str, JobEnd]:
-    """Return how the jobs ended that need no new run: stored ones that serve, with intact files.
+    """Return how the jobs ended that need no new run: stored ones that serve, and are intact.
 
     A case whose job is to be run again goes on keeping the time series that its job has, as exact
     as they are.
     """
     found: dict[str, JobEnd] = {}
-    rows = store.rows
     for case, keys in [*wanted.alike()]:
-        places = rows.find(keys)
+        places = store.rows.find(keys)
         indices = np.flatnonzero(places >= 0)
         satisfied = store.serving(places[indices], case)
         for at, position, serves in zip(
             indices.tolist(), places[indices].tolist(), satisfied.tolist(), strict=True
         ):
-            key = keys[at]
-            if serves and rows.intact(position):
+            key, end = keys[at], store.status_at(position)
+            if serves and store.intact(position):
                 found[key] = OK_END
-                if rows.columns["status"][position] != b"ok":
-                    end = store.status_at(position)
+                if end.status != "ok":
                     found[key] = JobEnd(end.status, end.reason, end.detail)
             else:
-                wanted[key] = store.status_at(position).with_stored_outputs(wanted[key])
+                wanted[key] = end.with_stored_outputs(wanted[key])
     return found
-
-
-def revolutions(case: Case) -> float:
-    """Return how many revolutions a run of a case is, at most."""
-    return case.duration / case.turn

@@ -1,23 +1,21 @@
-"""A worker process from the inside: its limits, and batches of jobs with a note of each job."""
+"""A worker process from the inside: its limits, and batches of jobs."""
 
 import contextlib
 import ctypes
 import gc
-import mmap
 import os
 import pickle
 import signal
-import struct
 import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
-from typing import Any
+from dataclasses import dataclass, replace
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple
 
 from compressor.reasons import Reason
-from compressor.store import StoreError, sync_later
+from compressor.store import StoreError
 
 MAX_OVERRUN = 2.0  # target_seconds after which a worker gives the rest of a batch back
 MAX_TEXT = 20_000  # characters of a traceback
@@ -25,8 +23,6 @@ ENDING = [signal.SIGINT, signal.SIGTERM]
 if hasattr(signal, "SIGHUP"):  # not on Windows
     ENDING.append(signal.SIGHUP)
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
-NOTE = struct.Struct("ddd")  # process; job of the batch; since when it runs, or minus its end (s)
-MAX_PROBLEM = 400  # characters of what keeps a worker from beginning: a message in one piece
 
 
 @dataclass(frozen=True)
@@ -52,53 +48,64 @@ class JobLost:
     traceback: str = ""
 
 
-@dataclass(frozen=True)
-class Workers:
-    """Worker processes: how many, and the rules for them.
+End = JobResult | JobLost
 
-    `prepare` is called once in each, before its clocks and limits are set. `memory`: bytes that a
-    job may add (by default `memory_share`). `grace`: s beyond its time in which a job may end by
-    itself.
+
+class Setup(NamedTuple):
+    """What a worker is told before its first batch."""
+
+    work: Callable[[Any], Any]  # of a job's payload
+    store: Callable[[list[Any]], list[Any]] | None  # of a batch's results; returns what to send
+    prepare: Callable[[], object]  # called once, before limits are set
+    memory: int  # bytes that a job may add
+    target_seconds: float  # of a batch
+    parent: int  # process
+
+
+class NotReady(NamedTuple):
+    """The answer of a worker that cannot begin: why."""
+
+    problem: str
+
+
+def serve(pipe: Connection, begun: int) -> None:
+    """Run the batches that come through a pipe, until it is closed.
+
+    The place of each job goes to the file `begun` before it runs, and the number of all when they
+    have run: a byte each. An answer is the list of ends, all but a rest that is given back,
+    StoreError or NotReady.
     """
+    settle()
+    try:
+        setup = Setup(*pipe.recv())
+        if os.getppid() != setup.parent:  # it died before `settle`
+            return
+        gc.disable()  # until it is prepared: what is loaded is no garbage, and much to look at
+        setup.prepare()
+        gc.freeze()  # what is there by now stays: looking at it took a thirtieth of short jobs' time
+        gc.enable()
+        limit(setup.memory)
+    except BaseException as error:
+        pipe.send(NotReady(describe_error(error)[0]))
+        return
+    with contextlib.suppress(EOFError):
+        while True:
+            try:
+                answer: Any = do_batch(setup, pipe.recv(), begun)
+            except StoreError as error:
+                answer = error
+            pipe.send(answer)
 
-    count: int = 2
-    prepare: Callable[[], object] = int
-    memory: int | None = None
-    grace: float = 1.0
-    target_seconds: float = 0.2
 
-
-HERE: dict[str, Any] = {}  # what `init_worker` leaves for `do_batch`
-
-
-def init_worker(work: Callable[[Any], Any], rules: Workers, parent: int) -> None:
-    """Make a new process a worker: its end, signals and streams."""
+def settle() -> None:
+    """Make this process a worker: its end, signals and streams."""
     if sys.platform == "linux":  # die when the parent does, even amid compiled code
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it died before
-        os._exit(0)
     for number in (signal.SIGINT, signal.SIGHUP):  # Ctrl-C reaches all: the parent ends us
         signal.signal(number, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
-    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     with contextlib.suppress(OSError):  # there may be no stderr
         os.dup2(2, 1)  # stdout is for data
-    gc.disable()  # until it is prepared: what is loaded is no garbage, and much to look at
-    HERE.update(work=work, rules=rules, prepared=False)
-
-
-def prepare() -> str:
-    """Prepare this process for its first batch; return what prevents that, or ""."""
-    rules = HERE["rules"]
-    try:
-        rules.prepare()
-    except BaseException as error:
-        return describe_error(error)[0][:MAX_PROBLEM]
-    gc.freeze()  # what is there by now stays: looking at it took a thirtieth of short jobs' time
-    gc.enable()
-    limit(rules.memory)
-    HERE["prepared"] = True
-    return ""
 
 
 def limit(memory: int) -> None:
@@ -122,58 +129,63 @@ def limit(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (wanted, most))
 
 
-def do_batch(path: str, data: bytes, count: int) -> str:
-    """Run the jobs of a batch; return what keeps this process from any job, or "".
+def do_batch(setup: Setup, payloads: Sequence[Any], begun: int) -> list[End]:
+    """Run jobs and store their results; return how they ended, results pickled."""
+    most = f"the {setup.memory / 1e9:.3g} GB that a worker may add"
+    ends: list[End] = []
+    began = time.monotonic()
+    for place, payload in enumerate(payloads):
+        os.write(begun, bytes([place]))
+        ends.append(attempt(setup.work, payload, most))
+        if time.monotonic() - began > MAX_OVERRUN * setup.target_seconds:
+            break
+    os.write(begun, bytes([len(payloads)]))
+    if setup.store:
+        ends = store_results(setup.store, ends, most)
+    return [pack(end, most) for end in ends]
 
-    data: their pickled payloads; count: how many they are. The file gets a note of who is at which
-    job, and in the end how jobs ended, all but a rest that is given back.
+
+def attempt(work: Callable[[Any], Any], payload: Any, most: str = "there is") -> End:
+    """Return what some work gives, or why it gives nothing. Raises StoreError.
+
+    most: the memory that it may need, in words.
     """
-    if not HERE["prepared"] and (problem := prepare()):
-        return problem
-    with open(path, "r+b") as file, mmap.mmap(file.fileno(), NOTE.size) as note:
-        found: list[JobResult | JobLost] = []
-        began = time.monotonic()
-        NOTE.pack_into(note, 0, os.getpid(), 0, began)
-        jobs = read_jobs(data, count)
-        try:
-            with sync_later():  # or each job would wait for the disk
-                for position, job in enumerate(jobs):
-                    start = time.monotonic()
-                    NOTE.pack_into(note, 0, os.getpid(), position, start)
-                    found.append(perform(job, start))
-                    if time.monotonic() - began > MAX_OVERRUN * HERE["rules"].target_seconds:
-                        break
-        except StoreError as error:  # no job's time series are known to be on disk
-            found = [JobResult(None, pickle.dumps(error, pickle.HIGHEST_PROTOCOL), 0.0)]
-        NOTE.pack_into(note, 0, os.getpid(), 0, -time.monotonic())
-        file.seek(NOTE.size)
-        pickle.dump(found, file, pickle.HIGHEST_PROTOCOL)
-    return ""
-
-
-def read_jobs(data: bytes, count: int) -> Sequence[Callable[[], Any]]:
-    """Return for each job of a batch a function that returns the argument of its work."""
+    start = time.monotonic()
     try:
-        return [partial(lambda job: job, job) for job in pickle.loads(data)]
-    except MemoryError:  # each job by itself will need less, or fail alone
-        return [partial(read_job, data, position) for position in range(count)]
-
-
-def read_job(data: bytes, position: int) -> Any:
-    """Return the argument of a job's work, of those of a batch."""
-    return pickle.loads(data)[position]
-
-
-def perform(job: Callable[[], Any], start: float) -> JobResult | JobLost:
-    """Return the result of one job, pickled, or why it has none."""
-    try:
-        result = pickle.dumps(HERE["work"](job()), pickle.HIGHEST_PROTOCOL)
-        return JobResult(None, result, time.monotonic() - start)
+        return JobResult(None, work(payload), time.monotonic() - start)
+    except StoreError:
+        raise
     except MemoryError:
-        most = f"needs more than the {HERE['rules'].memory / 1e9:.3g} GB that a worker may add"
-        return JobLost(None, Reason.OUT_OF_MEMORY, most)
+        return JobLost(None, Reason.OUT_OF_MEMORY, f"needs more than {most}")
     except BaseException as error:  # work may even call sys.exit
         return JobLost(None, Reason.INTERNAL_ERROR, *describe_error(error))
+
+
+def store_results(
+    store: Callable[[list[Any]], list[Any]], ends: Sequence[End], most: str
+) -> list[End]:
+    """Store the results of a batch in one go, one by one where that fails; return what is sent.
+
+    Raises StoreError.
+    """
+    done = [end for end in ends if isinstance(end, JobResult)]
+    if not done:
+        return [*ends]
+    kept = attempt(store, [end.result for end in done], most)
+    if isinstance(kept, JobLost):
+        if len(ends) == 1:
+            return [kept]
+        return [left for end in ends for left in store_results(store, [end], most)]
+    sent = iter(kept.result)
+    return [replace(e, result=next(sent)) if isinstance(e, JobResult) else e for e in ends]
+
+
+def pack(end: End, most: str) -> End:
+    """Return an end with its result pickled, which some results cannot be."""
+    if isinstance(end, JobLost):
+        return end
+    packed = attempt(pickle.dumps, end.result, most)
+    return replace(packed, seconds=end.seconds) if isinstance(packed, JobResult) else packed
 
 
 def describe_error(error: BaseException) -> tuple[str, str]:

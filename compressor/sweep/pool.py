@@ -1,0 +1,381 @@
+"""Run jobs in worker processes: one that crashes, hangs or eats memory costs itself only.
+
+joblib gives threads, their queue and their results. Each thread has a process of its own, with a
+pipe that breaks if that dies: so a death names its own job, and costs no other process.
+"""
+
+import contextlib
+import itertools
+import math
+import operator
+import os
+import pickle
+import platform
+import signal
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Hashable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from multiprocessing import Pipe
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from joblib import Parallel, cpu_count, delayed
+
+from compressor.program import THREAD_VARIABLES, CompsimError
+from compressor.reasons import Reason
+from compressor.store import StoreError
+from compressor.sweep.worker import (
+    ENDING,
+    End,
+    JobLost,
+    JobResult,
+    NotReady,
+    Setup,
+    describe_error,
+)
+
+Input = tuple[Hashable, Any, float]  # id, payload, wall time that the job may take (s)
+
+TICK = 0.1  # s between two looks at a worker that is silent
+MAX_BATCH = 200  # jobs, whose places fit in a byte
+MAX_JOBS_IN_MEAN = 50  # jobs that a mean of their seconds rests on
+# s that a worker may take to begin (what it prepares may have to be compiled), and to store
+MAX_SILENCE = 600.0
+MAX_FRUITLESS = 10  # times in a row that workers may die before any job begins
+FAILED_ALONE = "also when it ran again alone"
+MEMORY_SHARE = 0.75  # of the machine's memory, for all workers together
+MEMORY_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+START = (  # a worker's program
+    "import sys; from multiprocessing.connection import Connection; "
+    "pipe = Connection(int(sys.argv[1])); sys.path[:] = pipe.recv(); "
+    "from compressor.sweep.worker import serve; serve(pipe, int(sys.argv[2]))"
+)
+
+
+class WorkersFailed(CompsimError):
+    """Worker processes cannot be started, or die before they begin a job."""
+
+
+class UnsupportedSystem(CompsimError):
+    """A system on which no jobs are run, such as Windows."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Worker processes: how many, and the rules for them.
+
+    `prepare` is called once in each, before its clocks and limits are set. `memory`: bytes that a
+    job may add (by default `memory_share`). `grace`: s beyond its time in which a job may end by
+    itself. `target_seconds`: s that a batch of jobs takes.
+    """
+
+    count: int = 2
+    prepare: Callable[[], object] = int
+    memory: int | None = None
+    grace: float = 1.0
+    target_seconds: float = 0.2
+
+
+class Job(NamedTuple):
+    """A job that is not finished; one that is tried again runs alone, in a new process."""
+
+    id: Any
+    payload: Any
+    timeout: float
+    again: bool = False
+
+
+def require_posix() -> None:
+    """Raise UnsupportedSystem where workers lack limits: on Windows."""
+    try:
+        import resource  # noqa: F401
+    except ImportError as error:
+        problem = f"{platform.system()} has no {error.name}, which a run needs"
+        remedy = "run it under Linux, macOS or WSL, and open the folder of results here"
+        raise UnsupportedSystem(f"{problem}: {remedy}") from error
+
+
+def run_batches(
+    work: Callable[[Any], Any],
+    jobs: Iterable[Input],
+    workers: Workers,
+    store: Callable[[list[Any]], list[Any]] | None = None,
+) -> Generator[End, None, None]:
+    """Yield how each job ended, for whose payload a worker process has called `work`.
+
+    jobs: read as workers need them; where they have a length, batches shrink towards the end.
+    store: called with the results of a batch in the worker; returns what is sent home for each.
+    What both are must be found by name in another process. What `work` raises makes its job a
+    JobLost, but a StoreError ends the call. Closing the iterator kills the workers. Raises
+    StoreError, WorkersFailed, and what `jobs` raises.
+    """
+    pool = Pool(work, jobs, workers, store)
+    ends: Iterator[list[End]] = iter(())
+    with Parallel(pool.width, backend="threading", return_as="generator_unordered") as parallel:
+        try:
+            while pool.batches.waiting or not pool.batches.drained:  # given back by the last, too
+                ends = parallel(delayed(pool.do)(batch) for batch in iter(pool.next_batch, []))
+                for found in ends:
+                    yield from found
+        finally:
+            pool.stop()
+            with contextlib.suppress(Exception):  # others that had come, too
+                for _ in ends:  # of which joblib would warn
+                    pass
+
+
+class Batches:
+    """Jobs that are not finished, in batches that take about `target_seconds`."""
+
+    def __init__(self, jobs: Iterable[Input], target_seconds: float, width: int):
+        self.source, self.left = iter(jobs), operator.length_hint(jobs, 0)
+        self.target_seconds, self.width = target_seconds, width  # width: batches at work at once
+        self.waiting: deque[list[Job]] = deque()  # to be run before what is left in the source
+        self.drained = False  # no jobs are left in the source
+        self.mean, self.weight = 0.0, 0  # seconds a job; how many jobs that rests on
+
+    def next(self) -> list[Job]:
+        """Return the next batch, of few jobs at first and towards the end; [] where none is left.
+
+        Jobs may wait again after that.
+        """
+        size = self.target_seconds / max(self.mean, 1e-9) if self.weight else 1.0
+        if self.left:
+            size = min(size, self.left / (2 * self.width))
+        count = min(max(1, math.ceil(size)), MAX_BATCH)
+        batch = self.waiting.popleft() if self.waiting else self.issue(count)
+        if batch[count:]:
+            self.waiting.appendleft(batch[count:])
+        return batch[:count]
+
+    def issue(self, count: int) -> list[Job]:
+        """Return so many jobs of the source, or those that are left."""
+        batch = [Job(*job) for job in itertools.islice(self.source, count)]
+        self.left = max(self.left - len(batch), 0)
+        self.drained = len(batch) < count
+        return batch
+
+    def learn(self, seconds: float) -> None:
+        """Learn that a job has taken so long."""
+        known = min(self.weight, MAX_JOBS_IN_MEAN)
+        self.mean, self.weight = (known * self.mean + seconds) / (known + 1), known + 1
+
+
+class Pool:
+    """The workers of this machine, one for each thread that comes to `do` batches."""
+
+    def __init__(
+        self,
+        work: Callable[[Any], Any],
+        jobs: Iterable[Input],
+        rules: Workers,
+        store: Callable[[list[Any]], list[Any]] | None = None,
+    ):
+        self.width = min(rules.count, operator.length_hint(jobs, 0) or rules.count)
+        self.batches = Batches(jobs, rules.target_seconds, self.width)
+        self.grace = rules.grace
+        memory = rules.memory or memory_share(self.width)
+        setup = Setup(work, store, rules.prepare, memory, rules.target_seconds, os.getpid())
+        self.setup = pickle.dumps(tuple(setup))
+        self.fruitless = 0  # workers in a row that have died before any job began
+        self.lock, self.stopped = threading.Lock(), False
+        self.workers: set[Worker] = set()
+        self.own = threading.local()  # .worker: this thread's, if it has one
+
+    def next_batch(self) -> list[Job]:
+        """Return the next batch, [] where none is left or no more are to be run."""
+        return [] if self.stopped else self.batches.next()
+
+    def do(self, batch: list[Job]) -> list[End]:
+        """Return how jobs of a batch ended in this thread's worker; others wait to run again.
+
+        Raises StoreError, and WorkersFailed.
+        """
+        try:
+            answer = self.worker(batch[0].again).ask(batch, self.grace)
+        except WorkerDied as died:
+            self.retire()
+            return [] if self.stopped else self.lose(batch, died)
+        except CancelledStart:
+            return []
+        if isinstance(answer, StoreError):
+            raise answer
+        if isinstance(answer, NotReady):
+            raise WorkersFailed(f"jobs could not even begin: {answer.problem}")
+        self.fruitless = 0
+        if batch[len(answer) :]:
+            self.batches.waiting.appendleft(batch[len(answer) :])
+        return [self.settle(job, end) for job, end in zip(batch, answer, strict=False)]
+
+    def worker(self, new: bool) -> "Worker":
+        """Return this thread's worker, a new one if asked for. Raises WorkersFailed."""
+        if new:
+            self.retire()
+        if not getattr(self.own, "worker", None):
+            with self.lock:
+                if self.stopped:
+                    raise CancelledStart
+                try:
+                    self.own.worker = Worker(self.setup)
+                except OSError as error:
+                    raise WorkersFailed(f"no worker process can be started: {error}") from error
+                self.workers.add(self.own.worker)
+        return self.own.worker
+
+    def retire(self) -> None:
+        """End this thread's worker, if it has one."""
+        if worker := getattr(self.own, "worker", None):
+            worker.end()
+            self.workers.discard(worker)
+            self.own.worker = None
+
+    def settle(self, job: Job, end: End) -> End:
+        """Return the end of a job with its id and its own result."""
+        if isinstance(end, JobLost):
+            return replace(end, id=job.id)
+        self.batches.learn(end.seconds)
+        try:
+            return replace(end, id=job.id, result=pickle.loads(end.result))
+        except Exception as error:
+            return JobLost(job.id, Reason.INTERNAL_ERROR, *describe_error(error))
+
+    def lose(self, batch: list[Job], died: "WorkerDied") -> list[End]:
+        """Return the job that is lost with its worker, if any; the others wait to run again.
+
+        A job that was at work when its worker died is tried again alone, since an outsider may have
+        killed it. Raises WorkersFailed.
+        """
+        if died.place is None:
+            self.fruitless += 1
+            if self.fruitless > MAX_FRUITLESS:
+                raise WorkersFailed(f"jobs could not even begin: {died.how}")
+            self.batches.waiting.append(batch)
+            return []
+        if died.place == len(batch) > 1:  # amid storing: the half with the cause will show
+            self.batches.waiting.extend([batch[: len(batch) // 2], batch[len(batch) // 2 :]])
+            return []
+        job = batch.pop(min(died.place, len(batch) - 1))
+        if batch:
+            self.batches.waiting.appendleft(batch)
+        if died.late:
+            text = f"more than {job.timeout:g} s of wall time; its worker was killed"
+            return [JobLost(job.id, Reason.BUDGET_SECONDS, text)]
+        if job.again:
+            text = f"its worker ended by {died.how}, {FAILED_ALONE}"
+            return [JobLost(job.id, Reason.WORKER_DIED, text)]
+        self.batches.waiting.append([job._replace(again=True)])
+        return []
+
+    def stop(self) -> None:
+        """End all workers, and start no more."""
+        with self.lock:
+            self.stopped = True
+        for worker in [*self.workers]:
+            worker.end()
+
+
+class CancelledStart(Exception):
+    """No worker is started any more."""
+
+
+class WorkerDied(Exception):
+    """A worker has ended amid a batch.
+
+    place: of the job at work, the number of jobs where they were being stored, None before the
+    first; how: it ended; late: because the job took too long.
+    """
+
+    def __init__(self, place: int | None, how: str, late: bool):
+        self.place, self.how, self.late = place, how, late
+
+
+class Worker:
+    """A worker process, from the outside; used by one thread alone, but for `end`."""
+
+    def __init__(self, setup: bytes):
+        self.pipe, theirs = Pipe()
+        self.begun, begins = Pipe(duplex=False)  # for the places of jobs that begin: bytes
+        os.set_blocking(self.begun.fileno(), False)
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in it, too, until it settles
+        try:
+            numbers = theirs.fileno(), begins.fileno()
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", START, *map(str, numbers)], pass_fds=numbers,
+                stdin=subprocess.DEVNULL, env=os.environ | dict.fromkeys(THREAD_VARIABLES, "1"),
+            )  # fmt: skip
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+            theirs.close()
+            begins.close()
+        with contextlib.suppress(OSError):  # it has died, as `ask` will find
+            self.pipe.send(sys.path)
+            self.pipe.send_bytes(setup)
+
+    def ask(self, batch: list[Job], grace: float) -> Any:
+        """Return a worker's answer to a batch. Raises WorkerDied."""
+        self.read_begun()  # of the batch before
+        place, left, late = None, MAX_SILENCE, False
+        try:
+            self.pipe.send([job.payload for job in batch])
+            while not self.pipe.poll(TICK):
+                if news := self.read_begun():
+                    place = news[-1]
+                    at_work = place < len(batch)
+                    left = batch[place].timeout + grace if at_work else MAX_SILENCE
+                # ticks are counted, since time goes on while all are stopped, as by Ctrl-Z
+                left -= TICK
+                late = left < 0
+                if late or (self.process.poll() is not None and not self.pipe.poll()):
+                    break
+            else:
+                return self.pipe.recv()
+        except (EOFError, OSError):
+            pass
+        self.process.kill()
+        how = describe_ending(self.process.wait())
+        if news := self.read_begun():
+            place, late = news[-1], False
+        raise WorkerDied(place, how, late and place != len(batch))
+
+    def read_begun(self) -> bytes:
+        """Return the places of jobs that have begun since the last look."""
+        try:
+            return os.read(self.begun.fileno(), 1 << 16)
+        except BlockingIOError:
+            return b""
+
+    def end(self) -> None:
+        """Kill the process."""
+        self.process.kill()
+        self.process.wait()
+
+
+def describe_ending(code: int) -> str:
+    """Return how a process ended, from its exit code (less the signal's number)."""
+    if code >= 0:
+        return f"exit code {code}"
+    if code == -signal.SIGKILL:
+        return "SIGKILL: out of memory, or killed from outside"
+    return signal.Signals(-code).name
+
+
+def cores() -> int:
+    """Return how many cores this process may use, by its affinity and its container's quota."""
+    return cpu_count()
+
+
+def memory_share(count: int) -> int:
+    """Return the bytes for each of `count` workers, of three quarters of the memory there is.
+
+    That is the machine's, or the container's where it has a limit.
+    """
+    most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    for path in MEMORY_LIMITS:
+        with contextlib.suppress(OSError, ValueError):  # absent, or "max"
+            most = min(most, int(Path(path).read_text()))
+    return int(MEMORY_SHARE * most / count)
