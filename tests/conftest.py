@@ -17,6 +17,8 @@ one_thread_each()  # before numpy loads: as the commands do, so that sums are th
 import hypothesis
 import numpy as np
 import pytest
+from compressor.store.series_file import series_path, write_series
+from compressor.store.writer import Writer
 
 from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
@@ -26,9 +28,7 @@ from compressor.outcome import ROW, Outcome
 from compressor.solve.simulate import simulate
 from compressor.store.files import name_pending
 from compressor.store.reader import read_store
-from compressor.store.series_file import series_path, write_series
 from compressor.store.studies import read_studies, write_study
-from compressor.store.writer import Writer
 from compressor.sweep.worker import JobResult
 
 # nohup ignores SIGHUP, and a shell SIGINT of what it runs behind: tests that send them, and the
@@ -322,10 +322,10 @@ def assert_same_bits(one, other):
 def jobs_here():
     """Jobs of sweeps and studies run in this process, one after the other: no worker starts."""
 
-    def run_batches(work, jobs, workers, pulse=lambda: None):
+    def run_batches(work, jobs, workers, store=None):
         for name, payload, _ in jobs:
-            yield JobResult(name, work(payload), 0.01)
-            pulse()
+            result = work(payload)
+            yield JobResult(name, store([result])[0] if store else result, 0.01)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys.modules["compressor.sweep.sweep"], "run_batches", run_batches)

@@ -1,7 +1,6 @@
 """`compsim plan`: what a run would do, without doing it."""
 
 import dataclasses
-import math
 from typing import TYPE_CHECKING
 
 import click
@@ -15,7 +14,6 @@ if TYPE_CHECKING:
     from compressor.sweep import Forecast
 
 FIRST = 5  # missing jobs that are listed
-BUSY = 0.8  # of the cores: below, a machine is busy with other things
 
 
 @click.command()
@@ -33,8 +31,8 @@ def plan(configs, folder, jobs, as_json, **how) -> int:
     compsim plan machine.yaml
     compsim plan wear.yaml --only 'clearance_mm < 0.2'
 
-    Jobs that are stored already are not run again. Times up to a dozen jobs of each study, drawn
-    over its design, for some seconds; stores nothing.
+    Jobs that are stored already are not run again. Times one job of each study, and takes the
+    others to cost as much for every revolution; stores nothing.
     """
     from compressor.analysis import describe_machine
     from compressor.sweep import cores, forecast
@@ -60,18 +58,8 @@ def plan(configs, folder, jobs, as_json, **how) -> int:
 
 
 def cost(whole: "Forecast") -> str:
-    """Return the line of what a run will take: time with its range, workers, bytes, compiling.
-
-    Where others are at work on this machine, also the time without them.
-    """
-    from compressor.sweep import cores
-
-    workers, by = plural(whole.workers, "worker"), f"by {plural(whole.timed, 'timed job')}"
-    if whole.timed < whole.missing and not math.isnan(whole.most):
-        by = f"{duration(whole.least)} to {duration(whole.most)} {by}"
+    """Return the line of what a run will take: time, workers, compiling, bytes."""
+    workers = plural(whole.workers, "worker")
     first = f", after about {duration(whole.compiling)} of compiling" if whole.compiling else ""
-    idle = min(whole.workers, cores())
-    alone = whole.seconds * whole.cores / idle
-    busy = f", or {duration(alone)} if nothing else ran" if whole.cores < BUSY * idle else ""
-    taken = f"about {duration(whole.seconds)} with {workers} ({by})"
-    return f"{taken}{busy}{first}, and {screen.size(whole.bytes)}"
+    taken = f"about {duration(whole.seconds)} with {workers} (by one timed job of each study)"
+    return f"{taken}{first}, and {screen.size(whole.bytes)}"

@@ -41,10 +41,9 @@ def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Run on this dask cluster, such as tcp://host:8786."
 )
-@click.option("--wait", is_flag=True, help="Wait for another run on the folder to end.")
 @options.quiet
 @click.pass_obj
-def run(command, configs, folder, jobs, rerun, shard, scheduler, wait, quiet, **how) -> int:
+def run(command, configs, folder, jobs, rerun, shard, scheduler, quiet, **how) -> int:
     """Simulate what case files ask for, and store the results.
 
     \b
@@ -66,7 +65,9 @@ def run(command, configs, folder, jobs, rerun, shard, scheduler, wait, quiet, **
     cluster: Any = Cluster(scheduler) if scheduler else nullcontext()
     opening = partial(screen.say_machines, studies)  # where there are jobs to run
     with ProgressReporter(quiet, "jobs", folder, opening) as progress, cluster as elsewhere:
-        asked = Options(command, bool(rerun), shard, wait, elsewhere, progress.count_failed)
+        asked = Options(
+            command, how["overrides"], bool(rerun), shard, elsewhere, progress.count_failed
+        )
         summary = sweep(studies, folder, jobs or cores(), progress, asked)
     report_run(summary, folder, quiet)
     return screen.SOME_FAILED if summary.failed else screen.DONE

@@ -31,7 +31,6 @@ from compressor.sweep.worker import (
     ENDING,
     End,
     JobLost,
-    JobResult,
     NotReady,
     Setup,
     describe_error,

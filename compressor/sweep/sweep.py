@@ -37,12 +37,14 @@ Backend = Callable[
 class Options:
     """How to sweep.
 
-    command: what the store says that it was made by; rerun_failed: failed jobs count as missing;
-    part: (i, n) for shard i of n, of which other processes may run the rest; backend: where jobs
-    run, if not here; failed: called with the number of failed jobs, before progress is.
+    command: what the store says that it was made by; overrides: KEY=VALUE that it set in the case
+    files; rerun_failed: failed jobs count as missing; part: (i, n) for shard i of n, of which other
+    processes may run the rest; backend: where jobs run, if not here; failed: called with the number
+    of failed jobs, before progress is.
     """
 
     command: str = ""
+    overrides: Sequence[str] = ()
     rerun_failed: bool = False
     part: tuple[int, int] | None = None
     backend: Backend | None = None
@@ -108,7 +110,7 @@ def sweep(
         ends = {key: end for key, end in ends.items() if end.status == "ok"}
     missing = [key for key in wanted if key not in ends]
     for study in studies:
-        write_study(folder, study, options.command)
+        write_study(folder, study, options.command, options.overrides)
     if missing:
         for damage in stored.damaged:
             progress(len(ends), len(wanted), f"{damage}: its jobs count as missing")

@@ -17,7 +17,7 @@ from compressor.program import COMPILED, library_versions, machine_code_folder
 from compressor.store import StoreError
 
 COMPILING = (
-    "compiling the equations, for about {seconds} s or, on a slow or busy machine, longer; once for "
+    "compiling the equations, for about {seconds} s, or longer on a slow or busy machine; once for "
     "each version of the program, and a stop loses nothing"
 )
 SECONDS = {"auto": 26, "laws": 28, "features": 50}  # of compiling, on an idle cloud core of 2026

@@ -82,7 +82,7 @@ def serve(pipe: Connection, begun: int) -> None:
             return
         gc.disable()  # until it is prepared: what is loaded is no garbage, and much to look at
         setup.prepare()
-        gc.freeze()  # what is there by now stays: looking at it took a thirtieth of short jobs' time
+        gc.freeze()  # what is there stays: looking at it took a thirtieth of short jobs' time
         gc.enable()
         limit(setup.memory)
     except BaseException as error:

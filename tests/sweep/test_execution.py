@@ -16,12 +16,12 @@ from pathlib import Path
 
 import pytest
 from bad_jobs import LEAST, POISON, Many, named, sleep, work
+from compressor.sweep.execution import WorkersFailed, drain, run_batches
 from joblib.externals.loky import process_executor
 from joblib.externals.loky.backend import resource_tracker as loky_tracker
 from joblib.externals.loky.backend.process import LokyProcess
 
 from compressor.sweep import execution
-from compressor.sweep.execution import WorkersFailed, drain, run_batches
 from compressor.sweep.worker import MAX_TEXT, JobLost, JobResult, Workers
 
 RULES = {"memory": LEAST, "grace": 0.3}

@@ -7,10 +7,10 @@ import signal
 import subprocess
 import sys
 
+import compressor.store.writer
 import numpy as np
 import pytest
 
-import compressor.store.writer
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.store import reader as store

@@ -184,12 +184,12 @@ class FitJobs:
         """Run the jobs of new points, in a study with all points so far."""
         every = [*self.points, *new]
         study = self.study(every)
+        sets = self.settings(every, QUIET)
         words = ["compsim", "run", self.path, "-r", str(self.folder)]
-        for text in self.settings(every, QUIET):
-            words += ["--set", text]
+        words += [word for text in sets for word in ("--set", text)]
         few = in_this_process if len(new) < FEW else None
         # so that `status` shows how to go on
-        options = Options(shlex.join(words), backend=few)
+        options = Options(shlex.join(words), sets, backend=few)
         done = sweep([study], self.folder, self.workers, self.progress, options)
         self.run_now += done.run_now
         self.points = dict(zip(every, study.keys, strict=True))

@@ -16,8 +16,9 @@ import itertools
 import json
 import math
 import re
+import threading
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property, partial
 from operator import itemgetter
@@ -66,6 +67,7 @@ FOLDER = "follow"
 REMEDY = "delete it: the same command makes it again"
 SCHEMA = 3  # of a row's numbers: a change of what they mean makes chains again
 SECONDS_BETWEEN_WRITES = 2.0  # s between two writings of what is finished
+SECONDS_BETWEEN_LOOKS = 0.5  # s between two looks at what chains have written
 RUNS = 4  # of a value, each with the case's own wall time at most, and some more
 FURTHER = 200  # rev that motions run on before they are compared again
 STARTS, SEED = 8, 13  # from other places, and of these
@@ -285,23 +287,19 @@ def follow(
     return Followed(sum(len(chain.cases) for chain in chains), before, data, path)
 
 
-def run_chain(chain: Chain, folder: Path, rerun: bool = False) -> StoreError | None:
+def run_chain(chain: Chain, folder: Path, rerun: bool = False) -> None:
     """Run what a chain's file does not hold yet, in a worker; rerun: from its first failed value.
 
-    A StoreError is returned: it ends the run, while an exception is a failure of the chain.
+    Raises StoreError.
     """
-    try:
-        rows = rows_to_keep(chain, folder, rerun)
-        written = time.monotonic()
-        for number in range(len(rows), len(chain.cases)):
-            rows.append(run_value(chain.cases[number], chain.begin(rows), chain.plan))
-            is_last = len(rows) == len(chain.cases)
-            if is_last or time.monotonic() - written > SECONDS_BETWEEN_WRITES:
-                write_dataset(chain.path(folder), chain_dataset(chain, rows))
-                written = time.monotonic()
-    except StoreError as error:
-        return error
-    return None
+    rows = rows_to_keep(chain, folder, rerun)
+    written = time.monotonic()
+    for number in range(len(rows), len(chain.cases)):
+        rows.append(run_value(chain.cases[number], chain.begin(rows), chain.plan))
+        is_last = len(rows) == len(chain.cases)
+        if is_last or time.monotonic() - written > SECONDS_BETWEEN_WRITES:
+            write_dataset(chain.path(folder), chain_dataset(chain, rows))
+            written = time.monotonic()
 
 
 def rows_to_keep(chain: Chain, folder: Path, rerun: bool) -> list[Row]:
@@ -361,14 +359,31 @@ def run_chains(
     lost: dict[str, JobLost] = {}
     look("")
     work = partial(run_chain, folder=place, rerun=rerun)
-    with contextlib.closing(run_here(work, jobs, needs, workers, look, partial(look, ""))) as ends:
+    running = run_here(work, jobs, needs, workers, look)
+    with contextlib.closing(running) as ends, calling_often(partial(look, "")):
         for end in ends:
             if isinstance(end, JobLost):
                 lost[end.id] = end
-            elif isinstance(end.result, StoreError):
-                raise end.result
     look("")
     return lost
+
+
+@contextlib.contextmanager
+def calling_often(look: Callable[[], object]) -> Iterator[None]:
+    """Call a function about once a second, in a thread: chains end long after their values."""
+    ended = threading.Event()
+
+    def call() -> None:
+        while not ended.wait(SECONDS_BETWEEN_LOOKS):
+            look()
+
+    thread = threading.Thread(target=call, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 class ChainWatch:

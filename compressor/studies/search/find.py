@@ -251,10 +251,10 @@ class SearchJobs:
         self.values |= {*arguments.values()}
         values = sorted(self.values)
         study = question.study(values)
+        sets = question.settings(values)
         words = ["compsim", "run", question.path, "-r", str(self.folder)]
-        for text in question.settings(values):
-            words += ["--set", text]
-        options = Options(shlex.join(words))  # so that `status` shows how to go on
+        words += [word for text in sets for word in ("--set", text)]
+        options = Options(shlex.join(words), sets)  # so that `status` shows how to go on
         self.run_now += sweep([study], self.folder, self.workers, self.progress, options).run_now
         keys = dict(zip(values, study.keys, strict=True))
         store = read_store(self.folder)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from compressor.cases import Case, Study, points
 from compressor.program import CompsimError, Progress
-from compressor.store import Folder, StoreError, writable_folder
+from compressor.store import Folder, writable_folder
 from compressor.studies.wear.stages import (
     Life,
     Stage,
@@ -128,8 +128,6 @@ def run_wear(
     running = run_here(follow_wear, jobs, needs, workers, remark)
     with contextlib.closing(running):
         for end in running:
-            if isinstance(end, JobResult) and isinstance(end.result, StoreError):
-                raise end.result
             ends[end.id] = end.result if isinstance(end, JobResult) else end
             remark("")
     ends |= {key: wear_end(tasks[key].worn, stored_stages(tasks[key])) for key in before}
@@ -150,22 +148,16 @@ def complete(task: WearTask) -> bool:
     return bool(stages) and task.worn.over(stages[-1])
 
 
-def follow_wear(task: WearTask) -> WearEnd | StoreError:
-    """Follow what is missing of a machine, in a worker.
-
-    A StoreError is returned: it ends the run, while an exception is a failure of the machine.
-    """
+def follow_wear(task: WearTask) -> WearEnd:
+    """Follow what is missing of a machine, in a worker. Raises StoreError."""
     worn = task.worn
-    try:
-        stages = stored_stages(task)
-        if not stages:
-            stages = [first_stage(worn)]
-            write(worn, task.folder, stages)
-        while not worn.over(stages[-1]):
-            stages.append(next_stage(worn, stages[-1]))
-            write(worn, task.folder, stages)
-    except StoreError as error:
-        return error
+    stages = stored_stages(task)
+    if not stages:
+        stages = [first_stage(worn)]
+        write(worn, task.folder, stages)
+    while not worn.over(stages[-1]):
+        stages.append(next_stage(worn, stages[-1]))
+        write(worn, task.folder, stages)
     return wear_end(worn, stages)
 
 
