@@ -100,7 +100,7 @@ def find_runs(
     found: dict[str, xr.Dataset] = {}
     damaged = set()
     for key in paper_candidates(stored, studies, labels):
-        name = labels[str(stored.rows.words["physics_key"][stored.position(key)])]
+        name = labels[str(stored.rows.word("physics_key")[stored.position(key)])]
         try:
             run = stored.job(key)
         except DamagedFile as error:

@@ -40,7 +40,6 @@ from compressor.store.netcdf import (
     open_netcdf,
     read_attributes,
     read_bytes,
-    read_variable,
 )
 
 FOLDER, SUFFIX = "batches", ".h5"
@@ -204,7 +203,7 @@ def read_batch(path: Path) -> Batch:
         words = {name: read_bytes(file[name]) for name in WORDS}
         batch = Batch(
             path, read_bytes(file["job"]), words, file["samples"][()], file["end_time"][()],
-            tuple(read_variable(file, "metric")[1].tolist()), bool(file.attrs["compressed"]),
+            tuple(read_bytes(file["metric"]).astype(str).tolist()), bool(file.attrs["compressed"]),
         )  # fmt: skip
         shape = (len(batch), len(batch.labels))
         if {len(one) for one in (*words.values(), batch.samples, batch.ends)} != {len(batch)} or (

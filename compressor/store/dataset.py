@@ -159,7 +159,7 @@ def _outcomes(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr
     is_stored = positions >= 0
 
     def words(name: str, otherwise: str) -> np.ndarray:
-        return np.where(is_stored, _values_at(rows.words[name], positions), otherwise)
+        return np.where(is_stored, _values_at(rows.word(name), positions), otherwise)
 
     texts = {
         "key": (layout.keys, "a job's identity"),

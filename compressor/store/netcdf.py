@@ -105,10 +105,11 @@ def _create(file: Any, name: str, array: np.ndarray, dims: tuple[str, ...], gzip
         how = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
         how.set_layout(h5py.h5d.COMPACT)
         return file.create_dataset(name, data=array, dcpl=how, track_times=False)
-    chunks = (1, *array.shape[1:]) if dims[0] == "job" and array[0].nbytes > MAX_COMPACT else None
+    by_job = dims[:1] == ("job",) and array[0].nbytes > MAX_COMPACT
+    chunks = (1, *array.shape[1:]) if by_job else array.shape
     more: dict[str, Any] = {"compression": GZIP_LEVEL, "shuffle": True} if gzip else {}
     return file.create_dataset(
-        name, data=array, chunks=chunks or array.shape, fletcher32=True, track_times=False, **more
+        name, data=array, chunks=chunks, fletcher32=True, track_times=False, **more
     )
 
 

@@ -88,10 +88,9 @@ class Rows:
         places = np.minimum(np.searchsorted(self.keys, wanted), len(self) - 1)
         return np.where(self.keys[places] == wanted, places, -1)
 
-    @cached_property
-    def words(self) -> dict[str, np.ndarray]:
-        """Return the words of every job as text, (jobs,) each."""
-        return {name: np.char.decode(values, "utf-8") for name, values in self.bytes_of.items()}
+    def word(self, name: str) -> np.ndarray:
+        """Return a word of every job, of `batch.WORDS`, as text, (jobs,)."""
+        return self.bytes_of[name].astype(str)
 
     @cached_property
     def given(self) -> frozenset[str]:

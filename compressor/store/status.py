@@ -103,7 +103,7 @@ def run_caveats(rows: Rows, study: StoredStudy) -> list[str]:
     if not positions.size:
         return []
     numbers = rows.numbers(positions, ("settled_rev", "clipped_fraction"))
-    regimes = rows.words["regime"][positions]
+    regimes = rows.word("regime")[positions]
     settle = np.array(_settle_revs(study), float)[there]
     unrepeated = is_unrepeated(regimes, numbers["settled_rev"])
     late = is_late(regimes, numbers["settled_rev"], settle)
@@ -346,10 +346,10 @@ def standings(folder: Folder) -> list[StudyProgress]:
     for study in studies:
         positions = rows.find(study.keys)
         stored = positions[positions >= 0]
-        is_ok = rows.words["status"][stored] == "ok"
+        is_ok = rows.word("status")[stored] == "ok"
 
         def counts(word: str, which: np.ndarray) -> dict[str, int]:
-            return dict(Counter(rows.words[word][which].tolist()).most_common())
+            return dict(Counter(rows.word(word)[which].tolist()).most_common())
 
         done = stored[is_ok]
         ok, failed = int(is_ok.sum()), int((~is_ok).sum())
