@@ -23,10 +23,10 @@ from compressor.store.writer import Writer
 from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
-from compressor.metrics import NUMBERS
+from compressor.metrics import NUMBERS, SIZES
 from compressor.outcome import ROW, Outcome
 from compressor.solve.simulate import simulate
-from compressor.store.files import name_pending
+from compressor.store.batch import write_batch
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies, write_study
 from compressor.sweep.worker import JobResult
@@ -158,26 +158,29 @@ def refused(read, text, *overrides, **more):
     return str(caught.value).split("\n")
 
 
-def write_named(place, dataset, output):
-    """Write a job's file and give it its name, without a row; returns its path."""
-    file = write_series(place, dataset, output)
-    path = series_path(place, dataset.attrs["key"], file.digest)
-    name_pending([path])
-    return path
+def outcome_of(dataset):
+    """The outcome of a job's Dataset, whatever it holds."""
+    numbers = np.full(1, np.nan, ROW)[0]
+    for name in NUMBERS:
+        if name in dataset:
+            numbers[name] = dataset[name].values
+    texts = (str(dataset[name].values) for name in ("status", "reason"))
+    found = Outcome(*texts, numbers, dict(dataset.attrs))
+    if "time" not in dataset.dims:
+        return found
+    series = {
+        name: (item.dims, item.values, item.attrs)
+        for name, item in dataset.variables.items()
+        if item.dtype.kind == "f" and item.dims and name not in NUMBERS and name not in SIZES
+    }
+    return found.with_series(series, Case.from_attribute(dataset.attrs["case"]).output.precision)
 
 
 def keep(folder, *datasets):
     """Store jobs as they are, whatever they hold, as a sweep would."""
-    with Writer(folder) as writer:
-        for dataset in datasets:
-            numbers = np.full(1, np.nan, ROW)[0]
-            for name in NUMBERS:
-                if name in dataset:
-                    numbers[name] = dataset[name].values
-            output = Case.from_attribute(dataset.attrs["case"]).output
-            series = write_series(writer.place, dataset, output) if "time" in dataset.dims else None
-            texts = (str(dataset[name].values) for name in ("status", "reason"))
-            writer.add(Outcome(*texts, numbers, dict(dataset.attrs), series))
+    for dataset in datasets:
+        compress = Case.from_attribute(dataset.attrs["case"]).output.compress
+        write_batch(folder, [outcome_of(dataset)], compress)
 
 
 def store(folder, *paths, overrides=()):

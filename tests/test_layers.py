@@ -63,7 +63,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "pydantic": {"compressor.cases"},
     "joblib": {"compressor.sweep"},
     "distributed": {"compressor.sweep"},
-    "h5py": {"compressor.store.hdf5"},
+    "h5py": {"compressor.store.netcdf"},
     "jinja2": {"compressor.report.page"},
     "matplotlib": {"compressor.report.figures"},
     "contourpy": {"compressor.report.figures.contours"},

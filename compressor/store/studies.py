@@ -16,6 +16,7 @@ import os
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -253,7 +254,6 @@ def _unit(key: str) -> str:
     return (row.unit or "1") if row and row.kind in ("number", "integer") else ""
 
 
-MAX_LIKE = 5  # keys, or values of an axis, that are offered
 SAME_VALUE = 1e-9  # relative; the decimal fractions of a case file are not meant to the last bit
 
 
@@ -262,19 +262,16 @@ def find_study(
 ) -> StoredStudy:
     """Return the study of a name, or the only one; known: the folder's studies, if they were read.
 
-    Raises WrongName with the nearest names where there is none, or without a name several.
+    Raises WrongName with the nearest name where there is none, or without a name several.
     """
-    if known is None:
-        known = read_studies(folder)
-    studies = {one.name: one for one in known}
+    studies = {one.name: one for one in (read_studies(folder) if known is None else known)}
     if name is None and len(studies) == 1:
         return next(iter(studies.values()))
     if name is None:
         raise WrongName(folder, "holds several studies", f"name one: {list_few([*studies])}")
     if name not in studies:
         holds = f"it holds {list_few([*studies]) or 'none'}"
-        near = did_you_mean(name, studies) or holds
-        raise WrongName(folder, f"holds no study {name!r}", near)
+        raise WrongName(folder, f"holds no study {name!r}", did_you_mean(name, studies) or holds)
     return studies[name]
 
 
@@ -303,33 +300,31 @@ def whole_key(
     if matches:
         problem = f"{len(matches)} jobs' keys begin with {beginning!r}: {list_few(matches)}"
         raise WrongName(folder, problem, "give more of the key")
-    hint = did_you_mean(beginning, [study.name for study in studies])
     problem = f"no job's key begins with {beginning!r}, and no study is called so"
-    remedy = hint or "compsim status lists the studies, and a job is named by STUDY AXIS=VALUE, too"
-    raise WrongName(folder, problem, remedy)
+    remedy = "compsim status lists the studies, and a job is named by STUDY AXIS=VALUE, too"
+    hint = did_you_mean(beginning, [study.name for study in studies])
+    raise WrongName(folder, problem, hint or remedy)
 
 
 def _job_at(folder: Folder, study: StoredStudy, words: Sequence[str]) -> str:
     """Return the one job of a study at some values of its axes."""
     wanted = dict(find_value(folder, study, word) for word in words)
-    jobs = [
-        (key, point)
+    jobs = {
+        key: point
         for key, point in zip(study.keys, points(study), strict=True)
         if all(key in point and point[key] == value for key, value in wanted.items())
-    ]
-    matches = {key for key, _ in jobs}
-    if len(matches) == 1:
-        return matches.pop()
+    }
+    if len(jobs) == 1:
+        return next(iter(jobs))
     conditions = " and ".join(f"{key}={in_words(value)}" for key, value in wanted.items())
-    if not matches:
+    if not jobs:
         raise WrongName(folder, f"no job of {study.name} has {conditions}", _axes(study))
-    problem = (
-        f"{len(matches)} jobs of {study.name} have {conditions}"
-        if conditions
-        else (f"{study.name} is a study of {len(matches)} jobs")
-    )
-    left = _varied_axes([point for _, point in jobs])
-    more = "; ".join(f"{key}=… of {_some(values)}" for key, values in left.items())
+    problem = f"{len(jobs)} jobs of {study.name} have {conditions}"
+    if not conditions:
+        problem = f"{study.name} is a study of {len(jobs)} jobs"
+    values = {key: dict.fromkeys(point.get(key) for point in jobs.values()) for key in
+              dict.fromkeys(key for point in jobs.values() for key in point)}  # fmt: skip
+    more = "; ".join(f"{key}=… of {_some(some)}" for key, some in values.items() if len(some) > 1)
     raise WrongName(folder, problem, f"choose one by {more}" if more else "give a job's key")
 
 
@@ -341,11 +336,10 @@ def find_axis(folder: Folder, study: StoredStudy, name: str) -> StoredAxis:
         for axis in study.axes
         if name in (axis.key, short[axis.key]) or axis.key.endswith(f".{name}")
     ]
-    if len(found) != 1:
-        problem = f"has no axis {name!r}" if not found else f"has {len(found)} axes {name!r}"
-        near = did_you_mean(name, [*short, *short.values()])
-        raise WrongName(folder, f"{study.name} {problem}", near or _axes(study))
-    return found[0]
+    if len(found) == 1:
+        return found[0]
+    problem = f"{study.name} has {len(found) or 'no'} {'axes' if found else 'axis'} {name!r}"
+    raise WrongName(folder, problem, did_you_mean(name, [*short, *short.values()]) or _axes(study))
 
 
 def find_value(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]:
@@ -356,59 +350,33 @@ def find_value(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]
     axis = find_axis(folder, study, name)
     row = row_of(axis.key)
     text = row.choice_of(text) if row else text
-    for is_same in (lambda text, value: text == in_words(value), _is_close, _is_rounded):
-        same = [value for value in axis.values if is_same(text, value)]
-        if same and (len({*same}) == 1 or is_same is not _is_rounded):
-            return axis.key, same[0]
+    for is_same in (lambda value: text == in_words(value), partial(_is_close, text),
+                    lambda value: isinstance(value, float) and text == f"{value:g}"):  # fmt: skip
+        same = dict.fromkeys(filter(is_same, axis.values))
+        if len(same) == 1:
+            return axis.key, next(iter(same))
     problem = f"no job of {study.name} has {axis.key}={text}"
-    raise WrongName(folder, problem, f"there are {_some(axis.values, text)}")
+    raise WrongName(folder, problem, f"there are {_some(axis.values)}")
 
 
 def _is_close(text: str, value: Any) -> bool:
     """Return whether a text is the number of an axis, but for rounding."""
-    number = _number(text)
-    return (
-        not isinstance(value, str | tuple | bool | None)
-        and number is not None
-        and math.isclose(number, value, rel_tol=SAME_VALUE)
-    )
-
-
-def _is_rounded(text: str, value: Any) -> bool:
-    """Return whether a text is the number of an axis as captions round it."""
-    return not isinstance(value, str | tuple | bool | None) and text == f"{value:g}"
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    with contextlib.suppress(ValueError):
+        return math.isclose(float(text), value, rel_tol=SAME_VALUE)
+    return False
 
 
 def _axes(study: StoredStudy) -> str:
     """Return a hint at the axes of a study, by which one of its jobs is named."""
-    axes = [f"{axis.key}={in_words(axis.values[0])}" for axis in study.axes]
-    return (
-        f"its axes are {list_few([axis.key for axis in study.axes])}, as in {axes[0]}"
-        if axes
-        else ("it is one job: leave the values out")
-    )
+    if not study.axes:
+        return "it is one job: leave the values out"
+    first = f"{study.axes[0].key}={in_words(study.axes[0].values[0])}"
+    return f"its axes are {list_few([axis.key for axis in study.axes])}, as in {first}"
 
 
-def _varied_axes(jobs: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
-    """Return the axes in which jobs differ, and their values."""
-    keys = dict.fromkeys(key for point in jobs for key in point)
-    values = {key: [*dict.fromkeys(point.get(key) for point in jobs)] for key in keys}
-    return {key: found for key, found in values.items() if len(found) > 1}
-
-
-def _some(values: Sequence[Any], near: str = "") -> str:
-    """Return a few values of an axis, those next to a number where one is given."""
+def _some(values: Iterable[Any]) -> str:
+    """Return a few values of an axis."""
     found = [value for value in dict.fromkeys(values) if value is not None]
-    number = _number(near)
-    numeric = all(isinstance(value, int | float) for value in found)
-    if number is not None and numeric and len(found) > MAX_LIKE:
-        found = sorted(sorted(found, key=lambda value: abs(value - number))[:MAX_LIKE])
-        return f"{', '.join(map(setting, found))} next to it"
     return list_few([setting(one) if isinstance(one, float) else in_words(one) for one in found])
