@@ -17,8 +17,6 @@ one_thread_each()  # before numpy loads: as the commands do, so that sums are th
 import hypothesis
 import numpy as np
 import pytest
-from compressor.store.series_file import series_path, write_series
-from compressor.store.writer import Writer
 
 from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
