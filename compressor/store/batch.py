@@ -235,34 +235,43 @@ def read_series(path: Path, row: int, names: Sequence[str] | None = None) -> dic
         return _read_series(file, row, names)
 
 
+def _read_series(file: Any, row: int, names: Sequence[str] | None = None) -> dict[str, Variable]:
+    found = {}
+    for name in names_of(file) if names is None else names:
+        for values in _read_rows(file, name, [row]):
+            if values is not None:
+                data = file[name]
+                dims = [DIMENSIONS.get(dim, dim) for dim in dimensions_of(data)[1:]]
+                attrs = read_attributes(data)
+                attrs.pop("absent", None)
+                found[name] = Variable(tuple(dims), values, attrs)
+    return found
+
+
 def read_one_series(path: Path, name: str, rows: Sequence[int]) -> list[np.ndarray | None]:
     """Return one time series of some jobs of a batch, None where a job has none.
 
     Raises DamagedFile, and FileNotFoundError.
     """
     with open_netcdf(path) as file:
-        found = [_read_series(file, row, [name]) for row in rows]
-        return [one[name].values if name in one else None for one in found]
+        return _read_rows(file, name, rows) or [None] * len(rows)
 
 
-def _read_series(file: Any, row: int, names: Sequence[str] | None = None) -> dict[str, Variable]:
-    found = {}
-    for name in names_of(file) if names is None else names:
-        data = file.get(name)
-        if data is None or data.ndim < 2 or name in TABLES or "_Encoding" in data.attrs:
-            continue
-        attrs = read_attributes(data)
-        if row in attrs.pop("absent", ()):
-            continue
-        dims = [DIMENSIONS.get(dim, dim) for dim in dimensions_of(data)[1:]]
-        part = [
-            slice(None)
-            if dim in LABELS
-            else slice(int(file["samples" if dim == "time" else f"{dim}_count"][row]))
-            for dim in dims
-        ]
-        found[name] = Variable(tuple(dims), data[(row, *part)], attrs)
-    return found
+def _read_rows(file: Any, name: str, rows: Sequence[int]) -> list[np.ndarray | None]:
+    """Return a series of some jobs, cut to the length of each; [] of what is none."""
+    data = file.get(name)
+    if data is None or data.ndim < 2 or name in TABLES or "_Encoding" in data.attrs:
+        return []
+    absent = data.attrs.get("absent", ())
+    lengths = [
+        file["samples" if dim == "sample" else f"{DIMENSIONS.get(dim, dim)}_count"][()]
+        for dim in dimensions_of(data)[1:]
+        if dim not in LABELS
+    ]
+    return [
+        None if row in absent else data[(row, *(slice(int(some[row])) for some in lengths))]
+        for row in rows
+    ]
 
 
 def read_outcomes(batch: Batch) -> list[Outcome]:
