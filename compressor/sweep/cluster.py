@@ -6,21 +6,23 @@ the batch, which are stored here. A batch that fells its workers is tried job by
 
 import functools
 import logging
+import os
 import pickle
+import platform
 import re
 import time
-from collections.abc import Callable, Collection, Generator
+from collections.abc import Callable, Generator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from compressor.program import CompsimError
+from compressor.cases import MODEL_VERSION
+from compressor.program import COMPILED, VERSION, CompsimError, library_versions, sources_hash
 from compressor.reasons import Reason
 from compressor.store import encode_batch, publish_batch
-from compressor.sweep.pool import Batches, Input
+from compressor.sweep.pool import Batches, Job
 from compressor.sweep.sweep import run_job
-from compressor.sweep.versions import REMEDY, differences, versions
-from compressor.sweep.wanted import JobEnd
+from compressor.sweep.wanted import JobEnd, PendingJobs
 from compressor.sweep.warm_up import Needs, load
 from compressor.sweep.worker import End, JobLost, JobResult, attempt
 
@@ -39,14 +41,25 @@ class ClusterError(CompsimError):
     exit_code = 2
 
 
-class Unfit(Exception):
-    """A worker whose results would not be the same to the bit: why."""
+@functools.cache
+def versions() -> dict[str, str]:
+    """Return what decides the bits of a result: the programs here, and their versions."""
+    return {
+        "compsim": VERSION, "model": MODEL_VERSION, "COMPSIM_JIT": os.getenv("COMPSIM_JIT", "1"),
+        "sources of compsim": sources_hash(COMPILED.parent), "machine": platform.machine(),
+        "Python": platform.python_version(), "C library": " ".join(platform.libc_ver()),
+    } | library_versions("numpy", "scipy", "numba", "llvmlite")  # fmt: skip
 
 
-def run_cases(ours: dict[str, str], needs: Needs, cases: bytes) -> tuple[list[End], bytes]:
-    """Return how pickled cases ended, and their encoded batch, on a worker. Raises Unfit."""
-    if different := differences(ours, versions()):
-        raise Unfit(different)
+def run_cases(ours: dict[str, str], needs: Needs, cases: bytes) -> str | tuple[list[End], bytes]:
+    """Return how pickled cases ended, and their encoded batch, on a worker of the cluster.
+
+    Return where its versions are others, if they are.
+    """
+    theirs = versions()
+    if theirs != ours:
+        names = [name for name in ours if ours[name] != theirs[name]]
+        return ", ".join(f"{name} {theirs[name]} in place of {ours[name]}" for name in names)
     load_once(needs)
     ends = [attempt(run_job, case) for case in pickle.loads(cases)]
     ran = [end.result for end in ends if isinstance(end, JobResult)]
@@ -63,8 +76,7 @@ load_once = functools.cache(load)  # in each process of the cluster, so that no 
 class Cluster:
     """A dask cluster as a `compressor.sweep.sweep.Backend`; a context manager.
 
-    Raises ClusterError where there is no scheduler, where it is lost, and where a worker has other
-    versions.
+    Raises ClusterError where there is no scheduler, or it is lost, or a worker's programs differ.
     """
 
     def __init__(self, address: str):
@@ -92,56 +104,55 @@ class Cluster:
         self.client.close(timeout=2)
 
     def __call__(
-        self, folder: Path, jobs: Collection[Input], remark: Callable[[str], None]
+        self, folder: Path, jobs: PendingJobs, remark: Callable[[str], None]
     ) -> Generator[End, None, None]:
         """Yield how each job ended; `compressor.sweep.sweep.Backend` says the rest."""
         from distributed import KilledWorker, as_completed
 
-        needs, batches = Needs.of(case for _, case, _ in jobs), Batches(jobs, TARGET_SECONDS, 1)
-        out: dict[Any, list[Any]] = {}
-        suspects: list[Any] = []  # jobs of batches that have felled their workers
+        needs, batches = Needs.of(jobs.cases()), Batches(jobs, TARGET_SECONDS, 1)
+        out: dict[Any, list[Job]] = {}  # batches on their way, by dask's future
+        suspects: list[Job] = []  # of batches that have felled their workers
         ready = as_completed(loop=self.client.loop)
         remark(STARTING if self.count_threads() else WAITING)
+
+        def next_batch() -> list[Job]:
+            if (batch := batches.next()) or out or not suspects:
+                return batch
+            return [suspects.pop()._replace(again=True)]  # alone on the cluster
+
         try:
             while True:
                 batches.width = max(1, self.count_threads())
-                while len(out) < BATCHES_AHEAD * batches.width and (batch := batches.next()):
-                    self.submit(out, ready, needs, batch)
-                if alone := not out:
-                    if not suspects:
-                        return
-                    self.submit(out, ready, needs, [suspects.pop()])
+                while len(out) < BATCHES_AHEAD * batches.width and (batch := next_batch()):
+                    cases = pickle.dumps([job.payload for job in batch])
+                    future = self.client.submit(run_cases, versions(), needs, cases, pure=False)
+                    out[future] = batch
+                    ready.add(future)
+                if not out:
+                    return
                 future = next(ready)
                 batch, error = out.pop(future), future.exception()
                 if not isinstance(error, KilledWorker):
                     yield from self.take(folder, batch, future, batches)
-                elif alone:
-                    how = f"{error.allowed_failures + 1} workers of the cluster died that had it"
-                    yield JobLost(batch[0].id, Reason.WORKER_DIED, f"{how} alone")
+                elif batch[0].again:
+                    how = f"{error.allowed_failures + 1} workers of the cluster that had it alone"
+                    yield JobLost(batch[0].id, Reason.WORKER_DIED, f"it felled {how}")
                 else:
                     suspects += batch
         finally:
             self.client.cancel([*out])
 
-    def submit(self, out: dict[Any, list[Any]], ready: Any, needs: Needs, batch: list[Any]) -> None:
-        """Send a batch to the cluster."""
-        cases = pickle.dumps([job.payload for job in batch])
-        future = self.client.submit(run_cases, versions(), needs, cases, pure=False)
-        out[future] = batch
-        ready.add(future)
-
     def take(
-        self, folder: Path, batch: list[Any], future: Any, batches: Batches
+        self, folder: Path, batch: list[Job], future: Any, batches: Batches
     ) -> Generator[End, None, None]:
         """Store a batch that has ended, and yield how its jobs did. Raises ClusterError."""
         error = future.exception()
         if future.cancelled() or self.client.status != "running":
             raise self.lost() from error
-        if isinstance(error, Unfit):
-            raise ClusterError(f"a worker of the cluster {error}") from error
-        if isinstance(error, ImportError | AttributeError):
-            text = f"a worker of the cluster has no compsim, or an old one ({error}); {REMEDY}"
-            raise ClusterError(text) from error
+        problem = f"no compsim, or an old one ({error})" if error else future.result()
+        if isinstance(problem, str):
+            remedy = "have the same programs on all machines, then start its workers again"
+            raise ClusterError(f"a worker of the cluster has {problem}; {remedy}") from error
         ends, data = future.result()
         if data:
             publish_batch(folder, data)

@@ -17,7 +17,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Generator, Hashable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from multiprocessing import Pipe
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,27 +27,18 @@ from joblib import Parallel, cpu_count, delayed
 from compressor.program import THREAD_VARIABLES, CompsimError
 from compressor.reasons import Reason
 from compressor.store import StoreError
-from compressor.sweep.worker import (
-    ENDING,
-    End,
-    JobLost,
-    NotReady,
-    Setup,
-    describe_error,
-)
+from compressor.sweep.worker import ENDING, End, JobLost, Store, Workers, describe_error
 
 Input = tuple[Hashable, Any, float]  # id, payload, wall time that the job may take (s)
 
 TICK = 0.1  # s between two looks at a worker that is silent
 MAX_BATCH = 200  # jobs, whose places fit in a byte
 MAX_JOBS_IN_MEAN = 50  # jobs that a mean of their seconds rests on
-# s that a worker may take to begin (what it prepares may have to be compiled), and to store
-MAX_SILENCE = 600.0
-MAX_FRUITLESS = 10  # times in a row that workers may die before any job begins
-FAILED_ALONE = "also when it ran again alone"
+MAX_SILENCE = 600.0  # s in which a worker begins (compiling, maybe), or stores a batch
+MAX_FRUITLESS = 10  # workers in a row that may die before any job begins
 MEMORY_SHARE = 0.75  # of the machine's memory, for all workers together
 MEMORY_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
-START = (  # a worker's program
+START = (  # a worker's program, which has our path and not our main module
     "import sys; from multiprocessing.connection import Connection; "
     "pipe = Connection(int(sys.argv[1])); sys.path[:] = pipe.recv(); "
     "from compressor.sweep.worker import serve; serve(pipe, int(sys.argv[2]))"
@@ -64,22 +55,6 @@ class UnsupportedSystem(CompsimError):
     exit_code = 2
 
 
-@dataclass(frozen=True)
-class Workers:
-    """Worker processes: how many, and the rules for them.
-
-    `prepare` is called once in each, before its clocks and limits are set. `memory`: bytes that a
-    job may add (by default `memory_share`). `grace`: s beyond its time in which a job may end by
-    itself. `target_seconds`: s that a batch of jobs takes.
-    """
-
-    count: int = 2
-    prepare: Callable[[], object] = int
-    memory: int | None = None
-    grace: float = 1.0
-    target_seconds: float = 0.2
-
-
 class Job(NamedTuple):
     """A job that is not finished; one that is tried again runs alone, in a new process."""
 
@@ -91,31 +66,25 @@ class Job(NamedTuple):
 
 def require_posix() -> None:
     """Raise UnsupportedSystem where workers lack limits: on Windows."""
-    try:
-        import resource  # noqa: F401
-    except ImportError as error:
-        problem = f"{platform.system()} has no {error.name}, which a run needs"
+    if os.name != "posix":
         remedy = "run it under Linux, macOS or WSL, and open the folder of results here"
-        raise UnsupportedSystem(f"{problem}: {remedy}") from error
+        raise UnsupportedSystem(f"no jobs run under {platform.system()}: {remedy}")
 
 
 def run_batches(
-    work: Callable[[Any], Any],
-    jobs: Iterable[Input],
-    workers: Workers,
-    store: Callable[[list[Any]], list[Any]] | None = None,
+    work: Callable[[Any], Any], jobs: Iterable[Input], workers: Workers, store: Store | None = None
 ) -> Generator[End, None, None]:
     """Yield how each job ended, for whose payload a worker process has called `work`.
 
     jobs: read as workers need them; where they have a length, batches shrink towards the end.
     store: called with the results of a batch in the worker; returns what is sent home for each.
-    What both are must be found by name in another process. What `work` raises makes its job a
+    Both functions must be found by name in another process. What `work` raises makes its job a
     JobLost, but a StoreError ends the call. Closing the iterator kills the workers. Raises
     StoreError, WorkersFailed, and what `jobs` raises.
     """
     pool = Pool(work, jobs, workers, store)
     ends: Iterator[list[End]] = iter(())
-    with Parallel(pool.width, backend="threading", return_as="generator_unordered") as parallel:
+    with Parallel(pool.batches.width, "threading", "generator_unordered") as parallel:
         try:
             while pool.batches.waiting or not pool.batches.drained:  # given back by the last, too
                 ends = parallel(delayed(pool.do)(batch) for batch in iter(pool.next_batch, []))
@@ -124,8 +93,7 @@ def run_batches(
         finally:
             pool.stop()
             with contextlib.suppress(Exception):  # others that had come, too
-                for _ in ends:  # of which joblib would warn
-                    pass
+                deque(ends, 0)  # joblib would warn of what is not taken
 
 
 class Batches:
@@ -147,17 +115,14 @@ class Batches:
         if self.left:
             size = min(size, self.left / (2 * self.width))
         count = min(max(1, math.ceil(size)), MAX_BATCH)
-        batch = self.waiting.popleft() if self.waiting else self.issue(count)
+        if not self.waiting:
+            new = [Job(*job) for job in itertools.islice(self.source, count)]
+            self.left, self.drained = max(self.left - len(new), 0), len(new) < count
+            return new
+        batch = self.waiting.popleft()
         if batch[count:]:
             self.waiting.appendleft(batch[count:])
         return batch[:count]
-
-    def issue(self, count: int) -> list[Job]:
-        """Return so many jobs of the source, or those that are left."""
-        batch = [Job(*job) for job in itertools.islice(self.source, count)]
-        self.left = max(self.left - len(batch), 0)
-        self.drained = len(batch) < count
-        return batch
 
     def learn(self, seconds: float) -> None:
         """Learn that a job has taken so long."""
@@ -173,18 +138,16 @@ class Pool:
         work: Callable[[Any], Any],
         jobs: Iterable[Input],
         rules: Workers,
-        store: Callable[[list[Any]], list[Any]] | None = None,
+        store: Store | None = None,
     ):
-        self.width = min(rules.count, operator.length_hint(jobs, 0) or rules.count)
-        self.batches = Batches(jobs, rules.target_seconds, self.width)
-        self.grace = rules.grace
-        memory = rules.memory or memory_share(self.width)
-        setup = Setup(work, store, rules.prepare, memory, rules.target_seconds, os.getpid())
-        self.setup = pickle.dumps(tuple(setup))
+        width = min(rules.count, operator.length_hint(jobs, 0) or rules.count)
+        rules = replace(rules, memory=rules.memory or memory_share(width))
+        self.batches, self.grace = Batches(jobs, rules.target_seconds, width), rules.grace
+        self.setup = pickle.dumps((os.getpid(), work, store, rules))
         self.fruitless = 0  # workers in a row that have died before any job began
         self.lock, self.stopped = threading.Lock(), False
         self.workers: set[Worker] = set()
-        self.own = threading.local()  # .worker: this thread's, if it has one
+        self.own = threading.local()  # .worker: this thread's
 
     def next_batch(self) -> list[Job]:
         """Return the next batch, [] where none is left or no more are to be run."""
@@ -195,36 +158,30 @@ class Pool:
 
         Raises StoreError, and WorkersFailed.
         """
-        try:
-            answer = self.worker(batch[0].again).ask(batch, self.grace)
-        except WorkerDied as died:
+        if batch[0].again:
             self.retire()
-            return [] if self.stopped else self.lose(batch, died)
-        except CancelledStart:
-            return []
-        if isinstance(answer, StoreError):
-            raise answer
-        if isinstance(answer, NotReady):
-            raise WorkersFailed(f"jobs could not even begin: {answer.problem}")
-        self.fruitless = 0
-        if batch[len(answer) :]:
-            self.batches.waiting.appendleft(batch[len(answer) :])
-        return [self.settle(job, end) for job, end in zip(batch, answer, strict=False)]
-
-    def worker(self, new: bool) -> "Worker":
-        """Return this thread's worker, a new one if asked for. Raises WorkersFailed."""
-        if new:
-            self.retire()
-        if not getattr(self.own, "worker", None):
-            with self.lock:
-                if self.stopped:
-                    raise CancelledStart
+        with self.lock:
+            if self.stopped:
+                return []
+            if not getattr(self.own, "worker", None):
                 try:
                     self.own.worker = Worker(self.setup)
                 except OSError as error:
                     raise WorkersFailed(f"no worker process can be started: {error}") from error
                 self.workers.add(self.own.worker)
-        return self.own.worker
+        try:
+            answer = self.own.worker.ask(batch, self.grace)
+        except WorkerDied as died:
+            self.retire()
+            return [] if self.stopped else self.lose(batch, died)
+        if isinstance(answer, StoreError):
+            raise answer
+        if isinstance(answer, str):
+            raise WorkersFailed(f"jobs could not even begin: {answer}")
+        self.fruitless = 0
+        if rest := batch[len(answer) :]:
+            self.batches.waiting.appendleft(rest)
+        return [self.settle(job, end) for job, end in zip(batch, answer, strict=False)]
 
     def retire(self) -> None:
         """End this thread's worker, if it has one."""
@@ -249,25 +206,26 @@ class Pool:
         A job that was at work when its worker died is tried again alone, since an outsider may have
         killed it. Raises WorkersFailed.
         """
+        waiting, half = self.batches.waiting, len(batch) // 2
         if died.place is None:
             self.fruitless += 1
             if self.fruitless > MAX_FRUITLESS:
                 raise WorkersFailed(f"jobs could not even begin: {died.how}")
-            self.batches.waiting.append(batch)
+            waiting.append(batch)
             return []
         if died.place == len(batch) > 1:  # amid storing: the half with the cause will show
-            self.batches.waiting.extend([batch[: len(batch) // 2], batch[len(batch) // 2 :]])
+            waiting.extend([batch[:half], batch[half:]])
             return []
         job = batch.pop(min(died.place, len(batch) - 1))
         if batch:
-            self.batches.waiting.appendleft(batch)
+            waiting.appendleft(batch)
         if died.late:
             text = f"more than {job.timeout:g} s of wall time; its worker was killed"
             return [JobLost(job.id, Reason.BUDGET_SECONDS, text)]
         if job.again:
-            text = f"its worker ended by {died.how}, {FAILED_ALONE}"
+            text = f"its worker ended by {died.how}, also when it ran again alone"
             return [JobLost(job.id, Reason.WORKER_DIED, text)]
-        self.batches.waiting.append([job._replace(again=True)])
+        waiting.append([job._replace(again=True)])
         return []
 
     def stop(self) -> None:
@@ -276,10 +234,6 @@ class Pool:
             self.stopped = True
         for worker in [*self.workers]:
             worker.end()
-
-
-class CancelledStart(Exception):
-    """No worker is started any more."""
 
 
 class WorkerDied(Exception):
@@ -300,9 +254,9 @@ class Worker:
         self.pipe, theirs = Pipe()
         self.begun, begins = Pipe(duplex=False)  # for the places of jobs that begin: bytes
         os.set_blocking(self.begun.fileno(), False)
+        numbers = theirs.fileno(), begins.fileno()
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in it, too, until it settles
         try:
-            numbers = theirs.fileno(), begins.fileno()
             self.process = subprocess.Popen(
                 [sys.executable, "-c", START, *map(str, numbers)], pass_fds=numbers,
                 stdin=subprocess.DEVNULL, env=os.environ | dict.fromkeys(THREAD_VARIABLES, "1"),
@@ -318,28 +272,26 @@ class Worker:
     def ask(self, batch: list[Job], grace: float) -> Any:
         """Return a worker's answer to a batch. Raises WorkerDied."""
         self.read_begun()  # of the batch before
-        place, left, late = None, MAX_SILENCE, False
-        try:
+        place, left = None, MAX_SILENCE
+        with contextlib.suppress(EOFError, OSError):
             self.pipe.send([job.payload for job in batch])
             while not self.pipe.poll(TICK):
                 if news := self.read_begun():
                     place = news[-1]
-                    at_work = place < len(batch)
-                    left = batch[place].timeout + grace if at_work else MAX_SILENCE
+                    left = batch[place].timeout + grace if place < len(batch) else MAX_SILENCE
                 # ticks are counted, since time goes on while all are stopped, as by Ctrl-Z
                 left -= TICK
-                late = left < 0
-                if late or (self.process.poll() is not None and not self.pipe.poll()):
+                if left < 0 or (self.process.poll() is not None and not self.pipe.poll()):
                     break
             else:
                 return self.pipe.recv()
-        except (EOFError, OSError):
-            pass
-        self.process.kill()
-        how = describe_ending(self.process.wait())
-        if news := self.read_begun():
-            place, late = news[-1], False
-        raise WorkerDied(place, how, late and place != len(batch))
+        self.end()
+        news = self.read_begun()
+        place = news[-1] if news else place
+        raise WorkerDied(
+            place, describe_ending(self.process.returncode),
+            left < 0 and not news and place != len(batch),
+        )  # fmt: skip
 
     def read_begun(self) -> bytes:
         """Return the places of jobs that have begun since the last look."""
@@ -356,11 +308,9 @@ class Worker:
 
 def describe_ending(code: int) -> str:
     """Return how a process ended, from its exit code (less the signal's number)."""
-    if code >= 0:
-        return f"exit code {code}"
     if code == -signal.SIGKILL:
         return "SIGKILL: out of memory, or killed from outside"
-    return signal.Signals(-code).name
+    return f"exit code {code}" if code >= 0 else signal.Signals(-code).name
 
 
 def cores() -> int:

@@ -5,8 +5,8 @@ ended. A run that fails, breaks, or takes its worker with it, is a result with a
 """
 
 import time
-from collections.abc import Callable, Collection, Generator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from compressor.store import Folder, merge_batches, read_store, write_batch, wri
 from compressor.sweep.pool import Input, Workers, require_posix, run_batches
 from compressor.sweep.wanted import JobEnd, PendingJobs, RequestedJobs, stored_ends
 from compressor.sweep.warm_up import Needs, compile_once, load
-from compressor.sweep.worker import End, JobLost, JobResult, attempt, describe_error
+from compressor.sweep.worker import End, JobResult, Store, attempt, describe_error, store_results
 
 MANY_JOBS = 100_000  # jobs whose cases take a while to be made
 GRACE = 5.0  # s beyond its time in which a job may end by itself, before its worker is killed
@@ -29,7 +29,7 @@ REPORT_SECONDS = 0.1  # s between two reports of progress, or more
 # and yields how each job ended, with a JobEnd as its result; but lost ones are stored by the sweep.
 # The last argument is called with what takes time.
 Backend = Callable[
-    [Path, Collection[Input], Callable[[str], None]], Generator[End, None, None]
+    [Path, PendingJobs, Callable[[str], None]], Generator[End, None, None]
 ]  # fmt: skip
 
 
@@ -190,39 +190,34 @@ def store_outcomes(folder: Path, ran: Sequence[Ran]) -> list[JobEnd]:
 
 
 def run_locally(
-    workers: int, folder: Path, jobs: Collection[Input], remark: Callable[[str], None]
+    workers: int, folder: Path, jobs: PendingJobs, remark: Callable[[str], None]
 ) -> Generator[End, None, None]:
     """Run jobs in the worker processes of this machine: a Backend, but for its first argument."""
-    needs = Needs.of(case for _, case, _ in jobs)
-    return run_here(run_job, jobs, needs, workers, remark, partial(store_outcomes, folder))
+    store = partial(store_outcomes, folder)
+    return run_here(run_job, jobs, Needs.of(jobs.cases()), workers, remark, store)
 
 
 def in_this_process(
-    folder: Path, jobs: Collection[Input], remark: Callable[[str], None]
+    folder: Path, jobs: PendingJobs, remark: Callable[[str], None]
 ) -> Generator[End, None, None]:
-    """Yield how jobs end in this process, one after the other; the backend for a few short ones.
+    """Yield how jobs end that have run in this process; the backend for a few short ones.
 
     Starting workers takes longer than they do. A job that ends its process ends the sweep; one that
     raises an exception is lost, as in a worker.
     """
-    compile_once(Needs.of(case for _, case, _ in jobs), remark)
-    ran = [(key, attempt(run_job, case)) for key, case, _ in jobs]
-    results = [end.result for _, end in ran if isinstance(end, JobResult)]
-    kept = iter(store_outcomes(folder, results) if results else [])
-    for key, end in ran:
-        if isinstance(end, JobLost):
-            yield JobLost(key, end.reason, end.detail, end.traceback)
-        else:
-            yield JobResult(key, next(kept), end.seconds)
+    compile_once(Needs.of(jobs.cases()), remark)
+    ran = [attempt(run_job, case) for case in jobs.cases()]
+    ends = store_results(partial(store_outcomes, folder), ran)
+    yield from (replace(end, id=key) for key, end in zip(jobs.keys, ends, strict=True))
 
 
 def run_here(
     work: Callable[[Any], Any],
-    jobs: Collection[Input],
+    jobs: PendingJobs | Sequence[Input],
     needs: Needs,
     workers: int,
     remark: Callable[[str], None],
-    store: Callable[[list[Any]], list[Any]] | None = None,
+    store: Store | None = None,
 ) -> Generator[End, None, None]:
     """Return the generator of how jobs end in processes here, which load the equations first.
 

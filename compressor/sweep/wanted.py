@@ -1,6 +1,6 @@
 """The jobs that studies want, each once, and how those stored ended."""
 
-from collections.abc import Collection, Container, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Container, Hashable, Iterable, Iterator, Mapping, Sequence, Sized
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -72,10 +72,10 @@ class RequestedJobs(Mapping[str, Case]):
             yield self[keys[0]], keys
 
 
-class PendingJobs(Collection[Input]):
-    """Some requested jobs as workers take them; cases are built one by one: many take much memory.
+class PendingJobs(Sized, Iterable[Input]):
+    """Some requested jobs as workers take them: a job's id is its key, its payload the case.
 
-    A job's id is its key, its payload the case.
+    Cases are built one by one, since many take much memory.
     """
 
     def __init__(self, wanted: RequestedJobs, keys: Sequence[str]):
@@ -84,13 +84,12 @@ class PendingJobs(Collection[Input]):
     def __len__(self) -> int:
         return len(self.keys)
 
-    def __contains__(self, job: object) -> bool:
-        return any(job == one for one in self)
-
     def __iter__(self) -> Iterator[Input]:
-        for key in self.keys:
-            case = self.wanted[key]
-            yield key, case, case.solve.timeout_s
+        return ((case.key, case, case.solve.timeout_s) for case in self.cases())
+
+    def cases(self) -> Iterator[Case]:
+        """Yield the cases of the jobs."""
+        return (self.wanted[key] for key in self.keys)
 
 
 def serving_both(first: Case, second: Case) -> Case:

@@ -12,7 +12,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
-from typing import Any, NamedTuple
+from typing import Any
 
 from compressor.reasons import Reason
 from compressor.store import StoreError
@@ -23,6 +23,8 @@ ENDING = [signal.SIGINT, signal.SIGTERM]
 if hasattr(signal, "SIGHUP"):  # not on Windows
     ENDING.append(signal.SIGHUP)
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
+
+Store = Callable[[list[Any]], list[Any]]  # of results; returns what is sent home for each
 
 
 @dataclass(frozen=True)
@@ -51,47 +53,47 @@ class JobLost:
 End = JobResult | JobLost
 
 
-class Setup(NamedTuple):
-    """What a worker is told before its first batch."""
+@dataclass(frozen=True)
+class Workers:
+    """Worker processes: how many, and the rules for them.
 
-    work: Callable[[Any], Any]  # of a job's payload
-    store: Callable[[list[Any]], list[Any]] | None  # of a batch's results; returns what to send
-    prepare: Callable[[], object]  # called once, before limits are set
-    memory: int  # bytes that a job may add
-    target_seconds: float  # of a batch
-    parent: int  # process
+    `prepare` is called once in each, before its clocks and limits are set. `memory`: bytes that a
+    job may add (by default `memory_share`). `grace`: s beyond its time in which a job may end by
+    itself. `target_seconds`: of a batch.
+    """
 
-
-class NotReady(NamedTuple):
-    """The answer of a worker that cannot begin: why."""
-
-    problem: str
+    count: int = 2
+    prepare: Callable[[], object] = int
+    memory: int = 0
+    grace: float = 1.0
+    target_seconds: float = 0.5
 
 
 def serve(pipe: Connection, begun: int) -> None:
     """Run the batches that come through a pipe, until it is closed.
 
     The place of each job goes to the file `begun` before it runs, and the number of all when they
-    have run: a byte each. An answer is the list of ends, all but a rest that is given back,
-    StoreError or NotReady.
+    have run: a byte each. An answer is a list of ends, without the rest that is given back;
+    StoreError; or a text of what keeps this process from any job.
     """
     settle()
     try:
-        setup = Setup(*pipe.recv())
-        if os.getppid() != setup.parent:  # it died before `settle`
+        parent, work, store, rules = pipe.recv()
+        if os.getppid() != parent:  # it died before `settle`
             return
         gc.disable()  # until it is prepared: what is loaded is no garbage, and much to look at
-        setup.prepare()
+        rules.prepare()
         gc.freeze()  # what is there stays: looking at it took a thirtieth of short jobs' time
         gc.enable()
-        limit(setup.memory)
+        limit(rules.memory)
     except BaseException as error:
-        pipe.send(NotReady(describe_error(error)[0]))
+        pipe.send(describe_error(error)[0])
         return
     with contextlib.suppress(EOFError):
         while True:
+            payloads = pipe.recv()
             try:
-                answer: Any = do_batch(setup, pipe.recv(), begun)
+                answer: Any = do_batch(work, store, rules, payloads, begun)
             except StoreError as error:
                 answer = error
             pipe.send(answer)
@@ -129,19 +131,24 @@ def limit(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (wanted, most))
 
 
-def do_batch(setup: Setup, payloads: Sequence[Any], begun: int) -> list[End]:
+def do_batch(
+    work: Callable[[Any], Any],
+    store: Store | None,
+    rules: Workers,
+    payloads: Sequence[Any],
+    begun: int,
+) -> list[End]:
     """Run jobs and store their results; return how they ended, results pickled."""
-    most = f"the {setup.memory / 1e9:.3g} GB that a worker may add"
+    most = f"the {rules.memory / 1e9:.3g} GB that a worker may add"
     ends: list[End] = []
     began = time.monotonic()
     for place, payload in enumerate(payloads):
         os.write(begun, bytes([place]))
-        ends.append(attempt(setup.work, payload, most))
-        if time.monotonic() - began > MAX_OVERRUN * setup.target_seconds:
+        ends.append(attempt(work, payload, most))
+        if time.monotonic() - began > MAX_OVERRUN * rules.target_seconds:
             break
     os.write(begun, bytes([len(payloads)]))
-    if setup.store:
-        ends = store_results(setup.store, ends, most)
+    ends = store_results(store, ends, most) if store else ends
     return [pack(end, most) for end in ends]
 
 
@@ -161,9 +168,7 @@ def attempt(work: Callable[[Any], Any], payload: Any, most: str = "there is") ->
         return JobLost(None, Reason.INTERNAL_ERROR, *describe_error(error))
 
 
-def store_results(
-    store: Callable[[list[Any]], list[Any]], ends: Sequence[End], most: str
-) -> list[End]:
+def store_results(store: Store, ends: Sequence[End], most: str = "there is") -> list[End]:
     """Store the results of a batch in one go, one by one where that fails; return what is sent.
 
     Raises StoreError.
