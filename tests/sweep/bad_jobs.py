@@ -1,13 +1,13 @@
-"""Jobs that do harm, by name: what each does, why it is lost, and part of what is said of it.
-
-A module of its own, since worker processes import it.
-"""
+"""What workers do in tests, good and bad: a module of its own, since worker processes import it."""
 
 import math
 import os
 import signal
 import sys
 import time
+from pathlib import Path
+
+from compressor.store import StoreError
 
 LEAST = 400_000_000  # bytes that a job may add
 SECONDS = {"hang": 1.0, "stop": 1.0}  # that a job may take; others end by themselves
@@ -51,6 +51,7 @@ def stop():
     os.kill(os.getpid(), signal.SIGSTOP)
 
 
+# by name: what a job does, why it is lost, and part of what is said of it
 POISON = {
     "crash": (lambda: os.kill(os.getpid(), signal.SIGSEGV), "worker_died", "SIGSEGV"),
     "killed": (lambda: os.kill(os.getpid(), signal.SIGKILL), "worker_died", "out of memory, or"),
@@ -71,19 +72,6 @@ def work(payload):
     return POISON[payload][0]() if payload in POISON else payload
 
 
-class Many:
-    """Jobs that are listed nowhere, of which there may be a million."""
-
-    def __init__(self, jobs):
-        self.jobs = jobs
-
-    def __iter__(self):
-        return iter(self.jobs)
-
-    def __length_hint__(self):
-        return 10**6
-
-
 def named(payloads):
     """Payloads as jobs of their own names."""
     return [(payload, payload, SECONDS.get(payload, math.inf)) for payload in payloads]
@@ -93,3 +81,80 @@ def sleep(payload):
     """Sleep for so long (s)."""
     time.sleep(payload)
     return payload
+
+
+def pid_after(seconds):
+    """Sleep; return the worker's process."""
+    time.sleep(seconds)
+    return os.getpid()
+
+
+def look(name):
+    """What a worker finds: an environment variable, or what its files are."""
+    if name != "files":
+        return os.environ.get(name)
+    return [os.path.realpath(f"/dev/fd/{number}") for number in os.listdir("/dev/fd")]
+
+
+def note(folder, name, text="x"):
+    """Append to a file of a folder; return what it has then."""
+    with open(Path(folder, str(name)), "a") as file:
+        file.write(text)
+    return Path(folder, str(name)).read_text()
+
+
+def prepare(folder, seconds):
+    """Take a while to begin."""
+    time.sleep(seconds)
+    note(folder, os.getpid())
+
+
+def is_prepared(folder, _):
+    return Path(folder, str(os.getpid())).exists()
+
+
+def refuse():
+    raise MemoryError("no room for machine code")
+
+
+def leave(code):
+    os._exit(code)
+
+
+def crash_once(folder, at, payload):
+    """Crash at the first try of a job, and count how often each has run."""
+    if payload == at and note(folder, payload) == "x":
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if payload != at:
+        note(folder, payload)
+    time.sleep(0.01)
+    return payload
+
+
+def die_amid(pid, payload):
+    """Interrupt the parent, amid a long job."""
+    if payload == 50:
+        os.kill(pid, signal.SIGINT)
+        time.sleep(60)
+    time.sleep(0.002)
+    return payload
+
+
+def store(folder, results):
+    """Store a batch of results in one file; return what it is called, for each."""
+    name = f"{os.getpid()}-{time.monotonic_ns()}"
+    if "unstorable" in results:
+        raise MemoryError
+    if "deadly" in results:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if "full" in results:
+        raise StoreError(folder, "No space left on device", "free some")
+    for result in results:
+        note(folder, name, f"{result}\n")
+    return [name] * len(results)
+
+
+def announced(payload):
+    """Say which process this is, then do what the payload's name says."""
+    os.write(2, f"{os.getpid()}\n".encode())
+    return work(payload)

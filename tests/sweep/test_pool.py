@@ -1,0 +1,344 @@
+"""Worker processes: a bad job costs itself only, and no process outlives its parent."""
+
+import fcntl
+import itertools
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from functools import partial
+from pathlib import Path
+
+import bad_jobs
+import pytest
+from bad_jobs import LEAST, POISON, named, sleep, work
+
+from compressor.store import StoreError
+from compressor.sweep import pool
+from compressor.sweep.pool import Batches, WorkersFailed, run_batches
+from compressor.sweep.worker import MAX_TEXT, JobLost, JobResult, Workers
+
+RULES = {"memory": LEAST, "grace": 0.3}
+
+
+def results(ends):
+    return {end.id: end.result for end in ends if isinstance(end, JobResult)}
+
+
+def lost(ends):
+    return {end.id: end for end in ends if isinstance(end, JobLost)}
+
+
+def is_running(pid):
+    """Whether a process is there and is no zombie."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False
+    return stat.rpartition(")")[2].split()[0] != "Z"
+
+
+def children():
+    """Our own child processes, zombies too."""
+    tasks = Path("/proc/self/task").glob("*/children")
+    return {int(pid) for path in tasks for pid in path.read_text().split()}
+
+
+@pytest.fixture(autouse=True)
+def no_child_is_left():
+    before = children()
+    yield
+    assert children() <= before
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_said(capfd):
+    """No message of ours, of joblib or of a dying worker."""
+    yield
+    assert capfd.readouterr() == ("", "")
+
+
+def wait_for(condition, seconds=60.0):
+    deadline = time.monotonic() + seconds
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert condition()
+
+
+# ---- good jobs ----------------------------------------------------------------------------------
+
+
+def test_no_more_processes_start_than_there_are_jobs(monkeypatch):
+    started = []
+    start = pool.Worker.__init__
+    monkeypatch.setattr(pool.Worker, "__init__", lambda *a: (started.append(1), start(*a))[1])
+    assert results(run_batches(work, named(range(2)), Workers(12))) == {0: 0, 1: 1}
+    assert list(run_batches(work, [], Workers())) == []
+    assert len(started) <= 2
+
+
+def test_batches_take_their_time_and_are_small_at_first_and_towards_the_end():
+    batches = Batches([(n, n, 9.0) for n in range(100)], 0.5, 2)
+    assert len(batches.next()) == 1  # nothing is known
+    batches.learn(0.05)
+    sizes = []
+    while batch := batches.next():
+        sizes.append(len(batch))
+    assert sizes[0] == 10
+    assert sizes[-1] == 1
+    assert sizes == sorted(sizes, reverse=True)
+    assert sum(sizes) == 99
+
+
+def test_jobs_are_read_as_they_are_needed():
+    issued = itertools.count()
+    ends = run_batches(sleep, ((n, 0.01, 9.0) for n in issued), Workers(target_seconds=0.05))
+    list(itertools.islice(ends, 20))
+    assert next(issued) < 200
+    ends.close()
+
+
+def test_a_long_batch_gives_its_rest_back():
+    """Twenty short jobs promise a long batch, which meets jobs that take forty times as long."""
+    seconds = [0.005] * 40 + [0.2] * 20
+    jobs = [(n, t, 9.0) for n, t in enumerate(seconds)]
+    ends = results(run_batches(bad_jobs.pid_after, jobs, Workers(target_seconds=0.05)))
+    assert len({ends[n] for n in range(40, 60)}) == 2
+
+
+def test_a_worker_has_none_of_our_files(tmp_path):
+    """A lock that we hold would else outlive us in a worker; what it prints is no data."""
+    with open(tmp_path / "lock", "w") as lock:
+        os.set_inheritable(lock.fileno(), True)
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        (files,) = results(run_batches(bad_jobs.look, named(["files"]), Workers(1))).values()
+    assert not [name for name in files if "lock" in name]
+    assert files[0] == os.devnull
+    assert files[1] == files[2]
+
+
+def test_numeric_libraries_have_one_thread_in_a_worker(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "8")
+    names = ["OMP_NUM_THREADS", "NUMBA_NUM_THREADS"]
+    assert [*results(run_batches(bad_jobs.look, named(names), Workers(1))).values()] == ["1", "1"]
+
+
+def test_what_is_prepared_is_not_timed(tmp_path):
+    jobs = [(n, n, 0.5) for n in range(4)]
+    rules = Workers(2, partial(bad_jobs.prepare, tmp_path, 1.5), grace=0.2)
+    ends = list(run_batches(partial(bad_jobs.is_prepared, tmp_path), jobs, rules))
+    assert results(ends) == dict.fromkeys(range(4), True)
+
+
+def test_two_calls_at_once_do_not_mix():
+    first = run_batches(sleep, named([0.01 + n / 1e6 for n in range(40)]), Workers(1))
+    ends = [next(first)]
+    second = []
+    thread = threading.Thread(
+        target=lambda: second.extend(run_batches(work, named(range(5)), Workers(2)))
+    )
+    thread.start()
+    ends += first
+    thread.join()
+    assert len(results(ends)) == 40
+    assert results(second) == {n: n for n in range(5)}
+
+
+# ---- poison -------------------------------------------------------------------------------------
+
+
+DEADLY = ("killed", "hang", "crash", "leave", "stop", "bomb")
+RAISING = tuple(name for name, (_, reason, _) in POISON.items() if reason == "internal_error")
+
+
+@pytest.mark.parametrize(
+    ("names", "workers"), [(DEADLY[:2], 1), (DEADLY[2:], 2), (RAISING, 2)]
+)  # one worker: joblib works in the calling thread
+def test_a_poison_job_costs_itself_only(names, workers):
+    first, *others = names
+    jobs = named([*range(60), first, *range(60, 90), *others, *range(90, 120)])
+    ends = list(run_batches(work, jobs, Workers(workers, **RULES)))
+    assert len(ends) == 120 + len(names)
+    assert results(ends) == {n: n for n in range(120)}
+    assert {*lost(ends)} == {*names}
+    for name, end in lost(ends).items():
+        assert end.reason == POISON[name][1]
+        assert POISON[name][2] in end.detail
+        assert (end.reason == "internal_error") == ("Traceback" in end.traceback)
+        assert len(end.traceback) <= MAX_TEXT
+        assert (end.reason == "worker_died") == ("also when it ran again alone" in end.detail)
+
+
+def test_a_job_may_succeed_when_it_is_tried_again(tmp_path):
+    """An outsider may have killed its worker; of the other batches no job runs twice."""
+    crash_once = partial(bad_jobs.crash_once, tmp_path, 100)
+    ends = list(run_batches(crash_once, named(range(200)), Workers(2, target_seconds=0.1)))
+    assert results(ends) == {n: n for n in range(200)}
+    runs = {n: len((tmp_path / str(n)).read_text()) for n in range(200)}
+    assert runs[100] == 2
+    again = [n for n, count in runs.items() if count > 1]
+    assert max(runs.values()) == 2
+    assert 100 - min(again) <= 20  # those of its batch before it
+
+
+def test_a_worker_s_time_stands_still_with_ours():
+    """All are stopped, as by Ctrl-Z, for longer than the job may take."""
+    code = (
+        "import bad_jobs; from compressor.sweep.pool import run_batches, Workers\n"
+        "jobs = [(n, 1.0, 1.5) for n in range(2)]\n"
+        "for end in run_batches(bad_jobs.sleep, jobs, Workers(2, grace=0.5)): print(end)"
+    )
+    folder = Path(__file__).parent
+    running = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, start_new_session=True,
+        env=os.environ | {"PYTHONPATH": f"{folder}"},
+    )  # fmt: skip
+    time.sleep(2.5)
+    os.killpg(running.pid, signal.SIGSTOP)
+    time.sleep(4.0)
+    os.killpg(running.pid, signal.SIGCONT)
+    said, _ = running.communicate(timeout=60)
+    assert said.count("JobResult") == 2
+
+
+@pytest.mark.parametrize(
+    ("prepare", "why"),
+    [(partial(bad_jobs.leave, 7), "exit code 7"),
+     (bad_jobs.refuse, "MemoryError: no room for machine code")],
+)  # fmt: skip
+def test_workers_that_cannot_begin_end_the_call_and_say_why(prepare, why, monkeypatch):
+    monkeypatch.setattr(pool, "MAX_FRUITLESS", 2)
+    with pytest.raises(WorkersFailed, match=f"jobs could not even begin: {why}"):
+        list(run_batches(work, named(range(100)), Workers(2, prepare)))
+
+
+def test_no_room_for_workers_ends_the_call(monkeypatch):
+    def refuse(*arguments, **options):
+        raise BlockingIOError("no more processes")
+
+    monkeypatch.setattr(subprocess, "Popen", refuse)
+    with pytest.raises(WorkersFailed, match="no worker process can be started: no more processes"):
+        list(run_batches(work, named(range(100)), Workers()))
+
+
+# ---- storing ------------------------------------------------------------------------------------
+
+
+def stored(folder, payloads, **more):
+    jobs = [(n, one, math.inf) for n, one in enumerate(payloads)]
+    rules = Workers(1, **RULES, **more)
+    return list(run_batches(work, jobs, rules, partial(bad_jobs.store, folder)))
+
+
+def test_a_batch_is_stored_once_by_its_worker(tmp_path):
+    """What jobs crash of it runs again, and is stored once."""
+    found = results(stored(tmp_path, [*range(100), "crash", *range(100, 200)]))
+    lines = [line for path in tmp_path.iterdir() for line in path.read_text().split()]
+    assert sorted(map(int, lines)) == [*range(200)]
+    assert {*found.values()} == {path.name for path in tmp_path.iterdir()}
+    assert len({*found.values()}) < 50
+
+
+@pytest.mark.parametrize(
+    ("bad", "reason"), [("unstorable", "out_of_memory"), ("deadly", "worker_died")]
+)
+def test_a_job_that_cannot_be_stored_costs_itself_only(bad, reason, tmp_path):
+    ends = stored(tmp_path, [*range(40), bad, *range(40, 80)])
+    assert len(results(ends)) == 80
+    assert [end.reason for end in lost(ends).values()] == [reason]
+
+
+def test_a_disk_that_is_full_ends_the_call(tmp_path):
+    with pytest.raises(StoreError, match="No space left on device"):
+        stored(tmp_path, [*range(100), "full", *range(100)])
+
+
+# ---- ends ---------------------------------------------------------------------------------------
+
+
+def test_closing_ends_the_workers():
+    ends = run_batches(work, named([1, "hang", "stop"]), Workers(3, grace=60))
+    assert next(ends).id == 1
+    assert len(children()) >= 2
+    began = time.monotonic()
+    ends.close()
+    assert time.monotonic() - began < 5
+    assert list(ends) == []
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_results_that_came_before_an_interruption_are_kept(workers):
+    ends = []
+    interrupting = partial(bad_jobs.die_amid, os.getpid())
+    rules = Workers(workers, target_seconds=0.01)
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        ends.extend(run_batches(interrupting, named(range(100)), rules))
+    assert time.monotonic() - began < 30
+    assert results(ends).keys() >= set(range(30))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_what_the_jobs_raise_comes_through(workers):
+    def jobs():
+        yield from named(range(30))
+        raise LookupError("no more")
+
+    with pytest.raises(LookupError, match="no more"):
+        list(run_batches(work, jobs(), Workers(workers)))
+
+
+PARENT = """
+import bad_jobs, signal, sys
+from compressor.sweep.pool import run_batches
+from compressor.sweep.worker import Workers
+
+signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+jobs = [(name, name, 1e9) for name in ("hang", "stop")]
+list(run_batches(bad_jobs.announced, jobs, Workers(2)))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_no_process_outlives_its_parent(number):
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
+    parent = subprocess.Popen(
+        [sys.executable, "-c", PARENT], stderr=subprocess.PIPE, text=True, start_new_session=True,
+        env=environment,
+    )  # fmt: skip
+    pids = [int(parent.stderr.readline()) for _ in range(2)]
+    assert all(map(is_running, pids))
+    parent.send_signal(number)
+    parent.wait(60)
+    wait_for(lambda: not any(map(is_running, pids)))
+    assert parent.stderr.read() == ""  # until the last process of all has ended
+    parent.stderr.close()
+
+
+UNGUARDED = """
+import bad_jobs
+from compressor.sweep.pool import run_batches, Workers
+print(sorted(end.result for end in run_batches(bad_jobs.work, bad_jobs.named([1, 2]), Workers(2))))
+"""
+
+
+def test_a_script_needs_no_guard(tmp_path):
+    """Workers do not run the caller's main module."""
+    (tmp_path / "script.py").write_text(UNGUARDED)
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
+    words = [sys.executable, tmp_path / "script.py"]
+    assert subprocess.check_output(words, text=True, env=environment) == "[1, 2]\n"
+
+
+# ---- settings -----------------------------------------------------------------------------------
+
+
+def test_memory_is_shared_among_workers(monkeypatch, tmp_path):
+    (tmp_path / "most").write_text("8000000000\n")
+    monkeypatch.setattr(pool, "MEMORY_LIMITS", [tmp_path / "none", tmp_path / "most"])
+    assert pool.memory_share(2) == 3_000_000_000
+    (tmp_path / "most").write_text("max\n")
+    assert pool.memory_share(1) > pool.memory_share(4) > 0
