@@ -15,7 +15,14 @@ from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
 from compressor.program import Progress, ignore_warnings, no_progress
 from compressor.reasons import Reason
-from compressor.store import Folder, merge_batches, read_store, write_batch, write_study
+from compressor.store import (
+    Folder,
+    merge_batches,
+    read_store,
+    set_aside,
+    write_batch,
+    write_study,
+)
 from compressor.sweep.pool import Input, Workers, require_posix, run_batches
 from compressor.sweep.wanted import JobEnd, PendingJobs, RequestedJobs, stored_ends
 from compressor.sweep.warm_up import Needs, compile_once, load
@@ -114,7 +121,14 @@ def sweep(
     if missing:
         for damage in stored.damaged:
             progress(len(ends), len(wanted), f"{damage}: its jobs count as missing")
+            set_aside(Path(damage.path))
         run_missing(folder, PendingJobs(wanted, missing), ends, workers, progress, options)
+        if broken := [path for path, whole in stored.checked.items() if not whole]:
+            rows = read_store(folder).rows
+            counting = {rows.batches[n].path for n in rows.source}
+            for path in broken:
+                if path not in counting:  # all of its jobs have run again
+                    set_aside(path)
         merge_batches(folder)
     counts, failed = endings(studies, ends)
     return Summary(

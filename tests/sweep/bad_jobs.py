@@ -158,3 +158,17 @@ def announced(payload):
     """Say which process this is, then do what the payload's name says."""
     os.write(2, f"{os.getpid()}\n".encode())
     return work(payload)
+
+
+def harmful(case):
+    """Run a case, but for three that do harm: in place of `run_job`."""
+    from compressor.sweep.sweep import run_job
+
+    match case.load, case.machine.rod_mass_kg:
+        case "none", 4:
+            return {}["the bug"]
+        case "none", 5:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        case "spring", 4:
+            bytearray(10**15)
+    return run_job(case)

@@ -3,11 +3,10 @@
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 
-import compressor.store.writer
+import bad_jobs
 import numpy as np
 import pytest
 
@@ -108,30 +107,21 @@ def test_where_studies_share_a_job_the_greater_demand_counts(studies):
     assert case.output.keep == "series"
 
 
-def flipped(data):
-    return data[:-9] + bytes([data[-9] ^ 1]) + data[-8:]
-
-
-@pytest.mark.parametrize("damage", [lambda _: b"", flipped])
-@pytest.mark.parametrize("kind", ["jobs", "rows", "studies"])
+@pytest.mark.parametrize("damage", [lambda _: b"", lambda data: data[:-9], lambda data: data[:999]])
+@pytest.mark.parametrize("kind", ["batches", "studies"])
 def test_damage_is_mended_by_the_same_run(kind, damage, studies, tmp_path, in_process):
     made = studies(one={"load": ["none", "spring"]})
     sweep(made, tmp_path / "out", 1)
-    keys = {case.key for case in made[0].cases}
-    victims = sorted((tmp_path / "out" / kind).glob("*"))
-    victims[0].write_bytes(damage(victims[0].read_bytes()))
+    victim = min((tmp_path / "out" / kind).glob("*"))
+    victim.write_bytes(damage(victim.read_bytes()))
     found = verify(tmp_path / "out")
-    assert [item.path for item in found] == [victims[0]]
-    assert (
-        len(found[0].keys) == {"jobs": 1, "rows": len(keys) - len(victims) + 1, "studies": 0}[kind]
-    )
-    assert keys.issuperset(found[0].keys)
+    assert [item.path for item in found] == [victim]
     told = []
     summary = sweep(made, tmp_path / "out", 1, lambda *event: told.append(event[2]))
-    assert summary.run_now == len(found[0].keys)
+    assert summary.run_now == (1 if kind == "batches" else 0)
     assert verify(tmp_path / "out") == []
     assert statuses(tmp_path / "out", made[0]) == ["ok", "ok"]
-    assert any(str(victims[0]) in remark for remark in told) == (kind == "rows")
+    assert any(str(victim) in remark for remark in told) == (kind == "batches")
 
 
 def test_shards_are_one_study_together(studies, tmp_path, in_process):
@@ -145,8 +135,6 @@ def test_shards_are_one_study_together(studies, tmp_path, in_process):
     assert sweep(made, tmp_path / "out", 1).run_now == 0
     whole = {key for study in made for key in study.keys}
     assert store.read_store(tmp_path / "out").keys() == whole
-    shards = {path.name for path in (tmp_path / "out" / "shards").iterdir()}
-    assert shards == {"1-of-3", "2-of-3", "3-of-3"}
     assert verify(tmp_path / "out") == []
 
 
@@ -158,14 +146,15 @@ def test_series_that_were_rounded_do_not_serve_for_exact_ones(studies, tmp_path,
     assert sweep(single, tmp_path / "out", 1).run_now == 0
     exact = store.read_job(tmp_path / "out", single[0].cases[0].key)
     assert exact.acceleration.dtype == "f8"
-    assert len(list(tmp_path.glob("out/jobs/*"))) == 1
 
 
 def test_damaged_series_are_mended_as_exact_as_they_were(studies, tmp_path, in_process):
     sweep(studies(one={}), tmp_path / "out", 1)
     for rough in ({"keep": "metrics"}, {"precision": "single"}):
-        (path,) = tmp_path.glob("out/jobs/*")
-        path.write_bytes(b"")
+        path = max(tmp_path.glob("out/batches/*.h5"))
+        data = path.read_bytes()
+        middle = len(data) // 2  # amid the series
+        path.write_bytes(data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :])
         made = studies(one={"output": rough})
         assert sweep(made, tmp_path / "out", 1).run_now == 1
         assert sweep(made, tmp_path / "out", 1).run_now == 0
@@ -174,44 +163,21 @@ def test_damaged_series_are_mended_as_exact_as_they_were(studies, tmp_path, in_p
         assert verify(tmp_path / "out") == []
 
 
-def test_a_run_that_keeps_less_takes_no_series_away(studies, tmp_path, monkeypatch, in_process):
-    """A shard keeps the time series of a job that another run, which ends later, runs without."""
-    monkeypatch.setattr(compressor.store.writer, "MAX_AGE", 0)
-    shared = studies(all={"machine": {"rod_mass_kg": 6}})
-    masses = {"machine": {"rod_mass_kg": [3, 4, 5, 6]}}
-    fewer = studies(few={**masses, "output": {"keep": "metrics"}})
-    inside = []
-
-    def meanwhile(done, total, remark):
-        if not inside:
-            inside.append(sweep(shared, tmp_path / "out", 1, options=Options(part=(1, 1))))
-
-    sweep(fewer, tmp_path / "out", 1, meanwhile)
-    assert inside[0].run_now == 1
-    assert sweep(shared, tmp_path / "out", 1).run_now == 0
-
-
-HARM = {  # by load and rod mass: what the job does, its reason, its detail
-    ("none", 4): (lambda: {}["the bug"], "internal_error", "KeyError: 'the bug'"),
-    ("none", 5): (lambda: os.kill(os.getpid(), signal.SIGSEGV), "worker_died", ".*SIGSEGV.*"),
-    ("spring", 4): (lambda: bytearray(10**15), "out_of_memory", "needs more .* ran again alone"),
+HARM = {  # by load and rod mass: the reason, the detail
+    ("none", 4): ("internal_error", "KeyError: 'the bug'"),
+    ("none", 5): ("worker_died", ".*SIGSEGV.*ran again alone"),
+    ("spring", 4): ("out_of_memory", "needs more .*"),
 }
 
 
 def test_jobs_that_do_harm_are_failed_jobs(studies, tmp_path, monkeypatch):
     """Each in its place, an exception with its traceback; none is tried again."""
-
-    def harmful(place, case, real=SWEEP.run_job):
-        if harm := HARM.get((case.load, case.machine.rod_mass_kg)):
-            harm[0]()
-        return real(place, case)
-
-    monkeypatch.setattr(SWEEP, "run_job", harmful)
+    monkeypatch.setattr(SWEEP, "run_job", bad_jobs.harmful)
     made = studies(one={"load": ["none", "spring"], "machine": {"rod_mass_kg": [4, 5]}})
     summary = sweep(made, tmp_path / "out", 1)
     assert statuses(tmp_path / "out", made[0]) == ["failed"] * 3 + ["ok"]
     assert [tuple(failure.coordinates.values()) for failure in summary.failed] == [*HARM]
-    for failure, (_, reason, detail) in zip(summary.failed, HARM.values(), strict=True):
+    for failure, (reason, detail) in zip(summary.failed, HARM.values(), strict=True):
         assert failure.reason == reason
         assert re.fullmatch(detail, failure.detail)
         job = store.read_job(tmp_path / "out", failure.key)
@@ -220,7 +186,7 @@ def test_jobs_that_do_harm_are_failed_jobs(studies, tmp_path, monkeypatch):
         assert Case.from_attribute(job.attrs["case"]).key == failure.key
     assert sweep(made, tmp_path / "out", 1).run_now == 0
     found = store.open_study(tmp_path / "out")
-    reasons = [reason for _, reason, _ in HARM.values()]
+    reasons = [reason for reason, _ in HARM.values()]
     assert found.reason.values.ravel().tolist() == [*reasons, ""]
     assert np.isnan(found.peak_acceleration).values.ravel().tolist() == [True] * 3 + [False]
 
@@ -232,71 +198,60 @@ def test_a_job_that_ran_out_of_time_is_tried_again(studies, tmp_path, in_process
         assert summary.failed[0].reason == "budget_seconds"
 
 
-def test_compiling_is_told_once_for_each_version(studies, tmp_path, monkeypatch, in_process):
-    monkeypatch.setattr(warm_up, "SECONDS_TO_REMARK", 0)
+@pytest.fixture
+def uncompiled(tmp_path, monkeypatch):
+    """A machine that has compiled nothing: the needs that were loaded since."""
+    loaded = []
+    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path / "code")
+    monkeypatch.setattr(warm_up, "load", loaded.append)
+    return loaded
+
+
+def test_one_line_tells_of_compiling_and_for_how_long(studies, tmp_path, uncompiled, in_process):
     told = []
-    for name in ("one", "one", "two"):
-        monkeypatch.setattr(warm_up, "machine_code_folder", lambda name=name: tmp_path / name)
-        monkeypatch.setattr(warm_up, "slowness", lambda: 1.0)
-        sweep(studies(one={}), tmp_path / "out" / str(len(told)), 1, lambda *e: told.append(e[2]))
-    remarks = [remark for remark in told if remark]
-    assert (
-        remarks[0::2]
-        == [
-            "compiling the equations, part 1 of 1: dry joints, about 26 s; each part once for each "
-            "version of the program, and a stop loses nothing"
-        ]
-        * 2
-    )
-    assert all(re.fullmatch(r"compiled in \d+ s", remark) for remark in remarks[1::2])
+    for folder in ("one", "two"):
+        sweep(studies(one=BOTH), tmp_path / folder, 1, lambda *event: told.append(event[2]))
+    (remark,) = filter(None, told)
+    assert remark.startswith("compiling the equations, for about 26 s, or longer on a slow")
 
 
-def test_each_part_is_compiled_by_itself_and_named(tmp_path, monkeypatch):
+def test_each_part_is_compiled_by_itself(uncompiled, monkeypatch):
     """What was finished before a stop is not compiled again."""
-    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
-    monkeypatch.setattr(warm_up, "slowness", lambda: 1.0)
-    needs = warm_up.Needs(("auto", "Radau"), plain=True, laws=True)
-    ahead = ["Radau", "auto", "laws"]
-    assert sorted(needs.parts) == ahead
-    assert warm_up.compile_seconds(needs) == 26 + 1 + 28
-    loaded, told = [], []
+    needs, told = warm_up.Needs(("auto", "Radau"), plain=True, laws=True), []
 
     def load(alone):
-        if alone.laws and len(loaded) == 2:
+        uncompiled.append(alone)
+        if alone.laws and len(uncompiled) == 3:
             raise KeyboardInterrupt
-        loaded.append(alone)
 
     monkeypatch.setattr(warm_up, "load", load)
-    monkeypatch.setattr(
-        warm_up, "load_with_remark", lambda a, words, say: (load(a), told.append(words))
-    )
     with pytest.raises(KeyboardInterrupt):
-        warm_up.compile_once(needs, pytest.fail)
-    assert list(needs.uncompiled) == ["laws"]
-    assert warm_up.compile_seconds(needs) == 28
-    loaded.clear()
-    warm_up.compile_once(needs, pytest.fail)
-    assert loaded == [needs.parts[part] for part in ("laws",)]
-    assert "part 2 of 3: solve.method Radau, about 1 s" in told[1]
-    assert "part 1 of 1: oil, cards and other laws, about 28 s" in told[2]
+        warm_up.compile_once(needs, told.append)
+    assert [*needs.uncompiled] == ["laws"]
+    warm_up.compile_once(needs, told.append)
+    assert [alone.laws for alone in uncompiled] == [False, False, True, True]
+    assert [re.search(r"\d+ s", text)[0] for text in told] == ["55 s", "28 s"]
     assert not needs.uncompiled
-    assert warm_up.compile_seconds(needs) == 0
 
 
-def test_only_what_cases_need_is_compiled():
+def test_a_switch_against_compiling_is_told(uncompiled, monkeypatch):
+    told = []
+    warm_up.compile_once(warm_up.Needs(("auto",), plain=True), str)
+    for value in ("0", "1"):
+        monkeypatch.setenv("NUMBA_DISABLE_JIT", value)
+        warm_up.compile_once(warm_up.Needs(("auto",), plain=True), told.append)
+    (text,) = told
+    assert text.startswith("NUMBA_DISABLE_JIT is set: nothing is compiled")
+
+
+def test_only_what_cases_need_is_compiled(uncompiled):
     """A machine with oil in its joints needs no equations of dry ones."""
     oiled = {"joint": "both", "clearance_mm": 0.1, "lubricant": True}
     for values, parts in (
         ({"joint": "both", "clearance_mm": 0.1}, {"auto"}), (oiled, {"laws"}),
         (oiled | {"guide": True}, {"features"}),
     ):  # fmt: skip
-        assert {*warm_up.Needs.of([Case.from_values(values)]).parts} == parts
-
-
-def test_every_part_that_can_be_needed_has_words():
-    for kinds in ({"laws": True}, {"features": True}):
-        needs = warm_up.Needs(("auto",), plain=True, **kinds)
-        assert {*needs.parts} <= {*warm_up.WHAT}
+        assert {*warm_up.Needs.of([Case.from_values(values)]).uncompiled} == parts
 
 
 STOPPED = """
@@ -354,27 +309,24 @@ def test_laws_are_an_axis_of_a_sweep(studies, tmp_path, in_process):
     assert np.unique(peaks.values).size == 3
 
 
-def test_a_copied_folder_compiles_again(tmp_path, monkeypatch):
+def test_a_copied_folder_compiles_again(tmp_path, monkeypatch, uncompiled):
     """Numba keeps machine code by path: the mark that came with a copy made each worker compile."""
-    loaded = []
-    monkeypatch.setattr(warm_up, "load", loaded.append)
-    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
     for place in ("here", "here", "copy", "copy", "here"):
         monkeypatch.setattr(warm_up, "COMPILED", tmp_path / place)
         warm_up.compile_once(warm_up.Needs(("auto",), plain=True), lambda remark: None)
-    assert len(loaded) == 2
+    assert len(uncompiled) == 2
 
 
 def test_a_job_that_cannot_be_stored_ends_the_sweep(studies, tmp_path, in_process):
     (tmp_path / "out").mkdir()
-    (tmp_path / "out/jobs").symlink_to("nowhere")
-    with pytest.raises(store.StoreError, match=r"out/jobs: is a link that leads nowhere"):
+    (tmp_path / "out/batches").symlink_to("nowhere")
+    with pytest.raises(store.StoreError, match=r"out/batches: is a link that leads nowhere"):
         sweep(studies(one={"load": ["none", "spring"]}), tmp_path / "out", 2)
 
 
 def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):
     (tmp_path / "out").mkdir()
-    (tmp_path / "out/rows").write_text("in the way")
+    (tmp_path / "out/batches").write_text("in the way")
     with pytest.raises(store.StoreError, match="Not a directory; choose another folder"):
         sweep(studies(one={}), tmp_path / "out", 1, lambda *event: pytest.fail("began to run"))
 
@@ -391,19 +343,19 @@ def test_progress_counts_every_job_once(studies, tmp_path, in_process):
 
 def test_an_interrupted_sweep_keeps_its_jobs_and_goes_on(studies, tmp_path):
     def stop(done, total, remark):
-        if done == 1:
+        if done:
             raise KeyboardInterrupt
 
-    made = studies(one={**BOTH, "machine": {"rod_mass_kg": [4, 5, 6, 7]}})
+    made = studies(one={**BOTH, "machine": {"rod_mass_kg": {"linspace": [4, 7, 30]}}})
     with pytest.raises(KeyboardInterrupt):
         sweep(made, tmp_path / "out", 1, stop)
-    finished = store.read_store(tmp_path / "out").keys()
-    kept = {name: at for name, at in stamps(tmp_path / "out").items() if name[:20] in finished}
-    done = len(finished)
-    assert 0 < done < 4
+    keys = store.read_store(tmp_path / "out").keys()
+    before = {key: store.read_job(tmp_path / "out", key).seconds.item() for key in keys}
+    assert 0 < len(before) < 30
     summary = sweep(made, tmp_path / "out", 1)
-    assert (summary.done_before, summary.run_now) == (done, 4 - done)
-    assert kept.items() <= stamps(tmp_path / "out").items()
+    assert (summary.done_before, summary.run_now) == (len(before), 30 - len(before))
+    for key, seconds in before.items():  # none has run again
+        assert store.read_job(tmp_path / "out", key).seconds.item() == seconds
 
 
 def test_a_relative_folder_is_the_one_of_the_start(studies, tmp_path, monkeypatch):
