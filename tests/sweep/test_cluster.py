@@ -1,44 +1,34 @@
 """A dask cluster does as one machine does, whatever becomes of its workers."""
 
 import contextlib
-import itertools
 import json
 import os
-import pickle
 import signal
-import socket
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
+import bad_jobs
 import distributed
 import numpy as np
 import pytest
-from bad_jobs import Many, named
-from bad_jobs import work as poisoned
 from compsim.cli import main
-from test_execution import is_running, lost, results, wait_for
 
-from compressor.cases.case import MODEL_VERSION
 from compressor.cases.load import load_studies
 from compressor.store import reader as store
 from compressor.store.files import StoreError
 from compressor.store.status import verify
 from compressor.sweep import cluster
-from compressor.sweep.cluster import Cluster, Remote
+from compressor.sweep.cluster import Cluster, ClusterError
 from compressor.sweep.sweep import Options, sweep
-from compressor.sweep.versions import ClusterError, differences, versions
-from compressor.sweep.worker import JobResult, Workers
 
-MEMORY = "800MB"  # of a worker, of which a job may add three quarters
 TIMES = ("seconds",)  # what two runs of a job may differ in
 
 
 @pytest.fixture(scope="module")
 def living():
-    """Gives a cluster of two worker processes on this machine.
+    """Gives a cluster of two worker processes on this machine, with our path.
 
     It is a new one where dask has not replaced a worker that a test has killed.
     """
@@ -50,30 +40,24 @@ def living():
                 made[-1].wait_for_workers(2, timeout=15)
                 return made[-1]
             made.pop().close()
+        os.environ["PYTHONPATH"] = os.pathsep.join(sys.path)
         made.append(
             distributed.LocalCluster(
-                n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0",
-                memory_limit=MEMORY,
+                n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
             )
-        )  # fmt: skip
+        )
         made[-1].wait_for_workers(2, timeout=60)
         return made[-1]
 
     yield cluster_of_two
     for one in made:
         one.close()
+    os.environ.pop("PYTHONPATH", None)
 
 
 @pytest.fixture
 def dask(living):
-    """A cluster of two worker processes on this machine."""
     return living()
-
-
-@pytest.fixture
-def client(dask):
-    with Cluster(dask.scheduler_address) as made:
-        yield made.client
 
 
 @pytest.fixture(scope="module")
@@ -98,20 +82,15 @@ def locally(studies, tmp_path_factory):
     return store.read_store(folder)
 
 
-def assert_same(folder, expected):
-    """Two stores hold the same jobs and bits, timings apart; no file of another is there."""
+def assert_same(folder, expected, but=()):
+    """Two stores hold the same jobs and bits, timings and some jobs apart, and no more files."""
     found = store.read_store(folder)
     assert found.keys() == expected.keys()
-    for key in expected.keys():  # noqa: SIM118
-        ours, theirs = (s.outcome(s.position(key)) for s in (found, expected))
-        assert (ours.status, ours.reason) == (theirs.status, theirs.reason)
-        for name in set(ours.numbers.dtype.names) - {*TIMES}:
-            assert ours.numbers[name].tobytes() == theirs.numbers[name].tobytes(), name
-        if expected.rows.path(expected.position(key)):
-            one, other = found.job(key), expected.job(key)
-            assert set(one.variables) == set(other.variables)
-            for name in set(one.variables) - {*TIMES}:
-                np.testing.assert_array_equal(one[name].values, other[name].values)
+    for key in expected.keys() - set(but):
+        one, other = found.job(key), expected.job(key)
+        assert set(one.variables) == set(other.variables)
+        for name in set(one.variables) - {*TIMES}:
+            np.testing.assert_array_equal(one[name].values, other[name].values)
     assert verify(folder) == []
     assert not list(Path(folder).glob("**/.*"))
 
@@ -120,8 +99,7 @@ def watched(backend, after, act):
     """A backend that calls act() when so many jobs have ended."""
 
     def run(*arguments):
-        ends = backend(*arguments)
-        for number, end in enumerate(ends, 1):
+        for number, end in enumerate(backend(*arguments), 1):
             if number == after:
                 act()
             yield end
@@ -129,11 +107,7 @@ def watched(backend, after, act):
     return run
 
 
-# ---- sweeps -------------------------------------------------------------------------------------
-
-
-def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "store_series", lambda *_: pytest.fail("the folder is shared"))
+def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path):
     victim = dask.workers[0].process.pid
     with Cluster(dask.scheduler_address) as backend:
         killing = watched(backend, 8, lambda: os.kill(victim, signal.SIGKILL))
@@ -144,38 +118,24 @@ def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path,
         os.kill(victim, 0)
 
 
-def test_without_a_shared_folder_results_travel(dask, studies, locally, tmp_path, monkeypatch):
-    @contextlib.contextmanager
-    def elsewhere(place):
-        yield tmp_path / "of another machine" / "token", "text"
-
-    stored = []
-
-    def noted(*arguments, real=cluster.store_series):
-        stored.append(arguments)
-        return real(*arguments)
-
-    monkeypatch.setattr(cluster, "visible", elsewhere)
-    monkeypatch.setattr(cluster, "store_series", noted)
+def test_a_job_that_fells_its_workers_is_lost_alone(dask, studies, locally, tmp_path, monkeypatch):
+    monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
+    monkeypatch.setattr(cluster, "run_job", bad_jobs.felling)
+    monkeypatch.setattr(cluster, "run_cases", bad_jobs.run_felling_cases)
     with Cluster(dask.scheduler_address) as backend:
-        sweep(studies, tmp_path / "out", options=Options(backend=backend))
-    assert len(stored) == 10
-    assert_same(tmp_path / "out", locally)
-
-
-def test_a_folder_is_shared_if_our_file_is_seen(tmp_path):
-    with cluster.visible(tmp_path) as (token, text):
-        assert cluster.sees(token, text)
-        assert not cluster.sees(token, "of another run")
-    assert not cluster.sees(token, text)
+        summary = sweep(studies, tmp_path / "out", options=Options(backend=backend))
+    (lost,) = summary.failed
+    assert lost.coordinates["clearance_mm"] == pytest.approx(0.2017, abs=0.001)
+    assert lost.reason == "worker_died"
+    assert lost.detail == "it felled 1 workers of the cluster that had it alone"
+    assert_same(tmp_path / "out", locally, but={lost.key})
 
 
 def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_path, monkeypatch):
-    def full(place, *_):
-        raise StoreError(place, "No space left on device", "free some")
+    def full(folder, data):
+        raise StoreError(folder, "No space left on device", "free some")
 
-    monkeypatch.setattr(cluster, "visible", lambda place: contextlib.nullcontext((place, "")))
-    monkeypatch.setattr(cluster, "store_series", full)
+    monkeypatch.setattr(cluster, "publish_batch", full)
     with (
         Cluster(dask.scheduler_address) as backend,
         pytest.raises(StoreError, match="No space left on device"),
@@ -183,188 +143,50 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
         sweep(studies[1:], tmp_path / "out", options=Options(backend=backend))
 
 
-# ---- jobs that fail -----------------------------------------------------------------------------
+def test_few_batches_are_on_their_way(dask, studies, tmp_path, monkeypatch):
+    sent, submit = [], distributed.Client.submit
 
+    def noted(client, *arguments, **more):
+        sent.append(1)
+        return submit(client, *arguments, **more)
 
-def remote(client, work, jobs, seconds=0.2, **more):
-    """The ends of jobs on a cluster."""
-    made = Remote(client, work, Workers(grace=0.3, target_seconds=seconds), jobs)
-    vars(made).update(more)
-    return made.run(lambda: None)
-
-
-def run(client, work, payloads):
-    return list(remote(client, work, named(payloads)))
-
-
-def parent_of(pid):
-    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
-
-
-def pids(_):
-    return os.getpid()
-
-
-def slow_pid(_):
-    time.sleep(0.05)
-    return os.getpid()
-
-
-def felling(payload):
-    """Kill the cluster's worker."""
-    if payload == "worker":
-        os.kill(os.getppid(), signal.SIGKILL)
-        time.sleep(60)
-    return payload
-
-
-def test_a_job_that_fells_workers_is_tried_alone_then_lost(dask, client, monkeypatch):
-    monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
-    ends = run(client, felling, [*range(4), "worker", *range(4, 8)])
-    assert results(ends) == {n: n for n in range(8)}
-    (end,) = lost(ends).values()
-    assert (end.id, end.reason) == ("worker", "worker_died")
-    assert "1 workers of the cluster died" in end.detail
-    assert end.detail.endswith("also when it ran again alone")
-
-
-def test_nothing_of_a_cluster_s_worker_outlives_it(dask, client):
-    """Its processes die with it, though dask does not know of them."""
-    pid, *_ = results(run(client, pids, range(4))).values()
-    worker = parent_of(pid)
-    os.kill(worker, signal.SIGKILL)
-    wait_for(lambda: not is_running(pid) and not is_running(worker))
-
-
-def test_threads_of_one_worker_share_its_processes():
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=2, processes=True, dashboard_address=":0",
-        memory_limit=MEMORY,
-    ) as made, Cluster(made.scheduler_address) as backend:  # fmt: skip
-        ends = run(backend.client, slow_pid, range(40))
-        assert len({*results(ends).values()}) == 2
-        ends = run(backend.client, poisoned, [*range(40), "crash", *range(40, 80)])
-        assert results(ends) == {n: n for n in range(80)}
-        assert lost(ends)["crash"].reason == "worker_died"
-
-
-class DoneAtOnce:
-    """A future of dask's that has its result."""
-
-    def __init__(self, data):
-        self.data = data
-
-    def result(self):
-        return self.data
-
-    def add_done_callback(self, call):
-        threading.Timer(0.01, call, [self]).start()
-
-
-class ClientThatIsDone:
-    """A client of dask's with three workers, whose batches are done as soon as they are sent."""
-
-    status = "running"
-
-    def submit(self, _, data, pure):
-        jobs = range(len(cluster.Batch(*pickle.loads(data)).timeouts))
-        return DoneAtOnce(pickle.dumps([JobResult(n, pickle.dumps(n), 0.01) for n in jobs]))
-
-    def nthreads(self):
-        return dict.fromkeys("abc", 1)
-
-    def cancel(self, futures):
-        pass
-
-
-def test_results_that_wait_at_an_interruption_are_kept():
-    run = Remote(ClientThatIsDone(), int, Workers(), [(n, n, 9.0) for n in range(40)])
-    beats = itertools.count()
-
-    def interrupt():
-        if next(beats) == 2:
-            time.sleep(0.3)
-            raise KeyboardInterrupt
-
-    found = []
-
-    def collect():
-        for end in run.run(interrupt):
-            found.append(end.id)
-
-    with pytest.raises(KeyboardInterrupt):
-        collect()
-    assert run.arrived.empty()
-    assert len(found) == len({*found}) > 2
-
-
-def large(payload):
-    return bytes(payload)
-
-
-def test_few_large_results_are_on_their_way(client, monkeypatch):
-    monkeypatch.setattr(cluster, "MAX_BYTES", 3_000_000)
-    issued = itertools.count()
-    ends = remote(client, large, Many((n, 1_000_000, 9.0) for n in issued), 1e-9)
-    for taken in range(1, 30):
+    monkeypatch.setattr(distributed.Client, "submit", noted)
+    with Cluster(dask.scheduler_address) as backend:
+        ends = backend(tmp_path, PendingOf(studies[0]), str)
         next(ends)
-        assert next(issued) < 2 * taken + 15  # one of each two is ours
-    ends.close()
+        assert len(sent) <= 2 * cluster.BATCHES_AHEAD + 1
+        ends.close()
+    wait_until(lambda: not dask.scheduler.tasks)
 
 
-# ---- versions -----------------------------------------------------------------------------------
+class PendingOf(list):
+    """All jobs of a study, as a sweep hands them to a backend."""
+
+    def __init__(self, study):
+        super().__init__((case.key, case, 9.0) for case in study.cases)
+
+    def cases(self):
+        return [case for _, case, _ in self]
 
 
-def other_versions():
-    return versions() | {"numpy": "1.0", "model": "none"}
+def wait_until(condition):
+    until = time.monotonic() + 20
+    while not condition() and time.monotonic() < until:
+        time.sleep(0.05)
+    assert condition()
 
 
-def test_workers_with_other_versions_are_refused(dask, monkeypatch):
-    monkeypatch.setattr(
-        cluster, "differences", lambda ours, theirs: differences(other_versions(), theirs)
-    )
-    with pytest.raises(ClusterError) as told, Cluster(dask.scheduler_address):
-        pass
-    lines = str(told.value).splitlines()
-    assert len(lines) == 2
-    for line in lines:
-        assert line.startswith("worker tcp://")
-        assert f"numpy {np.__version__} in place of 1.0" in line
-        assert "have the same programs on all machines" in line
-
-
-def test_a_worker_with_other_versions_that_came_later_is_refused(client, monkeypatch):
-    wrong = rf"worker tcp://.*: has model {MODEL_VERSION} in place of none, numpy"
-    with pytest.raises(ClusterError, match=wrong):
-        list(remote(client, abs, named(range(10)), versions=other_versions()))
-
-
-def test_versions_tell_programs_apart():
-    ours = versions()
-    assert {"compsim", "model", "sources of compsim", "Python", "numpy", "numba"} <= ours.keys()
-    assert differences(ours, ours) == ""
-    without = {name: text for name, text in ours.items() if name != "numba"}
-    assert differences(ours, without).startswith("has numba unknown in place of ")
-
-
-# ---- schedulers ---------------------------------------------------------------------------------
+def test_workers_with_other_programs_are_refused(dask, studies, tmp_path, monkeypatch):
+    others = cluster.versions() | {"numpy": "1.0"}
+    monkeypatch.setattr(cluster, "versions", lambda: others)
+    there = rf"worker of the cluster has numpy {np.__version__} in place of 1\.0; have the same"
+    with Cluster(dask.scheduler_address) as backend, pytest.raises(ClusterError, match=there):
+        sweep(studies[1:], tmp_path / "out", options=Options(backend=backend))
 
 
 @pytest.fixture
 def impatient(monkeypatch):
     monkeypatch.setattr(cluster, "CONNECT_SECONDS", 1.0)
-
-
-def test_a_scheduler_that_is_not_there_is_an_error(impatient):
-    with socket.socket() as deaf:  # takes calls and never answers
-        deaf.bind(("127.0.0.1", 0))
-        deaf.listen()
-        for port in (1, deaf.getsockname()[1]):
-            with (
-                pytest.raises(ClusterError, match=rf"127.0.0.1:{port}: no scheduler answers"),
-                Cluster(f"tcp://127.0.0.1:{port}"),
-            ):
-                pass
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1", "localhost"])
@@ -383,21 +205,18 @@ def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path)
 
         def remark(done, total, text):
             told.append(text)
-            if text == cluster.WAITING_REMARK:
+            if text == cluster.WAITING:
                 empty.close()
 
         with pytest.raises(ClusterError, match="the scheduler was lost; the same command goes on"):
             sweep(studies, tmp_path / "out", progress=remark, options=Options(backend=backend))
-    assert told.count(cluster.WAITING_REMARK) == 1
+    assert told.count(cluster.WAITING) == 1
 
 
 def test_without_distributed_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ClusterError, match=r"pip install 'compsim\[dask\]'"), Cluster("tcp://a:1"):
         pass
-
-
-# ---- the command line ---------------------------------------------------------------------------
 
 
 def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, impatient):
@@ -415,18 +234,12 @@ def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
     out = tmp_path / "out"
     call = [sys.executable, "-m", "compsim", "run", str(config), "-r", str(out)]
     call += ["--scheduler", dask.scheduler_address]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    running = subprocess.Popen(call, stderr=subprocess.PIPE, text=True, env=environment)
-    until = time.monotonic() + 60
-    while not list(out.glob("rows/*.h5")) and time.monotonic() < until:
-        time.sleep(0.05)
+    running = subprocess.Popen(call, stderr=subprocess.PIPE, text=True)
+    wait_until(lambda: list(out.glob("batches/*.h5")))
     running.send_signal(signal.SIGTERM)
     _, told = running.communicate(timeout=20)
     assert running.returncode == 143, told
     assert "interrupted by SIGTERM" in told
     assert 0 < len(store.read_store(out).keys()) < 5000
-    assert not list(out.glob("jobs/.*"))
-    until = time.monotonic() + 20
-    while dask.scheduler.tasks and time.monotonic() < until:
-        time.sleep(0.05)
-    assert not dask.scheduler.tasks
+    assert not list(out.glob("batches/.*"))
+    wait_until(lambda: not dask.scheduler.tasks)

@@ -15,12 +15,12 @@ import tempfile
 from functools import cache, partial
 from pathlib import Path
 
-import compressor.sweep.execution
 from chaos.processes import Run
 from chaos.stored import LEAN, case_file, contents, damage
 from chaos.tally import Tally
 from compressor.cases.load import load_studies
 from compressor.store.reader import read_store
+from compressor.sweep import pool
 
 SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 WHAT = "jobs that crash, leave, hang, stand still or eat memory, among good ones"
@@ -70,16 +70,16 @@ def poisoned(kinds):
     def prepare():
         SWEEP.run_job = partial(harmful, kinds)
         SWEEP.GRACE = 0.2
-        compressor.sweep.execution.memory_share = lambda count: LEAST
+        pool.memory_share = lambda count: LEAST
 
     return prepare
 
 
-def harmful(kinds, place, case):
+def harmful(kinds, case):
     """Run a case, unless it is one that does harm: in a worker."""
     if case.key in kinds:
         KINDS[kinds[case.key]][0]()
-    return SWEEP.run_job(place, case)
+    return SWEEP.run_job(case)
 
 
 def mixed(folder, draw):
@@ -122,7 +122,8 @@ def trial(folder, expected, draw, counts):
     stored = read_store(folder / "out")
     for key, kind in bad.items():
         _, reason, detail = KINDS[kind]
-        end = stored.status(key)
+        place = stored.position(key)
+        end = None if place is None else stored.status_at(place)
         if not end or (end.status, end.reason) != ("failed", reason) or detail not in end.detail:
             how = f"{end.reason}: {end.detail}" if end else "missing"
             problems.append(f"{kind}, job {key}: {how}")

@@ -1,8 +1,7 @@
 """Runs of `compsim` in sessions of their own: watched on a terminal, killed, searched for orphans.
 
 A run is the real command, `python -m compsim`, or a fork of this process that calls its `main`:
-that starts in milliseconds, since all is imported, and can be prepared (slow clocks made fast, jobs
-poisoned).
+that starts in milliseconds, and can be prepared (slow disks, jobs poisoned).
 """
 
 import contextlib
@@ -15,15 +14,11 @@ import sys
 import termios
 import time
 import traceback
-from multiprocessing import resource_tracker
 from pathlib import Path
 
 from compsim.cli import main
-from joblib.externals.loky.backend import resource_tracker as loky_tracker
 
 PROGRESS = re.compile(rb"(\d+) of \d+ jobs, \d+ %")
-MIN_FILES = 3  # the first descriptor that is no standard stream
-MAX_FILES = 1024
 
 
 class Run:
@@ -73,38 +68,14 @@ class Run:
         """Its child processes that run."""
         return [pid for pid, parent in members(self.pid).items() if parent == self.pid]
 
-    @contextlib.contextmanager
-    def held(self):
-        """Stop all its processes for a while, so that it does not end while one looks at it."""
-        self.send(signal.SIGSTOP, whole=True)
-        try:
-            yield
-        finally:
-            self.send(signal.SIGCONT, whole=True)
-
-    def kill(self, whole=False):
-        """SIGKILL, of itself alone or of the whole session at once."""
-        self.send(signal.SIGKILL, whole)
-
-    def send(self, number, whole):
+    def send(self, number, whole=False):
         """Send a signal to itself alone, or to the whole session at once."""
         with contextlib.suppress(ProcessLookupError):  # it may have ended
             (os.killpg if whole else os.kill)(self.pid, number)
 
-    def kill_one(self, pid):
-        """SIGKILL of one of its processes."""
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGKILL)
-
-    def orphans(self, seconds):
-        """Processes of its session that still run so long after its end, which are killed then."""
-        deadline = time.monotonic() + seconds
-        while (left := members(self.pid)) and time.monotonic() < deadline:
-            self.read(0.01)
-        for pid in left:
-            self.kill_one(pid)
-        self.read()
-        return list(left)
+    def kill(self, whole=False):
+        """SIGKILL, of itself alone or of the whole session at once."""
+        self.send(signal.SIGKILL, whole)
 
     def finish(self, seconds=120.0, orphans=5.0):
         """Wait for its end, and that of all it started; its exit code, or what went wrong."""
@@ -112,7 +83,13 @@ class Run:
         if late:
             self.kill(whole=True)
             self.watch(5.0)
-        left = self.orphans(orphans)
+        deadline = time.monotonic() + orphans
+        while (left := members(self.pid)) and time.monotonic() < deadline:
+            self.read(0.01)
+        for pid in left:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        self.read()
         os.close(self.master)
         if late:
             return f"ran for more than {seconds:g} s"
@@ -137,9 +114,7 @@ def become(arguments, folder, terminal, real, prepare):
         nothing = os.open(os.devnull, os.O_RDWR)
         for stream, source in enumerate((nothing, nothing, terminal)):
             os.dup2(source, stream)
-        os.closerange(MIN_FILES, MAX_FILES)
-        for tracker in (resource_tracker, loky_tracker):
-            tracker._resource_tracker._fd = None  # it is our parent's
+        os.closerange(3, 1024)
         if real:
             os.execv(sys.executable, [sys.executable, "-m", "compsim", *arguments])
         sys.stdout, sys.stderr = open(1, "w"), open(2, "w", buffering=1)

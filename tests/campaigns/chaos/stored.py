@@ -3,15 +3,9 @@
 import hashlib
 import json
 
-import numpy as np
-
-from compressor.store import hdf5
 from compressor.store.files import StoreError
-from compressor.store.hdf5 import DamagedJob, open_file
-from compressor.store.reader import places, read_store
-from compressor.store.series_file import intact
+from compressor.store.reader import read_store
 from compressor.store.status import verify
-from compressor.store.studies import study_paths
 
 TIMED = "seconds"
 LEAN = {  # of a quick job
@@ -40,47 +34,24 @@ def contents(folder, foreign=()):
     foreign: attributes that depend on which of several studies ran it.
     """
     stored, found = read_store(folder), {}
-    names = [name for name in stored.rows.numbers.dtype.names if name != TIMED]
-    columns = stored.rows.columns
-    for position in np.argsort(stored.rows.source, kind="stable"):  # segment by segment: quicker
-        parts = [stored.rows.numbers[name][position].tobytes() for name in names]
-        parts += [bytes(columns[name][position]) for name in ("status", "reason", "precision")]
-        parts += [columns[name][position].tobytes() for name in ("samples", "end")]
-        attributes = stored.rows.attributes(position)
-        if path := stored.rows.path(position):
-            data = path.read_bytes()
-            with open_file(data, path) as file:
-                held = hdf5.variables(file, data)
-                attributes |= hdf5.attributes(file)
-            for name in sorted(set(held) - {TIMED}):
-                values = np.asarray(held[name][1])
-                text = repr(values.tolist()).encode()  # of an object, bytes are an address
-                parts += [name.encode(), text if values.dtype == object else values.tobytes()]
-        for name in sorted(set(attributes) - set(foreign)):
-            parts += [name.encode(), repr(attributes[name]).encode()]
-        found[columns["key"][position].decode()] = hashlib.sha256(b"\0".join(parts)).hexdigest()
+    for key in sorted(stored.keys()):
+        outcome = stored.outcome(position := stored.position(key))
+        parts = [outcome.status, outcome.reason]
+        parts += [
+            outcome.numbers[name].tobytes() for name in outcome.numbers.dtype.names if name != TIMED
+        ]
+        parts += [(n, outcome.attributes[n]) for n in outcome.attributes if n not in foreign]
+        for name, (dims, values, attrs) in stored.rows.series(position).items():
+            parts += [name, dims, values.dtype.char, values.tobytes(), attrs]
+        found[key] = hashlib.sha256(repr(parts).encode()).hexdigest()
     return found
 
 
-def rows(folder):
-    """Key -> a stored job's numbers, seconds too, as bytes: they change when it runs again."""
-    found = read_store(folder).rows
-    keys = (key.decode() for key in found.columns["key"])
-    return dict(zip(keys, (row.tobytes() for row in found.numbers), strict=True))
-
-
-def torn(folder):
-    """Files of a store that are under their names, but not whole; those of no row, too.
-
-    Not a study with jobs that have not run yet.
-    """
-    found = []
-    for place in places(folder):
-        found += [path for path in place.glob("jobs/*.h5") if not intact(path)]
-    stored = read_store(folder, DamagedJob)
-    if stored.segments or stored.damaged or study_paths(folder):
-        found += [one.path for one in verify(folder) if not one.problem.endswith("or gone")]
-    return [*dict.fromkeys(str(path) for path in found)]
+def seconds(folder):
+    """Key -> the seconds that a stored job took: they change when it runs again."""
+    stored = read_store(folder)
+    numbers = {key: stored.outcome(stored.position(key)).numbers for key in sorted(stored.keys())}
+    return {key: float(row[TIMED]) for key, row in numbers.items()}
 
 
 def unfinished(folder):
@@ -89,9 +60,9 @@ def unfinished(folder):
 
 
 def damage(folder):
-    """What is wrong with a store, in a line; empty where all is well."""
+    """What is wrong with a store, in a line; empty where all is well, or nothing was stored."""
     try:
-        files = torn(folder)
+        found = [str(one) for one in verify(folder) if not one.problem.endswith("or gone")]
     except StoreError as error:
-        return str(error)
-    return f"torn: {', '.join(files)}" if files else ""
+        return "" if not list(folder.glob("batches/*.h5")) else str(error)
+    return "; ".join(found)
