@@ -87,6 +87,6 @@ def test_a_run_ends_with_one_clear_line(elsewhere):
     code = f"from compsim import cli\nprint(*(cli.main(words) for words in {commands}))"
     out, err = elsewhere(code)
     assert out == "2 2\n"
-    assert err.count("has no fcntl, which a run needs: run it under Linux, macOS or WSL") == 2
+    assert err.count("has no resource, which a run needs: run it under Linux, macOS or WSL") == 2
     assert "Traceback" not in err
     assert "compiling" not in err

@@ -10,7 +10,6 @@ import os
 import pickle
 import platform
 import re
-import time
 from collections.abc import Callable, Generator
 from dataclasses import replace
 from pathlib import Path
@@ -24,13 +23,12 @@ from compressor.sweep.pool import Batches, Job
 from compressor.sweep.sweep import run_job
 from compressor.sweep.wanted import JobEnd, PendingJobs
 from compressor.sweep.warm_up import Needs, load
-from compressor.sweep.worker import End, JobLost, JobResult, attempt
+from compressor.sweep.worker import End, JobLost, JobResult, attempt, then
 
 WITH_PORT = re.compile(r":\d+/?$|^inproc://")
 CONNECT_SECONDS = 8.0  # s until a scheduler that does not answer counts as not there
 TARGET_SECONDS = 0.5  # of a batch
 BATCHES_AHEAD = 3  # that a thread of the cluster has at most: one at work, others on their way
-SECONDS_BETWEEN_COUNTS = 2.0  # of the cluster's threads
 WAITING = "the cluster has no workers: waiting for the first"
 STARTING = "the cluster's workers load, or compile, the equations first (under a minute)"
 
@@ -65,9 +63,7 @@ def run_cases(ours: dict[str, str], needs: Needs, cases: bytes) -> str | tuple[l
     ran = [end.result for end in ends if isinstance(end, JobResult)]
     compress = any(compress for _, compress in ran)
     data = encode_batch([outcome for outcome, _ in ran], compress) if ran else b""
-    return [
-        replace(e, result=JobEnd.of(e.result[0])) if isinstance(e, JobResult) else e for e in ends
-    ], data
+    return [then(end, lambda one: JobEnd.of(one[0])) for end in ends], data
 
 
 load_once = functools.cache(load)  # in each process of the cluster, so that no job's time has it
@@ -81,7 +77,6 @@ class Cluster:
 
     def __init__(self, address: str):
         self.address = address
-        self.counted, self.threads = -SECONDS_BETWEEN_COUNTS, 0
 
     def __enter__(self) -> "Cluster":
         try:
@@ -162,14 +157,11 @@ class Cluster:
             yield replace(end, id=job.id)
 
     def count_threads(self) -> int:
-        """Return how many threads the cluster has, or had a moment ago. Raises ClusterError."""
-        if time.monotonic() - self.counted > SECONDS_BETWEEN_COUNTS:
-            try:
-                self.threads = sum(self.client.nthreads().values())
-            except (OSError, TimeoutError, ValueError) as error:
-                raise self.lost() from error
-            self.counted = time.monotonic()
-        return self.threads
+        """Return how many threads the cluster has. Raises ClusterError."""
+        try:
+            return sum(self.client.nthreads().values())
+        except (OSError, TimeoutError, ValueError) as error:
+            raise self.lost() from error
 
     def lost(self) -> ClusterError:
         """Return the error of a scheduler that has gone."""

@@ -66,9 +66,12 @@ class Job(NamedTuple):
 
 def require_posix() -> None:
     """Raise UnsupportedSystem where workers lack limits: on Windows."""
-    if os.name != "posix":
+    try:
+        import resource  # noqa: F401
+    except ImportError as error:
+        problem = f"{platform.system()} has no {error.name}, which a run needs"
         remedy = "run it under Linux, macOS or WSL, and open the folder of results here"
-        raise UnsupportedSystem(f"no jobs run under {platform.system()}: {remedy}")
+        raise UnsupportedSystem(f"{problem}: {remedy}") from error
 
 
 def run_batches(
@@ -141,9 +144,9 @@ class Pool:
         store: Store | None = None,
     ):
         width = min(rules.count, operator.length_hint(jobs, 0) or rules.count)
-        rules = replace(rules, memory=rules.memory or memory_share(width))
-        self.batches, self.grace = Batches(jobs, rules.target_seconds, width), rules.grace
-        self.setup = pickle.dumps((os.getpid(), work, store, rules))
+        self.rules = replace(rules, memory=rules.memory or memory_share(width))
+        self.batches = Batches(jobs, rules.target_seconds, width)
+        self.setup = pickle.dumps((os.getpid(), work, store, self.rules))
         self.fruitless = 0  # workers in a row that have died before any job began
         self.lock, self.stopped = threading.Lock(), False
         self.workers: set[Worker] = set()
@@ -169,11 +172,10 @@ class Pool:
                 except OSError as error:
                     raise WorkersFailed(f"no worker process can be started: {error}") from error
                 self.workers.add(self.own.worker)
-        try:
-            answer = self.own.worker.ask(batch, self.grace)
-        except WorkerDied as died:
+        answer = self.own.worker.ask(batch, self.rules.grace)
+        if isinstance(answer, Death):
             self.retire()
-            return [] if self.stopped else self.lose(batch, died)
+            return [] if self.stopped else self.lose(batch, answer)
         if isinstance(answer, StoreError):
             raise answer
         if isinstance(answer, str):
@@ -193,6 +195,9 @@ class Pool:
     def settle(self, job: Job, end: End) -> End:
         """Return the end of a job with its id and its own result."""
         if isinstance(end, JobLost):
+            if end.reason == Reason.OUT_OF_MEMORY:
+                most = f"{self.rules.memory / 1e9:.3g} GB that a worker may add"
+                end = replace(end, detail=f"needs more than the {most}")
             return replace(end, id=job.id)
         self.batches.learn(end.seconds)
         try:
@@ -200,7 +205,7 @@ class Pool:
         except Exception as error:
             return JobLost(job.id, Reason.INTERNAL_ERROR, *describe_error(error))
 
-    def lose(self, batch: list[Job], died: "WorkerDied") -> list[End]:
+    def lose(self, batch: list[Job], died: "Death") -> list[End]:
         """Return the job that is lost with its worker, if any; the others wait to run again.
 
         A job that was at work when its worker died is tried again alone, since an outsider may have
@@ -236,15 +241,12 @@ class Pool:
             worker.end()
 
 
-class WorkerDied(Exception):
-    """A worker has ended amid a batch.
+class Death(NamedTuple):
+    """How a worker has ended amid a batch."""
 
-    place: of the job at work, the number of jobs where they were being stored, None before the
-    first; how: it ended; late: because the job took too long.
-    """
-
-    def __init__(self, place: int | None, how: str, late: bool):
-        self.place, self.how, self.late = place, how, late
+    place: int | None  # of the job at work, the number of all while they are stored, None before
+    how: str
+    late: bool  # the job took too long
 
 
 class Worker:
@@ -270,7 +272,7 @@ class Worker:
             self.pipe.send_bytes(setup)
 
     def ask(self, batch: list[Job], grace: float) -> Any:
-        """Return a worker's answer to a batch. Raises WorkerDied."""
+        """Return a worker's answer to a batch, or its Death."""
         self.read_begun()  # of the batch before
         place, left = None, MAX_SILENCE
         with contextlib.suppress(EOFError, OSError):
@@ -287,11 +289,8 @@ class Worker:
                 return self.pipe.recv()
         self.end()
         news = self.read_begun()
-        place = news[-1] if news else place
-        raise WorkerDied(
-            place, describe_ending(self.process.returncode),
-            left < 0 and not news and place != len(batch),
-        )  # fmt: skip
+        late = left < 0 and not news and place != len(batch)
+        return Death(news[-1] if news else place, describe_ending(self.process.returncode), late)
 
     def read_begun(self) -> bytes:
         """Return the places of jobs that have begun since the last look."""

@@ -93,7 +93,7 @@ def serve(pipe: Connection, begun: int) -> None:
         while True:
             payloads = pipe.recv()
             try:
-                answer: Any = do_batch(work, store, rules, payloads, begun)
+                answer: Any = do_batch(work, store, rules.target_seconds, payloads, begun)
             except StoreError as error:
                 answer = error
             pipe.send(answer)
@@ -134,63 +134,57 @@ def limit(memory: int) -> None:
 def do_batch(
     work: Callable[[Any], Any],
     store: Store | None,
-    rules: Workers,
+    seconds: float,
     payloads: Sequence[Any],
     begun: int,
 ) -> list[End]:
     """Run jobs and store their results; return how they ended, results pickled."""
-    most = f"the {rules.memory / 1e9:.3g} GB that a worker may add"
     ends: list[End] = []
     began = time.monotonic()
     for place, payload in enumerate(payloads):
         os.write(begun, bytes([place]))
-        ends.append(attempt(work, payload, most))
-        if time.monotonic() - began > MAX_OVERRUN * rules.target_seconds:
+        ends.append(attempt(work, payload))
+        if time.monotonic() - began > MAX_OVERRUN * seconds:
             break
     os.write(begun, bytes([len(payloads)]))
-    ends = store_results(store, ends, most) if store else ends
-    return [pack(end, most) for end in ends]
+    ends = store_results(store, ends) if store else ends
+    return [then(end, pickle.dumps) for end in ends]
 
 
-def attempt(work: Callable[[Any], Any], payload: Any, most: str = "there is") -> End:
-    """Return what some work gives, or why it gives nothing. Raises StoreError.
-
-    most: the memory that it may need, in words.
-    """
+def attempt(work: Callable[[Any], Any], payload: Any) -> End:
+    """Return what some work gives, or why it gives nothing. Raises StoreError."""
     start = time.monotonic()
     try:
         return JobResult(None, work(payload), time.monotonic() - start)
     except StoreError:
         raise
     except MemoryError:
-        return JobLost(None, Reason.OUT_OF_MEMORY, f"needs more than {most}")
+        return JobLost(None, Reason.OUT_OF_MEMORY, "needs more memory than its worker may add")
     except BaseException as error:  # work may even call sys.exit
         return JobLost(None, Reason.INTERNAL_ERROR, *describe_error(error))
 
 
-def store_results(store: Store, ends: Sequence[End], most: str = "there is") -> list[End]:
+def then(end: End, work: Callable[[Any], Any]) -> End:
+    """Return the end of a job after more work on its result."""
+    if isinstance(end, JobLost):
+        return end
+    more = attempt(work, end.result)
+    return replace(more, seconds=end.seconds) if isinstance(more, JobResult) else more
+
+
+def store_results(store: Store, ends: list[End]) -> list[End]:
     """Store the results of a batch in one go, one by one where that fails; return what is sent.
 
     Raises StoreError.
     """
-    done = [end for end in ends if isinstance(end, JobResult)]
-    if not done:
-        return [*ends]
-    kept = attempt(store, [end.result for end in done], most)
-    if isinstance(kept, JobLost):
-        if len(ends) == 1:
-            return [kept]
-        return [left for end in ends for left in store_results(store, [end], most)]
-    sent = iter(kept.result)
-    return [replace(e, result=next(sent)) if isinstance(e, JobResult) else e for e in ends]
-
-
-def pack(end: End, most: str) -> End:
-    """Return an end with its result pickled, which some results cannot be."""
-    if isinstance(end, JobLost):
-        return end
-    packed = attempt(pickle.dumps, end.result, most)
-    return replace(packed, seconds=end.seconds) if isinstance(packed, JobResult) else packed
+    results = [end.result for end in ends if isinstance(end, JobResult)]
+    if not results:
+        return ends
+    stored = attempt(store, results)
+    if isinstance(stored, JobLost):
+        return [then(end, lambda result: store([result])[0]) for end in ends]
+    sent = iter(stored.result)
+    return [then(end, lambda _: next(sent)) for end in ends]
 
 
 def describe_error(error: BaseException) -> tuple[str, str]:

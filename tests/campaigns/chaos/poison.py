@@ -127,7 +127,7 @@ def trial(folder, expected, draw, counts):
         if not end or (end.status, end.reason) != ("failed", reason) or detail not in end.detail:
             how = f"{end.reason}: {end.detail}" if end else "missing"
             problems.append(f"{kind}, job {key}: {how}")
-        if not re.search(rf": {reason}: .*\n    job {key}\n", run.text()):
+        if not re.search(rf": {reason}: .*; job {key}\n", run.text()):
             problems.append(f"{kind}, job {key}: not named on the terminal")
     problems += [text for text in [damage(folder / "out")] if text]
     counts.update(bad.values())
