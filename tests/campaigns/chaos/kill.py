@@ -23,7 +23,9 @@ from compressor.sweep.worker import Workers
 SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 WHAT = "SIGKILL of the parent, a worker or both at a random moment, then resumed"
 VICTIMS = ("parent", "worker", "both")
-AMID = 0.5  # share of the kills that wait for a file to be half-written
+EARLY = 0.15  # share of the kills that may come before the first file
+AMID = 0.5  # share of the later ones that wait for a file to be half-written
+MAX_FILES = 8  # for one of which a later kill waits
 REAL = 3  # one trial in so many is the real command
 KINDS = {"metrics": ("metrics", 100, 600), "series": ("series", 12, 24)}  # keep, jobs, of real ones
 
@@ -77,13 +79,17 @@ def strike(run, victim, draw):
 def trial(scene, folder, draw, counts):
     """Kill a sweep and resume it; what went wrong, in a line."""
     shutil.copytree(scene.template, folder)
-    victim, amid = draw.choice(VICTIMS), draw.random() < AMID
-    run = scene.run(folder)
-    run.watch(draw.uniform(0, scene.seconds))
+    victim, early, amid = draw.choice(VICTIMS), draw.random() < EARLY, draw.random() < AMID
+    run, files = scene.run(folder), draw.randint(1, MAX_FILES)
+    if early:
+        run.watch(draw.uniform(0, scene.seconds))
+    else:
+        while run.watch(0.001) and len(list(folder.glob("out/batches/*.h5"))) < files:
+            pass
     run.send(signal.SIGSTOP, whole=True)
     before = seconds(folder / "out")
     run.send(signal.SIGCONT, whole=True)
-    while amid and run.watch(0.0) and not unfinished(folder):
+    while amid and not early and run.watch(0.0) and not unfinished(folder):
         pass
     worker_struck = strike(run, victim, draw)
     code = run.finish()
@@ -101,7 +107,6 @@ def trial(scene, folder, draw, counts):
         f"after the kill: {torn}": torn,
         f"the resumed run: {resumed}: {again.text()[-500:]}": resumed != 0,
         f"after resuming: {damage(folder / 'out')}": damage(folder / "out"),
-        "half-written files stay": unfinished(folder),
         "differs from an undisturbed study": contents(folder / "out") != scene.whole,
     }
     moment = "after the end" if not struck else "amid the rows" if before else "before any row"
