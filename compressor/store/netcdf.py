@@ -71,10 +71,9 @@ def encode_netcdf(
                 made[name] = _create(file, name, array, dims[name], name in compressed)
                 for number, dim in enumerate(dims[name]):
                     made[name].dims[number].attach_scale(made[dim])
-            elif len(dims[name]) > 1:  # a coordinate of texts
-                made[name].attrs["_Netcdf4Coordinates"] = np.array(
-                    [ids[dim] for dim in dims[name]], "i4"
-                )
+            if array.ndim:
+                numbers = np.array([ids[dim] for dim in dims[name]], "i4")
+                made[name].attrs["_Netcdf4Coordinates"] = numbers
             if dims[name][-1:] == (f"text{array.shape[-1] if array.ndim else 0}",):
                 _set_attribute(made[name], "_Encoding", "utf-8")
             for key, value in variables[name][2].items():
@@ -155,22 +154,24 @@ def read_values(data: Any) -> np.ndarray:
 
 def read_attributes(place: Any) -> dict[str, Any]:
     """Return the attributes of a variable or a file, but for those of netCDF itself."""
-    return {
-        name: value.decode() if isinstance(value, bytes) else value
-        for name, value in place.attrs.items()
-        if name not in OF_NETCDF and not name.startswith("_")
-    }
+    wanted = [name for name in place.attrs if name not in OF_NETCDF and not name.startswith("_")]
+    found = {name: place.attrs[name] for name in wanted}
+    return {n: v.decode() if isinstance(v, bytes) else v for n, v in found.items()}
 
 
 def dimensions_of(data: Any) -> list[str]:
-    """Return the names of the dimensions of a variable that is no coordinate."""
-    return [dim[0].name.removeprefix("/") for dim in data.dims]
+    """Return the names of the dimensions of a variable.
+
+    Its DIMENSION_LIST has them, too, but no checksum: HDF5 may take for ever over a damaged one.
+    """
+    names = [*data.file]  # dimensions first, in the order of their numbers
+    return [names[at] for at in data.attrs.get("_Netcdf4Coordinates", ())]
 
 
 def read_variable(file: Any, name: str) -> tuple[tuple[str, ...], np.ndarray, dict[str, Any]]:
     """Return names of dimensions, values and attributes of a variable."""
     data = file[name]
-    dims = [name, "text"][: data.ndim] if "NAME" in data.attrs else dimensions_of(data)
+    dims = dimensions_of(data)
     if "_Encoding" in data.attrs:
         del dims[-1]
     return tuple(dims), read_values(data), read_attributes(data)
