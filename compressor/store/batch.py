@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 
 from compressor.metrics import AXES, HORIZON, JOINTS, NUMBERS, QUANTILES, SEGMENTS, THRESHOLDS
-from compressor.outcome import ROW, Outcome, Variable, coordinates
+from compressor.outcome import ABSCISSAE, ROW, Outcome, Variable, coordinates
 from compressor.store.files import Folder, publish
 from compressor.store.netcdf import (
     dimensions_of,
@@ -178,12 +178,13 @@ def _join_series(outcomes: Sequence[Outcome]) -> dict[str, Variable]:
     return found
 
 
-def publish_batch(folder: Folder, data: bytes) -> Path:
+def publish_batch(folder: Folder, data: bytes, written: str = "") -> Path:
     """Write the bytes of a batch under a new name, durably; return its path.
 
-    folder: of results. Raises StoreError where the disk refuses.
+    folder: of results; written: the time that its name begins with, by default now. Raises
+    StoreError where the disk refuses.
     """
-    name = f"{time.time_ns():020}-{uuid.uuid4().hex[:8]}{SUFFIX}"
+    name = f"{written or f'{time.time_ns():020}'}-{uuid.uuid4().hex[:8]}{SUFFIX}"
     path = Path(folder) / FOLDER / name
     publish(path, data)
     return path
@@ -213,9 +214,10 @@ def read_batch(path: Path) -> Batch:
         return batch
 
 
-def read_numbers(batch: Batch) -> tuple[np.ndarray, np.ndarray]:
-    """Return values and error bars, (jobs, labels) each. Raises DamagedFile."""
-    with open_netcdf(batch.path) as file:
+@lru_cache(maxsize=4)
+def read_numbers(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Return values and error bars of a batch, (jobs, labels) each. Raises DamagedFile."""
+    with open_netcdf(path) as file:
         return file["value"][()], file["error"][()]
 
 
@@ -263,20 +265,25 @@ def _read_rows(file: Any, name: str, rows: Sequence[int]) -> list[np.ndarray | N
     if data is None or data.ndim < 2 or name in TABLES or "_Encoding" in data.attrs:
         return []
     absent = data.attrs.get("absent", ())
+    dims = dimensions_of(data)[1:]
     lengths = [
         file["samples" if dim == "sample" else f"{DIMENSIONS.get(dim, dim)}_count"][()]
-        for dim in dimensions_of(data)[1:]
+        for dim in dims
         if dim not in LABELS
     ]
+    kinds = np.full(len(data), data.dtype)
+    if "sample" in dims and name not in ABSCISSAE:  # beside doubles, singles are stored as such
+        kinds[read_bytes(file["precision"]) == b"single"] = np.dtype("f4")
     return [
-        None if row in absent else data[(row, *(slice(int(some[row])) for some in lengths))]
+        None if row in absent else
+        data[(row, *(slice(int(some[row])) for some in lengths))].astype(kinds[row], copy=False)
         for row in rows
-    ]
+    ]  # fmt: skip
 
 
 def read_outcomes(batch: Batch) -> list[Outcome]:
     """Return all that a batch holds, to be merged with others. Raises DamagedFile."""
-    values, errors = read_numbers(batch)
+    values, errors = read_numbers(batch.path)
     numbers = spread_numbers(batch.labels, values, errors)
     lines = read_lines(batch.path)
     with open_netcdf(batch.path) as file:

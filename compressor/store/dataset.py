@@ -1,7 +1,7 @@
 """Jobs as one labelled Dataset: metrics in memory, series read when they are used."""
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,19 +88,15 @@ def outcomes(layout: Layout, rows: Rows) -> xr.Dataset:
     return _with_coordinates(variables, layout)
 
 
-def label_dataset(layout: Layout, rows: Rows, read_again: Callable[[], Rows]) -> xr.Dataset:
-    """Return the Dataset of a layout, from the rows of a store and its jobs with time series.
-
-    read_again: returns the rows of the store as it is when series are read, if their batches have
-    been merged with others by then.
-    """
+def label_dataset(layout: Layout, rows: Rows) -> xr.Dataset:
+    """Return the Dataset of a layout, from the rows of a store and its jobs with time series."""
     dataset = outcomes(layout, rows)
     positions = rows.find(layout.keys)
     found = np.unique(positions[positions >= 0])
     whole = found[rows.samples[found] > 0]
     if not whole.size:
         return dataset
-    series = _series(layout, rows, positions, whole, read_again)
+    series = _series(layout, rows, positions, whole)
     return _with_coordinates(dict(dataset.variables) | series, layout)
 
 
@@ -190,23 +186,19 @@ def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.
 
 
 def _series(
-    layout: Layout,
-    rows: Rows,
-    positions: np.ndarray,
-    whole: np.ndarray,
-    read_again: Callable[[], Rows],
+    layout: Layout, rows: Rows, positions: np.ndarray, whole: np.ndarray
 ) -> dict[str, xr.Variable]:
     """Return the time series of all jobs; none but those of one of the longest are read yet."""
     template = _first_readable(rows, whole[np.argsort(-rows.samples[whole], kind="stable")])
     if not template:
         return {}
     lengths = {*zip(rows.samples[whole].tolist(), rows.ends[whole].tolist(), strict=True)}
-    keys = np.where(np.isin(positions, whole), layout.keys, "").astype(object)
+    positions = np.where(np.isin(positions, whole), positions, -1)
     dim = "time" if len(lengths) == 1 else "sample"
     found = {"time": xr.Variable(*template["time"])} if dim == "time" else {}
     for name, item in template.items():
         if "time" in item.dims and name not in found:
-            lazy = StudySeries(rows, read_again, name, keys, item.values.shape)
+            lazy = StudySeries(rows, name, positions, item.values.shape)
             dims = (*layout.dims, dim, *item.dims[1:])
             found[name] = xr.Variable(dims, indexing.LazilyIndexedArray(lazy), item.attrs)
     return found
@@ -226,17 +218,9 @@ def _first_readable(rows: Rows, positions: np.ndarray) -> dict[str, Variable]:
 class StudySeries(BackendArray):
     """One series of all jobs of a study; indexing reads the batches of those jobs alone."""
 
-    def __init__(
-        self,
-        rows: Rows,
-        read_again: Callable[[], Rows],
-        name: str,
-        keys: np.ndarray,
-        longest: tuple[int, ...],
-    ):
-        self.rows, self.read_again, self.name = rows, read_again, name
-        self.keys, self.longest = keys, longest
-        self.shape = (*keys.shape, *longest)
+    def __init__(self, rows: Rows, name: str, positions: np.ndarray, longest: tuple[int, ...]):
+        self.rows, self.name, self.positions, self.longest = rows, name, positions, longest
+        self.shape = (*positions.shape, *longest)
         self.dtype = np.dtype(float)
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> np.ndarray:
@@ -244,18 +228,16 @@ class StudySeries(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, basic, self._read)
 
     def _read(self, index: tuple[Any, ...]) -> np.ndarray:
-        jobs, samples = index[: self.keys.ndim], index[self.keys.ndim :]
-        keys = np.asarray(self.keys[jobs], dtype=object)
-        try:
-            blocks = self._blocks(self.rows, keys, samples)
-        except FileNotFoundError:  # merged with others since
-            blocks = self._blocks(self.read_again(), keys, samples)
-        return blocks.reshape((*keys.shape, *blocks.shape[1:]))
+        jobs, samples = index[: self.positions.ndim], index[self.positions.ndim :]
+        positions = np.asarray(self.positions[jobs])
+        blocks = self.rows.fresh(
+            positions.ravel(), lambda rows, at: self._blocks(rows, at, samples)
+        )
+        return blocks.reshape((*positions.shape, *blocks.shape[1:]))
 
-    def _blocks(self, rows: Rows, keys: np.ndarray, samples: tuple[Any, ...]) -> np.ndarray:
+    def _blocks(self, rows: Rows, positions: np.ndarray, samples: tuple[Any, ...]) -> np.ndarray:
         """Return a series of jobs, (jobs, samples, ...), nan beyond the end of each."""
-        found = np.full((keys.size, *np.empty(self.longest)[samples].shape), np.nan)
-        positions = rows.find(keys.ravel())
+        found = np.full((positions.size, *np.empty(self.longest)[samples].shape), np.nan)
         for place, values in rows.series_of_jobs(self.name, positions):
             block = np.full(self.longest, np.nan)
             block[: len(values)] = values

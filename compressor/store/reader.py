@@ -20,10 +20,9 @@ import numpy as np
 from compressor.cases import Case, CaseError, PerJoint
 from compressor.outcome import Outcome, word_variables
 from compressor.reasons import Reason
-from compressor.store.batch import Batch, batch_paths, read_batch
-from compressor.store.files import KEY, Folder, StoreError, StoreWarning, system_error
+from compressor.store.files import KEY, Folder, StoreError, StoreWarning
 from compressor.store.netcdf import DamagedFile, check_file
-from compressor.store.rows import Rows
+from compressor.store.rows import Rows, read_rows
 from compressor.store.studies import StoredStudy, find_study, read_studies
 
 if TYPE_CHECKING:
@@ -42,7 +41,6 @@ RERUN_REASONS = {
     Reason.OUT_OF_MEMORY,
     Reason.INVALID_INPUT,
 }
-ATTEMPTS = 100  # at reading batches that a run merges meanwhile
 
 
 @dataclass(frozen=True)
@@ -102,9 +100,8 @@ class JobStatus:
 class Stored:
     """What a folder held when it was read: `rows`, and the batches that are `damaged`."""
 
-    def __init__(self, folder: Path, batches: Sequence[Batch], damaged: Sequence[DamagedFile]):
-        self.folder, self.damaged = folder, damaged
-        self.rows = Rows.of(batches)
+    def __init__(self, rows: Rows, damaged: Sequence[DamagedFile]):
+        self.folder, self.rows, self.damaged = rows.folder, rows, damaged
         self.checked: dict[Path, bool] = {}
 
     def warned(self) -> "Stored":
@@ -121,7 +118,7 @@ class Stored:
             raise damage
         text = f"{damage}: its jobs count as missing"
         warnings.warn(text, StoreWarning, stacklevel=3)
-        return Stored(self.folder, left, [*self.damaged, damage])
+        return Stored(Rows.of(self.folder, left), [*self.damaged, damage])
 
     def keys(self) -> set[str]:
         """Return the keys of all stored jobs, failed ones included."""
@@ -184,13 +181,13 @@ class Stored:
         return first, kind
 
     def intact(self, position: int) -> bool:
-        """Return whether the batch of a job is there, and as it was written."""
+        """Return whether the batch of a job is as it was written."""
         path = self.rows.path(position)
         if path not in self.checked:
             try:
-                check_file(path)
+                self.rows.fresh(np.array([position]), lambda rows, at: check_file(rows.path(at[0])))
                 self.checked[path] = True
-            except (FileNotFoundError, DamagedFile):
+            except DamagedFile:
                 self.checked[path] = False
         return self.checked[path]
 
@@ -235,7 +232,7 @@ class Stored:
 
         is_grid = len(studies) == 1 and studies[0].is_grid
         layout = datasets.grid(studies[0]) if is_grid else datasets.table_of_jobs(studies)
-        dataset = datasets.label_dataset(layout, self.rows, lambda: read_store(self.folder).rows)
+        dataset = datasets.label_dataset(layout, self.rows)
         if trusted:
             dataset = datasets.mask_untrusted(dataset)
         dataset = dataset.assign(datasets.machine_constants(studies, layout))
@@ -255,21 +252,7 @@ def read_store(folder: Folder) -> Stored:
 
     Raises StoreError, also where runs change the folder faster than it can be read.
     """
-    folder = Path(os.path.abspath(folder))
-    for _ in range(ATTEMPTS):
-        batches, damaged = [], []
-        try:
-            for path in batch_paths(folder):
-                try:
-                    batches.append(read_batch(path))
-                except DamagedFile as error:
-                    damaged.append(error)
-        except FileNotFoundError:
-            continue  # merged with others meanwhile
-        except OSError as error:
-            raise system_error(folder, error) from error
-        return Stored(folder, batches, damaged)
-    raise StoreError(folder, "changes faster than it can be read", "try again")
+    return Stored(*read_rows(folder))
 
 
 def read_job(folder: Folder, key: str) -> "xr.Dataset":

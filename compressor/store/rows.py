@@ -1,15 +1,17 @@
 """The jobs of a folder of results: of several rows of a job the one that counts.
 
-The most complete one counts (`completeness`), of equals the one that was written later.
+The most complete one counts (`completeness`), of equals the one that was written later. A run may
+merge the batches of rows with others at any time: then they are looked for again (`Rows.fresh`).
 """
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+import os
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,14 +22,20 @@ from compressor.store.batch import (
     NAMES,
     WORDS,
     Batch,
+    batch_paths,
     parse_attributes,
+    read_batch,
     read_lines,
     read_numbers,
     read_one_series,
     read_series,
     spread_numbers,
 )
+from compressor.store.files import Folder, StoreError, system_error
+from compressor.store.netcdf import DamagedFile
 
+ATTEMPTS = 100  # at reading batches that a run merges meanwhile
+Found = TypeVar("Found")
 _ENDS = np.cumsum([math.prod(ROW[name].shape) for name in NUMBERS])
 # positions of a number in the columns of ROW: first, one past the last
 COLUMNS = {
@@ -37,19 +45,20 @@ COLUMNS = {
 
 
 def completeness(words: dict[str, np.ndarray], samples: np.ndarray) -> np.ndarray:
-    """Return how complete rows are, integers (rows,): failed 0, ok 1, with time series 3.
+    """Return how complete rows are, integers (rows,): failed 0, ok 1, with time series 5.
 
-    Double precision adds 2, signals add 1.
+    Double precision adds 4; signals, error bars and a horizon add 1 each.
     """
     series, double = samples > 0, words["precision"] == b"double"
-    score = 1 + (words["signals"] == b"yes") + series * (2 + 2 * double)
-    return (words["status"] == b"ok") * score
+    extras = sum((words[name] == b"yes").astype(int) for name in ("signals", "bars", "horizon"))
+    return (words["status"] == b"ok") * (1 + extras + series * (4 + 4 * double))
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
     """The rows that count of some batches, one a job, in the order of their keys."""
 
+    folder: Path
     batches: tuple[Batch, ...]
     source: np.ndarray  # index of the batch, (jobs,)
     row: np.ndarray  # and of the row in it
@@ -59,8 +68,8 @@ class Rows:
     ends: np.ndarray  # last time of the series, s
 
     @classmethod
-    def of(cls, batches: Sequence[Batch]) -> "Rows":
-        """Return the rows of batches that count; batches are in the order of writing."""
+    def of(cls, folder: Path, batches: Sequence[Batch]) -> "Rows":
+        """Return the rows of a folder's batches that count; these are in the order of writing."""
 
         def join(parts: Sequence[np.ndarray], kind: str) -> np.ndarray:
             return np.concatenate([*parts, np.zeros(0, kind)])
@@ -75,7 +84,8 @@ class Rows:
         last = np.append(keys[order][1:] != keys[order][:-1], True)[: len(keys)]
         at = order[last]
         words = {name: values[at] for name, values in words.items()}
-        return cls(tuple(batches), source[at], row[at], keys[at], words, samples[at], ends[at])
+        found = source[at], row[at], keys[at], words, samples[at], ends[at]
+        return cls(folder, tuple(batches), *found)
 
     def __len__(self) -> int:
         return len(self.keys)
@@ -99,6 +109,26 @@ class Rows:
         bars = {f"{NAMES[label]}_error" for label in labels & ERRORS.keys()}
         return ALWAYS | {NAMES[label] for label in labels} | bars
 
+    def fresh(self, positions: np.ndarray, read: "Callable[[Rows, np.ndarray], Found]") -> Found:
+        """Return what `read` gives of these rows and positions, (jobs,).
+
+        Where their batches have been merged since: of the rows that the folder has now. Raises
+        StoreError where jobs are gone.
+        """
+        rows = self
+        for _ in range(ATTEMPTS):
+            try:
+                return read(rows, positions)
+            except FileNotFoundError:
+                there = positions >= 0
+                keys = rows.keys[positions[there]]
+                rows, _ = read_rows(self.folder)
+                positions = positions.copy()
+                positions[there] = rows.find(keys)
+                if (positions[there] < 0).any():
+                    raise StoreError(self.folder, "has lost jobs meanwhile", "try again") from None
+        raise StoreError(self.folder, "changes faster than it can be read", "try again")
+
     def numbers(self, positions: np.ndarray, names: Sequence[str] = ()) -> dict[str, np.ndarray]:
         """Return numbers of jobs at positions by name, nan at -1 and where a job has none.
 
@@ -109,12 +139,7 @@ class Rows:
         names = names or [name for name in NUMBERS if name in self.given]
         columns = {name: COLUMNS[name] for name in names}
         wanted = np.concatenate([np.arange(*span) for span in columns.values()])
-        found = np.full((flat.size, wanted.size), np.nan)
-        for number in np.unique(self.source[flat[flat >= 0]]).tolist():
-            mine = np.flatnonzero((flat >= 0) & (self.source[flat] == number))
-            batch = self.batches[number]
-            whole = spread_numbers(batch.labels, *read_numbers(batch))
-            found[mine] = whole[np.ix_(self.row[flat[mine]], wanted)]
+        found = self.fresh(flat, lambda rows, at: rows._numbers(at, wanted))
         ends = np.cumsum([end - begin for begin, end in columns.values()])
         shape = np.shape(positions)
         return {
@@ -122,15 +147,28 @@ class Rows:
             for (name, span), end in zip(columns.items(), ends.tolist(), strict=True)
         }
 
+    def _numbers(self, positions: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        """Return some columns of ROW of jobs at positions, nan at -1."""
+        found = np.full((positions.size, wanted.size), np.nan)
+        for number in np.unique(self.source[positions[positions >= 0]]).tolist():
+            mine = np.flatnonzero((positions >= 0) & (self.source[positions] == number))
+            batch, rows = self.batches[number], self.row[positions[mine]]
+            parts = (part[rows] for part in read_numbers(batch.path))
+            found[mine] = spread_numbers(batch.labels, *parts)[:, wanted]
+        return found
+
     def number_row(self, position: int) -> np.void:
         """Return all numbers of a job, dtype ROW. Raises DamagedFile."""
-        batch = self.batches[self.source[position]]
-        values, errors = (part[self.row[position]][np.newaxis] for part in read_numbers(batch))
-        return spread_numbers(batch.labels, values, errors).view(ROW)[0, 0]
+        wanted = np.arange(ROW.itemsize // 8)
+        found = self.fresh(np.array([position]), lambda rows, at: rows._numbers(at, wanted))
+        return found.view(ROW)[0, 0]
 
     def attributes(self, position: int) -> dict[str, Any]:
         """Return a job's attributes. Raises DamagedFile."""
-        return parse_attributes(read_lines(self.path(position))[self.row[position]])
+        return self.fresh(
+            np.array([position]),
+            lambda rows, at: parse_attributes(read_lines(rows.path(at[0]))[rows.row[at[0]]]),
+        )
 
     def path(self, position: int) -> Path:
         """Return the batch with a job."""
@@ -140,12 +178,15 @@ class Rows:
         """Return time series of a job by name, of `names` those that it has. Raises DamagedFile."""
         if not self.samples[position]:
             return {}
-        return read_series(self.path(position), int(self.row[position]), names)
+        return self.fresh(
+            np.array([position]),
+            lambda rows, at: read_series(rows.path(at[0]), int(rows.row[at[0]]), names),
+        )
 
     def series_of_jobs(self, name: str, positions: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
         """Yield a series of each of some jobs that has it, with its place among positions, (n,).
 
-        A batch is opened once. Raises DamagedFile, and FileNotFoundError.
+        A batch is opened once. Raises DamagedFile, and FileNotFoundError, as `fresh` expects.
         """
         stored = np.flatnonzero((positions >= 0) & (self.samples[positions] > 0))
         order = stored[np.argsort(self.source[positions[stored]], kind="stable")]
@@ -157,3 +198,25 @@ class Rows:
             parts = read_one_series(self.batches[number].path, name, rows)
             yield from ((place, part) for place, part in zip(mine, parts, strict=True)
                         if part is not None)  # fmt: skip
+
+
+def read_rows(folder: Folder) -> tuple[Rows, list[DamagedFile]]:
+    """Return the rows of a folder, and its damaged batches.
+
+    Raises StoreError, also where runs change the folder faster than it can be read.
+    """
+    folder = Path(os.path.abspath(folder))
+    for _ in range(ATTEMPTS):
+        batches, damaged = [], []
+        try:
+            for path in batch_paths(folder):
+                try:
+                    batches.append(read_batch(path))
+                except DamagedFile as error:
+                    damaged.append(error)
+        except FileNotFoundError:
+            continue  # merged with others meanwhile
+        except OSError as error:
+            raise system_error(folder, error) from error
+        return Rows.of(folder, batches), damaged
+    raise StoreError(folder, "changes faster than it can be read", "try again")

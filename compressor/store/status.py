@@ -264,7 +264,8 @@ def verify(
     rows = stored.rows
     absent = {key for study in studies for key in study.keys} - stored.keys()
     for damage in stored.damaged:  # of which even the keys cannot be read
-        found.append(Damage(Path(damage.path), damage.problem, tuple(sorted(absent))))
+        remedy = "" if absent else "delete it: no job needs it"
+        found.append(Damage(Path(damage.path), damage.problem, tuple(sorted(absent)), remedy))
     broken = [Path(damage.path) for damage in stored.damaged]
     whole = [path for path in (*paths, *others) if path not in broken]
     for number, path in enumerate(whole):

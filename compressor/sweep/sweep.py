@@ -19,7 +19,6 @@ from compressor.store import (
     Folder,
     merge_batches,
     read_store,
-    set_aside,
     write_batch,
     write_study,
 )
@@ -121,14 +120,8 @@ def sweep(
     if missing:
         for damage in stored.damaged:
             progress(len(ends), len(wanted), f"{damage}: its jobs count as missing")
-            set_aside(Path(damage.path))
         run_missing(folder, PendingJobs(wanted, missing), ends, workers, progress, options)
-        if broken := [path for path, whole in stored.checked.items() if not whole]:
-            rows = read_store(folder).rows
-            counting = {rows.batches[n].path for n in rows.source}
-            for path in broken:
-                if path not in counting:  # all of its jobs have run again
-                    set_aside(path)
+    if missing or stored.damaged:
         merge_batches(folder)
     counts, failed = endings(studies, ends)
     return Summary(

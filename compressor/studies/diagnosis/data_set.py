@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 RECORD = ("sensor_time", "sensor_acceleration", "tacho_time")
-CLIPPED = "clipped_fraction"
 # groups of a case
 NOT_BUILT = (
     "name", "load", "sensor", "solve", "output", "initial_offset_mm", "healthy_clearance_mm",
@@ -233,9 +232,9 @@ def without_sensor(study: StoredStudy) -> DataSetError:
 
 
 def _record(stored: Stored, key: str) -> dict[str, np.ndarray]:
-    """Return a job's record by the names of `RECORD`, and `CLIPPED`; nothing where it has none."""
-    found = stored.values(key, (*RECORD, CLIPPED))
-    return found if found.keys() >= {*RECORD} else {}
+    """Return a job's record by the names of `RECORD`; nothing where it has none."""
+    found = stored.values(key, RECORD)
+    return found if found.keys() == {*RECORD} else {}
 
 
 def job_rows(
@@ -259,7 +258,7 @@ def job_rows(
         "key": key, "machine": machine_of(case), "joint": case.worn_joint, "load": case.load,
         "regime": str(outcome.attributes.get("regime", "")), **labels_of(case),
         "models": models_of(case),
-        "clipped": float(record.get(CLIPPED, np.nan)),
+        "clipped": float(outcome.numbers["clipped_fraction"]),
     }  # fmt: skip
     rows = []
     hop = options.hop or options.revolutions

@@ -106,7 +106,7 @@ def vector(record: Record) -> np.ndarray:
 def _place(stored: Stored, key: str) -> int | None:
     """Return the row in a store of a job that is ok and has series, else None."""
     place = stored.position(key)
-    if place is None or stored.rows.word("status")[place] != "ok":
+    if place is None or stored.rows.bytes_of["status"][place] != b"ok":
         return None
     return place if stored.rows.samples[place] else None
 

@@ -269,7 +269,8 @@ class SearchJobs:
                 reading = JobReading(reason=f"the job failed, {end.reason}: {end.detail}")
             else:
                 reading = question.goal.read(
-                    store.rows.number_row(position), str(store.rows.word("regime")[position])
+                    store.rows.number_row(position),
+                    store.rows.bytes_of["regime"][position].decode(),
                 )
             found.append(Point(share, value, reading, key, end.status != "ok"))
         return found
