@@ -261,8 +261,10 @@ def read_one_series(path: Path, name: str, rows: Sequence[int]) -> list[np.ndarr
 
 def _read_rows(file: Any, name: str, rows: Sequence[int]) -> list[np.ndarray | None]:
     """Return a series of some jobs, cut to the length of each; [] of what is none."""
-    data = file.get(name)
-    if data is None or data.ndim < 2 or name in TABLES or "_Encoding" in data.attrs:
+    if name not in file:
+        return []
+    data = file[name]  # not `get`, to which what is damaged is absent
+    if data.ndim < 2 or name in TABLES or "_Encoding" in data.attrs:
         return []
     absent = data.attrs.get("absent", ())
     dims = dimensions_of(data)[1:]
