@@ -277,15 +277,18 @@ def test_what_is_not_there_is_named(results, tmp_path, capsys):
 def test_damaged_series_are_left_out_and_told(results, tmp_path, capsys):
     copy = tmp_path / "results"
     shutil.copytree(results, copy)
-    (hurt, *others) = sorted((copy / "jobs").iterdir())
-    data = bytearray(hurt.read_bytes())
-    data[len(data) // 2] ^= 1
-    hurt.write_bytes(data)
+    stored = read_store(copy)
+    whole = {key: stored.values(key, ["acceleration"]) for key in stored.keys()}  # noqa: SIM118
+    hurt = min(whole)
+    path = stored.rows.path(stored.position(hurt))
+    data = bytearray(path.read_bytes())
+    data[data.index(whole[hurt]["acceleration"].tobytes())] ^= 1
+    path.write_bytes(data)
     out = tmp_path / "out"
     assert cli.main(["export", "-r", str(copy), "-o", str(out), "--series"]) == 5
-    assert f"{hurt}: is damaged" in capsys.readouterr().err
-    assert {path.stem for path in out.rglob("*/*.nc")} == {p.name[:20] for p in others}
-    assert cli.main(["export", hurt.name[:20], "-r", str(copy), "-o", str(out)]) == 5
+    assert f"{path}: is damaged" in capsys.readouterr().err
+    assert {path.stem for path in out.rglob("*/*.nc")} == whole.keys() - {hurt}
+    assert cli.main(["export", hurt, "-r", str(copy), "-o", str(out)]) == 5
 
 
 def test_a_disk_that_fills_up_leaves_no_part(results, tmp_path, monkeypatch):

@@ -2,15 +2,15 @@
 
 import json
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
 from compsim import cli
+from conftest import store
 
 from compressor.cases.load import load_studies
 from compressor.digits import by_bar
-from compressor.store.reader import read_store
-from compressor.store.rows import Rows
 from compressor.store.status import report_job, standings
 from compressor.sweep.sweep import sweep
 
@@ -81,22 +81,21 @@ def test_show_json_is_json(mix, capsys):
 
 
 def test_the_next_run_has_the_same_jobs(tmp_path, monkeypatch, capsys, in_process):
-    """What was set on the command line is part of them, and so is a raised limit."""
+    """What was set on the command line is part of them."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "one case.yaml").write_text(json.dumps({"name": "one", "solve": SHORT}))
     setting = ["--set", "joint=big_end", "--set=clearance_mm=[0.1, 0.2]"]
-    command = ["run", "one case.yaml", "-j", "1", "--quiet", *setting, "--max-jobs", "20000"]
+    command = ["run", "one case.yaml", "-j", "1", "--quiet", *setting]
     assert cli.main([*command, "--only", "clearance_mm < 0.15"]) == 0
     capsys.readouterr()
     assert cli.main(["status"]) == 0
     next_run = capsys.readouterr().err.removeprefix("next: ").strip()
-    assert next_run.endswith("--max-jobs 20000")
     assert cli.main([*shlex.split(next_run)[1:], "--quiet", "-j", "1"]) == 0
     assert standings("results")[0].missing == 0
 
 
 def test_damage_is_told_where_its_jobs_count_as_missing(mix, capsys):
-    paths = [*Path("results/rows").iterdir()]
+    paths = [*Path("results/batches").iterdir()]
     for path in paths:
         path.write_bytes(path.read_bytes()[:-1])
     for command in (["status"], ["show", mix.keys[0]], ["status", "--json"]):
@@ -108,15 +107,29 @@ def test_damage_is_told_where_its_jobs_count_as_missing(mix, capsys):
         assert "Warning" not in err  # said as other messages are, without a place in the source
 
 
-def test_a_foreign_row_without_a_case_is_refused(mix, capsys, monkeypatch):
-    """By `show`, which needs the case; what counts jobs goes on."""
-    own = Rows.attributes
-    monkeypatch.setattr(
-        Rows, "attributes", lambda rows, at: {k: v for k, v in own(rows, at).items() if k != "case"}
+def budget(folder):
+    """A study of which the half with the smaller budget fails, in a store."""
+    case = {
+        "name": "budget", "clearance_mm": [0.1, 0.12, 0.14, 0.16, 0.18, 0.2], "joint": "big_end",
+        "solve": {"max_steps": [5, 5000000], "duration_rev": 2, "accuracy": "draft",
+                  "error_bars": False, "horizon": False},
+    }  # fmt: skip
+    (folder / "budget.yaml").write_text(json.dumps(case))
+    store(folder / "results", folder / "budget.yaml")
+    return str(folder / "results")
+
+
+def test_status_shows_where_jobs_fail_by_a_tree_of_scikit_learn_s(tmp_path, monkeypatch, capsys):
+    """Where that is installed."""
+    folder = budget(tmp_path)
+    assert cli.main(["status", "-r", folder]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "where jobs fail (jobs of each class in weights):" in out
+    assert (
+        "|--- solve.max_steps <= 2500002.5000 | |--- weights: [6.0000, 0.0000] class: failed" in out
     )
-    key = min(read_store("results").keys())
-    assert cli.main(["show", key]) == 5
-    assert "is no file of compsim's" in capsys.readouterr().err
-    assert cli.main(["status"]) == 0
-    stored = read_store("results")
-    assert stored.case_at(0) is None is stored.case_at(-1)
+    monkeypatch.setitem(sys.modules, "sklearn.tree", None)
+    assert cli.main(["status", "-r", folder]) == 0
+    out = capsys.readouterr().out
+    assert "6 failed" in out
+    assert "where jobs fail" not in out

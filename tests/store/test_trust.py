@@ -1,10 +1,8 @@
 """How far results are to be trusted, as the store keeps and tells it: promises and regimes."""
 
-import io
 import json
 import math
 
-import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -17,11 +15,10 @@ from compressor.metrics import METRICS, NUMBERS, QUANTILES
 from compressor.outcome import REGIME_WORDS, Regime
 from compressor.report import write_report
 from compressor.solve.simulate import measure, simulate
+from compressor.store.batch import write_batch
 from compressor.store.dataset import mask_untrusted
 from compressor.store.export import export
-from compressor.store.hdf5 import DamagedJob
 from compressor.store.reader import open_study, read_store
-from compressor.store.rows import LATER_COLUMNS, decode, encode, of_outcomes
 from compressor.store.status import standings
 from compressor.store.studies import write_study
 
@@ -62,39 +59,10 @@ def test_promise_and_regime_of_each_job_are_kept(ring):
         assert read_store(ring).job(key).attrs["regime"] == regime
 
 
-def test_results_of_before_are_read_without_either(plain, tmp_path):
-    data = encode(of_outcomes([plain], 1))
-    with io.BytesIO(data) as stream:
-        with h5py.File(stream, "r+") as file:
-            for name in LATER_COLUMNS:
-                del file[name]
-        older = decode(stream.getvalue(), tmp_path / "rows/000000001-0.h5")
-    newer = decode(data, tmp_path / "rows/000000001-0.h5")
-    for name in LATER_COLUMNS:
-        assert older.columns[name].tolist() == [b""]
-        assert newer.columns[name].tolist() != [b""] or name == "signals"
-    for name in NUMBERS:
-        np.testing.assert_array_equal(older.numbers()[name], newer.numbers()[name])
-
-
-def test_numbers_that_cannot_be_read_are_told_when_the_file_is(plain, tmp_path):
-    """They are read again when they are asked for: a file of many jobs must not fail then."""
-    stream = io.BytesIO(encode(of_outcomes([plain] * 50, 1)))
-    with h5py.File(stream, "r+") as file:
-        del file["rms_acceleration"]
-        file.create_dataset("rms_acceleration", data=np.arange(50.0), compression="gzip")
-        place = file["rms_acceleration"].id.get_chunk_info(0).byte_offset
-    decode(stream.getvalue(), tmp_path / "rows/000000001-0.h5")
-    data = bytearray(stream.getvalue())
-    data[place : place + 4] = b"\xff" * 4
-    with pytest.raises(DamagedJob):
-        decode(bytes(data), tmp_path / "rows/000000001-0.h5")
-
-
-def test_statistics_take_no_room_where_nothing_is_chaotic(plain, ring):
+def test_statistics_take_no_room_where_nothing_is_chaotic(plain, ring, tmp_path):
     always = {name for name, row in NUMBERS.items() if not row.when}
-    with h5py.File(io.BytesIO(encode(of_outcomes([plain], 1)))) as file:
-        assert NUMBERS.keys() & file.keys() == always
+    write_batch(tmp_path, [plain])
+    assert read_store(tmp_path).rows.given == always
     assert NUMBERS.keys() & plain.table({}).variables.keys() == always
     assert "quantile" not in plain.table({}).variables
     study = open_study(ring)

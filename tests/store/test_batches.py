@@ -1,0 +1,225 @@
+"""Batches of a folder: which row of a job counts, merges beside readers, stores that are copied."""
+
+import shutil
+
+import numpy as np
+import pytest
+import xarray as xr
+from made_jobs import batches, forget, held, key, made, peaks, plan
+
+from compressor.store import merge, reader, rows
+from compressor.store.batch import write_batch
+from compressor.store.files import StoreError
+from compressor.store.merge import merge_batches
+from compressor.store.reader import open_study, read_store
+from compressor.store.status import standings, verify
+
+
+def merge_all(folder):
+    """Merge as many batches as can be, and forget what was read of them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(merge, "MAX_SMALL", 0)
+        merge_batches(folder)
+    forget()
+
+
+@pytest.fixture
+def mixed(tmp_path):
+    """A study of 12 jobs of three lengths, one failed and one missing, in batches of one or two."""
+    plan(tmp_path, 12)
+    for number in range(0, 10, 2):
+        write_batch(tmp_path, [made(n, samples=n % 3 * 5) for n in (number, number + 1)])
+    write_batch(tmp_path, [made(10, reason="non_finite", detail="µ \0")])
+    return tmp_path
+
+
+# ---- rows ---------------------------------------------------------------------------------------
+
+
+def test_of_equal_rows_the_later_counts(tmp_path):
+    write_batch(tmp_path, [made(1, 10), made(2, 20)])
+    write_batch(tmp_path, [made(1, 11)])
+    write_batch(tmp_path, [made(3, 30), made(3, 31)])
+    assert peaks(tmp_path) == {1: 11, 2: 20, 3: 31}
+
+
+def barred(number, **more):
+    found = made(number, **more)
+    found.numbers["peak_acceleration_error"] = 0.1
+    return found
+
+
+@pytest.mark.parametrize(
+    ("better", "worse"),
+    [
+        (made(1), made(1, reason="worker_died")),
+        (made(1, samples=3, precision="single"), made(1)),
+        (made(1, samples=3), made(1, samples=3, precision="single")),
+        (made(1, samples=3, precision="single"), made(1, reason="worker_died", samples=3)),
+        (barred(1), made(1)),
+        (made(1, signals="all"), made(1)),
+        (made(1, samples=3, precision="single"), barred(1, signals="all")),
+    ],
+)
+@pytest.mark.parametrize("merged", [False, True])
+def test_a_more_complete_row_counts_whoever_writes_last(better, worse, merged, tmp_path):
+    write_batch(tmp_path / "alone", [better])
+    for outcome in (worse, better, worse):
+        write_batch(tmp_path / "both", [outcome])
+    if merged:
+        merge_all(tmp_path / "both")
+        assert len(batches(tmp_path / "both")) == 1
+    assert held(read_store(tmp_path / "both")) == held(read_store(tmp_path / "alone"))
+
+
+def test_twenty_thousand_rows_open_as_a_grid(tmp_path):
+    jobs = [made(number) for number in range(20_000)]
+    plan(tmp_path, 20_000)
+    for first in range(0, 20_000, 4000):
+        write_batch(tmp_path, [job for job in jobs[first : first + 4000] if job is not jobs[7]])
+    found = open_study(tmp_path)
+    expected = np.arange(20_000.0)
+    expected[7] = np.nan
+    np.testing.assert_array_equal(found.peak_acceleration.values, expected)
+    assert found.peak_contact_force_axis.dims == ("speed_rpm", "joint", "axis")
+    assert found.status.values[6:8].tolist() == ["ok", "missing"]
+
+
+# ---- merges -------------------------------------------------------------------------------------
+
+
+def test_a_merge_changes_nothing_but_the_number_of_files(mixed):
+    before, jobs = open_study(mixed).load(), held(read_store(mixed))
+    merge_all(mixed)
+    assert len(batches(mixed)) == 3  # by the lengths that are in them
+    xr.testing.assert_identical(open_study(mixed).load(), before)
+    assert held(read_store(mixed)) == jobs
+    merge_all(mixed)
+    assert held(read_store(mixed)) == jobs
+
+
+def test_few_small_batches_and_large_ones_are_left_alone(tmp_path, monkeypatch):
+    for number in range(merge.MAX_SMALL):
+        write_batch(tmp_path, [made(number)])
+    merge_batches(tmp_path)
+    assert len(batches(tmp_path)) == merge.MAX_SMALL
+    monkeypatch.setattr(merge, "MAX_JOBS", 4)  # one with a job is no small one
+    write_batch(tmp_path, [made(100)])
+    merge_batches(tmp_path)
+    assert len(batches(tmp_path)) == merge.MAX_SMALL + 1
+    monkeypatch.setattr(merge, "MAX_JOBS", 8)
+    merge_batches(tmp_path)
+    assert len(batches(tmp_path)) == 2  # of eight jobs and one
+    assert peaks(tmp_path) == {n: n for n in (*range(merge.MAX_SMALL), 100)}
+
+
+def test_a_merge_does_not_make_an_old_row_new(tmp_path, monkeypatch):
+    """Of other lengths, so that two merged batches hold the job; or where it is written amid."""
+    write_batch(tmp_path, [made(1, reason="old"), made(2, samples=5)])
+    write_batch(tmp_path, [made(1, reason="new"), made(3, samples=6)])
+    write_batch(tmp_path, [made(4, samples=5)])
+    write_batch(tmp_path, [made(5, samples=6)])
+    real = merge.encode_batch
+
+    def write_amid(*args):
+        monkeypatch.undo()
+        write_batch(tmp_path, [made(4, 44, samples=5)])
+        return real(*args)
+
+    monkeypatch.setattr(merge, "encode_batch", write_amid)
+    merge_all(tmp_path)
+    assert len(batches(tmp_path)) == 3
+    assert read_store(tmp_path).status(key(1)).reason == "new"
+    assert peaks(tmp_path)[4] == 44
+
+
+def test_rows_that_do_not_count_go_and_damaged_batches_are_set_aside(tmp_path):
+    write_batch(tmp_path, [made(1), made(2)])
+    write_batch(tmp_path, [made(1, 11)])
+    write_batch(tmp_path, [made(2, 12)])
+    write_batch(tmp_path, [made(3)]).write_bytes(b"torn")
+    merge_batches(tmp_path)
+    assert [len(batch) for batch in read_store(tmp_path).rows.batches] == [1, 1]
+    assert peaks(tmp_path) == {1: 11, 2: 12}
+    (aside,) = (tmp_path / "batches").glob("*.damaged")
+    assert aside.read_bytes() == b"torn"
+
+
+def test_a_batch_whose_values_are_damaged_stays_while_its_rows_count(mixed):
+    path = max(batches(mixed), key=lambda one: one.stat().st_size)
+    data = bytearray(path.read_bytes())
+    series = made(5, samples=10).series["contact_force"].values.tobytes()
+    data[data.index(series)] ^= 1
+    path.write_bytes(data)
+    merge_all(mixed)
+    assert path.exists()
+    assert read_store(mixed).position(key(5)) is not None
+
+
+# ---- readers beside merges ----------------------------------------------------------------------
+
+
+def test_a_reader_that_loses_the_race_with_a_merge_reads_again(mixed, monkeypatch):
+    real, jobs = rows.read_batch, held(read_store(mixed))
+
+    def merged_meanwhile(path):
+        monkeypatch.undo()
+        merge_all(mixed)
+        return real(path)
+
+    monkeypatch.setattr(rows, "read_batch", merged_meanwhile)
+    assert held(read_store(mixed)) == jobs
+
+
+def test_numbers_and_series_of_batches_that_were_merged_since_are_found(mixed, monkeypatch):
+    expected, jobs = open_study(mixed).load(), held(read_store(mixed))
+    stored, lazy = read_store(mixed), open_study(mixed)
+    real = reader.read_rows
+
+    def merged_after(folder):
+        found = real(folder)
+        merge_all(mixed)
+        return found
+
+    monkeypatch.setattr(reader, "read_rows", merged_after)
+    xr.testing.assert_identical(open_study(mixed).load(), expected)
+    monkeypatch.undo()
+    assert held(stored) == jobs
+    assert all(stored.intact(position) for position in range(len(stored.rows)))
+    xr.testing.assert_identical(lazy.load(), expected)
+
+
+def test_a_job_that_is_gone_amid_reading_is_told(mixed):
+    lazy, stored = open_study(mixed), read_store(mixed)
+    shutil.rmtree(mixed / "batches")
+    forget()
+    for read in (lazy.load, lambda: stored.rows.attributes(0)):
+        with pytest.raises(StoreError, match="has lost jobs meanwhile; try again"):
+            read()
+
+
+# ---- folders ------------------------------------------------------------------------------------
+
+
+def test_stores_are_merged_by_copying_their_batches(tmp_path):
+    plan(tmp_path / "one", 4)
+    for name, jobs in (("one", (0, 1, 2)), ("two", (2, 3))):
+        write_batch(tmp_path / name, [made(n, samples=4) for n in jobs])
+    shutil.copytree(tmp_path / "two", tmp_path / "one", dirs_exist_ok=True)
+    assert peaks(tmp_path / "one") == {n: n for n in range(4)}
+    assert np.isfinite(open_study(tmp_path / "one").acceleration).all()
+    assert verify(tmp_path / "one") == []
+
+
+def test_batches_may_lie_in_a_folder_that_stores_share(tmp_path):
+    """A run of one merges them, and leaves what the other has."""
+    (tmp_path / "shared").mkdir()
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "batches").symlink_to(tmp_path / "shared")
+        plan(tmp_path / name, 3)
+        for number in range(3):
+            write_batch(tmp_path / name, [made(number, samples=3)])
+    merge_all(tmp_path / "a")
+    assert len(batches(tmp_path / "b")) == 1
+    assert standings(tmp_path / "b")[0].ok == 3

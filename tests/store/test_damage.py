@@ -1,0 +1,244 @@
+"""Disks that refuse or fill up, and files that are not what was written: whole, absent, or told."""
+
+import errno
+import json
+import os
+import random
+
+import pytest
+import xarray as xr
+from compsim import cli
+from made_jobs import batches, forget, held, key, made, plan
+
+from compressor.store import rows
+from compressor.store.batch import write_batch
+from compressor.store.files import StoreError, StoreWarning, discard_leftovers, publish
+from compressor.store.netcdf import DamagedFile, read_dataset, write_dataset
+from compressor.store.reader import open_study, read_store
+from compressor.store.status import verify
+
+REFUSED = [
+    (errno.ENOSPC, "free some space"),
+    (errno.EDQUOT, "free some space"),
+    (errno.EROFS, "get the permission"),
+    (errno.EACCES, "get the permission"),
+    (errno.EMFILE, "allow more open files"),
+    (errno.EIO, "check the disk"),
+]
+
+
+def refusing(number):
+    def refuse(*args, **more):
+        raise OSError(number, os.strerror(number))
+
+    return refuse
+
+
+# ---- disks --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("call", ["fsync", "replace"])
+@pytest.mark.parametrize(("number", "remedy"), REFUSED)
+def test_what_the_disk_refuses_leaves_no_part_and_has_a_remedy(
+    call, number, remedy, tmp_path, monkeypatch
+):
+    write_batch(tmp_path, [made(1)])
+    before = held(read_store(tmp_path))
+    monkeypatch.setattr(os, call, refusing(number))
+    with pytest.raises(StoreError) as error:
+        write_batch(tmp_path, [made(1, 5), made(2)])
+    monkeypatch.undo()
+    assert os.strerror(number) in str(error.value)
+    assert remedy in error.value.remedy
+    assert [*(tmp_path / "batches").iterdir()] == batches(tmp_path)
+    assert held(read_store(tmp_path)) == before
+
+
+def test_a_disk_that_fills_up_amid_a_file_leaves_what_was_there(tmp_path):
+    path = tmp_path / "one.nc"
+    publish(path, b"old")
+    with open("/dev/full", "wb") as full, pytest.MonkeyPatch.context() as patch:
+        patch.setattr("builtins.open", lambda *args: os.fdopen(os.dup(full.fileno()), "wb"))
+        with pytest.raises(StoreError, match="No space left on device; free some space"):
+            publish(path, bytes(10**6))
+    assert [*tmp_path.iterdir()] == [path]
+    assert path.read_bytes() == b"old"
+
+
+def test_files_and_folders_are_synced(tmp_path, monkeypatch):
+    synced, real = [], os.fsync
+    monkeypatch.setattr(
+        os, "fsync", lambda fd: (synced.append(os.readlink(f"/proc/self/fd/{fd}")), real(fd))
+    )
+    path = write_batch(tmp_path / "new", [made(1)])
+    above, folder, file, named = synced  # the names of folders; the data, then the name
+    assert [above, folder] == [str(tmp_path), str(tmp_path / "new")]
+    assert file.startswith(f"{path.parent}/.")
+    assert named == str(path.parent)
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.EOPNOTSUPP])
+def test_a_folder_that_cannot_be_synced_is_let_pass(number, tmp_path, monkeypatch):
+    real = os.fsync
+
+    def sync(descriptor):
+        if os.path.isdir(f"/proc/self/fd/{descriptor}"):
+            raise OSError(number, os.strerror(number))
+        real(descriptor)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    write_batch(tmp_path / "fuse", [made(1)])
+    assert read_store(tmp_path / "fuse").keys() == {key(1)}
+
+
+def test_old_leftovers_are_removed_and_young_ones_kept(tmp_path):
+    write_batch(tmp_path, [made(1)])
+    old, young = (tmp_path / f"batches/.{name}.h5.1.tmp" for name in ("old", "young"))
+    for path in (old, young):
+        path.touch()
+    os.utime(old, (0, 0))
+    (tmp_path / "elsewhere").mkdir()
+    beyond = tmp_path / "elsewhere" / ".old.tmp"
+    beyond.touch()
+    os.utime(beyond, (0, 0))
+    (tmp_path / "store").mkdir()
+    (tmp_path / "store/batches").symlink_to(tmp_path / "elsewhere")
+    discard_leftovers(tmp_path / "store")
+    assert beyond.exists()
+    discard_leftovers(tmp_path)
+    assert [path.exists() for path in (old, young, beyond)] == [False, True, False]
+    assert read_store(tmp_path).keys() == {key(1)}
+
+
+def test_a_folder_that_may_not_be_read_is_no_damage(tmp_path, monkeypatch):
+    write_batch(tmp_path, [made(1)])
+    for module, name in ((os, "listdir"), (rows, "read_batch")):
+        with monkeypatch.context() as patch:
+            patch.setattr(module, name, refusing(errno.EACCES))
+            with pytest.raises(StoreError, match="Permission denied; get the permission"):
+                read_store(tmp_path)
+
+
+# ---- damage -------------------------------------------------------------------------------------
+
+
+def flipped(data, at, bit):
+    found = bytearray(data)
+    found[at] ^= 1 << bit
+    return bytes(found)
+
+
+def damages(data, rng):
+    """All bits of the superblock, some of each part of the file, and files that end early."""
+    for at in range(48):
+        yield from (flipped(data, at, bit) for bit in range(8))
+    for _ in range(300):
+        yield flipped(data, rng.randrange(48, len(data)), rng.randrange(8))
+    for size in range(0, len(data), len(data) // 10):
+        yield data[:size]
+
+
+@pytest.mark.parametrize("samples", [0, 30])
+def test_every_flipped_bit_of_a_batch_is_told_or_changes_nothing(samples, tmp_path):
+    jobs = [made(n, samples=samples, detail="µ") for n in range(3)]
+    path = write_batch(tmp_path, jobs)
+    plan(tmp_path, 3)
+    good, whole, told = path.read_bytes(), held(read_store(tmp_path)), 0
+    for data in damages(good, random.Random(samples)):
+        path.write_bytes(data)
+        try:
+            stored = read_store(tmp_path)
+            found = None if stored.damaged else held(stored)
+        except DamagedFile:
+            found = None
+        assert found in (None, whole)
+        if found is None:
+            told += 1
+            (damage,) = verify(tmp_path)
+            assert (damage.path, damage.keys) == (path, (key(0), key(1), key(2)))
+            assert {*damage.studies[key(1)]} == {"made"}
+    assert told > 400
+    path.write_bytes(good)
+    assert verify(tmp_path) == []
+
+
+def test_every_flipped_bit_of_a_study_is_found(tmp_path):
+    plan(tmp_path, 3)
+    path = tmp_path / "studies/made.json"
+    good, rng = path.read_bytes(), random.Random(1)
+    for at in range(len(good)):
+        path.write_bytes(flipped(good, at, rng.randrange(8)))
+        (damage,) = verify(tmp_path)
+        assert (damage.path, damage.keys) == (path, ())
+        assert damage.remedy == "run its case file again"
+
+
+def test_damage_to_a_machine_that_was_followed_is_told(tmp_path, capsys):
+    kept = xr.Dataset(
+        {
+            "hours": ("stage", [0.0, 1.5, 3.0], {"units": "h"}),
+            "reason": ("stage", ["", "worn", "µ"]),
+            "load": (("stage", "joint"), [[1.0, 2.0]] * 3),
+        },
+        {"stage": [1, 2, 3]},
+        {"key": "0123456789abcdef0123", "model_version": 2},
+    )
+    path = write_dataset(tmp_path / "follow/chains/0123456789abcdef0123.nc", kept)
+    whole = read_dataset(path)
+    assert whole.equals(kept)
+    assert whole.attrs == kept.attrs
+    with xr.open_dataset(path, engine="h5netcdf") as opened:
+        xr.testing.assert_equal(opened, kept)
+    assert verify(tmp_path) == []
+    assert cli.main(["status", "-r", str(tmp_path)]) == 2
+    good = path.read_bytes()
+    for data in damages(good, random.Random(2)):
+        path.write_bytes(data)
+        try:
+            assert read_dataset(path).identical(whole)
+        except DamagedFile:
+            (damage,) = verify(tmp_path)
+            assert damage.path == path
+            assert "delete it" in damage.remedy
+    assert cli.main(["verify", "-r", str(tmp_path)]) == 5
+    assert "delete it" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("data", [b"", b"not a job", b"\x89HDF\r\n\x1a\n", b"\x80\x04."])
+def test_what_is_no_batch_is_told_with_a_remedy(data, tmp_path):
+    path = write_batch(tmp_path, [made(1)])
+    path.write_bytes(data)
+    (damage,) = read_store(tmp_path).damaged
+    assert str(damage).startswith(f"{path}: is damaged, or no file of compsim's; delete it")
+
+
+def test_jobs_in_a_damaged_batch_count_as_missing_with_a_warning(tmp_path, capsys):
+    """Where it cannot be opened, and where only its numbers are damaged."""
+    parts = [[0], [1], [*range(2, 400)]]  # the values of the last have a checksum of their own
+    paths = [write_batch(tmp_path, [made(n) for n in part]) for part in parts]
+    plan(tmp_path, 400)
+    paths[0].write_bytes(paths[0].read_bytes()[:-1])
+    data = paths[2].read_bytes()
+    at = data.index(made(2).numbers["peak_contact_force_axis"].tobytes())
+    paths[2].write_bytes(flipped(data, at, 0))
+    with pytest.warns(StoreWarning, match="is damaged.*count as missing") as told:
+        found = open_study(tmp_path)
+    assert [sum(path.name in str(one.message) for one in told) for path in paths] == [1, 0, 1]
+    assert found.status.values[:3].tolist() == ["missing", "ok", "missing"]
+    lost = {damage.path: damage.keys for damage in verify(tmp_path)}
+    assert lost == {paths[0]: (key(0),), paths[2]: (*map(key, range(2, 400)),)}
+    assert cli.main(["verify", "-r", str(tmp_path), "--json"]) == 5
+    assert {one["path"] for one in json.loads(capsys.readouterr().out)} == {*map(str, lost)}
+    stored = read_store(tmp_path)
+    assert [stored.intact(stored.position(key(n))) for n in (1, 2, 3)] == [True, False, False]
+
+
+def test_damage_to_series_is_told_when_they_are_read(tmp_path):
+    path = write_batch(tmp_path, [made(n, samples=3) for n in range(2)])
+    plan(tmp_path, 2)
+    lazy = open_study(tmp_path)
+    values = made(1, samples=3).series["acceleration"].values.tobytes()
+    path.write_bytes(flipped(data := path.read_bytes(), data.index(values), 3))
+    forget()
+    with pytest.raises(DamagedFile, match=path.name):
+        lazy.acceleration.load()

@@ -1,0 +1,221 @@
+"""Jobs in batches: they come back as they were, to compsim and to other programs."""
+
+import itertools
+import json
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import WORN_SENSOR, assert_same_bits, keep
+from made_jobs import SHORT, batches, held, key, made
+
+from compressor.cases.case import Case
+from compressor.solve.simulate import simulate
+from compressor.store.batch import read_batch, read_outcomes, write_batch
+from compressor.store.files import StoreError
+from compressor.store.reader import read_job, read_store
+
+STUCK = {"joint": "both", "clearance_mm": 0.1, "solve": {**SHORT, "max_steps": 5}}
+JOBS = {
+    "ok": {},
+    "metrics": {"output": {"keep": "metrics"}},
+    "failed": STUCK,
+    "failed metrics": {**STUCK, "output": {"keep": "metrics"}},
+    "sensor": {"body": True, "sensor": {**WORN_SENSOR, "length_rev": 2}, "joint": "big_end",
+               "clearance_mm": 0.2, "solve": {**SHORT, "duration_rev": 2}},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=list(JOBS))
+def job(request):
+    return simulate(Case.from_values({"solve": SHORT, **JOBS[request.param]}))
+
+
+@pytest.fixture(scope="module")
+def ideal():
+    return simulate(Case.from_values({"solve": SHORT}))
+
+
+def asking(dataset, **output):
+    """A job's Dataset as if its case had asked for some output."""
+    case = json.loads(dataset.attrs["case"]) | {"output": output}
+    return dataset.assign_attrs(case=json.dumps(case))
+
+
+# ---- to compsim ---------------------------------------------------------------------------------
+
+
+def test_a_job_comes_back_identical_in_kind_and_bits(job, tmp_path):
+    assert job.regime.item() == job.attrs["regime"]
+    keep(tmp_path, job)
+    assert_same_bits(read_job(tmp_path, job.attrs["key"]), job)
+    end = read_store(tmp_path).status(job.attrs["key"])
+    assert (end.status, end.reason) == (str(job.status.values), str(job.reason.values))
+    assert end.samples == job.sizes.get("time", 0)
+    assert end.detail == job.attrs.get("detail", "")
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_single_precision_rounds_series_alone(compress, ideal, tmp_path):
+    keep(tmp_path, asking(ideal, precision="single", compress=compress))
+    back = read_job(tmp_path, ideal.attrs["key"])
+    for name, item in ideal.variables.items():
+        rounded = "time" in item.dims and name not in ("time", "crank_angle")
+        expected = item.values.astype("f4") if rounded else item.values
+        assert back[name].dtype == expected.dtype
+        np.testing.assert_array_equal(back[name].values, expected)
+
+
+def test_compression_loses_nothing_and_saves_room(tmp_path):
+    jobs = [made(number, samples=5000) for number in range(3)]
+    for job in jobs:
+        job.series["contact_force"].values[:] = 0
+    paths = [write_batch(tmp_path / str(gzip), jobs, gzip) for gzip in (False, True)]
+    assert paths[1].stat().st_size < 0.6 * paths[0].stat().st_size
+    assert held(read_store(tmp_path / "True")) == held(read_store(tmp_path / "False"))
+
+
+def test_jobs_of_any_length_kind_and_variables_share_a_batch(tmp_path):
+    """Also single precision beside double."""
+    jobs = [made(n, samples=n * 7 % 5, precision=("double", "single")[n % 2]) for n in range(8)]
+    path = write_batch(tmp_path, jobs)
+    for back, job in zip(read_outcomes(read_batch(path)), jobs, strict=True):
+        assert back.numbers.tobytes() == job.numbers.tobytes()
+        assert back.attributes == job.attributes
+        assert back.series.keys() == job.series.keys()
+        for name, item in job.series.items():
+            other = back.series[name]
+            assert (other.dims, other.attrs) == (item.dims, item.attrs)
+            assert other.values.dtype == item.values.dtype
+            assert other.values.tobytes() == item.values.tobytes()
+
+
+@pytest.mark.parametrize("text", ["", "nul \0 in it", "lone \udc80 surrogate", "Größe µ 漢"])
+def test_any_text_can_be_stored(text, tmp_path):
+    state = np.array([1.5, -0.0, np.nan])
+    write_batch(tmp_path, [made(1, reason="non_finite", detail=text, state=state, complete=0)])
+    stored = read_store(tmp_path)
+    assert stored.status(key(1)).detail == text
+    back = stored.outcome(0).attributes
+    assert (back["detail"], back["complete"]) == (text, 0)
+    assert back["state"].tobytes() == state.tobytes()
+
+
+def test_what_is_not_stored_is_no_job(ideal, tmp_path):
+    name = ideal.attrs["key"]
+    assert read_store(tmp_path).keys() == set()
+    assert read_store(tmp_path).status(name) is None
+    with pytest.raises(StoreError, match="is not stored; run its study first"):
+        read_job(tmp_path, name)
+    with pytest.raises(StoreError, match="a key is 20 hexadecimal digits"):
+        read_job(tmp_path, "../../etc/passwd")
+
+
+# ---- to other programs --------------------------------------------------------------------------
+
+
+def test_xarray_opens_a_batch(ideal, tmp_path):
+    """Jobs x metrics by their labels, and jobs x samples with units and joints."""
+    failed = simulate(Case.from_values({"solve": SHORT, **STUCK}))
+    cases = [ideal, failed]
+    keep(tmp_path, *cases)
+    for job, path in zip(cases, batches(tmp_path), strict=True):
+        with xr.open_dataset(path, engine="h5netcdf") as found:
+            assert found.value.dims == found.error.dims == ("job", "metric")
+            one = found.sel(job=job.attrs["key"])
+            assert (one.status, one.reason) == (job.status, job.reason)
+            units = dict(zip(found.metric.values, found.unit.values, strict=True))
+            if job is ideal:
+                labels = {"peak_acceleration": "m/s2", "peak_contact_force.small_end": "N"}
+                assert units.items() >= labels.items()
+                assert one.value.sel(metric="peak_acceleration") == job.peak_acceleration
+                assert one.error.sel(metric="peak_acceleration") == job.peak_acceleration_error
+                force = job.peak_contact_force.sel(joint="small_end")
+                assert one.value.sel(metric="peak_contact_force.small_end") == force
+            force, count = one.contact_force.sel(joint="big_end", axis="y"), int(one.samples)
+            assert force.attrs == job.contact_force.attrs
+            expected = job.contact_force.sel(joint="big_end", axis="y")
+            np.testing.assert_array_equal(force[:count], expected)
+            np.testing.assert_array_equal(one.time[:count], job.time)
+            assert found.attrs["comment"] == "SI units"
+
+
+def test_a_few_lines_of_h5py_read_one_job(tmp_path):
+    """As MATLAB's ncread does: variables by their names, texts as rows of characters."""
+    jobs = [made(number, samples=4 + number) for number in range(3)]
+    path = write_batch(tmp_path, jobs)
+    with h5py.File(path) as file:
+        row = [b"".join(one).decode() for one in file["job"]].index(key(1))
+        count = file["samples"][row]
+        acceleration = file["acceleration"][row, :count]
+        unit = file["acceleration"].attrs["units"].decode()
+        labels = [b"".join(one).decode() for one in file["metric"]]
+        peak = file["value"][row, labels.index("peak_acceleration")]
+    np.testing.assert_array_equal(acceleration, jobs[1].series["acceleration"].values)
+    assert (unit, peak) == ("m/s2", 1.0)
+
+
+def test_ncdump_reads_a_batch(ncdump, tmp_path):
+    path = write_batch(tmp_path, [made(1, samples=5)])
+    text = ncdump("-v", "acceleration", path)
+    assert "char job(job, text20) ;" in text
+    assert "double value(job, metric) ;" in text
+    assert "double contact_force(job, sample, joint, axis) ;" in text
+    assert '\tacceleration:units = "m/s2" ;' in text
+
+
+# ---- what a stored job serves -------------------------------------------------------------------
+
+
+SERVING = [  # output of what is stored, its reason, output of the case, serves
+    ("series", "double", "", "metrics", "double", True),
+    ("metrics", "double", "", "series", "double", False),
+    ("series", "single", "", "series", "double", False),
+    ("series", "double", "", "series", "single", True),
+    ("metrics", "double", "budget_steps", "metrics", "double", True),
+    ("metrics", "double", "budget_seconds", "metrics", "double", False),
+    ("metrics", "double", "internal_error", "series", "double", True),
+    ("metrics", "double", "worker_died", "series", "double", True),
+    ("metrics", "double", "out_of_memory", "series", "double", True),
+]
+
+
+def stored_as(row, ideal, folder, name):
+    """Store a job under a key as a row of SERVING says."""
+    keeps, precision, reason, *_ = row
+    dataset = ideal if keeps == "series" else ideal.drop_dims("time")
+    dataset = dataset.assign(status="failed" if reason else "ok", reason=reason)
+    keep(folder, asking(dataset, keep=keeps, precision=precision).assign_attrs(key=name))
+
+
+@pytest.mark.parametrize("row", SERVING)
+def test_what_a_stored_job_serves(row, ideal, tmp_path):
+    *_, asks, exact, serves = row
+    stored_as(row, ideal, tmp_path, ideal.attrs["key"])
+    case = Case.resolve({"output": {"keep": asks, "precision": exact}})
+    end = read_store(tmp_path).status(ideal.attrs["key"])
+    assert end.satisfies(case) == serves
+    again = end.with_stored_outputs(case).output
+    kinds = {exact for keeps, exact in (row[:2], (asks, exact)) if keeps == "series"}
+    assert again.keep == ("series" if kinds else "metrics")
+    assert again.precision == min(kinds, default="double")
+
+
+def test_many_jobs_serve_as_each_does(ideal, tmp_path):
+    """Jobs of one kind are asked once, and kinds differ in all that decides."""
+    for number, row in enumerate([*SERVING, *SERVING[::2]]):
+        stored_as(row, ideal, tmp_path, key(number))
+    keep(tmp_path, simulate(Case.from_values({"solve": SHORT | {"error_bars": False}})))
+    stored, told = read_store(tmp_path), set()
+    positions = np.arange(len(stored.rows))[::-1]
+    for keeps, precision, bars in itertools.product(
+        ("series", "metrics"), ("double", "single"), (True, False)
+    ):
+        output = {"keep": keeps, "precision": precision}
+        case = Case.resolve({"output": output, "solve": {"error_bars": bars}})
+        each = [stored.status_at(position).satisfies(case) for position in positions]
+        assert stored.serving(positions, case).tolist() == each
+        told |= {*each}
+    assert told == {True, False}
+    assert stored.serving(positions[:0], case).tolist() == []

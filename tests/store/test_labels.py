@@ -1,0 +1,238 @@
+"""A folder of results as labelled data: axes, units, lazily read series."""
+
+import shutil
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import keep
+from made_jobs import SHORT, fill, study
+
+from compressor.cases.case import Case
+from compressor.cases.table import table
+from compressor.metrics import METRICS
+from compressor.solve.simulate import simulate
+from compressor.store import rows
+from compressor.store.export import ExportOptions, export
+from compressor.store.files import StoreError, StoreWarning
+from compressor.store.reader import open_study, read_job, read_store
+from compressor.store.studies import coordinate_names, write_study
+
+TIMES = 5  # each that three threads read three jobs
+
+
+@pytest.mark.parametrize(
+    ("keys", "names"),
+    [
+        (["machine.rod_mass_kg"], ["rod_mass_kg"]),
+        (["joint", "clearance_mm"], ["fault", "clearance_mm"]),
+        (["gas.exponent", "contact.exponent"], ["gas_exponent", "contact_exponent"]),
+        (["clearance_mm.big_end"], ["clearance_mm_big_end"]),
+        (["initial_offset_mm.big_end_x"], ["initial_offset_mm_big_end_x"]),
+    ],
+)
+def test_names_of_coordinates(keys, names):
+    assert list(coordinate_names(keys).values()) == names
+
+
+def test_no_coordinate_hides_what_a_job_holds():
+    ideal = simulate(Case.from_values({"solve": SHORT}))
+    names = {name for key in table() for name in coordinate_names([key]).values()}
+    assert names & {*ideal.variables, "key", "study", "job", "sample"} == set()
+
+
+@pytest.fixture(scope="module")
+def grid(tmp_path_factory):
+    """A 2 x 2 study of ideal joints; the last job is missing."""
+    folder = tmp_path_factory.mktemp("grid")
+    one = study("grid", load=["spring", "none"], machine={"rod_mass_kg": [4, 5]})
+    fill(folder, one, skip=(3,))
+    return folder, one
+
+
+def test_one_study_has_its_axes_as_dimensions(grid):
+    folder, one = grid
+    found = open_study(folder)
+    assert found.key.dims == ("load", "rod_mass_kg")
+    assert found.key.values.ravel().tolist() == [case.key for case in one.cases]
+    assert found.rod_mass_kg.attrs["units"] == "kg"
+    assert found.status.values.tolist() == [["ok", "ok"], ["ok", "missing"]]
+    assert np.isnan(found.peak_acceleration.values).tolist() == [[False, False], [False, True]]
+    assert set(METRICS) <= set(found)
+    for name in found:
+        assert found[name].attrs["long_name"], name
+
+
+def test_a_table_of_a_study_has_its_machine(grid, tmp_path):
+    found = open_study(grid[0])
+    assert found.rod_mass_kg.dims == ("rod_mass_kg",)
+    table = found[["peak_acceleration", "speed_rpm", "reciprocating_mass_kg"]].to_dataframe()
+    assert table.index.names == ["load", "rod_mass_kg"]
+    assert {*table.speed_rpm} == {500.0}
+    assert {*table.reciprocating_mass_kg} == {14.0}
+    assert found.speed_rpm.attrs == {
+        "units": "rpm", "long_name": "crank speed", "case_key": "machine.speed_rpm"
+    }  # fmt: skip
+    assert "rod_inertia_kg_m2" not in found  # it follows from the mass that is swept
+    swept = study("stroke", machine={"stroke_mm": [200, 240], "speed_rpm": 300})
+    write_study(tmp_path, swept, "by hand")
+    other = open_study(tmp_path, "stroke")
+    assert other.speed_rpm.item() == 300.0
+    assert other.crank_radius_mm.dims != ()
+
+
+def test_a_series_is_that_of_its_job(grid):
+    folder, one = grid
+    found = open_study(folder).sel(load="none", rod_mass_kg=4)
+    job = read_job(folder, one.cases[2].key)
+    assert found.contact_force.dims == ("time", "joint", "axis")
+    for name in ("time", "acceleration", "contact_force", "penetration"):
+        assert found[name].attrs == job[name].attrs
+        assert found[name].values.tobytes() == job[name].values.tobytes()
+
+
+def test_only_the_jobs_asked_for_are_read(grid, monkeypatch):
+    folder, one = grid
+    read, real = [], rows.read_one_series
+    monkeypatch.setattr(
+        rows, "read_one_series", lambda *args: read.append(args) or real(*args)
+    )  # fmt: skip
+    found = open_study(folder)
+    assert found.acceleration.sizes["time"] == 101
+    assert repr(found)
+    assert read == []
+    float(found.acceleration.sel(load="spring", rod_mass_kg=5).max())
+    stored = read_store(folder)
+    position = stored.position(one.cases[1].key)
+    assert read == [(stored.rows.path(position), "acceleration", [stored.rows.row[position]])]
+
+
+@pytest.mark.parametrize(
+    "index",
+    [
+        (0, 1, 7),
+        (slice(None), slice(None, None, -1), slice(100, None, -7)),
+        (1, 1, slice(3)),
+        ([1, 0], 0, [5, 2, 2]),
+        (slice(0, 0), 0, slice(None)),
+    ],
+)
+def test_lazy_indexing_is_numpy_s(grid, index):
+    found = open_study(grid[0]).acceleration
+    whole = xr.DataArray(found.values, dims=found.dims)
+    assert found.shape == (2, 2, 101)
+    assert np.array_equal(found[index].values, whole[index].values, equal_nan=True)
+
+
+def test_different_time_grids_are_padded(tmp_path):
+    solve = {"duration_rev": 1, "settle_rev": 0, "output_step_s": 1e-3}
+    fill(tmp_path, study("speeds", solve, machine={"speed_rpm": [300, 500]}))
+    found = open_study(tmp_path)
+    assert found.acceleration.dims == found.time.dims == ("speed_rpm", "sample")
+    assert found.sizes["sample"] == 201
+    slow, fast = found.time.values
+    assert (slow[-1], fast[120]) == (0.2, 0.12)
+    assert np.isnan(fast[121:]).all()
+    assert np.isnan(found.acceleration.sel(speed_rpm=500)[121:]).all()
+    assert np.isfinite(found.acceleration.sel(speed_rpm=500)[:121]).all()
+
+
+def test_several_studies_have_jobs_with_coordinates(grid, tmp_path):
+    shutil.copytree(grid[0], tmp_path, dirs_exist_ok=True)
+    fill(tmp_path, study("faults", joint=["none", "both"], clearance_mm=[0.1]), skip=(0,))
+    found = open_study(tmp_path)
+    assert found.study.values.tolist() == ["faults"] * 2 + ["grid"] * 4
+    assert found.fault.values.tolist() == ["none", "both"] + ["none"] * 4
+    assert found["load"].values.tolist()[1:5] == ["spring", "spring", "spring", "none"]
+    assert found.rod_mass_kg.values.tolist() == [4.7, 4.7, 4, 5, 4, 5]
+    assert found.clearance_mm.values[:2].tolist() == [0.1, 0.1]
+    assert found.acceleration.dims == ("job", "time")
+    assert found.reciprocating_mass_kg.dims == ("job",)
+    with pytest.warns(StoreWarning, match="select both"):
+        faults = open_study(tmp_path, "faults")
+    assert faults.peak_contact_force.sel(joint="big_end").dims == ("fault", "clearance_mm")
+    assert faults.clearance_mm.attrs["long_name"] == "radial clearance"
+    assert open_study(tmp_path, "grid").key.shape == (2, 2)
+    with pytest.raises(StoreError, match=r"'gird'; did you mean grid\?"):
+        open_study(tmp_path, "gird")
+
+
+def test_a_study_of_one_job_has_no_axes(tmp_path):
+    fill(tmp_path, study("alone", output={"keep": "metrics"}))
+    found = open_study(tmp_path)
+    assert found.peak_acceleration.dims == ()
+    assert found.peak_contact_force.dims == ("joint",)
+    assert "acceleration" not in found
+
+
+def test_failed_jobs_have_a_reason_and_no_metrics(tmp_path):
+    solve = SHORT | {"max_steps": [5, 100000]}
+    fill(tmp_path, study("budgets", solve, joint="both", clearance_mm=0.1))
+    found = open_study(tmp_path)
+    assert found.reason.values.tolist() == ["budget_steps", ""]
+    assert np.isnan(found.peak_acceleration.values).tolist() == [True, False]
+    assert np.isfinite(found.acceleration.sel(max_steps=5)[0])
+    assert np.isnan(found.acceleration.sel(max_steps=5)[-1])
+
+
+def test_jobs_that_were_simulated_for_metrics_have_no_series_beside_others(tmp_path):
+    write_study(tmp_path, one := study("loads", load=["spring", "none"]), "by hand")
+    keep(tmp_path, simulate(one.cases[0]), simulate(one.cases[1]).drop_dims("time"))
+    found = open_study(tmp_path)
+    assert found.status.values.tolist() == ["ok", "ok"]
+    assert np.isfinite(found.acceleration.values).all(axis=1).tolist() == [True, False]
+    assert np.isnan(found.acceleration.sel(load="none")).all()
+
+
+def test_a_study_without_any_job_is_all_missing(tmp_path):
+    write_study(tmp_path, study("planned", clearance_mm=[0.1, 0.2], joint=["both"]))
+    found = open_study(tmp_path)
+    assert found.status.values.tolist() == [["missing"], ["missing"]]
+    assert found.clearance_mm.attrs["units"] == "mm"
+
+
+# ---- several threads ----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """A folder with a study of three clearances, and its accelerations, which differ."""
+    folder = tmp_path_factory.mktemp("threads") / "results"
+    fill(folder, study("small", joint="big_end", clearance_mm=[0.1, 0.2, 0.3]))
+    found = open_study(folder, "small").acceleration.values
+    assert not any(np.array_equal(found[n], found[n - 1]) for n in range(3))
+    return folder, found
+
+
+def test_threads_read_the_series_of_their_own_jobs(small):
+    folder, alone = small
+    right = 0
+    with ThreadPoolExecutor(3) as pool:
+        for _ in range(TIMES):
+            series = open_study(folder).acceleration
+            found = pool.map(lambda n, s=series: s.isel(clearance_mm=n).values, range(3))
+            right += sum(map(np.array_equal, found, alone))
+    assert right == 3 * TIMES
+
+
+def test_dask_threads_read_the_series_of_their_own_jobs(small):
+    folder, alone = small
+    for _ in range(TIMES):
+        chunked = open_study(folder).acceleration.chunk({"clearance_mm": 1})
+        np.testing.assert_array_equal(chunked.compute(scheduler="threads"), alone)
+
+
+def test_threads_export_the_same_as_one(small, tmp_path):
+    def written(name):
+        for form in ("csv", "netcdf"):
+            export(small[0], ["small"], tmp_path / name / form, ExportOptions(form, series=True))
+        return {
+            path.relative_to(tmp_path / name): path.read_bytes()
+            for path in (tmp_path / name).rglob("*.*")
+        }
+
+    expected = written("alone")
+    with ThreadPoolExecutor(3) as pool:
+        assert all(found == expected for found in pool.map(written, "abc"))
+    assert len(expected) == 8

@@ -1,0 +1,242 @@
+"""Studies of a store, and folders: what is stored and found, and what is near where nothing is."""
+
+import json
+import os
+
+import pytest
+from made_jobs import study
+
+from compressor.cases.study import points
+from compressor.program import did_you_mean
+from compressor.store.files import StoreError, WrongName, make_folder, no_results, writable_folder
+from compressor.store.reader import open_study
+from compressor.store.studies import (
+    StoredAxis,
+    StoredStudy,
+    find_job,
+    find_study,
+    find_value,
+    read_studies,
+    write_study,
+)
+
+# ---- files --------------------------------------------------------------------------------------
+
+
+def test_a_study_is_stored_and_found(tmp_path):
+    one = study("speeds", machine={"speed_rpm": [300, 500]}, load=["spring", "none"])
+    write_study(tmp_path, one, "compsim run speeds.yaml", ["joint=none"])
+    (found,) = read_studies(tmp_path)
+    assert (found.name, found.command) == ("speeds", "compsim run speeds.yaml")
+    assert found.keys == tuple(case.key for case in one.cases)
+    assert (found.again.overrides, found.again.jobs) == (("joint=none",), 4)
+    assert [(axis.key, axis.values, axis.units) for axis in found.axes] == [
+        ("machine.speed_rpm", (300, 500), "rpm"),
+        ("load", ("spring", "none"), ""),
+    ]
+    assert list(points(found))[1] == {"machine.speed_rpm": 300, "load": "none"}
+
+
+def test_storing_a_study_again_leaves_its_file_alone_and_a_changed_one_takes_its_place(tmp_path):
+    pairs = [["steel", "steel"], ["steel", "copper"]]
+    worn = {"joint": "big_end", "clearance_mm": 0.2}
+    one = study("pairs", **worn, contact={"materials": pairs})
+    write_study(tmp_path, one, "first")
+    before = (tmp_path / "studies/pairs.json").stat().st_mtime_ns
+    write_study(tmp_path, one, "second")
+    assert (tmp_path / "studies/pairs.json").stat().st_mtime_ns == before
+    write_study(tmp_path, study("pairs", **worn, contact={"materials": pairs[:1]}), "third")
+    (found,) = read_studies(tmp_path)
+    assert (found.command, found.jobs) == ("third", 1)
+    assert os.listdir(tmp_path / "studies") == ["pairs.json"]
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[1]", "[" * 10**5, "NaN", '{"digest": 1}', "\xff"])
+def test_a_damaged_study_is_named_with_a_remedy_and_run_again(text, tmp_path):
+    write_study(tmp_path, one := study("one"))
+    path = tmp_path / "studies/one.json"
+    good = json.loads(path.read_text())
+    path.write_text(text, encoding="latin-1")
+    with pytest.raises(StoreError, match=r"one\.json.*delete it and run its case file again"):
+        read_studies(tmp_path)
+    write_study(tmp_path, one)
+    assert json.loads(path.read_text())["keys"] == good["keys"]
+    path.rename(tmp_path / "studies/two.json")
+    with pytest.raises(StoreError, match=r"two\.json: is damaged"):
+        read_studies(tmp_path)
+
+
+# ---- folders ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """A working directory with folders of results and other things."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("results/studies/a.json", "deep/wear/studies/b.json", "wear/studies/c.json"):
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).write_text("{}")
+    for name in ("alone/results/studies", "alone/plots", "empty/plots"):
+        (tmp_path / name).mkdir(parents=True)
+    (tmp_path / "case.yaml").touch()
+    (tmp_path / "notes.txt").touch()
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("folder", "told"),
+    [
+        ("case.yaml", "is a case file, where a folder of results is needed; compsim run case.yaml"),
+        ("notes.txt", "is a file, where a folder of results is needed; choose another folder, or"),
+        ("resluts", "there is no such folder of results; did you mean results?"),
+        ("results/studies", "did you mean results?"),
+        ("results/batches", "did you mean results?"),
+        ("deep", "holds no study; did you mean deep/wear?"),
+        ("alone/plots", "holds no study; did you mean alone/results?"),
+        ("empty/plots", "holds no study; choose another folder, or make one: compsim run CONFIG"),
+        ("no/where", "there is no such folder of results; choose another folder, or make one"),
+    ],
+)
+def test_what_is_said_of_a_folder_without_results(folder, told, place):
+    error = no_results(folder)
+    assert isinstance(error, WrongName)
+    assert told in str(error)
+    assert "\n" not in str(error)
+    with pytest.raises(WrongName):
+        open_study(folder)
+
+
+def test_a_folder_that_may_not_be_written_is_found_before(tmp_path, monkeypatch):
+    made = tmp_path / "a" / "b"
+    writable_folder(made)
+    assert made.is_dir()
+    monkeypatch.setattr("os.access", lambda path, mode: path != made)  # root may write anywhere
+    with pytest.raises(WrongName, match=r"nothing may be written to .*get the permission"):
+        writable_folder(made / "c" / "d")
+    assert not (made / "c").exists()
+
+
+def test_a_file_or_a_broken_link_is_no_folder(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(WrongName, match="is a file, where a folder is needed; choose another"):
+        writable_folder(tmp_path / "file" / "c")
+    with pytest.raises(WrongName, match="is a file, where a folder is needed; choose another"):
+        make_folder(tmp_path / "file")
+    (tmp_path / "out").symlink_to("nowhere")
+    with pytest.raises(WrongName, match="out: is a link that leads nowhere; choose another"):
+        make_folder(tmp_path / "out")
+
+
+# ---- names --------------------------------------------------------------------------------------
+
+
+def named(name, axes, keys, is_grid=True):
+    made = tuple(StoredAxis(key, tuple(values), "") for key, values in axes.items())
+    return StoredStudy(name, f"{name}.yaml", made, tuple(keys), {}, "", {}, "", is_grid)
+
+
+WEAR = named(
+    "wear",
+    {"clearance_mm": (0.1, 0.2, 1e-3), "machine.rod_mass_kg": (3, 4.7)},
+    ["aa11", "aa12", "ab21", "ab22", "cc31", "cc32"],
+)
+SAMPLED = named(
+    "drawn",
+    {"clearance_mm": [n / 100 for n in range(1, 21)], "machine.speed_rpm": range(300, 320)},
+    [f"dd{n:02}" for n in range(20)],
+    is_grid=False,
+)
+WORDS = named("words", {"joint": ("none", "both"), "friction": (True, False)}, "efgh")
+ONE = named("one", {}, ["beef"])
+KNOWN = [WEAR, SAMPLED, WORDS, ONE]
+
+
+def found(*words):
+    return find_job("results", words, KNOWN, {"f0f0f0f0"})
+
+
+@pytest.mark.parametrize(
+    ("words", "key"),
+    [
+        (["aa11"], "aa11"),
+        (["f0"], "f0f0f0f0"),
+        (["wear", "clearance_mm=0.2", "machine.rod_mass_kg=3"], "ab21"),
+        (["wear", "rod_mass_kg=4.70", "clearance_mm=.2"], "ab22"),
+        (["wear", "clearance_mm=1e-3", "rod_mass_kg=3.0"], "cc31"),
+        (["drawn", "clearance_mm=0.07"], "dd06"),
+        (["words", "fault=both", "friction=false"], "h"),
+        (["words", "joint=none", "friction=true"], "e"),
+        (["one"], "beef"),
+    ],
+)
+def test_a_job_by_its_key_or_its_place_in_a_study(words, key):
+    assert found(*words) == key
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["aa"], "2 jobs' keys begin with 'aa': aa11, aa12; give more of the key"),
+        (["aa13"], "no job's key begins with 'aa13', and no study is called so; compsim status"),
+        (["waer"], "and no study is called so; did you mean wear?"),
+        (["WEAR.yaml"], "did you mean wear?"),
+        (["waer", "clearance_mm=0.1"], "holds no study 'waer'; did you mean wear?"),
+        (["other", "clearance_mm=0.1"], "holds no study 'other'; it holds wear, drawn, words, one"),
+        (["wear"], "wear is a study of 6 jobs; choose one by clearance_mm=… of 0.1, 0.2, 0.001; "
+                   "machine.rod_mass_kg=… of 3, 4.7"),
+        (["wear", "clearance_mm=0.1"], "2 jobs of wear have clearance_mm=0.1; choose one by "
+                                       "machine.rod_mass_kg=… of 3, 4.7"),
+        (["wear", "clearence_mm=0.1"], "wear has no axis 'clearence_mm'; did you mean clearance"),
+        (["wear", "load=none"], "wear has no axis 'load'; its axes are clearance_mm, machine.rod_"),
+        (["wear", "clearance_mm=0.3"], "no job of wear has clearance_mm=0.3; there are 0.1, 0.2, "),
+        (["wear", "clearance_mm=0.2mm"], "there are 0.1, 0.2, 0.001"),
+        (["wear", "clearance_mm"], "'clearance_mm' is no AXIS=VALUE of wear; its axes are"),
+        (["drawn", "clearance_mm=0.123"],
+         "no job of drawn has clearance_mm=0.123; there are 0.01, 0.02, 0.03, 0.04, 0.05, …"),
+        (["drawn", "clearance_mm=0.01", "speed_rpm=301"], "no job of drawn has clearance_mm=0.01"),
+        (["one", "clearance_mm=0.1"], "one has no axis 'clearance_mm'; it is one job: leave"),
+        (["words", "joint=botch", "friction=true"], "no job of words has joint=botch; there are"),
+    ],
+)  # fmt: skip
+def test_what_is_said_where_no_one_job_is_meant(words, told):
+    with pytest.raises(WrongName) as error:
+        found(*words)
+    assert told in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_studies_by_name():
+    assert find_study("results", "wear", KNOWN) is WEAR
+    assert find_study("results", None, [ONE]) is ONE
+    with pytest.raises(WrongName, match="holds several studies; name one: wear, drawn, words"):
+        find_study("results", None, KNOWN)
+    with pytest.raises(WrongName, match=r"it holds s0, s1, s2, s3, s4, …"):
+        find_study("results", "quite", [named(f"s{n}", {}, ["a"]) for n in range(7)])
+
+
+@pytest.mark.parametrize(
+    ("word", "told"),
+    [
+        ("staus", "did you mean status?"),
+        ("STATUS", "did you mean status?"),
+        ("configs/big-end.yaml", "did you mean big-end?"),
+        ("quite another", ""),
+        ("x" * 10**6, ""),
+    ],
+)
+def test_what_a_word_means(word, told):
+    assert did_you_mean(word, ["status", "big-end", "show"]) == told
+
+
+@pytest.mark.parametrize(
+    ("word", "expected"), [("500.002", 500.002), ("500.001", 500.001), ("712.3", 712.3000001)]
+)
+def test_a_value_is_the_nearest_before_a_rounded_one(word, expected):
+    near = named("near", {"machine.speed_rpm": (500, 500.001, 500.0015, 500.002, 712.3000001)}, "")
+    assert find_value("place", near, f"speed_rpm={word}") == ("machine.speed_rpm", expected)
+
+
+def test_what_rounds_to_several_values_is_none_of_them():
+    near = named("near", {"machine.speed_rpm": (500.00151, 500.00152)}, "")
+    with pytest.raises(WrongName, match=r"no job of near has machine.speed_rpm=500.002"):
+        find_value("place", near, "speed_rpm=500.002")
