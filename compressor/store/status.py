@@ -249,18 +249,19 @@ def verify(
     `progress` is called with how many files, of how many, were read. Raises StoreError for a folder
     that cannot be read.
     """
+    place = Path(os.path.abspath(folder))  # as batches have it
     with refusals(folder):
-        paths, others = batch_paths(folder), sorted(Path(folder).glob("**/*.nc"))
-    if not (paths or others or study_paths(folder)):
+        paths, others = batch_paths(place), sorted(place.glob("**/*.nc"))
+    if not (paths or others or study_paths(place)):
         raise no_results(folder)
     found: list[Damage] = []
     studies: list[StoredStudy] = []
-    for path in study_paths(folder):
+    for path in study_paths(place):
         try:
             studies.append(read_study(path))
         except StoreError as error:
             found.append(Damage(path, error.problem, (), "run its case file again"))
-    stored = read_store(folder)
+    stored = read_store(place)
     rows = stored.rows
     absent = {key for study in studies for key in study.keys} - stored.keys()
     for damage in stored.damaged:  # of which even the keys cannot be read
