@@ -76,7 +76,7 @@ LONG = (
     "physics/test_march", "physics/test_contact_laws", "solve/test_chosen_laws",
     "solve/test_feature_runs", "sweep/test_cluster", "sweep/test_execution",
     "report/test_report", "cases/test_card", "campaigns/test_chaos_files", "cmd/test_cli",
-    "sweep/test_sweep", "solve/test_integrate", "test_newcomer", "store/test_writer",
+    "sweep/test_sweep", "solve/test_integrate", "test_newcomer", "store/test_damage",
     "studies/follow/test_lyapunov", "test_systems", "studies/compare/test_compare",
     "studies/calibrate/test_calibrate_command", "campaigns/test_calibrate_campaign",
     "test_tutorial", "studies/stress/test_stress", "report/test_second_sets",

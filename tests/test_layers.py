@@ -261,7 +261,7 @@ def test_the_house_keeps_its_rules(rule):
     [
         (forbidden_imports, "compressor.physics.contact", "from compressor.cases import Case"),
         (forbidden_imports, "compressor.cases.study", "def late():\n    import compressor.store"),
-        (imports_past_doors, "compressor.sweep.sweep", "from compressor.store import hdf5"),
+        (imports_past_doors, "compressor.sweep.sweep", "from compressor.store import netcdf"),
         (imports_of_own_door, "compressor.cases.case", "from compressor.cases import table"),
         (circles, "compressor.physics.kinematics", "import compressor.physics.motion"),
         (faults_of_doors, "compressor.store", "HANDY = 1"),

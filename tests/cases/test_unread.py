@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from conftest import outcome_of
 
 from compressor.cases.case import Case
 from compressor.cases.checks import value_of
@@ -14,7 +15,7 @@ from compressor.cases.load import CaseFileError, load_cases, load_studies
 from compressor.cases.parameter import CaseError
 from compressor.cases.table import parts_by_key, table
 from compressor.solve import simulate
-from compressor.store.series_file import series_image
+from compressor.store.batch import encode_batch
 from compressor.studies.wear.stages import Worn, first_stage, life, next_stage, stages_dataset
 
 SHORT = {"duration_rev": 1, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 5,
@@ -253,8 +254,8 @@ def stored(text: str) -> dict[str, str]:
     found["worn"] = Case.from_attribute(run.attrs["case"]).worn_joint
     if case.output.keep == "metrics":
         return {name: text for name, text in found.items() if name != "time"}
-    # less the text of the case, which is longer by the key
-    found["file"] = str((len(series_image(run, case.output)) - len(run.attrs["case"])) // 1000)
+    # of its time series: the text of the case is longer by the key
+    found["file"] = str(len(encode_batch([outcome_of(run)], case.output.compress)) // 10_000)
     if case.wear:
         worn = Worn(case)
         begun = first_stage(worn)

@@ -38,7 +38,7 @@ MISTAKES = [
     # names of files
     ("run waer.yaml", "waer.yaml: cannot be read: No such file", "compsim init"),
     ("run again", "again: cannot be read: Is a directory", "compsim run again/*.yaml"),
-    ("run results/jobs/JOB.h5", "is not UTF-8 text; a case file is YAML"),
+    ("run results/batches/BATCH.h5", "is not UTF-8 text; a case file is YAML"),
     ("run empty.yaml", "empty.yaml:1:1: is empty", "compsim init"),
     ("run wear.yaml again/wear.yaml", "would be stored under one name, wear"),
     ("run 'my case.yaml'", "name: the file's name gives none", "set name"),
@@ -84,8 +84,8 @@ MISTAKES = [
     ("init wear", "wear.yaml exists, and is not overwritten: compsim init wear -o OTHER.yaml"),
     # folders of results
     ("status -r resluts", "resluts: there is no such folder of results; did you mean results?"),
-    ("verify -r again", "again: holds no study; there are results in results"),
-    ("report -r results/jobs", "did you mean results?"),
+    ("verify -r again", "again: holds no study; did you mean results?"),
+    ("report -r results/batches", "did you mean results?"),
     ("status -r wear.yaml", "Folder 'wear.yaml' is a file"),
     ("report -o READONLY", "nothing may be written to READONLY", "another folder"),
     ("export -o READONLY/all.csv", "nothing may be written to READONLY", "another folder"),
@@ -182,8 +182,8 @@ def morning(tmp_path_factory):
     (big_end,) = (path for path in CONFIGS if path.stem == "big-end")
     store(place / "results", place / "grid", big_end, overrides=["solve.accuracy=draft"])
     (place / "READONLY").mkdir()
-    job = next((place / "results" / "jobs").iterdir())
-    shutil.copy(job, place / "results" / "jobs" / "JOB.h5")
+    batch = next((place / "results" / "batches").iterdir())
+    shutil.copy(batch, batch.with_name("BATCH.h5"))
     return place
 
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 from compressor.cases.load import load_studies
 from compressor.store.files import StoreError
-from compressor.store.series_file import write_dataset
+from compressor.store.netcdf import write_dataset
 from compressor.studies.claims import study as machine_study
 from compressor.studies.claims.study import (
     ClaimsError,

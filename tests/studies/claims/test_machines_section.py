@@ -6,7 +6,7 @@ from compressor.cases.examples import example
 from compressor.cases.load import load_studies
 from compressor.report.page import document
 from compressor.store.files import StoreError
-from compressor.store.series_file import write_dataset
+from compressor.store.netcdf import write_dataset
 from compressor.studies.claims.page import (
     add,
     machine_drawings,

@@ -5,7 +5,7 @@ import pytest
 
 from compressor.cases.load import load_studies
 from compressor.store import StoreError
-from compressor.store.series_file import read_dataset, write_dataset
+from compressor.store.netcdf import read_dataset, write_dataset
 from compressor.studies.claims import search as searching
 from compressor.studies.claims.findings import change
 from compressor.studies.claims.search import POPULATION, AssumptionRange, cost, least_change

@@ -17,8 +17,8 @@ from compressor.cases.table import table
 from compressor.metrics import JOINTS, METRICS
 from compressor.solve.si_record import stiffness_of
 from compressor.solve.simulate import simulate
+from compressor.store.netcdf import write_dataset
 from compressor.store.reader import read_job
-from compressor.store.series_file import write_dataset
 from compressor.store.status import verify
 from compressor.studies.tradeoff import model_choices as module
 from compressor.studies.tradeoff.model_choices import (

@@ -11,7 +11,7 @@ from compsim.screen import wrap_value
 from compressor.metrics import JOINTS, METRICS
 from compressor.report.page import document
 from compressor.store.files import StoreWarning
-from compressor.store.series_file import write_dataset
+from compressor.store.netcdf import write_dataset
 from compressor.store.studies import StoredAxis, StoredStudy
 from compressor.studies.tradeoff.page import (
     add,

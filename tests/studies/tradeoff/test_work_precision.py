@@ -7,7 +7,7 @@ import xarray as xr
 from compressor.cases.case import Case
 from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
-from compressor.store.series_file import write_dataset
+from compressor.store.netcdf import write_dataset
 from compressor.studies.tradeoff.figures import draw_work_precision
 from compressor.studies.tradeoff.work_precision import (
     ReferenceFailed,
