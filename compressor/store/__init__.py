@@ -10,7 +10,7 @@ from compressor.store.files import (
     system_error,
     writable_folder,
 )
-from compressor.store.merge import merge_batches, set_aside
+from compressor.store.merge import merge_batches
 from compressor.store.netcdf import DamagedFile, read_dataset, write_dataset
 from compressor.store.reader import Stored, open_study, read_job, read_store
 from compressor.store.sensor_records import find_record, job_record
