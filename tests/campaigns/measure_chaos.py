@@ -25,7 +25,6 @@ CAMPAIGNS = {  # name: (module of chaos/, trials, trials of a sample)
     "poison": ("poison", 200, 4),
     "flips": ("flips", 3000, 5),
     "concurrent": ("concurrent", 100, 3),
-    "hostile": ("hostile", 1000, 12),
 }
 
 

@@ -1,42 +1,31 @@
-"""What the campaigns share: a small store, commands in forked processes, what a store holds."""
+"""What the campaigns on files share: a small store, commands in forked processes, what it holds."""
 
 import contextlib
 import dataclasses
 import faulthandler
+import itertools
 import json
+import multiprocessing
 import os
-import pickle
-import select
 import shutil
 import signal
 import sys
-import tempfile
-import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import click.utils
+from click.testing import CliRunner
 from compsim import cli
 
 from compressor.cases.load import load_studies
-from compressor.report import report
-from compressor.report.figures import pictures
 from compressor.store.reader import open_study
 from compressor.store.status import standings, verify
-from compressor.sweep import plan as forecast
-from compressor.sweep.sweep import sweep
+from compressor.sweep.worker import JobResult
 
-
-def undrawn():
-    """Let reports draw nothing, which takes seconds, and copy no library."""
-    report.draw_sweep = lambda *args: []
-    pictures.render_kinds = lambda *args: [b"drawn"] * 2
-    report.publish_library = lambda *args: None
-
-
+SWEEP: Any = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
+FORK = multiprocessing.get_context("fork")
 SECONDS = 60.0  # in which a trial must end; what hangs takes for ever
 SOLVE = {"duration_rev": 0.02, "settle_rev": 0, "output_step_deg": 0.72, "accuracy": "draft",
          "error_bars": False}  # fmt: skip
@@ -58,8 +47,7 @@ class Ended(NamedTuple):
     """How a forked process ended: what its work gave, or how it died."""
 
     result: Any
-    death: str  # "" where it gave a result
-    seconds: float  # of processor time, its children's included: other processes do not count
+    death: str = ""  # "" where it gave a result
 
 
 class Said(NamedTuple):
@@ -70,94 +58,73 @@ class Said(NamedTuple):
     err: str
 
 
+def run_here(size: int = 2, stored: Callable[[list[Any]], object] = len) -> None:
+    """Have sweeps run their jobs in this process, in batches; `stored` gets the keys of each."""
+
+    def run_batches(work: Any, jobs: Any, workers: Any, store: Any) -> Iterator[JobResult]:
+        left = iter(jobs)
+        while batch := [*itertools.islice(left, size)]:
+            ends = store([work(job[1]) for job in batch])
+            stored([job[0] for job in batch])
+            yield from (JobResult(job[0], end, 0.01) for job, end in zip(batch, ends, strict=True))
+
+    SWEEP.run_batches = run_batches
+
+
 def complete_store(folder: Path) -> Path:
-    """A store with all jobs of `STUDIES`; loads and compiles all that forked processes need."""
-    store = folder / "complete"
-    sweep(load_studies(*case_files(folder / "cases")), store, 1)
-    contents(store)
-    studies = load_studies(*case_files(folder / "cases"))
-    forecast.forecast(studies, folder / "new", 1).with_times(1, str)
-    return store
+    """A store with all jobs of `STUDIES`; compiles all that forked processes need."""
+    place = folder / "complete"
+
+    def fill() -> None:
+        run_here()
+        SWEEP.sweep(load_studies(*case_files(folder / "cases")), place, 1)
+
+    SWEEP.run_job(load_studies(*case_files(folder / "cases"))[0].cases[0])
+    assert not (ended := forked(fill, 600)).death, ended
+    return place
 
 
-def case_files(folder: Path) -> list[Path]:
-    """The case files of `STUDIES` in a folder."""
+def case_files(folder: Path, studies: dict[str, Any] = STUDIES) -> list[Path]:
+    """The case files of studies in a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, values in STUDIES.items():
+    for name, values in studies.items():
         text = json.dumps(values | {"solve": SOLVE | values.get("solve", {})})
         (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
-    return [folder / f"{name}.yaml" for name in STUDIES]
+    return [folder / f"{name}.yaml" for name in studies]
 
 
 def forked(work: Callable[[], Any], seconds: float = SECONDS) -> Ended:
     """Do some work in a process of its own, which may crash or hang."""
-    reader, writer = os.pipe()
-    began = time.monotonic()
-    child = os.fork()
-    if not child:
-        _child(work, writer)
-    os.close(writer)
-    data, late = _received(reader, began + seconds)
-    os.close(reader)
-    if late:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(child, signal.SIGKILL)
-    _, status, used = os.wait4(child, 0)
-    took = used.ru_utime + used.ru_stime
-    if late:
-        return Ended(None, f"hangs: {seconds:.0f} s", took)
-    code = os.waitstatus_to_exitcode(status)
-    if code:
-        return Ended(None, signal.Signals(-code).name if code < 0 else f"exit code {code}", took)
-    result, error = pickle.loads(data)
-    return Ended(result, error, took)
 
-
-def _child(work: Callable[[], Any], writer: int) -> None:
-    """The forked process: never returns."""
-    code = 1
-    faulthandler.disable()  # of pytest: a death is reported as `Ended.death`
-    try:
+    def begin() -> None:
         os.setpgid(0, 0)
+        faulthandler.disable()  # of pytest: a death is reported as `Ended.death`
         try:
-            answer = (work(), "")
+            theirs.send(Ended(work()))
         except Exception:
-            answer = (None, traceback.format_exc())
-        with open(writer, "wb") as file:
-            file.write(pickle.dumps(answer))
-        code = 0
-    finally:
-        os._exit(code)
+            theirs.send(Ended(None, traceback.format_exc()))
 
-
-def _received(reader: int, until: float) -> tuple[bytes, bool]:
-    """All bytes of a pipe, and whether they took too long."""
-    data = b""
-    while (left := until - time.monotonic()) > 0:
-        if select.select([reader], [], [], left)[0]:
-            part = os.read(reader, 1 << 20)
-            data += part
-            if not part:
-                return data, False
-    return data, True
+    ours, theirs = FORK.Pipe(duplex=False)
+    child: Any = FORK.Process(target=begin)
+    child.start()
+    theirs.close()
+    ended = None
+    with contextlib.suppress(EOFError):
+        ended = ours.recv() if ours.poll(seconds) else Ended(None, f"hangs: {seconds:.0f} s")
+    if ended and ended.death.startswith("hangs"):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(child.pid, signal.SIGKILL)
+    child.join()
+    code = child.exitcode
+    died = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+    return ended or Ended(None, died)
 
 
 def command(*arguments: object) -> Said:
-    """What a command says, run in this process, which is a forked one."""
-    click.utils.should_strip_ansi = lambda *args: False  # as on a terminal
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-        os.dup2(out.fileno(), 1)
-        os.dup2(err.fileno(), 2)
-        sys.stdout = open(1, "w", encoding="utf-8", closefd=False)
-        sys.stderr = open(2, "w", encoding="utf-8", errors="backslashreplace", closefd=False)
+    """What a command says, run in this process."""
+    with CliRunner().isolation() as (out, err, _):
         code = cli.main([str(argument) for argument in arguments])
-        sys.stdout.flush()
-        sys.stderr.flush()
-        texts = []
-        for file in (out, err):
-            file.seek(0)
-            texts.append(file.read().decode(errors="backslashreplace"))
-    return Said(code, *texts)
+        return Said(code, out.getvalue().decode(), err.getvalue().decode())
 
 
 def contents(folder: Path) -> dict[str, Any]:
@@ -169,9 +136,8 @@ def contents(folder: Path) -> dict[str, Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         for standing in standings(folder):
-            study = open_study(folder, standing.study).load()
             found[standing.study] = dataclasses.replace(standing, written="")  # when: a timing
-            for name, item in study.variables.items():
+            for name, item in open_study(folder, standing.study).load().variables.items():
                 if name not in TIMINGS:
                     values = item.values
                     plain = values.tolist() if values.dtype.kind in "OU" else values.tobytes()
@@ -179,8 +145,14 @@ def contents(folder: Path) -> dict[str, Any]:
     return found
 
 
+def differing(found: dict[str, Any], whole: dict[str, Any]) -> str:
+    """The names of what differs, "" where nothing does."""
+    names = sorted(found.keys() | whole.keys())
+    return ", ".join(name for name in names if found.get(name) != whole.get(name))
+
+
 @contextlib.contextmanager
-def fresh(folder: Path, name: str) -> Iterator[Path]:
+def fresh(folder: Path, name: str = "trial") -> Iterator[Path]:
     """An empty folder for a trial, gone after it."""
     place = folder / name
     shutil.rmtree(place, ignore_errors=True)

@@ -12,7 +12,6 @@ alone, acknowledged results are lost.
 
 import contextlib
 import fcntl
-import json
 import os
 import random
 import select
@@ -25,16 +24,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from chaos.common import SOLVE, contents, forked, fresh
+from chaos.common import FORK, SWEEP, case_files, contents, differing, forked, fresh, run_here
 from chaos.tally import Tally
 from compressor.cases.load import load_studies
-from compressor.cases.study import Study
-from compressor.store import writer
+from compressor.store import merge
 from compressor.store.reader import read_store
-from compressor.sweep.sweep import sweep
 
 SHUTDOWN = 0x8004587D  # FS_IOC_SHUTDOWN, _IOR('X', 125, __u32) of linux/fs.h
-NO_FLUSH = 2  # FS_SHUTDOWN_FLAGS_NOLOGFLUSH
+NO_FLUSH = struct.pack("I", 2)  # FS_SHUTDOWN_FLAGS_NOLOGFLUSH
 IMAGE_BYTES = 24 << 20
 TOOLS = ("mkfs.ext4", "e2fsck", "mount", "umount")
 OPTIONS = ("commit=1", "commit=5", "commit=1,data=writeback", "commit=1,nodelalloc")
@@ -54,8 +51,7 @@ def unable(image: Path) -> str:
     """Why power cannot be cut here; "" where it can: then `image` is an empty file system."""
     if os.geteuid() != 0:
         return "only root may mount an image"
-    absent = [tool for tool in TOOLS if not shutil.which(tool)]
-    if absent:
+    if absent := [tool for tool in TOOLS if not shutil.which(tool)]:
         return f"{', '.join(absent)} not installed"
     with open(image, "wb") as file:
         file.truncate(IMAGE_BYTES)
@@ -68,14 +64,6 @@ def unable(image: Path) -> str:
     except (RuntimeError, OSError) as error:
         return str(error)
     return ""
-
-
-def studies(folder: Path) -> list[Study]:
-    """The studies that are run: a thousand quick jobs, and some with time series."""
-    for name, values in STUDIES.items():
-        text = json.dumps(values | {"solve": SOLVE})
-        (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
-    return load_studies(*(folder / f"{name}.yaml" for name in STUDIES))
 
 
 @contextlib.contextmanager
@@ -96,26 +84,17 @@ def call(*words: object, good: tuple[int, ...] = (0,)) -> None:
         raise RuntimeError(f"{words[0]}: {done.returncode}: {done.stdout}{done.stderr}")
 
 
-def write(wanted: list[Study], store: Path, channel: int, control: str, rng: random.Random) -> None:
-    """In a forked process: run a sweep that tells each acknowledged key over a pipe."""
-    if rng.random() < 0.5:  # write and merge more often than the program does
-        writer.MAX_AGE, writer.MAX_SMALL, writer.MAX_SMALL_AT_END = 0.05, 5, 2
-    if control:
-        os.fsync = without(control)
-    flush = writer.Writer.flush
-
-    def told(self: writer.Writer) -> list[str]:
-        keys = flush(self)
-        os.write(channel, "".join(f"{key}\n" for key in keys).encode())
-        return keys
-
-    writer.Writer.flush = told  # type: ignore[method-assign]
-    sweep(wanted, store, 1)
+def cut(place: Path) -> None:
+    """Cut a file system off, at once, without writing what it still holds in memory."""
+    root = os.open(place, os.O_RDONLY)
+    try:
+        fcntl.ioctl(root, SHUTDOWN, NO_FLUSH)
+    finally:
+        os.close(root)
 
 
-def without(control: str) -> Any:
+def fsync_less(control: str, real: Any = os.fsync) -> Any:
     """An fsync that does less than it says."""
-    real = os.fsync
 
     def fsync(descriptor: int) -> None:
         is_folder = os.path.isdir(f"/proc/self/fd/{descriptor}")
@@ -135,39 +114,50 @@ def next_of(reader: int, seconds: float) -> str:
     return data.decode()
 
 
-def cut(place: Path) -> None:
-    """Cut a file system off, at once, without writing what it still holds in memory."""
-    root = os.open(place, os.O_RDONLY)
-    try:
-        fcntl.ioctl(root, SHUTDOWN, struct.pack("I", NO_FLUSH))
-    finally:
-        os.close(root)
-
-
 class Campaign:
     """The trials of `campaign`: the studies, an undisturbed store, an `empty` file system."""
 
     def __init__(self, tally: Tally, folder: Path, empty: Path):
         self.tally, self.folder, self.empty = tally, folder, empty
-        self.studies = studies(folder)
-        sweep(self.studies, folder / "whole", 1)
-        self.whole = contents(folder / "whole")
+        self.studies = load_studies(*case_files(folder, STUDIES))
+        SWEEP.run_job(self.studies[0].cases[0])  # compiles what all need
+        self.whole = forked(lambda: self.swept(folder / "whole"), 600).result
+
+    def swept(self, store: Path) -> dict[str, Any]:
+        """Run the sweep here; what is stored then."""
+        run_here(20)
+        SWEEP.sweep(self.studies, store, 1)
+        return contents(store)
+
+    def write(self, store: Path, channel: int, control: str, every: int) -> None:
+        """In a forked process: run a sweep that tells each acknowledged key over a pipe."""
+        with contextlib.suppress(BaseException), open(os.devnull, "w") as nothing:
+            os.setpgid(0, 0)
+            os.dup2(nothing.fileno(), 2)
+            os.fsync = fsync_less(control) if control else os.fsync
+            merge.MAX_SMALL = 3
+            count = 0
+
+            def stored(keys: list[str]) -> None:
+                nonlocal count
+                count += 1
+                os.write(channel, "".join(f"{key}\n" for key in keys).encode())
+                if every and count % every == 0:  # more often than the program does
+                    merge.merge_batches(store)
+
+            run_here(20, stored)
+            SWEEP.sweep(self.studies, store, 1)
 
     def disturbed(self, trial: Path, rng: random.Random, control: str) -> set[str]:
         """Run a sweep and cut it off; the keys that were acknowledged. The image: `cut.img`."""
         shutil.copyfile(self.empty, trial / "disk.img")
-        options = rng.choice(OPTIONS)
-        wait = rng.uniform(0, MAX_SECONDS)
+        options, wait = rng.choice(OPTIONS), rng.uniform(0, MAX_SECONDS)
         promptly = bool(control) or rng.random() < 0.5  # upon an acknowledgement
         reader, channel = os.pipe()
         with mounted(trial / "disk.img", trial / "disk", options) as disk:
-            child = os.fork()
-            if not child:
-                with contextlib.suppress(BaseException), open(os.devnull, "w") as nothing:
-                    os.setpgid(0, 0)
-                    os.dup2(nothing.fileno(), 2)
-                    write(self.studies, disk / "store", channel, control, rng)
-                os._exit(0)
+            arguments = disk / "store", channel, control, rng.choice((0, 8))
+            child: Any = FORK.Process(target=self.write, args=arguments)
+            child.start()
             os.close(channel)
             told = next_of(reader, 60)
             until = time.monotonic() + wait
@@ -176,28 +166,21 @@ class Campaign:
             told += next_of(reader, 5) if promptly else ""
             cut(disk)
             shutil.copyfile(trial / "disk.img", trial / "cut.img")
-            self.end(child)
+            child.join(30)
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(child.pid, signal.SIGKILL)
+                self.tally.counts["writers that had to be killed"] += 1
         with open(reader, encoding="ascii") as file:
             return set((told + file.read()).split())
-
-    def end(self, child: int) -> None:
-        """Wait for a process that meets a dead disk, and for its workers."""
-        until = time.monotonic() + 30
-        while time.monotonic() < until and os.waitpid(child, os.WNOHANG) == (0, 0):
-            time.sleep(0.01)
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(child, signal.SIGKILL)
-            self.tally.counts["writers that had to be killed"] += 1
 
     def trial(self, number: int, control: str = "") -> bool:
         """Cut the power once; whether an acknowledged result is lost."""
         rng = random.Random(f"{self.tally.seed} {number} {control}")
-        with fresh(self.folder, "trial") as trial:
+        with fresh(self.folder) as trial:
             acknowledged = self.disturbed(trial, rng, control)
             call("e2fsck", "-fy", trial / "cut.img", good=(0, 1))
             with mounted(trial / "cut.img", trial / "copy", "commit=5") as disk:
-                store = disk / "store"
-                ended = forked(lambda: acknowledged - intact(store))
+                ended = forked(lambda: acknowledged - intact(disk / "store"))
                 lost = acknowledged if ended.death else ended.result
                 if control:
                     return bool(lost)
@@ -205,21 +188,16 @@ class Campaign:
                 self.tally.counts["acknowledged results"] += len(acknowledged)
                 if lost:
                     self.tally.fail(f"trial {number}", f"lost {len(lost)}: {ended.death}")
-                again = forked(lambda: (sweep(self.studies, store, 1), contents(store))[1])
-                if again.death:
-                    self.tally.fail(f"trial {number}", f"not resumed: {again.death}")
-                elif differing := [n for n in self.whole if again.result.get(n) != self.whole[n]]:
-                    self.tally.fail(f"trial {number}", f"differs after resuming: {differing}")
+                again = forked(lambda: self.swept(disk / "store"))
+                if problem := again.death or differing(again.result, self.whole):
+                    self.tally.fail(f"trial {number}", f"not resumed: {problem}")
         return bool(lost)
 
 
 def intact(store: Path) -> set[str]:
-    """The keys of a store's jobs, without those whose time series are damaged."""
-    if not store.exists():
-        return set()
-    rows = read_store(store).rows
-    keys = (key.decode() for key in rows.columns["key"])
-    return {key for position, key in enumerate(keys) if rows.intact(position)}
+    """The keys of a store's jobs, without those whose batches are damaged."""
+    stored = read_store(store)
+    return {key.decode() for at, key in enumerate(stored.rows.keys) if stored.intact(at)}
 
 
 def campaign(trials: int, seed: int, folder: Path) -> dict[str, Any]:
@@ -232,10 +210,9 @@ def campaign(trials: int, seed: int, folder: Path) -> dict[str, Any]:
     for number in range(trials):
         tried.trial(number)
     for control in CONTROLS if trials >= CONTROL_EVERY else CONTROLS[:1]:
-        tally.counts[f"controls, {control}"] = tally.counts[f"of these lost, {control}"] = 0
-        for number in range(max(1, trials // CONTROL_EVERY)):
-            tally.counts[f"controls, {control}"] += 1
-            tally.counts[f"of these lost, {control}"] += tried.trial(number, control)
-        if not tally.counts[f"of these lost, {control}"]:
+        made = max(1, trials // CONTROL_EVERY)
+        lost = sum(tried.trial(number, control) for number in range(made))
+        tally.counts |= {f"controls, {control}": made, f"of these lost, {control}": lost}
+        if not lost:
             tally.fail(f"controls, {control}", "nothing is lost: the campaign would not notice")
     return tally.result()
