@@ -375,7 +375,8 @@ def calling_often(look: Callable[[], object]) -> Iterator[None]:
 
     def call() -> None:
         while not ended.wait(SECONDS_BETWEEN_LOOKS):
-            look()
+            with contextlib.suppress(StoreError):  # which the last look raises again
+                look()
 
     thread = threading.Thread(target=call, daemon=True)
     thread.start()

@@ -159,6 +159,5 @@ def test_another_file_of_its_name_is_refused(whole, tmp_path):
     wrong = chain.path(tmp_path)
     wrong.parent.mkdir(parents=True)
     wrong.write_bytes(chain.path(folder).read_bytes()[:-9])
-    found = run_chain(chain, tmp_path)
-    assert isinstance(found, StoreError)
-    assert "delete it" in str(found)
+    with pytest.raises(StoreError, match="delete it"):
+        run_chain(chain, tmp_path)
