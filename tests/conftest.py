@@ -14,6 +14,7 @@ from pathlib import Path
 from compsim.screen import one_thread_each
 
 one_thread_each()  # before numpy loads: as the commands do, so that sums are theirs to the bit
+import h5py
 import hypothesis
 import numpy as np
 import pytest
@@ -179,6 +180,24 @@ def keep(folder, *datasets):
     for dataset in datasets:
         compress = Case.from_attribute(dataset.attrs["case"]).output.compress
         write_batch(folder, [outcome_of(dataset)], compress)
+
+
+def damage_series(folder, key):
+    """Flip a bit in each time series of a stored job; return its batch."""
+    rows = read_store(folder).rows
+    (position,) = rows.find([key])
+    path, row = rows.path(position), int(rows.row[position])
+    with h5py.File(path) as file:
+        places = [
+            data.id.get_chunk_info_by_coord((row, *(0 for _ in data.shape[1:]))).byte_offset
+            for data in file.values()
+            if data.chunks and data.ndim > 1 and data.chunks[0] == 1
+        ]
+    content = bytearray(path.read_bytes())
+    for place in places:
+        content[place + 100] ^= 1
+    path.write_bytes(content)
+    return path
 
 
 def store(folder, *paths, overrides=()):

@@ -27,6 +27,8 @@ import time
 from pathlib import Path
 
 import numpy as np
+from compressor.store.series_file import read_series, series_path, write_series
+from compressor.store.writer import Writer
 from measure_accuracy import provenance
 
 from compressor.cases.case import Case
@@ -34,10 +36,8 @@ from compressor.cases.groups import Output
 from compressor.solve.simulate import measure, simulate
 from compressor.store.files import pending_path, sync_later
 from compressor.store.reader import open_study, read_store
-from compressor.store.series_file import read_series, series_path, write_series
 from compressor.store.status import verify
 from compressor.store.studies import StoredAxis, StoredStudy, encode
-from compressor.store.writer import Writer
 
 WORN = {"joint": "big_end", "clearance_mm": 0.2}
 FILES = 60  # that are made one after the other

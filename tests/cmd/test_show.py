@@ -126,8 +126,8 @@ def test_json_is_in_si_and_whole(paper_store, show):
         report_job(paper_store, *HERE).numbers["peak_contact_force"], rel=1e-15
     )
     assert {*found} == {
-        "key", "status", "reason", "detail", "file", "studies", "again", "numbers", "attributes",
-        "caveats",
+        "key", "status", "reason", "detail", "file", "samples", "studies", "again", "numbers",
+        "attributes", "caveats",
     }  # fmt: skip
 
 

@@ -109,7 +109,7 @@ def test_a_folder_whose_name_is_no_utf_8_holds_results(tmp_path):
         call = [os.fsencode(word) for word in (sys.executable, "-m", "compsim", *words)]
         done = subprocess.run([*call, b"r\xff"], cwd=tmp_path, capture_output=True, timeout=100)
         assert done.returncode == 0, done.stderr
-    assert next(os.scandir(os.fsencode(tmp_path) + b"/r\xff/rows")).is_file()
+    assert next(os.scandir(os.fsencode(tmp_path) + b"/r\xff/batches")).is_file()
 
 
 STEERING = "x\x1b]0;mine\x07\x1b[31m\u202e"

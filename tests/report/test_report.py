@@ -5,7 +5,6 @@ import html.parser
 import itertools
 import json
 import re
-import shlex
 import shutil
 import sys
 from dataclasses import replace
@@ -14,7 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from compsim import cli
-from conftest import keep, part_of, store, without_pictures
+from conftest import damage_series, keep, part_of, store, without_pictures
 
 from compressor.analysis.runs import paper_cases
 from compressor.analysis.shaking import last_revolution
@@ -144,8 +143,7 @@ def replace_jobs(folder, *jobs):
     """Put jobs in place of what was stored of them, which a failed run by itself never is."""
     kept = {key: read_job(folder, key) for key in sorted(read_store(folder).keys())}
     kept |= {job.attrs["key"]: job for job in jobs}
-    for name in ("rows", "jobs"):
-        shutil.rmtree(folder / name)
+    shutil.rmtree(folder / "batches")
     keep(folder, *kept.values())
 
 
@@ -265,8 +263,7 @@ def forget(folder, key):
     """Make a job one that is not stored."""
     stored = read_store(folder)
     others = [stored.job(other).load() for other in sorted(stored.keys() - {key})]
-    for place in ("rows", "jobs"):
-        shutil.rmtree(folder / place)
+    shutil.rmtree(folder / "batches")
     keep(folder, *others)
 
 
@@ -324,8 +321,7 @@ def test_a_failed_case_is_told_with_its_reason(paper_store, tmp_path):
 
 def test_a_damaged_case_is_told(paper_store, tmp_path):
     part = part_of(paper_store, tmp_path / "part", "typical")
-    (path,) = (part / "jobs").iterdir()
-    path.write_bytes(path.read_bytes()[:-1])
+    path = damage_series(part, read_studies(part)[0].keys[0])
     with pytest.warns(StoreWarning, match=f"{path.name}: is damaged"):
         paper = find_paper_runs(read_store(part), read_studies(part))
     assert paper.absent["typical"] == "its file is damaged"
@@ -415,7 +411,7 @@ def test_a_sweep_is_drawn_over_the_crank_angle(tmp_path):
     file.write_text(swept + titled)
     settings = ["solve.duration_rev=2", "solve.settle_rev=1", *DRAFT]
     (whole,) = load_studies(file, overrides=settings)
-    write_study(own, whole, shlex.join(["compsim", "run", *(f"--set={one}" for one in settings)]))
+    write_study(own, whole, "compsim run", settings)
     store(own, file, overrides=settings)
     write_report(own, tmp_path / "out")
     raw = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
@@ -438,8 +434,7 @@ def test_a_sweep_is_drawn_over_the_crank_angle(tmp_path):
     assert "own: a revolution as an analyst reads it, clearance_mm 0.2" in text
     assert f"acceleration of the crosshead reaches {peaks[0.2]:.3g} m/s² (" in text
     assert "It is the job with the greatest vibration of these. Here machine.rod_mass_kg 3." in text
-    (path,) = (own / "jobs").glob(f"{study.keys[2]}-*.h5")
-    path.write_bytes(path.read_bytes()[:-9])
+    damage_series(own, study.keys[2])
     write_report(own, tmp_path / "out")
     text = " ".join(read(tmp_path / "out").text.split())
     assert "own: a revolution as an analyst reads it, clearance_mm 0.1" in text
