@@ -191,7 +191,13 @@ def write_study(
     )
     old = _present(folder, study.name)
     if old:
-        same = replace(new, command=old.command, versions=old.versions, written=old.written)
+        same = replace(
+            new,
+            command=old.command,
+            overrides=old.overrides,
+            versions=old.versions,
+            written=old.written,
+        )
         if same == old:
             return
     publish(Path(folder) / "studies" / f"{study.name}.json", encode(new))
