@@ -2,12 +2,10 @@
 
     python tests/campaigns/measure_store.py tests/results/store.json [jobs]  (make store-bench)
 
-Rows are those of a real job under made-up keys, given to a `Writer` as a sweep would; the folder is
-in the working directory, so that its disk is what is measured. The greatest wait is the time from a
-row's `add` to its acknowledgement.
+Rows are those of a real job under made-up keys, in batches as a sweep's; the folder is in the
+working directory, so that its disk is what is measured. Series are of a default job.
 
-CPU to make a file: of jobs of one layout, one after the other, with numbers and texts that change;
-bytes, digest and writing, without waiting for the disk. The price of time series in a sweep: whole
+CPU to make a batch: without waiting for the disk. The price of time series in a sweep: whole
 commands with and without them, in turn and in both orders, each with few and with many jobs; what
 the further jobs take is divided by their number.
 """
@@ -27,20 +25,24 @@ import time
 from pathlib import Path
 
 import numpy as np
-from compressor.store.series_file import read_series, series_path, write_series
-from compressor.store.writer import Writer
 from measure_accuracy import provenance
 
 from compressor.cases.case import Case
-from compressor.cases.groups import Output
-from compressor.solve.simulate import measure, simulate
-from compressor.store.files import pending_path, sync_later
+from compressor.store.batch import (
+    batch_paths,
+    encode_batch,
+    publish_batch,
+    read_series,
+    write_batch,
+)
+from compressor.store.merge import merge_batches
 from compressor.store.reader import open_study, read_store
 from compressor.store.status import verify
 from compressor.store.studies import StoredAxis, StoredStudy, encode
+from compressor.sweep.sweep import run_job
 
 WORN = {"joint": "big_end", "clearance_mm": 0.2}
-FILES = 60  # that are made one after the other
+BATCH = 100  # rows in a batch, as of a sweep whose jobs take 2 ms
 SELECTED = 1000  # jobs whose acceleration is read
 SWEPT, TURNS = (100, 500), 4  # jobs of a sweep, few and many; how often both are run
 SWEEP = """
@@ -48,33 +50,34 @@ joint: big_end
 clearance_mm: {{linspace: [0.05, 0.5, {jobs}]}}
 output: {{keep: {keep}}}
 """
-OUTPUTS = [Output(precision=p, compress=c) for p in ("double", "single") for c in (False, True)]
 
 
 def key(number):
     return hashlib.sha256(str(number).encode()).hexdigest()[:20]
 
 
+def copies(found, numbers):
+    """The outcome of a job under made-up keys; each peak acceleration is its number."""
+    for number in numbers:
+        row = found.numbers.copy()
+        row["peak_acceleration"] = number
+        yield dataclasses.replace(
+            found, numbers=row, attributes=found.attributes | {"key": key(number)}
+        )
+
+
 def write_rows(folder, jobs):
-    """Seconds to write rows, and the greatest wait for an acknowledgement."""
-    found = measure(Case.from_values({**WORN, "output": {"keep": "metrics"}}))
-    came, waits = {}, []
-
-    def acknowledged(keys):
-        waits.extend(time.monotonic() - came.pop(k) for k in keys)
-
+    """Seconds to write rows, the longest that a batch takes, and seconds to merge them."""
+    found, _ = run_job(Case.from_values({**WORN, "output": {"keep": "metrics"}}))
+    seconds = []
+    for first in range(0, jobs, BATCH):
+        batch = [*copies(found, range(first, min(first + BATCH, jobs)))]
+        began = time.monotonic()
+        write_batch(folder, batch)
+        seconds.append(time.monotonic() - began)
     began = time.monotonic()
-    with Writer(folder) as writer:
-        for number in range(jobs):
-            numbers = found.numbers.copy()
-            numbers["peak_acceleration"] = number
-            attributes = found.attributes | {"key": key(number)}
-            outcome = dataclasses.replace(found, numbers=numbers, attributes=attributes)
-            came[outcome.key] = time.monotonic()
-            acknowledged(writer.add(outcome))
-        acknowledged(writer.flush())
-    assert not came
-    return time.monotonic() - began, max(waits)
+    merge_batches(folder)
+    return sum(seconds), max(seconds), time.monotonic() - began
 
 
 def plan(folder, jobs):
@@ -101,21 +104,22 @@ def timed(function, times=3):
 
 
 def rows(folder, jobs):
-    """Writing, reading, opening and verifying many rows."""
-    write, wait = write_rows(folder, jobs)
+    """Writing, merging, reading, opening and verifying many rows."""
+    write, wait, merged = write_rows(folder, jobs)
     plan(folder, jobs)
     read, _ = timed(lambda: read_store(folder))
     opened, study = timed(lambda: open_study(folder))
     assert (np.sort(study.peak_acceleration.values, axis=None) == np.arange(jobs)).all()
     checked, damage = timed(lambda: verify(folder), 1)
     assert not damage
-    files = list(folder.glob("rows/*"))
+    files = batch_paths(folder)
     return {
         "jobs": jobs,
         "write_s": round(write, 2),
         "jobs_per_s": round(jobs / write),
         "greatest_wait_s": round(wait, 3),
-        "segments": len(files),
+        "merge_s": round(merged, 2),
+        "batches": len(files),
         "bytes_a_job": round(sum(path.stat().st_size for path in files) / jobs),
         "read_rows_s": round(read, 3),
         "open_study_s": round(opened, 3),
@@ -124,55 +128,38 @@ def rows(folder, jobs):
 
 
 def series(folder):
-    """Size and time of a default job's file in each form of its time series."""
-    dataset = simulate(Case.from_values(WORN))
-    found = []
-    for output in OUTPUTS:
-        write, kept = timed(lambda output=output: write_series(folder, dataset, output), 5)
-        path = pending_path(series_path(folder, dataset.attrs["key"], kept.digest))
-        read, back = timed(lambda path=path: read_series(path), 5)
-        exact, a = dataset["acceleration"].values, back["acceleration"].values
-        found.append(
-            {
-                "precision": output.precision,
-                "compress": output.compress,
-                "bytes": path.stat().st_size,
-                "write_ms": round(1000 * write, 1),
-                "write_cpu_ms": round(1000 * file_cpu(folder, output), 2),
-                "read_ms": round(1000 * read, 1),
-                "acceleration_rounding": float(
-                    f"{np.abs(a - exact).max() / np.abs(exact).max():.1g}"
-                ),
-            }
-        )
+    """Size and time of a default job in each form of its time series."""
+    exact, found = None, []
+    for precision, compress in itertools.product(("double", "single"), (False, True)):
+        case = Case.from_values({**WORN, "output": {"precision": precision, "compress": compress}})
+        outcome, _ = run_job(case)
+        data = encode_batch([outcome], compress)
+        began = time.process_time()
+        for _ in range(5):
+            encode_batch([outcome], compress)
+        cpu = (time.process_time() - began) / 5
+        write, path = timed(
+            lambda data=(outcome,), compress=compress: publish_batch(
+                folder, encode_batch(data, compress)
+            ), 5,
+        )  # fmt: skip
+        read, back = timed(lambda path=path: read_series(path, 0), 5)
+        a = back["acceleration"].values.astype(float)
+        exact = a if exact is None else exact
+        rounding = np.abs(a - exact).max() / np.abs(exact).max()
+        found.append({
+            "precision": precision, "compress": compress, "bytes": len(data),
+            "write_ms": round(1000 * write, 1), "write_cpu_ms": round(1000 * cpu, 2),
+            "read_ms": round(1000 * read, 1), "acceleration_rounding": float(f"{rounding:.1g}"),
+        })  # fmt: skip
     return found
-
-
-def file_cpu(folder, output):
-    """Median of the CPU seconds that a job's file takes; the first one lays its kind out."""
-    dataset, seconds = simulate(Case.from_values(WORN)), []
-    exact = dataset["acceleration"].values.copy()
-    with sync_later():
-        for number in range(FILES):
-            dataset["acceleration"].values[:] = exact + number
-            dataset.attrs |= {"key": key(number), "settle": float(number)}
-            began = time.thread_time()
-            write_series(folder, dataset, output)
-            seconds.append(time.thread_time() - began)
-    return statistics.median(seconds)
 
 
 def selection(folder):
     """Seconds to open a study with time series, to read one of them at a time, and whole."""
-    dataset, case = simulate(Case.from_values(WORN)), Case.from_values(WORN)
-    found = measure(case)
-    with Writer(folder) as writer, sync_later():
-        for number in range(SELECTED):
-            attributes = dataset.attrs | {"key": key(number)}
-            kept = write_series(folder, dataset.assign_attrs(attributes), case.output)
-            writer.pending[key(number)] = dataclasses.replace(
-                found, attributes=attributes, series=kept
-            )
+    found, _ = run_job(Case.from_values(WORN))
+    for first in range(0, SELECTED, 20):
+        write_batch(folder, [*copies(found, range(first, first + 20))])
     plan(folder, SELECTED)
     opened, study = timed(lambda: open_study(folder))
     one, _ = timed(lambda: study["acceleration"].isel(time=-1).values)

@@ -196,12 +196,13 @@ def sweeping(jobs):
         seconds = wall(["-m", "compsim", "run", "many.yaml", "-j", str(WORKERS), "--quiet"], folder)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         busy = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
-        numbers = read_store(Path(folder, "results")).rows.numbers
+        rows = read_store(Path(folder, "results")).rows
+        numbers = rows.numbers(np.arange(len(rows)), ["seconds"])["seconds"]
         again = wall(["-m", "compsim", "run", "many.yaml", "--quiet"], folder)
         (study,) = load_studies(path)
     chosen = study.cases[:: len(study.cases) // SAMPLE]
     alone = statistics.mean(float(measure(case).numbers["seconds"]) for case in chosen)
-    kernel = float(numbers["seconds"].sum())
+    kernel = float(numbers.sum())
     return {
         "jobs": len(numbers),
         "workers": WORKERS,

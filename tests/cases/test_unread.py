@@ -61,6 +61,7 @@ QUIET = HEARD | {"sensor": {"noise_m_per_s2": 0}}
 SIDEWAYS = HEARD | {"sensor": {"place": "guide", "direction": "x"}}
 OWN_CORNER = IDEAL | {"guide": {"clearance_mm": 0.1, "damping_N_s_per_mm": 9, "exponent": 1.4,
                                 "full_damping_mm": 0.01}}  # fmt: skip
+LONG_SERIES = IDEAL | {"solve": SHORT | {"output_step_deg": 0.2}}  # short ones are not compressed
 SMALL_FILES = IDEAL | {"output": {"keep": "metrics"}}
 
 
@@ -200,7 +201,7 @@ ENTRIES = {
         solve__max_steps=5, solve__timeout_s=1e-9,
     ),
     "output.keep": Entry("metrics", IDEAL | {"output": {}}),
-    **entries(IDEAL, SMALL_FILES, output__precision="single", output__compress=True),
+    **entries(LONG_SERIES, SMALL_FILES, output__precision="single", output__compress=True),
     "output.signals": Entry(True, SMALL_FILES),
 }  # fmt: skip
 RIVALS = {"solve.duration_s": "duration_rev", "solve.output_step_s": "output_step_deg",

@@ -12,7 +12,7 @@ from compressor.store.batch import write_batch
 from compressor.store.files import StoreError
 from compressor.store.merge import merge_batches
 from compressor.store.reader import open_study, read_store
-from compressor.store.status import standings, verify
+from compressor.store.status import verify
 
 
 def merge_all(folder):
@@ -70,19 +70,6 @@ def test_a_more_complete_row_counts_whoever_writes_last(better, worse, merged, t
         merge_all(tmp_path / "both")
         assert len(batches(tmp_path / "both")) == 1
     assert held(read_store(tmp_path / "both")) == held(read_store(tmp_path / "alone"))
-
-
-def test_twenty_thousand_rows_open_as_a_grid(tmp_path):
-    jobs = [made(number) for number in range(20_000)]
-    plan(tmp_path, 20_000)
-    for first in range(0, 20_000, 4000):
-        write_batch(tmp_path, [job for job in jobs[first : first + 4000] if job is not jobs[7]])
-    found = open_study(tmp_path)
-    expected = np.arange(20_000.0)
-    expected[7] = np.nan
-    np.testing.assert_array_equal(found.peak_acceleration.values, expected)
-    assert found.peak_contact_force_axis.dims == ("speed_rpm", "joint", "axis")
-    assert found.status.values[6:8].tolist() == ["ok", "missing"]
 
 
 # ---- merges -------------------------------------------------------------------------------------
@@ -209,17 +196,3 @@ def test_stores_are_merged_by_copying_their_batches(tmp_path):
     assert peaks(tmp_path / "one") == {n: n for n in range(4)}
     assert np.isfinite(open_study(tmp_path / "one").acceleration).all()
     assert verify(tmp_path / "one") == []
-
-
-def test_batches_may_lie_in_a_folder_that_stores_share(tmp_path):
-    """A run of one merges them, and leaves what the other has."""
-    (tmp_path / "shared").mkdir()
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "batches").symlink_to(tmp_path / "shared")
-        plan(tmp_path / name, 3)
-        for number in range(3):
-            write_batch(tmp_path / name, [made(number, samples=3)])
-    merge_all(tmp_path / "a")
-    assert len(batches(tmp_path / "b")) == 1
-    assert standings(tmp_path / "b")[0].ok == 3

@@ -3,16 +3,13 @@
 import json
 import math
 
-import numpy as np
 import pytest
 from compsim import cli
-from conftest import jobs_here, without_pictures
+from conftest import jobs_here
 
 from compressor.cases.case import Case
-from compressor.outcome import REGIME_WORDS, Regime
-from compressor.report.report import write_report
 from compressor.solve.simulate import simulate
-from compressor.store.reader import open_study, read_job
+from compressor.store.reader import open_study
 from compressor.store.status import is_late, is_unrepeated, job_caveats, report_job, standings
 from compressor.studies.diagnosis.data_card import data_card
 from compressor.studies.diagnosis.data_set import make_data_set
@@ -70,43 +67,6 @@ def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder
     assert standings(folder)[0].caveats[-1] == OUTSIDE
 
 
-def test_show_says_it_of_its_job(folder, capsys):
-    light, heavy = open_study(folder).key.values
-    out = said(capsys, "show", heavy, "-r", folder).out
-    share = 100 * report_job(folder, heavy).numbers["clipped_fraction"]
-    assert f"{share:.3g} % of the sensor's samples are clipped at its range, 0.05 m/s²" in out
-    assert OUTSIDE in out
-    assert OUTSIDE not in said(capsys, "show", light, "-r", folder).out
-    regime = read_job(folder, heavy).attrs["regime"]
-    assert f"{regime} ({REGIME_WORDS[Regime(regime)]})" in out
-
-
-def test_the_page_says_it(folder, tmp_path):
-    with without_pictures():
-        page = write_report(folder, tmp_path).read_text(encoding="utf-8")
-    assert OUTSIDE in page
-    assert "2 of 2 sensor records are clipped" in page
-    seen = {*open_study(folder)["regime"].values.tolist()}
-    assert all(REGIME_WORDS[Regime(name)].split("'")[0] in page for name in seen)
-
-
-def test_plot_says_it(folder, tmp_path, capsys):
-    key = open_study(folder).key.values[0]
-    out = said(capsys, "plot", key, "-r", folder, "--what", "spectra", "-o", tmp_path).out
-    assert "of the sensor's samples are clipped at its range, 0.05 m/s²" in out
-
-
-def test_the_clipped_fraction_is_a_value_of_the_study(folder):
-    study = open_study(folder)
-    fractions = study["clipped_fraction"]
-    assert (fractions.dims, fractions.attrs["units"]) == (("rod_mass_kg",), "1")
-    for key, value in zip(study.key.values, fractions.values, strict=True):
-        record = read_job(folder, key)
-        beyond = np.abs(record["sensor_acceleration"].values) >= 0.05
-        assert value == record["clipped_fraction"] == pytest.approx(beyond.mean())
-        assert value > 0.1
-
-
 def test_the_data_card_says_it(folder):
     found = make_data_set(folder)
     worst = 100 * open_study(folder)["clipped_fraction"].max().item()
@@ -136,7 +96,3 @@ def test_auto_is_no_caveat():
     assert is_late(["periodic", "periodic", "chaotic"], [2.0, 1.0, 2.0], 1.0).tolist() == [
         True, False, False,
     ]  # fmt: skip
-
-
-def test_every_regime_is_explained_once():
-    assert REGIME_WORDS.keys() == {*Regime}

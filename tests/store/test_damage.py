@@ -77,20 +77,6 @@ def test_files_and_folders_are_synced(tmp_path, monkeypatch):
     assert named == str(path.parent)
 
 
-@pytest.mark.parametrize("number", [errno.EINVAL, errno.EOPNOTSUPP])
-def test_a_folder_that_cannot_be_synced_is_let_pass(number, tmp_path, monkeypatch):
-    real = os.fsync
-
-    def sync(descriptor):
-        if os.path.isdir(f"/proc/self/fd/{descriptor}"):
-            raise OSError(number, os.strerror(number))
-        real(descriptor)
-
-    monkeypatch.setattr(os, "fsync", sync)
-    write_batch(tmp_path / "fuse", [made(1)])
-    assert read_store(tmp_path / "fuse").keys() == {key(1)}
-
-
 def test_old_leftovers_are_removed_and_young_ones_kept(tmp_path):
     write_batch(tmp_path, [made(1)])
     old, young = (tmp_path / f"batches/.{name}.h5.1.tmp" for name in ("old", "young"))
@@ -202,14 +188,6 @@ def test_damage_to_a_machine_that_was_followed_is_told(tmp_path, capsys):
             assert "delete it" in damage.remedy
     assert cli.main(["verify", "-r", str(tmp_path)]) == 5
     assert "delete it" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("data", [b"", b"not a job", b"\x89HDF\r\n\x1a\n", b"\x80\x04."])
-def test_what_is_no_batch_is_told_with_a_remedy(data, tmp_path):
-    path = write_batch(tmp_path, [made(1)])
-    path.write_bytes(data)
-    (damage,) = read_store(tmp_path).damaged
-    assert str(damage).startswith(f"{path}: is damaged, or no file of compsim's; delete it")
 
 
 def test_jobs_in_a_damaged_batch_count_as_missing_with_a_warning(tmp_path, capsys):

@@ -127,13 +127,6 @@ def test_studies_together_have_a_dimension_of_jobs(results, tmp_path):
     assert [row["key"] for row in table(tmp_path / "all.csv")] == study.key.values.tolist()
 
 
-def test_ncdump_reads_an_export(results, ncdump, tmp_path):
-    export(results, [], tmp_path / "all.nc")
-    header = ncdump("-h", tmp_path / "all.nc")
-    assert "job = 6" in header
-    assert 'peak_acceleration:coordinates = "key study' in header
-
-
 @pytest.mark.parametrize("name", ["grid", "list"])
 def test_series_read_back_to_the_bit(results, name, tmp_path, monkeypatch):
     monkeypatch.setattr(sys.modules["compressor.store.export"], "BLOCK", 7)
@@ -188,31 +181,6 @@ def test_a_folder_gets_a_file_each(results, tmp_path, capsys):
     assert len(table(out / "list.csv")) == 2
 
 
-@pytest.mark.parametrize("name", ["plain", "with.dot/", "is.there"])
-def test_a_folder_is_a_name_without_suffix_with_a_slash_or_of_a_folder(results, name, tmp_path):
-    (tmp_path / "is.there").mkdir()
-    export(results, ["grid"], f"{tmp_path}/{name}")
-    assert (tmp_path / name / "grid.nc").exists()
-
-
-def test_a_record_in_csv_is_what_identify_reads(worn, tmp_path, capsys):
-    """Times, values and pulses as they are stored, whatever the job's own samples are."""
-    stored = read_store(worn)
-    key = next(key for key in sorted(stored.keys()) if "sensor_time" in stored.job(key))
-    job = stored.job(key)
-    path = tmp_path / "job.csv"
-    assert cli.main(["export", key, "-r", str(worn), "-o", str(path)]) == 0
-    rows = table(path)
-    assert [*rows[0]][-3:] == ["time_s", "acceleration_m_per_s2", "tacho"]
-    assert len(rows) == max(job.sizes["time"], job.sizes["sensor_time"])
-    assert sum(row["time [s]"] != "" for row in rows) == job.sizes["time"]
-    assert sum(row["time_s"] != "" for row in rows) == job.sizes["sensor_time"]
-    found = read_record(path)
-    np.testing.assert_allclose(found.times, job.sensor_time, atol=1e-12)
-    np.testing.assert_array_equal(found.values, job.sensor_acceleration)
-    np.testing.assert_allclose(found.tacho, job.tacho_time, atol=2e-7)
-
-
 @pytest.mark.parametrize(
     ("suffix", "hints"),
     [(".wav", {"channel": "1", "tacho": "2", "unit": "m/s2"}), (".mat", {})],
@@ -235,17 +203,6 @@ def test_a_record_alone_is_what_analysts_open(suffix, hints, worn, tmp_path, cap
     assert (folder / f"{one}{suffix}").read_bytes() == path.read_bytes()
 
 
-def test_a_record_is_of_a_job_with_a_sensor(results, tmp_path):
-    key = open_study(results, "list").key.values[0]
-    with pytest.raises(ExportError, match=r"x\.wav: a file of the type \.wav is the sensor"):
-        export(results, ["grid"], tmp_path / "x.wav")
-    with pytest.raises(ExportError, match="name jobs by their keys, not studies"):
-        export(results, [], tmp_path / "folder", ExportOptions(form="mat"))
-    with pytest.raises(StoreError, match=r"has no sensor's record; run it with body: true"):
-        export(results, [key], tmp_path / "x.mat")
-    assert not any(tmp_path.iterdir())
-
-
 @pytest.mark.parametrize(
     ("names", "file", "more", "message"),
     [
@@ -259,18 +216,6 @@ def test_what_does_not_fit_is_refused(results, names, file, more, message, tmp_p
     names = [key if name == "KEY" else name for name in names]
     with pytest.raises(ExportError, match=message):
         export(results, names, tmp_path / file, ExportOptions(**more))
-    assert not any(tmp_path.iterdir())
-
-
-def test_what_is_not_there_is_named(results, tmp_path, capsys):
-    missing = str(open_study(results, "grid").key.values[1, 1])
-    for name, problem in (
-        ("gird", "holds no study 'gird'; did you mean grid?"),
-        (missing, f"job {missing} is not stored; run its case file first"),
-        ("0" * 20, "no job's key begins with '00000000000000000000'"),
-    ):
-        assert cli.main(["export", name, "-r", str(results), "-o", str(tmp_path / "x.csv")]) == 2
-        assert problem in capsys.readouterr().err
     assert not any(tmp_path.iterdir())
 
 

@@ -156,15 +156,6 @@ def test_a_few_lines_of_h5py_read_one_job(tmp_path):
     assert (unit, peak) == ("m/s2", 1.0)
 
 
-def test_ncdump_reads_a_batch(ncdump, tmp_path):
-    path = write_batch(tmp_path, [made(1, samples=5)])
-    text = ncdump("-v", "acceleration", path)
-    assert "char job(job, text20) ;" in text
-    assert "double value(job, metric) ;" in text
-    assert "double contact_force(job, sample, joint, axis) ;" in text
-    assert '\tacceleration:units = "m/s2" ;' in text
-
-
 # ---- what a stored job serves -------------------------------------------------------------------
 
 

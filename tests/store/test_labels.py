@@ -1,7 +1,6 @@
 """A folder of results as labelled data: axes, units, lazily read series."""
 
 import shutil
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -9,12 +8,9 @@ import xarray as xr
 from conftest import keep
 from made_jobs import SHORT, fill, study
 
-from compressor.cases.case import Case
-from compressor.cases.table import table
 from compressor.metrics import METRICS
 from compressor.solve.simulate import simulate
 from compressor.store import rows
-from compressor.store.export import ExportOptions, export
 from compressor.store.files import StoreError, StoreWarning
 from compressor.store.reader import open_study, read_job, read_store
 from compressor.store.studies import coordinate_names, write_study
@@ -34,12 +30,6 @@ TIMES = 5  # each that three threads read three jobs
 )
 def test_names_of_coordinates(keys, names):
     assert list(coordinate_names(keys).values()) == names
-
-
-def test_no_coordinate_hides_what_a_job_holds():
-    ideal = simulate(Case.from_values({"solve": SHORT}))
-    names = {name for key in table() for name in coordinate_names([key]).values()}
-    assert names & {*ideal.variables, "key", "study", "job", "sample"} == set()
 
 
 @pytest.fixture(scope="module")
@@ -158,14 +148,6 @@ def test_several_studies_have_jobs_with_coordinates(grid, tmp_path):
         open_study(tmp_path, "gird")
 
 
-def test_a_study_of_one_job_has_no_axes(tmp_path):
-    fill(tmp_path, study("alone", output={"keep": "metrics"}))
-    found = open_study(tmp_path)
-    assert found.peak_acceleration.dims == ()
-    assert found.peak_contact_force.dims == ("joint",)
-    assert "acceleration" not in found
-
-
 def test_failed_jobs_have_a_reason_and_no_metrics(tmp_path):
     solve = SHORT | {"max_steps": [5, 100000]}
     fill(tmp_path, study("budgets", solve, joint="both", clearance_mm=0.1))
@@ -185,13 +167,6 @@ def test_jobs_that_were_simulated_for_metrics_have_no_series_beside_others(tmp_p
     assert np.isnan(found.acceleration.sel(load="none")).all()
 
 
-def test_a_study_without_any_job_is_all_missing(tmp_path):
-    write_study(tmp_path, study("planned", clearance_mm=[0.1, 0.2], joint=["both"]))
-    found = open_study(tmp_path)
-    assert found.status.values.tolist() == [["missing"], ["missing"]]
-    assert found.clearance_mm.attrs["units"] == "mm"
-
-
 # ---- several threads ----------------------------------------------------------------------------
 
 
@@ -205,34 +180,8 @@ def small(tmp_path_factory):
     return folder, found
 
 
-def test_threads_read_the_series_of_their_own_jobs(small):
-    folder, alone = small
-    right = 0
-    with ThreadPoolExecutor(3) as pool:
-        for _ in range(TIMES):
-            series = open_study(folder).acceleration
-            found = pool.map(lambda n, s=series: s.isel(clearance_mm=n).values, range(3))
-            right += sum(map(np.array_equal, found, alone))
-    assert right == 3 * TIMES
-
-
 def test_dask_threads_read_the_series_of_their_own_jobs(small):
     folder, alone = small
     for _ in range(TIMES):
         chunked = open_study(folder).acceleration.chunk({"clearance_mm": 1})
         np.testing.assert_array_equal(chunked.compute(scheduler="threads"), alone)
-
-
-def test_threads_export_the_same_as_one(small, tmp_path):
-    def written(name):
-        for form in ("csv", "netcdf"):
-            export(small[0], ["small"], tmp_path / name / form, ExportOptions(form, series=True))
-        return {
-            path.relative_to(tmp_path / name): path.read_bytes()
-            for path in (tmp_path / name).rglob("*.*")
-        }
-
-    expected = written("alone")
-    with ThreadPoolExecutor(3) as pool:
-        assert all(found == expected for found in pool.map(written, "abc"))
-    assert len(expected) == 8

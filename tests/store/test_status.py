@@ -73,13 +73,6 @@ def test_show_tells_how_a_job_ended(mix, capsys):
     assert err.startswith("next: compsim run ")
 
 
-def test_show_json_is_json(mix, capsys):
-    for key in mix.keys:
-        assert cli.main(["show", key, "--json"]) == 0
-        found = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
-        assert (found["key"], [*found["studies"]]) == (key, ["mix"])
-
-
 def test_the_next_run_has_the_same_jobs(tmp_path, monkeypatch, capsys, in_process):
     """What was set on the command line is part of them."""
     monkeypatch.chdir(tmp_path)

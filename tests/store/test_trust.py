@@ -7,17 +7,15 @@ import numpy as np
 import pytest
 import xarray as xr
 from compsim import cli
-from conftest import keep, without_pictures
+from conftest import keep
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.metrics import METRICS, NUMBERS, QUANTILES
 from compressor.outcome import REGIME_WORDS, Regime
-from compressor.report import write_report
 from compressor.solve.simulate import measure, simulate
 from compressor.store.batch import write_batch
 from compressor.store.dataset import mask_untrusted
-from compressor.store.export import export
 from compressor.store.reader import open_study, read_store
 from compressor.store.status import standings
 from compressor.store.studies import write_study
@@ -107,16 +105,6 @@ def test_numbers_that_few_jobs_have_can_be_masked():
         assert found[name].notnull().values.tolist() == known, name
 
 
-def test_numbers_without_bars_are_not_known(tmp_path):
-    values = {**RING, "contact": {}, "solve": {**BRIEF, "error_bars": False}}
-    (tmp_path / "bare.yaml").write_text(json.dumps(values))
-    (study,) = load_studies(tmp_path / "bare.yaml")
-    write_study(tmp_path / "results", study, "by hand")
-    keep(tmp_path / "results", *map(simulate, study.cases))
-    assert open_study(tmp_path / "results")["rms_acceleration"].notnull().all()
-    assert open_study(tmp_path / "results", trusted=True)["rms_acceleration"].isnull().all()
-
-
 def test_status_counts_by_promise_and_by_regime(ring, capsys):
     (one,) = standings(ring)
     assert one.promises == {"none": 1, "kept": 1}
@@ -128,23 +116,3 @@ def test_status_counts_by_promise_and_by_regime(ring, capsys):
     assert "of those ok: 1 without a promise, 1 kept what accuracy promises of those ok" in out
     for regime in ("chaotic", "periodic"):
         assert f"of those ok: 1 {regime} ({REGIME_WORDS[Regime(regime)]})" in out
-
-
-def test_the_report_counts_and_marks_what_is_chaotic(ring, tmp_path):
-    with without_pictures():
-        page = write_report(ring, tmp_path).read_text()
-    assert "1 of the jobs are chaotic" in page
-    assert 'class="chaotic"' in page
-
-
-def test_a_table_for_others_has_all_digits(ring, tmp_path):
-    export(ring, ["ring"], tmp_path / "ring.csv")
-    head, *rows = (tmp_path / "ring.csv").read_text().splitlines()
-    columns = head.split(",")
-    study = open_study(ring)
-    at = columns.index("rms_acceleration [m/s2]")
-    for row, value in zip(rows, study["rms_acceleration"].values.flat, strict=True):
-        text = row.split(",")[at]
-        assert (float(text) if text else np.nan) == pytest.approx(value, rel=0, nan_ok=True)
-    assert "regime" in columns
-    assert "promise" in columns
