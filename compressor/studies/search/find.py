@@ -6,10 +6,8 @@ point is a job of a study that grows, stored and run as any other. Structure tha
 scan may be missed.
 """
 
-import contextlib
 import math
 import operator
-import shlex
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -17,9 +15,9 @@ from itertools import pairwise
 from scipy.optimize import minimize_scalar
 
 from compressor.program import Progress, no_progress
-from compressor.store import Folder, StoreError, read_store, read_studies
+from compressor.store import Folder, StoreError, read_store
+from compressor.studies.frame import GrowingStudy
 from compressor.studies.search.question import JobReading, Question
-from compressor.sweep import Options, sweep
 
 MAX_POINTS = 200  # that one search may ask for beyond its scan
 place = operator.attrgetter("share")  # of a point
@@ -219,7 +217,7 @@ def find(
         answer = find_extremum(jobs, goal.sign == "greatest", shares, tolerance)
     else:
         answer = find_first(jobs, goal.holds, shares, tolerance, workers)
-    return replace(answer, run_now=jobs.run_now, study=jobs.name, base=base)
+    return replace(answer, run_now=jobs.study.run_now, study=jobs.study.name, base=base)
 
 
 class SearchJobs:
@@ -227,42 +225,24 @@ class SearchJobs:
 
     def __init__(self, question: Question, folder: Folder, workers: int, progress: Progress):
         self.question, self.folder = question, folder
-        self.workers, self.progress = workers, progress
-        self.run_now = 0
-        self.name = question.study([question.low]).name
-        self.values = self.earlier()
-
-    def earlier(self) -> set[float]:
-        """Return the key's values in the stored study of this name whose jobs are of this case."""
-        with contextlib.suppress(StoreError):  # no study yet
-            for study in read_studies(self.folder):
-                if study.name == self.name and [a.key for a in study.axes] == [self.question.key]:
-                    values, stored = study.axes[0].values, read_store(self.folder).keys()
-                    with contextlib.suppress(ValueError):  # the case file no longer takes them
-                        now = self.question.study(values).keys
-                        pairs = zip(values, now, strict=True)
-                        return {value for value, key in pairs if key in stored}
-        return set()
+        self.study = GrowingStudy(
+            question.path, [question.key], f"-find-{question.key}", folder, question.overrides,
+            workers, progress,
+        )  # fmt: skip
+        self.study.find_earlier((question.low,))
 
     def __call__(self, shares: Sequence[float]) -> list[Point]:
         """Return the points of some shares of the range, each a stored job."""
         question = self.question
         arguments = {share: question.argument(share) for share in shares}
-        self.values |= {*arguments.values()}
-        values = sorted(self.values)
-        study = question.study(values)
-        sets = question.settings(values)
-        words = ["compsim", "run", question.path, "-r", str(self.folder)]
-        words += [word for text in sets for word in ("--set", text)]
-        options = Options(shlex.join(words), sets)  # so that `status` shows how to go on
-        self.run_now += sweep([study], self.folder, self.workers, self.progress, options).run_now
-        keys = dict(zip(values, study.keys, strict=True))
+        keys = self.study.run([(value,) for value in arguments.values()])
         store = read_store(self.folder)
         found = []
-        for share, value in arguments.items():
-            key = keys[value]
+        for (share, value), key in zip(arguments.items(), keys, strict=True):
             position = store.position(key)
             if position is None:
+                if refused := self.study.refused.get((value,)):
+                    raise refused
                 raise StoreError(self.folder, f"job {key} is gone", "ask again")
             end = store.status_at(position)
             if end.status != "ok":

@@ -17,6 +17,7 @@ from compressor.cases import Study, load_studies, row_of
 from compressor.metrics import AXES, BARRED, JOINTS, NUMBERS, SEGMENTS, THRESHOLDS
 from compressor.program import CompsimError, did_you_mean
 from compressor.solve import average_bar
+from compressor.studies.frame import DIGITS
 from compressor.units import READABLE, Units, read_quantity, split_number, unit_in
 
 SIGNS = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
@@ -27,9 +28,7 @@ WORDS = {
     "joint": JOINTS, "axis": AXES, "threshold": THRESHOLDS,
     "segment": tuple(f"{degrees:g}" for degrees in SEGMENTS),
 }  # fmt: skip
-DIGITS = 12  # of an argument: enough for any tolerance, and short to read
 GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
-NAME = 64  # characters that a study's name may have
 
 
 class QuestionError(CompsimError, ValueError):
@@ -258,19 +257,9 @@ class Question:
             raise QuestionError(f"{self.key} changes nothing in the case of {self.path}")
         return self.study([self.argument(share) for share in self.shares])
 
-    def settings(self, values: Sequence[float]) -> list[str]:
-        """Return the overrides that make the study of some values of the key.
-
-        The caller sorts them.
-        """
-        listed, end = ", ".join(map(repr, values)), f"-find-{self.key}"
-        name = self._load(f"{self.key}={self.low!r}").name[: NAME - len(end)]
-        return [*self.overrides, f"name={name}{end}", f"{self.key}=[{listed}]"]
-
     def study(self, values: Sequence[float]) -> Study:
         """Return the study of some values of the key, its one axis."""
-        (found,) = load_studies(self.path, overrides=self.settings(values))
-        return found
+        return self._load(f"{self.key}=[{', '.join(map(repr, values))}]")
 
     def _load(self, setting: str) -> Study:
         """Return the study of the file with one more key set."""

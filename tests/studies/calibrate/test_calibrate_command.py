@@ -109,8 +109,8 @@ def test_what_is_set_for_the_machine_gives_way_where_a_point_needs_another(fitte
     unknown = Unknown.written("body.mass_kg=300:600")
     jobs = FitJobs("machine.yaml", [unknown], given, "results", 1, no_progress)
     jobs.run_at(500.0)
-    (quiet,) = jobs.study([(400.0,)]).cases
-    (own,) = jobs.study([(400.0,)], ()).cases
+    (quiet,) = jobs.study.load([(400.0,)]).cases
+    own = jobs.case_at(np.array([1.0 / 3.0]))
     assert (quiet.sensor.noise_m_per_s2, own.sensor.noise_m_per_s2) == (0.0, 0.02)
     assert quiet.machine.speed_rpm == own.machine.speed_rpm == 500.0
 

@@ -1,0 +1,224 @@
+"""What studies share: jobs of a study that grows, jobs with a record, records by revolutions.
+
+A study is a function of stored jobs. What it has to run it runs as ordinary jobs, so that progress,
+resume, `compsim status`, shards and a cluster serve it, too.
+"""
+
+import contextlib
+import math
+import shlex
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from compressor.cases import Case, CaseFileError, Study, load_studies, points
+from compressor.outcome import Outcome
+from compressor.program import CompsimError, Progress, no_progress, report_progress
+from compressor.store import (
+    DamagedFile,
+    Folder,
+    StoredStudy,
+    StoreError,
+    healthy_clearance,
+    job_record,
+    read_store,
+    read_studies,
+)
+from compressor.sweep import Options, in_this_process, sweep
+from compressor.vibration import Record, check_record, resample_angle, turns_at
+
+DIGITS = 12  # of a key's value: enough for any derivative, and short to read
+MAX_NAME = 64  # characters of a study's name
+USABLE = 2.56  # sampling rate over the highest frequency that it holds well (ISO 13373-1)
+RECORD_REMEDY = "write `body: true` and `sensor: {{length_rev: {length}}}` into {file}, keep series"
+
+Point = tuple[float, ...]  # values of keys, in the case file's units
+
+
+class GrowingStudy:
+    """One study of a case file whose jobs are added point by point, by values of some keys.
+
+    Every job is stored and run as any other, so that asking again runs nothing. `jobs`: the key of
+    the job of each point; `refused`: points that make no case; `run_now`: jobs that were run. few:
+    so many new jobs, or more, are run by workers, fewer in this process.
+    """
+
+    def __init__(
+        self,
+        path: str,
+        keys: Sequence[str],
+        ending: str,
+        folder: Folder,
+        overrides: Sequence[str] = (),
+        workers: int = 2,
+        progress: Progress = no_progress,
+        few: int = 0,
+    ):
+        self.path, self.keys, self.overrides = path, tuple(keys), tuple(overrides)
+        self.ending, self.folder = ending, folder
+        self.workers, self.progress, self.few = workers, progress, few
+        self.name = ""
+        self.jobs: dict[Point, str] = {}  # point -> key of its job
+        self.refused: dict[Point, CaseFileError] = {}
+        self.run_now = 0
+
+    def load(self, given: Sequence[Point]) -> Study:
+        """Return the study of some points. Raises CaseFileError."""
+        (found,) = load_studies(self.path, overrides=self.settings(given))
+        return found
+
+    def settings(self, given: Sequence[Point]) -> list[str]:
+        """Return the overrides that make the study of some points."""
+        columns = dict(zip(self.keys, zip(*given, strict=True), strict=True))
+        texts = [f"name={self.name or self.find_name(given[0])}"]
+        texts += [f"{key}=[{', '.join(map(repr, values))}]" for key, values in columns.items()]
+        texts += [f"zip=[[{', '.join(self.keys)}]]"] if len(self.keys) > 1 else []
+        return replace_settings(self.overrides, *texts)
+
+    def find_name(self, point: Point) -> str:
+        """Return the study's name: that of the case file, and the ending."""
+        texts = [f"{key}={value!r}" for key, value in zip(self.keys, point, strict=True)]
+        (one,) = load_studies(self.path, overrides=replace_settings(self.overrides, *texts))
+        self.name = one.name[: MAX_NAME - len(self.ending)] + self.ending
+        return self.name
+
+    def find_earlier(self, point: Point) -> None:
+        """Take up the points of the stored study of this name that are still of this case.
+
+        point: one that makes a case.
+        """
+        self.find_name(point)
+        with contextlib.suppress(StoreError):  # no study yet
+            for study in read_studies(self.folder):
+                axes = {axis.key: axis.values for axis in study.axes}
+                if study.name == self.name and [*axes] == [*self.keys]:
+                    given = [*zip(*axes.values(), strict=True)]
+                    stored = read_store(self.folder).keys()
+                    with contextlib.suppress(ValueError):  # the file no longer takes them
+                        pairs = zip(given, self.load(given).keys, strict=True)
+                        self.jobs |= {point: key for point, key in pairs if key in stored}
+
+    def run(self, given: Sequence[Point]) -> list[str]:
+        """Return the keys of the jobs of points, run where they are missing; "" of refused ones.
+
+        Raises StoreError and WorkersFailed.
+        """
+        known = self.jobs.keys() | self.refused.keys()
+        new = [point for point in dict.fromkeys(given) if point not in known and self.takes(point)]
+        if new:
+            every = sorted([*self.jobs, *new])
+            study, texts = self.load(every), self.settings(every)
+            words = ["compsim", "run", self.path, "-r", str(self.folder)]
+            words += [word for text in texts for word in ("--set", text)]
+            few = in_this_process if len(new) < self.few else None
+            # the command is what `compsim status` shows to go on with
+            options = Options(shlex.join(words), texts, backend=few)
+            done = sweep([study], self.folder, self.workers, self.progress, options)
+            self.run_now += done.run_now
+            self.jobs = dict(zip(every, study.keys, strict=True))
+        return [self.jobs.get(point, "") for point in given]
+
+    def takes(self, point: Point) -> bool:
+        """Return whether a point makes a case; one that does not is noted with the reason."""
+        try:
+            self.load([point])
+        except CaseFileError as error:
+            self.refused[point] = error
+        return point not in self.refused
+
+
+def replace_settings(overrides: Sequence[str], *new: str) -> list[str]:
+    """Return overrides `key=value` with new ones in place of those of the same keys."""
+    keys = {text.partition("=")[0].strip() for text in new}
+    return [text for text in overrides if text.partition("=")[0].strip() not in keys] + [*new]
+
+
+class RecordedJob(NamedTuple):
+    """A stored job with a sensor's record."""
+
+    key: str
+    point: Mapping[str, Any]  # its values of the study's axes
+    case: Case
+    outcome: Outcome
+    record: Record
+
+
+def records(
+    folder: Folder, source: StoredStudy, left: Counter[str], progress: Progress = no_progress
+) -> Iterator[RecordedJob]:
+    """Yield the jobs of a study that are ok and have a record, each once.
+
+    left: counts the others by reason. A joint counts as sound by the study's healthy clearance.
+    """
+    stored, healthy = read_store(folder).warned(), healthy_clearance(source)
+    own = dict(zip(source.keys, points(source), strict=True))
+    for key, point in report_progress([*own.items()], progress):
+        try:
+            found = stored.find_ok(key, healthy)
+            record = None if isinstance(found, str) else job_record(stored, key)
+        except DamagedFile:
+            left["damaged"] += 1
+            continue
+        if isinstance(found, str):
+            left[found] += 1
+        elif record is None:
+            left["without_record"] += 1
+        else:
+            yield RecordedJob(key, point, *found, record)
+
+
+def no_records(
+    source: StoredStudy, left: Mapping[str, int], revolutions: int, kind: type[CompsimError]
+) -> CompsimError:
+    """Return the error that says why a study has no record of so many revolutions."""
+    if {*left} <= {"without_record"}:
+        remedy = RECORD_REMEDY.format(length=2 * revolutions + 1, file=source.case_file)
+        return kind(f"study {source.name} has no sensor's record: {remedy}, and run it again")
+    reasons = ", ".join(f"{count} {reason}" for reason, count in left.items())
+    text = f"study {source.name} has no record of {revolutions} revolutions: {reasons}"
+    remedy = f"run what is missing, or with sensor.length_rev: {revolutions + 1} or more"
+    return kind(f"{text}; {remedy}")
+
+
+@dataclass(frozen=True)
+class Revolutions:
+    """A record by whole revolutions, at equal crank angles.
+
+    values: (revolutions, samples a revolution), m/s2; first: where the first sample is, in
+    revolutions after top dead centre, up to a step before it; speed: mean, rev/s; rate: Hz.
+    """
+
+    values: np.ndarray
+    first: float
+    speed: float
+    rate: float
+
+    @property
+    def highest(self) -> int:
+        """Return the highest order that the sampling rate holds."""
+        return math.floor(self.rate / USABLE / self.speed)
+
+    def lines(self, orders: int) -> np.ndarray:
+        """Return complex amplitudes of the orders 1, 2, ... of each revolution, (n, orders)."""
+        found = np.fft.rfft(self.values, axis=1)[:, : orders + 1] * (2.0 / self.values.shape[1])
+        return (found * np.exp(-2j * np.pi * self.first * np.arange(found.shape[1])))[:, 1:]
+
+
+def by_revolutions(record: Record, multiple: int = 2) -> Revolutions:
+    """Return a record by whole revolutions; samples a revolution are a multiple of a number.
+
+    Raises RecordError if it cannot be used.
+    """
+    whole = check_record(record.times, record.values, record.tacho)
+    turns = turns_at(record.times, record.tacho)
+    # from the last sample that is not after the first pulse: the rest then reach over all turns
+    first = max(int(np.searchsorted(turns, 0.0, side="right")) - 1, 0)
+    inside = slice(first, int(np.searchsorted(turns, whole)) + 2)
+    speed = whole / (record.tacho[-1] - record.tacho[0])
+    count = multiple * math.ceil(record.rate / speed / multiple)
+    even = resample_angle(2.0 * math.pi * turns[inside], record.values[inside], count)
+    values = even[: whole * count].reshape(-1, count)
+    return Revolutions(values, float(turns[first]), speed, record.rate)
