@@ -201,9 +201,15 @@ class Revolutions:
         """Return the highest order that the sampling rate holds."""
         return math.floor(self.rate / USABLE / self.speed)
 
+    @property
+    def rpm(self) -> float:
+        """Return the mean speed in rpm."""
+        return 60.0 * self.speed
+
     def lines(self, orders: int) -> np.ndarray:
-        """Return complex amplitudes of the orders 1, 2, ... of each revolution, (n, orders)."""
-        found = np.fft.rfft(self.values, axis=1)[:, : orders + 1] * (2.0 / self.values.shape[1])
+        """Return the orders 1, 2, ... of each revolution, complex and rms, (n, orders)."""
+        scale = math.sqrt(2.0) / self.values.shape[1]
+        found = np.fft.rfft(self.values, axis=1)[:, : orders + 1] * scale
         return (found * np.exp(-2j * np.pi * self.first * np.arange(found.shape[1])))[:, 1:]
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from compressor.studies.frame import USABLE
 from compressor.vibration import Record, band_signal, check_record, measure_record, noisy, turns_at
 
 RECORD = "record"  # the filter's name of a record as it is
-USABLE = 2.56  # sampling rate over the highest frequency that an anti-aliasing filter lets through
 FRAME_HZ = (2.0, 1000.0)  # ours: the band in which frames are judged by body_velocity_rms
 # m/s2, 20 a decade: the levels over which peaks are counted
 LADDER = np.geomspace(1e-2, 1e4, 121)

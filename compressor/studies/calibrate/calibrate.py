@@ -14,8 +14,8 @@ from compressor.cases import Case, design, load_studies, row_of
 from compressor.program import Progress, no_progress
 from compressor.store import Folder, job_record, read_store
 from compressor.studies.calibrate.fit import Fit, fit_orders
-from compressor.studies.calibrate.orders import LIMIT, CalibrationError, orders_of
-from compressor.studies.frame import DIGITS, GrowingStudy, Point, replace_settings
+from compressor.studies.calibrate.orders import CalibrationError, orders_of
+from compressor.studies.frame import DIGITS, USABLE, GrowingStudy, Point, replace_settings
 from compressor.vibration import Record
 
 POINTS_A_KEY = 6  # of the design that the fit begins with
@@ -163,7 +163,7 @@ def calibrate(
     jobs.run_at(60.0 * measured.speed)
     sensor = jobs.middle.sensor
     assert sensor is not None
-    corner = sensor.low_pass_Hz or sensor.rate_Hz / LIMIT  # the highest order that both hold
+    corner = sensor.low_pass_Hz or sensor.rate_Hz / USABLE  # the highest order that both hold
     jobs.highest = min(len(measured.amplitudes), int(corner / measured.speed))
     measured = measured.up_to(jobs.highest)
     starts = np.array(design("lhs", POINTS_A_KEY * len(unknowns), len(unknowns), SEED))

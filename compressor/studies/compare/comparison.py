@@ -23,12 +23,11 @@ from compressor.studies.compare.likeness import (
     SWING,
     Curves,
     Likeness,
-    Turned,
     compare_lines,
     curves,
     share_inside,
-    turn_record,
 )
+from compressor.studies.frame import Revolutions, by_revolutions
 from compressor.vibration import RecordError
 
 UNSAID = {"joint", "clearance_mm", "sensor"}  # swept groups that are told otherwise, or not
@@ -82,7 +81,7 @@ class Comparison:
     name: str
     key: str
     remarks: tuple[str, ...]
-    turned: Turned
+    turned: Revolutions
     curves: Curves
     orders: int
     jobs: tuple[Compared, ...]
@@ -105,7 +104,7 @@ def compare_record(
     or orders are too few.
     """
     key, record = find_record(name, folder, hints)
-    mine = turn_record(record)
+    mine = by_revolutions(record)
     _check_orders(mine.highest, name)
     own = {mine.highest: curves(mine.lines(mine.highest))}  # by the highest order
     stored = read_store(folder).warned()
@@ -116,7 +115,7 @@ def compare_record(
         other, case = job_record(stored, one), stored.case_at(int(stored.rows.find([one])[0]))
         if other is not None and case is not None and case.sensor:
             with contextlib.suppress(RecordError):  # too short, or all zero
-                jobs.append(_compare_job(mine, own, turn_record(other), one, case, swept))
+                jobs.append(_compare_job(mine, own, by_revolutions(other), one, case, swept))
     if not jobs:
         text = f"none of the {len(wanted)} jobs has a sensor's record of two revolutions"
         raise CompareError(f"{text}: run them with body: true, sensor: true and series kept")
@@ -132,9 +131,9 @@ def compare_record(
 
 
 def _compare_job(
-    mine: Turned,
+    mine: Revolutions,
     own: dict[int, Curves],
-    turned: Turned,
+    turned: Revolutions,
     key: str,
     case: Case,
     swept: Mapping[str, Any],
@@ -184,7 +183,7 @@ def _wanted_jobs(
             yield report_job(folder, word).key, {}
 
 
-def find_misfits(record: Turned, jobs: Sequence[Compared], is_file: bool) -> Iterator[str]:
+def find_misfits(record: Revolutions, jobs: Sequence[Compared], is_file: bool) -> Iterator[str]:
     """Yield a sentence for what does not fit between a record and jobs, the most alike first."""
     best = jobs[0]
     likeness = best.likeness
@@ -197,8 +196,8 @@ def find_misfits(record: Turned, jobs: Sequence[Compared], is_file: bool) -> Ite
     if abs(record.rate / best.rate - 1.0) > SAME_RATE:
         yield (f"sampling rate: {record.rate:.6g} Hz, and the job has {best.rate:.6g}: what only "
                "the faster one holds is left out")  # fmt: skip
-    if len(record.spectra) < FEW:
-        yield (f"length: {len(record.spectra)} revolutions: noise falls by their root alone; "
+    if len(record.values) < FEW:
+        yield (f"length: {len(record.values)} revolutions: noise falls by their root alone; "
                f"record {FEW} or more")  # fmt: skip
     ratio = likeness.rms_ratio.value
     meant = [text for size, text in MISTAKES.items() if abs(ratio / size - 1.0) <= NEAR]

@@ -82,7 +82,7 @@ def caption(found: Comparison) -> str:
     best = found.jobs[0]
     like = best.likeness
     text = (
-        f"(a) Mean revolution of {found.name} ({len(found.turned.spectra)} revolutions) and of the "
+        f"(a) Mean revolution of {found.name} ({len(found.turned.values)} revolutions) and of the "
         f"jobs most alike, orders 1 to {best.orders}: correlation {like.correlation.value:.3f} "
         f"with job {best.key[:KEY]}, {best.what}. (b) Peak and, paler, rms of each 10 "
         f"degrees, on average over revolutions: peaks most different at "

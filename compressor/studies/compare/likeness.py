@@ -10,9 +10,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from compressor.vibration import Record, check_record, resample_angle, segment_levels, turns_at
+from compressor.vibration import segment_levels
 
-USABLE = 2.56  # sampling rate over the highest usable frequency, as analysers have it
 SEGMENTS = 36
 SWING = 12  # order up to which a machine without clearance shakes; the envelope is of what is above
 FINE = 4  # points on a curve for each cycle of its highest order
@@ -27,46 +26,6 @@ MIN_LINES = 8  # of a third octave, by which noise is known
 QUIET = 1e-4  # share of the loudest third octave below which none is compared
 SAME_BAND = 0.5  # dB, to which a third octave of a job is taken as known
 LOUD = 0.1  # share of the greatest peak from which a segment is compared
-
-
-@dataclass(frozen=True)
-class Turned:
-    """A record by revolutions.
-
-    spectra: rms lines (m/s2) of the orders 0, 1, 2, ... of each revolution from top dead centre on,
-    (n, k), complex; rpm: mean speed; rate: Hz.
-    """
-
-    spectra: np.ndarray
-    rpm: float
-    rate: float
-
-    @property
-    def highest(self) -> int:
-        """Return the highest order that the sampling rate holds."""
-        return math.floor(self.rate / USABLE / (self.rpm / 60.0))
-
-    def lines(self, orders: int) -> np.ndarray:
-        """Return the lines of the orders 1, 2, ... of each revolution, (n, orders)."""
-        return self.spectra[:, 1 : orders + 1]
-
-
-def turn_record(record: Record) -> Turned:
-    """Return a record by whole revolutions. Raises RecordError if it cannot be used."""
-    whole = check_record(record.times, record.values, record.tacho)
-    turns = turns_at(record.times, record.tacho)
-    # from the last sample that is not after the first pulse: the rest then reach over all turns
-    first = max(int(np.searchsorted(turns, 0.0, side="right")) - 1, 0)
-    inside = slice(first, int(np.searchsorted(turns, whole)) + 2)
-    rate = record.rate
-    speed = whole / (record.tacho[-1] - record.tacho[0])
-    a_turn = SEGMENTS * math.ceil(rate / speed / SEGMENTS)
-    angle = 2.0 * math.pi * turns[inside]
-    even = resample_angle(angle, record.values[inside], a_turn)[: whole * a_turn]
-    spectra = np.fft.rfft(even.reshape(-1, a_turn), axis=1) * (math.sqrt(2.0) / a_turn)
-    # the first sample is up to a step off top dead centre: turn the lines back by its angle
-    spectra *= np.exp(-1j * angle[0] * np.arange(spectra.shape[1]))
-    return Turned(spectra, 60.0 * speed, rate)
 
 
 @dataclass(frozen=True)

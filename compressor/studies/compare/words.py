@@ -19,7 +19,7 @@ def list_comparison(found: Comparison) -> Iterator[str]:
     """Yield the record, the table of jobs, and what does not fit."""
     mine, more = found.turned, len(found.jobs) - MAX_LISTED
     rms = (found.curves.spectrum**2).sum() ** 0.5
-    turns = f"{plural(len(mine.spectra), 'revolution')} at {mine.rpm:.4g} rpm, {mine.rate:.6g} Hz"
+    turns = f"{plural(len(mine.values), 'revolution')} at {mine.rpm:.4g} rpm, {mine.rate:.6g} Hz"
     yield f"{found.name}: {turns}, {rms:.4g} m/s2 rms up to order {found.orders}"
     yield from (f"read: {text}" for text in found.remarks)
     yield from align_columns([HEAD, *map(list_cells, found.jobs[:MAX_LISTED])], "<<>>>>>")
@@ -49,7 +49,7 @@ def format_number(found: Measured) -> str:
 def jsonable_comparison(found: Comparison) -> dict[str, Any]:
     """Return a comparison as JSON says it."""
     mine = found.turned
-    head = {"record": found.name, "revolutions": len(mine.spectra), "rpm": mine.rpm}
+    head = {"record": found.name, "revolutions": len(mine.values), "rpm": mine.rpm}
     head |= {"rate_Hz": mine.rate, "orders": found.orders, "left_out": found.left_out}
     head |= {"remarks": found.remarks, "envelope_inside": found.inside, "misfits": found.misfits}
     jobs = []

@@ -10,16 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from compressor.studies.frame import by_revolutions
 from compressor.vibration import (
+    Record,
     RecordError,
-    check_record,
     energy_angle,
     envelope_spectrum,
     high_pass_orders,
     line_amplitudes,
-    resample_angle,
     shape,
-    turns_at,
 )
 
 SWING = 12.0  # order up to which a machine without clearance shakes
@@ -83,17 +82,14 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
     than two revolutions, pulses that do not increase or lie beyond the samples, and values that are
     not all numbers, or all zero.
     """
-    whole = check_record(times, values, tacho)
-    turns = turns_at(times, tacho)
-    # from the last sample that is not after the first pulse: the rest then reach over all turns
-    first = max(int(np.searchsorted(turns, 0.0, side="right")) - 1, 0)
-    inside = slice(first, int(np.searchsorted(turns, whole)) + 1)
+    turned = by_revolutions(Record(times, values, tacho, math.nan), SECTORS)
+    even, a_turn, speed = turned.values.ravel(), turned.values.shape[1], turned.speed
+    # from the last sample that is not after the first pulse to the first not before the last one
+    first = max(int(np.searchsorted(times, tacho[0], side="right")) - 1, 0)
+    inside = slice(first, int(np.searchsorted(times, tacho[-1])) + 1)
     if not np.any(values[inside]):
         raise RecordError("the record's values are all zero: they hold no signal")
-    rate = (len(times) - 1) / (times[-1] - times[0])  # two stamps alone lose digits
-    speed = whole / (tacho[-1] - tacho[0])
-    a_turn = SECTORS * math.ceil(rate / speed / SECTORS)
-    even = resample_angle(2.0 * math.pi * turns[inside], values[inside], a_turn)[: whole * a_turn]
+    rate = turned.rate
     size, *shapes = shape(even)
     found = {"level": math.log10(size), "speed": math.log10(speed)}
     found |= dict(zip(("crest_factor", "kurtosis", "gini"), shapes, strict=True))

@@ -14,7 +14,8 @@ from conftest import store
 from scipy.interpolate import CubicSpline
 
 from compressor.store import job_record, read_store
-from compressor.studies.compare.likeness import compare_lines, curves, turn_record
+from compressor.studies.compare.likeness import compare_lines, curves
+from compressor.studies.frame import by_revolutions
 from compressor.vibration import Record
 
 PAGE = Path(__file__).parents[3] / "compressor/docs/diagnosis.md"
@@ -216,12 +217,12 @@ def test_the_neighbour_of_the_true_clearance_comes_first(tmp_path):
     (study,) = store(tmp_path / "results", tmp_path / "machines.yaml")
     stored = read_store(tmp_path / "results")
     records = {one.clearance_mm.big_end: job_record(stored, one.key) for one in study.cases}
-    jobs = {clearance: turn_record(records[clearance]) for clearance in GRID}
+    jobs = {clearance: by_revolutions(records[clearance]) for clearance in GRID}
     right = {"difference": 0, "correlation": 0}
     for true in TRUE:
         near = {max(one for one in GRID if one < true), min(one for one in GRID if one > true)}
         for seed, noise in ((31, 0.05), (32, 0.05), (33, 0.5), (34, 0.5)):
-            mine = turn_record(as_measured(records[true], seed, noise))
+            mine = by_revolutions(as_measured(records[true], seed, noise))
             found = {}
             for clearance, job in jobs.items():
                 lines = [one.lines(min(mine.highest, job.highest)) for one in (mine, job)]

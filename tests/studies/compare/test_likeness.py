@@ -12,8 +12,8 @@ from compressor.studies.compare.likeness import (
     share_inside,
     spectral_distance,
     third_octaves,
-    turn_record,
 )
+from compressor.studies.frame import by_revolutions
 from compressor.vibration import RecordError
 from compressor.vibration.accelerometer import Record
 
@@ -29,7 +29,7 @@ def record(*waves, noise=0.0, seed=1):
     turns = (TIMES - FIRST) / TURN
     values = sum(a * np.sin(2 * np.pi * k * (turns - late / 360)) for k, a, late in waves)
     values = values + np.random.default_rng(seed).normal(0.0, noise, TIMES.size)
-    return turn_record(Record(TIMES, values, TACHO, math.nan))
+    return by_revolutions(Record(TIMES, values, TACHO, math.nan))
 
 
 def likeness(one, two, orders=ORDERS):
@@ -40,7 +40,7 @@ def likeness(one, two, orders=ORDERS):
 def test_a_record_is_turned_to_top_dead_centre():
     """Whatever lies between a sample and the pulse: lines of sines are imaginary, of their rms."""
     turned = record((3, 2.0, 0.0), (40, 1.0, 0.0))
-    assert (len(turned.spectra), turned.rate) == (WHOLE, pytest.approx(RATE))
+    assert (len(turned.values), turned.rate) == (WHOLE, pytest.approx(RATE))
     assert turned.rpm == pytest.approx(60 / TURN)
     assert turned.highest == int(RATE / 2.56 * TURN)
     lines = turned.lines(ORDERS)
@@ -91,7 +91,7 @@ def test_the_envelope_hears_bursts_whatever_rings_in_them():
     turns = (TIMES - FIRST) / TURN
     burst = sum(np.exp(-(((turns - at) % 1.0 - 0.1) ** 2) / 0.001) for at in (0.2, 0.6))
     one, two = (
-        turn_record(Record(TIMES, burst * np.sin(2 * np.pi * k * turns), TACHO, math.nan))
+        by_revolutions(Record(TIMES, burst * np.sin(2 * np.pi * k * turns), TACHO, math.nan))
         for k in (80, 117)
     )
     found = likeness(one, two)
@@ -105,7 +105,7 @@ def test_the_segment_that_is_most_another_one_is_named():
     place = turns % 1.0 * 360
     wave = np.sin(2 * np.pi * 80 * turns)
     one, two = (
-        turn_record(Record(TIMES, values, TACHO, math.nan))
+        by_revolutions(Record(TIMES, values, TACHO, math.nan))
         for values in (np.where((place > 102) & (place < 108), 6.0, 2.0) * wave, wave)
     )
     found = likeness(one, two)
@@ -165,4 +165,4 @@ def test_a_share_inside_counts_angles():
 
 def test_a_record_that_tells_nothing_is_refused():
     with pytest.raises(RecordError, match="2 tacho pulses are too few"):
-        turn_record(Record(TIMES, 0 * TIMES, TACHO[:2], math.nan))
+        by_revolutions(Record(TIMES, 0 * TIMES, TACHO[:2], math.nan))
