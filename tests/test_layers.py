@@ -230,7 +230,7 @@ def studies_that_know_others(sources: Sources) -> list[str]:
         f"{module} imports {source}"
         for module in sources
         for source, _ in ours(sources, module)
-        if study(source) not in {"", study(module)}
+        if study(source) not in {"", "frame", study(module)}
         if room(module) != "compsim"
     ]
 
