@@ -79,17 +79,11 @@ class Offset:
 
     big_end_x: float = shift("start of the big end's journal along x", read=AT_JOINTS["big_end"])
     big_end_y: float = shift("start of the big end's journal along y", read=AT_JOINTS["big_end"])
-    small_end_x: float = number(
-        0.0,
-        "[-1000, 1000]",
-        "start of the small end's journal along x",
-        read=AT_JOINTS["small_end"],
+    small_end_x: float = shift(
+        "start of the small end's journal along x", read=AT_JOINTS["small_end"]
     )
-    small_end_y: float = number(
-        0.0,
-        "[-1000, 1000]",
-        "start of the small end's journal along y",
-        read=AT_JOINTS["small_end"],
+    small_end_y: float = shift(
+        "start of the small end's journal along y", read=AT_JOINTS["small_end"]
     )
 
 

@@ -329,11 +329,9 @@ class Sensor:
         read="body.start == steady",
     )  # fmt: skip
     seed: int = integer(
-        1,
-        "[0, 2147483648]",
-        "seed of noise and jitter",
+        1, "[0, 2147483648]", "seed of noise and jitter",
         read="sensor.noise_m_per_s2 > 0 or sensor.speed_jitter > 0",
-    )
+    )  # fmt: skip
     length_rev: int | None = integer(
         None, "[1, 10000]", "revolutions of the record; more of them repeat", "the settled ones",
         read="body.start == steady",
@@ -343,12 +341,9 @@ class Sensor:
         "none: no peaks are counted",
     )  # fmt: skip
     second_threshold_m_per_s2: float | None = number(
-        None,
-        "(0, 1e6]",
-        "second level over which a peak counts",
-        "none",
+        None, "(0, 1e6]", "second level over which a peak counts", "none",
         read="sensor.threshold_m_per_s2 > 0",
-    )
+    )  # fmt: skip
 
     @property
     def thresholds(self) -> tuple[float | None, float | None]:
