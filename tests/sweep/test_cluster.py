@@ -170,7 +170,7 @@ class PendingOf(list):
 
 
 def wait_until(condition):
-    until = time.monotonic() + 20
+    until = time.monotonic() + 100
     while not condition() and time.monotonic() < until:
         time.sleep(0.05)
     assert condition()

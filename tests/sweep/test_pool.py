@@ -278,7 +278,8 @@ def test_results_that_came_before_an_interruption_are_kept(workers):
     with pytest.raises(KeyboardInterrupt):
         ends.extend(run_batches(interrupting, named(range(100)), rules))
     assert time.monotonic() - began < 30
-    assert results(ends).keys() >= set(range(30))
+    # a worker that has not begun yet holds a batch, of one job at first
+    assert len(results(ends).keys() & set(range(30))) > 30 - workers
 
 
 @pytest.mark.parametrize("workers", [1, 2])
