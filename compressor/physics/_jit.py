@@ -121,7 +121,9 @@ def _compile(function: Function, made: type[Deferred], **options: Any) -> Functi
     # wrappers for who does not call it would only take time to compile: for C, and some for Python
     how: Any = {
         "cache": True, "error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True,
-        "no_cpython_wrapper": made is Inlined, **options,
+        "no_cpython_wrapper": made is Inlined,
+        # said, or what an `inline_llvm` calls were inlined, too, if it is compiled for it first
+        "forceinline": False, **options,
     }  # fmt: skip
 
     def make() -> Any:
@@ -142,6 +144,14 @@ def jit(function: Function) -> Function:
     went wrong. As it is with ``COMPSIM_JIT=0``.
     """
     return _compile(function, Deferred)
+
+
+def inner(function: Function) -> Function:
+    """Return `jit` for compiled callers alone: without the wrapper by which Python calls it.
+
+    Python calls the function as it is written.
+    """
+    return _compile(function, Inlined)
 
 
 def inline_llvm(function: Function) -> Function:
@@ -180,7 +190,9 @@ def dispatch_on_record(field: str, special: Function, usual: Function) -> Functi
         for deferred, of_special in ((special, True), (usual, False)):
             # the very options: its machine code on disk serves direct callers, too
             options = vars(deferred)["options"]
-            overload(choose, options)(implementation_for(field, of_special, uncompiled(deferred)))
+            overload(choose, options)(
+                implementation_for(field, of_special, vars(deferred)["__wrapped__"])
+            )
         cpu_target.typing_context.refresh()
         return choose
 
@@ -201,14 +213,6 @@ def implementation_for(field: str, wanted: bool, function: Any) -> Any:
         return function if any(field in names for names in fields) == wanted else None
 
     return implementation
-
-
-def uncompiled(function: Function) -> Function:
-    """Return the Python function itself: for a single call, which does not wait for machine code.
-
-    What it calls is compiled all the same.
-    """
-    return getattr(function, "__wrapped__", function)
 
 
 def _without_refcount() -> Any:

@@ -12,13 +12,7 @@ import math
 from enum import IntEnum
 from typing import NamedTuple
 
-from compressor.physics._jit import (
-    dispatch_on_record,
-    inline_llvm,
-    inline_once,
-    jit,
-    square_root,
-)
+from compressor.physics._jit import dispatch_on_record, inline_llvm, inline_once, square_root
 from compressor.physics.contact_laws import (
     HYSTERESIS,
     Law,
@@ -56,28 +50,28 @@ def adams(slip, p):
     return (2.0 * rise((slip + p.stiction_velocity) * p.per_stiction) - 1.0) * size
 
 
-@jit
+@inline_llvm
 def threlfall(slip, p):
     """Return Threlfall's law: an exponential rise (Mech. Mach. Theory 13, 1978)."""
     speed = min(1.0, abs(slip) / p.stiction_velocity)
     return math.copysign(p.dynamic * (1.0 - math.exp(-3.0 * speed)) / SATURATED, slip)
 
 
-@jit
+@inline_llvm
 def ambrosio(slip, p):
     """Return Ambrosio's law: 0 up to the stiction velocity, then a line to the friction one."""
     share = (abs(slip) - p.stiction_velocity) * p.per_transition
     return math.copysign(p.dynamic * min(1.0, max(0.0, share)), slip)
 
 
-@jit
+@inline_llvm
 def stribeck(slip, p):
     """Return LuGre's coefficient in steady sliding without its viscous part."""
     ratio = slip / p.stiction_velocity
     return (p.static - p.dynamic) * math.exp(-ratio * ratio) + p.dynamic
 
 
-@jit
+@inline_llvm
 def bristle_rate(slip, bristle, p):
     """Return how fast LuGre's bristles bend (m/s), of a mean deflection (m).
 
@@ -89,14 +83,14 @@ def bristle_rate(slip, bristle, p):
     return slip - relaxation
 
 
-@jit
+@inline_llvm
 def lugre(slip, bristle, p):
     """Return LuGre's law (Canudas de Wit et al., IEEE Trans. Autom. Control 40, 1995)."""
     bending = p.bristle_damping * bristle_rate(slip, bristle, p)
     return p.bristle_stiffness * bristle + (p.viscous * slip + bending)
 
 
-@jit
+@inline_llvm
 def chosen_coefficient(slip, bristle, p):
     """Return the coefficient by the law that a record has chosen."""
     if p.friction == COULOMB_TANH:

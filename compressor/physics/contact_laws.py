@@ -27,12 +27,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from compressor.physics._jit import (
-    dispatch_on_record,
-    inline_llvm,
-    inline_once,
-    square_root,
-)
+from compressor.physics._jit import dispatch_on_record, inline_llvm, inline_once, square_root
 from compressor.physics.record import CHOSEN_FORCES
 
 FLATTEST = 1.25  # of ln(4 S c / F) - 1: from there on Johnson's force goes on along its tangent

@@ -32,7 +32,7 @@ bore its load, and struck: how hard, followed from the share.
 
 import math
 
-from compressor.physics._jit import dispatch_on_record, inline_llvm, jit, square_root
+from compressor.physics._jit import dispatch_on_record, inline_llvm, square_root
 from compressor.physics.contact import ContactState, carried_numbers, joint_contact
 from compressor.physics.contact_laws import rise
 from compressor.physics.record import CHOSEN_FORCES, FILM_TERMS
@@ -40,7 +40,7 @@ from compressor.physics.record import CHOSEN_FORCES, FILM_TERMS
 CENTRE_ECCENTRICITY = 0.1
 
 
-@jit
+@inline_llvm
 def bounded_eccentricity(eps, share):
     """Return eps up to the film's last share, and from there to the wall smoothly to its middle."""
     begin = 1.0 - share
@@ -50,7 +50,7 @@ def bounded_eccentricity(eps, share):
     return begin + share * (s - 0.5 * s * s)
 
 
-@jit
+@inline_llvm
 def short_film(eps, wedge, closing):
     """Return the force of a short bearing along the line of centres and across, over (B / D)^2.
 
@@ -77,7 +77,7 @@ def short_film(eps, wedge, closing):
     return 2.0 * closing * cosines - wedge * mixed, wedge * sines - 2.0 * closing * mixed
 
 
-@jit
+@inline_llvm
 def short_bearing_shares(eps, constants):
     """Return a bearing's numbers over the short one's: pressed, pulled apart, turned; its attitude.
 
@@ -104,7 +104,7 @@ def short_bearing_shares(eps, constants):
     return pressed, pulled, turned, further
 
 
-@jit
+@inline_llvm
 def film_numbers_at(eps, wedge, closing, constants):
     """Return the numbers of `short_film` of a bearing of finite length, with the factor (B / D)^2.
 
@@ -132,7 +132,7 @@ def film_numbers_at(eps, wedge, closing, constants):
     return size * (towards - away), size * 2.0 * further * sine
 
 
-@jit
+@inline_llvm
 def film(joint, eccentricity, spins, p):
     """Return the force on the journal x, y (N), both moments (N m), and the power lost (W).
 
@@ -163,7 +163,7 @@ def film(joint, eccentricity, spins, p):
     return fx, fy, -shear - half, shear - half, lost
 
 
-@jit
+@inline_llvm
 def oiled_contact(joint, contact, eccentricity, spins, p):
     """Return a joint's `ContactState` with the force, the moments and the loss of its film."""
     if p.viscosity == 0.0:

@@ -17,7 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from compressor.physics._jit import inline_llvm, jit
+from compressor.physics._jit import inline_llvm, inner
 from compressor.physics.kinematics import angle_at
 from compressor.physics.record import Load, derive
 
@@ -93,7 +93,7 @@ def cylinder_force(phase, x, p):
     return head - crank - p.back_force
 
 
-@jit
+@inner
 def begin_stroke(t, deviation, i, phases, p):
     """Write into the phase of segment i where the piston was at its last dead centre.
 

@@ -16,6 +16,7 @@ from compressor.physics._jit import (
     dispatch_on_record,
     inline_llvm,
     inline_once,
+    inner,
     jit,
     without_refcount,
 )
@@ -48,16 +49,15 @@ from compressor.physics.runge_kutta import (
     weights_at,
 )
 from compressor.physics.step_control import (
+    LAST_STRETCH,
     MIN_ERROR,
+    MIN_STEP,
     MIN_TEST_PAUSE,
     Mode,
     choose_method,
     first_step,
-    is_accepted,
-    is_last_step,
     next_step_length,
     refuse,
-    shortest_step,
 )
 from compressor.physics.systems import (
     beyond_model,
@@ -73,6 +73,7 @@ from compressor.physics.tally import (
     gap_fraction_between,
     lobatto,
     may_beat_peaks,
+    may_exceed,
     tally_energy,
     tally_step,
 )
@@ -192,7 +193,7 @@ def new_work(n):
 
 
 MIDDLE = NODES.size // 2
-INWARD = np.array([2, 1, 3])  # nodes between a step's ends, the middle first
+TO_OBSERVE = np.array([0, 2, 1, 3])  # nodes but the last: a step's begin, its middle, the others
 
 rosenbrock_step, rosenbrock_error = rosenbrock.take_step, rosenbrock.error_norm
 rosenbrock_extend = rosenbrock.extend
@@ -228,14 +229,16 @@ def observe_step(w, base, h, z, work, phase, p, tally):
         rosenbrock_extend(z, work.new, work.k[1:], work.dense)
         observe_with_energy(ideal(w.t + h, p), work.new[:n], phase, p, work.rows[last])
     w.has_dense = w.stiff
-    if w.observed:  # the last step's end is this step's begin
-        for j in range(ACCELERATION, COLUMNS):
-            work.rows[0, j] = work.row[j]
-    else:
-        observe_contact(ideal(w.t, p), z[:n], phase, p, work.rows[0])
     stride = 1 if w.stiff else MIDDLE
-    for i in INWARD:
-        if w.stiff:
+    for i in TO_OBSERVE:
+        if i == 0 and w.observed:  # the last step's end is this step's begin
+            for j in range(ACCELERATION, COLUMNS):
+                work.rows[0, j] = work.row[j]
+            continue
+        if i == 0:
+            for j in range(n):
+                work.y[j] = z[j]
+        elif w.stiff:
             interpolate(NODES[i], work.dense, work.y)
         elif i == MIDDLE or stride == 1:
             combine(NODE_WEIGHTS[i], h, z, work.k, work.y)
@@ -321,7 +324,7 @@ def measure_gap_fractions(w, h, stride, work, size, phase, p, tally):
         work.gap_fraction[joint] = gap_fraction
 
 
-@jit
+@inner
 def look_within(s, column, w, base, h, z, work, phase, p):
     """Return an observed column at the fraction s of the step just taken; writes work.y, .row."""
     if w.has_dense:
@@ -339,7 +342,7 @@ def signed(value, sign):
     return abs(value) if sign == 0.0 else sign * value
 
 
-@jit
+@inner
 def find_top(column, sign, known, w, base, h, stride, z, work, phase, p):
     """Return the greater of `known` and the greatest value of a column over the step just taken.
 
@@ -372,24 +375,25 @@ def find_top(column, sign, known, w, base, h, stride, z, work, phase, p):
     return known
 
 
-@jit
+@inline_llvm
 def skip_tops(w, base, h, stride, z, work, phase, p, tally):
     """Return at once: the tally's own peaks will do."""
 
 
-@jit
+@inner
 def raise_tops(w, base, h, stride, z, work, phase, p, tally):
-    """Raise the tally's peaks by `find_top` of the step just taken."""
+    """Raise the tally's peaks by `find_top` of the step just tallied."""
     for k in range(PEAKED):
-        tally.peak[k] = find_top(
-            ACCELERATION + k, 0.0, tally.peak[k], w, base, h, stride, z, work, phase, p
-        )
+        if may_exceed(tally.top[k], tally.peak[k]):
+            tally.peak[k] = find_top(
+                ACCELERATION + k, 0.0, tally.peak[k], w, base, h, stride, z, work, phase, p
+            )
 
 
 look_for_peaks = dispatch_on_record(CHOSEN_FORCES, raise_tops, skip_tops)
 
 
-@jit
+@inner
 def add_sides(low, high, before, after, w, base, h, z, work, phase, p):
     """Add to work.sides how much of a step, from low to high, the rod load is on each side.
 
@@ -413,7 +417,7 @@ def add_sides(low, high, before, after, w, base, h, z, work, phase, p):
         work.sides[0 if load > 0.0 else 1] += abs(0.5 * (inside + outside) - end)
 
 
-@jit
+@inner
 def measure_sides(w, base, h, stride, z, work, phase, p, tally):
     """Write the step's shares and peaks of both sides of the rod load into work.sides.
 
@@ -443,29 +447,28 @@ def measure_sides(w, base, h, stride, z, work, phase, p, tally):
             add_sides(low, high, before, after, w, base, h, z, work, phase, p)
 
 
-@inline_llvm
+@inline_once
 def accumulate_metrics(w, base, h, stride, z, work, size, phase, p, tally):
     """Tally an accepted step that has been observed, and audit its energy."""
     measured = w.t >= w.settle
     if measured and tally.has_rod_load:
         measure_sides(w, base, h, stride, z, work, phase, p, tally)
     if measured:
-        look_for_peaks(w, base, h, stride, z, work, phase, p, tally)
-    last = NODES.size - 1
-    for j in range(ACCELERATION, COLUMNS):
-        work.row[j] = work.rows[last, j]
-    w.observed = 1
-    n = work.y.size
-    tally_energy(work.row, work.new[n:], tally)
-    if measured:
         measure_gap_fractions(w, h, stride, work, size, phase, p, tally)
     weights = WEIGHTS if stride == 1 else COARSE_WEIGHTS
     tally_step(
         h, NODES, weights, work.rows, stride, work.gap_fraction, work.sides, measured, tally, p
     )
+    if measured:
+        look_for_peaks(w, base, h, stride, z, work, phase, p, tally)
+    last = NODES.size - 1
+    for j in range(ACCELERATION, COLUMNS):
+        work.row[j] = work.rows[last, j]
+    w.observed = 1
+    tally_energy(work.row, work.new[work.y.size :], tally)
 
 
-@jit
+@inline_llvm
 def keep_velocities(w, t, work, phase, p, tally):
     """Return False: with the default laws contacts carry no speed."""
     return False
@@ -483,13 +486,13 @@ def finish_at_event(w, h, work, phase, p, tally):
     return store_velocities(w, w.t + h, work, phase, p, tally)
 
 
-@jit
+@inline_llvm
 def pass_with_crank(t, z, p):
     """Return the time (s) that has passed when a crank is where a steady one were at t."""
     return t + z[p.at[0] - 1] if p.driven else t
 
 
-@jit
+@inline_llvm
 def pass_steadily(t, z, p):
     """Return t: a steady crank's time is the time that passes."""
     return t
@@ -509,7 +512,7 @@ def begin_attempt(w, h, z, error, work, p):
     return row
 
 
-@jit
+@inner
 def is_finite(new):
     """Return whether every number of a state is finite."""
     total = 0.0
@@ -579,7 +582,7 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         if w.h == 0.0:
             w.h = first_step(w, z, work, atol, phase, p, end)
         h = min(w.h, end - w.t)
-        if is_last_step(w.t, h, end):
+        if w.t + LAST_STRETCH * h >= end:
             h = end - w.t
         landing = w.landing > 0.0
         if landing:  # a part of a step that was within its tolerance: it is not judged again
@@ -588,9 +591,9 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         error = try_step(w, base, h, z, work, atol, size, phase, p)
         attempt = begin_attempt(w, h, z, error, work, p)
         if not landing:
-            if not is_accepted(error):
+            if not error <= 1.0:  # nan is refused
                 refuse(w, h, error)
-                if w.h < shortest_step(w.t, p.omega):
+                if w.h < MIN_STEP * (w.t + 1.0 / p.omega):
                     w.status = STEP_UNDERFLOW if is_finite(work.k[0]) else NON_FINITE
                 continue
             next_h = next_step_length(w, h, error)

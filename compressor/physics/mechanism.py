@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import jit, square_root
+from compressor.physics._jit import inline_llvm, inner, square_root
 from compressor.physics.card import measured_force
 from compressor.physics.contact import NO_CONTACT, ContactState
 from compressor.physics.contact_laws import power, rise
@@ -69,7 +69,7 @@ _ALIKE = np.equal.outer(_SIGNS, _SIGNS)
 ALIKE, CROSSED = _PRODUCT * _ALIKE, _SIGNS[:, None] * _PRODUCT * ~_ALIKE
 
 
-@jit
+@inline_llvm
 def dot_rows(row, begin, end, q):
     """Return the sum of a row of numbers times those of q, from begin to end."""
     total = 0.0
@@ -78,7 +78,7 @@ def dot_rows(row, begin, end, q):
     return total
 
 
-@jit
+@inner
 def fill_rod(pose, p):
     """Write the rod's mass matrix, and its own forces, of its motion and weight; SI."""
     m, length, spin = p.rod_mass, p.rod_length, pose.spin
@@ -109,7 +109,7 @@ def fill_rod(pose, p):
     force[3] = -2.0 * spin * swelling - p.gravity * (along * vy - across * uy)
 
 
-@jit
+@inner
 def fill_modes(axes, spin, q, rates, p):
     """Write the rod's modes' inertia, their coupling and the material's forces.
 
@@ -135,7 +135,7 @@ def fill_modes(axes, spin, q, rates, p):
         force[row] -= material(i, q, p) + p.rod_damping * material(i, rates, p)
 
 
-@jit
+@inner
 def material(i, q, p):
     """Return the elastic force (N) against mode i of the deflections q, (4,) m."""
     if i < ACROSS:
@@ -143,7 +143,7 @@ def material(i, q, p):
     return p.axial_stiffness * (AXIAL[i - 2, 0] * q[2] + AXIAL[i - 2, 1] * q[3])
 
 
-@jit
+@inline_llvm
 def material_work(q, other, p):
     """Return the sum of the elastic forces of deflections q times others, both (4,).
 
@@ -171,13 +171,13 @@ class Guided(NamedTuple):
 UNGUIDED = Guided(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-@jit
+@inner
 def guide_coefficient(slip, p):
     """Return the friction coefficient of the guide at a slip (m/s): mu tanh(v / v_s)."""
     return p.guide_friction * math.tanh(slip / p.guide_stiction) if p.guide_friction else 0.0
 
 
-@jit
+@inner
 def corner_force(penetration, rate, p):
     """Return the normal force (N) of a corner and its elastic part.
 
@@ -190,7 +190,7 @@ def corner_force(penetration, rate, p):
     return max(0.0, damping * rate + elastic), elastic
 
 
-@jit
+@inner
 def corners(pose, p):
     """Return what the guide does to a crosshead with play, as `Guided`."""
     v, rise, spin = p.velocity[8], p.velocity[9], p.velocity[10]
@@ -264,7 +264,7 @@ class Joints(NamedTuple):
     pin_spin: float  # of the crosshead
 
 
-@jit
+@inner
 def unpack(y, p):
     """Write the coordinates and their rates; what is left out stays 0.
 
@@ -278,7 +278,7 @@ def unpack(y, p):
         p.w[coordinate], p.rates[coordinate] = y[i], y[n + i]
 
 
-@jit
+@inner
 def pose_of(motion, p):
     """Return the `Pose` at a crank angle, whose ideal `Motion` is given."""
     w, rates = p.w, p.rates
@@ -296,7 +296,7 @@ def pose_of(motion, p):
     )  # fmt: skip
 
 
-@jit
+@inner
 def apply_jacobian(pose, rates, p, velocity):
     """Write the bodies' velocities that follow from the coordinates' rates, (11,) both.
 
@@ -316,7 +316,7 @@ def apply_jacobian(pose, rates, p, velocity):
     velocity[9], velocity[10] = rates[5], rates[6]
 
 
-@jit
+@inner
 def apply_jacobian_transpose(pose, force, p, pushed):
     """Write the forces on the coordinates that follow from those on the bodies, (11,) both."""
     along = force[1] + force[8]
@@ -331,7 +331,7 @@ def apply_jacobian_transpose(pose, force, p, pushed):
         pushed[STRETCH] += pose.sin_phi * turning + pose.cos_phi * force[8]
 
 
-@jit
+@inner
 def apply_mass(vector, p, out):
     """Write the bodies' mass matrix times their velocities or accelerations, (11,) both."""
     out[0] = p.crank_inertia * vector[0]
@@ -345,7 +345,7 @@ def apply_mass(vector, p, out):
     out[10] = p.crosshead_inertia * vector[10]
 
 
-@jit
+@inner
 def fill_bias(pose, p):
     """Write the bodies' accelerations where the coordinates' own are zero."""
     bias = p.bias
@@ -359,7 +359,7 @@ def fill_bias(pose, p):
     bias[8] += pose.length * pose.sin_phi * bias[3]
 
 
-@jit
+@inner
 def joints_of(phase, y, motion, pose, p):
     """Return the `Joints` at a state."""
     w, rates, velocity = p.w, p.rates, p.velocity
@@ -381,7 +381,7 @@ def joints_of(phase, y, motion, pose, p):
     return Joints(big, small, guide, load, big_spin, small_spin, pin_spin)
 
 
-@jit
+@inner
 def add_forces(pose, joints, p, force):
     """Add to the bodies' forces, (11,), those of contacts, guide, load, weight and motor."""
     big, small, guide = joints.big, joints.small, joints.guide
@@ -398,7 +398,7 @@ def add_forces(pose, joints, p, force):
     force[10] += (p.pin_radius[1] - small.penetration) * small.friction
 
 
-@jit
+@inner
 def add_on_rod(pose, big, small, p, force):
     """Add a force (N) and a moment (N m) on the rod at either end: each (x, y, moment)."""
     force[1] += big[0] + small[0]
@@ -413,7 +413,7 @@ def add_on_rod(pose, big, small, p, force):
         force[7] += pose.cos_phi * small[0] - pose.sin_phi * small[1]
 
 
-@jit
+@inner
 def motor_torque(pose, p):
     """Return the torque (N m) of the motor at the crank's speed: a line."""
     # by the slip: of a steep line the difference of two speeds would leave no digits

@@ -6,7 +6,7 @@ physics/README.md, The general mechanism.
 import math
 from typing import NamedTuple
 
-from compressor.physics._jit import jit, square_root
+from compressor.physics._jit import inner, square_root
 from compressor.physics.contact import friction_coefficient
 from compressor.physics.kinematics import IdealMotion
 from compressor.physics.linear import factorize_positive, substitute_positive
@@ -58,7 +58,7 @@ class Solved(NamedTuple):
     reactions: Reactions
 
 
-@jit
+@inner
 def reduce_mass(pose, p):
     """Write the mass matrix of the coordinates that move, its lower half."""
     for i in range(p.degrees):
@@ -72,7 +72,7 @@ def reduce_mass(pose, p):
             p.matrix[i, j] = p.pushed[p.coordinates[j]]
 
 
-@jit
+@inner
 def friction_arms(pose, joints, p):
     """Return the friction of what is ideal over its force: of both joints (m), and the guide's."""
     big, small, guide = 0.0, 0.0, 0.0
@@ -87,7 +87,7 @@ def friction_arms(pose, joints, p):
     return big, small, guide
 
 
-@jit
+@inner
 def reactions_of(pose, joints, arms, last, p):
     """Return the `Reactions` that the motion needs, with their friction where joints rub.
 
@@ -114,7 +114,7 @@ def reactions_of(pose, joints, arms, last, p):
     return Reactions(big_x, big_y, small_x, small_y, guide, big_torque, small_torque, rubbing)
 
 
-@jit
+@inner
 def needed_of(row, p):
     """Return what the rod needs beside its weight: force along x, along y, or the moment.
 
@@ -123,7 +123,7 @@ def needed_of(row, p):
     return dot_rows(p.mass[row], 1, 8 if p.elastic else 4, p.body) - p.own[row]
 
 
-@jit
+@inner
 def friction_differs(one, other):
     """Return whether the friction of two `Reactions` differs beyond rounding.
 
@@ -136,7 +136,7 @@ def friction_differs(one, other):
     return torque > FRICTION_TOLERANCE * size or force > FRICTION_TOLERANCE * most
 
 
-@jit
+@inner
 def solve(motion, y, phase, p):
     """Return the mechanism `Solved` around the ideal motion, in the load's phase.
 
@@ -176,7 +176,7 @@ def solve(motion, y, phase, p):
     return Solved(motion, pose, joints, reactions)
 
 
-@jit
+@inner
 def add_rubbing(pose, reactions, p, force):
     """Add to the bodies' forces the friction of ideal joints and of an ideal guide."""
     big, small = reactions.big_torque, reactions.small_torque

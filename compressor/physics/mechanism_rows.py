@@ -5,7 +5,7 @@
 
 import math
 
-from compressor.physics._jit import jit, square_root
+from compressor.physics._jit import inline_llvm, inner, square_root
 from compressor.physics.contact import LUGRE, bristle_rate, nearness
 from compressor.physics.kinematics import ideal
 from compressor.physics.mechanism import (
@@ -51,13 +51,13 @@ STALLED = 0.01  # of the steady speed: a crank that is slower has all but stoppe
 IMPLAUSIBLE = 0.1  # of half the crosshead, or of the rod: more than any contact or bar bears
 
 
-@jit
+@inline_llvm
 def pace_of(now, p):
     """Return the time that passes over the time in which a steady crank would turn as far."""
     return 1.0 / (1.0 + now.pose.slip)
 
 
-@jit
+@inline_llvm
 def write_rates(now, y, p, out):
     """Write dy/dt, of a steady crank's t, into out."""
     n, pace, place = p.freedoms, pace_of(now, p), 2 * p.freedoms
@@ -77,14 +77,14 @@ def write_rates(now, y, p, out):
         out[p.rod_loss] = rod_damping_power(now, p) * pace
 
 
-@jit
+@inline_llvm
 def rod_damping_power(now, p):
     """Return the power (W) that the rod's material takes."""
     modes = p.rates[7:11]
     return p.rod_damping * material_work(modes, modes, p)
 
 
-@jit
+@inline_llvm
 def crank_torque(now, p):
     """Return the torque (N m) that drives the crank against the rod."""
     pose, forces, big = now.pose, now.reactions, now.joints.big
@@ -93,7 +93,7 @@ def crank_torque(now, p):
     return torque - (p.pin_radius[0] - big.penetration) * big.friction - big.film_moment
 
 
-@jit
+@inline_llvm
 def guide_moment(now, p):
     """Return the moment (N m) of the crosshead on its guide about the crank's centre.
 
@@ -110,7 +110,7 @@ def guide_moment(now, p):
     return moment
 
 
-@jit
+@inline_llvm
 def write_powers(now, y, p, row):
     """Write four powers (W) into row, (4,): of crank and load, into contacts, lost to friction."""
     big, small, guide, pose = now.joints.big, now.joints.small, now.joints.guide, now.pose
@@ -127,7 +127,7 @@ def write_powers(now, y, p, row):
     row[3] = friction - forces.rubbing * p.velocity[8]
 
 
-@jit
+@inline_llvm
 def write_energies(now, y, p, row):
     """Write kinetic and potential energy (J) into the row, without the journals' contacts."""
     pose, joints, modes = now.pose, now.joints, p.w[7:11]
@@ -141,7 +141,7 @@ def write_energies(now, y, p, row):
     row[POTENTIAL] = stored + p.gravity * (weight + p.unbalance * pose.sin_theta)
 
 
-@jit
+@inline_llvm
 def ideal_acceleration(now, p):
     """Return the acceleration (m/s^2) of an ideal machine's crosshead with this crank's motion."""
     if not p.driven:
@@ -150,7 +150,7 @@ def ideal_acceleration(now, p):
     return now.motion.a * speed * speed + now.motion.v / p.omega * p.accelerations[0]
 
 
-@jit
+@inline_llvm
 def write_contact_columns(now, y, p, row):
     """Write the columns from ACCELERATION to GUIDE_MOMENT."""
     forces = now.reactions
@@ -170,7 +170,7 @@ def write_contact_columns(now, y, p, row):
     row[CRANK_TORQUE], row[GUIDE_MOMENT] = crank_torque(now, p), guide_moment(now, p)
 
 
-@jit
+@inner
 def deviation(t, y, p):
     """Return how far (m) the crosshead is from its ideal place at the crank's angle."""
     motion = ideal(t, p)
@@ -178,7 +178,7 @@ def deviation(t, y, p):
     return pose_of(motion, p).x - motion.x
 
 
-@jit
+@inner
 def write_place(now, y, p, row):
     """Write the columns before ACCELERATION."""
     row[DISPLACEMENT], row[VELOCITY] = now.pose.x, p.velocity[8]
@@ -188,7 +188,7 @@ def write_place(now, y, p, row):
         row[ECCENTRICITY + i] = p.w[1 + i]
 
 
-@jit
+@inner
 def write_frame(now, p, row):
     """Write the columns behind PACE into a row that has the others."""
     pose, guide, forces = now.pose, now.joints.guide, now.reactions
@@ -200,13 +200,13 @@ def write_frame(now, p, row):
     write_frame_forces((-(guide.fx + forces.rubbing), -forces.guide), turning, row)
 
 
-@jit
+@inline_llvm
 def contacts_of(now, p):
     """Return the `ContactState` of the big end and of the small end."""
     return now.joints.big, now.joints.small
 
 
-@jit
+@inner
 def beyond_model(y, p):
     """Return the number of what no machine can do in a state, or 0.
 

@@ -11,7 +11,7 @@ a clearance of a nanometre keeps its digits.
 
 from typing import NamedTuple
 
-from compressor.physics._jit import inline_llvm, inline_once, jit, square_root
+from compressor.physics._jit import inline_llvm, inline_once, inner, square_root
 from compressor.physics.card import measured_force
 from compressor.physics.contact import (
     LUGRE,
@@ -145,19 +145,17 @@ def evaluate(motion, y, phase, p):
     """
     at = place_of(motion, y, p)
     load = load_force(phase, at, motion, p)
-    big = NO_CONTACT
-    small = NO_CONTACT
-    a = motion.a
-    spin_up = motion.spin_up
-    if p.scene == BIG_END:
+    big, small = NO_CONTACT, NO_CONTACT
+    if p.scene & BIG_END:  # once each, not once a scene: the machine code is half as long
         big = oiled_joint(AT_BIG_END, at.big, (p.omega, -at.rate), y, p)
+    if p.scene & SMALL_END:
+        small = oiled_joint(AT_SMALL_END, at.small, (0.0, -at.rate), y, p)
+    a, spin_up = motion.a, motion.spin_up
+    if p.scene == BIG_END:
         a, spin_up = solve_big_end(at, load, big, p)
     elif p.scene == SMALL_END:
-        small = oiled_joint(AT_SMALL_END, at.small, (0.0, -at.rate), y, p)
         a, spin_up = solve_small_end(motion, at, load, small, p)
     elif p.scene == BOTH:
-        big = oiled_joint(AT_BIG_END, at.big, (p.omega, -at.rate), y, p)
-        small = oiled_joint(AT_SMALL_END, at.small, (0.0, -at.rate), y, p)
         a, spin_up = solve_both(at, load, big, small, p)
     # second derivatives of the rod's direction, (cos, -sin) of phi, with the other sign
     along = at.cos_phi * at.rate * at.rate + at.sin_phi * spin_up
@@ -246,14 +244,14 @@ def contacts_of(now, p):
     return now.big, now.small
 
 
-@jit
+@inner
 def deviation(t, y, p):
     """Return how far (m) the crosshead is from its ideal place."""
     motion = ideal(t, p)
     return place_of(motion, y, p).x - motion.x
 
 
-@jit
+@inner
 def is_within_model(y, p):
     """Return 0: how deep contacts of a scene are is watched by the tally."""
     return 0

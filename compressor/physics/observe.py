@@ -6,7 +6,7 @@
 import math
 from enum import IntEnum
 
-from compressor.physics._jit import inline_llvm, inline_once, jit, square_root
+from compressor.physics._jit import inline_llvm, inline_once, inner, jit, square_root
 from compressor.physics.contact import nearness
 
 
@@ -90,7 +90,7 @@ def torque_and_moment(crank, x, forces, friction, penetration, film, p):
     return torque, moment
 
 
-@jit
+@inner
 def write_frame_forces(guide, turning, row):
     """Write what the machine does to its frame into a row that has the forces on its parts.
 
@@ -104,7 +104,7 @@ def write_frame_forces(guide, turning, row):
     row[SHAKING_FORCE + 1] = row[BEARING_FORCE + 1] + guide[1]
 
 
-@jit
+@inner
 def write_scene_frame(cos_theta, sin_theta, p, row):
     """Write `write_frame_forces` of a scene: a crosshead at its height, a steady crank."""
     guide = 0.0, -row[FORCE + 3] - p.reciprocating_mass * p.gravity
@@ -201,7 +201,7 @@ def write_place(now, y, p, row):
     row[ECCENTRICITY + 2], row[ECCENTRICITY + 3] = at.small[0], at.small[1]
 
 
-@jit
+@inner
 def write_frame(now, p, row):
     """Write the columns behind PACE into a row that has the others."""
     write_scene_frame(now.motion.cos_theta, now.motion.sin_theta, p, row)

@@ -8,7 +8,7 @@ metrics take the share of it that was without contact.
 
 import math
 
-from compressor.physics._jit import inline_llvm, inline_once, jit
+from compressor.physics._jit import inline_llvm, inline_once, inner, jit
 from compressor.physics.contact import nearness
 from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.observe import NEARNESS, PENETRATION
@@ -25,36 +25,20 @@ LANDING_FRACTION = 1e-3  # of a step: an onset nearer to its start is the one it
 NEVER = 2.0  # a fraction of the step beyond its end
 
 
-@inline_llvm
-def may_change_in(low, high):
-    """Return whether contact may begin or end in a step, by the range of its nearness.
-
-    low, high: the least and the greatest at its ends and in its middle. Twice their range is
-    allowed for beyond them.
-    """
-    beyond = 2.0 * (high - low)
-    return (low - beyond <= 0.0) & (high + beyond > 0.0)
-
-
-@inline_llvm
-def may_touch_in(low, high):
-    """Return whether contact may begin where a step's nodes have a nearness from low to high.
-
-    A quartic, as the step's interpolant is, rises above its greatest value at five Lobatto nodes
-    by less than a third of their range; a whole range is allowed for here.
-    """
-    return (low <= 0.0) & (high + (high - low) > 0.0)
-
-
 @inline_once
 def may_change(rows, p):
-    """Return whether contact may begin or end within a step, by its first, middle and last row."""
+    """Return whether contact may begin or end within a step, by its first, middle and last row.
+
+    Twice the range of their nearness is allowed for beyond them.
+    """
     middle, last = rows.shape[0] // 2, rows.shape[0] - 1
     for joint in range(2):
         if p.clearance[joint] > 0.0:
             column = NEARNESS + joint
             a, b, c = rows[0, column], rows[middle, column], rows[last, column]
-            if may_change_in(min(a, b, c), max(a, b, c)):
+            low, high = min(a, b, c), max(a, b, c)
+            beyond = 2.0 * (high - low)
+            if low - beyond <= 0.0 < high + beyond:
                 return True
     return False
 
@@ -69,17 +53,19 @@ def range_of(rows, column):
     return low, high
 
 
-@inline_llvm
+@inner
 def may_touch(rows, p):
     """Return whether contact may begin within a step, by the rows at all its nodes.
 
-    With chosen laws also where a journal may have flown between two nodes: the speed at which it
-    comes back counts, however short the flight was.
+    A quartic, as the step's interpolant is, rises above its greatest value at five Lobatto nodes
+    by less than a third of their range; a whole range is allowed for here. With chosen laws also
+    where a journal may have flown between two nodes: the speed at which it comes back counts,
+    however short the flight was.
     """
     for joint in range(2):
         if p.clearance[joint] > 0.0:
             low, high = range_of(rows, NEARNESS + joint)
-            if may_touch_in(low, high):
+            if low <= 0.0 < high + (high - low):
                 return True
             if has_chosen_laws(p):
                 low, high = range_of(rows, PENETRATION + joint)

@@ -7,9 +7,9 @@ Seven stages, the last being the next step's first, order 5 with an embedded err
 
 import numpy as np
 
-from compressor.physics._jit import inline_llvm, inline_once, square_root
+from compressor.physics._jit import inline_llvm, inline_once, inner, square_root
 from compressor.physics.kinematics import ideal_after
-from compressor.physics.systems import derivative_and_columns, write_flowing_derivative
+from compressor.physics.systems import write_flowing_derivative
 
 STAGES = 7
 FLOWS = 4
@@ -94,14 +94,13 @@ def take_step(base, h, z, k, phase, p, new, row):
     Only the motion enters the right-hand side, so flows are summed at the end alone.
     """
     n = z.size - FLOWS
-    for stage in range(1, STAGES):
+    for stage in range(1, STAGES - 1):
+        add_stages(A[stage], stage, h, z, k, new[:n])
         motion = ideal_after(base, C[stage] * h, p)
-        size = z.size if stage == STAGES - 1 else n
-        add_stages(A[stage], stage, h, z, k, new[:size])
-        if stage < STAGES - 1:
-            write_flowing_derivative(motion, new, phase, p, k[stage])
-        else:
-            derivative_and_columns(motion, new, phase, p, k[stage], row)
+        write_flowing_derivative(motion, new, phase, p, k[stage], row, False)
+    add_stages(A[STAGES - 1], STAGES - 1, h, z, k, new)
+    motion = ideal_after(base, h, p)
+    write_flowing_derivative(motion, new, phase, p, k[STAGES - 1], row, True)
 
 
 @inline_once
@@ -135,7 +134,7 @@ def combine(weights, h, z, k, out):
     add_stages(weights, STAGES, h, z, k, out)
 
 
-@inline_llvm
+@inner
 def extend(h, z, k, dense):
     """Write a step's interpolant into dense, (5, n): y(s) = sum over j of dense[j] s^j."""
     n = dense.shape[1]

@@ -73,62 +73,26 @@ def first_step(w, z, work, atol, phase, p, end):
     return min(100.0 * guess, by_slope, end - w.t)
 
 
-@inline_llvm
-def is_accepted(error):
-    """Return whether a step with an error norm is taken; nan is refused."""
-    return error <= 1.0
-
-
-@inline_llvm
-def is_last_step(t, h, end):
-    """Return whether a step of length h from t is to reach the segment's end."""
-    return t + LAST_STRETCH * h >= end
-
-
-@inline_llvm
-def shortest_step(t, omega):
-    """Return the length (s) below which a step at t makes no way."""
-    return MIN_STEP * (t + 1.0 / omega)
-
-
-@inline_llvm
-def log_error(error):
-    """Return the logarithm of an error norm, as the control reads it."""
-    return math.log(max(error, 1e-10))
-
-
-@inline_llvm
-def growth(now, last, order):
-    """Return the next step's length over that of an accepted one, by PI control.
-
-    now, last: `log_error` of the accepted step and of the one before it.
-    """
-    # the last error damps steps that stability holds, which I control lets swing about the limit
-    factor = SAFETY * math.exp((INTEGRAL * last - PROPORTIONAL * now) / order)
-    return min(GROW, max(SHRINK, factor))
-
-
-@inline_llvm
-def shrinkage(now, order):
-    """Return the next attempt's length over that of a refused one, by `log_error`."""
-    return max(SHRINK, SAFETY * math.exp(-now / order))
-
-
 @inline_once
 def next_step_length(w, h, error):
-    """Return the next step's length after an accepted step, and remember its error."""
-    now = log_error(error)
-    longer = h * growth(now, w.error, STIFF_ORDER if w.stiff else EXPLICIT_ORDER)
+    """Return the next step's length after an accepted step, and remember its error: PI control."""
+    now = math.log(max(error, 1e-10))
+    order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
+    # the last error damps steps that stability holds, which I control lets swing about the limit
+    factor = SAFETY * math.exp((INTEGRAL * w.error - PROPORTIONAL * now) / order)
     w.error = max(now, MIN_ERROR)
-    return longer
+    return h * min(GROW, max(SHRINK, factor))
 
 
 @inline_once
 def refuse(w, h, error):
     """Shorten the step after a refused attempt."""
-    order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
     w.rejected += 1
-    w.h = h * (shrinkage(log_error(error), order) if error < math.inf else NON_FINITE_SHRINK)
+    factor = NON_FINITE_SHRINK
+    if error < math.inf:
+        order = STIFF_ORDER if w.stiff else EXPLICIT_ORDER
+        factor = max(SHRINK, SAFETY * math.exp(-math.log(max(error, 1e-10)) / order))
+    w.h = h * factor
 
 
 @inline_once
@@ -153,23 +117,6 @@ def stiff_rate(w, h, z, work, size):
         above += ((work.k[STAGES - 1, i] - work.k[STAGES - 2, i]) / size[i]) ** 2
         below += (change / size[i]) ** 2
     return square_root(above / below) if below > 0.0 else 0.0
-
-
-@inline_llvm
-def count_limited(limited, reach):
-    """Return the count of steps in a row that stability has held, after a test.
-
-    limited: the count before; reach: the step's length over `STABILITY_LIMIT`. One test alone
-    decides nothing: under PI control such steps swing around the limit.
-    """
-    return limited + TEST_INTERVAL if reach > LIMITED_REACH else max(0, limited - TEST_INTERVAL)
-
-
-@inline_llvm
-def begin_stiff_steps(w):
-    """Change to the stiff partner where stability has held the explicit steps for a while."""
-    if w.stability_limited >= STEPS_BEFORE_STIFF:
-        w.stiff, w.stability_limited, w.explicit_ok, w.steps_saved = 1, 0, 0, 0.0
 
 
 @inline_llvm
@@ -200,5 +147,8 @@ def choose_method(w, h, z, work, size):
             w.steps_to_test = w.test_pause
             w.h = min(w.h, h / max(reach, 1.0))
     else:
-        w.stability_limited = count_limited(w.stability_limited, reach)
-        begin_stiff_steps(w)
+        # one test alone decides nothing: under PI control such steps swing around the limit
+        more = TEST_INTERVAL if reach > LIMITED_REACH else -TEST_INTERVAL
+        w.stability_limited = max(0, w.stability_limited + more)
+        if w.stability_limited >= STEPS_BEFORE_STIFF:
+            w.stiff, w.stability_limited, w.explicit_ok, w.steps_saved = 1, 0, 0, 0.0

@@ -15,7 +15,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from compressor.physics import mechanism_motion, mechanism_rows, motion, observe
-from compressor.physics._jit import dispatch_on_record, inline_llvm, jit, without_refcount
+from compressor.physics._jit import dispatch_on_record, inline_llvm, inner, jit, without_refcount
 from compressor.physics.kinematics import crank_direction, ideal, ideal_at
 from compressor.physics.loads import CYLINDER, GAS, begin_stroke
 from compressor.physics.observe import CRANK_POWER, KINETIC, PACE, WIDE
@@ -78,36 +78,35 @@ def derivative_with_flows(t, z, phase, p, out):
 
     t: s, of a steady crank; z, out: (n + 4,); phase: of the load, 0 to 3.
     """
-    write_flowing_derivative(ideal(t, p), z, phase, p, out)
+    write_flowing_derivative(ideal(t, p), z, phase, p, out, out, False)
 
 
 @inline_llvm
-def write_flowing_derivative(motion, z, phase, p, out):
-    """Write `derivative_with_flows` around an ideal motion that is known."""
+def write_flowing_derivative(motion, z, phase, p, out, row, observed):
+    """Write `derivative_with_flows` around an ideal motion that is known.
+
+    Where `observed`, write `observe_with_energy` of the same evaluation into row.
+    """
     n = z.size - 4
     y = z[:n]
     now = evaluate(motion, y, phase, p)
     write_rates(now, y, p, out[:n])
-    write_powers(now, y, p, out[n:])
+    if observed:
+        write_row(now, y, p, row)
+        for i in range(4):
+            out[n + i] = row[CRANK_POWER + i]
+    else:
+        write_powers(now, y, p, out[n:])
     for i in range(n, z.size):
         out[i] *= pace_of(now, p)
 
 
 @inline_llvm
-def derivative_and_columns(motion, z, phase, p, out, row):
-    """Write both `derivative_with_flows` and `observe_with_energy` from one evaluation."""
-    n = z.size - 4
-    y = z[:n]
-    now = evaluate(motion, y, phase, p)
-    write_rates(now, y, p, out[:n])
-    write_row(now, y, p, row)
-    for i in range(4):
-        out[n + i] = row[CRANK_POWER + i] * row[PACE]
-
-
-@jit
 def contact_at(joint, t, y, phase, p):
-    """Return a joint's `ContactState` at a time and state."""
+    """Return a joint's `ContactState` at a time and state.
+
+    Of which who calls it computes only what it reads: of a nearness no friction and no film.
+    """
     big, small = contacts_of(evaluate(ideal(t, p), y, phase, p), p)
     return big if joint == 0 else small
 
@@ -129,7 +128,7 @@ def observe_contact(motion, y, phase, p, row):
     row[PACE] = pace_of(now, p)
 
 
-@jit
+@inner
 def observe_with_energy(motion, y, phase, p, row):
     """Write the columns from ACCELERATION on: what a step is judged, tallied and audited by."""
     write_row(evaluate(motion, y, phase, p), y, p, row)

@@ -140,7 +140,7 @@ def merge_tallies(tallies):
     return whole
 
 
-@jit
+@inline_llvm
 def vertex(left, right, before, here, after):
     """Return the top of the parabola through three values, or the middle one without a top there.
 
@@ -179,14 +179,14 @@ def may_exceed(top, known):
     return 2.0 * top >= known
 
 
-@jit
-def peak_of(nodes, rows, every, column, known, size):
-    """Return the greater of `known` and the largest value of a column over a step, or |value|.
+@inline_llvm
+def peak_of(nodes, rows, every, column, known):
+    """Return the greater of `known` and the largest value of a column over a step.
 
     The step's nodes count, `every` first, second, ... of them, and the parabola through the best.
-    size: whether |value| is meant.
+    Of a column of GREATEST it is the largest |value|.
     """
-    last = nodes.size - 1
+    last, size = nodes.size - 1, column < DEVIATION
     best, top = 0, -math.inf
     for i in range(0, last + 1, every):
         value = abs(rows[i, column]) if size else rows[i, column]
@@ -202,15 +202,15 @@ def peak_of(nodes, rows, every, column, known, size):
     return max(top, known, vertex(left, right, before, here, after))
 
 
-@jit
+@inline_llvm
 def add_peaks(nodes, rows, every, tally, p):
     """Raise the tally's peaks by the nodes of a step, and by parabolas through them."""
     for k in range(PEAKED):
         if may_exceed(tally.top[k], tally.peak[k]):
-            tally.peak[k] = peak_of(nodes, rows, every, ACCELERATION + k, tally.peak[k], True)
+            tally.peak[k] = peak_of(nodes, rows, every, ACCELERATION + k, tally.peak[k])
 
 
-@jit
+@inline_llvm
 def add_peaks_of_nodes(nodes, rows, every, tally, p):
     """Raise the tally's peaks by the nodes of a step alone.
 
@@ -222,16 +222,6 @@ def add_peaks_of_nodes(nodes, rows, every, tally, p):
 
 
 peaks_of_step = dispatch_on_record(CHOSEN_FORCES, add_peaks_of_nodes, add_peaks)
-
-
-@inline_llvm
-def larger_imbalance(known, gain, crank, load, damping, friction):
-    """Return the larger of a known imbalance (J) and that of a gain of energy and its flows.
-
-    A nan is kept: a comparison with it is false.
-    """
-    imbalance = abs(gain - crank - load + damping + friction)
-    return known if imbalance <= known else imbalance
 
 
 @inline_llvm
@@ -247,9 +237,10 @@ def tally_energy(row, flows, tally):
     tally.crank_work, tally.load_work = flows[0], flows[1]
     tally.contact_work, tally.friction_loss = flows[2], flows[3]
     tally.peak_kinetic = max(tally.peak_kinetic, row[KINETIC])
-    tally.worst_imbalance = larger_imbalance(
-        tally.worst_imbalance, energy - tally.energy, flows[0], flows[1], flows[2], flows[3]
-    )
+    gain = energy - tally.energy
+    imbalance = abs(gain - flows[0] - flows[1] + flows[2] + flows[3])
+    if not imbalance <= tally.worst_imbalance:  # so that a nan is kept
+        tally.worst_imbalance = imbalance
 
 
 @jit
@@ -260,12 +251,6 @@ def add_flows(rows, weights, span, flows):
             flows[k] += span * weights[i] * rows[i, CRANK_POWER + k]
 
 
-@inline_llvm
-def may_beat(top, known):
-    """Return whether a known peak may be beaten between nodes whose greatest is `top`."""
-    return (top > 0.0) & (top >= PEAK_NEARNESS * known)
-
-
 @inline_once
 def may_beat_peaks(rows, middle, tally):
     """Return whether a peak may be beaten within a step, by its first, middle and last row."""
@@ -273,12 +258,12 @@ def may_beat_peaks(rows, middle, tally):
     for k in range(PEAKED):
         column = ACCELERATION + k
         top = max(abs(rows[0, column]), abs(rows[middle, column]), abs(rows[last, column]))
-        if may_beat(top, tally.peak[k]):
+        if 0.0 < top >= PEAK_NEARNESS * tally.peak[k]:
             return True
     for joint in range(2):
         column = PENETRATION + joint
         top = max(rows[0, column], rows[middle, column], rows[last, column])
-        if may_beat(top, tally.max_penetration[joint]):
+        if 0.0 < top >= PEAK_NEARNESS * tally.max_penetration[joint]:
             return True
     return False
 
@@ -292,50 +277,28 @@ def gap_fraction_between(before, after):
     return low / (low - high) if low < 0.0 else 0.0
 
 
-@inline_llvm
-def count_contacts(touching, flown, impacts, releases, normal, depth, counts):
-    """Return `touching`, `flown`, `impacts` and `releases` of a joint after a node of a step.
-
-    Whether it touches, whether its journal was off its bore since the last contact, and how many
-    contacts began after flight or without it. normal, depth: contact force and penetration at the
-    node; counts: whether contacts count.
-    """
-    now = in_contact(normal)
-    flown = flown | (depth < 0.0)
-    begins = counts & now & (not touching)
-    return now, flown & (not now), impacts + (begins & flown), releases + (begins & (not flown))
-
-
 @inline_once
 def tally_contact(joint, span, nodes, rows, every, gap_fraction, measured, tally):
     """Add a step's contact loss, impacts, releases and penetration at one joint."""
-    touching, flown = tally.touching[joint] > 0, tally.flown[joint] > 0
-    impacts, releases = tally.impacts[joint], tally.releases[joint]
+    touching, flown = tally.touching[joint], tally.flown[joint]
     for i in range(0, nodes.size, every):
         depth = rows[i, PENETRATION + joint]
-        touching, flown, impacts, releases = count_contacts(
-            touching, flown, impacts, releases, rows[i, NORMAL + joint], depth, measured
-        )
+        touches = 1 if in_contact(rows[i, NORMAL + joint]) else 0
+        if depth < 0.0:
+            flown = 1
+        if measured and touches > touching:  # a contact begins
+            tally.impacts[joint] += flown
+            tally.releases[joint] += 1 - flown
+        touching = touches
+        if touches:
+            flown = 0
         tally.deepest = max(tally.deepest, depth)
     tally.touching[joint], tally.flown[joint] = touching, flown
-    tally.impacts[joint], tally.releases[joint] = impacts, releases
     if measured:
         known = tally.max_penetration[joint]
         column = PENETRATION + joint
-        tally.max_penetration[joint] = peak_of(nodes, rows, every, column, known, False)
+        tally.max_penetration[joint] = peak_of(nodes, rows, every, column, known)
         tally.loss_seconds[joint] += gap_fraction[joint] * span
-
-
-@inline_llvm
-def pace_of_step(weights, rows, every):
-    """Return the mean over a step of the time that passes over a steady crank's, for which it is 1.
-
-    weights: of its nodes.
-    """
-    more = 0.0
-    for i in range(0, weights.size, every):
-        more += weights[i] * (rows[i, PACE] - 1.0)
-    return 1.0 + more
 
 
 @inline_llvm
@@ -351,7 +314,10 @@ def tally_step(span, nodes, weights, rows, every, gap_fraction, sides, measured,
 
     span is that of a steady crank; what is tallied are shares and means of the time that passes.
     """
-    seconds = span * pace_of_step(weights, rows, every)
+    more = 0.0
+    for i in range(0, nodes.size, every):
+        more += weights[i] * (rows[i, PACE] - 1.0)
+    seconds = span * (1.0 + more)
     for joint in range(2):
         if p.clearance[joint] > 0.0:
             tally_contact(joint, seconds, nodes, rows, every, gap_fraction, measured, tally)

@@ -14,7 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from compressor.physics import FILM_TERMS, short_film, uncompiled
+from compressor.physics import FILM_TERMS, short_film
 
 GRID = (96, 12)  # cells around and along half the bearing
 MAX_LOOKS = 200  # in which the cells that bear are found
@@ -110,7 +110,7 @@ def film_constants(ratio: float, share: float) -> tuple[np.ndarray, float]:
     values = np.array([_over_short(1.0 - one * one, ratio, near) for one in u])
     fits = [np.polynomial.Chebyshev.fit(u, column, FILM_TERMS - 1) for column in values.T]
     constants = np.array([fit.convert(kind=np.polynomial.Polynomial).coef for fit in fits]).T
-    short = uncompiled(short_film)(1.0 - thinnest, 0.0, 1.0)[0]
+    short = short_film(1.0 - thinnest, 0.0, 1.0)[0]
     return constants, float(short * thinnest / fits[0](least))
 
 
@@ -119,12 +119,11 @@ def _over_short(eps: float, ratio: float, near: Bearing) -> tuple[float, ...]:
 
     Pressed, pulled apart, turned; tan(beta / 2) over that of Ocvirk's angle.
     """
-    short = uncompiled(short_film)
-    turned, ocvirk = reynolds(eps, ratio, near=near), short(eps, 1.0, 0.0)
+    turned, ocvirk = reynolds(eps, ratio, near=near), short_film(eps, 1.0, 0.0)
     pressed, pulled = (abs(reynolds(eps, ratio, 0.0, way, near=near)[0]) for way in (1, -1))
     return (
-        (1.0 - eps) * short(eps, 0.0, 1.0)[0] / pressed,
-        (1.0 + eps) * -short(eps, 0.0, -1.0)[0] / pulled,
+        (1.0 - eps) * short_film(eps, 0.0, 1.0)[0] / pressed,
+        (1.0 + eps) * -short_film(eps, 0.0, -1.0)[0] / pulled,
         (1.0 - eps) * np.hypot(*ocvirk) / np.hypot(*turned),
         np.tan(0.5 * np.arctan2(turned[1], turned[0]))
         / np.tan(0.5 * np.arctan2(ocvirk[1], ocvirk[0])),

@@ -5,7 +5,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.physics.kinematics import ideal
-from compressor.physics.observe import COLUMNS, Column
+from compressor.physics.observe import ACCELERATION, COLUMNS, PENETRATION, Column
 from compressor.physics.record import state_names
 from compressor.physics.systems import observe_contact, start
 from compressor.physics.tally import (
@@ -40,20 +40,22 @@ def test_lobatto_is_exact_for_polynomials(n):
 @pytest.mark.parametrize("middle", [0.1, 0.37, 0.5, 0.93])
 def test_peak_between_nodes_is_found(middle):
     rows = np.zeros((NODES.size, COLUMNS))
-    rows[:, 2] = -7.0 + 3 * (NODES - middle) ** 2
-    assert peak_of(NODES, rows, 1, 2, 0.0, True) == pytest.approx(7.0, rel=1e-12)
-    assert peak_of(NODES, rows, 1, 2, 6.9, True) == pytest.approx(7.0, rel=1e-12)
-    assert peak_of(NODES, rows, 1, 2, 50.0, True) == 50.0
+    rows[:, ACCELERATION] = -7.0 + 3 * (NODES - middle) ** 2
+    assert peak_of(NODES, rows, 1, ACCELERATION, 0.0) == pytest.approx(7.0, rel=1e-12)
+    assert peak_of(NODES, rows, 1, ACCELERATION, 6.9) == pytest.approx(7.0, rel=1e-12)
+    assert peak_of(NODES, rows, 1, ACCELERATION, 50.0) == 50.0
 
 
 @pytest.mark.parametrize("middle", [0.1, 0.37, 0.5, 0.93])
 def test_depth_between_nodes_is_found(middle):
     rows = np.zeros((NODES.size, COLUMNS))
-    rows[:, 2] = 1e-5 - 2e-4 * (NODES - middle) ** 2  # a gap at both ends, larger than the depth
-    assert peak_of(NODES, rows, 1, 2, -np.inf, False) == pytest.approx(1e-5, rel=1e-12)
-    assert peak_of(NODES, rows, 1, 2, 9.9e-6, False) == pytest.approx(1e-5, rel=1e-12)
-    assert peak_of(NODES, rows, 1, 2, 5e-5, False) == 5e-5
-    assert peak_of(NODES, rows - 1.0, 1, 2, -np.inf, False) == pytest.approx(1e-5 - 1, rel=1e-12)
+    rows[:, PENETRATION] = (
+        1e-5 - 2e-4 * (NODES - middle) ** 2
+    )  # a gap at both ends, larger than the depth
+    assert peak_of(NODES, rows, 1, PENETRATION, -np.inf) == pytest.approx(1e-5, rel=1e-12)
+    assert peak_of(NODES, rows, 1, PENETRATION, 9.9e-6) == pytest.approx(1e-5, rel=1e-12)
+    assert peak_of(NODES, rows, 1, PENETRATION, 5e-5) == 5e-5
+    assert peak_of(NODES, rows - 1.0, 1, PENETRATION, -np.inf) == pytest.approx(1e-5 - 1, rel=1e-12)
 
 
 def steady_rows(count):

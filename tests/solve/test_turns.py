@@ -19,7 +19,7 @@ def case(joint, method, **solve):
 
 
 def run(of, cuts=(), enough=None):
-    rtol = 1e-7 if of.solve.method == "DOP853" else 1e-8  # which steps in Python
+    rtol = 1e-7 if of.solve.method == "DOP853" else 1e-9  # which steps in Python
     return run_at_tolerance(of, rtol, 60.0, False, cuts=cuts, enough=enough)
 
 
