@@ -672,8 +672,8 @@ def calibrate_table():
 
 def alarms_table():
     found = kept("alarms.json")
-    head = ["worn joint", "alarm, with its best filter", "limits over what is usual",
-            "false alarms", "trips in, by clearance in mm", "detects from, mm",
+    head = ["worn joint", "alarm, with its best filter", "false alarms",
+            "trips in, by clearance in mm", "detects from, mm",
             f"limits for {found['looser']:.0%}",
             *(f"with noise of {noise:g} m/s²" for noise in alarm_noise(found)[1:]),
             "hours before the limit"]  # fmt: skip
@@ -694,9 +694,8 @@ def alarms_table():
         hours = "–"
         if row["lead_hours"] is not None:
             hours = "{lead_hours:g} [{lead_hours_low:g}, {lead_hours_high:g}]".format_map(row)
-        limits = "{:g} to {:g}".format(*row["limits"])
         rows.append([
-            joint_name(row["joint"]), f"{row['alarm']}, {row['filter']}", limits,
+            joint_name(row["joint"]), f"{row['alarm']}, {row['filter']}",
             alarm_false(row), trips, alarm_first(row), *others, hours,
         ])  # fmt: skip
     return markdown(head, rows) + "\n" + " ".join(alarm_sentences(found)) + "\n"

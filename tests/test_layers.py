@@ -49,7 +49,6 @@ LIBRARIES = {  # library -> the modules that may import it
         "compressor.analysis.effects",
         "compressor.analysis.contacts",
         "compressor.cases.swept",
-        "compressor.studies.diagnosis.approximate",
         "compressor.studies.claims.search",
         "compressor.studies.search.find",
         "compressor.studies.calibrate.fit",
@@ -70,7 +69,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "click": {"compsim"},
     "rich": {"compsim.progress"},
     "pyarrow": {"compressor.studies.diagnosis"},
-    "sklearn": {"compressor.store.status"},
+    "sklearn": {"compressor.store.status", "compressor.studies.diagnosis.identify"},
 }  # fmt: skip
 MAX_NAMES = 30  # on average, of those that other rooms import
 
@@ -225,7 +224,10 @@ def study(module: str) -> str:
 
 
 def studies_that_know_others(sources: Sources) -> list[str]:
-    """Imports of a study from another one, or from elsewhere than the command line."""
+    """Imports of a study from another one, or from elsewhere than the command line.
+
+    The frame is no study, but what all share.
+    """
     return [
         f"{module} imports {source}"
         for module in sources

@@ -1,5 +1,7 @@
 """`compsim identify`: the joint and clearance that explain a sensor's record."""
 
+from importlib.util import find_spec
+
 import click
 
 from compsim import options, screen
@@ -27,22 +29,25 @@ def identify(record, study, folder, hints, as_json, quiet) -> int:
     sensor's record, named by the beginning of its key; it is then left out of the study. Joints are
     ranked by probability, where the study's shares of them are the prior, and each clearance has a
     90 % interval. Where no joint of the study fits, that is said first.
+    Needs scikit-learn: pip install 'compsim[learn]'.
 
     Exit code 0 also where nothing fits: that is an answer.
     """
     from compressor.store import find_record
-    from compressor.studies.diagnosis.identify import explain_record
-    from compressor.studies.diagnosis.words import jsonable_record, list_joints
+
+    if find_spec("sklearn") is None:
+        raise click.UsageError("this needs scikit-learn: pip install 'compsim[learn]'")
+    from compressor.studies.diagnosis.identify import explain_record, jsonable_answer, list_joints
 
     key, found = find_record(record, folder, hints)
     with ProgressReporter(quiet) as progress:
         fitted, answer = explain_record(found, folder, study, key, progress)
     if as_json:
-        screen.print_json(jsonable_record(record, fitted, answer))
+        screen.print_json(jsonable_answer(record, fitted, answer))
         return screen.DONE
     turns = len(found.tacho) - 1
     rpm = 60.0 * turns / (found.tacho[-1] - found.tacho[0])
     screen.print_text(f"{record}: {turns} revolutions at {rpm:.4g} rpm, {found.rate:.6g} Hz")
     screen.print_text(*(f"read: {text}" for text in found.remarks))
-    screen.print_text(*list_joints(fitted, answer, folder))
+    screen.print_text(*list_joints(fitted, answer))
     return screen.DONE

@@ -1,5 +1,6 @@
 """The options and arguments that commands share."""
 
+import math
 import os
 from collections.abc import Callable
 from functools import wraps
@@ -112,13 +113,26 @@ def record(command: Callable[..., int]) -> Callable[..., int]:
 
 
 def read_levels(context: click.Context, parameter: click.Parameter, text: str) -> tuple[float, ...]:
-    """Return the numbers of a list with commas: levels of noise, m/s2."""
+    """Return the numbers of a list with commas: levels of noise, m/s2. Raises BadParameter."""
     try:
-        return tuple(float(word) for word in text.split(","))
+        levels = tuple(float(word) for word in text.split(","))
     except ValueError as error:
         raise click.BadParameter(f"{text!r} is no list such as 0,0.1,1") from error
+    if not all(0.0 <= level < math.inf for level in levels):
+        raise click.BadParameter(f"{text}: noise is an rms, 0 or more")
+    if len({*levels}) < len(levels):
+        raise click.BadParameter(f"{text}: a noise level is given twice")
+    return levels
 
 
 def noise(text: str) -> Callable[..., Any]:
     """Return the option --noise, a list of levels."""
     return click.option("--noise", default="0", callback=read_levels, metavar="RMS,...", help=text)
+
+
+revolutions = click.option(
+    "--revolutions",
+    type=click.IntRange(min=2),
+    default=5,
+    help="Cut windows of so many whole revolutions.",
+)

@@ -1,4 +1,4 @@
-"""What studies share: jobs of a study that grows, jobs with a record, records by revolutions.
+"""What studies share: jobs of a study that grows, jobs with a record, a record's revolutions.
 
 A study is a function of stored jobs. What it has to run it runs as ordinary jobs, so that progress,
 resume, `compsim status`, shards and a cluster serve it, too.
@@ -181,6 +181,21 @@ def no_records(
     text = f"study {source.name} has no record of {revolutions} revolutions: {reasons}"
     remedy = f"run what is missing, or with sensor.length_rev: {revolutions + 1} or more"
     return kind(f"{text}; {remedy}")
+
+
+def cut_windows(record: Record, revolutions: int, hop: int = 0) -> Iterator[tuple[int, Record]]:
+    """Yield the windows of a record, each behind the number of the pulse that it begins with.
+
+    A window reaches from the last sample that is not after a pulse to the first that is not before
+    the pulse `revolutions` later. hop: revolutions to the next one, 0: none of it twice.
+    """
+    for first in range(0, len(record.tacho) - revolutions, hop or revolutions):
+        pulses = record.tacho[first : first + revolutions + 1]
+        begin = max(int(np.searchsorted(record.times, pulses[0], side="right")) - 1, 0)
+        inside = slice(begin, int(np.searchsorted(record.times, pulses[-1])) + 1)
+        since = record.times[begin]
+        times, values = record.times[inside] - since, record.values[inside]
+        yield first, Record(times, values, pulses - since, record.clipped)
 
 
 @dataclass(frozen=True)

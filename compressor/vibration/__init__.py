@@ -3,7 +3,6 @@
 from compressor.vibration.accelerometer import (
     Record,
     analogue_rate,
-    find_noise_mistake,
     noisy,
 )
 from compressor.vibration.body import Forces, casing_motion

@@ -163,13 +163,6 @@ def mode_of(sensor: Sensor) -> tuple[float, float]:
     return sensor.mounting_Hz, sensor.mounting_damping_ratio
 
 
-def find_noise_mistake(levels: Sequence[float]) -> str:
-    """Return what is wrong with levels of noise for `noisy`, m/s2 rms; "" where nothing is."""
-    if not levels or not all(0.0 <= rms < np.inf for rms in levels):
-        return f"noise is an rms in m/s2, 0 or above, not {levels}"
-    return f"a noise level is given twice: {levels}" if len({*levels}) < len(levels) else ""
-
-
 def noisy(values: np.ndarray, rms: float, seed: Sequence[int]) -> np.ndarray:
     """Return a window's samples (m/s2, (n,)) with white noise of an rms and a seed.
 

@@ -19,13 +19,12 @@ import numpy as np
 import yaml
 from measure_accuracy import provenance
 
+from compressor.cases import Wear
 from compressor.cases.load import load_studies
 from compressor.metrics import JOINTS
 from compressor.program import no_progress
-from compressor.store import open_study
-from compressor.studies.alarms.alarms import best_of_each, judge_alarms
-from compressor.studies.alarms.lead import add_lead_times, open_run
-from compressor.studies.alarms.windows import AlarmOptions
+from compressor.store import find_study, open_study
+from compressor.studies.alarms.alarms import add_hours, judge_alarms, rank_alarms, read_wear
 from compressor.studies.wear.run import run_wear
 from compressor.studies.wear.stages import Worn
 from compressor.sweep.sweep import Options, sweep
@@ -99,23 +98,24 @@ def digest_keys(studies, wear_studies):
     return hashlib.sha256("\n".join(keys).encode()).hexdigest()[:20]
 
 
-def judge(folder, study, run=None):
+def judge(folder, study, run=None, revolutions=5):
     """What the command says of a stored study: best alarms by joint and noise, with their rates."""
-    found = judge_alarms(folder, study, AlarmOptions(noise=NOISE))
-    found = add_lead_times(found, run) if run else found
-    looser = judge_alarms(folder, study, AlarmOptions(false_alarms=LOOSER))
+    found = judge_alarms(folder, study, noise=NOISE, revolutions=revolutions)
+    found = found if run is None else add_hours(found, run)
+    looser = judge_alarms(folder, study, false_alarms=LOOSER, revolutions=revolutions)
     return {
         "looser": LOOSER, "at_looser": [
-            {name: row[name] for name in ("joint", "alarm", "filter", "limits", "clearances",
+            {name: row[name] for name in ("joint", "alarm", "filter", "limit", "clearances",
                                           "first", "first_low", "first_high")}
             for joint in looser["joint"].values.tolist() for row in rows_of(looser, joint)
         ],
         "peaks": peaks(folder, study),
-        "sound_draws": int(found.attrs["sound_draws"]), "jobs": int(found.attrs["jobs"]),
+        "sound_draws": int(found.attrs["sound_draws"]), "jobs": len(find_study(folder, study).keys),
         "worn_jobs": int(found.attrs["worn_jobs"]), "left_out": json.loads(found.attrs["left_out"]),
-        "attainable": rounded(found.attrs["attainable"]), "detected": found.attrs["detected"],
+        "attainable": rounded(found.attrs["rate"]), "detected": found.attrs["detected"],
         "alarms": found.sizes["alarm"], "clipped": int(found.attrs["clipped"]),
         "rows": [row for joint in found["joint"].values.tolist() for row in rows_of(found, joint)],
+        "wear_end": rounded(found.attrs.get("wear_end", math.nan)),
     }  # fmt: skip
 
 
@@ -143,22 +143,21 @@ def rows_of(found, joint):
     """A row for the best filter of each kind of alarm, by joint and noise."""
     mine = found["worn_joint"].values == joint
     for level, noise in enumerate(found["noise"].values.tolist()):
-        for place in best_of_each(found, joint, level):
-            one = found.isel(alarm=place, noise=level)
-            first = one.sel(joint=joint)
+        for place in rank_alarms(found, joint, level):
+            one = found.isel(alarm=place, noise=level).sel(joint=joint)
             row = {
-                "joint": joint, "noise": noise, "alarm": one["title"].item(),
-                "filter": one["filter"].item(),
-                "limits": [rounded(one[f"limit_{end}"]) for end in ("low", "high")],
+                "joint": joint, "noise": noise, "alarm": one["kind"].item(),
+                "filter": one["filter"].item(), "limit": rounded(one["limit"]),
                 "clearances": one["clearance"].values[mine].tolist(),
-                "draws": found["draws"].values[mine].tolist(),
+                "draws": one["draws"].values[mine].tolist(),
             }  # fmt: skip
-            for end in ("", "_low", "_high"):
-                row[f"detection{end}"] = [rounded(n) for n in one[f"detection{end}"].values[mine]]
-                row[f"false_alarms{end}"] = rounded(one[f"false_alarms{end}"])
-                row[f"first{end}"] = rounded(first[f"first_clearance{end}"])
-                if "lead_hours" in found:
-                    row[f"lead_hours{end}"] = rounded(first[f"lead_hours{end}"])
+            for ending, end in (("", "value"), ("_low", "low"), ("_high", "high")):
+                of = one.sel(end=end)
+                row[f"detection{ending}"] = [rounded(n) for n in of["detection"].values[mine]]
+                row[f"false_alarms{ending}"] = rounded(of["false_alarms"])
+                row[f"first{ending}"] = rounded(of["first_clearance"])
+                if "hours" in found:
+                    row[f"lead_hours{ending}"] = rounded(of["hours"])
             yield row
 
 
@@ -175,11 +174,13 @@ def main(target, place, jobs):
     studies, worn = load_studies(place / "plant.yaml"), load_studies(place / "worn.yaml")
     summary = sweep(studies, place / "plant", jobs, no_progress, Options("make alarms"))
     run_wear(worn, place / "worn", jobs, no_progress)
-    run = open_run(place / "worn")
+    run = read_wear(place / "worn")
     kept = judge(place / "plant", "plant", run)
-    last = dict(zip(JOINTS, map(rounded, run.clearances[-1]), strict=True))
+    opened = 1e3 * run["clearance"].transpose("stage", "joint").values[-1]
+    stages = {joint: rounded(one) for joint, one in zip(JOINTS, opened, strict=True)}
     wear = {
-        "end": rounded(run.end), "limit_mm": run.limit, "factor": run.factor, "clearances": last,
+        "end": kept.pop("wear_end"), "limit_mm": WEAR["limit_mm"],
+        "factor": Wear().coefficient_factor, "clearances": stages,
     }  # fmt: skip
     result = {
         **provenance("make alarms"), "keys": digest_keys(studies, worn),

@@ -23,7 +23,7 @@ from sklearn.dummy import DummyClassifier
 from sklearn.ensemble import RandomForestClassifier, RandomForestRegressor
 from sklearn.metrics import balanced_accuracy_score, confusion_matrix, r2_score
 
-from compressor.studies.diagnosis.data_set import DataSetOptions, make_data_set
+from compressor.studies.diagnosis.dataset import make_data_set
 
 MACHINES, SEED = 2000, 1
 NOISE = (0.0, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0)  # m/s2 rms, beside the sensor's own
@@ -43,7 +43,7 @@ def population(folder, count=MACHINES, seed=SEED, more=()):
     code = cli.main(["run", str(case_file), "-r", results, "--quiet", *sets])
     if code not in (0, 3):  # 3: some failed, which the data set counts
         sys.exit(code)
-    return make_data_set(results, "machines", DataSetOptions(noise=NOISE, signals=False))
+    return make_data_set(results, "machines", noise=NOISE, signals=False)
 
 
 def short(value):

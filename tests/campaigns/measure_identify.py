@@ -10,7 +10,6 @@ on machines of other seeds. Writes a small JSON file.
 import argparse
 import copy
 import json
-import math
 import os
 import subprocess
 import sys
@@ -25,8 +24,7 @@ from scipy.stats import binomtest, qmc
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 from compressor.studies.diagnosis.features import FEATURES, features
-from compressor.studies.diagnosis.identify import Identifier
-from compressor.studies.diagnosis.library import SIDES, open_library
+from compressor.studies.diagnosis.identify import SIDES, Identifier, read_library
 
 STUDY, SEED, JUDGE = 3000, 2101, 2102  # machines of the study; seeds of it and of the judged
 JUDGED = 200
@@ -171,7 +169,7 @@ def studied(folder, count, seed, jobs):
     results = os.path.join(folder, "results")
     words = ["run", os.fspath(path), "-r", results, "-j", str(jobs), "--quiet"]
     subprocess.run([sys.executable, "-c", code, *words], check=True)
-    return Identifier.fit(open_library(results, "machines"))
+    return Identifier.fit(read_library(results, "machines"))
 
 
 def main(target, count, many, folder, jobs, seeds):
@@ -182,7 +180,6 @@ def main(target, count, many, folder, jobs, seeds):
         for name, other in OTHERS.items():
             rows = parallel(delayed(row_of)(machine, other) for machine in drawn)
             kept[name] = judged(identifier, drawn, rows)
-    held = [one for ends in identifier.covered.values() for one in ends.values()]
     result = {
         **provenance("make identify"),
         "seeds": list(seeds),
@@ -190,7 +187,7 @@ def main(target, count, many, folder, jobs, seeds):
                    "speed_rpm": SPEED},
         "fixed": FIXED,
         "study": {"jobs": len(identifier.library.keys), "of": count,
-                  "right": short(identifier.right), "covered": short(math.fsum(held) / len(held))},
+                  "right": short(identifier.right)},
         "models": kept,
     }  # fmt: skip
     text = json.dumps(result, indent=1)

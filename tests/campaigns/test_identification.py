@@ -18,9 +18,8 @@ from measure_identify import (
 from page_tables import kept
 
 from compressor.cases.load import load_studies
-from compressor.studies.diagnosis.approximate import Distance, Interval
 from compressor.studies.diagnosis.features import FEATURES
-from compressor.studies.diagnosis.identify import Candidate, Identification
+from compressor.studies.diagnosis.identify import Candidate, Identification, Interval
 
 
 def test_machines_are_spread_and_come_again():
@@ -79,8 +78,7 @@ class Told:
                 ("both", 0.1, ["big_end", "small_end"]),
             )
         ]
-        nowhere = Distance(1.0, 1.0)
-        return Identification(tuple(found), self.calls % 2 == 0, 0.5, nowhere, nowhere, "", {})
+        return Identification(found, self.calls % 2 == 0, 0.5, "")
 
 
 def test_answers_are_counted():

@@ -137,7 +137,7 @@ MISTAKES = [
     ("dataset waer -o faults", "did you mean wear?"),
     ("dataset wear -o faults --noise 0,loud", "'0,loud' is no list such as 0,0.1,1"),
     ("dataset wear -o faults --noise 0,-1", "noise is an rms"),
-    ("dataset wear -o faults --revolutions 1", "at least 2 revolutions, not 1"),
+    ("dataset wear -o faults --revolutions 1", "--revolutions", "1 is not in the range x>=2"),
     ("dataset wear -o faults --test-share 1", "1"),
     ("dataset -o faults", "Missing argument 'STUDY'"),
     ("find typo.yaml --over clearance_mm=0.01:0.3 --first 'peak_acceleration > 1'",

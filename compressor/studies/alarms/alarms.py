@@ -1,284 +1,454 @@
-"""Judge alarms by the records of a stored study: when each trips, and how often falsely."""
+"""Judge alarms by the records of a stored study: when each trips, and how often falsely.
+
+Windows of one draw (a load, a speed, a machine, whatever a study varies beside joint and clearance)
+are alike, so that draws count, and not windows. All sound windows set what is usual and the limit
+by which worn ones are judged. Sound windows are judged by folds of draws: each by the limit that
+the others set.
+
+A limit for a rate of false alarms is that of conformal risk control (Angelopoulos et al. 2022,
+arXiv:2208.02814): with n draws and the share f_i of windows of draw i above it, the least limit for
+which (sum f_i + 1) / (n + 1) is at most the rate. A new draw then trips at most so often in the
+mean over all such n draws, whatever their distribution is. Below 1 / (n + 1) no limit says so: it
+then is the greatest score, and the rate 1 / (n + 1).
+"""
 
 import json
 import math
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from compressor.program import PROGRAM, Progress, no_progress
-from compressor.store import Folder, find_study
-from compressor.studies.alarms.detection import (
-    FOLDS,
-    First,
-    Rate,
-    compute_rate,
-    find_limit,
-    first_clearance,
-    share_out,
+from compressor.analysis import interpolate_hours
+from compressor.cases import Case, Sensor, Wear
+from compressor.metrics import JOINTS
+from compressor.program import PROGRAM, CompsimError, Progress, no_progress
+from compressor.store import Folder, StoredStudy, find_study, read_dataset
+from compressor.studies.alarms.readings import (
+    ALARMS,
+    BODY_VELOCITY,
+    RECORD,
+    Alarm,
+    Band,
+    Readings,
+    default_bands,
+    read_windows,
 )
-from compressor.studies.alarms.readings import ALARMS, RECORD, Alarm, Readings, band_name
-from compressor.studies.alarms.windows import AlarmOptions, Windows, check_draws, read_study
+from compressor.studies.frame import no_records, records
+from compressor.vibration import RecordError
 
-MAX_LEVELS = 12  # clearances of a joint that stay as they are; more of them are put together
-BINS = 6  # into as many groups of equal size
-# of the limit, times a sound machine's usual reading, over which the curves go
-FACTORS = np.concatenate([np.arange(0.8, 2.0, 0.02), np.geomspace(2.0, 1e4, 100)])
+SOUND = "none"  # the joint that is worn in a sound machine
+MIN_SOUND = 10  # draws of a sound machine: by fewer of them no limit means anything
+NO_DRAW = ("joint", "clearance_mm", "sensor", "healthy_clearance_mm")  # groups that make no draw
+FOLDS, SEED = 5, 1
+MAX_LEVELS, BINS = 12, 6  # clearances of a joint, beyond which they are put together in groups
+Z = NormalDist().inv_cdf(0.975)  # of intervals of 95 %
+ENDS = ("value", "low", "high")  # of a number and its interval
+WEAR_REMEDY = "compsim wear the machine's case file, and name the file, or its folder of results"
+
+
+class AlarmsError(CompsimError):
+    """A study by which no alarm can be judged, or a band or a run that it cannot have."""
+
+    exit_code = 2
 
 
 @dataclass(frozen=True)
-class State:
-    """A worn joint with a clearance, or a range of them: the rows of its windows, (n,) boolean.
+class Windows:
+    """The n windows of a study's jobs.
 
-    clearance: the middle one, mm; a sound machine's is nan.
+    joints: worn ones, (n,); clearances: of the worn joint, of both the greater one, mm, (n,);
+    draws, keys: (n,); readings: by noise level and filter; clipped: jobs with clipped records.
     """
 
-    joint: str
-    clearance: float
-    low: float
-    high: float
-    rows: np.ndarray
+    joints: np.ndarray
+    clearances: np.ndarray
+    draws: np.ndarray
+    keys: np.ndarray
+    readings: dict[tuple[int, str], Readings]
+    clipped: int
+
+
+def read_study(
+    folder: Folder, source: StoredStudy, bands: Sequence[Band], noise: Sequence[float],
+    revolutions: int, left: Counter[str], progress: Progress,
+) -> Windows:  # fmt: skip
+    """Return the windows of all jobs of a study that have a record. Raises AlarmsError.
+
+    bands: Hz, none for `default_bands`; left: counts the other jobs by reason.
+    """
+    rows: list[tuple[str, float, str, str]] = []
+    readings: dict[tuple[int, str], list[Readings]] = defaultdict(list)
+    clipped = 0
+    for job in records(folder, source, left, progress):
+        case, record = job.case, job.record
+        bands = bands or default_bands(record.rate, highest_passed(case.sensor))
+        check_bands(bands, job.key, record.rate, highest_passed(case.sensor))
+        if len(record.tacho) - 1 < revolutions or not np.ptp(record.values):
+            left["too_short" if np.ptp(record.values) else "silent_record"] += 1
+            continue
+        low, high = case.body.band_Hz if case.body else (0.0, math.inf)
+        in_band = low, min(high, record.rate / 2.0)
+        own: dict[tuple[int, str], Readings] = {}
+        try:
+            for level, rms in enumerate(noise):
+                seed = [SEED, int(job.key, 16), level]
+                read = read_windows(record, revolutions, bands, in_band, rms, seed)
+                own |= {(level, name): one for name, one in read.items()}
+        except RecordError:
+            left["silent_record"] += 1
+            continue
+        count = len(own[0, RECORD]["sensor_rms"])
+        velocity = np.asarray(job.outcome.numbers["body_velocity_rms"], float)
+        for place, one in own.items():
+            if place[1] == RECORD:
+                one["body_velocity_rms"] = np.tile(velocity, (count, 1))
+            readings[place].append(one)
+        joint = case.worn_joint
+        sides = JOINTS if joint == "both" else (joint,)
+        clearance = max(getattr(case.clearance_mm, side, math.nan) for side in sides)
+        varied = {k: one for k, one in job.point.items() if k.partition(".")[0] not in NO_DRAW}
+        rows += [(joint, clearance, json.dumps(varied, sort_keys=True), job.key)] * count
+        clipped += float(job.outcome.numbers["clipped_fraction"]) >= Sensor.REPORTED
+    if not rows:
+        raise no_records(source, left, revolutions, AlarmsError)
+    stacked = {
+        place: {name: np.concatenate([one[name] for one in some]) for name in some[0]}
+        for place, some in readings.items()
+    }
+    joints, clearances, draws, keys = map(np.array, zip(*rows, strict=True))
+    return Windows(joints, clearances, draws, keys, stacked, clipped)
+
+
+def highest_passed(sensor: Sensor | None) -> float:
+    """Return the frequency (Hz) above which a sensor's low pass or mounting lets nothing through.
+
+    Without a low pass of its own a sensor has one by its sampling rate, which bands mind anyway.
+    """
+    return min(sensor.low_pass_Hz or math.inf, sensor.mounting_Hz) if sensor else math.inf
+
+
+def check_bands(bands: Sequence[Band], key: str, rate: float, passes: float) -> None:
+    """Raise AlarmsError unless a job's record holds the bands."""
+    top = min(rate / 2.0, passes)
+    for low, high in bands:
+        if high > top * (1.0 + 1e-9):
+            raise AlarmsError(
+                f"band {low:g}-{high:g} Hz: job {key} is sampled at {rate:.6g} Hz, and its sensor "
+                f"passes up to {passes:g} Hz (sensor.low_pass_Hz, or the resonance "
+                f"sensor.mounting_Hz): give bands up to {top:g} Hz"
+            )
+
+
+def check_draws(source: StoredStudy, windows: Windows) -> None:
+    """Raise AlarmsError unless there are enough draws of a sound machine, and a worn one."""
+    sound = windows.joints == SOUND
+    count = len({*windows.draws[sound].tolist()})
+    if count < MIN_SOUND:
+        raise AlarmsError(
+            f"study {source.name} has {count} draws of a sound machine (joint: none, or clearances "
+            f"up to healthy_clearance_mm), and limits need {MIN_SOUND} at the least, for 1 % of "
+            "false alarms 124: draw load and speed, such as machine.speed_rpm: {random: "
+            "[700, 780]} with sample: {n: 124}"
+        )
+    if sound.all():
+        raise AlarmsError(
+            f"study {source.name}: none of its jobs with a record is worn: add clearances beyond "
+            "healthy_clearance_mm, or a joint, and run it again"
+        )
+
+
+def find_limit(scores: np.ndarray, draws: np.ndarray, rate: float) -> float:
+    """Return the least limit for a rate of false alarms, by the scores of sound windows, (n,)."""
+    _, place, sizes = np.unique(draws, return_inverse=True, return_counts=True)
+    spare = max(rate * (sizes.size + 1) - 1.0, 0.0)
+    levels, at = np.unique(scores, return_inverse=True)
+    of_level = np.bincount(at, 1.0 / sizes[place], levels.size)
+    above = of_level[::-1].cumsum()[::-1] - of_level
+    return float(levels[np.flatnonzero(above <= spare + 1e-9)[0]])
+
+
+def compute_rate(trips: np.ndarray, draws: np.ndarray) -> tuple[float, float, float]:
+    """Return how often windows trip, (n,), as the mean over draws of each one's share.
+
+    With Wilson's interval of independent draws (JASA 22, 1927). A draw may trip in part of its
+    windows: it then scatters less than one that trips or does not, and the interval is too wide
+    rather than too narrow.
+    """
+    _, place, sizes = np.unique(draws, return_inverse=True, return_counts=True)
+    share = min(float((np.bincount(place, trips, sizes.size) / sizes).mean()), 1.0)
+    spread = Z**2 / sizes.size
+    middle = (share + spread / 2.0) / (1.0 + spread)
+    half = Z * math.sqrt(share * (1.0 - share) / sizes.size + spread / 4.0 / sizes.size)
+    low, high = middle - half / (1.0 + spread), middle + half / (1.0 + spread)
+    return share, max(low, 0.0), min(high, 1.0)
+
+
+def find_onset(clearances: np.ndarray, rates: np.ndarray, least: float) -> list[float]:
+    """Return the least of rising clearances from which on a rate is `least` or more, or inf.
+
+    With its interval. rates: (n, 3), by `ENDS`: the interval goes from where their upper ends are
+    so on, to where their lower ends are.
+    """
+    found = []
+    for column in (0, 2, 1):
+        missed = np.flatnonzero(rates[:, column] < least)
+        begin = missed[-1] + 1 if missed.size else 0
+        found.append(float(clearances[begin]) if begin < len(clearances) else math.inf)
+    return found
+
+
+def list_states(windows: Windows) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the states of a study: a worn joint, and the rows of its windows at a clearance.
+
+    In rising order. More than `MAX_LEVELS` clearances of a joint are put together into groups.
+    """
+    for joint in (*JOINTS, "both"):
+        mine = windows.joints == joint
+        levels = np.unique(windows.clearances[mine])
+        parts = BINS if levels.size > MAX_LEVELS else levels.size
+        for group in np.array_split(levels, parts) if parts else ():
+            yield joint, mine & np.isin(windows.clearances, group)
 
 
 def judge_alarms(
-    folder: Folder,
-    study: str,
-    options: AlarmOptions | None = None,
-    progress: Progress = no_progress,
-) -> xr.Dataset:
+    folder: Folder, study: str, bands: Sequence[Band] = (), noise: Sequence[float] = (0.0,),
+    revolutions: int = 5, false_alarms: float = 0.01, factor: float | None = None,
+    detected: float = 0.9, progress: Progress = no_progress,
+) -> xr.Dataset:  # fmt: skip
     """Return how often each alarm trips in each state of a stored study, and how often falsely.
 
-    Dimensions: `alarm` (with its filter), `noise` (m/s2), `state` (a worn joint and a clearance),
-    `joint`, `factor` (of a limit over a sound machine's usual reading). Variables: `detection` and
-    `false_alarms` with `_low` and `_high` ends of 95 % intervals by draws, for limits as they were
-    set; `first_clearance` (mm) with its interval, inf where there is none; `limit_low` and
-    `limit_high`, the ends of the limits; and `curve_detection` and `curve_false_alarms` over the
-    factor. Raises AlarmsError, and StoreError where the store cannot
-    be read.
+    bands: of the filters, Hz, none for `default_bands`; noise: rms values (m/s2) of white noise
+    that is added to records; revolutions: of a window; false_alarms: the rate that limits are set
+    for; factor: limits in its place, times a sound machine's usual reading; detected: the share of
+    windows from which on an alarm is said to detect.
+
+    Dimensions: `alarm` (with its filter), `noise`, `state` (a worn joint and a clearance), `joint`,
+    `end` (a value and its 95 % interval by draws, for limits as they were set). Variables: `limit`,
+    `detection`, `false_alarms` and `first_clearance` (mm; inf where there is none). Raises
+    AlarmsError, and StoreError where the store cannot be read.
     """
-    options = options or AlarmOptions()
-    source = find_study(folder, study)
-    windows = read_study(folder, source, options, progress)
+    source, left = find_study(folder, study), Counter[str]()
+    windows = read_study(folder, source, bands, noise, revolutions, left, progress)
     check_draws(source, windows)
-    found = judge_windows(windows, options)
-    return found.assign_attrs(
+    sound = windows.joints == SOUND
+    draws = len({*windows.draws[sound].tolist()})
+    return judge_windows(windows, noise, false_alarms, factor, detected).assign_attrs(
         title=f"compsim: alarms of {source.name}", program=PROGRAM, study=source.name,
-        case_file=source.case_file, jobs=source.jobs, machine=json.dumps(windows.values),
-        swept=json.dumps([axis.key for axis in source.axes]),
-        left_out=json.dumps(windows.left_out), clipped=windows.clipped,
+        case_file=source.case_file, revolutions=revolutions, detected=detected,
+        rate=max(false_alarms, 1.0 / (draws + 1)), wanted=false_alarms, factor=factor or math.nan,
+        sound_draws=draws, sound_jobs=len({*windows.keys[sound].tolist()}),
+        worn_jobs=len({*windows.keys[~sound].tolist()}), clipped=windows.clipped,
+        left_out=json.dumps(+left),
     )  # fmt: skip
 
 
-def list_states(windows: Windows) -> Iterator[State]:
-    """Yield the states of a study: each worn joint with its clearances, in rising order.
+def judge_windows(
+    windows: Windows, noise: Sequence[float], false_alarms: float, factor: float | None,
+    detected: float,
+) -> xr.Dataset:  # fmt: skip
+    """Return the rates of all alarms whose reading all sound windows have."""
+    sound, draws, readings = windows.joints == SOUND, windows.draws, windows.readings
+    states = [*list_states(windows)]
+    joint_of = np.array([joint for joint, _ in states])
+    joints = [*dict.fromkeys(joint_of.tolist())]
+    sizes = [windows.clearances[rows] for _, rows in states]
+    middle = np.array([np.median(size) for size in sizes])
+    order = np.random.default_rng(SEED).permutation(sorted({*draws[sound].tolist()})).tolist()
+    fold = np.array([order.index(one) % FOLDS if one in order else -1 for one in draws.tolist()])
+    listed: list[tuple[Alarm, str]] = []
+    numbers: dict[str, list[Any]] = defaultdict(list)
+    for alarm in ALARMS:
+        for name in dict.fromkeys(name for _, name in readings):
+            usual = readings[0, name].get(alarm.reading, np.full(sound.shape, math.nan))[sound]
+            if not np.isfinite(usual).all() or (name != RECORD and not alarm.is_filtered):
+                continue
+            listed.append((alarm, name))
+            for level in range(len(noise)):
+                own = readings[level, name]
 
-    More than `MAX_LEVELS` clearances of a joint are put together into `BINS` groups.
-    """
-    for joint in ("big_end", "small_end", "both"):
-        mine = windows.joints == joint
-        levels = np.unique(windows.clearances[mine])
-        groups = np.array_split(levels, BINS) if levels.size > MAX_LEVELS else levels[:, None]
-        for group in groups:
-            if group.size:
-                rows = mine & np.isin(windows.clearances, group)
-                middle = float(np.median(windows.clearances[rows]))
-                yield State(joint, middle, float(group[0]), float(group[-1]), rows)
+                def trip(setting: np.ndarray, alarm=alarm, own=own) -> tuple[float, np.ndarray]:
+                    scores = alarm.score(own, setting)
+                    limit = factor or find_limit(scores[setting], draws[setting], false_alarms)
+                    return limit, scores > limit
 
-
-@dataclass(frozen=True)
-class AlarmPerformance:
-    """How an alarm did: rates by state, of false alarms, limits, curves, and what is seen first.
-
-    limits: by fold, and of all sound windows; detection: rates by factor, (states, factors), and
-    false_curve, (factors,); first: by joint.
-    """
-
-    rates: list[Rate]
-    false: Rate
-    limits: list[float]
-    detection: np.ndarray
-    false_curve: np.ndarray
-    first: dict[str, First]
-
-
-def judge_windows(windows: Windows, options: AlarmOptions) -> xr.Dataset:
-    """Return the rates of all alarms by windows that have been read."""
-    states = list(list_states(windows))
-    sound = windows.is_sound
-    folds = share_out(windows.draws, sound, FOLDS, options.seed)
-    listed = [
-        (alarm, name)
-        for alarm in ALARMS
-        for name in (RECORD, *map(band_name, windows.bands if alarm.is_filtered else ()))
-        if is_known(alarm, windows.readings[0, name], sound)
-    ]
-    performances = [
-        [
-            judge_alarm(alarm, windows.readings[level, name], windows, states, folds, options)
-            for level in range(len(options.noise))
-        ]
-        for alarm, name in listed
-    ]
-    judged = {alarm.title for alarm, _ in listed}
-    fewest = min(len({*windows.draws[sound & (folds != k)].tolist()}) for k in range(FOLDS))
-    found = as_dataset(listed, states, performances, options)
-    return found.assign_attrs(
-        false_alarms=options.false_alarms, factor=options.factor or math.nan, folds=FOLDS,
-        attainable=max(options.false_alarms, 1.0 / (fewest + 1)), detected=options.detected,
-        seed=options.seed, revolutions=options.revolutions, windows=int(sound.size),
-        sound_draws=len({*windows.draws[sound].tolist()}),
-        sound_jobs=len({*windows.keys[sound].tolist()}),
-        worn_jobs=len({*windows.keys[~sound].tolist()}),
-        not_judged=json.dumps([one.title for one in ALARMS if one.title not in judged]),
-    )  # fmt: skip
-
-
-def is_known(alarm: Alarm, readings: Readings, sound: np.ndarray) -> bool:
-    """Return whether all sound windows have the reading of an alarm."""
-    return alarm.reading in readings and bool(np.isfinite(readings[alarm.reading][sound]).all())
-
-
-def judge_alarm(
-    alarm: Alarm,
-    readings: Readings,
-    windows: Windows,
-    states: Sequence[State],
-    folds: np.ndarray,
-    options: AlarmOptions,
-) -> AlarmPerformance:
-    """Return how an alarm does: each fold is judged by a limit that the others' windows set.
-
-    The last fold, of draws without sound windows, is judged by the limit of all sound windows.
-    """
-    sound, draws = windows.is_sound, windows.draws
-    trips = np.zeros(sound.size)
-    by_factor = np.zeros((sound.size, FACTORS.size))
-    limits = []
-    for fold in range(FOLDS + 1):
-        setting, judged = sound & (folds != fold), folds == fold
-        scores = alarm.score(readings, setting)
-        limits.append(
-            options.factor or find_limit(scores[setting], draws[setting], options.false_alarms)
-        )
-        trips[judged] = scores[judged] > limits[-1]
-        by_factor[judged] = scores[judged, None] > FACTORS
-    rates = [compute_rate(trips[one.rows], draws[one.rows]) for one in states]
-    weights = np.array([draw_weights(rows, draws) for rows in (*(s.rows for s in states), sound)])
-    curves = np.minimum(weights @ by_factor, 1.0)
-    first = {}
-    for joint in dict.fromkeys(one.joint for one in states):
-        mine = [(one.clearance, rate) for one, rate in zip(states, rates, strict=True)
-                if one.joint == joint]  # fmt: skip
-        clearances, of_joint = zip(*mine, strict=True)
-        first[joint] = first_clearance(clearances, of_joint, options.detected)
-    false = compute_rate(trips[sound], draws[sound])
-    return AlarmPerformance(rates, false, limits, curves[:-1], curves[-1], first)
-
-
-def draw_weights(rows: np.ndarray, draws: np.ndarray) -> np.ndarray:
-    """Return weights of windows, (n,), whose sum over trips is the mean of each draw's share."""
-    _, place, sizes = np.unique(draws[rows], return_inverse=True, return_counts=True)
-    weights = np.zeros(rows.size)
-    weights[rows] = 1.0 / (sizes[place] * sizes.size)
-    return weights
-
-
-def as_dataset(
-    listed: Sequence[tuple[Alarm, str]],
-    states: Sequence[State],
-    performances: Sequence[Sequence[AlarmPerformance]],
-    options: AlarmOptions,
-) -> xr.Dataset:
-    """Return performances, by alarm and noise, as a Dataset."""
-    joints = list(dict.fromkeys(one.joint for one in states))
-
-    def stack(value: Any) -> np.ndarray:
-        return np.array([[value(one) for one in row] for row in performances], float)
-
-    share = {"units": "1"}
-    found: dict[str, Any] = {}
-    for end, name in (("", "share"), ("_low", "low"), ("_high", "high")):
-        which = {"": "", "_low": "lower", "_high": "upper"}[end]
-        side = f"{which} end of the 95 % interval, for limits as they were set, of the " * bool(end)
-        found[f"detection{end}"] = (
-            ("alarm", "noise", "state"),
-            stack(lambda one, name=name: [getattr(rate, name) for rate in one.rates]),
-            share | {"long_name": f"{side}share of windows in which the alarm trips"},
-        )
-        found[f"false_alarms{end}"] = (
-            ("alarm", "noise"), stack(lambda one, name=name: getattr(one.false, name)),
-            share | {"long_name": f"{side}share of windows of sound machines in which it trips"},
-        )  # fmt: skip
-        of_first = "clearance" if name == "share" else name
-        found[f"first_clearance{end}"] = (
-            ("alarm", "noise", "joint"),
-            stack(lambda one, name=of_first: [getattr(one.first[j], name) for j in joints]),
-            {"units": "mm", "long_name": f"{side}least clearance from which on it detects"},
-        )
-    for end, pick in (("low", min), ("high", max)):
-        found[f"limit_{end}"] = (
-            ("alarm", "noise"), stack(lambda one, pick=pick: pick(one.limits)),
-            share | {"long_name": "limit over the usual reading of a sound machine, the "
-                     f"{'least' if end == 'low' else 'greatest'} of the folds and of all"},
-        )  # fmt: skip
-    found["curve_detection"] = (
-        ("alarm", "noise", "state", "factor"), stack(lambda one: one.detection),
-        share | {"long_name": "share of windows in which the alarm trips, by its limit"},
-    )  # fmt: skip
-    found["curve_false_alarms"] = (
-        ("alarm", "noise", "factor"), stack(lambda one: one.false_curve),
-        share | {"long_name": "share of windows of sound machines in which it trips, by its limit"},
-    )  # fmt: skip
-    draws = [rate.draws for rate in performances[0][0].rates]
-    found["draws"] = ("state", np.array(draws), {"units": "1", "long_name": "draws of a state"})
-    found["sound_draws"] = performances[0][0].false.draws
-    words = {
-        "kind": ("alarm", [alarm.name for alarm, _ in listed], {"long_name": "what it reads"}),
-        "title": ("alarm", [alarm.title for alarm, _ in listed], {"long_name": "in words"}),
-        "filter": ("alarm", [name for _, name in listed], {"long_name": "filter of the record"}),
-        "worn_joint": ("state", [one.joint for one in states], {"long_name": "worn joint"}),
+                limit, trips = trip(sound)
+                rates = np.array([compute_rate(trips[rows], draws[rows]) for _, rows in states])
+                for k in range(FOLDS):
+                    trips[fold == k] = trip(sound & (fold != k))[1][fold == k]
+                numbers["limit"].append(limit)
+                numbers["detection"].append(rates)
+                numbers["false_alarms"].append(compute_rate(trips[sound], draws[sound]))
+                numbers["first_clearance"].append([
+                    find_onset(middle[joint_of == joint], rates[joint_of == joint], detected)
+                    for joint in joints
+                ])  # fmt: skip
+    of = {
+        "limit": ((), "1", "limit, times the usual reading of a sound machine"),
+        "detection": (("state", "end"), "1", "share of windows in which the alarm trips"),
+        "false_alarms": (("end",), "1", "share of windows of sound machines in which it trips"),
+        "first_clearance": (("joint", "end"), "mm", "least clearance from which on it detects"),
     }
-    clearance = {"units": "mm", "long_name": "clearance of the worn joint, the middle one"}
-    numbers = {
-        "clearance": ("state", [one.clearance for one in states], clearance),
-        "clearance_low": ("state", [one.low for one in states],
-                          clearance | {"long_name": "least clearance of a state"}),
-        "clearance_high": ("state", [one.high for one in states],
-                           clearance | {"long_name": "greatest clearance of a state"}),
-        "noise": ("noise", list(options.noise),
-                  {"units": "m/s2", "long_name": "rms of the white noise that was added"}),
-        "factor": ("factor", FACTORS,
-                   {"units": "1", "long_name": "limit over a sound machine's usual reading"}),
+    found = {
+        name: (
+            ("alarm", "noise", *dims),
+            np.reshape(numbers[name], (len(listed), len(noise), *np.shape(numbers[name])[1:])),
+            {"units": unit, "long_name": phrase},
+        )
+        for name, (dims, unit, phrase) in of.items()
+    }
+    size = {"units": "mm", "long_name": "clearance of the worn joint"}
+    where = {
+        "alarm": [f"{alarm.title}, {name}" if alarm.is_filtered else alarm.title
+                  for alarm, name in listed],
+        "kind": ("alarm", [alarm.title for alarm, _ in listed]),
+        "filter": ("alarm", [name for _, name in listed]),
+        "noise": ("noise", np.array(noise, float), {"units": "m/s2", "long_name": "added noise"}),
+        "joint": joints, "end": [*ENDS], "worn_joint": ("state", joint_of),
+        "clearance": ("state", middle, size),
+        "clearance_low": ("state", np.array([one.min() for one in sizes]), size),
+        "clearance_high": ("state", np.array([one.max() for one in sizes]), size),
+        "draws": ("state", np.array([len({*draws[rows].tolist()}) for _, rows in states])),
     }  # fmt: skip
-    names = [f"{alarm.title}, {name}" if alarm.is_filtered else alarm.title
-             for alarm, name in listed]  # fmt: skip
-    return xr.Dataset(found, {"alarm": names, "joint": joints, **words, **numbers})
+    return xr.Dataset(found, where)
 
 
 def rank_alarms(found: xr.Dataset, joint: str, noise: int = 0) -> list[int]:
-    """Return the alarms of a result, the first to see a joint's wear first.
+    """Return the best filter of each kind of alarm, the first to see a joint's wear first.
 
     By the least clearance from which on they detect, then by the ends of its interval, then by
     their mean rate over the joint's clearances, then by fewer false alarms.
     """
     mine = found.isel(noise=noise)
-    firsts = mine.sel(joint=joint)
-    rates = mine["detection"].values[:, found["worn_joint"].values == joint].mean(axis=1)
-    columns = [
-        *(firsts[f"first_clearance{end}"].values for end in ("", "_high", "_low")),
-        -rates, mine["false_alarms"].values,
-    ]  # fmt: skip
-    return np.lexsort(columns[::-1]).tolist()
-
-
-def best_of_each(found: xr.Dataset, joint: str, noise: int = 0) -> list[int]:
-    """Return the best filter of each kind of alarm, in the order of `rank_alarms`."""
+    first, low, high = mine["first_clearance"].sel(joint=joint).transpose("end", "alarm").values
+    rates = mine["detection"].sel(end="value").transpose("alarm", "state").values
+    rate = rates[:, found["worn_joint"].values == joint].mean(axis=1)
+    order = np.lexsort([mine["false_alarms"].sel(end="value").values, -rate, low, high, first])
     kinds = found["kind"].values.tolist()
-    ranked = rank_alarms(found, joint, noise)
-    first: dict[str, int] = {}
-    for place in ranked:
-        first.setdefault(kinds[place], place)
-    return list(first.values())
+    best: dict[str, int] = {}
+    for place in order.tolist():
+        best.setdefault(kinds[place], place)
+    return [*best.values()]
+
+
+def read_wear(place: str | Path) -> xr.Dataset:
+    """Return the stages of a file of `compsim wear`, or of the only one of a folder of results.
+
+    Raises AlarmsError, and StoreError for a damaged file.
+    """
+    path = Path(place)
+    if path.is_dir():
+        files = sorted({*path.glob("*.nc"), *path.glob("wear/*.nc")})
+        if len(files) != 1:
+            raise AlarmsError(f"{path} has {len(files)} wear runs: {WEAR_REMEDY}")
+        path = files[0]
+    try:
+        run = read_dataset(path, WEAR_REMEDY)
+    except OSError as error:
+        raise AlarmsError(f"{path}: {error.strerror}: {WEAR_REMEDY}") from error
+    if not {"hours", "clearance"} <= {*run.variables} or "case" not in run.attrs:
+        raise AlarmsError(f"{path} holds no wear run: {WEAR_REMEDY}")
+    return run
+
+
+def add_hours(found: xr.Dataset, run: xr.Dataset) -> xr.Dataset:
+    """Return a result with `hours` from each alarm to the end of a wear run; 0: it does not lead.
+
+    The end is where the first joint is worn out, which may be the other one; nan of all where none
+    is within the run's hours. The interval carries that of the clearance and the factor of the
+    coefficient of wear, by which all hours grow or shrink together. run: of `read_wear`.
+    """
+    case = Case.from_attribute(run.attrs["case"])
+    hours, opened = run["hours"].values, 1e3 * run["clearance"].transpose("joint", "stage").values
+    wear = case.wear or Wear()
+
+    def hours_at(joint: str, clearance: float) -> float:
+        return interpolate_hours(hours, opened[JOINTS.index(joint)], clearance)
+
+    end = min(hours_at(joint, wear.limit_mm or math.inf) for joint in JOINTS)
+    end = end if end <= wear.hours else math.nan
+    first, factor = found["first_clearance"], wear.coefficient_factor
+    lead = np.full(first.shape, math.nan)
+    for index in np.ndindex(first.shape[:-1]):
+        joint = str(found["joint"].values[index[-1]])
+        if joint in JOINTS:
+            value, low, high = (max(end - hours_at(joint, one), 0.0) for one in first.values[index])
+            # the low end of the clearance is seen the earliest
+            lead[index] = value, high / factor, low * factor
+    what = {"units": "h", "long_name": "hours from the alarm to a worn-out joint"}
+    return found.assign(hours=(first.dims, lead, what)).assign_attrs(wear_end=end)
+
+
+def list_rows(found: xr.Dataset) -> list[tuple[str, ...]]:
+    """Return the table, its head first: by joint and noise, the first to see wear first.
+
+    Each alarm has its best filter; an end beyond the study's greatest clearance has a >.
+    """
+    rows: list[tuple[str, ...]] = [
+        (
+            *("joint", "noise, m/s2", "alarm", "limit", "false alarms, %", "detects from, mm"),
+            *(("hours before the limit",) if "hours" in found else ()),
+        )
+    ]
+    for joint in found["joint"].values.tolist():
+        greatest = found["clearance"].values[found["worn_joint"].values == joint].max()
+        for level, noise in enumerate(found["noise"].values.tolist()):
+            for place in rank_alarms(found, joint, level):
+                one = found.isel(alarm=place, noise=level).sel(joint=joint)
+                if noise and one["kind"].item() == BODY_VELOCITY:
+                    continue
+                row = (
+                    joint, f"{noise:g}", one["alarm"].item(), f"{one['limit'].item():.3g}",
+                    show_interval(100.0 * one["false_alarms"].values, "{:.2g}"),
+                    show_interval(one["first_clearance"].values, "{:.3g}", greatest),
+                )  # fmt: skip
+                more = (show_interval(one["hours"].values, "{:.4g}"),) if "hours" in found else ()
+                rows.append((*row, *more))
+    return rows
+
+
+def show_interval(numbers: np.ndarray, form: str, greatest: float = math.inf) -> str:
+    """Return a value with its interval; of what a study's greatest clearance does not reach, >."""
+    if np.isnan(numbers).any():
+        return "-"
+    value, low, high = (
+        form.format(one) if math.isfinite(one) else f"> {form.format(greatest)}" for one in numbers
+    )
+    return f"{value} [{low}, {high}]"
+
+
+def list_numbers(found: xr.Dataset) -> list[str]:
+    """Return what was judged, and how, as labelled numbers."""
+    attrs = found.attrs
+    factor, limits = attrs["factor"], f"for {100 * attrs['rate']:.2g} % of false alarms"
+    return [
+        f"study: {attrs['study']}",
+        f"sound machines: {attrs['sound_jobs']} jobs of {attrs['sound_draws']} draws",
+        f"worn machines: {attrs['worn_jobs']} jobs",
+        f"windows: {attrs['revolutions']} revolutions",
+        f"limits: {limits if math.isnan(factor) else f'{factor:g} times the usual reading'}",
+        f"detects: trips in {attrs['detected']:.0%} of windows, from that clearance on",
+    ]
+
+
+def list_warnings(found: xr.Dataset) -> Iterator[str]:
+    """Yield what makes a result less than it seems."""
+    attrs = found.attrs
+    for reason, count in json.loads(attrs["left_out"]).items():
+        yield f"left out: {count} {reason}"
+    if attrs["clipped"]:
+        yield f"clipped: {attrs['clipped']} jobs; raise sensor.range_m_per_s2"
+    if math.isnan(attrs["factor"]) and attrs["rate"] > attrs["wanted"] * (1.0 + 1e-9):
+        yield (f"{attrs['sound_draws']} sound draws allow no limit for {100 * attrs['wanted']:.2g} "
+               f"% of false alarms: {math.ceil(1.0 / attrs['wanted']) - 1} are needed")  # fmt: skip
+    absent = [one.title for one in ALARMS if one.title not in found["kind"].values]
+    if absent:
+        yield f"not judged, since not all sound records have it: {', '.join(absent)}"
+    needed = math.ceil(Z**2 * attrs["detected"] / max(1.0 - attrs["detected"], 1e-9))
+    if (few := int(found["draws"].min())) < needed:
+        yield f"a clearance has {few} draws: to be sure that it is detected takes {needed}"

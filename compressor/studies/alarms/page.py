@@ -1,38 +1,85 @@
-"""The section of a report about alarms: its table, remarks and figures, of what was written."""
+"""What a result of alarms looks like: its figure, its files, and its section of a report."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+import xarray as xr
+
 from compressor.report import (
+    CYCLE,
+    GREY,
     Additions,
     Cell,
     Chapter,
+    Drawing,
+    LineStyle,
+    Note,
     PageTable,
     Plate,
     Section,
     StudyNote,
     TableRow,
     file_name,
+    make_grid,
+    render,
+    title_figure,
 )
-from compressor.store import Folder, StoredStudy, read_dataset
-from compressor.studies.alarms.figures import caption, draw_alarms
-from compressor.studies.alarms.words import heading, list_remarks, table_rows
+from compressor.store import Folder, StoredStudy, publish, read_dataset, write_dataset
+from compressor.studies.alarms.alarms import list_numbers, list_rows, list_warnings, rank_alarms
 
-FILE = "alarms.nc"
+FILE, FIGURE = "alarms.nc", "alarms.png"
 REMEDY = "compsim alarms STUDY -o the folder writes it again"
+MAX_KINDS = 6  # kinds of alarm that have a line: the first to see wear
+CAPTION = (
+    "Share of windows in which an alarm trips, by clearance, each kind with its best filter; "
+    "dashed: the share from which on it detects."
+)
+
+
+def draw_alarms(found: xr.Dataset) -> Drawing:
+    """Return a panel a joint: the share of windows in which alarms trip, by clearance.
+
+    Of the first level of noise, and of the kinds that see wear first over all joints.
+    """
+    joints = found["joint"].values.tolist()
+    figure, grid = make_grid(1, len(joints), 3.6)
+    kinds = found["kind"].values
+    best = {joint: {kinds[place]: place for place in rank_alarms(found, joint)} for joint in joints}
+    first = sorted(
+        best[joints[0]], key=lambda kind: sum([*one].index(kind) for one in best.values())
+    )
+    for panel, joint in zip(grid.flat, joints, strict=True):
+        mine = found.isel(noise=0, state=np.flatnonzero(found["worn_joint"].values == joint))
+        for kind, line in zip(first[:MAX_KINDS], CYCLE, strict=False):
+            shares = mine["detection"].isel(alarm=best[joint][kind]).sel(end="value").values
+            style = replace(line, marker="o", markersize=3.5)
+            panel.plot(mine["clearance"].values, shares, style, kind)
+        style = LineStyle(GREY, linewidth=0.8, linestyle="--")
+        panel.notes.append(Note(y=found.attrs["detected"], style=style))
+        panel.title = f"({'abc'[joints.index(joint)]}) {joint.replace('_', ' ')}"
+        panel.x.title, panel.x.margin = "clearance (mm)", 0.04
+        panel.y.span(-0.02, 1.04)
+    grid.flat[0].y.title = "windows in which it trips"
+    figure.legend = grid.flat[0].traces
+    return figure
+
+
+def write_alarms(found: xr.Dataset, output: Folder, title: str) -> list[Path]:
+    """Write a result as netCDF and as a figure; return their paths. title: of the machine."""
+    drawing = draw_alarms(found)
+    drawing.title = title_figure(title, "alarms by clearance", [])
+    publish(Path(output, FIGURE), render(drawing, "png"))
+    return [write_dataset(Path(output, FILE), found), Path(output, FIGURE)]
 
 
 @dataclass(frozen=True)
 class AlarmsContent:
-    """What the section shows: sentences before the table, and below it, and figures.
+    """What the section shows. `title`, `notes`: what the case file says of the machine."""
 
-    `title`, `notes`: what the study's case file says of the machine.
-    """
-
-    sentences: list[str]
+    lines: list[str]
     table: PageTable
-    remarks: list[str]
     plates: list[Plate]
     title: str
     notes: str
@@ -52,19 +99,12 @@ def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Addit
     study = next((study for study in studies if study.name == name), None)
     if study is None:
         return Additions({}, [])
-    plates = []
-    for level, noise in enumerate(found["noise"].values.tolist()):
-        title = "Alarms by clearance" + (f", with noise of {noise:g} m/s²" if noise else "")
-        words = file_name("alarms", name, *([f"noise-{noise:g}"] if noise else []))
-        plates.append(Plate(words, title, caption(found, level), draw_alarms(found, level)))
-    head, rows = table_rows(found)
-    cells = PageTable(head, [TableRow([Cell(text) for text in row]) for row in rows])
-    before, after = (
-        [t[0].upper() + t[1:] for t in part(found)] for part in (heading, list_remarks)
-    )
-    content = AlarmsContent(before, cells, after, plates, study.title, study.notes)
-    anchor = file_name("alarms-of", name)
-    title = f"Which alarm sees wear first in study {name}"
+    plates = [Plate(file_name("alarms", name), "Alarms by clearance", CAPTION, draw_alarms(found))]
+    head, *rows = list_rows(found)
+    table = PageTable(head, [TableRow([Cell(text) for text in row]) for row in rows], lead=3)
+    lines = [*list_numbers(found), *list_warnings(found)]
+    content = AlarmsContent(lines, table, plates, study.title, study.notes)
+    anchor, title = file_name("alarms-of", name), f"Which alarm sees wear first in study {name}"
     section = Section(anchor, title, "compressor.studies.alarms:alarms.html", content)
     line = f"{found.sizes['alarm']} alarms were judged by its records."
     note = StudyNote(line, anchor, "Which alarm sees wear first")

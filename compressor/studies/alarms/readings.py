@@ -1,13 +1,12 @@
 """What alarms read of a sensor's record: levels, counts and velocity of windows, by filter."""
 
-import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from compressor.studies.frame import USABLE
+from compressor.studies.frame import USABLE, cut_windows
 from compressor.vibration import Record, band_signal, check_record, measure_record, noisy, turns_at
 
 RECORD = "record"  # the filter's name of a record as it is
@@ -15,7 +14,7 @@ FRAME_HZ = (2.0, 1000.0)  # ours: the band in which frames are judged by body_ve
 # m/s2, 20 a decade: the levels over which peaks are counted
 LADDER = np.geomspace(1e-2, 1e4, 121)
 COUNTED = (0.5, 1.0)  # ours: times the sound machine's peak, over which peaks are counted
-BODY_VELOCITY = "body_velocity"  # the alarm that reads a stored metric: no noise disturbs it
+BODY_VELOCITY = "velocity of the body"  # reads a stored metric: no noise disturbs it
 LEAST_COUNT = 1.0  # a revolution: fewer of a sound machine count as so many
 
 Band = tuple[float, float]
@@ -25,14 +24,13 @@ Score = Callable[[Readings, np.ndarray], np.ndarray]  # of readings, by the rows
 
 @dataclass(frozen=True)
 class Alarm:
-    """An alarm: its name, its title, the readings it needs, and its score, (windows,).
+    """An alarm: its title, the reading that it needs, and its score, (windows,).
 
-    A score is how many times above a sound machine a window is, by the rows that set the limits;
-    the alarm trips where it is above its limit. is_filtered: whether it reads the record of each
+    A score is how many times above a sound machine a window is, by the rows of sound windows; the
+    alarm trips where it is above its limit. is_filtered: whether it reads the record of each
     filter; else the record as it is, or the body.
     """
 
-    name: str
     title: str
     reading: str
     score: Score
@@ -70,23 +68,19 @@ def score_by_counts(times: float) -> Score:
 
 
 ALARMS = (
-    Alarm("peak", "peak", "sensor_peak", score_by_ratio("sensor_peak")),
-    Alarm("rms", "rms", "sensor_rms", score_by_ratio("sensor_rms")),
-    Alarm("crest_factor", "crest factor", "sensor_crest_factor",
-          score_by_ratio("sensor_crest_factor")),
-    Alarm("kurtosis", "kurtosis", "sensor_kurtosis", score_by_ratio("sensor_kurtosis")),
-    Alarm("segment_peak", "segment peak", "sensor_segment_peak",
-          score_by_ratio("sensor_segment_peak")),
-    Alarm("segment_rms", "segment rms", "sensor_segment_rms", score_by_ratio("sensor_segment_rms")),
+    Alarm("peak", "sensor_peak", score_by_ratio("sensor_peak")),
+    Alarm("rms", "sensor_rms", score_by_ratio("sensor_rms")),
+    Alarm("crest factor", "sensor_crest_factor", score_by_ratio("sensor_crest_factor")),
+    Alarm("kurtosis", "sensor_kurtosis", score_by_ratio("sensor_kurtosis")),
+    Alarm("segment peak", "sensor_segment_peak", score_by_ratio("sensor_segment_peak")),
+    Alarm("segment rms", "sensor_segment_rms", score_by_ratio("sensor_segment_rms")),
     *(
-        Alarm(f"count_{times:g}", f"counts over {times:g} peak", "sensor_counts_per_rev",
-              score_by_counts(times))
+        Alarm(f"counts over {times:g} peak", "sensor_counts_per_rev", score_by_counts(times))
         for times in COUNTED
     ),
-    Alarm("velocity", "velocity of the record", "velocity", score_by_ratio("velocity"), False),
-    Alarm(BODY_VELOCITY, "velocity of the body", "body_velocity_rms",
-          score_by_ratio("body_velocity_rms"), False),
-)  # fmt: skip
+    Alarm("velocity of the record", "velocity", score_by_ratio("velocity"), False),
+    Alarm(BODY_VELOCITY, "body_velocity_rms", score_by_ratio("body_velocity_rms"), False),
+)
 
 
 def default_bands(rate: float, passes: float = math.inf) -> tuple[Band, ...]:
@@ -103,43 +97,35 @@ def default_bands(rate: float, passes: float = math.inf) -> tuple[Band, ...]:
     return ((low, edge), (edge, middle), (middle, float(f"{top:.6g}")))
 
 
-def band_name(band: Band) -> str:
-    """Return a band as a filter's name."""
-    return f"{band[0]:g}-{band[1]:g} Hz"
-
-
 def read_windows(
     record: Record, revolutions: int, bands: Sequence[Band], velocity_band: Band,
     noise: float, seed: Sequence[int],
 ) -> dict[str, Readings]:  # fmt: skip
     """Return the readings of a record's windows by filter, `RECORD` first; {} of a shorter record.
 
-    Windows of so many revolutions follow each other from the first tacho pulse on. White noise of
-    `noise` m/s2 rms is added to the record by a seed before all else. A band's filter removes the
-    other lines of the spectrum of all windows. Raises RecordError as `check_record`.
+    White noise of `noise` m/s2 rms is added to the record by a seed before all else. A band's
+    filter removes the other lines of the spectrum of all revolutions. Raises RecordError as
+    `check_record`.
     """
     whole = check_record(record.times, record.values, record.tacho)
-    count = whole // revolutions
-    if not count:
-        return {}
-    turns = turns_at(record.times, record.tacho)
-    edges = np.searchsorted(turns, revolutions * np.arange(count + 1) - 1e-9)
-    inside = slice(edges[0], edges[-1])
-    turns, edges = turns[inside], edges - edges[0]
-    values = noisy(record.values, noise, seed)[inside]
-    rate = record.rate
+    ((_, record),) = cut_windows(record, whole)
+    values, rate = noisy(record.values, noise, seed), record.rate
+    signals = {RECORD: values}
+    signals |= {f"{low:g}-{high:g} Hz": band_signal(values, rate, low, high) for low, high in bands}
     found = {}
-    for name, band in ((RECORD, None), *((band_name(one), one) for one in bands)):
-        signal = values if band is None else band_signal(values, rate, *band)
-        found[name] = stack_readings(
-            read_window(signal[low:high], turns[low:high], revolutions)
-            for low, high in itertools.pairwise(edges)
+    for name, signal in signals.items():
+        windows = cut_windows(replace(record, values=signal), revolutions)
+        if rows := [
+            read_window(one.values, turns_at(one.times, one.tacho), revolutions)
+            for _, one in windows
+        ]:
+            found[name] = stack_readings(rows)
+    if found:
+        speed = band_velocity(values, rate, *velocity_band)
+        windows = cut_windows(replace(record, values=speed), revolutions)
+        found[RECORD]["velocity"] = np.array(
+            [[np.sqrt(np.mean(one.values**2))] for _, one in windows]
         )
-    speed = band_velocity(values, rate, *velocity_band)
-    found[RECORD]["velocity"] = np.array([
-        [np.sqrt(np.mean(speed[low:high] ** 2))]
-        for low, high in itertools.pairwise(edges)
-    ])  # fmt: skip
     return found
 
 

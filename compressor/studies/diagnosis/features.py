@@ -5,8 +5,9 @@ level is one feature; all others are shares and shapes, which say nothing of the
 Whole revolutions count alone, from the first tacho pulse to the last.
 """
 
+import itertools
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,49 +30,40 @@ BEATS = (1, 2, 3, 4)  # orders of the envelope
 SMALLEST = 1e-6  # share that the logarithm of a share is taken of at least
 
 
-@dataclass(frozen=True)
-class SignalFeature:
-    """A feature's name, unit and phrase."""
+class SignalFeature(NamedTuple):
+    """A feature's unit and phrase."""
 
-    name: str
     unit: str
     phrase: str
 
 
-def _table() -> dict[str, SignalFeature]:
-    rows = [
-        SignalFeature("level", "", "log10 of the rms in m/s2"),
-        SignalFeature("speed", "", "log10 of the speed in rev/s"),
-        SignalFeature("crest_factor", "1", "greatest magnitude over rms"),
-        SignalFeature("kurtosis", "1", "fourth central moment over the square of the second"),
-        SignalFeature("gini", "1", "Gini index of magnitudes"),
-        SignalFeature(
-            "energy_angle", "1", f"share of angle with 90 % of the energy above order {SWING:g}"
-        ),
-        SignalFeature("above_swing", "", f"log10 of the share of the energy above order {SWING:g}"),
-        SignalFeature(
-            "synchronous", "1", f"of the energy above order {SWING:g}, that every turn repeats"
-        ),
-    ]
-    for low, high in zip(BANDS, (*BANDS[1:], math.inf), strict=True):
-        reach = f"{low:g} to {high:g} Hz" if high < math.inf else f"above {low:g} Hz"
-        rows.append(
-            SignalFeature(f"band_{low:g}", "", f"log10 of the share of the energy, {reach}")
+ABOVE = f"the energy above order {SWING:g}"
+FEATURES = {
+    "level": SignalFeature("", "log10 of the rms in m/s2"),
+    "speed": SignalFeature("", "log10 of the speed in rev/s"),
+    "crest_factor": SignalFeature("1", "greatest magnitude over rms"),
+    "kurtosis": SignalFeature("1", "fourth central moment over the square of the second"),
+    "gini": SignalFeature("1", "Gini index of magnitudes"),
+    "energy_angle": SignalFeature("1", f"share of angle with 90 % of {ABOVE}"),
+    "above_swing": SignalFeature("", f"log10 of the share of {ABOVE}"),
+    "synchronous": SignalFeature("1", f"of {ABOVE}, that every turn repeats"),
+    **{
+        f"band_{low:g}": SignalFeature(
+            "", f"log10 of the share of the energy, {low:g} to {high:g} Hz"
         )
-    for k in range(SECTORS):
-        begin, end = 360 * k // SECTORS, 360 * (k + 1) // SECTORS
-        rows.append(SignalFeature(
-            f"sector_{begin}", "",
-            f"log10 of the share of the energy above order {SWING:g}, {begin} to {end} degrees",
-        ))  # fmt: skip
-    for beat in BEATS:
-        rows.append(
-            SignalFeature(f"envelope_{beat}", "1", f"order {beat} of the envelope over its mean")
+        for low, high in itertools.pairwise((*BANDS, math.inf))
+    },
+    **{
+        f"sector_{begin}": SignalFeature(
+            "", f"log10 of the share of {ABOVE}, from {begin} degrees on"
         )
-    return {row.name: row for row in rows}
-
-
-FEATURES = _table()
+        for begin in range(0, 360, 360 // SECTORS)
+    },
+    **{
+        f"envelope_{beat}": SignalFeature("1", f"order {beat} of the envelope over its mean")
+        for beat in BEATS
+    },
+}
 
 
 def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[str, float]:

@@ -1,16 +1,15 @@
-"""Lead times by wear runs that are straight lines, and runs that are something else."""
+"""Hours between an alarm and the end of a wear run, by runs that are straight lines."""
 
 import math
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from compressor.cases import Case
-from compressor.store import StoreError, read_dataset, write_dataset
-from compressor.studies.alarms.detection import First
-from compressor.studies.alarms.lead import compute_lead, differences, open_run
-from compressor.studies.alarms.windows import AlarmsError
-from compressor.studies.wear.stages import Worn, life, stages_dataset
+from compressor.store import StoreError, write_dataset
+from compressor.studies.alarms.alarms import AlarmsError, add_hours, read_wear
+from compressor.studies.wear.stages import Worn, stages_dataset
 
 CASE = {
     "joint": "both", "clearance_mm": 0.1,
@@ -37,61 +36,53 @@ def write_run(folder, case=CASE, hours=(0.0, 400.0, 1000.0)):
     return path
 
 
-def test_lead_times_are_differences_of_hours(tmp_path):
-    """Big end: 0.1 mm and 0.2 mm more in 1,000 h; small end: 0.1 mm more."""
-    run = open_run(write_run(tmp_path))
-    assert run.end == pytest.approx(1000.0)
-    assert run.hours_at("big_end", 0.15) == pytest.approx(250.0)
-    assert run.hours_at("small_end", 0.15) == pytest.approx(500.0)
-    assert run.hours_at("small_end", 0.05) == 0.0
-    assert math.isinf(run.hours_at("small_end", 0.25))
-    lead = compute_lead(run, "big_end", First(0.15, 0.12, 0.2))
-    assert lead == pytest.approx((750.0, 500.0 / 2, 900.0 * 2))
-    # the big end ends the run; an alarm that sees nothing of the small end until then leads by 0
-    lead = compute_lead(run, "small_end", First(0.15, 0.12, math.inf))
-    assert lead == pytest.approx((500.0, 0.0, 800.0 * 2))
-    assert compute_lead(run, "small_end", First(math.inf, math.inf, math.inf)) == (0.0, 0.0, 0.0)
+def hours(place, clearances):
+    """The hours by joint before the limit."""
+    found = xr.Dataset(
+        {"first_clearance": (("alarm", "noise", "joint", "end"), [[[*clearances.values()]]])},
+        {"joint": [*clearances]},
+    )
+    lead = add_hours(found, read_wear(place))["hours"].values[0, 0]
+    return dict(zip(clearances, lead.tolist(), strict=True))
 
 
-def test_without_a_limit_reached_no_lead_is_known(tmp_path):
-    run = open_run(write_run(tmp_path, hours=(0.0, 400.0)))
-    assert all(map(math.isnan, compute_lead(run, "big_end", First(0.12, 0.11, 0.13))))
+def test_hours_are_those_to_the_first_joint_that_is_worn_out(tmp_path):
+    """Big end: 0.1 mm and 0.2 mm more in 1,000 h, which ends the run; small end: 0.1 mm more."""
+    found = hours(write_run(tmp_path), {
+        "big_end": (0.15, 0.12, 0.2), "small_end": (0.15, 0.05, math.inf), "both": (0.1,) * 3
+    })  # fmt: skip
+    assert found["big_end"] == pytest.approx([750.0, 500.0 / 2, 900.0 * 2])
+    # an alarm that sees nothing of the small end until the big end is worn out leads by 0
+    assert found["small_end"] == pytest.approx([500.0, 0.0, 1000.0 * 2])
+    assert np.isnan(found["both"]).all()  # no run wears both as one
+    never = hours(tmp_path, {"small_end": (math.inf,) * 3})
+    assert never["small_end"] == [0.0, 0.0, 0.0]
 
 
-def test_a_life_beyond_the_hours_to_judge_is_none_as_for_compsim_wear(tmp_path):
-    """The run goes on to twice its hours, and is worn out there: no life, and no lead."""
-    for hours, is_known in ((999.0, False), (1001.0, True)):
-        case = CASE | {"wear": CASE["wear"] | {"hours": hours}}
-        path = write_run(tmp_path / f"{hours}", case)
-        found = life(Worn(Case.from_values(case)), read_dataset(path, ""))
-        run = open_run(path)
-        assert math.isfinite(found.hours) == math.isfinite(run.end) == is_known
-        assert math.isfinite(compute_lead(run, "big_end", First(0.15, 0.12, 0.2)).hours) == is_known
-        if is_known:
-            assert run.end == pytest.approx(found.hours)
+@pytest.mark.parametrize(
+    ("ends", "judged", "is_known"),
+    [(400.0, 5e4, False), (1000.0, 999.0, False), (1000.0, 1001.0, True)],
+)
+def test_without_a_limit_reached_no_hours_are_known(tmp_path, ends, judged, is_known):
+    """A run that is short, and a life beyond the hours to judge, as for `compsim wear`."""
+    case = CASE | {"wear": CASE["wear"] | {"hours": judged}}
+    found = hours(write_run(tmp_path, case, (0.0, 400.0, ends)), {"big_end": (0.12,) * 3})
+    assert np.isfinite(found["big_end"]).all() == is_known
 
 
 def test_a_folder_has_one_run(tmp_path):
+    clearances = {"big_end": (0.15, 0.12, 0.2)}
     path = write_run(tmp_path)
-    assert open_run(tmp_path).name == open_run(path.parent).name == path.stem
+    assert hours(tmp_path, clearances) == hours(path, clearances) == hours(path.parent, clearances)
     write_run(tmp_path, CASE | {"clearance_mm": 0.12})
-    with pytest.raises(AlarmsError, match="has 2 wear runs"):
-        open_run(tmp_path)
-    (tmp_path / "empty").mkdir()
-    with pytest.raises(AlarmsError, match=r"has 0 wear runs \(none\): compsim wear the machine's"):
-        open_run(tmp_path / "empty")
-    with pytest.raises(AlarmsError, match=r"absent.nc: No such file"):
-        open_run(tmp_path / "absent.nc")
     (tmp_path / "other.nc").write_bytes(b"text")
+    (tmp_path / "empty").mkdir()
+    write_dataset(tmp_path / "study.nc", xr.Dataset())
+    for place, told in (
+        (tmp_path / "wear", "has 2 wear runs"), (tmp_path / "empty", "has 0 wear runs: compsim w"),
+        (tmp_path / "absent.nc", "No such file"), (tmp_path / "study.nc", "holds no wear run"),
+    ):  # fmt: skip
+        with pytest.raises(AlarmsError, match=told):
+            hours(place, clearances)
     with pytest.raises(StoreError, match="compsim wear the machine's case file"):
-        open_run(tmp_path / "other.nc")
-
-
-def test_machines_that_differ_are_named():
-    one = Case.from_values({"joint": "both", "clearance_mm": 0.1, "lubricant": True}).values()
-    other = Case.from_values({
-        "joint": "both", "clearance_mm": 0.1, "machine": {"speed_rpm": 600, "rod_mass_kg": 5},
-        "drive": True,
-    }).values()  # fmt: skip
-    found = [*differences(one, ["machine.speed_rpm", "machine.rod_inertia_kg_m2"], other)]
-    assert found == ["machine.rod_mass_kg", "lubricant", "drive"]
+        hours(tmp_path / "other.nc", clearances)

@@ -1,64 +1,48 @@
 """Data sets: windows hold whole revolutions, labels are those of the case, no machine is split."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from compsim import cli
 
 from compressor.cases.case import Case
-from compressor.cases.groups import PerJoint
 from compressor.store.files import WrongName
 from compressor.store.reader import read_store
-from compressor.studies.diagnosis.data_set import (
-    LABELS,
+from compressor.studies.diagnosis.dataset import (
     DataSetError,
-    DataSetOptions,
-    job_rows,
-    labels_of,
-    machine_of,
     make_data_set,
-    noisy,
+    name_machine,
     split_by_machine,
-    windows,
 )
 from compressor.studies.diagnosis.features import FEATURES, features
+from compressor.studies.frame import cut_windows
+from compressor.vibration import Record, noisy
 
-OPTIONS = DataSetOptions(noise=(0.0, 0.5))
+NOISE, SEED = (0.0, 0.5), 1
 
 
 @pytest.fixture(scope="module")
 def made(worn):
-    return make_data_set(worn, "worn", OPTIONS)
+    return make_data_set(worn, "worn", noise=NOISE, seed=SEED)
 
 
 def test_windows_reach_from_pulse_to_pulse():
     times = np.arange(1000) / 100.0
     tacho = 0.103 + 0.77 * np.arange(12)
-    record = {"sensor_time": times, "sensor_acceleration": np.sin(times), "tacho_time": tacho}
-    found = [*windows(record, 3, 2)]
-    assert [one.first for one in found] == [0, 2, 4, 6, 8]
-    for one in found:
+    record = Record(times, np.sin(times), tacho, 0.0)
+    found = [*cut_windows(record, 3, 2)]
+    assert [first for first, _ in found] == [0, 2, 4, 6, 8]
+    for first, one in found:
         assert len(one.tacho) == 4
         assert 0.0 <= one.tacho[0] < 0.01
         assert 0.0 <= one.times[-1] - one.tacho[-1] < 0.01
-        since = tacho[one.first] - one.tacho[0]
+        since = tacho[first] - one.tacho[0]
         assert one.times[0] == 0.0
         assert one.values == pytest.approx(np.sin(one.times + since), abs=1e-12)
-    assert [*windows(record, 12, 1)] == []
-    assert len([*windows(record, 11, 1)]) == 1
-
-
-def test_no_record_is_kept_in_memory(worn):
-    """A view would keep the whole record, in double precision."""
-    stored = read_store(worn)
-    key = make_data_set(worn, "worn")["key"].values[0]
-    for signals in (True, False):
-        for row in job_rows(stored, key, replace(OPTIONS, signals=signals), PerJoint(0.0, 0.0)):
-            kept = row["window"]
-            assert all(part.base is None for part in (kept.times, kept.values, kept.tacho))
-            assert kept.values.dtype == np.float32
-            assert (kept.values.size > 0) == signals
+    assert [first for first, _ in cut_windows(record, 3)] == [0, 3, 6]
+    assert [*cut_windows(record, 12, 1)] == []
+    assert len([*cut_windows(record, 11, 1)]) == 1
 
 
 def test_every_job_that_can_gives_windows(made):
@@ -78,7 +62,7 @@ def test_labels_are_those_of_the_case(made, worn):
         case = Case.from_attribute(stored.job(row["key"].item()).attrs["case"])
         assert row["joint"] == case.joint
         assert row["load"] == case.load
-        assert row["machine"] == machine_of(case)
+        assert row["machine"] == name_machine(case)
         assert row["speed_rpm"] == case.machine.speed_rpm
         assert row["rod_mass_kg"] == case.machine.rod_mass_kg
         worn_ends = {"none": (0, 0), "both": (0.1, 0.3)}.get(case.joint)
@@ -95,8 +79,8 @@ def test_features_are_those_of_the_stored_samples(made):
         times = np.arange(count) / row["rate"].item()
         values = row["signal"].values[:count].astype(float)
         assert np.isnan(row["signal"].values[count:]).all()
-        for level, rms in enumerate(OPTIONS.noise):
-            seed = [OPTIONS.seed, int(row["key"].item(), 16), row["first_pulse"].item(), level]
+        for level, rms in enumerate(NOISE):
+            seed = [SEED, int(row["key"].item(), 16), row["first_pulse"].item(), level]
             found = features(times, noisy(values, rms, seed), row["tacho"].values)
             assert [*found] == made["feature"].values.tolist()
             assert row["features"].values[level] == pytest.approx([*found.values()], abs=1e-4)
@@ -151,22 +135,20 @@ def test_a_machine_is_what_is_built():
         {"load": "gas"}, {"machine": {"speed_rpm": 300}}, {"sensor": {"seed": 5}},
         {"solve": {**solve, "accuracy": "draft"}}, {"name": "other"},
     ):  # fmt: skip
-        assert machine_of(Case.from_values({**values, "solve": solve, **other})) == machine_of(one)
+        assert name_machine(Case.from_values({**values, "solve": solve, **other})) == name_machine(
+            one
+        )
     for other in (
         {"clearance_mm": 0.21}, {"machine": {"rod_mass_kg": 5}}, {"joint": "big_end"},
         {"body": {"mass_kg": 501}}, {"friction": False},
     ):  # fmt: skip
-        assert machine_of(Case.from_values({**values, "solve": solve, **other})) != machine_of(one)
-
-
-def test_an_ideal_machine_has_no_clearance():
-    found = labels_of(Case.from_values({"joint": "none"}))
-    assert [*found] == [*LABELS]
-    assert found["clearance_mm_big_end"] == found["clearance_mm_small_end"] == 0.0
+        assert name_machine(Case.from_values({**values, "solve": solve, **other})) != name_machine(
+            one
+        )
 
 
 def test_windows_may_overlap_and_go_without_samples(worn):
-    made = make_data_set(worn, "worn", DataSetOptions(4, hop=3, signals=False))
+    made = make_data_set(worn, "worn", 4, hop=3, signals=False)
     assert {*made["first_pulse"].values.tolist()} == {0, 3, 6}
     assert "signal" not in made
     assert made["features"].shape == (made.sizes["window"], 1, len(FEATURES))
@@ -175,7 +157,7 @@ def test_windows_may_overlap_and_go_without_samples(worn):
 def test_jobs_that_are_not_run_are_counted(worn, tmp_path):
     """A store of the studies alone."""
     (tmp_path / "studies").symlink_to(worn / "studies")
-    with pytest.raises(DataSetError, match="has no record to cut windows of: 14 missing"):
+    with pytest.raises(DataSetError, match="has no record of 5 revolutions: 14 missing"):
         make_data_set(tmp_path, "worn")
 
 
@@ -194,18 +176,18 @@ def test_a_study_that_cannot_be_used(worn, study, told):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("words", "told"),
     [
-        ({"revolutions": 1}, "at least 2 revolutions, not 1"),
-        ({"hop": 0}, "at least 1 revolution apart"),
-        ({"noise": ()}, "noise is an rms"),
-        ({"noise": (0.1, -1.0)}, "noise is an rms"),
-        ({"noise": (float("nan"),)}, "noise is an rms"),
-        ({"noise": (0.1, 0.1)}, "given twice"),
-        ({"test_share": 0.0}, "between 0 and 1, not 0"),
-        ({"test_share": 1.0}, "between 0 and 1, not 1"),
+        (["--revolutions", "1"], "1 is not in the range x>=2"),
+        (["--hop", "0"], "0 is not in the range x>=1"),
+        (["--noise", ""], "is no list such as 0,0.1,1"),
+        (["--noise", "0.1,-1"], "noise is an rms, 0 or more"),
+        (["--noise", "nan"], "noise is an rms, 0 or more"),
+        (["--noise", "0.1,0.1"], "a noise level is given twice"),
+        (["--test-share", "0"], "0.0 is not in the range 0.0<x<1.0"),
+        (["--test-share", "1"], "1.0 is not in the range 0.0<x<1.0"),
     ],
 )
-def test_options_that_make_no_sense(change, told):
-    with pytest.raises(DataSetError, match=told):
-        replace(OPTIONS, **change)
+def test_options_that_make_no_sense(words, told, worn, tmp_path, capsys):
+    assert cli.main(["dataset", "worn", "-r", str(worn), "-o", str(tmp_path / "to"), *words]) == 2
+    assert told in capsys.readouterr().err

@@ -10,9 +10,8 @@ from compressor.cases.case import Case, CaseError
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.study import Study
 from compressor.store.reader import read_store
-from compressor.studies.diagnosis.data_card import data_card
-from compressor.studies.diagnosis.data_set import DataSetOptions, make_data_set
-from compressor.studies.diagnosis.library import open_library
+from compressor.studies.diagnosis.dataset import make_data_set, write_card
+from compressor.studies.diagnosis.identify import read_library
 from compressor.studies.tradeoff.explain import terms
 from compressor.sweep.sweep import sweep
 
@@ -106,15 +105,15 @@ def test_one_store_holds_each_job_once(results):
 def test_the_data_set_and_the_library_say_worn_beyond_it(results):
     labels, library = {}, {}
     for name in ("plain", "sound"):
-        found = make_data_set(results, name, DataSetOptions(revolutions=4))
+        found = make_data_set(results, name, revolutions=4)
         labels[name] = found["joint"].values.tolist()
-        jobs = open_library(results, name)
+        jobs = read_library(results, name)
         library[name] = jobs.joints.tolist()
         assert sorted(jobs.clearances[:, 1].tolist()) == [0.0, 0.05, 0.25]
         machines = {*found["machine"].values.tolist()}
-        card = data_card(found, parquet=False)
-        assert ("up to 0.1 mm at the big end" in card) == (name == "sound")
-        assert ("Sound joints with a clearance" in card) == (name == "plain")
+        card = write_card(found)
+        assert ("| healthy_clearance_mm.big_end | 0.1 |" in card) == (name == "sound")
+        assert ("**Warning:** sound joints are ideal" in card) == (name == "plain")
     assert labels["plain"] == library["plain"] == ["none", "both", "both"]
     assert labels["sound"] == library["sound"] == ["none", "none", "small_end"]
     assert len(machines) == 3

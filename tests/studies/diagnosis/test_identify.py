@@ -1,7 +1,7 @@
 """`compsim identify`: what it prints of files and jobs, and what it refuses."""
 
 import json
-import shutil
+import re
 
 import numpy as np
 import pytest
@@ -10,13 +10,32 @@ from conftest import struck
 from scipy.io import wavfile
 
 from compressor.store.reader import read_store
+from compressor.studies.diagnosis import identify
 
 
 @pytest.fixture(scope="module")
-def folder(worn_store, tmp_path_factory):
-    place = tmp_path_factory.mktemp("identify") / "worn"
-    shutil.copytree(worn_store, place)
-    return str(place)
+def folder(worn_store):
+    return str(worn_store)
+
+
+@pytest.fixture(scope="module")
+def learned(folder):
+    library = identify.read_library(folder, "worn")
+    return library, identify.Identifier.fit(library)
+
+
+@pytest.fixture(autouse=True)
+def once_learned(request, monkeypatch):
+    """What records of files are explained by is the same each time, and learned once."""
+    if "mistakes" in request.node.name:
+        return
+    library, fitted = request.getfixturevalue("learned")
+    fit = identify.Identifier.fit
+    monkeypatch.setattr(identify, "read_library", lambda *_: library)
+    monkeypatch.setattr(
+        identify.Identifier, "fit",
+        lambda jobs: fitted if len(jobs.keys) == len(library.keys) else fit(jobs),
+    )  # fmt: skip
 
 
 def written(path, times, values, tacho, wave=True):
@@ -37,7 +56,7 @@ def record(tmp_path):
 
 def test_a_record_is_explained(record, folder, capsys):
     assert cli.main(["identify", record, "--study", "worn", "-r", folder, "--quiet"]) == 0
-    first, head, best, *_, last = capsys.readouterr().out.splitlines()
+    first, head, best, *_, last, _ = capsys.readouterr().out.splitlines()
     assert first.startswith(f"{record}: ")
     assert "revolutions at 500 rpm, 8000 Hz" in first
     assert head.split()[:3] == ["rank", "joint", "probability"]
@@ -46,7 +65,7 @@ def test_a_record_is_explained(record, folder, capsys):
     assert float(chance) > 0.8
     assert float(low.strip(",")) < float(median) < float(high.strip("]"))
     assert abs(float(median) - 0.2) < 0.06
-    assert last.split()[0] == "machine.rod_mass_kg"
+    assert last.split() == ["varied:", "machine.rod_mass_kg", "2.0202", "to", "7.9455"]
 
 
 def test_as_json(record, folder, capsys):
@@ -60,7 +79,7 @@ def test_as_json(record, folder, capsys):
 def test_a_job_is_explained_by_the_others(folder, capsys):
     key = sorted(read_store(folder).keys())[0]
     assert cli.main(["identify", key[:12], "--study", "worn", "-r", folder]) == 0
-    assert "rests on 239 of 240 jobs of study worn" in capsys.readouterr().out
+    assert re.search(r"^jobs of the study +239 of 240$", capsys.readouterr().out, re.MULTILINE)
 
 
 def test_an_exported_job_is_explained_as_the_job_itself(tmp_path, folder, capsys):
@@ -134,9 +153,13 @@ def test_what_does_not_fit_is_said_first(tmp_path, folder, capsys):
     assert cli.main(["identify", path, "--study", "worn", "-r", folder]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[1].startswith("NOTHING IN THIS STUDY FITS: ")
-    assert lines[2].startswith("farthest from what other features foretell: ")
-    assert lines[3].startswith("what to do: first compare noise with the study's sensor.noise_m")
-    assert "g read as m/s2 is a factor of 9.8" in lines[3]
+    assert lines[2].startswith("compare noise (sensor.noise_m_per_s2), unit (g read as m/s2 is")
+
+
+def test_without_scikit_learn_it_says_how_to_get_it(record, folder, capsys, monkeypatch):
+    monkeypatch.setattr("compsim.identify.find_spec", lambda name: None)
+    assert cli.main(["identify", record, "--study", "worn", "-r", folder]) == 2
+    assert "needs scikit-learn: pip install 'compsim[learn]'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
