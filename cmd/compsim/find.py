@@ -1,7 +1,5 @@
 """`compsim find`: where a metric first passes a value, or is greatest or least, over a key."""
 
-import dataclasses
-
 import click
 
 from compsim import options, screen
@@ -51,12 +49,13 @@ def find(config, over, folder, jobs, units, as_json, quiet, **asked) -> int:
 
     VALUE of --first is in SI, or has its unit, as 166 kN, or is a factor of the metric at LOW, as
     1.5 * base. CONFIG makes one case once the key is given. The answer of --first is an interval:
-    at its lower end the comparison does not hold, at its upper end it does. Points that their error
-    bars leave open, or whose job failed, stay inside the interval and are named. Later crossings
-    are named as wide as the scan shows them; a narrower --over narrows one down. Of --greatest and
-    --least it is the best point, and the points whose error bars reach its own. Structure that is
-    finer than the scan may be missed. In a chaotic motion a peak stands for its mean over
-    revolutions.
+    at its lower end the comparison does not hold, at its upper end it does. Of --greatest and
+    --least it is the best point. Every point has a row: whether the comparison holds there (yes,
+    no), or how the point compares with the best (best, as good as far as error bars show, worse);
+    what error bars leave open, or whose job failed, is open, and stays inside the interval. A later
+    change from yes to no is as wide as the scan shows it; a narrower --over narrows it down.
+    Structure that is finer than the scan may be missed. In a chaotic motion a peak stands for its
+    mean over revolutions.
 
     Every point is a job of the study CONFIG-find-KEY in the folder of results: it is stored, and
     not run again. --json has all numbers in SI. Exit code 3 if any point's job failed.
@@ -66,21 +65,20 @@ def find(config, over, folder, jobs, units, as_json, quiet, **asked) -> int:
     if len(given) != 1:
         raise click.UsageError("give one of --first, --greatest and --least")
     from compressor.studies.search.find import find as search
-    from compressor.studies.search.question import Question
-    from compressor.studies.search.words import jsonable_answer, list_answer
+    from compressor.studies.search.find import jsonable_answer, list_answer
+    from compressor.studies.search.question import read_question
     from compressor.sweep import cores
 
     ((kind, goal),) = given
-    question = Question.written(config, over, goal, kind, **asked)
+    question = read_question(config, over, goal, kind, **asked)
     study = question.checked()
     if not quiet:
         screen.caution([study])
     with ProgressReporter(quiet, "points") as progress:
-        answer = search(question, folder, jobs or cores(), progress)
-    if answer.base:
-        question = dataclasses.replace(question, goal=question.goal.beside(answer.base))
+        question, answer = search(question, folder, jobs or cores(), progress)
     if as_json:
         screen.print_json(jsonable_answer(question, answer))
     else:
         screen.print_lines(list_answer(question, answer, folder, units))
-    return screen.SOME_FAILED if answer.failed else screen.DONE
+    failed = any(point.failed for point in answer.points)
+    return screen.SOME_FAILED if failed else screen.DONE

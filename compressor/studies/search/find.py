@@ -8,16 +8,19 @@ scan may be missed.
 
 import math
 import operator
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 from scipy.optimize import minimize_scalar
 
+from compressor.digits import align_columns, by_bar
 from compressor.program import Progress, no_progress
 from compressor.store import Folder, StoreError, read_store
 from compressor.studies.frame import GrowingStudy
 from compressor.studies.search.question import JobReading, Question
+from compressor.units import Units
 
 MAX_POINTS = 200  # that one search may ask for beyond its scan
 place = operator.attrgetter("share")  # of a point
@@ -39,31 +42,17 @@ Holds = Callable[[JobReading], bool | None]
 
 
 @dataclass(frozen=True)
-class Crossing:
-    """Neighbours, of the points that decide a comparison, between which it changes.
-
-    holds: whether it holds at `high`, and so not at `low`, or the other way round.
-    """
-
-    low: Point
-    high: Point
-    holds: bool
-
-
-@dataclass(frozen=True)
 class SearchResult:
     """What a search found.
 
     kind: `found`; `undecided`: found, but points inside the interval cannot be decided; `at_low`:
     the comparison holds from the range's lower end on; `nowhere`: it holds at no point; `unclear`:
     no point surely meets the goal, and some say nothing.
-    low, high: the ends of the interval. Of a comparison: where it does not hold and where it does;
-    low is None where no point below surely fails. Of an extremum: the nearest points that are
+    low, high: the ends of the interval. Of a comparison: where it does not hold and where it first
+    does; low is None where no point below surely fails. Of an extremum: the nearest points that are
     surely worse, None where the range ends before.
     best: of an extremum, the best point; within: the points whose bars reach the best one's.
     blind: points inside the interval that do not decide.
-    crossings: of a comparison, all that the points show, in their order; only the first that makes
-    it hold, between low and high, is narrowed down.
     points: all, by argument; run_now: jobs that were not stored before; study: where they are.
     base: the reading at the range's lower end, where the goal's limit is so many times it.
     """
@@ -74,15 +63,10 @@ class SearchResult:
     best: Point | None = None
     within: tuple[Point, ...] = ()
     blind: tuple[Point, ...] = ()
-    crossings: tuple[Crossing, ...] = ()
     points: tuple[Point, ...] = ()
     run_now: int = 0
     study: str = ""
     base: JobReading | None = None
-
-    @property
-    def failed(self) -> list[Point]:
-        return [point for point in self.points if point.failed]
 
 
 def find_first(
@@ -105,22 +89,18 @@ def find_first(
 def interval(points: Sequence[Point], holds: Holds) -> SearchResult:
     """Return the interval in which a comparison first becomes true, by points in their order."""
     verdicts = [(point, holds(point.reading)) for point in points]
-    decided = [(point, verdict) for point, verdict in verdicts if verdict is not None]
-    crossings = tuple(
-        Crossing(low, high, after)
-        for (low, before), (high, after) in pairwise(decided)
-        if before != after
-    )
     blind = tuple(point for point, verdict in verdicts if verdict is None)
-    high = next((point for point, verdict in decided if verdict), None)
+    high = next((point for point, verdict in verdicts if verdict), None)
     if high is None:
-        kind, low = "unclear" if blind else "nowhere", None
-    else:
-        low = next((one.low for one in crossings if one.high is high), None)
-        left = -math.inf if low is None else low.share
-        blind = tuple(point for point in blind if left < point.share < high.share)
-        kind = "undecided" if blind else "found" if low else "at_low"
-    return SearchResult(kind, low, high, blind=blind, crossings=crossings, points=tuple(points))
+        return SearchResult(
+            "unclear" if blind else "nowhere", None, None, blind=blind, points=tuple(points)
+        )
+    below = [point for point, verdict in verdicts if verdict is False and point.share < high.share]
+    low = below[-1] if below else None
+    left = -math.inf if low is None else low.share
+    blind = tuple(point for point in blind if left < point.share < high.share)
+    kind = "undecided" if blind else "found" if low else "at_low"
+    return SearchResult(kind, low, high, blind=blind, points=tuple(points))
 
 
 def sections(answer: SearchResult, tolerance: float, at_once: int) -> list[float]:
@@ -193,64 +173,111 @@ def bracket_best(known: Iterable[Point], factor: float) -> SearchResult:
     left = -math.inf if low is None else low.share
     right = math.inf if high is None else high.share
     blind = tuple(p for p in points if p.reading.reason and left < p.share < right)
-    return SearchResult("undecided" if blind else "found", low, high, best, tuple(within), blind,
-                        points=tuple(points))  # fmt: skip
+    kind = "undecided" if blind else "found"
+    return SearchResult(kind, low, high, best, tuple(within), blind, tuple(points))
 
 
 def find(
     question: Question, folder: Folder, workers: int = 2, progress: Progress = no_progress
-) -> SearchResult:
-    """Return the answer to a question, by jobs in a folder's store.
+) -> tuple[Question, SearchResult]:
+    """Return a question with its limit in SI, and its answer, by jobs in a folder's store.
 
     Jobs that it holds are not run again. The study is called after the file and the key. It keeps
     the points of earlier questions that are of the same case. Raises QuestionError, CaseFileError,
     StoreError and WorkersFailed.
     """
     question.checked()
-    jobs = SearchJobs(question, folder, workers, progress)
+    study = GrowingStudy(
+        question.path, [question.key], f"-find-{question.key}", folder, question.overrides,
+        workers, progress,
+    )  # fmt: skip
+    study.find_earlier((question.low,))
+
+    def evaluate(shares: Sequence[float]) -> list[Point]:
+        values = [question.argument(share) for share in shares]
+        keys = study.run([(value,) for value in values])
+        store, found = read_store(folder), []
+        for share, value, key in zip(shares, values, keys, strict=True):
+            position = store.position(key)
+            if position is None:
+                if refused := study.refused.get((value,)):
+                    raise refused
+                raise StoreError(folder, f"job {key} is gone", "ask again")
+            end = store.status_at(position)
+            if end.status == "ok":
+                regime = store.rows.bytes_of["regime"][position].decode()
+                reading = question.goal.read(store.rows.number_row(position), regime)
+            else:
+                reading = JobReading(reason=f"the job failed, {end.reason}: {end.detail}")
+            found.append(Point(share, value, reading, key, end.status != "ok"))
+        return found
+
     goal, shares, tolerance = question.goal, question.shares, question.tolerance
     base = None
     if not math.isnan(goal.times):
-        base = jobs(shares)[0].reading
+        base = evaluate(shares)[0].reading
         goal = goal.beside(base)
     if goal.sign in ("greatest", "least"):
-        answer = find_extremum(jobs, goal.sign == "greatest", shares, tolerance)
+        answer = find_extremum(evaluate, goal.sign == "greatest", shares, tolerance)
     else:
-        answer = find_first(jobs, goal.holds, shares, tolerance, workers)
-    return replace(answer, run_now=jobs.study.run_now, study=jobs.study.name, base=base)
+        answer = find_first(evaluate, goal.holds, shares, tolerance, workers)
+    found = replace(answer, run_now=study.run_now, study=study.name, base=base)
+    return replace(question, goal=goal), found
 
 
-class SearchJobs:
-    """Evaluates a question's goal by jobs of one study that grows."""
+# ---- as rows ------------------------------------------------------------------------------------
 
-    def __init__(self, question: Question, folder: Folder, workers: int, progress: Progress):
-        self.question, self.folder = question, folder
-        self.study = GrowingStudy(
-            question.path, [question.key], f"-find-{question.key}", folder, question.overrides,
-            workers, progress,
-        )  # fmt: skip
-        self.study.find_earlier((question.low,))
 
-    def __call__(self, shares: Sequence[float]) -> list[Point]:
-        """Return the points of some shares of the range, each a stored job."""
-        question = self.question
-        arguments = {share: question.argument(share) for share in shares}
-        keys = self.study.run([(value,) for value in arguments.values()])
-        store = read_store(self.folder)
-        found = []
-        for (share, value), key in zip(arguments.items(), keys, strict=True):
-            position = store.position(key)
-            if position is None:
-                if refused := self.study.refused.get((value,)):
-                    raise refused
-                raise StoreError(self.folder, f"job {key} is gone", "ask again")
-            end = store.status_at(position)
-            if end.status != "ok":
-                reading = JobReading(reason=f"the job failed, {end.reason}: {end.detail}")
-            else:
-                reading = question.goal.read(
-                    store.rows.number_row(position),
-                    store.rows.bytes_of["regime"][position].decode(),
-                )
-            found.append(Point(share, value, reading, key, end.status != "ok"))
-        return found
+def list_answer(
+    question: Question, answer: SearchResult, folder: Folder, units: Units | None
+) -> Iterator[str]:
+    """Yield an answer as it is printed: where it lies, and a row for each point.
+
+    Numbers are in the chosen units, or in that of the limit.
+    """
+    goal, (unit, factor) = question.goal, question.goal.unit_shown(units)
+    ends = [f"{one.argument:.9g}" if one else "none" for one in (answer.low, answer.high)]
+    steps = question.scan - 1
+    if question.logarithmic:
+        step = f"a factor {(question.high / question.low) ** (1 / steps):.4g} apart"
+    else:
+        step = f"{(question.high - question.low) / steps:.4g} apart"
+    is_limit = goal.sign not in ("greatest", "least")
+    limit = f" {factor * goal.limit:g} {unit}".rstrip() if is_limit else ""
+    yield f"{goal.name} {goal.sign}{limit}: {answer.kind}"
+    head = {"at": f"{answer.best.argument:.9g}"} if answer.best else {}
+    head["between" if is_limit else "worse from"] = " and ".join(ends)
+    if answer.base:
+        head["base"] = f"{read(answer.base, unit, factor)}, times {goal.times:g}"
+    head["scan"] = f"{question.scan} points {step}: what is finer may be missed"
+    head["jobs"] = f"{len(answer.points)}, {answer.run_now} of them run now, in study "
+    head["jobs"] += f"{answer.study} of {folder}"
+    yield from align_columns(head.items())
+    title = f"{goal.metric} ({unit})" if unit else goal.metric
+    rows = [(question.key, title, "", "job")]
+    for point in answer.points:
+        text = point.reading.reason or read(point.reading, "", factor)
+        rows.append((f"{point.argument:.9g}", text, verdict(goal, answer, point), point.key[:8]))
+    yield from align_columns(rows, ">")
+
+
+def verdict(goal: Any, answer: SearchResult, point: Point) -> str:
+    """Return what a point says to the question, in a word."""
+    if answer.best is not None:
+        within = "as good" if point in answer.within else "worse"
+        return "best" if point is answer.best else "open" if point.reading.reason else within
+    holds = goal.holds(point.reading)
+    return "failed" if point.failed else "open" if holds is None else "yes" if holds else "no"
+
+
+def read(reading: JobReading, unit: str, factor: float) -> str:
+    """Return a job's number with its error bar in a unit."""
+    bar = factor * reading.bar if reading.barred else math.nan
+    text = f"{by_bar(factor * reading.value, bar, False)} {unit}".rstrip()
+    text += " (mean over revolutions: chaotic)" if reading.averaged else ""
+    return text if reading.barred else f"{text} (no error bar was made)"
+
+
+def jsonable_answer(question: Question, answer: SearchResult) -> dict[str, Any]:
+    """Return a question and its answer as JSON says them."""
+    return asdict(question) | {"unit": question.goal.unit} | asdict(answer)

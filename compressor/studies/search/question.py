@@ -7,9 +7,7 @@ it: a number with its error bar, or why it says nothing.
 import math
 import operator
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +26,6 @@ WORDS = {
     "joint": JOINTS, "axis": AXES, "threshold": THRESHOLDS,
     "segment": tuple(f"{degrees:g}" for degrees in SEGMENTS),
 }  # fmt: skip
-GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
 
 
 class QuestionError(CompsimError, ValueError):
@@ -70,16 +67,6 @@ class Goal:
     slack: float = 0.0
     limit_unit: str = ""
 
-    def beside(self, base: JobReading) -> "Goal":
-        """Return the goal with its limit, from the reading at the range's lower end.
-
-        Raises QuestionError where that says nothing.
-        """
-        if base.reason:
-            raise QuestionError(f"base, {self.name} at the range's lower end: {base.reason}")
-        slack = abs(self.times) * base.bar
-        return replace(self, limit=self.times * base.value, slack=slack)
-
     @property
     def name(self) -> str:
         return ".".join((self.metric, *self.place))
@@ -88,6 +75,15 @@ class Goal:
     def unit(self) -> str:
         """Return the SI unit, "" for a share or a count."""
         return "" if BARRED[self.metric].unit == "1" else BARRED[self.metric].unit
+
+    def beside(self, base: JobReading) -> "Goal":
+        """Return the goal with its limit, from the reading at the range's lower end.
+
+        Raises QuestionError where that says nothing.
+        """
+        if base.reason:
+            raise QuestionError(f"base, {self.name} at the range's lower end: {base.reason}")
+        return replace(self, limit=self.times * base.value, slack=abs(self.times) * base.bar)
 
     def unit_shown(self, units: Units | None) -> tuple[str, float]:
         """Return the unit in which numbers are shown, and the factor to it from SI.
@@ -99,34 +95,27 @@ class Goal:
         return unit_in(self.unit, units or "si")
 
     def holds(self, reading: JobReading) -> bool | None:
-        """Return whether the comparison holds.
-
-        None where the error bar does not decide.
-        """
-        compare = SIGNS[self.sign]
+        """Return whether the comparison holds; None where the error bar does not decide."""
+        reach = reading.bar + self.slack
         ends = {
-            bool(compare(reading.value + side * (reading.bar + self.slack), self.limit))
-            for side in (-1.0, 1.0)
+            bool(SIGNS[self.sign](reading.value + side * reach, self.limit)) for side in (-1.0, 1.0)
         }
         return ends.pop() if not reading.reason and len(ends) == 1 else None
 
     def read(self, numbers: np.void, regime: str) -> JobReading:
         """Return the reading of the goal from the numbers (dtype ROW) of a job that is ok.
 
-        regime: that the job moves in.
-
-        A single peak of a chaotic motion has no meaning: the mean over revolutions of each one's
-        counts, with the 95 % interval that its standard error and Student's t give. The bars of
-        other metrics of a chaotic motion are such intervals already.
+        A single peak of a chaotic motion (`regime`) has no meaning: the mean over revolutions of
+        each one's counts, with the 95 % interval that its standard error and Student's t give. The
+        bars of other metrics of a chaotic motion are such intervals already.
         """
-        averaged = regime == "chaotic" and f"{self.metric}_mean" in NUMBERS
+        mean = f"{self.metric}_mean"
+        averaged = regime == "chaotic" and mean in NUMBERS
+        value = self._at(numbers, mean if averaged else self.metric)
         if averaged:
-            mean = f"{self.metric}_mean"
-            value = self._at(numbers, mean)
             error = np.array(self._at(numbers, f"{mean}_standard_error"))
             bar = float(average_bar(error, int(numbers["revolutions"])))
         else:
-            value = self._at(numbers, self.metric)
             bar = self._at(numbers, f"{self.metric}_error")
         if math.isnan(value):
             return JobReading(reason=f"the job has no {self.metric}")
@@ -199,23 +188,6 @@ class Question:
     scan: int = 9
     overrides: tuple[str, ...] = ()
 
-    @classmethod
-    def written(
-        cls, path: str, over: str, goal: str, which: str = "first", **more: Any
-    ) -> "Question":
-        """Return the question that texts ask.
-
-        over: KEY=LOW:HIGH; goal: a comparison, or with `which` greatest or least a metric; more:
-        other fields. Raises QuestionError.
-        """
-        parts = OVER.fullmatch(over)
-        ends = [_number(text) for text in parts.groups()[1:]] if parts else [math.nan]
-        if parts is None or any(map(math.isnan, ends)):
-            raise QuestionError(f"{over!r} is no range: write KEY=LOW:HIGH, such as "
-                                "clearance_mm=0.01:0.3")  # fmt: skip
-        question_goal = comparison(goal) if which == "first" else goal_of(goal, which)
-        return cls(path, parts[1], ends[0], ends[1], question_goal, **more)
-
     @property
     def shares(self) -> list[float]:
         """Return the shares of the range at which to look first: 0 to 1, evenly."""
@@ -244,9 +216,7 @@ class Question:
         row = row_of(self.key)
         if row is not None and row.kind != "number":
             raise QuestionError(f"{self.key} cannot be searched over: it is no continuous number")
-        ends = []
-        for value in (self.low, self.high):
-            ends.append(self._load(f"{self.key}={value!r}"))
+        ends = [self._load(f"{value!r}") for value in (self.low, self.high)]
         if row is None:
             raise QuestionError(f"{self.key} is no single number")
         if ends[0].jobs > 1:
@@ -255,16 +225,30 @@ class Question:
                                 f"sweeps {axes}: choose one case by --set")  # fmt: skip
         if ends[0].keys == ends[1].keys:
             raise QuestionError(f"{self.key} changes nothing in the case of {self.path}")
-        return self.study([self.argument(share) for share in self.shares])
+        return self._load(f"[{', '.join(repr(self.argument(share)) for share in self.shares)}]")
 
-    def study(self, values: Sequence[float]) -> Study:
-        """Return the study of some values of the key, its one axis."""
-        return self._load(f"{self.key}=[{', '.join(map(repr, values))}]")
-
-    def _load(self, setting: str) -> Study:
-        """Return the study of the file with one more key set."""
-        (study,) = load_studies(self.path, overrides=[*self.overrides, setting])
+    def _load(self, value: str) -> Study:
+        """Return the study of the file with the key set, too."""
+        (study,) = load_studies(self.path, overrides=[*self.overrides, f"{self.key}={value}"])
         return study
+
+
+def read_question(
+    path: str, over: str, goal: str, which: str = "first", **more: object
+) -> Question:
+    """Return the question that texts ask.
+
+    over: KEY=LOW:HIGH; goal: a comparison, or with `which` greatest or least a metric; more: other
+    fields. Raises QuestionError.
+    """
+    parts = OVER.fullmatch(over)
+    ends = [_number(text) for text in parts.groups()[1:]] if parts else [math.nan]
+    if parts is None or any(map(math.isnan, ends)):
+        raise QuestionError(
+            f"{over!r} is no range: write KEY=LOW:HIGH, such as clearance_mm=0.01:0.3"
+        )
+    sought = comparison(goal) if which == "first" else goal_of(goal, which)
+    return Question(path, parts[1], ends[0], ends[1], sought, **more)  # type: ignore[arg-type]
 
 
 def _number(text: str) -> float:
