@@ -39,16 +39,22 @@ def compare(record, names, folder, hints, output, as_json, quiet) -> int:
     distance     of the spectra in third octaves, scaled to one level, in dB
 
     A number's error, behind +-, is the standard error by the record's revolutions; it needs at
-    least three. What does not fit (speed, sampling rate, length, unit, crank angle) is said below
-    the table; a file does not say where its sensor was.
+    least three. A unit that was perhaps mistaken is named. A file does not say where its sensor
+    was; --json has the jobs' places, and by how many degrees the record comes later where it is
+    most alike.
     """
     kind = os.path.splitext(output or "")[1]
     if output and kind not in KINDS:
         raise click.UsageError(f"-o {output}: end the name in {', '.join(KINDS)}")
     from compressor.store import writable_folder
-    from compressor.studies.compare.comparison import compare_record
-    from compressor.studies.compare.figures import caption, draw_comparison, write_figure
-    from compressor.studies.compare.words import jsonable_comparison, list_comparison
+    from compressor.studies.compare.comparison import (
+        CAPTION,
+        compare_record,
+        draw_comparison,
+        jsonable_comparison,
+        list_comparison,
+        write_figure,
+    )
 
     if output:
         writable_folder(os.path.dirname(output) or os.curdir, make=False)
@@ -60,5 +66,5 @@ def compare(record, names, folder, hints, output, as_json, quiet) -> int:
         screen.print_text(*list_comparison(found))
     if output:
         write_figure(draw_comparison(found), output, kind)
-        screen.say(output) if as_json else screen.print_text(output, f"  {caption(found)}")
+        screen.say(output) if as_json else screen.print_text(output, f"  {CAPTION}")
     return screen.DONE

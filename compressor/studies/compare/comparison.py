@@ -1,28 +1,44 @@
-"""Compare a record with stored jobs: their numbers, and what does not fit."""
+"""Compare a record with stored jobs: their numbers, as rows and as a figure."""
 
 import contextlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from compressor.cases import Case, points
+from compressor.digits import align_columns, plural
 from compressor.program import CompsimError, Progress, no_progress
+from compressor.report import (
+    BLACK,
+    CYCLE,
+    GREY,
+    Drawing,
+    LineStyle,
+    as_csv,
+    fill,
+    make_grid,
+    render,
+)
 from compressor.store import (
     Folder,
     find_record,
     find_study,
     job_record,
+    publish,
     read_store,
     read_studies,
     report_job,
 )
 from compressor.studies.compare.likeness import (
+    SEGMENTS,
     SWING,
     Curves,
     Likeness,
+    Measured,
     compare_lines,
     curves,
     share_inside,
@@ -31,16 +47,24 @@ from compressor.studies.frame import Revolutions, by_revolutions
 from compressor.vibration import RecordError
 
 UNSAID = {"joint", "clearance_mm", "sensor"}  # swept groups that are told otherwise, or not
-SAME_SPEED = 0.01  # share by which speeds may differ, beyond which forces do by 2 %
-SAME_RATE = 1e-3  # share by which sampling rates may differ: an order of a thousand stays
-FEW = 5  # revolutions, below which the mean revolution is noisy
-MIN_SHIFT, MIN_GAIN = 2.0, 0.1  # degrees and correlation from which a shift is named
-FAR = 3.0  # ratio of rms beyond which the level is named
 NEAR = 0.25  # share by which a ratio may differ from one between two units
 MISTAKES = {  # ratio of rms -> what was probably mistaken
     9.80665: "m/s2 were perhaps read as g", 1 / 9.80665: "g were perhaps read as m/s2",
     1000.0: "mm/s2 were perhaps read as m/s2", 1e-3: "m/s2 were perhaps read as mm/s2",
 }  # fmt: skip
+NUMBERS = {  # of a likeness -> title of its column
+    "difference": "difference, dB", "correlation": "correlation", "envelope": "envelope",
+    "rms_ratio": "rms ratio", "spectral_distance": "distance, dB",
+}  # fmt: skip
+MAX_LISTED = 20  # jobs
+MAX_DRAWN = 3  # jobs with a line of their own; the others are in the range alone
+KEY_DIGITS = 10
+RECORD = LineStyle(BLACK, linewidth=1.3, zorder=3.0)
+CAPTION = (
+    "The record (black) beside the jobs most alike: (a) mean revolution; (b) peak and, paler, rms "
+    "of each 10 degrees, on average over revolutions; (c) rms of the orders; (d) envelope above "
+    f"order {SWING}, in the range of all jobs."
+)
 
 
 class CompareError(CompsimError):
@@ -53,15 +77,14 @@ class CompareError(CompsimError):
 class Compared:
     """A job beside the record.
 
-    what: its joint, clearance and swept values, in words; rpm, rate: of its record, rate in Hz;
-    sensor: where it sits and what it measures along, in words; orders: the highest order that both
-    hold, up to which they are compared.
+    what: its joint, clearance and swept values, in words; rpm: of its record; sensor: where it sits
+    and what it measures along, in words; orders: the highest order that both hold, up to which they
+    are compared.
     """
 
     key: str
     what: str
     rpm: float
-    rate: float
     sensor: str
     orders: int
     likeness: Likeness
@@ -72,14 +95,12 @@ class Compared:
 class Comparison:
     """A record beside jobs, the most alike first.
 
-    remarks: how a file was read; key: of a record that is a stored job's, else ""; orders: the
-    highest that the record holds; left_out: jobs without a record that can be used; inside: share
-    of crank angle at which the record's envelope lies in the range of the jobs', nan of a single
-    job; misfits: sentences on what does not fit.
+    remarks: how a file was read, and which unit it was perhaps written in; orders: the highest that
+    the record holds; left_out: jobs without a record that can be used; inside: share of crank angle
+    at which the record's envelope lies in the range of the jobs', nan of a single job.
     """
 
     name: str
-    key: str
     remarks: tuple[str, ...]
     turned: Revolutions
     curves: Curves
@@ -87,7 +108,6 @@ class Comparison:
     jobs: tuple[Compared, ...]
     left_out: int
     inside: float
-    misfits: tuple[str, ...]
 
 
 def compare_record(
@@ -105,17 +125,27 @@ def compare_record(
     """
     key, record = find_record(name, folder, hints)
     mine = by_revolutions(record)
-    _check_orders(mine.highest, name)
+    check_orders(mine.highest, name)
     own = {mine.highest: curves(mine.lines(mine.highest))}  # by the highest order
     stored = read_store(folder).warned()
-    wanted = dict(_wanted_jobs(words, folder, key))
+    wanted = dict(wanted_jobs(words, folder, key))
     jobs = []
     for number, (one, swept) in enumerate(wanted.items()):
         progress(number, len(wanted), "")
         other, case = job_record(stored, one), stored.case_at(int(stored.rows.find([one])[0]))
-        if other is not None and case is not None and case.sensor:
-            with contextlib.suppress(RecordError):  # too short, or all zero
-                jobs.append(_compare_job(mine, own, by_revolutions(other), one, case, swept))
+        if other is None or case is None or not case.sensor:
+            continue
+        with contextlib.suppress(RecordError):  # too short, or all zero
+            theirs = by_revolutions(other)
+            orders = min(mine.highest, theirs.highest)
+            check_orders(orders, f"job {one}")
+            lines, others = mine.lines(orders), theirs.lines(orders)
+            own[orders] = own.get(orders) or curves(lines)
+            drawn = curves(others)
+            place = f"{case.sensor.place} along {case.sensor.direction}"
+            likeness = compare_lines(lines, others, own[orders], drawn)
+            what = describe_job(case, swept)
+            jobs.append(Compared(one, what, theirs.rpm, place, orders, likeness, drawn))
     if not jobs:
         text = f"none of the {len(wanted)} jobs has a sensor's record of two revolutions"
         raise CompareError(f"{text}: run them with body: true, sensor: true and series kept")
@@ -123,38 +153,16 @@ def compare_record(
     curve = own[mine.highest]
     several = np.array([job.curves.envelope for job in jobs])
     inside = share_inside(curve.envelope, several) if len(jobs) > 1 else math.nan
+    ratio = jobs[0].likeness.rms_ratio.value
+    unit = [f"the rms is {ratio:.3g} times the job's: {text}; check --unit"
+            for size, text in MISTAKES.items() if abs(ratio / size - 1.0) <= NEAR]  # fmt: skip
     return Comparison(
-        name, key, record.remarks, mine, curve, mine.highest, tuple(jobs),
+        name, (*record.remarks, *unit), mine, curve, mine.highest, tuple(jobs),
         len(wanted) - len(jobs), inside,
-        tuple(find_misfits(mine, jobs, is_file=not key)),
     )  # fmt: skip
 
 
-def _compare_job(
-    mine: Revolutions,
-    own: dict[int, Curves],
-    turned: Revolutions,
-    key: str,
-    case: Case,
-    swept: Mapping[str, Any],
-) -> Compared:
-    """Return a job beside the record.
-
-    own: the record's curves by the highest order; swept: values of its study, by key.
-    """
-    orders = min(mine.highest, turned.highest)
-    _check_orders(orders, f"job {key}")
-    lines, others = mine.lines(orders), turned.lines(orders)
-    if orders not in own:
-        own[orders] = curves(lines)
-    drawn = curves(others)
-    likeness = compare_lines(lines, others, own[orders], drawn)
-    place = f"{case.sensor.place} along {case.sensor.direction}" if case.sensor else ""
-    what = describe_job(case, swept)
-    return Compared(key, what, turned.rpm, turned.rate, place, orders, likeness, drawn)
-
-
-def _check_orders(orders: int, what: str) -> None:
+def check_orders(orders: int, what: str) -> None:
     """Raise CompareError where a sampling rate holds too few orders."""
     if orders <= SWING:
         text = f"{what}: the sampling rate holds the orders up to {orders} alone"
@@ -169,7 +177,7 @@ def describe_job(case: Case, swept: Mapping[str, Any]) -> str:
     return ", ".join([*words, *(f"{key} {value}" for key, value in others.items())])
 
 
-def _wanted_jobs(
+def wanted_jobs(
     words: Sequence[str], folder: Folder, own: str
 ) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield keys and swept values of the jobs that words name, of studies without the own one."""
@@ -183,37 +191,94 @@ def _wanted_jobs(
             yield report_job(folder, word).key, {}
 
 
-def find_misfits(record: Revolutions, jobs: Sequence[Compared], is_file: bool) -> Iterator[str]:
-    """Yield a sentence for what does not fit between a record and jobs, the most alike first."""
-    best = jobs[0]
-    likeness = best.likeness
-    if abs(record.rpm / best.rpm - 1.0) > SAME_SPEED:
-        more = (record.rpm / best.rpm) ** 2
-        yield (
-            f"speed: {record.rpm:.4g} rpm, and the job has {best.rpm:.4g}: forces of inertia "
-            f"are {more:.3g} times as large; run it at machine.speed_rpm: {record.rpm:.4g}"
-        )
-    if abs(record.rate / best.rate - 1.0) > SAME_RATE:
-        yield (f"sampling rate: {record.rate:.6g} Hz, and the job has {best.rate:.6g}: what only "
-               "the faster one holds is left out")  # fmt: skip
-    if len(record.values) < FEW:
-        yield (f"length: {len(record.values)} revolutions: noise falls by their root alone; "
-               f"record {FEW} or more")  # fmt: skip
-    ratio = likeness.rms_ratio.value
-    meant = [text for size, text in MISTAKES.items() if abs(ratio / size - 1.0) <= NEAR]
-    if meant:
-        yield f"unit: the rms is {ratio:.3g} times the job's: {meant[0]}; check --unit"
-    elif not 1.0 / FAR <= ratio <= FAR:
-        yield (f"level: the rms is {ratio:.3g} times the job's: check unit and full scale, then "
-               "masses, foundation and the sensor's place")  # fmt: skip
-    gain = likeness.shifted - likeness.correlation.value
-    if abs(likeness.shift_deg) >= MIN_SHIFT and gain >= MIN_GAIN:
-        yield (
-            f"crank angle: most alike ({likeness.shifted:.2f}) where the record comes "
-            f"{likeness.shift_deg:+.1f} degrees later: a hint to check the tacho (--tacho-deg), "
-            "no measurement of its angle"
-        )
-    if is_file:
-        places = " or ".join(dict.fromkeys(job.sensor for job in jobs))
-        yield (f"place: the jobs' sensor is at the {places}; a file does not say where its sensor "
-               "was")  # fmt: skip
+# ---- as rows ------------------------------------------------------------------------------------
+
+
+def list_comparison(found: Comparison) -> Iterator[str]:
+    """Yield the record and the table of jobs."""
+    mine, more = found.turned, len(found.jobs) - MAX_LISTED
+    rms = (found.curves.spectrum**2).sum() ** 0.5
+    turns = f"{plural(len(mine.values), 'revolution')} at {mine.rpm:.4g} rpm, {mine.rate:.6g} Hz"
+    yield f"{found.name}: {turns}, {rms:.4g} m/s2 rms up to order {found.orders}"
+    yield from (f"read: {text}" for text in found.remarks)
+    rows = [("job", "what it is", "rpm", *NUMBERS.values())]
+    for job in found.jobs[:MAX_LISTED]:
+        numbers = (format_number(getattr(job.likeness, name)) for name in NUMBERS)
+        rows.append((job.key[:KEY_DIGITS], job.what, f"{job.rpm:.4g}", *numbers))
+    yield from align_columns(rows, "<<>>>>>>")
+    if more > 0:
+        yield f"and {more} less alike, which --json lists"
+    if found.left_out:
+        yield f"left out: {plural(found.left_out)} without a sensor's record of two revolutions"
+    if not math.isnan(found.inside):
+        share = f"{found.inside:.0%} of crank angles"
+        yield f"envelope: inside the range of the {len(found.jobs)} jobs at {share}"
+
+
+def format_number(found: Measured) -> str:
+    """Return a number with its standard error, where it has one."""
+    return f"{found.value:.3f}" + ("" if math.isnan(found.error) else f" +- {found.error:.2g}")
+
+
+def jsonable_comparison(found: Comparison) -> dict[str, Any]:
+    """Return a comparison as JSON says it, with peak and rms over a revolution."""
+
+    def levels(one: Comparison | Compared) -> dict[str, list[float]]:
+        peak, rms = one.curves.peak.tolist(), one.curves.rms.tolist()
+        return {"peak_m_per_s2": peak, "rms_m_per_s2": rms}
+
+    mine, named = found.turned, ("key", "what", "rpm", "orders", "sensor")
+    return {
+        "record": found.name, "revolutions": len(mine.values), "rpm": mine.rpm,
+        "rate_Hz": mine.rate, "orders": found.orders, "left_out": found.left_out,
+        "remarks": found.remarks, "envelope_inside": found.inside, **levels(found),
+        "jobs": [{name: getattr(job, name) for name in named} | asdict(job.likeness) | levels(job)
+                 for job in found.jobs],
+    }  # fmt: skip
+
+
+# ---- the figure ---------------------------------------------------------------------------------
+
+
+def draw_comparison(found: Comparison) -> Drawing:
+    """Return the four panels of a comparison, the record's curves in black."""
+    figure, grid = make_grid(2, 2, 7.4)
+    shown = [(found.name, found.curves, RECORD), *(
+        (f"{job.key[:KEY_DIGITS]}: {job.what}", job.curves, line)
+        for job, line in zip(found.jobs[:MAX_DRAWN], CYCLE, strict=False)
+    )]  # fmt: skip
+    (mean, segments), (orders, envelope) = grid
+    degrees = np.arange(360) + 0.5
+    if len(found.jobs) > 1:
+        several = np.array([job.curves.envelope for job in found.jobs])
+        around = np.concatenate([degrees, degrees[::-1]])
+        edge = np.concatenate([several.min(axis=0), several.max(axis=0)[::-1]])
+        envelope.plot(around, edge, fill(GREY, 0.5), f"range of {len(several)} jobs", kind="band")
+    steps = np.repeat(np.arange(SEGMENTS + 1) * (360.0 / SEGMENTS), 2)[1:-1]
+    for name, one, line in shown:
+        mean.plot(one.angle, one.mean, line, name)
+        segments.plot(steps, np.repeat(one.peak, 2), line, name)
+        segments.plot(steps, np.repeat(one.rms, 2), replace(line, alpha=0.45), f"{name}, rms")
+        orders.plot(np.arange(1, one.spectrum.size + 1), one.spectrum, line, name)
+        envelope.plot(degrees, one.envelope, line, name)
+    figure.legend = mean.traces
+    for panel in (mean, segments, envelope):
+        panel.x.title, panel.x.ticks = "crank angle (deg)", range(0, 361, 60)
+        panel.x.span(0.0, 360.0)
+    mean.y.title = "mean revolution (m/s²)"
+    segments.y.title = "peak and rms of 10° segments (m/s²)"
+    orders.x.title, orders.y.title = "order of the speed", "rms of an order (m/s²)"
+    orders.x.log = orders.y.log = True
+    orders.x.span(1.0, found.orders)
+    envelope.y.title = f"envelope above order {SWING} (m/s²)"
+    for panel in (segments, envelope):
+        panel.y.span(low=0.0)
+    for panel, letter in zip(grid.flat, "abcd", strict=True):
+        panel.title = f"({letter})"
+    return figure
+
+
+def write_figure(drawing: Drawing, output: str, kind: str) -> None:
+    """Write a figure as a picture, or its numbers as CSV."""
+    data = as_csv(drawing).encode() if kind == ".csv" else render(drawing, kind[1:])
+    publish(Path(output), data)
