@@ -93,7 +93,7 @@ peers: install  ## time other tools and ours in turn on one problem (about six m
 	$(CAMPAIGN)/measure_peers.py tests/results/peers.json
 	$(CAMPAIGN)/measure_validation.py tests/results/validation.json
 
-tradeoff: install  ## measure speed against accuracy, and what the model's features do (5 minutes)
+tradeoff: install  ## measure speed against accuracy, and what the model's features do (ten minutes)
 	$(CAMPAIGN)/measure_tradeoff.py tests/results/tradeoff.json
 
 ladders: install  ## measure error against tolerance, and the limit of no clearance (a minute)
@@ -155,6 +155,6 @@ lock:  ## write the versions that a fresh environment for tests and site gets: .
 	    echo "# pip install -c .ci/requirements.lock -e '.[dev,docs]'"; \
 	    "$$place/bin/python" -m pip --disable-pip-version-check freeze --exclude-editable; } > .ci/requirements.lock
 
-clean:  ## remove results, report, claims, tradeoff, stress, alarms, site, dist and caches; .venv stays
-	rm -rf results report claims tradeoff stress alarms site dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+clean:  ## remove results, report, claims, stress, alarms, site, dist and caches; .venv stays
+	rm -rf results report claims stress alarms site dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

@@ -89,7 +89,7 @@ import doctest
 import json
 import compressor
 from compressor.cases import optional_groups
-from compressor.studies.tradeoff.features import FEATURES
+from compressor.studies.tradeoff.variants import FEATURES, change
 
 solve = {"duration_rev": 0.03, "settle_rev": 0, "accuracy": "draft", "error_bars": False}
 usual = {"solve": solve, "output": {"signals": True}}
@@ -98,8 +98,8 @@ worn = {"joint": "big_end", "clearance_mm": 0.2}
 cases = [compressor.Case.from_values(usual | values)
          for values in ({}, damper, worn, worn | damper)]
 (row,) = (row for row in FEATURES if row.key == "damper")
-assert row.remove(cases[1]) == cases[0]
-assert row.add(cases[0]) == compressor.Case.from_values(usual | {"damper": True})
+assert change(cases[1], row.left_out) == cases[0]
+assert change(cases[0], row.given) == compressor.Case.from_values(usual | {"damper": True})
 assert doctest.testmod(optional_groups).failed == 0
 names = ("velocity", "acceleration", "shaking_force", "crank_work", "contact_damping_loss",
          "energy_residual", "status")
@@ -125,8 +125,8 @@ def test_the_page_on_features_is_right(tmp_path):
         ("compressor/solve/si_record.py", (indented(value), "    if rod:\n", False)),
         ("compressor/physics/mechanism.py", (function + "\n\n", "class BodyRow(", False),
          (indented(call), "    ideal_v = motion.v", False)),
-        ("compressor/studies/tradeoff/features.py",
-         (indented(row), '    group_feature("elastic rod"', False)),
+        ("compressor/studies/tradeoff/variants.py",
+         (indented(row), '    Feature("elastic rod"', False)),
         (tests, (indented(usual), "NUMBERS = {\n", True),
          ("crosshead_damping=0.0, ", "joint, features, values, rod_damping=0.0, ", True),
          ("crosshead_damping=0.0, ", "joint, (), values, crank_inertia=0.0, ", True)),

@@ -16,7 +16,6 @@ import page_tables
 import pytest
 import tutorial
 from compsim.cli import VERBS, cli
-from measure_tradeoff import fingerprint
 
 from compressor.cases.checks import DOUBLES, stands_for
 from compressor.cases.examples import example
@@ -143,15 +142,6 @@ def test_rows_of_a_table_have_as_many_cells_as_its_head(page):
         cells = found
 
 
-def test_the_trade_was_measured_with_these_numerics():
-    """The work of a few fixed runs: as measured, to what makes no difference in the table."""
-    kept, now = page_tables.kept("tradeoff.json")["fingerprint"], fingerprint()
-    assert now["rtol"] == kept["rtol"], "stale: run make tradeoff and make pages"
-    assert now["evaluations"] == pytest.approx(kept["evaluations"], rel=0.03), (
-        "stale: the numerics have changed; run make tradeoff and make pages"
-    )
-
-
 @pytest.mark.parametrize("verb", sorted(set(re.findall(r"(?:`|^)make ([a-z-]+)", TEXT, re.M))))
 def test_make_verbs_exist(verb):
     assert re.search(rf"^{verb}:", MAKEFILE, re.MULTILINE), f"make {verb}"
@@ -242,7 +232,7 @@ def test_what_features_cost_is_what_was_measured():
     for words, changes in (
         ("an elastic rod", ("elastic rod",)),
         ("oil, a guide with play or friction, friction of ideal joints, a soft drive",
-         ("oil film", "50 µm of play in the guide", "friction of the guide",
+         ("oil film", "play of the guide", "friction of the guide",
           "friction of ideal joints", "speed that gives way")),
     ):  # fmt: skip
         low, high = map(float, re.search(rf"\| {words} \| (\d+) to (\d+) \|", page).groups())

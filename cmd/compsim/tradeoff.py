@@ -1,4 +1,4 @@
-"""`compsim tradeoff`: speed against accuracy, and what features of the model do."""
+"""`compsim tradeoff`: speed against accuracy, by method and tolerance."""
 
 from pathlib import Path
 
@@ -9,50 +9,45 @@ from compsim.progress import ProgressReporter
 
 
 @click.command()
-@click.argument("configs", nargs=-1, metavar="[CONFIG...]", type=options.FILE)
-@options.output("Write the study into this folder.", default="tradeoff")
+@options.configs
+@options.results
 @click.option(
-    "--repeats", type=options.COUNT, default=3, help="Time all points so often; the best counts."
-)
-@click.option(
-    "--budget",
-    type=click.FloatRange(min=0, min_open=True),
-    default=4.0,
-    help="Allow one point so many seconds.",
+    "-j", "--jobs", type=options.COUNT, default=1, help="Run so many at once, if times may be off."
 )
 @options.set_keys
 @options.quiet
-def tradeoff(configs, output, repeats, budget, overrides, quiet) -> int:
-    """Measure speed against accuracy, and what model features do.
+def tradeoff(configs, folder, jobs, overrides, quiet) -> int:
+    """Measure speed against accuracy, by method and tolerance.
 
     \b
-    compsim tradeoff machine.yaml --repeats 1 --budget 1
+    compsim tradeoff machine.yaml
+    compsim tradeoff machine.yaml --set 'solve.method=[auto, RODAS]'
 
-    Every job of the case files, or the paper's three faults at 0.2 mm where there is none (some
-    five minutes), by every method at every tolerance. Writes tradeoff.nc and modelling.nc, which
-    xarray and h5py read, and the figure tradeoff.png and tradeoff.svg; the fastest methods and
-    the effects of the features go to stdout.
+    Every job of the case files by every solve.method at each of some solve.rtol: a study that is
+    stored as any other, which takes minutes; --set gives other lists, and solve.timeout_s, the
+    seconds of a job, 4 without. Errors are those against the tightest job of another method. The
+    fastest method for each error goes to stdout, numbers and figure into tradeoff/ of the folder.
     """
-    if overrides and not configs:
-        raise click.UsageError("--set changes case files: name one, such as configs/both.yaml")
-    from compressor.store import writable_folder, write_dataset
-    from compressor.studies.tradeoff import work_precision as methods
-    from compressor.studies.tradeoff.figures import write_methods
-    from compressor.studies.tradeoff.model_choices import trade as feature_trade
-    from compressor.studies.tradeoff.words import list_fastest, list_trade
+    from compressor.report import render
+    from compressor.store import publish, write_dataset
+    from compressor.studies.tradeoff.work_precision import (
+        draw_work_precision,
+        list_fastest,
+        load_methods,
+        work_precision,
+    )
+    from compressor.sweep import Options, sweep
 
-    cases = methods.cases_of_files(configs, overrides) if configs else methods.default_cases()
-    folder = Path(output)
-    writable_folder(folder)  # minutes before it is needed
-    with ProgressReporter(quiet, "points") as progress:
-        study = methods.work_precision(cases, repeats=repeats, budget=budget, progress=progress)
-        write_methods(folder, study)
-    with ProgressReporter(quiet, "changes of the model") as progress:
-        trade = feature_trade(cases, repeats=repeats, progress=progress)
-    write_dataset(folder / "modelling.nc", trade)
-    screen.print_lines([*list_fastest(study), "", *list_trade(trade)])
-    if not quiet:
-        for name in ("tradeoff.png", "tradeoff.nc", "modelling.nc"):
-            screen.say(str(folder / name))
-        screen.say("next: compsim explain --models CONFIG does the same for a case, in seconds")
+    for config in configs:
+        study, texts = load_methods(config, overrides, folder)
+        with ProgressReporter(quiet, folder=folder) as progress:
+            command = " ".join(["compsim tradeoff", config, "-r", folder])
+            sweep([study], folder, jobs, progress, Options(command, texts))
+        found = work_precision(folder, study)
+        screen.print_text(*list_fastest(found))
+        path = Path(folder, "tradeoff", study.name)
+        write_dataset(path.with_suffix(".nc"), found)
+        for kind in ("png", "svg"):
+            publish(path.with_suffix(f".{kind}"), render(draw_work_precision(found), kind))
+        screen.print_text(*(f"{path}.{kind}" for kind in ("png", "svg", "nc")))
     return screen.DONE

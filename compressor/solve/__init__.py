@@ -16,7 +16,6 @@ from compressor.solve.run_metrics import (
     statistics,
     sure,
 )
-from compressor.solve.scipy_driver import LOCAL
 from compressor.solve.search import (
     find_repetition,
     least_promise,

@@ -21,7 +21,7 @@ from measure_accuracy import provenance
 import compressor
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
-from compressor.studies.tradeoff.model_choices import Choice, vary_numbers
+from compressor.studies.tradeoff.variants import Variant, vary_numbers
 
 CLEARANCE = 0.2  # mm
 LAST_SHARES = (0.05, 0.01)  # beside the default, which is that of the file
@@ -95,11 +95,11 @@ def decided():
 def machines(study, job):
     """A job as it is, with each deciding number at both ends, and on each foundation."""
     case, key = study.cases[job], "body.frequency_x_Hz"
-    yield Choice("", case)
+    yield Variant("", case)
     yield from (one for one in vary_numbers(study, job) if one.varied in DECIDING)
     for frequency in FOUNDATIONS:
         body = replace(case.body, frequency_x_Hz=frequency)
-        yield Choice(f"{key} {frequency:g}", replace(case, body=body), varied=key)
+        yield Variant(f"{key} {frequency:g}", replace(case, body=body), varied=key)
 
 
 def plain(value):

@@ -1,22 +1,19 @@
 """What a case models: its terms, its natural scales, its cost, and features without effect.
 
-A feature has no effect where leaving it out changes peaks by less than the accuracy that the
-case promises: model only what a scene requires.
+A feature has no effect where leaving it out changes peaks by less than the accuracy that the case
+promises: model only what a scene requires.
 """
 
-import statistics
+import math
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import xarray as xr
 
-from compressor.analysis import (
-    cylinder_words,
-    describe_machine,
-    healthy_body_velocity_rms,
-)
+from compressor.analysis import cylinder_words, describe_machine, healthy_body_velocity_rms
 from compressor.cases import (
     ACCURACY,
     CYLINDRICAL,
@@ -27,9 +24,10 @@ from compressor.cases import (
     to_si,
     with_ideal_joints,
 )
+from compressor.digits import align_columns, plural
 from compressor.metrics import JOINTS
 from compressor.physics import state_names
-from compressor.program import Progress, no_progress
+from compressor.program import Progress, duration, no_progress
 from compressor.solve import (
     JointScales,
     expected_cost,
@@ -38,9 +36,18 @@ from compressor.solve import (
     simulate,
     stiffness_of,
 )
-from compressor.studies.tradeoff.features import FEATURES, Effect, ModelFeature, comparable, compare
-from compressor.studies.tradeoff.model_choices import shown_words
-from compressor.studies.tradeoff.work_precision import SLOW_SECONDS, complete, faulty
+from compressor.studies.tradeoff.page import ModelTable, model_table, percent
+from compressor.studies.tradeoff.variants import (
+    FEATURES,
+    REPEATS,
+    SLOW_SECONDS,
+    Feature,
+    Variant,
+    faulty,
+    format_value,
+    run_variants,
+    variants,
+)
 
 SCENES = {  # by the joints with clearance
     (): "ideal joints",
@@ -48,106 +55,85 @@ SCENES = {  # by the joints with clearance
     ("small_end",): "clearance at the small end",
     ("big_end", "small_end"): "clearance at both joints",
 }
-
-
-@dataclass(frozen=True)
-class Advice:
-    """What leaving one feature out changes.
-
-    `needed_for` names the quantities that change by more than the case promises; `removable`: none.
-    """
-
-    key: str
-    name: str
-    neutral: str
-    effect: Effect
-    needed_for: tuple[str, ...]
-    removable: bool
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """What is known of one study: of its first job, measured, and of the sweep."""
-
-    study: str
-    path: str
-    jobs: int
-    point: dict[str, Any]  # of the sweep's axes, at the job explained
-    machine: Any  # what `compressor.analysis.describe_machine` returns
-    scene: str
-    unknowns: tuple[str, ...]
-    active: dict[str, str]  # term -> in words
-    absent: tuple[str, ...]  # terms left out, at no cost
-    scales: tuple[JointScales, ...]
-    expected_steps: float  # by the scales alone, before the run; 0 where these do not suffice
-    expected_seconds: float
-    accuracy: str  # the word, or "" where rtol is given
-    rtol: float
-    promise: float
-    method: str
-    reason: str  # why the job failed; empty when it did not
-    detail: str
-    seconds: float  # wall time of the job, without storing it
-    solution_seconds: float  # part of it: `seconds` of the job's results
-    other_work: tuple[str, ...]  # what takes the rest of it
-    steps: int
-    evaluations: int
-    workers: int
-    sweep_seconds: float  # of all jobs, if they cost what this one does
-    advice: tuple[Advice, ...]
+PEAKS = {"peak_acceleration": "acceleration", "peak_contact_force": "force"}
 
 
 def explain(
-    study: Study,
-    workers: int,
-    repeats: int = 5,
-    progress: Progress = no_progress,
-) -> Explanation:
-    """Return the explanation of a study's first job, by running it without each feature.
+    study: Study, job: int, workers: int, progress: Progress = no_progress
+) -> dict[str, Any]:
+    """Return what is known of a job of a study, by running it, too, without each feature.
 
-    Times are medians of `repeats`; a job above `bench.SLOW_SECONDS` is timed once. progress:
-    called with how many features have been tried, of how many.
+    Seconds are the best of some runs, if they are short. `advice` is of each feature that the job
+    pays for. progress: called with how many features have been tried, of how many.
     """
-    case = study.cases[0]
-    run, seconds, solution_seconds = time_case(case, 1)
-    repeats = repeats if seconds < SLOW_SECONDS else 1
-    ended = complete(run)
-    if repeats > 1:
-        run, seconds, solution_seconds = time_case(case, repeats - 1)
+    case = study.cases[job]
+    run, seconds = time_case(case)
+    good = run["status"] == "ok"
     active, absent = terms(case)
-    if case.body and ended:
+    if case.body and good:
         active["body"] = body_words(case, run)
-    joints = tuple(ideal_scales(case))
+    scales = [*ideal_scales(case)]
     unknown = case.needs_mechanism or case.lubricant
-    steps, expected = (0.0, 0.0) if unknown else expected_cost(case, joints)
-    return Explanation(
-        study=study.name,
-        path=study.path,
-        jobs=len(study.cases),
-        point=next(points(study)),
-        machine=describe_machine(replace(study, selected=[0])),
-        scene=SCENES[tuple(faulty(case))],
-        unknowns=unknown_names(case),
-        active=active,
-        absent=absent,
-        scales=joints,
-        expected_steps=steps,
-        expected_seconds=expected,
-        accuracy=requested_accuracy(case),
-        rtol=case.rtol,
-        promise=promise(case),
-        method=case.solve.method,
-        reason=run["reason"].item(),
-        detail=run.attrs.get("detail", ""),
-        seconds=seconds,
-        solution_seconds=solution_seconds,
-        other_work=other_work(case),
-        steps=int(run["steps"]),
-        evaluations=int(run["evaluations"]),
-        workers=workers,
-        sweep_seconds=seconds * len(study.cases) / min(workers, len(study.cases)),
-        advice=tuple(advise(case, repeats, progress)) if ended and run["steps"] > 0 else (),
-    )
+    steps, expected = (0.0, 0.0) if unknown else expected_cost(case, scales)
+    advice: Sequence[dict[str, Any]] = ()
+    if good and run["steps"] > 0:
+        paid = [one for one in variants(case) if one.left_out]
+        table = model_table(run_variants(case, paid, progress))
+        advice = [*advise(paid, table, case)]
+    return {
+        "study": study.name,
+        "jobs": study.jobs,
+        "point": next(islice(points(study), job, None)),
+        "machine": describe_machine(replace(study, selected=[job])).lines(),
+        "scene": SCENES[tuple(faulty(case))],
+        "unknowns": unknown_names(case),
+        "active": active,
+        "absent": absent,
+        "scales": scales,
+        "expected_steps": steps,
+        "expected_seconds": expected,
+        "accuracy": requested_accuracy(case),
+        "rtol": case.rtol,
+        "promise": promise(case),
+        "method": case.solve.method,
+        "reason": run["reason"].item(),
+        "detail": run.attrs.get("detail", ""),
+        "seconds": seconds,
+        "solution_seconds": run["seconds"].item(),
+        "other_work": other_work(case),
+        "steps": int(run["steps"]),
+        "evaluations": int(run["evaluations"]),
+        "workers": workers,
+        "sweep_seconds": seconds * study.jobs / min(workers, study.jobs),
+        "advice": advice,
+    }
+
+
+def advise(paid: Sequence[Variant], table: ModelTable, case: Case) -> Iterator[dict[str, Any]]:
+    """Yield how leaving each feature out changes peaks and time, and what it is needed for.
+
+    Of the joints with clearance the greatest change counts; nan where one is not known.
+    """
+    left_out = {one.name: one.left_out for one in paid}
+    for row in table.rows:
+        changes = {}
+        for name, words in PEAKS.items():
+            every = [
+                size
+                for m, size in zip(table.measures, row.changes, strict=True)
+                if m.variable == name and m.joint in ("", *faulty(case))
+            ]
+            changes[words] = max(
+                every, key=lambda size: (size != size, abs(size)), default=math.nan
+            )
+        yield {
+            "name": row.name,
+            "left_out": left_out[row.name],
+            "changes": changes,
+            "time_ratio": row.time_ratio,
+            "needed_for": [w for w, size in changes.items() if not abs(size) < promise(case)],
+            "note": row.note,
+        }
 
 
 def unknown_names(case: Case) -> tuple[str, ...]:
@@ -164,27 +150,28 @@ def unknown_names(case: Case) -> tuple[str, ...]:
     return found + tuple(name for name in names[2 * n :] if name.startswith("crank's lag"))
 
 
-def time_case(case: Case, repeats: int) -> tuple[xr.Dataset, float, float]:
-    """Run a case and return it, its wall time and that of its solution alone (s), both medians.
-
-    Compiled code is there already.
-    """
-    run = simulate(case)
-    seconds, of_solution = [], []
-    for _ in range(repeats if complete(run) and run["seconds"].item() < SLOW_SECONDS else 1):
+def time_case(case: Case) -> tuple[xr.Dataset, float]:
+    """Run a case and return it with its wall time (s), the best of some runs if it is short."""
+    found: list[tuple[xr.Dataset, float]] = []
+    for _ in range(1 + REPEATS):
         began = time.perf_counter()
         run = simulate(case)
-        seconds.append(time.perf_counter() - began)
-        of_solution.append(run["seconds"].item())
-    return run, statistics.median(seconds), statistics.median(of_solution)
+        seconds = time.perf_counter() - began
+        found.append((run, seconds))
+        if run["status"] != "ok" or (len(found) > 1 and seconds > SLOW_SECONDS):
+            break  # the first one may load compiled code
+    return min(found, key=lambda one: one[1])
 
 
-def other_work(case: Case) -> tuple[str, ...]:
+def other_work(case: Case) -> list[str]:
     """Return the work of a job beside its solution, in words."""
-    found = ["the runs that its error bars come from"] if case.wants_bars else []
-    found += ["its time series"] if case.output.keep == "series" else []
-    found += ["the motion of its body"] if case.body else []
-    return (*found, "the record of its sensor") if case.sensor else (*found,)
+    works = {
+        "the runs that its error bars come from": case.wants_bars,
+        "its time series": case.output.keep == "series",
+        "the motion of its body": case.body,
+        "the record of its sensor": case.sensor,
+    }
+    return [words for words, is_done in works.items() if is_done]
 
 
 def requested_accuracy(case: Case) -> str:
@@ -206,20 +193,32 @@ def promise(case: Case) -> float:
     return min(promises, default=ACCURACY["draft"].promise)
 
 
-def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
+def ideal_scales(case: Case) -> Iterator[JointScales]:
+    """Yield the natural scales of each joint with clearance, under its greatest force when ideal.
+
+    The ideal machine has none of a case's features: its guide, drive and rod are ideal, too.
+    """
+    p, ideal = record(case), simulate(with_ideal_joints(case, features=False))
+    for joint in faulty(case):
+        yield joint_scales(p, joint, float(ideal["peak_contact_force"].sel(joint=joint)))
+
+
+# ---- terms in words -----------------------------------------------------------------------------
+
+
+def terms(case: Case) -> tuple[dict[str, str], list[str]]:
     """Return the terms that a case computes, in words, and those that it leaves out at no cost."""
     ideal = not faulty(case)
     own_keys = ("clearance_mm", "contact.law", "friction.law")  # with contact and friction
-    shown = [feature for feature in FEATURES if not feature.key.startswith(own_keys)]
-    used = [f for f in shown if f.paid(case) and not (ideal and f.key == "friction")]
-    active = {feature.name: paid_value(case, feature) for feature in used}
-    absent = tuple(feature.name for feature in shown if feature not in used)
+    shown = [row for row in FEATURES if not (row.word or row.key.startswith(own_keys))]
+    active = {row.name: paid_value(case, row) for row in shown if row.is_in(case)}
+    absent = [row.name for row in shown if row.name not in active]
     if case.load == "gas" and case.gas.switching == "exact":
         active["cylinder"] = cylinder_words(case)
     if case.counterweight:
         active["counterweight"] = counterweight_words(case)
     if ideal:
-        return active, (*absent, "clearance", "contact")
+        return active, [*absent, "clearance", "contact"]
     widths = [f"{getattr(case.clearance_mm, joint):g} mm at the {joint.replace('_', ' ')}"
               for joint in faulty(case)]  # fmt: skip
     active["clearance"] = ", ".join(widths)
@@ -227,6 +226,19 @@ def terms(case: Case) -> tuple[dict[str, str], tuple[str, ...]]:
         active["clearance"] += f"; worn: {case.worn_joint.replace('_', ' ')}"
     active["contact"] = contact_words(case)
     return active, absent
+
+
+def paid_value(case: Case, feature: Feature) -> str:
+    """Return the value by which a case pays for a feature."""
+    group, dot, name = feature.key.partition(".")
+    if feature.key == "friction" and case.friction:
+        law = f"{case.friction.law}, " if case.friction.law else ""
+        return f"{law}static {case.friction.static:g}, dynamic {case.friction.dynamic:g}"
+    value = getattr(getattr(case, group), name) if dot else getattr(case, group)
+    if not dot and hasattr(value, "__dataclass_fields__"):
+        fields = {key: one for key, one in vars(value).items() if one is not None}
+        value = ", ".join(f"{key} {format_value(one)}" for key, one in fields.items())
+    return f"{feature.key} = {value}"
 
 
 def body_words(case: Case, run: xr.Dataset) -> str:
@@ -251,19 +263,16 @@ def counterweight_words(case: Case) -> str:
     )
 
 
-def material_words(case: Case) -> str:
-    """Return the materials of the joints with clearance in words; "" without any."""
-    materials = case.contact.materials
-    pairs = dict.fromkeys(materials.at(joint) for joint in faulty(case)) if materials else ()
-    return " and ".join(" on ".join(pair) for pair in pairs)
-
-
 def contact_words(case: Case) -> str:
     """Return the law, stiffness, exponent and damping of a contact in words, with their sources."""
     contact, usual = case.contact, Contact()
     shape = f"p = {contact.exponent:g}"
+    pairs = dict.fromkeys(
+        contact.materials.at(joint) for joint in faulty(case) if contact.materials
+    )
+    material = " and ".join(" on ".join(pair) for pair in pairs)
     if contact.law in CYLINDRICAL:
-        material = material_words(case) or f"E* = {contact.modulus_GPa:g} GPa"
+        material = material or f"E* = {contact.modulus_GPa:g} GPa"
         lengths = dict.fromkeys(
             contact.length_mm.at(joint) for joint in faulty(case) if contact.length_mm
         )
@@ -273,8 +282,8 @@ def contact_words(case: Case) -> str:
         each = {
             f"{stiffness_of(case, joint) / 1000.0**contact.exponent:.4g}" for joint in faulty(case)
         }
-        material = f"K = {' and '.join(sorted(each))} N/mm^p (Eq. 15, pins {where}: "
-        material += material_words(case) + ")"
+        stiffness = f"K = {' and '.join(sorted(each))} N/mm^p"
+        material = f"{stiffness} (Eq. 15, pins {where}: {material})"
     else:
         paper = contact.stiffness_N_per_mm15 == usual.stiffness_N_per_mm15
         source = "Table 3, of a pin of 10 mm radius" if paper else "given"
@@ -290,46 +299,77 @@ def contact_words(case: Case) -> str:
     return f"{contact.law}, {material}, {shape}, {damped}"
 
 
-def paid_value(case: Case, feature: ModelFeature) -> str:
-    """Return the value by which a case pays for a feature."""
-    group, dot, name = feature.key.partition(".")
-    if feature.key == "friction" and case.friction:
-        law = f"{case.friction.law}, " if case.friction.law else ""
-        return f"{law}static {case.friction.static:g}, dynamic {case.friction.dynamic:g}"
-    value = getattr(getattr(case, group), name) if dot else getattr(case, group)
-    if not dot and hasattr(value, "__dataclass_fields__"):
-        fields = {key: one for key, one in vars(value).items() if one is not None}
-        value = ", ".join(f"{key} {shown_words(one)}" for key, one in fields.items())
-    return f"{feature.key} = {value}"
+# ---- as text ------------------------------------------------------------------------------------
 
 
-def ideal_scales(case: Case) -> Iterator[JointScales]:
-    """Yield the natural scales of each joint with clearance, under its greatest force when ideal.
+def list_explanation(facts: dict[str, Any]) -> Iterator[str]:
+    """Yield an explanation as it is printed."""
+    point = ", ".join(f"{key} = {value}" for key, value in facts["point"].items())
+    yield f"{facts['study']}: {plural(facts['jobs'])}" + (f"; explained: {point}" if point else "")
+    count = len(facts["unknowns"])
+    solved = f"{count} degrees of freedom" if count else "closed form, nothing integrated"
+    method = f"{facts['accuracy'] or 'given'}: rtol {facts['rtol']:g}, {facts['method']}"
+    failed = f"unknown: the job failed, {facts['reason']}: {facts['detail']}"
+    parts = {
+        "machine": align_columns(facts["machine"]),
+        "motion": [
+            f"{facts['scene']}: {solved}",
+            *filter(None, ["; ".join(name.rpartition(",")[0] for name in facts["unknowns"])]),
+        ],
+        "active": [f"{term}: {words}" for term, words in facts["active"].items()],
+        "absent": [f"{', '.join(facts['absent'])}: cost nothing"] if facts["absent"] else [],
+        "scales": [text for joint in facts["scales"] for text in scale_lines(joint)],
+        "tolerance": [f"{method}, for errors below {percent(facts['promise'])}"],
+        "cost": [failed] if facts["reason"] else [*cost_lines(facts)],
+    }
+    lines = [("", word if n == 0 else "", text)
+             for word, texts in parts.items() for n, text in enumerate(texts)]  # fmt: skip
+    yield from align_columns(lines)
+    if facts["advice"]:
+        limit = percent(facts["promise"])
+        head = ("without a feature", *PEAKS.values(), "time", f"needed, or below {limit}: can go")
+        yield from align_columns([head, *map(advice_row, facts["advice"])], "<>>>")
 
-    The ideal machine has none of a case's features: its guide, drive and rod are ideal, too.
-    """
-    p, ideal = record(case), simulate(with_ideal_joints(case, features=False))
-    for joint in faulty(case):
-        yield joint_scales(p, joint, float(ideal["peak_contact_force"].sel(joint=joint)))
+
+def scale_lines(joint: JointScales) -> Iterator[str]:
+    """Yield the natural scales of a joint."""
+    depth, hertz = f"{joint.penetration * 1e6:.0f} µm", joint.swing_frequency
+    load = f"the greatest force without clearance, {joint.force:.0f} N"
+    yield f"{joint.joint.replace('_', ' ')}: {load}, presses the surfaces {depth} into each other"
+    yield (
+        f"in contact: damping ratio {joint.damping_ratio:.2g} (it bounces below 1); the journal "
+        f"swings sideways in its bore at about {hertz:.0f} Hz, once in {1e3 / hertz:.2f} ms"
+    )
+    yield (
+        f"longest time steps: explicit about {joint.explicit_step * 1e6:.3g} µs, limited by "
+        f"{joint.limited_by}; implicit about {joint.implicit_step * 1e6:.3g} µs, limited by the "
+        f"stiffness of the contact"
+    )
 
 
-def paid_features(case: Case) -> list[ModelFeature]:
-    """Return the features of the model that a case pays for."""
-    return [feature for feature in FEATURES if feature.paid(case)]
+def cost_lines(facts: dict[str, Any]) -> Iterator[str]:
+    """Yield the cost of a job and of the sweep."""
+    work = f" ({facts['steps']} steps, {facts['evaluations']} evaluations)" * bool(facts["steps"])
+    yield f"{short_time(facts['seconds'])} a job{work}"
+    rest = f", the rest for {', '.join(facts['other_work'])}" if facts["other_work"] else ""
+    solved = short_time(facts["solution_seconds"])
+    yield f"{solved} of it for the solution (`seconds` in show){rest}"
+    if facts["expected_steps"]:
+        seconds = short_time(facts["expected_seconds"], 1)
+        yield f"by the scales alone about {facts['expected_steps']:.1g} steps, {seconds}"
+    if facts["jobs"] > 1:
+        by = f"{plural(facts['jobs'])} with {plural(facts['workers'], 'worker')}"
+        yield f"{facts['sweep_seconds']:.2g} s for {by}, if all cost the same"
 
 
-def advise(case: Case, repeats: int, progress: Progress) -> Iterator[Advice]:
-    """Yield the effect of each feature that a case pays for, and whether it could be left out."""
-    paid = paid_features(case)
-    if not paid:
-        return
-    allowed, known = promise(case), simulate(comparable(case))
-    for done, feature in enumerate(paid):
-        progress(done, len(paid), "")
-        effect = compare(case, feature.remove(case), repeats, known)
-        needed = {
-            "peak acceleration": effect.change_peak_acceleration,
-            "contact force": effect.change_peak_contact_force,
-        }
-        needed_for = tuple(name for name, change in needed.items() if not abs(change) < allowed)
-        yield Advice(feature.key, feature.name, feature.neutral, effect, needed_for, not needed_for)
+def short_time(seconds: float, digits: int = 3) -> str:
+    """Return a time in ms to some digits, or as `duration` does from a second on."""
+    return duration(seconds) if seconds >= 1 else f"{1e3 * seconds:.{digits}g} ms"
+
+
+def advice_row(advice: dict[str, Any]) -> tuple[str, ...]:
+    """Return how a feature moves peaks and time, and how to leave it out if it is not needed."""
+    sizes = advice["changes"].values()
+    changes = ("unknown" if math.isnan(size) else percent(size, "+") for size in sizes)
+    verdict = advice["note"] or ("needed" if advice["needed_for"] else advice["left_out"])
+    return advice["name"], *changes, f"× {advice['time_ratio']:.2g}", verdict

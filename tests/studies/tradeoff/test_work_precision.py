@@ -1,131 +1,134 @@
 """Work and precision: errors that fall, failures that stay, references that know their limits."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
 
-from compressor.cases.case import Case
+from compressor.program import no_progress
 from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
 from compressor.store.netcdf import write_dataset
-from compressor.studies.tradeoff.figures import draw_work_precision
 from compressor.studies.tradeoff.work_precision import (
-    ReferenceFailed,
-    default_cases,
-    errors,
+    ERRORS,
+    NothingIntegrated,
+    draw_work_precision,
     fastest,
-    grid_values,
-    reference,
-    settle_span,
-    stored_values,
+    load_methods,
+    tabulate,
     work_precision,
 )
+from compressor.sweep.sweep import Options, in_this_process, sweep
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0}
 METHODS = ("auto", "RODAS", "LSODA")
+SOME = ["solve.method=[auto, RODAS, LSODA]", "solve.rtol=[1.0e-3, 1.0e-7, 1.0e-5, 1.0e-12]"]
 
 
-def case(**solve):
-    return Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "solve": {**SHORT, **solve}})
+def made(place, *overrides, **values):
+    """The numbers of a case file's study, the study, and the folder of results."""
+    path = Path(place, "worn.yaml")
+    path.write_text(json.dumps({"joint": "big_end", "clearance_mm": 0.2, "solve": SHORT} | values))
+    study, texts = load_methods(str(path), overrides, place / "kept")
+    sweep([study], place / "kept", 1, no_progress, Options("", texts, backend=in_this_process))
+    return work_precision(place / "kept", study), study, place / "kept"
 
 
 @pytest.fixture(scope="module")
-def study():
-    told = []
-    found = work_precision(
-        {"one": case()}, METHODS, (1e-7, 1e-3, 1e-5), 2, progress=lambda *event: told.append(event)
-    )
-    assert told[-1][:2] == (2 * 9 + 3, 2 * 9 + 3)
-    return found
+def whole(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("methods"), *SOME, "solve.timeout_s=600")
 
 
-def test_a_case_that_stores_no_series_settles_before_it_is_measured():
-    span = {"duration_rev": "auto", "settle_rev": "auto", "accuracy": "draft"}
-    values = {"joint": "big_end", "clearance_mm": 0.2, "solve": span}
-    case = settle_span(Case.from_values({**values, "output": {"keep": "metrics"}}))
-    assert (case.solve.duration_rev, case.solve.settle_rev) == (4.0, 1.0)
-    assert case.output.keep == "metrics"
-    assert settle_span(case) is case
+@pytest.fixture(scope="module")
+def study(whole):
+    return whole[0]
+
+
+def test_the_study_is_named_after_the_file_and_its_lists_are_what_set_says(whole):
+    study = whole[1]
+    assert study.name == "worn-tradeoff"
+    assert {axis.key: len(axis.values) for axis in study.axes} == {
+        "solve.method": 3, "solve.rtol": 4,
+    }  # fmt: skip
+    assert whole[0]["scene"].values.tolist() == ["worn"]
+    assert not study.cases[0].wants_bars
 
 
 def test_errors_fall_with_the_tolerance(study):
-    assert study["tolerance"].values.tolist() == [1e-3, 1e-5, 1e-7]
-    for name in ("acceleration", "peak_acceleration", "rms_acceleration", "peak_contact_force"):
-        found = study[f"error_{name}"].values
-        assert (found[..., -1] < 1e-5).all(), name
-    assert (study["error_acceleration"].diff("tolerance") < 0).all()
+    assert study["rtol"].values.tolist() == [1e-3, 1e-5, 1e-7, 1e-12]
+    for name in ERRORS:
+        assert (study[f"error_{name}"].sel(rtol=1e-7) < 1e-5).all(), name
+    compared = study["error_acceleration"].sel(rtol=[1e-3, 1e-5, 1e-7])
+    assert (compared.diff("rtol") < 0).all()
+
+
+def test_errors_are_those_of_runs_made_by_hand(whole):
+    found, study, _ = whole
+    cases = {(one.solve.method, one.rtol): one for one in study.cases}
+    run, truth = (simulate(cases[which]) for which in (("auto", 1e-5), ("RODAS", 1e-12)))
+    a, b = (one["acceleration"].values for one in (run, truth))
+    one = found.sel({"method": "auto", "rtol": 1e-5}).squeeze()
+    assert one["error_acceleration"] == np.linalg.norm(a - b) / np.linalg.norm(b)
+    forces = [float(each["peak_contact_force"].sel(joint="big_end")) for each in (run, truth)]
+    assert one["error_peak_contact_force"] == pytest.approx(abs(forces[0] / forces[1] - 1))
 
 
 def test_tighter_tolerances_take_more_evaluations(study):
     assert (study["status"] == "ok").all()
-    assert (study["evaluations"].diff("tolerance") > 0).all()
+    assert (study["evaluations"].diff("rtol") > 0).all()
     assert (study["seconds"] > 0).all()
-    assert float(study["seconds_compile"]) >= 0
 
 
-def test_the_references_agree_better_than_what_they_judge(study):
-    apart = study["reference_uncertainty"].sel(quantity="acceleration").item()
-    assert 0 < apart < 1e-8
-    assert study["error_acceleration"].min() > apart
+def test_no_job_is_judged_by_itself(study):
+    """RODAS at 1e-12 is the truth of the others, and the tightest other one is that of RODAS."""
+    apart = study["reference_uncertainty"].item()
+    rodas = study["error_acceleration"].sel({"method": "RODAS", "rtol": 1e-12}).item()
+    assert 0 < apart == rodas < 1e-8
+    assert study["error_acceleration"].sel(rtol=[1e-3, 1e-5, 1e-7]).min() > apart
 
 
-def test_a_reference_is_never_judged_by_itself():
-    found = work_precision({"one": case()}, ("DOP853",), (1e-12,), 1)
-    apart = found["reference_uncertainty"].sel(quantity="acceleration").item()
-    assert apart > 0
-    assert found["error_acceleration"].item() == pytest.approx(apart, rel=1e-6)
+def test_a_job_that_fails_has_no_error(tmp_path):
+    found = made(tmp_path, "solve.method=[auto, RODAS]", "solve.max_steps=900")[0]
+    failed = found["status"] == "failed"
+    assert failed.any()
+    assert not failed.all()
+    assert (found["error_acceleration"].isnull() | ~failed).all()
+    assert {*found["reason"].values.ravel()} == {"", "budget_steps"}
 
 
-def test_a_point_that_fails_stays_and_ends_its_row():
-    # a compiled run of few steps ends before anybody looks at the clock
-    found = work_precision({"one": case()}, ("auto", "Radau"), (1e-3, 1e-5), 2, budget=1e-9)
-    radau = found.sel({"method": "Radau"}).squeeze()
-    assert radau["status"].values.tolist() == ["failed", "missing"]
-    assert radau["reason"].values.tolist() == ["budget_seconds", ""]
-    assert np.isnan(radau["error_acceleration"]).all()
-    assert (found.sel({"method": "auto"})["status"] == "ok").all()
+def test_each_case_of_a_file_is_a_scene(tmp_path):
+    found = made(tmp_path, *SOME[:1], "solve.rtol=[1.0e-3, 1.0e-5]", joint=["big_end", "both"])[0]
+    assert found["scene"].values.tolist() == ["big_end", "both"]
+    assert found["error_acceleration"].notnull().sum() >= 10
 
 
-def test_an_ideal_machine_is_refused():
-    with pytest.raises(ValueError, match="calm has no joint with clearance"):
-        work_precision({"calm": Case()})
+def test_a_run_that_finds_its_own_length_gives_it_to_all(tmp_path, in_process):
+    """A draft of this one settles after one revolution."""
+    path = tmp_path / "auto.yaml"
+    solve = {"duration_rev": "auto", "settle_rev": "auto", "accuracy": "draft"}
+    path.write_text(json.dumps({"joint": "big_end", "clearance_mm": 0.2, "solve": solve}))
+    study, texts = load_methods(str(path), SOME, tmp_path)
+    assert {(one.solve.duration_rev, one.solve.settle_rev) for one in study.cases} == {(4.0, 1.0)}
+    assert "solve.settle_rev=1.0" in texts
 
 
-def test_a_reference_that_fails_says_so():
-    with pytest.raises(
-        ReferenceFailed, match=r"^one: the reference, RODAS at 1e-12, ends with budget_steps"
-    ):
-        reference("one", case(max_steps=50), "RODAS")
-
-
-def test_the_grid_misses_peaks_of_the_dense_solution():
-    run = simulate(default_cases()["both 0.2"])
-    joints = ["big_end", "small_end"]
-    grid, dense = grid_values(run, joints), stored_values(run, joints)
-    assert 0.9 < grid["peak_acceleration"] / dense["peak_acceleration"] < 0.999
-    assert (grid["peak_contact_force"] <= dense["peak_contact_force"]).all()
-    assert grid["rms_acceleration"] == pytest.approx(dense["rms_acceleration"], rel=0.01)
-    assert errors(dense, dense) == dict.fromkeys(errors(dense, dense), 0.0)
-
-
-def test_the_paper_s_point_is_judged_too(study):
-    assert 0 < study["paper_error_acceleration"].item() < 0.1
-    assert study["paper_error_peak_acceleration"].item() > 1e-3  # read from the output grid
-    assert study["paper_seconds"].item() > study["seconds"].sel({"method": "auto"}).max()
+def test_an_ideal_machine_is_refused(tmp_path):
+    path = tmp_path / "calm.yaml"
+    path.write_text("load: gas\n")
+    with pytest.raises(NothingIntegrated, match="a job of calm has no joint with clearance"):
+        load_methods(str(path), [], tmp_path)
 
 
 def synthetic(errors, seconds, unknown):
     """A study of one scene by method and tolerance."""
-    dims = ("scene", "method", "tolerance")
-    return xr.Dataset(
-        {
-            "error_acceleration": (dims, [errors]),
-            "seconds": (dims, [seconds]),
-            "reference_uncertainty": (("scene", "quantity"), [[unknown]]),
-        },
-        {"scene": ["s"], "method": ["a", "b"], "tolerance": [1e-2, 1e-5],
-         "quantity": ["acceleration"]},
-    )  # fmt: skip
+    rows = [
+        {"scene": "s", "method": method, "rtol": rtol, "error_acceleration": errors[m][n],
+         "seconds": seconds[m][n], "reference_uncertainty": unknown}
+        for m, method in enumerate("ab") for n, rtol in enumerate((1e-2, 1e-5))
+    ]  # fmt: skip
+    return tabulate(rows)
 
 
 def test_the_fastest_of_each_decade():
@@ -139,12 +142,11 @@ def test_nothing_is_fastest_below_what_the_references_know():
     assert [row["error_below"] for row in fastest(data)] == [0.1, 0.01, 1e-3, 1e-4]
 
 
-def test_a_study_is_stored_for_other_tools(study, tmp_path):
+def test_numbers_are_stored_for_other_tools(study, tmp_path):
     path = write_dataset(tmp_path / "new" / "study.nc", study)
     with xr.open_dataset(path, engine="h5netcdf") as found:
         assert found.load().equals(study)
-        assert found.attrs["references"] == study.attrs["references"]
-    assert all(study[name].attrs["long_name"] for name in study.variables)
+        assert found.attrs["study"] == "worn-tradeoff"
 
 
 def test_the_figure_draws_what_is_there(study):
@@ -152,7 +154,7 @@ def test_the_figure_draws_what_is_there(study):
     (panel,) = drawing.panels
     assert panel.x.log
     assert panel.y.log
-    lines = [trace.y for trace in panel.traces if trace.y.size == 3]
+    lines = [trace.y for trace in panel.traces if trace.y.size == 4 and trace.name]
     assert len(lines) == len(METHODS)
     assert lines[0] == pytest.approx(study["error_acceleration"].values[0, 0])
     assert render(drawing, "svg").startswith(b"<?xml")

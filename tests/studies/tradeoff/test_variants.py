@@ -1,4 +1,4 @@
-"""Choices of the model: which a case has, what they assume, and that they move metrics so far."""
+"""Variants: which a case has, what they assume, and that they move metrics so far."""
 
 import json
 import math
@@ -12,6 +12,7 @@ from compressor.cases import Lubricant
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.cases.materials import contact_stiffness
+from compressor.cases.optional_groups import Rod
 from compressor.cases.parameter import PerJoint
 from compressor.cases.table import table
 from compressor.metrics import JOINTS, METRICS
@@ -20,22 +21,25 @@ from compressor.solve.simulate import simulate
 from compressor.store.netcdf import write_dataset
 from compressor.store.reader import read_job
 from compressor.store.status import verify
-from compressor.studies.tradeoff import model_choices as module
-from compressor.studies.tradeoff.model_choices import (
-    GRID,
+from compressor.studies.tradeoff import variants as module
+from compressor.studies.tradeoff.page import models_file
+from compressor.studies.tradeoff.variants import (
+    CONTACT_LAWS,
+    FEATURES,
     ITSELF,
-    Choice,
+    Variant,
+    change,
     choose_job,
+    contact_values,
     explain_models,
-    model_choices,
-    model_variants,
-    run_choices,
-    shown_words,
-    tabulate,
-    trade,
+    format_value,
+    other_models,
+    rod_values,
+    run_variants,
+    scale_contact,
+    variants,
     vary_numbers,
 )
-from compressor.studies.tradeoff.page import models_file
 from compressor.sweep.sweep import sweep
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0}
@@ -48,38 +52,152 @@ def case(**values):
 
 
 def by_name(values):
-    return {choice.name: choice for choice in model_choices(values)}
+    return {one.name: one for one in other_models(values)}
 
 
-def run_by_hand(itself, choices):
-    every = [Choice(ITSELF, itself), *choices]
-    return tabulate(every, run_choices(itself, choices, 1, lambda *_: None))
+def applied(values, base):
+    """The values of a feature for a case, whether they are a function of it or not."""
+    return values(base) if callable(values) else values
 
 
 @pytest.fixture
 def few(monkeypatch):
-    """Of the choices those named, which need no equations of features."""
+    """Of the variants those named, which need no equations of features."""
 
     def kept(names=THREE):
-        whole = module.model_choices
-        monkeypatch.setattr(
-            module, "model_choices", lambda case: [one for one in whole(case) if one.name in names]
-        )
-        numbers = module.vary_numbers
-        monkeypatch.setattr(
-            module, "vary_numbers", lambda *of: [one for one in numbers(*of) if one.name in names]
-        )
+        for function in ("other_models", "vary_numbers"):
+            whole = getattr(module, function)
+
+            def some(*of, whole=whole):
+                return [one for one in whole(*of) if one.name in names]
+
+            monkeypatch.setattr(module, function, some)
 
     return kept
 
 
-def test_the_choices_of_a_plain_case():
+# ---- features -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("values", "paid"),
+    [
+        ({}, ["friction", "spring damping", "load"]),
+        ({"friction": False, "load": "none"}, []),
+        ({"load": "gas", "friction": False}, ["load"]),
+        ({"load": "gas", "gas": {"back_pressure_MPa": 0.1}, "friction": False},
+         ["back pressure", "load"]),
+        ({"machine": {"gravity_m_per_s2": 9.81}, "load": "none"}, ["friction", "gravity"]),
+        ({"joint": "both", "load": "none", "friction": False},
+         ["clearance of the big end", "clearance of the small end"]),
+    ],
+)  # fmt: skip
+def test_what_a_case_pays_for(values, paid):
+    found = [one for one in variants(case(**values)) if one.left_out]
+    names = {row.off or f"no {row.name}": row.name for row in FEATURES}
+    assert [names[one.name] for one in found] == paid
+
+
+@pytest.mark.parametrize("feature", FEATURES, ids=lambda feature: feature.name)
+def test_a_feature_that_is_left_out_is_no_longer_paid_for(feature):
+    of_gas = feature.key.startswith("gas")
+    rich = case(
+        joint="big_end" if feature.key == "friction.ideal_joints" else "both",
+        machine={"gravity_m_per_s2": 9.81},
+        load="gas" if of_gas or feature.word == "spring" else "spring",
+        gas={"back_pressure_MPa": 0.1} if of_gas else {},
+    )
+    rich = rich if feature.is_in(rich) else change(rich, applied(feature.given, rich))
+    assert feature.is_in(rich)
+    assert Case.from_values(rich.values()) == rich
+    if feature.left_out is None:
+        return
+    poor = change(rich, applied(feature.left_out, rich))
+    assert not feature.is_in(poor)
+    assert Case.from_values(poor.values()) == poor  # still a valid case
+    added = applied(feature.given, poor)
+    assert added is None or feature.is_in(change(poor, added))
+
+
+def test_a_joint_made_ideal_starts_concentric():
+    both = case(joint="both", initial_offset_mm={"big_end_x": 0.1, "small_end_y": 0.1})
+    (one,) = (one.case for one in variants(both) if one.name == "ideal big end")
+    assert one.joint == "small_end"
+    assert (one.initial_offset_mm.big_end_x, one.initial_offset_mm.small_end_y) == (0, 0.1)
+
+
+def test_variants_of_one_faulty_joint_and_of_two():
+    one, two = ({v.name: v for v in variants(case(joint=j))} for j in ("big_end", "both"))
+    assert [*one][:4] == ["no friction", "no spring damping", "gravity", "no load"]
+    assert {"gas load", "friction of ideal joints"} < {*one}
+    assert "friction of ideal joints" not in two  # both are worn
+    assert one["clearance of the small end"].case.clearance_mm.small_end == 0.001
+    assert one["clearance of the small end"].note == "clearance_mm.small_end 0.001"
+    assert two["ideal big end"].case.joint == "small_end"
+    assert {"ideal big end", "ideal small end"} < {*two}
+
+
+@pytest.mark.parametrize("law", ["impact", *CONTACT_LAWS])
+@pytest.mark.parametrize("other", ["impact", *CONTACT_LAWS])
+def test_each_contact_law_may_stand_in_place_of_each_other(law, other):
+    """With what the case has; what it has not is a default."""
+    plain = case(contact={"stiffness_N_per_mm15": 5e5, "damping_N_s_per_mm": 100})
+    one = change(plain, contact_values(law, plain))
+    two = change(one, contact_values(other, one))
+    assert Case.from_values(two.values()) == two
+    assert two.contact.law == other
+    if {law, other} <= {"impact", "hertz", "flores", "lankarani_nikravesh"}:
+        assert two.contact.stiffness_N_per_mm15 == 5e5
+
+
+def contact_of(values, law):
+    return change(values, contact_values(law, values)).contact
+
+
+def test_a_law_takes_over_restitution_materials_and_length():
+    given = {"law": "flores", "restitution": 0.7, "materials": ["steel", "copper"]}
+    contact = contact_of(case(contact=given), "liu")
+    assert (contact.restitution, contact.materials) == (0.7, PerJoint(*[("steel", "copper")] * 2))
+    assert contact.length_mm == PerJoint(20.0, 20.0)  # as long as wide
+    oiled = case(contact=given, lubricant={"bearing_length_mm": 15})
+    assert contact_of(oiled, "liu").length_mm == PerJoint(15.0, 15.0)
+    for law in ("hertz", "impact"):  # as of two discs, which the file says by no geometry
+        assert contact_of(case(contact=given), law).geometry is None
+
+
+def test_a_modulus_alone_gives_other_laws_the_default_stiffness():
+    given = {"law": "johnson", "modulus_GPa": 100, "length_mm": 30}
+    assert contact_of(case(contact=given), "liu").modulus_GPa == 100
+    assert contact_of(case(contact=given), "hertz").stiffness_N_per_mm15 == 3.36e5
+
+
+def test_an_elastic_rod_has_the_section_that_its_mass_needs():
+    assert change(case(), rod_values(case())).rod == Rod()
+    heavy = case(machine={"rod_mass_kg": 4 * 4.7, "rod_length_mm": 600})
+    assert rod_values(heavy)["rod"] == {"depth_mm": 80.0, "width_mm": 50.0}
+
+
+@pytest.mark.parametrize("key", ["guide", "guide.clearance_mm"])
+def test_a_guide_is_that_of_the_machine_s_own_crosshead(key):
+    """Its inertia was that of the default machine's 14 kg."""
+    heavy = case(machine={"reciprocating_mass_kg": 150})
+    (row,) = (row for row in FEATURES if row.key == key)
+    own = change(heavy, row.given).guide.crosshead_inertia_kg_m2
+    guide = {"clearance_mm": 0.05} if key != "guide" else True
+    given = Case.from_values(heavy.values() | {"guide": guide})
+    assert own == given.guide.crosshead_inertia_kg_m2 > 0.2
+
+
+# ---- other models -------------------------------------------------------------------------------
+
+
+def test_the_other_models_of_a_plain_case():
     assert [*by_name(case())] == [
         "contact law: Hertz", "contact law: Lankarani-Nikravesh", "contact law: Flores",
-        "contact law: Johnson", "contact law: Liu", "contact stiffness ÷ 2",
+        "contact law: Johnson", "contact law: Liu", "friction law: Coulomb (tanh)",
+        "friction law: Threlfall", "friction law: Ambrósio", "friction law: LuGre",
+        "play of the guide", "oil film", "elastic rod", "contact stiffness ÷ 2",
         "contact stiffness × 2", "contact damping ÷ 2", "contact damping × 2",
-        "friction law: Coulomb (tanh)", "friction law: Threlfall", "friction law: Ambrósio",
-        "friction law: LuGre", "50 µm of play in the guide", "oil film", "elastic rod",
     ]  # fmt: skip
 
 
@@ -102,26 +220,12 @@ def test_what_a_case_has_is_varied_the_other_way():
 def test_pins_that_are_not_the_paper_s_have_a_choice_of_their_own_stiffness():
     values = {"joint": "small_end", "clearance_mm": 0.2}
     name = "contact stiffness of its pins (Eq. 15)"
-    assert name not in {one.name for one in model_choices(Case.from_values(values))}
+    assert name not in {one.name for one in other_models(Case.from_values(values))}
     odd = Case.from_values(values | {"machine": {"pin_radius_mm": 35}})
-    (one,) = (choice for choice in model_choices(odd) if choice.name == name)
+    (one,) = (choice for choice in other_models(odd) if choice.name == name)
     assert one.case.contact.materials.small_end == ("steel", "steel")
     expected = contact_stiffness("steel", "steel", 0.035, 0.0352, internal=True)
     assert stiffness_of(one.case, "small_end") == pytest.approx(expected)
-
-
-def test_equations_are_compiled_before_a_choice_has_its_time(few, monkeypatch):
-    few()
-    done = []
-    monkeypatch.setattr(module, "compile_once", lambda needs, remark: done.append(needs))
-    real = module.fastest_run
-    monkeypatch.setattr(module, "fastest_run", lambda *of: done.append("run") or real(*of))
-    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "solve": SHORT})
-    others = [Choice("oil", replace(case, lubricant=Lubricant())), *module.model_choices(case)]
-    run_choices(case, others, 1, lambda *_: None)
-    needs, *runs = done
-    assert needs.laws
-    assert runs == ["run"] * (1 + len(others))
 
 
 def test_stiffness_and_damping_are_doubled_and_halved_where_the_law_reads_them():
@@ -312,7 +416,7 @@ def test_rod_load_body_and_sensor_are_compared(few, tmp_path):
     few(("body.casing_mass_kg 240",))
     text = "joint: big_end\nclearance_mm: 0.2\noutput: {signals: true}\nbody: {mass_kg: 3000}\n"
     text += "sensor: {noise_m_per_s2: 0}\nsolve: {duration_rev: 2, accuracy: draft}\n"
-    data = explain_models(read_study(tmp_path, text))
+    data = explain_models(read_study(tmp_path, text), 0)
     level = data["sensor_rms"].values
     # all that it hears but the body's own motion, which is little, goes as the mode's inverse mass
     assert level[1] / level[0] == pytest.approx(0.5, rel=0.02)
@@ -320,20 +424,8 @@ def test_rod_load_body_and_sensor_are_compared(few, tmp_path):
     assert "time" not in data.dims
 
 
-def test_play_in_the_guide_is_that_of_the_machine_s_own_crosshead():
-    """Its inertia was that of the default machine's 14 kg."""
-    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2,
-                             "machine": {"reciprocating_mass_kg": 150}})  # fmt: skip
-    (own,) = (one.case for one in model_choices(case) if "play" in one.name and one.case)
-    given = Case.from_values(case.values() | {"guide": {"clearance_mm": own.guide.clearance_mm}})
-    assert own.guide.crosshead_inertia_kg_m2 == given.guide.crosshead_inertia_kg_m2 > 0.2
-
-
 def test_the_ideal_machine_has_choices_beyond_its_contacts():
-    assert [*by_name(Case.from_values({"load": "none"}))] == [
-        "50 µm of play in the guide",
-        "elastic rod",
-    ]
+    assert [*by_name(Case.from_values({"load": "none"}))] == ["play of the guide", "elastic rod"]
 
 
 def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
@@ -347,11 +439,9 @@ def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
     }
     path.write_text(json.dumps(values))
     seen = []
-    data = explain_models(
-        load_studies(path)[0], progress=lambda done, total, _: seen.append((done, total))
-    )
-    assert data["choice"].values.tolist() == [ITSELF, *sorted(THREE)]
-    assert seen == sorted(seen)  # each several times where equations are compiled meanwhile
+    study = load_studies(path)[0]
+    data = explain_models(study, 0, progress=lambda done, total, _: seen.append((done, total)))
+    assert {*data["choice"].values} == {ITSELF, *THREE}
     assert [*dict.fromkeys(seen)] == [(n, 4) for n in (0, 1, 2, 3, 4)]
     assert data.attrs["study"] == "worn"
     by_hand = {
@@ -367,7 +457,7 @@ def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
             np.testing.assert_array_equal(row[metric], run[metric])
             np.testing.assert_array_equal(row[f"{metric}_error"], run[f"{metric}_error"])
         assert row["regime"] == run.attrs["regime"]
-    assert data.attrs["key"] == load_studies(path)[0].cases[0].key
+    assert data.attrs["key"] == study.keys[0]
 
 
 def test_a_damaged_table_is_named(few, tmp_path):
@@ -375,7 +465,7 @@ def test_a_damaged_table_is_named(few, tmp_path):
     path = Path(tmp_path / "worn.yaml")
     path.write_text(json.dumps({"joint": "big_end", "clearance_mm": 0.1, "solve": SHORT}))
     kept = write_dataset(
-        models_file(tmp_path, "worn", "0" * 20), explain_models(load_studies(path)[0])
+        models_file(tmp_path, "worn", "0" * 20), explain_models(load_studies(path)[0], 0)
     )
     assert verify(tmp_path) == []
     kept.write_bytes(kept.read_bytes()[:-1])
@@ -384,15 +474,13 @@ def test_a_damaged_table_is_named(few, tmp_path):
     assert "the command that made it makes it again" in damage.remedy
 
 
-def test_failed_and_impossible_choices_have_no_numbers():
+def test_failed_and_impossible_variants_have_no_numbers():
     good = case()
-    choices = [
-        Choice("short", replace(good, solve=replace(good.solve, max_steps=20))),
-        Choice("none", None, "needs more"),
+    others = [
+        Variant("short", replace(good, solve=replace(good.solve, max_steps=20))),
+        Variant("none", None, "needs more"),
     ]
-    data = tabulate(
-        [Choice(ITSELF, good), *choices], run_choices(good, choices, 1, lambda *_: None)
-    )
+    data = run_variants(good, others)
     assert data["status"].values.tolist() == ["ok", "failed", "missing"]
     assert data["reason"].values.tolist() == ["", "budget_steps", ""]
     assert data["note"].values.tolist() == ["", "", "needs more"]
@@ -401,46 +489,20 @@ def test_failed_and_impossible_choices_have_no_numbers():
 
 def test_a_case_that_fails_is_the_only_row():
     bad = case(solve={**SHORT, "max_steps": 20})
-    choices = model_choices(bad)
-    data = run_by_hand(bad, choices)
+    data = run_variants(bad, scale_contact(bad))
     assert data["reason"].values.tolist() == ["budget_steps"]
     assert data.attrs["detail"] == "more than 20 steps"
 
 
-def test_variants_of_one_faulty_joint_and_of_two():
-    one, two = ({v.name: v for v in model_variants(case(joint=j))} for j in ("big_end", "both"))
-    assert [*one][:4] == ["no friction", "no spring damping", "gravity 9.81 m/s²",
-                          "1 µm in the ideal joint"]  # fmt: skip
-    assert {choice.name for choice in model_choices(case())} < {*one}
-    assert {"gas load", "friction of ideal joints"} < {*one}
-    assert "friction of ideal joints" not in two  # both are worn
-    assert one["1 µm in the ideal joint"].case.clearance_mm.small_end == 0.001
-    assert two["ideal big end"].case.joint == "small_end"
-    assert {"ideal big end", "ideal small end"} < {*two}
-
-
-def test_a_trade_has_a_row_for_each_change_of_each_scene(few, monkeypatch):
-    few(("contact law: Flores",))
-    names = {
-        "contact law flores",
-        "friction",
-        "clearance of the big end",
-        "clearance of the small end",
-    }
-    rows = tuple(feature for feature in module.FEATURES if feature.name in names)
-    monkeypatch.setattr(module, "FEATURES", rows)
-    found = trade({"one": case(), "two": case(joint="both")}, repeats=1)
-    assert found["peak_acceleration"].dims == ("scene", "choice")
-    assert {GRID, "gas load", "ideal big end", "contact law: Flores"} < {*found["choice"].values}
-    lacking = found.sel(scene="one", choice="ideal big end")
-    assert lacking["status"] == "missing"
-    assert np.isnan(lacking["peak_acceleration"])
-    for scene in ("one", "two"):
-        one = found.sel(scene=scene)
-        itself = one.sel(choice=ITSELF)["peak_acceleration"]
-        assert abs(one.sel(choice="no friction")["peak_acceleration"] / itself - 1) > 1e-3
-        assert one.sel(choice=GRID)["peak_acceleration"] < itself
-    assert found["place_error"].values == pytest.approx(0.6123, abs=1e-3)
+def test_equations_are_compiled_before_a_variant_has_its_time(monkeypatch):
+    done = []
+    monkeypatch.setattr(module, "compile_once", lambda needs, remark: done.append(needs))
+    real = module.fastest_run
+    monkeypatch.setattr(module, "fastest_run", lambda *of: done.append("run") or real(*of))
+    run_variants(case(), [Variant("oil", replace(case(), lubricant=Lubricant()))])
+    needs, *runs = done
+    assert needs.laws
+    assert runs == ["run"] * 2
 
 
 @pytest.mark.parametrize(
@@ -452,4 +514,4 @@ def test_a_trade_has_a_row_for_each_change_of_each_scene(few, monkeypatch):
     ],
 )
 def test_values_of_parts_are_told_as_one_where_they_are(value, words):
-    assert shown_words(value) == words
+    assert format_value(value) == words

@@ -1,0 +1,522 @@
+"""A case with one thing otherwise: another model of its machine, or another value of a number.
+
+`FEATURES` has a row for each feature of the model, `variants` makes cases of the rows, and
+`vary_numbers` of the numbers in doubt: those that the file does not give, or that a plant can only
+guess (`Plausible` in the table of keys), at both ends of their range. `run_variants` runs them.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from compressor.cases import (
+    CYLINDRICAL,
+    Case,
+    CaseError,
+    Output,
+    Study,
+    keys_of,
+    paper_notes,
+    path_of,
+    put,
+    reads,
+    row_of,
+    stands_for,
+    value_in,
+    value_of,
+    values_given,
+)
+from compressor.metrics import BARRED, JOINTS, METRICS
+from compressor.program import PROGRAM, Progress, no_progress, report_progress
+from compressor.solve import simulate, stiffness_of
+from compressor.store import Folder, read_store
+from compressor.sweep import Needs, compile_once
+
+ITSELF = "the case itself"
+MAX_SECONDS = 30.0  # of a variant
+SLOW_SECONDS = 0.25  # of a run that is timed once
+REPEATS = 3  # of shorter ones; the fastest counts
+RESTITUTION = 0.9  # of a law that damps by it, where the case has none
+STEEL = ("steel", "steel")  # where a law needs materials, and the case has none
+UNDAMPED = ("impact", "hertz")  # laws that no restitution damps
+# words of a case file -> the laws' names
+CONTACT_LAWS = {
+    "hertz": "Hertz",
+    "lankarani_nikravesh": "Lankarani-Nikravesh",
+    "flores": "Flores",
+    "johnson": "Johnson",
+    "liu": "Liu",
+}
+FRICTION_LAWS = {
+    "coulomb_tanh": "Coulomb (tanh)",
+    "threlfall": "Threlfall",
+    "ambrosio": "Ambrósio",
+    "lugre": "LuGre",
+}
+SCALES = {"÷ 2": 0.5, "× 2": 2.0}  # of the contact's stiffness and damping
+SCALED = ("contact.stiffness_N_per_mm15", "contact.damping_N_s_per_mm")
+SAME_STIFFNESS = 1.01  # stiffnesses of two joints
+FOLLOWING = ("switching", "back_pressure_MPa")
+OWN_CORNERS = (
+    "cannot be: the paper prints the corners of its own cylinder alone; gas: {switching: exact, "
+    "back_pressure_MPa: 0} has those of any"
+)
+WORDS = ("status", "reason", "seconds")
+# of every run, and what else is shown of it: rod load, body and sensor
+COMPARED = (*METRICS, *(name for name, row in BARRED.items() if row.shown and name not in METRICS))
+
+Values = Mapping[str, Any]  # of a case file, by dotted key
+OfCase = Values | Callable[[Case], Values | None] | None  # None: not for this case
+
+
+def faulty(case: Case) -> list[str]:
+    """Return the joints of a case that have clearance."""
+    return [joint for joint in JOINTS if getattr(case.clearance_mm, joint) > 0]
+
+
+def change(case: Case, values: Values) -> Case:
+    """Return a case with other values. Raises CaseError where there is no such case."""
+    nested = case.values()
+    for key, value in values.items():
+        nested = put(nested, path_of(key), value)
+    return Case.resolve(nested)
+
+
+# ---- other models -------------------------------------------------------------------------------
+
+
+def contact_values(law: str, case: Case) -> Values | None:
+    """Return the values of another contact law; None without any contact.
+
+    What the law needs and the case does not have is a default: its stiffness, steel on steel, a
+    joint as long as wide, a restitution of 0.9.
+    """
+    contact = case.contact
+    if not faulty(case):
+        return None
+    # without a geometry, materials would be those of pins in their bores
+    values: dict[str, Any] = {
+        "contact.law": law,
+        "contact.geometry": contact.geometry or "external",
+    }
+    if law not in UNDAMPED:
+        values["contact.restitution"] = contact.restitution or RESTITUTION
+    if law in CYLINDRICAL:
+        length = contact.length_mm and vars(contact.length_mm)
+        values["contact.length_mm"] = length or bearing_length(case)
+        if not (contact.materials or contact.modulus_GPa):
+            values |= {"contact.materials": STEEL, SCALED[0]: None}
+    elif not (contact.materials or contact.stiffness_N_per_mm15):
+        values[SCALED[0]] = type(contact)().stiffness_N_per_mm15
+    return values
+
+
+def friction_values(law: str, case: Case) -> Values | None:
+    """Return the values of another friction law; None where nothing rubs."""
+    if not case.friction or not faulty(case):
+        return None
+    if law == "lugre" and case.friction.ideal_joints:  # which have no bristles
+        return None
+    return {"friction.law": law}
+
+
+def bearing_length(case: Case) -> Any:
+    """Return the length of a case's bearings (mm): of its oil film, or as long as wide."""
+    if case.lubricant:
+        return vars(case.lubricant.bearing_length_mm)
+    return 2.0 * min(vars(case.machine.pin_radius_mm).values())
+
+
+def oil_values(case: Case) -> Values | None:
+    """Return the values of an oil film in the bearings; None without any clearance."""
+    length = bearing_length(case)
+    return {"lubricant": {"bearing_length_mm": length}} if faulty(case) else None
+
+
+def rod_values(case: Case) -> Values:
+    """Return the values of an elastic steel bar of the section that has the rod's mass.
+
+    The default section is that of the default rod; another one is as wide to its depth.
+    """
+    machine, usual = case.machine, Case().machine
+    mass = machine.rod_mass_kg / usual.rod_mass_kg
+    scale = (mass * usual.rod_length_mm / machine.rod_length_mm) ** 0.5
+    bar = vars(change(Case(), {"rod": True}).rod)
+    return {"rod": {name: round(scale * bar[name], 2) for name in ("depth_mm", "width_mm")}}
+
+
+def rubbing_values(case: Case) -> Values | None:
+    """Return the values by which ideal joints rub as worn ones do; None where none is ideal."""
+    if not case.friction or case.friction.law == "lugre" or len(faulty(case)) == len(JOINTS):
+        return None
+    return {"friction.ideal_joints": True}
+
+
+def clearance_values(joint: str, case: Case) -> Values | None:
+    """Return the values of a small clearance in the joint that is ideal; None of another case."""
+    is_one = len(faulty(case)) == 1 and faulty(case) != [joint]
+    return {"joint": "both", f"clearance_mm.{joint}": 0.001} if is_one else None
+
+
+def ideal_values(joint: str, case: Case) -> Values | None:
+    """Return the values by which one of two worn joints is ideal, and concentric at the start."""
+    other = next(name for name in JOINTS if name != joint)
+    centred = {f"initial_offset_mm.{joint}_{axis}": 0.0 for axis in "xy"}
+    return {"joint": other, **centred} if len(faulty(case)) == 2 else None
+
+
+class Feature(NamedTuple):
+    """A feature of the model: what a case file gives with it, and without it.
+
+    key: which a case sets that has the feature, to `word` where that is given; off: name of a case
+    that is changed so. is_choice: another model of the same machine, no other machine.
+    """
+
+    name: str
+    key: str
+    given: OfCase
+    left_out: OfCase
+    off: str = ""
+    is_choice: bool = False
+    word: str = ""
+
+    def is_in(self, case: Case) -> bool:
+        """Return whether a case has the feature, and so pays for it."""
+        value = case.load if self.key == "load" else value_of(case, self.key)
+        has = value == self.word if self.word else value not in (None, False, 0, "none")
+        return has and reads(case, self.key)
+
+
+SPRING_DAMPING, GRAVITY = "spring.damping_N_s_per_mm", "machine.gravity_m_per_s2"
+FEATURES = (
+    Feature("friction", "friction", lambda case: {"friction": {}} if faulty(case) else None,
+            {"friction": False}),
+    Feature("spring damping", SPRING_DAMPING,
+            lambda case: {SPRING_DAMPING: Case().spring.damping_N_s_per_mm}
+            if case.load == "spring" else None,
+            {SPRING_DAMPING: 0}),
+    Feature("gravity", GRAVITY, {GRAVITY: 9.81}, {GRAVITY: 0}),
+    Feature("back pressure", "gas.back_pressure_MPa", None, {"gas.back_pressure_MPa": 0}),
+    Feature("load", "load", None, {"load": "none"}),
+    Feature("gas load", "load", lambda case: {"load": "gas"} if case.load == "spring" else None,
+            None, word="gas"),
+    Feature("spring load", "load", lambda case: {"load": "spring"} if case.load == "gas" else None,
+            None, word="spring"),
+    *(Feature(f"clearance of the {joint.replace('_', ' ')}", f"clearance_mm.{joint}",
+              partial(clearance_values, joint), partial(ideal_values, joint),
+              f"ideal {joint.replace('_', ' ')}")
+      for joint in JOINTS),
+    Feature("friction of ideal joints", "friction.ideal_joints", rubbing_values,
+            {"friction.ideal_joints": False}),
+    Feature("friction of the guide", "guide", {"guide": True}, {"guide": None}, "ideal guide"),
+    Feature("speed that gives way", "drive", {"drive": True}, {"drive": None}, "steady speed"),
+    *(Feature(f"contact law: {name}", "contact.law", partial(contact_values, law),
+              partial(contact_values, "impact"), "contact law: IMPACT (ADAMS)", True, law)
+      for law, name in CONTACT_LAWS.items()),
+    *(Feature(f"friction law: {name}", "friction.law", partial(friction_values, law),
+              {"friction.law": "adams"}, "friction law: ADAMS", True, law)
+      for law, name in FRICTION_LAWS.items()),
+    Feature("play of the guide", "guide.clearance_mm", {"guide.clearance_mm": 0.05},
+            {"guide.clearance_mm": 0}, "guide without play", True),
+    Feature("oil film", "lubricant", oil_values, {"lubricant": None}, "dry joints", True),
+    Feature("elastic rod", "rod", rod_values, {"rod": None}, "rigid rod", True),
+)  # fmt: skip
+
+
+class Variant(NamedTuple):
+    """A case with one thing otherwise: its name, the case, and what else that assumes.
+
+    Where there can be no such case, `case` is None and `note` says why. varied: the number that is
+    another one, with which the name begins; left_out: how a case file leaves out what the case has
+    and this one has not.
+    """
+
+    name: str
+    case: Case | None
+    note: str = ""
+    varied: str = ""
+    left_out: str = ""
+
+
+def variants(case: Case) -> Iterator[Variant]:
+    """Yield a case without each feature that it has, and with each that it may have."""
+    for row in FEATURES:
+        is_in = row.is_in(case)
+        values = row.left_out if is_in else row.given
+        values = values(case) if callable(values) else values
+        if values is not None:
+            name = (row.off or f"no {row.name}") if is_in else row.name
+            yield vary(case, name, values, left_out=file_text(values) if is_in else "")
+
+
+def file_text(values: Values) -> str:
+    """Return the first of some values as a case file has it."""
+    key, value = next(iter(values.items()))
+    return f"no {key}" if value is None else f"{key}: {str(value).lower()}"
+
+
+def other_models(case: Case) -> Iterator[Variant]:
+    """Yield the other models of a case's machine: laws, stiffness, damping, oil, rod and guide.
+
+    A case without friction has another friction law by having any.
+    """
+    choices = {row.name for row in FEATURES if row.is_choice}
+    choices |= {row.off for row in FEATURES if row.is_choice}
+    choices |= set() if case.friction else {"friction"}
+    yield from (one for one in variants(case) if one.name in choices)
+    yield from scale_contact(case)
+
+
+def vary(case: Case, name: str, values: Values, note: str = "", **more: Any) -> Variant:
+    """Return a variant of a case by other values, with what it assumes, or why it cannot be."""
+    try:
+        other = change(case, values)
+    except CaseError as error:
+        return Variant(name, None, f"cannot be: {error.problems[0]}", **more)
+    return Variant(name, other, ", ".join(filter(None, [note, *assumed(case, other)])), **more)
+
+
+def assumed(case: Case, other: Case) -> Iterator[str]:
+    """Yield the values that the other case reads and the case has not, as `key value`."""
+    for key in keys_of(partial(value_of, other)):
+        value = value_of(other, key)
+        is_new = value != value_of(case, key) or not reads(case, key)
+        if value and not isinstance(value, str | bool) and is_new and reads(other, key):
+            whole, _, name = key.rpartition(".")
+            yield f"{key if stands_for(whole) else name} {format_value(value)}"
+
+
+def format_value(value: Any) -> str:
+    """Return a value of a case file as text."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if hasattr(value, "__dataclass_fields__"):  # of parts, told apart where they differ
+        each = {part: format_value(one) for part, one in vars(value).items()}
+        alike = len({*each.values()}) == 1
+        return next(iter(each.values())) if alike else ", ".join(map(" ".join, each.items()))
+    return " on ".join(value) if isinstance(value, tuple) else str(value)
+
+
+def scale_contact(case: Case) -> Iterator[Variant]:
+    """Yield a case with twice and half its contact stiffness and damping.
+
+    With the stiffness of its pins too, and bearings as long as wide, where those are the paper's.
+    """
+    contact, notes = case.contact, paper_notes(case)
+    if faulty(case):
+        for words, factor in SCALES.items():
+            values, note = scaled_stiffness(case, factor)
+            name = f"contact stiffness {words}"
+            yield vary(case, name, values, note, varied="contact stiffness")
+        if SCALED[0] in notes:
+            values = {"contact.materials": STEEL, "contact.geometry": "internal", SCALED[0]: None}
+            yield vary(case, "contact stiffness of its pins (Eq. 15)", values,
+                       "steel on steel, in a bore")  # fmt: skip
+        for words, factor in SCALES.items():
+            name, more = f"contact damping {words}", {"varied": "contact damping"}
+            if contact.law == "impact" and contact.damping_N_s_per_mm > 0.0:
+                yield vary(case, name, {SCALED[1]: factor * contact.damping_N_s_per_mm}, **more)
+            elif contact.restitution is not None and contact.restitution < 1.0:
+                # such laws damp by 1 - e, to the first order
+                restitution = 1.0 - factor * (1.0 - contact.restitution)
+                if restitution > 0.0:
+                    yield vary(case, name, {"contact.restitution": restitution}, **more)
+                else:
+                    note = f"needs a restitution above {1.0 - 1.0 / factor:g}"
+                    yield Variant(name, None, note, **more)
+    if case.lubricant and "lubricant.bearing_length_mm" in notes:
+        wide = {joint: 2.0 * case.machine.pin_radius_mm.at(joint) for joint in JOINTS}
+        yield vary(case, "bearings as long as wide", {"lubricant.bearing_length_mm": wide})
+
+
+def scaled_stiffness(case: Case, factor: float) -> tuple[Values, str]:
+    """Return the values of a scaled contact stiffness, or modulus, and a note of both joints.
+
+    One key serves both joints, which materials may give a stiffness each: their geometric mean.
+    """
+    contact, worn = case.contact, faulty(case)
+    values: dict[str, Any] = {"contact.materials": None}
+    if contact.law in CYLINDRICAL:
+        key, unit = "contact.modulus_GPa", 1e9
+        lines = change(case, {"contact.law": "johnson"})  # whose stiffness is pi E* L
+        each = [stiffness_of(lines, j) / (math.pi * contact.length_mm.at(j) / 1e3) for j in worn]  # type: ignore[union-attr]
+        each = [contact.modulus_GPa * unit] if contact.modulus_GPa else each
+    else:
+        key, unit, values["contact.geometry"] = SCALED[0], 1000.0**contact.exponent, None
+        each = [stiffness_of(case, joint) for joint in worn]
+    values[key] = factor * (math.prod(each) ** (1.0 / len(each)) / unit)
+    return values, "" if max(each) <= SAME_STIFFNESS * min(each) else "of both joints"
+
+
+# ---- numbers in doubt ---------------------------------------------------------------------------
+
+
+def vary_numbers(study: Study, job: int, named: Sequence[str] = ()) -> Iterator[Variant]:
+    """Yield a job with each number in doubt at both ends of its plausible range.
+
+    In doubt is what the file does not give, and what a plant can only guess; named: other keys that
+    are, though the file gives them. A key that the file sweeps is not varied, nor is the paper's
+    cylinder with the corners that the paper prints of it.
+    """
+    case, nested = study.cases[job], study.given(job)
+    given, swept = values_given(nested), {axis.key for axis in study.axes}
+    for key in doubted_keys(case, named):
+        row, whole = row_of(key), key.rpartition(".")[0]
+        names = {key, *stands_for(key)} | ({whole} if stands_for(whole) else set())
+        doubt = row.plausible if row else None
+        if doubt is None or key in SCALED or not reads(case, key):
+            continue
+        is_named, is_given = not names.isdisjoint(named), not names.isdisjoint(given)
+        value = value_in(nested, key) if is_given else value_of(case, key)
+        span = doubt.given if is_given else doubt.left_out
+        span = span or (doubt.left_out if is_named else None)
+        if span is None or value is None or (not names.isdisjoint(swept) and not is_named):
+            continue
+        base = nested
+        if key.startswith("gas."):
+            if case.gas.switching == "paper" and key != "gas.back_pressure_MPa":
+                yield Variant(key, None, OWN_CORNERS, key)
+                continue
+            # which follow from what else is given of a cylinder, and are to stay
+            held = {name: getattr(case.gas, name) for name in FOLLOWING}
+            base = nested | {"gas": held | nested.get("gas", {})}
+        if stands_for(whole) and not is_given:  # the other parts stay
+            base = put(base, path_of(whole), value)
+        for end in span.ends(value):
+            label = f"{key} {end:.4g}"
+            try:
+                yield Variant(label, Case.resolve(put(base, path_of(key), end)), doubt.why, key)
+            except CaseError as error:
+                yield Variant(label, None, f"cannot be: {error.problems[0]}", key)
+
+
+def doubted_keys(case: Case, named: Sequence[str]) -> Iterator[str]:
+    """Yield the keys of a case; of parts with one value in common each where one is named."""
+    for key in keys_of(partial(value_of, case)):
+        parts = stands_for(key)
+        yield from parts if {*parts}.intersection(named) else (key,)
+
+
+# ---- runs ---------------------------------------------------------------------------------------
+
+
+def choose_job(study: Study, folder: Folder) -> tuple[int, str]:
+    """Return the number of the job of a study that matters most, and why that one.
+
+    It is the one with the greatest known force on a joint of those stored in a folder of results;
+    where there is none, the one with the greatest clearances.
+    """
+    if study.jobs == 1:
+        return 0, "the job"
+    rows = read_store(folder).rows
+    positions = rows.find(study.keys)
+    stored = np.flatnonzero(positions >= 0)
+    if stored.size:
+        numbers = rows.numbers(
+            positions[stored], ("peak_contact_force", "peak_contact_force_error")
+        )
+        known = np.isfinite(numbers["peak_contact_force_error"])
+        forces = np.where(known, numbers["peak_contact_force"], -1.0).max(axis=1)
+        if forces.max() > 0.0:
+            place = int(stored[forces.argmax()])
+            return place, f"the one of {study.jobs} jobs with the greatest stored contact force"
+    gaps = [sum(getattr(case.clearance_mm, j) for j in JOINTS) for case in study.cases]
+    why = f"the one of {study.jobs} jobs with the greatest clearance, as none with a known force "
+    return int(np.argmax(gaps)), f"{why}is stored"
+
+
+def explain_models(
+    study: Study,
+    job: int,
+    named: Sequence[str] = (),
+    every: bool = False,
+    progress: Progress = no_progress,
+) -> xr.Dataset:
+    """Run a job of a study, with every number in doubt, and by every other model of its machine.
+
+    named: as of `vary_numbers`; every: with all other features toggled, too. Returns the Dataset of
+    `run_variants` with the attributes `study` and `key` (of the job).
+    """
+    case = replace(study.cases[job], wear=None)  # which is of no single run
+    models = [*variants(case), *scale_contact(case)] if every else [*other_models(case)]
+    data = run_variants(case, [*vary_numbers(study, job, named), *models], progress)
+    return data.assign_attrs({"study": study.name, "key": study.keys[job]})
+
+
+def run_variants(
+    case: Case, others: Iterable[Variant], progress: Progress = no_progress
+) -> xr.Dataset:
+    """Run a case and its variants; return their metrics with error bars, dim `choice`, in SI.
+
+    The first is the case itself, alone if it fails. Metrics are nan where a run failed, which
+    `status` and `reason` show, and where there is no such case, whose `status` is missing.
+    `seconds`: of the solution, the best of some runs; `varied`, `note`: of the variant.
+    """
+    every = [Variant(ITSELF, case), *others]
+    # each variant has little time, which compiling its equations would use up
+    needs = Needs.of([one.case for one in every if one.case])
+    compile_once(needs, lambda remark: progress(0, len(every), remark))
+    runs: list[xr.Dataset] = []
+    for one in report_progress(every, progress):
+        if one.case is None:
+            runs.append(without_numbers(runs[0]))
+            continue
+        runs.append(compare_metrics(fastest_run(one.case, MAX_SECONDS if runs else math.inf)))
+        if runs[0]["status"] != "ok":
+            break
+    shown = every[: len(runs)]
+    lacking = without_numbers(runs[0])  # where a failed run has nothing of body and sensor
+    whole = [run.assign({n: lacking[n] for n in lacking if n not in run}) for run in runs]
+    table = xr.concat([run[[*lacking]].drop_attrs() for run in whole], "choice")
+    words = {
+        "regime": [str(run.attrs.get("regime", "")) for run in runs],
+        "note": [one.note for one in shown],
+        "varied": [one.varied for one in shown],
+    }
+    phrases = {
+        "regime": "how far the motion can be foretold",
+        "note": "assumed values, or why it cannot be",
+        "varied": "the number that is another one",
+    }
+    for name in lacking:
+        table[name].attrs = runs[0][name].attrs
+    for name, values in words.items():
+        table[name] = "choice", np.array(values, object), {"long_name": phrases[name]}
+    titles = np.array([one.name for one in shown], object)
+    attrs = {"title": "metrics by choices of the model", "program": PROGRAM}
+    return table.assign_coords(
+        choice=("choice", titles, {"long_name": "choice of the model"})
+    ).assign_attrs(attrs | {"detail": runs[0].attrs.get("detail", "")})
+
+
+def fastest_run(case: Case, limit: float) -> xr.Dataset:
+    """Run a case with error bars and without series, in limited time (s).
+
+    Again where it is short; the run of the least wall time is returned.
+    """
+    seconds = min(case.solve.timeout_s, limit)
+    solve = replace(case.solve, error_bars=True, timeout_s=seconds)
+    output = Output("metrics", signals=case.output.signals)
+    bare = replace(case, wear=None, output=output, solve=solve)
+    run = simulate(bare)
+    again = REPEATS - 1 if run.attrs["complete"] and run["seconds"] < SLOW_SECONDS else 0
+    return min(
+        [run, *(simulate(bare) for _ in range(again))], key=lambda one: one["seconds"].item()
+    )
+
+
+def compare_metrics(run: xr.Dataset) -> xr.Dataset:
+    """Return what is compared of a run, with its attributes."""
+    names = (name + end for name in COMPARED for end in ("", "_error"))
+    return run[[*WORDS, *(name for name in names if name in run)]]
+
+
+def without_numbers(run: xr.Dataset) -> xr.Dataset:
+    """Return a run without numbers, as of a case that cannot be."""
+    lacking = {name: values * math.nan for name, values in run.items() if name not in WORDS[:2]}
+    return run.assign(lacking | {"status": "missing", "reason": ""}).assign_attrs(regime="")
