@@ -292,7 +292,7 @@ def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, capsys):
         assert re.search(rf"^  {word} ", out, re.MULTILINE), word
     assert max(map(len, out.splitlines())) <= 80
     assert "2 degrees of freedom\n" in out
-    last = [" ".join(line.split()) for line in out.splitlines()[-5:]]
+    last = [" ".join(line.split()) for line in out.splitlines()[-6:]]
     assert last[0].startswith("without a feature acceleration force time needed, or below 2 %:")
     flat = " ".join(out.split())
     assert "big end eccentricity x; big end eccentricity y active" in flat
