@@ -118,7 +118,7 @@ def work_precision(folder: Folder, study: Study) -> xr.Dataset:
             run = stored.outcome(position)
             row |= {"status": run.status, "reason": run.reason, "numbers": run.numbers}
             row |= {name: run.numbers[name].item() for name in COUNTS}
-            row |= stored.values(key, ["acceleration"])
+            row |= stored.values(key, ["acceleration"]) if run.status == "ok" else {}
             row["worn"] = [getattr(case.clearance_mm, joint) > 0 for joint in JOINTS]
         rows.append(row)
     for scene in dict.fromkeys(row["scene"] for row in rows):
@@ -161,13 +161,14 @@ def judge(rows: Sequence[dict[str, Any]]) -> None:
     for row in rows:
         truth = other if other and row["method"] == tight[0]["method"] else tight[0]
         a, true_a = row["acceleration"], truth["acceleration"]
-        if row is truth or a.size != true_a.size or row["status"] != "ok":
+        if row is truth or a.size != true_a.size:
             continue
         row["error_acceleration"] = np.linalg.norm(a - true_a) / np.linalg.norm(true_a)
         for name in [*ERRORS][1:]:
             apart = np.abs(row["numbers"][name] / truth["numbers"][name] - 1)
             row[f"error_{name}"] = apart[row["worn"]].max() if apart.ndim else apart
-    tight[0]["reference_uncertainty"] = tight[0].get("error_acceleration", math.nan)
+    for row in tight[:1]:
+        row["reference_uncertainty"] = row.get("error_acceleration", math.nan)
 
 
 def fastest(study: xr.Dataset) -> Iterator[dict[str, Any]]:
