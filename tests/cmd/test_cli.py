@@ -13,7 +13,6 @@ import time
 from pathlib import Path
 
 import pytest
-from compressor.store.writer import Writer
 from compsim import cli, screen
 from conftest import jobs_here, without_pictures
 
