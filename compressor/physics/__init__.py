@@ -3,7 +3,7 @@
 from compressor.physics.contact import choose_laws, steepest
 from compressor.physics.contact_laws import elastic_form
 from compressor.physics.film import short_film
-from compressor.physics.kinematics import exact_motion, series_motion
+from compressor.physics.kinematics import exact_motion
 from compressor.physics.loads import (
     complete,
     gas_corners,

@@ -281,19 +281,18 @@ def test_durations_points_and_sizes(say, thing, text):
 
 def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, capsys):
     case_file(
-        "two.yaml", joint="big_end", clearance_mm=[0.3, 0.2], machine={"gravity_m_per_s2": 1e-4}
+        "two.yaml", joint="big_end", clearance_mm=[0.1, 0.2], machine={"gravity_m_per_s2": 1e-4}
     )
     assert cli.main(["explain", "two.yaml", "-j", "1"]) == 0
     out, err = capsys.readouterr()
-    assert out.startswith("two: 2 jobs; explained: clearance_mm = 0.3\n  machine    piston  ")
+    assert out.startswith("two: 2 jobs; explained: clearance_mm = 0.2\n  machine    piston  ")
     assert "\n  motion     clearance at " in out
     for word in ("active", "absent", "scales", "tolerance", "cost"):
         assert re.search(rf"^  {word} ", out, re.MULTILINE), word
     assert max(map(len, out.splitlines())) <= 80
     assert "2 degrees of freedom\n" in out
-    last = [" ".join(line.split()) for line in out.splitlines()[-6:]]
-    assert last[0].startswith("without a feature acceleration force time needed, or below 2 %:")
     flat = " ".join(out.split())
+    assert "without a feature acceleration force time needed, or below 2 %: can go" in flat
     assert "big end eccentricity x; big end eccentricity y active" in flat
     assert "for 2 jobs with 1 worker," in flat
     assert re.search(r" ms of it for the solution .* the rest for the runs that its error", flat)
@@ -301,7 +300,7 @@ def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, capsys):
     assert re.search(r"no friction [+-]\S+ % [+-]\S+ % × \S+ needed", flat)
     assert err.startswith(
         "running the one of 2 jobs with the greatest clearance, as none with a known\n"
-        "  force is stored of two, clearance_mm = 0.3, and with one thing otherwise\n"
+        "  force is stored of two, clearance_mm = 0.2, and with one thing otherwise\n"
     )
 
 

@@ -121,7 +121,7 @@ MISTAKES = [
     ("explain", "Missing argument 'CONFIG...'"),
     ("tradeoff again/wear.yaml", "again/wear.yaml: a job of wear has no joint with clearance"),
     ("tradeoff", "Missing argument 'CONFIG...'"),
-    ("tradeoff good.yaml --set solve.methd=auto", "did you mean method?"),
+    ("tradeoff good.yaml --set solve.methd=auto", "did you mean solve.method?"),
     ("follow good.yaml", "Missing option '--over'"),
     ("follow good.yaml --over clearance_mm=0.1:0.2", "write KEY=LOW:HIGH:N, such as clearance_mm="),
     ("follow good.yaml --over sped_rpm=1:2:3", "--over sped_rpm=1:2:3: sped_rpm is no key of a num",
