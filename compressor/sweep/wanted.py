@@ -123,11 +123,12 @@ def stored_ends(store: Stored, wanted: RequestedJobs) -> dict[str, JobEnd]:
         for at, position, serves in zip(
             indices.tolist(), places[indices].tolist(), satisfied.tolist(), strict=True
         ):
-            key, end = keys[at], store.status_at(position)
-            if serves and store.intact(position):
+            key = keys[at]
+            if not (serves and store.intact(position)):
+                wanted[key] = store.status_at(position).with_stored_outputs(wanted[key])
+            elif store.rows.bytes_of["status"][position] == b"ok":
                 found[key] = OK_END
-                if end.status != "ok":
-                    found[key] = JobEnd(end.status, end.reason, end.detail)
             else:
-                wanted[key] = end.with_stored_outputs(wanted[key])
+                end = store.status_at(position)
+                found[key] = JobEnd(end.status, end.reason, end.detail)
     return found
