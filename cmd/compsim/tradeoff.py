@@ -1,5 +1,6 @@
 """`compsim tradeoff`: speed against accuracy, by method and tolerance."""
 
+import shlex
 from pathlib import Path
 
 import click
@@ -12,7 +13,11 @@ from compsim.progress import ProgressReporter
 @options.configs
 @options.results
 @click.option(
-    "-j", "--jobs", type=options.COUNT, default=1, help="Run so many at once, if times may be off."
+    "-j",
+    "--jobs",
+    type=options.COUNT,
+    default=1,
+    help="Run so many at once; times are then less exact.",
 )
 @options.set_keys
 @options.quiet
@@ -41,7 +46,7 @@ def tradeoff(configs, folder, jobs, overrides, quiet) -> int:
     for config in configs:
         study, texts = load_methods(config, overrides, folder)
         with ProgressReporter(quiet, folder=folder) as progress:
-            command = " ".join(["compsim tradeoff", config, "-r", folder])
+            command = shlex.join(["compsim", "tradeoff", config, "-r", folder])
             sweep([study], folder, jobs, progress, Options(command, texts))
         found = work_precision(folder, study)
         screen.print_text(*list_fastest(found))
