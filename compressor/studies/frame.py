@@ -170,17 +170,21 @@ def records(
             yield RecordedJob(key, point, *found, record)
 
 
-def no_records(
-    source: StoredStudy, left: Mapping[str, int], revolutions: int, kind: type[CompsimError]
-) -> CompsimError:
+class StudyError(CompsimError):
+    """A study by which what is asked cannot be answered: and what to do."""
+
+    exit_code = 2
+
+
+def no_records(source: StoredStudy, left: Mapping[str, int], revolutions: int) -> StudyError:
     """Return the error that says why a study has no record of so many revolutions."""
     if {*left} <= {"without_record"}:
         remedy = RECORD_REMEDY.format(length=2 * revolutions + 1, file=source.case_file)
-        return kind(f"study {source.name} has no sensor's record: {remedy}, and run it again")
+        return StudyError(f"study {source.name} has no sensor's record: {remedy}, and run it again")
     reasons = ", ".join(f"{count} {reason}" for reason, count in left.items())
     text = f"study {source.name} has no record of {revolutions} revolutions: {reasons}"
     remedy = f"run what is missing, or with sensor.length_rev: {revolutions + 1} or more"
-    return kind(f"{text}; {remedy}")
+    return StudyError(f"{text}; {remedy}")
 
 
 def cut_windows(record: Record, revolutions: int, hop: int = 0) -> Iterator[tuple[int, Record]]:

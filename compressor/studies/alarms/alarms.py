@@ -27,7 +27,7 @@ import xarray as xr
 from compressor.analysis import interpolate_hours
 from compressor.cases import Case, Sensor, Wear
 from compressor.metrics import JOINTS
-from compressor.program import PROGRAM, CompsimError, Progress, no_progress
+from compressor.program import PROGRAM, Progress, no_progress
 from compressor.store import Folder, StoredStudy, find_study, read_dataset
 from compressor.studies.alarms.readings import (
     ALARMS,
@@ -39,7 +39,7 @@ from compressor.studies.alarms.readings import (
     default_bands,
     read_windows,
 )
-from compressor.studies.frame import no_records, records
+from compressor.studies.frame import StudyError, no_records, records
 from compressor.vibration import RecordError
 
 SOUND = "none"  # the joint that is worn in a sound machine
@@ -50,12 +50,6 @@ MAX_LEVELS, BINS = 12, 6  # clearances of a joint, beyond which they are put tog
 Z = NormalDist().inv_cdf(0.975)  # of intervals of 95 %
 ENDS = ("value", "low", "high")  # of a number and its interval
 WEAR_REMEDY = "compsim wear the machine's case file, and name the file, or its folder of results"
-
-
-class AlarmsError(CompsimError):
-    """A study by which no alarm can be judged, or a band or a run that it cannot have."""
-
-    exit_code = 2
 
 
 @dataclass(frozen=True)
@@ -78,7 +72,7 @@ def read_study(
     folder: Folder, source: StoredStudy, bands: Sequence[Band], noise: Sequence[float],
     revolutions: int, left: Counter[str], progress: Progress,
 ) -> Windows:  # fmt: skip
-    """Return the windows of all jobs of a study that have a record. Raises AlarmsError.
+    """Return the windows of all jobs of a study that have a record. Raises StudyError.
 
     bands: Hz, none for `default_bands`; left: counts the other jobs by reason.
     """
@@ -116,7 +110,7 @@ def read_study(
         rows += [(joint, clearance, json.dumps(varied, sort_keys=True), job.key)] * count
         clipped += float(job.outcome.numbers["clipped_fraction"]) >= Sensor.REPORTED
     if not rows:
-        raise no_records(source, left, revolutions, AlarmsError)
+        raise no_records(source, left, revolutions)
     stacked = {
         place: {name: np.concatenate([one[name] for one in some]) for name in some[0]}
         for place, some in readings.items()
@@ -134,11 +128,11 @@ def highest_passed(sensor: Sensor | None) -> float:
 
 
 def check_bands(bands: Sequence[Band], key: str, rate: float, passes: float) -> None:
-    """Raise AlarmsError unless a job's record holds the bands."""
+    """Raise StudyError unless a job's record holds the bands."""
     top = min(rate / 2.0, passes)
     for low, high in bands:
         if high > top * (1.0 + 1e-9):
-            raise AlarmsError(
+            raise StudyError(
                 f"band {low:g}-{high:g} Hz: job {key} is sampled at {rate:.6g} Hz, and its sensor "
                 f"passes up to {passes:g} Hz (sensor.low_pass_Hz, or the resonance "
                 f"sensor.mounting_Hz): give bands up to {top:g} Hz"
@@ -146,18 +140,18 @@ def check_bands(bands: Sequence[Band], key: str, rate: float, passes: float) -> 
 
 
 def check_draws(source: StoredStudy, windows: Windows) -> None:
-    """Raise AlarmsError unless there are enough draws of a sound machine, and a worn one."""
+    """Raise StudyError unless there are enough draws of a sound machine, and a worn one."""
     sound = windows.joints == SOUND
     count = len({*windows.draws[sound].tolist()})
     if count < MIN_SOUND:
-        raise AlarmsError(
+        raise StudyError(
             f"study {source.name} has {count} draws of a sound machine (joint: none, or clearances "
             f"up to healthy_clearance_mm), and limits need {MIN_SOUND} at the least, for 1 % of "
             "false alarms 124: draw load and speed, such as machine.speed_rpm: {random: "
             "[700, 780]} with sample: {n: 124}"
         )
     if sound.all():
-        raise AlarmsError(
+        raise StudyError(
             f"study {source.name}: none of its jobs with a record is worn: add clearances beyond "
             "healthy_clearance_mm, or a joint, and run it again"
         )
@@ -231,7 +225,7 @@ def judge_alarms(
     Dimensions: `alarm` (with its filter), `noise`, `state` (a worn joint and a clearance), `joint`,
     `end` (a value and its 95 % interval by draws, for limits as they were set). Variables: `limit`,
     `detection`, `false_alarms` and `first_clearance` (mm; inf where there is none). Raises
-    AlarmsError, and StoreError where the store cannot be read.
+    StudyError, and StoreError where the store cannot be read.
     """
     source, left = find_study(folder, study), Counter[str]()
     windows = read_study(folder, source, bands, noise, revolutions, left, progress)
@@ -339,20 +333,20 @@ def rank_alarms(found: xr.Dataset, joint: str, noise: int = 0) -> list[int]:
 def read_wear(place: str | Path) -> xr.Dataset:
     """Return the stages of a file of `compsim wear`, or of the only one of a folder of results.
 
-    Raises AlarmsError, and StoreError for a damaged file.
+    Raises StudyError, and StoreError for a damaged file.
     """
     path = Path(place)
     if path.is_dir():
         files = sorted({*path.glob("*.nc"), *path.glob("wear/*.nc")})
         if len(files) != 1:
-            raise AlarmsError(f"{path} has {len(files)} wear runs: {WEAR_REMEDY}")
+            raise StudyError(f"{path} has {len(files)} wear runs: {WEAR_REMEDY}")
         path = files[0]
     try:
         run = read_dataset(path, WEAR_REMEDY)
     except OSError as error:
-        raise AlarmsError(f"{path}: {error.strerror}: {WEAR_REMEDY}") from error
+        raise StudyError(f"{path}: {error.strerror}: {WEAR_REMEDY}") from error
     if not {"hours", "clearance"} <= {*run.variables} or "case" not in run.attrs:
-        raise AlarmsError(f"{path} holds no wear run: {WEAR_REMEDY}")
+        raise StudyError(f"{path} holds no wear run: {WEAR_REMEDY}")
     return run
 
 

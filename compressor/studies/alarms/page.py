@@ -1,7 +1,7 @@
 """What a result of alarms looks like: its figure, its files, and its section of a report."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,17 +74,6 @@ def write_alarms(found: xr.Dataset, output: Folder, title: str) -> list[Path]:
     return [write_dataset(Path(output, FILE), found), Path(output, FIGURE)]
 
 
-@dataclass(frozen=True)
-class AlarmsContent:
-    """What the section shows. `title`, `notes`: what the case file says of the machine."""
-
-    lines: list[str]
-    table: PageTable
-    plates: list[Plate]
-    title: str
-    notes: str
-
-
 def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:
     """Return the section of the alarms that are in a folder, and a line on their study.
 
@@ -103,7 +92,8 @@ def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Addit
     head, *rows = list_rows(found)
     table = PageTable(head, [TableRow([Cell(text) for text in row]) for row in rows], lead=3)
     lines = [*list_numbers(found), *list_warnings(found)]
-    content = AlarmsContent(lines, table, plates, study.title, study.notes)
+    content = {"lines": lines, "table": table, "plates": plates,
+               "title": study.title, "notes": study.notes}  # fmt: skip
     anchor, title = file_name("alarms-of", name), f"Which alarm sees wear first in study {name}"
     section = Section(anchor, title, "compressor.studies.alarms:alarms.html", content)
     line = f"{found.sizes['alarm']} alarms were judged by its records."

@@ -17,10 +17,10 @@ import numpy as np
 import xarray as xr
 
 from compressor.cases import Case, Sensor
-from compressor.program import PROGRAM, CompsimError, Progress, no_progress
+from compressor.program import PROGRAM, Progress, no_progress
 from compressor.store import Folder, find_study, publish, write_dataset
 from compressor.studies.diagnosis.features import FEATURES, features
-from compressor.studies.frame import RecordedJob, cut_windows, no_records, records
+from compressor.studies.frame import RecordedJob, StudyError, cut_windows, no_records, records
 from compressor.vibration import RecordError, noisy
 
 # groups of a case that are no part of a machine
@@ -33,12 +33,6 @@ NO_PARQUET = (
     "run the same command again"
 )
 MAX_WORDS = 8  # kinds of a label that are listed
-
-
-class DataSetError(CompsimError):
-    """A study that no data set can be made of, or a folder that has something else."""
-
-    exit_code = 2
 
 
 class Label(NamedTuple):
@@ -96,7 +90,7 @@ def make_data_set(
     `features`, the `LABELS`, `first_pulse` and `split` (train or test); `signal` (m/s2, single
     precision, nan beyond a window's end) with `samples`, `rate` (Hz) and `tacho` (s). Jobs that
     give no window are counted in the attribute `left_out`. In memory are the windows, 4 bytes a
-    sample. Raises DataSetError where nothing is left, StoreError where the store cannot be read.
+    sample. Raises StudyError where nothing is left, StoreError where the store cannot be read.
     """
     source = find_study(folder, study)
     left: Counter[str] = Counter()
@@ -125,7 +119,7 @@ def make_data_set(
         rows += own
         clipped += [float(job.outcome.numbers["clipped_fraction"])] if own else []
     if not rows:
-        raise no_records(source, +left, revolutions, DataSetError)
+        raise no_records(source, +left, revolutions)
     return stack_rows(rows, noise, test_share, seed).assign_attrs(
         title=f"compsim: labelled windows of {source.name}", program=PROGRAM, study=source.name,
         case_file=source.case_file, fixed=json.dumps(source.fixed),
@@ -202,7 +196,7 @@ def list_values(values: Iterable[Any]) -> str:
     kinds = Counter(map(str, known))
     if len(kinds) > MAX_WORDS:
         return f"{len(kinds):,} different"
-    return ", ".join(f"{kind} ({count:,})" for kind, count in sorted(kinds.items()))
+    return ", ".join(f"{kind or 'not known'} ({count:,})" for kind, count in sorted(kinds.items()))
 
 
 def count_windows(dataset: xr.Dataset) -> list[tuple[str, str, int, int]]:
@@ -335,18 +329,18 @@ def tabulate(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
 
 
 def check_folder(folder: Folder) -> None:
-    """Raise DataSetError where a folder has a README.md that is no data set's card."""
+    """Raise StudyError where a folder has a README.md that is no data set's card."""
     place = Path(folder)
     if (place / CARD_FILE).exists() and not (place / WINDOWS).exists():
         text = f"{place} has a {CARD_FILE} of something else, which the card would replace"
-        raise DataSetError(f"{text}: choose another folder, such as {place / 'faults'}")
+        raise StudyError(f"{text}: choose another folder, such as {place / 'faults'}")
 
 
 def write_data_set(folder: Folder, dataset: xr.Dataset) -> list[Path]:
     """Write a data set into a folder, each file whole or not at all; return their paths.
 
     Files of an earlier one are replaced. Parquet needs pyarrow, and is left out without. Raises
-    StoreError where the disk refuses, DataSetError as `check_folder` does.
+    StoreError where the disk refuses, StudyError as `check_folder` does.
     """
     check_folder(folder)
     place = Path(folder)

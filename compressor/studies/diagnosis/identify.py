@@ -23,11 +23,11 @@ from sklearn.model_selection import StratifiedGroupKFold, cross_val_predict
 from sklearn.neighbors import KNeighborsRegressor, NearestNeighbors
 
 from compressor.digits import align_columns
-from compressor.program import CompsimError, Progress, no_progress
+from compressor.program import Progress, no_progress
 from compressor.store import Folder, find_study
 from compressor.studies.diagnosis.dataset import list_values, name_machine
 from compressor.studies.diagnosis.features import features
-from compressor.studies.frame import no_records, records
+from compressor.studies.frame import StudyError, no_records, records
 from compressor.vibration import MIN_REVOLUTIONS, Record, RecordError
 
 MIN_JOBS, MIN_IN_ALL = 30, 200  # jobs of one joint, for it to be identified, and of all
@@ -49,12 +49,6 @@ SAMPLE = 800  # jobs by which the kernel of a regression is chosen
 # of strangeness: share of the variance that components have, how many of them foretell the others,
 # and by which kernel
 VARIANCE, STRONG, WIDTH, RIDGE = 0.999, 10, 0.02, 0.03
-
-
-class StudyError(CompsimError):
-    """A study that nothing can be identified by."""
-
-    exit_code = 2
 
 
 @dataclass(frozen=True)
@@ -94,7 +88,7 @@ def read_library(folder: Folder, study: str, progress: Progress = no_progress) -
         ends = [getattr(job.case.clearance_mm, side) for side in SIDES]
         rows.append((job.key, job.case.worn_joint, ends, found, name_machine(job.case)))
     if not rows:
-        raise no_records(source, left, MIN_REVOLUTIONS, StudyError)
+        raise no_records(source, left, MIN_REVOLUTIONS)
     swept = {
         axis.key: list_values(axis.values)
         for axis in source.axes

@@ -135,7 +135,7 @@ def test_a_record_that_cannot_be_read_is_counted(
 
     read, source, left = alarms.records, read_studies(worn_store)[0], Counter()
     monkeypatch.setattr(alarms, "records", few)
-    with pytest.raises(alarms.AlarmsError, match=f"1 {reason}; run what is missing"):
+    with pytest.raises(alarms.StudyError, match=f"1 {reason}; run what is missing"):
         alarms.read_study(worn_store, source, (), (0.0,), revolutions, left, lambda *_: None)
     assert left == {reason: 1}
 

@@ -7,7 +7,7 @@ import pytest
 
 from compressor.cases import Sensor
 from compressor.studies.alarms.alarms import (
-    AlarmsError,
+    StudyError,
     Windows,
     check_bands,
     check_draws,
@@ -134,7 +134,7 @@ def test_a_study_without_sound_or_worn_jobs_is_refused():
         (many.joints[~sound], many.draws[~sound], "has 0 draws of a sound machine .* limits need"),
         (many.joints, one_draw, "has 1 draws of a sound machine"),
     ):
-        with pytest.raises(AlarmsError, match=told):
+        with pytest.raises(StudyError, match=told):
             check_draws(Source, Windows(joints, joints, draws, draws, {}, 0))
 
 
@@ -216,5 +216,5 @@ def test_bands_fill_what_a_record_holds():
     assert default_bands(1024.0) == ((2.0, 400.0),)
     check_bands(((2.0, 2000.0),), "key", 8000.0, 2000.0)
     for passes, told in ((2000.0, "give bands up to 2000 Hz"), (math.inf, "up to 4000 Hz")):
-        with pytest.raises(AlarmsError, match=f"band 500-4500 Hz: job key .*{told}"):
+        with pytest.raises(StudyError, match=f"band 500-4500 Hz: job key .*{told}"):
             check_bands(((500.0, 4500.0),), "key", 8000.0, passes)

@@ -8,7 +8,7 @@ import xarray as xr
 
 from compressor.cases import Case
 from compressor.store import StoreError, write_dataset
-from compressor.studies.alarms.alarms import AlarmsError, add_hours, read_wear
+from compressor.studies.alarms.alarms import StudyError, add_hours, read_wear
 from compressor.studies.wear.stages import Worn, stages_dataset
 
 CASE = {
@@ -82,7 +82,7 @@ def test_a_folder_has_one_run(tmp_path):
         (tmp_path / "wear", "has 2 wear runs"), (tmp_path / "empty", "has 0 wear runs: compsim w"),
         (tmp_path / "absent.nc", "No such file"), (tmp_path / "study.nc", "holds no wear run"),
     ):  # fmt: skip
-        with pytest.raises(AlarmsError, match=told):
+        with pytest.raises(StudyError, match=told):
             hours(place, clearances)
     with pytest.raises(StoreError, match="compsim wear the machine's case file"):
         hours(tmp_path / "other.nc", clearances)

@@ -11,7 +11,7 @@ from compsim import cli
 
 from compressor.studies.diagnosis.dataset import (
     LABELS,
-    DataSetError,
+    StudyError,
     count_windows,
     list_warnings,
     make_data_set,
@@ -119,7 +119,7 @@ def test_a_readme_of_something_else_is_not_replaced(worn, made, tmp_path, capsys
     card.write_text("mine")
     assert cli.main(["dataset", "worn", "-r", str(worn), "-o", str(tmp_path)]) == 2
     assert "choose another folder" in capsys.readouterr().err
-    with pytest.raises(DataSetError, match=r"README\.md of something else"):
+    with pytest.raises(StudyError, match=r"README\.md of something else"):
         write_data_set(tmp_path, made)
     assert [*tmp_path.iterdir()] == [card]
     assert card.read_text() == "mine"

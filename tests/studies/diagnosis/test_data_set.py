@@ -10,7 +10,7 @@ from compressor.cases.case import Case
 from compressor.store.files import WrongName
 from compressor.store.reader import read_store
 from compressor.studies.diagnosis.dataset import (
-    DataSetError,
+    StudyError,
     make_data_set,
     name_machine,
     split_by_machine,
@@ -157,7 +157,7 @@ def test_windows_may_overlap_and_go_without_samples(worn):
 def test_jobs_that_are_not_run_are_counted(worn, tmp_path):
     """A store of the studies alone."""
     (tmp_path / "studies").symlink_to(worn / "studies")
-    with pytest.raises(DataSetError, match="has no record of 5 revolutions: 14 missing"):
+    with pytest.raises(StudyError, match="has no record of 5 revolutions: 14 missing"):
         make_data_set(tmp_path, "worn")
 
 
@@ -171,7 +171,7 @@ def test_jobs_that_are_not_run_are_counted(worn, tmp_path):
     ],
 )
 def test_a_study_that_cannot_be_used(worn, study, told):
-    with pytest.raises((DataSetError, WrongName), match=told):
+    with pytest.raises((StudyError, WrongName), match=told):
         make_data_set(worn, study)
 
 

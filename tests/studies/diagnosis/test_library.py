@@ -9,7 +9,7 @@ from compressor.store.reader import read_store
 from compressor.store.rows import Rows
 from compressor.store.sensor_records import stored_record
 from compressor.studies.compare import comparison
-from compressor.studies.diagnosis.dataset import DataSetError, make_data_set
+from compressor.studies.diagnosis.dataset import make_data_set
 from compressor.studies.diagnosis.features import features
 from compressor.studies.diagnosis.identify import StudyError, describe_record, read_library
 from compressor.vibration.accelerometer import Record
@@ -69,7 +69,7 @@ def test_rows_of_another_version_are_left_out(worn_store, monkeypatch):
     )
     with pytest.raises(StudyError, match=f"{WORN_JOBS} damaged"):
         read_library(worn_store, "worn")
-    with pytest.raises(DataSetError, match=f"{WORN_JOBS} damaged"):
+    with pytest.raises(StudyError, match=f"{WORN_JOBS} damaged"):
         make_data_set(worn_store, "worn")
     monkeypatch.setattr(comparison, "find_record", lambda *names: ("", record))
     with pytest.raises(comparison.CompareError, match=f"none of the {WORN_JOBS} jobs"):
