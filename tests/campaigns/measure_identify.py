@@ -26,7 +26,7 @@ from compressor.solve.simulate import simulate
 from compressor.studies.diagnosis.features import FEATURES, features
 from compressor.studies.diagnosis.identify import SIDES, Identifier, read_library
 
-STUDY, SEED, JUDGE = 3000, 2101, 2102  # machines of the study; seeds of it and of the judged
+STUDY, SEED, JUDGE = 3000, 2103, 2104  # machines of the study; seeds of it and of the judged
 JUDGED = 200
 CLEARANCE, ROD, MASS, SPEED = (0.05, 0.5), (2, 8), (4, 25), (300, 700)  # mm, log-uniform; kg; rpm
 LOADS, JOINTS = ("spring", "gas"), ("none", "big_end", "small_end", "both")
