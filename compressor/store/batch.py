@@ -234,19 +234,24 @@ def read_series(path: Path, row: int, names: Sequence[str] | None = None) -> dic
     Raises DamagedFile, and FileNotFoundError.
     """
     with open_netcdf(path) as file:
-        return _read_series(file, row, names)
+        return _read_series(file, [row], names)[0]
 
 
-def _read_series(file: Any, row: int, names: Sequence[str] | None = None) -> dict[str, Variable]:
-    found = {}
+def _read_series(
+    file: Any, rows: Sequence[int], names: Sequence[str] | None = None
+) -> list[dict[str, Variable]]:
+    """Return time series of some jobs, each by name."""
+    found: list[dict[str, Variable]] = [{} for _ in rows]
     for name in names_of(file) if names is None else names:
-        for values in _read_rows(file, name, [row]):
+        parts = _read_rows(file, name, rows)
+        if not parts:
+            continue
+        data = file[name]
+        dims = tuple(DIMENSIONS.get(dim, dim) for dim in dimensions_of(data)[1:])
+        attrs = {key: value for key, value in read_attributes(data).items() if key != "absent"}
+        for one, values in zip(found, parts, strict=True):
             if values is not None:
-                data = file[name]
-                dims = [DIMENSIONS.get(dim, dim) for dim in dimensions_of(data)[1:]]
-                attrs = read_attributes(data)
-                attrs.pop("absent", None)
-                found[name] = Variable(tuple(dims), values, attrs)
+                one[name] = Variable(dims, values, attrs)
     return found
 
 
@@ -288,15 +293,16 @@ def read_outcomes(batch: Batch) -> list[Outcome]:
     values, errors = read_numbers(batch.path)
     numbers = spread_numbers(batch.labels, values, errors)
     lines = read_lines(batch.path)
+    kept = np.flatnonzero(batch.samples).tolist()
     with open_netcdf(batch.path) as file:
-        return [
-            Outcome(
-                batch.words["status"][row].decode(), batch.words["reason"][row].decode(),
-                numbers[row].view(ROW)[0], parse_attributes(lines[row]),
-                _read_series(file, row) if batch.samples[row] else {},
-            )
-            for row in range(len(batch))
-        ]  # fmt: skip
+        series = dict(zip(kept, _read_series(file, kept), strict=True)) if kept else {}
+    return [
+        Outcome(
+            batch.words["status"][row].decode(), batch.words["reason"][row].decode(),
+            numbers[row].view(ROW)[0], parse_attributes(lines[row]), series.get(row, {}),
+        )
+        for row in range(len(batch))
+    ]  # fmt: skip
 
 
 def spread_numbers(labels: Sequence[str], values: np.ndarray, errors: np.ndarray) -> np.ndarray:
