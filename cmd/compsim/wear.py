@@ -1,7 +1,10 @@
 """`compsim wear`: how bores wear over operating hours, and when a joint is worn out."""
 
+from pathlib import Path
+
 import click
 
+from compressor.digits import align_columns
 from compsim import options, screen
 from compsim.progress import ProgressReporter, read_cases
 
@@ -24,12 +27,12 @@ def wear(configs, folder, jobs, rerun, as_json, quiet, **how) -> int:
     they are opens them evenly, by Archard's law, and stands for all revolutions until one has grown
     by wear.step_mm. One line a machine goes to stdout: the hours until a clearance reaches
     wear.limit_mm, with the least and the greatest coefficient beside them. Clearances and metrics
-    of the runs are kept in wear/ of the folder, with a figure; what was interrupted goes on from
-    there.
+    of the runs are kept in wear/ of the folder, with a figure of each study; what was interrupted
+    goes on from there.
     """
-    from compressor.studies.wear.figures import draw_machines
-    from compressor.studies.wear.run import check_wear, run_wear
-    from compressor.studies.wear.words import jsonable_wear, list_machines
+    from compressor.report import render, title_figure
+    from compressor.store import publish
+    from compressor.studies.wear import check_wear, draw_wear, run_wear, table, to_row
     from compressor.sweep import cores
 
     studies = read_cases(configs, quiet, **how)
@@ -37,16 +40,24 @@ def wear(configs, folder, jobs, rerun, as_json, quiet, **how) -> int:
     with ProgressReporter(quiet, "machines", folder=folder) as progress:
         summary = run_wear(studies, folder, jobs or cores(), progress, rerun)
     if as_json:
-        screen.print_json([jsonable_wear(one, folder) for one in summary.machines])
+        screen.print_json([to_row(one, folder) for one in summary.machines])
     else:
-        screen.print_text(*list_machines(summary.machines))
-    drawn = draw_machines(summary, folder, {study.name: study.title for study in studies})
+        screen.print_text(*align_columns(table(summary.machines), "<>><"))
     if not quiet:
         new = len(summary.machines) - summary.done_before
         screen.say_done(new, summary.done_before, summary.seconds, folder, "machine")
-        screen.say("\n".join(drawn))
+    for study in studies:
+        mine = [one for one in summary.machines if one.study == study.name]
+        if any(one.life for one in mine):
+            drawing, path = draw_wear(mine), Path(folder, "wear", f"{study.name}.png")
+            drawing.title = title_figure(study.title or study.name, "wear of the bores", [])
+            publish(path, render(drawing, "png"))
+            if not quiet:
+                screen.say(str(path))
     failed = [
-        (one.study + screen.point_text(one.point), one.reason, one.detail) for one in summary.failed
+        (one.study + screen.point_text(one.point), one.reason, one.detail)
+        for one in summary.machines
+        if one.reason
     ]
     if failed:
         screen.say_failures(failed)

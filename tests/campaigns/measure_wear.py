@@ -14,7 +14,7 @@ import numpy as np
 from measure_accuracy import provenance
 
 from compressor.cases.case import Case
-from compressor.studies.wear.stages import Worn, first_stage, life, next_stage, stages_dataset
+from compressor.studies.wear import Worn, first_stage, life, next_stage, stages_dataset
 
 ONE = {"joint": "both", "clearance_mm": 0.2}
 LIMIT = 1.5  # clearances, at which it ends

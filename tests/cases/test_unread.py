@@ -16,7 +16,7 @@ from compressor.cases.parameter import CaseError
 from compressor.cases.table import parts_by_key, table
 from compressor.solve import simulate
 from compressor.store.batch import encode_batch
-from compressor.studies.wear.stages import Worn, first_stage, life, next_stage, stages_dataset
+from compressor.studies.wear import Worn, first_stage, life, next_stage, stages_dataset
 
 SHORT = {"duration_rev": 1, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 5,
          "error_bars": False, "horizon": False}  # fmt: skip

@@ -9,7 +9,7 @@ import xarray as xr
 from compressor.cases import Case
 from compressor.store import StoreError, write_dataset
 from compressor.studies.alarms.alarms import StudyError, add_hours, read_wear
-from compressor.studies.wear.stages import Worn, stages_dataset
+from compressor.studies.wear import Worn, stages_dataset
 
 CASE = {
     "joint": "both", "clearance_mm": 0.1,

@@ -1,14 +1,18 @@
 """How long a joint lasts: the hours until its clearance has grown to a limit.
 
 A stage is an ordinary run at the clearances that wear has opened. What rubs in it wears the bores
-evenly, by Archard's law, until the next stage.
+evenly, by Archard's law, until the next stage. A machine's stages are one file, which is rewritten
+after each of them; the same command goes on from it.
 """
 
+import contextlib
 import hashlib
 import json
 import math
+import time
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,12 +20,24 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import interpolate_hours, rubbing_work, settled_part, settled_revolutions
-from compressor.cases import MODEL_VERSION, Case, CaseError, Output, PerJoint, Wear, to_si
+from compressor.cases import (
+    MODEL_VERSION,
+    Case,
+    CaseError,
+    Output,
+    PerJoint,
+    Study,
+    Wear,
+    points,
+    to_si,
+)
 from compressor.metrics import JOINTS, METRICS
-from compressor.program import PROGRAM
+from compressor.program import PROGRAM, CompsimError, Progress
 from compressor.reasons import Reason
+from compressor.report import BLACK, CYCLE, GREY, Drawing, LineStyle, Note, fill, make_grid
 from compressor.solve import simulate
-from compressor.store import Folder, StoreError, read_dataset, write_dataset
+from compressor.store import Folder, StoreError, read_dataset, writable_folder, write_dataset
+from compressor.sweep import JobLost, Needs, run_here
 
 FOLDER = "wear"
 REMEDY = "delete it: the same command makes it again"
@@ -40,7 +56,16 @@ NUMBERS: dict[str, tuple[tuple[str, ...], str, str]] = {
     **{name: (METRICS[name].dims, METRICS[name].unit, METRICS[name].phrase) for name in SHOWN},
 }
 
+AT_MOST = 100_000  # motions, whose wall time a machine may take
+MAX_DRAWN = len(CYCLE)  # machines in a figure
+
 Stage = dict[str, Any]
+
+
+class NoWear(CompsimError):
+    """A case that has nothing to wear."""
+
+    exit_code = 2
 
 
 @dataclass(frozen=True)
@@ -194,11 +219,6 @@ def read_kept_stages(machine: Worn, path: Path) -> list[Stage]:
     return stages
 
 
-def write(machine: Worn, folder: Folder, stages: list[Stage]) -> None:
-    """Store the stages of a machine. Raises StoreError."""
-    write_dataset(machine.path(folder), stages_dataset(machine, stages))
-
-
 def wear_file(folder: Folder, case: Case) -> Path:
     """Return the path at which the stages of a case with wear are stored."""
     return Worn(case).path(folder)
@@ -246,3 +266,190 @@ def life(machine: Worn, stages: xr.Dataset) -> Life:
         float(opened[-1, worst]),
         float(hours[-1]),
     )
+
+
+@dataclass(frozen=True)
+class WornMachine:
+    """How a machine of a study has worn; `point`: its swept values, `stages`: that are stored.
+
+    `reason`, `detail`: why it ended early, if it did. `life`: None where no stage is stored.
+    """
+
+    study: str
+    point: dict[str, Any]
+    worn: Worn
+    stages: xr.Dataset | None
+    life: Life | None
+    reason: str = ""
+    detail: str = ""
+
+
+class WearSummary(NamedTuple):
+    """What a run did: machines, how many of them were complete before, and seconds."""
+
+    machines: list[WornMachine]
+    done_before: int
+    seconds: float
+
+
+def check_wear(studies: Sequence[Study]) -> None:
+    """Raise NoWear unless each case wears, and is measured over whole revolutions."""
+    for study, case in ((one, case) for one in studies for case in one.cases):
+        if case.joint == "none":
+            raise NoWear(f"{study.path}: joint: none has no bore that wears: leave none out")
+        if not case.wear:
+            remedy = "write wear: true, or keys of it (compsim schema)"
+            raise NoWear(f"{study.path}: has no wear: {remedy}")
+        if case.solve.duration_rev == "auto":
+            continue
+        turns = (case.duration - case.settle) / case.turn
+        if abs(turns - round(turns)) > 1e-9 or turns < 1.0 - 1e-9:
+            raise NoWear(
+                f"{study.path}: solve.duration_rev: {turns:g} after settle_rev must be whole "
+                "revolutions, one at least"
+            )
+
+
+def run_wear(
+    studies: Sequence[Study], folder: Folder, workers: int, progress: Progress, rerun: bool = False
+) -> WearSummary:
+    """Follow and store the wear of all cases of studies, as far as it is missing.
+
+    rerun: machines that failed go on from their last good stage. Progress counts machines. Raises
+    StoreError and WorkersFailed; whatever ends it early, what was stored stays, and the same call
+    goes on.
+    """
+    began = time.monotonic()
+    writable_folder(folder)
+    listed = [
+        (study.name, point, Worn(case))
+        for study in studies
+        for point, case in zip(points(study), study.cases, strict=True)
+    ]
+    machines = {worn.key: worn for _, _, worn in listed}
+    missing = [one for one in machines.values() if not is_complete(one, folder, rerun)]
+    done, total, lost = len(machines) - len(missing), len(machines), {}
+    work = partial(follow_wear, folder=folder, rerun=rerun)
+    jobs = [(worn.key, worn, AT_MOST * worn.case.solve.timeout_s) for worn in missing]
+    needs = Needs.of(worn.case for worn in missing)
+    progress(done, total, "")
+    running = run_here(work, jobs, needs, workers, partial(progress, done, total))
+    with contextlib.closing(running):
+        for count, end in enumerate(running, done + 1):
+            if isinstance(end, JobLost):
+                lost[end.id] = end
+            progress(count, total, "")
+    found = [worn_machine(*one, folder, lost.get(one[2].key)) for one in listed]
+    return WearSummary(found, done, time.monotonic() - began)
+
+
+def stored_stages(worn: Worn, folder: Folder, rerun: bool = False) -> list[Stage]:
+    """Return the stages of a machine that are kept; rerun: without failed ones."""
+    stages = read_kept_stages(worn, worn.path(folder))
+    return [stage for stage in stages if not (rerun and stage["reason"])]
+
+
+def is_complete(worn: Worn, folder: Folder, rerun: bool = False) -> bool:
+    """Return whether all stages of a machine are stored. Raises StoreError."""
+    stages = stored_stages(worn, folder, rerun)
+    return bool(stages) and worn.over(stages[-1])
+
+
+def follow_wear(worn: Worn, folder: Folder, rerun: bool = False) -> None:
+    """Run and store what is missing of a machine, in a worker. Raises StoreError."""
+    stages = stored_stages(worn, folder, rerun)
+    while not stages or not worn.over(stages[-1]):
+        stages.append(next_stage(worn, stages[-1]) if stages else first_stage(worn))
+        write_dataset(worn.path(folder), stages_dataset(worn, stages))
+
+
+def worn_machine(
+    study: str, point: dict[str, Any], worn: Worn, folder: Folder, end: JobLost | None
+) -> WornMachine:
+    """Return a machine of a study by its stored stages; end: how its worker was lost, if it was."""
+    kept = stored_stages(worn, folder)
+    if not kept:
+        why = (str(end.reason), end.detail) if end else ("", "")
+        return WornMachine(study, point, worn, None, None, *why)
+    stages, last = stages_dataset(worn, kept), kept[-1]
+    why = (str(end.reason), end.detail) if end else (last["reason"], last["detail"])
+    return WornMachine(study, point, worn, stages, life(worn, stages), *why)
+
+
+HEAD = ("machine", "worn out after, h", "from more to less wear, h", "at the end")
+
+
+def table(machines: Iterable[WornMachine]) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each machine below a head: its hours, their range, and its end."""
+    yield HEAD
+    for one in machines:
+        failed = f"failed: {one.reason}" if one.reason else ""
+        found, keys = one.life, one.worn.wear
+        if not found:
+            yield name_of(one), "", "", failed
+            continue
+        factor = keys.coefficient_factor
+        low, mid, high = (
+            # not worn out in the hours that were followed, or are followed at most
+            f"> {hours(min(times * found.followed, keys.hours))}"
+            if math.isnan(value)
+            else hours(value)
+            for value, times in ((found.low, 1 / factor), (found.hours, 1.0), (found.high, factor))
+        )
+        end = f"{1e3 * found.clearance:.3f} mm at {found.joint}"
+        yield name_of(one), mid, f"{low} to {high}", "; ".join(filter(None, (end, failed)))
+
+
+def name_of(one: WornMachine) -> str:
+    """Return the study of a machine and its swept values."""
+    return " ".join([one.study, *(f"{key}={value}" for key, value in one.point.items())])
+
+
+def hours(value: float) -> str:
+    """Return the hours in four digits."""
+    return f"{value:.0f}" if value >= 1000 else f"{value:.4g}"
+
+
+def to_row(one: WornMachine, folder: Folder) -> dict[str, Any]:
+    """Return a machine as JSON says it."""
+    found: dict[str, Any] = {"study": one.study, **one.point, "reason": one.reason}
+    if one.life:
+        found |= {**one.life._asdict(), "file": str(one.worn.path(folder))}
+    return found
+
+
+def draw_wear(machines: Iterable[WornMachine]) -> Drawing:
+    """Return two panels: clearance and greatest force of each machine's worst joint by hours.
+
+    Of the first machines that have a life. Shaded: with the least and the greatest coefficient.
+    """
+    figure, grid = make_grid(1, 2, 3.6)
+    opening, force = grid.flat
+    drawn = [one for one in machines if one.life][:MAX_DRAWN]
+    last = 1e-9
+    for one, line in zip(drawn, CYCLE, strict=False):
+        assert one.stages is not None
+        assert one.life
+        stages, factor = one.stages.sel(joint=one.life.joint), one.worn.wear.coefficient_factor
+        at, opened = stages["hours"].values, 1e3 * stages["clearance"].values
+        opening.plot(at, opened, line)
+        around = np.concatenate([at / factor, at[::-1] * factor])
+        opening.plot(
+            around, np.concatenate([opened, opened[::-1]]), fill(line.color, 0.15), kind="band"
+        )
+        peaks = 1e-3 * stages["peak_contact_force"].values
+        force.plot(at, peaks, line, f"{name_of(one)}, {one.life.joint.replace('_', ' ')}")
+        last = max(last, float(at[-1]))
+    for limit in {1e3 * one.worn.limit for one in drawn if math.isfinite(one.worn.limit)}:
+        opening.notes.append(Note(y=limit, style=LineStyle(BLACK, linewidth=0.8)))
+        opening.notes.append(Note("limit", 0.02 * last, limit, shift=(0, 2), size=8.5))
+    opening.x.title = force.x.title = "operating hours"
+    opening.x.span(0.0, last)
+    opening.y.title = "clearance (mm)"
+    force.y.title = "greatest contact force (kN)"
+    force.y.span(low=0.0)
+    figure.legend = force.traces
+    for panel, letter in zip(grid.flat, "ab", strict=True):
+        panel.title = f"({letter})"
+        panel.notes.append(Note(y=0.0, style=LineStyle(GREY, linewidth=0.5, zorder=0)))
+    return figure

@@ -8,7 +8,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.solve import simulate
-from compressor.studies.wear.stages import (
+from compressor.studies.wear import (
     Worn,
     first_stage,
     follow_stage,

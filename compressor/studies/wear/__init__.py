@@ -1,1 +1,0 @@
-"""Bores that wear over operating hours, until a joint is worn out."""
