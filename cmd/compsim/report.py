@@ -22,7 +22,6 @@ from compsim import options, screen
     "unit, such as 'sensor_peak=0.5,2 g'.",
 )
 @options.units("kN, mm, µm, m/s²")
-@options.addition("claims")
 @options.addition("alarms")
 @click.pass_obj
 def report(command, names, folder, output, single, limits, units, **places) -> int:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # study whose module `page` has `add`, what it adds to a report -> the folder of what it is made
 # from, by default; "" in that of results
-PAGES = {"claims": "claims", "tradeoff": "", "alarms": "alarms"}
+PAGES = {"tradeoff": "", "alarms": "alarms"}
 
 
 def page_additions(folders: "Mapping[str, Folder]") -> "list[Add]":

@@ -302,7 +302,7 @@ def test_the_tail_of_a_normal_distribution_is_refused_with_its_draw(read):
 
 
 def test_axes_without_ends_have_no_range(read):
-    """`compsim claims` searches ranges: a triangle has one, a normal distribution has none."""
+    """A triangle has a range, a normal distribution has none."""
     spreads = {axis.key: axis.spread for axis in read(DRAWN % (("lhs",) * 3)).axes}
     assert spreads["clearance_mm"] is None
     assert [spreads["machine.speed_rpm"](share) for share in (0.0, 1.0)] == [300, 900]

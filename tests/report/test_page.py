@@ -37,7 +37,6 @@ from compressor.report.paper_sections import (
 from compressor.report.side_by_side import HealthyAndWorn
 from compressor.report.study_section import JobsContent, StudyContent
 from compressor.store.studies import StoredStudy
-from compressor.studies.claims.page import MachinesFile
 from compressor.studies.tradeoff.page import ModelsContent
 
 ROOT = Path(__file__).parents[2]
@@ -108,7 +107,6 @@ def contents(evil):
         "diagnosis.html": DiagnosisContent(12, table(evil), [plate(evil)]),
         "figures.html": [plate(evil), plate(evil)],
         "jobs.html": JobsContent(evil(), 9, table(evil), [evil()]),
-        f"{STUDIES}.claims:machines.html": [MachinesFile(evil(), [evil()], plate(evil))],
         "missing.html": MissingFigures([evil()], [evil()], evil()),
         f"{STUDIES}.tradeoff:models.html": ModelsContent(evil(), evil(), evil(), table(evil)),
         "printed.html": table(evil),

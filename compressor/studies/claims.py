@@ -1,0 +1,395 @@
+"""Judge the paper's eight claims on many machines: how far each is off, and what decides it.
+
+A machine is eleven ordinary jobs of a study: both ideal loads and the paper's nine worn cases, by
+blocks, as the examples `claims` and `assumptions` have them; whatever else is swept makes machines.
+Margins are taken from the stored jobs by the rules of the report, 0 at a claim's threshold.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from compressor.analysis import LOADS, RULES, claim_margins, label, paper_cases, saltelli_design
+from compressor.cases import Case, points
+from compressor.digits import setting
+from compressor.program import CompsimError, Progress, no_progress, report_progress
+from compressor.report import (
+    BLACK,
+    BLUE,
+    GREY,
+    RED,
+    ColorScale,
+    Drawing,
+    LineStyle,
+    Panel,
+    Trace,
+    contour_area,
+    contour_lines,
+    fill,
+    join_with_gaps,
+    make_grid,
+    map_cells,
+    mark,
+    midway,
+    palette,
+    share_scales,
+)
+from compressor.store import (
+    DamagedFile,
+    Folder,
+    StoredStudy,
+    coordinate_names,
+    read_store,
+    swept_column,
+)
+
+CLAIMS = tuple(range(1, len(RULES) + 1))
+SHORT = (
+    "same ideal motion", "spring load differs", "acceleration alone changes",
+    "peaks grow with clearance", "horizontal force dominates", "acceleration follows force",
+    "big end hits steadily", "two clearances are worse",
+)  # fmt: skip
+SHARES = ("apart", "hit", "energy_angle", "active")  # by which claim 7 is measured
+SHORT_SHARES = (
+    "flight and impact alone", "10° windows hit alone", "angle of energy alone", "vibration alone",
+)  # fmt: skip
+ROLES = ("load", "joint", "clearance_mm")  # keys that make the paper's cases of a machine
+LABELS = tuple(paper_cases())
+ROD, RECIPROCATING = "rod_mass_kg", "reciprocating_mass_kg"
+CUT = 1.0  # margins beyond this are cut: how far beyond decides no claim
+ORDERS = ("first_order", "total_order")
+INTERVALS = tuple(f"{order}{end}" for order in ORDERS for end in ("", "_low", "_high"))
+UNIT = {"units": "1"}
+REMEDY = "compsim init claims writes a case file with all eleven cases of each machine"
+
+Key = tuple[tuple[str, Any], ...]  # swept values of a machine
+
+
+class ClaimsError(CompsimError, ValueError):
+    """A study that makes no machines to judge."""
+
+    exit_code = 2
+
+
+class Margins(NamedTuple):
+    """How far a machine is from each claim's threshold; nan where jobs are missing or failed.
+
+    `margin`, `error`: (8,), relative; `share_margin`, `share_error`: of claim 7 by each of `SHARES`
+    alone, (4,). `chaotic`: how many cases are. `failed`: which cases there are not, and why.
+    """
+
+    margin: list[float]
+    error: list[float]
+    share_margin: list[float]
+    share_error: list[float]
+    chaotic: int = 0
+    failed: str = ""
+
+
+def machines(source: StoredStudy) -> dict[Key, dict[str, str]]:
+    """Return the keys of the jobs of each machine, by the labels of the paper's cases.
+
+    Jobs that are none of these are left aside. Raises ClaimsError without a machine that has all.
+    """
+    ideal = {load: name for name, load in LOADS.items()}
+    found: dict[Key, dict[str, str]] = {}
+    for key, point in zip(source.keys, points(source), strict=True):
+        load, joint, clearance = (point.get(role) for role in ROLES)
+        name = ideal.get(str(load), "") if joint == "none" else ""
+        if load == LOADS["design"] and isinstance(clearance, float):
+            name = label(str(joint), clearance)
+        machine = tuple(one for one in point.items() if one[0] not in ROLES)
+        if name in LABELS:
+            found.setdefault(machine, {})[name] = key
+    if not any(len(jobs) == len(LABELS) for jobs in found.values()):
+        raise ClaimsError(f"study {source.name} has no machine with the paper's cases: {REMEDY}")
+    return found
+
+
+def judge_machines(
+    folder: Folder, source: StoredStudy, progress: Progress = no_progress
+) -> xr.Dataset:
+    """Return the margins of each machine of a stored study, with the dimension machine.
+
+    `margin`, `error` over claim; `share_margin`, `share_error` over share; swept keys are
+    coordinates, in the case file's unit. Raises ClaimsError and StoreError.
+    """
+    found = machines(source)
+    stored = read_store(folder).warned()
+    rows = []
+    for jobs in report_progress([*found.values()], progress):
+        runs, problems = {}, [f"{name}: missing" for name in LABELS if name not in jobs]
+        for name, key in jobs.items():
+            status = stored.status(key)
+            if status is None or status.reason or not status.samples:
+                problems.append(f"{name}: {status.reason if status else 'missing'}")
+                continue
+            try:
+                runs[name] = stored.job(key)
+            except DamagedFile:
+                problems.append(f"{name}: damaged")
+        rows.append(measure(runs, "; ".join(problems)))
+    columns = zip(*(dict(machine).values() for machine in found), strict=True)
+    names = coordinate_names([key for key, _ in next(iter(found))])
+    coords: dict[str, tuple] = {
+        name: ("machine", *swept_column(key, column))
+        for (key, name), column in zip(names.items(), columns, strict=True)
+    }
+    return machines_dataset(rows, coords).assign_attrs(study=source.name)
+
+
+def measure(runs: Mapping[str, xr.Dataset], failed: str = "") -> Margins:
+    """Return the margins of one machine's runs by label; nan where some failed."""
+    chaotic = sum(run.attrs.get("regime") == "chaotic" for run in runs.values())
+    if failed:
+        no_claim, no_share = [math.nan] * len(CLAIMS), [math.nan] * len(SHARES)
+        return Margins(no_claim, no_claim, no_share, no_share, chaotic, failed)
+    each, alone = claim_margins(runs)
+    shares = [alone[name] for name in SHARES]
+    return Margins(
+        [one.value for one in each], [one.error for one in each],
+        [one.value for one in shares], [one.error for one in shares], chaotic,
+    )  # fmt: skip
+
+
+def machines_dataset(rows: list[Margins], coords: Mapping[str, tuple]) -> xr.Dataset:
+    """Return margins with the dimension machine; coords: of the swept keys."""
+    phrases = {
+        "margin": ("claim", "how far a claim is from its threshold, relative to it"),
+        "error": ("claim", "how far the margin may be off"),
+        "share_margin": ("share", "margin of claim 7 by one share of the revolution alone"),
+        "share_error": ("share", "how far that margin may be off"),
+    }
+    variables: dict[str, tuple] = {
+        name: (("machine", dim), [getattr(row, name) for row in rows], UNIT | {"long_name": phrase})
+        for name, (dim, phrase) in phrases.items()
+    }
+    about = {"long_name": "how many of the cases are chaotic", **UNIT}
+    variables["chaotic"] = "machine", [row.chaotic for row in rows], about
+    texts = np.array([row.failed for row in rows], object)
+    variables["failed"] = "machine", texts, {"long_name": "cases there are not, and why"}
+    own = {
+        "claim": ("claim", np.array(CLAIMS), {"long_name": "claim of the paper"}),
+        "share": ("share", np.array(SHARES, object), {"long_name": "measure of claim 7"}),
+    }
+    thresholds = "; ".join(f"{n}. {rule.threshold}" for n, rule in zip(CLAIMS, RULES, strict=True))
+    return xr.Dataset(variables, {**coords, **own}, {"thresholds": thresholds})
+
+
+def assumptions(found: xr.Dataset) -> list[str]:
+    """Return the names of the swept keys of machines."""
+    return [str(name) for name, one in found.coords.items() if "case_key" in one.attrs]
+
+
+def sensitivity(found: xr.Dataset) -> xr.Dataset | None:
+    """Return Sobol's indices of each claim's margin over the swept keys; None without the design.
+
+    `first_order` and `total_order` over (claim, assumption), with `_low` and `_high`, the ends of
+    the 95 % bootstrap interval; nan where a margin is the same at all machines. Margins are cut at
+    ± 1. A machine without margins counts as the median one.
+    """
+    names = assumptions(found)
+    columns = [found[name].values for name in names]
+    is_numeric = bool(columns) and all(column.dtype != object for column in columns)
+    design = saltelli_design(np.stack(columns, axis=1)) if is_numeric else None
+    if design is None:
+        return None
+    margin = np.clip(found["margin"].transpose("claim", "machine").values, -CUT, CUT)
+    margin = np.where(np.isnan(margin), np.nanmedian(margin, axis=1, keepdims=True), margin)
+    values = {name: np.full((len(CLAIMS), len(names)), np.nan) for name in INTERVALS}
+    for claim in np.flatnonzero(np.ptp(margin, axis=1) > 0.0):
+        for name, row in design.indices(margin[claim]).items():
+            values[name][claim] = row
+    coords = {"claim": found["claim"].values, "assumption": np.array(names, object)}
+    return xr.Dataset({n: (("claim", "assumption"), one) for n, one in values.items()}, coords)
+
+
+def mass_plane(found: xr.Dataset) -> xr.Dataset | None:
+    """Return machines that are a grid over both masses with these as dimensions, else None."""
+    if {*assumptions(found)} != {ROD, RECIPROCATING}:
+        return None
+    sizes = [np.unique(found[name]).size for name in (ROD, RECIPROCATING)]
+    if found.sizes["machine"] != math.prod(sizes) or min(sizes) < 3:
+        return None
+    return found.set_index(machine=[RECIPROCATING, ROD]).unstack("machine")
+
+
+class Consistent(NamedTuple):
+    """A machine of a mass plane (kg), and the least margin of some claims there and around it."""
+
+    rod_mass: float
+    reciprocating_mass: float
+    least: float
+    claims: tuple[int, ...]
+
+
+def most_consistent(plane: xr.Dataset) -> Consistent:
+    """Return the machine around which the least margin, at its neighbours too, is greatest.
+
+    Claims 1 and 2, which do not depend on masses, are left aside, and so are claims that hold at no
+    machine. Machines at the plane's edge are not chosen.
+    """
+    held = (plane["margin"] >= 0.0).any([ROD, RECIPROCATING])
+    claims = tuple(claim for claim in CLAIMS[2:] if held.sel(claim=claim))
+    margin = plane["margin"].sel(claim=[*claims]).min("claim").fillna(-np.inf)
+    around = margin.rolling({ROD: 3, RECIPROCATING: 3}, center=True).min().fillna(-np.inf)
+    best = around.isel(around.argmax(...))
+    return Consistent(float(best[ROD]), float(best[RECIPROCATING]), float(best), claims)
+
+
+HEAD = ("claim", "", "holds in", "least", "median", "greatest", "most by, total effect")
+
+
+def table(found: xr.Dataset, effects: xr.Dataset | None) -> Iterator[tuple[str, ...]]:
+    """Yield a row for each claim below a head: machines where it holds, its margins in percent.
+
+    Claim 7 stands by each of its shares alone, too. effects: of `sensitivity`.
+    """
+    yield HEAD
+    for claim, short in zip(CLAIMS, SHORT, strict=True):
+        by = most_by(effects.sel(claim=claim)) if effects is not None else ""
+        yield f"{claim}", short, *cells(found["margin"].sel(claim=claim)), by
+        for share, name in zip(SHARES, SHORT_SHARES, strict=True):
+            if claim == 7:
+                yield "", name, *cells(found["share_margin"].sel(share=share)), ""
+
+
+def cells(margin: xr.DataArray) -> list[str]:
+    """Return how often a margin is not negative, and its least, median and greatest, in percent."""
+    known = margin.values[~np.isnan(margin.values)]
+    if not known.size:
+        return ["-"] * 4
+    spread = (np.min(known), np.median(known), np.max(known))
+    return [f"{(known >= 0.0).sum()}", *(f"{100 * value:+.3g} %" for value in spread)]
+
+
+def most_by(one: xr.Dataset) -> str:
+    """Return the assumption with the greatest total effect on a claim, with its interval."""
+    total = one["total_order"].values
+    if np.isnan(total).all():
+        return "-"
+    best = one.isel(assumption=int(np.nanargmax(total)))
+    value, low, high = (best[f"total_order{end}"].item() for end in ("", "_low", "_high"))
+    return f"{best['assumption'].item()} {value:.2f} [{low:.2f}, {high:.2f}]"
+
+
+def numbers(found: xr.Dataset) -> list[tuple[str, str]]:
+    """Return up to six labelled numbers of machines."""
+    known = found["failed"].values == ""
+    held = found["margin"].values >= 0.0
+    others = [claim != 7 for claim in CLAIMS]
+    rows = [
+        ("machines judged", f"{known.sum()}"),
+        ("without a verdict", f"{(~known).sum()}"),
+        ("with chaotic cases", f"{(found['chaotic'].values > 0).sum()}"),
+        ("all eight claims hold in", f"{held.all(axis=1).sum()}"),
+        ("all but claim 7 hold in", f"{held[:, others].all(axis=1).sum()}"),
+    ]
+    plane = mass_plane(found)
+    if plane is not None:
+        best = most_consistent(plane)
+        masses = f"{setting(best.rod_mass)} and {setting(best.reciprocating_mass)} kg"
+        names = ", ".join(map(str, best.claims))
+        rows.append(("most consistent", f"{masses}: claims {names} by {100 * best.least:.2g} %"))
+    return rows
+
+
+REACH = 0.5  # of the threshold: margins beyond it have the same colour
+OF_MASSES = (3, 4, 5, 6, 7, 8)  # claims that masses can decide
+EFFECTS = (
+    ("first_order", GREY, 0.19, "main effect"),
+    ("total_order", BLUE, -0.19, "total"),
+)
+MAP = "blue: the claim holds, red: it does not, by its margin; ring: the default masses"
+BARS = "shares of the variance of a claim's margin by an assumption, with 95 % intervals"
+
+
+def draw(found: xr.Dataset, effects: xr.Dataset | None) -> tuple[Drawing, str] | None:
+    """Return the figure of machines and a sentence on it; None where they are neither kind.
+
+    A map over both masses, or what decides each claim.
+    """
+    plane = mass_plane(found)
+    if plane is not None:
+        return draw_map(plane), MAP
+    return (draw_sensitivity(effects), BARS) if effects is not None else None
+
+
+def draw_map(plane: xr.Dataset) -> Drawing:
+    """Return each claim's margin over rod and reciprocating mass, and how many claims hold."""
+    figure, panels = make_grid(2, 4, 5.6)
+    x, y = (midway(plane[name].values) for name in (ROD, RECIPROCATING))
+    colors = ColorScale(palette("RdBu"), -REACH, REACH, side="")
+    *shown, number, best = figure.panels
+    for claim, panel in zip(OF_MASSES, shown, strict=True):
+        margin = plane["margin"].sel(claim=claim).transpose(RECIPROCATING, ROD).values
+        panel.traces.append(map_cells(x, y, margin, colors))
+        border(panel, plane, margin >= 0.0, BLACK)
+        panel.title = f"claim {claim}"
+    bar = replace(colors, side="right", aspect=40, beside_column=True, pointed=True,
+                  bar_title="margin, relative to the threshold; holds above 0")  # fmt: skip
+    last = panels[0, 3].traces
+    last[0] = replace(last[0], scale=bar)
+    count = (plane["margin"] >= 0.0).transpose("claim", RECIPROCATING, ROD).sum("claim").values
+    steps = ColorScale(palette("cividis", 7), 1.5, 8.5, side="bottom", aspect=18,
+                       ticks=(*range(2, 9),))  # fmt: skip
+    number.traces.append(map_cells(x, y, count.astype(float), steps))
+    number.title = "how many of eight hold"
+    most = int(count.max())
+    best.ground = fill("#f4f4f4")
+    masses = plane[ROD].values, plane[RECIPROCATING].values
+    around = contour_area(*masses, (count == most).astype(float), 0.5, 1.5)
+    best.plot(*around, fill(BLUE, 0.35), kind="band")
+    border(best, plane, count == most, BLUE)
+    best.title = f"most of them: {most} hold"
+    default = Case.from_values({}).machine
+    for panel in figure.panels:
+        ring = mark(RED, "o", 6, is_hollow=True, edge_width=1.8)
+        panel.plot(default.rod_mass_kg, default.reciprocating_mass_kg, ring)
+        panel.grid = ""
+    for panel in panels[1]:
+        panel.x.title = "rod mass (kg)"
+    for panel in panels[:, 0]:
+        panel.y.title = "reciprocating mass (kg)"
+    share_scales(figure.panels, "x", "y")
+    return figure
+
+
+def border(panel: Panel, plane: xr.Dataset, inside: np.ndarray, color: str) -> None:
+    """Draw the line around the machines for which something is true."""
+    if inside.any() and not inside.all():
+        masses = plane[ROD].values, plane[RECIPROCATING].values
+        line = contour_lines(*masses, inside.astype(float), [0.5])
+        panel.plot(*line, LineStyle(color, linewidth=1.0))
+
+
+def draw_sensitivity(effects: xr.Dataset) -> Drawing:
+    """Return main and total effect of each assumption on each claim's margin, with intervals."""
+    names = [str(name).replace("_", " ") for name in effects["assumption"].values]
+    claims = [claim for claim in CLAIMS if effects["total_order"].sel(claim=claim).notnull().any()]
+    rows = -(-len(claims) // 4)
+    figure, _ = make_grid(rows, 4, 0.8 + rows * (0.9 + 0.21 * len(names)), len(claims))
+    place = np.arange(len(names), dtype=float)
+    for panel, claim in zip(figure.panels, claims, strict=True):
+        for variable, color, shift, name in EFFECTS:
+            one = effects.sel(claim=claim)
+            value, at = one[variable].values, place - shift
+            low, high = (one[f"{variable}_{end}"].values for end in ("low", "high"))
+            ends = (np.minimum(value, low), np.maximum(value, high))
+            pairs = np.stack([np.stack([end, at], axis=1) for end in ends], axis=1)
+            x, y = join_with_gaps(pairs)
+            bars = Trace(np.maximum(value, 0.0), at, fill(color), name, "bars", thick=0.36)
+            panel.traces += [bars, Trace(x, y, LineStyle(BLACK, linewidth=0.9))]
+        panel.title = f"claim {claim}"
+        panel.x.title = "share of the variance"
+        panel.x.span(0.0, 1.25)
+    first = figure.panels[0]
+    first.y.name(names)
+    first.y.span(*first.limits("y")[::-1])
+    share_scales(figure.panels, "y")
+    figure.legend = [trace for trace in first.traces if trace.name]
+    return figure

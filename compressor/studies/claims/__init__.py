@@ -1,1 +1,0 @@
-"""In which machines the paper's claims hold: over masses, friction, contact and loads."""
