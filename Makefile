@@ -59,7 +59,7 @@ calibration: install  ## measure what estimates of errors are worth, on cases th
 accuracy: install  ## judge promises and error bars on 1,000 other random cases (7 minutes)
 	$(CAMPAIGN)/measure_accuracy.py tests/results/accuracy.json
 
-claims: install  ## measure the paper's claims over machines, and what decides them (an hour)
+claims: install  ## measure the paper's claims over machines, and what decides them (an hour, 5 GB)
 	$(CAMPAIGN)/measure_claims.py tests/results/claims.json
 
 page: install  ## test the report's page in a browser, measure how it is written and opens (ten minutes)
@@ -117,7 +117,7 @@ alarms: install  ## measure which alarm sees wear of the nameplate machine first
 identify: install  ## measure what is identified of other machines, and under another friction law (15 minutes)
 	$(CAMPAIGN)/measure_identify.py tests/results/identify.json
 
-stress: install  ## run and judge 2,000 extreme scenes (within the hour on two cores)
+stress: install  ## run and judge 3,000 extreme cases (two hours on two cores)
 	$(CAMPAIGN)/measure_stress.py tests/results/stress.json
 
 chaos: install  ## inject faults, thousands, and count what did not survive (two to three hours)

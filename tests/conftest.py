@@ -64,9 +64,9 @@ TOGETHER = {
     "tests/solve/test_lubricated.py": "features",
     "tests/solve/test_model_version.py": "features",
     "tests/solve/test_references.py": "features",
-    "tests/studies/stress/test_stress_laws.py": "features",
-    "tests/studies/wear/test_stages.py": "features",
-    "tests/studies/wear/test_wear_command.py": "features",
+    "tests/studies/test_judge.py": "features",
+    "tests/studies/test_wear_stages.py": "features",
+    "tests/studies/test_wear.py": "features",
     "tests/campaigns/test_wear_campaign.py": "features",
 }
 # modules that take long; the others, in small pieces, then even out the processes. The first
@@ -79,7 +79,7 @@ LONG = (
     "sweep/test_sweep", "solve/test_integrate", "test_newcomer", "store/test_damage",
     "studies/follow/test_lyapunov", "test_systems", "studies/compare/test_compare",
     "studies/calibrate/test_calibrate_command", "campaigns/test_calibrate_campaign",
-    "test_tutorial", "studies/stress/test_stress", "report/test_second_sets",
+    "test_tutorial", "report/test_second_sets",
 )  # fmt: skip
 
 

@@ -83,7 +83,7 @@ def test_commands_that_run_nothing_work(elsewhere, paper_store, tmp_path):
 
 
 def test_a_run_ends_with_one_clear_line(elsewhere):
-    commands = ["run", "two.yaml"], ["stress", "--scenes", "1"]
+    commands = ["run", "two.yaml"], ["wear", "two.yaml"]
     code = f"from compsim import cli\nprint(*(cli.main(words) for words in {commands}))"
     out, err = elsewhere(code)
     assert out == "2 2\n"

@@ -32,7 +32,7 @@ VERBS = {  # by their headings in `compsim --help`; each is in the module of its
     "Work": ("init", "plan", "run", "report"),
     "Read what is stored": ("status", "show", "plot", "export", "verify"),
     "Study a machine": ("explain", "find", "follow", "wear", "alarms"),
-    "Study the model": ("tradeoff", "claims", "stress"),
+    "Study the model": ("tradeoff", "claims", "judge"),
     "Work with measured records": ("dataset", "identify", "compare", "calibrate"),
     "Editor": ("schema",),
 }

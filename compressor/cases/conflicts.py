@@ -4,8 +4,8 @@ Keys that a case does not read: the one rule, which `keys_read` applies to jobs 
 a key stands in the table of parameters (`read`). Where a file gives a key and none of the jobs it
 is given for reads it, the file's author believes in what does not count.
 
-Where a case leaves the range that the program was judged on. Extreme scenes are drawn from it
-(`compressor.studies.stress.extremes`); it stands in the table of parameters as `judged`.
+Where a case leaves the range that the program was judged on, from which the example `extremes`
+draws; it stands in the table of parameters as `judged`.
 """
 
 import contextlib

@@ -1,127 +1,93 @@
-"""Keep what `compsim stress` finds, for the README (make stress, within the hour).
+"""Run the extreme cases of `compsim init extremes`, and let other integrators judge them.
 
-Runs the command and writes a small JSON file and, beside it, the map of outcomes. A campaign that
-was interrupted goes on from its folder. With --fresh the outcomes of scenes of another seed, which
-chose nothing, are kept in the file beside those of the whole campaign; with --drawn those of scenes
-with drawn laws, or laws and features.
+Jobs are kept in a folder of results, from which the same command goes on. Writes a small JSON file
+for the pages.
 """
 
 import argparse
 import json
-import shutil
+from collections import Counter
 from pathlib import Path
 
-import numpy as np
-import xarray as xr
 from compsim import cli
 from compsim.screen import DONE, SOME_FAILED
 from measure_accuracy import provenance
 
-from compressor.studies.stress.extremes import SPANS
-from compressor.studies.stress.stress import FILE, counts, slowest, worst
-from compressor.studies.stress.words import command
+from compressor.cases.examples import example
+from compressor.cases.load import load_studies
+from compressor.store.reader import read_store
+from compressor.studies.judge import FOLDER, count_ends, judge, rank
 
+STUDY = "extremes"
 WORST = 10
-SHOWN = ("verdict", "reason", "joint", "load", "rtol", "judges", "worst_metric", "horizon",
-         "judged", "excess", "excess_beyond", "error", "bar", "seconds")  # fmt: skip
+# what each block of the file draws: numbers in the supported ranges or in wider ones; more besides
+BLOCKS = ("supported", "whole", "supported", "laws", "supported", *["features"] * 6)
+
+
+def kinds(overrides):
+    """The kind of each job, by key."""
+    (study,) = load_studies(example(STUDY), overrides=overrides)
+    sizes = [len(block.numbers) for block in study.cases.parts]
+    each = [kind for kind, size in zip(BLOCKS, sizes, strict=True) for _ in range(size)]
+    return dict(zip(study.keys, each, strict=True))
 
 
 def plain(value):
-    """A number to three digits, None for nan; text as it is."""
-    value = value.item() if isinstance(value, np.generic) else value
-    if not isinstance(value, float):
-        return value
+    """A number to three digits, None for nan."""
     return None if value != value else float(f"{value:.3g}")
 
 
-def described(study, scene):
-    """A scene's outcome, and the command that repeats it."""
+def shown(job):
+    """A job's verdict, and the metric that is farthest from its judge's."""
+    vote = job.deciding
     return {
-        "command": command(scene, study.attrs),
-        **{name: plain(scene[name].values[()]) for name in SHOWN},
-    }
+        "job": job.key, "verdict": job.verdict, "worst_metric": vote.metric,
+        "excess": plain(vote.ratio), "error": plain(vote.error), "bar": plain(vote.bar),
+        "judges": [one.method for one in job.votes],
+    }  # fmt: skip
 
 
-def ranges():
-    """The drawn ranges: unit, whole and supported."""
-    return {
-        name: {"unit": unit, "whole": whole, "supported": narrow or whole}
-        for name, (unit, whole, narrow, _) in SPANS.items()
-    }
+def group(jobs):
+    """What is kept of jobs of a kind."""
+    wrong = [shown(job) for job in jobs if job.verdict == "silent_wrong"]
+    return {"scenes": len(jobs), "ends": count_ends(jobs), "silent_wrong": wrong}
 
 
-def found(study):
-    """What is kept of a campaign."""
-    most = worst(study, WORST)
-    wrong = int((study["verdict"].values == "silent_wrong").sum())
-    good = study.isel(scene=study["verdict"].values == "ok")
-    return {
-        "scenes": study.sizes["scene"],
-        "seed": int(study.attrs["seed"]),
-        "settings": study.attrs["settings"],
-        "ranges": ranges(),
-        "ends": counts(study),
-        "silent_wrong": wrong,
-        "at_most": plain(3.0 / study.sizes["scene"]),  # 95 % bound where none was found
-        "unforeseeable": int((good["horizon"].values < 1).sum()),
-        "judged_whole": int((good["judged"].values == 1).sum()),
-        "worst": [described(study, most.isel(scene=i)) for i in range(most.sizes["scene"])],
-        "slowest": described(study, slowest(study)),
-        "slowest_judging_s": plain(float(study["judging_seconds"].max())),
-        "peak_memory_MiB": round(float(study["peak_memory"].max()) / 2**20),
-    }
+def seconds(folder):
+    """The wall time of all jobs of a folder of results, and of the longest one."""
+    rows = read_store(folder).rows
+    taken = rows.numbers(rows.find(rows.keys), ["seconds"])["seconds"]
+    return float(taken.sum()), float(taken.max())
 
 
-def fresh(study):
-    """What is kept of scenes of another seed: how many, how they ended, and which were wrong."""
-    wrong = study.isel(scene=study["verdict"].values == "silent_wrong")
-    return {
-        "seed": int(study.attrs["seed"]),
-        "drawn": study.attrs["drawn"],
-        "scenes": study.sizes["scene"],
-        "ends": counts(study),
-        "silent_wrong": [
-            described(study, wrong.isel(scene=i)) for i in range(wrong.sizes["scene"])
-        ],
-    }
-
-
-def beside(target, made):
-    """A campaign's file with fresh scenes in it, in place of earlier ones of their seed."""
-    kept = json.loads(target.read_text(encoding="utf-8"))
-    others = [one for one in kept.get("fresh", []) if one["seed"] != made["seed"]]
-    return kept | {"fresh": sorted([*others, made], key=lambda one: one["seed"])}
-
-
-def main(target, count, seed, jobs, folder, aside, drawn):
-    words = ["stress", "-n", str(count), "--seed", str(seed), "-j", str(jobs), "-o", folder]
-    words += [f"--{drawn}"] if drawn else []
-    code = cli.main(words)
+def main(target, folder, workers, overrides):
+    settings = [word for text in overrides for word in ("--set", text)]
+    code = cli.main(["run", str(example(STUDY)), "-r", folder, "-j", str(workers), *settings])
     if code not in (DONE, SOME_FAILED):
         raise SystemExit(code)
-    study = xr.load_dataset(Path(folder, FILE), engine="h5netcdf").isel(scene=slice(count))
-    seconds = float(study["judging_seconds"].sum())  # of all runs of the command that it took
-    target = Path(target)
-    if aside or drawn:
-        kept = beside(target, provenance("make stress") | fresh(study))
-    else:
-        kept = {**provenance("make stress"), "workers": jobs, "work_s": plain(seconds)}
-        before = json.loads(target.read_text(encoding="utf-8")) if target.exists() else {}
-        kept |= found(study) | {"fresh": before.get("fresh", [])}
-        shutil.copyfile(Path(folder, "stress.png"), target.with_suffix(".png"))
-    target.write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    raise SystemExit(code)
+    jobs, of = judge(folder, STUDY, workers), kinds(overrides)
+    by_kind = {name: [job for job in jobs if of[job.key] == name] for name in dict.fromkeys(BLOCKS)}
+    drawn = [*by_kind["supported"], *by_kind["whole"]]
+    ok = [job for job in drawn if job.verdict == "ok"]
+    (own, slowest), (judging, _) = seconds(folder), seconds(Path(folder, FOLDER))
+    found = {
+        **provenance("make stress"), "workers": workers, "work_s": plain(own + judging),
+        "scenes": len(drawn), "silent_wrong": Counter(j.verdict for j in drawn)["silent_wrong"],
+        "at_most": plain(3.0 / len(drawn)),  # 95 % bound where none was found
+        "ends": {name: count_ends(by_kind[name]) for name in ("supported", "whole")},
+        "unforeseeable": sum(job.is_chaotic for job in ok),
+        "worst": [shown(job) for job in rank(drawn)[:WORST]],
+        "slowest_s": plain(slowest),
+        "fresh": [{"drawn": name, **group(by_kind[name])} for name in ("laws", "features")],
+    }  # fmt: skip
+    Path(target).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("target", help="file to write")
-    parser.add_argument("-n", "--scenes", type=int, default=2000)
-    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("-j", "--jobs", type=int, default=2, help="worker processes")
     parser.add_argument("-o", "--output", default="stress", help="folder of the campaign")
-    parser.add_argument("--fresh", action="store_true", help="keep them beside the file's own")
-    parser.add_argument("--drawn", default="", choices=["", "laws", "features"],
-                        help="what is drawn beside numbers; as --fresh")  # fmt: skip
+    parser.add_argument("--set", dest="overrides", action="append", default=[])
     asked = parser.parse_args()
-    main(asked.target, asked.scenes, asked.seed, asked.jobs, asked.output, asked.fresh, asked.drawn)
+    main(asked.target, asked.output, asked.jobs, asked.overrides)

@@ -1,13 +1,15 @@
 """The range that the program was judged on: one source for the table, the draw and the warning."""
 
+import re
+
 import pytest
 
 from compressor.cases.case import Case
-from compressor.cases.checks import row_of
 from compressor.cases.conflicts import judged_range, outside_judged
+from compressor.cases.examples import example
+from compressor.cases.load import load_studies
 from compressor.cases.parameter import parameter_table
 from compressor.cases.table import parts_by_key, table
-from compressor.studies.stress.extremes import OF_LAWS, PAPER_DAMPING, RANGES, SPANS
 
 LOOSE = {"joint": "both", "clearance_mm": 0.2}
 
@@ -50,27 +52,23 @@ def test_what_is_not_read_is_not_outside():
     assert outside(**other) == {}
 
 
-def test_scenes_are_drawn_from_the_judged_ranges():
-    drawn = {f"{group}.{name}" for group, keys in RANGES.items() for name in keys}
-    drawn |= {key for key, (_, narrow) in OF_LAWS.items() if row_of(key).judged == narrow}
-    for key, (_, narrow) in [(k, v) for k, v in OF_LAWS.items() if k in drawn]:
-        assert narrow == judged_range(key)
-    for key in (key for key in drawn if key not in OF_LAWS):
-        group, _, name = key.partition(".")
-        assert RANGES[group][name][1] == judged_range(key)
-    drawn |= {
-        "clearance_mm", "contact.stiffness_N_per_mm15",
-        "contact.exponent", "contact.damping_N_s_per_mm", "friction.static", "friction.dynamic",
-        "friction.stiction_velocity_mm_per_s", "machine.rod_mass_kg", "machine.speed_rpm",
-        "machine.reciprocating_mass_kg", "machine.pin_radius_mm",
-    }  # fmt: skip
-    judged = {key for key, row in table().items() if row.judged}
-    wholes = {key.rpartition(".")[0] for key in judged} & parts_by_key().keys()
-    assert {key for key in judged if key.rpartition(".")[0] not in wholes} | wholes == drawn
-    assert SPANS["rod_mass"][2] == judged_range("machine.rod_mass_kg")
-    most = PAPER_DAMPING * SPANS["damping"][1][1]  # none of it is drawn, too
-    assert judged_range("contact.damping_N_s_per_mm") == (0.0, most)
-    assert judged_range("friction.dynamic") == judged_range("friction.static")
+def test_the_example_draws_extremes_from_the_judged_ranges():
+    """Each key that has a range is drawn from it, in numbers of four digits."""
+    (study,) = load_studies(example("extremes"), overrides=["sample.n=1"])
+    text = example("extremes").read_text(encoding="utf-8")
+    drawn = {axis.key for axis in study.axes}
+    for key, row in table().items():
+        if row.judged:
+            whole = key.rpartition(".")[0]
+            assert {key, whole} & drawn, key
+            name = (whole if whole in parts_by_key() else key).rpartition(".")[2]
+            name = key.rpartition(".")[2] if key.startswith("clearance_mm") else name
+            spans = re.findall(rf"\b{name}: {{sobol: \[(.*?), (.*?)\]", text)
+            found = [(float(low), float(high)) for low, high in spans]
+            low, high = row.judged
+            assert any(
+                one == pytest.approx((low or one[0], high), rel=1e-3) for one in found
+            ), (key, found)  # fmt: skip
 
 
 def test_the_table_shows_the_judged_range():

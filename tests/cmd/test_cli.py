@@ -237,8 +237,7 @@ def reporter(monkeypatch):
     def write_report(results, report, command, add, limits, units, studies, single):
         assert (limits, units, studies, single) == ((), "usual", (), False)
         read_studies(results)
-        place, other = [one.keywords["place"] for one in add if one.keywords["place"]]
-        assert other == "alarms"
+        (place,) = [one.keywords["place"] for one in add if one.keywords["place"]]
         return Path(report, command, place)
 
     monkeypatch.setattr("compressor.report.write_report", write_report)
@@ -248,7 +247,7 @@ def test_report_prints_the_path_of_its_page(reporter, case_file, capsys):
     assert cli.main(["run", case_file("one.yaml"), "-j", "1", "--quiet"]) == 0
     capsys.readouterr()
     assert cli.main(["report", "-o", "page"]) == 0
-    assert capsys.readouterr().out == "page/compsim report -o page/claims\n"
+    assert capsys.readouterr().out == "page/compsim report -o page/alarms\n"
 
 
 def test_the_unforeseen_is_told_with_its_traceback(case_file, capsys, monkeypatch):

@@ -1,4 +1,4 @@
-"""Extreme scenes: journals in clearances drawn far beyond what a machine is built with.
+"""Extreme scenes of the kept oracle: journals in clearances far beyond what is built.
 
 Scene k of a seed is always the same, however many are drawn. Even scenes lie inside the range that
 is documented as supported, odd ones in the whole range; each kind has a scrambled Sobol sequence of
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from compressor.cases import Case, design, judged_range, table
+from compressor.cases import design, judged_range, table
 from compressor.metrics import JOINTS
 
 Span = tuple[float, float]
@@ -174,28 +174,6 @@ def choose_law(group: str, draw: random.Random, inside: bool) -> dict[str, Any]:
     if found["law"] in ELASTIC and draw.random() < 0.5:
         del found["restitution"]
     return found
-
-
-def place(case: Case) -> dict[str, float]:
-    """Return a scene's place on the axes of `SPANS`; the clearance of an ideal joint is nan."""
-    exponent = case.contact.exponent
-    stiffness = (case.contact.stiffness_N_per_mm15 or math.nan) * 1000.0**exponent
-    friction = case.friction
-    clearances = {
-        f"clearance_{one}": getattr(case.clearance_mm, one) / 1e3 or math.nan for one in JOINTS
-    }
-    return clearances | {
-        "stiffness": stiffness / FULL_DAMPING ** (1.5 - exponent),
-        "exponent": exponent,
-        "damping": case.contact.damping_N_s_per_mm / PAPER_DAMPING,
-        "friction": friction.static if friction else 0.0,
-        "stiction_velocity": friction.stiction_velocity_mm_per_s / 1e3 if friction else math.nan,
-        "rod_mass": case.machine.rod_mass_kg,
-        "reciprocating_mass": case.machine.reciprocating_mass_kg,
-        "speed": case.machine.speed_rpm,
-        "pin_radius": case.machine.pin_radius_mm.big_end / 1e3,
-        "rtol": case.rtol,
-    }
 
 
 @cache

@@ -1,0 +1,47 @@
+"""`compsim judge`: are the numbers of a stored study right? Other integrators say so."""
+
+import click
+
+from compressor.digits import align_columns
+from compsim import options, screen
+from compsim.progress import ProgressReporter
+
+WORST = 10  # jobs that are listed
+
+
+@click.command()
+@click.argument("study", required=False)
+@options.results
+@options.jobs()
+@options.as_json
+@options.quiet
+def judge(study, folder, jobs, as_json, quiet) -> int:
+    """Compare a study's numbers with other integrators', by error bars.
+
+    \b
+    compsim init extremes
+    compsim run extremes.yaml
+    compsim judge extremes
+
+    Each job that is ok is run again by another integrator at a hundredth of its tolerance; by a
+    second one where that does not agree, and by a third where these differ. The majority counts. A
+    job ends ok; silent_wrong, where a number is off by more than ten error bars and a thousand
+    times the tolerance (5 % at most); or unjudged. Of a chaotic motion averages are compared.
+    Counts and the worst jobs go to stdout; what judges ran is kept in judge/ of the folder, and the
+    same command goes on from there.
+
+    Exit code 3 if a number is wrong without a warning.
+    """
+    from compressor.studies.judge import judge as judge_study
+    from compressor.studies.judge import rank, summarize, table, to_rows
+    from compressor.sweep import cores
+
+    with ProgressReporter(quiet, "runs of judges", folder=folder) as progress:
+        found = judge_study(folder, study, jobs or cores(), progress)
+    if as_json:
+        screen.print_json(to_rows(found))
+    else:
+        worst = table(rank(found)[:WORST])
+        screen.print_text(summarize(found), "", *align_columns(worst, "<<<>>><"))
+    wrong = any(job.verdict == "silent_wrong" for job in found)
+    return screen.SOME_FAILED if wrong else screen.DONE

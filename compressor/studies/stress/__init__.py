@@ -1,1 +1,0 @@
-"""Numerical stability at the extremes: scenes drawn at random, each run and judged."""
