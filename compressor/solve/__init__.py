@@ -3,7 +3,7 @@
 from compressor.solve.cautions import JointScales, cautions, expected_cost, joint_scales
 from compressor.solve.measured_gas import gas_nodes
 from compressor.solve.request import Metrics, Request, Trajectory, revolutions
-from compressor.solve.run import COMPILED, Solution, integrate, run_at_tolerance
+from compressor.solve.run import integrate, run_at_tolerance
 from compressor.solve.run_metrics import (
     allowed_residual,
     average_bar,
@@ -19,11 +19,9 @@ from compressor.solve.run_metrics import (
 from compressor.solve.search import (
     find_repetition,
     least_promise,
-    predictability_horizon,
     steady,
     with_settle_rev,
 )
 from compressor.solve.series import SIGNALS, signals_of_scene
 from compressor.solve.si_record import is_ideal, natural_sizes, record, stiffness_of
 from compressor.solve.simulate import measure, observe, simulate
-from compressor.solve.solution import solve

@@ -19,7 +19,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from compressor.cases import design, judged_range, table
+from compressor.cases.conflicts import judged_range
+from compressor.cases.swept import design
+from compressor.cases.table import table
 from compressor.metrics import JOINTS
 
 Span = tuple[float, float]

@@ -47,8 +47,9 @@ from published import (
 from compressor.analysis import rubbing_work
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
-from compressor.solve import predictability_horizon, simulate
+from compressor.solve import simulate
 from compressor.solve.bearing import reynolds
+from compressor.solve.search import predictability_horizon
 
 SICONOS = "Siconos, SliderCrankMoreauJeanDirectProjectionOSI.ref, steps of 0.1 ms"
 TIMES = (1e-3, 2e-3)  # s
