@@ -25,8 +25,7 @@ from compressor.metrics import JOINTS
 from compressor.program import no_progress
 from compressor.store import find_study, open_study
 from compressor.studies.alarms.alarms import add_hours, judge_alarms, rank_alarms, read_wear
-from compressor.studies.wear import run_wear
-from compressor.studies.wear import Worn
+from compressor.studies.wear import Worn, run_wear
 from compressor.sweep.sweep import Options, sweep
 
 ROOT = Path(__file__).parent.parent.parent
