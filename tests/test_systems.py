@@ -83,7 +83,8 @@ def test_commands_that_run_nothing_work(elsewhere, paper_store, tmp_path):
 
 
 def test_a_run_ends_with_one_clear_line(elsewhere):
-    commands = ["run", "two.yaml"], ["wear", "two.yaml"]
+    follow = ["follow", "two.yaml", "--over", "machine.speed_rpm=300:500:2"]
+    commands = ["run", "two.yaml"], follow
     code = f"from compsim import cli\nprint(*(cli.main(words) for words in {commands}))"
     out, err = elsewhere(code)
     assert out == "2 2\n"
