@@ -111,11 +111,10 @@ class GrowingStudy:
         if new:
             every = sorted([*self.jobs, *new])
             study, texts = self.load(every), self.settings(every)
-            words = ["compsim", "run", self.path, "-r", str(self.folder)]
-            words += [word for text in texts for word in ("--set", text)]
             few = in_this_process if len(new) < self.few else None
-            # the command is what `compsim status` shows to go on with
-            options = Options(shlex.join(words), texts, backend=few)
+            # by its verb a report knows steps of a search from jobs of a sweep
+            command = shlex.join(["compsim", self.ending.split("-")[1], self.path])
+            options = Options(command, texts, backend=few)
             done = sweep([study], self.folder, self.workers, self.progress, options)
             self.run_now += done.run_now
             self.jobs = dict(zip(every, study.keys, strict=True))

@@ -112,6 +112,7 @@ def test_the_store_is_one_study_that_status_and_run_understand(found, folder, ca
     points = found[1]["points"]
     assert study.axes[0].values == tuple(point["argument"] for point in points)
     assert study.keys == tuple(point["key"] for point in points)
+    assert study.is_trial  # a report puts it behind studies of a run
     assert cli.main(["status"]) == 0
     assert f"{len(points)} ok" in capsys.readouterr().out
     assert cli.main(["verify"]) == 0
