@@ -347,7 +347,9 @@ def jobs_here():
             yield JobResult(name, store([result])[0] if store else result, 0.01)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys.modules["compressor.sweep.sweep"], "run_batches", run_batches)
+        module = sys.modules["compressor.sweep.sweep"]
+        patch.setattr(module, "run_batches", run_batches)
+        patch.setattr(module, "REPORT_SECONDS", 0.0)  # progress is told of each job
         yield
 
 

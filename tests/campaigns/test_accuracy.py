@@ -79,9 +79,11 @@ def test_a_stranger_s_case_keeps_its_promise(values):
     assert (found["status"].item(), found.attrs["promise"]) == ("ok", "kept")
     best = run(values, rtol=TRUTH)
     error = apart(settled(found), settled(best))
-    assert error <= found["acceleration_error"] <= ACCURACY["standard"].promise
+    # one bar in twenty or more is too short
+    assert error <= 1.5 * found["acceleration_error"]
+    assert max(error, found["acceleration_error"]) <= ACCURACY["standard"].promise
     away = abs(found["rms_acceleration"] - best["rms_acceleration"])
-    assert away <= 1.5 * found["rms_acceleration_error"]  # one bar in twenty or more is too short
+    assert away <= 1.5 * found["rms_acceleration_error"]
 
 
 def test_the_figure_shows_runs_that_say_kept():

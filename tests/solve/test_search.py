@@ -122,7 +122,9 @@ def test_a_horizon_is_kept_and_asked_for_beside_a_job_s_identity(tmp_path):
     keep(tmp_path, simulate(plain))
     assert not read_store(tmp_path).status(plain.key).satisfies(asked)
     keep(tmp_path, simulate(asked))
-    stored = read_store(tmp_path).status(plain.key)
+    store = read_store(tmp_path)
+    stored = store.status(plain.key)
     assert stored.satisfies(asked)
     assert stored.satisfies(plain)
-    assert 0 < stored.numbers["predictability_horizon"] < asked.duration
+    numbers = store.rows.number_row(store.position(plain.key))
+    assert 0 < numbers["predictability_horizon"] < asked.duration
