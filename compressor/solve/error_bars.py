@@ -49,8 +49,8 @@ def is_amplified(rtol: float, apart: Mapping[str, Any]) -> bool:
 
 
 def ratio_of(share: float) -> float:
-    """Return the ratio of tolerances with a closeness."""
-    return TEN * (LOOSER / share) ** (1.0 / FALL)
+    """Return the ratio of tolerances with a closeness; inf where that is 0, by an unknown error."""
+    return math.inf if share == 0.0 else TEN * (LOOSER / share) ** (1.0 / FALL)
 
 
 def bars(
