@@ -1,6 +1,6 @@
 """Batches: files with some finished jobs each, `<folder>/batches/<name>.h5`, whole or not there.
 
-A worker writes one about five times a second. A job is done when its batch has its name: there is
+A worker writes one about twice a second. A job is done when its batch has its name: there is
 no other writer, no lock and no index, and stores are merged by copying their batches. Names begin
 with the time of writing, so that of two equal results of a job the later one is known.
 

@@ -143,7 +143,7 @@ class Cluster:
         """Store a batch that has ended, and yield how its jobs did. Raises ClusterError."""
         error = future.exception()
         if future.cancelled() or self.client.status != "running":
-            raise self.lost() from error
+            raise self.describe_lost_scheduler() from error
         problem = f"no compsim, or an old one ({error})" if error else future.result()
         if isinstance(problem, str):
             remedy = "have the same programs on all machines, then start its workers again"
@@ -161,9 +161,9 @@ class Cluster:
         try:
             return sum(self.client.nthreads().values())
         except (OSError, TimeoutError, ValueError) as error:
-            raise self.lost() from error
+            raise self.describe_lost_scheduler() from error
 
-    def lost(self) -> ClusterError:
+    def describe_lost_scheduler(self) -> ClusterError:
         """Return the error of a scheduler that has gone."""
         text = "the scheduler was lost; the same command goes on with another"
         return ClusterError(f"{self.address}: {text}")

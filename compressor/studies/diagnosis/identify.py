@@ -152,7 +152,7 @@ class Clearance:
     @classmethod
     def fit(cls, points: np.ndarray, logs: np.ndarray, machines: np.ndarray) -> "Clearance":
         """Return the regressions of log clearances, (n, k), on points, (n, F)."""
-        folds = fold(np.zeros(len(points)), machines)
+        folds = split_into_folds(np.zeros(len(points)), machines)
         sample = slice(None, None, -(-len(points) // SAMPLE))
         models, told = [], np.empty_like(logs)
         for k, column in enumerate(logs.T):
@@ -182,7 +182,9 @@ class Clearance:
         return [Interval(*column) for column in np.exp(ends).T.tolist()]
 
 
-def fold(labels: np.ndarray, machines: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+def split_into_folds(
+    labels: np.ndarray, machines: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return folds of jobs, (others, own) places each: a machine is in one of them alone.
 
     Where a label has too few machines, whatever is alike, each job stands for itself.
@@ -264,7 +266,7 @@ class Identifier:
         filled = np.where(np.isnan(library.features), middle, library.features)
         scale = np.maximum(filled.std(axis=0), MIN_SPREAD)
         points = np.clip((filled - middle) / scale, -FARTHEST, FARTHEST)
-        folds = fold(library.joints, library.machines)
+        folds = split_into_folds(library.joints, library.machines)
         one_hot = (library.joints[:, None] == joints).astype(float)
         scorer, chooser, right = KernelRidge(kernel="rbf", gamma=GAMMA, alpha=ALPHA), None, 1.0
         if len(joints) > 1:

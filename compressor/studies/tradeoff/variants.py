@@ -278,10 +278,12 @@ def vary(case: Case, name: str, values: Values, note: str = "", **more: Any) -> 
         other = change(case, values)
     except CaseError as error:
         return Variant(name, None, f"cannot be: {error.problems[0]}", **more)
-    return Variant(name, other, ", ".join(filter(None, [note, *assumed(case, other)])), **more)
+    return Variant(
+        name, other, ", ".join(filter(None, [note, *list_assumed_values(case, other)])), **more
+    )
 
 
-def assumed(case: Case, other: Case) -> Iterator[str]:
+def list_assumed_values(case: Case, other: Case) -> Iterator[str]:
     """Yield the values that the other case reads and the case has not, as `key value`."""
     for key in keys_of(partial(value_of, other)):
         value = value_of(other, key)

@@ -14,7 +14,7 @@ from compressor.studies.diagnosis.identify import (
     Identifier,
     Library,
     StudyError,
-    fold,
+    split_into_folds,
 )
 
 JOINTS = np.array(["none", "big_end", "small_end", "both"])
@@ -179,8 +179,8 @@ def test_a_clearance_that_never_changes_is_told():
 def test_a_machine_is_judged_by_others_alone():
     machines = np.repeat(np.arange(40), 5)
     labels = np.array(["none", "both"])[machines % 2]
-    for others, own in fold(labels, machines):
+    for others, own in split_into_folds(labels, machines):
         assert not {*machines[others]} & {*machines[own]}
         assert {*labels[others]} == {"none", "both"}
     # of one sound machine each job stands for itself
-    assert len(fold(labels, np.where(labels == "none", 0, machines))) == FOLDS
+    assert len(split_into_folds(labels, np.where(labels == "none", 0, machines))) == FOLDS
