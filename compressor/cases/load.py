@@ -8,7 +8,7 @@ whole, for its key and for what is wrong with its values, and again when it is u
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -41,7 +41,6 @@ from compressor.cases.yaml_reader import (
 )
 from compressor.program import Progress, no_progress
 
-Variants = Callable[[Any], Iterable[Any]]  # of a case: the cases that are run for it
 Changes = tuple[Mapping[Path, Any], Places]  # values of the command line, and their places
 MAX_JOBS = 10_000
 NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
@@ -51,11 +50,6 @@ IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
 AT_TOP = "needs keys at the top, such as `joint: big_end`, with a space after the colon"
 NO_BLOCKS = "needs a list of mappings, such as [{load: none}, {joint: both}]"
 NO_DRAWS = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
-
-
-def itself(case: Any) -> Iterable[Any]:
-    """Return the cases that are run for a case: itself."""
-    return (case,)
 
 
 def load_cases(*paths: str | os.PathLike[str]) -> list[Case]:
@@ -85,15 +79,13 @@ def load_studies(
     max_jobs: int = MAX_JOBS,
     only: str = "",
     progress: Progress = no_progress,
-    variants: Variants = itself,
 ) -> list[Study]:
     """Return the studies of YAML case files.
 
     Each override, `key=value`, replaces a value in all of them. A file with more than `max_jobs`
     jobs is refused before any is made; `only`, a comparison, selects the jobs to be run. `progress`
-    is called with how many of how many cases are read. `variants` gives the cases that the caller
-    runs for one; a key that none of them reads is refused. Raises CaseFileError with everything
-    that is wrong in all files, overrides and the comparison.
+    is called with how many of how many cases are read. A key that no case reads is refused. Raises
+    CaseFileError with everything that is wrong in all files, overrides and the comparison.
     """
     values, places, problems = read_overrides(overrides)
     test = None
@@ -113,7 +105,7 @@ def load_studies(
         problems += wrong
         studies += [study] if study else []
         blocks.append((file, found))
-    problems += _find_unread(blocks, variants)
+    problems += _find_unread(blocks)
     if not problems and not any(study.selected for study in studies):
         problems.append(FileProblem(selection, "", NONE_SELECTED))
     if problems:
@@ -368,7 +360,7 @@ Where = tuple[Place, str]  # a key of a file, which may be given for several blo
 
 
 def _find_unread(
-    found: Sequence[tuple[CaseFile, list[Block]]], variants: Variants
+    found: Sequence[tuple[CaseFile, list[Block]]],
 ) -> list[FileProblem]:
     """Return the keys that no job reads of those that they are given for.
 
@@ -377,20 +369,18 @@ def _find_unread(
     read: set[Where] = set()
     unread: dict[Where, FileProblem] = {}
     for block in (block for _, blocks in found for block in blocks):
-        some, none = _read_in(block, variants, read)
+        some, none = _read_in(block, read)
         read |= some
         unread |= none
     for file, _ in found:
         lacking = [where for where in unread.keys() - read if where[0].file == file.path]
         if lacking and file.changes[0]:
             for block in _blocks(file, ({}, {}), MAX_JOBS)[0]:
-                read |= _read_in(block, variants, read)[0]
+                read |= _read_in(block, read)[0]
     return [problem for where, problem in unread.items() if where not in read]
 
 
-def _read_in(
-    block: Block, variants: Variants, known: set[Where]
-) -> tuple[set[Where], dict[Where, FileProblem]]:
+def _read_in(block: Block, known: set[Where]) -> tuple[set[Where], dict[Where, FileProblem]]:
     """Return which keys of a block its jobs read, and a problem for each other one.
 
     known: those of which it is known already. Cases are built only until each key has a reader.
@@ -409,10 +399,10 @@ def _read_in(
         if not lacking:
             break
         try:
-            cases = [*variants(block.case(number))]
+            case = block.case(number)
         except CaseError:  # of a file without what the command line changes
             continue
-        for case, where in itertools.product(cases, lacking):
+        for where in lacking:
             unmet = [one for one in needed[where] if not condition(one[1])(case)]
             lacking[where] = [one for one in lacking[where] if one in unmet]
             read |= set() if unmet else {where}
