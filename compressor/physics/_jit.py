@@ -120,7 +120,7 @@ def _compile(function: Function, made: type[Deferred], **options: Any) -> Functi
     """Return a function that numba compiles with these options when it is first needed."""
     # wrappers for who does not call it would only take time to compile: for C, and some for Python
     how: Any = {
-        "cache": True, "error_model": "numpy", "fastmath": {"contract"}, "no_cfunc_wrapper": True,
+        "cache": True, "error_model": "numpy", "no_cfunc_wrapper": True,
         "no_cpython_wrapper": made is Inlined,
         # said, or what an `inline_llvm` calls were inlined, too, if it is compiled for it first
         "forceinline": False, **options,
@@ -139,9 +139,10 @@ def _compile(function: Function, made: type[Deferred], **options: Any) -> Functi
 def jit(function: Function) -> Function:
     """Compile `function` on its first call and keep the machine code on disk.
 
-    Arithmetic is IEEE's, in the order written, but that a product and a sum may be rounded once. A
-    division by zero gives inf or nan, not an exception, so that the caller can judge a state that
-    went wrong. As it is with ``COMPSIM_JIT=0``.
+    Arithmetic is IEEE's, in the order written, as it is with ``COMPSIM_JIT=0``: a product and a sum
+    that were rounded once would save a twentieth of a run, but which ones are depends on what else
+    was compiled before, so that workers found other last bits. A division by zero gives inf or nan,
+    not an exception, so that the caller can judge a state that went wrong.
     """
     return _compile(function, Deferred)
 

@@ -56,17 +56,10 @@ def probe(jit):
 
 @pytest.mark.slow
 def test_compiled_and_pure_agree():
-    """Formulas to the last digits; runs, whose steps rounding moves, to their tolerance."""
+    """To the bit, since both compute in the order written."""
     compiled, pure = probe("1"), probe("0")
-    assert (compiled["compiled"], pure["compiled"]) == (True, False)
-    for one, other in zip(compiled["rows"], pure["rows"], strict=True):
-        assert one == pytest.approx(other, rel=1e-12, abs=1e-14 * np.abs(other).max())
-    for (rtol, steps, one), (_, other_steps, other) in zip(
-        compiled["runs"], pure["runs"], strict=True
-    ):
-        assert steps == pytest.approx(other_steps, rel=0.02)
-        # their own errors, at the peak of a blow, are up to 45 rtol
-        assert one == pytest.approx(other, rel=0, abs=100 * rtol * np.abs(other).max())
+    assert (compiled.pop("compiled"), pure.pop("compiled")) == (True, False)
+    assert compiled == pure
 
 
 def test_machine_code_belongs_to_its_sources(tmp_path, monkeypatch):
