@@ -116,7 +116,7 @@ def distance_over_clearance(p: np.record, one: Trajectory, other: Trajectory) ->
 WORK = 20.0  # times the evaluations of the first run: for all runs, and again for shifted ones
 MIN_WORK = 20_000_000  # evaluations that they may take at least: about 2 s
 LOOK_RTOL, LOOK_SHIFT = 1e-9, 1e-6  # of runs that are to tell whether a motion is chaotic
-SURE_FACTOR = 10.0  # times tighter: where two motions part, these are to part as well
+SURE_FACTOR = 100.0  # times tighter: where two motions part, these are to part as well
 LATER_FACTOR = 1.5  # times the first horizon, within which they are to
 
 
