@@ -239,15 +239,12 @@ def test_the_page_on_verbs_is_right(tmp_path):
 
 def test_the_page_on_studies_is_right(tmp_path, paper_store):
     copy_of_the_program(tmp_path)
-    purpose, module, verb = blocks("## How to add a study", "## How to add a public name")
-    folder = tmp_path / "compressor/studies/count"
-    folder.mkdir()
-    (folder / "__init__.py").write_text(purpose, encoding="utf-8")
-    (folder / "count.py").write_text(module, encoding="utf-8")
+    module, verb = blocks("## How to add a study", "## How to add a public name")
+    (tmp_path / "compressor/studies/count.py").write_text(module, encoding="utf-8")
     add_verb(tmp_path, "count", verb, '"count",\n')
     (tmp_path / "results").symlink_to(paper_store)
-    assert run_in(tmp_path, "-m", "compsim", "count", "big-end", cwd=tmp_path) == "3\n"
-    assert "Print how many jobs" in run_in(tmp_path, "-m", "compsim", "--help", cwd=tmp_path)
+    assert run_in(tmp_path, "-m", "compsim", "count", "big-end", cwd=tmp_path) == "periodic 3\n"
+    assert "Print how many jobs of a study" in run_in(tmp_path, "-m", "compsim", "--help", cwd=tmp_path)
 
 
 def test_the_page_on_alarms_is_right(tmp_path):
