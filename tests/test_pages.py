@@ -68,8 +68,8 @@ def test_generated_tables_are_current(page, name):
 SOURCES = [*ROOT.glob("compressor/**/*.py"), *ROOT.glob("cmd/**/*.py")]
 PLACES = ("", "compressor", "cmd", "tests")  # that paths on pages begin at
 EXAMPLES = (
-    "cmd/compsim/size.py", "cmd/compsim/count.py", "studies/count/", "results/",
-    "compressor.studies.count",
+    "cmd/compsim/size.py", "cmd/compsim/count.py", "studies/count", "tests/studies/test_count.py",
+    "results/",
 )  # fmt: skip
 
 
