@@ -244,7 +244,9 @@ def test_the_page_on_studies_is_right(tmp_path, paper_store):
     add_verb(tmp_path, "count", verb, '"count",\n')
     (tmp_path / "results").symlink_to(paper_store)
     assert run_in(tmp_path, "-m", "compsim", "count", "big-end", cwd=tmp_path) == "periodic 3\n"
-    assert "Print how many jobs of a study" in run_in(tmp_path, "-m", "compsim", "--help", cwd=tmp_path)
+    assert "Print how many jobs of a study" in run_in(
+        tmp_path, "-m", "compsim", "--help", cwd=tmp_path
+    )
 
 
 def test_the_page_on_alarms_is_right(tmp_path):
