@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes diagnosis identify calibrate nameplate stress chaos mutants measurements pages docs release lock alarms clean
+.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench scale throughput sweep-bench peers tradeoff ladders chaotic regimes identify calibrate nameplate stress chaos mutants measurements pages docs release lock alarms clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -105,9 +105,6 @@ chaotic: install  ## compare chaotic motions' statistics by two integrators (a q
 regimes: install  ## follow a machine over its clearance, up and down (three minutes)
 	$(CAMPAIGN)/measure_regimes.py tests/results/regimes.json
 
-diagnosis: install  ## train on 2,000 simulated machines, and test on some it never saw (half an hour)
-	$(CAMPAIGN)/measure_diagnosis.py tests/results/diagnosis.json
-
 calibrate: install  ## measure what calibrate makes of known machines and of others (15 minutes)
 	$(CAMPAIGN)/measure_calibrate.py tests/results/calibrate.json
 
@@ -129,10 +126,11 @@ nameplate: install  ## run the case file of compsim init machine, for its page (
 mutants: install  ## plant bugs and see whether the fast tests catch them (half an hour)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: test-oldest calibration accuracy validation wear claims page tradeoff ladders chaotic regimes diagnosis identify nameplate store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
+measurements: test-oldest calibration accuracy validation wear claims page tradeoff ladders chaotic regimes identify nameplate store-bench scale throughput sweep-bench peers pages  ## all of these (about three hours)
 
 pages: install  ## write the pages' generated tables, compressor/API.md, the tutorial's notebook
 	$(BIN)/python tests/page_tables.py
+	$(CAMPAIGN)/result_pages.py
 	$(BIN)/python tests/api_page.py
 	$(BIN)/python tests/tutorial.py
 

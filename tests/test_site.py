@@ -55,19 +55,3 @@ def test_links_lead_to_files_and_headings_of_the_tree(page):
         if not place.is_file() or (anchor and anchor not in ANCHORS.get(name, ())):
             dead.append(target)
     assert dead == []
-
-
-def test_a_dead_link_is_found(tmp_path):
-    text = '[a](no.md) `[b](code.md)` ![c](no.png)\n```text\n[d](block.md)\n```\n<img src="no.svg">'
-    found = [one or other for one, other in LINK.findall(CODE.sub("", text))]
-    assert found == ["no.md", "no.png", "no.svg"]
-    assert anchors("# The `a` of b\n## The a of b\n```sh\n# c\n```\n") == {
-        "the-a-of-b",
-        "the-a-of-b-1",
-    }
-
-
-def test_a_pattern_stands_for_pages_that_nobody_names(monkeypatch):
-    monkeypatch.setattr(conf, "PAGES", {"One": ("b", "a/x", "a/*"), "Two": ("a/y", "a/gone")})
-    known = {"b", "a/x", "a/y", "a/z", "c", "a/b/c"}
-    assert conf.contents(known) == {"One": ["b", "a/x", "a/z"], "Two": ["a/y"]}

@@ -5,15 +5,11 @@ Its notebook is that page, cell by cell; nbclient runs the first ones.
 
 import contextlib
 import io
-import os
 import re
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import tutorial
-from compsim import cli
 
 import compressor
 
@@ -145,33 +141,9 @@ def test_the_words_about_the_nameplate_s_machine_follow_from_the_runs(ran):
     assert abs(1 - other / pin[2]) == pytest.approx(0.04, abs=0.005)
 
 
-@pytest.mark.slow
-def test_the_notebook_runs(tmp_path, monkeypatch):
-    """Its first cells, of the shell: the others are the page's."""
-    nbformat, nbclient, _ = map(pytest.importorskip, ("nbformat", "nbclient", "ipykernel"))
-    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
-    monkeypatch.setenv("PATH", path)
-    book = nbformat.read(tutorial.NOTEBOOK, as_version=4)
-    nbformat.validate(book)
-    book.cells = [cell for cell in book.cells if cell.cell_type == "code"][:2]
-    where = {"metadata": {"path": str(tmp_path)}}
-    nbclient.NotebookClient(book, timeout=600, kernel_name="python3", resources=where).execute()
-    for one, cell in zip(CELLS, book.cells, strict=False):
-        printed = "".join(out.text for out in cell.outputs if out.name == "stdout")
-        assert tutorial.missing(one.output, printed) == ""
-
-
 def test_the_notebook_is_made_from_the_page():
     written = tutorial.NOTEBOOK.read_text(encoding="utf-8")
     assert written == tutorial.notebook(TEXT), "stale: run make pages"
-
-
-def test_the_page_names_every_command_that_it_should():
-    used = {line.split()[1] for one in CELLS for line in one.source.splitlines()
-            if one.kind == "console" and line.startswith("compsim ")}  # fmt: skip
-    assert used >= {"init", "run", "show", "find", "report"}
-    assert used - {"--version"} <= {*cli.cli.commands}
-    assert set(re.findall(r"`compsim ([a-z]+)`", TEXT)) <= {*cli.cli.commands}
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,12 @@ how long they would be. From these the shares of `compressor.metrics` and
 
 import argparse
 import json
-from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
-from measure_accuracy import CONTACT, EXACT, percentiles, provenance, short
+from measure_accuracy import CONTACT, EXACT, percentiles, short
 from random_cases import strangers
+from result_pages import keep, provenance
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
@@ -110,9 +110,8 @@ def main(target, jobs, count):
             name: [metric_row(rows, name, ratio) for ratio in RATIOS] for name in METRICS
         },
     }  # fmt: skip
-    text = json.dumps(result, indent=1)
-    Path(target).write_text(text + "\n", encoding="utf-8")
-    print(text)
+    keep(target, result)
+    print(json.dumps(result, indent=1))
 
 
 if __name__ == "__main__":

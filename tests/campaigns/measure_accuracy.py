@@ -10,12 +10,8 @@ the words cost and keep.
 
 import argparse
 import json
-import platform
-import subprocess
 import time
 from collections import Counter
-from datetime import date
-from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +20,7 @@ import xarray as xr
 from campaign_figures import draw_kept_error
 from joblib import Parallel, delayed
 from random_cases import load_equations, strangers
+from result_pages import keep, provenance
 
 from compressor.cases.case import Case
 from compressor.cases.parameter import ACCURACY
@@ -259,34 +256,6 @@ def broken(word, cases, measured):
     ]
 
 
-def read_commit():
-    """Return the commit of the program that is measured, "" without git; whether files differ."""
-    git = ["git", "-C", str(Path(__file__).parent)]
-    try:
-        asked = {"check": True, "capture_output": True, "text": True}
-        head = subprocess.run([*git, "rev-parse", "--short=10", "HEAD"], **asked).stdout.strip()
-        # of the program and its campaigns: what earlier campaigns wrote does not count
-        folders = [":/compressor/**.py", ":/cmd/**.py", ":/tests/**.py"]
-        status = [*git, "status", "--porcelain", "--", *folders]
-        changed = subprocess.run(status, **asked).stdout
-    except (OSError, subprocess.CalledProcessError):
-        return ""
-    return f"{head} with changes" if changed else head
-
-
-def provenance(command):
-    """Return command, date, commit, machine and versions of a measurement, which its file keeps."""
-    names = ("compsim", "numpy", "scipy", "numba")
-    commit = read_commit()
-    return {
-        "command": command,
-        "date": date.today().isoformat(),
-        **({"commit": commit} if commit else {}),
-        "machine": f"{platform.machine()}, Python {platform.python_version()}",
-        "versions": {name: metadata.version(name) for name in names},
-    }
-
-
 def main(target, jobs, count, seeds):
     cases = [values for seed in seeds for values in strangers(seed, count)]
     with Parallel(n_jobs=jobs) as parallel:
@@ -308,8 +277,7 @@ def main(target, jobs, count, seeds):
         "broken": {word: broken(word, cases, measured) for word in ACCURACY},
         "trade": trade(measured),
     }
-    text = json.dumps(result, indent=1)
-    Path(target).write_text(text + "\n", encoding="utf-8")
+    keep(target, result)
     Path(target).with_suffix(".svg").write_bytes(render(drawing(measured), "svg"))
     print(json.dumps({"words": words, "bars": bars}, indent=1))
 

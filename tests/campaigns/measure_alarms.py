@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 
 from compressor.cases import Wear
 from compressor.cases.load import load_studies
@@ -185,7 +185,7 @@ def main(target, place, jobs):
         **provenance("make alarms"), "keys": digest_keys(studies, worn),
         "failed": len(summary.failed), **kept, "wear": wear,
     }  # fmt: skip
-    Path(target).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    keep(target, result)
     for row in kept["rows"]:
         print({name: one for name, one in row.items() if not isinstance(one, list)})
 

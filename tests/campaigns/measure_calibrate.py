@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 from scipy.stats import binomtest
 
 from compressor.cases.case import Case
@@ -123,9 +123,8 @@ def main(target, count, jobs, seed):
         **provenance("make calibrate"), "seed": seed, "ranges": RANGES, "fixed": FIXED,
         "others": kept,
     }  # fmt: skip
-    text = json.dumps(result, indent=1)
-    Path(target).write_text(text + "\n", encoding="utf-8")
-    print(text)
+    keep(target, result)
+    print(json.dumps(result, indent=1))
 
 
 if __name__ == "__main__":

@@ -14,12 +14,11 @@ import argparse
 import json
 import math
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
-from measure_accuracy import provenance
 from random_cases import strangers
+from result_pages import keep, provenance
 
 from compressor.cases.case import Case
 from compressor.metrics import JOINTS
@@ -217,9 +216,8 @@ def main(target, drawn, wanted):
         "scenes": {name: scene_row(values, METHODS) for name, values in SCENES.items()},
         "random": random_row(drawn, wanted),
     }  # fmt: skip
-    text = json.dumps(kept, indent=1)
-    Path(target).write_text(text + "\n", encoding="utf-8")
-    print(text)
+    keep(target, kept)
+    print(json.dumps(kept, indent=1))
 
 
 if __name__ == "__main__":

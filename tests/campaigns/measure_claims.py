@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 
 from compressor.analysis import RULES, cases_of
 from compressor.cases.case import Case
@@ -74,7 +74,7 @@ def main(target):
         **{name: table[name].values.round(4).tolist() for name in table},
     }  # fmt: skip
     found["agreeing"] = agreeing()
-    target.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    keep(target, found)
     target.with_suffix(".svg").write_bytes(render(draw_map(plane), "svg"))
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 from scipy.stats import binomtest, qmc
 
 from compressor.cases.case import Case
@@ -190,9 +190,8 @@ def main(target, count, many, folder, jobs, seeds):
                   "right": short(identifier.right)},
         "models": kept,
     }  # fmt: skip
-    text = json.dumps(result, indent=1)
-    Path(target).write_text(text + "\n", encoding="utf-8")
-    print(text)
+    keep(target, result)
+    print(json.dumps(result, indent=1))
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 from campaign_figures import RUNGS, draw_scaled_limit, draw_tolerance_ladder
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 
 from compressor.analysis.runs import FAULTS, label, paper_cases
 from compressor.cases.case import Case
@@ -184,7 +184,7 @@ def main(target):
         "limit": vanishing,
         "slopes": slopes(vanishing),
     }
-    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    keep(target, kept)
     for name, drawing in figures(kept).items():
         Path(target).with_name(name).write_bytes(render(drawing, "svg"))
     print(json.dumps({"slopes": kept["slopes"], "references_apart": apart}, indent=1))

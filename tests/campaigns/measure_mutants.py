@@ -273,12 +273,12 @@ def main(target, jobs, only, pure, compiled):
         load_reference()
     rows = campaign(mutants, jobs, pure, compiled)
     minutes = round((time.monotonic() - began) / 60, 1)
-    from measure_accuracy import provenance  # which loads the program
+    from result_pages import keep, provenance  # which loads the program
 
     kept = {**provenance("make mutants"), "seed": SEED, "minutes": minutes, "mutants": rows}
     if only != [""]:
         kept |= earlier(target, rows, everyone)
-    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    keep(target, kept)
     sys.exit(judge(rows, minutes) or 0)
 
 

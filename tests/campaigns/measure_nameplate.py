@@ -8,7 +8,6 @@ both ends of its plausible range, as `compsim explain --models` takes them, and 
 of foundations.
 """
 
-import json
 import sys
 from dataclasses import replace
 from math import isfinite
@@ -16,7 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from compsim import cli
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 
 import compressor
 from compressor.cases.examples import example
@@ -119,7 +118,7 @@ def main(target):
         films = [{"last_share": share, "rows": found[share]} for share in LAST_SHARES]
         kept = provenance("make nameplate") | {"rows": found[None], "films": films, "oils": oils()}
         kept["decides"] = decided()
-    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    keep(target, kept)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ a network, from the start of the navigation to the end of `load`, and until the 
 interactive; without a chromium it is left out. Medians of a few.
 """
 
-import json
 import resource
 import shutil
 import statistics
@@ -19,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "report"))
 from browsing import browser, lacking, live, wait_for
@@ -68,7 +67,7 @@ def main(target, jobs=100_000):
             make(folder)
             found["stores"][name] = measured(Path(folder), rounds)
             print(name, found["stores"][name], flush=True)
-    Path(target).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    keep(target, found)
 
 
 def compsim(folder, *words):

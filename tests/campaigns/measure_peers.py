@@ -22,15 +22,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from importlib import metadata
-from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
 import reference
-from measure_accuracy import provenance
 from peers import multibody, notebook, soda, sweeps
 from peers.mechanism import DURATION, SCENES, case_values, error, loosest, output_grid, params
 from peers.sweeps import rounded
+from result_pages import keep, provenance
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
@@ -239,7 +238,7 @@ def main(target):
     kept |= {"rounds": ROUNDS, "our_first_call_seconds": compile_seconds()}
     kept |= {"agreement": checks, "numbalsoda_tightened": tighter, "rows": rows}
     kept |= {"swept_jobs": sweeps.JOBS, "sweeps": swept}
-    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    keep(target, kept)
     print(json.dumps(rows, indent=1))
 
 

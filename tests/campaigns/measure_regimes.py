@@ -4,13 +4,12 @@ Runs the example `regimes` into the folder `results`, from which the same comman
 of each value and direction what was found. Writes a small JSON file.
 """
 
-import json
 import math
 import sys
 from pathlib import Path
 
 import numpy as np
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 
 from compressor.cases.examples import example
 from compressor.report.figures.pictures import render
@@ -38,7 +37,7 @@ def main(target):
     found = {
         **provenance("make regimes"), "over": over, "rows": rows, "differ": differing(data),
     }  # fmt: skip
-    Path(target).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    keep(target, found)
     Path(target).with_suffix(".svg").write_bytes(render(draw_followed(data), "svg"))
     print(*table(data), sep="\n")
 

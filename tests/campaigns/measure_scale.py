@@ -99,7 +99,7 @@ def scale(jobs):
 
 
 def main(target, jobs=JOBS):
-    from measure_accuracy import provenance
+    from result_pages import keep, provenance
 
     target, home = Path(target).absolute(), os.getcwd()
     place = tempfile.mkdtemp(prefix="scale-", dir=".")
@@ -109,7 +109,7 @@ def main(target, jobs=JOBS):
     finally:
         os.chdir(home)
         shutil.rmtree(place)
-    target.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    keep(target, kept)
     print(json.dumps(kept, indent=1))
 
 

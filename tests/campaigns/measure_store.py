@@ -25,7 +25,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 
 from compressor.cases.case import Case
 from compressor.store.batch import (
@@ -188,9 +188,9 @@ def price_of_series(folder):
     found = {"series": [], "metrics": []}
     sweep_seconds(folder, "series", few)  # compiled and in the disk's cache from here on
     for turn in range(TURNS):
-        for keep in sorted(found, reverse=turn % 2):
-            further = sweep_seconds(folder, keep, many) - sweep_seconds(folder, keep, few)
-            found[keep].append(1000 * further / (many - few))
+        for kind in sorted(found, reverse=turn % 2):
+            further = sweep_seconds(folder, kind, many) - sweep_seconds(folder, kind, few)
+            found[kind].append(1000 * further / (many - few))
     wall, cpu = np.median(np.array(found["series"]) / found["metrics"], axis=0)
     medians = {keep: np.median(times, axis=0) for keep, times in found.items()}
     return {
@@ -212,7 +212,7 @@ def main(target, jobs=100_000):
         }
     finally:
         shutil.rmtree(place)
-    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    keep(target, kept)
     print(json.dumps(kept, indent=1))
 
 

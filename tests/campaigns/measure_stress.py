@@ -5,13 +5,12 @@ for the pages.
 """
 
 import argparse
-import json
 from collections import Counter
 from pathlib import Path
 
 from compsim import cli
 from compsim.screen import DONE, SOME_FAILED
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
@@ -80,7 +79,7 @@ def main(target, folder, workers, overrides):
         "slowest_s": plain(slowest),
         "fresh": [{"drawn": name, **group(by_kind[name])} for name in ("laws", "features")],
     }  # fmt: skip
-    Path(target).write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    keep(target, found)
 
 
 if __name__ == "__main__":

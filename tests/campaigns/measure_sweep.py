@@ -20,9 +20,9 @@ from pathlib import Path
 
 from chaos.processes import Run, members
 from chaos.stored import contents, damage
-from measure_accuracy import provenance
 from measure_store import timed
 from measure_throughput import WORKERS, many
+from result_pages import keep, provenance
 
 from compressor.store.reader import open_study, read_store
 
@@ -132,7 +132,7 @@ def main(target, jobs=JOBS):
         "files": files,
         "open_study_s": round(opened, 3),
     }
-    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    keep(target, kept)
     print(json.dumps(kept, indent=1))
 
 

@@ -22,7 +22,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 
 from compressor.cases.load import load_studies
 from compressor.solve.simulate import measure
@@ -221,7 +221,7 @@ def main(target, jobs=10_000, commit=BEFORE):
     kept = {**provenance("make throughput")}
     kept |= {"start": starting(), "sweep": sweeping(int(jobs))}
     kept |= {"before": commit, "compared": compared(commit)}
-    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    keep(target, kept)
     print(json.dumps(kept, indent=1))
 
 

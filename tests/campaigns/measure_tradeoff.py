@@ -4,7 +4,6 @@ The paper's three faults at 0.2 mm. Each time is the best of three rounds. Write
 and, beside it, the figure.
 """
 
-import json
 import sys
 import tempfile
 from pathlib import Path
@@ -12,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 from compsim import cli
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 
 from compressor.analysis.runs import settled_part
 from compressor.cases.load import load_studies
@@ -102,7 +101,7 @@ def main(target):
         {name: digits(value) for name, value in row.items()} | {"scene": f"{row['scene']} 0.2"}
         for row in fastest(found)
     ]
-    Path(target).write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    keep(target, kept)
     Path(target).with_suffix(".svg").write_bytes(figure(kept))
 
 

@@ -4,7 +4,6 @@ Each row has what was expected, what was found, and how far apart the two may be
 fitted; the machines and equations are those of tests/published.py.
 """
 
-import json
 import math
 import sys
 from importlib.util import find_spec
@@ -15,7 +14,6 @@ from scipy.interpolate import CubicSpline
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from measure_accuracy import provenance
 from peers import guide
 from published import (
     ACCELERATION,
@@ -43,6 +41,7 @@ from published import (
     rubbing,
     simeon,
 )
+from result_pages import keep, provenance
 
 from compressor.analysis import rubbing_work
 from compressor.cases.case import Case
@@ -204,7 +203,7 @@ def main(target):
     )
     rows = [one for made in every for one in made()]
     kept = provenance("make validation") | {"rows": rows}
-    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    keep(target, kept)
     bad = [one for one in rows if not math.fabs(one["found"] - one["expected"]) <= one["within"]]
     print(f"{len(rows)} numbers, {len(bad)} beyond what they may differ by", *bad, sep="\n")
     return 1 if bad else 0

@@ -4,14 +4,12 @@ The convergence of one machine chose the default; machines drawn at random, even
 of each range, judge it.
 """
 
-import json
 import random
 import sys
 from concurrent.futures import ProcessPoolExecutor
-from pathlib import Path
 
 import numpy as np
-from measure_accuracy import provenance
+from result_pages import keep, provenance
 
 from compressor.cases.case import Case
 from compressor.studies.wear import Worn, first_stage, life, next_stage, stages_dataset
@@ -78,7 +76,7 @@ def main(target):
         one, machines = pool.submit(convergence), [*pool.map(judged, cases)]
         kept = {**provenance("make wear"), "convergence": one.result()}
     kept |= {"step_mm": DEFAULT, "seed": SEED, "machines": machines}
-    Path(target).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    keep(target, kept)
     errors = [row["error"] for row in machines if not row["reason"]]
     print(f"{len(errors)} of {COUNT}: hours differ by {np.median(errors):.2%}, at most "
           f"{max(errors):.2%}")  # fmt: skip

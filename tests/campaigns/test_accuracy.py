@@ -2,9 +2,8 @@
 
 import math
 
-import numpy as np
 import pytest
-from measure_accuracy import SEEDS, TRUTH, apart, drawing, run, settled
+from measure_accuracy import SEEDS, TRUTH, apart, run, settled
 from page_tables import kept
 from random_cases import strangers
 
@@ -84,15 +83,3 @@ def test_a_stranger_s_case_keeps_its_promise(values):
     assert max(error, found["acceleration_error"]) <= ACCURACY["standard"].promise
     away = abs(found["rms_acceleration"] - best["rms_acceleration"])
     assert away <= 1.5 * found["rms_acceleration_error"]
-
-
-def test_the_figure_shows_runs_that_say_kept():
-    row = {"seconds": 0.01, "error": 1e-4, "promise": "kept"}
-    refused = {**row, "error": 0.5, "promise": "none"}
-    cases = [{"words": dict.fromkeys(ACCURACY, one)} for one in (row, row, refused)]
-    (panel,) = drawing(cases).panels
-    clouds, medians = panel.traces[::2], panel.traces[1::2]
-    assert [cloud.x.size for cloud in clouds] == [2] * len(ACCURACY)
-    assert [median.name for median in medians] == list(ACCURACY)
-    np.testing.assert_allclose([median.y[0] for median in medians], 1e-4)
-    assert [note.y for note in panel.notes] == [tier.promise for tier in ACCURACY.values()]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from measure_regimes import ALONG, distinct
-from page_tables import kept, regimes_table
+from page_tables import kept
 
 from compressor.cases.examples import example
 from compressor.studies.follow.follow import load_values, machines
@@ -61,4 +61,3 @@ def test_points_that_are_near_count_once():
         {"joint": ["big_end", "small_end"]},
     )
     assert distinct(one, 0.1) == 2
-    assert "| up | " in regimes_table()

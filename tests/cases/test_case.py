@@ -1,7 +1,6 @@
 """The case: what makes it the same job, what it fills in, and what it refuses."""
 
 import copy
-import pickle
 
 import pytest
 from hypothesis import given
@@ -9,20 +8,13 @@ from hypothesis import strategies as st
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_cases
-from compressor.cases.parameter import ACCURACY, CaseError, PerJoint, Problem, quote_value, to_si
+from compressor.cases.parameter import ACCURACY, CaseError, to_si
 from compressor.cases.table import table
-from compressor.metrics import JOINTS
 from compressor.program import CompsimError
 from compressor.solve.simulate import simulate
 
 BIG_END = {"joint": "big_end", "clearance_mm": 0.1}
 EXACT_GAS = {"switching": "exact"}
-
-
-def problems_of(values) -> list[tuple[str, str]]:
-    with pytest.raises(CaseError) as caught:
-        Case.from_values(values)
-    return [(problem.key, problem.message) for problem in caught.value.problems]
 
 
 # Identity
@@ -98,14 +90,6 @@ def test_the_rod_is_uniform_unless_told(values, centre, inertia):
     assert machine.rod_inertia_kg_m2 == pytest.approx(inertia, rel=1e-14)
 
 
-def test_what_stands_in_place_of_a_default_removes_it():
-    contact = {"materials": ["steel", "copper"]}
-    case = Case.from_values(BIG_END | {"solve": {"duration_s": 0.48}, "contact": contact})
-    assert case.solve.duration_rev is None
-    assert case.contact.stiffness_N_per_mm15 is None
-    assert case.contact.materials == PerJoint(("steel", "copper"), ("steel", "copper"))
-
-
 def test_a_value_of_none_is_the_default():
     values = {"contact": {"stiffness_N_per_mm15": None}, "solve": {"duration_rev": None}}
     assert Case.from_values(values) == Case.from_values({})
@@ -131,72 +115,6 @@ def test_a_tenth_of_a_millimetre_is_exactly_1e_4_metres():
 
 
 # What is refused
-
-
-@pytest.mark.parametrize(
-    ("values", "key", "message"),
-    [
-        ({"machine": {"crank_radius_mm": 600}}, "machine.crank_radius_mm", "shorter than the rod"),
-        ({"joint": "both", "clearance_mm": 5, "machine": {"rod_length_mm": 129}},
-         "machine.crank_radius_mm", "120 mm and 10 mm of clearance, must be shorter than the rod"),
-        ({**BIG_END, "initial_offset_mm": {"big_end_x": 0.9, "big_end_y": 0.9}},
-         "initial_offset_mm.big_end_x", "by 1.27279 mm, 1.17 mm into its bearing"),
-        ({"load": "gas", "joint": "both", "clearance_mm": 0.3,
-          "gas": {"head_clearance_mm": 0.6, **EXACT_GAS}},
-         "gas.head_clearance_mm", "0.6 mm does not exceed the clearances, 0.6 mm in all"),
-        ({"machine": {"rod_centre_mm": 601}}, "machine.rod_centre_mm", "beyond"),
-        ({"machine": {"rod_mass_kg": 1e6, "rod_length_mm": 1e6}},
-         "machine.rod_inertia_kg_m2", "m L^2 / 12 of the rod: 8.33333e+10 is outside"),
-        ({"joint": "both", "clearance_mm": {"big_end": 1}}, "clearance_mm.small_end", "needed"),
-        ({"joint": "small_end"}, "clearance_mm.small_end", "is needed with joint: small_end"),
-        ({"joint": "big_end", "clearance_mm": 11}, "clearance_mm", "exceeds the pin"),
-        ({"solve": {"duration_s": 0.48, "duration_rev": 4}}, "solve.duration_s", "in place of"),
-        ({"solve": {"output_step_s": 1e-4, "output_step_deg": 0.3}},
-         "solve.output_step_s", "in place of"),
-        ({"solve": {"rtol": 1e-5, "accuracy": "standard"}}, "solve.rtol", "in place of"),
-        ({**BIG_END, "contact": {"materials": ["steel", "steel"], "stiffness_N_per_mm15": 1}},
-         "contact.materials", "in place of"),
-        ({**BIG_END, "contact": {"materials": ["steel", "steel"], "exponent": 2}},
-         "contact.exponent", "needs exponent 1.5"),
-        ({**BIG_END, "friction": {"stiction_velocity_mm_per_s": 100}},
-         "friction.friction_velocity_mm_per_s", "must exceed"),
-        ({**BIG_END, "friction": {"law": "ambrosio", "stiction_velocity_mm_per_s": 100}},
-         "friction.friction_velocity_mm_per_s", "must exceed"),
-        ({**BIG_END, "contact": {"law": "flores"}}, "contact.restitution",
-         "is needed with contact.law: flor"),
-        ({**BIG_END, "contact": {"law": "liu", "modulus_GPa": 110}}, "contact.length_mm",
-         "such as 20"),
-        ({**BIG_END, "contact": {"law": "johnson", "length_mm": 20}}, "contact.materials",
-         "or give modulus"),
-        ({**BIG_END, "contact": {"law": "johnson", "length_mm": 20, "modulus_GPa": 110,
-                      "materials": ["steel", "steel"]}}, "contact.materials", "give one of the"),
-        ({"spring": {"stroke_mm": 240}}, "spring.stroke_mm", "less than the piston's stroke"),
-        ({"load": "gas", "gas": {"discharge_MPa": 0.1}}, "gas.discharge_MPa", "must exceed"),
-        ({"load": "gas", "gas": {"exponent": 1.3, "switching": "paper"}}, "gas.switching",
-         "set switching: exact"),
-        ({"load": "gas", "gas": {"discharge_MPa": 10, **EXACT_GAS}},
-         "gas.head_clearance_mm", "never expands"),
-        ({"load": "gas", "gas": {"suction_MPa": 1e-300, **EXACT_GAS}},
-         "gas.head_clearance_mm", "never expands"),
-        ({"solve": {"output_step_deg": 0.7}}, "solve.output_step_deg", "2057.14 output steps"),
-        ({"solve": {"output_step_s": 1}}, "solve.output_step_s", "longer than the duration"),
-        ({"solve": {"output_step_s": 1e-307}}, "solve.output_step_s", "makes 4.8e+306 samples"),
-        ({"solve": {"settle_rev": 4}}, "solve.settle_rev", "leave nothing of a run of 4"),
-        ({**BIG_END, "lubricant": {"bearing_length_mm": 40}}, "lubricant.bearing_length_mm",
-         "2 times the diameter"),
-        ({**BIG_END, "wear": True, "lubricant": True}, "wear", "leave out lubricant or wear"),
-        ({**BIG_END, "wear": {"limit_mm": 0.1}}, "wear.limit_mm", "more than the clearance"),
-        ({"body": True, "drive": True}, "body", "leave out body or drive"),
-        ({"rod": True, "machine": {"rod_centre_mm": 200}}, "machine.rod_centre_mm", "uniform bar"),
-        ({"rod": True, "machine": {"rod_inertia_kg_m2": 0.1}}, "machine.rod_inertia_kg_m2",
-         "0.141 kg m2 at least"),
-        ({"friction": {"law": "lugre", "ideal_joints": True}}, "friction.ideal_joints", "bristles"),
-    ],
-)  # fmt: skip
-def test_values_that_do_not_fit_each_other(values, key, message):
-    (found,) = problems_of(values)
-    assert found[0] == key
-    assert message in found[1]
 
 
 @pytest.mark.parametrize(
@@ -229,17 +147,6 @@ def test_what_is_not_simulated_is_not_checked(values):
     """A job of a sweep may have it, where another job reads it."""
     case = Case.resolve(values)
     assert Case.from_attribute(case.attributes()["case"]) == case
-
-
-def test_an_error_survives_the_way_between_processes():
-    error = CaseError([Problem("load", "is heavy")])
-    copied = pickle.loads(pickle.dumps(error))
-    assert (str(copied), copied.problems) == ("load: is heavy", error.problems)
-
-
-def test_quoted_values_cannot_write_to_a_terminal():
-    assert quote_value("\x1b[31m") == r"'\x1b[31m'"
-    assert len(quote_value("x" * 10_000)) <= 60
 
 
 # Values
@@ -304,29 +211,6 @@ def test_what_a_named_law_does_not_read_makes_no_other_job(group, other, unread)
     assert [problem.key for problem in caught.value.problems] == [f"{group}.{k}" for k in unread]
 
 
-EVERYTHING = {
-    "joint": "both",
-    "clearance_mm": {"big_end": 0.1, "small_end": 0.2},
-    "friction": False,
-    "contact": {"materials": ["steel", "copper"]},
-    "load": "gas",
-    "solve": {"duration_s": 0.12, "settle_rev": 0, "rtol": 1e-6},
-}
-
-
-@pytest.mark.parametrize(
-    ("values", "key", "physics"),
-    [
-        ({"solve": {"rtol": 5e-5}}, "deb66454fa46df6b2097", "9b474049b4f9445c7396"),
-        (EVERYTHING, "cc45f3d841f388318e3a", "1f4d1586cc61cbc33675"),
-    ],
-)
-def test_keys_stay_as_they_are_stored(values, key, physics):
-    """A key changes only with the model's version: stores hold results under it."""
-    case = Case.from_values(values)
-    assert (case.key, case.physics_key) == (key, physics)
-
-
 @pytest.mark.parametrize(
     ("values", "switching", "back"),
     [
@@ -359,19 +243,6 @@ def test_a_case_tells_what_is_stored_of_it():
     said = case.attributes()
     assert (said["name"], said["key"], said["physics_key"]) == ("some", case.key, case.physics_key)
     assert Case.from_attribute(said["case"]) == case
-
-
-def test_the_defaults_are_valid():
-    wrong = [
-        key for key, row in table().items() if row.default is not None and row.check(row.default)
-    ]
-    assert wrong == []
-
-
-def test_clearances_have_a_row_for_each_joint():
-    assert [f"clearance_mm.{joint}" for joint in JOINTS] == [
-        key for key in table() if key.startswith("clearance_mm")
-    ]
 
 
 NUMBERS = [key for key, row in table().items() if row.kind in ("number", "integer")]

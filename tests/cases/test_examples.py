@@ -71,17 +71,6 @@ def test_a_template_names_the_file_that_it_is_written_to(name, file, commands):
     assert text.splitlines()[3:] == example(name).read_text().splitlines()[3:]
 
 
-def test_an_unknown_example_names_those_that_there_are():
-    with pytest.raises(ValueError, match=r"no example 'none'.* consistent"):
-        example("none")
-
-
-def test_the_list_has_all_of_them():
-    page = (FOLDER / "README.md").read_text(encoding="utf-8")
-    assert NAMES
-    assert [name for name in NAMES if f"| `{name}.yaml` |" not in page] == []
-
-
 def test_the_consistent_machine_has_the_paper_s_faults():
     (study,) = load_studies(example("consistent"))
     cases = cases_of(study.cases[-1])

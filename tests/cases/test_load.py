@@ -11,20 +11,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from compressor.cases.case import Case, to_yaml
-from compressor.cases.checks import known_keys, row_of
+from compressor.cases.checks import row_of
 from compressor.cases.conflicts import values_read
 from compressor.cases.groups import CYLINDER_KEYS
 from compressor.cases.laws import USUAL
 from compressor.cases.load import CaseFileError, load_cases, load_studies
-from compressor.cases.parameter import parameter_table
 from compressor.cases.study import Axis
-from compressor.cases.swept import FORMS
 from compressor.cases.table import table
 from compressor.cases.yaml_reader import MAX_BYTES, resolve_scalar
-from compressor.metrics import METRICS
 
 BIG_END = "joint: big_end\nclearance_mm: 0.1\n"
-NEEDS_FORM = f"needs a value, a list of values or a mapping with one of {' '.join(FORMS)}"
 one_file = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=3000)
 
 
@@ -181,56 +177,7 @@ def test_ten_thousand_jobs_are_the_most(write):
     ]
 
 
-def test_jobs_beyond_counting_are_refused_at_once(write):
-    keys = [k for k in table() if k.startswith(("machine.", "initial_offset_mm."))]
-    keys = [k for k in keys if k.count(".") == 1]
-    groups: dict[str, list[str]] = {}
-    for key in keys:
-        group, _, name = key.partition(".")
-        groups.setdefault(group, []).append(f"  {name}: {numbers(500)}\n")
-    text = "".join(f"{group}:\n" + "".join(lines) for group, lines in groups.items())
-    (message,) = mistakes(write(text))
-    assert f"{500 ** len(keys)} jobs are more than 10000" in message
-
-
-def test_cases_that_fit_are_not_looked_at_one_by_one(write, monkeypatch):
-    built, build = [], Case.from_values
-    monkeypatch.setattr(Case, "from_values", lambda values: built.append(values) or build(values))
-    (study,) = load_studies(write("load: [none, spring]\n"))
-    assert [case.load for case in [*study.cases, *study.cases]] == ["none", "spring"] * 2
-    assert [case.key for case in study.cases] == [*study.keys]
-    assert not built
-
-
 # Mistakes
-
-
-def test_nine_mistakes_are_nine_messages(write):
-    text = """\
-name: two words
-load: sprnig
-joint: [none, big_end, big_end]
-clearance_mm: [0.1, 1001]
-machine:
-  rod_mass: 5
-  speed_rpm: fast
-  speed_rpm: 500
-spring: {stiffness_N_per_mm: .inf}
-qqq: wet
-"""
-    assert mistakes(write(text)) == [
-        "case.yaml:1:7: name: 'two words' is no name: "
-        "use [A-Za-z0-9._-], at most 64, no leading dot",
-        "case.yaml:2:7: load: needs spring, gas or none, not 'sprnig'; did you mean spring?",
-        "case.yaml:3:24: joint: 'big_end' is in the list twice",
-        "case.yaml:4:21: clearance_mm: 1001 is outside [0, 1000] mm",
-        "case.yaml:6:3: machine.rod_mass: unknown key; did you mean machine.rod_mass_kg?",
-        "case.yaml:7:14: machine.speed_rpm: needs a number in (0, 100000] rpm, not 'fast'",
-        "case.yaml:8:3: machine.speed_rpm: is given twice; first at line 7",
-        "case.yaml:9:30: spring.stiffness_N_per_mm: must be finite: "
-        "needs a number in [0, 1e+06] N/mm, not inf",
-        f"case.yaml:10:1: qqq: unknown key; a case file has {', '.join(known_keys(''))}",
-    ]
 
 
 def test_mistakes_of_all_files_are_told_at_once(write):
@@ -242,140 +189,6 @@ def test_mistakes_of_all_files_are_told_at_once(write):
         "missing.yaml: cannot be read: No such file or directory; compsim init writes "
         "a case file to start from",
     ]
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("", "1:1: is empty; compsim init writes a case file to start from"),
-        ("# nothing\n", "1:1: is empty; compsim init writes a case file to start from"),
-        ("12\n", "1:1: needs keys at the top, such as `joint: big_end`, "
-         "with a space after the colon"),
-        ("joint: none\n---\njoint: none\n", "2:1: a second document begins here; "
-         "a case file holds one"),
-        ("%YAML 1.1\n---\nload: none\n", "1:1: case files are YAML 1.2"),
-        ("load: none\n\tjoint: none\n", "2:1: is no YAML: found character '\\t' that cannot "
-         "start any token; indent with spaces, not tabs"),
-        ("load: [none\n", "2:1: is no YAML: expected ',' or ']', but got '<stream end>'"),
-        ('name: "\\UFFFFFFFF"\n', "1:1: is no YAML: a number is too large here"),
-        ("load: none\nname: \x07\n", "2:7: must not hold the character U+0007"),
-        ("load: none # \u2028joint: both\n", "1:14: must not hold the character U+2028"),
-        (b"load: none\nname: \xff\n", "2:7: is not UTF-8 text; a case file is YAML"),
-        ("load: none\n".encode("utf-16"), "1:1: is not UTF-8 text; a case file is YAML"),
-        ("load: ~\n", "1:7: load: has no value; leave the key out to get its default"),
-        ("load:\n", "1:6: load: has no value; leave the key out to get its default"),
-        ("load: !!str none\n", "1:7: tags (!) are not allowed"),
-        ("load: ! none\n", "1:7: tags (!) are not allowed"),
-        ("<<: {load: none}\n", "1:1: merge keys (<<) are not allowed; write the values out"),
-        ("? [load]\n: none\n", "1:3: a key must be plain text"),
-        ('"": none\n', "1:1: a key is missing before the colon"),
-        ("load: none\nload: none\n", "2:1: load: is given twice; first at line 1"),
-        ("{load: *a}\n", "1:8: aliases (*) are not allowed; write the value out"),
-        ("load: {linspace: [1, 2, 3]}\n", "1:7: load: is no number, so that linspace cannot "
-         "sweep it: give a list"),
-        ("load: []\n", "1:7: load: is an empty list"),
-        ("load: [none, [none]]\n", "1:14: load: needs spring, gas or none, not ['none']"),
-        ("name: [a, b]\n", "1:7: name: cannot be swept: it does not change what a job computes"),
-        ("friction: [false]\n", "1:11: friction: needs false or a mapping of keys, such as "
-         "{static: 0.23}, not [False]"),
-        ("contact: {materials: steel}\n", "1:22: contact.materials: needs a pair of materials, "
-         "steel or copper, such as [steel, steel], not 'steel'"),
-        ("contact: {materials: [[steel, steel], [steel, tin]]}\n",
-         "1:39: contact.materials: needs a pair of materials, steel or copper, such as "
-         "[steel, steel], not ['steel', 'tin']"),
-        ("report: {title: 5}\n", "1:17: report.title: needs a line of text of up to 100 letters, "
-         "not 5"),
-        ("report: Unit\n", "1:9: report: needs a mapping of keys, not 'Unit'"),
-        ("blocks: [{report: {title: x}}]\n", "1:11: report: cannot stand in a block: it belongs "
-         "to the whole file"),
-        ("solve: {max_steps: [1, 1.0]}\n", "1:24: solve.max_steps: 1 is in the list twice"),
-        ("machine: {speed_rpm: " + "9" * 5000 + "}\n", "1:22: machine.speed_rpm: must be "
-         "finite: needs a number in (0, 100000] rpm, not inf"),
-        ("machine: {pin_radius_mm: {}}\n", f"1:26: machine.pin_radius_mm: {NEEDS_FORM}"),
-        ("machine: {pin_radius_mm: {normal: {mean: 60, sd: 1}}}\n",
-         f"1:26: machine.pin_radius_mm: {NEEDS_FORM}"),
-        ("machine: {pin_radius_mm: {big_end: [], small_end: 40}}\n",
-         "1:36: machine.pin_radius_mm.big_end: is an empty list"),
-        ("machine: {pin_radius_mm: [40, {big_end: 60, small_end: 40}]}\n",
-         "1:26: machine.pin_radius_mm: a list has values of all parts alike: sweep each part, "
-         "{big_end: [...], small_end: ...}"),
-        ("clearance_mm: {big_end: 0.1, small_ends: 0.1}\n",
-         "1:42: clearance_mm.small_ends: unknown key; did you mean clearance_mm.small_end?"),
-        ("machine: {stroke_mm: [240, ~]}\n", "1:28: machine.stroke_mm: has no value; "
-         "leave the key out to get its default"),
-        ("solve: {accuracy: {sobol: [1, 2]}}\nsample: {n: 4}\n",
-         f"1:27: solve.accuracy.sobol: unknown metric; metrics are {', '.join(METRICS)}"),
-        ("load: spring\nmachine: {rod_mass_kg: {lhs: [3, 4]}}\nexclude: load == gas\n",
-         "2:24: machine.rod_mass_kg: needs a number of samples: add `sample: {n: 64, seed: 1}` to "
-         "the file"),
-        ("spring: {stroke_mm: [250, -1]}\n", "1:27: spring.stroke_mm: -1 is outside "
-         f"{row_of('spring.stroke_mm').range} mm"),
-    ],
-)  # fmt: skip
-def test_one_mistake_is_one_message(write, text, expected):
-    assert mistakes(write(text)) == [f"case.yaml:{expected}"]
-
-
-@pytest.mark.parametrize(
-    ("text", "hint"),
-    [
-        ("clearance: 1", "; did you mean clearance_mm?"),
-        ("machine: {rod_mass_g: 1}", "; did you mean machine.rod_mass_kg?"),
-        ("machine: {speed_hz: 1}", "; did you mean machine.speed_rpm?"),
-        ("contact: {stiffness: 1}", "; did you mean contact.stiffness_N_per_mm15?"),
-        ("spring: {stiffness: 1}", "; did you mean spring.stiffness_N_per_mm?"),
-        ("solve: {duration: 1}", "; did you mean solve.duration_rev?"),
-        ("accuracy: fine", "; did you mean solve.accuracy?"),
-        ("small_end_pin_radius_mm: 1", "; did you mean machine.pin_radius_mm.small_end?"),
-        ("rod_mass: 1", "; did you mean machine.rod_mass_kg?"),
-        ("exponent: 1", "; did you mean gas.exponent or contact.exponent or guide.exponent?"),
-        ("solve.accuracy: fine", "; write accuracy inside solve"),
-        ("machine: {speed_rpm:500: 1}", "; put a space after the colon"),
-        ("JOINT: both", "; did you mean joint?"),
-        ("body: {qqq: 1}", f"; body has {', '.join(known_keys('body'))}"),
-    ],
-)
-def test_an_unknown_key_is_told_with_what_was_meant(write, text, hint):
-    (message,) = mistakes(write(text))
-    assert message.partition("unknown key")[2] == hint
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("clearance_mm: [1, 2, 3]\n",
-         ["1:1: clearance_mm: nothing reads this key: it needs joint != none; "
-          "set that, or leave the key out"]),
-        ("joint: [none, both]\nclearance_mm: {big_end: 1}\n",
-         ["2:1: clearance_mm.small_end: is needed with joint: both; "
-          "give it in mm, such as 0.2"]),
-        ("\njoint: both\n", ["2:1: clearance_mm.big_end: is needed with joint: both; "
-          "give it in mm, such as 0.2",
-                             "2:1: clearance_mm.small_end: is needed with joint: both; "
-          "give it in mm, such as 0.2"]),
-        ("joint: both\nclearance_mm: [9, 11, 12]\n",
-         ["2:19: clearance_mm: 11 mm exceeds the pin radius, 10 mm: lower it",
-          "2:23: clearance_mm: 12 mm exceeds the pin radius, 10 mm: lower it"]),
-        ("spring:\n  stroke_mm: [100, 250]\nsolve: {rtol: 1e-5, accuracy: [fine, draft]}\n",
-         ["2:20: spring.stroke_mm: 250 mm must be less than the piston's stroke, 240 mm",
-          "3:15: solve.rtol: stands in place of solve.accuracy: give one of the two"]),
-        ("load: gas\ngas: {exponent: 1.3, switching: paper}\n",
-         ["2:33: gas.switching: the printed corners hold for the paper's geometry and pressures "
-          "only; set switching: exact"]),
-        ("load: gas\ngas:\n  action: double\n  rod_diameter_mm: 30\n"
-         "  clearance_percent: {head: 12}\n",
-         ["5:3: gas.clearance_percent.crank: is needed with action: double and a clearance of the "
-          "head"]),
-        ("machine: {pin_radius_mm: [40, 50]}\n",
-         ["1:11: machine.pin_radius_mm: nothing reads this key: it needs clearance_mm.big_end > 0 "
-          "or friction.ideal_joints == true or clearance_mm.small_end > 0; set that, or leave the "
-          "key out"]),
-        ("joint: big_end\nclearance_mm: {lhs: {normal: {mean: 40, sd: 1e-9}}}\nsample: {n: 1}\n",
-         ["2:15: clearance_mm: 40 mm exceeds the pin radius, 10 mm: lower it"]),
-    ],
-)  # fmt: skip
-def test_values_that_do_not_fit_are_told_once_where_they_stand(write, text, expected):
-    assert mistakes(write(text)) == [f"case.yaml:{line}" for line in expected]
 
 
 def test_a_sweep_full_of_conflicts_is_cut_short(write):
@@ -493,13 +306,6 @@ def test_a_hostile_file_is_refused_soon(write, text, end):
     start = time.process_time()
     assert mistakes(path)[-1].endswith(end)
     assert time.process_time() - start < 30  # about 2 s on one slow core
-
-
-def test_an_alias_bomb_does_not_unfold(write):
-    text = "a0: &a0 x\n" + "".join(f"a{i}: &a{i} [*a{i - 1}, *a{i - 1}]\n" for i in range(1, 60))
-    assert mistakes(write(text)) == [
-        "case.yaml:1:5: anchors (&) are not allowed; write the value out"
-    ]
 
 
 @pytest.mark.parametrize(
@@ -656,14 +462,6 @@ def test_a_case_reads_back_from_its_yaml(write, values, joints):
 
 
 # The table, and the house
-
-
-def test_the_table_has_a_row_for_every_key_and_nine_columns():
-    lines = parameter_table(table().values()).splitlines()
-    assert [line.split("`")[1] for line in lines[2:]] == list(table())
-    assert {line.replace("\\|", "").count("|") for line in lines} == {10}
-    row = "| `machine.rod_mass_kg` | kg | 4.7 | (0, 1e+06] |"
-    assert any(line.startswith(row) for line in lines)
 
 
 @pytest.mark.parametrize(

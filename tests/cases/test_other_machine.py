@@ -4,7 +4,6 @@ import html
 from dataclasses import replace
 
 from compsim import cli
-from conftest import refused
 
 from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness, paper_notes
@@ -28,13 +27,6 @@ gas:
 """
 
 
-def test_its_gas_without_the_load_is_refused_with_the_remedy(read):
-    assert refused(read, MACHINE) == [
-        "case.yaml:11:1: gas: nothing reads this group: it needs load == gas; set that, or leave "
-        "the group out"
-    ]
-
-
 def test_with_the_load_it_is_the_machine_that_was_meant(read):
     (case,) = read("load: gas" + MACHINE).cases
     assert case == Case.from_values({
@@ -45,17 +37,6 @@ def test_with_the_load_it_is_the_machine_that_was_meant(read):
         "gas": {"piston_radius_mm": 110, "suction_MPa": 0.2, "discharge_MPa": 0.7,
                 "switching": "exact"},
     })  # fmt: skip
-
-
-def test_other_units_of_it_are_answered_with_the_numbers(read):
-    text = MACHINE.replace("suction_MPa: 0.2", "suction_bar: 2").replace("_mm: 0.2", "_um: 200")
-    text = text.replace("discharge_MPa: 0.7", "discharge_bar: 7")
-    absolute = ", absolute; to a gauge's add the atmosphere's 0.101325"
-    assert refused(read, "load: gas" + text) == [
-        "case.yaml:3:1: clearance_um: unknown key; write clearance_mm: 0.2",
-        f"case.yaml:13:3: gas.suction_bar: unknown key; write suction_MPa: 0.2{absolute}",
-        f"case.yaml:14:3: gas.discharge_bar: unknown key; write discharge_MPa: 0.7{absolute}",
-    ]
 
 
 def test_its_contact_is_told_to_be_of_another_pin(read):

@@ -9,7 +9,7 @@ import pytest
 from compressor.cases.case import Case, CaseError
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.materials import composite_modulus, contact_stiffness
-from compressor.cases.parameter import PerEnd, PerJoint
+from compressor.cases.parameter import PerJoint
 from compressor.physics.film import film
 from compressor.solve.cautions import remarks
 from compressor.solve.si_record import record
@@ -33,35 +33,6 @@ def test_a_file_gives_one_radius_or_one_for_each_joint():
     assert Case.from_values(two.values()) == two
     assert Case.from_attribute(two.attributes()["case"]).key == two.key
     assert two.key != one.key
-
-
-@pytest.mark.parametrize(
-    ("pin", "key", "words"),
-    [
-        ({"big_end": 60}, "machine.pin_radius_mm", "needs both, big_end and small_end"),
-        ({"big_end": 60, "small_ends": 5}, "machine.pin_radius_mm.small_ends", "mm.small_end?"),
-        ({"big_end": 60, "small_end": -5}, "machine.pin_radius_mm.small_end", "outside"),
-        ({"big_end": 60, "small_end": 0.1}, "clearance_mm", "exceeds the pin radius"),
-    ],
-)
-def test_what_is_wrong_with_two_radii_is_told_of_the_one_it_is(pin, key, words):
-    with pytest.raises(CaseError) as error:
-        case(machine={"pin_radius_mm": pin})
-    assert any(one.key == key and words in one.message for one in error.value.problems)
-
-
-@pytest.mark.parametrize(
-    "pin",
-    ["30", None, -1, True, {}, {1: 2}, {"big_end": 30}, {"big_end": 30, "small_end": None},
-     {"big_end": 30, "small_end": 20, "top": 3}, PerJoint(30, "x"), PerEnd(1, 2)],
-)  # fmt: skip
-def test_a_machine_of_python_is_refused_in_the_words_of_a_case(pin):
-    with pytest.raises(CaseError) as alone:
-        replace(case().machine, pin_radius_mm=pin)
-    with pytest.raises(CaseError) as whole:
-        case(machine={"pin_radius_mm": pin})
-    own = str(alone.value).replace("pin_radius_mm", "machine.pin_radius_mm")
-    assert own == str(whole.value)
 
 
 @pytest.mark.parametrize(
@@ -202,21 +173,3 @@ def test_pins_that_differ_have_a_stiffness_each():
     (found,) = (one for one in remarks(odd) if one.kind == "default")
     assert "for one of 60 mm in its bore" in found.message
     assert "for one of 35 mm in its bore" in found.message
-
-
-@pytest.mark.parametrize(
-    ("values", "words"),
-    [
-        ({}, "impact, K = 336000 N/mm^p (Table 3, of a pin of 10 mm radius), p = 1.5, "
-             "C_max = 336 N s/mm from 0.1 mm on (Table 3)"),
-        ({"contact": {"stiffness_N_per_mm15": 5e5, "damping_N_s_per_mm": 9}},
-         "K = 500000 N/mm^p (given), p = 1.5, C_max = 9 N s/mm from 0.1 mm on (given)"),
-        ({"contact": MATERIALS, "machine": {"pin_radius_mm": 35}},
-         "N/mm^p (Eq. 15, pins in their bores: steel on copper)"),
-        ({"contact": {"law": "flores", "restitution": 0.7}}, "restitution 0.7 (given)"),
-        ({"contact": {"law": "johnson", "length_mm": 20, **MATERIALS}},
-         "johnson, steel on copper, 20 mm long, undamped"),
-    ],
-)  # fmt: skip
-def test_explain_says_k_p_and_damping_and_where_each_is_from(values, words):
-    assert words in contact_words(case(**values))

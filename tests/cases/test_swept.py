@@ -64,45 +64,6 @@ def test_a_range_is_that_of_decimal_numbers(first, step, count):
     assert sweep.make() == [float(first + i * step) for i in range(count)]
 
 
-@pytest.mark.parametrize(
-    ("axis", "message"),
-    [
-        ("{linspace: [0.1, 0.3]}", "1:25: rod_mass_kg: linspace needs [first, last, count], finite "
-         "numbers"),
-        ("{linspace: 5}", "1:25: rod_mass_kg: linspace needs [first, last, count], finite numbers"),
-        ("{linspace: [1, x, 3]}", "1:25: rod_mass_kg: linspace needs [first, last, count], finite "
-         "numbers"),
-        ("{linspace: [1, .inf, 3]}", "1:25: rod_mass_kg: linspace needs [first, last, count], "
-         "finite numbers"),
-        ("{linspace: [1, 2, 2.5]}", "1:25: rod_mass_kg: linspace needs a whole count of 2 or more"),
-        ("{linspace: [1, 2, 1]}", "1:25: rod_mass_kg: linspace needs a whole count of 2 or more"),
-        ("{linspace: [1, 1, 2]}", "1:25: rod_mass_kg: linspace needs two different ends"),
-        ("{linspace: [0, 1, 2]}", "1:14: rod_mass_kg: 0 is outside (0, 1e+06] kg"),
-        ("{linspace: [1, 2, 3], log: true}", "1:41: rod_mass_kg: log is true or false, and for "
-         "random lhs sobol saltelli alone"),
-        ("{logspace: [-1, 1, 3]}", "1:25: rod_mass_kg: logspace needs ends above 0"),
-        ("{range: [1, 2, 0]}", "1:22: rod_mass_kg: range never gets from 1 to 2 by this step"),
-        ("{range: [1, 2, -1]}", "1:22: rod_mass_kg: range never gets from 1 to 2 by this step"),
-        ("{lnspace: [1, 2, 3]}", "1:14: rod_mass_kg: needs a value, a list of values or a mapping "
-         "with one of linspace logspace range random lhs sobol saltelli; did you mean linspace or "
-         "logspace?"),
-        ("{range: [1, 2, 1], linspace: [1, 2, 3]}", "1:14: rod_mass_kg: needs a value, a list of "
-         "values or a mapping with one of linspace logspace range random lhs sobol saltelli; "
-         "did you mean range?"),
-        ("{random: [2, 1]}", "1:23: rod_mass_kg: random needs [least, greatest]: 2 exceeds 1"),
-        ("{random: [1, 2]}", "1:14: rod_mass_kg: needs a number of samples: add "
-         "`sample: {n: 64, seed: 1}` to the file"),
-    ],
-)  # fmt: skip
-def test_a_wrong_axis_is_told(read, axis, message):
-    place, text = message.split(" ", 1)
-    line, column, _ = place.split(":")
-    # the key is nested: its value stands at column 25 of `machine: {rod_mass_kg: ...`
-    (found,) = refused(read, f"machine: {{rod_mass_kg: {axis}}}")
-    assert found.endswith(text)
-    assert found.startswith(f"case.yaml:{line}:{int(column) + 10}: machine.")
-
-
 # ---- too many -----------------------------------------------------------------------------------
 
 
@@ -130,15 +91,6 @@ def test_a_bomb_is_counted_not_made(read, text, where, count):
     assert peak < 4e6
 
 
-def test_cases_are_built_when_they_are_asked_for(read):
-    study = read(ONE + "clearance_mm: {linspace: [0.1, 1, 100]}\n")
-    assert len(study.cases) == 100
-    assert study.cases[-1].clearance_mm.big_end == 1.0
-    assert [case.clearance_mm.big_end for case in study.cases[:2]] == [0.1, 0.109090909090909091]
-    with pytest.raises(IndexError):
-        study.cases[100]
-
-
 # ---- together -----------------------------------------------------------------------------------
 
 
@@ -150,27 +102,6 @@ def test_zipped_keys_advance_together(read):
     pairs = [(0.1, 300.0), (0.2, 400.0), (0.1, 500.0)]
     assert rows(study) == [(load, *pair) for load in ("none", "spring") for pair in pairs]
     assert not study.is_grid
-
-
-@pytest.mark.parametrize(
-    ("groups", "message"),
-    [
-        ("[load, joint]", "zip: needs a list of groups of keys, such as "
-         "[[machine.speed_rpm, clearance_mm]]"),
-        ("[[load]]", "zip: needs a list of groups of keys, such as "
-         "[[machine.speed_rpm, clearance_mm]]"),
-        ("[[load, speed]]", "zip: 'speed' is not swept here; did you mean machine.speed_rpm?"),
-        ("[[load, joint]]", "zip: 'joint' is not swept here"),
-        ("[[load, load]]", "zip: load is named twice"),
-        ("[[load, clearance_mm]]", "zip: needs equally many values of each key: load has 2, "
-         "clearance_mm has 3"),
-        ("[[load, gas.exponent], [gas.exponent, load]]", "zip: gas.exponent is named twice"),
-    ],
-)  # fmt: skip
-def test_a_wrong_zip_is_told(read, groups, message):
-    text = f"zip: {groups}\nload: [none, spring]\njoint: both\nclearance_mm: [1, 2, 3]\n"
-    found = refused(read, text + "gas: {exponent: [1.3, 1.4]}\n")
-    assert {line.split(": ", 1)[1] for line in found} == {message}
 
 
 SAMPLED = """\
@@ -261,32 +192,6 @@ def test_whole_numbers_and_halved_keys_are_drawn_from_distributions(read):
     assert stroke == radius
 
 
-@pytest.mark.parametrize(
-    ("form", "message"),
-    [
-        ("{lhs: {normal: {mean: 4}}}", "1:39: {}: normal needs {{mean: number, sd: number}}, "
-         "finite numbers, sd above 0"),
-        ("{lhs: {normal: {mean: 4, sd: 0}}}", "finite numbers, sd above 0"),
-        ("{lhs: {normal: {mean: 4, sd: x}}}", "finite numbers, sd above 0"),
-        ("{lhs: {normal: {mean: 4, sd: 1, max: 5}}}", "finite numbers, sd above 0"),
-        ("{lhs: {normal: [4, 1]}}", "normal needs {{mean: number, sd: number}}"),
-        ("{lhs: {normal: {mean: -4, sd: 1}}}", "draw 1 of 8: -5.11637 is outside (0, 1e+06] kg"),
-        ("{lhs: {triangular: [3, 4]}}", "triangular needs [least, likeliest, greatest], finite "
-         "numbers, in rising order, the ends different"),
-        ("{lhs: {triangular: [3, 2, 4]}}", "in rising order, the ends different"),
-        ("{lhs: {triangular: [3, 3, 3]}}", "in rising order, the ends different"),
-        ("{lhs: {norml: {mean: 4, sd: 1}}}", "lhs needs [least, greatest], {{normal: {{mean: "
-         "number, sd: number}}}} or {{triangular: [least, likeliest, greatest]}}; did you mean n"),
-        ("{lhs: {}}", "lhs needs [least, greatest], {{normal: "),
-        ("{lhs: {normal: {mean: 4, sd: 1}}, log: true}", "log is for [least, greatest], not for"),
-        ("{linspace: {normal: {mean: 4, sd: 1}}}", "linspace needs [first, last, count]"),
-    ],
-)  # fmt: skip
-def test_a_wrong_distribution_is_told(read, form, message):
-    found = refused(read, f"machine: {{rod_mass_kg: {form}}}\nsample: {{n: 8}}")[0]
-    assert message.format("machine.rod_mass_kg") in found
-
-
 def test_the_tail_of_a_normal_distribution_is_refused_with_its_draw(read):
     """Of 64 draws the first beyond the key's range, counted as the design draws them."""
     text = "machine: {rod_mass_kg: {lhs: {normal: {mean: 2, sd: 1}}}}\nsample: {n: 64, seed: 1}"
@@ -299,13 +204,6 @@ def test_the_tail_of_a_normal_distribution_is_refused_with_its_draw(read):
         "[least, likeliest, greatest]}"
     )
     assert "1:" in message
-
-
-def test_axes_without_ends_have_no_range(read):
-    """A triangle has a range, a normal distribution has none."""
-    spreads = {axis.key: axis.spread for axis in read(DRAWN % (("lhs",) * 3)).axes}
-    assert spreads["clearance_mm"] is None
-    assert [spreads["machine.speed_rpm"](share) for share in (0.0, 1.0)] == [300, 900]
 
 
 def test_saltelli_exchanges_one_key_after_another(read):
@@ -324,26 +222,6 @@ def test_designs_fill_every_eighth_of_every_key(kind):
         assert sorted((8 * column).astype(int)) == [*range(8)]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (SAMPLED % ("lhs", "random"), "one design draws all sampled keys: lhs or random, not both"),
-        (SAMPLED % ("lhs", "lhs") + "zip: [[clearance_mm, machine.speed_rpm]]",
-         "zip: sampled keys go together by their design already"),
-        (ONE + "clearance_mm: {saltelli: [1, 2]}\nsample: {n: 4}", "clearance_mm: saltelli "
-         "exchanges keys one by one: draw two or more, or draw this one by sobol"),
-        ("sample: {n: 3}", "1:1: sample: samples nothing: give a key {random: [least, greatest]}, "
-         "lhs, sobol or saltelli"),
-        ("sample: 3", "sample: needs a mapping of keys, not 3"),
-        ("sample: {n: 2.5}", "sample.n: needs a whole number from 1"),
-        ("sample: {n: 1, seed: -1}", "sample.seed: needs a whole number from 0"),
-        ("sample: {n: 1, sed: 1}", "sample.sed: unknown key; did you mean sample.seed?"),
-    ],
-)  # fmt: skip
-def test_a_wrong_design_is_told(read, text, message):
-    assert refused(read, text)[0].endswith(message)
-
-
 # ---- left out, and put together -----------------------------------------------------------------
 
 
@@ -359,20 +237,6 @@ def test_what_does_not_fit_may_be_excluded(read):
     assert len(refused(read, text)) == 1
     study = read(text + "exclude: machine.crank_radius_mm == 700 and machine.rod_length_mm < 700\n")
     assert len(study.cases) == 3
-
-
-@pytest.mark.parametrize(
-    ("exclude", "message"),
-    [
-        ("1", "needs comparisons, such as clearance_mm > 0.2"),
-        ("[load == x]", "load needs spring | gas | none, not x"),
-        ("load != both", "load needs spring | gas | none, not both"),
-        ("clearance_mm > 0", "leaves no job"),
-    ],
-)
-def test_a_wrong_exclusion_is_told(read, exclude, message):
-    (found,) = refused(read, ONE + f"clearance_mm: [0.1, 0.2]\nexclude: {exclude}\n")
-    assert found.partition("exclude: ")[2] == message
 
 
 def test_a_comparison_knows_what_is_not_swept(read):
@@ -414,22 +278,6 @@ def test_a_block_takes_the_place_of_the_files_keys_and_an_override_of_both(read)
     assert rows(read(text, overrides=["load=gas"])) == [(0.3,), (0.1,), (0.2,)]
     assert rows(read(text, overrides=["blocks=[{load: none}]"])) == [(0.1,), (0.2,)]
     assert rows(read(text, overrides=["clearance_mm=0.4"])) == [("spring",), ("none",)]
-
-
-@pytest.mark.parametrize(
-    ("blocks", "message"),
-    [
-        ("{load: none}", "1:9: blocks: needs a list of mappings, such as "
-         "[{load: none}, {joint: both}]"),
-        ("[]", "1:9: blocks: needs a list of mappings, such as [{load: none}, {joint: both}]"),
-        ("[{name: x}]", "1:11: name: cannot stand in a block: it belongs to the whole file"),
-        ("[{laod: none}]", "1:11: laod: unknown key; did you mean load?"),
-        ("[{load: none}, {joint: both}]", "1:24: clearance_mm.big_end: is needed with joint: both"),
-        ("[{load: none}, {load: [x]}]", "1:32: load: needs spring, gas or none, not 'x'"),
-    ],
-)  # fmt: skip
-def test_a_wrong_block_is_told(read, blocks, message):
-    assert refused(read, f"blocks: {blocks}")[0].startswith(f"case.yaml:{message}")
 
 
 # ---- selected -----------------------------------------------------------------------------------

@@ -6,10 +6,8 @@ import pytest
 from conftest import refused
 
 from compressor.cases.case import Case
-from compressor.cases.checks import DOUBLES, probable_keys
-from compressor.cases.parameter import CaseError
+from compressor.cases.checks import DOUBLES
 from compressor.cases.study import Axis
-from compressor.cases.table import GROUPS, table
 
 
 @pytest.mark.parametrize("word", DOUBLES)
@@ -53,53 +51,6 @@ def test_a_block_and_the_command_line_replace_either_word(read):
     assert study.cases[0].machine.crank_radius_mm == 100
     study = read("load: none\nmachine: {stroke_mm: 200}", "machine.crank_radius_mm=80")
     assert study.cases[0].machine.crank_radius_mm == 80
-
-
-def test_a_file_gives_one_of_the_two(read):
-    both = "machine.stroke_mm: stands in place of machine.crank_radius_mm: give one of the two"
-    text = "machine: {crank_radius_mm: 90, stroke_mm: 180}\nload: none"
-    assert refused(read, text) == [f"case.yaml:1:32: {both}"]
-    with pytest.raises(CaseError) as caught:
-        Case.from_values({"machine": {"crank_radius_mm": 90, "stroke_mm": 180}, "load": "none"})
-    assert str(caught.value) == both
-    assert (
-        "set twice"
-        in refused(read, "load: none", "machine.stroke_mm=180", "machine.crank_radius_mm=3")[0]
-    )
-
-
-@pytest.mark.parametrize(
-    ("text", "hint"),
-    [
-        ("gas: {load: gas}", "gas.load: unknown key; write load at the top, outside gas"),
-        ("gas: {suction_bar: 2}", "gas.suction_bar: unknown key; write suction_MPa: 0.2"),
-        ("gas: {suction_kPa: [200, 300]}", "unknown key; write suction_MPa: [0.2, 0.3]"),
-        ("gas: {suction_bar: {lhs: [1, 2]}}", "; write suction_MPa: 1 bar is 0.1 MPa"),
-        ("clearance_um: 250", "clearance_um: unknown key; write clearance_mm: 0.25"),
-        ("machine: {stroke_cm: 18}", "stroke_cm: unknown key; write stroke_mm: 180"),
-        ("machine: {rod_length_m: 0.45}", "unknown key; write rod_length_mm: 450"),
-        ("gas: {clearance_pct: 8}",
-         "clearance_pct: unknown key; write clearance_percent, a number or {head: 12, crank: 14}"),
-        ("gas: {head_clearance_percent: 8}", "unknown key; write clearance_percent, a number or"),
-        ("clearance_percent: 10", "; of the cylinder, write gas.clearance_percent, a number or "
-         "{head: 12, crank: 14}; of joints, clearance_mm in mm"),
-        ("stroke: 180", "; did you mean spring.stroke_mm or machine.stroke_mm?"),
-        ("bore: 180", "; did you mean gas.bore_mm?"),
-        ("load: none\nexclude: machine.stroke_mm > 180",
-         "; write machine.crank_radius_mm, which is half of it"),
-    ],
-)  # fmt: skip
-def test_what_is_written_otherwise_is_answered(read, text, hint):
-    assert hint in refused(read, text)[0]
-
-
-@pytest.mark.parametrize("group", GROUPS)
-def test_no_hint_points_to_another_group(group):
-    words = [key.rpartition(".")[2] for key in (*table(), *DOUBLES)]
-    stems = [word.rpartition("_")[0] for word in words]
-    for word in [*words, *stems, "bore", "stroke", "mass"]:
-        assert all(key.startswith(f"{group}.") for key in probable_keys(word, group)), word
-    assert probable_keys("stroke_mm", "contact") == probable_keys("bore_mm", "wear") == []
 
 
 @pytest.mark.parametrize(("older", "word"), [("design", "spring"), ("typical", "gas")])
