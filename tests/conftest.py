@@ -359,7 +359,7 @@ def without_pictures():
     from compressor.report.figures import pictures
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pictures, "render_kinds", lambda drawing, kinds: [b"drawn" for _ in kinds])
+        patch.setattr(pictures, "render", lambda drawing: b"drawn")
         yield
 
 

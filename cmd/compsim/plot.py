@@ -8,7 +8,6 @@ from compsim import options, screen
 OF_JOB = ["analyst", "loads", "signals", "cards", "spectra", "orbits", "modes", "impacts"]
 OF_STUDY = ["cycles", "segments", "waterfall", "map"]
 LISTED = f"of a job {', '.join(OF_JOB)}; of a study {', '.join(OF_STUDY)}"
-KINDS = {"png": ("png",), "svg": ("svg",), "both": ("png", "svg")}
 
 
 def read_figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
@@ -34,13 +33,6 @@ def read_figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str,
 )
 @options.output("Write the figures into this folder.", default="plots")
 @click.option(
-    "--format",
-    "kinds",
-    type=click.Choice([*KINDS]),
-    default="png",
-    help="Write figures as PNG, as SVG, or as both.",
-)
-@click.option(
     "--over",
     default="",
     show_default=False,
@@ -62,7 +54,7 @@ def read_figures(_: click.Context, __: click.Parameter, text: str) -> tuple[str,
     "times the machine without clearance.",
 )
 @options.units("kN, mm, µm, m/s²")
-def plot(words, folder, output, kinds, units, **chosen) -> int:
+def plot(words, folder, output, units, **chosen) -> int:
     """Draw one job, or one study.
 
     Prints the files and their captions. A job is named as in compsim show: by the beginning of its
@@ -84,7 +76,7 @@ def plot(words, folder, output, kinds, units, **chosen) -> int:
     from compressor.store import writable_folder
 
     writable_folder(output, make=False)
-    choice = PlotChoice(kinds=KINDS[kinds], units=units or "usual", **chosen)
+    choice = PlotChoice(units=units or "usual", **chosen)
     for drawn in write_plots(folder, output, words, choice):
-        screen.print_text(" ".join(map(str, drawn.paths)), f"  {drawn.caption}")
+        screen.print_text(str(drawn.path), f"  {drawn.caption}")
     return screen.DONE

@@ -17,7 +17,6 @@ from compressor.analysis.effects import (
     grid_effects,
     saltelli_design,
     sampled_effects,
-    trend,
 )
 from compressor.analysis.machine_numbers import describe_cases, describe_machine
 from compressor.analysis.margins import mean_peak

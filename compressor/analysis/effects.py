@@ -1,4 +1,4 @@
-"""Which swept key matters for a quantity, how the quantity follows it, and Sobol's indices."""
+"""Which swept key matters for a quantity, and Sobol's indices."""
 
 import contextlib
 import math
@@ -126,12 +126,11 @@ def saltelli_design(columns: np.ndarray) -> SaltelliDesign | None:
 MAX_GAPS = 0.2  # of a grid's points
 FILLS = 500  # rounds of filling
 FILLED = 1e-9  # of the values' span: no round changes more
-MIN_POINTS = 8  # points of a ranking or a trend
+MIN_POINTS = 8  # points of a ranking
 MAX_BASE = 1024  # points of the parts of a `saltelli` design, beyond which its bootstrap is slow
 MAX_POINTS = 4000  # of the resampling
 RANKING_RESAMPLES = 400
 RANKING_SEED = 1
-ORDER = 2  # of a trend
 
 
 @dataclass(frozen=True)
@@ -310,31 +309,3 @@ def correlation_ratio(codes: np.ndarray, values: np.ndarray) -> tuple[float, flo
         draws.append(math.sqrt(max(0.0, between) / (one.var() or 1.0)))
     low, high = np.quantile(draws, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return found, min(found, float(low)), max(found, float(high))
-
-
-def trend(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, ...] | None:
-    """Return a least-squares parabola at places, and the ends of its 95 % interval.
-
-    x, y: (points,), nan where unknown; None of fewer than MIN_POINTS points or three places. The
-    interval is that of the mean at a place, by Student's t and the covariance HC3, which holds
-    where the scatter differs along x, too (MacKinnon and White, Journal of Econometrics 29, 1985,
-    305-325).
-    """
-    from scipy.stats import t
-
-    good = np.isfinite(x) & np.isfinite(y)
-    x, y = x[good], y[good]
-    if x.size < MIN_POINTS or np.unique(x).size <= ORDER:
-        return None
-    middle, half = 0.5 * (x.max() + x.min()), 0.5 * np.ptp(x)
-    powers = np.vander((x - middle) / half, ORDER + 1)
-    places = np.vander((at - middle) / half, ORDER + 1)
-    inverse = np.linalg.pinv(powers.T @ powers)
-    factors = inverse @ powers.T @ y
-    leverage = np.einsum("ij,jk,ik->i", powers, inverse, powers).clip(max=1.0 - 1e-9)
-    rest = (y - powers @ factors) / (1.0 - leverage)
-    spread = inverse @ (powers.T * rest**2) @ powers @ inverse
-    error = np.sqrt(np.einsum("ij,jk,ik->i", places, spread, places).clip(min=0.0))
-    reach = float(t.ppf(0.5 + LEVEL / 2, x.size - ORDER - 1)) * error
-    found = places @ factors
-    return found, found - reach, found + reach

@@ -40,7 +40,7 @@ from compressor.report.figures.job import (
     draw_spectra,
     draw_waterfall,
 )
-from compressor.report.figures.pictures import render_kinds
+from compressor.report.figures.pictures import render
 from compressor.report.figures.plant_units import in_units
 from compressor.report.figures.sweep_data import name_in_words
 from compressor.report.study_section import file_name
@@ -79,15 +79,14 @@ class PlotChoice:
     over: str = ""
     at: tuple[str, ...] = ()
     limit: str = ""
-    kinds: tuple[str, ...] = ("png",)
     units: Units = "usual"
 
 
 @dataclass(frozen=True)
 class Plotted:
-    """A figure that was written, one file a kind."""
+    """A figure that was written."""
 
-    paths: tuple[Path, ...]
+    path: Path
     caption: str
 
 
@@ -111,18 +110,15 @@ def publish_drawings(
 ) -> Iterator[Plotted]:
     """Write drawings with their names and captions as files; yields each. Raises StoreError.
 
-    One without a title has that of its file, or of its machine. choice: of the kinds of files, and
-    of units; title: of the machine.
+    One without a title has that of its file, or of its machine. choice: of units; title: of the
+    machine.
     """
-    kinds = choice.kinds
     for name, caption, usual in drawn:
         drawing = in_units(usual, choice.units)
         drawing.title = drawing.title or title_figure(title or stem, name.replace("-", " "))
-        paths = []
-        for kind, picture in zip(kinds, render_kinds(drawing, kinds), strict=True):
-            paths.append(Path(output) / f"{file_name(stem, name)}.{kind}")
-            publish(paths[-1], picture)
-        yield Plotted(tuple(paths), caption)
+        path = Path(output) / f"{file_name(stem, name)}.png"
+        publish(path, render(drawing))
+        yield Plotted(path, caption)
 
 
 JOB, STUDY = PLOT_CAPTIONS["job"], PLOT_CAPTIONS["study"]

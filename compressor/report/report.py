@@ -1,8 +1,7 @@
 """The report of a store: the paper's figures and claims, every study's table, and where from.
 
 Everything is drawn in memory before a file is written, and the page is written last, so that a
-report which is interrupted leaves the one before as it was. Pictures that the folder has already,
-of the same data by the same code, are not drawn again.
+report which is interrupted leaves the one before as it was.
 """
 
 import contextlib
@@ -16,7 +15,7 @@ from typing import NamedTuple
 
 import xarray as xr
 
-from compressor.analysis import Claim, caption, case_of, claims
+from compressor.analysis import Claim, caption, claims
 from compressor.outcome import Regime
 from compressor.report.answer import (
     FirstScreen,
@@ -25,16 +24,13 @@ from compressor.report.answer import (
     answer_section,
     assumptions_section,
     findings,
-    last_case,
-    mechanism_svg,
-    mechanism_words,
     provenance_section,
     round_robin,
     study_findings,
     worn_joints,
 )
 from compressor.report.figures import FIGURES
-from compressor.report.figures.pictures import Painter
+from compressor.report.figures.pictures import render_all
 from compressor.report.figures.plant_units import in_units
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.interactive import (
@@ -96,7 +92,7 @@ from compressor.store import (
 )
 from compressor.units import Units
 
-KINDS = ("png", "svg", "csv", "js")  # of files beside the page
+KINDS = ("png", "csv", "js")  # of files beside the page
 
 
 def write_report(
@@ -121,10 +117,11 @@ def write_report(
     report's folder cannot be written.
     """
     folder, zones = Path(report), read_limits(limits, units)
-    with Painter(folder) as painter:
-        contents = build_report(results, command, add, painter, zones, units, studies)
-        files = painter.finish()
-    for plate in contents.plates:
+    contents = build_report(results, command, add, zones, units, studies)
+    plates = contents.plates
+    pictures = render_all([(plate.heading, plate.drawing) for plate in plates])
+    files = {f"{one.name}.png": png for one, png in zip(plates, pictures, strict=True)}
+    for plate in plates:
         files |= {name: text.encode() for name, text in plate.texts.items()}
     files |= {f"{series_name(key)}.js": text.encode() for key, text in contents.series.items()}
     if single:
@@ -163,29 +160,20 @@ def build_report(
     results: Folder,
     command: str,
     add: Sequence[Add],
-    painter: Painter,
     limits: Limits,
     units: Units = "usual",
     names: Sequence[str] = (),
 ) -> ReportContent:
     """Return the figures, series and page of a report, in memory.
 
-    painter: it gets each figure as soon as there is one; limits, units, names: of studies, see
-    `write_report`.
+    limits, units, names: of studies, see `write_report`.
     """
-
-    def begin(plates: Sequence[Plate]) -> None:
-        """Let pictures be drawn while the page is made."""
-        for plate in plates:
-            painter.add(plate.name, plate.drawing, plate.heading)
-
     studies, stored = choose_studies(results, names), read_store(results).warned()
     paper = find_paper_runs(stored, studies)
     papers = [study for study in studies if is_of_paper(stored, study)]
     if not papers:
         paper = PaperRuns({}, {}, {})  # a few like runs in a sweep of one's own are no reproduction
     of_paper = plates_in(draw_paper(paper), units)
-    begin(of_paper)
     others = second_sets(stored, studies, paper)
     of_others = {
         n: plates_in([Plate(*parts) for parts in second_drawings(one)], units)
@@ -209,12 +197,11 @@ def build_report(
     chapters = [chapter for one in added for chapter in one.chapters]
     later = [*chain(*of_others.values(), of_faults, *(one.plates for one in drawn))]
     later += [plate for chapter in chapters for plate in plates_in(chapter.plates, units)]
-    begin(later)
     caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored.rows, one)]
     judged = claims(paper.usable) if paper.stored else []
     figures, tables = paper_sections(paper, of_paper, judged, caveats, units)
     sections = [
-        answer_section(summarise(stored, own, paper, judged, drawn, units)),
+        answer_section(summarise(own, paper, judged, drawn, units)),
         *(one.figures for one in drawn),
         *figures,
         *sets,
@@ -317,7 +304,6 @@ def motion_cautions(stored: Stored, study: StoredStudy, data: xr.Dataset) -> lis
 
 
 def summarise(
-    stored: Stored,
     own: Sequence[StoredStudy],
     paper: PaperRuns,
     judged: Sequence[Claim],
@@ -337,17 +323,8 @@ def summarise(
             (label_in_words(name), run) for name, run in paper.stored.items() if name != "typical"
         )
         each.append(("The paper's cases", findings(worn, units)))
-    shown = [(f"The last job of {study.name}", last_case(stored, study)) for study in own[:1]]
-    if paper.stored and not shown:
-        name, run = [*paper.stored.items()][-1]
-        shown = [(label_in_words(name), case_of(run))]
-    pictures = [
-        (mechanism_svg(case), f"{name[0].upper()}{name[1:]}: {mechanism_words(case)}")
-        for name, case in shown
-        if case
-    ]
     cautions = [text for one in drawn for text in one.cautions]
-    return FirstScreen(lines, [*round_robin(each)], judged, pictures, cautions)
+    return FirstScreen(lines, [*round_robin(each)], judged, cautions)
 
 
 def remove_stale(report: Path, contents: ReportContent) -> None:

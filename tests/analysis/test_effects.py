@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from compressor.analysis.effects import correlation, grid_effects, sampled_effects, trend
+from compressor.analysis.effects import correlation, grid_effects, sampled_effects
 from compressor.cases.swept import design
 
 
@@ -105,25 +105,3 @@ def test_intervals_of_correlations_hold_as_often_as_they_say():
         _, low, high = correlation(x, 0.6 * x + 0.8 * noise)
         held += low <= exact <= high
     assert held / 400 == pytest.approx(0.95, abs=0.033)
-
-
-def test_a_trend_through_a_parabola_is_it():
-    x = np.linspace(300, 900, 20)
-    at = np.array([300.0, 512.5])
-    found, low, high = trend(x, 2 + 3e-3 * x**2, at)
-    assert found == pytest.approx(2 + 3e-3 * at**2)
-    assert high - low == pytest.approx([0, 0], abs=1e-8)
-    assert trend(x[:5], x[:5], at) is None
-    assert trend(np.tile([1.0, 2.0], 10), x, at) is None
-
-
-def test_a_trend_s_interval_holds_as_often_as_it_says():
-    """Scatter that grows along x, at both ends; 95 % of 400, within 4 sigma."""
-    rng = np.random.default_rng(4)
-    at, held = np.array([0.0, 1.0]), np.zeros(2)
-    for _ in range(400):
-        x = rng.random(60)
-        _, low, high = trend(x, 1 + x - x**2 + (0.1 + x) * rng.normal(size=60), at)
-        exact = np.array([1.0, 1.0])
-        held += (low <= exact) & (exact <= high)
-    assert held / 400 == pytest.approx([0.95, 0.95], abs=0.044)

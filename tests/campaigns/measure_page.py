@@ -104,7 +104,7 @@ def measured(folder, rounds):
     files = {path.name: path.stat().st_size for path in (folder / "report").iterdir()}
     of = {
         kind: sum(size for name, size in files.items() if name.endswith(kind) and name != LIBRARY)
-        for kind in (".html", ".js", ".csv", ".png", ".svg")
+        for kind in (".html", ".js", ".csv", ".png")
     }
     opens = [] if lacking() else [opened(folder / "report") for _ in range(max(rounds, 2))]
     loaded, first = (
@@ -114,9 +114,9 @@ def measured(folder, rounds):
     )
     return {
         **medians("write", written), **medians("rewrite", again),
-        "figures": len([name for name in files if name.endswith(".svg")]),
+        "figures": len([name for name in files if name.endswith(".png")]),
         "page_bytes": of[".html"], "data_bytes": of[".js"], "library_bytes": files[LIBRARY],
-        "csv_bytes": of[".csv"], "picture_bytes": of[".png"] + of[".svg"],
+        "csv_bytes": of[".csv"], "picture_bytes": of[".png"],
         "open_seconds": loaded, "first_figure_seconds": first,
     }  # fmt: skip
 

@@ -98,6 +98,6 @@ def complete(monkeypatch):
 
 def test_commands_choices_files_and_folders_are_completed(complete):
     assert complete("sta") == ["plain,status"]
-    assert complete("plot", "--format", "s") == ["plain,svg"]
+    assert complete("export", "--format", "w") == ["plain,wav"]
     assert complete("run", "conf") == ["file,conf"]  # the shell goes on
     assert complete("status", "-r", "res") == ["dir,res"]

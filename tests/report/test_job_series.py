@@ -47,7 +47,7 @@ def test_scripts_lie_beside_the_page_and_stale_ones_go(paper_store, tmp_path, mo
     out = tmp_path / "out"
     out.mkdir()
     (out / "job-old.js").write_text("an earlier report's")
-    monkeypatch.setattr(pictures, "render_kinds", lambda drawing, kinds: [bytes(24)] * 2)
+    monkeypatch.setattr(pictures, "render", lambda drawing: bytes(24))
     write_report(part, out)
     assert {path.name for path in out.glob("job-*.js")} == {
         f"job-{key}.js" for key in study.keys[1:]

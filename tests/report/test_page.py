@@ -95,7 +95,6 @@ def contents(evil):
         [StudyLine(evil(), evil(), evil(), bad) for bad in (True, False)],
         [(evil(), [found]), (evil(), [found])],
         claims,
-        [(evil(), evil())],
         [evil()],
     )
     study = StoredStudy(evil(), evil(), (), (evil(), evil()), {}, evil(), {evil(): evil()}, evil())
@@ -128,7 +127,7 @@ def test_every_template_escapes_every_text():
     jobs = JobsToOpen(words, [JobFacts([words], {"key": [words]})], ["key"])
     sections = [Section(evil(), evil(), name, content) for name, content in given.items()]
     text = document(sections, jobs, title=evil())
-    own = {"page.html", "pieces.html", "style.css", "report.js", "mechanism.svg"}
+    own = {"page.html", "pieces.html", "style.css", "report.js"}
     assert {*PackageLoader("compressor.report").list_templates()} - {*given} == own
     scripts = re.findall("<script(.*?)>(.*?)</script>", text, re.DOTALL)
     assert [kind for kind, _ in scripts] == ["", ' type="application/json" id="jobs"']

@@ -81,7 +81,7 @@ def undrawn(monkeypatch):
     }
     monkeypatch.setattr(report, "FIGURES", figures[report])
     monkeypatch.setattr(paper_sections, "SET", figures[paper_sections])
-    monkeypatch.setattr(pictures, "render_kinds", lambda drawing, kinds: [bytes(24)] * 2)
+    monkeypatch.setattr(pictures, "render", lambda drawing: bytes(24))
 
 
 # ---- which studies ----------------------------------------------------------------------------
@@ -272,6 +272,11 @@ def test_what_could_not_be_drawn_is_told_and_removed(tmp_path, undrawn):
     write_report(folder, tmp_path / "out")
     names = {path.stem for path in (tmp_path / "out").glob("*.png")}
     left = {f"other-figure-{n:02d}" for n in (9, 10, 12, 13, 15, 16)}
-    swept = {"sweep-other-ranking", "sweep-other-overview", "cycles-other", "analyst-other"}
+    swept = {
+        "sweep-other-ranking",
+        "sweep-other-points",
+        "cycles-other",
+        "analyst-other",
+    }
     assert names == left | swept | {"foreign-figure-08"}
     assert "Figures 8, 11, 14 are not drawn" in read(tmp_path / "out").text

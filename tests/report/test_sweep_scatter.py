@@ -1,4 +1,4 @@
-"""Sampled sweeps: points are jobs, trends are the fit of what is known, and thinning is told."""
+"""Sampled sweeps: points are jobs, and thinning is told."""
 
 import time
 
@@ -22,7 +22,7 @@ def traces(panel):
     return {trace.name: trace for trace in panel.traces}
 
 
-def test_points_are_jobs_and_a_parabola_is_its_own_trend():
+def test_points_are_jobs_over_what_matters_most():
     found = plan(listed(COLUMNS, 2 + SPEED**2))
     assert [*found] == ["ranking", "points", "scatter"]
     panel = found["points"].figure.panels[0]
@@ -31,9 +31,10 @@ def test_points_are_jobs_and_a_parabola_is_its_own_trend():
     assert one["a job"].x.tolist() == SPEED.tolist()
     assert one["a job"].y == pytest.approx(2 + SPEED**2)
     assert one["a job"].jobs == tuple(f"k{n}" for n in range(60))
-    assert one["trend"].y == pytest.approx(2 + one["trend"].x ** 2)
-    assert one["trend"].x[[0, -1]] == pytest.approx([SPEED.min(), SPEED.max()])
-    assert "a parabola fitted by least squares" in found["points"].caption
+    assert (
+        found["points"].caption
+        == "Every metric over the key that matters most for it, a point a job."
+    )
 
 
 def test_each_key_has_a_column_and_each_metric_a_row():
@@ -44,19 +45,17 @@ def test_each_key_has_a_column_and_each_metric_a_row():
         assert panels[column].x.words == panel.x.words
 
 
-def test_words_are_colours_with_trends_of_their_own():
+def test_words_are_colours():
     load = np.array(["spring", "gas"] * 30)
     values = np.where(load == "spring", SPEED, 5 - SPEED)
     panel = plan(listed(COLUMNS | {"load": load}, values))["points"].figure.panels[0]
     one = traces(panel)
     assert one["load spring"].y == pytest.approx(values[::2])
-    assert one["trend, load spring"].style.color == one["load spring"].style.color
-    assert one["trend, load gas"].style.color != one["load spring"].style.color
-    assert "95 % interval of the trend, load gas" in one
+    assert one["load gas"].style.color != one["load spring"].style.color
 
 
 def test_a_caption_speaks_of_what_is_drawn():
-    """Of four jobs there is no ranking and no trend; of words none is on an axis."""
+    """Of four jobs there is no ranking."""
     few = plan(listed({name: values[:4] for name, values in COLUMNS.items()}, SPEED[:4]))["points"]
     assert few.caption == "Every metric over a key, a point a job."
     assert [one.name for one in few.figure.legend] == ["a job"]
@@ -67,7 +66,7 @@ def test_a_caption_speaks_of_what_is_drawn():
     assert "over each number, a point a job" in found["scatter"].caption
 
 
-def test_what_is_not_known_is_drawn_but_not_fitted():
+def test_what_is_not_known_is_marked():
     status, regime = (np.full(60, word, dtype="U11") for word in ("ok", "predictable"))
     status[3], regime[7] = "failed", "chaotic"
     values = 2 + SPEED**2
@@ -82,7 +81,6 @@ def test_what_is_not_known_is_drawn_but_not_fitted():
     assert size <= one["a job"].style.markersize + 1e-9  # it covers no point
     marks = content(panel)["panels"][0]["traces"]
     assert [mark.get("hollow", False) for mark in marks if mark["name"] == ring.name] == [True]
-    assert one["trend"].y == pytest.approx(2 + one["trend"].x ** 2)
 
 
 def test_many_jobs_are_thinned_with_a_word():

@@ -5,29 +5,22 @@ user's matplotlibrc nor a user's own figures are touched.
 """
 
 import contextlib
-import gc
-import hashlib
 import io
 import multiprocessing
 import os
-import pathlib
-import pickle
 import signal
 import sys
 import threading
-from collections import deque
-from collections.abc import Iterable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from functools import cache
-from typing import Any, Self
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib import style
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
@@ -37,19 +30,13 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullFormatter
 
-from compressor.report.figures import drawing as drawing_module
-from compressor.report.figures import style as style_module
 from compressor.report.figures.drawing import WAYS, Drawing, Note, Panel, Trace, Way
 from compressor.report.figures.style import LineStyle
 
 DPI = 150
 SVG_DPI = 200  # of what is pixels in an SVG: 1920 across a page, twice those of a usual screen
-MAX_VECTOR_MARKS = 1000  # of a cloud of points: more are pixels in an SVG
 LEGEND_WIDTH = 130  # characters, in a row of a legend
 PLAIN_DECADES = 2.5  # of a log axis with plain numbers, up to which it has ticks at 2 and 5 as well
-ENDS = {"png": b"IEND\xaeB`\x82", "svg": b"</svg>\n"}  # of whole files
-KINDS = tuple(ENDS)
-HEAD = 2000  # bytes of a picture, in which its identifier is
 
 STYLE: dict[str, Any] = {
     "font.size": 9.5,
@@ -75,72 +62,51 @@ STYLE: dict[str, Any] = {
 }
 
 
-def render(drawing: Drawing, kind: str) -> bytes:
-    """Return a drawing as the bytes of a `png` or `svg` file, without a time stamp."""
-    (picture,) = render_kinds(drawing, [kind])
-    return picture
-
-
 @style.context(STYLE, after_reset=True)
-def render_kinds(drawing: Drawing, kinds: Iterable[str]) -> list[bytes]:
-    """Return a drawing as the bytes of a file of each kind.
+def render(drawing: Drawing, kind: str = "png") -> bytes:
+    """Return a drawing as the bytes of a `png` or `svg` file, without a time stamp.
 
-    Its layout is found once, and each picture is drawn once: `savefig` draws all once more before.
+    Its layout is found once: `savefig` would find it twice.
     """
     figure = paint(drawing)
     layout = figure.get_layout_engine()
     assert layout
     layout.execute(figure)
     figure.set_layout_engine("none")
-    mark = digest_drawing(drawing)
-    encode = {"png": encode_png, "svg": encode_svg}
-    return [encode[kind](figure, mark) for kind in kinds]
+    stream = io.BytesIO()
+    if kind == "png":
+        FigureCanvasAgg(figure).print_png(stream)
+    else:
+        figure.savefig(stream, format=kind, dpi=SVG_DPI, metadata={"Date": None})
+    return stream.getvalue()
 
 
-def digest_drawing(drawing: Drawing) -> str:
-    """Return a digest of all that the pictures of a drawing follow from: its data and the code.
+def render_reported(heading: str, drawing: Drawing) -> bytes:
+    """Return the PNG of a drawing; say what is drawn in one write, since two share stderr."""
+    with contextlib.suppress(OSError):
+        sys.stderr.write(f"drawing {heading}\n")
+        sys.stderr.flush()
+    return render(drawing)
 
-    It stands in the pictures themselves, which thus show whether they are still those of a drawing.
+
+def render_all(drawings: Sequence[tuple[str, Drawing]]) -> list[bytes]:
+    """Return the PNG of drawings, each with what it is called on stderr.
+
+    They are drawn two at a time, by copies of this process; one after the other where the system
+    makes no copies, or threads run, whose locks a copy would take along.
     """
-    return hashlib.sha256(code_digest() + pickle.dumps(drawing)).hexdigest()
-
-
-@cache
-def code_digest() -> bytes:
-    """Return a digest of the code that draws: these modules and matplotlib."""
-    found = hashlib.sha256(f"{matplotlib.__version__} {np.__version__}".encode())
-    for file in (__file__, drawing_module.__file__, style_module.__file__):
-        found.update(pathlib.Path(file).read_bytes())
-    return found.digest()
-
-
-def is_drawn(drawing: Drawing, folder: pathlib.Path, name: str) -> bool:
-    """Return whether the pictures of a drawing lie in a folder, whole, as this code draws them."""
-    mark = digest_drawing(drawing).encode()
-    for kind, end in ENDS.items():
-        try:
-            picture = (folder / f"{name}.{kind}").read_bytes()
-        except OSError:
-            return False
-        if mark not in picture[:HEAD] or not picture.endswith(end):
-            return False
-    return True
-
-
-def encode_svg(figure: Figure, mark: str) -> bytes:
-    """Return a figure as the bytes of an SVG file. mark: its identifier."""
-    stream = io.BytesIO()
-    figure.dpi, dpi = SVG_DPI, figure.dpi
-    FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Identifier": mark})
-    figure.dpi = dpi
-    return stream.getvalue()
-
-
-def encode_png(figure: Figure, mark: str) -> bytes:
-    """Return a figure as the bytes of a PNG file. mark: its identifier."""
-    stream = io.BytesIO()
-    FigureCanvasAgg(figure).print_png(stream, metadata={"Identifier": mark})
-    return stream.getvalue()
+    affinity = getattr(os, "sched_getaffinity", None)
+    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
+    can_fork = cores > 1 and "fork" in multiprocessing.get_all_start_methods()
+    if can_fork and threading.active_count() == 1 and len(drawings) > 1:
+        context, ignored = multiprocessing.get_context("fork"), (signal.SIGINT, signal.SIG_DFL)
+        # a copy has died, such as for want of memory: all is drawn here
+        with (
+            contextlib.suppress(BrokenProcessPool),
+            ProcessPoolExecutor(2, context, signal.signal, ignored) as pool,
+        ):
+            return [*pool.map(render_reported, *zip(*drawings, strict=True))]
+    return [render_reported(*one) for one in drawings]
 
 
 def paint(drawing: Drawing) -> Figure:
@@ -192,7 +158,6 @@ def paint_panel(axes: Axes, panel: Panel, column: Sequence[Axes]) -> None:
             paint_bars(axes, trace)
         else:
             look = line_properties(trace.style)
-            look["rasterized"] = trace.is_points and trace.x.size > MAX_VECTOR_MARKS
             if trace.errors is None:
                 axes.plot(trace.x, trace.y, **look)
             else:
@@ -327,86 +292,3 @@ def paint_note(axes: Axes, note: Note, limits: tuple[float, float]) -> None:
         axes.axhline(note.y, clip_on=not low <= note.y <= high, **line_properties(look))
     else:
         axes.axvline(note.x, **line_properties(look))
-
-
-class Painter:
-    """Draws PNG and SVG of drawings, in a copy of this process while this one does other work.
-
-    A copy takes drawings from the first on as soon as they are added; `finish` takes them from the
-    last on until both meet. Where threads run, whose locks a fork may copy, or the system has no
-    fork, all is done here. What is drawn is reported on stderr.
-    """
-
-    def __init__(self, folder: pathlib.Path):
-        """Set the folder, whose pictures are not drawn again where they are those of a drawing."""
-        self.folder = folder
-        self.added: dict[str, tuple[Drawing, str]] = {}
-        self.waiting: deque[str] = deque()
-        self.futures: dict[str, Future[list[bytes]]] = {}
-        self.pool: ProcessPoolExecutor | None = None
-        self.sent: Future[list[bytes]] | None = None  # last of all
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self.pool:
-            self.pool.shutdown(cancel_futures=True)
-        gc.unfreeze()
-
-    def add(self, name: str, drawing: Drawing, heading: str) -> None:
-        """Draw a drawing as files of a name; heading: what it is called on stderr."""
-        if is_drawn(drawing, self.folder, name):
-            return
-        self.added[name] = drawing, heading
-        self.waiting.append(name)
-        if not self.pool and threading.active_count() == 1 and can_fork():
-            gc.freeze()  # what is there no collection needs to look at again, nor the copy to write
-            context = multiprocessing.get_context("fork")
-            ignored = signal.SIGINT, signal.SIG_DFL
-            self.pool = ProcessPoolExecutor(1, context, signal.signal, ignored)
-        if self.sent is None or self.sent.done():
-            self.send()
-
-    def send(self, _: object = None) -> None:
-        """Submit the next drawing to the copy, which has finished one or has none."""
-        with contextlib.suppress(IndexError, RuntimeError):  # there is none; it has died
-            if self.pool:
-                # in the pool's own thread, but a deque gives each name to one side only
-                name = self.waiting.popleft()
-                self.sent = self.futures[name] = self.pool.submit(draw_reported, *self.added[name])
-                self.sent.add_done_callback(self.send)
-
-    def finish(self) -> dict[str, bytes]:
-        """Return the pictures that were to be drawn by the names of their files."""
-        gc.freeze()
-        drawn = {}
-        while self.waiting:
-            with contextlib.suppress(IndexError):
-                name = self.waiting.pop()
-                drawn[name] = draw_reported(*self.added[name])
-        for name in self.added.keys() - drawn.keys():
-            try:
-                drawn[name] = self.futures[name].result()
-            except (KeyError, OSError, RuntimeError):  # the copy has died
-                drawn[name] = draw_reported(*self.added[name])
-        return {
-            f"{name}.{kind}": picture
-            for name in self.added
-            for kind, picture in zip(KINDS, drawn[name], strict=True)
-        }
-
-
-def can_fork() -> bool:
-    """Return whether the system can copy a process, and has a core for the copy."""
-    affinity = getattr(os, "sched_getaffinity", None)
-    cores = len(affinity(0)) if affinity else os.cpu_count() or 1
-    return cores > 1 and "fork" in multiprocessing.get_all_start_methods()
-
-
-def draw_reported(drawing: Drawing, heading: str) -> list[bytes]:
-    """Return the pictures of a drawing; say what is drawn in one write, since two share stderr."""
-    with contextlib.suppress(OSError):
-        sys.stderr.write(f"drawing {heading}\n")
-        sys.stderr.flush()
-    return render_kinds(drawing, KINDS)

@@ -21,7 +21,6 @@ from compressor.report.figures.sweep_maps import (
 from compressor.report.figures.sweep_panels import (
     MAX_COLUMNS,
     draw_curves,
-    draw_multiples,
     draw_overview,
     draw_points,
     draw_scatter,
@@ -31,7 +30,6 @@ from compressor.report.limits import NO_LIMITS, Limits
 from compressor.units import Units
 
 MAX_ROWS = 3  # measures that stand in a figure with rows of them
-MAX_DETAILED = 2  # measures that have a figure of their own
 
 
 class SweepFigure(NamedTuple):
@@ -84,8 +82,7 @@ def draw_grid(
 ) -> Iterator[SweepFigure]:
     """Yield the figures of a grid of two or more axes.
 
-    A ranking, an overview of all metrics, and from three axes on some of them in more detail. Two
-    axes of numbers, or of words, are a map.
+    A ranking, and an overview of all metrics. Two axes of numbers, or of words, are a map.
     """
     found = ranking(sweep, shown)
     yield from draw_ranked(sweep, found, shown)
@@ -99,22 +96,11 @@ def draw_grid(
         caption = captions.join_sentences(words, *marks, *zone_words(shown, limits))
         yield SweepFigure("map", title, caption, figure)
         return
-    role = roles_of(sweep, order, False)
+    role = roles_of(sweep, order)
     title = f"metrics over {sweep.axes[role.x].phrase} and {sweep.axes[role.color].phrase}"
-    are_first = len(sweep.axes) > 2 and bool(found) and {role.x, role.color} == {*order[:2]}
+    are_first = len(sweep.axes) > 2 and bool(found) and {*role} == {*order[:2]}
     caption = captions.join_sentences(captions.overview(sweep, role, are_first), marks[1])
     yield SweepFigure("overview", title, caption, draw_overview(sweep, role, shown))
-    if len(sweep.axes) == 2:
-        return
-    leaders = leading(sweep, shown, MAX_ROWS)
-    groups = [leaders] if len(sweep.axes) == 3 else [[one] for one in leaders[:MAX_DETAILED]]
-    for group in groups:
-        own = found.get(group[0])
-        role = roles_of(sweep, order_of(own) if own and len(group) == 1 else order, True)
-        title = f"{', '.join(one.title for one in group)} over all axes"
-        caption = captions.multiples(sweep, role)
-        name = "panels" if len(group) > 1 else f"panels-{group[0].variable}"
-        yield SweepFigure(name, title, caption, draw_multiples(sweep, role, group))
 
 
 def draw_sampled(
@@ -134,7 +120,7 @@ def draw_sampled(
         strongest.append(next(n for n in own if n in numbers))
     kind, is_ranked = captions.axis_kind(sweep), bool(found)
     figure = draw_points(sweep, strongest, shown)
-    caption = captions.join_sentences(captions.points(sweep, is_ranked, figure), *marks)
+    caption = captions.join_sentences(captions.points(sweep, is_ranked), *marks)
     which = f"the {kind} that matters most for each" if is_ranked else f"a {kind}"
     yield SweepFigure("points", f"metrics over {which}", caption, figure)
     if len(numbers) < 2:
@@ -142,7 +128,7 @@ def draw_sampled(
     columns = numbers[:MAX_COLUMNS]
     group = leading(sweep, shown, MAX_ROWS)
     figure = draw_scatter(sweep, columns, group)
-    words = captions.scatter(sweep, len(columns), len(numbers), is_ranked, figure)
+    words = captions.scatter(sweep, len(columns), len(numbers), is_ranked)
     title = f"{', '.join(one.title for one in group)} over each {kind}"
     yield SweepFigure("scatter", title, captions.join_sentences(words, marks[0]), figure)
 

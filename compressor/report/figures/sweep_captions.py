@@ -4,20 +4,16 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from compressor.report.figures.drawing import Drawing
 from compressor.report.figures.sweep_data import Measure, PlottedAxis, PlottedSweep, shown_value
 from compressor.report.figures.sweep_maps import MAX_CELLS, Ranking, describe_ranking
 from compressor.report.figures.sweep_panels import (
     CHAOTIC,
-    MAX_COLUMNS,
     MAX_JOBS,
     MAX_LINES,
     MAX_PLACES,
     MAX_POINTS,
-    MAX_ROWS,
     Roles,
     grouping,
-    has_trends,
 )
 
 MARKS = {
@@ -39,10 +35,6 @@ INDICES = (
 RANKS = (
     "Spearman's correlation of ranks of each metric with each key, and of words the correlation "
     "ratio of ranks, with 95 % intervals. An effect that rises and falls again is not seen in it."
-)
-TREND = (
-    "A line: a parabola fitted by least squares, on the panel's scales; a band: the 95 % interval "
-    "of its mean."
 )
 
 
@@ -129,55 +121,37 @@ def overview(sweep: PlottedSweep, role: Roles, are_first: bool) -> str:
     )
 
 
-def multiples(sweep: PlottedSweep, role: Roles) -> str:
-    """Describe the panels for the values of an axis, or of two."""
-    places = [sweep.axes[n].phrase for n in role[2:] if n >= 0]
-    limits = zip(role, (MAX_PLACES, MAX_LINES, MAX_COLUMNS, MAX_ROWS), strict=True)
-    return join_sentences(
-        f"A panel for each {' and '.join(places)}, a colour for each value of "
-        f"{sweep.axes[role.color].phrase}.",
-        describe_points(sweep, role),
-        *(describe_thinning(sweep.axes[n], most) for n, most in limits if n >= 0),
-    )
-
-
 def axis_kind(sweep: PlottedSweep) -> str:
     """Return what a list of jobs is drawn over: a key, or a number where some keys are words."""
     return "number" if {axis.is_words for axis in sweep.axes} == {True, False} else "key"
 
 
-def points(sweep: PlottedSweep, is_ranked: bool, drawn: Drawing) -> str:
+def points(sweep: PlottedSweep, is_ranked: bool) -> str:
     """Describe each metric of a list of jobs over a key."""
     kind = axis_kind(sweep)
     which = f"the {kind} that matters most for it" if is_ranked else f"a {kind}"
-    return join_sentences(
-        f"Every metric over {which}, a point a job.", *describe_trends(sweep, drawn)
-    )
+    return join_sentences(f"Every metric over {which}, a point a job.", *describe_colors(sweep))
 
 
-def scatter(sweep: PlottedSweep, shown: int, keys: int, is_ranked: bool, drawn: Drawing) -> str:
+def scatter(sweep: PlottedSweep, shown: int, keys: int, is_ranked: bool) -> str:
     """Describe some metrics of a list of jobs over several keys. shown: so many of the keys."""
     kind = axis_kind(sweep)
     most = f"the {shown} strongest" if is_ranked else f"{shown}"
     some = f"{most} of {keys} {kind}s" if keys > shown else f"each {kind}"
     return join_sentences(
         f"The metrics that change most over {some}, a point a job.",
-        *describe_trends(sweep, drawn),
+        *describe_colors(sweep),
     )
 
 
-def describe_trends(sweep: PlottedSweep, drawn: Drawing) -> Iterator[str]:
-    """Yield the sentences on trends, on colours, and on how many points are drawn."""
-    if has_trends(drawn):
-        yield TREND
+def describe_colors(sweep: PlottedSweep) -> Iterator[str]:
+    """Yield the sentences on colours, and on how many points are drawn."""
     phrase, _, _ = grouping(sweep)
     if phrase:
         yield f"A colour for each {phrase}."
     count = sweep.place.size
     if count > MAX_POINTS:
-        yield (
-            f"{MAX_POINTS:,} of {count:,} jobs are drawn; trends and the ranking are those of all."
-        )
+        yield f"{MAX_POINTS:,} of {count:,} jobs are drawn; the ranking is that of all."
 
 
 def ranking(sweep: PlottedSweep, found: Ranking, shown: Sequence[Measure]) -> str:

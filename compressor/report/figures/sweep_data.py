@@ -1,7 +1,7 @@
 """A study as its sweep is drawn: its metrics, its axes, and its jobs in a grid or a list."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -139,9 +139,7 @@ def shown_value(value: Any) -> str:
 
 
 LOG_RATIO = 100.0  # numbers that span more are drawn on a log scale
-MAX_GAPS = 0.5  # of a grid: a list of jobs with more of them is no grid
 LONG_PHRASE = 32  # letters of a phrase
-OUTSIDE = "outside"  # status of a point of the grid that the study leaves out
 
 
 @dataclass(frozen=True)
@@ -198,8 +196,8 @@ class PlottedAxis:
 class PlottedSweep:
     """The jobs of a study over its axes.
 
-    place: the number of each point's job in the order of the study's `status`, -1 where the study
-    leaves the point out; of the axes' lengths in a grid, else (jobs,).
+    place: the number of each point's job in the order of the study's `status`; of the axes'
+    lengths in a grid, else (jobs,).
     """
 
     data: xr.Dataset
@@ -208,15 +206,8 @@ class PlottedSweep:
     is_grid: bool
 
     def of(self, values: xr.DataArray) -> np.ndarray:
-        """Return a variable of the study's jobs at the points.
-
-        Nan, or no word, where there is no job.
-        """
-        flat = values.transpose(*self.data["status"].dims).values.ravel()
-        found = flat[self.place]
-        if (self.place < 0).any():
-            found = np.where(self.place < 0, math.nan if flat.dtype.kind == "f" else "", found)
-        return found
+        """Return a variable of the study's jobs at the points."""
+        return values.transpose(*self.data["status"].dims).values.ravel()[self.place]
 
     def values(self, measure: Measure) -> np.ndarray:
         """Return a measure at the points, in its unit."""
@@ -239,8 +230,8 @@ class PlottedSweep:
 
     @cached_property
     def status(self) -> np.ndarray:
-        """Return the status of each point's job, or `OUTSIDE`."""
-        return np.where(self.place < 0, OUTSIDE, self.of(self.data["status"]))
+        """Return the status of each point's job."""
+        return self.of(self.data["status"])
 
     @cached_property
     def chaotic(self) -> np.ndarray:
@@ -256,19 +247,12 @@ class PlottedSweep:
 
 
 def sweep_of(data: xr.Dataset) -> PlottedSweep:
-    """Return the sweep of a study, as `open_study` gives it.
-
-    A list of jobs is a grid where it fills one.
-
-    Axes that advance together are one, which is named after both. Numbers of a grid are sorted.
-    """
+    """Return the sweep of a study, as `open_study` gives it; numbers of a grid are sorted."""
     status = data["status"]
     names = swept_axes(data)
     if status.dims == ("job",):
         axes = [axis_of(data, name, data[name].values) for name in names]
-        return grid_jobs(data, axes) or PlottedSweep(
-            data, tuple(axes), np.arange(status.size), False
-        )
+        return PlottedSweep(data, tuple(axes), np.arange(status.size), False)
     place = np.arange(status.size).reshape(status.shape)
     found = []
     for name in names:
@@ -310,58 +294,6 @@ def name_in_words(name: str, unit: str) -> str:
     head, inside, part = name.partition(f"{ending}_") if ending else (name, "", "")
     words = f"{head}, {part}" if inside and part else name.removesuffix(ending)
     return words.replace("_", " ")
-
-
-def grid_jobs(data: xr.Dataset, columns: Sequence[PlottedAxis]) -> PlottedSweep | None:
-    """Return a list of jobs as a grid; None where it leaves out too much of it, as samples do."""
-    if any(has_gaps(axis) for axis in columns) or not columns:
-        return None
-    axes: list[PlottedAxis] = []
-    codes: list[np.ndarray] = []
-    for axis in columns:
-        values, code = levels(axis)
-        for n, other in enumerate(codes):
-            if advance_together(code, other, axis.is_words or axes[n].is_words):
-                named = f"{axes[n].phrase}, with {axis.phrase}"
-                axes[n] = PlottedAxis(axes[n].name, named, axes[n].unit, axes[n].values)
-                break
-        else:
-            axes.append(PlottedAxis(axis.name, axis.phrase, axis.unit, values))
-            codes.append(code)
-    shape = tuple(axis.values.size for axis in axes)
-    jobs = data["status"].size
-    if math.prod(shape) * (1.0 - MAX_GAPS) > jobs:
-        return None
-    place = np.full(shape, -1)
-    place[tuple(codes)] = np.arange(jobs)
-    if (place >= 0).sum() != jobs:
-        return None  # one point has two jobs
-    return PlottedSweep(data, tuple(axes), place, True)
-
-
-def has_gaps(axis: PlottedAxis) -> bool:
-    """Return whether some jobs have no value of a key."""
-    return bool((axis.values == "").any() if axis.is_words else np.isnan(axis.places).any())
-
-
-def levels(axis: PlottedAxis) -> tuple[np.ndarray, np.ndarray]:
-    """Return the different values of a column, numbers in order, and which of them each job has."""
-    if not axis.is_words:
-        return np.unique(axis.values, return_inverse=True)
-    return np.array([*dict.fromkeys(axis.values.tolist())]), axis.places.astype(int)
-
-
-def advance_together(one: np.ndarray, other: np.ndarray, has_words: bool) -> bool:
-    """Return whether the values of two columns come in pairs, and in order for numbers.
-
-    Each value of one then stands beside one value of the other. Of words any order will do; numbers
-    rise or fall together.
-    """
-    pairs = np.unique(np.stack([one, other]), axis=1)
-    size = pairs.shape[1]
-    if not size == np.unique(one).size == np.unique(other).size:
-        return False
-    return has_words or bool((np.diff(pairs[1]) > 0).all() or (np.diff(pairs[1]) < 0).all())
 
 
 def spans_decades(values: np.ndarray) -> bool:

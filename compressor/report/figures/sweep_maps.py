@@ -28,7 +28,6 @@ from compressor.report.figures.style import BLUE, GOLD, GREY, RED, LineStyle, fi
 from compressor.report.figures.sweep_data import (
     MARKS,
     NAMES,
-    OUTSIDE,
     Measure,
     PlottedAxis,
     PlottedSweep,
@@ -100,8 +99,6 @@ def draw_maps(
     figure.legend = marks_shown(status, chaotic)
     if any((np.isnan(values) & (status == "ok")).any() for values in tables):
         figure.legend.append(entry("the job lacks this metric", NOTHING, "band"))
-    if (status == OUTSIDE).any():
-        figure.legend.append(entry("no job of the study", NOTHING, "band"))
     return figure
 
 

@@ -1,4 +1,4 @@
-"""Sweeps drawn as lines, rows and columns of lines, or points: a panel a metric."""
+"""Sweeps drawn as lines or points: a panel a metric."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -7,18 +7,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from compressor.analysis import trend
 from compressor.report.figures.drawing import (
     Drawing,
     Panel,
     Trace,
-    band,
     entry,
     make_grid,
     share_scales,
     thin_places,
 )
-from compressor.report.figures.style import BLUE, CYCLE, LineStyle, fill, mark, palette
+from compressor.report.figures.style import BLUE, CYCLE, LineStyle, mark, palette
 from compressor.report.figures.sweep_data import (
     MARKS,
     NAMES,
@@ -179,17 +177,15 @@ def draw_curves(sweep: PlottedSweep, measures: Sequence[Measure]) -> Drawing:
     return figure
 
 
-MAX_COLUMNS, MAX_ROWS = 4, 3
+MAX_COLUMNS = 4
 MAX_PLACES = 200  # in x
 
 
 class Roles(NamedTuple):
-    """Which axis of a sweep does what, by number; -1: none. The others are averaged over."""
+    """Which axis of a sweep lies in x and which has colours; the others are averaged over."""
 
     x: int
     color: int
-    column: int = -1
-    row: int = -1
 
 
 @dataclass(frozen=True)
@@ -208,23 +204,15 @@ class MeasuredPoints:
         return self.values.shape[1] == 1
 
 
-def roles_of(sweep: PlottedSweep, order: Sequence[int], detailed: bool) -> Roles:
-    """Return the roles of the axes in a figure.
-
-    order: the axes' numbers, the strongest first.
+def roles_of(sweep: PlottedSweep, order: Sequence[int]) -> Roles:
+    """Return the roles of the axes; order: the axes' numbers, the strongest first.
 
     In x lies the one of the two strongest axes of numbers that has more values, in colours the
-    strongest of the others; with `detailed` the next two make columns and rows.
+    strongest of the others.
     """
     numbers = [n for n in order if not sweep.axes[n].is_words] or list(order)
     x = max(numbers[:2], key=lambda n: sweep.axes[n].values.size)
-    color, *others = [n for n in order if n != x]
-    return Roles(x, color, *(others[:2] if detailed else []))
-
-
-def chosen_of(axis: PlottedAxis, most: int) -> np.ndarray:
-    """Return the numbers of an axis' values that are shown."""
-    return thin_places(axis.values.size, most)
+    return Roles(x, next(n for n in order if n != x))
 
 
 def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]) -> Drawing:
@@ -235,7 +223,7 @@ def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure])
     sweep = coarse(sweep, role.x, MAX_PLACES)
     figure, panels = metric_panels(measures, 2.35)
     for panel, measure in zip(panels, measures, strict=True):
-        plot_parts(panel, sweep, role, {}, whole_part(sweep, measure, role))
+        plot_parts(panel, sweep, role, whole_part(sweep, measure))
         panel.y.title = measure.unit
     figure.x_title = sweep.axes[role.x].title
     figure.legend = named_lines(figure)
@@ -249,48 +237,21 @@ def named_lines(figure: Drawing) -> list[Trace]:
     return sorted(named.values(), key=lambda one: ranks.get(one.name, 0))
 
 
-def draw_multiples(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]) -> Drawing:
-    """Return a panel for each value of one axis and, in rows, of another, or for each measure."""
-    sweep = coarse(sweep, role.x, MAX_PLACES)
-    columns = chosen_of(sweep.axes[role.column], MAX_COLUMNS)
-    has_rows = role.row >= 0
-    rows: Sequence[int] = chosen_of(sweep.axes[role.row], MAX_ROWS).tolist() if has_rows else []
-    grid_rows = [(measures[0], n) for n in rows] if has_rows else [(m, -1) for m in measures]
-    figure, grid = make_grid(len(grid_rows), columns.size, 2.2 * len(grid_rows) + 1.0)
-    for line, (measure, row) in zip(grid, grid_rows, strict=True):
-        whole = whole_part(sweep, measure, role)
-        for panel, column in zip(line, columns, strict=True):
-            at = {role.column: int(column)} | ({role.row: row} if has_rows else {})
-            plot_parts(panel, sweep, role, at, whole)
-            words = [] if has_rows else [measure.title]
-            words += [sweep.axes[axis].value_text(n) for axis, n in at.items()]
-            panel.title, panel.title_size = "\n".join(words), 9.0
-        line[0].y.title = measure.unit
-    share_scales(figure.panels, "x")
-    for panels in [grid.flat] if has_rows else grid:
-        share_scales(panels, "y")
-    figure.x_title = sweep.axes[role.x].title
-    figure.legend = named_lines(figure)
-    return figure
-
-
-def whole_part(sweep: PlottedSweep, measure: Measure, role: Roles) -> MeasuredPoints:
+def whole_part(sweep: PlottedSweep, measure: Measure) -> MeasuredPoints:
     """Return a measure over a sweep.
 
     Where lines are means, what is known of it within its error bar.
     """
-    is_averaged = any(n not in role for n in range(len(sweep.axes)))
-    values = sweep.known(measure) if is_averaged else sweep.values(measure)
+    values = sweep.known(measure) if len(sweep.axes) > 2 else sweep.values(measure)
     return MeasuredPoints(values, sweep.bars(measure), sweep.status, sweep.chaotic, sweep.keys)
 
 
-def line_part(whole: MeasuredPoints, role: Roles, at: dict[int, int]) -> MeasuredPoints:
-    """Return what a line shows: the points over x at a value of some axes, numbers by number."""
+def line_part(whole: MeasuredPoints, role: Roles, color: int) -> MeasuredPoints:
+    """Return what a line shows: the points over x at a colour's value, by its number."""
 
     def part(values: np.ndarray) -> np.ndarray:
-        index = tuple(at.get(n, slice(None)) for n in range(values.ndim))
-        left = [n for n in range(values.ndim) if n not in at]
-        return np.moveaxis(values[index], left.index(role.x), 0).reshape(values.shape[role.x], -1)
+        first = np.moveaxis(values, (role.x, role.color), (0, 1))
+        return first[:, color].reshape(values.shape[role.x], -1)
 
     return MeasuredPoints(
         part(whole.values), part(whole.bars), part(whole.status), part(whole.chaotic),
@@ -298,17 +259,13 @@ def line_part(whole: MeasuredPoints, role: Roles, at: dict[int, int]) -> Measure
     )  # fmt: skip
 
 
-def plot_parts(
-    panel: Panel, sweep: PlottedSweep, role: Roles, at: dict[int, int], whole: MeasuredPoints
-) -> None:
-    """Draw a panel's lines and marks, at a value of some axes, numbers by number."""
+def plot_parts(panel: Panel, sweep: PlottedSweep, role: Roles, whole: MeasuredPoints) -> None:
+    """Draw a panel's lines and marks."""
     axis, color = sweep.axes[role.x], sweep.axes[role.color]
-    x, chosen = axis.places, chosen_of(color, MAX_LINES)
-    parts = [line_part(whole, role, at | {role.color: int(n)}) for n in chosen]
+    x, chosen = axis.places, thin_places(color.values.size, MAX_LINES)
+    parts = [line_part(whole, role, int(n)) for n in chosen]
     scale_x(panel, axis)
-    values = whole.values  # so that all panels of a measure have one scale
-    if role.column < 0 and not parts[0].is_jobs:
-        values = np.stack([mean_of(part.values) for part in parts])
+    values = whole.values if parts[0].is_jobs else np.stack([mean_of(p.values) for p in parts])
     span = scale_y(panel, values)
     for n, part, line in zip(chosen, parts, lines_for(color, chosen), strict=True):
         marker = MARKERS[int(n) % len(MARKERS)] if color.is_words else "o"
@@ -317,7 +274,7 @@ def plot_parts(
         plot_part(panel, x, part, color.value_text(int(n)), style, span)
     if not parts[0].is_jobs:
         return
-    places = np.repeat(x, sum(part.values.shape[1] for part in parts))
+    places = np.repeat(x, len(parts))
     status = np.concatenate([part.status for part in parts], axis=1).ravel()
     keys = np.concatenate([part.keys for part in parts], axis=1).ravel()
     mark_feet(panel, places, status, keys)
@@ -344,7 +301,6 @@ def mean_of(values: np.ndarray) -> np.ndarray:
 
 
 MAX_POINTS = 2000  # in a panel
-PLACES = 60  # of a trend
 POINT = 3.0  # size of a job
 
 
@@ -358,7 +314,7 @@ def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Mea
         plot_points(panel, sweep, axis, measure)
         panel.x.title = sweep.axes[axis].title
         panel.y.title = measure.unit
-    figure.legend = scatter_entries(sweep, figure)
+    figure.legend = scatter_entries(sweep)
     return figure
 
 
@@ -374,7 +330,7 @@ def draw_scatter(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Me
     for column, axis in zip(grid.T, axes, strict=True):
         column[-1].x.title = sweep.axes[axis].title
         share_scales(column, "x")
-    figure.legend = scatter_entries(sweep, figure)
+    figure.legend = scatter_entries(sweep)
     return figure
 
 
@@ -390,7 +346,7 @@ def grouping(sweep: PlottedSweep) -> tuple[str, list[Any], np.ndarray]:
 
 
 def plot_points(panel: Panel, sweep: PlottedSweep, axis: int, measure: Measure) -> None:
-    """Draw the jobs over one axis, and for each group the trend and its interval."""
+    """Draw the jobs over one axis, in the colours of their groups."""
     one = sweep.axes[axis]
     x, y, keys = one.places, sweep.values(measure), sweep.keys
     scale_x(panel, one)
@@ -405,41 +361,13 @@ def plot_points(panel: Panel, sweep: PlottedSweep, axis: int, measure: Measure) 
         alpha = 0.55 if y.size < 500 else 0.35
         dots = mark(color, MARKERS[n], POINT, edge_width=0.0, alpha=alpha)
         mark_points(panel, x[here], y[here], keys[here], dots, name)
-        if not one.is_words:
-            known = np.where(group == n, sweep.known(measure), np.nan)
-            plot_trend(panel, x, known, color, name)
     ring = shown & sweep.chaotic
     mark_points(panel, x[ring], y[ring], keys[ring], ring_around(POINT), CHAOTIC)
     mark_feet(panel, x[shown], sweep.status[shown], keys[shown])
 
 
-def plot_trend(panel: Panel, x: np.ndarray, y: np.ndarray, color: str, name: str) -> None:
-    """Draw a parabola through points and the 95 % interval of its mean, on the panel's scales."""
-    logs = panel.x.log, panel.y.log
-    known = x[np.isfinite(x) & np.isfinite(y)]
-    if not known.size or not np.ptp(known):
-        return
-    low, high = known.min(), known.max()
-    at = np.geomspace(low, high, PLACES) if logs[0] else np.linspace(low, high, PLACES)
-    found = trend(
-        np.log(x) if logs[0] else x, np.log(y) if logs[1] else y, np.log(at) if logs[0] else at
-    )
-    if found is None:
-        return
-    middle, below, above = (np.exp(part) if logs[1] else part for part in found)
-    name = "" if name == "a job" else f", {name}"
-    area = fill(color, 0.22)
-    panel.traces.append(band(at, below, above, area, f"95 % interval of the trend{name}"))
-    panel.plot(at, middle, LineStyle(color, "-", 1.8, 3), f"trend{name}")
-
-
-def has_trends(figure: Drawing) -> bool:
-    """Return whether a trend is drawn in some panel, as it is from a few points on."""
-    return any(one.name.startswith("trend") for panel in figure.panels for one in panel.traces)
-
-
-def scatter_entries(sweep: PlottedSweep, figure: Drawing) -> list[Trace]:
-    """Return the legend of a scatter diagram, whose panels are drawn."""
+def scatter_entries(sweep: PlottedSweep) -> list[Trace]:
+    """Return the legend of a scatter diagram."""
     phrase, words, _ = grouping(sweep)
     found = []
     for n, word in enumerate(words):
@@ -447,8 +375,4 @@ def scatter_entries(sweep: PlottedSweep, figure: Drawing) -> list[Trace]:
         found.append(
             entry(name_value(phrase, word) if phrase else "a job", mark(color, MARKERS[n], 4.5))
         )
-    color = BLUE if not phrase else "#606060"
-    if has_trends(figure):
-        found.append(entry("trend", LineStyle(color, "-", 1.8)))
-        found.append(entry("its 95 % interval", fill(color, 0.3), "band"))
     return found + marks_shown(sweep.status, sweep.chaotic)
