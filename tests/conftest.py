@@ -79,7 +79,7 @@ LONG = (
     "sweep/test_sweep", "solve/test_integrate", "test_newcomer", "store/test_damage",
     "studies/follow/test_lyapunov", "test_systems", "studies/compare/test_compare",
     "studies/calibrate/test_calibrate_command", "campaigns/test_calibrate_campaign",
-    "test_tutorial", "report/test_second_sets",
+    "test_tutorial", "report/test_own_figures",
 )  # fmt: skip
 
 

@@ -227,6 +227,7 @@ def of_percent(name: str, group: str) -> str:
 SWEEP = ("sample", "zip", "exclude", "blocks", "report")
 MAPPINGS = ("sample", "report")  # of these, those with keys of their own
 REPORT = {"title": 100, "notes": 2000}  # keys of `report`, and how many letters they may have
+FIGURES = ("paper",)  # what its key `figures` asks for
 MAX_MEANT = 3  # keys that an unknown one may have meant
 
 
@@ -235,7 +236,7 @@ def known_keys(group: str, file: bool = True) -> list[str]:
     if group == "sample":
         return ["n", "seed"]
     if group == "report":
-        return [*REPORT]
+        return [*REPORT, "figures"]
     if group and group not in GROUPS:
         return [*parts_by_key().get(group, ())]
     names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]

@@ -8,7 +8,7 @@ swept. What it cannot check, such as whether values fit each other, reading the 
 from dataclasses import replace
 from typing import Any
 
-from compressor.cases.checks import DOUBLES, REPORT, phrase_of, row_of
+from compressor.cases.checks import DOUBLES, FIGURES, REPORT, phrase_of, row_of
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.parameter import NAME, Parameter, adapter_of
 from compressor.cases.swept import DISTRIBUTIONS, FORMS, SAMPLED
@@ -134,6 +134,7 @@ def _sweeps() -> Schema:
     group = {"type": "array", "items": keys, "minItems": 2, "uniqueItems": True}
     texts = {"type": "array", "items": TEXT}
     report = {name: {**TEXT, "minLength": 1, "maxLength": most} for name, most in REPORT.items()}
+    report["figures"] = {"enum": [*FIGURES]}
     about = {
         "sample": ("how many samples, and from which seed", sample),
         "zip": ("keys whose values advance together", {"type": "array", "items": group}),

@@ -14,7 +14,7 @@ from typing import Any
 
 from compressor.cases.blocks import Block, plan_block
 from compressor.cases.case import Case
-from compressor.cases.checks import REPORT, row_of, stands_for, value_of
+from compressor.cases.checks import FIGURES, REPORT, row_of, stands_for, value_of
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
 from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
 from compressor.cases.keys import (
@@ -165,9 +165,15 @@ def _read(path: str, changes: Changes) -> CaseFile:
 
 
 def _read_report(tree: Tree) -> tuple[dict[str, str], list[FileProblem]]:
-    """Return the title and the notes that a file gives for the page of the report."""
+    """Return what a file gives for the page of the report: title, notes, and which figures."""
     texts, problems = {}, []
     for name, value in tree.values.get("report", {}).items():
+        if name == "figures":
+            texts[name] = str(value)
+            if value not in FIGURES:
+                message = f"needs {' or '.join(FIGURES)}, not {quote_value(value)}"
+                problems.append(tree.problem(("report", name), message))
+            continue
         text = value.strip() if isinstance(value, str) else ""
         lines = text.split("\n") if name == "notes" else [text]
         if text and len(text) <= REPORT[name] and all(line.isprintable() for line in lines):

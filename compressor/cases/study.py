@@ -28,7 +28,8 @@ class Study:
     """One case file. In a grid, jobs are in C order over the axes, in the file's order.
 
     Otherwise every axis is a column, with a value for each job, None where the job has none.
-    `title` and `notes` are what the page of the report says of the machine, "" without.
+    `title` and `notes` are what the page of the report says of the machine, "" without; `figures`:
+    whose figures it draws of it, `paper` for the paper's.
     `fixed` has the values that are not swept, group by group as each block of the file gives them.
     """
 
@@ -42,6 +43,7 @@ class Study:
     fixed: tuple[Mapping[str, Any], ...] = ()
     title: str = ""
     notes: str = ""
+    figures: str = ""
 
     @property
     def jobs(self) -> int:

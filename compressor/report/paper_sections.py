@@ -1,12 +1,10 @@
-"""The sections of a report about the paper: figures, cases, claims, other machines, diagnosis."""
+"""The sections of a report about the paper: figures, cases, claims, own machines, diagnosis."""
 
-import itertools
 import math
 import shlex
 import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
@@ -20,7 +18,6 @@ from compressor.analysis import (
     Claim,
     Shaking,
     caption,
-    case_of,
     cases_of,
     claims,
     comparisons,
@@ -30,9 +27,9 @@ from compressor.analysis import (
     settled_part,
     shaking,
 )
-from compressor.cases import Case, CaseError, points, table, value_in
+from compressor.cases import Case
+from compressor.report.answer import last_case
 from compressor.report.figures import FIGURES, Drawing
-from compressor.report.figures import Figure as PaperFigure
 from compressor.report.figures.diagnosis import (
     Shakings,
     draw_diagnosis_angles,
@@ -40,12 +37,12 @@ from compressor.report.figures.diagnosis import (
     draw_diagnosis_spectra,
 )
 from compressor.report.figures.sweep_data import MEASURES, measures
-from compressor.report.inputs import spelt
 from compressor.report.page import (
     Cell,
     PageTable,
     Plate,
     Section,
+    StudyNote,
     TableRow,
     column_title,
     job_row,
@@ -54,7 +51,7 @@ from compressor.report.page import (
     status_text,
     value_cell,
 )
-from compressor.report.study_section import KEY_DIGITS, file_name
+from compressor.report.study_section import KEY_DIGITS, file_name, table_anchor
 from compressor.store import DamagedFile, Folder, Stored, StoredStudy, StoreWarning
 from compressor.units import Units
 
@@ -153,180 +150,53 @@ def case_files(labels: Collection[str]) -> dict[str, str]:
     return files
 
 
-@dataclass(frozen=True)
-class Difference:
-    """A key of a case file whose value is not the default; both values with their unit."""
-
-    key: str
-    phrase: str  # what the key is; empty for a whole group
-    value: str
-    default: str
-
-    @property
-    def said(self) -> str:
-        """Return the difference in words."""
-        phrase = f", {self.phrase}" if self.phrase else ""
-        return f"{self.key}{phrase}: {self.value} (default: {self.default})"
-
-
-def differences(case: Case, besides: tuple[str, ...] = ()) -> list[Difference]:
-    """Return the keys in which a case differs from the default case, in a file's order.
-
-    Only its physics and span count. A value that follows from others, such as the inertia of a
-    uniform rod, is none of its own, nor is one that means the same as the default. besides: groups
-    or keys at the top to leave out.
-    """
-    values, defaults = case.values(), Case().values()
-    found = []
-    for key, value in leaves(values, defaults):
-        default = value_in(defaults, key) if "." in key else defaults.get(key)
-        if key.partition(".")[0] in besides or value == default or follows(case, values, key):
-            continue
-        row = table().get(key)
-        unit, phrase = (row.unit, row.phrase) if row else ("", "")
-        found.append(Difference(key, phrase, spelt(value, unit), spelt(default, unit)))
-    return found
-
-
-def leaves(values: Mapping[str, Any], defaults: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the dotted keys and values.
-
-    A group that the default case lacks, or has alone, is one value.
-    """
-    for name in dict.fromkeys([*defaults, *values]):
-        value, default = values.get(name), defaults.get(name)
-        if isinstance(value, Mapping) and isinstance(default, Mapping):
-            yield from ((f"{name}.{inner}", item) for inner, item in value.items())
-        else:
-            yield name, value
-
-
-def follows(case: Case, values: Mapping[str, Any], key: str) -> bool:
-    """Return whether a case stays the same without a key.
-
-    The key then follows from the others, or is not read.
-    """
-    group, _, name = key.rpartition(".")
-    rest: dict[str, Any] = {n: item for n, item in values.items() if n != key}
-    if group:
-        rest[group] = {n: item for n, item in values[group].items() if n != name}
-    try:
-        return Case.resolve(rest).physics_key == case.physics_key
-    except CaseError:
-        return False  # what is left fits no more
-
-
-WORN_LABELS = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)
-IDEAL = ("design", "typical")
-# what the motion of a worn machine depends on; the gas does not push with the spring load
-MACHINE = ("machine", "spring", "contact", "friction")
 REVOLUTION_ROUNDING = 1e-6  # revolutions: rounding of a whole one
-SET = tuple(figure for figure in FIGURES if {*WORN_LABELS} & {*figure.needs})
-NO_IDEAL = (
-    "Figures {} are not drawn: no run without clearance of a machine with this motion is stored on "
-    "the same output grid. A block with joint: none in the case file gives it."
-)
+UNEQUAL = "whose runs do not settle at one crank angle, with fine samples of a whole revolution"
 
 
 @dataclass(frozen=True)
-class SecondSet:
-    """The paper's faults in another machine, all of one study.
+class OwnFigures:
+    """The paper's figures of the machine of a study whose case file asks for them.
 
-    `case` is one of its worn cases; `drawn` are the runs for figures and `judged` those for claims,
-    by label: the study's own, and where it has none without clearance the default machine's, if
-    those are the same.
+    note: on its section; sections: of figures and claims, none where nothing can be drawn.
     """
 
-    study: str
-    case: Case
-    keys: frozenset[str]  # of the study's jobs that it shows
-    drawn: Mapping[str, xr.Dataset]
-    judged: Mapping[str, xr.Dataset]
+    note: StudyNote
+    plates: Sequence[Plate]
+    sections: Sequence[Section]
 
 
-@dataclass(frozen=True)
-class FigurePair:
-    """A figure of a second set, and its counterpart in the first where that is drawn."""
+def own_figures(stored: Stored, study: StoredStudy) -> OwnFigures:
+    """Return the paper's figures and claims of the machine of a study's last job.
 
-    first: Plate | None
-    second: Plate
-
-
-@dataclass(frozen=True)
-class SecondSetContent:
-    """What a page says of a second set; `table`: the id of its study's section."""
-
-    study: str
-    table: str
-    differences: Sequence[str]
-    notes: Sequence[str]
-    pairs: Sequence[FigurePair]
-    claims: Sequence[object]
-
-    @property
-    def beside(self) -> bool:
-        """Return whether any figure has a counterpart."""
-        return any(pair.first for pair in self.pairs)
-
-
-def second_sets(
-    stored: Stored, studies: Sequence[StoredStudy], paper: PaperRuns
-) -> dict[str, SecondSet]:
-    """Return the second set of each study that has one, by the study's name."""
-    found = {study.name: second_set(stored, study, paper) for study in studies}
-    return {name: one for name, one in found.items() if one}
-
-
-def second_set(stored: Stored, study: StoredStudy, paper: PaperRuns) -> SecondSet | None:
-    """Return a study's set of the paper's worn cases in another machine, or None.
-
-    None unless it holds all nine worn cases of just one other machine. They must be alike in all
-    but the fault, have ended well, and have time series that are `comparable`.
+    A figure needs those of the paper's cases that it shows among the study's jobs.
     """
-    machines = [*itertools.islice(other_machines(stored, study), 2)]
-    if len(machines) != 1:
-        return None  # a sweep over machines is drawn as one
-    (cases,) = machines
-    runs = find_runs(stored, [study], cases)
-    if not runs.usable.keys() >= {*WORN_LABELS} or not comparable(runs.usable.values()):
-        return None
-    case = case_of(runs.usable[WORN_LABELS[-1]])
-    drawn, judged = (
-        default_machine_runs(case, paper, loads) | runs.usable for loads in (False, True)
+    case = last_case(stored, study)
+    runs = find_runs(stored, [study], cases_of(case)).usable if case else {}
+    alike = comparable(runs.values())
+    plates = [
+        Plate(file_name(study.name, f"figure-{item.number:02d}"),
+              f"Figure {item.number} of {study.name}: {item.title}",
+              caption(item.number, runs), item.draw(runs))
+        for item in FIGURES if alike and runs.keys() >= {*item.needs}
+    ]  # fmt: skip
+    lacking = [str(item.number) for item in FIGURES if not runs.keys() >= {*item.needs}]
+    why = f", but not Figures {', '.join(lacking)}, whose cases are not among its jobs" * bool(
+        lacking
     )
-    keys = frozenset(run.attrs["key"] for run in runs.stored.values())
-    return SecondSet(study.name, case, keys, drawn, judged)
-
-
-def other_machines(stored: Stored, study: StoredStudy) -> Iterator[dict[str, Case]]:
-    """Yield `cases_of` each machine but the default one whose nine worn cases a study holds."""
-    swept = {value for axis in study.axes for value in axis.values}
-    if not swept >= {*FAULTS, *CLEARANCES}:
-        return
-    positions = stored.rows.find(study.keys)
-    stored_keys = {*stored.rows.bytes_of["physics_key"][positions[positions >= 0]].tolist()}
-    ideals = set()
-    for position, point in zip(positions, points(study), strict=True):
-        # the first of the nine stands for all
-        if position < 0 or not {FAULTS[0], CLEARANCES[0]} <= {*point.values()}:
-            continue
-        case = stored.case_at(position)
-        if case is None:
-            continue
-        cases = cases_of(case)
-        if not cases.keys() >= {"design", *WORN_LABELS}:
-            continue
-        ideal = cases["design"].physics_key
-        if ideal in ideals or not is_other(case):
-            continue
-        ideals.add(ideal)
-        if all(cases[name].physics_key.encode() in stored_keys for name in WORN_LABELS):
-            yield cases
-
-
-def is_other(case: Case) -> bool:
-    """Return whether a case is of another machine than the default one, whatever its span."""
-    return any(getattr(case, group) != getattr(Case(), group) for group in MACHINE)
+    text = f"The paper's figures and claims are drawn of this machine{why}"
+    if not plates:
+        text = (
+            f"The paper's figures of this machine are not drawn{why if alike else f', {UNEQUAL}'}"
+        )
+        return OwnFigures(StudyNote(text, table_anchor(study.name), "Its jobs"), [], [])
+    anchor = file_name("figures", study.name)
+    sections = [
+        Section(anchor, f"{study.name}: the paper's figures", "figures.html", plates),
+        Section(file_name("claims", study.name), f"{study.name}: the paper's claims", "claims.html",
+                claims(runs)),
+    ]  # fmt: skip
+    return OwnFigures(StudyNote(text, anchor, "Figures and claims"), plates, sections)
 
 
 def comparable(runs: Collection[xr.Dataset]) -> bool:
@@ -336,6 +206,8 @@ def comparable(runs: Collection[xr.Dataset]) -> bool:
     so close that the lines above `ORDER`, which claim 7 reads, are resolved.
     """
     grids = [settled_part(run)["crank_angle"].values for run in runs]
+    if not grids:
+        return True
     turns = (grids[0][-1] - grids[0][0]) / (2.0 * np.pi)
     fine = grids[0].size - 1 > 2 * (ORDER + 1) * turns
     return (
@@ -343,73 +215,6 @@ def comparable(runs: Collection[xr.Dataset]) -> bool:
         and fine
         and all(np.array_equal(g, grids[0]) for g in grids)
     )
-
-
-def default_machine_runs(case: Case, paper: PaperRuns, loads: bool) -> dict[str, xr.Dataset]:
-    """Return the default machine's ideal runs that hold for a case's machine as well.
-
-    Without clearance masses, contact and friction are not read: the motion is that of equal crank,
-    rod, speed and span. loads: whether the loads on the piston are to be the same, too.
-    """
-    default = Case()
-    lengths = ("crank_radius_mm", "rod_length_mm", "speed_rpm")
-    machine = replace(default.machine, **{name: getattr(case.machine, name) for name in lengths})
-    unread = ["contact", "friction", "initial_offset_mm", "body", "sensor"]
-    unread += [] if loads else ["gas", "spring"]
-    others: dict[str, Any] = {name: getattr(default, name) for name in unread}
-    try:  # its oil may not fit the default pin, nor its rod the default's mass centre
-        same = replace(case, joint="none", lubricant=None, wear=None, machine=machine, **others)
-    except CaseError:
-        return {}
-    twins, defaults = cases_of(same), paper_cases()
-    return {
-        load: paper.usable[load]
-        for load in IDEAL
-        if load in paper.usable
-        and load in twins
-        and twins[load].physics_key == defaults[load].physics_key
-    }
-
-
-def second_drawings(found: SecondSet) -> Iterator[tuple[str, str, str, Drawing]]:
-    """Yield the names, headings, captions and drawings of the figures whose runs there are."""
-    for item in SET:
-        if found.drawn.keys() >= {*item.needs}:
-            heading = f"Figure {item.number} of {found.study}: {item.title}"
-            text = caption(item.number, found.drawn)
-            yield second_name(found.study, item), heading, text, item.draw(found.drawn)
-
-
-def second_name(study: str, figure: PaperFigure) -> str:
-    """Return the name of a figure's files in a study's second set."""
-    return file_name(study, f"figure-{figure.number:02d}")
-
-
-def second_anchor(study: str) -> str:
-    """Return the id of the section of a second set."""
-    return file_name("figures", study)
-
-
-def second_section(
-    found: SecondSet, plates: Sequence[Plate], first: Sequence[Plate], table: str
-) -> Section:
-    """Return a second set on the page: how its machine differs, figures, and claims.
-
-    plates: of `second_drawings`; first: of the first set; table: the id of the study's section.
-    """
-    counterparts = {plate.name: plate for plate in first}
-    names = {second_name(found.study, item): item for item in SET}
-    pairs = [
-        FigurePair(counterparts.get(f"figure-{names[plate.name].number:02d}"), plate)
-        for plate in plates
-    ]
-    lacking = [item for name, item in names.items() if name not in {p.name for p in plates}]
-    numbers = ", ".join(str(item.number) for item in lacking)
-    notes = [NO_IDEAL.format(numbers)] if lacking else []
-    texts = [one.said for one in differences(found.case, ("name", "load", "joint", "clearance_mm"))]
-    content = SecondSetContent(found.study, table, texts, notes, pairs, claims(found.judged))
-    title = f"{found.study}: Figures 8 to 16 of another machine"
-    return Section(second_anchor(found.study), title, "second_set.html", content)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -51,23 +51,17 @@ from compressor.report.page import (
     document,
 )
 from compressor.report.paper_sections import (
-    SET,
     TITLES,
     PaperRuns,
-    SecondSet,
     diagnosis_drawings,
     diagnosis_sections,
     find_paper_runs,
     is_of_paper,
     label_in_words,
     missing_sections,
+    own_figures,
     paper_sections,
     repeats_paper,
-    second_anchor,
-    second_drawings,
-    second_name,
-    second_section,
-    second_sets,
     shakings,
 )
 from compressor.report.plots import page_figures
@@ -77,7 +71,6 @@ from compressor.report.study_section import (
     job_counts,
     job_facts,
     study_sections,
-    table_anchor,
 )
 from compressor.store import (
     Folder,
@@ -174,10 +167,9 @@ def build_report(
     if not papers:
         paper = PaperRuns({}, {}, {})  # a few like runs in a sweep of one's own are no reproduction
     of_paper = plates_in(draw_paper(paper), units)
-    others = second_sets(stored, studies, paper)
-    of_others = {
-        n: plates_in([Plate(*parts) for parts in second_drawings(one)], units)
-        for n, one in others.items()
+    of_own = {one.name: own_figures(stored, one) for one in studies if one.figures}
+    of_own = {
+        name: replace(one, plates=plates_in(one.plates, units)) for name, one in of_own.items()
     }
     found = shakings(paper)
     of_faults = plates_in([Plate(*parts) for parts in diagnosis_drawings(found, paper)], units)
@@ -185,17 +177,17 @@ def build_report(
     added = [one(results, studies) for one in add]
     drawn = [
         drawn_study(
-            stored, study, others.get(study.name),
-            [one.notes[study.name] for one in added if study.name in one.notes], limits, units,
+            stored, study,
+            [one.note for name, one in of_own.items() if name == study.name]
+            + [one.notes[study.name] for one in added if study.name in one.notes],
+            limits, units,
         )
         for study in own
     ]  # fmt: skip
-    sets = [
-        second_section(one, of_others[name], of_paper, table_anchor(name))
-        for name, one in others.items()
-    ]
     chapters = [chapter for one in added for chapter in one.chapters]
-    later = [*chain(*of_others.values(), of_faults, *(one.plates for one in drawn))]
+    later = [
+        *chain(*(one.plates for one in of_own.values()), of_faults, *(one.plates for one in drawn))
+    ]
     later += [plate for chapter in chapters for plate in plates_in(chapter.plates, units)]
     caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored.rows, one)]
     judged = claims(paper.usable) if paper.stored else []
@@ -204,7 +196,7 @@ def build_report(
         answer_section(summarise(own, paper, judged, drawn, units)),
         *(one.figures for one in drawn),
         *figures,
-        *sets,
+        *chain(*(one.sections for one in of_own.values())),
         *diagnosis_sections(found, of_faults),
         *(chapter.section for chapter in chapters),
         *(one.table for one in drawn),
@@ -256,30 +248,28 @@ class DrawnStudy(NamedTuple):
 def drawn_study(
     stored: Stored,
     study: StoredStudy,
-    other: SecondSet | None,
     notes: Sequence[StudyNote],
     limits: Limits,
     units: Units,
 ) -> DrawnStudy:
     """Return a user's own study: its sections, and its sweep, drawn; `notes`: lines on it.
 
-    And revolutions over the crank angle. Neither is drawn where all of the study is shown as
-    another set of the paper's figures.
+    And revolutions over the crank angle. Neither is drawn where the paper's figures are.
     """
-    anchor = second_anchor(study.name) if other else ""
-    whole = other is not None and other.keys.issuperset(study.keys)
     with stored.label([study]) as data:
         plates = [
             Plate(file_name("sweep", study.name, one.name), f"{study.name}: {one.title}",
                   one.caption, one.figure)
-            for one in ([] if whole else draw_sweep(data, limits, units))
+            for one in ([] if study.figures else draw_sweep(data, limits, units))
         ]  # fmt: skip
         plates += [
             Plate(file_name(name, study.name), f"{study.name}: {title}", words,
                   in_units(drawing, units))
-            for name, title, words, drawing in ([] if whole else page_figures(stored, study))
+            for name, title, words, drawing in (
+                [] if study.figures else page_figures(stored, study)
+            )
         ]  # fmt: skip
-        figures, table = study_sections(stored, study, data, plates, anchor, notes, limits, units)
+        figures, table = study_sections(stored, study, data, plates, notes, limits, units)
         keys = [*(key for plate in plates for key in plate.jobs), *study.keys[:MAX_ROWS]]
         counts = job_counts(data)
         return DrawnStudy(
@@ -331,7 +321,10 @@ def remove_stale(report: Path, contents: ReportContent) -> None:
     """Remove what an earlier report drew and this one did not: the paper's figures, and series."""
     plates = {plate.name for plate in contents.plates}
     names = {f"figure-{item.number:02d}" for item in FIGURES}
-    names |= {second_name(study, item) for study in contents.studies for item in SET}
+    names |= {
+        file_name(study, f"figure-{item.number:02d}")
+        for study, item in product(contents.studies, FIGURES)
+    }
     names = (names | {f"diagnosis-{name}" for name in TITLES}) - plates
     stale = [report / f"{name}.{kind}" for name in names for kind in KINDS]
     scripts = {f"{series_name(key)}.js" for key in contents.series}

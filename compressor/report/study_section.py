@@ -57,7 +57,6 @@ class Counts(NamedTuple):
 class StudyContent:
     """What a page says of a study; `chaotic` counts jobs whose statistics alone hold.
 
-    `second_set`: the id of the section with its own Figures 8 to 16, empty where it has none;
     `notes`: lines that others add; `caveats`: what to know beside the numbers, a sentence each;
     `title`, `about`: what its case file says of the machine; `settings`: what `--set` changed;
     `beside`: the machine without clearance; `inputs`: what was given, swept and assumed.
@@ -71,7 +70,6 @@ class StudyContent:
     remedies: Sequence[str]
     plates: Sequence[Plate]
     jobs: str
-    second_set: str = ""
     notes: Sequence[StudyNote] = ()
     title: str = ""
     about: str = ""
@@ -99,7 +97,6 @@ def study_sections(
     study: StoredStudy,
     data: xr.Dataset,
     plates: Sequence[Plate],
-    second_set: str = "",
     notes: Sequence[StudyNote] = (),
     limits: Limits = NO_LIMITS,
     units: Units = "usual",
@@ -119,7 +116,6 @@ def study_sections(
         remedies=[f"{reason}: {remedy(reason)}" for reason in reasons],
         plates=plates,
         jobs=anchor,
-        second_set=second_set,
         notes=notes,
         title=study.title,
         about=study.notes,

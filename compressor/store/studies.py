@@ -78,6 +78,7 @@ class StoredStudy:
     notes: str = ""
     given: tuple[str, ...] = ()  # keys that the file gives, and does not sweep
     overrides: tuple[str, ...] = ()  # KEY=VALUE that the command line set in the file
+    figures: str = ""  # whose figures the page draws of it: `paper`, or "" for its sweep
 
     @property
     def jobs(self) -> int:
@@ -188,6 +189,7 @@ def write_study(
         study.notes,
         tuple(dict.fromkeys(key for block in study.fixed for key in values_given(block))),
         tuple(overrides),
+        study.figures,
     )
     old = _present(folder, study.name)
     if old:

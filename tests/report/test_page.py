@@ -29,10 +29,8 @@ from compressor.report.page import (
 )
 from compressor.report.paper_sections import (
     DiagnosisContent,
-    FigurePair,
     MissingFigures,
     PaperCasesContent,
-    SecondSetContent,
 )
 from compressor.report.side_by_side import HealthyAndWorn
 from compressor.report.study_section import JobsContent, StudyContent
@@ -89,7 +87,6 @@ def contents(evil):
     """What every template is given, each text of it hostile; by the template's name."""
     claims = [Claim(n, evil(), evil(), held, [(evil(), evil())], evil())
               for n, held in enumerate((True, False, None))]  # fmt: skip
-    first = replace(plate(lambda: "stands in the first set"), heading=evil())
     found = MetricChange(*(evil() for _ in range(6)), 1.0)
     answer = FirstScreen(
         [StudyLine(evil(), evil(), evil(), bad) for bad in (True, False)],
@@ -110,11 +107,8 @@ def contents(evil):
         f"{STUDIES}.tradeoff:models.html": ModelsContent(evil(), evil(), evil(), table(evil)),
         "printed.html": table(evil),
         "provenance.html": Provenance(*(evil() for _ in range(6)), [study]),
-        "second_set.html": SecondSetContent(
-            evil(), evil(), [evil()], [evil()], [FigurePair(first, plate(evil))], claims
-        ),
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [plate(evil)],
-                                   evil(), evil(), [StudyNote(evil(), evil(), evil())],
+                                   evil(), [StudyNote(evil(), evil(), evil())],
                                    evil(), evil(), [evil()], HealthyAndWorn(evil(), table(evil)),
                                    Inputs(*([(evil(), evil())] for _ in range(5)))),
     }  # fmt: skip
