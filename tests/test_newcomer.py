@@ -1,20 +1,15 @@
 """The recipes of compressor/README.md, followed literally in a copy of the program."""
 
-import json
 import os
 import re
-import runpy
 import shutil
 import subprocess
 import sys
 import textwrap
 from pathlib import Path
 
-import numpy as np
 import pytest
 from conftest import part_of
-
-from compressor import Case
 
 ROOT = Path(__file__).parents[1]
 LAWS, WORDS = "compressor/physics/contact_laws.py", "compressor/cases/laws.py"
@@ -82,72 +77,6 @@ def run_in(copy, *words, cwd):
     )
     assert ran.returncode == 0, ran.stdout[-3000:] + ran.stderr
     return ran.stdout
-
-
-DAMPED = """
-import doctest
-import json
-import compressor
-from compressor.cases import optional_groups
-from compressor.studies.tradeoff.variants import FEATURES, change
-
-solve = {"duration_rev": 0.03, "settle_rev": 0, "accuracy": "draft", "error_bars": False}
-usual = {"solve": solve, "output": {"signals": True}}
-damper = {"damper": {"damping_N_s_per_mm": 0.2}}
-worn = {"joint": "big_end", "clearance_mm": 0.2}
-cases = [compressor.Case.from_values(usual | values)
-         for values in ({}, damper, worn, worn | damper)]
-(row,) = (row for row in FEATURES if row.key == "damper")
-assert change(cases[1], row.left_out) == cases[0]
-assert change(cases[0], row.given) == compressor.Case.from_values(usual | {"damper": True})
-assert doctest.testmod(optional_groups).failed == 0
-names = ("velocity", "acceleration", "shaking_force", "crank_work", "contact_damping_loss",
-         "energy_residual", "status")
-for case in cases:
-    run = compressor.simulate(case)
-    print(json.dumps([run[name].values.tolist() for name in names]))
-print(json.dumps([compressor.Case.from_values(values).key for values in ({}, worn)]))
-"""
-
-
-def test_the_page_on_features_is_right(tmp_path):
-    copy_of_the_program(tmp_path, "tests")
-    group, of_settings, number, value, function, call, usual, row = blocks(
-        "## How to add a feature", "## How to add a metric"
-    )
-    tests = "tests/physics/test_general_mechanism.py"
-    for name, *edits in (
-        ("compressor/cases/optional_groups.py", (group + "\n\n", "def fill_guide(", False)),
-        ("compressor/cases/table.py", (" Damper,", "optional_groups import Body,", True),
-         (indented(of_settings), "    rod: Rod |", False)),
-        ("compressor/cases/case.py", ("self.damper or ", "return bool(self.guide or ", True)),
-        ("compressor/physics/record.py", (indented(number), '    ("axial_stiffness"', False)),
-        ("compressor/solve/si_record.py", (indented(value), "    if rod:\n", False)),
-        ("compressor/physics/mechanism.py", (function + "\n\n", "class BodyRow(", False),
-         (indented(call), "    ideal_v = motion.v", False)),
-        ("compressor/studies/tradeoff/variants.py",
-         (indented(row), '    Feature("elastic rod"', False)),
-        (tests, (indented(usual), "NUMBERS = {\n", True),
-         ("crosshead_damping=0.0, ", "joint, features, values, rod_damping=0.0, ", True),
-         ("crosshead_damping=0.0, ", "joint, (), values, crank_inertia=0.0, ", True)),
-    ):  # fmt: skip
-        changed(tmp_path, name, *edits)
-    *runs, keys = map(json.loads, run_in(tmp_path, "-c", DAMPED, cwd=tmp_path).splitlines())
-    assert keys == [Case.from_values(values).key for values in ({}, BIG_END)]
-    assert [run[-1] for run in runs] == ["ok"] * 4
-    assert max(run[-2] for run in runs) < 1e-4
-    ideal, damped, worn, slowed = runs
-    v = np.array(ideal[0])
-    # ideal joints at a steady speed: motion and force on the frame are given, and the crank pays
-    for one, other in zip(ideal[:3], damped[:3], strict=True):
-        assert np.array(other) == pytest.approx(np.array(one), rel=1e-9, abs=1e-6)
-    taken = 200 * np.trapezoid(v**2, dx=0.03 * 60 / 500 / (v.size - 1))
-    assert damped[4] == pytest.approx(taken, rel=1e-3)
-    assert damped[3] - ideal[3] == pytest.approx(taken, rel=1e-3)
-    change = np.linalg.norm(np.subtract(slowed[1], worn[1])) / np.linalg.norm(worn[1])
-    assert change > 0.02  # what "draft" promises
-    words = "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", tests
-    run_in(tmp_path, *words, "-k", "powers and none or scene and none-0", cwd=tmp_path)
 
 
 def test_the_page_on_metrics_is_right(tmp_path):
@@ -247,22 +176,6 @@ def test_the_page_on_studies_is_right(tmp_path, paper_store):
     assert "Print how many jobs of a study" in run_in(
         tmp_path, "-m", "compsim", "--help", cwd=tmp_path
     )
-
-
-def test_the_page_on_alarms_is_right(tmp_path):
-    shutil.copyfile(ROOT / "compressor/studies/alarms/readings.py", tmp_path / "readings.py")
-    reading, row = blocks("## How to add an alarm", "## How to release")
-    changed(
-        tmp_path, "readings.py",
-        (indented(reading), "    counts = np.zeros(LADDER.size)\n", False),
-        (indented(row), "ALARMS = (\n", True),
-    )  # fmt: skip
-    module = runpy.run_path(str(tmp_path / "readings.py"))
-    record = np.tile([1.0, -1.0, 3.0, -1.0], 360)
-    found = module["read_window"](record, np.arange(record.size) / record.size, 1)["impulse"]
-    (alarm,) = (one for one in module["ALARMS"] if one.title == "impulse factor")
-    assert found.tolist() == [2.0]
-    assert alarm.score({"impulse": np.array([found, 3 * found])}, np.array([0])).tolist() == [1, 3]
 
 
 def test_the_page_on_contact_laws_is_right(tmp_path):

@@ -1,20 +1,15 @@
 """Measure the paper's claims over machines (make claims).
 
 Judges a fine map of the example `claims` and the design of `assumptions`, the machine of the
-example `agreeing` in long runs, and looks at neighbours on the map between which a claim changes
-sides: bisection follows the margin from one to the other. Jobs are kept in the folder `claims`,
-from which the same command goes on. Writes a small JSON file.
+example `agreeing` in long runs. Jobs are kept in the folder `claims`, from which the same command
+goes on. Writes a small JSON file.
 """
 
 import json
-import random
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-from joblib import Parallel, delayed
 from result_pages import keep, provenance
 
 from compressor.analysis import RULES, cases_of
@@ -26,8 +21,6 @@ from compressor.solve.simulate import simulate
 from compressor.store.studies import find_study
 from compressor.studies.claims import (
     CLAIMS,
-    RECIPROCATING,
-    ROD,
     SHARES,
     assumptions,
     draw_map,
@@ -45,9 +38,6 @@ FINE = (
     "machine.reciprocating_mass_kg={linspace: [2.5, 29.8, 40]}",
 )
 LONG_REV = 20.0  # of the machine in which all claims hold
-PAIRS = 12  # of neighbours a claim, that are looked between
-HALVINGS = 18
-SEED = 13
 
 
 def main(target):
@@ -60,8 +50,6 @@ def main(target):
     found["map"] = {**counted(judged), "seconds": seconds}
     found["consistent"] = most_consistent(plane)._asdict()
     print(f"map: {seconds} s", flush=True)
-    found["flips"] = {claim: flips(plane, claim) for claim in CLAIMS}
-    found["between"] = between(plane)
     default = judged_alone(Case.from_values({}))
     found["default"] = {
         "margin": default.margin, "error": default.error,
@@ -112,95 +100,6 @@ def counted(found):
         "but_7": int(held[:, [claim != 7 for claim in CLAIMS]].all(axis=1).sum()),
         "chaotic": int((found["chaotic"].values > 0).sum()),
     }  # fmt: skip
-
-
-def flips(plane, claim):
-    """Pairs of neighbours, those of which one alone holds, and of these those within the error."""
-    one = plane.sel(claim=claim)
-    counts = np.zeros(3, int)
-    for dim in (ROD, RECIPROCATING):
-        (a, ea), (b, eb) = (
-            (one["margin"].isel({dim: part}).values, one["error"].isel({dim: part}).values)
-            for part in (slice(None, -1), slice(1, None))
-        )
-        known = ~(np.isnan(a) | np.isnan(b))
-        turned = known & ((a >= 0.0) != (b >= 0.0))
-        within = turned & ((np.abs(a) <= ea) | (np.abs(b) <= eb))
-        counts += [known.sum(), turned.sum(), within.sum()]
-    return dict(zip(("pairs", "flips", "within"), counts.tolist(), strict=True))
-
-
-def between(plane):
-    """For each claim, what bisection finds between some neighbours of which one holds it."""
-    draw = random.Random(SEED)
-    rods, masses = plane[ROD].values, plane[RECIPROCATING].values
-    rows = {}
-    for claim in CLAIMS:
-        margin = plane["margin"].sel(claim=claim).transpose(ROD, RECIPROCATING).values
-        pairs = [
-            (at, to)
-            for at in np.ndindex(margin.shape)
-            for to in ((at[0] + 1, at[1]), (at[0], at[1] + 1))
-            if to[0] < rods.size and to[1] < masses.size
-            and {margin[at] >= 0.0, margin[to] >= 0.0} == {False, True}
-            and not np.isnan(margin[at] + margin[to])
-        ]  # fmt: skip
-        some = [
-            [machine(rods[i], masses[j]) for i, j in pair]
-            for pair in draw.sample(pairs, min(PAIRS, len(pairs)))
-        ]
-        ends = Parallel(n_jobs=2)(delayed(closed)(*pair, claim) for pair in some)
-        rows[claim] = {
-            "pairs": len(some),
-            "closed": sum(within for within, _ in ends),
-            "widest": max((width for _, width in ends), default=0.0),
-        }
-    return rows
-
-
-def machine(rod, reciprocating, **solve):
-    """The machine with two masses."""
-    masses = {"rod_mass_kg": float(rod), "reciprocating_mass_kg": float(reciprocating)}
-    return Case.from_values({"machine": masses, "solve": solve})
-
-
-def closed(one, other, claim):
-    """Whether a margin comes within its error between two machines, and how far apart they are.
-
-    The distance is a share of that of the two neighbours.
-    """
-    width = 1.0
-    sides = [side(one, claim), side(other, claim)]
-    for _ in range(HALVINGS):
-        if any(near for _, near in sides):
-            return True, width
-        middle = midway(one, other)
-        found = side(middle, claim)
-        width /= 2.0
-        if found[0] == sides[0][0]:
-            one, sides[0] = middle, found
-        else:
-            other, sides[1] = middle, found
-    return any(near for _, near in sides), width
-
-
-def side(machine, claim):
-    """Whether a claim holds at a machine, and whether its margin is within its error."""
-    found = judged_alone(machine)
-    margin, error = found.margin[claim - 1], found.error[claim - 1]
-    return margin >= 0.0, abs(margin) <= error
-
-
-def midway(one, other):
-    """The machine with the mean masses of two."""
-    masses = {
-        name: 0.5 * (getattr(one.machine, name) + getattr(other.machine, name))
-        for name in (ROD, RECIPROCATING)
-    }
-    # the inertia of a uniform bar follows its mass
-    machine = replace(one.machine, **masses, rod_centre_mm=None, rod_inertia_kg_m2=None)
-    given = {name: value for name, value in vars(machine).items() if value is not None}
-    return Case.from_values({**one.values(), "machine": given})
 
 
 if __name__ == "__main__":

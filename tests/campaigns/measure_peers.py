@@ -8,8 +8,6 @@ ends with the crosshead's acceleration on the output grid of 0.1 ms; ours is the
 `simulate(case)`, with all its series, metrics and energy balance, the kernel's own seconds beside
 it. Errors are against the reference of reference.py. What is not installed, or fails, is a
 row with its reason.
-
-Before that a sweep by a user's script is timed beside ours, on two cores (peers/sweeps.py).
 """
 
 import json
@@ -26,9 +24,8 @@ from statistics import median
 from typing import NamedTuple
 
 import reference
-from peers import multibody, notebook, soda, sweeps
+from peers import multibody, notebook, soda
 from peers.mechanism import DURATION, SCENES, case_values, error, loosest, output_grid, params
-from peers.sweeps import rounded
 from result_pages import keep, provenance
 
 from compressor.cases.case import Case
@@ -38,7 +35,7 @@ LADDER = (1e-3, 5e-4, 3e-4, 2e-4, 1e-4, 7e-5, 5e-5, 3e-5, 2e-5, 1.4e-5, 1e-5, 7e
           1e-6)  # fmt: skip
 ROUNDS = 5
 LEAST_CPU = 0.2  # s of a contest's round: one call of some milliseconds says little
-LIBRARIES = ("exudyn", "scikit-sundae", "numbalsoda")
+LIBRARIES = ("exudyn", "numbalsoda")
 TIGHT = 1e-9  # tolerance of Exudyn's run that verifies ours
 FIRST_CALL = """
 import json, sys, time
@@ -61,14 +58,17 @@ class Peer(NamedTuple):
 
 PEERS = (
     Peer("SciPy LSODA, plain Python", "rtol 1e-5",
-         partial(notebook.acceleration, notebook.by_scipy, rtol=1e-5)),
+         partial(notebook.acceleration, rtol=1e-5)),
     Peer("Exudyn DOPRI5, symbolic functions", "rtol 1e-6",
          partial(multibody.acceleration, rtol=1e-6)),
     Peer("Exudyn generalised-alpha", "h = 1e-5 s", partial(multibody.acceleration, step=1e-5)),
-    Peer("CVODE BDF (scikit-sundae), plain Python", "rtol 1e-6",
-         partial(notebook.acceleration, notebook.by_cvode, rtol=1e-6)),
     Peer("LSODA in C++ (numbalsoda), numba", "rtol 1e-6", partial(soda.acceleration, rtol=1e-6)),
 )  # fmt: skip
+
+
+def rounded(value):
+    """A number to three digits."""
+    return float(f"{value:.3g}")
 
 
 def timed(call):
@@ -211,7 +211,6 @@ def versions():
 
 
 def main(target):
-    swept = sweeps.compare()
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     errors, contestants, rows, checks, tighter = {}, [], [], [], []
     for scene in SCENES:
@@ -237,7 +236,6 @@ def main(target):
     kept["versions"] |= versions()
     kept |= {"rounds": ROUNDS, "our_first_call_seconds": compile_seconds()}
     kept |= {"agreement": checks, "numbalsoda_tightened": tighter, "rows": rows}
-    kept |= {"swept_jobs": sweeps.JOBS, "sweeps": swept}
     keep(target, kept)
     print(json.dumps(rows, indent=1))
 

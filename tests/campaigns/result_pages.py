@@ -162,15 +162,11 @@ def claims(found):
     rows = []
     for place, statement in enumerate(found["statements"]):
         claim, margin = str(place + 1), default["margin"][place]
-        one, inside = found["flips"][claim], found["between"][claim]
-        closed = f"{inside['closed']} of {inside['pairs']} fall to zero within the error"
         rows.append({
             "claim": f"{claim}. {statement}",
             "at the default masses": f"{'holds' if margin >= 0 else 'does not hold'}, "
             f"{100 * margin:+.3g} % ± {100 * default['error'][place]:.2g} %",
             "map: machines where it holds": f"{plane['each'][claim]} of {plane['judged']}",
-            "neighbours with different verdicts": f"{one['flips']} of {one['pairs']}",
-            "margin between them": closed if inside["pairs"] else "–",
             "random assumptions: machines where it holds":
             f"{drawn['each'][claim]} of {drawn['judged']}",
             "parameter with the largest total effect": deciding(drawn, place),
@@ -264,19 +260,7 @@ def peers(found):
             ("its wall time / our solver's", "kernel_wall_ratio", 2),
         )
     }  # fmt: skip
-    of_sweeps = {
-        "program": "way", "total time, s": "seconds:.2g", "ms per further job": "ms_a_job:.2g",
-        "CPU ms per further job": "cpu_ms_a_job:.2g",
-        "error of peak acceleration: median": "peak_acceleration_error:.2g",
-        "largest": "worst_peak_acceleration_error:.2g",
-        "of peak force: median": "peak_contact_force_error:.2g",
-        "largest of force": "worst_peak_contact_force_error:.2g",
-        "script's total time / ours": "ratio:.2g",
-        "time of a further job / ours": "ratio_a_job:.2g",
-        "CPU time of a further job / ours": "cpu_ratio_a_job:.2g",
-    }  # fmt: skip
-    return {"peers": table(tools.values(), columns), "sweeps": table(found.get("sweeps", []),
-                                                                     of_sweeps)}  # fmt: skip
+    return {"peers": table(tools.values(), columns)}
 
 
 def by_scene(rows, key, make):
@@ -318,13 +302,6 @@ def throughput(found):
                         f"commit {found['before']}": "before:.3g",
                         "then / now": "times as fast:.2f"}),
     ])}  # fmt: skip
-
-
-def scale(found):
-    rows = [{"name": name, **one} for name, one in found["processes"].items()]
-    columns = {"whole process": "name", "seconds": "seconds:.2g", "peak memory, MB": "peak_MB"}
-    return {"scale": table(rows, columns) + "\n" + listed({"jobs": found["jobs"], **{
-        f"bytes of {name}": size for name, size in found["bytes"].items()}})}  # fmt: skip
 
 
 def page(found):
@@ -598,7 +575,6 @@ CAMPAIGNS = {
     "mutants": ("Would the tests notice a bug?", mutants),
     "sweep": ("Does an interrupted sweep lose a job?", sweep),
     "throughput": ("How many jobs a second?", throughput),
-    "scale": ("What does a sweep of 100,000 jobs take?", scale),
     "store": ("How large and fast is the store?", store),
     "page": ("How fast is the report?", page),
     "nameplate": ("What does the case file of `compsim init machine` give?", nameplate),

@@ -25,13 +25,13 @@ def exact():
 
 @pytest.mark.parametrize("scene", mechanism.SCENES)
 def test_plain_scipy_agrees(exact, scene):
-    found = notebook.acceleration(notebook.by_scipy, scene, 1e-9, SHORT)
+    found = notebook.acceleration(scene, 1e-9, SHORT)
     assert mechanism.error(found, exact[scene]) < 2e-5
 
 
 def test_agreement_would_show_a_wrong_lever_arm(exact, monkeypatch):
     monkeypatch.setattr(mechanism, "BORE", mechanism.PIN)
-    found = notebook.acceleration(notebook.by_scipy, "small_end", 1e-9, SHORT)
+    found = notebook.acceleration("small_end", 1e-9, SHORT)
     assert mechanism.error(found, exact["small_end"]) > 1e-3
 
 
@@ -46,13 +46,6 @@ def test_exudyn_agrees_with_fixed_steps(exact):
     pytest.importorskip("exudyn", reason="exudyn is not installed (make peers)")
     found = multibody.acceleration("both", step=2e-6, duration=SHORT)
     assert mechanism.error(found, exact["both"]) < 2e-3
-
-
-@pytest.mark.parametrize("scene", mechanism.SCENES)
-def test_cvode_agrees(exact, scene):
-    pytest.importorskip("sksundae", reason="sksundae is not installed (make peers)")
-    found = notebook.acceleration(notebook.by_cvode, scene, 1e-9, SHORT)
-    assert mechanism.error(found, exact[scene]) < 1e-4
 
 
 @pytest.mark.parametrize("scene", mechanism.SCENES)

@@ -11,7 +11,7 @@ from compressor.cases.card import CardError, mark_card, open_card, read_card
 from compressor.cases.case import Case, CaseError
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.solve.cautions import remarks
-from compressor.solve.measured_gas import card_noise, fit_polytrope, gas_nodes, sensed_noise
+from compressor.solve.measured_gas import card_noise, fit_polytrope, gas_nodes
 from compressor.solve.simulate import measure
 
 ANGLES = list(range(0, 360, 5))
@@ -281,24 +281,6 @@ def test_a_card_is_held_against_its_own_lines(tmp_path, how, words):
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "kinds"),
-    [
-        (0.105, 0.4, {"vacuum": "0.0037 MPa absolute", "fit": "fit no polytropic lines"}),
-        (0.2, 0.7, {"fit": "at an exponent of 1.88"}),
-        (0.3, 0.9, {"fit": "at an exponent of 1.64"}),
-    ],
-)
-def test_gauge_pressures_that_are_called_absolute_are_told(tmp_path, low, high, kinds):
-    """The less pressure there is, the worse is the fit: where none was, nothing was told."""
-    case = measured(head(tmp_path / "a.csv", 10, -1.01325, "pressure_bar", low=low, high=high))
-    told = {one.kind: one.message for one in remarks(case) if one.key == "gas.indicator.head"}
-    assert told.keys() == kinds.keys()
-    assert all(words in told[kind] for kind, words in kinds.items())
-    right = measured(head(tmp_path / "b.csv", 10, -1.01325, "pressure_barg", low=low, high=high))
-    assert [one.kind for one in remarks(right) if one.key == "gas.indicator.head"] == ["gauge"]
-
-
-@pytest.mark.parametrize(
     ("end", "gas", "words"),
     [
         ("head", {"head_clearance_mm": 24}, "and gas.head_clearance_mm gives 10 %"),
@@ -340,40 +322,3 @@ def test_noise_of_a_card_is_told_and_smoothed(tmp_path):
     left = [gas_nodes(one, "head")[:, 0] - gas_nodes(quiet, "head")[:, 0]
             for one in (rough, smooth)]  # fmt: skip
     assert left[1].std() < 0.5 * left[0].std()
-
-
-def test_the_level_of_a_card_s_noise_is_that_of_a_run(tmp_path):
-    """By what a run of the sound machine adds: the casing's resonance made it four times more."""
-    noise = np.random.default_rng(3).normal(0, 0.003, len(FINE)).tolist()
-    noisy = [(a, cycle(a) + n) for a, n in zip(FINE, noise, strict=True)]
-    coarse = [(a, round(cycle(a), 2)) for a in FINE]
-    sensor = {"place": "bearing", "direction": "x", "noise_m_per_s2": 0}
-    more = {"body": {"mass_kg": 3000}, "sensor": sensor, "output": {"keep": "metrics"}, **SHORT}
-
-    def made(path, smooth):
-        gas = {"indicator": path, "smooth_deg": smooth}
-        return Case.from_values({"load": "gas", "gas": gas} | more)
-
-    def level(case):
-        return measure(case).numbers["sensor_rms"]
-
-    quiet = head(tmp_path / "quiet.csv")
-    files = {"noisy": write(tmp_path / "n.csv", noisy), "coarse": write(tmp_path / "c.csv", coarse)}
-    for name, smooth in (("noisy", 0), ("noisy", 8), ("coarse", 0)):
-        case = made(files[name], smooth)
-        added = math.sqrt(max(level(case) ** 2 - level(made(quiet, smooth)) ** 2, 0.0))
-        assert sensed_noise(case, "head") == pytest.approx(added, rel=0.3, abs=1e-3)
-        (told,) = [one.message for one in remarks(case) if one.kind == "noise"]
-        assert "m/s2 (rms) at the sensor" in told
-        assert f"; smoothed over {smooth:g} degrees" in told
-
-
-def test_rounding_of_a_card_is_noise_and_the_digits_of_a_fine_one_are_not(tmp_path):
-    """Its plateaus have no fourth differences: the median of these is 0."""
-    for step in (0.01, 0.0005):
-        rows = [(a, round(round(cycle(a) / step) * step, 6)) for a in FINE]
-        case = measured(write(tmp_path / "steps.csv", rows))
-        assert card_noise(case, "head") == pytest.approx(step / math.sqrt(12), rel=1e-3)
-        assert bool([one for one in remarks(case) if one.kind == "noise"]) == (step == 0.01)
-    few = measured(write(tmp_path / "few.csv", [(a, cycle(a)) for a in FINE[::10]]))
-    assert [one for one in remarks(few) if one.kind == "noise"] == []  # no steps: few samples

@@ -10,11 +10,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from compressor.cases.case import Case, to_yaml
+from compressor.cases.case import Case
 from compressor.cases.checks import row_of
-from compressor.cases.conflicts import values_read
-from compressor.cases.groups import CYLINDER_KEYS
-from compressor.cases.laws import USUAL
 from compressor.cases.load import CaseFileError, load_cases, load_studies
 from compressor.cases.study import Axis
 from compressor.cases.table import table
@@ -388,77 +385,13 @@ def group(name: str, *left_out: str):
     return st.fixed_dictionaries({}, optional=optional)
 
 
-# keys that need the name of a law beside them; the law itself
-OF_LAWS = ["law", "restitution", "length_mm", "modulus_GPa", *USUAL]
-OF_MATERIALS = ["materials", "geometry"]
-
-
-def as_hertz(values):
-    """With a law that any method takes."""
-    return values | {"law": "hertz"}
-
-
-def as_pin(values):
-    """With a law of a pin in its bore."""
-    return {"length_mm": 20, "modulus_GPa": 110} | values | {"law": "johnson"}
-
-
-TIMES = [
-    {"duration_rev": 3, "output_step_deg": 0.5},
-    {"duration_s": 0.6, "output_step_s": 1e-4, "settle_rev": 0},
-]
-SOLVES = [{"accuracy": "draft"}, {"rtol": 1e-7}, {"method": "BDF", "max_steps": 7}]
 EXACT = {"switching": "exact"}
-CYLINDERS = st.fixed_dictionaries(
-    {"action": st.just("double"), "rod_diameter_mm": st.floats(20, 40)},
-    optional={"clearance_percent": st.fixed_dictionaries({"crank": st.floats(5, 14)})},
-)
-CASES = st.fixed_dictionaries(
-    {"name": st.from_regex(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}", fullmatch=True)},
-    optional={
-        "load": st.sampled_from(["spring", "gas", "none"]),
-        # together less than the tenth of a pin radius that a journal may be shifted at most
-        "initial_offset_mm": group("initial_offset_mm").map(
-            lambda offsets: {key: 0.6 * mm for key, mm in offsets.items()}
-        ),
-        "machine": group("machine", "balance"),
-        "gas": group("gas", "switching", *CYLINDER_KEYS).map(lambda gas: gas | EXACT)
-        | st.tuples(group("gas", "switching", *CYLINDER_KEYS[:3], "indicator"), CYLINDERS).map(
-            lambda parts: parts[0] | parts[1]
-        ),
-        "spring": group("spring"),
-        "contact": group("contact", *OF_MATERIALS, "exponent", *OF_LAWS)
-        | group("contact", *OF_MATERIALS, "restitution").map(as_hertz)
-        | st.just({"materials": ["steel", "copper"]})
-        | group("contact", *OF_MATERIALS, "restitution").map(as_pin)
-        | st.just({"materials": ["steel", "steel"], "geometry": "internal"}),
-        "friction": st.just(False)
-        | group("friction", *OF_LAWS)
-        | group("friction", "ideal_joints").map(lambda values: {"law": "lugre"} | values),
-        "guide": st.just(True) | group("guide"),
-        "drive": st.just(True) | group("drive"),
-        "solve": st.sampled_from([a | b for a in TIMES for b in SOLVES]),
-        "output": group("output", "signals") | st.just({"keep": "series", "signals": True}),
-    },
-)
 JOINTS = st.just({}) | st.fixed_dictionaries(
     {
         "joint": st.sampled_from(["big_end", "small_end", "both"]),
         "clearance_mm": st.fixed_dictionaries(dict.fromkeys(("big_end", "small_end"), TOLD_FROM_0)),
     }
 )
-
-
-@one_file
-@given(CASES, JOINTS)
-def test_a_case_reads_back_from_its_yaml(write, values, joints):
-    if values.get("load") == "gas":
-        values.setdefault("gas", {"switching": "exact"})
-    case = Case.resolve(values | joints)
-    read = Case.from_values(values_read(case))
-    (again,) = load_cases(write(to_yaml(case)))
-    assert again == read
-    assert again.key == read.key
 
 
 # The table, and the house

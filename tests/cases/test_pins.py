@@ -151,11 +151,6 @@ def test_a_default_length_is_refused_as_a_default():
     assert problem.message.endswith(remedy)
 
 
-@pytest.mark.parametrize("more", [{"contact": MATERIALS}, {"machine": {"speed_rpm": 400}}])
-def test_the_paper_s_pin_with_the_paper_s_stiffness_is_no_odd_one(more):
-    assert not [one for one in remarks(case(**more)) if one.kind == "default"]
-
-
 def test_the_paper_s_stiffness_at_another_pin_is_told_with_that_of_the_pin():
     odd = case(machine={"pin_radius_mm": {"big_end": 10, "small_end": 35}})
     (found,) = (one for one in remarks(odd) if one.kind == "default")
@@ -166,10 +161,3 @@ def test_the_paper_s_stiffness_at_another_pin_is_told_with_that_of_the_pin():
     assert found.key == "contact.stiffness_N_per_mm15"
     assert f"gives {inside:.3g} for one of 35 mm in its bore ({discs:.3g} as of" in found.message
     assert "contact.materials" in found.message
-
-
-def test_pins_that_differ_have_a_stiffness_each():
-    odd = case(joint="both", machine={"pin_radius_mm": {"big_end": 60, "small_end": 35}})
-    (found,) = (one for one in remarks(odd) if one.kind == "default")
-    assert "for one of 60 mm in its bore" in found.message
-    assert "for one of 35 mm in its bore" in found.message

@@ -6,7 +6,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from conftest import keep, refused
+from conftest import refused
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.stats import norm, triang
@@ -14,9 +14,6 @@ from scipy.stats import norm, triang
 from compressor.cases.load import CaseFileError
 from compressor.cases.study import points
 from compressor.cases.swept import design, design_size, sweep_of
-from compressor.solve.simulate import simulate
-from compressor.store import reader as store
-from compressor.store.studies import read_studies, write_study
 
 ONE = "joint: big_end\n"
 SHORT = "solve: {duration_rev: 0.25, settle_rev: 0, accuracy: draft, output_step_deg: 0.9}\n"
@@ -164,14 +161,6 @@ def test_distributions_are_drawn_by_their_quantiles(read, kind):
     np.testing.assert_array_equal(even[:, 2], found[:, 2])
 
 
-@pytest.mark.parametrize("ends", [[300, 300, 900], [300, 900, 900]])
-def test_a_triangle_may_be_a_right_one(read, ends):
-    text = DRAWN.replace("[300, 500, 900]", str(ends)) % (("lhs",) * 3)
-    speed = np.array(rows(read(text)))[:, 1]
-    expected = triang.ppf(np.array(design("lhs", 64, 3, 5))[:, 1], (ends[1] - 300) / 600, 300, 600)
-    np.testing.assert_allclose(speed, expected, rtol=1e-11)
-
-
 def test_whole_numbers_and_halved_keys_are_drawn_from_distributions(read):
     """A stroke is twice the crank's radius: all numbers of its distribution are halved."""
     text = ONE + "clearance_mm: 0.2\nbody: true\nsample: {n: 16, seed: 5}\n"
@@ -214,12 +203,6 @@ def test_saltelli_exchanges_one_key_after_another(read):
     assert (first == np.stack([b[:, 0], a[:, 1]], axis=1)).all()
     assert (second == np.stack([a[:, 0], b[:, 1]], axis=1)).all()
     assert design_size("saltelli", 8, 2) == 32 == len(design("saltelli", 8, 2, 1))
-
-
-@pytest.mark.parametrize("kind", ["lhs", "sobol"])
-def test_designs_fill_every_eighth_of_every_key(kind):
-    for column in np.array(design(kind, 8, 3, 1)).T:
-        assert sorted((8 * column).astype(int)) == [*range(8)]
 
 
 # ---- left out, and put together -----------------------------------------------------------------
@@ -299,35 +282,6 @@ def test_only_some_jobs_are_selected_and_all_are_in_the_study(read):
 
 
 # ---- stored -------------------------------------------------------------------------------------
-
-
-def test_a_study_that_is_no_grid_has_a_job_dimension(read, tmp_path):
-    second = "{joint: big_end, clearance_mm: 0.1, contact: {materials: [steel, copper]}, "
-    second += "machine: {rod_centre_mm: 200}}"
-    study = read(SHORT + f"blocks:\n  - {{load: [none, spring]}}\n  - {second}\n")
-    write_study(tmp_path, study, "by hand")
-    keep(tmp_path, *(simulate(case) for case in study.cases[:2]))
-    (stored,) = read_studies(tmp_path)
-    assert list(points(stored)) == list(points(study))
-    found = store.open_study(tmp_path, "case")
-    assert found.status.dims == ("job",)
-    assert found.status.values.tolist() == ["ok", "ok", "missing"]
-    assert found["load"].values.tolist() == ["none", "spring", "spring"]
-    assert found.materials.values.tolist() == ["", "", "steel, copper"]
-    assert found.rod_centre_mm.values.tolist() == [300, 300, 200]
-    assert found.rod_centre_mm.attrs["units"] == "mm"
-    assert found.acceleration.dims == ("job", "time")
-    one = store.read_job(tmp_path, study.cases[1].key)
-    assert found.acceleration.isel(job=1).values.tobytes() == one.acceleration.values.tobytes()
-
-
-def test_only_a_grid_is_stored_as_one(read, tmp_path):
-    for text, is_grid in [("load: [none, spring]\n", True), ("load: [none]\nexclude: []\n", True),
-                          ("load: [none, spring]\nexclude: load == none\n", False)]:  # fmt: skip
-        study = read(text)
-        write_study(tmp_path, study)
-        (stored,) = read_studies(tmp_path)
-        assert (stored.is_grid, stored.jobs) == (is_grid, len(study.cases))
 
 
 PARTS = ["clearance_mm", "load", "{", "}", "[", "]", ": ", ", ", "linspace", "range", "random",

@@ -18,7 +18,7 @@ from conftest import jobs_here, without_pictures
 
 from compressor.analysis.runs import paper_cases
 from compressor.cases import load
-from compressor.cases.load import MAX_JOBS, load_cases
+from compressor.cases.load import load_cases
 from compressor.program import duration
 from compressor.store import reader as store
 from compressor.store.studies import read_studies
@@ -48,19 +48,6 @@ def test_help_needs_nothing_heavy():
     assert found.stdout == "[]\n"
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["--version"], ["run", "--help"]])
-def test_help_is_on_stdout(arguments, capsys):
-    assert cli.main(arguments) == 0
-    assert "compsim" in capsys.readouterr().out
-
-
-def test_all_mistakes_are_told_at_once(tmp_path, capsys):
-    (tmp_path / "bad.yaml").write_text("joint: knee\nload: heavy\nclearence_mm: 1\n")
-    assert cli.main(["run", str(tmp_path / "bad.yaml")]) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.split(":")[1] for line in lines] == ["1", "2", "3"]
-
-
 def test_a_run_says_what_it_did_and_what_comes_next(case_file, capsys):
     case_file("two.yaml", load=["none", "spring"])
     case_file("one.yaml", load="gas")
@@ -85,14 +72,6 @@ def test_configs_are_the_paper_s_cases_and_nothing_else():
     found = load_cases(*CONFIGS.glob("*.yaml"))
     assert sorted(case.key for case in found) == sorted(c.key for c in paper_cases().values())
     assert {path.suffix for path in CONFIGS.iterdir()} == {".yaml", ".md"}
-
-
-def test_set_changes_every_case_file(case_file):
-    case_file("a.yaml", load="none")
-    case_file("b.yaml", load="spring")
-    assert cli.main(["run", "a.yaml", "b.yaml", "-j", "1", "--set", "load=[none, gas]"]) == 0
-    assert [study.axes[0].values for study in read_studies("results")] == [("none", "gas")] * 2
-    assert len(store.read_store("results").keys()) == 2
 
 
 @pytest.mark.parametrize("quiet", [[], ["--quiet"]])
@@ -160,13 +139,6 @@ def test_plan_tells_what_a_run_will_do_and_stores_nothing(case_file, capsys):
     assert capsys.readouterr().out.split() == ["two", "2", "jobs", "2", "done", "0", "missing"]
 
 
-def test_the_most_jobs_are_those_of_the_library():
-    defaults = [
-        p.default for c in cli.cli.commands.values() for p in c.params if p.name == "max_jobs"
-    ]
-    assert {*defaults} == {MAX_JOBS}
-
-
 def test_shards(case_file, capsys):
     case_file("two.yaml", load=["none", "spring", "gas"])
     ran = 0
@@ -228,26 +200,6 @@ def test_many_failures_are_counted(case_file, capsys):
     assert err.count("more than 5 steps") == screen.MAX_FAILURES
     assert "and 5 more" in err
     assert "budget_steps (25)" in err
-
-
-@pytest.fixture
-def reporter(monkeypatch):
-    """Stands in for compressor.report, which draws for seconds."""
-
-    def write_report(results, report, command, add, limits, units, studies, single):
-        assert (limits, units, studies, single) == ((), "usual", (), False)
-        read_studies(results)
-        (place,) = [one.keywords["place"] for one in add if one.keywords["place"]]
-        return Path(report, command, place)
-
-    monkeypatch.setattr("compressor.report.write_report", write_report)
-
-
-def test_report_prints_the_path_of_its_page(reporter, case_file, capsys):
-    assert cli.main(["run", case_file("one.yaml"), "-j", "1", "--quiet"]) == 0
-    capsys.readouterr()
-    assert cli.main(["report", "-o", "page"]) == 0
-    assert capsys.readouterr().out == "page/compsim report -o page/alarms\n"
 
 
 def test_the_unforeseen_is_told_with_its_traceback(case_file, capsys, monkeypatch):
@@ -411,20 +363,6 @@ def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch
     err = " ".join(capsys.readouterr().err.split())
     assert "nc: is not shown, as worn has no such job: run the case file with the same" in err
     assert "models-worn" not in Path("page/index.html").read_text(encoding="utf-8")
-
-
-def test_explain_models_as_json_and_of_a_job_that_fails(case_file, capsys, monkeypatch):
-    without_laws(monkeypatch)
-    case_file("a.yaml", joint="both", clearance_mm=0.1)
-    case_file("b.yaml", joint="both", clearance_mm=0.1, solve={"max_steps": 5})
-    assert cli.main(["explain", "--models", "a.yaml", "b.yaml", "--json"]) == 3
-    out, err = capsys.readouterr()
-    (found,) = json.loads(out)
-    assert found["study"] == "a"
-    assert re.fullmatch(r"results/models/a-[0-9a-f]{8}\.nc", found["file"])
-    assert len(found["rows"][0]["changes"]) == len(found["measures"]) == len(found["spans"])
-    assert "b: the job failed, budget_steps: more than 5 steps" in err
-    assert [*Path("results/models").iterdir()] == [Path(found["file"])]
 
 
 # ---- signals ------------------------------------------------------------------------------------

@@ -14,7 +14,6 @@ from compressor.analysis.plot_captions import FILM, PLOT_CAPTIONS, SweptRow
 from compressor.analysis.shaking import frame_forces
 from compressor.cases.case import Case
 from compressor.report.figures.job import draw_analyst, draw_map, draw_modes, draw_spectra
-from compressor.report.plots import job_title, study_title
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
@@ -199,12 +198,6 @@ def test_a_study_is_drawn_along_an_axis(plot, folder, unpainted):
     assert "Here machine.speed_rpm 400." in default
 
 
-def test_a_study_that_is_no_grid_says_what_else_varies(plot, unpainted):
-    code, found, _ = plot("listed", "--what", "waterfall")
-    assert code == 0
-    assert "Along with it vary machine.speed_rpm." in next(iter(found.values()))
-
-
 def test_rounding_is_not_drawn_as_a_spectrum(folder):
     ideal, worn = (draw_spectra(job(folder, name), None).panels[1] for name in ("ideal", "worn"))
     assert not ideal.traces
@@ -250,22 +243,6 @@ def test_what_cannot_be_drawn_is_told(plot, folder, words, told):
     assert told in " ".join(err.split())
 
 
-def test_a_job_named_by_too_little(plot, folder):
-    keys = read_store(folder).keys()
-    first = next(c for c in "0123456789abcdef" if sum(k.startswith(c) for k in keys) > 1)
-    code, _, err = plot(first)
-    assert code == 2
-    assert f"jobs' keys begin with '{first}'" in err
-
-
-def test_a_chaotic_job_is_drawn_and_said_to_be_chaotic(folder, paper_runs):
-    run = job(folder, "worn", 3)
-    calm = PLOT_CAPTIONS["job"]["orbits"](run, None)
-    run.attrs["regime"] = "chaotic"
-    assert "The motion is chaotic" in PLOT_CAPTIONS["job"]["orbits"](run, None)
-    assert "chaotic" not in calm
-
-
 def test_segments_of_a_study_are_drawn_beside_the_healthy_machine(tmp_path, capsys, unpainted):
     """The limit is times the rms of the same machine without clearance; other studies have none."""
     values = {
@@ -296,19 +273,3 @@ def test_segments_of_a_study_are_drawn_beside_the_healthy_machine(tmp_path, caps
     other = [word if word != "segments" else "map" for word in words]
     assert cli.main([*other, "--limit", "5x"]) == 2
     assert "--limit 5x is of segments: add --what segments" in capsys.readouterr().err
-
-
-def test_pictures_are_titled_by_study_joint_and_place(folder):
-    studies = read_studies(folder)
-    (worn,) = (study for study in studies if study.name == "worn")
-    here = " Here machine.speed_rpm 400. Along with it vary load."
-    assert study_title(worn, "map", here) == (
-        "worn: most frequent contact mode over crank angle\n"
-        "clearance at the big end; machine.speed_rpm 400; Along with it vary load"
-    )
-    key = worn.keys[0]
-    assert job_title(studies, key, "orbits") == (
-        f"worn: orbits of the journals\nclearance_mm 0.1; machine.speed_rpm 400; job {key[:10]}"
-    )
-    (ideal,) = (study for study in studies if study.name == "ideal")
-    assert study_title(ideal, "cycles", "").endswith("\nno clearance; 500 rpm")

@@ -63,17 +63,6 @@ def test_failed_jobs_and_the_time_left_stand_in_the_line(terminal, clock, capsys
     assert " 503 of 1000 jobs, 50 %, 3 failed 0:08:17" in plain(err)
 
 
-@pytest.mark.parametrize("columns", [20, 40, 60])
-def test_a_narrow_terminal_gets_one_line_as_well(columns, terminal, capsys):
-    terminal(columns)
-    with ProgressReporter(quiet=False) as progress:
-        progress(123456, 1000000, "")
-        progress.line.refresh()
-    drawn = re.split(r"\r|\x1b\[\d?[AK]|\n", plain(capsys.readouterr().err))
-    assert max(map(len, drawn)) <= columns
-    assert any("123456 of" in line for line in drawn)
-
-
 @pytest.mark.parametrize(("name", "value"), [("NO_COLOR", "1"), ("TERM", "dumb")])
 def test_a_terminal_that_shall_not_draw_is_a_log(name, value, terminal, capsys, monkeypatch):
     terminal()
@@ -100,21 +89,6 @@ def test_a_log_gets_a_line_at_the_start_some_between_and_one_at_the_end(clock, c
     assert lines[0][1] == "0 of 900 jobs, 0 %\n"
     assert re.fullmatch(r"\d+ of 900 jobs, \d+ %, about \d+ min left\n", lines[10][1])
     assert capsys.readouterr().err == "899 of 900 jobs, 99 %\n"
-
-
-def test_what_is_over_soon_writes_nothing(clock, capsys):
-    with ProgressReporter(quiet=False, things="files") as progress:
-        for done in range(10):
-            clock[0] += 0.09
-            progress(done, 9, "")
-    assert capsys.readouterr().err == ""
-
-
-def test_one_thing_is_not_several(clock, capsys):
-    with ProgressReporter(quiet=False, things="points") as progress:
-        clock[0] += 1
-        progress(0, 1, "")
-    assert capsys.readouterr().err == "0 of 1 point, 0 %\n"
 
 
 def test_quiet_is_quiet(clock, capsys):

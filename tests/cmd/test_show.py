@@ -91,19 +91,6 @@ def test_numbers_may_be_in_plant_units_or_si(paper_store, show):
         assert float(value) == pytest.approx(force / (1e3 if unit == "kN" else 1.0), rel=1e-3)
 
 
-def test_nothing_is_an_array_and_nothing_is_said_of_a_contact_that_is_none(paper_store, show):
-    out = show(paper_store, *HERE)
-    assert "[" not in out
-    told = values(out)
-    assert "penetration, big end" in told
-    of_small_end = {label for label in told if "small end" in label}
-    assert {label.split(",")[0] for label in of_small_end} == {
-        "peak contact force", "peak contact force axis", "contact force"
-    }  # fmt: skip
-    assert "max penetration, small end" in values(show(paper_store, "both", "clearance_mm=0.2"))
-    assert not any("penetration" in label for label in values(show(paper_store, "design")))
-
-
 def test_the_case_is_shown_so_that_it_makes_the_same_job(paper_store, show, tmp_path):
     key, path = report_job(paper_store, *HERE).key, tmp_path / "one.yaml"
     changed = show(paper_store, *HERE).partition("(--case prints it whole)\n")[2].split()

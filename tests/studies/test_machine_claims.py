@@ -1,6 +1,5 @@
 """The paper's claims over machines: margins of stored jobs, what decides them, and the command."""
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -166,22 +165,6 @@ def test_the_indices_of_ishigami_s_function(drawn):
     drawing, _ = draw(drawn, found)
     assert [panel.title for panel in drawing.panels] == ["claim 3"]
     assert render(drawing, "png").startswith(b"\x89PNG")
-
-
-def test_the_order_of_columns_is_no_matter(drawn):
-    other = drawn.drop_vars("static").assign_coords(static=drawn["static"])
-    a, b = (sensitivity(one)["total_order"].sel(claim=3) for one in (drawn, other))
-    assert b.sel(assumption=a["assumption"].values).values == pytest.approx(a.values)
-
-
-def test_a_machine_without_margins_counts_as_the_median(drawn):
-    drawn["margin"][7, :] = math.nan
-    total = sensitivity(drawn)["total_order"].sel(claim=3)
-    assert total.values[1] == pytest.approx(0.4424, abs=0.06)
-
-
-def test_only_the_design_s_points_are_one(drawn):
-    assert sensitivity(drawn.isel(machine=slice(0, -1))) is None
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from conftest import assert_same_bits, jobs_here
 from compressor.cases.load import load_cases
 from compressor.store.files import StoreError
 from compressor.studies import wear
-from compressor.studies.wear import Worn, follow_wear, hours, open_wear, run_wear, wear_file
+from compressor.studies.wear import Worn, follow_wear, hours, open_wear, wear_file
 
 TEXT = """
 joint: both
@@ -175,14 +175,3 @@ def test_a_file_of_something_else_is_told(told, tmp_path):
         wear.read_kept_stages(Worn(cases[1]), place)
     with pytest.raises(StoreError, match="compsim wear the case file"):
         open_wear(tmp_path / "nowhere", cases[0])
-
-
-def test_progress_counts_machines(told, place):
-    seen = []
-    from compressor.cases.load import load_studies
-
-    found = run_wear(
-        load_studies(place / "bearing.yaml"), told[1], 1, lambda *now: seen.append(now)
-    )
-    assert (found.done_before, [one.reason for one in found.machines]) == (2, ["", ""])
-    assert {*seen} == {(2, 2, "")}

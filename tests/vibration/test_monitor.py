@@ -76,12 +76,6 @@ def test_levels_are_those_of_plain_numpy():
         assert rms[k] == pytest.approx(np.sqrt(np.mean(inside**2)), rel=1e-12)
 
 
-def test_a_segment_without_samples_has_no_number():
-    peak, rms = segment_levels(np.array([0.0, 90.0, 360.0 - 1e-12]), np.array([1.0, -2.0, 3.0]), 4)
-    np.testing.assert_array_equal(peak, [3.0, 2.0, np.nan, np.nan])
-    np.testing.assert_allclose(rms, [math.sqrt(5.0), 2.0, np.nan, np.nan])
-
-
 def test_an_angle_at_a_begin_lies_in_the_segment_that_begins_there():
     turns = np.arange(72) * 10.0 / 360.0  # of which some are rounded down
     peak, _ = segment_levels(360.0 * turns, np.arange(72.0))

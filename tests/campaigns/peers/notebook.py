@@ -1,4 +1,4 @@
-"""A plain-Python right-hand side, under SciPy's LSODA and under SUNDIALS's CVODE.
+"""A plain-Python right-hand side under SciPy's LSODA.
 
 What a careful notebook has: scalar formulas without arrays, absolute tolerances scaled to the
 clearance (a third faster here than the best single number), a fresh start at every load corner,
@@ -21,18 +21,6 @@ def plain_rates(scene, phase):
     return rates
 
 
-def in_place_rates(scene, phase):
-    """(t, y, out): the same as scikit-sundae calls it."""
-    accelerate, n = ACCELERATIONS[scene], len(START[scene]) // 2
-
-    def rates(t, y, out):
-        y = y.tolist()
-        out[:n] = y[n:]
-        out[n:] = accelerate(t, *y, phase)
-
-    return rates
-
-
 def by_scipy(scene, phase, times, y, rtol):
     """States at `times` (ascending, the first is the start) by SciPy's LSODA."""
     found = solve_ivp(
@@ -44,26 +32,12 @@ def by_scipy(scene, phase, times, y, rtol):
     return found.y.T
 
 
-def by_cvode(scene, phase, times, y, rtol):
-    """States at `times` by CVODE's BDF."""
-    from sksundae.cvode import CVODE
-
-    solver = CVODE(
-        in_place_rates(scene, phase), method="BDF", rtol=rtol, atol=tolerances(scene, rtol),
-        max_num_steps=1_000_000,
-    )  # fmt: skip
-    found = solver.solve(times, y)
-    if not found.success:
-        raise RuntimeError(found.message)
-    return found.y
-
-
-def acceleration(integrate, scene, rtol, duration=DURATION):
-    """Crosshead acceleration (m/s2) on the output grid by one of the functions above."""
+def acceleration(scene, rtol, duration=DURATION):
+    """Crosshead acceleration (m/s2) on the output grid."""
     accelerate = ACCELERATIONS[scene]
     a, y = np.empty(output_grid(duration).size), np.array(START[scene])
     for samples, times, wanted, phase in pieces(duration):
-        states = integrate(scene, phase, times, y, rtol)
+        states = by_scipy(scene, phase, times, y, rtol)
         y = states[-1].copy()
         a[samples] = [
             accelerate(t, *row, phase)[0]

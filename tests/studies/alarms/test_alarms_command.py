@@ -4,7 +4,6 @@ import contextlib
 import dataclasses
 import html
 import re
-from collections import Counter
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from test_lead import CASE, write_run
 
 from compressor.report.page import document
 from compressor.store import read_dataset, read_studies
-from compressor.studies.alarms import alarms
 from compressor.studies.alarms.alarms import list_rows, rank_alarms
 from compressor.studies.alarms.page import CAPTION, add, draw_alarms
 
@@ -115,29 +113,6 @@ def test_hours_stand_beside_the_clearances(written):
     expected = np.clip(1000.0 - (first - 0.1) / 0.2 * 1000.0, 0.0, 1000.0)
     np.testing.assert_allclose(lead, expected, rtol=1e-6, atol=1e-6)
     assert "hours before the limit" in out
-
-
-@pytest.mark.parametrize(
-    ("revolutions", "change", "reason"),
-    [
-        (2, lambda one: {"tacho": one.tacho[:2]}, "too_short"),
-        (5, lambda one: {}, "too_short"),
-        (2, lambda one: {"values": 0.0 * one.values}, "silent_record"),
-        (2, lambda one: {"values": one.values + np.nan}, "silent_record"),
-    ],
-)
-def test_a_record_that_cannot_be_read_is_counted(
-    worn_store, monkeypatch, revolutions, change, reason
-):
-    def few(*given):
-        job = next(read(*given))
-        yield job._replace(record=dataclasses.replace(job.record, **change(job.record)))
-
-    read, source, left = alarms.records, read_studies(worn_store)[0], Counter()
-    monkeypatch.setattr(alarms, "records", few)
-    with pytest.raises(alarms.StudyError, match=f"1 {reason}; run what is missing"):
-        alarms.read_study(worn_store, source, (), (0.0,), revolutions, left, lambda *_: None)
-    assert left == {reason: 1}
 
 
 def test_mistakes_are_named(worn_store, worn, capsys, tmp_path):

@@ -5,27 +5,19 @@ import math
 import numpy as np
 import pytest
 
-from compressor.cases import Sensor
 from compressor.studies.alarms.alarms import (
     StudyError,
     Windows,
-    check_bands,
     check_draws,
-    highest_passed,
     judge_windows,
     list_rows,
-    list_warnings,
     rank_alarms,
-    show_interval,
 )
 from compressor.studies.alarms.readings import (
     LADDER,
     RECORD,
     band_velocity,
-    default_bands,
     read_windows,
-    score_by_counts,
-    score_by_ratio,
 )
 from compressor.vibration import Record
 
@@ -78,34 +70,10 @@ def test_rates_of_made_up_windows_are_known(judged):
     assert judged["alarm"].values[rank_alarms(judged, "small_end")[0]] == "rms, record"
 
 
-def test_noise_is_not_said_to_disturb_the_velocity_of_the_body():
-    """No noise is in it: with noise it has no row."""
-    windows = made_windows()
-    plain = windows.readings[0, RECORD]
-    plain["body_velocity_rms"] = plain["sensor_rms"]
-    windows.readings[1, RECORD] = plain
-    _, *rows = list_rows(judge(windows, noise=(0.0, 1.0)))
-    kinds = {noise: [row[2] for row in rows if row[1] == noise] for noise in ("0", "1")}
-    assert {*kinds["0"]} - {*kinds["1"]} == {"velocity of the body"}
-    assert "rms, record" in kinds["1"]
-
-
 def test_an_alarm_that_reads_nothing_new_never_detects(judged):
     (row,) = [row for row in list_rows(judged) if row[2] == "peak, record"]
     assert row[-1] == "> 0.4 [> 0.4, > 0.4]"
     assert "velocity of the record" not in judged["alarm"].values  # no window has it
-
-
-@pytest.mark.parametrize(
-    ("ends", "words"),
-    [
-        ((3.0, 2.0, 4.0), "3 [2, 4]"),
-        ((math.inf, 3.0, math.inf), "> 5 [3, > 5]"),
-        ((math.nan,) * 3, "-"),
-    ],
-)
-def test_an_interval_says_what_lies_beyond_the_study(ends, words):
-    assert show_interval(np.array(ends), "{:.3g}", 5.0) == words
 
 
 def test_what_sets_a_limit_does_not_judge_it():
@@ -136,27 +104,6 @@ def test_a_study_without_sound_or_worn_jobs_is_refused():
     ):
         with pytest.raises(StudyError, match=told):
             check_draws(Source, Windows(joints, joints, draws, draws, {}, 0))
-
-
-def test_a_score_is_the_greatest_ratio_to_the_sound_median():
-    values = np.array([[1.0, 10.0], [3.0, 30.0], [2.0, 20.0], [4.0, 100.0], [0.0, 0.0]])
-    sound = np.array([True, True, True, False, False])
-    assert score_by_ratio("x")({"x": values}, sound).tolist() == [0.5, 1.5, 1.0, 5.0, 0.0]
-    silent = np.array([[0.0], [0.0], [0.0], [2.0], [0.0]])
-    assert score_by_ratio("x")({"x": silent}, sound).tolist() == [1.0, 1.0, 1.0, math.inf, 1.0]
-
-
-def test_counts_are_over_the_next_level_of_the_ladder():
-    peaks = np.array([[4.0], [4.0], [9.0]])
-    counts = np.tile(np.arange(LADDER.size, 0.0, -1.0), (3, 1))
-    counts[2] += 1000.0
-    found = score_by_counts(0.5)({"sensor_peak": peaks, "sensor_counts_per_rev": counts},
-                             np.array([True, True, False]))  # fmt: skip
-    usual = LADDER.size - np.flatnonzero(LADDER >= 2.0)[0]
-    assert found.tolist() == pytest.approx([1.0, 1.0, 1.0 + 1000.0 / usual])
-    none = {"sensor_peak": peaks, "sensor_counts_per_rev": np.array([[0.0], [0.0], [3.0]])
-            * np.ones(LADDER.size)}  # fmt: skip
-    assert score_by_counts(1.0)(none, np.array([True, True, False])).tolist() == [0.0, 0.0, 3.0]
 
 
 def test_windows_of_a_sine_are_read_in_closed_form():
@@ -190,31 +137,3 @@ def test_velocity_is_the_integral_in_a_band():
     found = band_velocity(accel, rate, 2.0, 100.0)
     np.testing.assert_allclose(found, 3.0 * np.sin(2 * np.pi * 20 * times) / (2 * np.pi * 20),
                                atol=1e-12)  # fmt: skip
-
-
-def test_warnings_say_what_a_result_lacks():
-    attrs = {
-        "left_out": '{"missing": 3}', "clipped": 2, "factor": math.nan, "rate": 1 / 21,
-        "wanted": 0.01, "sound_draws": 20, "detected": 0.9,
-    }  # fmt: skip
-    found = [*list_warnings(judge(made_windows()).assign_attrs(attrs))]
-    assert found[:3] == [
-        "left out: 3 missing",
-        "clipped: 2 jobs; raise sensor.range_m_per_s2",
-        "20 sound draws allow no limit for 1 % of false alarms: 99 are needed",
-    ]
-    assert found[3].startswith("not judged, since not all sound records have it: crest factor")
-    assert found[4] == "a clearance has 10 draws: to be sure that it is detected takes 35"
-
-
-def test_bands_fill_what_a_record_holds():
-    assert default_bands(25600.0) == ((2.0, 1000.0), (1000.0, 3200.0), (3200.0, 10000.0))
-    assert default_bands(25600.0, 5000.0) == ((2.0, 1000.0), (1000.0, 2200.0), (2200.0, 5000.0))
-    assert highest_passed(Sensor(low_pass_Hz=5000.0)) == 5000.0
-    assert highest_passed(Sensor(mounting_Hz=8000.0)) == 8000.0
-    assert default_bands(4096.0) == ((2.0, 1000.0),)
-    assert default_bands(1024.0) == ((2.0, 400.0),)
-    check_bands(((2.0, 2000.0),), "key", 8000.0, 2000.0)
-    for passes, told in ((2000.0, "give bands up to 2000 Hz"), (math.inf, "up to 4000 Hz")):
-        with pytest.raises(StudyError, match=f"band 500-4500 Hz: job key .*{told}"):
-            check_bands(((500.0, 4500.0),), "key", 8000.0, passes)

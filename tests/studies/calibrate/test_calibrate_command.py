@@ -11,10 +11,9 @@ from compsim import cli
 from conftest import jobs_here
 
 from compressor.cases.load import load_cases
-from compressor.program import no_progress
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
-from compressor.studies.calibrate.calibrate import FitJobs, Unknown
+from compressor.studies.calibrate.calibrate import Unknown
 from compressor.studies.calibrate.orders import CalibrationError
 
 CASE = {
@@ -99,20 +98,6 @@ def test_what_is_printed_is_a_case_file(fitted, monkeypatch):
 def test_what_is_no_range_is_refused(text, what):
     with pytest.raises(CalibrationError, match=what):
         Unknown.written(text)
-
-
-def test_what_is_set_for_the_machine_gives_way_where_a_point_needs_another(fitted, monkeypatch):
-    """Points run without noise, at the record's speed; the case that comes out has its noise."""
-    place, *_ = fitted
-    monkeypatch.chdir(place)
-    given = ["sensor.noise_m_per_s2=0.02", "machine.speed_rpm=450"]
-    unknown = Unknown.written("body.mass_kg=300:600")
-    jobs = FitJobs("machine.yaml", [unknown], given, "results", 1, no_progress)
-    jobs.run_at(500.0)
-    (quiet,) = jobs.study.load([(400.0,)]).cases
-    own = jobs.case_at(np.array([1.0 / 3.0]))
-    assert (quiet.sensor.noise_m_per_s2, own.sensor.noise_m_per_s2) == (0.0, 0.02)
-    assert quiet.machine.speed_rpm == own.machine.speed_rpm == 500.0
 
 
 def test_a_case_without_a_sensor_is_refused(fitted, monkeypatch, capsys):

@@ -9,7 +9,6 @@ from compressor.studies.compare.likeness import (
     SMALLEST,
     compare_lines,
     curves,
-    share_inside,
     spectral_distance,
     third_octaves,
 )
@@ -99,20 +98,6 @@ def test_the_envelope_hears_bursts_whatever_rings_in_them():
     assert found.envelope.value > 0.98
 
 
-def test_the_segment_that_is_most_another_one_is_named():
-    """A record twice as strong, but from 100 to 110 degrees, where it is six times as strong."""
-    turns = (TIMES - FIRST) / TURN
-    place = turns % 1.0 * 360
-    wave = np.sin(2 * np.pi * 80 * turns)
-    one, two = (
-        by_revolutions(Record(TIMES, values, TACHO, math.nan))
-        for values in (np.where((place > 102) & (place < 108), 6.0, 2.0) * wave, wave)
-    )
-    found = likeness(one, two)
-    assert found.segment == 100
-    assert found.segment_ratio == pytest.approx(6.0, rel=0.1)
-
-
 def test_noise_costs_the_correlation_what_it_should():
     """Of a mean of n revolutions: 1 / sqrt(1 + noise / signal / n) by their powers in the band."""
     clean, noisy = record((5, 1.0, 0.0)), record((5, 1.0, 0.0), noise=1.0)
@@ -155,12 +140,6 @@ def test_spectra_are_compared_by_third_octaves():
     alone[0] = 1.0
     assert spectral_distance(apart, alone) == pytest.approx(-10 * math.log10(SMALLEST))
     assert math.isnan(spectral_distance(alone, 0 * alone))
-
-
-def test_a_share_inside_counts_angles():
-    jobs = np.array([np.zeros(360), np.ones(360)])
-    inside = np.where(np.arange(360) < 90, 0.5, 2.0)
-    assert share_inside(inside, jobs) == 0.25
 
 
 def test_a_record_that_tells_nothing_is_refused():

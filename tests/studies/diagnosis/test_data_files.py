@@ -11,11 +11,8 @@ from compsim import cli
 
 from compressor.studies.diagnosis.dataset import (
     LABELS,
-    StudyError,
-    count_windows,
     list_warnings,
     make_data_set,
-    tabulate,
     write_card,
     write_data_set,
 )
@@ -91,45 +88,10 @@ def test_the_card_warns_of_what_spoils_a_score(made):
     assert "sound joints are ideal" not in write_card(made.assign_attrs(fixed=json.dumps(fixed)))
 
 
-def test_counts(made):
-    rows = {(joint, split): (machines, n) for joint, split, machines, n in count_windows(made)}
-    assert rows == {
-        ("big_end", "train"): (2, 8), ("big_end", "test"): (1, 4), ("both", "train"): (1, 4),
-        ("both", "test"): (0, 0), ("none", "train"): (1, 4), ("none", "test"): (0, 0),
-    }  # fmt: skip
-
-
-def test_cells_cannot_break_a_table():
-    assert tabulate(["x"], [["a|b\nc"]]).splitlines()[2] == r"| a\|b c |"
-
-
 def test_without_pyarrow_the_rest_is_written(made, tmp_path, without_pyarrow):
     (tmp_path / "features.parquet").write_bytes(b"of an earlier data set")
     written = {path.name for path in write_data_set(tmp_path, made)}
     assert written == {"windows.nc", "README.md"} == {path.name for path in tmp_path.iterdir()}
-
-
-def test_the_command_says_how_to_get_parquet(worn, tmp_path, without_pyarrow, capsys):
-    assert cli.main(["dataset", "worn", "-r", str(worn), "-o", str(tmp_path / "to")]) == 0
-    assert "pip install 'compsim[dataset]'" in " ".join(capsys.readouterr().err.split())
-
-
-def test_a_readme_of_something_else_is_not_replaced(worn, made, tmp_path, capsys):
-    card = tmp_path / "README.md"
-    card.write_text("mine")
-    assert cli.main(["dataset", "worn", "-r", str(worn), "-o", str(tmp_path)]) == 2
-    assert "choose another folder" in capsys.readouterr().err
-    with pytest.raises(StudyError, match=r"README\.md of something else"):
-        write_data_set(tmp_path, made)
-    assert [*tmp_path.iterdir()] == [card]
-    assert card.read_text() == "mine"
-
-
-def test_an_earlier_data_set_is_replaced(made, tmp_path):
-    write_data_set(tmp_path, made)
-    write_data_set(tmp_path, made.isel(window=slice(0, 4)))
-    with xr.open_dataset(tmp_path / "windows.nc", engine="h5netcdf") as found:
-        assert found.sizes["window"] == 4
 
 
 def test_the_command(worn, tmp_path, capsys):

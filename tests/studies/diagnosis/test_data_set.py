@@ -4,10 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from compsim import cli
 
 from compressor.cases.case import Case
-from compressor.store.files import WrongName
 from compressor.store.reader import read_store
 from compressor.studies.diagnosis.dataset import (
     StudyError,
@@ -87,25 +85,6 @@ def test_features_are_those_of_the_stored_samples(made):
     assert made["signal"].dtype == np.float32
 
 
-def test_speed_and_noise_are_seen_in_the_features(made):
-    speeds = 60.0 * 10.0 ** made["features"].sel(feature="speed").values[:, 0]
-    assert speeds == pytest.approx(made["speed_rpm"].values, rel=0.01)
-    rms = 10.0 ** made["features"].sel(feature="level").values
-    # the spline that resamples takes up to a quarter of white noise's power, at its highest part
-    assert (rms[:, 1] < 1.02 * np.hypot(rms[:, 0], 0.5)).all()
-    assert (rms[:, 1] > 0.98 * np.hypot(rms[:, 0], 0.43)).all()
-
-
-def test_noise_is_as_loud_as_it_says_and_repeats_itself():
-    values = np.zeros(100_000)
-    found = noisy(values, 0.3, [1, 2, 3, 4])
-    assert np.std(found) == pytest.approx(0.3, rel=0.01)
-    assert np.array_equal(found, noisy(values, 0.3, [1, 2, 3, 4]))
-    for other in ([2, 2, 3, 4], [1, 3, 3, 4], [1, 2, 4, 4], [1, 2, 3, 5]):
-        assert abs(np.corrcoef(found, noisy(values, 0.3, other))[0, 1]) < 0.02
-    assert noisy(values, 0.0, [1]) is values
-
-
 def test_no_machine_is_on_both_sides(made):
     for one in {*made["machine"].values.tolist()}:
         assert len({*made["split"].values[made["machine"].values == one].tolist()}) == 1
@@ -159,35 +138,3 @@ def test_jobs_that_are_not_run_are_counted(worn, tmp_path):
     (tmp_path / "studies").symlink_to(worn / "studies")
     with pytest.raises(StudyError, match="has no record of 5 revolutions: 14 missing"):
         make_data_set(tmp_path, "worn")
-
-
-@pytest.mark.parametrize(
-    ("study", "told"),
-    [
-        ("deaf", "has no sensor's record: write `body: true` and `sensor:.*deaf.yaml"),
-        ("worm", "holds no study 'worm'; did you mean worn?"),
-        ("quite another", "it holds deaf, worn"),
-        (None, "several studies; name one: deaf, worn"),
-    ],
-)
-def test_a_study_that_cannot_be_used(worn, study, told):
-    with pytest.raises((StudyError, WrongName), match=told):
-        make_data_set(worn, study)
-
-
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["--revolutions", "1"], "1 is not in the range x>=2"),
-        (["--hop", "0"], "0 is not in the range x>=1"),
-        (["--noise", ""], "is no list such as 0,0.1,1"),
-        (["--noise", "0.1,-1"], "noise is an rms, 0 or more"),
-        (["--noise", "nan"], "noise is an rms, 0 or more"),
-        (["--noise", "0.1,0.1"], "a noise level is given twice"),
-        (["--test-share", "0"], "0.0 is not in the range 0.0<x<1.0"),
-        (["--test-share", "1"], "1.0 is not in the range 0.0<x<1.0"),
-    ],
-)
-def test_options_that_make_no_sense(words, told, worn, tmp_path, capsys):
-    assert cli.main(["dataset", "worn", "-r", str(worn), "-o", str(tmp_path / "to"), *words]) == 2
-    assert told in capsys.readouterr().err

@@ -9,7 +9,6 @@ from compsim import job_text
 from compressor.cases.case import Case, CaseError
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.study import Study
-from compressor.store.reader import read_store
 from compressor.studies.diagnosis.dataset import make_data_set, write_card
 from compressor.studies.diagnosis.identify import read_library
 from compressor.studies.tradeoff.explain import terms
@@ -55,12 +54,6 @@ def test_a_job_says_which_of_its_joints_are_worn():
     assert "worn" not in terms(plain)[0]["clearance"]
 
 
-def test_a_case_that_names_none_is_stored_as_before():
-    case = Case.from_values(BOTH)
-    assert "healthy_clearance_mm" not in case.values()
-    assert "healthy" not in case.attributes()["case"]
-
-
 @pytest.mark.parametrize("joint", ["none", "big_end"])
 def test_joints_that_are_ideal_are_never_worn(joint):
     clearance = {} if joint == "none" else {"clearance_mm": 0.2}
@@ -96,10 +89,6 @@ def results(tmp_path_factory):
     for study in paths:
         sweep([study], folder / "results", workers=1)
     return folder / "results"
-
-
-def test_one_store_holds_each_job_once(results):
-    assert len({*read_store(results).keys()}) == 3
 
 
 def test_the_data_set_and_the_library_say_worn_beyond_it(results):

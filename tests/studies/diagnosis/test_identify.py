@@ -1,7 +1,6 @@
 """`compsim identify`: what it prints of files and jobs, and what it refuses."""
 
 import json
-import re
 
 import numpy as np
 import pytest
@@ -66,20 +65,6 @@ def test_a_record_is_explained(record, folder, capsys):
     assert float(low.strip(",")) < float(median) < float(high.strip("]"))
     assert abs(float(median) - 0.2) < 0.06
     assert last.split() == ["varied:", "machine.rod_mass_kg", "2.0202", "to", "7.9455"]
-
-
-def test_as_json(record, folder, capsys):
-    assert cli.main(["identify", record, "--study", "worn", "-r", folder, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert (found["jobs"], found["jobs_of_study"], found["fits"]) == (240, 240, True)
-    assert found["candidates"][0]["joint"] == "small_end"
-    assert set(found["candidates"][0]["clearances"]["small_end"]) == {"median", "low", "high"}
-
-
-def test_a_job_is_explained_by_the_others(folder, capsys):
-    key = sorted(read_store(folder).keys())[0]
-    assert cli.main(["identify", key[:12], "--study", "worn", "-r", folder]) == 0
-    assert re.search(r"^jobs of the study +239 of 240$", capsys.readouterr().out, re.MULTILINE)
 
 
 def test_an_exported_job_is_explained_as_the_job_itself(tmp_path, folder, capsys):

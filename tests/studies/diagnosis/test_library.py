@@ -6,10 +6,7 @@ from conftest import WORN_JOBS, struck
 
 from compressor.store.files import StoreError
 from compressor.store.reader import read_store
-from compressor.store.rows import Rows
 from compressor.store.sensor_records import stored_record
-from compressor.studies.compare import comparison
-from compressor.studies.diagnosis.dataset import make_data_set
 from compressor.studies.diagnosis.features import features
 from compressor.studies.diagnosis.identify import StudyError, describe_record, read_library
 from compressor.vibration.accelerometer import Record
@@ -34,22 +31,11 @@ def test_features_are_those_of_the_records(library):
     np.testing.assert_allclose(library.features[7], list(expected.values()), rtol=1e-9)
 
 
-def test_a_job_is_left_out(library):
-    one = library.only(library.keys != library.keys[3])
-    assert library.keys[3] not in one.keys
-    assert len(one.keys) == len(one.features) == len(one.joints) == WORN_JOBS - 1
-
-
 def test_a_job_gives_its_record_by_the_beginning_of_its_key(library, worn_store):
     key, record = stored_record(worn_store, library.keys[7][:12])
     assert key == library.keys[7]
     assert isinstance(record, Record)
     np.testing.assert_array_equal(describe_record(record), library.features[7])
-
-
-def test_a_study_that_is_not_there_is_named(worn_store):
-    with pytest.raises(StoreError, match="holds no study 'torn'; did you mean worn"):
-        read_library(worn_store, "torn")
 
 
 def test_jobs_without_a_sensor_are_told(paper_store):
@@ -58,19 +44,3 @@ def test_jobs_without_a_sensor_are_told(paper_store):
     key = sorted(read_store(paper_store).keys())[0]
     with pytest.raises(StoreError, match=f"job {key} has no sensor's record"):
         stored_record(paper_store, key)
-
-
-def test_rows_of_another_version_are_left_out(worn_store, monkeypatch):
-    """By identify, dataset and compare: of what was simulated nothing is known."""
-    _, record = stored_record(worn_store, min(read_store(worn_store).keys()))
-    own = Rows.attributes
-    monkeypatch.setattr(
-        Rows, "attributes", lambda rows, at: {k: v for k, v in own(rows, at).items() if k != "case"}
-    )
-    with pytest.raises(StudyError, match=f"{WORN_JOBS} damaged"):
-        read_library(worn_store, "worn")
-    with pytest.raises(StudyError, match=f"{WORN_JOBS} damaged"):
-        make_data_set(worn_store, "worn")
-    monkeypatch.setattr(comparison, "find_record", lambda *names: ("", record))
-    with pytest.raises(comparison.CompareError, match=f"none of the {WORN_JOBS} jobs"):
-        comparison.compare_record("record.csv", ["worn"], worn_store, {})

@@ -144,13 +144,6 @@ def test_every_revolution_between_pulses_counts(speed, share):
     assert found["level"] == pytest.approx(math.log10(math.sqrt(1 / 6)), abs=2e-3)
 
 
-def test_what_lies_beyond_the_pulses_does_not_count():
-    loud = np.where((TURNS < -0.01) | (TURNS > WHOLE + 0.01), 1e3, 0.0) + sine(100)
-    apart = features(TIMES, loud, TACHO), features(TIMES, sine(100), TACHO)
-    for name in FEATURES:
-        assert apart[0][name] == pytest.approx(apart[1][name], abs=2e-2)
-
-
 @pytest.mark.parametrize(
     ("values", "tacho", "told"),
     [

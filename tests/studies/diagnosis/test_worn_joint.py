@@ -86,33 +86,10 @@ def test_no_record_is_so_far_off_that_there_is_no_answer(identifier):
     assert np.isfinite([one.probability for one in answer.candidates]).all()
 
 
-def test_a_feature_that_a_record_does_not_have_is_borne(identifier):
-    row = made(4, 6).features[2].copy()
-    row[5] = np.nan
-    assert identifier.identify(row).candidates[0].joint == "small_end"
-
-
-def test_equal_clearances_are_told_alike():
-    found = Identifier.fit(made(400, 7, equal=True))
-    both = next(
-        one for one in found.identify(made(4, 8, equal=True).features[3]).candidates
-        if one.joint == "both"
-    )  # fmt: skip
-    assert both.clearances["big_end"].median == pytest.approx(
-        both.clearances["small_end"].median, rel=1e-6
-    )
-
-
 def test_a_study_of_one_joint_is_sure_of_it():
     found = Identifier.fit(made(220, 9, joints=JOINTS[1:2]))
     (only,) = found.identify(made(1, 10, joints=JOINTS[1:2]).features[0]).candidates
     assert (only.joint, only.probability) == ("big_end", 1.0)
-
-
-def test_joints_with_few_jobs_are_not_told():
-    library = made(600, 11)
-    few = (library.joints != "both") | (np.arange(600) < 80)
-    assert Identifier.fit(library.only(few)).joints == ["none", "big_end", "small_end"]
 
 
 def test_too_few_jobs_are_refused():
@@ -161,19 +138,6 @@ def test_intervals_are_wide_where_errors_are_great():
         np.log(one.high / one.low) for (one,) in map(found.locate, np.array([[-2.7], [-0.5]]))
     ]
     assert widths[1] > 2.5 * widths[0]
-
-
-def test_intervals_end_where_the_study_does(clearance):
-    least, most = np.exp(clearance.span[:, 0])
-    for far in (-40.0, 40.0):
-        (found,) = clearance.locate(far * SLOPES)
-        assert least <= found.low <= found.median <= found.high <= most
-
-
-def test_a_clearance_that_never_changes_is_told():
-    points = np.random.default_rng(4).normal(size=(60, 2))
-    (found,) = Clearance.fit(points, np.full((60, 1), np.log(0.2)), np.arange(60)).locate(points[0])
-    assert astuple(found) == pytest.approx((0.2, 0.2, 0.2))
 
 
 def test_a_machine_is_judged_by_others_alone():

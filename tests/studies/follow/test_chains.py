@@ -4,7 +4,6 @@ import multiprocessing
 import os
 import signal
 import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -88,70 +87,6 @@ def test_a_killed_chain_goes_on_and_ends_in_the_same_bits(whole, tmp_path, monke
     assert process.exitcode == 0
     assert len({*stops}) > 2
     assert_same_bits(read_dataset(chain.path(tmp_path)), read_dataset(chain.path(folder)))
-
-
-def test_each_value_begins_where_the_last_one_ended(whole, monkeypatch, tmp_path):
-    chain, folder = whole
-    rows, begun = read_rows(chain, folder), []
-
-    def run(case, state, plan):
-        begun.append((case, state))
-        return rows[len(begun) - 1]
-
-    monkeypatch.setattr(follow, "run_value", run)
-    run_chain(chain, tmp_path)
-    assert [case for case, _ in begun] == [*chain.cases]
-    assert begun[0][1] is None
-    for (_, state), row in zip(begun[1:], rows, strict=False):
-        np.testing.assert_array_equal(state, row["end_state"])
-    assert_same_bits(read_dataset(chain.path(tmp_path)), read_dataset(chain.path(folder)))
-
-
-def test_a_chain_goes_on_past_a_failed_value_and_is_run_again_from_there(
-    whole, monkeypatch, tmp_path
-):
-    chain, folder = whole
-    rows, states, fails = read_rows(chain, folder), [], True
-
-    def run(case, state, plan):
-        number = chain.cases.index(case)
-        states.append(state)
-        bad = {"status": "failed", "reason": "budget_steps", "end_state": state}
-        return rows[number] | (bad if number == 2 and fails else {})
-
-    monkeypatch.setattr(follow, "run_value", run)
-    for _ in range(2):
-        assert run_chain(chain, tmp_path) is None
-        assert [row["status"] for row in read_rows(chain, tmp_path)].index("failed") == 2
-        assert len(states) == 6
-    np.testing.assert_array_equal(states[3], rows[1]["end_state"])
-    fails = False
-    run_chain(chain, tmp_path, rerun=True)
-    assert {row["status"] for row in read_rows(chain, tmp_path)} == {"ok"}
-    assert len(states) == 10
-
-
-def test_what_is_stored_is_not_run_again(whole, monkeypatch):
-    chain, folder = whole
-    monkeypatch.setattr(follow, "run_value", pytest.fail)
-    before = chain.path(folder).stat().st_mtime_ns
-    assert run_chain(chain, folder) is None
-    assert chain.path(folder).stat().st_mtime_ns == before
-
-
-def test_a_chain_is_named_by_all_that_decides_its_numbers(chains):
-    up, down = chains
-    states = (np.zeros(4), None)
-    others = [
-        down,
-        replace(up, cases=up.cases[:-1]),
-        replace(up, plan=ValuePlan(6)),
-        replace(up, plan=ValuePlan(7, exponent=False)),
-        replace(up, states=states),
-        replace(up, states=states[::-1]),
-    ]
-    assert len({up.key, *(one.key for one in others)}) == 7
-    assert replace(up, values=()).key == up.key
 
 
 def test_another_file_of_its_name_is_refused(whole, tmp_path):

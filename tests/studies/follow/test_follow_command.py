@@ -69,13 +69,6 @@ def test_the_dataset_has_machines_both_ways_and_values(place):
     assert {*NUMBERS, *TEXTS} - {*found.data_vars} == {"end_state"}
 
 
-def test_values_belong_to_the_key_whichever_way_it_is_followed(place):
-    """Of a motion that is the same both ways: its numbers stand at the same place."""
-    found = xr.load_dataset(place / FILE)["rms_acceleration"]
-    np.testing.assert_allclose(found[:, 0], found[:, 1], rtol=1e-3)
-    assert (np.abs(found.diff("clearance_mm")) > 0.5).all()
-
-
 def test_a_second_run_has_nothing_to_do_and_prints_the_same(place, capsys):
     code, out, said = run(place, capsys)
     assert code == 0
@@ -139,19 +132,6 @@ def test_failed_values_end_with_3_and_say_why(in_process, capsys, tmp_path):
     assert [path.suffix for path in (tmp_path / "follow").iterdir() if path.is_file()] == [".nc"]
 
 
-def test_a_study_that_is_no_grid_has_jobs(in_process, tmp_path):
-    blocks = "blocks: [{joint: big_end, clearance_mm: 0.2}, {joint: both, clearance_mm: 0.1}]\n"
-    path = write(tmp_path / "blocks.yaml", blocks + "solve: {accuracy: draft}\n")
-    words = ["--over", "machine.speed_rpm=450:500:2", "--no-exponent", "--points", "8", "--quiet"]
-    assert cli.main(["follow", path, *words, "-r", str(tmp_path), "-j", "1"]) == 0
-    found = xr.load_dataset(tmp_path / "follow/blocks-machine.speed_rpm.nc")
-    assert found["section"].dims[:3] == ("job", "direction", "speed_rpm")
-    assert found["fault"].values.tolist() == ["big_end", "both"]
-    assert found["section"].notnull().any(["direction", "speed_rpm", "revolution"]).values[
-        :, :, 0
-    ].tolist() == [[True, False], [True, True]]
-
-
 # What is asked for
 
 
@@ -160,33 +140,10 @@ def followed(path, over, only="", **more):
     return machines(load_values(path, along, only=only), along)
 
 
-def test_each_machine_has_its_values_up_and_down(tmp_path):
-    path = write(tmp_path / "case.yaml", "joint: big_end\nmachine: {rod_mass_kg: [3, 4]}\n")
-    found = followed(path, "clearance_mm=0.01:1:3", log=True, both=True)
-    assert [one.point for one in found] == [{"machine.rod_mass_kg": mass} for mass in (3.0, 4.0)]
-    up, down = found[1].chains
-    assert up.values == (0.01, 0.1, 1.0) == down.values[::-1]
-    cases = [(case.machine.rod_mass_kg, case.clearance_mm.big_end) for case in down.cases]
-    assert cases == [(4.0, 1.0), (4.0, 0.1), (4.0, 0.01)]
-
-
-def test_what_does_not_move_the_machine_does_not_count(tmp_path):
-    path = write(tmp_path / "case.yaml", WORN)
-    more = write(tmp_path / "more.yaml", WORN + "body: true\nsensor: true\nwear: true\n")
-    (one,), (other,) = (followed(each, OVER) for each in (path, more))
-    assert one.chains[0].key == other.chains[0].key
-
-
 def test_the_file_may_sweep_or_leave_out_what_is_followed(tmp_path):
     texts = ("joint: big_end\n", WORN, "joint: big_end\nclearance_mm: [0.3, 0.4]\n")
     paths = [write(tmp_path / f"{n}.yaml", text) for n, text in enumerate(texts)]
     assert len({followed(path, OVER)[0].chains[0].key for path in paths}) == 1
-
-
-def test_defaults_that_depend_on_what_is_followed_follow_it(tmp_path):
-    (one,) = followed(write(tmp_path / "case.yaml", WORN), "machine.rod_mass_kg=2:6:2")
-    inertias = [case.machine.rod_inertia_kg_m2 for case in one.chains[0].cases]
-    assert inertias == pytest.approx([0.06, 0.18])
 
 
 def test_a_chain_reads_at_its_last_value_what_it_does_not_at_its_first(tmp_path):

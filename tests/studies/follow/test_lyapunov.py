@@ -12,7 +12,6 @@ from compressor.solve.request import Request
 from compressor.solve.run import integrate
 from compressor.solve.search import PARTED_DISTANCE, SHIFT, predictability_horizon
 from compressor.solve.si_record import natural_sizes, offsets, record, scene
-from compressor.studies.follow import lyapunov
 from compressor.studies.follow.lyapunov import (
     LOST_DISTANCE,
     OF_STEPS,
@@ -86,22 +85,6 @@ def test_a_difference_that_errors_swallow_gives_a_bound(factor):
     assert rates(found) == pytest.approx(math.log(LOST_DISTANCE / 1e-7))
 
 
-def test_a_difference_is_followed_as_long_as_it_is_small():
-    """It doubles at each of 30 looks: a hundredth is passed at the 17th, from 1e-7."""
-    each = 2.0 ** np.arange(1, 31)[:, np.newaxis]
-    (one,) = growths(lambda difference: each * difference, np.array([1e-7]), 1)
-    assert one.span == pytest.approx(17 / 30)
-    assert one.growth == pytest.approx(17 * math.log(2.0))
-
-
-def test_batches_hold_whole_periods():
-    """Growths of a motion of period 4 have no scatter; of one revolution there is no error."""
-    value, error = mean_with_error(np.tile([3.0, -1.0, 0.5, -2.0], 16))
-    assert value == pytest.approx(0.125)
-    assert error == pytest.approx(0.0, abs=1e-12)
-    assert mean_with_error(np.ones(7)) == (1.0, math.inf)
-
-
 def test_errors_hold_as_often_as_they_say():
     draws = np.random.default_rng(4).normal(size=(400, 64))
     hits = [abs(value) <= error for value, error in map(mean_with_error, draws)]
@@ -146,22 +129,6 @@ def test_explicit_steps_that_stability_holds_do_not_part_motions():
     assert -1.1 < found.value < -0.8
 
 
-def test_the_same_call_gives_the_same_bits():
-    made = case({"joint": "small_end", "clearance_mm": 0.2})
-    y = at_rest(made)
-    assert largest_exponent(made, y, 1, math.inf) == largest_exponent(made, y.copy(), 1, 1e3)
-
-
-def test_a_value_is_a_bound_where_errors_are_reached(monkeypatch):
-    made = case({"joint": "big_end", "clearance_mm": 0.2})
-    y = at_rest(made)
-    plain = largest_exponent(made, y, 1, math.inf)
-    monkeypatch.setattr(lyapunov, "LOST_DISTANCE", 0.5 * lyapunov.SHIFT)
-    found = largest_exponent(made, y, 1, math.inf)
-    assert (plain.at_most, found.at_most) == (False, True)
-    assert found.value > plain.value
-
-
 def test_what_has_no_exponent_is_refused():
     ideal = case({"joint": "none"})
     with pytest.raises(ValueError, match="all joints are ideal"):
@@ -169,10 +136,3 @@ def test_what_has_no_exponent_is_refused():
     made = case(LIGHT)
     with pytest.raises(ValueError, match="0 revolutions"):
         largest_exponent(made, at_rest(made), 0, math.inf)
-
-
-def test_a_run_that_stops_has_no_exponent():
-    made = case(LIGHT)
-    late = largest_exponent(made, at_rest(made), 8, 0.0)
-    lost = largest_exponent(made, np.full(4, math.nan), 8, math.inf)
-    assert np.isnan([*late[:2], *lost[:2]]).all()

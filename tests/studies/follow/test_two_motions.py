@@ -10,8 +10,6 @@ from compressor.cases.case import Case
 from compressor.solve.si_record import record
 from compressor.studies.follow import follow
 from compressor.studies.follow.follow import (
-    START_ROOM,
-    STARTS,
     find_doubts,
     has_two,
     load_values,
@@ -97,46 +95,6 @@ solve: {accuracy: draft, output_step_deg: 1}
     )
     (machine,) = machines(load_values(path, along), along)
     return machine
-
-
-def test_values_at_which_chains_differ_are_doubted(two):
-    """Up and down differ at the middle value alone, at 0.2 and 0.8 of the clearance."""
-    ups, downs = ([periodic(at=at) for at in places] for places in ((0, 0.2, 0), (0, 0.8, 0)))
-    every = [two, two]
-    ((where, doubt),) = find_doubts(every, [[ups, ups], [ups, downs]]).items()
-    assert where == (1, two.chains[0].values[1])
-    assert doubt.cases[:2] == (two.chains[0].cases[1],) * 2
-    assert doubt.begin([]) is ups[1]["end_state"]
-    assert doubt.begin([0]) is downs[1]["end_state"]
-    assert [doubt.begin([0] * number) for number in range(2, 2 + STARTS)] == [None] * STARTS
-    assert find_doubts(every, [[ups, ups], [ups, downs[:1]]]) == {}
-
-
-@pytest.mark.parametrize(
-    ("rows", "expected"),
-    [
-        ([periodic(), periodic(at=0.5), periodic()], True),
-        ([periodic(), periodic(), periodic()], False),
-        ([periodic(), periodic(), chaotic()], True),
-        ([UNKNOWN, periodic(), periodic()], False),
-        ([], False),
-    ],
-)
-def test_two_motions_that_are_reached_confirm(monkeypatch, two, tmp_path, rows, expected):
-    monkeypatch.setattr(follow, "read_rows", lambda chain, folder: rows)
-    assert has_two(two.chains[0], tmp_path) is expected
-
-
-def test_other_starts_are_within_the_clearances_and_always_the_same():
-    starts = [*other_starts(CASE)]
-    assert starts == [*other_starts(CASE)]
-    assert len({case.key for case in starts}) == STARTS
-    for case, joint in itertools.product(starts, ("big_end", "small_end")):
-        offset = case.initial_offset_mm
-        size = math.hypot(getattr(offset, f"{joint}_x"), getattr(offset, f"{joint}_y"))
-        assert 0 < size < START_ROOM * 0.2
-    alone = Case.from_values({"joint": "big_end", "clearance_mm": 0.2})
-    assert all(case.initial_offset_mm.small_end_x == 0 for case in other_starts(alone))
 
 
 def test_a_machine_with_two_motions_is_found_and_confirmed(two, tmp_path, monkeypatch):

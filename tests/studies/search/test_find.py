@@ -10,7 +10,6 @@ from compressor.studies.search.find import Point, find_extremum, find_first
 from compressor.studies.search.question import (
     Goal,
     JobReading,
-    Question,
     QuestionError,
     comparison,
     goal_of,
@@ -68,13 +67,6 @@ def test_a_threshold_is_between_the_ends(threshold, at_once):
     assert max(map(len, calls[1:])) <= at_once
 
 
-def test_no_share_is_asked_for_twice():
-    calls = []
-    find_first(jobs(lambda x: 1.0 + x - 0.3, calls=calls), ABOVE.holds, SCAN, 1e-4, 3)
-    shares = [share for call in calls for share in call]
-    assert len(shares) == len({*shares})
-
-
 def test_a_jump_is_found():
     found = find_first(jobs(lambda x: 2.0 if x >= 0.7 else 0.0), ABOVE.holds, SCAN, 1e-6, 2)
     assert found.low.share < 0.7 <= found.high.share
@@ -86,13 +78,6 @@ def test_the_first_of_several_changes_counts():
         jobs(lambda x: 1.0 + math.sin(4 * math.pi * (x - 0.05))), ABOVE.holds, SCAN, 1e-3
     )
     assert found.low.share <= 0.05 < found.high.share
-
-
-def test_a_comparison_that_becomes_false_is_found_by_its_opposite():
-    found = find_first(
-        jobs(lambda x: 2.0 - 3.0 * x), comparison("peak_acceleration < 1").holds, SCAN, 1e-3
-    )
-    assert found.low.share <= 1 / 3 < found.high.share
 
 
 @pytest.mark.parametrize(
@@ -118,12 +103,6 @@ def test_bars_leave_an_interval(bar):
     assert found.high.share > 0.4 + bar
     assert found.blind
     assert all(abs(point.share - 0.4) <= bar for point in found.blind)
-
-
-def test_what_cannot_be_decided_from_the_lower_end_on_has_no_lower_end():
-    found = find_first(jobs(lambda x: 0.95 + x, 0.1), ABOVE.holds, SCAN, 1e-3, 2)
-    assert (found.kind, found.low) == ("undecided", None)
-    assert found.high.share == pytest.approx(0.15, abs=1.001e-3)
 
 
 def test_failed_jobs_are_gone_around():
@@ -235,13 +214,6 @@ def test_a_limit_without_a_bar_is_decided(sign, there):
     assert Goal("peak_acceleration", (), sign, 5.0).holds(JobReading(5.0, 0.0)) is there
     assert Goal("peak_acceleration", (), sign, 5.0).holds(JobReading(5.0, 1e-9)) is None
     assert Goal("peak_acceleration", (), sign, 5.0).holds(FAILED) is None
-
-
-def test_arguments_are_even_in_the_range_or_its_logarithm():
-    even = Question("a.yaml", "clearance_mm", 0.1, 0.3, ABOVE, scan=3)
-    assert [even.argument(share) for share in even.shares] == [0.1, 0.2, 0.3]
-    log = Question("a.yaml", "clearance_mm", 0.001, 10.0, ABOVE, True, scan=5)
-    assert [log.argument(share) for share in log.shares] == [0.001, 0.01, 0.1, 1.0, 10.0]
 
 
 @pytest.mark.parametrize(

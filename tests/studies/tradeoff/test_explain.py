@@ -7,17 +7,13 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
-from compressor.cases.parameter import ACCURACY
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.explain import (
     explain,
     ideal_scales,
-    paid_value,
-    promise,
     terms,
-    unknown_names,
 )
-from compressor.studies.tradeoff.variants import FEATURES, choose_job
+from compressor.studies.tradeoff.variants import choose_job
 
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0}
 
@@ -131,52 +127,9 @@ def test_scales_follow_the_contact():
     assert (big.damping_ratio > 1, found.damping_ratio) == (True, 0.0)
 
 
-def test_scales_are_those_of_the_machine_without_features():
-    values = {"joint": "both", "clearance_mm": 0.2}
-    more = {"guide": {"clearance_mm": 0.1}, "drive": True, "rod": True, "lubricant": True}
-    plain, full = Case.from_values(values), Case.from_values(values | more)
-    assert [*ideal_scales(full)] == [*ideal_scales(plain)]
-    names = unknown_names(full)
-    assert len(names) == 11
-    assert names[4:6] == ("height in the guide, m", "tilt in the guide, rad")
-    assert names[-1] == "crank's lag, s"
-
-
-def test_what_a_case_pays_for_is_told_of_every_group():
-    more = {"guide": True, "drive": True, "rod": True, "lubricant": True}
-    case = Case.from_values({"joint": "both", "clearance_mm": 0.2} | more)
-    found = {one.key: paid_value(case, one) for one in FEATURES if one.is_in(case)}
-    assert {"guide", "drive", "rod", "lubricant"} <= found.keys()
-    assert "crosshead_length_mm 120" in found["guide"]
-    assert "None" not in " ".join(found.values())
-
-
-def test_freedoms_and_terms():
-    both = Case.from_values({"joint": "both", "clearance_mm": {"big_end": 0.1, "small_end": 0.2}})
-    active, absent = terms(both)
-    assert active["clearance"] == "0.1 mm at the big end, 0.2 mm at the small end"
-    assert active["load"] == "load = spring"
-    assert absent == [
-        "gravity", "back pressure", "friction of ideal joints", "friction of the guide",
-        "speed that gives way", "play of the guide", "oil film", "elastic rod",
-    ]  # fmt: skip
-    steel = Case.from_values(
-        {"joint": "big_end", "clearance_mm": 0.1, "contact": {"materials": ["steel", "copper"]}}
-    )
-    assert "steel on copper" in terms(steel)[0]["contact"]
-
-
 def test_power_is_told_of_every_cylinder_with_exact_corners():
     """The efficiency is 1 + c - c r^(1/n) of a clearance of 20 mm in a stroke of 240."""
     own = terms(Case.from_values({"load": "gas", "gas": {"discharge_MPa": 0.5}}))[0]
     efficiency = 1 + 20 / 240 * (1 - (0.5 / 0.105) ** (1 / 1.4))
     assert f"at a volumetric efficiency of {efficiency:.3g}" in own["cylinder"]
     assert "cylinder" not in terms(Case.from_values({"load": "gas"}))[0]  # the paper's corners
-
-
-@pytest.mark.parametrize("word", ACCURACY)
-def test_promises(word):
-    assert promise(Case.from_values({"solve": {"accuracy": word}})) == ACCURACY[word].promise
-    looser = Case.from_values({"solve": {"rtol": ACCURACY[word].rtol * 0.9}})
-    assert promise(looser) == ACCURACY[word].promise
-    assert promise(Case.from_values({"solve": {"rtol": 0.05}})) == ACCURACY["draft"].promise

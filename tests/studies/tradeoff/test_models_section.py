@@ -15,7 +15,6 @@ from compressor.store.studies import StoredAxis, StoredStudy
 from compressor.studies.tradeoff.page import (
     add,
     headline,
-    list_changes,
     main_numbers,
     model_table,
     models_file,
@@ -90,15 +89,6 @@ def test_a_change_is_what_lies_beyond_both_bars():
     assert table.rows[1].time_ratio == 3.0
 
 
-def test_impacts_of_a_revolution_change_by_a_number_and_no_points():
-    data = made(impacts_per_rev=([0.0, 2.0, 33.0, 0.0, math.nan, math.nan], [0.0] * 6))
-    table = model_table(data)
-    row = cells(table)["oil"]
-    (title,) = (name for name in row if "contacts after" in name)
-    assert row[title] == "+33"
-    assert table.span_texts[[*row].index(title)] == "0 to +33"
-
-
 def test_the_main_numbers_are_those_of_the_table():
     table = model_table(made())
     assert main_numbers(table) == {
@@ -157,14 +147,3 @@ def test_choices_are_read_where_they_are_of_a_job_of_the_study(tmp_path):
     write_dataset(path, xr.Dataset({"a": 1.0}))
     with pytest.warns(StoreWarning, match="holds no choices of the model"):
         assert len(read_models(tmp_path, study)) == 1
-
-
-def test_what_moves_each_metric_most_comes_first():
-    flat = made(max_penetration=([20e-6] * 6, [1e-9] * 6), rms_acceleration=(PEAK, PEAK_BAR))
-    table = model_table(flat.isel(choice=[0, 1, 2, 5]))
-    lines = [" ".join(line.split()) for line in list_changes("worn, the only job", table)]
-    assert lines[0] == f"worn, the only job: {headline(table)}"
-    start = next(n for n, line in enumerate(lines) if line.startswith("time without dry contact"))
-    assert lines[start + 1 : start + 3] == ["oil +99 points", "softer +4 points"]
-    assert "nothing is seen to move: max penetration, big end" in lines
-    assert {"impossible needs more", "softer K 1"} < {*lines}

@@ -1,40 +1,28 @@
 """Variants: which a case has, what they assume, and that they move metrics so far."""
 
 import json
-import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from compressor.cases import Lubricant
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
-from compressor.cases.materials import contact_stiffness
-from compressor.cases.optional_groups import Rod
-from compressor.cases.parameter import PerJoint
 from compressor.cases.table import table
-from compressor.metrics import JOINTS, METRICS
-from compressor.solve.si_record import stiffness_of
+from compressor.metrics import METRICS
 from compressor.solve.simulate import simulate
-from compressor.store.netcdf import write_dataset
 from compressor.store.reader import read_job
-from compressor.store.status import verify
 from compressor.studies.tradeoff import variants as module
-from compressor.studies.tradeoff.page import models_file
 from compressor.studies.tradeoff.variants import (
     CONTACT_LAWS,
     FEATURES,
     ITSELF,
-    Variant,
     change,
     choose_job,
     contact_values,
     explain_models,
-    format_value,
     other_models,
-    rod_values,
     run_variants,
     scale_contact,
     variants,
@@ -79,25 +67,6 @@ def few(monkeypatch):
 # ---- features -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("values", "paid"),
-    [
-        ({}, ["friction", "spring damping", "load"]),
-        ({"friction": False, "load": "none"}, []),
-        ({"load": "gas", "friction": False}, ["load"]),
-        ({"load": "gas", "gas": {"back_pressure_MPa": 0.1}, "friction": False},
-         ["back pressure", "load"]),
-        ({"machine": {"gravity_m_per_s2": 9.81}, "load": "none"}, ["friction", "gravity"]),
-        ({"joint": "both", "load": "none", "friction": False},
-         ["clearance of the big end", "clearance of the small end"]),
-    ],
-)  # fmt: skip
-def test_what_a_case_pays_for(values, paid):
-    found = [one for one in variants(case(**values)) if one.left_out]
-    names = {row.off or f"no {row.name}": row.name for row in FEATURES}
-    assert [names[one.name] for one in found] == paid
-
-
 @pytest.mark.parametrize("feature", FEATURES, ids=lambda feature: feature.name)
 def test_a_feature_that_is_left_out_is_no_longer_paid_for(feature):
     of_gas = feature.key.startswith("gas")
@@ -117,13 +86,6 @@ def test_a_feature_that_is_left_out_is_no_longer_paid_for(feature):
     assert Case.from_values(poor.values()) == poor  # still a valid case
     added = applied(feature.given, poor)
     assert added is None or feature.is_in(change(poor, added))
-
-
-def test_a_joint_made_ideal_starts_concentric():
-    both = case(joint="both", initial_offset_mm={"big_end_x": 0.1, "small_end_y": 0.1})
-    (one,) = (one.case for one in variants(both) if one.name == "ideal big end")
-    assert one.joint == "small_end"
-    assert (one.initial_offset_mm.big_end_x, one.initial_offset_mm.small_end_y) == (0, 0.1)
 
 
 def test_variants_of_one_faulty_joint_and_of_two():
@@ -150,44 +112,6 @@ def test_each_contact_law_may_stand_in_place_of_each_other(law, other):
         assert two.contact.stiffness_N_per_mm15 == 5e5
 
 
-def contact_of(values, law):
-    return change(values, contact_values(law, values)).contact
-
-
-def test_a_law_takes_over_restitution_materials_and_length():
-    given = {"law": "flores", "restitution": 0.7, "materials": ["steel", "copper"]}
-    contact = contact_of(case(contact=given), "liu")
-    assert (contact.restitution, contact.materials) == (0.7, PerJoint(*[("steel", "copper")] * 2))
-    assert contact.length_mm == PerJoint(20.0, 20.0)  # as long as wide
-    oiled = case(contact=given, lubricant={"bearing_length_mm": 15})
-    assert contact_of(oiled, "liu").length_mm == PerJoint(15.0, 15.0)
-    for law in ("hertz", "impact"):  # as of two discs, which the file says by no geometry
-        assert contact_of(case(contact=given), law).geometry is None
-
-
-def test_a_modulus_alone_gives_other_laws_the_default_stiffness():
-    given = {"law": "johnson", "modulus_GPa": 100, "length_mm": 30}
-    assert contact_of(case(contact=given), "liu").modulus_GPa == 100
-    assert contact_of(case(contact=given), "hertz").stiffness_N_per_mm15 == 3.36e5
-
-
-def test_an_elastic_rod_has_the_section_that_its_mass_needs():
-    assert change(case(), rod_values(case())).rod == Rod()
-    heavy = case(machine={"rod_mass_kg": 4 * 4.7, "rod_length_mm": 600})
-    assert rod_values(heavy)["rod"] == {"depth_mm": 80.0, "width_mm": 50.0}
-
-
-@pytest.mark.parametrize("key", ["guide", "guide.clearance_mm"])
-def test_a_guide_is_that_of_the_machine_s_own_crosshead(key):
-    """Its inertia was that of the default machine's 14 kg."""
-    heavy = case(machine={"reciprocating_mass_kg": 150})
-    (row,) = (row for row in FEATURES if row.key == key)
-    own = change(heavy, row.given).guide.crosshead_inertia_kg_m2
-    guide = {"clearance_mm": 0.05} if key != "guide" else True
-    given = Case.from_values(heavy.values() | {"guide": guide})
-    assert own == given.guide.crosshead_inertia_kg_m2 > 0.2
-
-
 # ---- other models -------------------------------------------------------------------------------
 
 
@@ -199,73 +123,6 @@ def test_the_other_models_of_a_plain_case():
         "play of the guide", "oil film", "elastic rod", "contact stiffness ÷ 2",
         "contact stiffness × 2", "contact damping ÷ 2", "contact damping × 2",
     ]  # fmt: skip
-
-
-def test_what_a_case_has_is_varied_the_other_way():
-    found = by_name(
-        case(lubricant=True, rod=True, guide={"clearance_mm": 0.1},
-             contact={"law": "flores", "restitution": 0.8}, friction={"law": "threlfall"})
-    )  # fmt: skip
-    assert found["dry joints"].case.lubricant is None
-    assert found["rigid rod"].case.rod is None
-    assert found["guide without play"].case.guide.clearance_mm == 0
-    assert found["contact law: IMPACT (ADAMS)"].case.contact.law == "impact"
-    assert found["friction law: ADAMS"].case.friction.law is None
-    assert not {"oil film", "elastic rod", "contact law: Flores"} & {*found}
-    without = by_name(case(friction=False))
-    assert without["friction"].case.friction == Case().friction
-    assert not [name for name in without if name.startswith("friction law")]
-
-
-def test_pins_that_are_not_the_paper_s_have_a_choice_of_their_own_stiffness():
-    values = {"joint": "small_end", "clearance_mm": 0.2}
-    name = "contact stiffness of its pins (Eq. 15)"
-    assert name not in {one.name for one in other_models(Case.from_values(values))}
-    odd = Case.from_values(values | {"machine": {"pin_radius_mm": 35}})
-    (one,) = (choice for choice in other_models(odd) if choice.name == name)
-    assert one.case.contact.materials.small_end == ("steel", "steel")
-    expected = contact_stiffness("steel", "steel", 0.035, 0.0352, internal=True)
-    assert stiffness_of(one.case, "small_end") == pytest.approx(expected)
-
-
-def test_stiffness_and_damping_are_doubled_and_halved_where_the_law_reads_them():
-    found = by_name(case())
-    contact = found["contact stiffness × 2"].case.contact
-    assert contact == replace(Case().contact, stiffness_N_per_mm15=6.72e5)
-    assert found["contact damping ÷ 2"].case.contact.damping_N_s_per_mm == 168
-    restituting = by_name(case(contact={"law": "flores", "restitution": 0.8}))
-    assert restituting["contact damping × 2"].case.contact.restitution == pytest.approx(0.6)
-    plastic = by_name(case(contact={"law": "flores", "restitution": 0.4}))["contact damping × 2"]
-    assert plastic[:3] == ("contact damping × 2", None, "needs a restitution above 0.5")
-    assert "contact damping × 2" not in by_name(case(contact={"law": "hertz"}))
-    liu = {"law": "liu", "length_mm": 20, "materials": ["steel", "steel"]}
-    line = by_name(case(contact=liu))["contact stiffness × 2"].case.contact
-    assert line.modulus_GPa == pytest.approx(207 / (1 - 0.29**2), rel=1e-9)  # E* doubled
-    steel = {"materials": ["steel", "steel"]}
-    made = by_name(case(joint="both", clearance_mm=0.1, contact=steel))["contact stiffness ÷ 2"]
-    assert made.case.contact.stiffness_N_per_mm15 == pytest.approx(1.68e5, rel=0.01)
-    assert made.note.startswith("stiffness_N_per_mm15 ")
-    apart = {"joint": "both", "clearance_mm": {"big_end": 0.1, "small_end": 0.2}}
-    two = case(**apart, contact=steel | {"geometry": "internal"})
-    each = [stiffness_of(two, joint) / 1000**1.5 for joint in JOINTS]
-    made = by_name(two)["contact stiffness × 2"]
-    assert made.case.contact.stiffness_N_per_mm15 == pytest.approx(2 * math.prod(each) ** 0.5)
-    assert made.note.startswith("of both joints, stiffness_N_per_mm15 ")
-
-
-def test_a_choice_that_cannot_be_says_why():
-    off = case(machine={"rod_centre_mm": 200})
-    rod = by_name(off)["elastic rod"]
-    assert rod.case is None
-    assert rod.note.startswith("cannot be: machine.rod_centre_mm: an elastic rod is a uniform bar")
-
-
-def test_bearings_of_the_default_length_are_tried_as_long_as_wide():
-    pins = {"big_end": 60, "small_end": 35}
-    oiled = {"joint": "both", "clearance_mm": 0.1, "lubricant": True}
-    assert "bearings as long as wide" not in by_name(case(**oiled))
-    one = by_name(case(**oiled, machine={"pin_radius_mm": pins}))["bearings as long as wide"]
-    assert [one.case.lubricant.bearing_length_mm.at(joint) for joint in JOINTS] == [120, 70]
 
 
 # ---- numbers in doubt ---------------------------------------------------------------------------
@@ -323,12 +180,6 @@ def test_what_follows_from_a_number_follows_when_it_is_varied(tmp_path):
     assert found["body.mass_kg 250"].body.casing_mass_kg == 10
     assert found["machine.rod_mass_kg 9.4"].machine.rod_inertia_kg_m2 == pytest.approx(0.282)
     assert found["body.casing_mass_kg 4"].body.mass_kg == 500
-
-
-def test_a_number_that_the_command_names_is_varied_though_it_is_given(tmp_path):
-    study = read_study(tmp_path)
-    named = ends(study, named=["machine.rod_mass_kg", "body.mass_kg"])
-    assert (named["machine.rod_mass_kg"], named["body.mass_kg"]) == ([20, 80], [3000, 12000])
 
 
 @pytest.mark.parametrize(
@@ -424,10 +275,6 @@ def test_rod_load_body_and_sensor_are_compared(few, tmp_path):
     assert "time" not in data.dims
 
 
-def test_the_ideal_machine_has_choices_beyond_its_contacts():
-    assert [*by_name(Case.from_values({"load": "none"}))] == ["play of the guide", "elastic rod"]
-
-
 def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
     few()
     path = Path(tmp_path / "worn.yaml")
@@ -460,58 +307,8 @@ def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
     assert data.attrs["key"] == study.keys[0]
 
 
-def test_a_damaged_table_is_named(few, tmp_path):
-    few(())
-    path = Path(tmp_path / "worn.yaml")
-    path.write_text(json.dumps({"joint": "big_end", "clearance_mm": 0.1, "solve": SHORT}))
-    kept = write_dataset(
-        models_file(tmp_path, "worn", "0" * 20), explain_models(load_studies(path)[0], 0)
-    )
-    assert verify(tmp_path) == []
-    kept.write_bytes(kept.read_bytes()[:-1])
-    (damage,) = verify(tmp_path)
-    assert damage.path == kept
-    assert "the command that made it makes it again" in damage.remedy
-
-
-def test_failed_and_impossible_variants_have_no_numbers():
-    good = case()
-    others = [
-        Variant("short", replace(good, solve=replace(good.solve, max_steps=20))),
-        Variant("none", None, "needs more"),
-    ]
-    data = run_variants(good, others)
-    assert data["status"].values.tolist() == ["ok", "failed", "missing"]
-    assert data["reason"].values.tolist() == ["", "budget_steps", ""]
-    assert data["note"].values.tolist() == ["", "", "needs more"]
-    assert data["peak_acceleration"].isnull().values.tolist() == [False, True, True]
-
-
 def test_a_case_that_fails_is_the_only_row():
     bad = case(solve={**SHORT, "max_steps": 20})
     data = run_variants(bad, scale_contact(bad))
     assert data["reason"].values.tolist() == ["budget_steps"]
     assert data.attrs["detail"] == "more than 20 steps"
-
-
-def test_equations_are_compiled_before_a_variant_has_its_time(monkeypatch):
-    done = []
-    monkeypatch.setattr(module, "compile_once", lambda needs, remark: done.append(needs))
-    real = module.fastest_run
-    monkeypatch.setattr(module, "fastest_run", lambda *of: done.append("run") or real(*of))
-    run_variants(case(), [Variant("oil", replace(case(), lubricant=Lubricant()))])
-    needs, *runs = done
-    assert needs.laws
-    assert runs == ["run"] * 2
-
-
-@pytest.mark.parametrize(
-    ("value", "words"),
-    [
-        (PerJoint(70.0, 70.0), "70"),
-        (PerJoint(120.0, 70.0), "big_end 120, small_end 70"),
-        (PerJoint(("steel", "steel"), ("steel", "steel")), "steel on steel"),
-    ],
-)
-def test_values_of_parts_are_told_as_one_where_they_are(value, words):
-    assert format_value(value) == words
