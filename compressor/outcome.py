@@ -61,7 +61,8 @@ class Outcome:
 
     `numbers`: a scalar of dtype ROW, metrics nan where the run did not reach its end; `reason`: a
     stable name, empty when ok; `attributes`: those of the job's Dataset, its `key` among them;
-    `series`: the time series that are to be stored, {} where none are.
+    `series`: the time series that are to be stored, {} where none are; `compress`: whether these
+    are to be deflated.
     """
 
     status: str
@@ -69,11 +70,12 @@ class Outcome:
     numbers: np.void
     attributes: dict[str, Any]
     series: "dict[str, Variable]" = field(default_factory=dict)
+    compress: bool = False
 
     def __reduce__(self) -> Any:
         """Return the pickled form without the names of all numbers, whose sending costs most."""
-        parts = self.status, self.reason, self.numbers.tobytes(), self.attributes, self.series
-        return _rebuild_outcome, parts
+        rest = self.attributes, self.series, self.compress
+        return _rebuild_outcome, (self.status, self.reason, self.numbers.tobytes(), *rest)
 
     @property
     def key(self) -> str:
@@ -85,13 +87,15 @@ class Outcome:
         """Return what is known of a failure beyond its reason."""
         return str(self.attributes.get("detail", ""))
 
-    def with_series(self, variables: Mapping[str, tuple], precision: str) -> "Outcome":
+    def with_series(
+        self, variables: Mapping[str, tuple], precision: str, compress: bool = False
+    ) -> "Outcome":
         """Return this outcome with time series to be stored, in single or double precision."""
         series = {}
         for name, (dims, values, attrs) in variables.items():
             is_exact = precision == "double" or "time" not in dims or name in ABSCISSAE
             series[name] = Variable(dims, np.asarray(values, float if is_exact else "f4"), attrs)
-        return replace(self, series=series)
+        return replace(self, series=series, compress=compress)
 
     def table(self, more: Mapping[str, tuple]) -> "DatasetParts":
         """Return what the job's Dataset is made of: its own variables, and more of them."""

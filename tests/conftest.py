@@ -26,7 +26,7 @@ from compressor.metrics import NUMBERS, SIZES
 from compressor.outcome import ROW, Outcome
 from compressor.solve.simulate import simulate
 from compressor.store.batch import write_batch
-from compressor.store.reader import read_store
+from compressor.store.stored import read_store
 from compressor.store.studies import read_studies, write_study
 from compressor.sweep.worker import JobResult
 
@@ -171,21 +171,20 @@ def outcome_of(dataset):
         for name, item in dataset.variables.items()
         if item.dtype.kind == "f" and item.dims and name not in NUMBERS and name not in SIZES
     }
-    return found.with_series(series, Case.from_attribute(dataset.attrs["case"]).output.precision)
+    output = Case.from_attribute(dataset.attrs["case"]).output
+    return found.with_series(series, output.precision, output.compress)
 
 
 def keep(folder, *datasets):
     """Store jobs as they are, whatever they hold, as a sweep would."""
     for dataset in datasets:
-        compress = Case.from_attribute(dataset.attrs["case"]).output.compress
-        write_batch(folder, [outcome_of(dataset)], compress)
+        write_batch(folder, [outcome_of(dataset)])
 
 
 def damage_series(folder, key):
     """Flip a bit in each time series of a stored job; return its batch."""
-    rows = read_store(folder).rows
-    (position,) = rows.find([key])
-    path, row = rows.path(position), int(rows.row[position])
+    stored = read_store(folder)
+    path, row = stored.batch_of(stored.position(key))
     with h5py.File(path) as file:
         places = [
             data.id.get_chunk_info_by_coord((row, *(0 for _ in data.shape[1:]))).byte_offset

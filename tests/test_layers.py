@@ -66,7 +66,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "click": {"compsim"},
     "rich": {"compsim.progress"},
     "pyarrow": {"compressor.studies.diagnosis"},
-    "sklearn": {"compressor.store.status", "compressor.studies.diagnosis.identify"},
+    "sklearn": {"compressor.store.caveats", "compressor.studies.diagnosis.identify"},
 }  # fmt: skip
 
 Sources = dict[str, str]  # module -> text; a package's door has the package's name

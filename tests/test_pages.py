@@ -272,7 +272,7 @@ def folder(tmp_path_factory):
 @pytest.mark.slow
 def test_console_commands_work(folder):
     assert (folder / "report" / "index.html").exists()
-    assert (read_store(folder / "results").rows.samples > 0).sum() == 11
+    assert (read_store(folder / "results").columns["samples"] > 0).sum() == 11
     assert (folder / "wear-report" / "index.html").exists()
     assert len((folder / "big-end.csv").read_text(encoding="utf-8").splitlines()) == 4
     assert len(list((folder / "exported").glob("*/*.csv"))) == 11

@@ -95,8 +95,8 @@ def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
         return
     from compressor.store import read_store, read_studies, run_caveats
 
-    ran, rows = {one.study for one in summary.counts}, read_store(folder).rows
+    ran, stored = {one.study for one in summary.counts}, read_store(folder)
     for study in read_studies(folder):  # what only runs show: `caution` has said the rest
-        for text in run_caveats(rows, study) if study.name in ran else ():
+        for text in run_caveats(stored, study) if study.name in ran else ():
             screen.say_wrapped(f"{study.name}: {text}")
     screen.say(f"next: compsim report -r {shlex.quote(folder)}")

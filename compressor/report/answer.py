@@ -81,7 +81,7 @@ def last_case(stored: Stored, study: StoredStudy) -> Case | None:
 
     None where there is none that this version knows.
     """
-    places = [place for place in stored.rows.find([*study.keys]).tolist() if place >= 0]
+    places = [place for place in stored.find([*study.keys]).tolist() if place >= 0]
     return stored.case_at(places[-1]) if places else None
 
 

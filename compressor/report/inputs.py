@@ -38,7 +38,7 @@ class Inputs:
 
 def find_inputs(stored: Stored, study: StoredStudy) -> Inputs | None:
     """Return the inputs of a study; None where this version knows no case of it."""
-    places = [place for place in stored.rows.find([*study.keys]).tolist() if place >= 0]
+    places = [place for place in stored.find([*study.keys]).tolist() if place >= 0]
     places = places[:: -(-len(places) // MAX_CASES) or 1]
     cases = [case for place in places if (case := stored.case_at(place))]
     if not cases:

@@ -282,16 +282,16 @@ def read_shown(stored: Stored, key: str) -> xr.Dataset:
 
     A tenth of the time that all of the job takes.
     """
-    position = stored.rows.find([key])[0]
+    position = stored.find([key])[0]
     variables = {
         name: (("time", *SERIES.get(name, ((),))[0]), values)
         for name, values in stored.values(key, SHOWN).items()
     }
     try:
-        settle = stored.rows.attributes(position)["settle"]
+        settle = stored.attributes(position)["settle"]
         return xr.Dataset(variables, attrs={"settle": settle})
     except (KeyError, ValueError) as error:
-        path = stored.rows.path(position)
+        path = stored.batch_of(position)[0]
         problem = "holds time series of different lengths, or no end of settling"
         raise DamagedFile(path, problem, "run its study again") from error
 

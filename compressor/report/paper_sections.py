@@ -72,7 +72,7 @@ def find_paper_runs(stored: Stored, studies: Sequence[StoredStudy]) -> PaperRuns
 
 def is_of_paper(stored: Stored, study: StoredStudy) -> bool:
     """Return whether all stored jobs of a study, and at least one, are cases of the paper."""
-    count = sum(at >= 0 for at in stored.rows.find([*study.keys]))
+    count = sum(at >= 0 for at in stored.find([*study.keys]))
     labels = {case.physics_key for case in paper_cases().values()}
     return 0 < count == len(paper_candidates(stored, [study], labels))
 
@@ -97,7 +97,7 @@ def find_runs(
     found: dict[str, xr.Dataset] = {}
     damaged = set()
     for key in paper_candidates(stored, studies, labels):
-        name = labels[str(stored.rows.word("physics_key")[stored.position(key)])]
+        name = labels[str(stored.words("physics_key")[stored.position(key)])]
         try:
             run = stored.job(key)
         except DamagedFile as error:
@@ -119,9 +119,9 @@ def paper_candidates(
     In the studies' order, each once. physics: the physics keys.
     """
     keys = list(dict.fromkeys(key for study in studies for key in study.keys))
-    positions = stored.rows.find(keys)
+    positions = stored.find(keys)
     physics_keys = np.array([*physics], "S")
-    same = np.isin(stored.rows.bytes_of["physics_key"], physics_keys)
+    same = np.isin(stored.columns["physics_key"], physics_keys)
     return [key for key, at in zip(keys, positions, strict=True) if at >= 0 and same[at]]
 
 

@@ -77,6 +77,7 @@ from compressor.store import (
     Stored,
     StoredStudy,
     find_study,
+    label_studies,
     publish,
     read_store,
     read_studies,
@@ -189,7 +190,7 @@ def build_report(
         *chain(*(one.plates for one in of_own.values()), of_faults, *(one.plates for one in drawn))
     ]
     later += [plate for chapter in chapters for plate in plates_in(chapter.plates, units)]
-    caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored.rows, one)]
+    caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored, one)]
     judged = claims(paper.usable) if paper.stored else []
     figures, tables = paper_sections(paper, of_paper, judged, caveats, units)
     sections = [
@@ -256,7 +257,7 @@ def drawn_study(
 
     And revolutions over the crank angle. Neither is drawn where the paper's figures are.
     """
-    with stored.label([study]) as data:
+    with label_studies(stored, [study]) as data:
         plates = [
             Plate(file_name("sweep", study.name, one.name), f"{study.name}: {one.title}",
                   one.caption, one.figure)
@@ -289,7 +290,7 @@ def motion_cautions(stored: Stored, study: StoredStudy, data: xr.Dataset) -> lis
     texts = [
         f"{chaotic} of {study.jobs} jobs are chaotic, and their peaks do not count here{of_knock}"
     ]
-    found = [*texts[: chaotic > 0], *run_caveats(stored.rows, study)]
+    found = [*texts[: chaotic > 0], *run_caveats(stored, study)]
     return [f"Study {study.name}: {text}." for text in found]
 
 

@@ -59,7 +59,7 @@ def compare_healthy(
             force = np.fmax(force, np.where(worn, known_values(measure, data), np.nan))
     jobs = np.flatnonzero(has_clearance)
     ranked = jobs[np.argsort(-force[jobs], kind="stable")]  # what is not known comes last
-    rows = stored.rows.find([*map(str, data["key"].values.ravel())]).tolist()
+    rows = stored.find([*map(str, data["key"].values.ravel())]).tolist()
     for place in ranked[:MAX_TRIED].tolist():
         if case := stored.case_at(rows[place]):
             alike = [n for n in differing_in_clearance(data, place) if has_clearance[n]]

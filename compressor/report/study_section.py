@@ -111,7 +111,7 @@ def study_sections(
         case_file=study.case_file,
         counts=job_counts(data).text,
         chaotic=int((data["regime"].values == Regime.CHAOTIC).sum()),
-        caveats=study_caveats(stored.rows, study),
+        caveats=study_caveats(stored, study),
         failures=failed_jobs(stored, data),
         remedies=[f"{reason}: {remedy(reason)}" for reason in reasons],
         plates=plates,

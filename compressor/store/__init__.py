@@ -1,6 +1,8 @@
 """Outcomes on disk, and back."""
 
 from compressor.store.batch import encode_batch, publish_batch, write_batch
+from compressor.store.caveats import run_caveats, study_caveats
+from compressor.store.demands import serving_both
 from compressor.store.export import ExportOptions, export
 from compressor.store.files import (
     Folder,
@@ -12,16 +14,10 @@ from compressor.store.files import (
 )
 from compressor.store.merge import merge_batches
 from compressor.store.netcdf import DamagedFile, read_dataset, write_dataset
-from compressor.store.reader import Stored, open_study, read_job, read_store
+from compressor.store.reader import label_studies, open_study, read_job
 from compressor.store.sensor_records import find_record, job_record
-from compressor.store.status import (
-    JobReport,
-    report_job,
-    run_caveats,
-    standings,
-    study_caveats,
-    verify,
-)
+from compressor.store.status import JobReport, report_job, standings, verify
+from compressor.store.stored import Stored, read_store
 from compressor.store.studies import (
     Again,
     StoredStudy,

@@ -10,15 +10,15 @@ import xarray as xr
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from compressor.cases import phrase_of, points, table, value_in
+from compressor.cases import points, table, value_in
 from compressor.digits import is_known
 from compressor.metrics import BARRED, NUMBERS, SIZES
 from compressor.outcome import Variable, coordinates, word_variables
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
 from compressor.store.netcdf import DamagedFile
-from compressor.store.rows import Rows
-from compressor.store.studies import StoredStudy, coordinate_names
+from compressor.store.stored import Stored
+from compressor.store.studies import StoredStudy, coordinate_names, swept_column
 
 
 @dataclass(frozen=True)
@@ -30,74 +30,71 @@ class Layout:
     coordinates: dict[str, xr.Variable]
 
 
-def _coordinate(dims: tuple[str, ...], key: str, values: Sequence[Any], units: str) -> xr.Variable:
-    attrs = {"units": units} if units else {}
-    attrs |= {"long_name": phrase_of(key), "case_key": key}
-    if not units:
-        values = [_word(value) for value in values]
-    return xr.Variable(dims, np.array(values), attrs)
-
-
-def _word(value: Any) -> str:
-    return ", ".join(map(_word, value)) if isinstance(value, tuple) else str(value).lower()
-
-
-def grid(study: StoredStudy) -> Layout:
-    """Return the layout of one study that is a grid: a dimension for every axis."""
+def lay_out(studies: Sequence[StoredStudy]) -> Layout:
+    """Return the layout of studies: of one that is a grid by its axes, else one of jobs."""
+    if len(studies) != 1 or not studies[0].is_grid:
+        return lay_out_jobs(studies)
+    (study,) = studies
     names = coordinate_names([axis.key for axis in study.axes])
-    coordinates = {
-        names[axis.key]: _coordinate((names[axis.key],), axis.key, axis.values, axis.units)
+    axes = {
+        name: xr.Variable(name, *swept_column(axis.key, axis.values))
         for axis in study.axes
+        for name in [names[axis.key]]
     }
     shape = tuple(len(axis.values) for axis in study.axes)
-    return Layout(tuple(coordinates), np.array(study.keys).reshape(shape), coordinates)
+    return Layout(tuple(axes), np.array(study.keys).reshape(shape), axes)
 
 
-def table_of_jobs(studies: Sequence[StoredStudy]) -> Layout:
-    """Return the layout of several studies, or of one that is no grid: one dimension, `job`."""
-    units = {"joint": "", "load": ""} | {a.key: a.units for s in studies for a in s.axes}
-    rows = [(study, point) for study in studies for point in points(study)]
-    coordinates = {"study": xr.Variable("job", [study.name for study, _ in rows])}
-    for key, name in coordinate_names(list(units)).items():
-        missing = np.nan if units[key] else ""
-        swept = {study.name: any(axis.key == key for axis in study.axes) for study in studies}
-        values = [
-            point.get(key, missing) if swept[study.name] else _fixed_value(study, key, missing)
-            for study, point in rows
-        ]
-        coordinates[name] = _coordinate(("job",), key, values, units[key])
-    keys = [key for study in studies for key in study.keys]
-    return Layout(("job",), np.array(keys), coordinates)
+def lay_out_jobs(studies: Sequence[StoredStudy]) -> Layout:
+    """Return the layout of studies with one dimension, `job`."""
+    swept = dict.fromkeys(axis.key for study in studies for axis in study.axes)
+    found = {"study": xr.Variable("job", [study.name for study in studies for _ in study.keys])}
+    for key, name in coordinate_names([*{"joint": 0, "load": 0} | swept]).items():
+        column: list[Any] = []
+        for study in studies:
+            if any(axis.key == key for axis in study.axes):
+                column += [point.get(key) for point in points(study)]
+            else:
+                column += [value_in(study.fixed, key)] * study.jobs
+        found[name] = xr.Variable("job", *swept_column(key, column))
+    return Layout(("job",), np.array([key for study in studies for key in study.keys]), found)
 
 
-def _fixed_value(study: StoredStudy, key: str, missing: Any) -> Any:
-    """Return the value of a key in all jobs of a study; `missing` where it has no single one."""
-    value = value_in(study.fixed, key)
-    return missing if value is None else value
-
-
-def outcomes(layout: Layout, rows: Rows) -> xr.Dataset:
-    """Return the Dataset of a layout from the rows of a store, without time series."""
-    positions = rows.find(layout.keys)
-    variables = _outcomes(layout, rows, positions)
+def label_jobs(layout: Layout, stored: Stored, with_series: bool = False) -> xr.Dataset:
+    """Return the Dataset of a layout from the jobs of a store, with their time series if wanted."""
+    positions = stored.find(layout.keys)
     found = positions[positions >= 0]
-    if (rows.bytes_of["reason"][found] != Reason.INTERNAL_ERROR.encode()).any():
-        variables |= _metrics(layout, rows, positions)
+    variables = _words(layout, stored, positions)
+    if (stored.columns["reason"][found] != Reason.INTERNAL_ERROR.encode()).any():
+        given = [name for name in NUMBERS if name in stored.given]
+        numbers = stored.numbers(positions, given)
+        for name, metric in NUMBERS.items():
+            if name in given and metric.is_given(numbers[name]):
+                dims = (*layout.dims, *metric.dims)
+                variables[name] = xr.Variable(dims, numbers[name], metric.attributes)
         axes = coordinates(dim for one in variables.values() for dim in one.dims)
-        variables |= {n: xr.Variable(*parts) for n, parts in axes.items()}
-    return _with_coordinates(variables, layout)
+        variables |= {name: xr.Variable(*parts) for name, parts in axes.items()}
+    if with_series:
+        variables |= _series(layout, stored, positions)
+    dataset = xr.Dataset(variables | layout.coordinates)
+    names = ["key", "study", *SIZES, "time", *layout.coordinates]
+    return dataset.set_coords([name for name in names if name in dataset])
 
 
-def label_dataset(layout: Layout, rows: Rows) -> xr.Dataset:
-    """Return the Dataset of a layout, from the rows of a store and its jobs with time series."""
-    dataset = outcomes(layout, rows)
-    positions = rows.find(layout.keys)
-    found = np.unique(positions[positions >= 0])
-    whole = found[rows.samples[found] > 0]
-    if not whole.size:
-        return dataset
-    series = _series(layout, rows, positions, whole)
-    return _with_coordinates(dict(dataset.variables) | series, layout)
+def _words(layout: Layout, stored: Stored, positions: np.ndarray) -> dict[Any, xr.Variable]:
+    """Return the key, status, reason, promise and regime of every job."""
+
+    def variable(name: str, otherwise: str, phrase: str) -> xr.Variable:
+        values = np.append(stored.words(name), otherwise)[positions]  # the last one at -1
+        return xr.Variable(layout.dims, values, {"long_name": phrase})
+
+    return {
+        "key": xr.Variable(layout.dims, layout.keys, {"long_name": "a job's identity"}),
+        "status": variable("status", "missing", "ok, failed or missing"),
+        "reason": variable("reason", "", "why a run failed"),
+    } | {
+        name: variable(name, "", one.attrs["long_name"]) for name, one in word_variables({}).items()
+    }
 
 
 def mask_untrusted(dataset: xr.Dataset) -> xr.Dataset:
@@ -128,87 +125,48 @@ def machine_constants(studies: Sequence[StoredStudy], layout: Layout) -> dict[st
         for key, row in table().items()
         if key.startswith("machine.") and row.kind == "number" and not row.optional
     ]
-    names = coordinate_names([row.key for row in rows])
     found = {}
-    for row in rows:
-        values = [_fixed_value(study, row.key, np.nan) for study in studies]
-        name = names[row.key]
+    for row, name in zip(rows, coordinate_names([row.key for row in rows]).values(), strict=True):
+        given = [value_in(study.fixed, row.key) for study in studies]
+        values = [np.nan if value is None else value for value in given]
         if name in layout.coordinates or not all(isinstance(one, int | float) for one in values):
             continue
         attrs = {"units": row.unit or "1", "long_name": row.label, "case_key": row.key}
-        if len(studies) == 1:
-            found[name] = xr.Variable((), float(values[0]), attrs)
-        else:
-            jobs = np.repeat(np.array(values, float), [study.jobs for study in studies])
-            found[name] = xr.Variable(("job",), jobs, attrs)
+        jobs = np.repeat(np.array(values, float), [study.jobs for study in studies])
+        found[name] = xr.Variable((), jobs[0], attrs) if len(studies) == 1 else (
+            xr.Variable(("job",), jobs, attrs)
+        )  # fmt: skip
     return found
 
 
-def _with_coordinates(variables: dict[Any, Any], layout: Layout) -> xr.Dataset:
-    names = ["key", "study", *SIZES, "time", *layout.coordinates]
-    dataset = xr.Dataset(variables | layout.coordinates)
-    return dataset.set_coords([name for name in names if name in dataset])
-
-
-def _outcomes(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
-    """Return the key, status, reason, promise and regime of every job."""
-    is_stored = positions >= 0
-
-    def words(name: str, otherwise: str) -> np.ndarray:
-        return np.where(is_stored, _values_at(rows.word(name), positions), otherwise)
-
-    texts = {
-        "key": (layout.keys, "a job's identity"),
-        "status": (words("status", "missing"), "ok, failed or missing"),
-        "reason": (words("reason", ""), "why a run failed"),
-    }
-    for name, one in word_variables({}).items():
-        texts[name] = (words(name, ""), one.attrs["long_name"])
-    return {
-        name: xr.Variable(layout.dims, values, {"long_name": phrase})
-        for name, (values, phrase) in texts.items()
-    }
-
-
-def _values_at(values: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """Return the values at positions; anything where a position is -1."""
-    return values[positions] if values.size else np.full(positions.shape, "")
-
-
-def _metrics(layout: Layout, rows: Rows, positions: np.ndarray) -> dict[str, xr.Variable]:
-    """Return all numbers of the rows, nan where a job has none, but for those that no job has."""
-    found = {}
-    for name, values in rows.numbers(positions).items():
-        metric = NUMBERS[name]
-        if metric.is_given(values):
-            found[name] = xr.Variable((*layout.dims, *metric.dims), values, metric.attributes)
-    return found
-
-
-def _series(
-    layout: Layout, rows: Rows, positions: np.ndarray, whole: np.ndarray
-) -> dict[str, xr.Variable]:
+def _series(layout: Layout, stored: Stored, positions: np.ndarray) -> dict[str, xr.Variable]:
     """Return the time series of all jobs; none but those of one of the longest are read yet."""
-    template = _first_readable(rows, whole[np.argsort(-rows.samples[whole], kind="stable")])
-    if not template:
+    samples, ends = stored.columns["samples"], stored.columns["end_time"]
+    found = np.unique(positions[positions >= 0])
+    whole = found[samples[found] > 0]
+    if not whole.size:
         return {}
-    lengths = {*zip(rows.samples[whole].tolist(), rows.ends[whole].tolist(), strict=True)}
-    positions = np.where(np.isin(positions, whole), positions, -1)
+    template = _first_readable(stored, whole[np.argsort(-samples[whole], kind="stable")])
+    lengths = {*zip(samples[whole].tolist(), ends[whole].tolist(), strict=True)}
     dim = "time" if len(lengths) == 1 else "sample"
-    found = {"time": xr.Variable(*template["time"])} if dim == "time" else {}
+    variables: dict[str, xr.Variable] = {}
     for name, item in template.items():
-        if "time" in item.dims and name not in found:
-            lazy = StudySeries(rows, name, positions, item.values.shape)
+        if name == dim:
+            variables[name] = xr.Variable(*item)
+        elif "time" in item.dims:
+            lazy = indexing.LazilyIndexedArray(
+                StudySeries(stored, name, positions, item.values.shape)
+            )
             dims = (*layout.dims, dim, *item.dims[1:])
-            found[name] = xr.Variable(dims, indexing.LazilyIndexedArray(lazy), item.attrs)
-    return found
+            variables[name] = xr.Variable(dims, lazy, item.attrs)
+    return variables
 
 
-def _first_readable(rows: Rows, positions: np.ndarray) -> dict[str, Variable]:
+def _first_readable(stored: Stored, positions: np.ndarray) -> dict[str, Variable]:
     """Return the series of the first of some jobs that is not damaged; {} without one, and warn."""
     for position in positions.tolist():
         try:
-            return rows.series(position)
+            return stored.series(position)
         except DamagedFile as error:
             damage = error
     warnings.warn(f"{damage}: no time series can be read", StoreWarning, stacklevel=2)
@@ -218,8 +176,8 @@ def _first_readable(rows: Rows, positions: np.ndarray) -> dict[str, Variable]:
 class StudySeries(BackendArray):
     """One series of all jobs of a study; indexing reads the batches of those jobs alone."""
 
-    def __init__(self, rows: Rows, name: str, positions: np.ndarray, longest: tuple[int, ...]):
-        self.rows, self.name, self.positions, self.longest = rows, name, positions, longest
+    def __init__(self, stored: Stored, name: str, positions: np.ndarray, longest: tuple[int, ...]):
+        self.stored, self.name, self.positions, self.longest = stored, name, positions, longest
         self.shape = (*positions.shape, *longest)
         self.dtype = np.dtype(float)
 
@@ -228,18 +186,13 @@ class StudySeries(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, basic, self._read)
 
     def _read(self, index: tuple[Any, ...]) -> np.ndarray:
+        """Return some samples of some jobs, nan beyond the end of each."""
         jobs, samples = index[: self.positions.ndim], index[self.positions.ndim :]
         positions = np.asarray(self.positions[jobs])
-        blocks = self.rows.fresh(
-            positions.ravel(), lambda rows, at: self._blocks(rows, at, samples)
-        )
-        return blocks.reshape((*positions.shape, *blocks.shape[1:]))
-
-    def _blocks(self, rows: Rows, positions: np.ndarray, samples: tuple[Any, ...]) -> np.ndarray:
-        """Return a series of jobs, (jobs, samples, ...), nan beyond the end of each."""
-        found = np.full((positions.size, *np.empty(self.longest)[samples].shape), np.nan)
-        for place, values in rows.series_of_jobs(self.name, positions):
+        shape = np.empty(self.longest)[samples].shape
+        found = np.full((positions.size, *shape), np.nan)
+        for place, values in self.stored.series_of_jobs(self.name, positions.ravel()):
             block = np.full(self.longest, np.nan)
             block[: len(values)] = values
             found[place] = block[samples]
-        return found
+        return found.reshape((*positions.shape, *shape))

@@ -5,16 +5,14 @@ Records of sensors, as programs that analyse vibration open them, are WAV and MA
 A CSV file has one header line, units in brackets where a name does not end in its unit, and
 numbers that read back to the bit; an empty cell is a number that there is not. A sensor's record
 has times of its own: its columns are those that `compsim identify` reads, and the shorter columns
-of a job end in empty cells. Rows are written block by block, and every file is whole or absent.
+of a job end in empty cells. Every file is whole or absent.
 """
 
-import csv
-import io
 import itertools
 import json
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,10 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compressor.program import PROGRAM, CompsimError, Progress, no_progress
-from compressor.store.files import Folder, WrongName, publish, publishing
+from compressor.store.files import Folder, WrongName, publish
 from compressor.store.netcdf import DamagedFile, encode_dataset
-from compressor.store.reader import Stored, read_store
 from compressor.store.sensor_records import NEEDS_SENSOR
+from compressor.store.stored import Stored, read_store
 from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
 from compressor.units import Units, unit_in
 
@@ -34,8 +32,9 @@ if TYPE_CHECKING:
 
 RECORD_SUFFIXES = {"wav": ".wav", "mat": ".mat"}  # of a sensor's record alone
 SUFFIXES = {"netcdf": ".nc", "csv": ".csv", **RECORD_SUFFIXES}
-BLOCK = 4096  # rows of a CSV file that are text at the same time
 HEXADECIMAL = re.compile("[0-9a-f]{1,20}")
+
+Content = tuple[StoredStudy, ...] | str  # of a file: studies, or a job by its key
 
 
 class ExportError(CompsimError):
@@ -66,19 +65,8 @@ class Exported:
     path: str
     # metrics: of studies, a row a job | series: of one job, a row a sample | record: of its sensor
     kind: str
-    name: str  # of the studies, or the job's key
     rows: int
     bytes: int
-
-
-@dataclass(frozen=True)
-class _Task:
-    """A file to be written: with metrics of studies, or with the time series of one job."""
-
-    path: Path
-    studies: tuple[StoredStudy, ...] = ()
-    key: str = ""
-    named: bool = True  # rather than one of all jobs of a study
 
 
 def export(
@@ -94,36 +82,57 @@ def export(
     or .mat for the sensor's record of one job; or a folder, in which each gets a file: a name
     without a suffix, with a slash at its end, or of a folder.
 
-    Returns what was written, and damage that was met, which costs the jobs in it alone. Raises
+    Returns what was written, and damage that was met, which costs the files of it alone. Raises
     ExportError before anything is written, StoreError where the store or the disk gives way.
     """
     stored, known = read_store(folder), read_studies(folder)
-    studies, keys = _named_jobs(folder, names, stored, known)
-    target = Path(output)
     options = options or ExportOptions()
-    form, is_file = _form(output, options.form)
+    form, is_file = _choose_form(output, options)
+    studies, keys = _named_jobs(folder, names, stored, known)
+    files = _plan_files(Path(output), form, is_file, stored, studies, keys, options.series)
+    for path in () if options.force else files:
+        if os.path.lexists(path):
+            raise ExportError(f"{path} exists: --force replaces it")
+    found, damaged = [], [*stored.damaged]
+    for number, (path, content) in enumerate(files.items()):
+        progress(number, len(files), "")
+        try:
+            if isinstance(content, str):
+                kind, rows, data = _encode_job(stored, content, form, options.units)
+            else:
+                rows = sum(study.jobs for study in content)
+                kind, data = "metrics", _encode_metrics(stored, content, form, options.units)
+        except DamagedFile as error:
+            damaged.append(error)
+            continue
+        publish(path, data)
+        found.append(Exported(os.fspath(path), kind, rows, len(data)))
+    return found, damaged
+
+
+def _choose_form(output: Folder, options: ExportOptions) -> tuple[str, bool]:
+    """Return the form of an export, and whether it goes to one file, by the target's suffix.
+
+    Raises ExportError for a suffix that is none of SUFFIXES, unless the name is that of a folder:
+    one that exists, or ends in a slash.
+    """
+    target, form = Path(output), options.form
+    is_file = bool(target.suffix) and not (target.is_dir() or os.fspath(output).endswith(os.sep))
+    if is_file:
+        known = {suffix: form for form, suffix in SUFFIXES.items()}.get(target.suffix)
+        if known is None:
+            raise ExportError(
+                f"{target}: no files of the type {target.suffix} are written: end the name in "
+                f".nc or .csv, for a job's record in {' or '.join(RECORD_SUFFIXES.values())}, or, "
+                f"for a folder, in {os.sep}"
+            )
+        if form not in (None, known):
+            raise ExportError(f"{target} is no name for {form}: end it in {SUFFIXES[form or '']}")
+        form = known
+    form = form or "netcdf"
     if options.units == "plant" and form != "csv":
         raise ExportError(f"{target}: plant units are of CSV alone: leave out --units")
-    if studies and form in RECORD_SUFFIXES:
-        problem = f"a file of the type {SUFFIXES[form]} is the sensor's record of one job"
-        raise ExportError(f"{target}: {problem}: name jobs by their keys, not studies")
-    if is_file:
-        tasks = [_one_file(target, studies, keys, options.series)]
-    else:
-        tasks = [*_files(target, SUFFIXES[form], stored, studies, keys, options.series)]
-    if not options.force:
-        _refuse_existing(tasks)
-    found, damaged = [], list(stored.damaged)
-    for number, task in enumerate(tasks):
-        progress(number, len(tasks), "")
-        try:
-            write = _metrics if task.studies else _series
-            found.append(write(task, stored, form, options.units))
-        except DamagedFile as error:
-            if task.named:
-                raise
-            damaged.append(error)
-    return found, damaged
+    return form, is_file
 
 
 def _named_jobs(
@@ -139,113 +148,78 @@ def _named_jobs(
             keys.append(whole_key(folder, name, known, stored.keys()))
         else:
             studies.append(find_study(folder, name, known))
-    return studies, list(dict.fromkeys(keys))
+    return studies, keys
 
 
-def _form(output: Folder, form: str | None) -> tuple[str, bool]:
-    """Return the form of an export, and whether it goes to one file, by the target's suffix.
-
-    Raises ExportError for a suffix that is none of SUFFIXES, unless the name is that of a folder:
-    one that exists, or ends in a slash.
-    """
-    target = Path(output)
-    if not target.suffix or target.is_dir() or os.fspath(output).endswith(os.sep):
-        return form or "netcdf", False
-    known = {suffix: form for form, suffix in SUFFIXES.items()}.get(target.suffix)
-    if known is None:
-        raise ExportError(
-            f"{target}: no files of the type {target.suffix} are written: end the name in "
-            f".nc or .csv, for a job's record in {' or '.join(RECORD_SUFFIXES.values())}, or, for "
-            f"a folder, in {os.sep}"
-        )
-    if form not in (None, known):
-        raise ExportError(f"{target} is no name for {form}: end it in {SUFFIXES[form or known]}")
-    return known, True
-
-
-def _one_file(
-    target: Path, studies: Sequence[StoredStudy], keys: Sequence[str], series: bool
-) -> _Task:
-    if series or len(keys) > 1 or (keys and studies):
-        raise ExportError(f"{target} is one file, and this needs several: give a folder")
-    return _Task(target, tuple(studies), "".join(keys))
-
-
-def _files(
+def _plan_files(
     target: Path,
-    suffix: str,
+    form: str,
+    is_file: bool,
     stored: Stored,
     studies: Sequence[StoredStudy],
     keys: Sequence[str],
     series: bool,
-) -> Iterator[_Task]:
-    """Yield a file for each study and each job, and those of the studies' time series."""
+) -> dict[Path, Content]:
+    """Return what is to be written, by file. Raises ExportError where it does not fit."""
+    suffix = SUFFIXES[form]
+    if studies and form in RECORD_SUFFIXES:
+        problem = f"a file of the type {suffix} is the sensor's record of one job"
+        raise ExportError(f"{target}: {problem}: name jobs by their keys, not studies")
+    if is_file and (series or len(keys) > 1 or (keys and studies)):
+        raise ExportError(f"{target} is one file, and this needs several: give a folder")
+    if is_file:
+        return {target: keys[0] if keys else tuple(studies)}
+    files: dict[Path, Content] = {}
     for study in studies:
-        yield _Task(target / f"{study.name}{suffix}", (study,))
-        if series:
-            positions = stored.rows.find(study.keys)
-            has_series = (positions >= 0) & (stored.rows.samples[positions] > 0)
-            for key in dict.fromkeys(itertools.compress(study.keys, has_series.tolist())):
-                yield _Task(target / study.name / f"{key}{suffix}", key=key, named=False)
-    for key in keys:
-        yield _Task(target / f"{key}{suffix}", key=key)
+        files[target / f"{study.name}{suffix}"] = (study,)
+        for key in study.keys if series else ():
+            status = stored.status(key)
+            if status and status.samples:
+                files[target / study.name / f"{key}{suffix}"] = key
+    return files | {target / f"{key}{suffix}": key for key in keys}
 
 
-def _refuse_existing(tasks: Iterable[_Task]) -> None:
-    for task in tasks:
-        if os.path.lexists(task.path):
-            raise ExportError(f"{task.path} exists: --force replaces it")
+def _encode_metrics(
+    stored: Stored, studies: Sequence[StoredStudy], form: str, units: Units
+) -> bytes:
+    """Return the numbers of studies' jobs as one table; in netCDF a lone grid keeps its axes."""
+    from compressor.store import dataset as datasets  # loads xarray: half a second
 
-
-def _metrics(task: _Task, stored: Stored, form: str, units: Units) -> Exported:
-    """Write the numbers of studies' jobs as one table; in netCDF a lone grid keeps its axes."""
-    from compressor.store.dataset import (  # loads xarray: half a second
-        grid,
-        outcomes,
-        table_of_jobs,
+    if form == "csv":
+        table = datasets.label_jobs(datasets.lay_out_jobs(studies), stored)
+        return encode_csv(columns(table, "job", units))
+    fields = ("name", "case_file", "fixed", "command", "versions", "written")
+    origin = [{name: getattr(study, name) for name in fields} for study in studies]
+    table = datasets.label_jobs(datasets.lay_out(studies), stored).assign_attrs(
+        title=f"compsim: {' '.join(study.name for study in studies)}",
+        program=PROGRAM,
+        studies=json.dumps(origin),
     )
-
-    studies = task.studies
-    if form == "csv":
-        table = outcomes(table_of_jobs(studies), stored.rows)
-        size = write_csv(task.path, columns(table, "job", units))
-    else:
-        is_grid = len(studies) == 1 and studies[0].is_grid
-        layout = grid(studies[0]) if is_grid else table_of_jobs(studies)
-        table = outcomes(layout, stored.rows).assign_attrs(_attributes(studies))
-        data = encode_dataset(_link_coordinates(table))
-        publish(task.path, data)
-        size = len(data)
-    jobs = sum(study.jobs for study in studies)
-    name = " ".join(study.name for study in studies)
-    return Exported(os.fspath(task.path), "metrics", name, jobs, size)
+    others = [name for name in table.coords if name not in table.dims]
+    for name in table.data_vars:  # as netCDF's readers expect
+        mine = [n for n in others if {*table[n].dims} <= {*table[name].dims}]
+        table[name].attrs["coordinates"] = " ".join(map(str, mine))
+    return encode_dataset(table)
 
 
-def _series(task: _Task, stored: Stored, form: str, units: Units) -> Exported:
-    """Write the time series of one job."""
-    position = stored.position(task.key)
+def _encode_job(stored: Stored, key: str, form: str, units: Units) -> tuple[str, int, bytes]:
+    """Return the kind of a job's file, its rows, and the time series in it."""
+    position = stored.position(key)
     if position is None:
-        raise WrongName(stored.folder, f"job {task.key} is not stored", "run its case file first")
-    if not (samples := int(stored.rows.samples[position])):
+        raise WrongName(stored.folder, f"job {key} is not stored", "run its case file first")
+    if not (samples := int(stored.columns["samples"][position])):
         remedy = "run its case file with --set output.keep=series, or export its study"
-        raise WrongName(stored.folder, f"job {task.key} has no time series", remedy)
-    kind, dataset = "series", stored.job(task.key)
+        raise WrongName(stored.folder, f"job {key} has no time series", remedy)
+    run = stored.job(key)
     if form == "csv":
-        size = write_csv(task.path, columns(dataset, "time", units) | _record(dataset))
-    else:
-        data = encode_dataset(dataset)
-        if form in RECORD_SUFFIXES:
-            from compressor.vibration import encode_record  # loads parts of SciPy
+        return "series", samples, encode_csv(columns(run, "time", units) | _record(run))
+    if form == "netcdf":
+        return "series", samples, encode_dataset(run)
+    from compressor.vibration import encode_record  # loads parts of SciPy
 
-            record = _record(dataset)
-            if not record:
-                problem = f"job {task.key} has no sensor's record"
-                raise WrongName(stored.folder, problem, NEEDS_SENSOR)
-            data = encode_record(record, SUFFIXES[form])
-            kind, samples = "record", len(next(iter(record.values())))
-        publish(task.path, data)
-        size = len(data)
-    return Exported(os.fspath(task.path), kind, task.key, samples, size)
+    if not (record := _record(run)):
+        raise WrongName(stored.folder, f"job {key} has no sensor's record", NEEDS_SENSOR)
+    return "record", len(next(iter(record.values()))), encode_record(record, SUFFIXES[form])
 
 
 def columns(table: "xr.Dataset", dim: str, units: Units = "si") -> dict[str, np.ndarray]:
@@ -282,48 +256,15 @@ def _record(run: "xr.Dataset") -> dict[str, np.ndarray]:
     return record_columns(*(run[name].values for name in names))
 
 
-def write_csv(path: Path, table: dict[str, np.ndarray]) -> int:
-    """Write columns as CSV, durably, and return the bytes written.
+def encode_csv(table: dict[str, np.ndarray]) -> bytes:
+    """Return columns as CSV; those that are shorter than others end in empty cells."""
+    import xarray as xr
 
-    Columns that are shorter than others end in empty cells.
-    """
     rows = max(map(len, table.values()))
-    with publishing(path) as file:
-        text = io.TextIOWrapper(file, "utf-8", newline="", write_through=True)
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(table)
-        for start in range(0, rows, BLOCK):
-            parts = [_cells(values[start : start + BLOCK]) for values in table.values()]
-            writer.writerows(itertools.zip_longest(*parts, fillvalue=""))
-        text.detach()
-        return file.tell()
-
-
-def _cells(values: np.ndarray) -> list[Any]:
-    """Return the values as csv takes them: floats are written to the last digit, nan as nothing."""
-    if values.dtype.kind != "f":
-        return values.tolist()
-    cells = values.astype(float).astype(object)
-    cells[np.isnan(values)] = ""
-    return cells.tolist()
-
-
-def _link_coordinates(table: "xr.Dataset") -> "xr.Dataset":
-    """Return a table whose variables name their coordinates, as netCDF's readers expect."""
-    others = [name for name in table.coords if name not in table.dims]
-    linked = table.copy()
-    for name in table.data_vars:
-        mine = [n for n in others if {*table[n].dims} <= {*table[name].dims}]
-        linked[name].attrs["coordinates"] = " ".join(map(str, mine))
-    return linked
-
-
-def _attributes(studies: Sequence[StoredStudy]) -> dict[str, str]:
-    """Return where the numbers of a file come from."""
-    fields = ("name", "case_file", "fixed", "command", "versions", "written")
-    origin = [{name: getattr(study, name) for name in fields} for study in studies]
-    return {
-        "title": f"compsim: {' '.join(study.name for study in studies)}",
-        "program": PROGRAM,
-        "studies": json.dumps(origin),
-    }
+    whole: dict[Any, Any] = {}
+    for name, values in table.items():
+        if values.dtype.kind == "f":  # to the last digit of a double
+            values = np.pad(values.astype(float), (0, rows - len(values)), constant_values=np.nan)
+        whole[name] = ("row", values)
+    text = xr.Dataset(whole).to_dataframe().to_csv(index=False, lineterminator="\n")
+    return text.encode()

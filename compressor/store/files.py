@@ -11,7 +11,6 @@ import time
 import uuid
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
 
 from compressor.program import CompsimError, CompsimWarning, did_you_mean
 
@@ -86,36 +85,26 @@ def system_error(path: Folder, error: OSError) -> StoreError:
 
 
 @contextlib.contextmanager
-def refusals(path: Folder) -> Iterator[None]:
-    """Turn what the file system refuses, there or at a path that it names, into a StoreError."""
+def refusals(path: Path, named: bool = True) -> Iterator[None]:
+    """Turn what the file system refuses into a StoreError of a path, or of one that it names."""
     try:
         yield
     except OSError as error:
-        named = error.filename if isinstance(error.filename, str) else path
-        raise system_error(named, error) from error
+        other = error.filename if named and isinstance(error.filename, str) else path
+        raise system_error(other, error) from error
 
 
 def publish(path: Path, data: bytes) -> None:
-    """Write a whole file under its name, durably, or leave what was there, as `publishing` does.
+    """Write a whole file under its name, durably, or leave what was there.
 
     Raises StoreError where the disk refuses.
     """
-    with publishing(path) as file:
-        file.write(data)
-
-
-@contextlib.contextmanager
-def publishing(path: Path) -> Iterator[BinaryIO]:
-    """Yield a file to write: it has its name, durably, once the block has ended well, or never.
-
-    What stood under the name is left until then. Raises StoreError where the disk refuses.
-    """
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
     make_folder(path.parent)
-    try:
+    with refusals(path, named=False):
         try:
             with open(temporary, "wb") as file:
-                yield file
+                file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(temporary, path)
@@ -124,8 +113,6 @@ def publishing(path: Path) -> Iterator[BinaryIO]:
                 temporary.unlink()
             raise
         sync_folder(path.parent)
-    except OSError as error:
-        raise system_error(path, error) from error
 
 
 def make_folder(folder: Path) -> None:
@@ -171,23 +158,16 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def discard_leftovers(folder: Folder) -> None:
+def discard_leftovers(folder: Path) -> None:
     """Remove the temporary files of writers that died long ago, from the folders in a folder.
 
-    Not where a link leads: others may write there. Raises StoreError.
+    Not where a link leads: others may write there. Raises OSError.
     """
-    with refusals(folder):
-        leftovers = [*Path(folder).glob("*/.*.tmp")]
-    for path in leftovers:
-        if path.parent.is_symlink():
-            continue
+    for path in folder.glob("*/.*.tmp"):
         with contextlib.suppress(OSError):
-            if time.time() - path.stat().st_mtime > LEFTOVER_AGE:
+            is_old = time.time() - path.stat().st_mtime > LEFTOVER_AGE
+            if is_old and not path.parent.is_symlink():
                 path.unlink()
-
-
-MAX_NAMES = 5  # that are listed
-MAKE = "make one: compsim run CONFIG..."
 
 
 def no_results(folder: Folder) -> WrongName:
@@ -201,27 +181,14 @@ def no_results(folder: Folder) -> WrongName:
         else "holds no study" if place.exists()
         else "there is no such folder of results"
     )  # fmt: skip
-    return WrongName(folder, problem, _near_results(place) or f"choose another folder, or {MAKE}")
+    near: dict[str, Path] = {}
+    with contextlib.suppress(OSError):
+        beside = (found.parent.name for found in place.absolute().parent.glob("*/studies"))
+        near = {name: place.parent / name for name in beside if name != place.name}
+    other = "choose another folder, or make one: compsim run CONFIG..."
+    return WrongName(folder, problem, did_you_mean(place.name, near, near) or other)
 
 
-def _near_results(place: Path) -> str:
-    """Return a hint at a folder that holds results: in a place, around it or nearly so named."""
-    above = place.absolute().parent
-    try:
-        beside = sorted(found.parent for found in above.glob("*/studies"))
-        inside = sorted(found.parent for found in place.glob("*/studies"))
-    except OSError:
-        return ""
-    if inside:
-        return f"did you mean {inside[0]}?"
-    if (above / "studies").is_dir():
-        return f"did you mean {place.parent}?"
-    near = {one.name: place.parent / one.name for one in beside if one.name != place.name}
-    return did_you_mean(place.name, near, near) or (
-        f"did you mean {place.parent / beside[0].name}?" if len(near) == 1 else ""
-    )
-
-
-def list_few(names: list[str]) -> str:
+def list_few(names: list[str], most: int = 5) -> str:
     """Return a few names, and whether there are more."""
-    return ", ".join(names[:MAX_NAMES]) + (", …" if len(names) > MAX_NAMES else "")
+    return ", ".join(names[:most]) + (", …" if len(names) > most else "")

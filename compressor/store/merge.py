@@ -1,9 +1,7 @@
 """Keep a folder of results tidy: merge small batches, set damaged ones aside."""
 
 import contextlib
-import os
 from collections import defaultdict
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +9,12 @@ import numpy as np
 from compressor.store.batch import Batch, encode_batch, publish_batch, read_outcomes
 from compressor.store.files import Folder, discard_leftovers, refusals
 from compressor.store.netcdf import DamagedFile
-from compressor.store.rows import Rows, read_rows
+from compressor.store.stored import read_store
 
 MAX_JOBS, MAX_BYTES = 4096, 32_000_000  # of a merged batch; one with a quarter of either is small
 MAX_SMALL = 8  # small batches that may stay
+
+Counting = tuple[Batch, list[int]]  # a batch, and its rows that count
 
 
 def merge_batches(folder: Folder) -> None:
@@ -25,66 +25,56 @@ def merge_batches(folder: Folder) -> None:
     cannot be read are set aside, and removed are those without a row that counts. Raises
     StoreError.
     """
+    folder = Path(folder)
     with refusals(folder):
         discard_leftovers(folder)
-        rows, damaged = read_rows(folder)
-        for damage in damaged:
-            set_aside(Path(damage.path))
-        used = {*rows.source.tolist()}
-        for number, batch in enumerate(rows.batches):
-            if number not in used:
+        stored = read_store(folder)
+        for damage in stored.damaged:  # nobody reads it again; its jobs count as missing
+            with contextlib.suppress(FileNotFoundError):
+                Path(damage.path).rename(f"{damage.path}.damaged")
+        batches, source, row = stored.places
+        small: dict[object, list[Counting]] = defaultdict(list)
+        for number, batch in enumerate(batches):
+            rows = np.sort(row[source == number]).tolist()
+            if not rows:
                 batch.path.unlink(missing_ok=True)
-        small = {n: size for n in sorted(used) if (size := _small_size(rows.batches[n]))}
-        for group in _groups(rows, small) if len(small) > MAX_SMALL else ():
-            if len(group) > 1:
-                _merge(rows, group)
+            elif len(batch) < MAX_JOBS // 4 and 0 < _size(batch) < MAX_BYTES // 4:
+                # of one length and kind, lest time series grow
+                kinds = {b"double" in k for k in batch.columns["kept"].tolist() if b"series" in k}
+                length = int(batch.columns["samples"].max())
+                small[length, batch.is_compressed, frozenset(kinds)].append((batch, rows))
+        if sum(map(len, small.values())) > MAX_SMALL:
+            for alike in small.values():
+                _merge_alike(folder, alike)
 
 
-def _small_size(batch: Batch) -> int:
-    """Return the bytes of a batch that is small, 0 of another."""
-    try:
-        size = batch.path.stat().st_size
-    except FileNotFoundError:  # merged by another run
-        return 0
-    return size if size < MAX_BYTES // 4 and len(batch) < MAX_JOBS // 4 else 0
-
-
-def _groups(rows: Rows, small: dict[int, int]) -> Iterator[list[int]]:
-    """Yield which batches are to be merged: time series of one length and kind, lest they grow."""
-    alike: dict[object, list[int]] = defaultdict(list)
-    for number in small:
-        batch = rows.batches[number]
-        kinds = frozenset(batch.words["precision"].tolist()) - {b""}
-        alike[int(batch.samples.max()), batch.is_compressed, kinds].append(number)
-    for numbers in alike.values():
-        group, jobs, size = [], 0, 0
-        for number in numbers:
-            group.append(number)
-            jobs, size = jobs + len(rows.batches[number]), size + small[number]
-            if jobs >= MAX_JOBS or size >= MAX_BYTES:
-                yield group
-                group, jobs, size = [], 0, 0
-        yield group
-
-
-def _merge(rows: Rows, group: list[int]) -> None:
-    """Write one batch in place of several; none is replaced where one is damaged or gone."""
-    batches = [rows.batches[number] for number in group]
-    outcomes = []
-    try:
-        for number, batch in zip(group, batches, strict=True):
-            found = read_outcomes(batch)
-            counting = np.sort(rows.row[rows.source == number]).tolist()
-            outcomes += [found[row] for row in counting]
-    except (DamagedFile, FileNotFoundError):
-        return
-    written = batches[-1].path.name[:20]
-    publish_batch(rows.folder, encode_batch(outcomes, batches[0].is_compressed), written)
-    for batch in batches:
-        batch.path.unlink(missing_ok=True)
-
-
-def set_aside(path: Path) -> None:
-    """Rename a damaged batch, so that nobody reads it again; its jobs count as missing."""
+def _size(batch: Batch) -> int:
+    """Return the bytes of a batch; 0 where another run has merged it."""
     with contextlib.suppress(FileNotFoundError):
-        os.rename(path, f"{path}.damaged")
+        return batch.path.stat().st_size
+    return 0
+
+
+def _merge_alike(folder: Path, batches: list[Counting]) -> None:
+    """Merge batches in groups that are large enough."""
+    group: list[Counting] = []
+    jobs = size = 0
+    for number, (batch, rows) in enumerate(batches, 1):
+        group.append((batch, rows))
+        jobs, size = jobs + len(batch), size + _size(batch)
+        if jobs >= MAX_JOBS or size >= MAX_BYTES or number == len(batches):
+            if len(group) > 1:
+                _merge_group(folder, group)
+            group, jobs, size = [], 0, 0
+
+
+def _merge_group(folder: Path, group: list[Counting]) -> None:
+    """Write one batch in place of several; none is replaced where one is damaged or gone."""
+    outcomes = []
+    with contextlib.suppress(DamagedFile, FileNotFoundError):
+        for batch, rows in group:
+            found = read_outcomes(batch)
+            outcomes += [found[row] for row in rows]
+        publish_batch(folder, encode_batch(outcomes), group[-1][0].path.name[:20])
+        for batch, _ in group:
+            batch.path.unlink(missing_ok=True)

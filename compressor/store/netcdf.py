@@ -3,7 +3,7 @@
 Values up to `MAX_COMPACT` lie in the header of their variable, which HDF5 sums up; larger ones in
 chunks with the Fletcher-32 filter. Texts are arrays of characters: of texts of any length HDF5 sums
 up nothing. The bytes are written by `compressor.store.files`, since HDF5 may crash the process when
-a disk fills up while it writes. Only this package imports h5py.
+a disk fills up while it writes. Only this module imports h5py.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # name -> names of its dimensions, values, attributes
-Variables = Mapping[str, tuple[tuple[str, ...], Any, Mapping[str, Any]]]
+Variables = Mapping[str, tuple[tuple[Any, ...], Any, Mapping[Any, Any]]]
 
 MAX_COMPACT = 8192  # bytes of a variable that lie in its header
 GZIP_LEVEL = 4
@@ -45,57 +45,50 @@ def encode_netcdf(
     A variable whose first dimension has its name is the coordinate of that dimension. compressed:
     names of variables to be deflated. Large arrays over `job` are in chunks of one job.
     """
-    arrays: dict[str, np.ndarray] = {}
-    dims: dict[str, tuple[str, ...]] = {}
-    for name, (names, values, _) in variables.items():
-        arrays[name], is_text = _as_stored(values)
-        dims[name] = (*names, f"text{arrays[name].shape[-1]}") if is_text else tuple(names)
-    sizes = {
-        dim: size
-        for name, array in arrays.items()
-        for dim, size in zip(dims[name], array.shape, strict=True)
-    }
+    stored = {name: _as_stored(*parts) for name, parts in variables.items()}
+    sizes: dict[str, int] = {}
+    for dims, array, _ in stored.values():
+        sizes |= dict(zip(dims, array.shape, strict=True))
+    numbers = {dim: number for number, dim in enumerate(sizes)}
     # HDF5 knows open files by their names, also those in memory
     with h5py.File(uuid.uuid4().hex, "w", driver="core", backing_store=False, libver="latest",
                    track_order=True) as file:  # fmt: skip
-        made = {}
-        for number, (dim, size) in enumerate(sizes.items()):
-            is_coordinate = dims.get(dim, ())[:1] == (dim,)
-            array = arrays[dim] if is_coordinate else np.zeros(size, "i1")
-            made[dim] = _create(file, dim, array, dims.get(dim, ()), dim in compressed)
-            made[dim].make_scale(dim if is_coordinate else f"{BARE.decode()}{size:10}")
-            made[dim].attrs["_Netcdf4Dimid"] = np.int32(number)
-        ids = {dim: number for number, dim in enumerate(sizes)}
-        for name, array in arrays.items():
-            if name not in made:
-                made[name] = _create(file, name, array, dims[name], name in compressed)
-                for number, dim in enumerate(dims[name]):
-                    made[name].dims[number].attach_scale(made[dim])
-            if array.ndim:
-                numbers = np.array([ids[dim] for dim in dims[name]], "i4")
-                made[name].attrs["_Netcdf4Coordinates"] = numbers
-            if dims[name][-1:] == (f"text{array.shape[-1] if array.ndim else 0}",):
-                _set_attribute(made[name], "_Encoding", "utf-8")
-            for key, value in variables[name][2].items():
-                _set_attribute(made[name], key, value)
+        for dim, size in sizes.items():
+            dims, array, _ = stored.get(dim, ((), np.zeros(0), {}))
+            is_coordinate = dims[:1] == (dim,)
+            values = array if is_coordinate else np.zeros(size, "i1")
+            scale = _create(file, dim, values, dims, dim in compressed)
+            scale.make_scale(dim if is_coordinate else f"{BARE.decode()}{size:10}")
+            scale.attrs["_Netcdf4Dimid"] = np.int32(numbers[dim])
+        for name, (dims, array, attrs) in stored.items():
+            if name not in sizes:
+                data = _create(file, name, array, dims, name in compressed)
+                for axis, dim in enumerate(dims):
+                    data.dims[axis].attach_scale(file[dim])
+            if dims:
+                attrs["_Netcdf4Coordinates"] = np.array([numbers[dim] for dim in dims], "i4")
+            for key, value in attrs.items():
+                _set_attribute(file[name], key, value)
         for key, value in attributes.items():
             _set_attribute(file, key, value)
         file.flush()
         return file.id.get_file_image()
 
 
-def _as_stored(values: Any) -> tuple[np.ndarray, bool]:
-    """Return values as they are stored, and whether they are texts, with an axis of characters."""
+def _as_stored(
+    dims: tuple[Any, ...], values: Any, attributes: Mapping[Any, Any]
+) -> tuple[tuple[str, ...], np.ndarray, dict[str, Any]]:
+    """Return a variable as it is stored: truth as 0 and 1, texts with an axis of characters."""
     array = np.asarray(values)
     if array.dtype.kind == "b":
-        return array.astype("i1"), False
+        array = array.astype("i1")
     if array.dtype.kind not in "OUS":
-        return array, False
+        return tuple(dims), array, {**attributes}
     if array.dtype.kind != "S":  # without lone surrogates
         array = np.char.encode(array.astype("U"), "utf-8", "replace")
     width = max(array.dtype.itemsize, 1)
-    whole = np.ascontiguousarray(array, f"S{width}").reshape(array.shape)
-    return whole[..., np.newaxis].view("S1"), True
+    whole = np.ascontiguousarray(array, f"S{width}").reshape(array.shape)[..., np.newaxis]
+    return (*dims, f"text{width}"), whole.view("S1"), {**attributes, "_Encoding": "utf-8"}
 
 
 def _create(file: Any, name: str, array: np.ndarray, dims: tuple[str, ...], gzip: bool) -> Any:
@@ -139,22 +132,20 @@ def open_netcdf(path: Path, remedy: str = REMEDY) -> Iterator[Any]:
         raise DamagedFile(path, "is damaged, or no file of compsim's", remedy) from error
 
 
+def is_text(data: Any) -> bool:
+    """Return whether a variable has texts, as an axis of characters."""
+    return "_Encoding" in data.attrs
+
+
 def read_bytes(data: Any) -> np.ndarray:
     """Return the texts of a variable as bytes."""
     values = np.ascontiguousarray(data[()])
     return values.view(f"S{values.shape[-1]}")[..., 0]
 
 
-def read_values(data: Any) -> np.ndarray:
-    """Return the values of a variable, texts as str."""
-    if "_Encoding" in data.attrs:
-        return np.char.decode(read_bytes(data), "utf-8")
-    return np.asarray(data[()])
-
-
 def read_attributes(place: Any) -> dict[str, Any]:
     """Return the attributes of a variable or a file, but for those of netCDF itself."""
-    wanted = [name for name in place.attrs if name not in OF_NETCDF and not name.startswith("_")]
+    wanted = [name for name in place.attrs if name[0] != "_" and name not in OF_NETCDF]
     found = {name: place.attrs[name] for name in wanted}
     return {n: v.decode() if isinstance(v, bytes) else v for n, v in found.items()}
 
@@ -166,15 +157,6 @@ def dimensions_of(data: Any) -> list[str]:
     """
     names = [*data.file]  # dimensions first, in the order of their numbers
     return [names[at] for at in data.attrs.get("_Netcdf4Coordinates", ())]
-
-
-def read_variable(file: Any, name: str) -> tuple[tuple[str, ...], np.ndarray, dict[str, Any]]:
-    """Return names of dimensions, values and attributes of a variable."""
-    data = file[name]
-    dims = dimensions_of(data)
-    if "_Encoding" in data.attrs:
-        del dims[-1]
-    return tuple(dims), read_values(data), read_attributes(data)
 
 
 def names_of(file: Any) -> list[str]:
@@ -193,10 +175,7 @@ def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
 
 def encode_dataset(dataset: "xr.Dataset") -> bytes:
     """Return a Dataset as the bytes of a netCDF-4 file."""
-    variables = {
-        str(name): (tuple(map(str, item.dims)), item.values, item.attrs)
-        for name, item in dataset.variables.items()
-    }
+    variables = {str(n): (one.dims, one.values, one.attrs) for n, one in dataset.variables.items()}
     return encode_netcdf(variables, {str(name): value for name, value in dataset.attrs.items()})
 
 
@@ -207,14 +186,22 @@ def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
     """
     import xarray as xr
 
+    found = {}
     with open_netcdf(path, remedy) as file:
-        found = {name: read_variable(file, name) for name in names_of(file)}
+        for name in names_of(file):
+            data, dims = file[name], dimensions_of(file[name])
+            if is_text(data):
+                values = np.char.decode(read_bytes(data), "utf-8")
+                dims = dims[:-1]
+            else:
+                values = data[()]
+            found[name] = dims, values, read_attributes(data)
         return xr.Dataset(found, attrs=read_attributes(file))
 
 
-def check_file(path: Path, remedy: str = REMEDY) -> None:
+def check_file(path: Path) -> None:
     """Read each value of a file. Raises DamagedFile where its checksum is wrong."""
-    with open_netcdf(path, remedy) as file:
+    with open_netcdf(path) as file:
         for name in file:
             file[name][()]
         read_attributes(file)

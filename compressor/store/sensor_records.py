@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from compressor.store.files import Folder, StoreError, WrongName
-from compressor.store.reader import Stored, read_store
 from compressor.store.status import report_job
+from compressor.store.stored import Stored, read_store
 
 if TYPE_CHECKING:
     from compressor.vibration import Record
@@ -30,18 +30,6 @@ def job_record(stored: Stored, key: str) -> "Record | None":
     return Record(times, values, tacho, math.nan)
 
 
-def stored_record(folder: Folder, beginning: str) -> "tuple[str, Record]":
-    """Return the key that begins so, and the sensor's record of that job.
-
-    Raises StoreError where there is no such job, or it has no record.
-    """
-    key = report_job(folder, beginning).key
-    record = job_record(read_store(folder), key)
-    if record is None:
-        raise StoreError(folder, f"job {key} has no sensor's record", NEEDS_SENSOR)
-    return key, record
-
-
 def find_record(name: str, folder: Folder, hints: Mapping[str, Any]) -> "tuple[str, Record]":
     """Return a record by the name of its file, or by the beginning of a stored job's key.
 
@@ -57,4 +45,8 @@ def find_record(name: str, folder: Folder, hints: Mapping[str, Any]) -> "tuple[s
         options = " ".join(f"--{hint.replace('_', '-')}" for hint in hints)
         problem = f"a stored job such as {name} says all of its record"
         raise WrongName(folder, problem, f"leave {options} out")
-    return stored_record(folder, name)
+    key = report_job(folder, name).key
+    record = job_record(read_store(folder), key)
+    if record is None:
+        raise StoreError(folder, f"job {key} has no sensor's record", NEEDS_SENSOR)
+    return key, record

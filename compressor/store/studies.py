@@ -16,7 +16,6 @@ import os
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -110,12 +109,10 @@ def swept_column(key: str, values: Sequence[Any]) -> tuple["np.ndarray", dict[st
     """
     import numpy as np  # status does without
 
-    row = row_of(key)
     attrs = {"long_name": phrase_of(key), "case_key": key}
-    if row and row.kind in ("number", "integer") and not any(isinstance(v, str) for v in values):
-        numbers = [math.nan if value is None else value for value in values]
-        return np.array(numbers, float), attrs | {"units": row.unit or "1"}
-    return np.array([in_words(value) for value in values], object), attrs
+    if (unit := _unit(key)) and not any(isinstance(value, str) for value in values):
+        return np.array([math.nan if v is None else v for v in values]), attrs | {"units": unit}
+    return np.array([in_words(value) for value in values], "U"), attrs
 
 
 def in_words(value: Any) -> str:
@@ -146,26 +143,6 @@ def healthy_clearance(study: StoredStudy) -> PerJoint:
     return PerJoint(**given) if given else PerJoint(0.0, 0.0)
 
 
-def owners(
-    studies: "Iterable[StoredStudy]", keys: Iterable[str]
-) -> dict[str, dict[str, dict[str, Any]]]:
-    """Return each job's studies by key and name, with the job's swept values there."""
-    found: dict[str, dict[str, dict[str, Any]]] = {key: {} for key in keys}
-    for study in studies:
-        if not found.keys().isdisjoint(study.keys):
-            for key, point in zip(study.keys, points(study), strict=True):
-                if key in found:
-                    found[key].setdefault(study.name, point)
-    return found
-
-
-def _present(folder: Folder, name: str) -> StoredStudy | None:
-    """Return the stored study of a name; None where there is none, or a damaged one."""
-    with contextlib.suppress(StoreError, FileNotFoundError):
-        return read_study(Path(folder) / "studies" / f"{name}.json")
-    return None
-
-
 def write_study(
     folder: Folder, study: "Study", command: str = "", overrides: Sequence[str] = ()
 ) -> None:
@@ -173,11 +150,10 @@ def write_study(
 
     Raises StoreError where the disk refuses.
     """
-    axes = [StoredAxis(axis.key, tuple(axis.values), _unit(axis.key)) for axis in study.axes]
     new = StoredStudy(
         study.name,
         os.path.abspath(study.path),
-        tuple(axes),
+        tuple(StoredAxis(axis.key, tuple(axis.values), _unit(axis.key)) for axis in study.axes),
         study.keys,
         study.cases[0].values(),
         command,
@@ -191,18 +167,15 @@ def write_study(
         tuple(overrides),
         study.figures,
     )
-    old = _present(folder, study.name)
-    if old:
-        same = replace(
-            new,
-            command=old.command,
-            overrides=old.overrides,
-            versions=old.versions,
-            written=old.written,
-        )
-        if same == old:
+    path = Path(folder) / "studies" / f"{study.name}.json"
+    with contextlib.suppress(StoreError, FileNotFoundError):  # one that is damaged is replaced
+        old = read_study(path)
+        made = {
+            name: getattr(old, name) for name in ("command", "overrides", "versions", "written")
+        }
+        if replace(new, **made) == old:
             return
-    publish(Path(folder) / "studies" / f"{study.name}.json", encode(new))
+    publish(path, encode(new))
 
 
 def encode(study: StoredStudy) -> bytes:
@@ -216,7 +189,7 @@ def encode(study: StoredStudy) -> bytes:
 
 def study_paths(folder: Folder) -> list[Path]:
     """Return the files of all studies of a store. Raises StoreError."""
-    with refusals(folder):
+    with refusals(Path(folder)):
         return sorted(Path(folder).glob("studies/*.json"))
 
 
@@ -292,9 +265,28 @@ def find_job(
     WrongName with the nearest names.
     """
     first, *values = words
-    if any(study.name == first for study in studies) or values:
-        return _job_at(folder, find_study(folder, first, studies), values)
-    return whole_key(folder, first, studies, stored)
+    if not values and all(study.name != first for study in studies):
+        return whole_key(folder, first, studies, stored)
+    study = find_study(folder, first, studies)
+    wanted = dict(find_value(folder, study, word) for word in values)
+    jobs = {
+        key: point
+        for key, point in zip(study.keys, points(study), strict=True)
+        if all(key in point and point[key] == value for key, value in wanted.items())
+    }
+    if len(jobs) == 1:
+        return next(iter(jobs))
+    conditions = " and ".join(f"{key}={in_words(value)}" for key, value in wanted.items())
+    if not jobs:
+        raise WrongName(folder, f"no job of {study.name} has {conditions}", _name_axes(study))
+    problem = f"{study.name} is a study of {len(jobs)} jobs"
+    if wanted:
+        problem = f"{len(jobs)} jobs of {study.name} have {conditions}"
+    left = {a.key: {point.get(a.key): 0 for point in jobs.values()} for a in study.axes}
+    more = [f"{key}=… of {_name_values(some)}" for key, some in left.items() if len(some) > 1]
+    raise WrongName(
+        folder, problem, f"choose one by {'; '.join(more)}" if more else "give a job's key"
+    )
 
 
 def whole_key(
@@ -314,28 +306,6 @@ def whole_key(
     raise WrongName(folder, problem, hint or remedy)
 
 
-def _job_at(folder: Folder, study: StoredStudy, words: Sequence[str]) -> str:
-    """Return the one job of a study at some values of its axes."""
-    wanted = dict(find_value(folder, study, word) for word in words)
-    jobs = {
-        key: point
-        for key, point in zip(study.keys, points(study), strict=True)
-        if all(key in point and point[key] == value for key, value in wanted.items())
-    }
-    if len(jobs) == 1:
-        return next(iter(jobs))
-    conditions = " and ".join(f"{key}={in_words(value)}" for key, value in wanted.items())
-    if not jobs:
-        raise WrongName(folder, f"no job of {study.name} has {conditions}", _axes(study))
-    problem = f"{len(jobs)} jobs of {study.name} have {conditions}"
-    if not conditions:
-        problem = f"{study.name} is a study of {len(jobs)} jobs"
-    values = {key: dict.fromkeys(point.get(key) for point in jobs.values()) for key in
-              dict.fromkeys(key for point in jobs.values() for key in point)}  # fmt: skip
-    more = "; ".join(f"{key}=… of {_some(some)}" for key, some in values.items() if len(some) > 1)
-    raise WrongName(folder, problem, f"choose one by {more}" if more else "give a job's key")
-
-
 def find_axis(folder: Folder, study: StoredStudy, name: str) -> StoredAxis:
     """Return the axis of a study by its key, or the end of it. Raises WrongName."""
     short = coordinate_names([axis.key for axis in study.axes])
@@ -347,36 +317,38 @@ def find_axis(folder: Folder, study: StoredStudy, name: str) -> StoredAxis:
     if len(found) == 1:
         return found[0]
     problem = f"{study.name} has {len(found) or 'no'} {'axes' if found else 'axis'} {name!r}"
-    raise WrongName(folder, problem, did_you_mean(name, [*short, *short.values()]) or _axes(study))
+    hint = did_you_mean(name, [*short, *short.values()])
+    raise WrongName(folder, problem, hint or _name_axes(study))
 
 
 def find_value(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]:
     """Return the key and the value of an axis that `axis=value` means. Raises WrongName."""
     name, equals, text = word.partition("=")
     if not equals or not text:
-        raise WrongName(folder, f"{word!r} is no AXIS=VALUE of {study.name}", _axes(study))
+        raise WrongName(folder, f"{word!r} is no AXIS=VALUE of {study.name}", _name_axes(study))
     axis = find_axis(folder, study, name)
     row = row_of(axis.key)
     text = row.choice_of(text) if row else text
-    for is_same in (lambda value: text == in_words(value), partial(_is_close, text),
-                    lambda value: isinstance(value, float) and text == f"{value:g}"):  # fmt: skip
-        same = dict.fromkeys(filter(is_same, axis.values))
+    number = math.nan
+    with contextlib.suppress(ValueError):
+        number = float(text)
+    for is_meant in (
+        lambda value: text == in_words(value),
+        lambda value: _is_number(value) and math.isclose(number, value, rel_tol=SAME_VALUE),
+        lambda value: isinstance(value, float) and text == f"{value:g}",  # as it is printed
+    ):
+        same = dict.fromkeys(filter(is_meant, axis.values))
         if len(same) == 1:
             return axis.key, next(iter(same))
     problem = f"no job of {study.name} has {axis.key}={text}"
-    raise WrongName(folder, problem, f"there are {_some(axis.values)}")
+    raise WrongName(folder, problem, f"there are {_name_values(axis.values)}")
 
 
-def _is_close(text: str, value: Any) -> bool:
-    """Return whether a text is the number of an axis, but for rounding."""
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        return False
-    with contextlib.suppress(ValueError):
-        return math.isclose(float(text), value, rel_tol=SAME_VALUE)
-    return False
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def _axes(study: StoredStudy) -> str:
+def _name_axes(study: StoredStudy) -> str:
     """Return a hint at the axes of a study, by which one of its jobs is named."""
     if not study.axes:
         return "it is one job: leave the values out"
@@ -384,7 +356,7 @@ def _axes(study: StoredStudy) -> str:
     return f"its axes are {list_few([axis.key for axis in study.axes])}, as in {first}"
 
 
-def _some(values: Iterable[Any]) -> str:
+def _name_values(values: Iterable[Any]) -> str:
     """Return a few values of an axis."""
     found = [value for value in dict.fromkeys(values) if value is not None]
     return list_few([setting(one) if isinstance(one, float) else in_words(one) for one in found])

@@ -146,18 +146,18 @@ def judge(
 def read_jobs(folder: Folder, source: StoredStudy) -> list[JudgedJob]:
     """Return the jobs of a study, each once."""
     stored, own = read_store(folder), dict(zip(source.keys, points(source), strict=True))
-    rows = stored.rows
-    at = rows.find([*own])
-    numbers = rows.numbers(at, [*JUDGED, *(f"{one}_error" for one in JUDGED), *COUNTS])
-    words = {name: rows.word(name) for name in ("status", "reason", "regime")}
+    at = stored.find([*own])
+    names = [*JUDGED, *(f"{one}_error" for one in JUDGED), *COUNTS]
+    numbers = stored.numbers(at, names)
+    words = {name: stored.words(name) for name in ("status", "reason", "regime")}
     found = []
     for number, (key, point) in enumerate(own.items()):
         where = int(at[number])
         said = {name: str(word[where]) if where >= 0 else "" for name, word in words.items()}
         is_ok = said["status"] == "ok"
         case = stored.case_at(where) if is_ok else None
-        rtol = float(rows.attributes(where)["rtol"]) if is_ok else math.nan
-        own_numbers = {name: values[number] for name, values in numbers.items()}
+        rtol = float(stored.attributes(where)["rtol"]) if is_ok else math.nan
+        own_numbers = {name: numbers[name][number] for name in names}
         status = said["status"] or "missing"
         job = JudgedJob(key, point, status, said["reason"], said["regime"], case, rtol,
                         own_numbers, [])  # fmt: skip
@@ -206,13 +206,13 @@ def study_of_judges(
 
 def hear_votes(place: Folder, jobs: Sequence[JudgedJob], cases: Sequence[Case]) -> None:
     """Give jobs the votes of what was run for them."""
-    rows = read_store(place).rows
-    at = rows.find([case.key for case in cases])
-    numbers, status = rows.numbers(at, JUDGED), rows.word("status")
+    stored = read_store(place)
+    at = stored.find([case.key for case in cases])
+    numbers, status = stored.numbers(at, JUDGED), stored.words("status")
     for number, (job, case) in enumerate(zip(jobs, cases, strict=True)):
         vote = Vote(case.solve.method)
         if at[number] >= 0 and status[at[number]] == "ok":
-            theirs = {name: values[number] for name, values in numbers.items()}
+            theirs = {name: numbers[name][number] for name in JUDGED}
             vote = compare(case.solve.method, job, theirs)
         job.votes.append(vote)
 

@@ -21,7 +21,7 @@ from compressor.reasons import Reason
 from compressor.store import encode_batch, publish_batch
 from compressor.sweep.pool import Batches, Job
 from compressor.sweep.sweep import run_job
-from compressor.sweep.wanted import JobEnd, PendingJobs
+from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Needs, load
 from compressor.sweep.worker import End, JobLost, JobResult, attempt, then
 
@@ -61,9 +61,8 @@ def run_cases(ours: dict[str, str], needs: Needs, cases: bytes) -> str | tuple[l
     load_once(needs)
     ends = [attempt(run_job, case) for case in pickle.loads(cases)]
     ran = [end.result for end in ends if isinstance(end, JobResult)]
-    compress = any(compress for _, compress in ran)
-    data = encode_batch([outcome for outcome, _ in ran], compress) if ran else b""
-    return [then(end, lambda one: JobEnd.of(one[0])) for end in ends], data
+    data = encode_batch(ran) if ran else b""
+    return [then(end, JobEnd.of) for end in ends], data
 
 
 load_once = functools.cache(load)  # in each process of the cluster, so that no job's time has it
@@ -99,7 +98,7 @@ class Cluster:
         self.client.close(timeout=2)
 
     def __call__(
-        self, folder: Path, jobs: PendingJobs, remark: Callable[[str], None]
+        self, folder: Path, jobs: RequestedJobs, remark: Callable[[str], None]
     ) -> Generator[End, None, None]:
         """Yield how each job ended; `compressor.sweep.sweep.Backend` says the rest."""
         from distributed import KilledWorker, as_completed

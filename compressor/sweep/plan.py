@@ -14,7 +14,7 @@ from compressor.cases import Case, Study, points
 from compressor.store import Folder, encode_batch, read_store
 from compressor.sweep.pool import cores
 from compressor.sweep.sweep import run_job
-from compressor.sweep.wanted import RequestedJobs, stored_ends
+from compressor.sweep.wanted import RequestedJobs
 from compressor.sweep.warm_up import Needs, compile_once, compile_seconds
 
 ROW_BYTES = 700  # of one job in a merged batch without time series
@@ -114,7 +114,7 @@ def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
     Nothing is stored. Raises StoreError where the folder cannot be read.
     """
     store, wanted = read_store(folder), RequestedJobs(studies)
-    done = {*stored_ends(store, RequestedJobs(studies, store.keys()))}
+    done = {*wanted.among(store.keys()).stored_ends(store)}
     missing: dict[str, list[str]] = {}
     ahead: list[Next] = []
     parts: list[StudyShare] = []
@@ -153,8 +153,8 @@ def time_job(case: Case) -> tuple[float, int]:
     """
     for _ in range(2):
         began = time.process_time()
-        outcome, compress = run_job(case)
+        outcome = run_job(case)
         seconds = time.process_time() - began
         if seconds > LONG_JOB:
             break
-    return seconds, len(encode_batch([outcome], compress))
+    return seconds, len(encode_batch([outcome]))

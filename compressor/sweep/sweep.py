@@ -15,15 +15,9 @@ from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
 from compressor.program import Progress, ignore_warnings, no_progress
 from compressor.reasons import Reason
-from compressor.store import (
-    Folder,
-    merge_batches,
-    read_store,
-    write_batch,
-    write_study,
-)
+from compressor.store import Folder, merge_batches, read_store, write_batch, write_study
 from compressor.sweep.pool import Input, Workers, require_posix, run_batches
-from compressor.sweep.wanted import JobEnd, PendingJobs, RequestedJobs, stored_ends
+from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Needs, compile_once, load
 from compressor.sweep.worker import End, JobResult, Store, attempt, describe_error, store_results
 
@@ -34,9 +28,7 @@ REPORT_SECONDS = 0.1  # s between two reports of progress, or more
 # Where jobs run: runs cases, the payloads of jobs, stores their outcomes in a folder of results,
 # and yields how each job ended, with a JobEnd as its result; but lost ones are stored by the sweep.
 # The last argument is called with what takes time.
-Backend = Callable[
-    [Path, PendingJobs, Callable[[str], None]], Generator[End, None, None]
-]  # fmt: skip
+Backend = Callable[[Path, RequestedJobs, Callable[[str], None]], Generator[End, None, None]]
 
 
 @dataclass(frozen=True)
@@ -111,28 +103,27 @@ def sweep(
     if jobs > MANY_JOBS:
         progress(0, jobs, f"preparing {jobs} jobs")
     wanted, stored = RequestedJobs(studies), read_store(folder)
-    ends = stored_ends(stored, wanted)
+    ends = wanted.stored_ends(stored)
     if options.rerun_failed:
         ends = {key: end for key, end in ends.items() if end.status == "ok"}
-    missing = [key for key in wanted if key not in ends]
+    missing = wanted.among(wanted.places.keys() - ends.keys())
     for study in studies:
         write_study(folder, study, options.command, options.overrides)
     if missing:
         for damage in stored.damaged:
             progress(len(ends), len(wanted), f"{damage}: its jobs count as missing")
-        run_missing(folder, PendingJobs(wanted, missing), ends, workers, progress, options)
+        run_missing(folder, missing, ends, workers, progress, options)
     if missing or stored.damaged:
         merge_batches(folder)
-    counts, failed = endings(studies, ends)
-    return Summary(
-        len(wanted), len(wanted) - len(missing), len(missing), counts, failed,
-        time.monotonic() - began,
-    )  # fmt: skip
+    counts, failed = count_ends(studies, ends)
+    seconds = time.monotonic() - began
+    before = len(wanted) - len(missing)
+    return Summary(len(wanted), before, len(missing), counts, failed, seconds)
 
 
 def run_missing(
     folder: Path,
-    jobs: PendingJobs,
+    jobs: RequestedJobs,
     ends: dict[str, JobEnd],
     workers: int,
     progress: Progress,
@@ -141,19 +132,22 @@ def run_missing(
     """Run and store jobs; `ends` gains how each ended. Progress counts those that are stored."""
     total = len(ends) + len(jobs)
     failed = sum(end.status != "ok" for end in ends.values())
-    options.failed(failed)
-    progress(len(ends), total, "")
-    told = time.monotonic()
-    backend = options.backend or partial(run_locally, workers)
-    running = backend(folder, jobs, lambda text: progress(len(ends), total, text))
+    told = -REPORT_SECONDS
+
+    def tell(text: str = "") -> None:
+        nonlocal told
+        told = time.monotonic()
+        options.failed(failed)
+        progress(len(ends), total, text)
+
+    tell()
+    running = (options.backend or partial(run_locally, workers))(folder, jobs, tell)
     try:
         for end in running:
-            ends[end.id] = store_lost(folder, jobs.wanted[end.id], end)
+            ends[end.id] = store_lost(folder, jobs[end.id], end)
             failed += ends[end.id].status != "ok"
             if time.monotonic() - told > REPORT_SECONDS or len(ends) == total:
-                options.failed(failed)
-                progress(len(ends), total, "")
-                told = time.monotonic()
+                tell()
     finally:
         running.close()
 
@@ -168,36 +162,33 @@ def store_lost(folder: Path, case: Case, end: End) -> JobEnd:
     return JobEnd.of(outcome)
 
 
-Ran = tuple[Outcome, bool]  # and whether its time series are to be compressed
-
-
-def run_job(case: Case) -> Ran:
+def run_job(case: Case) -> Outcome:
     """Simulate a case, in a worker; an exception is a failure of the job."""
     from compressor.solve import observe  # needs numba: only to simulate
 
     try:
         with ignore_warnings():  # a solver's remarks; what matters is in the result
             outcome, variables = observe(case)
-        if case.output.keep == "series" and outcome.reason != Reason.INVALID_INPUT:
-            outcome = outcome.with_series(variables, case.output.precision)
+        output = case.output
+        if output.keep == "series" and outcome.reason != Reason.INVALID_INPUT:
+            outcome = outcome.with_series(variables, output.precision, output.compress)
+        return outcome
     except MemoryError:
         raise
     except Exception as error:
         detail, traceback = describe_error(error)
-        more = {"traceback": traceback}
-        outcome = without_run(case.attributes(), Reason.INTERNAL_ERROR, detail, **more)
-    return outcome, case.output.compress
+        attributes = case.attributes()
+        return without_run(attributes, Reason.INTERNAL_ERROR, detail, traceback=traceback)
 
 
-def store_outcomes(folder: Path, ran: Sequence[Ran]) -> list[JobEnd]:
+def store_outcomes(folder: Path, outcomes: Sequence[Outcome]) -> list[JobEnd]:
     """Store the outcomes of a batch of jobs; return how each ended. Raises StoreError."""
-    outcomes = [outcome for outcome, _ in ran]
-    write_batch(folder, outcomes, any(compress for _, compress in ran))
+    write_batch(folder, outcomes)
     return [JobEnd.of(outcome) for outcome in outcomes]
 
 
 def run_locally(
-    workers: int, folder: Path, jobs: PendingJobs, remark: Callable[[str], None]
+    workers: int, folder: Path, jobs: RequestedJobs, remark: Callable[[str], None]
 ) -> Generator[End, None, None]:
     """Run jobs in the worker processes of this machine: a Backend, but for its first argument."""
     store = partial(store_outcomes, folder)
@@ -205,7 +196,7 @@ def run_locally(
 
 
 def in_this_process(
-    folder: Path, jobs: PendingJobs, remark: Callable[[str], None]
+    folder: Path, jobs: RequestedJobs, remark: Callable[[str], None]
 ) -> Generator[End, None, None]:
     """Yield how jobs end that have run in this process; the backend for a few short ones.
 
@@ -215,12 +206,12 @@ def in_this_process(
     compile_once(Needs.of(jobs.cases()), remark)
     ran = [attempt(run_job, case) for case in jobs.cases()]
     ends = store_results(partial(store_outcomes, folder), ran)
-    yield from (replace(end, id=key) for key, end in zip(jobs.keys, ends, strict=True))
+    yield from (replace(end, id=key) for key, end in zip(jobs.places, ends, strict=True))
 
 
 def run_here(
     work: Callable[[Any], Any],
-    jobs: PendingJobs | Sequence[Input],
+    jobs: RequestedJobs | Sequence[Input],
     needs: Needs,
     workers: int,
     remark: Callable[[str], None],
@@ -237,7 +228,7 @@ def run_here(
     return run_batches(work, jobs, Workers(workers, partial(load, needs), grace=GRACE), store)
 
 
-def endings(
+def count_ends(
     studies: Sequence[Study], ends: dict[str, JobEnd]
 ) -> tuple[tuple[JobCount, ...], tuple[JobFailure, ...]]:
     """Return how the selected jobs of each study ended, and every one that failed."""

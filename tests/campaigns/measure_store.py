@@ -31,7 +31,6 @@ from compressor.cases.case import Case
 from compressor.store.batch import (
     batch_paths,
     encode_batch,
-    publish_batch,
     read_series,
     write_batch,
 )
@@ -68,7 +67,7 @@ def copies(found, numbers):
 
 def write_rows(folder, jobs):
     """Seconds to write rows, the longest that a batch takes, and seconds to merge them."""
-    found, _ = run_job(Case.from_values({**WORN, "output": {"keep": "metrics"}}))
+    found = run_job(Case.from_values({**WORN, "output": {"keep": "metrics"}}))
     seconds = []
     for first in range(0, jobs, BATCH):
         batch = [*copies(found, range(first, min(first + BATCH, jobs)))]
@@ -132,18 +131,14 @@ def series(folder):
     exact, found = None, []
     for precision, compress in itertools.product(("double", "single"), (False, True)):
         case = Case.from_values({**WORN, "output": {"precision": precision, "compress": compress}})
-        outcome, _ = run_job(case)
-        data = encode_batch([outcome], compress)
+        outcome = run_job(case)
+        data = encode_batch([outcome])
         began = time.process_time()
         for _ in range(5):
-            encode_batch([outcome], compress)
+            encode_batch([outcome])
         cpu = (time.process_time() - began) / 5
-        write, path = timed(
-            lambda data=(outcome,), compress=compress: publish_batch(
-                folder, encode_batch(data, compress)
-            ), 5,
-        )  # fmt: skip
-        read, back = timed(lambda path=path: read_series(path, 0), 5)
+        write, path = timed(lambda data=(outcome,): write_batch(folder, data), 5)
+        read, (back,) = timed(lambda path=path: read_series(path, [0]), 5)
         a = back["acceleration"].values.astype(float)
         exact = a if exact is None else exact
         rounding = np.abs(a - exact).max() / np.abs(exact).max()
@@ -157,7 +152,7 @@ def series(folder):
 
 def selection(folder):
     """Seconds to open a study with time series, to read one of them at a time, and whole."""
-    found, _ = run_job(Case.from_values(WORN))
+    found = run_job(Case.from_values(WORN))
     for first in range(0, SELECTED, 20):
         write_batch(folder, [*copies(found, range(first, first + 20))])
     plan(folder, SELECTED)

@@ -8,6 +8,7 @@ import argparse
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 from compsim import cli
 from compsim.screen import DONE, SOME_FAILED
 from result_pages import keep, provenance
@@ -54,8 +55,8 @@ def group(jobs):
 
 def seconds(folder):
     """The wall time of all jobs of a folder of results, and of the longest one."""
-    rows = read_store(folder).rows
-    taken = rows.numbers(rows.find(rows.keys), ["seconds"])["seconds"]
+    stored = read_store(folder)
+    taken = stored.numbers(np.arange(len(stored)), ["seconds"])["seconds"]
     return float(taken.sum()), float(taken.max())
 
 

@@ -75,7 +75,7 @@ class Sweep:
         run.kill(whole)
         code = run.finish()
         assert code == -signal.SIGKILL, f"{code}: {run.text()[-2000:]}"
-        stored = len(read_store(self.folder / "results").rows)
+        stored = len(read_store(self.folder / "results"))
         assert stored >= run.told(), f"told of {run.told()} jobs, {stored} are stored"
         assert not damage(self.folder / "results"), damage(self.folder / "results")
         return {
@@ -111,7 +111,7 @@ def main(target, jobs=JOBS):
         assert not damage(results), damage(results)
         opened, study = timed(lambda: open_study(results))
         count = int((study.status == "ok").sum())
-        assert count == study.status.size == len(read_store(results).rows), "not complete"
+        assert count == study.status.size == len(read_store(results)), "not complete"
         same = contents(place / "undisturbed" / "results") == contents(results)
         assert same, "the resumed study differs from the undisturbed one"
         total, files = size(results)

@@ -196,8 +196,8 @@ def sweeping(jobs):
         seconds = wall(["-m", "compsim", "run", "many.yaml", "-j", str(WORKERS), "--quiet"], folder)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         busy = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
-        rows = read_store(Path(folder, "results")).rows
-        numbers = rows.numbers(np.arange(len(rows)), ["seconds"])["seconds"]
+        stored = read_store(Path(folder, "results"))
+        numbers = stored.numbers(np.arange(len(stored)), ["seconds"])["seconds"]
         again = wall(["-m", "compsim", "run", "many.yaml", "--quiet"], folder)
         (study,) = load_studies(path)
     chosen = study.cases[:: len(study.cases) // SAMPLE]

@@ -24,9 +24,9 @@ from compressor.report import page
 from compressor.report.figures import FIGURES, pictures
 from compressor.report.paper_sections import TITLES, find_paper_runs, paper_candidates
 from compressor.report.report import KINDS, write_report
+from compressor.store.caveats import study_caveats
 from compressor.store.files import StoreError, StoreWarning
 from compressor.store.reader import read_job, read_store
-from compressor.store.status import study_caveats
 from compressor.store.studies import encode, read_studies, write_study
 
 SHORT = ["solve.duration_rev=0.1", "solve.settle_rev=0", "solve.output_step_deg=1"]
@@ -331,7 +331,7 @@ def test_a_damaged_case_is_told(paper_store, tmp_path):
 
 def test_the_paper_s_cases_say_how_far_their_numbers_are_settled(full, paper_store):
     page, stored = read(full).text, read_store(paper_store)
-    found = {study.name: study_caveats(stored.rows, study) for study in read_studies(paper_store)}
+    found = {study.name: study_caveats(stored, study) for study in read_studies(paper_store)}
     assert any("settled after solve" in text for texts in found.values() for text in texts)
     for name, texts in found.items():
         for text in texts:

@@ -223,7 +223,7 @@ def test_without_body_or_sensor_there_is_nothing_of_them(tmp_path):
     numbers = measure(Case.from_values(plain)).numbers
     assert all(np.isnan(numbers[name]).all() for name in OF_BODY)
     keep(tmp_path / "plain", simulate(Case.from_values(plain)))
-    assert not {*OF_BODY} & read_store(tmp_path / "plain").rows.given
+    assert not {*OF_BODY} & read_store(tmp_path / "plain").given
     bare = measured({**plain, **BODY})
     assert np.isfinite(bare["body_velocity_rms"]).all()
     assert all(np.isnan(bare[name]).all() for name in OF_SENSOR)

@@ -20,8 +20,8 @@ from compressor.solve.search import (
 )
 from compressor.solve.si_record import offsets, record, scene
 from compressor.solve.simulate import measure, simulate
+from compressor.store.demands import serving_both
 from compressor.store.reader import read_store
-from compressor.sweep.wanted import serving_both
 
 REGULAR = {"joint": "both", "clearance_mm": 0.3}
 QUICK = {"duration_rev": 1.2, "settle_rev": 0}
@@ -126,5 +126,5 @@ def test_a_horizon_is_kept_and_asked_for_beside_a_job_s_identity(tmp_path):
     stored = store.status(plain.key)
     assert stored.satisfies(asked)
     assert stored.satisfies(plain)
-    numbers = store.rows.number_row(store.position(plain.key))
+    numbers = store.numbers([store.position(plain.key)])[0]
     assert 0 < numbers["predictability_horizon"] < asked.duration

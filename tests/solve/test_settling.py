@@ -13,7 +13,7 @@ from compressor.solve import error_bars, solution
 from compressor.solve import run as run_module
 from compressor.solve.search import MEASURED_REV, agree, least_promise, steady
 from compressor.solve.simulate import measure, simulate
-from compressor.store.status import job_caveats
+from compressor.store.caveats import job_caveats
 
 PAPER = {"joint": "big_end", "clearance_mm": 0.2}
 AUTO = {"settle_rev": "auto", "duration_rev": "auto"}

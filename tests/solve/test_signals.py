@@ -12,9 +12,9 @@ from compressor.cases.load import load_studies
 from compressor.metrics import NUMBERS, SERIES
 from compressor.solve.series import SIGNALS
 from compressor.solve.simulate import measure, simulate
+from compressor.store.demands import serving_both
 from compressor.store.reader import open_study, read_store
 from compressor.sweep.sweep import sweep
-from compressor.sweep.wanted import serving_both
 
 FINE = {"duration_rev": 0.3, "settle_rev": 0, "output_step_deg": 0.01, "error_bars": False,
         "accuracy": "reference"}  # fmt: skip

@@ -76,11 +76,11 @@ def held(stored):
     """Key -> all that a store holds of each job, to the bit."""
     forget()
     found = {}
-    for position, name in enumerate(stored.rows.keys):
+    for position, name in enumerate(stored.columns["job"]):
         one = stored.outcome(position)
         series = {
             n: (item.dims, item.values.dtype, item.values.tobytes(), item.attrs)
-            for n, item in stored.rows.series(position).items()
+            for n, item in stored.series(position).items()
         }
         numbers, attributes = one.numbers.tobytes(), repr(one.attributes)
         found[name.decode()] = stored.status_at(position), numbers, attributes, series
@@ -94,6 +94,6 @@ def batches(folder):
 def peaks(folder):
     """Number -> peak acceleration of the made-up jobs in a store."""
     stored = read_store(folder)
-    values = stored.rows.numbers(np.arange(len(stored.rows)), ["peak_acceleration"])
-    names = (int(name, 16) for name in stored.rows.keys)
+    values = stored.numbers(np.arange(len(stored)), ["peak_acceleration"])
+    names = (int(name, 16) for name in stored.columns["job"])
     return dict(zip(names, values["peak_acceleration"].tolist(), strict=True))

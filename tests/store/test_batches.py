@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 from made_jobs import batches, forget, held, key, made, peaks, plan
 
-from compressor.store import merge, reader, rows
-from compressor.store.batch import write_batch
+from compressor.store import merge, reader
+from compressor.store.batch import read_batch, write_batch
 from compressor.store.files import StoreError
 from compressor.store.merge import merge_batches
 from compressor.store.reader import open_study, read_store
@@ -126,7 +126,7 @@ def test_rows_that_do_not_count_go_and_damaged_batches_are_set_aside(tmp_path):
     write_batch(tmp_path, [made(2, 12)])
     write_batch(tmp_path, [made(3)]).write_bytes(b"torn")
     merge_batches(tmp_path)
-    assert [len(batch) for batch in read_store(tmp_path).rows.batches] == [1, 1]
+    assert [len(read_batch(path)) for path in batches(tmp_path)] == [1, 1]
     assert peaks(tmp_path) == {1: 11, 2: 12}
     (aside,) = (tmp_path / "batches").glob("*.damaged")
     assert aside.read_bytes() == b"torn"
@@ -147,32 +147,31 @@ def test_a_batch_whose_values_are_damaged_stays_while_its_rows_count(mixed):
 
 
 def test_a_reader_that_loses_the_race_with_a_merge_reads_again(mixed, monkeypatch):
-    real, jobs = rows.read_batch, held(read_store(mixed))
+    jobs = held(read_store(mixed))
 
     def merged_meanwhile(path):
         monkeypatch.undo()
         merge_all(mixed)
-        return real(path)
+        return read_batch(path)
 
-    monkeypatch.setattr(rows, "read_batch", merged_meanwhile)
+    monkeypatch.setattr("compressor.store.stored.read_batch", merged_meanwhile)
     assert held(read_store(mixed)) == jobs
 
 
 def test_numbers_and_series_of_batches_that_were_merged_since_are_found(mixed, monkeypatch):
     expected, jobs = open_study(mixed).load(), held(read_store(mixed))
     stored, lazy = read_store(mixed), open_study(mixed)
-    real = reader.read_rows
 
     def merged_after(folder):
-        found = real(folder)
+        found = read_store(folder)
         merge_all(mixed)
         return found
 
-    monkeypatch.setattr(reader, "read_rows", merged_after)
+    monkeypatch.setattr(reader, "read_store", merged_after)
     xr.testing.assert_identical(open_study(mixed).load(), expected)
     monkeypatch.undo()
     assert held(stored) == jobs
-    assert all(stored.intact(position) for position in range(len(stored.rows)))
+    assert all(stored.intact(position) for position in range(len(stored)))
     xr.testing.assert_identical(lazy.load(), expected)
 
 
@@ -180,7 +179,7 @@ def test_a_job_that_is_gone_amid_reading_is_told(mixed):
     lazy, stored = open_study(mixed), read_store(mixed)
     shutil.rmtree(mixed / "batches")
     forget()
-    for read in (lazy.load, lambda: stored.rows.attributes(0)):
+    for read in (lazy.load, lambda: stored.attributes(0)):
         with pytest.raises(StoreError, match="has lost jobs meanwhile; try again"):
             read()
 

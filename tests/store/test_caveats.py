@@ -9,8 +9,9 @@ from conftest import jobs_here
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
+from compressor.store.caveats import is_late, is_unrepeated, job_caveats
 from compressor.store.reader import open_study
-from compressor.store.status import is_late, is_unrepeated, job_caveats, report_job, standings
+from compressor.store.status import report_job, standings
 from compressor.studies.diagnosis.dataset import make_data_set, write_card
 
 SOLVE = {"duration_rev": 3, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}

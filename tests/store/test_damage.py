@@ -10,7 +10,6 @@ import xarray as xr
 from compsim import cli
 from made_jobs import batches, forget, held, key, made, plan
 
-from compressor.store import rows
 from compressor.store.batch import write_batch
 from compressor.store.files import StoreError, StoreWarning, discard_leftovers, publish
 from compressor.store.netcdf import DamagedFile, read_dataset, write_dataset
@@ -98,9 +97,9 @@ def test_old_leftovers_are_removed_and_young_ones_kept(tmp_path):
 
 def test_a_folder_that_may_not_be_read_is_no_damage(tmp_path, monkeypatch):
     write_batch(tmp_path, [made(1)])
-    for module, name in ((os, "listdir"), (rows, "read_batch")):
+    for name in ("os.listdir", "compressor.store.stored.read_batch"):
         with monkeypatch.context() as patch:
-            patch.setattr(module, name, refusing(errno.EACCES))
+            patch.setattr(name, refusing(errno.EACCES))
             with pytest.raises(StoreError, match="Permission denied; get the permission"):
                 read_store(tmp_path)
 

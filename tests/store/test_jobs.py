@@ -2,6 +2,7 @@
 
 import itertools
 import json
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -71,7 +72,10 @@ def test_compression_loses_nothing_and_saves_room(tmp_path):
     jobs = [made(number, samples=5000) for number in range(3)]
     for job in jobs:
         job.series["contact_force"].values[:] = 0
-    paths = [write_batch(tmp_path / str(gzip), jobs, gzip) for gzip in (False, True)]
+    paths = [
+        write_batch(tmp_path / str(gzip), [replace(job, compress=gzip) for job in jobs])
+        for gzip in (False, True)
+    ]
     assert paths[1].stat().st_size < 0.6 * paths[0].stat().st_size
     assert held(read_store(tmp_path / "True")) == held(read_store(tmp_path / "False"))
 
@@ -199,7 +203,7 @@ def test_many_jobs_serve_as_each_does(ideal, tmp_path):
         stored_as(row, ideal, tmp_path, key(number))
     keep(tmp_path, simulate(Case.from_values({"solve": SHORT | {"error_bars": False}})))
     stored, told = read_store(tmp_path), set()
-    positions = np.arange(len(stored.rows))[::-1]
+    positions = np.arange(len(stored))[::-1]
     for keeps, precision, bars in itertools.product(
         ("series", "metrics"), ("double", "single"), (True, False)
     ):

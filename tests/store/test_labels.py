@@ -10,7 +10,7 @@ from made_jobs import SHORT, fill, study
 
 from compressor.metrics import METRICS
 from compressor.solve.simulate import simulate
-from compressor.store import rows
+from compressor.store.batch import read_series
 from compressor.store.files import StoreError, StoreWarning
 from compressor.store.reader import open_study, read_job, read_store
 from compressor.store.studies import coordinate_names, write_study
@@ -84,18 +84,16 @@ def test_a_series_is_that_of_its_job(grid):
 
 def test_only_the_jobs_asked_for_are_read(grid, monkeypatch):
     folder, one = grid
-    read, real = [], rows.read_one_series
-    monkeypatch.setattr(
-        rows, "read_one_series", lambda *args: read.append(args) or real(*args)
-    )  # fmt: skip
+    read, name = [], "compressor.store.stored.read_series"
+    monkeypatch.setattr(name, lambda *args: read.append(args) or read_series(*args))
     found = open_study(folder)
     assert found.acceleration.sizes["time"] == 101
     assert repr(found)
-    assert read == []
+    (template,) = read  # for names, units and lengths
     float(found.acceleration.sel(load="spring", rod_mass_kg=5).max())
     stored = read_store(folder)
-    position = stored.position(one.cases[1].key)
-    assert read == [(stored.rows.path(position), "acceleration", [stored.rows.row[position]])]
+    path, row = stored.batch_of(stored.position(one.cases[1].key))
+    assert read == [template, (path, [row], ["acceleration"])]
 
 
 @pytest.mark.parametrize(

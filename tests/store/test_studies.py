@@ -70,15 +70,12 @@ def test_a_damaged_study_is_named_with_a_remedy_and_run_again(text, tmp_path):
 
 @pytest.fixture
 def place(tmp_path, monkeypatch):
-    """A working directory with folders of results and other things."""
+    """A working directory with a folder of results and other things."""
     monkeypatch.chdir(tmp_path)
-    for name in ("results/studies/a.json", "deep/wear/studies/b.json", "wear/studies/c.json"):
-        (tmp_path / name).parent.mkdir(parents=True)
-        (tmp_path / name).write_text("{}")
-    for name in ("alone/results/studies", "alone/plots", "empty/plots"):
+    for name in ("results/studies", "empty/plots"):
         (tmp_path / name).mkdir(parents=True)
-    (tmp_path / "case.yaml").touch()
-    (tmp_path / "notes.txt").touch()
+    for name in ("results/studies/a.json", "case.yaml", "notes.txt"):
+        (tmp_path / name).touch()
     return tmp_path
 
 
@@ -88,9 +85,6 @@ def place(tmp_path, monkeypatch):
         ("case.yaml", "is a case file, where a folder of results is needed; compsim run case.yaml"),
         ("notes.txt", "is a file, where a folder of results is needed; choose another folder, or"),
         ("resluts", "there is no such folder of results; did you mean results?"),
-        ("results/studies", "did you mean results?"),
-        ("deep", "holds no study; did you mean deep/wear?"),
-        ("alone/plots", "holds no study; did you mean alone/results?"),
         ("empty/plots", "holds no study; choose another folder, or make one: compsim run CONFIG"),
     ],
 )

@@ -60,7 +60,7 @@ def test_promise_and_regime_of_each_job_are_kept(ring):
 def test_statistics_take_no_room_where_nothing_is_chaotic(plain, ring, tmp_path):
     always = {name for name, row in NUMBERS.items() if not row.when}
     write_batch(tmp_path, [plain])
-    assert read_store(tmp_path).rows.given == always
+    assert read_store(tmp_path).given == always
     assert NUMBERS.keys() & plain.table({}).variables.keys() == always
     assert "quantile" not in plain.table({}).variables
     study = open_study(ring)

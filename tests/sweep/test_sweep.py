@@ -13,6 +13,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.store import reader as store
+from compressor.store.files import StoreError
 from compressor.store.status import verify
 from compressor.sweep import warm_up
 from compressor.sweep.sweep import JobFailure, Options, sweep
@@ -103,7 +104,7 @@ def test_where_studies_share_a_job_the_greater_demand_counts(studies):
     made = studies(
         few={"output": {"keep": "metrics"}}, all={}, less={"output": {"keep": "metrics"}}
     )
-    (case,) = RequestedJobs(made).values()
+    (case,) = RequestedJobs(made).cases()
     assert case.output.keep == "series"
 
 
@@ -320,14 +321,14 @@ def test_a_copied_folder_compiles_again(tmp_path, monkeypatch, uncompiled):
 def test_a_job_that_cannot_be_stored_ends_the_sweep(studies, tmp_path, in_process):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/batches").symlink_to("nowhere")
-    with pytest.raises(store.StoreError, match=r"out/batches: is a link that leads nowhere"):
+    with pytest.raises(StoreError, match=r"out/batches: is a link that leads nowhere"):
         sweep(studies(one={"load": ["none", "spring"]}), tmp_path / "out", 2)
 
 
 def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/batches").write_text("in the way")
-    with pytest.raises(store.StoreError, match="Not a directory; choose another folder"):
+    with pytest.raises(StoreError, match="Not a directory; choose another folder"):
         sweep(studies(one={}), tmp_path / "out", 1, lambda *event: pytest.fail("began to run"))
 
 

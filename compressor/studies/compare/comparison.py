@@ -132,7 +132,7 @@ def compare_record(
     jobs = []
     for number, (one, swept) in enumerate(wanted.items()):
         progress(number, len(wanted), "")
-        other, case = job_record(stored, one), stored.case_at(int(stored.rows.find([one])[0]))
+        other, case = job_record(stored, one), stored.case_at(int(stored.find([one])[0]))
         if other is None or case is None or not case.sensor:
             continue
         with contextlib.suppress(RecordError):  # too short, or all zero

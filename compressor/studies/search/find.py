@@ -205,8 +205,8 @@ def find(
                 raise StoreError(folder, f"job {key} is gone", "ask again")
             end = store.status_at(position)
             if end.status == "ok":
-                regime = store.rows.bytes_of["regime"][position].decode()
-                reading = question.goal.read(store.rows.number_row(position), regime)
+                regime = store.columns["regime"][position].decode()
+                reading = question.goal.read(store.numbers([position])[0], regime)
             else:
                 reading = JobReading(reason=f"the job failed, {end.reason}: {end.detail}")
             found.append(Point(share, value, reading, key, end.status != "ok"))

@@ -415,17 +415,17 @@ def choose_job(study: Study, folder: Folder) -> tuple[int, str]:
     """
     if study.jobs == 1:
         return 0, "the job"
-    rows = read_store(folder).rows
-    positions = rows.find(study.keys)
-    stored = np.flatnonzero(positions >= 0)
-    if stored.size:
-        numbers = rows.numbers(
-            positions[stored], ("peak_contact_force", "peak_contact_force_error")
+    stored = read_store(folder)
+    positions = stored.find(study.keys)
+    there = np.flatnonzero(positions >= 0)
+    if there.size:
+        numbers = stored.numbers(
+            positions[there], ("peak_contact_force", "peak_contact_force_error")
         )
         known = np.isfinite(numbers["peak_contact_force_error"])
         forces = np.where(known, numbers["peak_contact_force"], -1.0).max(axis=1)
         if forces.max() > 0.0:
-            place = int(stored[forces.argmax()])
+            place = int(there[forces.argmax()])
             return place, f"the one of {study.jobs} jobs with the greatest stored contact force"
     gaps = [sum(getattr(case.clearance_mm, j) for j in JOINTS) for case in study.cases]
     why = f"the one of {study.jobs} jobs with the greatest clearance, as none with a known force "

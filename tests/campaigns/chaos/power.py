@@ -197,7 +197,7 @@ class Campaign:
 def intact(store: Path) -> set[str]:
     """The keys of a store's jobs, without those whose batches are damaged."""
     stored = read_store(store)
-    return {key.decode() for at, key in enumerate(stored.rows.keys) if stored.intact(at)}
+    return {key.decode() for at, key in enumerate(stored.columns["job"]) if stored.intact(at)}
 
 
 def campaign(trials: int, seed: int, folder: Path) -> dict[str, Any]:

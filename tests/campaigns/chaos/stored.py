@@ -41,7 +41,7 @@ def contents(folder, foreign=()):
             outcome.numbers[name].tobytes() for name in outcome.numbers.dtype.names if name != TIMED
         ]
         parts += [(n, outcome.attributes[n]) for n in outcome.attributes if n not in foreign]
-        for name, (dims, values, attrs) in stored.rows.series(position).items():
+        for name, (dims, values, attrs) in stored.series(position).items():
             parts += [name, dims, values.dtype.char, values.tobytes(), attrs]
         found[key] = hashlib.sha256(repr(parts).encode()).hexdigest()
     return found

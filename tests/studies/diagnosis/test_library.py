@@ -6,7 +6,7 @@ from conftest import WORN_JOBS, struck
 
 from compressor.store.files import StoreError
 from compressor.store.reader import read_store
-from compressor.store.sensor_records import stored_record
+from compressor.store.sensor_records import find_record
 from compressor.studies.diagnosis.features import features
 from compressor.studies.diagnosis.identify import StudyError, describe_record, read_library
 from compressor.vibration.accelerometer import Record
@@ -32,7 +32,7 @@ def test_features_are_those_of_the_records(library):
 
 
 def test_a_job_gives_its_record_by_the_beginning_of_its_key(library, worn_store):
-    key, record = stored_record(worn_store, library.keys[7][:12])
+    key, record = find_record(library.keys[7][:12], worn_store, {})
     assert key == library.keys[7]
     assert isinstance(record, Record)
     np.testing.assert_array_equal(describe_record(record), library.features[7])
@@ -43,4 +43,4 @@ def test_jobs_without_a_sensor_are_told(paper_store):
         read_library(paper_store, "both")
     key = sorted(read_store(paper_store).keys())[0]
     with pytest.raises(StoreError, match=f"job {key} has no sensor's record"):
-        stored_record(paper_store, key)
+        find_record(key, paper_store, {})

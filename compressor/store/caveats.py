@@ -1,0 +1,141 @@
+"""What stored numbers cannot say of themselves, a sentence each, from stored values alone.
+
+Motions that were not seen to repeat, or settled after metrics began to count, clipped sensor
+records, cases outside the range that the program was judged on, and where jobs fail.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from compressor.cases import Case, CaseError, Sensor, outside_judged, paper_notes, points, value_in
+from compressor.outcome import Regime
+from compressor.store.stored import Stored
+from compressor.store.studies import StoredStudy, swept_column
+
+MIN_FAILED = 3  # failed jobs, and good ones, for a tree of where jobs fail
+MIN_GAIN = 0.02  # of impurity that a split must bring
+MAX_LOOKED_AT = 16  # stored jobs of a study, for what only their cases show: a millisecond each
+AUTO = "solve: {settle_rev: auto, duration_rev: auto} waits for that"
+LONGER_REMEDY = "a longer run may give other numbers, or be chaotic"
+
+
+def study_caveats(stored: Stored, study: StoredStudy) -> list[str]:
+    """Return what to know of a study's finished jobs beside their numbers, a sentence each."""
+    positions = stored.find(study.keys)
+    positions = positions[positions >= 0]
+    some = np.linspace(0, positions.size - 1, min(MAX_LOOKED_AT, positions.size)).astype(int)
+    notes: dict[str, str] = {}
+    outside: dict[str, str] = {}
+    for position in positions[some].tolist():
+        if case := stored.case_at(position):
+            notes |= paper_notes(case)
+            outside |= outside_judged(case.values())
+    of_cases = [f"{key}: {text}" for key, text in (*notes.items(), *outside.items())]
+    return [*run_caveats(stored, study), *of_cases, *_of_failures(stored, study)]
+
+
+def run_caveats(stored: Stored, study: StoredStudy) -> list[str]:
+    """Return the caveats of runs alone: of repetition, and of clipped sensor records."""
+    positions = stored.find(study.keys)
+    there = positions >= 0
+    there[there] = stored.columns["status"][positions[there]] == b"ok"
+    positions = positions[there]
+    if not positions.size:
+        return []
+    numbers = stored.numbers(positions, ("settled_rev", "clipped_fraction"))
+    regimes, settled = stored.words("regime")[positions], numbers["settled_rev"]
+    fixed = value_in(study.fixed, "solve.settle_rev")
+    begins = [point.get("solve.settle_rev", fixed) for point in points(study)]
+    begin = np.array([b if isinstance(b, int | float) else math.nan for b in begins], float)[there]
+    jobs = f"{positions.size} {'job' if positions.size == 1 else 'jobs'}"
+    found = []
+    if count := int(is_unrepeated(regimes, settled).sum()):
+        was = "was" if count == 1 else "were"
+        found.append(f"{count} of {jobs} {was} not seen to repeat; {LONGER_REMEDY}; {AUTO}")
+    if count := int(is_late(regimes, settled, begin).sum()):
+        found.append(
+            f"{count} of {jobs} settled after solve.settle_rev, with start-up in the metrics; "
+            "solve.settle_rev: auto leaves it out"
+        )
+    shares = numbers["clipped_fraction"]
+    if count := int((shares >= Sensor.REPORTED).sum()):
+        found.append(
+            f"{count} of {(shares >= 0.0).sum()} sensor records are clipped, at worst "
+            f"{100 * np.nanmax(shares):.3g} % of their samples: raise sensor.range_m_per_s2"
+        )
+    return found
+
+
+def is_unrepeated(regime: Any, settled: Any) -> Any:
+    """Return whether motions were not seen to repeat; settled (rev): also where `auto` found it."""
+    return (np.asarray(regime) == Regime.PREDICTABLE) & np.isnan(settled)
+
+
+def is_late(regime: Any, settled: Any, settle: Any) -> Any:
+    """Return whether periodic motions settled after metrics began to count, at `settle` (rev)."""
+    return (np.asarray(regime) == Regime.PERIODIC) & (np.asarray(settled) > settle)
+
+
+def job_caveats(numbers: Mapping[str, Any], attributes: Mapping[str, Any]) -> list[str]:
+    """Return what to know of a job that is ok beside its numbers, a sentence each.
+
+    numbers, attributes: as a row of a store has them.
+    """
+    try:
+        case = Case.from_attribute(attributes["case"])
+    except (KeyError, CaseError):
+        return []  # of another version of the program
+    of_case = (*paper_notes(case).items(), *outside_judged(case.values()).items())
+    of_run = _of_run(case, numbers, attributes.get("regime", ""))
+    return [*of_run, *(f"{key}: {text}" for key, text in of_case)]
+
+
+def _of_run(case: Case, numbers: Mapping[str, Any], regime: str) -> Iterator[str]:
+    """Yield the caveats of a job's run."""
+    settled = float(numbers.get("settled_rev", math.nan))
+    begin = math.nan if case.solve.settle_rev == "auto" else float(case.solve.settle_rev)
+    if is_unrepeated(regime, settled):
+        within = "its settled revolutions"
+        if case.solve.duration_rev != "auto":
+            count = (case.duration - case.settle) / case.turn
+            within = f"{count:.3g} settled revolution{'s' * (round(count, 9) != 1)}"
+        yield f"the motion was not seen to repeat within {within}; {LONGER_REMEDY}; {AUTO}"
+    if is_late(regime, settled, begin):
+        yield (
+            f"the motion repeats from revolution {settled:g} on, and metrics count from "
+            f"{begin:g} on: start-up is in them; solve.settle_rev: auto leaves it out"
+        )
+    clipped = float(numbers.get("clipped_fraction", math.nan))
+    if case.sensor and (text := case.sensor.report_clipping(clipped)):
+        yield text
+
+
+def _of_failures(stored: Stored, study: StoredStudy) -> list[str]:
+    """Return where in a study jobs fail: a decision tree, where scikit-learn is installed."""
+    positions = stored.find(study.keys)
+    there = positions >= 0
+    failed = stored.columns["status"][positions[there]] == b"failed"
+    if min(failed.sum(), (~failed).sum()) < MIN_FAILED or not study.axes:
+        return []
+    try:
+        from sklearn.tree import DecisionTreeClassifier, export_text
+    except ImportError:
+        return []
+    swept = [*points(study)]
+    columns: dict[str, np.ndarray] = {}
+    for axis in study.axes:
+        values = swept_column(axis.key, [point.get(axis.key) for point in swept])[0][there]
+        if values.dtype.kind == "U":  # of words a column each
+            columns |= {f"{axis.key} is {word}": values == word for word in np.unique(values)}
+        else:
+            columns[axis.key] = values
+    tree = DecisionTreeClassifier(
+        max_depth=2, min_samples_leaf=MIN_FAILED, min_impurity_decrease=MIN_GAIN, random_state=0
+    ).fit(np.array([*columns.values()], float).T, np.where(failed, "failed", "ok"))
+    if tree.get_depth() == 0:
+        return []
+    text = export_text(tree, feature_names=[*columns], decimals=4, show_weights=True)
+    return [f"where jobs fail (jobs of each class in weights):\n{text.rstrip()}"]

@@ -1,0 +1,317 @@
+"""The store: a folder of finished jobs and of the studies they belong to.
+
+    <folder>/batches/<name>.h5      some jobs each, with their time series where kept: `batch`
+    <folder>/studies/<name>.json    one study: axes, keys of its jobs in C order: `studies`
+
+Every file appears under its name only when all of it is on disk. There is no index: what is stored
+is read from the batches. A run may merge batches with others at any time: then jobs are looked for
+again.
+"""
+
+import contextlib
+import itertools
+import os
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from compressor.cases import Case, CaseError, PerJoint
+from compressor.metrics import ALWAYS, NUMBERS
+from compressor.outcome import ROW, Outcome, Variable
+from compressor.store.batch import (
+    ERRORS,
+    NAMES,
+    WORDS,
+    Batch,
+    batch_paths,
+    places_of,
+    read_attributes_of,
+    read_batch,
+    read_numbers,
+    read_series,
+)
+from compressor.store.demands import WORTH, JobStatus
+from compressor.store.files import KEY, Folder, StoreError, StoreWarning, system_error
+from compressor.store.netcdf import DamagedFile, check_file
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ATTEMPTS = 100  # at reading batches that a run merges meanwhile
+Found = TypeVar("Found")
+
+
+def completeness(columns: dict[str, np.ndarray]) -> np.ndarray:
+    """Return how complete rows are, (rows,): failed 0, ok 1 and more for what is kept (`WORTH`)."""
+    kinds, kind = np.unique(columns["kept"], return_inverse=True)
+    worth = [sum(map(WORTH.__getitem__, one.decode().split())) for one in kinds]
+    return (columns["status"] == b"ok") * (1 + np.array(worth, int)[kind])
+
+
+class Stored:
+    """The jobs that a folder held when it was read, in the order of their keys.
+
+    Of several rows of a job the most complete one counts (`completeness`), of equals the one that
+    was written later. `columns`: those of batches (`batch.Batch`), a value a job; `damaged`: the
+    batches that cannot be read. Jobs are named by their positions; methods that read a batch raise
+    DamagedFile, and StoreError where a job is gone meanwhile.
+    """
+
+    def __init__(self, folder: Path, batches: Sequence[Batch], damaged: Sequence[DamagedFile] = ()):
+        self.folder, self.damaged = folder, damaged
+        self.checked: dict[Path, bool] = {}
+        empty = {name: np.zeros(0, "S1") for name in ("job", *WORDS)}
+        empty |= {"samples": np.zeros(0, int), "end_time": np.zeros(0)}
+        columns = {
+            name: np.concatenate([none, *(batch.columns[name] for batch in batches)])
+            for name, none in empty.items()
+        }
+        source = np.repeat(np.arange(len(batches)), [len(batch) for batch in batches])
+        row = np.concatenate([np.zeros(0, int), *(np.arange(len(batch)) for batch in batches)])
+        order = np.lexsort((source, completeness(columns), columns["job"]))
+        keys = columns["job"][order]
+        at = order[np.append(keys[1:] != keys[:-1], True)[: len(keys)]]
+        self.columns = {name: values[at] for name, values in columns.items()}
+        # where each job is: all batches, index of its batch, of the row in it; replaced as one
+        self.places = tuple(batches), source[at], row[at]
+
+    def __len__(self) -> int:
+        return len(self.columns["job"])
+
+    # ---- which jobs there are -------------------------------------------------------------------
+
+    def keys(self) -> set[str]:
+        """Return the keys of all stored jobs, failed ones included."""
+        return {key.decode() for key in self.columns["job"]}
+
+    def find(self, keys: np.ndarray | Sequence[str]) -> np.ndarray:
+        """Return the positions of jobs by key, in the shape of `keys`; -1 where there is none."""
+        wanted, mine = np.asarray(keys).astype("S20"), self.columns["job"]
+        if not len(self):
+            return np.full(wanted.shape, -1)
+        places = np.minimum(np.searchsorted(mine, wanted), len(self) - 1)
+        return np.where(mine[places] == wanted, places, -1)
+
+    def position(self, key: str) -> int | None:
+        """Return the position of a job; None where it is not stored."""
+        position = int(self.find([key])[0])
+        return position if position >= 0 else None
+
+    def words(self, name: str) -> np.ndarray:
+        """Return a word of every job, of `batch.WORDS`, as text, (jobs,)."""
+        return self.columns[name].astype(str)
+
+    @cached_property
+    def given(self) -> frozenset[str]:
+        """Return the names of the numbers that every job has, or some batch."""
+        labels = {label for batch in self.places[0] for label in batch.labels}
+        bars = {f"{NAMES[label]}_error" for label in labels & ERRORS.keys()}
+        return ALWAYS | {NAMES[label] for label in labels} | bars
+
+    def warned(self) -> "Stored":
+        """Return this store, after a StoreWarning of each damage, whose jobs count as missing."""
+        for damage in self.damaged:
+            text = f"{damage}: its jobs count as missing"
+            warnings.warn(text, StoreWarning, stacklevel=3)
+        return self
+
+    def without(self, damage: DamagedFile) -> "Stored":
+        """Return this store less a damaged batch, after a StoreWarning. Raises other damage."""
+        batches = self.places[0]
+        left = [batch for batch in batches if os.fspath(batch.path) != damage.path]
+        if len(left) == len(batches):
+            raise damage
+        Stored(self.folder, (), [damage]).warned()
+        return Stored(self.folder, left, [*self.damaged, damage])
+
+    # ---- how they ended -------------------------------------------------------------------------
+
+    def status(self, key: str) -> JobStatus | None:
+        """Return how a stored job ended; None where it is not stored."""
+        position = self.position(key)
+        return None if position is None else self.status_at(position)
+
+    def status_at(self, position: int) -> JobStatus:
+        """Return how the job at a position ended."""
+        key, status, reason, kept = (
+            self.columns[name][position].decode() for name in ("job", "status", "reason", "kept")
+        )
+        detail = "" if status == "ok" else str(self.attributes(position).get("detail", ""))
+        samples = int(self.columns["samples"][position])
+        return JobStatus(key, status, reason, detail, samples, frozenset(kept.split()))
+
+    def serving(self, positions: np.ndarray, case: Case) -> np.ndarray:
+        """Return whether each of the jobs at some positions needs no new run for a case, boolean.
+
+        Jobs of one kind, in all that `JobStatus.satisfies` reads, are checked once.
+        """
+        first, kinds = self._kinds
+        satisfied = np.array([self.status_at(at).satisfies(case) for at in first.tolist()], bool)
+        return satisfied[kinds[positions]] if len(positions) else np.zeros(0, bool)
+
+    @cached_property
+    def _kinds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the position of the first job of each kind, and the kind of each job, (jobs,)."""
+        kinds = np.rec.fromarrays([self.columns[name] for name in ("status", "reason", "kept")])
+        _, first, kind = np.unique(kinds, return_index=True, return_inverse=True)
+        return first, kind
+
+    def find_ok(self, key: str, healthy: PerJoint) -> tuple[Case, Outcome] | str:
+        """Return the case and outcome of a job that is ok, else why there are none, in a word.
+
+        healthy: the clearance up to which a joint of the case counts as sound.
+        """
+        position = self.position(key)
+        if position is None:
+            return "missing"
+        outcome = self.outcome(position)
+        if outcome.status != "ok":
+            return outcome.reason
+        case = self.case_at(position)
+        return (replace(case, healthy_clearance_mm=healthy), outcome) if case else "damaged"
+
+    # ---- what is read of their batches ----------------------------------------------------------
+
+    def _read(self, read: Callable[[], Found]) -> Found:
+        """Return what `read` gives; look for all jobs again where their batches are gone."""
+        for _ in range(ATTEMPTS):
+            with contextlib.suppress(FileNotFoundError):
+                return read()
+            now = read_store(self.folder)
+            at = now.find(self.columns["job"])
+            if (at < 0).any():
+                raise StoreError(self.folder, "has lost jobs meanwhile", "try again")
+            batches, source, row = now.places
+            self.places = batches, source[at], row[at]
+        raise StoreError(self.folder, "changes faster than it can be read", "try again")
+
+    def _by_batch(self, positions: np.ndarray) -> Iterator[tuple[Batch, list[int], list[int]]]:
+        """Yield each batch of jobs at positions, the places among these, and rows; without -1."""
+        batches, source, row = self.places
+        stored = np.flatnonzero(positions >= 0)
+        order = stored[np.argsort(source[positions[stored]], kind="stable")].tolist()
+        for number, places in itertools.groupby(order, lambda at: int(source[positions[at]])):
+            mine = [*places]
+            yield batches[number], mine, row[positions[mine]].tolist()
+
+    def batch_of(self, position: int) -> tuple[Path, int]:
+        """Return the batch with a job, and the row in it."""
+        batches, source, row = self.places
+        return batches[source[position]].path, int(row[position])
+
+    def intact(self, position: int) -> bool:
+        """Return whether the batch of a job is as it was written."""
+        path, _ = self.batch_of(position)
+        if path not in self.checked:
+            try:
+                self._read(lambda: check_file(self.batch_of(position)[0]))
+                self.checked[path] = True
+            except DamagedFile:
+                self.checked[path] = False
+        return self.checked[path]
+
+    def numbers(self, positions: Any, names: Sequence[str] = ()) -> np.ndarray:
+        """Return numbers of jobs, in the shape of `positions`, nan at -1 and where a job has none.
+
+        A structured array with the dtype of ROW, or of some `names` in it. They are read each time:
+        a kilobyte a job.
+        """
+        names, flat = names or tuple(NUMBERS), np.ravel(positions)
+        wanted = places_of(names)
+        found = np.full((flat.size, wanted.size), np.nan)
+
+        def fill() -> None:
+            for batch, places, rows in self._by_batch(flat):
+                found[places] = read_numbers(batch)[rows][:, wanted]
+
+        self._read(fill)
+        kind = np.dtype([(name, ROW[name]) for name in names])
+        return found.view(kind)[:, 0].reshape(np.shape(positions))
+
+    def attributes(self, position: int) -> dict[str, Any]:
+        """Return a job's attributes."""
+        return self._read(lambda: read_attributes_of(*self.batch_of(position)))
+
+    def case_at(self, position: int) -> Case | None:
+        """Return the case of a job; None at -1, or where it is of another version's."""
+        if position < 0:
+            return None
+        try:
+            return Case.from_attribute(self.attributes(position)["case"])
+        except (KeyError, CaseError):
+            return None
+
+    def outcome(self, position: int) -> Outcome:
+        """Return the outcome of a job, without its time series."""
+        status, reason = (self.columns[name][position].decode() for name in ("status", "reason"))
+        return Outcome(status, reason, self.numbers([position])[0], self.attributes(position))
+
+    def series(self, position: int, names: Sequence[str] | None = None) -> dict[str, Variable]:
+        """Return time series of a job by name, of `names` those that it has."""
+        if not self.columns["samples"][position]:
+            return {}
+
+        def read() -> dict[str, Variable]:
+            path, row = self.batch_of(position)
+            return read_series(path, [row], names)[0]
+
+        return self._read(read)
+
+    def series_of_jobs(self, name: str, positions: np.ndarray) -> list[tuple[int, np.ndarray]]:
+        """Return a time series of each of some jobs that has it, by its place among positions."""
+        whole = np.where(self.columns["samples"][positions] > 0, positions, -1)
+
+        def read() -> list[tuple[int, np.ndarray]]:
+            return [
+                (place, one[name].values)
+                for batch, places, rows in self._by_batch(whole)
+                for place, one in zip(places, read_series(batch.path, rows, [name]), strict=True)
+                if name in one
+            ]
+
+        return self._read(read)
+
+    def values(self, key: str, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return some variables of a stored job's time series."""
+        position = self.position(key)
+        found = {} if position is None else self.series(position, names)
+        return {name: one.values for name, one in found.items()}
+
+    def job(self, key: str) -> "xr.Dataset":
+        """Return a stored job's Dataset. Raises StoreError where it is missing or damaged."""
+        import xarray as xr  # half a second
+
+        if not KEY.fullmatch(key):
+            raise StoreError(self.folder, f"{key!r} is no key", "a key is 20 hexadecimal digits")
+        position = self.position(key)
+        if position is None:
+            raise StoreError(self.folder, f"job {key} is not stored", "run its study first")
+        found = self.outcome(position).table(self.series(position))
+        return xr.Dataset(found.variables, attrs=found.attrs)
+
+
+def read_store(folder: Folder) -> Stored:
+    """Return what a folder holds; damaged batches are listed in `damaged`.
+
+    Raises StoreError, also where runs change the folder faster than it can be read.
+    """
+    folder = Path(os.path.abspath(folder))
+    for _ in range(ATTEMPTS):
+        batches, damaged = [], []
+        try:
+            for path in batch_paths(folder):
+                try:
+                    batches.append(read_batch(path))
+                except DamagedFile as error:
+                    damaged.append(error)
+        except FileNotFoundError:
+            continue  # merged with others meanwhile
+        except OSError as error:
+            raise system_error(folder, error) from error
+        return Stored(folder, batches, damaged)
+    raise StoreError(folder, "changes faster than it can be read", "try again")
