@@ -40,12 +40,12 @@ PURE = ("kinematics", "contact", "loads", "observe", "cam", "tally", "onset", "s
         "runge_kutta", "rosenbrock", "case", "integrate", "motion", "march",
         "general_mechanism")  # fmt: skip
 COMPILED = ("invariances", "march", "integrate", "rosenbrock", "simulate", "accuracy",
-            "horizon")  # fmt: skip
+            "regime")  # fmt: skip
 LAWS = ("contact_laws", "friction_laws", "chosen_laws")
 TESTED_IN = {
     **dict.fromkeys(("mechanism", "mechanism_motion"), ("general_mechanism",)),
     "mechanism_rows": ("general_mechanism", "feature_runs"),
-    "march": ("march", "stages"),
+    "march": ("march", "wear_stages"),
     "motion": ("motion", *LAWS),
     "contact": ("contact", *LAWS),
     "card": ("card_curve", "card"),

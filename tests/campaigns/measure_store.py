@@ -5,20 +5,15 @@
 Rows are those of a real job under made-up keys, in batches as a sweep's; the folder is in the
 working directory, so that its disk is what is measured. Series are of a default job.
 
-CPU to make a batch: without waiting for the disk. The price of time series in a sweep: whole
-commands with and without them, in turn and in both orders, each with few and with many jobs; what
-the further jobs take is divided by their number.
+CPU to make a batch: without waiting for the disk.
 """
 
 import dataclasses
 import hashlib
 import itertools
 import json
-import os
-import resource
 import shutil
 import statistics
-import subprocess
 import sys
 import tempfile
 import time
@@ -43,12 +38,6 @@ from compressor.sweep.sweep import run_job
 WORN = {"joint": "big_end", "clearance_mm": 0.2}
 BATCH = 100  # rows in a batch, as of a sweep whose jobs take 2 ms
 SELECTED = 1000  # jobs whose acceleration is read
-SWEPT, TURNS = (100, 500), 4  # jobs of a sweep, few and many; how often both are run
-SWEEP = """
-joint: big_end
-clearance_mm: {{linspace: [0.05, 0.5, {jobs}]}}
-output: {{keep: {keep}}}
-"""
 
 
 def key(number):
@@ -165,36 +154,6 @@ def selection(folder):
     }  # fmt: skip
 
 
-def sweep_seconds(folder, keep, jobs):
-    """Wall and CPU seconds of a sweep of so many jobs, in a folder that it leaves empty."""
-    folder.mkdir()
-    (folder / "case.yaml").write_text(SWEEP.format(jobs=jobs, keep=keep), encoding="utf-8")
-    before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
-    command = [sys.executable, "-m", "compsim", "run", "case.yaml", "-j", "2", "--quiet"]
-    subprocess.run(command, cwd=folder, env=os.environ, check=True)
-    wall, after = time.monotonic() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
-    shutil.rmtree(folder)
-    return np.array([wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime])
-
-
-def price_of_series(folder):
-    """What a further job of a sweep takes, with its time series and with metrics alone."""
-    few, many = SWEPT
-    found = {"series": [], "metrics": []}
-    sweep_seconds(folder, "series", few)  # compiled and in the disk's cache from here on
-    for turn in range(TURNS):
-        for kind in sorted(found, reverse=turn % 2):
-            further = sweep_seconds(folder, kind, many) - sweep_seconds(folder, kind, few)
-            found[kind].append(1000 * further / (many - few))
-    wall, cpu = np.median(np.array(found["series"]) / found["metrics"], axis=0)
-    medians = {keep: np.median(times, axis=0) for keep, times in found.items()}
-    return {
-        "wall_ms": {keep: round(float(wall), 2) for keep, (wall, _) in medians.items()},
-        "cpu_ms": {keep: round(float(cpu), 2) for keep, (_, cpu) in medians.items()},
-        "wall_ratio": round(float(wall), 2), "cpu_ratio": round(float(cpu), 2),
-    }  # fmt: skip
-
-
 def main(target, jobs=100_000):
     place = Path(tempfile.mkdtemp(prefix="store-bench-", dir="."))
     try:
@@ -203,7 +162,6 @@ def main(target, jobs=100_000):
             "rows": rows(place / "many", int(jobs)),
             "series": series(place / "series"),
             "selection": selection(place / "selection"),
-            "sweep": price_of_series(place / "sweep"),
         }
     finally:
         shutil.rmtree(place)

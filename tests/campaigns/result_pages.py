@@ -201,7 +201,10 @@ def store(found):
                "file, kB": lambda row: f"{row['bytes'] / 1000:.0f}", "writing, ms": "write_ms:.0f",
                "reading, ms": "read_ms:.0f",
                "rounding of acceleration": "acceleration_rounding:g"}  # fmt: skip
-    return {"store": table(found["series"], columns) + "\n" + listed(found["rows"])}
+    numbers = found["rows"] | {
+        f"{name}, with series": value for name, value in found.get("selection", {}).items()
+    }
+    return {"store": table(found["series"], columns) + "\n" + listed(numbers)}
 
 
 def validation(found):

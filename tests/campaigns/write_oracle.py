@@ -25,7 +25,6 @@ from compsim.screen import one_thread_each
 
 one_thread_each()  # before numpy loads: last bits of SciPy's methods depend on it
 import numpy as np
-from extreme_scenes import FEATURES, LAWS, Budget, values
 from joblib import Parallel, delayed
 from random_cases import strangers
 
@@ -35,6 +34,7 @@ from compressor.program import ignore_warnings
 from compressor.solve.simulate import simulate
 
 ROOT = Path(__file__).parents[2]
+KEPT = ROOT / "tests/results/oracle.json.xz"
 SEED = 33
 LEFT_OUT = {"assumptions.yaml", "extremes.yaml"}  # examples that came after the kept file
 # machines of the example `claims` as they were: ideal ones of a finer map
@@ -65,12 +65,9 @@ def cases_by_name():
                 found[f"{path.name} {number}"] = study.cases[number]
     for number, drawn in enumerate(strangers(SEED, 300)):
         found[f"plain {number}"] = Case.from_values(drawn)
-    for kind in (LAWS, FEATURES):
-        for number in range(60):
-            case = Case.resolve(values(number, SEED, Budget(drawn=kind)))
-            # corners of a guide damped by the joints' restitution once: another model
-            if not (case.guide and case.guide.clearance_mm and case.contact.restitution):
-                found[f"{kind} {number}"] = case
+    for name, row in load(KEPT).items():  # extreme scenes with other laws and features
+        if name.startswith(("laws ", "features ")):
+            found[name] = Case.from_attribute(row["attribute case"][0])
     for number, drawn in enumerate(strangers(SEED + 1, 20)):
         solve = {"method": SCIPY_METHODS[number % len(SCIPY_METHODS)], "duration_rev": 1,
                  "settle_rev": 0, "accuracy": "draft"}  # fmt: skip

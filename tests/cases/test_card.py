@@ -280,33 +280,6 @@ def test_a_card_is_held_against_its_own_lines(tmp_path, how, words):
         assert exponent == pytest.approx(1.3, abs=0.01)
 
 
-@pytest.mark.parametrize(
-    ("end", "gas", "words"),
-    [
-        ("head", {"head_clearance_mm": 24}, "and gas.head_clearance_mm gives 10 %"),
-        ("head", {"bore_mm": 90}, None),  # the paper's 20 mm, which nobody gave
-        ("head", {"clearance_percent": 20}, None),
-        ("crank", {"clearance_percent": {"crank": 9}}, "and gas.clearance_percent.crank gives 9 %"),
-        (
-            "crank",
-            {"clearance_percent": {"head": 20, "crank": 9}},
-            "clearance_percent.crank gives 9 %",
-        ),
-        ("crank", {"clearance_percent": {"head": 9, "crank": 20}}, None),
-    ],
-)
-def test_whatever_key_gives_a_clearance_is_held_against_the_card(tmp_path, end, gas, words):
-    path = head(tmp_path / "a.csv", clearance=0.2, crank=end == "crank")
-    more = {"indicator": path}
-    if end == "crank":
-        other = head(tmp_path / "b.csv", clearance=0.09)
-        more = ROD | {"indicator": {"head": other, "crank": path}}
-    case = Case.from_values({"load": "gas", "gas": more | gas, **SHORT})
-    key = f"gas.indicator.{end}"
-    told = [one.message for one in remarks(case) if one.kind == "fit" and one.key == key]
-    assert [words in one for one in told] == ([True] if words else [])
-
-
 def test_noise_of_a_card_is_told_and_smoothed(tmp_path):
     """0.003 MPa: told within a tenth, less by the window's width; a quiet card is not told."""
     noise = np.random.default_rng(3).normal(0, 0.003, len(FINE))

@@ -182,36 +182,6 @@ def test_the_paper_s_geometry_is_the_default():
 
 
 @pytest.mark.parametrize(
-    ("group", "other", "unread"),
-    [
-        ("contact", {"law": "hertz"}, {"damping_N_s_per_mm": 5, "restitution": 0.5}),
-        ("contact", {"law": "flores", "restitution": 0.5}, {"full_damping_mm": 0.2}),
-        ("contact", {"law": "impact"}, {"restitution": 0.5, "modulus_GPa": 110}),
-        (
-            "contact",
-            {"law": "johnson", "length_mm": 20, "modulus_GPa": 110},
-            {"damping_N_s_per_mm": 5, "exponent": 1.2, "stiffness_N_per_mm15": 1e5},
-        ),
-        (
-            "contact",
-            {"law": "liu", "length_mm": 20, "materials": ["steel", "copper"]},
-            {"geometry": "internal"},
-        ),
-        ("friction", {"law": "coulomb_tanh"}, {"static": 0.5, "friction_velocity_mm_per_s": 70}),
-        ("friction", {"law": "adams"}, {"bristle_damping_s_per_mm": 1}),
-    ],
-)
-def test_what_a_named_law_does_not_read_makes_no_other_job(group, other, unread):
-    """So that laws are swept beside the keys of any of them."""
-    one, more = (Case.resolve(BIG_END | {group: {**other, **keys}}) for keys in ({}, unread))
-    assert one.key == more.key
-    assert Case.from_values(more.values()) == one
-    with pytest.raises(CaseError) as caught:
-        Case.from_values(BIG_END | {group: {**other, **unread}})
-    assert [problem.key for problem in caught.value.problems] == [f"{group}.{k}" for k in unread]
-
-
-@pytest.mark.parametrize(
     ("values", "switching", "back"),
     [
         ({}, "paper", 0.0),

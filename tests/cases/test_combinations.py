@@ -177,34 +177,3 @@ def test_blocks_that_differ_in_a_part_have_axes_of_the_parts(tmp_path):
         "machine.balance.rotating": (0.3, 0.3),
         "machine.balance.reciprocating": (0.3, 0.0),
     }
-
-
-def test_keys_that_are_drawn_together_are_axes_side_by_side(tmp_path):
-    path = tmp_path / "drawn.yaml"
-    drawn = "{lhs: [1, 2]}"
-    text = f"gas: {{exponent: {drawn}}}\nload: [gas]\nmachine: {{rod_mass_kg: {drawn}}}\n"
-    path.write_text(f"{text}sample: {{n: 2}}\n", encoding="utf-8")
-    (study,) = load_studies(str(path))
-    assert [axis.key for axis in study.axes] == ["gas.exponent", "machine.rod_mass_kg", "load"]
-
-
-def test_a_comparison_selects_as_job_by_job(tmp_path):
-    path = tmp_path / "case.yaml"
-    path.write_text(TOGETHER)
-    text = "clearance_mm > 0.2 or not (joint == both and machine.rod_length_mm <= 550)"
-    (study,) = load_studies(path, only=text)
-    expected = [
-        number
-        for number, case in enumerate(study.cases)
-        if case.clearance_mm.big_end > 0.2
-        or not (case.joint == "both" and case.machine.rod_length_mm <= 550)
-    ]
-    assert list(study.selected) == expected
-    assert 0 < len(expected) < len(study.cases)
-    excluded = [
-        case
-        for case in study.cases
-        if (case.machine.speed_rpm > 700 and case.clearance_mm.big_end < 0.2)
-        or case.clearance_mm.small_end > 0.35
-    ]
-    assert not excluded

@@ -3,7 +3,6 @@
 import pytest
 
 from compressor.cases.case import Case, CaseError
-from compressor.cases.load import CaseFileError, load_studies
 from compressor.solve.cautions import remarks
 from compressor.solve.si_record import record
 
@@ -67,25 +66,3 @@ def test_a_piston_that_would_reach_a_cover():
     assert "gas.clearance_percent.crank: 0.48 mm does not exceed the clearances, 0.6 mm" in found
     assert "the cylinder cover at the crank end" in found
     assert "raise it; it is in per cent of the swept volume: 17, not 0.17" in found
-
-
-def test_studies_sweep_ends_and_valves(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    text = """
-load: gas
-gas:
-  action: [single, double, crank_end]
-  rod_diameter_mm: 30
-  clearance_percent: {head: [10, 12], crank: 14}
-  valve_loss_percent: [0, 4]
-"""
-    (tmp_path / "case.yaml").write_text(text)
-    (study,) = load_studies("case.yaml")
-    assert study.jobs == 12
-    assert [axis.key for axis in study.axes] == [
-        "gas.action", "gas.clearance_percent.head", "gas.valve_loss_percent"
-    ]  # fmt: skip
-    assert list(study.keys) == [one.key for one in study.cases]
-    (tmp_path / "case.yaml").write_text(text + "  unloaded: crank\n")
-    with pytest.raises(CaseFileError, match="no gas presses in the crank end"):
-        load_studies("case.yaml")

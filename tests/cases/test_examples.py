@@ -48,29 +48,6 @@ def test_templates_come_first_and_say_what_they_answer():
         assert one.next.startswith(f"compsim {verb} {one.name}.yaml")
 
 
-@pytest.mark.parametrize(
-    ("name", "file", "commands"),
-    [
-        ("wear", "bearing.yaml", "compsim run bearing.yaml; compsim report"),
-        ("diagnosis", "a/my.yaml", "compsim run a/my.yaml; compsim dataset my -o faults"),
-        (
-            "regimes",
-            "rise.yaml",
-            "compsim follow rise.yaml --over clearance_mm=0.01:1:80 --log --both",
-        ),
-        (
-            "claims",
-            "our masses.yaml",
-            "compsim run 'our masses.yaml'; compsim claims 'our masses'",
-        ),
-    ],
-)
-def test_a_template_names_the_file_that_it_is_written_to(name, file, commands):
-    text = templates()[name].text(Path(file))
-    assert text.splitlines()[2] == f"# next: {commands}"
-    assert text.splitlines()[3:] == example(name).read_text().splitlines()[3:]
-
-
 def test_the_consistent_machine_has_the_paper_s_faults():
     (study,) = load_studies(example("consistent"))
     cases = cases_of(study.cases[-1])

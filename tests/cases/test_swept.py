@@ -161,26 +161,6 @@ def test_distributions_are_drawn_by_their_quantiles(read, kind):
     np.testing.assert_array_equal(even[:, 2], found[:, 2])
 
 
-def test_whole_numbers_and_halved_keys_are_drawn_from_distributions(read):
-    """A stroke is twice the crank's radius: all numbers of its distribution are halved."""
-    text = ONE + "clearance_mm: 0.2\nbody: true\nsample: {n: 16, seed: 5}\n"
-    one = read(text + "sensor: {seed: {lhs: {triangular: [1, 50, 900]}}}\nsolve: {settle_rev: 1}\n")
-    drawn = triang.ppf(np.array(design("lhs", 16, 1, 5))[:, 0], 49 / 899, 1, 899)
-    assert [case.sensor.seed for case in one.cases] == [*map(round, drawn)]
-    radius, stroke = (
-        rows(read(f"{ONE}clearance_mm: 0.2\nsample: {{n: 16}}\nmachine: {{{form}}}"))
-        for form in ("crank_radius_mm: {lhs: {triangular: [100, 120, 160]}}",
-                     "stroke_mm: {lhs: {triangular: [200, 240, 320]}}")
-    )  # fmt: skip
-    assert stroke == radius
-    radius, stroke = (
-        rows(read(f"{ONE}clearance_mm: 0.2\nsample: {{n: 16}}\nmachine: {{{form}}}"))
-        for form in ("crank_radius_mm: {lhs: {normal: {mean: 120, sd: 5}}}",
-                     "stroke_mm: {lhs: {normal: {mean: 240, sd: 10}}}")
-    )  # fmt: skip
-    assert stroke == radius
-
-
 def test_the_tail_of_a_normal_distribution_is_refused_with_its_draw(read):
     """Of 64 draws the first beyond the key's range, counted as the design draws them."""
     text = "machine: {rod_mass_kg: {lhs: {normal: {mean: 2, sd: 1}}}}\nsample: {n: 64, seed: 1}"

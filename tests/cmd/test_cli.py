@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from compsim import cli, screen
-from conftest import jobs_here, without_pictures
+from conftest import jobs_here
 
 from compressor.analysis.runs import paper_cases
 from compressor.cases import load
@@ -311,7 +311,7 @@ def without_laws(monkeypatch):
         monkeypatch.setattr(module, name, plain)
 
 
-def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch):
+def test_explain_models_prints_and_stores(case_file, capsys, monkeypatch):
     from compressor.store.reader import open_study
 
     without_laws(monkeypatch)
@@ -347,22 +347,6 @@ def test_explain_models_prints_stores_and_reports(case_file, capsys, monkeypatch
     assert not lines[start + 6].startswith(" ")
     start = next(n for n, line in enumerate(lines) if line.startswith(f"{head[2]}  "))
     assert lines[start + 1].strip().startswith(head[3])
-
-    with without_pictures():
-        assert cli.main(["report", "-r", "kept", "-o", "page"]) == 0
-    page = Path("page/index.html").read_text(encoding="utf-8")
-    assert f'<p>What moves its numbers: {head[1]}. <a href="#models-worn">' in page
-    assert '<section id="models-worn">' in page
-    assert f"The table is of worn at clearance_mm = {greatest}, one of 2 jobs: its metrics" in page
-
-    case_file("worn.yaml", joint="big_end", clearance_mm=[0.25, 0.35], machine={"rod_mass_kg": 3})
-    assert cli.main(["run", "worn.yaml", "-r", "kept", "-j", "1"]) == 0
-    capsys.readouterr()
-    with without_pictures():
-        assert cli.main(["report", "-r", "kept", "-o", "page"]) == 0
-    err = " ".join(capsys.readouterr().err.split())
-    assert "nc: is not shown, as worn has no such job: run the case file with the same" in err
-    assert "models-worn" not in Path("page/index.html").read_text(encoding="utf-8")
 
 
 # ---- signals ------------------------------------------------------------------------------------

@@ -9,11 +9,10 @@ import pytest
 from compsim import cli
 from conftest import store
 
-from compressor.analysis.contacts import OILED_MODES, angle_modes
-from compressor.analysis.plot_captions import FILM, PLOT_CAPTIONS, SweptRow
+from compressor.analysis.plot_captions import PLOT_CAPTIONS
 from compressor.analysis.shaking import frame_forces
 from compressor.cases.case import Case
-from compressor.report.figures.job import draw_analyst, draw_map, draw_modes, draw_spectra
+from compressor.report.figures.job import draw_spectra
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
@@ -125,32 +124,6 @@ def test_a_job_is_drawn_with_its_numbers(plot, folder, unpainted):
 
 def peak(run, last):
     return np.abs(run["acceleration"].values[last]).max()
-
-
-def test_captions_of_oiled_joints_speak_of_dry_contact():
-    """A full film was "100 % flight", which reads as a disaster."""
-    values = {"joint": "big_end", "clearance_mm": 0.05, "solve": SOLVE}
-    dry = simulate(Case.from_values(values))
-    full = simulate(Case.from_values({**values, "lubricant": {"viscosity_mPa_s": 3000}}))
-    told = {name: PLOT_CAPTIONS["job"][name](full, None) for name in ("orbits", "modes", "impacts")}
-    for name, text in told.items():
-        assert text.endswith("contact is dry contact, and without it the film bears the journal.")
-        assert "film" not in PLOT_CAPTIONS["job"][name](dry, None)
-    assert "At the big end: film alone 100 %" in told["modes"]
-    assert told["impacts"].startswith("No dry contact begins after settling. The joints have oil")
-    analyst = PLOT_CAPTIONS["job"]["analyst"](full, None)
-    assert "Dry contact that begins at the big end: none." in analyst
-    assert "dry contact, big end" in draw_analyst(full, None).panels[0].y.words.values()
-    nearest = -1e6 * float(full["penetration"].sel(joint="big_end").values[2 * 720 :].max())
-    assert "is off its wall for 100 % of the time" in told["orbits"]
-    near = re.search(r"comes as near to it as ([\d.]+) µm", told["orbits"])[1]
-    assert float(near) == pytest.approx(nearest, rel=0.06)
-    rows = [SweptRow("0.05", modes=angle_modes(full), lubricated=True)]
-    told = PLOT_CAPTIONS["study"]["map"](rows, "clearance")
-    assert FILM in told
-    assert "At the big end it is film alone over at most 100 %" in told
-    for drawing in (draw_modes(full), draw_map(rows, "clearance")):
-        assert [one.name for one in drawing.legend] == [*OILED_MODES]
 
 
 def test_a_job_is_named_as_in_show(plot, folder, capsys, unpainted):

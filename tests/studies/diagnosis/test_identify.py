@@ -81,30 +81,6 @@ def test_an_exported_job_is_explained_as_the_job_itself(tmp_path, folder, capsys
     assert max(answers[1], key=answers[1].get) == max(answers[0], key=answers[0].get)
 
 
-@pytest.mark.parametrize("joint", ["big_end", "small_end"])
-def test_the_shape_of_the_tacho_does_not_change_the_answer(joint, tmp_path, folder, capsys):
-    """The study has one speed, and the pulses lie between samples."""
-    at, values, tacho = struck(joint, [0.2], 5004)
-    times = np.arange(0.0, at[-1], 1 / 7993)
-    values, tacho = np.interp(times, at, values), tacho + 0.0043
-    turns = (times - tacho[0]) / (tacho[1] - tacho[0])
-    since = (turns % 1) * (tacho[1] - tacho[0])
-    waves = {"sine": np.sin(2 * np.pi * turns), "square": since < 0.06, "short": since < 0.002,
-             "sample": since < 1 / 7993}  # fmt: skip
-    found = {}
-    for name, wave in waves.items():
-        path = str(tmp_path / f"{name}.csv")
-        header = "time_s,acceleration_m_per_s2,tacho"
-        np.savetxt(path, np.column_stack([times, values, wave]), "%.12g", ",", header=header,
-                   comments="")  # fmt: skip
-        words = ["identify", path, "--study", "worn", "-r", folder, "--quiet", "--json"]
-        assert cli.main(words) == 0
-        candidates = json.loads(capsys.readouterr().out)["candidates"]
-        found[name] = {one["joint"]: one["probability"] for one in candidates}[joint]
-    assert min(found.values()) > 0.6
-    assert max(found.values()) - min(found.values()) < 0.02
-
-
 def test_a_steady_speed_stands_in_for_a_tacho(tmp_path, folder, capsys):
     path = written(tmp_path / "bare.csv", *struck("big_end", [0.3], 5002), wave=False)
     steady = ["--rpm", "500", "--tdc", "0.24"]

@@ -15,8 +15,6 @@ from compressor.cases.load import load_cases, load_studies
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
 from compressor.store.studies import read_studies
-from compressor.studies.search.find import Point, interval, jsonable_answer, list_answer
-from compressor.studies.search.question import JobReading, Question, comparison
 
 LIMIT = 0.006
 ASKED = [
@@ -121,31 +119,6 @@ def test_the_store_is_one_study_that_status_and_run_understand(found, folder, ca
     assert same.keys == study.keys
 
 
-def test_another_question_keeps_the_points_of_this_case(found, folder, capsys):
-    ask = ["find", "worn.yaml", "--over", "clearance_mm=0.002:0.2", "--log", "--scan", "5",
-           "--tolerance", "0.4", "--greatest", "peak_acceleration", "--quiet"]  # fmt: skip
-    assert cli.main(ask) == 0
-    out = capsys.readouterr().out
-    assert " ".join(out.split()).startswith("peak_acceleration greatest: found at 0.2 worse from ")
-    assert re.search(r"^ +0\.2 .* best +[0-9a-f]{8}$", out, re.MULTILINE)
-    (study,) = read_studies("results")
-    assert {*study.axes[0].values} > {point["argument"] for point in found[1]["points"]}
-    # a changed case has none of these points
-    Path("worn.yaml").write_text(json.dumps(CASE | {"load": "none"}))
-    few = [
-        "--over",
-        "clearance_mm=0.01:0.02",
-        "--scan",
-        "3",
-        "--first",
-        "impact_count.small_end > 1e9",
-    ]
-    assert cli.main(["find", "worn.yaml", *few, "--quiet"]) == 0
-    assert re.match(r"impact_count.small_end > 1e\+09: nowhere\n", capsys.readouterr().out)
-    (study,) = read_studies("results")
-    assert study.axes[0].values == (0.01, 0.015, 0.02)
-
-
 def test_failed_jobs_are_no_answer(folder, capsys):
     ask = ["find", "worn.yaml", "--over", "clearance_mm=0.01:0.02", "--scan", "3", "--quiet",
            "--first", "peak_acceleration > 1", "--set", "solve.max_steps=5"]  # fmt: skip
@@ -153,30 +126,3 @@ def test_failed_jobs_are_no_answer(folder, capsys):
     out = capsys.readouterr().out
     assert re.match(r"peak_acceleration > 1 m/s2: unclear\n", out)
     assert out.count("the job failed, budget_steps: more than 5 steps  failed  ") == 3
-
-
-def test_every_point_has_a_row_in_the_unit_of_the_limit():
-    """Six points without jobs, every second one above the limit, and one that is open."""
-    goal = comparison("peak_contact_force.small_end > 1 kN")
-    question = Question("worn.yaml", "clearance_mm", 0.0, 5.0, goal, scan=6)
-    values = (1200.0, 800.0, 1200.0, 1000.5, 1200.0, 800.0)
-    points = [
-        Point(n / 5, float(n), JobReading(value, 1.0), "k" * 20) for n, value in enumerate(values)
-    ]
-    answer = interval(points, goal.holds)
-    lines = [" ".join(line.split()) for line in list_answer(question, answer, "results", None)]
-    assert lines == [
-        "peak_contact_force.small_end > 1 kN: at_low",
-        "between none and 0",
-        "scan 6 points 1 apart: what is finer may be missed",
-        "jobs 6, 0 of them run now, in study of results",
-        "clearance_mm peak_contact_force (kN) job",
-        "0 1.200 ± 0.001 yes kkkkkkkk",
-        "1 0.800 ± 0.001 no kkkkkkkk",
-        "2 1.200 ± 0.001 yes kkkkkkkk",
-        "3 1.000 ± 0.001 open kkkkkkkk",
-        "4 1.200 ± 0.001 yes kkkkkkkk",
-        "5 0.800 ± 0.001 no kkkkkkkk",
-    ]
-    found = jsonable_answer(question, answer)
-    assert (found["unit"], found["goal"]["limit"]) == ("N", 1000.0)

@@ -2,7 +2,7 @@
 
 mistakes.json has a row a mistake: the text of a file, the lines that answer it, and the other ways
 in which the same is said without a place: "values" (`Case.from_values`) and "set" (--set beside a
-file `{}`). `python tests/cases/test_mistakes.py` writes it anew, where answers are meant to change.
+file `{}`). `python tests/cases/test_mistaken_cases.py` writes it anew, where answers change.
 """
 
 import json
