@@ -12,13 +12,22 @@ from functools import cached_property
 from typing import Any
 
 from compressor.cases.case import Case
-from compressor.cases.checks import DOUBLES, hold_value, row_of, stands_for, suggestion, value_in
+from compressor.cases.checks import (
+    DOUBLES,
+    expand_synonyms,
+    hold_value,
+    no_mapping,
+    row_of,
+    stands_for,
+    suggestion,
+    value_in,
+)
 from compressor.cases.comparison import NoComparison, Test, comparison
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.keys import drop, key_of, leaves, path_of, put
-from compressor.cases.parameter import CaseError, quote_value
+from compressor.cases.parameter import CaseError, integer, make_group, quote_value
 from compressor.cases.swept import FORMS, NoSweep, Sweep, design, design_size, sweep_of
-from compressor.cases.table import OF_JOINTS, WORDS, outside_identity
+from compressor.cases.table import OF_JOINTS, outside_identity
 from compressor.cases.yaml_reader import FileProblem, Tree
 
 RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
@@ -31,7 +40,7 @@ class Block:
     """The jobs of a block: every combination of its factors' values, but for those left out.
 
     name: of the study. `given` has what is given by dotted key, `fixed` what is not swept of it,
-    nested, and `sweeps` how the rest is. `samples` and `seed` are those of a design.
+    nested, and `sweeps` how the rest is, with the `sample` of a design.
     """
 
     name: str
@@ -40,8 +49,7 @@ class Block:
     fixed: dict[str, Any]
     sweeps: dict[str, Sweep]
     factors: Factors
-    samples: int
-    seed: int
+    sample: "Sample"
     exclusions: list[Test]
 
     @property
@@ -53,7 +61,7 @@ class Block:
     def size(self, keys: tuple[str, ...]) -> int:
         """Return how many values keys that advance together have."""
         sweep = self.sweeps[keys[0]]
-        return sweep.count or design_size(sweep.kind, self.samples, len(keys))
+        return sweep.count or design_size(sweep.kind, self.sample.n or 0, len(keys))
 
     def sizes(self) -> dict[str, int]:
         """Return how many values each factor has, by its keys."""
@@ -65,15 +73,17 @@ class Block:
         found: dict[str, list[Any]] = {}
         for keys in self.factors:
             made = [self.sweeps[key].make() for key in keys]
-            if self.sweeps[keys[0]].is_drawn and self.samples:
-                points = design(self.sweeps[keys[0]].kind, self.samples, len(keys), self.seed)
+            if self.sweeps[keys[0]].is_drawn and self.sample.n:
+                kind, sample = self.sweeps[keys[0]].kind, self.sample
+                points = design(kind, sample.n, len(keys), sample.seed)
                 shares = zip(*points, strict=True)
                 made = [
                     [*map(self.sweeps[key].spread, own)]
                     for key, own in zip(keys, shares, strict=True)
                 ]
             for key, column in zip(keys, made, strict=True):
-                found[key] = [hold_value(key, value) for value in column]
+                is_own = self.sweeps[key].path == path_of(key)
+                found[key] = [hold_value(key, value) if is_own else value for value in column]
         return found
 
     @cached_property
@@ -130,40 +140,43 @@ class Block:
         """
         found: dict[Any, FileProblem] = {}
         for problem in error.problems:
-            parts, message = problem.key.split("."), problem.message
+            doubles = (double for double, half in DOUBLES.items() if half == problem.key)
+            key = next((one for one in doubles if path_of(one) in self.tree.places), problem.key)
+            message, once = problem.message, problem
+            parts = [key] if (key,) in self.tree.places else key.split(".")
             above = (".".join(parts[:n]) for n in range(len(parts), 0, -1))
-            key = next((one for one in above if one in rows), "")
-            once: Any = problem
-            if key:
-                sweep, row = self.sweeps[key], rows[key]
-                path = (*sweep.path, row) if sweep.kind == "list" else sweep.path
-                place = self.tree.at(*path)[1]
+            swept = next((own for one in above if (own := DOUBLES.get(one, one)) in rows), "")
+            if swept:
+                sweep, row = self.sweeps[swept], rows[swept]
+                place = self.tree.at(*sweep.path, *[row] * (sweep.kind == "list"))[1]
                 if not error.is_misfit and sweep.kind != "list":
-                    once = key
+                    once = swept
                 if not error.is_misfit and not sweep.has_ends:
-                    message = tell_draw(row + 1, len(self.columns[key]), message)
+                    message = tell_draw(row + 1, len(self.columns[swept]), message)
             else:
-                place = self.tree.at(*parts)[tuple(parts) in self.tree.places]
-            given = (word for word, half in DOUBLES.items() if half == problem.key)
-            named = next((one for one in given if path_of(one) in self.tree.places), problem.key)
-            found.setdefault(once, FileProblem(place, named, message))
+                is_value = tuple(parts) in self.tree.places and not is_of_key(message)
+                place = self.tree.at(*parts)[is_value]
+            found.setdefault(once, FileProblem(place, key, message))
         return found
 
     def find_repeated(self) -> Iterator[FileProblem]:
         """Yield the values that keys have twice."""
         for keys in self.factors:
-            seen: set[str] = set()
             sweep = self.sweeps[keys[0]]
-            is_list = sweep.kind == "list"
-            for number, row in enumerate(zip(*(self.columns[key] for key in keys), strict=True)):
-                text = repr(row)
-                if text in seen:
+            texts = [*map(repr, zip(*(self.columns[key] for key in keys), strict=True))]
+            for number in range(len(texts)) if len({*texts}) < len(texts) else ():
+                if texts[number] in texts[:number]:
+                    is_list = sweep.kind == "list"
                     where = "in the list" if is_list else "among its values"
-                    listed = ", ".join(map(quote_value, row))
+                    listed = ", ".join(quote_value(self.columns[key][number]) for key in keys)
                     place = self.tree.at(*sweep.path, *[number] * is_list)[1]
                     message = f"{listed} is {where} twice"
                     yield FileProblem(place, " with ".join(keys), message)
-                seen.add(text)
+
+
+def is_of_key(message: str) -> bool:
+    """Return whether a problem is about a key, and not about its value."""
+    return message.startswith("unknown key")
 
 
 def tell_draw(number: int, of: int, message: str) -> str:
@@ -177,11 +190,13 @@ def tell_draw(number: int, of: int, message: str) -> str:
 def reader(values: Mapping[str, Any]) -> Callable[[str], Any]:
     """Return the function that gives the value of a key in nested ones, or its default, or None."""
 
+    whole = expand_synonyms(values)[0]
+
     def value(key: str) -> Any:
-        found, row = value_in(values, key), row_of(key)
+        found, row = value_in(whole, key), row_of(key)
         if found is not None or not row or stands_for(key):
             return found
-        has_rival = key in RIVALS and value_in(values, RIVALS[key]) is not None
+        has_rival = key in RIVALS and value_in(whole, RIVALS[key]) is not None
         return None if has_rival else row.default
 
     return value
@@ -192,37 +207,39 @@ def plan_block(tree: Tree, name: str) -> tuple[Block, list[FileProblem]]:
 
     name: of the study.
     """
-    given = {key_of(path): value for path, value in leaves(tree.values)}
+    given: dict[str, Any] = {}
     fixed: dict[str, Any] = {}
     sweeps: dict[str, Sweep] = {}
     problems = []
     for path, value in leaves(tree.values):
-        key = key_of(path)
+        key = DOUBLES.get(key_of(path), key_of(path))
+        given[key] = value
         if not is_swept(key, value):
-            fixed = put(fixed, path, hold_value(key, value))
+            own = hold_value(key, value) if key == key_of(path) else value
+            fixed = put(fixed, path, own)
             continue
         try:
             sweeps[key] = _sweep(path, key, value)
         except NoSweep as error:
             problems.append(FileProblem(tree.at(*path, *error.path)[1], key, str(error)))
-    samples, seed, wrong_design = _design_of(tree, sweeps)
+    sample, wrong_design = _design_of(tree, sweeps)
     groups, wrong_zip = _zip_groups(tree, sweeps, {problem.key for problem in problems})
     exclusions, wrong_tests = _exclusions(tree)
     drawn = tuple(key for key, sweep in sweeps.items() if sweep.is_drawn)
     together = {key: group for group in [drawn, *groups] for key in group}
     factors = [*dict.fromkeys(together.get(key, (key,)) for key in sweeps)]
-    block = Block(name, tree, given, fixed, sweeps, factors, samples, seed, exclusions)
+    block = Block(name, tree, given, fixed, sweeps, factors, sample, exclusions)
     return block, [*problems, *wrong_design, *wrong_zip, *wrong_tests]
 
 
 def is_swept(key: str, value: Any) -> bool:
     """Return whether a value stands for many, unlike a pair of materials or an accuracy."""
-    if key in WORDS:
+    row = row_of(key)
+    if row is None:
         return False
     if isinstance(value, dict):
         return key != "solve.accuracy"
-    row = row_of(key)
-    is_pair = row is not None and row.kind == "materials"
+    is_pair = row.kind == "materials"
     return isinstance(value, list) and (not is_pair or any(isinstance(n, list) for n in value))
 
 
@@ -240,15 +257,18 @@ def _sweep(path: tuple[Any, ...], key: str, value: Any) -> Sweep:
     return sweep_of(path, value, row is not None and row.kind == "integer")
 
 
-def _design_of(tree: Tree, sweeps: dict[str, Sweep]) -> tuple[int, int, list[FileProblem]]:
+@make_group
+class Sample:
+    """How many samples a file's designs draw, and from which seed; `sample`."""
+
+    n: int | None = integer(None, "[1, 1e15]", "samples of a design")
+    seed: int = integer(0, "[0, 1e18]", "seed of a design")
+
+
+def _design_of(tree: Tree, sweeps: dict[str, Sweep]) -> tuple[Sample, list[FileProblem]]:
     """Return how many samples from which seed a block draws, and what is wrong with that."""
     drawn = [sweep for sweep in sweeps.values() if sweep.is_drawn]
-    given = tree.values.get("sample", {})
-    problems = [
-        tree.problem(("sample", name), f"needs a whole number from {least}")
-        for name, least in (("n", 1), ("seed", 0))
-        if name in given and not (type(given[name]) is int and given[name] >= least)
-    ]
+    sample, problems = read_own(Sample, "sample", tree)
     for sweep in drawn:
         if sweep.kind != drawn[0].kind:
             kinds = f"{drawn[0].kind} or {sweep.kind}"
@@ -257,10 +277,24 @@ def _design_of(tree: Tree, sweeps: dict[str, Sweep]) -> tuple[int, int, list[Fil
     if len(drawn) == 1 and drawn[0].kind == "saltelli":
         text = "saltelli exchanges keys one by one: draw two or more, or draw this one by sobol"
         problems.append(tree.problem(drawn[0].path, text))
-    if drawn and "n" not in given:
+    if drawn and sample.n is None and not problems:
         text = "needs a number of samples: add `sample: {n: 64, seed: 1}` to the file"
         problems.append(tree.problem(drawn[0].path, text))
-    return 0 if problems else given.get("n", 0), given.get("seed", 0), problems
+    return Sample() if problems else sample, problems
+
+
+def read_own(of: type[Any], name: str, tree: Tree) -> tuple[Any, list[FileProblem]]:
+    """Return a group of a file that is no part of a case, and what is wrong with it."""
+    values = tree.values.get(name, {})
+    if not isinstance(values, dict):
+        return of(), [tree.problem((name,), no_mapping(name, values))]
+    try:
+        return of(**values), []
+    except CaseError as error:
+        return of(), [
+            tree.problem((name, *path_of(one.key)), one.message, is_of_key(one.message))
+            for one in error.problems
+        ]
 
 
 def _zip_groups(

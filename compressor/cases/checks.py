@@ -130,8 +130,7 @@ def check_double(key: str, value: Any) -> str | None:
     """
     if isinstance(value, Mapping | list | tuple) or hasattr(value, "ndim") or value is None:
         return None
-    row = table()[DOUBLES[key]]
-    return dataclasses.replace(row, key=key, low=2 * row.low, high=2 * row.high).check(value)
+    return table()[DOUBLES[key]].doubled().check(value)
 
 
 def has_parts(key: str, value: Any) -> bool:
@@ -139,13 +138,8 @@ def has_parts(key: str, value: Any) -> bool:
     return isinstance(value, Mapping) and bool({*value} & {*parts_by_key().get(key, ())})
 
 
-def expand_synonyms(
-    values: Mapping[str, Any], halved: Callable[[Any], Any] = halve
-) -> tuple[dict[str, Any], list[Problem]]:
-    """Return nested values with each synonym as its key; both at once are a problem.
-
-    halved: the function that halves a value, or a sweep.
-    """
+def expand_synonyms(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
+    """Return nested values with each synonym as its key; both at once are a problem."""
     whole, problems = dict(values), []
     for synonym, key in DOUBLES.items():
         group, name, own = *synonym.split("."), key.rpartition(".")[2]
@@ -158,7 +152,7 @@ def expand_synonyms(
             whole[group] = {one: value for one, value in within.items() if one != name}
         else:
             renamed = {own if one == name else one: value for one, value in within.items()}
-            whole[group] = renamed | {own: halved(within[name])}
+            whole[group] = renamed | {own: halve(within[name])}
     return whole, problems
 
 
@@ -225,45 +219,32 @@ def of_percent(name: str, group: str) -> str:
 # keys of a case file that are no part of a case: how values are swept together, what the page of
 # the report says of the machine
 SWEEP = ("sample", "zip", "exclude", "blocks", "report")
-MAPPINGS = ("sample", "report")  # of these, those with keys of their own
-REPORT = {"title": 100, "notes": 2000}  # keys of `report`, and how many letters they may have
-FIGURES = ("paper",)  # what its key `figures` asks for
 MAX_MEANT = 3  # keys that an unknown one may have meant
 
 
-def known_keys(group: str, file: bool = True) -> list[str]:
-    """Return the keys that a group (or, for "", the top) may hold; a `file` has those of sweeps."""
-    if group == "sample":
-        return ["n", "seed"]
-    if group == "report":
-        return [*REPORT, "figures"]
+def known_keys(group: str) -> list[str]:
+    """Return the keys that a group (or, for "", the top) may hold."""
     if group and group not in GROUPS:
         return [*parts_by_key().get(group, ())]
-    names = [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]
-    return [*names, *SWEEP] if file and not group else names
+    return [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]
 
 
-def accepted_keys(group: str, file: bool = True) -> list[str]:
-    """Return the keys that a group may hold, words of the trade among them."""
-    return [*known_keys(group, file), *synonyms_of(group)]
-
-
-def describe_unknown(name: str, group: str, file: bool = True, value: Any = None) -> str:
+def describe_unknown(name: str, group: str, value: Any = None) -> str:
     """Return the error of a key that a group does not have; value: the key's."""
-    whole = group or ("a case file" if file else "a case")
+    known = known_keys(group)
     hint = (
-        in_our_unit(name, value, accepted_keys(group))
+        in_our_unit(name, value, [*known, *synonyms_of(group)])
         or of_percent(name, group)
         or of_diameter(name, group, value)
-        or ("" if DIAMETER.fullmatch(name) or name in SWEEP else suggestion(name, group))
-        or f"; {whole} has {', '.join(known_keys(group, file))}"
+        or ("" if DIAMETER.fullmatch(name) else suggestion(name, group))
+        or f"; {group or 'a case'} has {', '.join(known)}"
     )
     return f"unknown key{hint}"
 
 
 def describe_wrong(group: str, name: str, value: Any) -> str:
     """Return the error of an unknown key of a case's group, or without a name of what is none."""
-    return describe_unknown(name, group, False, value) if name else no_mapping(group, value)
+    return describe_unknown(name, group, value) if name else no_mapping(group, value)
 
 
 def no_mapping(key: str, value: Any) -> str:
@@ -351,7 +332,7 @@ def hold_value(key: str, value: Any) -> Any:
         held = adapter_of(row).validate_python(value) if row else value
     except ValidationError:
         return value
-    return tuple(sorted(held.items())) if isinstance(held, dict) else held
+    return tuple(sorted(held.items())) if row and isinstance(held, dict) else held
 
 
 def values_given(values: Mapping[Any, Any]) -> dict[str, Any]:

@@ -1,20 +1,20 @@
 """Case files to studies: what is swept multiplies, and all errors are reported at once.
 
-A file becomes nested values with their places (`yaml_reader`, `keys`), blocks and overrides take
-their places, and the jobs are counted (`blocks`) before any is made. Each job's case is then built
+A file becomes nested values with their places (`yaml_reader`), blocks and overrides stand over them
+(`keys`), and the jobs are counted (`blocks`) before any is made. Each job's case is then built
 whole, for its key and for what is wrong with its values, and again when it is used.
 """
 
 import itertools
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from compressor.cases.blocks import Block, plan_block
+from compressor.cases.blocks import Block, plan_block, read_own
 from compressor.cases.case import Case
-from compressor.cases.checks import FIGURES, REPORT, row_of, stands_for, value_of
+from compressor.cases.checks import DOUBLES, expand_synonyms, halve, row_of, stands_for, value_of
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
 from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
 from compressor.cases.keys import (
@@ -23,30 +23,28 @@ from compressor.cases.keys import (
     merge_block,
     override,
     path_of,
+    place_cards,
     read_overrides,
-    write_out,
 )
-from compressor.cases.parameter import NO_VALUE, CaseError, quote_value
+from compressor.cases.parameter import CaseError, choice, make_group, quote_value
 from compressor.cases.study import Axis, Cases, Study
 from compressor.cases.table import WORDS, outside_identity, table
 from compressor.cases.yaml_reader import (
     CaseFileError,
     FileProblem,
-    Path,
     Place,
-    Places,
     Tree,
     read_file,
     shorten,
 )
 from compressor.program import Progress, no_progress
 
-Changes = tuple[Mapping[Path, Any], Places]  # values of the command line, and their places
 MAX_JOBS = 10_000
 NONE_SELECTED = "selects no job; compsim plan without it lists those that there are"
 MANY_CASES = 20_000  # cases of a study that take seconds to be read
 MAX_CONFLICTS = 20  # reported of one file; a sweep can have another in every job
 IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
+WHOLE_FILE = ("name", "blocks", "report")
 AT_TOP = "needs keys at the top, such as `joint: big_end`, with a space after the colon"
 NO_BLOCKS = "needs a list of mappings, such as [{load: none}, {joint: both}]"
 NO_DRAWS = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
@@ -87,7 +85,7 @@ def load_studies(
     is called with how many of how many cases are read. A key that no case reads is refused. Raises
     CaseFileError with everything that is wrong in all files, overrides and the comparison.
     """
-    values, places, problems = read_overrides(overrides)
+    changes, problems = read_overrides(overrides)
     test = None
     selection = Place(f"--only {shorten(only or '')}")
     if only:
@@ -96,7 +94,7 @@ def load_studies(
         except NoComparison as error:
             problems.append(FileProblem(selection, "", str(error)))
     mistaken = bool(problems)
-    files = [_read(_path_of(path), ({}, {}) if mistaken else (values, places)) for path in paths]
+    files = [_read(_path_of(path), Tree({}, {}) if mistaken else changes) for path in paths]
     problems += [problem for file in files for problem in file.problems]
     problems += _find_shared_names(files)
     studies, blocks = [], []
@@ -104,21 +102,13 @@ def load_studies(
         study, found, wrong = _study(file, max_jobs, test, progress)
         problems += wrong
         studies += [study] if study else []
-        blocks.append((file, found))
-    problems += _find_unread(blocks)
+        blocks += found
+    problems += _find_unread(blocks, bool(changes.values))
     if not problems and not any(study.selected for study in studies):
         problems.append(FileProblem(selection, "", NONE_SELECTED))
     if problems:
-        unknown = {_spot(one) for one in problems if one.message.startswith("unknown key")}
-        raise CaseFileError(  # an unknown key has no default
-            [one for one in problems if one.message != NO_VALUE or _spot(one) not in unknown]
-        )
+        raise CaseFileError(problems)
     return studies
-
-
-def _spot(problem: FileProblem) -> tuple[str, int, str]:
-    """Return the file, the line and the last name of the key that a problem is about."""
-    return problem.place.file, problem.place.line, problem.key.rpartition(".")[2]
 
 
 def _path_of(path: Any) -> str:
@@ -128,6 +118,15 @@ def _path_of(path: Any) -> str:
     except TypeError as error:
         message = f"needs the path of a case file, not {quote_value(path)}"
         raise CaseFileError([FileProblem(Place("load_cases"), "", message)]) from error
+
+
+@make_group
+class Report:
+    """What the page of the report says of a machine; `report`."""
+
+    title: str | None = choice(None, (), "title of the page", kind="lines", high=100)
+    notes: str | None = choice(None, (), "notes on it", kind="lines", high=2000)
+    figures: str | None = choice(None, ("paper",), "whose figures are drawn of it")
 
 
 @dataclass(frozen=True)
@@ -140,49 +139,28 @@ class CaseFile:
     path: str
     problems: list[FileProblem]
     tree: Tree | None = None
-    changes: Changes = ({}, {})
+    changes: Tree = field(default_factory=lambda: Tree({}, {}))
     name: str = ""
     name_place: Place = field(default_factory=lambda: Place(""))
-    report: Mapping[str, str] = field(default_factory=dict)
+    report: Report = field(default_factory=Report)
 
 
-def _read(path: str, changes: Changes) -> CaseFile:
+def _read(path: str, changes: Tree) -> CaseFile:
     """Return a case file, and what is wrong with it as far as no job is made."""
     tree, problems = read_file(path)
     if tree is None or not isinstance(tree.values, dict):
         return CaseFile(path, problems + ([tree.problem((), AT_TOP)] if tree else []))
-    tree, wrong = write_out(tree)
-    whole = override(tree, *changes)
+    place_cards(tree)
+    whole = override(tree, changes)
     name, stem = whole.values.get("name"), os.path.splitext(os.path.basename(path))[0]
     place = whole.at("name")[1] if "name" in whole.values else Place(path, 1, 1)
     message = table()["name"].check(stem if name is None else name)
     if message and name is None:
         message = f"the file's name gives none: {message}; set name"
         problems.append(FileProblem(place, "name", message))
-    report, untold = _read_report(whole)
+    report, wrong = read_own(Report, "report", whole)
     name = "" if message else name or stem
-    return CaseFile(path, [*problems, *wrong, *untold], tree, changes, name, place, report)
-
-
-def _read_report(tree: Tree) -> tuple[dict[str, str], list[FileProblem]]:
-    """Return what a file gives for the page of the report: title, notes, and which figures."""
-    texts, problems = {}, []
-    for name, value in tree.values.get("report", {}).items():
-        if name == "figures":
-            texts[name] = str(value)
-            if value not in FIGURES:
-                message = f"needs {' or '.join(FIGURES)}, not {quote_value(value)}"
-                problems.append(tree.problem(("report", name), message))
-            continue
-        text = value.strip() if isinstance(value, str) else ""
-        lines = text.split("\n") if name == "notes" else [text]
-        if text and len(text) <= REPORT[name] and all(line.isprintable() for line in lines):
-            texts[name] = text
-        else:
-            what = "lines of text" if name == "notes" else "a line of text"
-            message = f"needs {what} of up to {REPORT[name]} letters, not {quote_value(value)}"
-            problems.append(tree.problem(("report", name), message))
-    return texts, problems
+    return CaseFile(path, problems + wrong, tree, changes, name, place, report)
 
 
 def _find_shared_names(files: Sequence[CaseFile]) -> list[FileProblem]:
@@ -201,7 +179,7 @@ def _study(
     file: CaseFile, max_jobs: int, only: Test | None, progress: Progress
 ) -> tuple[Study | None, list[Block], list[FileProblem]]:
     """Return the study of a file with its blocks, or what is wrong with it."""
-    blocks, problems = _blocks(file, file.changes, max_jobs)
+    blocks, problems = _blocks(file, max_jobs)
     if problems or not blocks:
         return None, [], problems
     is_grid = len(blocks) == 1 and blocks[0].is_grid
@@ -209,26 +187,28 @@ def _study(
     columns = [*blocks[0].columns] if is_grid else _columns(blocks)
     keys, values, problems = _check_cases(file, cases, [] if is_grid else columns, progress)
     is_drawn = any(sweep.is_drawn for block in blocks for sweep in block.sweeps.values())
-    if "sample" in blocks[0].tree.values and not (problems or file.changes[0] or is_drawn):
+    if "sample" in blocks[0].tree.values and not (problems or file.changes.values or is_drawn):
         problems = [blocks[0].tree.problem(("sample",), NO_DRAWS, True)]
     if problems:
         return None, [], problems
     cases.keys = keys
     spreads = {key: sweep.spread for block in blocks for key, sweep in block.sweeps.items()
                if sweep.is_drawn and sweep.has_ends}  # fmt: skip
-    values = blocks[0].columns if is_grid else values
+    values = dict(blocks[0].columns) if is_grid else values
+    for key, sweep in blocks[0].sweeps.items() if is_grid else ():
+        if key_of(sweep.path) in DOUBLES:
+            values[key] = [*map(halve, values[key])]
     axes = tuple(Axis(key, tuple(values[key]), spreads.get(key)) for key in columns)
     selected = range(len(cases)) if only is None else cases.where(only)
-    fixed = tuple(block.fixed for block in blocks)
-    study = Study(file.name, file.path, axes, cases, keys, is_grid, selected, fixed, **file.report)
+    fixed = tuple(expand_synonyms(block.fixed)[0] for block in blocks)
+    told = {name: text or "" for name, text in vars(file.report).items()}
+    study = Study(file.name, file.path, axes, cases, keys, is_grid, selected, fixed, **told)
     return study, blocks, []
 
 
-def _blocks(
-    file: CaseFile, changes: Changes, max_jobs: int
-) -> tuple[list[Block], list[FileProblem]]:
+def _blocks(file: CaseFile, max_jobs: int) -> tuple[list[Block], list[FileProblem]]:
     """Return the blocks of a file, or what is wrong with them, and with any single value."""
-    trees, problems = _block_trees(file, changes, max_jobs) if file.tree else ([], [])
+    trees, problems = _block_trees(file, max_jobs) if file.tree else ([], [])
     plans = [plan_block(tree, file.name) for tree in trees]
     blocks = [block for block, _ in plans]
     problems += [problem for _, wrong in plans for problem in wrong]
@@ -257,17 +237,16 @@ def _blocks(
     ]
 
 
-def _block_trees(
-    file: CaseFile, changes: Changes, max_jobs: int
-) -> tuple[list[Tree], list[FileProblem]]:
+def _block_trees(file: CaseFile, max_jobs: int) -> tuple[list[Tree], list[FileProblem]]:
     """Return the values of each block over those of the file; the file's alone without blocks."""
-    tree, (values, places) = file.tree, changes
+    tree, changes = file.tree, file.changes
     assert tree
-    if ("blocks",) in values:
-        tree = override(tree, {("blocks",): values["blocks",]}, places)
-        values = {path: value for path, value in values.items() if path != ("blocks",)}
+    if ("blocks",) in changes.values:
+        tree = override(tree, Tree({("blocks",): changes.values["blocks",]}, changes.places))
+        values = {path: value for path, value in changes.values.items() if path != ("blocks",)}
+        changes = Tree(values, changes.places)
     if "blocks" not in tree.values:
-        return [override(tree, values, places)], []
+        return [override(tree, changes)], []
     items = tree.values["blocks"]
     if not isinstance(items, list) or not items or not all(isinstance(i, dict) for i in items):
         return [], [tree.problem(("blocks",), NO_BLOCKS)]
@@ -275,18 +254,15 @@ def _block_trees(
         message = f"{len(items)} blocks are more jobs than {max_jobs}; raise --max-jobs"
         return [], [tree.problem(("blocks",), message)]
     whole = Tree({key: v for key, v in tree.values.items() if key != "blocks"}, tree.places)
-    within: list[dict[Path, tuple[Place, Place]]] = [{} for _ in items]
-    for (first, *rest), spots in ((path, spots) for path, spots in tree.places.items() if path):
-        if first == "blocks" and rest:
-            within[int(rest[0])][tuple(rest[1:])] = spots
+    within: list[dict[Any, tuple[Place, Place]]] = [{} for _ in items]
+    for path, spots in tree.places.items():
+        if path[:1] == ("blocks",) and path[1:]:
+            within[int(path[1])][path[2:]] = spots
     found, problems = [], []
     for item, own in zip(items, within, strict=True):
-        block, wrong = write_out(Tree(item, own))
-        problems += wrong
-        for key in {"name", "blocks", "report"} & {*block.values}:
-            problems.append(block.problem((key,), IN_BLOCK, True))
-            del block.values[key]
-        found.append(override(merge_block(whole, block), values, places))
+        block = Tree({key: v for key, v in item.items() if key not in WHOLE_FILE}, own)
+        problems += [block.problem((key,), IN_BLOCK, True) for key in WHOLE_FILE if key in item]
+        found.append(override(merge_block(whole, block), changes))
     return found, problems
 
 
@@ -365,25 +341,22 @@ def _check_cases(
 Where = tuple[Place, str]  # a key of a file, which may be given for several blocks or files
 
 
-def _find_unread(
-    found: Sequence[tuple[CaseFile, list[Block]]],
-) -> list[FileProblem]:
+def _find_unread(blocks: Sequence[Block], are_changed: bool) -> list[FileProblem]:
     """Return the keys that no job reads of those that they are given for.
 
-    A key that a file's own jobs read stands there rightly, whatever the command line changes.
+    are_changed: whether the command line changes them; then of its own keys alone.
     """
     read: set[Where] = set()
     unread: dict[Where, FileProblem] = {}
-    for block in (block for _, blocks in found for block in blocks):
+    for block in blocks:
         some, none = _read_in(block, read)
         read |= some
         unread |= none
-    for file, _ in found:
-        lacking = [where for where in unread.keys() - read if where[0].file == file.path]
-        if lacking and file.changes[0]:
-            for block in _blocks(file, ({}, {}), MAX_JOBS)[0]:
-                read |= _read_in(block, read)[0]
-    return [problem for where, problem in unread.items() if where not in read]
+    return [
+        problem
+        for where, problem in unread.items()
+        if where not in read and not (are_changed and where[0].line)
+    ]
 
 
 def _read_in(block: Block, known: set[Where]) -> tuple[set[Where], dict[Where, FileProblem]]:

@@ -12,7 +12,6 @@ import inspect
 import math
 import re
 import reprlib
-import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
@@ -47,15 +46,9 @@ from compressor.program import CompsimError, did_you_mean
 
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
-# metal of a bush or a pin -> which of ours to take for it, by its modulus of elasticity
-COPPER = "copper, whose modulus is nearest"
-SOFT = "copper, the softer one, or give contact.stiffness_N_per_mm15: babbitt has about 50 GPa"
-OTHER_WORDS = dict.fromkeys(("bronze", "brass", "cast iron", "cast_iron"), COPPER)
-OTHER_WORDS |= dict.fromkeys(("babbitt", "babbit", "white metal", "white_metal"), SOFT)
-OTHER_WORDS["dopri5"] = "RK45, the same pair in SciPy, or auto"
 NO_VALUE = "has no value; leave the key out to get its default"
 # a number that is written as text, with a comma or a unit
-AS_NUMBER = re.compile(r"\s*([-+]?\d+(?:([.,])\d+)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII)
+AS_NUMBER = re.compile(r"\s*([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII)
 
 # case-file unit -> numerator and denominator of its SI value
 UNITS = {
@@ -312,6 +305,8 @@ class Parameter:
         if self.is_number:
             number = "a whole number" if self.kind == "integer" else "a number"
             return " or ".join([*self.choices, f"{number} in {self.span} {self.unit}".strip()])
+        if self.kind == "lines":
+            return f"printable text of up to {self.high:g} letters"
         words = join_with_or(self.words)
         if self.kind == "materials":
             return f"a pair of materials, {words}, such as [steel, steel]"
@@ -330,6 +325,11 @@ class Parameter:
         """
         needed = [one for one in self.read if not any(o != one and o in one for o in self.read)]
         return "; ".join(dict.fromkeys(needed))
+
+    def doubled(self) -> "Parameter":
+        """Return the row of twice its value."""
+        default = self.default and 2 * self.default
+        return dataclasses.replace(self, default=default, low=2 * self.low, high=2 * self.high)
 
     def choice_of(self, value: Any) -> Any:
         """Return the choice that an alias stands for, and any other value as it is."""
@@ -378,24 +378,15 @@ class Parameter:
     def _refuse(self, value: Any, *words: Any) -> str:
         """Return the error of a value of another kind; words: of these one may be misspelt."""
         message = f"needs {self.needed}, not {quote_value(value)}"
-        word = words[0] if words and isinstance(words[0], str) else ""
-        lower = dict(self.aliases)
-        lower |= {choice.lower(): choice for choice in (*self.choices, "true", "false")}
-        if word.lower() in OTHER_WORDS:
-            return f"{message}; take {OTHER_WORDS[word.lower()]}"
-        near = get_close_matches(word[:MAX_WORD].lower(), lower, n=1)
+        word = words[0][:MAX_WORD] if words and isinstance(words[0], str) else ""
+        lower = dict(self.aliases) | {choice.lower(): choice for choice in self.words}
+        near = get_close_matches(word.lower(), lower, n=1)
+        number = AS_NUMBER.fullmatch(word) if self.is_number else None
         if near and lower[near[0]] in self.needed:
             return f"{message}; did you mean {lower[near[0]]}?"
-        number = AS_NUMBER.fullmatch(word[:MAX_WORD]) if self.is_number else None
-        if not number:
-            return message
-        plain, comma, unit = number[1].replace(",", "."), number[2] == ",", number[3]
-        if unit and unit != self.unit:
+        if number and number[2] not in ("", self.unit):
             return f"{message}; write a number alone" + (self.unit and f", in {self.unit}")
-        text = f"{message}; write {plain}" + ("" if comma or unit else " without quotes")
-        first, _, second = number[1].partition(",")
-        several = len(first) == len(second) > 1  # 700,800 is no decimal comma
-        return f"{text}, or [{number[1].replace(',', ', ')}]" if several else text
+        return f"{message}; write {number[1].replace(',', '.')}" if number else message
 
 
 def join_with_or(words: Sequence[str]) -> str:
@@ -424,19 +415,19 @@ def to_whole(value: Any) -> Any:
     return int(value) if type(value) is float and value.is_integer() else value
 
 
-def refuse_tiny(unit: str, value: float) -> float:
-    """Return a number, 0 for -0. Raises ValueError for one that is 0 in SI and not in its unit."""
-    if value and abs(to_si(value, unit)) < sys.float_info.min:
-        raise ValueError(f"{value:g} is too small to differ from 0: write 0, or a larger number")
-    return value + 0.0
-
-
 def check_name(value: str) -> str:
     """Return the name of a study. Raises ValueError for one that no file could have."""
     if NAME.fullmatch(value) and not value.startswith("."):
         return value
     allowed = "[A-Za-z0-9._-], at most 64"
     raise ValueError(f"{quote_value(value)} is no name: use {allowed}, no leading dot")
+
+
+def check_lines(value: str) -> str:
+    """Return a text of lines without blanks around it. Raises ValueError for any other."""
+    if value.strip() and all(line.isprintable() for line in value.strip().split("\n")):
+        return value.strip()
+    raise ValueError("needs printable text")
 
 
 def check_cards(value: PerEnd[str | None] | None) -> PerEnd[str | None] | None:
@@ -460,12 +451,16 @@ def annotation_of(row: Parameter) -> Any:
     kinds: dict[str, Any] = {
         "number": Annotated[
             float, Field(strict=True, allow_inf_nan=False, **ends), BeforeValidator(to_python),
-            AfterValidator(partial(refuse_tiny, row.unit)),
+            AfterValidator(lambda value: value + 0.0),  # of -0
         ],
         "integer": Annotated[int, Field(strict=True, **ends), BeforeValidator(to_whole)],
         "boolean": Annotated[bool, Field(strict=True), BeforeValidator(to_python)],
         "text": Annotated[str, Field(strict=True), AfterValidator(check_name)],
         "card": Annotated[str, Field(strict=True, min_length=1)],
+        "lines": Annotated[
+            str, Field(strict=True, min_length=1, max_length=int(row.high)),
+            AfterValidator(check_lines),
+        ],
         "materials": tuple[words, words],
         "accuracy": BY_METRIC,
     }  # fmt: skip

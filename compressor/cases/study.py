@@ -7,6 +7,7 @@ from typing import Any, Protocol, overload
 
 from compressor.cases.blocks import Block, reader
 from compressor.cases.case import Case
+from compressor.cases.checks import expand_synonyms
 from compressor.cases.comparison import Test
 
 
@@ -53,7 +54,7 @@ class Study:
         """Return what the file gives of a job, nested as a case file has it."""
         assert isinstance(self.cases, Cases)
         block, place = self.cases.combinations[number]
-        return {**block.values_of(place), "name": block.name}
+        return {**expand_synonyms(block.values_of(place))[0], "name": block.name}
 
     def solver_of(self, number: int) -> Hashable:
         """Return what jobs share only if their cases have equal groups `solve` and `output`."""

@@ -1,8 +1,8 @@
 """Strict YAML 1.2: a text -> plain values, and where each of them stands.
 
 PyYAML's composer reads; what a scalar means is decided here, by the core schema of YAML 1.2, so
-that `1e5` is a number and `no` is text. A value that is missing, or given twice, is noted with its
-place, and reading goes on; broken syntax, aliases, anchors, tags and oversized files end it.
+that `1e5` is a number and `no` is text. A key that is given twice is noted with its place, and
+reading goes on; broken syntax, aliases and tags end it.
 """
 
 import math
@@ -14,17 +14,11 @@ from typing import Any
 
 import yaml
 
-from compressor.cases.parameter import NO_VALUE
 from compressor.program import CompsimError, printable
 
 START = "compsim init writes a case file to start from"
 MAX_BYTES = 1 << 20
-MAX_DEPTH = 20
-MAX_PARTS = 50_000  # keys, values and brackets, which take a second
 
-OTHER_YAML = re.compile(r"%YAML (?!1\.2\s)")
-NOT_ZERO = re.compile("[^eE]*[1-9]")
-ODD_BREAKS = re.compile("[\x85\u2028\u2029]")  # lines for PyYAML, not for YAML 1.2 or an editor
 DECIMALS = re.compile(r"0\d+")  # behind a decimal comma, as in [0,05]
 NULLS = {"", "~", "null", "Null", "NULL"}
 BOOLEANS = {"true": True, "True": True, "TRUE": True}
@@ -122,46 +116,36 @@ def read_text(text: str, start: Place) -> Read:
 
     A `start` without a line is everything's place.
     """
-    if odd := ODD_BREAKS.search(text):
-        return None, [_forbid(text, odd.start(), start)]
-    if OTHER_YAML.match(text):
-        return None, [FileProblem(start, "", "case files are YAML 1.2")]
+    reader = _Reader(start)
     try:
         root = _Loader(text).get_single_node()
+        values = root and reader.plain(root, (), reader.place(root))
     except yaml.MarkedYAMLError as error:
         return None, [_tell_syntax(text, error, start)]
     except yaml.reader.ReaderError as error:
-        return None, [_forbid(text, error.position, start)]
-    except (ValueError, OverflowError):  # PyYAML on "\UFFFFFFFF" or %YAML 1.999...
-        return None, [FileProblem(start, "", "is no YAML: a number is too large here")]
+        place = _place_after(start.file, text[: error.position]) if start.line else start
+        told = f"must not hold the character U+{ord(text[error.position]):04X}"
+        return None, [FileProblem(place, "", told)]
+    except (ValueError, OverflowError, RecursionError) as error:  # PyYAML on "\UFFFFFFFF"
+        deep = isinstance(error, RecursionError)
+        told = "is nested too deeply" if deep else "is no YAML: a number is too large here"
+        return None, [FileProblem(start, "", told)]
     if root is None:
         return None, [FileProblem(start, "", f"is empty{f'; {START}' if start.line else ''}")]
-    reader = _Reader(start)
-    values = reader.plain(root, (), reader.place(root))
     return Tree(values, reader.places), reader.problems
 
 
 class _Loader(yaml.SafeLoader):
     """PyYAML's composer; what no case file has ends it."""
 
-    depth = parts = 0
-
     def compose_node(self, parent: Any, index: Any) -> Any:
         event = self.peek_event()
-        self.parts, self.depth = self.parts + 1, self.depth + 1
-        wrong = {
-            f"nested deeper than {MAX_DEPTH} levels": self.depth > MAX_DEPTH,
-            "is too long to be a case file": self.parts > MAX_PARTS,
-            "aliases (*) are not allowed; write the value out": isinstance(event, yaml.AliasEvent),
-            "anchors (&) are not allowed; write the value out": event.anchor is not None,
-            "tags (!) are not allowed": getattr(event, "tag", None) is not None,
-        }
-        for message, holds in wrong.items():
-            if holds:
-                raise _Refused(None, None, message, event.start_mark)
-        node = super().compose_node(parent, index)
-        self.depth -= 1
-        return node
+        if isinstance(event, yaml.AliasEvent):
+            told = "aliases (*) are not allowed; write the value out"
+            raise _Refused(None, None, told, event.start_mark)
+        if getattr(event, "tag", None) is not None:
+            raise _Refused(None, None, "tags (!) are not allowed", event.start_mark)
+        return super().compose_node(parent, index)
 
 
 class _Refused(yaml.MarkedYAMLError):
@@ -193,10 +177,7 @@ class _Reader:
             return self.mapping(node, path)
         if isinstance(node, yaml.SequenceNode):
             return self.items(node, path)
-        value = resolve_scalar(node.value) if node.style is None else node.value
-        if value is None:
-            self.note(node, path, NO_VALUE)
-        return value
+        return resolve_scalar(node.value) if node.style is None else node.value
 
     def mapping(self, node: Any, path: Path) -> dict[str, Any]:
         """Return the values of a mapping by key."""
@@ -204,13 +185,9 @@ class _Reader:
         for name_node, inner in node.value:
             name = name_node.value
             whole = (*path, name)
-            if not isinstance(name, str):
+            if not isinstance(name, str) or not name or not name.isprintable():
                 self.note(name_node, path, "a key must be plain text")
-            elif not name:
-                self.note(name_node, path, "a key is missing before the colon")
-            elif name == "<<" and name_node.style is None:
-                self.note(name_node, path, "merge keys (<<) are not allowed; write the values out")
-            elif whole in self.places:
+            elif name in found:
                 first = self.places[whole][0]
                 line = f" at line {first.line}" if first.line else ""
                 self.note(name_node, whole, f"is given twice; first{line}")
@@ -272,11 +249,6 @@ EQUALS = re.compile(r"\s*([A-Za-z]\w*)\s*=\s*(.*?)\s*(?:#.*)?$")
 KEY = re.compile(r"\s*[A-Za-z]\w*\s*:(\s|$)")
 
 
-def _forbid(text: str, position: int, start: Place) -> FileProblem:
-    place = _place_after(start.file, text[:position]) if start.line else start
-    return FileProblem(place, "", f"must not hold the character U+{ord(text[position]):04X}")
-
-
 def _place_after(path: str, before: str) -> Place:
     """Return the place that follows the text `before`."""
     return Place(path, before.count("\n") + 1, len(before) - before.rfind("\n"))
@@ -291,21 +263,9 @@ def resolve_scalar(text: str) -> Any:
     if NOT_FINITE.fullmatch(text):
         return float(text.replace(".", ""))
     if INTEGER.fullmatch(text):
-        return _integer(text)
-    if not REAL.fullmatch(text):
-        return text
-    number = float(text)
-    if number == 0 and NOT_ZERO.match(text):  # smaller than any float: not the 0 of an ideal joint
-        return math.nextafter(0, -1 if text[0] == "-" else 1)
-    return number
-
-
-def _integer(text: str) -> float:
-    """Return an integer; one beyond any float is infinite, since its digits may be a million."""
-    if text[:2] in ("0o", "0x"):
-        value = int(text, 0)
-        return value if value.bit_length() < 1000 else math.inf
-    return int(text) if len(text) <= 300 else float(text)
+        # of many digits it is none that any key takes, and none that Python reads
+        return int(text, 0 if text[:2] in ("0o", "0x") else 10) if len(text) < 300 else math.inf
+    return float(text) if REAL.fullmatch(text) else text
 
 
 class CaseFileError(CompsimError, ValueError):
