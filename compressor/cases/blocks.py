@@ -73,9 +73,9 @@ class Block:
         found: dict[str, list[Any]] = {}
         for keys in self.factors:
             made = [self.sweeps[key].make() for key in keys]
-            if self.sweeps[keys[0]].is_drawn and self.sample.n:
-                kind, sample = self.sweeps[keys[0]].kind, self.sample
-                points = design(kind, sample.n, len(keys), sample.seed)
+            sweep, count = self.sweeps[keys[0]], self.sample.n
+            if sweep.is_drawn and count:
+                points = design(sweep.kind, count, len(keys), self.sample.seed)
                 shares = zip(*points, strict=True)
                 made = [
                     [*map(self.sweeps[key].spread, own)]
@@ -142,7 +142,8 @@ class Block:
         for problem in error.problems:
             doubles = (double for double, half in DOUBLES.items() if half == problem.key)
             key = next((one for one in doubles if path_of(one) in self.tree.places), problem.key)
-            message, once = problem.message, problem
+            message = problem.message
+            once: Any = problem
             parts = [key] if (key,) in self.tree.places else key.split(".")
             above = (".".join(parts[:n]) for n in range(len(parts), 0, -1))
             swept = next((own for one in above if (own := DOUBLES.get(one, one)) in rows), "")

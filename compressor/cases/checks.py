@@ -236,7 +236,7 @@ def describe_unknown(name: str, group: str, value: Any = None) -> str:
         in_our_unit(name, value, [*known, *synonyms_of(group)])
         or of_percent(name, group)
         or of_diameter(name, group, value)
-        or ("" if DIAMETER.fullmatch(name) else suggestion(name, group))
+        or ("" if DIAMETER.fullmatch(name) or name in SWEEP else suggestion(name, group))
         or f"; {group or 'a case'} has {', '.join(known)}"
     )
     return f"unknown key{hint}"

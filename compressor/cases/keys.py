@@ -73,8 +73,10 @@ def merge_block(file: Tree, block: Tree) -> Tree:
     changes = dict(leaves(block.values))
     for key in SWEEP:
         value = block.values.get(key)
-        inner = value.items() if isinstance(value, dict) else ()
-        changes |= {(key, name): one for name, one in inner} or {(key,): value} if value else {}
+        if isinstance(value, dict):
+            changes |= {(key, name): one for name, one in value.items()}
+        elif value is not None:
+            changes[key,] = value
     return override(file, Tree(changes, block.places))
 
 

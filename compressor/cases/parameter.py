@@ -47,8 +47,10 @@ from compressor.program import CompsimError, did_you_mean
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
 NO_VALUE = "has no value; leave the key out to get its default"
-# a number that is written as text, with a comma or a unit
-AS_NUMBER = re.compile(r"\s*([-+]?\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII)
+# a number that is written as text, with a decimal comma or a unit
+AS_NUMBER = re.compile(
+    r"\s*([-+]?(?:\d{1,2},\d+|\d+(?:\.\d+)?)(?:[eE][-+]?\d+)?)\s*(.*?)\s*", re.ASCII
+)
 
 # case-file unit -> numerator and denominator of its SI value
 UNITS = {

@@ -142,14 +142,17 @@ class _Loader(yaml.SafeLoader):
         event = self.peek_event()
         if isinstance(event, yaml.AliasEvent):
             told = "aliases (*) are not allowed; write the value out"
-            raise _Refused(None, None, told, event.start_mark)
+            raise _Refused(told, event.start_mark)
         if getattr(event, "tag", None) is not None:
-            raise _Refused(None, None, "tags (!) are not allowed", event.start_mark)
+            raise _Refused("tags (!) are not allowed", event.start_mark)
         return super().compose_node(parent, index)
 
 
 class _Refused(yaml.MarkedYAMLError):
     """What is YAML, but no case file's."""
+
+    def __init__(self, problem: str, mark: Any):
+        super().__init__(problem=problem, problem_mark=mark)
 
 
 class _Reader:

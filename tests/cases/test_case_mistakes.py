@@ -12,7 +12,7 @@ from compressor.cases.parameter import CaseError
 from compressor.program import CompsimError
 
 WORN = {"joint": "big_end", "clearance_mm": 0.2}
-AT_TOP = ", ".join(known_keys("", file=False))
+AT_TOP = ", ".join(known_keys(""))
 IN_MACHINE = ", ".join(known_keys("machine"))
 
 

@@ -257,7 +257,6 @@ def test_only_some_jobs_are_selected_and_all_are_in_the_study(read):
     ]
     assert refused(read, "laod: none", only="clearance > 1") == [
         "--only clearance > 1: unknown key 'clearance'; did you mean clearance_mm?",
-        "case.yaml:1:1: laod: unknown key; did you mean load?",
     ]
 
 
