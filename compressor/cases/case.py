@@ -9,8 +9,8 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Set
-from dataclasses import replace
-from functools import cache, cached_property, lru_cache
+from dataclasses import field, replace
+from functools import cache, cached_property, lru_cache, partial
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
@@ -33,9 +33,29 @@ from compressor.cases.conflicts import (
     unread_values,
     values_read,
 )
-from compressor.cases.groups import ATMOSPHERE_MPA, Contact, Solve
+from compressor.cases.groups import (
+    ATMOSPHERE_MPA,
+    Contact,
+    Friction,
+    Gas,
+    Machine,
+    Offset,
+    Output,
+    Solve,
+    Spring,
+)
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
-from compressor.cases.optional_groups import fill_guide, fill_wear
+from compressor.cases.optional_groups import (
+    Body,
+    Drive,
+    Guide,
+    Lubricant,
+    Rod,
+    Sensor,
+    Wear,
+    fill_guide,
+    fill_wear,
+)
 from compressor.cases.parameter import (
     ACCURACY,
     BY_PART,
@@ -51,8 +71,8 @@ from compressor.cases.parameter import (
 from compressor.cases.table import (
     GROUPS,
     OF_JOINTS,
+    TOP,
     WORDS,
-    Settings,
     outside_identity,
     parts_by_key,
     table,
@@ -61,6 +81,7 @@ from compressor.cases.yaml_reader import resolve_scalar
 from compressor.metrics import JOINTS
 
 MODEL_VERSION = "3"  # of equations and of the meaning of what is stored; part of a key
+MAX_REV = 50.0  # with `duration_rev: auto`
 MAX_GROUPS = 4096  # whose identities are remembered
 SOUND = PerJoint(0.0, 0.0)  # a healthy clearance that no case need name
 FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is given of a cylinder
@@ -77,8 +98,22 @@ IDENTITY_GROUPS = tuple(
 )
 
 
+def group(name: str) -> Any:
+    """Return the field of a group of keys."""
+    of, word = GROUPS[name], WORDS.get(name)
+    opened = partial(open_group, of, word)
+    return field(default=None if word else of(), metadata={"open": opened})
+
+
+def open_group(of: type, word: bool | None, value: Any) -> Any:
+    """Return what a group is checked by: that of its word, a mapping as a dict, else the value."""
+    if word is not None and value is word:
+        return of() if word else None
+    return dict(value) if isinstance(value, Mapping) else value
+
+
 @make_group
-class Case(Settings):
+class Case:
     """One fully resolved simulation: every value of a case file, in the case file's units.
 
     `Case.from_values` makes a valid one. `name` (of the study), `load` (spring, gas or none)
@@ -105,6 +140,27 @@ class Case(Settings):
     compressor.cases.parameter.CaseError: spring.stroke_mm: 300 mm must be less than the piston's \
 stroke, 240 mm
     """
+
+    name: str = TOP["name"]
+    load: str = TOP["load"]
+    joint: str = TOP["joint"]
+    clearance_mm: PerJoint[float] = TOP["clearance_mm"]
+    healthy_clearance_mm: PerJoint[float] = TOP["healthy_clearance_mm"]
+    initial_offset_mm: Offset = group("initial_offset_mm")
+    machine: Machine = group("machine")
+    gas: Gas = group("gas")
+    spring: Spring = group("spring")
+    contact: Contact = group("contact")
+    friction: Friction | None = group("friction")
+    lubricant: Lubricant | None = group("lubricant")
+    guide: Guide | None = group("guide")
+    drive: Drive | None = group("drive")
+    rod: Rod | None = group("rod")
+    wear: Wear | None = group("wear")
+    body: Body | None = group("body")
+    sensor: Sensor | None = group("sensor")
+    solve: Solve = group("solve")
+    output: Output = group("output")
 
     @classmethod
     def from_values(cls, values: Mapping[str, Any]) -> "Case":
@@ -224,6 +280,79 @@ stroke, 240 mm
             else:
                 found[name] = value if isinstance(value, str) else dict(vars(value))
         return found
+
+    @property
+    def omega(self) -> float:
+        """Return the crank speed, rad/s."""
+        return self.machine.speed_rpm * math.pi / 30
+
+    @property
+    def turn(self) -> float:
+        """Return the time of one revolution, s."""
+        return 60.0 / self.machine.speed_rpm
+
+    @property
+    def worn_joint(self) -> str:
+        """Return which joints count as worn: none, big_end, small_end or both.
+
+        Those that `joint` names, but for a clearance that is healthy.
+        """
+        named = JOINTS if self.joint == "both" else (self.joint,)
+        least = {one: self.healthy_clearance_mm.at(one) for one in JOINTS}
+        sound = [one for one in JOINTS if 0.0 < least[one] >= self.clearance_mm.at(one)]
+        worn = [one for one in named if one not in sound]
+        return "both" if len(worn) > 1 else worn[0] if worn else "none"
+
+    @property
+    def unbalance(self) -> float:
+        """Return what is out of balance on the crank, towards its pin, kg mm.
+
+        A drive's own unbalance less the counterweight, and so below 0 where that is the greater.
+        """
+        return self._own_unbalance - self.counterweight
+
+    @property
+    def counterweight(self) -> float:
+        """Return the crank's counterweight, kg mm: as given, or by what it balances; 0 for none.
+
+        What turns with the crank pin is the rod's share there, m (1 - a / L), and the crank's own
+        unbalance, if a drive names one; the rest of the rod reciprocates.
+        """
+        machine = self.machine
+        if machine.balance is None:
+            return machine.counterweight_kg_mm or 0.0
+        rotating, reciprocating = machine.balance.rotating, machine.balance.reciprocating
+        at_crosshead = machine.rod_mass_kg * (machine.rod_centre_mm or 0.0) / machine.rod_length_mm
+        at_pin = machine.rod_mass_kg - at_crosshead
+        turning = at_pin * machine.crank_radius_mm + self._own_unbalance
+        back_and_forth = (machine.reciprocating_mass_kg + at_crosshead) * machine.crank_radius_mm
+        return rotating * turning + reciprocating * back_and_forth
+
+    @property
+    def _own_unbalance(self) -> float:
+        """Return the crank's unbalance without its counterweight, kg mm, as a drive names it."""
+        return self.drive.unbalance_kg_mm if self.drive else 0.0
+
+    @property
+    def duration(self) -> float:
+        """Return the duration, s; with `duration_rev: auto` the longest that it may come to."""
+        if self.solve.duration_s is not None:
+            return self.solve.duration_s
+        given = self.solve.duration_rev
+        return (MAX_REV if isinstance(given, str) else given or 0.0) * self.turn
+
+    @property
+    def settle(self) -> float:
+        """Return the time from which metrics count, s; 0 with `auto`, until that is known."""
+        given = self.solve.settle_rev
+        return 0.0 if isinstance(given, str) else given * self.turn
+
+    @property
+    def steps(self) -> float:
+        """Return the output steps in the duration, a whole number in a valid case."""
+        if self.solve.output_step_s is not None:
+            return self.duration / self.solve.output_step_s
+        return self.duration * self.machine.speed_rpm * 6.0 / (self.solve.output_step_deg or 1.0)
 
     @property
     def rtol(self) -> float:

@@ -27,7 +27,7 @@ from compressor.cases.parameter import (
     quote_value,
     split_unit,
 )
-from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, parts_by_key, table
+from compressor.cases.table import GROUPS, OF_JOINTS, TOP, WORDS, parts_by_key, table
 
 
 @lru_cache(1024)  # asked for of each key of each job
@@ -69,7 +69,7 @@ def keys_of(value: Callable[[str], Any]) -> Iterator[str]:
             yield whole
 
 
-def value_of(case: Settings, key: str) -> Any:
+def value_of(case: Any, key: str) -> Any:
     """Return a case's value of a dotted key; None where it has none, or no single one."""
     if key in WORDS:
         return getattr(case, key) is not None
@@ -226,7 +226,9 @@ def known_keys(group: str) -> list[str]:
     """Return the keys that a group (or, for "", the top) may hold."""
     if group and group not in GROUPS:
         return [*parts_by_key().get(group, ())]
-    return [item.name for item in dataclasses.fields(GROUPS[group] if group else Settings)]
+    if not group:
+        return [*TOP, *GROUPS]
+    return [item.name for item in dataclasses.fields(GROUPS[group])]
 
 
 def describe_unknown(name: str, group: str, value: Any = None) -> str:

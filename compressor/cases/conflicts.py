@@ -19,15 +19,17 @@ from typing import Any
 from compressor.cases.card import DRIVING, CardError, open_card, taken_work
 from compressor.cases.checks import TWICE, row_of, stands_for, value_in
 from compressor.cases.comparison import condition
-from compressor.cases.groups import CRANK_END, ENDS
+from compressor.cases.groups import CRANK_END, ENDS, PAPER_CYLINDER
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
 from compressor.cases.parameter import IMPLAUSIBLE, Problem
-from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, Settings, group_readers, table
+from compressor.cases.table import GROUPS, OF_JOINTS, READ, WORDS, table
 from compressor.metrics import AXES, JOINTS
 
+Case = Any  # that of `compressor.cases.case`, which needs these rules
 
-def back_action(case: Settings, axis: str, frequency: Any) -> Any:
+
+def back_action(case: Case, axis: str, frequency: Any) -> Any:
     """Return the relative change, complex, of the shaking force by the motion of its body.
 
     A body that accelerates by a takes the moving parts m along, so that the force X on it becomes
@@ -45,7 +47,7 @@ def back_action(case: Settings, axis: str, frequency: Any) -> Any:
     return moving_mass(case) / body.mass_kg * frequency**2 / stiffness
 
 
-def moving_mass(case: Settings) -> float:
+def moving_mass(case: Case) -> float:
     """Return the rod and reciprocating parts (kg), which a body takes along in both directions."""
     return case.machine.rod_mass_kg + case.machine.reciprocating_mass_kg
 
@@ -74,7 +76,7 @@ def conditions(key: str) -> list[tuple[str, str]]:
     A key by part is read where one of the parts is.
     """
     group = key.partition(".")[0]
-    whole = group_readers(group) if group in GROUPS else ()
+    whole = READ.get(group, ())
     if key in GROUPS:
         return [(key, one) for one in whole]
     rows = [table()[part] for part in stands_for(key) or (key,)]
@@ -90,7 +92,7 @@ def conditions(key: str) -> list[tuple[str, str]]:
     return [(group if one in whole else key, one) for one in (*shared, *either)]
 
 
-def reads(case: Settings, key: str) -> bool:
+def reads(case: Case, key: str) -> bool:
     """Return whether a case reads a key."""
     return all(condition(one)(case) for _, one in conditions(key))
 
@@ -109,7 +111,7 @@ def problem_of(key: str, needed: str) -> Problem:
 
 
 def unread_values(
-    case: Settings, values: Mapping[str, Any], given: Container[str]
+    case: Case, values: Mapping[str, Any], given: Container[str]
 ) -> Iterator[Problem]:
     """Yield a problem for each key of one case that it does not read.
 
@@ -139,12 +141,12 @@ def values_read(case: Any) -> dict[str, Any]:
     return found
 
 
-def default_in(case: Settings, key: str) -> Any:
+def default_in(case: Case, key: str) -> Any:
     """Return the value that a case would have of a key if it were not given."""
     row = row_of(key)
     group, _, name = key.rpartition(".")
     within = getattr(case, group, None) if row else None
-    if row is None or row.default is not None or within is None or not isinstance(case, Settings):
+    if row is None or row.default is not None or within is None:
         return row.default if row else None
     without: Any = {group: replace(within, **{name: None})}
     return getattr(getattr(replace(case, **without), group), name)
@@ -212,7 +214,7 @@ MAX_REVOLUTIONS_TOLD = 1e9  # revolutions, more than any run has
 SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 
 
-def conflicts(case: Settings) -> Iterator[Problem]:
+def conflicts(case: Case) -> Iterator[Problem]:
     """Yield everything in a case that does not fit together."""
     for rule in RULES:
         for key, message in rule(case):
@@ -231,7 +233,7 @@ def given_conflicts(joint: str, given: frozenset[str]) -> Sequence[Problem]:
     ]
 
 
-def machine_rules(case: Settings) -> Rules:
+def machine_rules(case: Case) -> Rules:
     """Yield a default inertia out of its range, and lengths with which the mechanism locks."""
     machine, play = case.machine, _play(case)
     key, inertia = "machine.rod_inertia_kg_m2", machine.rod_inertia_kg_m2
@@ -253,7 +255,7 @@ def machine_rules(case: Settings) -> Rules:
         )
 
 
-def clearance_rules(case: Settings) -> Rules:
+def clearance_rules(case: Case) -> Rules:
     """Yield clearances that do not fit the pin or its journal's start."""
     for joint in JOINTS:
         key, clearance = f"clearance_mm.{joint}", getattr(case.clearance_mm, joint)
@@ -271,7 +273,7 @@ def clearance_rules(case: Settings) -> Rules:
             )
 
 
-def load_rules(case: Settings) -> Rules:
+def load_rules(case: Case) -> Rules:
     """Yield what does not fit the stroke, or together in a cylinder."""
     gas, stroke = case.gas, 2 * case.machine.crank_radius_mm
     if case.load == "spring" and case.spring.stroke_mm >= stroke:
@@ -291,7 +293,7 @@ def load_rules(case: Settings) -> Rules:
     yield from card_rules(case) if gas.is_measured else cycle_rules(case)
 
 
-def cycle_rules(case: Settings) -> Rules:
+def cycle_rules(case: Case) -> Rules:
     """Yield clearances and pressures with which an ideal cycle has no corners."""
     gas, play, stroke = case.gas, _play(case), 2 * case.machine.crank_radius_mm
     for end in filter(gas.presses, ENDS):
@@ -326,7 +328,7 @@ def cycle_rules(case: Settings) -> Rules:
                     f"the gas left at the {end} never expands to the suction pressure; "
                     "lower it, or the pressure ratio",
                 )
-    elif gas.is_cylinder or _corners(case) != _corners(Settings()):
+    elif gas.is_cylinder or _corners(case) != PAPER_CORNERS:
         yield (
             "gas.switching",
             "the printed corners hold for the paper's geometry and pressures only; "
@@ -334,14 +336,18 @@ def cycle_rules(case: Settings) -> Rules:
         )
 
 
-def _corners(case: Settings) -> tuple[float | None, ...]:
+CORNER_KEYS = ("head_clearance_mm", "suction_MPa", "discharge_MPa", "exponent")
+PAPER_CORNERS = (120.0, 600.0, *(PAPER_CYLINDER[key] for key in CORNER_KEYS))
+
+
+def _corners(case: Case) -> tuple[float | None, ...]:
     """Return what decides where the gas cycle's corners lie."""
-    gas, machine = case.gas, case.machine
-    lengths = machine.crank_radius_mm, machine.rod_length_mm, gas.head_clearance_mm
-    return (*lengths, gas.suction_MPa, gas.discharge_MPa, gas.exponent)
+    machine = case.machine
+    of_gas = (getattr(case.gas, key) for key in CORNER_KEYS)
+    return (machine.crank_radius_mm, machine.rod_length_mm, *of_gas)
 
 
-def card_rules(case: Settings) -> Rules:
+def card_rules(case: Case) -> Rules:
     """Yield a card that is missing, or of an engine: each end in which gas presses has one."""
     for end in filter(case.gas.presses, ENDS):
         if end not in case.gas.cards:
@@ -363,7 +369,7 @@ def card_rules(case: Settings) -> Rules:
                 )
 
 
-def time_rules(case: Settings) -> Rules:
+def time_rules(case: Case) -> Rules:
     """Yield durations, output steps and settling times that do not divide each other."""
     solve = case.solve
     span_key = "solve.duration_s" if solve.duration_s is not None else "solve.duration_rev"
@@ -395,7 +401,7 @@ def time_rules(case: Settings) -> Rules:
         )
 
 
-def body_rules(case: Settings) -> Rules:
+def body_rules(case: Case) -> Rules:
     """Yield what a body and its sensor need; one that would move the machine back is refused."""
     body, sensor = case.body, case.sensor
     if body is None:
@@ -444,7 +450,7 @@ def body_rules(case: Settings) -> Rules:
         yield "sensor.low_pass_Hz", "must be less than half of rate_Hz"
 
 
-def contact_rules(case: Settings) -> Rules:
+def contact_rules(case: Case) -> Rules:
     """Yield what a law of contact lacks, or cannot have."""
     contact = case.contact
     needed = f"is needed with contact.law: {contact.law}; give it, such as"
@@ -462,7 +468,7 @@ def contact_rules(case: Settings) -> Rules:
         )
 
 
-def friction_rules(case: Settings) -> Rules:
+def friction_rules(case: Case) -> Rules:
     """Yield coefficients and speeds with which a law of friction has no value."""
     friction = case.friction
     if not friction:
@@ -487,7 +493,7 @@ def friction_rules(case: Settings) -> Rules:
         )
 
 
-def bore_rules(case: Settings) -> Rules:
+def bore_rules(case: Case) -> Rules:
     """Yield bearings for which the film's numbers do not hold, and bores that cannot wear."""
     film, wear = case.lubricant, case.wear
     for joint in JOINTS:
@@ -518,7 +524,7 @@ def bore_rules(case: Settings) -> Rules:
         )
 
 
-def rod_rules(case: Settings) -> Rules:
+def rod_rules(case: Case) -> Rules:
     """Yield numbers of an elastic rod that no uniform bar has."""
     machine = case.machine
     if not case.rod:
@@ -534,12 +540,12 @@ def rod_rules(case: Settings) -> Rules:
         )
 
 
-def _play(case: Settings) -> float:
+def _play(case: Case) -> float:
     """Return how much farther than ideal joints those with clearance let the crosshead go (mm)."""
     return case.clearance_mm.big_end + case.clearance_mm.small_end
 
 
-RULES: tuple[Callable[[Settings], Rules], ...] = (
+RULES: tuple[Callable[[Case], Rules], ...] = (
     machine_rules, clearance_rules, load_rules, time_rules, body_rules, contact_rules,
     friction_rules, bore_rules, rod_rules,
 )  # fmt: skip

@@ -574,9 +574,7 @@ else:
         A group of wrong values raises CaseError with everything that is wrong. Its docstring has
         its fields.
         """
-        own = {}
-        for one in reversed(cls.__mro__):
-            own |= vars(one).get("__annotations__", {})
+        own = dict(cls.__annotations__)
         for name, item in vars(cls).items():
             if isinstance(item, dataclasses.Field):
                 cls.__annotations__[name] = annotation_of_field(name, item, own[name])

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from conftest import CHAOTIC
 
-from compressor.cases.case import Case, CaseError
-from compressor.cases.table import MAX_REV
+from compressor.cases.case import MAX_REV, Case, CaseError
 from compressor.metrics import METRICS
 from compressor.solve import error_bars, solution
 from compressor.solve import run as run_module
