@@ -22,12 +22,15 @@ from compressor.cases.parameter import (
     PerJoint,
     PerMotion,
     PerValve,
+    Plausible,
     by_part,
     choice,
     flag,
+    from_to,
     integer,
     make_group,
     number,
+    times,
 )
 
 # conditions under which a case reads a key; others stand beside their only key
@@ -42,6 +45,23 @@ PAPER_STIFFNESS = 3.36e5  # N/mm^1.5
 METHODS = (*COMPILED, "LSODA", "Radau", "BDF", "DOP853", "RK45")
 
 
+# how far plants' machines are from what a case has: see `Plausible`
+NO_MASS = Plausible("the paper prints no masses", times(0.5, 2))
+PRESSURE = Plausible("gauges, lines and the day", times(0.95, 1.05), times(0.95, 1.05))
+CYLINDER_CLEARANCE = Plausible(
+    "data sheets round it, pockets and worn valves change it", times(0.8, 1.25), times(0.8, 1.25)
+)  # fmt: skip
+VALVE_LOSS = Plausible(
+    "no nameplate has it; valves lose up to a tenth", from_to(0, 8), from_to(0, 8)
+)  # fmt: skip
+CONTACT_GUESS = Plausible("no joint's contact is known better", times(0.5, 2), times(0.5, 2))
+SMOOTHING = Plausible("a smoothing of the law, which nobody measures", times(0.3, 3))
+HALF_BALANCED = from_to(0, 0.5)
+BEARING_LENGTH = Plausible(
+    "grooves and holes shorten what bears", times(0.5, 1.25), times(0.5, 1.25)
+)  # fmt: skip
+
+
 shift = partial(number, 0.0, "[-1000, 1000]", unit="mm")
 
 
@@ -49,7 +69,12 @@ shift = partial(number, 0.0, "[-1000, 1000]", unit="mm")
 class Offset:
     """How far a journal starts from its bore's centre, mm; a case's `initial_offset_mm`.
 
-    It shows whether a motion depends on where it starts.
+    It shows whether a motion depends on where it starts:
+
+    >>> import compressor
+    >>> values = {"joint": "big_end", "clearance_mm": 0.2, "initial_offset_mm": {"big_end_x": 0.1}}
+    >>> compressor.Case.from_values(values).initial_offset_mm.big_end_x
+    0.1
     """
 
     big_end_x: float = shift("start of the big end's journal along x", read=AT_JOINTS["big_end"])
@@ -79,26 +104,36 @@ class Machine:
     rod_length_mm: float = number(600.0, "(0, 1e6]", "rod length L", "Table 1")
     speed_rpm: float = number(500.0, "(0, 1e5]", "crank speed", "Table 1", judged=(50, 6000))
     rod_mass_kg: float = number(
-        4.7, "(0, 1e6]", "rod mass", "assumed: a 600 x 40 x 25 mm steel bar", judged=(0.1, 200)
-    )
+        4.7, "(0, 1e6]", "rod mass", "assumed: a 600 x 40 x 25 mm steel bar", judged=(0.1, 200),
+        plausible=NO_MASS,
+    )  # fmt: skip
     rod_centre_mm: float | None = number(
-        None, "[0, 1e6]", "rod's mass centre, from the big end", "assumed: half the rod"
-    )
+        None, "[0, 1e6]", "rod's mass centre, from the big end", "assumed: half the rod",
+        plausible=Plausible("a rod is heavier at its big end", times(0.6, 1), times(0.9, 1.1)),
+    )  # fmt: skip
     rod_inertia_kg_m2: float | None = number(
-        None, "(0, 1e9]", "rod's inertia about its mass centre", "assumed: m L^2 / 12"
-    )
+        None, "(0, 1e9]", "rod's inertia about its mass centre", "assumed: m L^2 / 12",
+        plausible=Plausible(
+            "drawn rods have 1.2 to 2 times that of a uniform bar", times(1, 2.5), times(0.8, 1.25)
+        ),
+    )  # fmt: skip
     reciprocating_mass_kg: float = number(
-        14.0, "(0, 1e6]", "crosshead, piston rod and piston", "assumed", judged=(0.1, 200)
-    )
+        14.0, "(0, 1e6]", "crosshead, piston rod and piston", "assumed", judged=(0.1, 200),
+        plausible=NO_MASS,
+    )  # fmt: skip
     pin_radius_mm: PerJoint[float] = by_part(
         PerJoint, 10.0,
         number(
             10.0, "(0, 1e4]", "journal radius R_j", "inferred from Eq. 15 and Table 3",
             judged=(10, 100), fact=True,
+            plausible=Plausible("the paper does not print it", times(0.7, 1.5)),
         ),
         {joint: f"{own} or friction.ideal_joints == true" for joint, own in AT_JOINTS.items()},
     )  # fmt: skip
-    gravity_m_per_s2: float = number(0.0, "[0, 1000]", "gravity, along -y", "assumed")
+    gravity_m_per_s2: float = number(
+        0.0, "[0, 1000]", "gravity, along -y", "assumed",
+        plausible=Plausible("it acts on a horizontal machine", from_to(0, 9.81)),
+    )  # fmt: skip
     counterweight_kg_mm: float | None = number(
         None, "[0, 1e9]",
         "counterweight on the crank, opposite to its pin: mass times its centre's distance from "
@@ -109,7 +144,7 @@ class Machine:
         PerMotion, None,
         number(
             None, "[0, 1]", "share that a counterweight balances; in place of counterweight_kg_mm",
-            "none",
+            "none", plausible=Plausible("no nameplate has it", HALF_BALANCED, HALF_BALANCED),
         ),
     )  # fmt: skip
 
@@ -169,21 +204,28 @@ class Gas:
     piston_radius_mm: float = number(50.0, "(0, 1e4]", "piston radius", "Table 1")
     head_clearance_mm: float | None = number(
         20.0, "(0, 1e5]", "clearance of the cylinder head s0", "Eq. 13",
-        read=(CYCLE, HEAD_CLEARANCE), fact=True,
+        read=(CYCLE, HEAD_CLEARANCE), fact=True, plausible=CYLINDER_CLEARANCE,
     )  # fmt: skip
     suction_MPa: float = number(
-        0.105, "(0, 1e3]", "suction pressure (absolute)", "Table 1", read=CYCLE, fact=True
-    )
+        0.105, "(0, 1e3]", "suction pressure (absolute)", "Table 1", read=CYCLE, fact=True,
+        plausible=PRESSURE,
+    )  # fmt: skip
     discharge_MPa: float = number(
-        0.393, "(0, 1e3]", "discharge pressure (absolute)", "Table 1", read=CYCLE, fact=True
-    )
-    exponent: float = number(1.4, "[1, 5]", "isentropic exponent", "Eq. 13", read=CYCLE, fact=True)
+        0.393, "(0, 1e3]", "discharge pressure (absolute)", "Table 1", read=CYCLE, fact=True,
+        plausible=PRESSURE,
+    )  # fmt: skip
+    exponent: float = number(
+        1.4, "[1, 5]", "isentropic exponent", "Eq. 13", read=CYCLE, fact=True,
+        plausible=Plausible("moist gas and cooled walls lower it", from_to(1.15, 1.4)),
+    )  # fmt: skip
     back_pressure_MPa: float | None = number(
         None, "[0, 1e3]",
         "pressure on what no gas cycle presses: the piston's other face, or the rod's "
         "cross-section in a double-acting cylinder; 0 in the paper's rig, and the atmosphere, "
-        f"{ATMOSPHERE_MPA:g}, in {OWN_CYLINDER.format(other='switching')}",
-        "assumed",
+        f"{ATMOSPHERE_MPA:g}, in {OWN_CYLINDER.format(other='switching')}", "assumed",
+        plausible=Plausible(
+            "a crankcase has the atmosphere's, or a little more", from_to(0.09, 0.15)
+        ),
     )  # fmt: skip
     switching: str | None = choice(
         None, ("paper", "exact"),
@@ -202,7 +244,7 @@ class Gas:
         PerEnd, None,
         number(
             None, "(0, 1000]", "clearance volume over swept volume; in place of head_clearance_mm",
-            optional=True, fact=True,
+            optional=True, fact=True, plausible=CYLINDER_CLEARANCE,
         ),
         {"head": (CYCLE, HEAD_CLEARANCE), "crank": (CYCLE, CRANK_END)}, fill=None,
     )  # fmt: skip
@@ -210,7 +252,7 @@ class Gas:
         PerValve, None,
         number(
             None, "[0, 90]", "loss of absolute pressure while open; 0 without", read=CYCLE,
-            fact=True,
+            fact=True, plausible=VALVE_LOSS,
         ),
     )  # fmt: skip
     unloaded: str | None = choice(
@@ -314,7 +356,11 @@ class Gas:
 class Spring:
     """The spring load, a spring between piston and cam follower (§2.2); a case's `spring`.
 
-    Read with `load: spring`, the default.
+    Read with `load: spring`, the default:
+
+    >>> import compressor
+    >>> compressor.Case.from_values({"spring": {"preload_N": 600}}).spring.preload_N
+    600.0
     """
 
     stiffness_N_per_mm: float = number(20.0, "[0, 1e6]", "spring stiffness k", "Table 1")
@@ -352,6 +398,7 @@ class Contact:
     stiffness_N_per_mm15: float | None = number(
         PAPER_STIFFNESS, "(0, 1e15]", "contact stiffness K, in N/mm^exponent", "Table 3",
         read=(CLEARANCE, "contact.law != johnson and contact.law != liu"), judged=JUDGED_STIFFNESS,
+        plausible=CONTACT_GUESS,
     )  # fmt: skip
     materials: PerJoint[tuple[str, str]] | None = by_part(
         PerJoint, None,
@@ -374,11 +421,12 @@ class Contact:
     damping_N_s_per_mm: float = number(
         336.0, "[0, 1e9]", "greatest contact damping C_max", "Table 3",
         read=(*by_law("contact", "damping_N_s_per_mm"), or_own("damping_N_s_per_mm")),
-        judged=(0, 33600),
+        judged=(0, 33600), plausible=CONTACT_GUESS,
     )  # fmt: skip
     full_damping_mm: float = number(
         0.1, "(0, 1e3]", "penetration of full damping d_max", "Table 3",
         read=(*by_law("contact", "full_damping_mm"), or_own("full_damping_mm")),
+        plausible=CONTACT_GUESS._replace(given=None),
     )  # fmt: skip
     restitution: float | None = number(
         None, "(0, 1]", "coefficient of restitution, in laws that damp by it",
@@ -388,11 +436,14 @@ class Contact:
         None, "(0, 1e6]",
         "approach speed below which the damping stays that of this speed; 10 by default",
         read=(*by_law("contact", "least_approach_mm_per_s"), "contact.restitution > 0"),
-        judged=(1.0, 100.0),
+        judged=(1.0, 100.0), plausible=SMOOTHING,
     )  # fmt: skip
     length_mm: PerJoint[float] | None = by_part(
         PerJoint, None,
-        number(None, "(0, 1e4]", "length (johnson, liu)", judged=(10.0, 100.0), fact=True),
+        number(
+            None, "(0, 1e4]", "length (johnson, liu)", judged=(10.0, 100.0), fact=True,
+            plausible=BEARING_LENGTH,
+        ),
         {joint: (own, *by_law("contact", "length_mm")) for joint, own in AT_JOINTS.items()},
     )  # fmt: skip
     modulus_GPa: float | None = number(
@@ -432,14 +483,20 @@ class Friction:
     static: float = number(
         0.23, "[0, 10]", "static coefficient", "Table 3", read=by_law("friction", "static"),
         judged=(0, 0.5),
+        plausible=Plausible("metals scatter, and oil lowers it", times(0.7, 1.5), times(0.7, 1.5)),
     )  # fmt: skip
-    dynamic: float = number(0.15, "[0, 10]", "dynamic coefficient", "Table 3", judged=(0, 0.5))
+    dynamic: float = number(
+        0.15, "[0, 10]", "dynamic coefficient", "Table 3", judged=(0, 0.5),
+        plausible=Plausible("metals scatter, and oil lowers it", times(0.5, 1.5), times(0.5, 1.5)),
+    )  # fmt: skip
     stiction_velocity_mm_per_s: float = number(
-        10.0, "(0, 1e6]", "stiction transition velocity", "Table 3", judged=(0.1, 100)
-    )
+        10.0, "(0, 1e6]", "stiction transition velocity", "Table 3", judged=(0.1, 100),
+        plausible=SMOOTHING,
+    )  # fmt: skip
     friction_velocity_mm_per_s: float = number(
         100.0, "(0, 1e6]", "friction transition velocity", "Table 3",
         read=by_law("friction", "friction_velocity_mm_per_s"),
+        plausible=SMOOTHING._replace(left_out=times(0.5, 2)),
     )  # fmt: skip
     law: str | None = choice(
         None, FRICTION_LAWS, "friction law (adams where none is named)", "Eq. 16"
@@ -447,10 +504,12 @@ class Friction:
     bristle_stiffness_per_mm: float | None = number(
         None, "(0, 1e9]", "LuGre's sigma_0 over the normal force; 100 by default",
         read=by_law("friction", "bristle_stiffness_per_mm"), judged=(10.0, 1e4),
+        plausible=SMOOTHING,
     )  # fmt: skip
     bristle_damping_s_per_mm: float | None = number(
         None, "[0, 1e6]", "LuGre's sigma_1 over the normal force; 0.03 by default",
         read=by_law("friction", "bristle_damping_s_per_mm"), judged=(1e-3, 0.1),
+        plausible=SMOOTHING,
     )  # fmt: skip
     viscous_s_per_mm: float | None = number(
         None, "[0, 1e6]", "LuGre's sigma_2 over the normal force; 0 by default",
@@ -541,7 +600,13 @@ class Solve:
 
 @make_group
 class Output:
-    """What is stored of a job; a case's `output`. Not part of the job's identity."""
+    """What is stored of a job; a case's `output`. Not part of the job's identity.
+
+    >>> import compressor
+    >>> kept = compressor.Case.from_values({"output": {"keep": "metrics"}})
+    >>> kept.key == compressor.Case.from_values({}).key
+    True
+    """
 
     keep: str = choice(
         "series", ("series", "metrics"), "stored results: time series too, or metrics only",

@@ -4,15 +4,18 @@ from dataclasses import replace
 from functools import partial
 from typing import ClassVar
 
-from compressor.cases.groups import AT_JOINTS
+from compressor.cases.groups import AT_JOINTS, BEARING_LENGTH, SMOOTHING
 from compressor.cases.parameter import (
     PerJoint,
+    Plausible,
     by_part,
     choice,
     flag,
+    from_to,
     integer,
     make_group,
     number,
+    times,
 )
 
 # conditions under which a case reads a key; others stand beside their only key
@@ -33,21 +36,36 @@ class Lubricant:
     """An oil film in the joints that have clearance; a case's `lubricant`, None: they run dry.
 
     The film bears by rotation and squeeze; in its last share of the clearance the dry contact takes
-    over. `True` stands for the defaults.
+    over. `True` stands for the defaults:
+
+    >>> import compressor
+    >>> case = compressor.Case.from_values(
+    ...     {"joint": "big_end", "clearance_mm": 0.05, "lubricant": True}
+    ... )
+    >>> case.lubricant.viscosity_mPa_s
+    30.0
     """
 
     viscosity_mPa_s: float = number(
         30.0, "(0, 1e6]", "dynamic viscosity", "ISO VG 100 at about 65 °C (ISO 3448)",
         judged=(3.0, 300.0), fact=True,
+        plausible=Plausible(
+            "it halves in 15 degrees, and a bearing's temperature is a guess",
+            times(0.5, 2), times(0.5, 2),
+        ),
     )  # fmt: skip
     bearing_length_mm: PerJoint[float] = by_part(
         PerJoint, 20.0,
-        number(20.0, "(0, 1e4]", "length of the bearing", "assumed: as long as wide", fact=True),
+        number(
+            20.0, "(0, 1e4]", "length of the bearing", "assumed: as long as wide", fact=True,
+            plausible=BEARING_LENGTH,
+        ),
         AT_JOINTS,
     )  # fmt: skip
     last_share: float = number(
         0.02, "[0.001, 0.5]", "share of the clearance below which the film gets no thinner",
         judged=(0.01, 0.1),
+        plausible=Plausible("nobody knows the roughness", times(0.5, 2), times(0.5, 2)),
     )  # fmt: skip
 
 
@@ -57,32 +75,42 @@ class Guide:
 
     With a clearance the crosshead moves across and tilts, and its four corners meet the guide by
     ADAMS's IMPACT, whatever the joints' `contact.law`. `True` stands for the defaults, an ideal
-    guide with friction.
+    guide with friction:
+
+    >>> import compressor
+    >>> case = compressor.Case.from_values({"guide": {"clearance_mm": 0.1}})
+    >>> round(case.guide.crosshead_inertia_kg_m2, 4)  # 14 kg (0.12^2 + 0.08^2) / 12
+    0.0243
     """
 
     clearance_mm: float = number(
         0.0, "[0, 100]", "clearance of the guide, on each side of the crosshead", judged=(0.01, 0.2)
     )
     friction: float = number(
-        0.05, "[0, 10]", "friction coefficient of the oiled guide", judged=(0.01, 0.2)
-    )
+        0.05, "[0, 10]", "friction coefficient of the oiled guide", judged=(0.01, 0.2),
+        plausible=Plausible("well oiled, or nearly dry", times(0.5, 3)),
+    )  # fmt: skip
     stiction_velocity_mm_per_s: float = number(
         10.0, "(0, 1e6]", "speed at which friction is three quarters of its greatest",
-        "Table 3, of the joints", read="guide.friction > 0",
+        "Table 3, of the joints", read="guide.friction > 0", plausible=SMOOTHING,
     )  # fmt: skip
     crosshead_length_mm: float = number(
-        120.0, "[0.001, 1e4]", "length of the crosshead", read=PLAY, judged=(60.0, 250.0)
-    )
+        120.0, "[0.001, 1e4]", "length of the crosshead", read=PLAY, judged=(60.0, 250.0),
+        plausible=Plausible("the default's is of no machine", times(0.7, 1.5)),
+    )  # fmt: skip
     crosshead_height_mm: float = number(
-        80.0, "[0.001, 1e4]", "height of the crosshead", read=PLAY, judged=(40.0, 150.0)
-    )
+        80.0, "[0.001, 1e4]", "height of the crosshead", read=PLAY, judged=(40.0, 150.0),
+        plausible=Plausible("the default's is of no machine", times(0.7, 1.5)),
+    )  # fmt: skip
     crosshead_inertia_kg_m2: float | None = number(
         None, "(0, 1e9]", "inertia of the crosshead about its pin",
         "assumed: of a uniform block, m (l^2 + h^2) / 12", read=PLAY,
+        plausible=Plausible("a crosshead is no block", times(0.5, 2)),
     )  # fmt: skip
     stiffness_N_per_mm15: float = number(
         3.36e5, "(0, 1e15]", "contact stiffness of a corner, in N/mm^exponent",
         "Table 3, of the joints", read=PLAY, judged=(3e4, 3e6),
+        plausible=Plausible("no contact of a guide is known better", times(0.3, 3)),
     )  # fmt: skip
     exponent: float | None = number(
         None, "[1, 3]", "force exponent of a corner", "as the joints'", read=PLAY
@@ -101,16 +129,23 @@ class Drive:
 
     The motor's torque is a line by the speed: `torque_N_m` at `machine.speed_rpm`, and more by
     `slope_N_m_s` for each rad/s that the crank is slower. `True` stands for the defaults; a
-    crank that runs free has neither torque nor slope.
+    crank that runs free has neither torque nor slope:
+
+    >>> import compressor
+    >>> free = {"slope_N_m_s": 0, "flywheel_kg_m2": 0.5}
+    >>> compressor.Case.from_values({"drive": free}).drive.torque_N_m
+    0.0
     """
 
     flywheel_kg_m2: float = number(
-        5.0, "(0, 1e9]", "inertia of crank, flywheel and motor", judged=(1.0, 100.0)
-    )
+        5.0, "(0, 1e9]", "inertia of crank, flywheel and motor", judged=(1.0, 100.0),
+        plausible=Plausible("the default's is of no machine", times(0.5, 2)),
+    )  # fmt: skip
     torque_N_m: float = number(0.0, "[-1e9, 1e9]", "torque at machine.speed_rpm")
     slope_N_m_s: float = number(
-        100.0, "[0, 1e9]", "torque added for each rad/s that the speed falls", judged=(10.0, 1e4)
-    )
+        100.0, "[0, 1e9]", "torque added for each rad/s that the speed falls", judged=(10.0, 1e4),
+        plausible=Plausible("motors differ by their size", times(0.3, 3)),
+    )  # fmt: skip
     unbalance_kg_mm: float = number(
         0.0, "[0, 1e9]",
         "unbalance of the crank towards its pin: mass times its centre's distance from the axis. "
@@ -123,7 +158,11 @@ class Rod:
     """An elastic rod; a case's `rod`, by default None: rigid.
 
     A bar of rectangular section: two bending modes, and two shapes of stretch. `True` stands for
-    the defaults.
+    the defaults:
+
+    >>> import compressor
+    >>> compressor.Case.from_values({"rod": True}).rod.depth_mm
+    40.0
     """
 
     youngs_modulus_GPa: float = number(
@@ -132,14 +171,16 @@ class Rod:
     depth_mm: float = number(
         40.0, "(0, 1e4]", "depth of the rod, in the plane of motion",
         "assumed: a 600 x 40 x 25 mm bar", judged=(20.0, 80.0),
+        plausible=Plausible("a rod is no bar", times(0.8, 1.25)),
     )  # fmt: skip
     width_mm: float = number(
         25.0, "(0, 1e4]", "width of the rod, across that plane", "assumed: a 600 x 40 x 25 mm bar",
-        judged=(10.0, 50.0),
+        judged=(10.0, 50.0), plausible=Plausible("a rod is no bar", times(0.8, 1.25)),
     )  # fmt: skip
     damping_ratio: float = number(
         0.005, "[0, 1]", "damping ratio of the first bending mode; others by stiffness",
         judged=(2e-3, 0.1),
+        plausible=Plausible("bolts and bushes damp more than steel", times(0.4, 4)),
     )  # fmt: skip
 
 
@@ -161,32 +202,48 @@ class Body:
 
     It is driven one way: the machine's forces move it, and it does not move the machine back. A
     body for which that would be wrong, since its motion would change the force by more than 30 %
-    at the speed's first two orders, is refused. `True` stands for the defaults.
+    at the speed's first two orders, is refused. `True` stands for the defaults:
+
+    >>> import compressor
+    >>> compressor.Case.from_values({"body": True}).body.mass_kg
+    500.0
     """
 
     freedoms: str = choice(
         "xy", ("x", "y", "xy", "xy_rocking"), "directions in which the rigid body may move"
     )
-    mass_kg: float = number(500.0, "(0, 1e7]", "mass of the body")
+    mass_kg: float = number(
+        500.0, "(0, 1e7]", "mass of the body",
+        plausible=Plausible("the default's is of no machine", times(0.5, 2)),
+    )  # fmt: skip
     inertia_kg_m2: float = number(
-        40.0, "(0, 1e9]", "inertia of the body about its mass centre", read=ROCKING
-    )
+        40.0, "(0, 1e9]", "inertia of the body about its mass centre", read=ROCKING,
+        plausible=Plausible("the default's is of no machine", times(0.5, 2)),
+    )  # fmt: skip
     centre_x_mm: float = number(
-        300.0, "[-1e5, 1e5]", "x of the body's mass centre, from the crank's", read=ROCKING
-    )
+        300.0, "[-1e5, 1e5]", "x of the body's mass centre, from the crank's", read=ROCKING,
+        plausible=Plausible("the default's is of no machine", times(0.5, 1.5)),
+    )  # fmt: skip
     centre_y_mm: float = number(
-        -200.0, "[-1e5, 1e5]", "y of the body's mass centre, from the crank's", read=ROCKING
-    )
+        -200.0, "[-1e5, 1e5]", "y of the body's mass centre, from the crank's", read=ROCKING,
+        plausible=Plausible("the default's is of no machine", times(0.5, 1.5)),
+    )  # fmt: skip
     frequency_x_Hz: float = number(
-        60.0, "(0, 1e5]", "natural frequency along x", BOLTED, read=("body", "body.freedoms != y")
-    )
+        60.0, "(0, 1e5]", "natural frequency along x", BOLTED, read=("body", "body.freedoms != y"),
+        plausible=Plausible("30 on a skid to 80 on rock", from_to(30, 80), times(0.7, 1.4)),
+    )  # fmt: skip
     frequency_y_Hz: float = number(
-        60.0, "(0, 1e5]", "natural frequency along y", BOLTED, read=("body", "body.freedoms != x")
-    )
+        60.0, "(0, 1e5]", "natural frequency along y", BOLTED, read=("body", "body.freedoms != x"),
+        plausible=Plausible("30 on a skid to 80 on rock", from_to(30, 80), times(0.7, 1.4)),
+    )  # fmt: skip
     frequency_rocking_Hz: float = number(
-        20.0, "(0, 1e5]", "natural frequency of rocking", read=ROCKING
-    )
-    damping_ratio: float = number(0.03, "(0, 0.99]", "damping ratio of the foundation")
+        20.0, "(0, 1e5]", "natural frequency of rocking", read=ROCKING,
+        plausible=Plausible("nobody computes it well", times(0.7, 1.4), times(0.7, 1.4)),
+    )  # fmt: skip
+    damping_ratio: float = number(
+        0.03, "(0, 0.99]", "damping ratio of the foundation",
+        plausible=Plausible("soil damps more than steel", times(0.3, 3)),
+    )  # fmt: skip
     casing: bool = flag(
         True, "casing modes, one at the guide and one at the main bearing, which sensors feel",
         read=CASING_SENSED,
@@ -194,13 +251,16 @@ class Body:
     casing_mass_kg: float | None = number(
         None, "(0, 1e6]", "modal mass of a casing mode; the sensor's level goes as its inverse",
         "program: a 25th of the body's mass", read=CASING,
+        plausible=Plausible("nobody weighs what a mode moves", times(0.2, 2), times(0.5, 2)),
     )  # fmt: skip
     casing_frequency_Hz: float = number(
-        2000.0, "(0, 1e5]", "natural frequency of a casing mode", read=CASING
-    )
+        2000.0, "(0, 1e5]", "natural frequency of a casing mode", read=CASING,
+        plausible=Plausible("a hammer finds it", times(0.5, 2)),
+    )  # fmt: skip
     casing_damping_ratio: float = number(
-        0.02, "(0, 0.99]", "damping ratio of a casing mode", read=CASING
-    )
+        0.02, "(0, 0.99]", "damping ratio of a casing mode", read=CASING,
+        plausible=Plausible("a hammer finds it", times(0.5, 2)),
+    )  # fmt: skip
     start: str = choice(
         "steady", ("steady", "rest"),
         "start of the body; steady: as if the settled revolutions had always repeated; rest: at "
@@ -229,7 +289,13 @@ class Body:
 class Sensor:
     """An accelerometer on the body, with a tacho; a case's `sensor`, None by default.
 
-    `True` stands for the defaults.
+    `True` stands for the defaults:
+
+    >>> import compressor
+    >>> sensor = {"place": "bearing", "noise_m_per_s2": 0.05}
+    >>> case = compressor.Case.from_values({"body": True, "sensor": sensor})
+    >>> case.sensor.rate_Hz, case.sensor.noise_m_per_s2
+    (25600.0, 0.05)
     """
 
     REPORTED: ClassVar[float] = 1e-3  # of a record's samples: clipping is reported from here on
@@ -244,14 +310,18 @@ class Sensor:
     low_pass_Hz: float | None = number(
         None, "(0, 1e6]", "anti-aliasing filter's corner", "usual: rate_Hz / 2.56"
     )
-    mounting_Hz: float = number(25000.0, "(0, 1e6]", "mounting resonance", "usual: on a stud")
+    mounting_Hz: float = number(
+        25000.0, "(0, 1e6]", "mounting resonance", "usual: on a stud",
+        plausible=Plausible("a magnet, or a hand, in place of a stud", times(0.2, 1)),
+    )  # fmt: skip
     mounting_damping_ratio: float = number(0.03, "(0, 0.99]", "damping ratio of the mounting")
     range_m_per_s2: float = number(
         490.0, "(0, 1e6]", "range of the sensor; the signal is clipped beyond it", "usual: 50 g"
     )
     noise_m_per_s2: float = number(
-        0.0015, "[0, 1e6]", "rms of white noise up to half the rate", "usual: piezoelectric"
-    )
+        0.0015, "[0, 1e6]", "rms of white noise up to half the rate", "usual: piezoelectric",
+        plausible=Plausible("cables, and a plant's own noise", times(1, 30)),
+    )  # fmt: skip
     speed_jitter: float = number(
         0.0, "[0, 0.1]",
         "rms of the speed's relative deviation; drawn once a revolution and smooth between: 0.93 "

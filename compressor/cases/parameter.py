@@ -8,10 +8,11 @@ from the measured trade of tests/results/accuracy.json (make accuracy), for `met
 """
 
 import dataclasses
+import inspect
 import math
 import re
 import reprlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from functools import lru_cache, partial
@@ -23,6 +24,7 @@ from typing import (
     Any,
     Generic,
     Literal,
+    NamedTuple,
     TypeVar,
     dataclass_transform,
     get_args,
@@ -39,7 +41,6 @@ from pydantic import (
 )
 
 from compressor.cases.card import CardError, mark_card
-from compressor.cases.plausible import PLAUSIBLE, Plausible
 from compressor.metrics import METRICS
 from compressor.program import CompsimError, did_you_mean
 
@@ -199,6 +200,42 @@ def to_si(value: float, unit: str) -> float:
     return value * numerator / denominator
 
 
+class Span(NamedTuple):
+    """Two numbers that a value may well be: factors of it, or values in the case file's unit."""
+
+    low: float
+    high: float
+    are_factors: bool = True
+
+    def ends(self, value: float) -> list[float]:
+        """Return the two values around one, those that are not the value itself."""
+        each = [self.low * value, self.high * value] if self.are_factors else [self.low, self.high]
+        return [end for end in each if abs(end - value) > 1e-9 * abs(value)]
+
+    def __str__(self) -> str:
+        return f"{self.low:g} to {self.high:g}" + " times" * self.are_factors
+
+
+times = Span  # a span of factors
+from_to = partial(Span, are_factors=False)  # a span of values in the case file's unit
+
+
+class Plausible(NamedTuple):
+    """How far a number of a plant's machine may be from what a case has, and why.
+
+    `left_out`: where the file does not give it. `given`: where it does, of what a plant can only
+    guess; None of what is known where it is given. `compsim explain --models` varies both.
+    """
+
+    why: str
+    left_out: Span
+    given: Span | None = None
+
+    def __str__(self) -> str:
+        also = f"; given, {self.given}" if self.given else ""
+        return f"{self.left_out}{', given or not' if self.given == self.left_out else also}"
+
+
 # kind -> what it may be beside the words of its row: for a table, and in an error
 OTHERWISE = {
     "accuracy": (
@@ -228,6 +265,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     optional: bool = False
     identity: bool = True  # whether it is part of a job's identity
+    aliases: tuple[tuple[str, str], ...] = ()  # other words, each with the choice it stands for
     judged: tuple[float, float] | None = None  # range that extreme scenes are drawn from
     read: tuple[str, ...] = ()  # conditions that all hold where a case reads it
     # whether it is of the machine: a file may give it though no job reads it, so that one file
@@ -295,6 +333,10 @@ class Parameter:
         default = self.default and 2 * self.default
         return dataclasses.replace(self, default=default, low=2 * self.low, high=2 * self.high)
 
+    def choice_of(self, value: Any) -> Any:
+        """Return the choice that an alias stands for, and any other value as it is."""
+        return next((choice for alias, choice in self.aliases if alias == value), value)
+
     def check(self, value: Any) -> str | None:
         """Return what is wrong with a scalar value of this parameter, or None."""
         try:
@@ -339,7 +381,7 @@ class Parameter:
         """Return the error of a value of another kind; words: of these one may be misspelt."""
         message = f"needs {self.needed}, not {quote_value(value)}"
         word = words[0][:MAX_WORD] if words and isinstance(words[0], str) else ""
-        lower = {choice.lower(): choice for choice in self.words}
+        lower = dict(self.aliases) | {choice.lower(): choice for choice in self.words}
         near = get_close_matches(word.lower(), lower, n=1)
         number = AS_NUMBER.fullmatch(word) if self.is_number else None
         if near and lower[near[0]] in self.needed:
@@ -427,7 +469,9 @@ def annotation_of(row: Parameter) -> Any:
     found: Any = kinds.get(row.kind)
     if words is not None and row.kind != "materials":
         found = words if found is None else words | found
-    return found | None if row.optional else found
+    if row.optional:
+        found = found | None
+    return Annotated[found, BeforeValidator(row.choice_of)] if row.aliases else found
 
 
 BY_METRIC: Any = None
@@ -545,6 +589,13 @@ else:
                 raise CaseError(problems_of(error, values, rows)) from None
 
         made.__init__ = __init__
+        made.__signature__ = inspect.Signature(
+            inspect.Parameter(
+                item.name, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=item.default,
+                annotation=own[item.name],
+            )
+            for item in fields(made)
+        )  # fmt: skip
         made.__annotations__ = own
         made.__doc__ = describe_fields(made)
         return made
@@ -600,7 +651,6 @@ def rows_of(
     optional = NoneType in get_args(annotation or item.type)
     units = [unit for name in key.split(".") if (unit := split_unit(name)[1])]
     shared = {"optional": optional and bool(whole), "unit": units[-1] if units else ""}
-    shared["plausible"] = PLAUSIBLE.get(key)
     for part, row in item.metadata.get("parts", whole).items():
         default = getattr(item.default, part, None) if part else item.default
         name = f"{key}.{part}" if part else key
@@ -670,11 +720,30 @@ def describe_fields(group: type) -> str:
         readers = dict.fromkeys(one.readers for one in rows if one.read)
         notes = f" Judged on {row.judged_on}." if row.judged else ""
         notes += f" Read with {'; or '.join(readers)}." if readers else ""
+        notes += f" Plausible: {row.plausible} ({row.plausible.why})." if row.plausible else ""
         lines.append(
             f"- `{item.name}`: {phrase}. Needs {needed}; default {default} ({row.source}).{notes}"
         )
     text = cleandoc(group.__doc__ or "")
     return f"{text}\n\nFields, with the sources of their defaults:\n\n" + "\n".join(lines)
+
+
+def parameter_table(rows: Iterable[Parameter]) -> str:
+    """Return the table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
+    heads = (
+        "key", "unit", "default", "range", "judged on", "source", "what it is", "read with",
+        "plausible",
+    )  # fmt: skip
+    lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
+    for row in rows:
+        default = "" if row.default is None or row.kind == "text" else str(row.default)
+        default = default.lower() if row.kind == "boolean" else default.removesuffix(".0")
+        cells = (
+            f"`{row.key}`", row.unit, default, row.range, row.judged_on, row.source, row.phrase,
+            row.readers, f"{row.plausible}: {row.plausible.why}" if row.plausible else "",
+        )  # fmt: skip
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines) + "\n"
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from compressor.sweep.pool import Batches, Job
 from compressor.sweep.sweep import run_job
 from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Needs, load
-from compressor.sweep.worker import End, JobLost, JobResult, attempt, then
+from compressor.sweep.worker import End, JobLost, JobResult, attempt
 
 WITH_PORT = re.compile(r":\d+/?$|^inproc://")
 CONNECT_SECONDS = 8.0  # s until a scheduler that does not answer counts as not there
@@ -62,7 +62,8 @@ def run_cases(ours: dict[str, str], needs: Needs, cases: bytes) -> str | tuple[l
     ends = [attempt(run_job, case) for case in pickle.loads(cases)]
     ran = [end.result for end in ends if isinstance(end, JobResult)]
     data = encode_batch(ran) if ran else b""
-    return [then(end, JobEnd.of) for end in ends], data
+    ended = iter([JobEnd.of(outcome) for outcome in ran])
+    return [replace(e, result=next(ended)) if isinstance(e, JobResult) else e for e in ends], data
 
 
 load_once = functools.cache(load)  # in each process of the cluster, so that no job's time has it

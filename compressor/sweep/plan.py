@@ -6,7 +6,7 @@ taken to cost as much for every revolution, which is no more than a guess where 
 
 import random
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -113,32 +113,20 @@ def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
 
     Nothing is stored. Raises StoreError where the folder cannot be read.
     """
-    store, wanted = read_store(folder), RequestedJobs(studies)
-    done = {*wanted.among(store.keys()).stored_ends(store)}
+    stored, wanted = read_store(folder), RequestedJobs(studies)
+    done = wanted.among(stored.keys()).stored_ends(stored).keys()
     missing: dict[str, list[str]] = {}
     ahead: list[Next] = []
     parts: list[StudyShare] = []
-    counted: set[str] = set()
     for study in studies:
-        mine = dict.fromkeys(k for n in study.selected if (k := study.keys[n]) not in counted)
-        counted.update(mine)
+        mine = [key for key, (owner, _) in wanted.places.items() if owner is study]
         new = missing[study.name] = [key for key in mine if key not in done]
         parts.append(StudyShare(study.name, len(mine), len(mine) - len(new), len(new)))
-        ahead += next_of(study, {*new}, first - len(ahead))
-    counts = Forecast(len(counted), len(done), len(counted) - len(done), tuple(parts), tuple(ahead))
-    return Ahead(counts, missing, wanted)
-
-
-def next_of(study: Study, keys: set[str], most: int) -> Iterator[Next]:
-    """Yield the first of a study's jobs with some keys."""
-    left = keys if most > 0 else set()
-    for number, point in enumerate(points(study)):
-        if not left or most == 0:
-            return
-        if (key := study.keys[number]) in left:
-            left.discard(key)
-            most -= 1
-            yield Next(study.name, point, key)
+        if named := {*new[: first - len(ahead)]}:
+            found = zip(study.keys, points(study), strict=True)
+            ahead += [Next(study.name, point, key) for key, point in found if key in named]
+    counts = len(wanted), len(done), len(wanted) - len(done)
+    return Ahead(Forecast(*counts, tuple(parts), tuple(ahead)), missing, wanted)
 
 
 def revolutions(case: Case) -> float:

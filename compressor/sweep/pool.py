@@ -27,12 +27,12 @@ from joblib import Parallel, cpu_count, delayed
 from compressor.program import THREAD_VARIABLES, CompsimError
 from compressor.reasons import Reason
 from compressor.store import StoreError
-from compressor.sweep.worker import ENDING, End, JobLost, Store, Workers, describe_error
+from compressor.sweep.worker import ENDING, End, JobLost, JobResult, Store, Workers
 
 Input = tuple[Hashable, Any, float]  # id, payload, wall time that the job may take (s)
 
 TICK = 0.1  # s between two looks at a worker that is silent
-MAX_BATCH = 200  # jobs, whose places fit in a byte
+MAX_BATCH = 200  # jobs
 MAX_JOBS_IN_MEAN = 50  # jobs that a mean of their seconds rests on
 MAX_SILENCE = 600.0  # s in which a worker begins (compiling, maybe), or stores a batch
 MAX_FRUITLESS = 10  # workers in a row that may die before any job begins
@@ -41,7 +41,7 @@ MEMORY_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limi
 START = (  # a worker's program, which has our path and not our main module
     "import sys; from multiprocessing.connection import Connection; "
     "pipe = Connection(int(sys.argv[1])); sys.path[:] = pipe.recv(); "
-    "from compressor.sweep.worker import serve; serve(pipe, int(sys.argv[2]))"
+    "from compressor.sweep.worker import serve; serve(pipe)"
 )
 
 
@@ -150,60 +150,59 @@ class Pool:
         self.fruitless = 0  # workers in a row that have died before any job began
         self.lock, self.stopped = threading.Lock(), False
         self.workers: set[Worker] = set()
-        self.own = threading.local()  # .worker: this thread's
+        self.idle: list[Worker] = []  # of these
 
     def next_batch(self) -> list[Job]:
         """Return the next batch, [] where none is left or no more are to be run."""
         return [] if self.stopped else self.batches.next()
 
     def do(self, batch: list[Job]) -> list[End]:
-        """Return how jobs of a batch ended in this thread's worker; others wait to run again.
+        """Return how jobs of a batch ended in a worker; others wait to run again.
 
         Raises StoreError, and WorkersFailed.
         """
-        if batch[0].again:
-            self.retire()
-        with self.lock:
-            if self.stopped:
-                return []
-            if not getattr(self.own, "worker", None):
-                try:
-                    self.own.worker = Worker(self.setup)
-                except OSError as error:
-                    raise WorkersFailed(f"no worker process can be started: {error}") from error
-                self.workers.add(self.own.worker)
-        answer = self.own.worker.ask(batch, self.rules.grace)
+        worker = self.take_worker(batch[0].again)
+        if not worker:
+            return []
+        answer = worker.ask(batch, self.rules.grace)
         if isinstance(answer, Death):
-            self.retire()
+            self.workers.discard(worker)
             return [] if self.stopped else self.lose(batch, answer)
         if isinstance(answer, StoreError):
             raise answer
         if isinstance(answer, str):
             raise WorkersFailed(f"jobs could not even begin: {answer}")
+        self.idle.append(worker)
         self.fruitless = 0
         if rest := batch[len(answer) :]:
             self.batches.waiting.appendleft(rest)
         return [self.settle(job, end) for job, end in zip(batch, answer, strict=False)]
 
-    def retire(self) -> None:
-        """End this thread's worker, if it has one."""
-        if worker := getattr(self.own, "worker", None):
-            worker.end()
-            self.workers.discard(worker)
-            self.own.worker = None
+    def take_worker(self, anew: bool) -> "Worker | None":
+        """Return a worker that is idle, or a new one; None where no more are to be run."""
+        with self.lock:
+            if self.stopped:
+                return None
+            if self.idle and not anew:
+                return self.idle.pop()
+            if self.idle:
+                self.idle[-1].end()
+                self.workers.discard(self.idle.pop())
+            try:
+                worker = Worker(self.setup)
+            except OSError as error:
+                raise WorkersFailed(f"no worker process can be started: {error}") from error
+            self.workers.add(worker)
+            return worker
 
     def settle(self, job: Job, end: End) -> End:
-        """Return the end of a job with its id and its own result."""
-        if isinstance(end, JobLost):
-            if end.reason == Reason.OUT_OF_MEMORY:
-                most = f"{self.rules.memory / 1e9:.3g} GB that a worker may add"
-                end = replace(end, detail=f"needs more than the {most}")
-            return replace(end, id=job.id)
-        self.batches.learn(end.seconds)
-        try:
-            return replace(end, id=job.id, result=pickle.loads(end.result))
-        except Exception as error:
-            return JobLost(job.id, Reason.INTERNAL_ERROR, *describe_error(error))
+        """Return the end of a job with its id."""
+        if isinstance(end, JobResult):
+            self.batches.learn(end.seconds)
+        elif end.reason == Reason.OUT_OF_MEMORY:
+            most = f"{self.rules.memory / 1e9:.3g} GB that a worker may add"
+            end = replace(end, detail=f"needs more than the {most}")
+        return replace(end, id=job.id)
 
     def lose(self, batch: list[Job], died: "Death") -> list[End]:
         """Return the job that is lost with its worker, if any; the others wait to run again.
@@ -250,54 +249,40 @@ class Death(NamedTuple):
 
 
 class Worker:
-    """A worker process, from the outside; used by one thread alone, but for `end`."""
+    """A worker process, from the outside; used by one thread at a time, but for `end`."""
 
     def __init__(self, setup: bytes):
         self.pipe, theirs = Pipe()
-        self.begun, begins = Pipe(duplex=False)  # for the places of jobs that begin: bytes
-        os.set_blocking(self.begun.fileno(), False)
-        numbers = theirs.fileno(), begins.fileno()
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in it, too, until it settles
         try:
             self.process = subprocess.Popen(
-                [sys.executable, "-c", START, *map(str, numbers)], pass_fds=numbers,
+                [sys.executable, "-c", START, str(theirs.fileno())], pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL, env=os.environ | dict.fromkeys(THREAD_VARIABLES, "1"),
             )  # fmt: skip
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
             theirs.close()
-            begins.close()
         with contextlib.suppress(OSError):  # it has died, as `ask` will find
             self.pipe.send(sys.path)
             self.pipe.send_bytes(setup)
 
     def ask(self, batch: list[Job], grace: float) -> Any:
         """Return a worker's answer to a batch, or its Death."""
-        self.read_begun()  # of the batch before
         place, left = None, MAX_SILENCE
         with contextlib.suppress(EOFError, OSError):
             self.pipe.send([job.payload for job in batch])
-            while not self.pipe.poll(TICK):
-                if news := self.read_begun():
-                    place = news[-1]
+            while left > 0:
+                if not self.pipe.poll(TICK):
+                    # ticks are counted, since time goes on while all are stopped, as by Ctrl-Z
+                    left -= TICK
+                elif isinstance(answer := self.pipe.recv(), int):
+                    place = answer
                     left = batch[place].timeout + grace if place < len(batch) else MAX_SILENCE
-                # ticks are counted, since time goes on while all are stopped, as by Ctrl-Z
-                left -= TICK
-                if left < 0 or (self.process.poll() is not None and not self.pipe.poll()):
-                    break
-            else:
-                return self.pipe.recv()
+                else:
+                    return answer
         self.end()
-        news = self.read_begun()
-        late = left < 0 and not news and place != len(batch)
-        return Death(news[-1] if news else place, describe_ending(self.process.returncode), late)
-
-    def read_begun(self) -> bytes:
-        """Return the places of jobs that have begun since the last look."""
-        try:
-            return os.read(self.begun.fileno(), 1 << 16)
-        except BlockingIOError:
-            return b""
+        late = left <= 0 and place is not None and place < len(batch)
+        return Death(place, describe_ending(self.process.returncode), late)
 
     def end(self) -> None:
         """Kill the process."""

@@ -10,7 +10,7 @@ import hashlib
 import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from compressor.cases import Case
 from compressor.program import COMPILED, library_versions, machine_code_folder
@@ -22,36 +22,32 @@ COMPILING = (
 )
 SECONDS = {"auto": 26, "laws": 28, "features": 50}  # of compiling, on an idle cloud core of 2026
 LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
+# what a case has that needs a part: the default forces alone; others; a mechanism with any feature
+KINDS: dict[str, dict[str, Any]] = {
+    "plain": {}, "laws": {"contact": {"law": "hertz"}}, "features": {"guide": True}
+}  # fmt: skip
 
 
 class Needs(NamedTuple):
-    """The parts of the equations that some cases need.
-
-    methods: of integration; plain: the default forces alone; laws: others beside them; features: a
-    mechanism with any.
-    """
+    """The parts of the equations that some cases need: methods of integration, and `KINDS`."""
 
     methods: tuple[str, ...] = ()
-    plain: bool = False
-    laws: bool = False
-    features: bool = False
+    kinds: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, cases: Iterable[Case]) -> "Needs":
-        methods, plain, laws, features = {"auto"}, False, False, False
+        methods, kinds = {"auto"}, set()
         for case in cases:  # which may be made one by one
             methods.add(case.solve.method)
-            features = features or case.needs_mechanism
-            laws = laws or (case.chooses_forces and not case.needs_mechanism)
-            plain = plain or not (case.chooses_forces or case.needs_mechanism)
-        return cls(tuple(sorted(methods)), plain, laws, features)
+            others = "laws" if case.chooses_forces else "plain"
+            kinds.add("features" if case.needs_mechanism else others)
+        return cls(tuple(sorted(methods)), tuple(sorted(kinds)))
 
     @property
     def uncompiled(self) -> "dict[str, Needs]":
         """Return the needed parts that this machine has not compiled before, as needs of theirs."""
-        found = {m: Needs((m,), plain=True) for m in self.methods if self.plain}
-        found |= {"laws": Needs(self.methods, laws=True)} if self.laws else {}
-        found |= {"features": Needs(self.methods, features=True)} if self.features else {}
+        found = {m: Needs((m,), ("plain",)) for m in self.methods if "plain" in self.kinds}
+        found |= {kind: Needs(self.methods, (kind,)) for kind in self.kinds if kind != "plain"}
         return {part: alone for part, alone in found.items() if not marker(part).exists()}
 
 
@@ -61,15 +57,10 @@ def load(needs: Needs) -> None:
 
     solve = {"duration_rev": 0.01, "settle_rev": 0, "output_step_deg": 0.36}
     measure(Case.from_values({"solve": solve}))
-    values: dict[str, object] = {"joint": "both", "clearance_mm": 0.1}
-    kinds: list[dict[str, object]] = [{}] if needs.plain else []
-    if needs.laws:
-        kinds.append({"contact": {"law": "hertz"}})
-    if needs.features:
-        kinds.append({"guide": True})
-    for kind in kinds:
+    for kind in needs.kinds:
         for method in needs.methods:
-            measure(Case.from_values({**values, **kind, "solve": {**solve, "method": method}}))
+            values = {"joint": "both", "clearance_mm": 0.1, "solve": {**solve, "method": method}}
+            measure(Case.from_values(values | KINDS[kind]))
 
 
 def compile_seconds(needs: Needs) -> int:

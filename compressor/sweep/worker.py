@@ -4,12 +4,11 @@ import contextlib
 import ctypes
 import gc
 import os
-import pickle
 import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from typing import Any
@@ -69,12 +68,12 @@ class Workers:
     target_seconds: float = 0.5
 
 
-def serve(pipe: Connection, begun: int) -> None:
+def serve(pipe: Connection) -> None:
     """Run the batches that come through a pipe, until it is closed.
 
-    The place of each job goes to the file `begun` before it runs, and the number of all when they
-    have run: a byte each. An answer is a list of ends, without the rest that is given back;
-    StoreError; or a text of what keeps this process from any job.
+    The place of each job goes home before it runs, and the number of all when they have run. An
+    answer is a list of ends, without the rest that is given back; StoreError; or a text of what
+    keeps this process from any job.
     """
     settle()
     try:
@@ -91,12 +90,17 @@ def serve(pipe: Connection, begun: int) -> None:
         return
     with contextlib.suppress(EOFError):
         while True:
-            payloads = pipe.recv()
+            payloads, ends, began = pipe.recv(), [], time.monotonic()
+            for place, payload in enumerate(payloads):
+                pipe.send(place)
+                ends.append(attempt(work, payload))
+                if time.monotonic() - began > MAX_OVERRUN * rules.target_seconds:
+                    break
+            pipe.send(len(payloads))
             try:
-                answer: Any = do_batch(work, store, rules.target_seconds, payloads, begun)
+                pipe.send(store_results(store, ends) if store else ends)
             except StoreError as error:
-                answer = error
-            pipe.send(answer)
+                pipe.send(error)
 
 
 def settle() -> None:
@@ -131,26 +135,6 @@ def limit(memory: int) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (wanted, most))
 
 
-def do_batch(
-    work: Callable[[Any], Any],
-    store: Store | None,
-    seconds: float,
-    payloads: Sequence[Any],
-    begun: int,
-) -> list[End]:
-    """Run jobs and store their results; return how they ended, results pickled."""
-    ends: list[End] = []
-    began = time.monotonic()
-    for place, payload in enumerate(payloads):
-        os.write(begun, bytes([place]))
-        ends.append(attempt(work, payload))
-        if time.monotonic() - began > MAX_OVERRUN * seconds:
-            break
-    os.write(begun, bytes([len(payloads)]))
-    ends = store_results(store, ends) if store else ends
-    return [then(end, pickle.dumps) for end in ends]
-
-
 def attempt(work: Callable[[Any], Any], payload: Any) -> End:
     """Return what some work gives, or why it gives nothing. Raises StoreError."""
     start = time.monotonic()
@@ -164,27 +148,21 @@ def attempt(work: Callable[[Any], Any], payload: Any) -> End:
         return JobLost(None, Reason.INTERNAL_ERROR, *describe_error(error))
 
 
-def then(end: End, work: Callable[[Any], Any]) -> End:
-    """Return the end of a job after more work on its result."""
-    if isinstance(end, JobLost):
-        return end
-    more = attempt(work, end.result)
-    return replace(more, seconds=end.seconds) if isinstance(more, JobResult) else more
-
-
 def store_results(store: Store, ends: list[End]) -> list[End]:
-    """Store the results of a batch in one go, one by one where that fails; return what is sent.
+    """Store the results of a batch in one go, one by one where that fails; return how jobs ended.
 
-    Raises StoreError.
+    What `store` gives takes the place of each result. Raises StoreError.
     """
     results = [end.result for end in ends if isinstance(end, JobResult)]
     if not results:
         return ends
     stored = attempt(store, results)
-    if isinstance(stored, JobLost):
-        return [then(end, lambda result: store([result])[0]) for end in ends]
-    sent = iter(stored.result)
-    return [then(end, lambda _: next(sent)) for end in ends]
+    if isinstance(stored, JobResult):
+        sent = iter(stored.result)
+        return [replace(e, result=next(sent)) if isinstance(e, JobResult) else e for e in ends]
+    if len(ends) == 1:
+        return [stored]
+    return [end for one in ends for end in store_results(store, [one])]
 
 
 def describe_error(error: BaseException) -> tuple[str, str]:

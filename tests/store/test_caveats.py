@@ -12,7 +12,6 @@ from compressor.solve.simulate import simulate
 from compressor.store.caveats import is_late, is_unrepeated, job_caveats
 from compressor.store.reader import open_study
 from compressor.store.status import report_job, standings
-from compressor.studies.diagnosis.dataset import make_data_set, write_card
 
 SOLVE = {"duration_rev": 3, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 STUDY = {
@@ -65,16 +64,6 @@ def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder
     assert OUTSIDE in out
     assert "warning: machine.rod_mass_kg: 262 kg is outside" in err  # before it runs
     assert standings(folder)[0].caveats[-1] == OUTSIDE
-
-
-def test_the_data_card_says_it(folder):
-    found = make_data_set(folder)
-    worst = 100 * open_study(folder)["clipped_fraction"].max().item()
-    told = (
-        f"2 records are clipped at sensor.range_m_per_s2, at worst {worst:.3g} % of their samples"
-    )
-    assert told in write_card(found)
-    assert "clipped at" not in write_card(found.assign_attrs(clipped_records=0))
 
 
 def test_what_is_seen_to_repeat_in_time_is_no_caveat():

@@ -232,16 +232,3 @@ def test_damaged_series_are_left_out_and_told(results, tmp_path, capsys):
     assert f"{path}: is damaged" in capsys.readouterr().err
     assert {path.stem for path in out.rglob("*/*.nc")} == whole.keys() - {hurt}
     assert cli.main(["export", hurt, "-r", str(copy), "-o", str(out)]) == 5
-
-
-def test_a_disk_that_fills_up_leaves_no_part(results, tmp_path, monkeypatch):
-    (tmp_path / "all.csv").write_text("old")
-
-    def full(descriptor):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(StoreError, match="No space left"):
-        export(results, [], tmp_path / "all.csv", ExportOptions(force=True))
-    assert [path.name for path in tmp_path.iterdir()] == ["all.csv"]
-    assert (tmp_path / "all.csv").read_text() == "old"

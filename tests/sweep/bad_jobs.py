@@ -23,11 +23,6 @@ class Unprintable(Exception):
         raise ValueError("no text")
 
 
-class Unreadable:
-    def __reduce__(self):
-        return math.sqrt, (-1,)
-
-
 def fail():
     raise Unprintable
 
@@ -62,8 +57,6 @@ POISON = {
     "raise": (fail, "internal_error", "Unprintable"),
     "exit": (lambda: sys.exit("over"), "internal_error", "SystemExit: over"),
     "deep": (lambda: unwind(0), "internal_error", "RecursionError"),
-    "odd": (lambda: lambda: None, "internal_error", "pickle"),
-    "unreadable": (Unreadable, "internal_error", "math domain error"),
 }
 
 

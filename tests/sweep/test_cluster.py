@@ -143,32 +143,6 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
         sweep(studies[1:], tmp_path / "out", options=Options(backend=backend))
 
 
-def test_few_batches_are_on_their_way(dask, studies, tmp_path, monkeypatch):
-    sent, submit = [], distributed.Client.submit
-
-    def noted(client, *arguments, **more):
-        sent.append(1)
-        return submit(client, *arguments, **more)
-
-    monkeypatch.setattr(distributed.Client, "submit", noted)
-    with Cluster(dask.scheduler_address) as backend:
-        ends = backend(tmp_path, PendingOf(studies[0]), str)
-        next(ends)
-        assert len(sent) <= 2 * cluster.BATCHES_AHEAD + 1
-        ends.close()
-    wait_until(lambda: not dask.scheduler.tasks)
-
-
-class PendingOf(list):
-    """All jobs of a study, as a sweep hands them to a backend."""
-
-    def __init__(self, study):
-        super().__init__((case.key, case, 9.0) for case in study.cases)
-
-    def cases(self):
-        return [case for _, case, _ in self]
-
-
 def wait_until(condition):
     until = time.monotonic() + 100
     while not condition() and time.monotonic() < until:

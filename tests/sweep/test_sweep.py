@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import subprocess
 import sys
 
 import bad_jobs
@@ -218,11 +217,11 @@ def test_one_line_tells_of_compiling_and_for_how_long(studies, tmp_path, uncompi
 
 def test_each_part_is_compiled_by_itself(uncompiled, monkeypatch):
     """What was finished before a stop is not compiled again."""
-    needs, told = warm_up.Needs(("auto", "Radau"), plain=True, laws=True), []
+    needs, told = warm_up.Needs(("auto", "Radau"), ("plain", "laws")), []
 
     def load(alone):
         uncompiled.append(alone)
-        if alone.laws and len(uncompiled) == 3:
+        if "laws" in alone.kinds and len(uncompiled) == 3:
             raise KeyboardInterrupt
 
     monkeypatch.setattr(warm_up, "load", load)
@@ -230,17 +229,17 @@ def test_each_part_is_compiled_by_itself(uncompiled, monkeypatch):
         warm_up.compile_once(needs, told.append)
     assert [*needs.uncompiled] == ["laws"]
     warm_up.compile_once(needs, told.append)
-    assert [alone.laws for alone in uncompiled] == [False, False, True, True]
+    assert ["laws" in alone.kinds for alone in uncompiled] == [False, False, True, True]
     assert [re.search(r"\d+ s", text)[0] for text in told] == ["55 s", "28 s"]
     assert not needs.uncompiled
 
 
 def test_a_switch_against_compiling_is_told(uncompiled, monkeypatch):
     told = []
-    warm_up.compile_once(warm_up.Needs(("auto",), plain=True), str)
+    warm_up.compile_once(warm_up.Needs(("auto",), ("plain",)), str)
     for value in ("0", "1"):
         monkeypatch.setenv("NUMBA_DISABLE_JIT", value)
-        warm_up.compile_once(warm_up.Needs(("auto",), plain=True), told.append)
+        warm_up.compile_once(warm_up.Needs(("auto",), ("plain",)), told.append)
     (text,) = told
     assert text.startswith("NUMBA_DISABLE_JIT is set: nothing is compiled")
 
@@ -255,66 +254,11 @@ def test_only_what_cases_need_is_compiled(uncompiled):
         assert {*warm_up.Needs.of([Case.from_values(values)]).uncompiled} == parts
 
 
-STOPPED = """
-import os, signal, sys
-import numba.core.event as event
-from compressor.physics._jit import jit, load_numba
-
-@jit
-def inner(x): return x + 1.0
-
-@jit
-def middle(x): return 2.0 * inner(x)
-
-@jit
-def outer(x): return middle(x) - 3.0
-
-class Ends(event.Listener):
-    compiled = []
-    def on_start(self, what): pass
-    def on_end(self, what):
-        self.compiled.append(what.data["dispatcher"].py_func.__name__)
-        if self.compiled[-1] == sys.argv[1]: os.kill(os.getpid(), signal.SIGINT)
-
-load_numba()
-event.register("numba:compile", Ends())
-try: outer(1.0)
-except KeyboardInterrupt: print("stopped", end=" ")
-print(*Ends.compiled)
-"""
-
-
-def test_a_stop_amid_compiling_loses_no_finished_function(tmp_path):
-    """As the remark on compiling says: numba stores each function as soon as it is compiled."""
-    (tmp_path / "equations.py").write_text(STOPPED)
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
-
-    def compiled(stop_after):
-        run = [sys.executable, tmp_path / "equations.py", stop_after]
-        return subprocess.check_output(run, env=environment, text=True).split()
-
-    assert compiled("middle")[:3] == ["stopped", "inner", "middle"]
-    assert compiled("none") in (["outer"], ["middle", "outer"])  # the last may not be stored yet
-    assert compiled("none") == []
-
-
-def test_laws_are_an_axis_of_a_sweep(studies, tmp_path, in_process):
-    """What one law alone reads stands beside it for all; equal jobs are run once."""
-    contact = {"law": ["impact", "hertz", "flores"], "restitution": [0.5, 0.9]}
-    made = studies(laws={**BOTH, "clearance_mm": 0.2, "contact": contact})
-    assert len({case.key for case in made[0].cases}) == 4
-    sweep(made, tmp_path / "found", 2)
-    data = store.open_study(tmp_path / "found", "laws").load()
-    assert (data["status"] == "ok").all()
-    peaks = data["peak_acceleration"].sel(restitution=0.5)
-    assert np.unique(peaks.values).size == 3
-
-
 def test_a_copied_folder_compiles_again(tmp_path, monkeypatch, uncompiled):
     """Numba keeps machine code by path: the mark that came with a copy made each worker compile."""
     for place in ("here", "here", "copy", "copy", "here"):
         monkeypatch.setattr(warm_up, "COMPILED", tmp_path / place)
-        warm_up.compile_once(warm_up.Needs(("auto",), plain=True), lambda remark: None)
+        warm_up.compile_once(warm_up.Needs(("auto",), ("plain",)), lambda remark: None)
     assert len(uncompiled) == 2
 
 
