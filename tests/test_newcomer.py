@@ -126,15 +126,25 @@ sys.exit(cli.main(["report", "-o", "out"]))
 
 def test_the_page_on_figures_is_right(tmp_path, paper_store):
     copy_of_the_program(tmp_path)
-    (function,) = blocks("## How to add a figure", "## How to add a verb")
+    function, line, caption, of_captions = blocks("## How to add a figure", "## How to add a verb")
     paper = tmp_path / "compressor/report/figures/paper.py"
     text = paper.read_text(encoding="utf-8")
     paper.write_text(f"{text}\n\n{function}", encoding="utf-8")
+    changed(
+        tmp_path, "compressor/report/figures/__init__.py",
+        (indented(line), "FIGURES = (\n", True),
+        ("    draw_phase_plane,\n", "    draw_piston_force,\n    draw_pressure", False),
+    )  # fmt: skip
+    changed(
+        tmp_path, "compressor/analysis/captions.py",
+        (caption + "\n\n", "CAPTIONS: dict[int,", False),
+        (indented(of_captions), "    3: pressure_volume,\n", False),
+    )  # fmt: skip
     part_of(paper_store, tmp_path / "results", "design", "big-end")  # which the figure needs
     run_in(tmp_path, "-c", REPORT, cwd=tmp_path)
     page = (tmp_path / "out/index.html").read_text(encoding="utf-8")
     assert "Velocity against displacement" in page
-    assert re.search(r"Greatest velocity: 6\.\d+ m/s", page)
+    assert re.search(r"The piston moves at up to 6\.\d+ m/s", page)
     rows = (tmp_path / "out/figure-17.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) > 1000
     assert (tmp_path / "out/figure-17.png").stat().st_size > 10_000
@@ -180,7 +190,7 @@ def test_the_page_on_contact_laws_is_right(tmp_path):
         ("LINEAR = int(Law.LINEAR)\n\n\n" + force,
          "\n\n@inline_llvm\ndef may_choose_laws(p)", False),
         *(first_in(name, chosen[name]) for name in
-          ("normal_force", "elastic_force", "elastic_form")),
+          ("normal_force", "elastic_force", "elastic_energy", "elastic_form")),
     )  # fmt: skip
     laws = (tmp_path / WORDS).read_text(encoding="utf-8")
     laws = re.sub(r"^RESTITUTING = .*?\)\n", words, laws, count=1, flags=re.DOTALL | re.MULTILINE)

@@ -4,7 +4,7 @@
 """
 
 EQUIVALENT: dict[str, str] = {
-    "rosenbrock.py, factorize: abs(matrix[i, j]) > abs(matrix[best, j]) -> "
+    "linear.py, factorize: abs(matrix[i, j]) > abs(matrix[best, j]) -> "
     "abs(matrix[i, j]) >= abs(matrix[best, j])": (
         "of two equally large pivots either may be taken"
     ),

@@ -43,13 +43,12 @@ COMPILED = ("invariances", "march", "integrate", "rosenbrock", "simulate", "accu
             "regime")  # fmt: skip
 LAWS = ("contact_laws", "friction_laws", "chosen_laws")
 TESTED_IN = {
-    "mechanism": ("general_mechanism", "linear_systems"),
+    **dict.fromkeys(("mechanism", "mechanism_motion"), ("general_mechanism",)),
     "mechanism_rows": ("general_mechanism", "feature_runs"),
     "march": ("march", "wear_stages"),
     "motion": ("motion", *LAWS),
     "contact": ("contact", *LAWS),
-    "loads": ("loads", "card_curve", "card"),
-    "rosenbrock": ("rosenbrock", "linear_systems"),
+    "card": ("card_curve", "card"),
 }  # where not in the module of the same name alone
 NO_JIT, JIT = "not slow and not compiled", "not slow"
 # s of processor time with the JIT off and on; a mutant that takes longer is caught: it never ends

@@ -18,8 +18,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from chaos.common import contents, damage
 from chaos.processes import Run, members
-from chaos.stored import contents, damage
 from measure_store import timed
 from measure_throughput import WORKERS, many
 from result_pages import keep, provenance
@@ -72,7 +72,7 @@ class Sweep:
         """Start it and kill it after a time: jobs that it had told of, and that are stored."""
         run = self.start()
         assert self.watch(run, seconds), f"it ended within {seconds:.1f} s, before its kill"
-        run.kill(whole)
+        run.send(signal.SIGKILL, whole)
         code = run.finish()
         assert code == -signal.SIGKILL, f"{code}: {run.text()[-2000:]}"
         stored = len(read_store(self.folder / "results"))

@@ -7,7 +7,7 @@ import time
 
 import measure_chaos
 import pytest
-from chaos import common, faults
+from chaos import common
 from page_tables import kept
 
 
@@ -38,20 +38,6 @@ def test_a_crash_a_hang_and_an_exception_are_told_apart():
     assert common.forked(os.abort).death == "SIGABRT"
     assert common.forked(lambda: os._exit(3)).death == "exit code 3"
     assert common.forked(lambda: time.sleep(60), 0.2).death == "hangs: 0 s"
-
-
-def test_only_the_call_that_is_meant_is_refused(tmp_path):
-    """In files, by descriptors, and not outside the folder."""
-    (tmp_path / "in").mkdir()
-    seen = faults.Faults(tmp_path / "in", "write", 2, 28)
-    with seen.injected():
-        (tmp_path / "out").write_text("not ours")
-        (tmp_path / "in" / "a").write_bytes(b"first")
-        with pytest.raises(OSError, match="No space left"):
-            (tmp_path / "in" / "b").write_bytes(b"second")
-    (tmp_path / "in" / "c").write_bytes(b"third")
-    assert (tmp_path / "in" / "b").read_bytes() == b"sec"  # torn
-    assert dict(zip(faults.NAMES, seen.counts, strict=True))["write"] == 2
 
 
 def test_a_partial_driver_keeps_the_other_campaigns(tmp_path, monkeypatch):

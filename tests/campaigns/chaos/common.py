@@ -1,8 +1,8 @@
-"""What the campaigns on files share: a small store, commands in forked processes, what it holds."""
+"""What the campaigns share: small studies, forked processes, what a store holds, a tally."""
 
 import contextlib
-import dataclasses
 import faulthandler
+import hashlib
 import itertools
 import json
 import multiprocessing
@@ -10,9 +10,11 @@ import os
 import shutil
 import signal
 import sys
+import tempfile
+import time
 import traceback
-import warnings
-from collections.abc import Callable, Iterator
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,15 +22,20 @@ from click.testing import CliRunner
 from compsim import cli
 
 from compressor.cases.load import load_studies
-from compressor.store.reader import open_study
-from compressor.store.status import standings, verify
+from compressor.store.files import StoreError
+from compressor.store.status import verify
+from compressor.store.stored import read_store
+from compressor.store.studies import read_studies
 from compressor.sweep.worker import JobResult
 
-SWEEP: Any = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
+SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 FORK = multiprocessing.get_context("fork")
 SECONDS = 60.0  # in which a trial must end; what hangs takes for ever
-SOLVE = {"duration_rev": 0.02, "settle_rev": 0, "output_step_deg": 0.72, "accuracy": "draft",
-         "error_bars": False}  # fmt: skip
+TIMED = "seconds"
+LEAN = {  # of a quick job
+    "duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9,
+    "error_bars": False,
+}  # fmt: skip
 STUDIES = {
     "series": {"joint": "big_end", "clearance_mm": [0.1, 0.2]},
     "metrics": {
@@ -40,7 +47,113 @@ STUDIES = {
         "output": {"keep": "metrics"},
     },
 }  # fmt: skip
-TIMINGS = {"seconds"}  # what differs between two runs of a job
+
+
+class Tally:
+    """What a campaign counts: trials, and short texts of those that failed."""
+
+    def __init__(self, what, seed, names=()):
+        self.what, self.seed, self.began = what, seed, time.monotonic()
+        self.trials, self.counts = 0, Counter(dict.fromkeys(names, 0))
+        self.failures = []
+
+    def note(self, trial, problem):
+        """Count a trial; note what went wrong, "" for nothing, with what repeats it."""
+        self.trials += 1
+        if problem:
+            self.failures.append(f"seed {self.seed}, {trial}: {problem[-1500:]}")
+
+    def result(self):
+        """The campaign's result."""
+        return {
+            "what": self.what, "trials": self.trials, "failed": len(self.failures),
+            "counts": dict(self.counts), "seconds": round(time.monotonic() - self.began, 1),
+            "failures": self.failures,
+        }  # fmt: skip
+
+
+# ---- case files and stores ----------------------------------------------------------------------
+
+
+def case_file(folder, name, **values):
+    """A case file of quick jobs: its path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{name}.yaml"
+    path.write_text(json.dumps(values | {"solve": LEAN | values.get("solve", {})}))
+    return path
+
+
+def rods_file(folder, name, masses, keep="metrics", **more):
+    """A case file of quick big-end jobs, one a rod mass (kg): its path."""
+    rods = {"joint": "big_end", "clearance_mm": 0.1, "machine": {"rod_mass_kg": [*masses]}}
+    return case_file(folder, name, **rods, output={"keep": keep}, **more)
+
+
+def complete_store(folder):
+    """A store with all jobs of `STUDIES`, and their case files; compiles what forks need."""
+    cases = [case_file(folder / "cases", name, **values) for name, values in STUDIES.items()]
+    SWEEP.run_job(load_studies(cases[0])[0].cases[0])
+
+    def fill():
+        run_here()
+        SWEEP.sweep(load_studies(*cases), folder / "complete", 1)
+
+    assert not (ended := forked(fill, 600)).death, ended
+    for words in (["plan", *cases], ["status"], ["export", "--force", "-o", folder / "out"]):
+        assert command(*words, "-r", folder / "complete").code == 0  # what forks need is imported
+    return folder / "complete", cases
+
+
+def contents(folder, foreign=()):
+    """Key -> a digest of all that is stored of a job but the seconds that it took.
+
+    foreign: attributes that depend on which of several studies ran it.
+    """
+    stored, found = read_store(folder), {}
+    for position, key in enumerate(stored.columns["job"]):
+        one = stored.outcome(position)
+        parts = [one.status, one.reason]
+        parts += [one.numbers[name].tobytes() for name in one.numbers.dtype.names if name != TIMED]
+        parts += [(name, one.attributes[name]) for name in one.attributes if name not in foreign]
+        for name, (dims, values, attrs) in stored.series(position).items():
+            parts += [name, dims, values.dtype.char, values.tobytes(), attrs]
+        found[key.decode()] = hashlib.sha256(repr(parts).encode()).hexdigest()
+    return found
+
+
+def whole(folder):
+    """All that is stored, studies too; raises StoreError where any is damaged."""
+    for error in read_store(folder).damaged:
+        raise error
+    studies = {one.name: replace(one, written="", command="") for one in read_studies(folder)}
+    return contents(folder) | studies
+
+
+def differing(found, expected):
+    """The names of what differs, "" where nothing does."""
+    names = sorted(found.keys() | expected.keys())
+    return ", ".join(name for name in names if found.get(name) != expected.get(name))
+
+
+def damage(folder):
+    """What is wrong with a store, in a line; empty where all is well, or nothing was stored."""
+    try:
+        return "; ".join(map(str, verify(folder)))
+    except StoreError as error:
+        return "" if not list(folder.glob("batches/*.h5")) else str(error)
+
+
+@contextlib.contextmanager
+def fresh(folder):
+    """An empty folder for a trial, gone after it."""
+    place = Path(tempfile.mkdtemp(prefix="trial-", dir=folder))
+    try:
+        yield place
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+
+
+# ---- forks and commands -------------------------------------------------------------------------
 
 
 class Ended(NamedTuple):
@@ -50,53 +163,10 @@ class Ended(NamedTuple):
     death: str = ""  # "" where it gave a result
 
 
-class Said(NamedTuple):
-    """What a command said."""
-
-    code: int
-    out: str
-    err: str
-
-
-def run_here(size: int = 2, stored: Callable[[list[Any]], object] = len) -> None:
-    """Have sweeps run their jobs in this process, in batches; `stored` gets the keys of each."""
-
-    def run_batches(work: Any, jobs: Any, workers: Any, store: Any) -> Iterator[JobResult]:
-        left = iter(jobs)
-        while batch := [*itertools.islice(left, size)]:
-            ends = store([work(job[1]) for job in batch])
-            stored([job[0] for job in batch])
-            yield from (JobResult(job[0], end, 0.01) for job, end in zip(batch, ends, strict=True))
-
-    SWEEP.run_batches = run_batches
-
-
-def complete_store(folder: Path) -> Path:
-    """A store with all jobs of `STUDIES`; compiles all that forked processes need."""
-    place = folder / "complete"
-
-    def fill() -> None:
-        run_here()
-        SWEEP.sweep(load_studies(*case_files(folder / "cases")), place, 1)
-
-    SWEEP.run_job(load_studies(*case_files(folder / "cases"))[0].cases[0])
-    assert not (ended := forked(fill, 600)).death, ended
-    return place
-
-
-def case_files(folder: Path, studies: dict[str, Any] = STUDIES) -> list[Path]:
-    """The case files of studies in a folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, values in studies.items():
-        text = json.dumps(values | {"solve": SOLVE | values.get("solve", {})})
-        (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
-    return [folder / f"{name}.yaml" for name in studies]
-
-
-def forked(work: Callable[[], Any], seconds: float = SECONDS) -> Ended:
+def forked(work, seconds=SECONDS):
     """Do some work in a process of its own, which may crash or hang."""
 
-    def begin() -> None:
+    def begin():
         os.setpgid(0, 0)
         faulthandler.disable()  # of pytest: a death is reported as `Ended.death`
         try:
@@ -105,7 +175,7 @@ def forked(work: Callable[[], Any], seconds: float = SECONDS) -> Ended:
             theirs.send(Ended(None, traceback.format_exc()))
 
     ours, theirs = FORK.Pipe(duplex=False)
-    child: Any = FORK.Process(target=begin)
+    child = FORK.Process(target=begin)
     child.start()
     theirs.close()
     ended = None
@@ -120,44 +190,29 @@ def forked(work: Callable[[], Any], seconds: float = SECONDS) -> Ended:
     return ended or Ended(None, died)
 
 
-def command(*arguments: object) -> Said:
+class Said(NamedTuple):
+    """What a command said."""
+
+    code: int
+    out: str
+    err: str
+
+
+def command(*words):
     """What a command says, run in this process."""
     with CliRunner().isolation() as (out, err, _):
-        code = cli.main([str(argument) for argument in arguments])
+        code = cli.main([*map(str, words)])
         return Said(code, out.getvalue().decode(), err.getvalue().decode())
 
 
-def contents(folder: Path) -> dict[str, Any]:
-    """All that readers find in a store, to the bit, but for timings; `damage`: what `verify` says.
+def run_here(size=2, stored=len):
+    """Have sweeps run their jobs in this process, in batches; `stored` gets the keys of each."""
 
-    Raises what they raise, and RuntimeError where they only warn.
-    """
-    found: dict[str, Any] = {"damage": [str(damage) for damage in verify(folder)]}
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", UserWarning)
-        for standing in standings(folder):
-            found[standing.study] = dataclasses.replace(standing, written="")  # when: a timing
-            for name, item in open_study(folder, standing.study).load().variables.items():
-                if name not in TIMINGS:
-                    values = item.values
-                    plain = values.tolist() if values.dtype.kind in "OU" else values.tobytes()
-                    found[f"{standing.study}/{name}"] = (item.dims, values.shape, plain)
-    return found
+    def run_batches(work, jobs, workers, store):
+        left = iter(jobs)
+        while batch := [*itertools.islice(left, size)]:
+            ends = store([work(job[1]) for job in batch])
+            stored([job[0] for job in batch])
+            yield from (JobResult(job[0], end, 0.01) for job, end in zip(batch, ends, strict=True))
 
-
-def differing(found: dict[str, Any], whole: dict[str, Any]) -> str:
-    """The names of what differs, "" where nothing does."""
-    names = sorted(found.keys() | whole.keys())
-    return ", ".join(name for name in names if found.get(name) != whole.get(name))
-
-
-@contextlib.contextmanager
-def fresh(folder: Path, name: str = "trial") -> Iterator[Path]:
-    """An empty folder for a trial, gone after it."""
-    place = folder / name
-    shutil.rmtree(place, ignore_errors=True)
-    place.mkdir(parents=True)
-    try:
-        yield place
-    finally:
-        shutil.rmtree(place, ignore_errors=True)
+    SWEEP.run_batches = run_batches

@@ -5,15 +5,11 @@ that it was asked for in the store, to the bit, whatever the others have done of
 """
 
 import random
-import shutil
-import tempfile
 import time
-from pathlib import Path
 
+from chaos.common import Tally, contents, damage, fresh, rods_file
 from chaos.kill import hurried
 from chaos.processes import Run
-from chaos.stored import case_file, contents, damage
-from chaos.tally import Tally
 from compressor.cases.load import load_studies
 from compressor.store.studies import read_studies
 
@@ -25,42 +21,17 @@ LATEST = 0.4  # s after the first start
 REAL = 10  # one trial in so many is of real commands
 
 
-def one_study(folder, draw):
-    """Every run has the same study."""
-    case_file(folder, "one", MASSES, draw.choice(KEEPS))
-    return [["one.yaml"]] * draw.randint(2, 4)
-
-
-def overlapping(folder, draw):
-    """Studies that share jobs, and keep more or less of them."""
-    found = []
-    for number in range(draw.randint(2, 4)):
+def arrange(folder, draw):
+    """Two to four commands: of one study or of some that share jobs, whole or in shards."""
+    count, commands = draw.randint(2, 4), []
+    names = [f"study-{n}" for n in range(draw.choice((1, count)))]
+    for name in names:
         first = draw.randrange(len(MASSES) // 2)
-        stretch = MASSES[first : first + len(MASSES) // 2]
-        case_file(folder, f"study-{number}", stretch, draw.choice(KEEPS))
-        found.append([f"study-{number}.yaml"])
-    return found
-
-
-def shards(folder, draw):
-    """One study in shards."""
-    case_file(folder, "one", MASSES, draw.choice(KEEPS))
-    count = draw.randint(2, 4)
-    return [["one.yaml", "--shard", f"{n}/{count}"] for n in range(1, count + 1)]
-
-
-def shards_and_whole(folder, draw):
-    """Shards of studies that share jobs, beside a run without shards."""
-    files = overlapping(folder, draw)[:3]
-    return [*([*name, "--shard", f"1/{n + 1}"] for n, name in enumerate(files)), files[0]]
-
-
-ARRANGEMENTS = {
-    "the same study": one_study,
-    "overlapping studies": overlapping,
-    "shards": shards,
-    "shards and a whole run": shards_and_whole,
-}
+        rods_file(folder, name, MASSES[first : first + len(MASSES) // 2], draw.choice(KEEPS))
+    for number in range(count):
+        shard = ["--shard", f"{number + 1}/{count}"] if draw.random() < 0.5 else []
+        commands.append([f"{names[number % len(names)]}.yaml", *shard])
+    return commands
 
 
 def together(folder, commands, draw, real):
@@ -89,8 +60,7 @@ def requested(folder, command):
 
 def trial(folder, expected, draw, counts, real):
     """Start runs together; what went wrong, in a line. expected: what a keep stores, by key."""
-    name = draw.choice(list(ARRANGEMENTS))
-    commands = ARRANGEMENTS[name](folder, draw)
+    commands = arrange(folder, draw)
     runs, codes = together(folder, commands, draw, real)
     problems = [
         f"{command}: {code}: {run.text()[-500:]}"
@@ -111,27 +81,26 @@ def trial(folder, expected, draw, counts, real):
     _, again = together(folder, commands, draw, False)
     if any(again) or contents(folder / "out", FOREIGN) != found:
         problems.append("the same commands, once more, do not leave all as it was")
-    counts.update([name])
+    counts.update("a shard" if "--shard" in command else "a whole run" for command in commands)
     return "; ".join(problems)
+
+
+def undisturbed(folder, keep):
+    """What a run alone stores of each job that keeps time series or not."""
+    with fresh(folder) as place:
+        rods_file(place, "one", MASSES, keep)
+        _, codes = together(place, [["one.yaml"]], random.Random(0), False)
+        assert codes == [0]
+        return contents(place / "out", FOREIGN)
 
 
 def campaign(trials, seed, folder):
     """Run `trials` arrangements of runs, every tenth with the real command."""
-    tally, expected = Tally(WHAT, seed), {}
-    place = Path(tempfile.mkdtemp(prefix="concurrent-", dir=folder))
-    for keep in KEEPS:
-        (place / keep).mkdir()
-        case_file(place / keep, "one", MASSES, keep)
-        _, codes = together(place / keep, [["one.yaml"]], random.Random(0), False)
-        assert codes == [0]
-        expected[keep] = contents(place / keep / "out", FOREIGN)
+    tally, expected = Tally(WHAT, seed), {keep: undisturbed(folder, keep) for keep in KEEPS}
     for own in range(seed, seed + trials):
-        (place / "trial").mkdir()
-        real = own % REAL == 0
-        if problem := trial(place / "trial", expected, random.Random(own), tally.counts, real):
-            tally.failures.append(f"seed {own}: {problem}")
-        tally.counts["of real commands"] += real
-        shutil.rmtree(place / "trial")
-        tally.trials += 1
-    shutil.rmtree(place)
+        is_real = own % REAL == 0
+        with fresh(folder) as place:
+            problem = trial(place, expected, random.Random(own), tally.counts, is_real)
+        tally.counts["of real commands"] += is_real
+        tally.note(f"trial {own}", problem)
     return tally.result()

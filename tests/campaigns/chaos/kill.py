@@ -7,27 +7,24 @@ may run on, and the resumed study must equal an undisturbed one to the bit, timi
 
 import os
 import random
-import shutil
 import signal
-import sys
-import tempfile
 import time
-from functools import partial
-from pathlib import Path
+from functools import cache, partial
 
+import numpy as np
+
+from chaos.common import SWEEP, TIMED, Tally, contents, damage, fresh, rods_file
 from chaos.processes import Run
-from chaos.stored import case_file, contents, damage, seconds, unfinished
-from chaos.tally import Tally
+from compressor.store.stored import read_store
 from compressor.sweep.worker import Workers
 
-SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 WHAT = "SIGKILL of the parent, a worker or both at a random moment, then resumed"
 VICTIMS = ("parent", "worker", "both")
 EARLY = 0.15  # share of the kills that may come before the first file
 AMID = 0.5  # share of the later ones that wait for a file to be half-written
 MAX_FILES = 8  # for one of which a later kill waits
 REAL = 3  # one trial in so many is the real command
-KINDS = {"metrics": ("metrics", 100, 600), "series": ("series", 12, 24)}  # keep, jobs, of real ones
+KINDS = {"metrics": (100, 600), "series": (12, 24)}  # jobs, of real ones
 
 
 def hurried():
@@ -36,38 +33,45 @@ def hurried():
     SWEEP.store_outcomes = store_slowly
 
 
-def store_slowly(folder, ran, real=SWEEP.store_outcomes, fsync=os.fsync):
+def store_slowly(folder, outcomes, real=SWEEP.store_outcomes, fsync=os.fsync):
     """Store a batch, in a worker, on a disk that takes its time."""
     os.fsync = lambda descriptor: (time.sleep(0.02), fsync(descriptor))
-    return real(folder, ran)
+    return real(folder, outcomes)
 
 
-class Scene:
-    """A kind of sweep that was run once undisturbed."""
+def start(folder, keep, is_real):
+    """Start a sweep in a folder."""
+    jobs = KINDS[keep][is_real]
+    rods_file(folder, "killed", [3 + n / 500 for n in range(jobs)], keep)
+    return Run(["run", "killed.yaml", "-j", "2", "-r", "out"], folder, is_real, hurried)
 
-    def __init__(self, folder, kind, real):
-        keep, jobs, real_jobs = KINDS[kind]
-        self.real, self.template = real, folder / "template"
-        self.template.mkdir(parents=True)
-        masses = [3 + n / 500 for n in range(real_jobs if real else jobs)]
-        case_file(self.template, "killed", masses, keep)
-        shutil.copytree(self.template, folder / "undisturbed")
-        began = time.monotonic()
-        run = self.run(folder / "undisturbed")
+
+@cache
+def undisturbed(folder, keep, is_real):
+    """The seconds of a sweep that nobody disturbs, and what is stored then."""
+    with fresh(folder) as place:
+        began, run = time.monotonic(), start(place, keep, is_real)
         code = run.finish()
         assert code == 0, run.text()
-        self.seconds = time.monotonic() - began
-        self.whole = contents(folder / "undisturbed" / "out")
+        return time.monotonic() - began, contents(place / "out")
 
-    def run(self, folder):
-        """Start the sweep in a folder."""
-        return Run(["run", "killed.yaml", "-j", "2", "-r", "out"], folder, self.real, hurried)
+
+def taken(folder):
+    """Key -> the seconds that a stored job took: they change when it runs again."""
+    stored = read_store(folder)
+    seconds = stored.numbers(np.arange(len(stored)), [TIMED])[TIMED]
+    return dict(zip(stored.columns["job"].tolist(), seconds.tolist(), strict=True))
+
+
+def unfinished(folder):
+    """Temporary files that a killed writer has left."""
+    return [*folder.glob("**/.*.tmp")]
 
 
 def strike(run, victim, draw):
     """Kill; whether it was a worker, and there was one."""
     if victim != "worker":
-        run.kill(whole=victim == "both")
+        run.send(signal.SIGKILL, whole=victim == "both")
         return False
     while run.watch(0.002):
         if workers := run.workers():
@@ -76,39 +80,37 @@ def strike(run, victim, draw):
     return False
 
 
-def trial(scene, folder, draw, counts):
+def trial(folder, expected, keep, is_real, draw, counts):
     """Kill a sweep and resume it; what went wrong, in a line."""
-    shutil.copytree(scene.template, folder)
+    seconds, whole = expected
     victim, early, amid = draw.choice(VICTIMS), draw.random() < EARLY, draw.random() < AMID
-    run, files = scene.run(folder), draw.randint(1, MAX_FILES)
+    run, files, out = start(folder, keep, is_real), draw.randint(1, MAX_FILES), folder / "out"
     if early:
-        run.watch(draw.uniform(0, scene.seconds))
-    else:
-        while run.watch(0.001) and len(list(folder.glob("out/batches/*.h5"))) < files:
-            pass
+        run.watch(draw.uniform(0, seconds))
+    while not early and run.watch(0.001) and len([*out.glob("batches/*.h5")]) < files:
+        pass
     run.send(signal.SIGSTOP, whole=True)
-    before = seconds(folder / "out")
+    before = taken(out)
     run.send(signal.SIGCONT, whole=True)
     while amid and not early and run.watch(0.0) and not unfinished(folder):
         pass
     worker_struck = strike(run, victim, draw)
     code = run.finish()
     struck = worker_struck or code == -signal.SIGKILL  # or it was leaving, with 0
-    after, left, torn = seconds(folder / "out"), unfinished(folder), damage(folder / "out")
-    again = scene.run(folder)
+    after, left, torn = taken(out), unfinished(folder), damage(out)
+    again = start(folder, keep, is_real)
     resumed = again.finish()
-    now = seconds(folder / "out")
-    expected = -signal.SIGKILL if struck and victim != "worker" else 0
     problems = {
-        f"the killed run: {code}: {run.text()[-500:]}": code != expected,
+        f"the killed run: {code}: {run.text()[-500:]}":
+            code != (-signal.SIGKILL if struck and victim != "worker" else 0),
         "results that were read are lost": not before.items() <= after.items(),
         f"told of {run.told()} jobs, {len(after)} are stored": len(after) < run.told(),
-        "acknowledged results ran again": not after.items() <= now.items(),
+        "acknowledged results ran again": not after.items() <= taken(out).items(),
         f"after the kill: {torn}": torn,
         f"the resumed run: {resumed}: {again.text()[-500:]}": resumed != 0,
-        f"after resuming: {damage(folder / 'out')}": damage(folder / "out"),
-        "differs from an undisturbed study": contents(folder / "out") != scene.whole,
-    }
+        f"after resuming: {damage(out)}": damage(out),
+        "differs from an undisturbed study": contents(out) != whole,
+    }  # fmt: skip
     moment = "after the end" if not struck else "amid the rows" if before else "before any row"
     counts.update([f"{victim} killed", f"killed {moment}"])
     counts["acknowledged results"] += max(len(before), run.told())
@@ -118,17 +120,13 @@ def trial(scene, folder, draw, counts):
 
 def campaign(trials, seed, folder):
     """Kill `trials` sweeps, every third of them the real command; trial n has the seed seed + n."""
-    tally, scenes = Tally(WHAT, seed), {}
-    place = Path(tempfile.mkdtemp(prefix="kill-", dir=folder))
+    tally = Tally(WHAT, seed)
     for own in range(seed, seed + trials):
-        draw = random.Random(own)
-        name, real = draw.choice(list(KINDS)), own % REAL == 0
-        if (name, real) not in scenes:
-            scenes[name, real] = Scene(place / f"scene-{len(scenes)}", name, real)
-        if problem := trial(scenes[name, real], place / "trial", draw, tally.counts):
-            tally.failures.append(f"seed {own}, {name}{', real' if real else ''}: {problem}")
-        shutil.rmtree(place / "trial")
-        tally.trials += 1
-        tally.counts["real commands"] += real
-    shutil.rmtree(place)
+        draw, is_real = random.Random(own), own % REAL == 0
+        keep = draw.choice([*KINDS])
+        expected = undisturbed(folder, keep, is_real)
+        with fresh(folder) as place:
+            problem = trial(place, expected, keep, is_real, draw, tally.counts)
+        tally.counts["real commands"] += is_real
+        tally.note(f"trial {own}, {keep}{', real' * is_real}", problem)
     return tally.result()

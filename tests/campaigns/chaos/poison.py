@@ -5,62 +5,27 @@ by the command, with its reason; and nothing of the sweep may run on five second
 """
 
 import itertools
-import os
 import random
 import re
-import shutil
-import signal
-import sys
-import tempfile
 from functools import cache, partial
-from pathlib import Path
 
+from sweep.bad_jobs import LEAST, POISON
+
+from chaos.common import SWEEP, Tally, contents, damage, fresh, rods_file
 from chaos.processes import Run
-from chaos.stored import LEAN, case_file, contents, damage
-from chaos.tally import Tally
 from compressor.cases.load import load_studies
-from compressor.store.reader import read_store
+from compressor.store.stored import read_store
 from compressor.sweep import pool
 
-SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 WHAT = "jobs that crash, leave, hang, stand still or eat memory, among good ones"
 GOOD = [4 + n / 100 for n in range(24)]  # rod masses, kg
 MAX_BAD = 5
 SECONDS = 0.3  # that a job which never ends may take
-LEAST = 300_000_000  # bytes that a job may add
 FOREIGN = ("case", "name")  # they hold the time that a job may take, and its study
 SOME_FAILED = 3
 
 
-def spin():
-    """Never end."""
-    while True:
-        pass
-
-
-def deaf():
-    """Never end, whatever signal asks for it."""
-    signal.pthread_sigmask(signal.SIG_BLOCK, set(signal.valid_signals()))
-    spin()
-
-
-def swell():
-    """Take all memory that there is, and try again when there is no more."""
-    kept = []
-    while True:
-        kept.append(b"x" * 20_000_000)
-
-
-# name: what the job does, the reason that is stored, part of the detail
-KINDS = {
-    "SIGSEGV": (lambda: os.kill(os.getpid(), signal.SIGSEGV), "worker_died", "SIGSEGV"),
-    "SIGKILL": (lambda: os.kill(os.getpid(), signal.SIGKILL), "worker_died", "SIGKILL"),
-    "_exit": (lambda: os._exit(3), "worker_died", "exit code 3"),
-    "hang": (spin, "budget_seconds", "wall time"),
-    "deaf hang": (deaf, "budget_seconds", "wall time"),
-    "memory bomb": (swell, "out_of_memory", "0.3 GB"),
-    "SIGSTOP": (lambda: os.kill(os.getpid(), signal.SIGSTOP), "budget_seconds", "wall time"),
-}
+KINDS = {name: POISON[name] for name in ("crash", "killed", "leave", "hang", "stop", "bomb")}
 ENDLESS = {name for name, (_, reason, _) in KINDS.items() if reason == "budget_seconds"}
 
 
@@ -95,8 +60,8 @@ def mixed(folder, draw):
     names, good, bad = [], set(), {}
     for endless, part in itertools.groupby(jobs, key=lambda job: job[1] in ENDLESS):
         masses, kinds = zip(*part, strict=True)
-        solve = LEAN | {"timeout_s": SECONDS if endless else 600}
-        path = case_file(folder, f"part-{len(names)}", masses, keep, solve=solve)
+        solve = {"timeout_s": SECONDS if endless else 600}
+        path = rods_file(folder, f"part-{len(names)}", masses, keep, solve=solve)
         names.append(path.name)
         (study,) = load_studies(path)
         bad |= {key: kind for key, kind in zip(study.keys, kinds, strict=True) if kind}
@@ -121,12 +86,9 @@ def trial(folder, expected, draw, counts):
     ]
     stored = read_store(folder / "out")
     for key, kind in bad.items():
-        _, reason, detail = KINDS[kind]
-        place = stored.position(key)
-        end = None if place is None else stored.status_at(place)
+        (_, reason, detail), end = KINDS[kind], stored.status(key)
         if not end or (end.status, end.reason) != ("failed", reason) or detail not in end.detail:
-            how = f"{end.reason}: {end.detail}" if end else "missing"
-            problems.append(f"{kind}, job {key}: {how}")
+            problems.append(f"{kind}, job {key}: {end}")
         if not re.search(rf": {reason}: .*; job {key}\n", run.text()):
             problems.append(f"{kind}, job {key}: not named on the terminal")
     problems += [text for text in [damage(folder / "out")] if text]
@@ -137,24 +99,17 @@ def trial(folder, expected, draw, counts):
 
 def undisturbed(folder, keep):
     """What is stored of the good jobs in a sweep without bad ones: key -> digest."""
-    (folder / keep).mkdir(parents=True)
-    case_file(folder / keep, "good", GOOD, keep)
-    run = Run(["run", "good.yaml", "-r", "out", "-j", "2"], folder / keep)
-    code = run.finish()
-    assert code == 0, run.text()
-    return contents(folder / keep / "out", FOREIGN)
+    with fresh(folder) as place:
+        rods_file(place, "good", GOOD, keep)
+        run = Run(["run", "good.yaml", "-r", "out", "-j", "2"], place)
+        assert run.finish() == 0, run.text()
+        return contents(place / "out", FOREIGN)
 
 
 def campaign(trials, seed, folder):
     """Run `trials` mixes of one to five bad jobs and up to forty good ones."""
-    tally = Tally(WHAT, seed)
-    place = Path(tempfile.mkdtemp(prefix="poison-", dir=folder))
-    expected = cache(partial(undisturbed, place / "good"))
+    tally, expected = Tally(WHAT, seed), cache(partial(undisturbed, folder))
     for own in range(seed, seed + trials):
-        (place / "trial").mkdir()
-        if problem := trial(place / "trial", expected, random.Random(own), tally.counts):
-            tally.failures.append(f"seed {own}: {problem}")
-        shutil.rmtree(place / "trial")
-        tally.trials += 1
-    shutil.rmtree(place)
+        with fresh(folder) as place:
+            tally.note(f"trial {own}", trial(place, expected, random.Random(own), tally.counts))
     return tally.result()

@@ -20,20 +20,25 @@ import signal
 import struct
 import subprocess
 import time
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
-from chaos.common import FORK, SWEEP, case_files, contents, differing, forked, fresh, run_here
-from chaos.tally import Tally
+from chaos.common import (
+    FORK,
+    SWEEP,
+    Tally,
+    case_file,
+    differing,
+    forked,
+    fresh,
+    run_here,
+    whole,
+)
 from compressor.cases.load import load_studies
 from compressor.store import merge
-from compressor.store.reader import read_store
+from compressor.store.stored import read_store
 
 SHUTDOWN = 0x8004587D  # FS_IOC_SHUTDOWN, _IOR('X', 125, __u32) of linux/fs.h
 NO_FLUSH = struct.pack("I", 2)  # FS_SHUTDOWN_FLAGS_NOLOGFLUSH
 IMAGE_BYTES = 24 << 20
-TOOLS = ("mkfs.ext4", "e2fsck", "mount", "umount")
 OPTIONS = ("commit=1", "commit=5", "commit=1,data=writeback", "commit=1,nodelalloc")
 CONTROLS = ("no fsync", "no fsync of folders")
 CONTROL_EVERY = 5  # trials; each control. A sample has the first alone: it never fails to lose
@@ -47,27 +52,24 @@ STUDIES = {
 }  # fmt: skip
 
 
-def unable(image: Path) -> str:
+def unable(image):
     """Why power cannot be cut here; "" where it can: then `image` is an empty file system."""
-    if os.geteuid() != 0:
-        return "only root may mount an image"
-    if absent := [tool for tool in TOOLS if not shutil.which(tool)]:
-        return f"{', '.join(absent)} not installed"
     with open(image, "wb") as file:
         file.truncate(IMAGE_BYTES)
     try:
         call("mkfs.ext4", "-q", "-F", "-E", "lazy_itable_init=0,lazy_journal_init=0", image)
-        with fresh(image.parent, "able") as trial:
+        with fresh(image.parent) as trial:
             shutil.copyfile(image, trial / "disk.img")
             with mounted(trial / "disk.img", trial / "disk", "commit=5") as disk:
                 cut(disk)
+            call("e2fsck", "-fy", trial / "disk.img", good=(0, 1))
     except (RuntimeError, OSError) as error:
         return str(error)
     return ""
 
 
 @contextlib.contextmanager
-def mounted(image: Path, place: Path, options: str) -> Iterator[Path]:
+def mounted(image, place, options):
     """An image's file system on a folder."""
     place.mkdir()
     call("mount", "-o", f"loop,{options}", image, place)
@@ -77,14 +79,14 @@ def mounted(image: Path, place: Path, options: str) -> Iterator[Path]:
         call("umount", place)
 
 
-def call(*words: object, good: tuple[int, ...] = (0,)) -> None:
-    """Call a program; raises RuntimeError with what it says."""
+def call(*words, good=(0,)):
+    """Call a program; raises RuntimeError with what it says, OSError where it is not installed."""
     done = subprocess.run([*map(str, words)], capture_output=True, text=True, check=False)
     if done.returncode not in good:
         raise RuntimeError(f"{words[0]}: {done.returncode}: {done.stdout}{done.stderr}")
 
 
-def cut(place: Path) -> None:
+def cut(place):
     """Cut a file system off, at once, without writing what it still holds in memory."""
     root = os.open(place, os.O_RDONLY)
     try:
@@ -93,10 +95,10 @@ def cut(place: Path) -> None:
         os.close(root)
 
 
-def fsync_less(control: str, real: Any = os.fsync) -> Any:
+def fsync_less(control, real=os.fsync):
     """An fsync that does less than it says."""
 
-    def fsync(descriptor: int) -> None:
+    def fsync(descriptor):
         is_folder = os.path.isdir(f"/proc/self/fd/{descriptor}")
         if control == "no fsync of folders" and not is_folder:
             real(descriptor)
@@ -104,7 +106,7 @@ def fsync_less(control: str, real: Any = os.fsync) -> Any:
     return fsync
 
 
-def next_of(reader: int, seconds: float) -> str:
+def next_of(reader, seconds):
     """What is told over a pipe next, or nothing in some seconds."""
     if not select.select([reader], [], [], seconds)[0]:
         return ""
@@ -117,19 +119,20 @@ def next_of(reader: int, seconds: float) -> str:
 class Campaign:
     """The trials of `campaign`: the studies, an undisturbed store, an `empty` file system."""
 
-    def __init__(self, tally: Tally, folder: Path, empty: Path):
+    def __init__(self, tally, folder, empty):
         self.tally, self.folder, self.empty = tally, folder, empty
-        self.studies = load_studies(*case_files(folder, STUDIES))
+        files = [case_file(folder, name, **values) for name, values in STUDIES.items()]
+        self.studies = load_studies(*files)
         SWEEP.run_job(self.studies[0].cases[0])  # compiles what all need
         self.whole = forked(lambda: self.swept(folder / "whole"), 600).result
 
-    def swept(self, store: Path) -> dict[str, Any]:
+    def swept(self, store):
         """Run the sweep here; what is stored then."""
         run_here(20)
         SWEEP.sweep(self.studies, store, 1)
-        return contents(store)
+        return whole(store)
 
-    def write(self, store: Path, channel: int, control: str, every: int) -> None:
+    def write(self, store, channel, control, every):
         """In a forked process: run a sweep that tells each acknowledged key over a pipe."""
         with contextlib.suppress(BaseException), open(os.devnull, "w") as nothing:
             os.setpgid(0, 0)
@@ -138,7 +141,7 @@ class Campaign:
             merge.MAX_SMALL = 3
             count = 0
 
-            def stored(keys: list[str]) -> None:
+            def stored(keys):
                 nonlocal count
                 count += 1
                 os.write(channel, "".join(f"{key}\n" for key in keys).encode())
@@ -148,7 +151,7 @@ class Campaign:
             run_here(20, stored)
             SWEEP.sweep(self.studies, store, 1)
 
-    def disturbed(self, trial: Path, rng: random.Random, control: str) -> set[str]:
+    def disturb(self, trial, rng, control):
         """Run a sweep and cut it off; the keys that were acknowledged. The image: `cut.img`."""
         shutil.copyfile(self.empty, trial / "disk.img")
         options, wait = rng.choice(OPTIONS), rng.uniform(0, MAX_SECONDS)
@@ -156,7 +159,7 @@ class Campaign:
         reader, channel = os.pipe()
         with mounted(trial / "disk.img", trial / "disk", options) as disk:
             arguments = disk / "store", channel, control, rng.choice((0, 8))
-            child: Any = FORK.Process(target=self.write, args=arguments)
+            child = FORK.Process(target=self.write, args=arguments)
             child.start()
             os.close(channel)
             told = next_of(reader, 60)
@@ -173,34 +176,33 @@ class Campaign:
         with open(reader, encoding="ascii") as file:
             return set((told + file.read()).split())
 
-    def trial(self, number: int, control: str = "") -> bool:
+    def trial(self, number, control=""):
         """Cut the power once; whether an acknowledged result is lost."""
         rng = random.Random(f"{self.tally.seed} {number} {control}")
         with fresh(self.folder) as trial:
-            acknowledged = self.disturbed(trial, rng, control)
+            acknowledged = self.disturb(trial, rng, control)
             call("e2fsck", "-fy", trial / "cut.img", good=(0, 1))
             with mounted(trial / "cut.img", trial / "copy", "commit=5") as disk:
                 ended = forked(lambda: acknowledged - intact(disk / "store"))
                 lost = acknowledged if ended.death else ended.result
                 if control:
                     return bool(lost)
-                self.tally.trials += 1
-                self.tally.counts["acknowledged results"] += len(acknowledged)
-                if lost:
-                    self.tally.fail(f"trial {number}", f"lost {len(lost)}: {ended.death}")
                 again = forked(lambda: self.swept(disk / "store"))
-                if problem := again.death or differing(again.result, self.whole):
-                    self.tally.fail(f"trial {number}", f"not resumed: {problem}")
+                different = again.death or differing(again.result, self.whole)
+                problems = [f"lost {len(lost)}: {ended.death}"] if lost else []
+                problems += [f"not resumed: {different}"] if different else []
+                self.tally.counts["acknowledged results"] += len(acknowledged)
+                self.tally.note(f"trial {number}", "; ".join(problems))
         return bool(lost)
 
 
-def intact(store: Path) -> set[str]:
+def intact(store):
     """The keys of a store's jobs, without those whose batches are damaged."""
     stored = read_store(store)
     return {key.decode() for at, key in enumerate(stored.columns["job"]) if stored.intact(at)}
 
 
-def campaign(trials: int, seed: int, folder: Path) -> dict[str, Any]:
+def campaign(trials, seed, folder):
     """Cut the power so often; and see that it costs results where fsync is taken out."""
     what = "power cut: ext4 cut off while a sweep writes, its image checked and resumed"
     tally = Tally(what, seed, ("acknowledged results",))
@@ -214,5 +216,5 @@ def campaign(trials: int, seed: int, folder: Path) -> dict[str, Any]:
         lost = sum(tried.trial(number, control) for number in range(made))
         tally.counts |= {f"controls, {control}": made, f"of these lost, {control}": lost}
         if not lost:
-            tally.fail(f"controls, {control}", "nothing is lost: the campaign would not notice")
+            tally.note(f"controls, {control}", "nothing is lost: the campaign would not notice")
     return tally.result()

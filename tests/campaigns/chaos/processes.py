@@ -73,15 +73,11 @@ class Run:
         with contextlib.suppress(ProcessLookupError):  # it may have ended
             (os.killpg if whole else os.kill)(self.pid, number)
 
-    def kill(self, whole=False):
-        """SIGKILL, of itself alone or of the whole session at once."""
-        self.send(signal.SIGKILL, whole)
-
     def finish(self, seconds=120.0, orphans=5.0):
         """Wait for its end, and that of all it started; its exit code, or what went wrong."""
         late = self.watch(seconds)
         if late:
-            self.kill(whole=True)
+            self.send(signal.SIGKILL, whole=True)
             self.watch(5.0)
         deadline = time.monotonic() + orphans
         while (left := members(self.pid)) and time.monotonic() < deadline:
