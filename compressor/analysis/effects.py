@@ -3,7 +3,7 @@
 import contextlib
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +13,12 @@ RESAMPLES = 1000
 LEVEL = 0.95
 SEED = 1  # of the resampling
 ORDERS = ("first_order", "total_order")
+MAX_GAPS = 0.2  # of a grid's points
+FILLS = 500  # rounds of filling
+FILLED = 1e-9  # of the values' span: no round changes more
+MIN_POINTS = 8  # points of a ranking
+MAX_BASE = 1024  # points of the parts of a `saltelli` design, beyond which its bootstrap is slow
+RANKING_RESAMPLES = 400
 
 
 @dataclass(frozen=True)
@@ -26,68 +32,41 @@ class SaltelliDesign:
     b: np.ndarray
     mixed: np.ndarray
 
-    def first(self, count: int) -> "SaltelliDesign":
-        """Return the design of the first points of the sequence.
-
-        A power of two keeps its balance.
-        """
-        return SaltelliDesign(self.a[:count], self.b[:count], self.mixed[:, :count])
-
-    def without(self, unknown: np.ndarray) -> "SaltelliDesign":
-        """Return the design without each block that has an unknown point, of all points (n,).
+    def whole(self, unknown: np.ndarray, most: int = MAX_BASE) -> "SaltelliDesign":
+        """Return the first blocks without an unknown point, of all points (n,): a power of two.
 
         A block is a point of A, that of B, and those of A with a column of B: the estimators take
         differences within it, so that what is left of one would count against nothing.
         """
-        whole = ~(unknown[self.a] | unknown[self.b] | unknown[self.mixed].any(axis=0))
-        return SaltelliDesign(self.a[whole], self.b[whole], self.mixed[:, whole])
+        is_whole = ~(unknown[self.a] | unknown[self.b] | unknown[self.mixed].any(axis=0))
+        places = np.flatnonzero(is_whole)[:most]
+        places = places[: 1 << max(0, places.size.bit_length() - 1)]
+        return SaltelliDesign(self.a[places], self.b[places], self.mixed[:, places])
 
     def indices(self, values: np.ndarray, resamples: int = RESAMPLES) -> dict[str, np.ndarray]:
         """Return Sobol's indices of a quantity over k keys with 95 % intervals, (k,) each.
 
-        values: of all points, finite and not all the same at the points of the design, shape
-        (n (k + 2),). `first_order` and `total_order`, with `_low` and `_high`, by Saltelli et al.,
-        Computer Physics Communications 181, 2010, Table 2 (b) and (f), less the mean; intervals by
-        the bootstrap BCa over blocks. SciPy's sobol_indices gives the same, but takes only a power
-        of two points, and several keys. A key that changes nothing has none of the variance,
-        surely.
+        values: of all points, finite at those of the design, whose number is a power of two.
+        `first_order` and `total_order`, with `_low` and `_high`, by SciPy: Saltelli et al.,
+        Computer Physics Communications 181, 2010, and the bootstrap BCa. A key that changes
+        nothing has none of the variance, surely.
         """
-        from scipy.stats import bootstrap  # takes half a second
+        from scipy.stats import sobol_indices  # takes half a second
 
         a, b, mixed = values[self.a], values[self.b], values[self.mixed]
         idle = (mixed == a).all(axis=1)
-        mean = np.mean([a[None], b[None]], axis=(0, -1))
-        a, b, mixed = a - mean, b - mean, mixed - mean
-
-        def estimate(places: np.ndarray) -> np.ndarray:
-            return sobol_estimates(a[places], b[places], mixed[:, places])
-
-        with (
-            ignore_warnings(),
-            seed_global_draws(),
-        ):  # warnings: the bootstrap of what changes nothing
-            found = sobol_estimates(a, b, mixed)
-            interval = bootstrap(
-                [np.arange(a.size)], estimate, confidence_level=LEVEL, n_resamples=resamples,
-                vectorized=False,
-            ).confidence_interval  # fmt: skip
+        several = np.concatenate([mixed, mixed])[: max(2, len(mixed))]  # SciPy takes no single key
+        table = {"f_A": a[None], "f_B": b[None], "f_AB": several[:, None]}
+        found = sobol_indices(func=table, n=a.size)
+        with ignore_warnings(), seed_global_draws():  # of what changes nothing
+            spread = found.bootstrap(LEVEL, resamples)
         rows = {}
-        for n, order in enumerate(ORDERS):
-            parts = ("", found[n]), ("_low", interval.low[n]), ("_high", interval.high[n])
-            for end, row in parts:
-                rows[f"{order}{end}"] = np.where(idle, 0.0, row)
+        for order in ORDERS:
+            interval = getattr(spread, order).confidence_interval
+            ends = ("", getattr(found, order)), ("_low", interval.low), ("_high", interval.high)
+            for end, row in ends:
+                rows[f"{order}{end}"] = np.where(idle, 0.0, row[: len(mixed)])
         return rows
-
-
-def sobol_estimates(a: np.ndarray, b: np.ndarray, mixed: np.ndarray) -> np.ndarray:
-    """Return the first and total indices of k keys, (2, k).
-
-    a, b: values at the parts A and B, (n,); mixed: at A with each column of B, (k, n).
-    """
-    variance = np.var([a[None], b[None]], axis=(0, -1))
-    first = np.mean(b * (mixed - a), axis=-1) / variance
-    total = 0.5 * np.mean((a - mixed) ** 2, axis=-1) / variance
-    return np.stack([first, total])
 
 
 @contextlib.contextmanager
@@ -123,16 +102,6 @@ def saltelli_design(columns: np.ndarray) -> SaltelliDesign | None:
     return SaltelliDesign(np.arange(n), np.arange(n, 2 * n), mixed)
 
 
-MAX_GAPS = 0.2  # of a grid's points
-FILLS = 500  # rounds of filling
-FILLED = 1e-9  # of the values' span: no round changes more
-MIN_POINTS = 8  # points of a ranking
-MAX_BASE = 1024  # points of the parts of a `saltelli` design, beyond which its bootstrap is slow
-MAX_POINTS = 4000  # of the resampling
-RANKING_RESAMPLES = 400
-RANKING_SEED = 1
-
-
 @dataclass(frozen=True)
 class Effects:
     """How much each of k keys does to a quantity.
@@ -140,11 +109,8 @@ class Effects:
     kind: `grid` and `saltelli`: shares of the variance, by the key alone and with its
     interactions; `rank`: correlations of ranks, of words the correlation ratio; no total.
     main, total: (k,); *_ends: the ends of the 95 % intervals, (2, k), None where the values are
-    exact. filled: points without a value of their own. base: how many points of each part
-    of a `saltelli` design were taken, where not all were; else 0. dropped: blocks of it with a
-    point without a value, which are left out, or points of a grid at values of an axis at which
-    nothing is known; with_unknown: the effects with these blocks, their unknown points having the
-    median, None where there are none.
+    exact. unknown: points without a value. base: how many points of each part of a `saltelli`
+    design were taken, where not all were; else 0.
     """
 
     kind: str
@@ -152,10 +118,8 @@ class Effects:
     total: np.ndarray | None = None
     main_ends: np.ndarray | None = None
     total_ends: np.ndarray | None = None
-    filled: int = 0
+    unknown: int = 0
     base: int = 0
-    dropped: int = 0
-    with_unknown: "Effects | None" = None
 
     @property
     def strength(self) -> np.ndarray:
@@ -181,7 +145,7 @@ def grid_effects(values: np.ndarray) -> Effects | None:
     unknown = ~np.isfinite(values)
     if not values.size or unknown.mean() > MAX_GAPS:
         return None
-    filled, dropped = int(unknown.sum()), whole_grid - values.size
+    lost = int(unknown.sum()) + whole_grid - values.size
     values = fill_unknown(values, unknown)
     axes = range(values.ndim)
     other_axes = [tuple(n for n in axes if n != axis) for axis in axes]
@@ -189,10 +153,10 @@ def grid_effects(values: np.ndarray) -> Effects | None:
     whole = scaled.var()
     if not whole:
         nothing = np.full(values.ndim, math.nan)
-        return Effects("grid", nothing, nothing, filled=filled, dropped=dropped)
+        return Effects("grid", nothing, nothing, unknown=lost)
     main = np.array([scaled.mean(axis=others).var() for others in other_axes]) / whole
     total = np.array([scaled.var(axis=axis).mean() for axis in axes]) / whole
-    return Effects("grid", main, total, filled=filled, dropped=dropped)
+    return Effects("grid", main, total, unknown=lost)
 
 
 def fill_unknown(values: np.ndarray, unknown: np.ndarray) -> np.ndarray:
@@ -221,49 +185,31 @@ def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effect
     """Return the effects of keys whose values a design drew; None where too little is known.
 
     columns: a key's value at each point, or words; values: (points,), nan where unknown. Of a
-    `saltelli` design Sobol's indices, of a large one of its first MAX_BASE points, without the
-    blocks that have an unknown point, and besides with them; else correlations, each over the
-    points that have its key.
+    `saltelli` design Sobol's indices, by the first blocks without an unknown point, at most
+    MAX_BASE; else correlations, each over the points that have its key.
     """
     good = np.isfinite(values)
     if good.sum() < MIN_POINTS:
         return None
     if not np.ptp(values[good]):
         return Effects("rank", np.full(len(columns), math.nan))
+    lost = int((~good).sum())
     numeric = all(column.dtype.kind in "fiu" for column in columns)
     design = saltelli_design(np.stack(columns, axis=1).astype(float)) if numeric else None
-    if design is not None and good.mean() >= 1.0 - MAX_GAPS:
-        base = MAX_BASE if design.a.size > MAX_BASE else 0
-        design = design.first(MAX_BASE)
-        whole = design.without(~good)
-        dropped, unknown = design.a.size - whole.a.size, int((~good).sum())
-        if whole.a.size >= MIN_POINTS:
-            found = _saltelli_effects(whole, values, unknown, base)
-            if found is None or not dropped:
-                return found
-            filled = np.where(good, values, np.median(values[good]))
-            other = _saltelli_effects(design, filled, unknown, base)
-            return replace(found, dropped=dropped, with_unknown=other)
+    whole = design.whole(~good) if design else None
+    if design and whole and whole.a.size >= MIN_POINTS and good.mean() >= 1.0 - MAX_GAPS:
+        found = whole.indices(values, RANKING_RESAMPLES)
+        if not all(np.isfinite(row).all() for row in found.values()):
+            return None  # some resamples are all the same
+        main, total = (
+            np.stack([found[f"{order}_low"], found[f"{order}_high"]]) for order in ORDERS
+        )
+        base = whole.a.size if whole.a.size < design.a.size else 0
+        first, all_orders = (found[order] for order in ORDERS)
+        return Effects("saltelli", first, all_orders, main, total, lost, base)
     known = [good & (c == c) & (c != "" if c.dtype.kind == "U" else True) for c in columns]
     rows = np.array([correlation(c[n], values[n]) for c, n in zip(columns, known, strict=True)])
-    return Effects("rank", rows[:, 0], main_ends=rows[:, 1:].T, filled=int((~good).sum()))
-
-
-def _saltelli_effects(
-    design: SaltelliDesign, values: np.ndarray, unknown: int, base: int
-) -> Effects | None:
-    """Return Sobol's indices of a design; None where so few points differ that they have none."""
-    found = design.indices(values, RANKING_RESAMPLES)
-    if not all(np.isfinite(row).all() for row in found.values()):
-        return None  # some resamples are all the same
-    ends = {
-        order: np.stack([found[f"{order}_low"], found[f"{order}_high"]])
-        for order in ("first_order", "total_order")
-    }
-    return Effects(
-        "saltelli", found["first_order"], found["total_order"], ends["first_order"],
-        ends["total_order"], unknown, base,
-    )  # fmt: skip
+    return Effects("rank", rows[:, 0], main_ends=rows[:, 1:].T, unknown=lost)
 
 
 def correlation(column: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
@@ -271,41 +217,19 @@ def correlation(column: np.ndarray, values: np.ndarray) -> tuple[float, float, f
 
     Of numbers Spearman's, the interval by Bonett and Wright (Psychometrika 65, 2000, 23-28). Of
     words the correlation ratio of the ranks, which is the root of Kruskal and Wallis' H / (n - 1),
-    with an interval by the bootstrap. nan where the key is the same at all points.
+    without an interval. nan where the key is the same at all points.
     """
-    from scipy.stats import norm, spearmanr  # takes half a second
+    from scipy.stats import kruskal, norm, spearmanr  # takes half a second
 
-    if values.size < MIN_POINTS:
+    if values.size < MIN_POINTS or np.unique(column).size < 2:
         return math.nan, math.nan, math.nan
     if column.dtype.kind not in "fiu":
-        return correlation_ratio(np.unique(column, return_inverse=True)[1], values)
-    if not np.ptp(column.astype(float)):
-        return math.nan, math.nan, math.nan
+        groups = [values[column == word] for word in np.unique(column)]
+        ratio = max(0.0, float(kruskal(*groups).statistic)) / (values.size - 1)
+        return math.sqrt(ratio), math.nan, math.nan
     found = float(spearmanr(column, values).statistic)
     if abs(found) > 1.0 - 1e-12:
         return found, found, found
     reach = float(norm.ppf(0.5 + LEVEL / 2)) * math.sqrt((1 + found**2 / 2) / (values.size - 3))
     low, high = np.tanh(np.arctanh(found) + np.array([-reach, reach]))
     return found, float(low), float(high)
-
-
-def correlation_ratio(codes: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
-    """Return the correlation ratio of ranks of values in groups, and its interval."""
-    from scipy.stats import kruskal, rankdata
-
-    if np.unique(codes).size < 2:
-        return math.nan, math.nan, math.nan
-    groups = [values[codes == code] for code in np.unique(codes)]
-    found = math.sqrt(max(0.0, float(kruskal(*groups).statistic)) / (values.size - 1))
-    rng = np.random.default_rng(RANKING_SEED)
-    ranks, size = rankdata(values), min(values.size, MAX_POINTS)
-    draws = []
-    for _ in range(RANKING_RESAMPLES):
-        picked = rng.integers(values.size, size=size)
-        counts = np.bincount(codes[picked])
-        sums = np.bincount(codes[picked], ranks[picked])
-        one = ranks[picked]
-        between = (sums[counts > 0] ** 2 / counts[counts > 0]).sum() / size - one.mean() ** 2
-        draws.append(math.sqrt(max(0.0, between) / (one.var() or 1.0)))
-    low, high = np.quantile(draws, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return found, min(found, float(low)), max(found, float(high))

@@ -1,4 +1,4 @@
-"""Effects of swept keys, of functions whose effects are known, and trends through points."""
+"""Effects of swept keys, of functions whose effects are known."""
 
 import math
 
@@ -44,7 +44,7 @@ def test_gaps_of_a_sum_are_filled_rightly():
     exact = grid_effects(values)
     values[0, 1, 2] = values[3, 3, 0] = values[2, 2, 2] = math.nan
     found = grid_effects(values)
-    assert (exact.filled, found.filled) == (0, 3)
+    assert (exact.unknown, found.unknown) == (0, 3)
     assert found.main == pytest.approx(exact.main, abs=1e-6)
     assert found.total == pytest.approx(exact.total, abs=1e-6)
     values[:, :2] = math.nan  # values of an axis at which nothing is known
@@ -63,7 +63,7 @@ def test_saltelli_s_designs_have_indices():
     values = points[:, 0] + 2 * points[:, 1]
     values[5] = math.nan
     found = sampled_effects([*points.T], values)
-    assert (found.kind, found.filled) == ("saltelli", 1)
+    assert (found.kind, found.unknown) == ("saltelli", 1)
     assert found.total == pytest.approx([0.2, 0.8], abs=0.03)
     assert (found.main_ends[0] <= found.main).all()
     assert (found.main_ends[1] >= found.main).all()
@@ -81,7 +81,7 @@ def test_other_designs_have_correlations_of_ranks():
     assert found.strength[0] == 1.0
     low, high = found.main_ends
     assert low[1] < 0 < high[1]
-    assert (low[2] <= found.main[2]) & (found.main[2] <= high[2])
+    assert np.isnan([low[2], high[2]]).all()  # of words
     assert found.main[2] < 0.3
     assert sampled_effects([x[:5]], values[:5]) is None
 
@@ -92,7 +92,8 @@ def test_of_two_words_the_ratio_is_the_correlation():
     values = rng.normal(size=80) + code
     found, low, high = correlation(np.array(["a", "b"])[code], values)
     assert found == pytest.approx(spearmanr(code, values).statistic)
-    assert low < found < high
+    assert math.isnan(low)
+    assert math.isnan(high)
 
 
 def test_intervals_of_correlations_hold_as_often_as_they_say():

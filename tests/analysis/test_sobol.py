@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.stats import sobol_indices
 
-from compressor.analysis.effects import SEED, saltelli_design, sampled_effects
+from compressor.analysis.effects import saltelli_design, sampled_effects
 from compressor.cases.swept import design
 
 
@@ -16,63 +15,42 @@ def test_only_a_design_is_one():
     assert saltelli_design(points.astype(object)) is None
 
 
-def test_the_first_points_of_a_design_are_one():
-    points = np.array(design("saltelli", 64, 2, 1))
-    part = saltelli_design(points).first(16)
-    assert np.array_equal(points[part.mixed[1], 1], points[part.b, 1])
-    assert part.indices(points[:, 0])["first_order"] == pytest.approx([1.0, 0.0], abs=0.05)
-
-
-@pytest.mark.parametrize("keys", [2, 5])
-def test_scipy_has_the_same_indices(keys):
-    points = np.array(design("saltelli", 64, keys, 1))
-    values = np.exp(points @ np.arange(1.0, keys + 1))
-    parts = saltelli_design(points)
-    found = parts.indices(values, 50)
-    table = {"f_A": values[parts.a][None], "f_B": values[parts.b][None],
-             "f_AB": values[parts.mixed][:, None]}  # fmt: skip
-    theirs = sobol_indices(func=table, n=64)
-    state = np.random.get_state()  # noqa: NPY002
-    np.random.seed(SEED)  # noqa: NPY002
-    spread = theirs.bootstrap(n_resamples=50)
-    np.random.set_state(state)  # noqa: NPY002
-    for order in ("first_order", "total_order"):
-        np.testing.assert_allclose(found[order], np.ravel(getattr(theirs, order)), rtol=1e-12)
-        interval = getattr(spread, order).confidence_interval
-        np.testing.assert_allclose(found[f"{order}_low"], np.ravel(interval.low), rtol=1e-9)
-        np.testing.assert_allclose(found[f"{order}_high"], np.ravel(interval.high), rtol=1e-9)
-
-
-def test_a_block_drops_out_whole():
-    """Of four blocks of three keys: an unknown point of A, of B, or of one mixed part costs one."""
+def test_blocks_drop_out_whole_and_a_power_of_two_is_left():
+    """An unknown point of A, of B, or of a mixed part costs its block."""
     points = np.array(design("saltelli", 8, 3, 1))
     parts = saltelli_design(points)
     unknown = np.zeros(len(points), bool)
     unknown[[parts.a[1], parts.b[3], parts.mixed[2, 4], parts.mixed[0, 4]]] = True
-    left = parts.without(unknown)
-    kept = [0, 2, 5, 6, 7]
+    left = parts.whole(unknown)
+    kept = [0, 2, 5, 6]  # 7 is whole, too
     assert left.a.tolist() == parts.a[kept].tolist()
     assert left.b.tolist() == parts.b[kept].tolist()
     assert left.mixed.tolist() == parts.mixed[:, kept].tolist()
+    assert parts.whole(unknown, 2).a.tolist() == parts.a[[0, 2]].tolist()
+    assert parts.whole(np.ones(len(points), bool)).a.size == 0
 
 
-def test_failed_runs_bias_the_indices_only_where_their_blocks_stay():
-    """y = x1 + 2 x2, a tenth of the points unknown by chance: 0.2 and 0.8, and the other answer."""
+def test_indices_of_a_plane():
+    """y = x1 + 2 x2: 0.2 and 0.8; a third key changes nothing, surely."""
+    points = np.array(design("saltelli", 256, 3, 1))
+    found = saltelli_design(points).indices(points[:, 0] + 2 * points[:, 1], 50)
+    for order in ("first_order", "total_order"):
+        assert found[order] == pytest.approx([0.2, 0.8, 0.0], abs=0.03)
+        assert (found[f"{order}_low"] <= found[order]).all()
+        assert (found[f"{order}_high"] >= found[order]).all()
+        assert found[f"{order}_high"][2] == 0.0
+
+
+def test_failed_runs_do_not_bias_the_indices():
+    """A tenth of the points is unknown by chance."""
     points = np.array(design("saltelli", 512, 2, 1))
     values = points[:, 0] + 2.0 * points[:, 1]
     lost = np.random.default_rng(4).random(values.size) < 0.1
     found = sampled_effects([*points.T], np.where(lost, np.nan, values))
-    assert found.filled == lost.sum()
-    parts = saltelli_design(points)
-    assert found.dropped == 512 - parts.without(lost).a.size > 100
+    assert (found.kind, found.unknown, found.base) == ("saltelli", lost.sum(), 256)
     assert found.total == pytest.approx([0.2, 0.8], abs=0.04)
-    other = found.with_unknown
-    assert other.filled == lost.sum()
-    # a point at the median is off by what the strong key does: the weak one seems to do it
-    assert other.total[0] == pytest.approx(0.29, abs=0.02)
-    assert other.main[1] == pytest.approx(0.74, abs=0.02)
     whole = sampled_effects([*points.T], values)
-    assert (whole.dropped, whole.with_unknown) == (0, None)
+    assert (whole.unknown, whole.base) == (0, 0)
 
 
 def test_where_few_blocks_are_whole_ranks_remain():

@@ -34,7 +34,8 @@ INDICES = (
 )
 RANKS = (
     "Spearman's correlation of ranks of each metric with each key, and of words the correlation "
-    "ratio of ranks, with 95 % intervals. An effect that rises and falls again is not seen in it."
+    "ratio of ranks, of numbers with 95 % intervals. An effect that rises and falls again is not "
+    "seen in it."
 )
 
 
@@ -158,29 +159,16 @@ def ranking(sweep: PlottedSweep, found: Ranking, shown: Sequence[Measure]) -> st
     """Describe which axis matters for which of the metrics that are shown."""
     left = [measure.title for measure in shown if measure not in found]
     kind = next(iter(found.values())).kind
-    most = max(effects.filled for effects in found.values())
-    base = max(effects.base for effects in found.values())
-    stands = {
-        "grid": "count with the sum of their axes' main effects",
-        "rank": "are left out",
-    }
-    dropped = max(effects.dropped for effects in found.values())
-    blocks = (
-        f"Jobs without a value that is known within its error bar, up to {most} of a metric: the "
-        f"{dropped} blocks of the design that have one are left out whole; “with them” such jobs "
-        "have the median."
-    )
-    gaps = f"Points without a value that is known within its error bar, up to {most} of a metric, "
-    rows = (
-        f"Values of an axis at which nothing is known, up to {dropped} points of the grid, are "
-        "left out."
-    )
+    most = max(effects.unknown for effects in found.values())
+    bases = {effects.base for effects in found.values() if effects.base}
     return join_sentences(
         describe_ranking(sweep, found) + " In parentheses: the correlation." * (kind == "rank"),
         {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS}[kind],
-        f"They are of the first {base:,} points of the design's sequence." if base else "",
-        (blocks if kind == "saltelli" else gaps + f"{stands[kind]}.") if most else "",
-        rows if kind == "grid" and dropped else "",
+        f"They are of the first {min(bases):,} whole blocks of the design." if bases else "",
+        f"Points without a value that is known within its error bar, up to {most} of a metric, "
+        + ("count with the sum of their axes' main effects." if kind == "grid" else "are left out.")
+        if most
+        else "",
         "Not ranked, since too few values are known or all known ones are the same: "
         f"{'; '.join(left)}."
         if left

@@ -277,8 +277,6 @@ def describe_ranking(sweep: PlottedSweep, found: Ranking) -> str:
         if effects.total is None:
             group.append(f"{measure.title} ({strength})")
             continue
-        if effects.with_unknown is not None:
-            strength += f" ({share(strength_of_first(effects))} with them)"
         what = "that" if group else "the spread"
         group.append(f"{strength} of {what} of {measure.title}")
     verb = "explains" if any(one.total is not None for one in found.values()) else "matters most"
@@ -306,12 +304,6 @@ def reaches(effects: Effects, weaker: int, stronger: int) -> bool:
     low, high = ends[:, stronger]
     least = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
     return bool(abs(ends[:, weaker]).max() >= least)
-
-
-def strength_of_first(effects: Effects) -> float:
-    """Return the strength of the strongest axis where unknown points have the median."""
-    other = effects.with_unknown
-    return math.nan if other is None else float(other.strength[order_of(effects)[0]])
 
 
 def describe_strength(effects: Effects) -> str:
