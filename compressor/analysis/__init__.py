@@ -1,16 +1,18 @@
 """What runs mean, and what the paper says of them."""
 
 from compressor.analysis.cam import Cam, comparisons
-from compressor.analysis.captions import caption, diagnosis_caption
 from compressor.analysis.claims import RULES, Claim, claim_margins, claims
 from compressor.analysis.contacts import (
     MODES,
     OILED_MODES,
+    UNKNOWN,
     angle_modes,
+    contact_modes,
     impacts,
     joints_with_clearance,
+    mode_shares,
 )
-from compressor.analysis.cycle import read_cycle, read_loads
+from compressor.analysis.cycle import Cycle, read_cycle, read_loads
 from compressor.analysis.cylinder import cylinder_words, end_states
 from compressor.analysis.effects import (
     Effects,
@@ -20,12 +22,7 @@ from compressor.analysis.effects import (
 )
 from compressor.analysis.machine_numbers import describe_cases, describe_machine
 from compressor.analysis.margins import mean_peak
-from compressor.analysis.plot_captions import (
-    PLOT_CAPTIONS,
-    SweptRow,
-    row_modes_words,
-    rows_modes,
-)
+from compressor.analysis.orbit import orbit
 from compressor.analysis.runs import (
     CLEARANCES,
     FAULTS,
@@ -33,14 +30,19 @@ from compressor.analysis.runs import (
     SPOKEN,
     case_of,
     cases_of,
+    faulty_joints,
     force_relation,
+    ideal_motion,
     label,
+    load_corners,
     load_phases,
     paper_cases,
     settled_part,
     settled_revolutions,
 )
 from compressor.analysis.shaking import (
+    AFTER,
+    BEFORE,
     ORDER,
     NoSeriesError,
     Shaking,

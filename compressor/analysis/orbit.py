@@ -1,7 +1,6 @@
-"""The journal's orbit in its clearance circle, and how it moves there."""
+"""The journal's orbit in its clearance circle, and where its force turns."""
 
 import itertools
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,54 +11,12 @@ from compressor.analysis.contacts import (
     flights,
     joints_with_clearance,
 )
-from compressor.analysis.runs import case_of, ideal_motion, settled_part
+from compressor.analysis.runs import settled_part
 
 if TYPE_CHECKING:
     import xarray as xr
 
 SAME_TURN_DEGREES = 20.0  # degrees: changes of sign nearer to each other are one turn
-AFTER, SPAN = 5.0, 90.0  # degrees after a turn, and how long its ringing is looked at
-PADDED = 16  # times longer with zeros, so that the lines of its spectrum lie close
-DRIFT = 5  # degree of the polynomial that is taken off what rings
-MIN_RING = 12.0  # of the crank's frequency: below it a motion is the machine's
-
-
-@dataclass(frozen=True)
-class JournalMotion:
-    """A journal's motion in its bearing after settling.
-
-    `gap_fraction`: share of time without contact; `least`: least penetration (m) of the samples,
-    negative where there is a gap; `laps`: how often the journal goes round its bearing in a
-    revolution, counter-clockwise positive; `turns`: crank angles (degrees) at which the horizontal
-    force changes its sign; `rings` (Hz): the strongest frequency of the acceleration's deviation
-    from the ideal motion after the first of them, nan where nothing turns.
-    """
-
-    joint: str
-    gap_fraction: float
-    least: float
-    laps: float
-    turns: tuple[float, ...]
-    rings: float
-
-
-def course(run: "xr.Dataset", joint: str) -> JournalMotion:
-    """Return the course of a joint with clearance, from a run with time series."""
-    settled = settled_part(run)
-    angle = np.degrees(settled["crank_angle"].values)
-    place = settled["eccentricity"].sel(joint=joint).values
-    contact = np.unwrap(np.arctan2(place[:, 1], place[:, 0]))
-    depth = settled["penetration"].sel(joint=joint).values
-    force = settled["contact_force"].sel(joint=joint, axis="x").values
-    turns = turning_points(angle, force)
-    return JournalMotion(
-        joint,
-        float(run["contact_loss_fraction"].sel(joint=joint)),
-        float(depth.min()),
-        float((contact[-1] - contact[0]) / np.radians(angle[-1] - angle[0])),
-        turns,
-        ringing(settled, turns[0]) if turns else float("nan"),
-    )
 
 
 def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
@@ -79,31 +36,6 @@ def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
     if len(groups) > 1 and groups[0][0] + 360.0 - groups[-1][-1] <= SAME_TURN_DEGREES:
         groups[0] = [one - 360.0 for one in groups.pop()] + groups[0]
     return tuple(sorted(float(np.mean(group)) % 360.0 for group in groups))
-
-
-def ringing(settled: "xr.Dataset", turn: float) -> float:
-    """Return the strongest frequency (Hz) in the acceleration after a turn (degrees).
-
-    Of the deviation from the ideal acceleration, without its slow drift; nan where the samples
-    are too few or no line is above order `MIN_RING`.
-    """
-    from scipy.signal import find_peaks, periodogram
-
-    angle = np.degrees(settled["crank_angle"].values)
-    begin = angle[0] + (turn + AFTER - angle[0]) % 360.0
-    inside = (angle >= begin) & (angle < begin + SPAN)
-    rest = (settled["acceleration"].values - ideal_motion(settled)[2])[inside]
-    if rest.size < 2 * DRIFT:
-        return float("nan")
-    count = np.linspace(-1.0, 1.0, rest.size)
-    rest = rest - np.polyval(np.polyfit(count, rest, DRIFT), count)
-    time = settled["time"].values
-    rate = 1.0 / (time[1] - time[0])
-    padding = {"nfft": PADDED * rest.size, "detrend": False}
-    frequency, power = periodogram(rest, rate, np.hanning(rest.size), **padding)
-    lines, _ = find_peaks(power)  # an end of the spectrum is no line, but a slower motion's foot
-    lines = lines[frequency[lines] >= MIN_RING * case_of(settled).omega / (2.0 * np.pi)]
-    return float(frequency[lines[np.argmax(power[lines])]]) if lines.size else float("nan")
 
 
 SERIES = {  # over time and joint: unit, long name

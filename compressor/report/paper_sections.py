@@ -4,7 +4,7 @@ import math
 import shlex
 import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -17,26 +17,18 @@ from compressor.analysis import (
     SPOKEN,
     Claim,
     Shaking,
-    caption,
     cases_of,
     claims,
     comparisons,
-    diagnosis_caption,
     label,
     paper_cases,
     settled_part,
-    shaking,
 )
 from compressor.cases import Case
 from compressor.report.answer import last_case
-from compressor.report.figures import FIGURES, Drawing
-from compressor.report.figures.diagnosis import (
-    Shakings,
-    draw_diagnosis_angles,
-    draw_diagnosis_orbits,
-    draw_diagnosis_spectra,
-)
+from compressor.report.figures import FIGURES, Shakings, measure_shaking
 from compressor.report.figures.sweep_data import MEASURES, measures
+from compressor.report.figures.table import Kind
 from compressor.report.page import (
     Cell,
     PageTable,
@@ -150,6 +142,7 @@ def case_files(labels: Collection[str]) -> dict[str, str]:
     return files
 
 
+PAPER = FIGURES["paper"]
 REVOLUTION_ROUNDING = 1e-6  # revolutions: rounding of a whole one
 UNEQUAL = "whose runs do not settle at one crank angle, with fine samples of a whole revolution"
 
@@ -174,16 +167,14 @@ def own_figures(stored: Stored, study: StoredStudy) -> OwnFigures:
     case = last_case(stored, study)
     runs = find_runs(stored, [study], cases_of(case)).usable if case else {}
     alike = comparable(runs.values())
+    lacking = [one for one in PAPER.values() if not runs.keys() >= {*one.needs}]
     plates = [
-        Plate(file_name(study.name, f"figure-{item.number:02d}"),
-              f"Figure {item.number} of {study.name}: {item.title}",
-              caption(item.number, runs), item.draw(runs))
-        for item in FIGURES if alike and runs.keys() >= {*item.needs}
+        replace(plate, name=file_name(study.name, plate.name),
+                heading=f"{study.name}: {plate.heading}")
+        for plate in (draw_paper(runs) if alike else ())
     ]  # fmt: skip
-    lacking = [str(item.number) for item in FIGURES if not runs.keys() >= {*item.needs}]
-    why = f", but not Figures {', '.join(lacking)}, whose cases are not among its jobs" * bool(
-        lacking
-    )
+    numbers = ", ".join(one.title.partition(":")[0].removeprefix("Figure ") for one in lacking)
+    why = f", but not Figures {numbers}, whose cases are not among its jobs" * bool(lacking)
     text = f"The paper's figures and claims are drawn of this machine{why}"
     if not plates:
         text = (
@@ -306,11 +297,11 @@ def printed_table() -> PageTable:
 def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
     """Yield the figures that could not be drawn, what they lack, and how to get it."""
     lacking = {
-        f"Figure {item.number}, {item.title}": [name for name in item.needs if name in paper.absent]
-        for item in FIGURES
+        item.title: [name for name in item.needs if name in paper.absent] for item in PAPER.values()
     }
     figures = [
-        f"{title}: " + "; ".join(f"{label_in_words(name)} ({paper.absent[name]})" for name in names)
+        f"{title} needs "
+        + "; ".join(f"{label_in_words(name)} ({paper.absent[name]})" for name in names)
         for title, names in lacking.items()
         if names
     ]
@@ -323,12 +314,14 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
     yield Section("missing", "Figures that could not be drawn", "missing.html", content)
 
 
-NEEDS = ("design", *(label(fault, c) for fault in FAULTS for c in CLEARANCES))
-TITLES = {
-    "spectra": "Diagnosis 1: orders of the force on the frame",
-    "orbits": "Diagnosis 2: orbits of the journals",
-    "angles": "Diagnosis 3: when the frame shakes, and the contact modes",
-}
+def draw_paper(runs: Mapping[str, xr.Dataset], kind: Kind = "paper") -> list[Plate]:
+    """Return every figure of the paper, or of the diagnosis, whose cases are there."""
+    plates = []
+    for one in FIGURES[kind].values():
+        if runs.keys() >= {*one.needs}:
+            shown = one.make(runs)
+            plates.append(Plate(one.name, one.title, shown.caption, shown.drawing))
+    return plates
 
 
 @dataclass(frozen=True)
@@ -340,33 +333,10 @@ class DiagnosisContent:
     plates: list[Plate]
 
 
-def shakings(paper: PaperRuns) -> Shakings:
-    """Return `shaking` of the healthy machine and all faults; empty unless all are stored."""
-    if not paper.usable.keys() >= {*NEEDS}:
-        return {}
-    return {name: shaking(paper.usable[name]) for name in NEEDS}
-
-
-def diagnosis_drawings(
-    found: Shakings, paper: PaperRuns
-) -> Iterator[tuple[str, str, str, Drawing]]:
-    """Yield the names, headings, captions and drawings, where there are `shakings`."""
-    if not found:
-        return
-    drawings = {
-        "spectra": draw_diagnosis_spectra(found),
-        "orbits": draw_diagnosis_orbits(paper.usable),
-        "angles": draw_diagnosis_angles(found, paper.usable),
-    }
-    for name, drawing in drawings.items():
-        caption = diagnosis_caption(name, found, paper.usable)
-        yield f"diagnosis-{name}", TITLES[name], caption, drawing
-
-
-def diagnosis_sections(found: Shakings, plates: list[Plate]) -> Iterator[Section]:
+def diagnosis_sections(runs: Mapping[str, xr.Dataset], plates: list[Plate]) -> Iterator[Section]:
     """Yield the section of the figures that were drawn, and a table of the force above `ORDER`."""
     if plates:
-        content = DiagnosisContent(ORDER, force_table(found), plates)
+        content = DiagnosisContent(ORDER, force_table(measure_shaking(runs)), plates)
         yield Section("diagnosis", "Diagnosis", "diagnosis.html", content)
 
 

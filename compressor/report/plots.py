@@ -10,10 +10,8 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import (
-    PLOT_CAPTIONS,
     SPOKEN,
     NoSeriesError,
-    SweptRow,
     angle_modes,
     case_of,
     healthy_twin,
@@ -25,21 +23,7 @@ from compressor.cases import points, row_of, with_ideal_joints
 from compressor.metrics import JOINTS
 from compressor.program import CompsimError
 from compressor.reasons import remedy
-from compressor.report.figures import Drawing
-from compressor.report.figures.job import (
-    draw_analyst,
-    draw_cards,
-    draw_cycles,
-    draw_impacts,
-    draw_loads,
-    draw_map,
-    draw_modes,
-    draw_orbits,
-    draw_segments,
-    draw_signals,
-    draw_spectra,
-    draw_waterfall,
-)
+from compressor.report.figures import FIGURES, Drawing, SweptRow
 from compressor.report.figures.pictures import render
 from compressor.report.figures.plant_units import in_units
 from compressor.report.figures.sweep_data import name_in_words
@@ -121,32 +105,7 @@ def publish_drawings(
         yield Plotted(path, caption)
 
 
-JOB, STUDY = PLOT_CAPTIONS["job"], PLOT_CAPTIONS["study"]
-OF_CONTACT = {"orbits": draw_orbits, "modes": draw_modes, "impacts": draw_impacts}
-BESIDE_TWIN = {
-    "analyst": draw_analyst, "loads": draw_loads, "signals": draw_signals, "cards": draw_cards,
-    "spectra": draw_spectra,
-}  # fmt: skip
-OVER_AXIS = {
-    "cycles": draw_cycles,
-    "segments": draw_segments,
-    "waterfall": draw_waterfall,
-    "map": draw_map,
-}
-TITLES = {
-    "analyst": "a revolution as an analyst reads it",
-    "loads": "gas load, inertia and rod load over crank angle",
-    "signals": "acceleration, forces and torque over crank angle",
-    "cards": "indicator cards",
-    "spectra": "order spectra",
-    "orbits": "orbits of the journals",
-    "modes": "contact modes over crank angle",
-    "impacts": "contacts that begin, over crank angle",
-    "cycles": "vibration over crank angle",
-    "segments": "vibration in segments of 10°",
-    "waterfall": "order spectra of the force on the frame along the cylinder",
-    "map": "most frequent contact mode over crank angle",
-}
+JOB, STUDY = FIGURES["job"], FIGURES["study"]
 JOINT_WORDS = {
     "none": "no clearance", "both": "clearance at both joints",
     **{joint: f"clearance at the {SPOKEN[joint]}" for joint in JOINTS},
@@ -189,27 +148,26 @@ def job_figures(
         raise PlotError(f"{key} is one job: --over, --at and --limit are for studies")
     run = drawable(stored, studies, key)
     try:
-        worn = joints_with_clearance(run)
+        worn = bool(joints_with_clearance(run))
     except ValueError:
-        worn = {}
-    for name in (one for one in figures if one in OF_CONTACT and choice.what and not worn):
-        raise PlotError(f"job {key} has ideal joints, so that there is no figure {name!r} of it")
+        worn = False
+    has = {"clearance": worn, "gas": case_of(run).load == "gas"}
+    why = {
+        "clearance": "has ideal joints",
+        "gas": "has no gas in its cylinder: cards are of load: gas",
+    }
+    for name in choice.what:
+        for lack in (need for need in JOB[name].needs if not has[need]):
+            raise PlotError(f"job {key} {why[lack]}, so that there is no figure {name!r} of it")
     twins: dict[str, xr.Dataset | None] = dict.fromkeys(figures, whole_twin(run) if worn else None)
     if worn and "analyst" in figures and "sensor_acceleration" in run:
         twins["analyst"] = whole_twin(run, sensed=True)
-    has_gas = case_of(run).load == "gas"
-    if "cards" in choice.what and not has_gas:
-        raise PlotError(f"job {key} has no gas in its cylinder: cards are of load: gas")
     try:
         for name in figures:
-            if (name in OF_CONTACT and not worn) or (name == "cards" and not has_gas):
-                continue
-            if name in OF_CONTACT:
-                drawing = OF_CONTACT[name](run)
-            else:
-                drawing = BESIDE_TWIN[name](run, twins[name])
-            drawing.title = job_title(studies, key, name)
-            yield name, JOB[name](run, twins[name]), drawing
+            if all(has[need] for need in JOB[name].needs):
+                shown = JOB[name].make(run, twins[name])
+                shown.drawing.title = job_title(studies, key, JOB[name].title)
+                yield name, shown.caption, shown.drawing
     except NoSeriesError as error:
         raise PlotError(f"job {key}: {error}") from error
 
@@ -262,10 +220,10 @@ def study_figures(
             if choice.what:
                 raise PlotError(f"no joint of {study.name} has clearance: there is no mode map")
             continue
-        shown = keep_sensed(rows) if name == "cycles" else rows
-        drawing = OVER_AXIS[name](shown, axis_words(over))
-        drawing.title = study_title(study, name, where)
-        yield name, STUDY[name](shown, over) + where, drawing
+        kept = keep_sensed(rows) if name == "cycles" else rows
+        shown = STUDY[name].make(kept, axis_words(over))
+        shown.drawing.title = study_title(study, STUDY[name].title, where)
+        yield name, shown.caption + where, shown.drawing
 
 
 def whole_twin(run: xr.Dataset, sensed: bool = False) -> xr.Dataset | None:
@@ -274,19 +232,17 @@ def whole_twin(run: xr.Dataset, sensed: bool = False) -> xr.Dataset | None:
     return twin if twin["status"].item() == "ok" else None
 
 
-def job_title(studies: Sequence[StoredStudy], key: str, name: str) -> str:
+def job_title(studies: Sequence[StoredStudy], key: str, what: str) -> str:
     """Return the title of a job's figure: its study, what is drawn, its place in the sweep."""
     for study in studies:
         if key in study.keys:
             point = [*points(study)][study.keys.index(key)]
             values = [f"{axis} {format_swept_value(value)}" for axis, value in point.items()]
-            return title_figure(
-                study.title or study.name, TITLES[name], [*values, f"job {key[:10]}"]
-            )
-    return in_lines(TITLES[name], [f"job {key[:10]}"])
+            return title_figure(study.title or study.name, what, [*values, f"job {key[:10]}"])
+    return in_lines(what, [f"job {key[:10]}"])
 
 
-def study_title(study: StoredStudy, name: str, where: str) -> str:
+def study_title(study: StoredStudy, what: str, where: str) -> str:
     """Return the title of a study's figure: what is drawn, which joints are worn, the speed."""
     swept = {axis.key for axis in study.axes}
     parts = []
@@ -296,7 +252,7 @@ def study_title(study: StoredStudy, name: str, where: str) -> str:
         parts.append(f"{study.fixed['machine']['speed_rpm']:g} rpm")
     said = where.strip().removesuffix(".").split(". ")
     parts += [part.removeprefix("Here ") for part in said if part]
-    return title_figure(study.title or study.name, TITLES[name], parts)
+    return title_figure(study.title or study.name, what, parts)
 
 
 def title_figure(machine: str, what: str, parts: Sequence[str] = ()) -> str:
@@ -388,20 +344,21 @@ def page_figures(stored: Stored, study: StoredStudy) -> Iterator[tuple[str, str,
         return
     if len(known) > 1:
         title = f"vibration over crank angle and {axis_words(over)}"
-        drawing = draw_cycles(rows, axis_words(over))
-        yield "cycles", title, STUDY["cycles"](rows, over) + drawn, drawing
+        shown = STUDY["cycles"].make(rows, axis_words(over))
+        yield "cycles", title, shown.caption + drawn, shown.drawing
     loudest = max(known, key=lambda n: np.abs(known[n].vibration).max())
     run = stored.job(jobs[loudest][1])
     case = case_of(run)
     is_worn = case.joint != "none"
     twin = whole_twin(run, sensed="sensor_acceleration" in run) if is_worn else None
     value = f"{over} {rows[loudest].value}" if jobs[loudest][0] != "" else rows[loudest].value
-    title = f"a revolution as an analyst reads it, {value}"
+    shown = JOB["analyst"].make(run, twin)
+    title = f"{JOB['analyst'].title}, {value}"
     note = " It is the job with the greatest vibration of these." if len(known) > 1 else ""
-    yield "analyst", title, JOB["analyst"](run, twin) + note + drawn, draw_analyst(run, twin)
+    yield "analyst", title, shown.caption + note + drawn, shown.drawing
     if case.load == "gas":
-        title = f"indicator cards, {value}"
-        yield "cards", title, JOB["cards"](run, twin) + where, draw_cards(run, twin)
+        shown, title = JOB["cards"].make(run, twin), f"{JOB['cards'].title}, {value}"
+        yield "cards", title, shown.caption + where, shown.drawing
 
 
 def keep_sensed(rows: Sequence[SweptRow]) -> list[SweptRow]:

@@ -9,13 +9,13 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import chain, product
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
 import xarray as xr
 
-from compressor.analysis import Claim, caption, claims
+from compressor.analysis import Claim, claims
 from compressor.outcome import Regime
 from compressor.report.answer import (
     FirstScreen,
@@ -51,10 +51,9 @@ from compressor.report.page import (
     document,
 )
 from compressor.report.paper_sections import (
-    TITLES,
     PaperRuns,
-    diagnosis_drawings,
     diagnosis_sections,
+    draw_paper,
     find_paper_runs,
     is_of_paper,
     label_in_words,
@@ -62,7 +61,6 @@ from compressor.report.paper_sections import (
     own_figures,
     paper_sections,
     repeats_paper,
-    shakings,
 )
 from compressor.report.plots import page_figures
 from compressor.report.study_section import (
@@ -167,13 +165,12 @@ def build_report(
     papers = [study for study in studies if is_of_paper(stored, study)]
     if not papers:
         paper = PaperRuns({}, {}, {})  # a few like runs in a sweep of one's own are no reproduction
-    of_paper = plates_in(draw_paper(paper), units)
+    of_paper = plates_in(draw_paper(paper.usable), units)
     of_own = {one.name: own_figures(stored, one) for one in studies if one.figures}
     of_own = {
         name: replace(one, plates=plates_in(one.plates, units)) for name, one in of_own.items()
     }
-    found = shakings(paper)
-    of_faults = plates_in([Plate(*parts) for parts in diagnosis_drawings(found, paper)], units)
+    of_faults = plates_in(draw_paper(paper.usable, "diagnosis"), units)
     own = [study for study in studies if not repeats_paper(study, paper)]
     added = [one(results, studies) for one in add]
     drawn = [
@@ -198,7 +195,7 @@ def build_report(
         *(one.figures for one in drawn),
         *figures,
         *chain(*(one.sections for one in of_own.values())),
-        *diagnosis_sections(found, of_faults),
+        *diagnosis_sections(paper.usable, of_faults),
         *(chapter.section for chapter in chapters),
         *(one.table for one in drawn),
         *tables,
@@ -321,25 +318,11 @@ def summarise(
 def remove_stale(report: Path, contents: ReportContent) -> None:
     """Remove what an earlier report drew and this one did not: the paper's figures, and series."""
     plates = {plate.name for plate in contents.plates}
-    names = {f"figure-{item.number:02d}" for item in FIGURES}
-    names |= {
-        file_name(study, f"figure-{item.number:02d}")
-        for study, item in product(contents.studies, FIGURES)
-    }
-    names = (names | {f"diagnosis-{name}" for name in TITLES}) - plates
+    own = (file_name(study, name) for study in contents.studies for name in FIGURES["paper"])
+    names = {*FIGURES["paper"], *FIGURES["diagnosis"], *own} - plates
     stale = [report / f"{name}.{kind}" for name in names for kind in KINDS]
     scripts = {f"{series_name(key)}.js" for key in contents.series}
     stale += [path for path in report.glob(f"{series_name('*')}.js") if path.name not in scripts]
     for path in stale:
         with contextlib.suppress(OSError):
             path.unlink()
-
-
-def draw_paper(paper: PaperRuns) -> list[Plate]:
-    """Return every figure of the paper whose cases are there."""
-    return [
-        Plate(f"figure-{item.number:02d}", f"Figure {item.number}: {item.title}",
-              caption(item.number, paper.usable), item.draw(paper.usable))
-        for item in FIGURES
-        if paper.usable.keys() >= {*item.needs}
-    ]  # fmt: skip

@@ -8,12 +8,13 @@ import xarray as xr
 
 from compressor.analysis.contacts import impacts
 from compressor.analysis.cycle import _reversals, read_cycle, read_loads
-from compressor.analysis.plot_captions import PLOT_CAPTIONS, SweptRow
 from compressor.analysis.runs import record_of
 from compressor.analysis.shaking import NoSeriesError, frame_forces, healthy_twin
 from compressor.cases.case import Case
 from compressor.report.figures.drawing import as_csv
-from compressor.report.figures.job import draw_analyst, draw_segments, split_events
+from compressor.report.figures.job import draw_analyst, split_events
+from compressor.report.figures.rows import SweptRow, draw_segments, number_segments
+from compressor.report.figures.table import spell
 from compressor.solve.simulate import simulate
 
 SOLVE = {"duration_rev": 3, "settle_rev": 1, "accuracy": "draft", "error_bars": False}
@@ -142,25 +143,27 @@ def test_the_twin_has_the_same_sensor(sensed):
 
 def test_the_caption_has_the_numbers(sensed):
     twin = healthy_twin(sensed, sensed=True)
-    told = PLOT_CAPTIONS["job"]["analyst"](sensed, twin)
+    found = draw_analyst(sensed, twin)
+    told = dict(found.numbers)
     record = sensed["sensor_acceleration"].values[3072:]
     peak, at = np.abs(record).max(), 360 * np.abs(record).argmax() / 3072
     ideal = np.abs(twin["sensor_acceleration"].values[3072:]).max()
-    rms = math.sqrt(np.mean(record**2))
-    assert (
-        f"(guide, along y) reaches {peak:.3g} m/s² ({peak / 9.80665:.3g} g) at {at:.0f}°, rms "
-        f"{rms:.3g} m/s²; without clearance it reaches {ideal:.3g} m/s²."
-    ) in told
+    assert "record of the sensor: guide, along y" in found.sentence
+    words = f"{spell(peak)} m/s² ({spell(peak / 9.80665)} g) at {at:.0f}°"
+    assert told["greatest acceleration"] == words
+    assert told["rms"] == spell(math.sqrt(np.mean(record**2)), "m/s²")
+    assert told["greatest without clearance"] == spell(ideal, "m/s²")
     load = frame_forces(sensed)["rod_load"][2400:3601] / 1e3
-    assert f"goes from {load.min():.2f} to {load.max():.2f} kN and changes its side at " in told
-    assert "Valves: discharge closes at 0°, suction opens at 39°, suction closes at 180°, " in told
-    assert f"at the big end: at {read_cycle(sensed).struck['big_end'][0]:.0f}°" in told
+    assert told["rod load"] == f"{spell(load.min())} to {spell(load.max())} kN"
+    assert told["events"].startswith("discharge closes at 0°, suction opens at 39°, suction closes")
+    first = read_cycle(sensed).struck["big_end"][0]
+    assert told["impacts at the big end"].startswith(f"{first:.0f}°")
     quiet = run(joint="none", clearance_mm=0, load="none", contact={}, machine={"speed_rpm": 60})
-    assert "Impacts" not in PLOT_CAPTIONS["job"]["analyst"](quiet, None)
+    assert "impacts" not in draw_analyst(quiet, None).caption
 
 
 def test_all_that_is_marked_is_in_the_table(sensed):
-    drawing = draw_analyst(sensed, healthy_twin(sensed, sensed=True))
+    drawing = draw_analyst(sensed, healthy_twin(sensed, sensed=True)).drawing
     found = read_cycle(sensed)
     strip, vibration, load = drawing.panels
     lanes = ["suction", "discharge", "impacts, big end", "reversals"]
@@ -201,18 +204,21 @@ def test_segments_over_their_limits_are_told():
         rows.append(SweptRow(value).with_segments(run, np.full(36, 3.0), (2.0, True)))
     assert [row.segments.over_limit.nonzero()[0].tolist() for row in rows] == [[], [32], [8, 32]]
     assert [row.segments.doubtful.nonzero()[0].tolist() for row in rows] == [[], [8], []]
-    told = PLOT_CAPTIONS["study"]["segments"](rows, "clearance_mm")
-    assert "greatest rms is 9.5 m/s², 320 to 330° at 0.3, 3.17 times that without" in told
-    assert (
-        "The first over its limit of 6 m/s² is 320 to 330° at 0.2, by 7 m/s²; over theirs are 1 "
-        "segment there and 2 at 0.3."
-    ) in told
+    told = dict(number_segments(rows))
+    assert told["greatest rms"] == (
+        "9.5 m/s² in 320 to 330° at 0.3, 3.167 times that without clearance"
+    )
+    assert told["segments over their limit"] == "0 at 0.1, 1 and perhaps 1 at 0.2, 2 at 0.3"
+    assert told["the first over it"] == "320 to 330° at 0.2, 7 m/s² over a limit of 6 m/s²"
     fixed = [row.with_segments(run, np.full(36, 3.0), (9.495, False)) for row in rows]
-    told = PLOT_CAPTIONS["study"]["segments"](fixed, "clearance_mm")
-    assert "No segment is over its limit; within error bars in 3 rows." in told
+    told = dict(number_segments(fixed))
+    assert told["segments over their limit"] == ", ".join(
+        f"0 and perhaps 1 at 0.{n}" for n in (1, 2, 3)
+    )
+    assert "the first over it" not in told
     free = [row.with_segments(run, np.full(36, 3.0), None) for row in rows]
-    assert "limit" not in PLOT_CAPTIONS["study"]["segments"](free, "clearance_mm")
-    drawing = draw_segments(rows, "clearance_mm")
+    assert [*dict(number_segments(free))] == ["greatest rms"]
+    drawing = draw_segments(rows, "clearance_mm").drawing
     over, doubtful = drawing.legend
     assert (over.name, over.x.tolist(), over.y.tolist()) == (
         "over its limit", [325.0, 85.0, 325.0], [1.0, 2.0, 2.0],

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bouncing import CLEARANCE, FLIGHT, SPEED, TURN, bounce, pressed, run_of, times
 
-from compressor.analysis.orbit import NUMBERS, SERIES, course, orbit
+from compressor.analysis.orbit import NUMBERS, SERIES, orbit
 
 
 def test_the_orbit_of_a_known_motion():
@@ -44,7 +44,8 @@ def test_the_paper_s_orbits_stay_on_the_wall(paper_runs, label):
     assert not found["leaves_wall"].any()
     assert (found["least_ratio"] > 1).all()
     for joint in found["joint"].values:
-        assert float(found["laps"].sel(joint=joint)) == pytest.approx(course(run, joint).laps)
+        way = 1.0 if joint == "big_end" else -1.0  # round the bearing once a revolution
+        assert float(found["laps"].sel(joint=joint)) == pytest.approx(way, abs=0.01)
 
 
 def test_an_orbit_needs_series_and_clearance(paper_runs):

@@ -16,7 +16,7 @@ from compressor.report.figures import FIGURES, curves, pictures, style
 from compressor.report.figures.paper import MOTION
 from compressor.solve.si_record import record
 
-FIGURE = {figure.number: figure for figure in FIGURES}
+FIGURE = {int(name[-2:]): figure for name, figure in FIGURES["paper"].items()}
 SETTLED = slice(1200, None)  # 0.3 degrees a sample: the first revolution is start-up
 LAST = slice(-1201, None)  # the last revolution, both ends
 SIZES = ("0.1", "0.2", "0.3")
@@ -27,7 +27,7 @@ JOINTS = {9: ("big_end", "big_end"), 12: ("small_end", "small_end"),
 @pytest.fixture(scope="module")
 def drawn(paper_runs):
     """All figures of the paper by number."""
-    return {number: figure.draw(paper_runs) for number, figure in FIGURE.items()}
+    return {number: figure.make(paper_runs).drawing for number, figure in FIGURE.items()}
 
 
 def lines(panel):
@@ -68,9 +68,8 @@ def responses(fault):
 
 
 def test_the_registry_has_the_papers_figures():
-    numbers = [figure.number for figure in FIGURES]
-    assert numbers[:13] == [3, 4, *range(6, 17)]
-    assert numbers == sorted(set(numbers))
+    assert [*FIGURE][:13] == [3, 4, *range(6, 17)]
+    assert [*FIGURE] == sorted(FIGURE)
 
 
 @pytest.mark.parametrize("number", FIGURE)
@@ -81,8 +80,8 @@ def test_figures_are_described(number):
 
 
 def test_needs_are_all_that_is_read(paper_runs):
-    for figure in FIGURES:
-        figure.draw({name: paper_runs[name] for name in figure.needs})
+    for figure in FIGURE.values():
+        figure.make({name: paper_runs[name] for name in figure.needs})
 
 
 # ---- lines ------------------------------------------------------------------------------------
@@ -321,10 +320,10 @@ def test_legends_cover_no_panel_and_nothing_warns(drawn, number, caplog):
 def test_a_users_settings_neither_matter_nor_change(paper_runs):
     with matplotlib.rc_context({"axes.facecolor": "red", "font.size": 30.0, "axes.grid": False}):
         before = dict(matplotlib.rcParams)
-        figure = FIGURE[7].draw(paper_runs)
+        figure = FIGURE[7].make(paper_runs).drawing
         mine = pictures.render(figure, "svg")
         assert dict(matplotlib.rcParams) == before
-    assert mine == pictures.render(FIGURE[7].draw(paper_runs), "svg")
+    assert mine == pictures.render(FIGURE[7].make(paper_runs).drawing, "svg")
 
 
 def test_rendered_files_are_what_they_are_called(drawn):

@@ -22,7 +22,8 @@ from compressor.cases.load import load_cases, load_studies
 from compressor.reasons import Reason
 from compressor.report import page
 from compressor.report.figures import FIGURES, pictures
-from compressor.report.paper_sections import TITLES, find_paper_runs, paper_candidates
+from compressor.report.figures.table import spell
+from compressor.report.paper_sections import find_paper_runs, paper_candidates
 from compressor.report.report import KINDS, write_report
 from compressor.store.caveats import study_caveats
 from compressor.store.files import StoreError, StoreWarning
@@ -151,16 +152,15 @@ def replace_jobs(folder, *jobs):
 
 
 def test_every_figure_is_drawn_and_shown(full):
-    numbers = [figure.number for figure in FIGURES]
-    names = {f"figure-{n:02d}.{kind}" for n in numbers for kind in KINDS}
-    more = {f"diagnosis-{name}.{kind}" for name in TITLES for kind in KINDS}
+    figures = FIGURES["paper"] | FIGURES["diagnosis"]
+    names = {f"{name}.{kind}" for name in figures for kind in KINDS}
     beside = {"index.html", "plotly.min.js"}
-    assert {path.name for path in full.iterdir()} == names | more | beside
+    assert {path.name for path in full.iterdir()} == names | beside
     found = read(full)
-    assert len(found.sources) == len(numbers) + len(TITLES)
-    for number in numbers:
-        assert f"Figure {number}:" in found.text
-        assert f"figure-{number:02d}" in found.ids
+    assert [name for name in found.ids if name in figures] == [*figures]
+    assert len(found.sources) == len(figures)
+    for figure in figures.values():
+        assert figure.title in found.text
 
 
 def test_every_csv_has_the_curves_of_its_figure(full):
@@ -276,12 +276,14 @@ def test_missing_cases_are_named_with_what_gives_them(paper_store, tmp_path):
     (tmp_path / "out" / "figure-09.csv").write_text("an earlier report's")
     write_report(part, tmp_path / "out")
     assert {p.name for p in (tmp_path / "out").glob("figure-*.png")} == {
-        f"figure-{one.number:02d}.png" for one in FIGURES if {*one.needs} <= {"design", "typical"}
+        f"{name}.png"
+        for name, one in FIGURES["paper"].items()
+        if {*one.needs} <= {"design", "typical"}
     }
     assert not (tmp_path / "out" / "figure-09.csv").exists()
     found = read(tmp_path / "out")
-    assert "Figure 9, Contact force at the big end: big end, 0.2 mm (not stored)" in found.text
-    assert "Figure 7, " not in found.text
+    assert "Figure 9: Contact force at the big end needs big end, 0.2 mm (not stored)" in found.text
+    assert "typical model needs" not in found.text
     raw = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     *files, command = re.findall("<pre>(.*?)</pre>", raw, re.DOTALL)
     paths = []
@@ -431,9 +433,10 @@ def test_a_sweep_is_drawn_over_the_crank_angle(tmp_path):
             _, last = last_revolution(run)
             peaks[clearance] = np.abs(last["acceleration"].values).max()
     assert peaks[0.1] < peaks[0.2]
-    assert f"it is least, {peaks[0.1]:.3g} m/s², at 0.1, and greatest, " in text
+    ends = [f"{spell(peak)} m/s² at {clearance}" for clearance, peak in peaks.items()]
+    assert f"Greatest magnitude: least {ends[0]}, greatest {ends[1]};" in text
     assert "own: a revolution as an analyst reads it, clearance_mm 0.2" in text
-    assert f"acceleration of the crosshead reaches {peaks[0.2]:.3g} m/s² (" in text
+    assert f"Greatest acceleration: {spell(peaks[0.2])} m/s² (" in text
     assert "It is the job with the greatest vibration of these. Here machine.rod_mass_kg 3." in text
     damage_series(own, study.keys[2])
     write_report(own, tmp_path / "out")

@@ -6,19 +6,22 @@ from dataclasses import replace
 import numpy as np
 
 from compressor.analysis import (
+    AFTER,
+    BEFORE,
     CLEARANCES,
     FAULTS,
     ORDER,
     SPOKEN,
     Shaking,
-    SweptRow,
     angle_modes,
+    contact_modes,
     label,
-    rows_modes,
+    mode_shares,
+    orbit,
+    shaking,
 )
 from compressor.report.figures.curves import ANGLE_AXIS, Runs
 from compressor.report.figures.drawing import (
-    Drawing,
     Note,
     Panel,
     band,
@@ -30,11 +33,13 @@ from compressor.report.figures.job import (
     ORDERS_AXIS,
     mode_entries,
     plot_lines,
-    plot_modes,
     plot_orbit,
     share_turn,
 )
+from compressor.report.figures.paper import AT, sizes
+from compressor.report.figures.rows import SweptRow, plot_modes, rows_modes
 from compressor.report.figures.style import BLUE, BY_CLEARANCE, GOLD, IDEAL, RED, LineStyle, fill
+from compressor.report.figures.table import Shown, figure, spell
 
 Shakings = Mapping[str, Shaking]  # by label of the paper's cases
 
@@ -44,15 +49,23 @@ BY_FAULT = {
     "small_end": LineStyle(RED, (0, (6, 1.2)), 1.2, 2.2, "D"),
     "both": LineStyle(GOLD, (0, (6, 1, 1.2, 1)), 1.8, 2.1, "s"),
 }
+NEEDS = sizes("big_end", "design") + sizes("small_end") + sizes("both")
 BIN = 5.0  # degrees over which the rms is taken
 NEAR = fill("#f2ead9", zorder=0.5)
 
 
-def draw_diagnosis_spectra(found: Shakings) -> Drawing:
+def measure_shaking(runs: Runs) -> Shakings:
+    """Return `shaking` of the healthy machine and all faults."""
+    return {name: shaking(runs[name]) for name in NEEDS}
+
+
+@figure("diagnosis", "diagnosis-spectra", "Diagnosis 1: orders of the force on the frame", *NEEDS)
+def draw_spectra(runs: Runs) -> Shown:
     """Return X over orders: healthy, and each joint at the greatest clearance.
 
     Rms over clearance.
     """
+    found = measure_shaking(runs)
     figure, panels = make_grid(1, 2, 4.6, widths=(2.3, 1))
     lines, trend = panels.flat
     names = {f: SPOKEN[f] + ("" if f in SINGLE_FAULTS else ", (b) only") for f in BY_FAULT}
@@ -75,10 +88,25 @@ def draw_diagnosis_spectra(found: Shakings) -> Drawing:
     trend.y.title = "rms (N)"
     trend.y.span(low=0)
     figure.legend = [entry("no clearance", IDEAL), *trend.traces]
-    return figure
+    sentence = (
+        "(a) Order spectra of X, the force on the frame along the cylinder, over the settled "
+        f"revolutions; dashed: order {ORDER}. (b) The rms above it over clearance."
+    )
+    numbers = [(f"rms above order {ORDER} without clearance",
+                spell(found["design"].spectrum.above, "N"))]  # fmt: skip
+    for fault in FAULTS:
+        forces = [found[label(fault, c)].spectrum.above for c in CLEARANCES]
+        numbers.append(
+            (
+                f"with {AT} at the {SPOKEN[fault]}" if fault != "both" else "at both joints",
+                spell(forces, "N"),
+            )
+        )
+    return Shown(figure, sentence, numbers)
 
 
-def draw_diagnosis_orbits(runs: Runs) -> Drawing:
+@figure("diagnosis", "diagnosis-orbits", "Diagnosis 2: orbits of the journals", *NEEDS)
+def draw_orbits(runs: Runs) -> Shown:
     """Return the journals' orbits of each joint at three clearances, all to one scale."""
     figure, panels = make_grid(len(SINGLE_FAULTS), len(CLEARANCES), 7.2)
     for row, joint in zip(panels, SINGLE_FAULTS, strict=True):
@@ -92,11 +120,25 @@ def draw_diagnosis_orbits(runs: Runs) -> Drawing:
         scale.span(-room, room)
     share_scales(figure.panels, "x", "y")
     figure.legend = [one for one in panels[0, 0].traces if one.is_points]
-    return figure
+    sentence = (
+        "The journal's centre in its bore over the last revolution, all to one scale; without "
+        "clearance it is a point. Outside the circle it is pressed in."
+    )
+    numbers = []
+    for joint in SINGLE_FAULTS:
+        each = [orbit(runs[label(joint, c)]).sel(joint=joint) for c in CLEARANCES]
+        off = [100.0 * one["off_wall_share"] for one in each]
+        numbers.append((f"off its wall at the {SPOKEN[joint]}, {AT}", spell(off, "% of the time")))
+        laps = [one["laps"] for one in each]
+        numbers.append(("turns a revolution, counter-clockwise positive", spell(laps)))
+    return Shown(figure, sentence, numbers)
 
 
-def draw_diagnosis_angles(found: Shakings, runs: Runs) -> Drawing:
+@figure("diagnosis", "diagnosis-angles",
+        "Diagnosis 3: when the frame shakes, and the contact modes", *NEEDS)  # fmt: skip
+def draw_angles(runs: Runs) -> Shown:
     """Return X's high orders and the joints' contact modes over the crank angle."""
+    found = measure_shaking(runs)
     figure, panels = make_grid(2 * len(SINGLE_FAULTS), 1, 8.4, heights=(2.6, 1) * 2)
     for joint, profile, strip in zip(SINGLE_FAULTS, panels[::2, 0], panels[1::2, 0], strict=True):
         plot_profiles(profile, found, joint)
@@ -113,7 +155,25 @@ def draw_diagnosis_angles(found: Shakings, runs: Runs) -> Drawing:
     share_turn(figure.panels)
     figure.legend = [entry(f"{c:g} mm", BY_CLEARANCE[c]) for c in CLEARANCES]
     figure.legend += [entry("the force turns", NEAR, "band"), *mode_entries()]
-    return figure
+    sentence = (
+        f"The part of X above order {ORDER} over crank angle; shaded: from {BEFORE:g}° before to "
+        f"{AFTER:g}° after a change of direction of the joint's force along the cylinder, at "
+        f"{CLEARANCES[-1]:g} mm. Below: contact modes."
+    )
+    numbers = []
+    for joint in SINGLE_FAULTS:
+        forces = [found[label(joint, c)] for c in CLEARANCES]
+        turns = ", ".join(f"{turn:.0f}°" for turn in forces[-1].turns) or "nowhere"
+        near, rest = ([getattr(o, n) for o in forces] for n in ("near_turns", "elsewhere"))
+        shares = [mode_shares(contact_modes(runs[label(joint, c)]))["share"] for c in CLEARANCES]
+        flight = [100.0 * one.sel(joint=joint, mode="flight") for one in shares]
+        numbers += [
+            (f"the force at the {SPOKEN[joint]} turns at", turns),
+            (f"rms near these angles at {AT}", spell(near, "N")),
+            ("elsewhere", spell(rest, "N")),
+            ("in flight", spell(flight, "% of the time")),
+        ]
+    return Shown(figure, sentence, numbers)
 
 
 def plot_profiles(panel: Panel, found: Shakings, joint: str) -> None:

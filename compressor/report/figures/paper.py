@@ -1,17 +1,22 @@
 """The paper's figures: 3 and 4, and 6 to 16."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from compressor.analysis import (
     CLEARANCES,
+    SPOKEN,
     Cam,
     case_of,
+    faulty_joints,
     force_relation,
+    ideal_motion,
     label,
+    load_corners,
     load_phases,
     settled_part,
 )
@@ -48,6 +53,30 @@ from compressor.report.figures.style import (
     fill,
     mark,
 )
+from compressor.report.figures.table import Shown, figure, spell
+
+SERIES = ("displacement", "velocity", "acceleration")
+WORDS = "displacement, velocity and acceleration"
+AT = f"{', '.join(f'{c:g}' for c in CLEARANCES)} mm"
+SAME_CURVE = 1e-9  # of a curve's range: what cannot be seen, and is rounding
+
+
+def paper_figure(
+    number: int, title: str, *needs: str, **options: str
+) -> Callable[[Callable[..., Shown]], Callable[..., Shown]]:
+    """Return a decorator that enters a figure of the paper into the table."""
+    return figure("paper", f"figure-{number:02d}", f"Figure {number}: {title}", *needs, **options)
+
+
+def sizes(fault: str, *more: str) -> tuple[str, ...]:
+    """Return the labels of more runs, and of a fault's three clearances."""
+    return (*more, *(label(fault, clearance) for clearance in CLEARANCES))
+
+
+def spell_angles(found: ArrayLike) -> str:
+    """Return angles (rad) in degrees, one after the other."""
+    return ", ".join(f"{angle:.2f}°" for angle in np.degrees(np.atleast_1d(found)))
+
 
 MOTION = (
     Quantity("displacement", "displacement", "displacement (mm)", 1e3, window=24.0, steep=True),
@@ -56,17 +85,34 @@ MOTION = (
 )
 
 
-def draw_load_response(runs: Runs) -> Drawing:
+@paper_figure(6, "Response of the design and the typical model", "design", "typical")
+def draw_load_response(runs: Runs) -> Shown:
     """Return figure 6: the design and the typical model without clearance."""
     curves = load_curves(runs)
     figure, panels = make_grid(3, 2, 9.6)
     for (full, enlarged), quantity, letters in zip(panels, MOTION, ("ab", "cd", "ef"), strict=True):
         plot(full, curves, quantity)
         enlarge([full], enlarged, curves, quantity, letters)
-    return finish_figure(figure, panels[-1])
+    one, other = runs["design"], runs["typical"]
+    away = [
+        np.abs(one[name].values - other[name].values).max() / np.ptp(other[name].values)
+        for name in SERIES
+    ]
+    sentence = (
+        "Both models without clearance: left, the last revolution; right, the part in the black "
+        "rectangle, at a peak."
+    )
+    shares = spell(np.where(np.array(away) <= SAME_CURVE, 0.0, 100.0 * np.array(away)))
+    numbers = [(f"greatest difference of {WORDS}", f"{shares} % of the range")]
+    return Shown(finish_figure(figure, panels[-1]), sentence, numbers)
 
 
-def draw_fault_response(runs: Runs, fault: str) -> Drawing:
+@paper_figure(8, "Response with clearance at the big end", *sizes("big_end", "design"),
+              fault="big_end")  # fmt: skip
+@paper_figure(11, "Response with clearance at the small end", *sizes("small_end", "design"),
+              fault="small_end")  # fmt: skip
+@paper_figure(14, "Response with clearance at both joints", *sizes("both", "design"), fault="both")
+def draw_fault_response(runs: Runs, fault: str) -> Shown:
     """Return figure 8, 11 or 14: no clearance, and three clearances of one fault.
 
     Acceleration oscillates fast: it has a row a clearance.
@@ -79,7 +125,30 @@ def draw_fault_response(runs: Runs, fault: str) -> Drawing:
     enlarged = beside(figure, panels, slice(2, 5))
     plot_rows(panels[2:, 0], curves, MOTION[2])
     enlarge(panels[2:, 0], enlarged, curves, MOTION[2], "ef")
-    return finish_figure(figure, [panels[-1, 0], enlarged])
+    sentence = (
+        "Left, the last revolution, acceleration in a row a clearance, with the motion without "
+        "clearance dotted; right, the part in the black rectangles, where the curves differ most."
+    )
+    worn = [runs[label(fault, c)] for c in CLEARANCES]
+    away = 100.0 * np.max([differences_from_ideal(run) for run in worn], axis=0)
+    peaks = spell([run["peak_acceleration"] for run in worn], "m/s²")
+    numbers = [
+        (f"greatest difference of {WORDS} from no clearance", f"{spell(away)} % of the range"),
+        (f"greatest acceleration at {AT}", peaks),
+    ]
+    for joint in faulty_joints(fault):
+        lost = [100.0 * run["contact_loss_fraction"].sel(joint=joint) for run in worn]
+        numbers.append((f"time without contact at the {SPOKEN[joint]}", spell(lost, "%")))
+    return Shown(finish_figure(figure, [panels[-1, 0], enlarged]), sentence, numbers)
+
+
+def differences_from_ideal(run: xr.Dataset) -> list[float]:
+    """Return how far `SERIES` of a run leave those of ideal joints, as shares of their ranges."""
+    settled = settled_part(run)
+    return [
+        float(np.abs(settled[name].values - ideal).max() / np.ptp(ideal))
+        for name, ideal in zip(SERIES, ideal_motion(settled), strict=True)
+    ]
 
 
 def beside(figure: Drawing, panels: np.ndarray, rows: slice) -> Panel:
@@ -118,15 +187,33 @@ PISTON = Quantity(
 )
 
 
-def draw_piston_force(runs: Runs) -> Drawing:
+@paper_figure(7, "Piston force of the design and the typical model", "design", "typical")
+def draw_piston_force(runs: Runs) -> Shown:
     """Return figure 7: the piston force of the design and the typical model."""
     figure, panels = make_grid(1, 1, 4.2)
     plot(panels[0, 0], load_curves(runs), PISTON)
     panels[0, 0].y.span(low=0)
-    return finish_figure(figure, panels[0])
+    sentence = (
+        "The force on the piston over the last revolution. Steps of the spring's force are its "
+        "damping, which acts only while the follower rests."
+    )
+    numbers = []
+    for load, name in (("design", "spring"), ("typical", "gas")):
+        peak = float(runs[load]["piston_force"].max()) * KILONEWTON
+        numbers.append((f"greatest force of the {name}", spell(peak, "kN")))
+        numbers.append((f"corners of the {name}", spell_angles(load_corners(runs[load]))))
+    return Shown(finish_figure(figure, panels[0]), sentence, numbers)
 
 
-def draw_contact_force(runs: Runs, fault: str, joint: str) -> Drawing:
+@paper_figure(9, "Contact force at the big end", *sizes("big_end"), fault="big_end",
+              joint="big_end")  # fmt: skip
+@paper_figure(12, "Contact force at the small end", *sizes("small_end"), fault="small_end",
+              joint="small_end")  # fmt: skip
+@paper_figure(15, "Contact force at the big end, clearance at both joints", *sizes("both"),
+              fault="both", joint="big_end")  # fmt: skip
+@paper_figure(16, "Contact force at the small end, clearance at both joints", *sizes("both"),
+              fault="both", joint="small_end")  # fmt: skip
+def draw_contact_force(runs: Runs, fault: str, joint: str) -> Shown:
     """Return figure 9, 12, 15 or 16: contact force at one joint, a row a clearance.
 
     Both ways in each row: along the cylinder and across it.
@@ -146,7 +233,19 @@ def draw_contact_force(runs: Runs, fault: str, joint: str) -> Drawing:
         top.title = f"({letter}) {top.title}"
         enlarged.title = "enlarged"
         enlarged.y.title = ""
-    return finish_figure(figure, [panels[-1, 0], enlarged])
+    sentence = (
+        "Force on the rod: (a) along the cylinder, positive away from the crank, and (b) vertical, "
+        "on a scale of its own. Left, the last revolution, a row a clearance; right, the part in "
+        f"the black rectangles, where the horizontal forces at the {SPOKEN[first_joint(fault)]} "
+        "differ most."
+    )
+    numbers = []
+    for axis, words in (("x", "along the cylinder"), ("y", "across it")):
+        peaks = [runs[label(fault, c)]["peak_contact_force_axis"].sel(joint=joint, axis=axis)
+                 for c in CLEARANCES]  # fmt: skip
+        values = spell(np.array(peaks) * KILONEWTON, "kN")
+        numbers.append((f"greatest {words} at {AT}", values))
+    return Shown(finish_figure(figure, [panels[-1, 0], enlarged]), sentence, numbers)
 
 
 def first_joint(fault: str) -> str:
@@ -161,7 +260,11 @@ def contact_force(joint: str, axis: str) -> Quantity:
     return Quantity("contact_force", title, "force (kN)", KILONEWTON, where=where)
 
 
-def draw_relation(runs: Runs, joint: str) -> Drawing:
+@paper_figure(10, "Acceleration against horizontal contact force, big end", *sizes("big_end"),
+              joint="big_end")  # fmt: skip
+@paper_figure(13, "Acceleration against horizontal contact force, small end", *sizes("small_end"),
+              joint="small_end")  # fmt: skip
+def draw_relation(runs: Runs, joint: str) -> Shown:
     """Return one panel a clearance: every stored sample, the regression line, r and r²."""
     figure, panels = make_grid(1, 3, 4.0)
     for panel, letter, clearance in zip(panels.flat, "abc", CLEARANCES, strict=True):
@@ -174,7 +277,16 @@ def draw_relation(runs: Runs, joint: str) -> Drawing:
         panel.x.margin = 0.05
     panels[0, 0].y.title = "acceleration (m/s²)"
     share_scales(figure.panels, "x", "y")
-    return figure
+    found = [force_relation(runs[label(joint, c)], joint) for c in CLEARANCES]
+    sentence = (
+        "A dot for each stored sample; the line is the least-squares fit of force on acceleration, "
+        "whose slope is a mass."
+    )
+    numbers = [
+        (f"slope at {AT}", spell([one.slope for one in found], "kg")),
+        ("r²", spell([one.r2 for one in found])),
+    ]
+    return Shown(figure, sentence, numbers)
 
 
 def scatter(panel: Panel, run: xr.Dataset, joint: str, color: str, name: str) -> None:
@@ -207,7 +319,8 @@ PRINTED = LineStyle(GOLD, "-", 1.6, 2.2)
 BASE = LineStyle("#707070", (0, (1, 1.2)), 1.2, 2.1)
 
 
-def draw_pressure_volume(runs: Runs) -> Drawing:
+@paper_figure(3, "The ideal p–V diagram", "typical")
+def draw_pressure_volume(runs: Runs) -> Shown:
     """Return figure 3: cylinder pressure over volume, with phases and direction."""
     run = settled_part(runs["typical"])
     volume, pressure = gas_state(run)
@@ -219,7 +332,16 @@ def draw_pressure_volume(runs: Runs) -> Drawing:
     panel.x.span(0, 1.05 * volume.max())
     panel.y.title = "pressure p (MPa, absolute)"
     panel.y.span(0, 1.15 * pressure.max())
-    return figure
+    sentence = (
+        "Cylinder pressure over gas volume in the typical model, from the stored piston force and "
+        "displacement; arrows point in the direction of time."
+    )
+    used, exact = load_corners(runs["typical"]), Cam(runs["typical"]).gas_corners
+    numbers = [
+        ("the phases change at", spell_angles(used)),
+        ("off the ideal gas's corners by up to", spell_angles(np.abs(used - exact).max())),
+    ]
+    return Shown(figure, sentence, numbers)
 
 
 def gas_state(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
@@ -235,7 +357,7 @@ def gas_state(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 def name_phases(panel: Panel, run: xr.Dataset, volume: np.ndarray, pressure: np.ndarray) -> None:
     """Write each phase's name beside it, with an arrow along its direction."""
-    phase = load_phases(run)
+    phase = load_phases(run) % len(PHASES)  # with exact switching they are numbered from 4 on
     offsets = {"expansion": (14, 8), "suction": (0, -16), "compression": (10, 8)}
     for number, name in enumerate(PHASES):
         here = np.flatnonzero(phase == number)
@@ -250,7 +372,8 @@ def name_phases(panel: Panel, run: xr.Dataset, volume: np.ndarray, pressure: np.
         panel.notes.append(Note(name, at, beside, shift=shift, side=side, level=level, size=11))
 
 
-def draw_cam(runs: Runs) -> Drawing:
+@paper_figure(4, "The cam of the spring load", "design")
+def draw_cam(runs: Runs) -> Shown:
     """Return figure 4: the cam's contour, and its follower's displacement.
 
     Beside the displacement stands the one that Eq. 10 gives as printed.
@@ -260,7 +383,18 @@ def draw_cam(runs: Runs) -> Drawing:
     figure, panels = make_grid(1, 2, 4.9, widths=(1, 1.25))
     draw_contour(panels[0, 0], cam, angles)
     draw_follower(panels[0, 1], cam, angles)
-    return figure
+    sentence = (
+        "(a) The path of the roller's centre around the base circle, at rest while the gas would "
+        "expand or be compressed. (b) The follower's displacement: of the closed cam, our "
+        "reconstruction, and of Eq. 10 as printed, with the ideal gas's corners."
+    )
+    rise, fall = cam.printed_heights
+    numbers = [
+        ("as printed it rises and falls by", spell([1e3 * rise, 1e3 * fall], "mm")),
+        ("the closed cam, each way, by", spell(1e3 * cam.height, "mm")),
+        ("both are the same from", spell_angles(cam.printed_fall)),
+    ]
+    return Shown(figure, sentence, numbers)
 
 
 def draw_contour(panel: Panel, cam: Cam, angles: np.ndarray) -> None:

@@ -1,0 +1,371 @@
+"""Figures of a study along an axis: a row a job, over orders or over the crank angle."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray as xr
+
+from compressor.analysis import MODES, OILED_MODES, ORDER, SPOKEN, UNKNOWN, Cycle, Shaking
+from compressor.metrics import JOINTS
+from compressor.report.figures.curves import ANGLE_AXIS
+from compressor.report.figures.drawing import (
+    ColorScale,
+    Drawing,
+    Note,
+    Panel,
+    entry,
+    join_with_gaps,
+    make_grid,
+    map_cells,
+    share_scales,
+)
+from compressor.report.figures.job import (
+    FILM,
+    MODE_COLORS,
+    ORDERS_AXIS,
+    UNSEEN,
+    G,
+    loudest,
+    mode_entries,
+    share_turn,
+)
+from compressor.report.figures.style import BLACK, BLUE, GOLD, RED, LineStyle, mark, palette
+from compressor.report.figures.table import Number, Shown, figure, spell
+
+
+@dataclass(frozen=True)
+class Segments:
+    """The rms of a sensor's record in 36 segments of 10 degrees, m/s2, (36,) each.
+
+    `rms` with its error `bar`; `healthy`: of the same machine without clearance; `limit`: nan where
+    none is given.
+    """
+
+    rms: np.ndarray
+    bar: np.ndarray
+    healthy: np.ndarray
+    limit: np.ndarray
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Return the rms over that of the machine without clearance, (36,)."""
+        return self.rms / self.healthy
+
+    @property
+    def over_limit(self) -> np.ndarray:
+        """Return which segments are over their limit by more than their error bar, (36,)."""
+        return self.rms - self.bar > self.limit
+
+    @property
+    def doubtful(self) -> np.ndarray:
+        """Return which segments may be over their limit, within their error bar, (36,)."""
+        return (self.rms + self.bar > self.limit) & ~self.over_limit
+
+
+@dataclass(frozen=True)
+class SweptRow:
+    """One job: its value on the axis in words, and what its series show.
+
+    `shaking` is None, and `problem` says why, where the job has none. `modes`: as `angle_modes`
+    gives them, None of ideal joints. `cycle`: its last revolution; `segments`: of its sensor's
+    record. `chaotic`: single lines hold for this course of the motion only. `lubricated`: its
+    joints have oil.
+    """
+
+    value: str
+    shaking: Shaking | None = None
+    modes: xr.Dataset | None = None
+    cycle: Cycle | None = None
+    segments: Segments | None = None
+    problem: str = ""
+    chaotic: bool = False
+    lubricated: bool = False
+
+    def with_segments(
+        self, run: xr.Dataset, healthy: np.ndarray, limit: tuple[float, bool] | None
+    ) -> "SweptRow":
+        """Return the row with the segments of a run that has a sensor.
+
+        healthy: rms in each segment without clearance, m/s2, (36,); limit: m/s2, or times that of
+        the healthy machine where the second is True.
+        """
+        rms = run["sensor_segment_rms"].values
+        bar = run["sensor_segment_rms_error"].values if "sensor_segment_rms_error" in run else None
+        limits = np.full(rms.size, np.nan)
+        if limit is not None:
+            limits = limit[0] * (healthy if limit[1] else np.ones(rms.size))
+        found = Segments(rms, np.zeros(rms.size) if bar is None else bar, healthy, limits)
+        return replace(self, segments=found)
+
+
+def row_modes_words(rows: Sequence[SweptRow]) -> tuple[str, ...]:
+    """Return what the contact modes of rows are called: of oiled joints where all have oil."""
+    return OILED_MODES if all(row.lubricated for row in rows if row.modes) else MODES
+
+
+def rows_modes(rows: Sequence[SweptRow]) -> dict[str, np.ndarray]:
+    """Return the most frequent mode over rows and crank angle, by joint: (rows, bins).
+
+    Integers, -1 where nothing is known; {} where no joint has clearance.
+    """
+    known = [row.modes for row in rows if row.modes is not None]
+    found = {}
+    for joint in (one for one in JOINTS if any(one in modes["joint"] for modes in known)):
+        table = np.full((len(rows), known[0].sizes["angle"]), UNKNOWN)
+        for number, row in enumerate(rows):
+            if row.modes is not None and joint in row.modes["joint"]:
+                table[number] = row.modes["majority"].sel(joint=joint).values
+        found[joint] = table
+    return found
+
+
+MAX_TICKS = 12
+MAX_MAP_ORDERS = 150
+MAP_DECADES = 3  # below the greatest line above `ORDER`
+CYCLE_DECADES = 2  # below the greatest vibration
+ROW, LEAST = 0.24, 3.4  # inches: of a row, and of all
+
+
+def start_map(
+    rows: Sequence[SweptRow], title: str, x: np.ndarray, table: np.ndarray,
+    ends: tuple[float, float], name: str,
+) -> tuple[Drawing, Panel]:  # fmt: skip
+    """Return a figure with a table in colour, a row a value, and the panel of that.
+
+    title: of the rows; x: edges of the table's columns; ends: of the colours, which `name` titles.
+    """
+    figure, panels = make_grid(1, 2, height(len(rows)) + 0.9, widths=(3, 1))
+    image = panels[0, 0]
+    colors = ColorScale(palette("cividis"), *ends, True, name, "top", 50, pointed=True)
+    edges = np.arange(len(rows) + 1) - 0.5
+    image.traces.append(map_cells(x, edges, np.maximum(table, ends[0]), colors))
+    label_rows(image, rows, title)
+    return figure, image
+
+
+def finish_map(figure: Drawing, values: np.ndarray, title: str, top: float) -> Drawing:
+    """Return a figure of `start_map` with a number a row beside the map, and a legend of marks."""
+    image, beside = figure.panels
+    dots = LineStyle(BLUE, linewidth=1.5, marker="o", markersize=3.5)
+    beside.plot(values, np.arange(values.size, dtype=float), dots)
+    beside.x.title = title
+    beside.x.span(0, top)
+    share_scales(figure.panels, "y")
+    figure.legend = [one for one in image.traces if one.is_points]
+    return figure
+
+
+@figure("study", "cycles", "vibration over crank angle")
+def draw_cycles(rows: Sequence[SweptRow], title: str) -> Shown:
+    """Return the vibration in each degree, a row a value, in colour; beside them its peaks.
+
+    Marks: the rod load changes its side; valves open and close, or the cam's follower stops.
+    """
+    found = [row.cycle for row in rows]
+    table = np.array([one.degree_peaks if one else np.full(360, np.nan) for one in found])
+    top = np.nanmax(table)
+    ends = top * 10.0**-CYCLE_DECADES, top
+    figure, image = start_map(rows, title, np.arange(361.0), table, ends, "|a| (m/s²)")
+    corners = [[at for at, _ in one.events] if one else [] for one in found]
+    reversals = [one.reversals if one else () for one in found]
+    has_cam = any(event.startswith("cam") for one in found if one for _, event in one.events)
+    corner = "corner of the load" if has_cam else "a valve opens or closes"
+    for name, shape, color, angles in (
+        (corner, "v", "#ffffff", corners),
+        ("rod load changes its side", "s", RED, reversals),
+    ):
+        if not any(len(some) for some in angles):
+            continue
+        x = np.array([at for some in angles for at in some])
+        y = np.array([float(n) for n, some in enumerate(angles) for _ in some])
+        image.plot(x, y, mark(color, shape, 4, edge=BLACK), name)
+    image.x.title = ANGLE_AXIS
+    share_turn([image], 90.0)
+    peaks = np.nanmax(np.where(np.isnan(table), -1.0, table), axis=1)
+    peaks = np.where(peaks < 0, np.nan, peaks)
+    sensed = any(one.is_sensed for one in found if one)
+    kind = "sensor's record" if sensed else "acceleration of the crosshead"
+    sentence = (
+        f"The greatest magnitude of the {kind} in each degree of the last settled revolution, "
+        f"{describe_rows(rows, title)}.{left_out(rows)}"
+    )
+    loud = np.array([loudest(one)[0] if one else np.nan for one in found])
+    at = next(loudest(one)[1] for one, peak in zip(found, loud, strict=True)
+              if one and peak == np.nanmax(loud))  # fmt: skip
+    counts = [len(one.reversals) for one in found if one]
+    numbers = [
+        *spell_ends("greatest magnitude", loud, rows, "m/s²"),
+        ("the greatest comes at", f"{at:.0f}°, {spell(G * np.nanmax(loud), 'g')}"),
+        ("changes of the rod load's side a revolution", ", ".join(map(str, sorted({*counts})))),
+    ]
+    return Shown(finish_map(figure, peaks, "peak (m/s²)", 1.08 * top), sentence, numbers)
+
+
+@figure("study", "segments", "vibration in segments of 10°")
+def draw_segments(rows: Sequence[SweptRow], title: str) -> Shown:
+    """Return the rms in segments of 10 degrees over the healthy machine's, a row a value.
+
+    In colour, with marks where a segment is over its limit; beside them the greatest rms.
+    """
+    found = [row.segments for row in rows]
+    table = np.array([one.ratio if one else np.full(36, np.nan) for one in found])
+    top = max(float(np.nanmax(table)), 1.1)
+    figure, image = start_map(rows, title, 10.0 * np.arange(37), table, (1.0, top),
+                              "rms over that without clearance")  # fmt: skip
+    for name, shape, color, over in (
+        ("over its limit", "s", RED, [o.over_limit if o else None for o in found]),
+        ("perhaps over it, by the bar", "o", GOLD, [o.doubtful if o else None for o in found]),
+    ):
+        marks = [(10.0 * at + 5.0, float(n)) for n, some in enumerate(over) if some is not None
+                 for at in np.flatnonzero(some)]  # fmt: skip
+        if marks:
+            x, y = np.array(marks).T
+            image.plot(x, y, mark(color, shape, 4, edge=BLACK), name)
+    image.x.title = ANGLE_AXIS
+    share_turn([image], 90.0)
+    greatest = np.array([np.nanmax(one.rms) if one else np.nan for one in found])
+    words = "greatest rms of a\nsegment (m/s²)"
+    drawing = finish_map(figure, greatest, words, 1.08 * float(np.nanmax(greatest)))
+    sentence = (
+        "The rms of the sensor's record in 36 segments of 10°, over that of the same machine "
+        f"without clearance, {describe_rows(rows, title)}. The model has no noise of valves, so "
+        f"that a sound machine is quieter than a real one.{left_out(rows)}"
+    )
+    return Shown(drawing, sentence, number_segments(rows))
+
+
+def number_segments(rows: Sequence[SweptRow]) -> list[Number]:
+    """Return the numbers of segments: the greatest, and those that are over their limits."""
+    known = [(row.segments, row.value) for row in rows if row.segments]
+    found, value = max(known, key=lambda one: np.nanmax(one[0].rms))
+    place = int(np.nanargmax(found.rms))
+    numbers = [(
+        "greatest rms",
+        f"{spell(found.rms[place], 'm/s²')} in {segment_words(place)} at {value}, "
+        f"{spell(found.ratio[place])} times that without clearance",
+    )]  # fmt: skip
+    if np.isnan(known[0][0].limit).all():
+        return numbers
+    texts = []
+    for found, value in known:
+        may = int(found.doubtful.sum())
+        perhaps = f" and perhaps {may}" * bool(may)
+        texts.append(f"{int(found.over_limit.sum())}{perhaps} at {value}")
+    numbers.append(("segments over their limit", ", ".join(texts)))
+    first = next(((found, value) for found, value in known if found.over_limit.any()), None)
+    if first:
+        found, value = first
+        place = int(np.nanargmax(np.where(found.over_limit, found.rms / found.limit, np.nan)))
+        rms, limit = (spell(values[place], "m/s²") for values in (found.rms, found.limit))
+        text = f"{segment_words(place)} at {value}, {rms} over a limit of {limit}"
+        numbers.append(("the first over it", text))
+    return numbers
+
+
+def segment_words(place: int) -> str:
+    """Return a segment's crank angles in words."""
+    return f"{10 * place} to {10 * place + 10}°"
+
+
+@figure("study", "waterfall", "order spectra of the force on the frame along the cylinder")
+def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Shown:
+    """Return order spectra of X, a row a value, in colour; beside them the rms above `ORDER`."""
+    found = [row.shaking for row in rows]
+    size = min(MAX_MAP_ORDERS, *(one.spectrum.orders.size - 1 for one in found if one))
+    table = np.full((len(rows), size), np.nan)
+    for number, one in enumerate(found):
+        if one:
+            table[number] = one.spectrum.amplitudes[1 : size + 1]
+    top = np.nanmax(table[:, ORDER:])  # the first orders are beyond the scale
+    if top < 1e-9 * np.nanmax(table):  # ideal joints: rounding
+        top = np.nanmax(table)
+    ends = top * 10.0**-MAP_DECADES, top
+    figure, image = start_map(rows, title, np.arange(size + 1) + 0.5, table, ends,
+                              "amplitude of X (N)")  # fmt: skip
+    image.notes.append(Note(x=ORDER + 0.5, style=LineStyle(RED, (0, (4, 1.5)))))
+    image.x.title = ORDERS_AXIS + f"; dashed: order {ORDER}"
+    above = np.array([one.spectrum.above if one else np.nan for one in found])
+    words = f"rms of X above\norder {ORDER} (N)"
+    drawing = finish_map(figure, above, words, max(1.0, 1.08 * np.nanmax(above)))
+    numbers = spell_ends(f"rms of X above order {ORDER}", above, rows, "N")
+    sentence = f"Order spectra of X, {describe_rows(rows, title)}.{left_out(rows)}"
+    return Shown(drawing, sentence, numbers)
+
+
+@figure("study", "map", "most frequent contact mode over crank angle")
+def draw_map(rows: Sequence[SweptRow], title: str) -> Shown:
+    """Return the most frequent contact mode over the crank angle, a row a value, for each joint."""
+    modes = rows_modes(rows)
+    figure, panels = make_grid(1, len(modes), height(len(rows)) + 0.9)
+    for panel, (joint, table) in zip(panels.flat, modes.items(), strict=True):
+        plot_modes(panel, table)
+        panel.title = SPOKEN[joint]
+        panel.x.title = ANGLE_AXIS
+    label_rows(panels[0, 0], rows, title)
+    share_scales(figure.panels, "y")
+    figure.legend = mode_entries(row_modes_words(rows))
+    if any((table < 0).any() for table in modes.values()):
+        figure.legend += [entry("no series, or no clearance", UNSEEN, "band")]
+    away, numbers = row_modes_words(rows)[0], []
+    for joint, table in modes.items():
+        share = 100.0 * (table == MODES.index("flight")).mean(axis=1)
+        numbers += spell_ends(f"{away} at the {SPOKEN[joint]}", share, rows, "% of the revolution")
+    sentence = (
+        f"The most frequent contact mode in each degree, {describe_rows(rows, title)}."
+        f"{FILM if any(row.lubricated for row in rows) else ''}{left_out(rows)}"
+    )
+    return Shown(figure, sentence, numbers)
+
+
+def describe_rows(rows: Sequence[SweptRow], title: str) -> str:
+    """Describe what a row of a map is: a value of the axis, or a job where values repeat."""
+    values = [row.value for row in rows]
+    if len({*values}) < len(values):
+        return f"a row for each job, in the order of {title}"
+    return f"a row for each value of {title}"
+
+
+def spell_ends(what: str, values: np.ndarray, rows: Sequence[SweptRow], unit: str) -> list[Number]:
+    """Return the least and the greatest of some rows' values, and where they are."""
+    if np.nanmax(values) == np.nanmin(values):
+        return [(what, spell(np.nanmax(values), unit))]
+    ends = (("least", np.nanargmin(values)), ("greatest", np.nanargmax(values)))
+    texts = [f"{word} {spell(values[n], unit)} at {rows[int(n)].value}" for word, n in ends]
+    return [(what, ", ".join(texts))]
+
+
+def left_out(rows: Sequence[SweptRow]) -> str:
+    """Describe the rows that could not be drawn, and those of chaotic motion."""
+    problems = [row.problem for row in rows if row.problem]
+    wild = sum(row.chaotic for row in rows)
+    text = f" Not drawn: {len(problems)} of {len(rows)} jobs ({', '.join(sorted({*problems}))})."
+    return text * bool(problems) + f" Chaotic, so that lines change: {wild} jobs." * bool(wild)
+
+
+def plot_modes(panel: Panel, table: np.ndarray) -> None:
+    """Draw modes, (rows, bins) of integers as in `mode_map`, in their colours; below 0 hatched."""
+    edges = np.linspace(0, 360, table.shape[1] + 1), np.arange(len(table) + 1) - 0.5
+    colors = ColorScale((*MODE_COLORS.values(),), -0.5, len(MODES) - 0.5, side="")
+    known = np.where(table < 0, np.nan, table)
+    panel.ground, panel.grid = UNSEEN, ""
+    panel.traces.append(map_cells(*edges, known, colors))
+    if len(table) < 40:
+        between = [np.array([[0.0, edge], [360.0, edge]]) for edge in edges[1][1:-1]]
+        panel.plot(*join_with_gaps(between), LineStyle("#ffffff", linewidth=0.8))
+    panel.x.span(0, 360)
+    panel.x.step = 90.0
+
+
+def label_rows(panel: Panel, rows: Sequence[SweptRow], title: str) -> None:
+    """Draw the swept values at some of the rows, with what became of those that have no series."""
+    each = -(-len(rows) // MAX_TICKS)
+    words = [f"{row.value} ({row.problem})" if row.problem else row.value for row in rows]
+    panel.y.words = {float(n): words[n] for n in range(0, len(rows), each)}
+    panel.y.span(-0.5, len(rows) - 0.5)
+    panel.y.title, panel.grid = title, ""
+
+
+def height(rows: int) -> float:
+    """Return the height (inches) of so many rows."""
+    return min(9.0, max(LEAST, ROW * rows))

@@ -1,0 +1,75 @@
+"""The table of figures: what each is called, what it needs, and the function that makes it.
+
+A figure is one function under one line: it returns what is drawn, a sentence on what is shown, and
+labelled numbers of it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from compressor.report.figures.drawing import Drawing
+
+Kind = Literal["paper", "diagnosis", "job", "study"]
+NOTHING = 1e-6  # in any unit of a figure: below it a number is rounding
+Number = tuple[str, str]  # a label, and what is measured, with its unit
+
+
+class Shown(NamedTuple):
+    """A figure: what is drawn, a sentence on what is shown, and labelled numbers of it."""
+
+    drawing: Drawing
+    sentence: str
+    numbers: Sequence[Number] = ()
+
+    @property
+    def caption(self) -> str:
+        """Return the sentence and the numbers."""
+        text = "; ".join(f"{label}: {value}" for label, value in self.numbers)
+        return f"{self.sentence} {text[0].upper()}{text[1:]}." if text else self.sentence
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A line of the table; `name`: of its files.
+
+    `make` takes runs by the labels in `needs`, of the paper's cases; a job's run and the same
+    machine without clearance, where `needs` has `clearance` or `gas` if the job has these; or the
+    rows of a study and the name of its axis.
+    """
+
+    name: str
+    title: str
+    needs: tuple[str, ...]
+    make: Callable[..., Shown]
+
+
+FIGURES: dict[Kind, dict[str, Figure]] = {"paper": {}, "diagnosis": {}, "job": {}, "study": {}}
+
+
+def figure(
+    kind: Kind, name: str, title: str, *needs: str, **options: Any
+) -> Callable[[Callable[..., Shown]], Callable[..., Shown]]:
+    """Return a decorator that enters a function into the table; options: given to it."""
+
+    def enter(make: Callable[..., Shown]) -> Callable[..., Shown]:
+        FIGURES[kind][name] = Figure(name, title, needs, partial(make, **options))
+        return make
+
+    return enter
+
+
+def spell(values: ArrayLike, unit: str = "") -> str:
+    """Return numbers to four digits, one after the other, with their unit; rounding is 0."""
+    known = np.atleast_1d(np.asarray(values, float))
+    known = np.where(abs(known) < NOTHING, 0.0, known)
+    return f"{', '.join(f'{float(text):g}' for text in np.char.mod('%.4g', known))} {unit}".rstrip()
+
+
+def spell_span(values: np.ndarray, unit: str) -> str:
+    """Return the least and the greatest of some values, with their unit."""
+    return f"{spell(values.min())} to {spell(values.max())} {unit}"
