@@ -265,12 +265,6 @@ def test_explain_as_json(case_file, capsys):
     assert screen.jsonable({"a": [math.nan, 1.0]}) == {"a": [None, 1.0]}
 
 
-def test_explain_of_a_failed_job_says_so(case_file, capsys):
-    case_file("a.yaml", joint="both", clearance_mm=0.1, solve={"max_steps": 5})
-    assert cli.main(["explain", "a.yaml"]) == 3
-    assert "the job failed, budget_steps: more than 5 steps" in capsys.readouterr().out
-
-
 def test_tradeoff_stores_draws_and_lists(case_file, capsys):
     import xarray as xr
 

@@ -27,7 +27,6 @@ from compressor.studies.judge import (
     rank,
     read_jobs,
     summarize,
-    table,
 )
 from compressor.sweep.sweep import Options, in_this_process, sweep
 
@@ -179,12 +178,3 @@ def test_judges_are_unlike_the_run_and_more_exact():
     assert (case.solve.method, case.solve.rtol) == ("RODAS", 1e-8)
     assert judge_case(replace(smooth, regime="chaotic"), "RODAS").solve.rtol == 1e-7
     assert judge_case(replace(smooth, rtol=1e-11), "RODAS").solve.rtol == 1e-12
-
-
-def test_the_worst_come_first():
-    right = job(key="c" * 20, votes=[YES])
-    jobs = [right, job(votes=[NO, NO]), job(status="failed", reason="non_finite", case=None)]
-    rows = [*table(rank(jobs))]
-    assert [row[0] for row in rows] == ["verdict", "silent_wrong", "ok"]
-    assert rows[2][-1] == "a"
-    assert summarize(jobs) == "3 jobs: ok 1, silent_wrong 1, non_finite 1"

@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 from scipy.io import loadmat, savemat, wavfile
 
-from compressor.program import CompsimError
 from compressor.vibration.record_files import (
-    Channel,
     RecordError,
     encode_record,
-    named_channel,
     read_record,
     record_columns,
 )
@@ -52,12 +49,6 @@ def test_a_record_reads_back(written):
     assert math.isnan(found.clipped)
 
 
-def test_columns_may_stand_in_any_order_among_others(written):
-    columns = [voltage(), 0 * TIMES, VALUES, TIMES]
-    found = read_record(written(columns, "tacho, room ,acceleration_m_per_s2, time_s"))
-    np.testing.assert_array_equal(found.values, VALUES)
-
-
 def test_a_tacho_of_zeros_and_ones_is_known_to_half_a_sample(written):
     logic = (voltage() > 2.0).astype(float)
     found = read_record(written([TIMES, VALUES, logic])).tacho
@@ -86,14 +77,6 @@ def test_a_record_may_begin_at_top_dead_centre(written):
         assert found[0] == pytest.approx(-first if count == 5 else TURN - first, abs=2e-5)
 
 
-def test_lines_at_the_end_without_a_record_are_left_out(written):
-    rest = dict.fromkeys(range(TIMES.size - 8, TIMES.size + 2), ",,")
-    found = read_record(written([TIMES, VALUES, voltage()], change=rest))
-    assert found.times.size == TIMES.size - 10
-    with pytest.raises(CompsimError, match=r"record\.csv:9: the cells are empty, and the table"):
-        read_record(written([TIMES, VALUES, voltage()], change={9: ",,"}))
-
-
 def test_a_tacho_that_chatters_at_its_middle_counts_once(written):
     noisy = voltage() + np.random.default_rng(1).normal(0, 0.4, TIMES.size)
     assert len(read_record(written([TIMES, VALUES, noisy])).tacho) == len(PULSES)
@@ -110,27 +93,6 @@ def test_a_steady_speed_stands_in_for_a_tacho(written):
     path = written([TIMES, VALUES], "time_s,acceleration_m_per_s2")
     found = read_record(path, rpm=60 / TURN, tdc=PULSES[2])
     np.testing.assert_allclose(found.tacho, PULSES, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("change", "told"),
-    [
-        ({9: "0.007,abc,1"}, "record.csv:9:2: acceleration_m_per_s2: 'abc' is no number"),
-        ({9: "0.007,,1"}, "record.csv:9:2: acceleration_m_per_s2: '' is no number"),
-        ({9: "0.007"}, "record.csv:9:2: acceleration_m_per_s2: '' is no number"),
-        ({9: "0.007,nan,1"}, "record.csv:9:2: acceleration_m_per_s2: 'nan' is not finite"),
-        ({9: "inf,1,1"}, "record.csv:9:1: time_s: 'inf' is not finite"),
-        (
-            {9: "0.0075,1,1"},
-            "record.csv: time_s: sample 8: a step of 0.0015 s, where the mean one is 0.001",
-        ),
-        ({9: "0.006,1,1"}, "record.csv: time_s: sample 8: a step of 0 s"),
-    ],
-)
-def test_mistakes_name_line_and_column(change, told, written):
-    with pytest.raises(CompsimError) as found:
-        read_record(written([TIMES, VALUES, voltage()], change=change))
-    assert told in str(found.value)
 
 
 @pytest.mark.parametrize(
@@ -327,39 +289,6 @@ def test_a_record_as_analysers_write_it_is_read(encoding, tmp_path):
     assert "separator semicolon, decimal comma, header in line 4, 3 columns; time Time" in layout
     assert "Keyphasor [V]: its rise counts as top dead centre; --tacho-deg says its angle" in tacho
     assert len(read_record(path, tacho_deg=30.0).remarks) == 1
-
-
-def test_what_a_text_does_not_say_is_told(tmp_path):
-    path = tmp_path / "plain.txt"
-    path.write_text(analyser_text().removeprefix(GERMAN))
-    with pytest.raises(
-        RecordError, match=r"only 1, 2, 3 \(separator semicolon, decimal comma, no "
-    ):
-        read_record(path)
-    told = {"time": "1", "time_unit": "ms", "channel": "2", "unit": "g", "tacho": "3"}
-    layout = {"separator": ";", "decimal": ",", "skip_lines": 0}
-    np.testing.assert_allclose(read_record(path, **told, **layout).values, VALUES, atol=1e-7)
-    with pytest.raises(
-        RecordError, match=r"separators tried: tab; .*--separator, --decimal and --"
-    ):
-        read_record(path, **told, separator="\t")
-    path = encoded(tmp_path, ".mat")
-    with pytest.raises(RecordError, match="is no file of text: leave --skip-lines out"):
-        read_record(path, skip_lines=3)
-
-
-@pytest.mark.parametrize(
-    ("name", "kind", "unit"),
-    [
-        ("Time [ms]", "time", "ms"), ("time_us", "time", "us"), ("t (s)", "time", "s"),
-        ("Acc [g]", "acceleration", "g"), ("Ch 1 (m/s²)", "acceleration", "m/s²"),
-        ("Accel", "acceleration", ""), ("Keyphasor [V]", "tacho", "V"), ("Tacho", "tacho", ""),
-        ("Temp [°C]", "", "°C"), ("T_oil", "", ""), ("acceleration_mm_per_s2", "acceleration",
-        "mm_per_s2"),
-    ],
-)  # fmt: skip
-def test_titles_say_what_a_column_is(name, kind, unit):
-    assert named_channel(name) == Channel(name, kind, unit)
 
 
 def uneven_times(share, drift):

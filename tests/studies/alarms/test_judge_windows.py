@@ -76,19 +76,6 @@ def test_an_alarm_that_reads_nothing_new_never_detects(judged):
     assert "velocity of the record" not in judged["alarm"].values  # no window has it
 
 
-def test_what_sets_a_limit_does_not_judge_it():
-    """A sound draw that is far above the others trips: no limit that judges it knows of it."""
-    windows = made_windows(worn="worn draw")
-    windows.readings[0, RECORD]["sensor_rms"][:2] = 50.0
-    one = judge(windows, factor=None).isel(noise=0).sel(alarm="rms, record")
-    value, low, _ = one["false_alarms"].values
-    assert value >= 1 / 20
-    assert low > 0.0
-    # worn windows are judged by the limit of all, which it lifts above them
-    assert one["detection"].sel(end="value").values.tolist() == [0.0, 0.0, 0.0]
-    assert float(one["limit"]) == pytest.approx(50.0, rel=0.02)
-
-
 def test_a_study_without_sound_or_worn_jobs_is_refused():
     class Source:
         name = "plant"

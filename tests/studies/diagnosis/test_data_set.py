@@ -13,7 +13,7 @@ from compressor.studies.diagnosis.dataset import (
     name_machine,
     split_by_machine,
 )
-from compressor.studies.diagnosis.features import FEATURES, features
+from compressor.studies.diagnosis.features import features
 from compressor.studies.frame import cut_windows
 from compressor.vibration import Record, noisy
 
@@ -124,13 +124,6 @@ def test_a_machine_is_what_is_built():
         assert name_machine(Case.from_values({**values, "solve": solve, **other})) != name_machine(
             one
         )
-
-
-def test_windows_may_overlap_and_go_without_samples(worn):
-    made = make_data_set(worn, "worn", 4, hop=3, signals=False)
-    assert {*made["first_pulse"].values.tolist()} == {0, 3, 6}
-    assert "signal" not in made
-    assert made["features"].shape == (made.sizes["window"], 1, len(FEATURES))
 
 
 def test_jobs_that_are_not_run_are_counted(worn, tmp_path):

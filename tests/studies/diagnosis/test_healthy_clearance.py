@@ -1,17 +1,14 @@
 """A joint with no more than a healthy clearance is sound: its label, data set, and library."""
 
 import json
-from types import SimpleNamespace
 
 import pytest
-from compsim import job_text
 
 from compressor.cases.case import Case, CaseError
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.study import Study
 from compressor.studies.diagnosis.dataset import make_data_set, write_card
 from compressor.studies.diagnosis.identify import read_library
-from compressor.studies.tradeoff.explain import terms
 from compressor.sweep.sweep import sweep
 
 BOTH = {"joint": "both", "clearance_mm": {"big_end": 0.08, "small_end": 0.25}}
@@ -38,20 +35,6 @@ def test_a_joint_is_worn_beyond_its_healthy_clearance(healthy, worn):
     assert case.physics_key == Case.from_values(BOTH).physics_key
     assert Case.from_values(case.values()) == case
     assert Case.from_attribute(case.attributes()["case"]) == case
-
-
-def test_a_job_says_which_of_its_joints_are_worn():
-    case = Case.from_values(BOTH | {"healthy_clearance_mm": 0.1})
-    assert job_text.worn_joints(SimpleNamespace(case=case)) == [
-        (
-            "worn",
-            "small end (healthy: big end 0.08 of up to 0.1 mm, small end 0.25 of up to 0.1 mm)",
-        )
-    ]
-    assert terms(case)[0]["clearance"].endswith("; worn: small end")
-    plain = Case.from_values(BOTH)
-    assert job_text.worn_joints(SimpleNamespace(case=plain)) == []
-    assert "worn" not in terms(plain)[0]["clearance"]
 
 
 @pytest.mark.parametrize("joint", ["none", "big_end"])

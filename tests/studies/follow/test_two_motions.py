@@ -1,6 +1,5 @@
 """Where up and down differ, and whether two motions are confirmed."""
 
-import itertools
 import math
 
 import numpy as np
@@ -14,7 +13,6 @@ from compressor.studies.follow.follow import (
     has_two,
     load_values,
     machines,
-    other_starts,
     read_over,
     run_chain,
 )
@@ -24,11 +22,9 @@ from compressor.studies.follow.motion import (
     ValuePlan,
     differ,
     empty_row,
-    run_value,
 )
 
 CASE = Case.from_values({"joint": "both", "clearance_mm": 0.2})
-DRAFT = {"solve": {"accuracy": "draft"}}
 
 
 def row(regime, period=math.nan, places=(), rms=200.0, error=0.0):
@@ -109,12 +105,3 @@ def test_a_machine_with_two_motions_is_found_and_confirmed(two, tmp_path, monkey
     assert len(doubt.cases) == 4
     assert run_chain(doubt, tmp_path) is None
     assert has_two(doubt, tmp_path)
-
-
-def test_the_paper_s_machine_has_one_motion():
-    """Two far ends of it are the same motion again after some revolutions."""
-    case = Case.from_values({"joint": "big_end", "clearance_mm": 0.2, **DRAFT})
-    plan = ValuePlan(points=8, exponent=False, further=100)
-    seen = [run_value(one, None, plan) for one in itertools.islice(other_starts(case), 2)]
-    assert [one["regime"] for one in seen] == ["periodic"] * 2
-    assert not differ(case, *seen)

@@ -75,18 +75,6 @@ def test_a_tighter_promise_keeps_what_a_looser_one_drops(explained):
     assert advice(explained(**weak, solve={"accuracy": "reference"}), name)["needed_for"]
 
 
-def test_a_job_costs_more_than_its_solution(explained):
-    told = explained(body={"start": "rest"}, sensor={"place": "guide"})
-    assert 0 < told["solution_seconds"] < told["seconds"]
-    assert told["other_work"] == [
-        "the runs that its error bars come from", "its time series", "the motion of its body",
-        "the record of its sensor",
-    ]  # fmt: skip
-    assert all(0 < one["time_ratio"] < 100 for one in told["advice"])
-    alone = explained(solve={"error_bars": False}, output={"keep": "metrics"})
-    assert alone["other_work"] == []
-
-
 def test_a_sweep_is_explained_by_the_job_that_matters_most(explained):
     told = explained(clearance_mm=[0.1, 0.3, 0.2], load=["gas", "spring"])
     assert told["jobs"] == 6

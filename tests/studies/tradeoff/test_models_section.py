@@ -15,7 +15,6 @@ from compressor.store.studies import StoredAxis, StoredStudy
 from compressor.studies.tradeoff.page import (
     add,
     headline,
-    main_numbers,
     model_table,
     models_file,
     models_section,
@@ -87,30 +86,6 @@ def test_a_change_is_what_lies_beyond_both_bars():
     assert table.span_texts == ("-66 to +93 %", "0 to +50 %", "0 to +350 %", "0 to +99 points")
     assert [row.note for row in table.rows] == ["K 1", "", "", "failed: budget_steps", "needs more"]
     assert table.rows[1].time_ratio == 3.0
-
-
-def test_the_main_numbers_are_those_of_the_table():
-    table = model_table(made())
-    assert main_numbers(table) == {
-        "peak acceleration": "100.0 m/s²", "numerical error": "0.01 %", "moved by": "-66 to +93 %",
-        "most by": "softer", "runs": "5", "without a number": "3",
-    }  # fmt: skip
-    (down,) = model_table(made().isel(choice=[0, 2])).span_texts[:1]
-    assert down == "-66 to 0 %"
-    idle = replace(table.rows[0], cells=("none seen",) * 4, changes=(0.0,) * 4)
-    still = main_numbers(replace(table, rows=(idle,), spans=((0.0, 0.0),) * 4))
-    assert (still["moved by"], still["most by"], still["runs"]) == ("none seen", "–", "1")
-
-
-def test_a_chaotic_case_has_no_peak_to_be_moved():
-    chaotic = made(peak_acceleration=(PEAK, [math.inf, *PEAK_BAR[1:]]))
-    table = model_table(chaotic)
-    assert table.unknown == ("peak acceleration",)
-    assert next(iter(main_numbers(table))) == "max penetration, big end"
-    nothing = model_table(chaotic[["status", "reason", "note", "varied", "regime", "seconds"]])
-    assert (nothing.measures, nothing.rows[0].cells) == ((), ())
-    assert main_numbers(nothing) == {}
-    assert headline(nothing) == "metrics that are known: 0"
 
 
 def test_the_page_shows_line_table_and_what_is_assumed():

@@ -23,9 +23,6 @@ from compressor.studies.tradeoff.variants import (
     contact_values,
     explain_models,
     other_models,
-    run_variants,
-    scale_contact,
-    variants,
     vary_numbers,
 )
 from compressor.sweep.sweep import sweep
@@ -86,17 +83,6 @@ def test_a_feature_that_is_left_out_is_no_longer_paid_for(feature):
     assert Case.from_values(poor.values()) == poor  # still a valid case
     added = applied(feature.given, poor)
     assert added is None or feature.is_in(change(poor, added))
-
-
-def test_variants_of_one_faulty_joint_and_of_two():
-    one, two = ({v.name: v for v in variants(case(joint=j))} for j in ("big_end", "both"))
-    assert [*one][:4] == ["no friction", "no spring damping", "gravity", "no load"]
-    assert {"gas load", "friction of ideal joints"} < {*one}
-    assert "friction of ideal joints" not in two  # both are worn
-    assert one["clearance of the small end"].case.clearance_mm.small_end == 0.001
-    assert one["clearance of the small end"].note == "clearance_mm.small_end 0.001"
-    assert two["ideal big end"].case.joint == "small_end"
-    assert {"ideal big end", "ideal small end"} < {*two}
 
 
 @pytest.mark.parametrize("law", ["impact", *CONTACT_LAWS])
@@ -171,15 +157,6 @@ def test_what_the_file_leaves_out_or_can_only_guess_is_varied(tmp_path):
         "guide.friction", "friction.bristle_stiffness_per_mm", "clearance_mm.small_end",
     }  # fmt: skip  # given as known, scaled elsewhere, not read, or swept
     assert not lacking & {*found}
-
-
-def test_what_follows_from_a_number_follows_when_it_is_varied(tmp_path):
-    """A casing's mass that is not given is a 25th of the body's, a rod's inertia by its mass."""
-    study = read_study(tmp_path, "load: none\nbody: true\nsensor: true\n")
-    found = {one.name: one.case for one in vary_numbers(study, 0)}
-    assert found["body.mass_kg 250"].body.casing_mass_kg == 10
-    assert found["machine.rod_mass_kg 9.4"].machine.rod_inertia_kg_m2 == pytest.approx(0.282)
-    assert found["body.casing_mass_kg 4"].body.mass_kg == 500
 
 
 @pytest.mark.parametrize(
@@ -305,10 +282,3 @@ def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
             np.testing.assert_array_equal(row[f"{metric}_error"], run[f"{metric}_error"])
         assert row["regime"] == run.attrs["regime"]
     assert data.attrs["key"] == study.keys[0]
-
-
-def test_a_case_that_fails_is_the_only_row():
-    bad = case(solve={**SHORT, "max_steps": 20})
-    data = run_variants(bad, scale_contact(bad))
-    assert data["reason"].values.tolist() == ["budget_steps"]
-    assert data.attrs["detail"] == "more than 20 steps"

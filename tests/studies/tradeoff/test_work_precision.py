@@ -91,7 +91,13 @@ def test_a_job_that_fails_has_no_error(tmp_path):
 
 
 def test_each_case_of_a_file_is_a_scene(tmp_path):
-    found = made(tmp_path, *SOME[:1], "solve.rtol=[1.0e-3, 1.0e-5]", joint=["big_end", "both"])[0]
+    found = made(
+        tmp_path,
+        *SOME[:1],
+        "solve.rtol=[1.0e-3, 1.0e-5]",
+        "solve.timeout_s=600",
+        joint=["big_end", "both"],
+    )[0]
     assert found["scene"].values.tolist() == ["big_end", "both"]
     assert found["error_acceleration"].notnull().sum() >= 10
 
