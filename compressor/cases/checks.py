@@ -107,20 +107,31 @@ OTHER_UNITS = {
     "kPa": ("MPa", UNITS["kpa"]), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3), "cm": ("mm", 10.0),
     "m": ("mm", 1e3), "in": ("mm", 25.4), "inch": ("mm", 25.4), "kN": ("N", 1e3),
 }  # fmt: skip
-GAUGE = ("barg", "psig")
-ABSOLUTE = ("bara", "psia")
+# words in the name of a diameter -> what to write of its value, half or whole
+DIAMETERS = (
+    (r"clearance", "clearance_mm: {half}, which is radial"),
+    (
+        r"wrist|gudgeon|small_end|(crosshead|piston)_?pin",
+        "machine.pin_radius_mm: {{small_end: {half}, ...}}",
+    ),
+    (r"crank_?pin|big_end", "machine.pin_radius_mm: {{big_end: {half}, ...}}"),
+    (r"pin(?!dle)|journal|(?<!main_)bearing", "machine.pin_radius_mm: {half}"),
+    (r"(?<!con)(?<!con_)(?<!connecting_)rod", "gas.rod_diameter_mm: {whole}, the piston rod's"),
+    (r"piston|cylinder|bore|^dia", "gas.bore_mm: {whole}"),
+)
 DIAMETER = re.compile(r"(?i)(\w*_)?(diameter|diametral|dia)(_\w*)?")
-OF_PIN = re.compile(r"pin(?!dle)|wrist|gudgeon|journal|(?<!main_)bearing|big_end|small_end")
-OF_PISTON_ROD = re.compile(r"(?<!con)(?<!con_)(?<!connecting_)rod")
-OF_SMALL_END = ("crosshead", "wrist", "gudgeon", "small_end", "piston_pin")
 PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
 TWICE = "stands in place of {}: give one of the two"
 
 
+def is_number(value: Any) -> bool:
+    """Return whether a value is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def halve(value: Any) -> Any:
     """Return half of a number, and any other value as it is."""
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return value / 2 if is_number else value
+    return value / 2 if is_number(value) else value
 
 
 def check_double(key: str, value: Any) -> str | None:
@@ -131,11 +142,6 @@ def check_double(key: str, value: Any) -> str | None:
     if isinstance(value, Mapping | list | tuple) or hasattr(value, "ndim") or value is None:
         return None
     return table()[DOUBLES[key]].doubled().check(value)
-
-
-def has_parts(key: str, value: Any) -> bool:
-    """Return whether a value is one for each part of a thing."""
-    return isinstance(value, Mapping) and bool({*value} & {*parts_by_key().get(key, ())})
 
 
 def expand_synonyms(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
@@ -156,64 +162,33 @@ def expand_synonyms(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Pro
     return whole, problems
 
 
-def synonyms_of(group: str) -> list[str]:
-    """Return the synonyms that a group may hold, without its name."""
-    return [key.rpartition(".")[2] for key in DOUBLES if key.partition(".")[0] == group]
-
-
 def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
     """Return the hint at a key in another unit, such as "; write suction_MPa: 0.2"; or ""."""
     stem, _, unit = name.rpartition("_")
     ours, factor = OTHER_UNITS.get(unit, ("", 1.0))
-    key = f"{stem}_{ours}"
-    if not stem or key not in allowed:
+    if not stem or f"{stem}_{ours}" not in allowed:
         return ""
-    gauge = unit in GAUGE
-    values = value if isinstance(value, list | tuple) else [value]
-    more = f" + {ATMOSPHERE_MPA:g}" if gauge else ""
-    note = "; pressures are absolute: gauge pressure and the atmosphere's" if gauge else ""
-    if ours == "MPa" and unit not in GAUGE + ABSOLUTE:
-        note = f", absolute; to a gauge's add the atmosphere's {ATMOSPHERE_MPA:g}"
-    if not all(isinstance(one, int | float) and not isinstance(one, bool) for one in values):
-        return f"; write {key}: 1 {unit} is {factor:g}{more} {ours}{note}"
-    digits = ".4g" if unit.startswith("psi") or gauge else ".12g"
-    amounts = ", ".join(f"{one * factor + ATMOSPHERE_MPA * gauge:{digits}}" for one in values)
-    several = isinstance(value, list | tuple)
-    return f"; write {key}: " + (f"[{amounts}]" if several else amounts) + note
+    is_pressure = ours == "MPa"
+    more = ATMOSPHERE_MPA if is_pressure and unit.endswith("g") else 0.0
+    is_told = is_pressure and unit not in ("bara", "psia")
+    note = f", absolute: a gauge's and the atmosphere's {ATMOSPHERE_MPA:g}" * is_told
+    each = f"..., 1 {unit} being {factor:g} {ours}"
+    amount = f"{value * factor + more:.4g}" if is_number(value) else each
+    return f"; write {stem}_{ours}: {amount}{note}"
 
 
-def of_diameter(name: str, group: str, value: Any) -> str:
-    """Return the hint at the diameter of a pin, a bore or a piston rod; "" for another name."""
-    if not DIAMETER.fullmatch(name):
-        return ""
+def of_other_quantity(name: str, group: str, value: Any) -> str:
+    """Return the hint at a diameter, or at a cylinder's clearance in per cent; "" for neither."""
+    is_near = group in ("", "machine", "gas")
+    if PERCENT.fullmatch(name) and is_near:
+        return "; write gas.clearance_percent, a number or {head: 12, crank: 14}"
     ours, factor = OTHER_UNITS.get(name.rpartition("_")[2], ("mm", 1.0))
-    is_number = halve(value) is not value and ours == "mm"
-    whole = f"{value * factor:.12g}" if is_number else "..."
-    half = f"{value * factor / 2:.12g}" if is_number else "..."
-    if "clearance" in name:
-        return f"; clearance_mm is radial, half of it: write clearance_mm: {half}"
-    if OF_PIN.search(name):
-        own = "small_end" if any(word in name for word in OF_SMALL_END) else "big_end"
-        named = own == "small_end" or "crank" in name or "big" in name
-        form = f"{{{own}: {half}, ...}}" if named else half
-        return f"; write machine.pin_radius_mm: {form}, half of it"
-    if group not in ("", "machine", "gas"):
-        return ""
-    if OF_PISTON_ROD.search(name):
-        return f"; write gas.rod_diameter_mm: {whole}, the piston rod's"
-    of_bore = any(word in name for word in ("piston", "cylinder", "bore"))
-    is_bare = group == "gas" and name.startswith("dia")
-    return f"; write gas.bore_mm: {whole}" if of_bore or is_bare else ""
-
-
-def of_percent(name: str, group: str) -> str:
-    """Return the hint at the key of a cylinder's clearance in per cent; "" for another name."""
-    if not PERCENT.fullmatch(name) or group not in ("", "gas", "machine"):
-        return ""
-    form = "clearance_percent, a number or {head: 12, crank: 14}"
-    if group == "gas":
-        return f"; write {form}"
-    return f"; of the cylinder, write gas.{form}; of joints, clearance_mm in mm"
+    known = is_number(value) and ours == "mm"
+    half, whole = (f"{value * factor / n:.12g}" if known else "..." for n in (2, 1))
+    for words, form in DIAMETERS if DIAMETER.fullmatch(name) else ():
+        if re.search(words, name) and (is_near or "pin_radius" in form):
+            return "; write " + form.format(half=half, whole=whole)
+    return ""
 
 
 # keys of a case file that are no part of a case: how values are swept together, what the page of
@@ -233,11 +208,10 @@ def known_keys(group: str) -> list[str]:
 
 def describe_unknown(name: str, group: str, value: Any = None) -> str:
     """Return the error of a key that a group does not have; value: the key's."""
-    known = known_keys(group)
+    known, doubles = known_keys(group), [key for key in DOUBLES if key.startswith(f"{group}.")]
     hint = (
-        in_our_unit(name, value, [*known, *synonyms_of(group)])
-        or of_percent(name, group)
-        or of_diameter(name, group, value)
+        in_our_unit(name, value, [*known, *map(_leaf, doubles)])
+        or of_other_quantity(name, group, value)
         or ("" if DIAMETER.fullmatch(name) or name in SWEEP else suggestion(name, group))
         or f"; {group or 'a case'} has {', '.join(known)}"
     )
@@ -278,34 +252,30 @@ def suggestion(name: str, group: str) -> str:
         return "; put a space after the colon"
     if name in DOUBLES:
         return f"; write {DOUBLES[name]}, which is half of it"
-    keys = probable_keys(name, group) or [key for key in table() if _leaf(key) == name]
+    keys = probable_keys(name, group)
     return f"; did you mean {' or '.join(keys)}?" if 0 < len(keys) <= MAX_MEANT else ""
 
 
 def probable_keys(name: str, group: str) -> list[str]:
     """Return the dotted keys that an unknown one probably means; in a group, those of the group."""
-    if name in table() and not group:
-        return [name]
-    if group and name in map(_leaf, DOUBLES):
-        return []  # a word of another group, which is like none of this one
-    if near := _nearest(name, known_keys(group), 0.6) or _nearest(name, synonyms_of(group), 0.8):
-        return [f"{group}.{near}" if group else near]
-    if group:
-        return _holding(name, f"{group}.")
-    every = [*table(), *DOUBLES]
-    near = _nearest(name, [_leaf(key) for key in every], cutoff=0.8)
-    return [key for key in every if _leaf(key) == near] or _holding(name)
-
-
-def _holding(name: str, within: str = "") -> list[str]:
-    """Return the keys, if they are few, whose names have all words of another one."""
+    parts = [*table()]
+    wholes = (
+        whole if (whole := key.rpartition(".")[0]) in parts_by_key() else key for key in parts
+    )
+    every = [*dict.fromkeys([*wholes, *DOUBLES])]
+    if exact := [key for key in every if _leaf(key) == name]:
+        return exact
+    near = _nearest(name, known_keys(group), 0.6)
+    if near:
+        return [f"{group}.{near}".lstrip(".")]
+    own = [key for key in every if key.startswith(f"{group}.") or not group]
+    near = _nearest(name, [_leaf(key) for key in own], 0.8)
     words = {word for word in name.lower().split("_") if word}
-    found = [
+    return [key for key in own if _leaf(key) == near] or [
         key
-        for key in table()
-        if key.startswith(within) and words and words <= {*re.split("[_.]", key.lower())}
+        for key in parts
+        if key.startswith(group) and words and words <= {*re.split("[_.]", key.lower())}
     ]
-    return found if len(found) <= MAX_MEANT else []
 
 
 def _leaf(key: str) -> str:
@@ -314,17 +284,13 @@ def _leaf(key: str) -> str:
 
 def _nearest(name: str, allowed: Sequence[str], cutoff: float) -> str | None:
     """Return the allowed key with another unit, or else the one most alike."""
-    stems = {_stem(key): key for key in reversed(allowed)}
+    stems = {split_unit(key)[0]: key for key in reversed(allowed)}
     for stem in sorted(stems, key=len, reverse=True):
         if stem != stems[stem] and f"{name}_".startswith(f"{stem}_"):
             return stems[stem]
     lower = {key.lower(): key for key in allowed}
     near = get_close_matches(name.lower(), lower, n=1, cutoff=cutoff)
     return lower[near[0]] if near else None
-
-
-def _stem(name: str) -> str:
-    return split_unit(name)[0]
 
 
 def hold_value(key: str, value: Any) -> Any:
@@ -345,7 +311,7 @@ def values_given(values: Mapping[Any, Any]) -> dict[str, Any]:
             found[key] = value
             continue
         for name, item in value.items():
-            if has_parts(f"{key}.{name}", item):
+            if isinstance(item, Mapping) and {*item} & {*parts_by_key().get(f"{key}.{name}", ())}:
                 found |= {f"{key}.{name}.{part}": one for part, one in item.items()}
             elif item is not None:
                 found[f"{key}.{name}"] = item
