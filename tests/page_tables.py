@@ -8,7 +8,6 @@ import math
 import re
 from pathlib import Path
 
-from compressor.cases.parameter import parameter_table
 from compressor.cases.table import table
 from compressor.reasons import Reason
 
@@ -140,6 +139,24 @@ def choose_table():
          "as it takes"],
     ]  # fmt: skip
     return markdown(["you want", "choose, in `solve`", "error", "time of a run"], rows)
+
+
+def parameter_table(rows):
+    """The table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
+    heads = (
+        "key", "unit", "default", "range", "judged on", "source", "what it is", "read with",
+        "plausible",
+    )  # fmt: skip
+    lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
+    for row in rows:
+        default = "" if row.default is None or row.kind == "text" else str(row.default)
+        default = default.lower() if row.kind == "boolean" else default.removesuffix(".0")
+        cells = (
+            f"`{row.key}`", row.unit, default, row.range, row.judged_on, row.source, row.phrase,
+            row.readers, f"{row.plausible}: {row.plausible.why}" if row.plausible else "",
+        )  # fmt: skip
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines) + "\n"
 
 
 def parameter_tables():

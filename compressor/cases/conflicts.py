@@ -152,17 +152,6 @@ def default_in(case: Case, key: str) -> Any:
     return getattr(getattr(replace(case, **without), group), name)
 
 
-def judged_range(key: str) -> tuple[float, float]:
-    """Return the range of a key, in its unit, that the program was judged on.
-
-    Raises KeyError for a key without one.
-    """
-    row = row_of(key)
-    if row is None or row.judged is None:
-        raise KeyError(key)
-    return row.judged
-
-
 OF_CONTACT = ("contact.", "friction.")  # keys that ideal joints do not read
 # keys that leave a thing out at 0, as a case without the group does
 ABSENT_AT_ZERO = ("guide.clearance_mm", "guide.friction")

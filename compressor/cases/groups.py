@@ -69,12 +69,7 @@ shift = partial(number, 0.0, "[-1000, 1000]", unit="mm")
 class Offset:
     """How far a journal starts from its bore's centre, mm; a case's `initial_offset_mm`.
 
-    It shows whether a motion depends on where it starts:
-
-    >>> import compressor
-    >>> values = {"joint": "big_end", "clearance_mm": 0.2, "initial_offset_mm": {"big_end_x": 0.1}}
-    >>> compressor.Case.from_values(values).initial_offset_mm.big_end_x
-    0.1
+    It shows whether a motion depends on where it starts.
     """
 
     big_end_x: float = shift("start of the big end's journal along x", read=AT_JOINTS["big_end"])
@@ -356,11 +351,7 @@ class Gas:
 class Spring:
     """The spring load, a spring between piston and cam follower (§2.2); a case's `spring`.
 
-    Read with `load: spring`, the default:
-
-    >>> import compressor
-    >>> compressor.Case.from_values({"spring": {"preload_N": 600}}).spring.preload_N
-    600.0
+    Read with `load: spring`, the default.
     """
 
     stiffness_N_per_mm: float = number(20.0, "[0, 1e6]", "spring stiffness k", "Table 1")
@@ -600,13 +591,7 @@ class Solve:
 
 @make_group
 class Output:
-    """What is stored of a job; a case's `output`. Not part of the job's identity.
-
-    >>> import compressor
-    >>> kept = compressor.Case.from_values({"output": {"keep": "metrics"}})
-    >>> kept.key == compressor.Case.from_values({}).key
-    True
-    """
+    """What is stored of a job; a case's `output`. Not part of the job's identity."""
 
     keep: str = choice(
         "series", ("series", "metrics"), "stored results: time series too, or metrics only",

@@ -26,7 +26,7 @@ from compressor.cases.keys import (
     place_cards,
     read_overrides,
 )
-from compressor.cases.parameter import CaseError, choice, make_group, quote_value
+from compressor.cases.parameter import CaseError, choice, make_group
 from compressor.cases.study import Axis, Cases, Study
 from compressor.cases.table import WORDS, outside_identity, table
 from compressor.cases.yaml_reader import (
@@ -94,7 +94,7 @@ def load_studies(
         except NoComparison as error:
             problems.append(FileProblem(selection, "", str(error)))
     mistaken = bool(problems)
-    files = [_read(_path_of(path), Tree({}, {}) if mistaken else changes) for path in paths]
+    files = [_read(os.fsdecode(path), Tree({}, {}) if mistaken else changes) for path in paths]
     problems += [problem for file in files for problem in file.problems]
     problems += _find_shared_names(files)
     studies, blocks = [], []
@@ -109,15 +109,6 @@ def load_studies(
     if problems:
         raise CaseFileError(problems)
     return studies
-
-
-def _path_of(path: Any) -> str:
-    """Return a path as text. Raises CaseFileError for what is none."""
-    try:
-        return os.fsdecode(path)
-    except TypeError as error:
-        message = f"needs the path of a case file, not {quote_value(path)}"
-        raise CaseFileError([FileProblem(Place("load_cases"), "", message)]) from error
 
 
 @make_group
@@ -364,7 +355,7 @@ def _read_in(block: Block, known: set[Where]) -> tuple[set[Where], dict[Where, F
 
     known: those of which it is known already. Cases are built only until each key has a reader.
     """
-    tree, needed = block.tree, {}
+    tree, wanted = block.tree, {}
     for key, value in block.given.items():
         path = path_of(key)
         while path not in tree.places:  # of a part, the key that gives all of them
@@ -372,24 +363,20 @@ def _read_in(block: Block, known: set[Where]) -> tuple[set[Where], dict[Where, F
         where = tree.at(*path)[0], key_of(path)
         if where not in known and (row_of(key) or key in WORDS) and not is_off(key, value):
             is_swept = key in block.sweeps
-            needed[where] = conditions(key) if is_swept else needs_of_given(key, block.given)
-    lacking, read = dict(needed), set()
-    for number in block.numbers:
-        if not lacking:
+            wanted[where] = conditions(key) if is_swept else needs_of_given(key, block.given)
+    read: set[Where] = set()
+    unread: dict[Where, FileProblem] = {}
+    for number in block.numbers if wanted else ():
+        case = block.case(number)
+        for where in [one for one in wanted if one not in read]:
+            unmet = [one for one in wanted[where] if not condition(one[1])(case)]
+            if not unmet:
+                read.add(where)
+            elif where not in unread:
+                problem = problem_of(*unmet[0])
+                at = tree.at(*path_of(problem.key))[0]
+                place = at if at.file == where[0].file else where[0]
+                unread[where] = FileProblem(place, problem.key, problem.message)
+        if len(read) == len(wanted):
             break
-        try:
-            case = block.case(number)
-        except CaseError:  # of a file without what the command line changes
-            continue
-        for where in lacking:
-            unmet = [one for one in needed[where] if not condition(one[1])(case)]
-            lacking[where] = [one for one in lacking[where] if one in unmet]
-            read |= set() if unmet else {where}
-        lacking = {where: rest for where, rest in lacking.items() if where not in read}
-    unread = {}
-    for where, rest in lacking.items():
-        problem = problem_of(*[*rest, needed[where][-1]][0])
-        at = tree.at(*path_of(problem.key))[0]
-        place = at if at.file == where[0].file else where[0]
-        unread[where] = FileProblem(place, problem.key, problem.message)
-    return read, unread
+    return read, {where: problem for where, problem in unread.items() if where not in read}

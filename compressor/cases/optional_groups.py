@@ -36,14 +36,7 @@ class Lubricant:
     """An oil film in the joints that have clearance; a case's `lubricant`, None: they run dry.
 
     The film bears by rotation and squeeze; in its last share of the clearance the dry contact takes
-    over. `True` stands for the defaults:
-
-    >>> import compressor
-    >>> case = compressor.Case.from_values(
-    ...     {"joint": "big_end", "clearance_mm": 0.05, "lubricant": True}
-    ... )
-    >>> case.lubricant.viscosity_mPa_s
-    30.0
+    over. `True` stands for the defaults.
     """
 
     viscosity_mPa_s: float = number(
@@ -75,12 +68,7 @@ class Guide:
 
     With a clearance the crosshead moves across and tilts, and its four corners meet the guide by
     ADAMS's IMPACT, whatever the joints' `contact.law`. `True` stands for the defaults, an ideal
-    guide with friction:
-
-    >>> import compressor
-    >>> case = compressor.Case.from_values({"guide": {"clearance_mm": 0.1}})
-    >>> round(case.guide.crosshead_inertia_kg_m2, 4)  # 14 kg (0.12^2 + 0.08^2) / 12
-    0.0243
+    guide with friction.
     """
 
     clearance_mm: float = number(
@@ -129,12 +117,7 @@ class Drive:
 
     The motor's torque is a line by the speed: `torque_N_m` at `machine.speed_rpm`, and more by
     `slope_N_m_s` for each rad/s that the crank is slower. `True` stands for the defaults; a
-    crank that runs free has neither torque nor slope:
-
-    >>> import compressor
-    >>> free = {"slope_N_m_s": 0, "flywheel_kg_m2": 0.5}
-    >>> compressor.Case.from_values({"drive": free}).drive.torque_N_m
-    0.0
+    crank that runs free has neither torque nor slope.
     """
 
     flywheel_kg_m2: float = number(
@@ -158,11 +141,7 @@ class Rod:
     """An elastic rod; a case's `rod`, by default None: rigid.
 
     A bar of rectangular section: two bending modes, and two shapes of stretch. `True` stands for
-    the defaults:
-
-    >>> import compressor
-    >>> compressor.Case.from_values({"rod": True}).rod.depth_mm
-    40.0
+    the defaults.
     """
 
     youngs_modulus_GPa: float = number(
@@ -202,11 +181,7 @@ class Body:
 
     It is driven one way: the machine's forces move it, and it does not move the machine back. A
     body for which that would be wrong, since its motion would change the force by more than 30 %
-    at the speed's first two orders, is refused. `True` stands for the defaults:
-
-    >>> import compressor
-    >>> compressor.Case.from_values({"body": True}).body.mass_kg
-    500.0
+    at the speed's first two orders, is refused. `True` stands for the defaults.
     """
 
     freedoms: str = choice(
@@ -289,13 +264,7 @@ class Body:
 class Sensor:
     """An accelerometer on the body, with a tacho; a case's `sensor`, None by default.
 
-    `True` stands for the defaults:
-
-    >>> import compressor
-    >>> sensor = {"place": "bearing", "noise_m_per_s2": 0.05}
-    >>> case = compressor.Case.from_values({"body": True, "sensor": sensor})
-    >>> case.sensor.rate_Hz, case.sensor.noise_m_per_s2
-    (25600.0, 0.05)
+    `True` stands for the defaults.
     """
 
     REPORTED: ClassVar[float] = 1e-3  # of a record's samples: clipping is reported from here on

@@ -12,7 +12,7 @@ import inspect
 import math
 import re
 import reprlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from functools import lru_cache, partial
@@ -726,24 +726,6 @@ def describe_fields(group: type) -> str:
         )
     text = cleandoc(group.__doc__ or "")
     return f"{text}\n\nFields, with the sources of their defaults:\n\n" + "\n".join(lines)
-
-
-def parameter_table(rows: Iterable[Parameter]) -> str:
-    """Return the table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
-    heads = (
-        "key", "unit", "default", "range", "judged on", "source", "what it is", "read with",
-        "plausible",
-    )  # fmt: skip
-    lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
-    for row in rows:
-        default = "" if row.default is None or row.kind == "text" else str(row.default)
-        default = default.lower() if row.kind == "boolean" else default.removesuffix(".0")
-        cells = (
-            f"`{row.key}`", row.unit, default, row.range, row.judged_on, row.source, row.phrase,
-            row.readers, f"{row.plausible}: {row.plausible.why}" if row.plausible else "",
-        )  # fmt: skip
-        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    return "\n".join(lines) + "\n"
 
 
 @dataclass(frozen=True)

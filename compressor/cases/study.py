@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, overload
+from typing import Any, overload
 
 from compressor.cases.blocks import Block, reader
 from compressor.cases.case import Case
@@ -107,21 +107,10 @@ class Cases(Sequence[Case]):
         return [number for number, job in enumerate(jobs) if test(job)]
 
 
-class StudyJobs(Protocol):
-    """What a study knows of its jobs, whether read from a case file or from a store."""
-
-    @property
-    def axes(self) -> Sequence[Any]: ...
-    @property
-    def is_grid(self) -> bool: ...
-    @property
-    def jobs(self) -> int: ...
-
-
-def points(study: StudyJobs) -> Iterator[dict[str, Any]]:
+def points(study: Any) -> Iterator[dict[str, Any]]:
     """Yield the swept values that each job has, by dotted key, in the order of the jobs.
 
-    What is swept in other blocks only is left out.
+    What is swept in other blocks only is left out. study: of a file, or of a store.
     """
     keys = [axis.key for axis in study.axes]
     columns = [axis.values for axis in study.axes]

@@ -5,7 +5,8 @@ import re
 import pytest
 
 from compressor.cases.case import Case
-from compressor.cases.conflicts import judged_range, outside_judged
+from compressor.cases.checks import row_of
+from compressor.cases.conflicts import outside_judged
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
 from compressor.cases.table import parts_by_key, table
@@ -28,9 +29,9 @@ def test_the_defaults_are_inside(joint):
 def test_the_ends_are_inside():
     for key in ("machine.rod_mass_kg", "machine.speed_rpm", "contact.stiffness_N_per_mm15"):
         group, _, name = key.partition(".")
-        for end in judged_range(key):
+        for end in row_of(key).judged:
             assert key not in outside(**{group: {name: end}})
-            beyond = end * (0.9 if end == judged_range(key)[0] else 1.1)
+            beyond = end * (0.9 if end == row_of(key).judged[0] else 1.1)
             assert key in outside(**{group: {name: beyond}})
 
 
