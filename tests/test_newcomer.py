@@ -180,7 +180,7 @@ def test_the_page_on_contact_laws_is_right(tmp_path):
         ("LINEAR = int(Law.LINEAR)\n\n\n" + force,
          "\n\n@inline_llvm\ndef may_choose_laws(p)", False),
         *(first_in(name, chosen[name]) for name in
-          ("normal_force", "elastic_force", "elastic_energy", "elastic_form")),
+          ("normal_force", "elastic_force", "elastic_form")),
     )  # fmt: skip
     laws = (tmp_path / WORDS).read_text(encoding="utf-8")
     laws = re.sub(r"^RESTITUTING = .*?\)\n", words, laws, count=1, flags=re.DOTALL | re.MULTILINE)

@@ -53,7 +53,7 @@ def cam_slope(p, angles):
 
 def printed_corners_of_gas(p):
     """Return the ideal gas's corners (rad), with which Eq. 10 as printed is evaluated."""
-    return gas_corners(p, p.discharge_force / p.suction_force)
+    return gas_corners(p)
 
 
 def printed_profile(p, angles):

@@ -1,4 +1,4 @@
-"""The one door to numba.
+"""The one door to numba: four ways to compile a function, and a choice by the kind of record.
 
 ``COMPSIM_JIT=0`` switches compilation off: the same source then runs as plain Python, for
 coverage and for debugging (``make test-pure``). Machine code is kept on disk in a folder named by
@@ -34,10 +34,7 @@ def discard_other_code(folder: Path) -> None:
 
 
 class Deferred:
-    """Something of numba's that is made when it is first needed.
-
-    Importing numba takes a third of a second: what calls no compiled function need not wait for it.
-    """
+    """Something of numba's, made when first needed: to import that takes a third of a second."""
 
     def __init__(self, make: Callable[[], Any], function: Any):
         functools.update_wrapper(self, function)
@@ -48,12 +45,9 @@ class Deferred:
         """Return what numba makes of the function."""
         with TARGET_LOCK:
             load_numba()
-            return vars(self).get("target") or self.make_target()
-
-    def make_target(self) -> Any:
-        """Make it, and hold it before another thread may look."""
-        vars(self)["target"] = self.make()
-        return vars(self)["target"]
+            if "target" not in vars(self):  # held before another thread may look
+                vars(self)["target"] = self.make()
+            return vars(self)["target"]
 
     def __call__(self, *arguments: Any) -> Any:
         return self.target(*arguments)
@@ -89,14 +83,11 @@ def load_numba() -> None:
 
     event.register("numba:compile", collect_seldom())
     # to be known before anything is compiled
-    without_refcount.make_target()  # type: ignore[attr-defined]
+    vars(without_refcount)["target"] = _without_refcount()
 
 
 def collect_seldom() -> Any:
-    """Return numba's listener that lets Python look for garbage seldom while numba compiles.
-
-    It took a tenth of the time: numba makes millions of objects, and hardly any is garbage.
-    """
+    """Return a listener that looks for garbage seldom during a compile: a tenth of its time."""
     from numba.core import event
 
     class Seldom(event.Listener):
@@ -116,8 +107,14 @@ def collect_seldom() -> Any:
     return Seldom()
 
 
-def _compile(function: Function, made: type[Deferred], **options: Any) -> Function:
-    """Return a function that numba compiles with these options when it is first needed."""
+def jit(function: Function, made: type[Deferred] = Deferred, **options: Any) -> Function:
+    """Compile `function` on its first call and keep the machine code on disk.
+
+    Arithmetic is IEEE's, in the order written, as it is with ``COMPSIM_JIT=0``: a product and a sum
+    that were rounded once would save a twentieth of a run, but which ones are depends on what else
+    was compiled before, so that workers found other last bits. A division by zero gives inf or nan,
+    not an exception, so that the caller can judge a state that went wrong.
+    """
     # wrappers for who does not call it would only take time to compile: for C, and some for Python
     how: Any = {
         "cache": True, "error_model": "numpy", "no_cfunc_wrapper": True,
@@ -136,49 +133,21 @@ def _compile(function: Function, made: type[Deferred], **options: Any) -> Functi
     return deferred if ENABLED else function
 
 
-def jit(function: Function) -> Function:
-    """Compile `function` on its first call and keep the machine code on disk.
-
-    Arithmetic is IEEE's, in the order written, as it is with ``COMPSIM_JIT=0``: a product and a sum
-    that were rounded once would save a twentieth of a run, but which ones are depends on what else
-    was compiled before, so that workers found other last bits. A division by zero gives inf or nan,
-    not an exception, so that the caller can judge a state that went wrong.
-    """
-    return _compile(function, Deferred)
-
-
-def inner(function: Function) -> Function:
-    """Return `jit` for compiled callers alone: without the wrapper by which Python calls it.
-
-    Python calls the function as it is written.
-    """
-    return _compile(function, Inlined)
-
-
-def inline_llvm(function: Function) -> Function:
-    """Return `jit`, written by LLVM into each caller, whatever its size.
-
-    It compiles in a small part of the time that numba's own inlining takes. Python calls the
-    function as it is written.
-    """
-    return _compile(function, Inlined, forceinline=True)
-
-
-def inline_once(function: Function) -> Function:
-    """Return `jit`, written by numba into its caller: for what one function calls, or a few lines.
-
-    So it has no machine code of its own, which is a third of what compiling it costs, and is not
-    optimized again in each function above. Where a caller gets long by it, that costs more than it
-    saves: numba's passes take longer than in proportion. Python calls it as it is written.
-    """
-    return _compile(function, Inlined, inline="always")
+# for compiled callers alone, without the wrapper by which Python calls: it calls them as written
+inner = functools.partial(jit, made=Inlined)
+# the same, written by LLVM into each caller, whatever its size: that compiles in a small part of
+# the time that numba's own inlining takes
+inline_llvm = functools.partial(jit, made=Inlined, forceinline=True)
+# the same, written by numba into its caller: for what one function calls, or a few lines. It has no
+# machine code of its own, which is a third of what compiling it costs, and is not optimized again
+# in each function above; where a caller gets long by it, numba's passes cost more than it saves
+inline_once = functools.partial(jit, made=Inlined, inline="always")
 
 
 def dispatch_on_record(field: str, special: Function, usual: Function) -> Function:
     """Return a function that is `special` for records that have a field, `usual` for all others.
 
-    Which one is settled by types when a caller is compiled, so that the other is no part of its
-    machine code, and is not compiled with it.
+    Types settle it when a caller is compiled: the other is not compiled with it.
     """
 
     def choose(*arguments: Any) -> Any:
@@ -202,10 +171,7 @@ def dispatch_on_record(field: str, special: Function, usual: Function) -> Functi
 
 
 def implementation_for(field: str, wanted: bool, function: Any) -> Any:
-    """Return what numba asks: the function if types of arguments have a field as wanted, or None.
-
-    wanted: whether a record among them is to have it.
-    """
+    """Return what numba asks: the function if a record has the field as wanted."""
     from numba import types
 
     @functools.wraps(function)  # numba compares parameters
@@ -242,19 +208,14 @@ def _without_refcount() -> Any:
 
 @inline_llvm
 def square_root(a: float) -> float:
-    """Return the square root.
-
-    Of a number below 0 it is nan: a step that tries an impossible position is refused, also in
-    plain Python.
-    """
+    """Return the square root; nan below 0: a step that tries an impossible position is refused."""
     return math.sqrt(a) if a >= 0.0 else math.nan
 
 
 def without_refcount(array: Any) -> Any:
     """Return the same array without a share in its ownership: nothing counts its references.
 
-    Counting is atomic, and every call that takes an array counts twice: a march took 2.6 times as
-    long.
+    Counting is atomic, at each call that takes an array: a march took 2.6 times as long.
     """
     return array
 

@@ -1,18 +1,15 @@
-"""Contact at a clearance joint: normal force, friction laws, and the point where bodies meet.
+"""Contact at a clearance joint: friction laws, the point where bodies meet, and the oil film.
 
-physics/README.md, Contact and Friction (Eq. 14-16).
-
-Friction laws: the friction coefficient by the slip, and what a contact's bristles do. A law is a
-member of `FrictionLaw`, named by `friction.law` in small letters, and a branch of
-`chosen_coefficient` (physics/README.md, Friction). ADAMS's is the default, for which nothing is
-compared; the others are no part of its machine code, or it would take half as long again to make.
+physics/README.md, Contact and Friction (Eq. 14-16). A friction law is a member of `FrictionLaw`,
+named by `friction.law` in small letters, and a branch of `friction_coefficient`. ADAMS's is the
+default, for which nothing is compared, and no other is in the machine code.
 """
 
 import math
 from enum import IntEnum
 from typing import NamedTuple
 
-from compressor.physics._jit import dispatch_on_record, inline_llvm, inline_once, square_root
+from compressor.physics._jit import dispatch_on_record, inline_llvm, square_root
 from compressor.physics.contact_laws import (
     HYSTERESIS,
     Law,
@@ -22,6 +19,7 @@ from compressor.physics.contact_laws import (
     normal_force,
     rise,
 )
+from compressor.physics.film import film
 from compressor.physics.record import CHOSEN_FORCES
 
 SATURATED = 1.0 - math.exp(-3.0)  # Threlfall's curve at its knee
@@ -73,14 +71,10 @@ def stribeck(slip, p):
 
 @inline_llvm
 def bristle_rate(slip, bristle, p):
-    """Return how fast LuGre's bristles bend (m/s), of a mean deflection (m).
-
-    There are none at mu 0.
-    """
+    """Return how fast LuGre's bristles bend (m/s) at a mean deflection (m); 0 without friction."""
     if p.static == 0.0 and p.dynamic == 0.0:
         return 0.0
-    relaxation = p.bristle_stiffness * abs(slip) * bristle / stribeck(slip, p)
-    return slip - relaxation
+    return slip - p.bristle_stiffness * abs(slip) * bristle / stribeck(slip, p)
 
 
 @inline_llvm
@@ -91,34 +85,22 @@ def lugre(slip, bristle, p):
 
 
 @inline_llvm
-def chosen_coefficient(slip, bristle, p):
-    """Return the coefficient by the law that a record has chosen."""
-    if p.friction == COULOMB_TANH:
-        return p.dynamic * math.tanh(slip / p.stiction_velocity)
-    if p.friction == THRELFALL:
-        return threlfall(slip, p)
-    if p.friction == AMBROSIO:
-        return ambrosio(slip, p)
-    if p.friction == LUGRE:
-        return lugre(slip, bristle, p)
+def friction_coefficient(slip, bristle, p):
+    """Return the signed coefficient at a slip (m/s) and a mean deflection of bristles (m)."""
+    if has_chosen_laws(p):
+        if p.friction == COULOMB_TANH:
+            return p.dynamic * math.tanh(slip / p.stiction_velocity)
+        if p.friction == THRELFALL:
+            return threlfall(slip, p)
+        if p.friction == AMBROSIO:
+            return ambrosio(slip, p)
+        if p.friction == LUGRE:
+            return lugre(slip, bristle, p)
     return adams(slip, p)
-
-
-@inline_llvm
-def default_coefficient(slip, bristle, p):
-    """Return `chosen_coefficient` where no law has been chosen: by ADAMS's."""
-    return adams(slip, p)
-
-
-# signed, at a slip (m/s) and a mean deflection of bristles (m)
-friction_coefficient = dispatch_on_record(CHOSEN_FORCES, chosen_coefficient, default_coefficient)
 
 
 def steepest(p) -> float:
-    """Return the greatest change of a record's friction coefficient with the slip (s/m).
-
-    It holds explicit steps back: times the normal force over the mass, it is friction's rate (1/s).
-    """
+    """Return the greatest slope of a record's friction coefficient over the slip (s/m)."""
     law, rise_over = p["friction"], p["stiction_velocity"].item()
     if law == FrictionLaw.ADAMS:
         return 1.5 * p["static"].item() / rise_over
@@ -132,35 +114,11 @@ def steepest(p) -> float:
 
 
 def choose_laws(p, contact: str, restitution: float, friction: str) -> None:
-    """Set a record's contact and friction laws by their names, and chi by the restitution.
-
-    p: a record, or a dict that one is filled from; contact, friction: names of `Law` and of
-    `FrictionLaw` in small letters. Raises KeyError where there is no law of a name.
-    """
+    """Set the laws of a record, or of a dict for one, by their names in small letters; chi by e."""
     law = Law[contact.upper()]
     p["law"], p["friction"] = law, FrictionLaw[friction.upper()]
-    p["hysteresis"] = hysteresis(contact, restitution) if law in HYSTERESIS else 0.0
+    p["hysteresis"] = HYSTERESIS[law](restitution) if law in HYSTERESIS else 0.0
     p["carries"] = int(p["hysteresis"] != 0.0 or p["friction"] == FrictionLaw.LUGRE)
-
-
-def hysteresis(contact: str, restitution: float) -> float:
-    """Return chi, the damping force over the elastic one at the approach speed, by a law's name.
-
-    restitution: e; the formulas and their papers stand in `contact_laws.HYSTERESIS`. Raises
-    KeyError for a law that has none.
-    """
-    return HYSTERESIS[Law[contact.upper()]](restitution)
-
-
-@inline_once
-def carried_numbers(joint, y, p):
-    """Return a joint's numbers among what contacts carry in the state: 1 and 0 where nothing does.
-
-    The speed (m/s) at which the bodies met, and the mean deflection (m) of the bristles.
-    """
-    if has_chosen_laws(p) and p.carries:
-        return y[2 * p.freedoms + joint], y[2 * p.freedoms + 2 + joint]
-    return 1.0, 0.0
 
 
 class ContactState(NamedTuple):
@@ -174,65 +132,94 @@ class ContactState(NamedTuple):
     penetration: float  # delta; negative: a gap
     rate: float  # of the penetration
     slip: float  # v_t
-    elastic: float  # part of it without damping
     unclamped: float  # normal force before the clamp at zero
     # of an oil film, whose force and moment on the rod are in those above
     film_moment: float  # on the journal, N m
     film_loss: float  # power that it takes, W
 
 
-NO_CONTACT = ContactState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_CONTACT = ContactState(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inline_llvm
-def joint_contact(eccentricity, spins, bearing, carried, p):
-    """Return the contact between a joint's journal and the rod's bore.
+def with_film(joint, contact, eccentricity, spins, p):
+    """Return a joint's `ContactState` with the force, the moments and the loss of its film."""
+    if p.viscosity == 0.0:
+        return contact
+    fx, fy, journal, bore, lost = film(joint, eccentricity, spins, p)
+    return ContactState(
+        contact.fx - fx, contact.fy - fy, contact.moment + bore, contact.normal, contact.friction,
+        contact.penetration, contact.rate, contact.slip, contact.unclamped, journal, lost,
+    )  # fmt: skip
 
-    eccentricity: journal centre minus bore centre, x and y (m), and its rate (m/s); spins of
-    journal and rod (rad/s, counter-clockwise); bearing: the joint's journal radius (m), clearance
-    (m) and stiffness (N/m^p); carried: as by `carried_numbers`. Returns a `ContactState`; one
+
+@inline_llvm
+def without_film(joint, contact, eccentricity, spins, p):
+    """Return the contact: records of the default forces have no oil."""
+    return contact
+
+
+add_film = dispatch_on_record(CHOSEN_FORCES, with_film, without_film)
+
+
+@inline_llvm
+def joint_contact(joint, eccentricity, spins, y, p):
+    """Return the `ContactState` between a joint's journal and the rod's bore, with its film.
+
+    eccentricity: journal centre minus bore centre, x and y (m), and its rate (m/s); spins: of
+    journal and rod (rad/s, counter-clockwise); y: the state, which holds what contacts carry. One
     contact point serves both bodies, so that angular momentum balances. Concentric circles exert
     no force.
     """
     ex, ey, ex_rate, ey_rate = eccentricity
-    pin, clearance, stiffness = bearing
+    pin, clearance, stiffness = p.pin_radius[joint], p.clearance[joint], p.stiffness[joint]
+    approach, bristle = 1.0, 0.0  # at which the bodies met (m/s), mean deflection (m)
+    if has_chosen_laws(p) and p.carries:
+        approach, bristle = y[2 * p.freedoms + joint], y[2 * p.freedoms + 2 + joint]
     distance = square_root(ex * ex + ey * ey)
-    penetration = distance - clearance
-    if distance == 0.0:
-        slip = 0.0
-        if has_chosen_laws(p):  # bristles, which bend by the slip, must not start with a jump
-            slip = spins[0] * (pin - penetration) - spins[1] * (pin + clearance)
-        return ContactState(0.0, 0.0, 0.0, 0.0, 0.0, penetration, 0.0, slip, 0.0, 0.0, 0.0, 0.0)
-    per_distance = 1.0 / distance
-    nx = ex * per_distance
-    ny = ey * per_distance
-    rate = ex_rate * nx + ey_rate * ny
-    bore = pin + clearance
-    arm = pin - penetration
-    journal_spin, rod_spin = spins
-    turning = journal_spin * arm - rod_spin * bore
-    slip = ey_rate * nx + (turning - ex_rate * ny)
-    approach, bristle = carried
-    normal, elastic, unclamped = normal_force(penetration, rate, approach, stiffness, clearance, p)
-    friction = 0.0
-    if p.friction and in_contact(normal):
-        friction = -friction_coefficient(slip, bristle, p) * normal
-    fx = normal * nx + friction * ny
-    fy = normal * ny - friction * nx
-    moment = -bore * friction
-    return ContactState(
-        fx, fy, moment, normal, friction, penetration, rate, slip, elastic, unclamped, 0.0, 0.0
+    penetration, bore = distance - clearance, pin + clearance
+    turning = spins[0] * (pin - penetration) - spins[1] * bore
+    fx, fy, moment, normal, friction, rate, unclamped = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    # bristles, which bend by the slip, must not start with a jump
+    slip = turning if has_chosen_laws(p) else 0.0
+    if distance != 0.0:
+        per_distance = 1.0 / distance
+        nx, ny = ex * per_distance, ey * per_distance
+        rate = ex_rate * nx + ey_rate * ny
+        slip = ey_rate * nx + (turning - ex_rate * ny)
+        normal, unclamped = normal_force(penetration, rate, approach, stiffness, clearance, p)
+        if p.friction and in_contact(normal):
+            friction = -friction_coefficient(slip, bristle, p) * normal
+        fx = normal * nx + friction * ny
+        fy = normal * ny - friction * nx
+        moment = -bore * friction
+    contact = ContactState(
+        fx, fy, moment, normal, friction, penetration, rate, slip, unclamped, 0.0, 0.0
     )
+    return add_film(joint, contact, eccentricity, spins, p)
 
 
 @inline_llvm
 def nearness(contact, stiffness, clearance, p):
     """Return how near a joint is to contact (m): positive in contact, else minus its distance.
 
-    The distance is the gap, or the clamped force as a length: divided by the contact's stiffness at
-    the penetration of full damping, so that both parts are small where contact is near.
+    That is the gap, or the clamped force over the stiffness at the penetration of full damping.
     """
     if contact.penetration <= 0.0:
         return contact.penetration
     full = p.full_damping
     return contact.unclamped * full / elastic_force(full, stiffness, clearance, p)
+
+
+@inline_llvm
+def write_carried_rates(big, small, pace, y, p, out):
+    """Write the rates of what contacts carry: an approach speed stays until the bodies meet again.
+
+    Bristles bend while the bodies slide, also where they do not touch. pace: of the time.
+    """
+    place = 2 * p.freedoms
+    out[place], out[place + 1], out[place + 2], out[place + 3] = 0.0, 0.0, 0.0, 0.0
+    if p.friction == LUGRE and p.clearance[0] > 0.0:
+        out[place + 2] = bristle_rate(big.slip, y[place + 2], p) * pace
+    if p.friction == LUGRE and p.clearance[1] > 0.0:
+        out[place + 3] = bristle_rate(small.slip, y[place + 3], p) * pace

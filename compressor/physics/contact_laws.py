@@ -1,23 +1,16 @@
-"""Contact laws: the force, damping and elastic energy of each, its depths, and the choice of one.
+"""Contact laws: the force and the elastic energy of each, its depths, and the choice of one.
 
 A law is a member of `Law`, named by `contact.law` in small letters (physics/README.md, Contact). If
 it damps by chi times the elastic force over the approach speed, it is a line in `HYSTERESIS`; if
-not, it needs a function like `impact`, and a branch in `normal_force`. If its elastic force is not
-K delta^p, that has a branch in each of `elastic_force`, `elastic_energy` and `elastic_form`.
-Nothing else knows of a law but the choices of `contact.law` in the table of parameters
-(`cases.laws`).
+its elastic force is not K delta^p, that has a branch in `elastic_force` and in `elastic_form`.
 
 For the default law nothing is compared: that took 3 to 10 % off the speed of the march. Whether a
 record's laws are chosen ones is its type (`record.CHOSEN`).
 
-Elastic forces of a pin that lies in its bore along a line, by Johnson and by Liu.
-physics/README.md, Pins in bores. Both need the length of the joint and the composite modulus E*, 1
-/ E* = sum of (1 - nu^2) / E; their force is no power of the penetration, and depends on the
-clearance c as well.
-
-Johnson, Contact Mechanics (1985), Eq. 5.57 with the radial clearance as the difference of radii:
-delta = F / S (ln(4 S c / F) - 1), S = pi E* L (N/m). Liu, Zhang and Yang, Mech. Mach. Theory 42
-(2007): F = S delta / 2 sqrt(delta / (2 (c + delta))), which is K delta^1.5 / sqrt(1 + delta / c).
+Johnson's and Liu's laws are of a pin that lies in its bore along a line (physics/README.md, Pins in
+bores): their force is no power of the penetration, and depends on the clearance c as well.
+Johnson, Contact Mechanics (1985), Eq. 5.57: delta = F / S (ln(4 S c / F) - 1), S = pi E* L (N/m).
+Liu, Zhang and Yang, Mech. Mach. Theory 42 (2007): K delta^1.5 / sqrt(1 + delta / c).
 """
 
 import math
@@ -41,10 +34,7 @@ SERIES = (
 
 @inline_once
 def johnson_share(depth):
-    """Return w = ln(4 S c / F) - 1 where a depth, over 4 c, is w exp(-1 - w): the larger solution.
-
-    By Newton's method; depth: of (0, exp(-2)).
-    """
+    """Return w = ln(4 S c / F) - 1, the larger solution of depth = w exp(-1 - w), by Newton."""
     level = -1.0 - math.log(depth)
     above = max(level - 1.0, 0.0)
     share = 1.0 + math.sqrt(2.0 * above) + above + math.log(1.0 + above) / 3.0
@@ -98,24 +88,16 @@ def liu_energy(penetration, stiffness, clearance):
 
 @dataclass(frozen=True)
 class Conformal:
-    """An elastic force that is no power of the penetration, for scales before a run; SI.
-
-    `force` (N) and `energy` (J) rise with the penetration (m); `slope` (N/m) is the force's;
-    `deepest` (m): beyond which the law has no force.
-    """
+    """An elastic force that is no power of the penetration, for scales before a run; SI."""
 
     force: Callable[[float], float]
-    slope: Callable[[float], float]
+    tangent: Callable[[float], float]  # N/m: stiffness of small motion
     energy: Callable[[float], float]
     deepest: float = math.inf
 
     def static_depth(self, force: float) -> float:
         """Return the penetration (m) at rest under a force (N)."""
         return solve_rising(self.force, force)
-
-    def tangent(self, depth: float) -> float:
-        """Return the stiffness (N/m) of small motion about a penetration (m)."""
-        return self.slope(depth)
 
     def damping(self, depth: float) -> float:
         """Return the damping coefficient (N s/m): unknown before bodies meet."""
@@ -126,10 +108,7 @@ class Conformal:
         return solve_rising(self.energy, 0.5 * mass * speed**2)
 
     def impact_time(self, depth: float, speed: float) -> float:
-        """Return the contact time (s) of an impact that goes to a depth (m).
-
-        2 / v times the integral of 1 / sqrt(1 - U / U_max) over the penetration.
-        """
+        """Return the contact time (s) of an impact: the integral of 2 / v / sqrt(1 - U / U_max)."""
         if not speed > 0.0:
             return math.inf
         nodes, weights = np.polynomial.legendre.leggauss(64)
@@ -242,64 +221,30 @@ def power(base, exponent):
 
 
 @inline_llvm
-def impact_elastic(penetration, stiffness, p):
-    """Return the elastic force (N) of ADAMS's IMPACT: K delta^p."""
-    return stiffness * power(penetration, p.exponent)
-
-
-@inline_once
-def impact(penetration, rate, stiffness, p):
-    """Return `normal_force` by ADAMS's IMPACT, damped by C_max STEP(delta / d_max) (N s/m)."""
-    if penetration <= 0.0:
-        return 0.0, 0.0, 0.0
-    elastic = impact_elastic(penetration, stiffness, p)
-    unclamped = p.damping * rise(penetration * p.per_full_damping) * rate + elastic
-    return max(0.0, unclamped), elastic, unclamped
-
-
-@inline_llvm
 def elastic_force(penetration, stiffness, clearance, p):
-    """Return the elastic force (N) of the record's law at a positive penetration (m).
-
-    stiffness and clearance (m): the joint's.
-    """
+    """Return the elastic force (N) of the record's law at a positive penetration (m)."""
     if has_chosen_laws(p) and p.law == JOHNSON:
         return johnson(penetration, stiffness, clearance)
     if has_chosen_laws(p) and p.law == LIU:
         return liu(penetration, stiffness, clearance)
-    return impact_elastic(penetration, stiffness, p)
-
-
-@inline_llvm
-def elastic_energy(elastic, penetration, stiffness, clearance, p):
-    """Return the energy (J) stored where the elastic force (N) has reached a penetration (m)."""
-    if has_chosen_laws(p) and elastic > 0.0 and p.law == JOHNSON:
-        return johnson_energy(elastic, penetration, stiffness, clearance)
-    if has_chosen_laws(p) and elastic > 0.0 and p.law == LIU:
-        return liu_energy(penetration, stiffness, clearance)
-    return elastic * penetration / (p.exponent + 1.0)
-
-
-@inline_once
-def hysteretic(penetration, rate, approach, stiffness, clearance, p):
-    """Return `normal_force` by a law of HYSTERESIS: F_e (1 + chi delta' / delta'_0)."""
-    if penetration <= 0.0:
-        return 0.0, 0.0, 0.0
-    elastic = elastic_force(penetration, stiffness, clearance, p)
-    unclamped = elastic * p.hysteresis / approach * rate + elastic
-    return max(0.0, unclamped), elastic, unclamped
+    return stiffness * power(penetration, p.exponent)
 
 
 @inline_llvm
 def normal_force(penetration, rate, approach, stiffness, clearance, p):
-    """Return F_N, its elastic part, and F_N before its lower bound (N), by the record's law.
+    """Return F_N, and F_N before its lower bound (N), by the record's law.
 
     At a penetration (m), its rate and the speed at which the bodies met (m/s): the elastic force
-    with damping times rate added, but never pulling. All are 0 unless the penetration is positive.
+    with damping times rate added, but never pulling. Both are 0 unless the penetration is positive.
     """
+    if penetration <= 0.0:
+        return 0.0, 0.0
+    elastic = elastic_force(penetration, stiffness, clearance, p)
     if has_chosen_laws(p) and p.law != IMPACT:
-        return hysteretic(penetration, rate, approach, stiffness, clearance, p)
-    return impact(penetration, rate, stiffness, p)
+        unclamped = elastic * p.hysteresis / approach * rate + elastic
+    else:  # damped by C_max STEP(delta / d_max) (N s/m)
+        unclamped = p.damping * rise(penetration * p.per_full_damping) * rate + elastic
+    return max(0.0, unclamped), unclamped
 
 
 @inline_llvm
@@ -310,10 +255,7 @@ def in_contact(normal):
 
 @dataclass(frozen=True)
 class Power:
-    """An elastic force K delta^p in closed form, for scales before a run; SI.
-
-    The damping beside it is as far as it is known then.
-    """
+    """An elastic force K delta^p in closed form, for scales before a run; SI."""
 
     stiffness: float
     exponent: float
@@ -354,11 +296,7 @@ class Power:
 
 
 def elastic_form(stiffness: float, clearance: float, p) -> Power | Conformal:
-    """Return the record's law with a joint's stiffness and clearance (m), for scales before a run.
-
-    stiffness: in N/m^p, of Johnson's and Liu's laws as for `johnson` and `liu`. Raises ValueError
-    for a number that is no member of `Law`.
-    """
+    """Return the record's law at a joint's stiffness and clearance (m), for scales before a run."""
     if p["law"] == Law.IMPACT:
         return Power(stiffness, p["exponent"], p["damping"], p["per_full_damping"])
     if p["law"] == Law.JOHNSON:

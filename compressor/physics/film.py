@@ -1,41 +1,21 @@
 """The oil film of a journal bearing under a load that moves: its forces, moments and loss.
 
-The journal's motion enters Reynolds' equation by one velocity: with the eccentricity eps over the
-clearance, eps' along the line of centres and eps w / 2 across it, w = w_J + w_B - 2 delta', delta
-the angle of the line of centres. The film bears on the half of the bearing that this velocity
-presses on. Of a short bearing that force has a closed form (`short_film`). Of a bearing of finite
-length it is known in three directions,
-
-    F_D = So_D(eps) B D eta |w| / psi^2   of rotation, at the angle beta behind the line of centres
-    F_V = So_V(eps) B D eta eps' / psi^2  of squeeze, along it; pulled apart: as of -eps
-
-B and D length and diameter, psi the clearance over the radius. Between them it follows from the
-short bearing's direction (`film_numbers_at`), to some per cent of one Reynolds field where the film
-is pressed, and of the force of rotation alone where it is pulled apart and bears little: up to a
-quarter of its own near the wall (physics/README.md, Oil film). Holland's sum of F_D and F_V is no
-such thing: where a journal leaves the wall slowly it keeps the force of rotation, most of which the
-opening takes away.
-
-The numbers are those of Reynolds' equation, solved once for a bearing's length over its diameter
-(`solve.bearing`): as polynomials of sqrt(1 - eps), in which they are smooth up to the wall, over
-the short bearing's.
+physics/README.md, Oil film. eps is the eccentricity over the clearance; the journal's motion enters
+by one velocity, eps' along the line of centres and eps w / 2 across it. The force follows from that
+of a short bearing, which has a closed form (`short_film`), by numbers of Reynolds' equation for the
+bearing's length over its diameter (`solve.bearing`): pressed, pulled apart, turned.
 
 Below `CENTRE_ECCENTRICITY` the numbers go to those that make the centre smooth: a force against
-the velocity.
-In the film's last share the numbers stay what they are where it begins, as if the film could get
-no thinner than half of it, the height of the surfaces' asperities. Beyond the wall dry contact adds
-to it (mixed lubrication), so that the force never falls with depth, and as the share goes to 0 the
-motion goes to that of Reynolds' film. Where the film faded beyond the wall instead (Flores,
-Ambrosio, Claro and Lankarani, Proc. IMechE K 218, 2004), a journal fell through before dry contact
-bore its load, and struck: how hard, followed from the share.
+the velocity. In the film's last share they stay what they are in its middle, so that the force
+never falls with depth: where it faded beyond the wall, a journal fell through before dry contact
+bore its load, and struck.
 """
 
 import math
 
-from compressor.physics._jit import dispatch_on_record, inline_llvm, square_root
-from compressor.physics.contact import ContactState, carried_numbers, joint_contact
+from compressor.physics._jit import inline_llvm, square_root
 from compressor.physics.contact_laws import rise
-from compressor.physics.record import CHOSEN_FORCES, FILM_TERMS
+from compressor.physics.record import FILM_TERMS
 
 CENTRE_ECCENTRICITY = 0.1
 
@@ -54,10 +34,9 @@ def bounded_eccentricity(eps, share):
 def short_film(eps, wedge, closing):
     """Return the force of a short bearing along the line of centres and across, over (B / D)^2.
 
-    Away from the wall and along the rotation, as `solve.bearing.Reynolds`; wedge: eps w, closing:
-    eps', over one speed. Half of the bearing bears, from an angle `begin` on, from the widest
-    gap: there the integrals of sin^2, sin cos and cos^2 over h^3 have a closed form (Booker 1965),
-    written so that nothing cancels at the centre.
+    Away from the wall and along the rotation; wedge: eps w, closing: eps', over one speed. Half of
+    the bearing bears, from an angle on: there the integrals of sin^2, sin cos and cos^2 over h^3
+    have a closed form (Booker 1965), written so that nothing cancels at the centre.
     """
     speed = square_root(closing * closing + 0.25 * wedge * wedge)
     if not speed > 0.0:
@@ -81,8 +60,8 @@ def short_film(eps, wedge, closing):
 def short_bearing_shares(eps, constants):
     """Return a bearing's numbers over the short one's: pressed, pulled apart, turned; its attitude.
 
-    Of the attitude, tan(beta / 2) over that of Ocvirk's angle. constants: (FILM_TERMS, 4), of
-    `solve.bearing.film_constants`. Those of a film at its centre are one.
+    Of that, tan(beta / 2) over that of Ocvirk's angle. constants: of
+    `solve.bearing.film_constants`.
     """
     u = square_root(1.0 - eps)
     pressed, pulled, turned, further = 0.0, 0.0, 0.0, 0.0
@@ -136,9 +115,8 @@ def film_numbers_at(eps, wedge, closing, constants):
 def film(joint, eccentricity, spins, p):
     """Return the force on the journal x, y (N), both moments (N m), and the power lost (W).
 
-    eccentricity: journal centre less bore centre, x and y (m), and its rate (m/s); spins: of
-    journal and bore (rad/s). The moments, on journal and bore, balance: both have half of that of
-    the force pair, and the shear of the film (Petroff's over sqrt(1 - eps^2)) against their spin.
+    The moments, on journal and bore, balance: both have half of that of the force pair, and the
+    shear of the film (Petroff's over sqrt(1 - eps^2)) against their spin.
     """
     ex, ey, ex_rate, ey_rate = eccentricity
     pin, clearance, constants = p.pin_radius[joint], p.clearance[joint], p.film_constants[joint]
@@ -161,36 +139,3 @@ def film(joint, eccentricity, spins, p):
     lost = shear * (journal_spin - bore_spin) + half * (journal_spin + bore_spin)
     lost -= normal * radial + side * across
     return fx, fy, -shear - half, shear - half, lost
-
-
-@inline_llvm
-def oiled_contact(joint, contact, eccentricity, spins, p):
-    """Return a joint's `ContactState` with the force, the moments and the loss of its film."""
-    if p.viscosity == 0.0:
-        return contact
-    fx, fy, journal, bore, lost = film(joint, eccentricity, spins, p)
-    return ContactState(
-        contact.fx - fx, contact.fy - fy, contact.moment + bore, contact.normal, contact.friction,
-        contact.penetration, contact.rate, contact.slip, contact.elastic, contact.unclamped,
-        journal, lost,
-    )  # fmt: skip
-
-
-@inline_llvm
-def dry_contact(joint, contact, eccentricity, spins, p):
-    """Return the contact: records of the default forces have no oil."""
-    return contact
-
-
-add_film = dispatch_on_record(CHOSEN_FORCES, oiled_contact, dry_contact)
-
-
-@inline_llvm
-def oiled_joint(joint, eccentricity, spins, y, p):
-    """Return the `ContactState` of a joint in a state y, with its film where it has one.
-
-    eccentricity, spins: as of `film`.
-    """
-    bearing = p.pin_radius[joint], p.clearance[joint], p.stiffness[joint]
-    contact = joint_contact(eccentricity, spins, bearing, carried_numbers(joint, y, p), p)
-    return add_film(joint, contact, eccentricity, spins, p)

@@ -1,4 +1,4 @@
-"""Ideal motion of the slider-crank: exact, and the paper's series for comparison.
+"""Ideal motion of the slider-crank.
 
 Frame and signs: crank centre at the origin, x along the cylinder, theta = 0 at top dead centre, rod
 direction from big end to small end (cos phi, -sin phi) (physics/README.md, Frame).
@@ -56,13 +56,9 @@ def ideal_at(cos_theta, sin_theta, p):
 
 
 @inline_llvm
-def small_angle(angle, p):
-    """Return sine and cosine of an angle (rad).
-
-    Up to MAX_SERIES_ANGLE they are series, which are exact there. Where the record says that no
-    angle is `wide`, there is nothing but the series.
-    """
-    if p.wide and abs(angle) > MAX_SERIES_ANGLE:
+def small_angle(angle):
+    """Return sine and cosine of an angle (rad), up to MAX_SERIES_ANGLE by series that are exact."""
+    if abs(angle) > MAX_SERIES_ANGLE:
         return math.sin(angle), math.cos(angle)
     s = angle * angle
     q = s * s
@@ -79,22 +75,14 @@ def crank_direction(t, p):
 
 @inline_llvm
 def ideal_after(base, span, p):
-    """Return the `IdealMotion` a time (s) after the crank angle whose (cosine, sine) is the base.
-
-    A step turns the crank by little, so that these need no sine and cosine of their own.
-    """
-    sine, cosine = small_angle(p.omega * span, p)
+    """Return the `IdealMotion` a time (s) after a crank angle, given by its (cosine, sine)."""
+    sine, cosine = small_angle(p.omega * span)
     cos_theta = base[0] * cosine - base[1] * sine
     return ideal_at(cos_theta, base[1] * cosine + base[0] * sine, p)
 
 
 def exact_motion(theta, crank_radius, rod_length, omega):
-    """Return the exact piston displacement (m), velocity (m/s) and acceleration (m/s^2).
-
-    theta: crank angle (rad), of any shape, which the three arrays have; lengths in m, omega in
-    rad/s. The displacement counts from the crank centre (Eq. 1 counts from the head: L + R + S0
-    minus this).
-    """
+    """Return the ideal crosshead's place from the crank (m), speed (m/s) and acceleration."""
     theta = np.asarray(theta, dtype=float)
     sin_phi = crank_radius / rod_length * np.sin(theta)
     cos_phi = np.sqrt(1.0 - sin_phi**2)
@@ -107,28 +95,8 @@ def exact_motion(theta, crank_radius, rod_length, omega):
     return x, v, a
 
 
-def series_motion(theta, crank_radius, rod_length, omega):
-    """Return the paper's truncated series (Eq. 3-4), in this program's frame, for comparison only.
-
-    Arrays of theta's shape: displacement from the crank centre (m), velocity (m/s), acceleration
-    (m/s^2). Off by 0.122 mm at 90 degrees for the paper's geometry.
-    """
-    theta = np.asarray(theta, dtype=float)
-    ratio = crank_radius / rod_length
-    from_head = crank_radius * (1 - np.cos(theta)) + ratio / 4 * crank_radius * (
-        1 - np.cos(2 * theta)
-    )
-    x = rod_length + crank_radius - from_head
-    v = -crank_radius * omega * (np.sin(theta) + ratio / 2 * np.sin(2 * theta))
-    a = -crank_radius * omega**2 * (np.cos(theta) + ratio * np.cos(2 * theta))
-    return x, v, a
-
-
 def angle_at(x, crank_radius, rod_length):
-    """Return the crank angle in [0, pi] (rad) at which the ideal crosshead stands at x (m).
-
-    Raises ValueError when x lies outside the stroke [L - R, L + R].
-    """
+    """Return the crank angle in [0, pi] (rad) at which the ideal crosshead stands at x (m)."""
     cosine = (x * x + crank_radius**2 - rod_length**2) / (2 * crank_radius * x)
     if abs(cosine) > 1 + 1e-12:
         low, high = rod_length - crank_radius, rod_length + crank_radius

@@ -1,11 +1,8 @@
-"""Piston force: the ideal gas cycle of one end or of both, and the spring on a cam.
+"""Piston force: the ideal gas cycle of one end or of both, measured gas, and the spring on a cam.
 
-physics/README.md, Loads.
-
-The force is positive towards the crank. A load has four phases a revolution (expansion, suction,
-compression, discharge); the caller names the phase, so that both sides of a corner are exact. A
-cylinder's two ends have phases of their own, and its phase is the head end's plus four times the
-crank end's.
+physics/README.md, Loads. The force is positive towards the crank. A load has four phases a
+revolution (expansion, suction, compression, discharge); the caller names the phase, so that both
+sides of a corner are exact. A cylinder's phase is the head end's plus four times the crank end's.
 
 Gas is shut in at a dead centre, with the space that is there: in a worn machine the piston stands
 beyond its ideal place. An integrator notes where in the phase (`begin_stroke`), in the bits above
@@ -13,17 +10,18 @@ the lowest four, so that whoever observes the motion later has it, too.
 """
 
 import math
-from functools import lru_cache
 
 import numpy as np
 
-from compressor.physics._jit import inline_llvm, inner
+from compressor.physics._jit import dispatch_on_record, inline_llvm, inner
 from compressor.physics.kinematics import angle_at
-from compressor.physics.record import Load, derive
+from compressor.physics.record import CARD_NODES, CHOSEN_FORCES, Load, derive
 
 GAS = int(Load.GAS)
 SPRING = int(Load.SPRING)
 CYLINDER = int(Load.CYLINDER)
+CARD = int(Load.CARD)
+PER_NODE = 2.0 * math.pi / CARD_NODES  # rad
 EXPANSION, SUCTION, COMPRESSION, DISCHARGE = range(4)
 PLACE_BITS = 4  # of a phase, below the piston's place
 PLACE_UNIT = 2.0**-52  # m
@@ -31,19 +29,15 @@ PLACE_UNIT = 2.0**-52  # m
 
 @inline_llvm
 def piston_place(phase):
-    """Return how far (m) the piston was beyond its ideal place at the last dead centre.
-
-    Positive towards the cylinder's head.
-    """
+    """Return how far (m) the piston was beyond its ideal place at the last dead centre."""
     return (phase >> PLACE_BITS) * PLACE_UNIT
 
 
 @inline_llvm
 def shut_in_force(phase, space, clearance, suction_force, discharge_force, p):
-    """Return the force (N) that gas has in one end of a cylinder with its valves shut: Eq. 6.
+    """Return the force (N) of gas in one end of a cylinder with its valves shut, polytropic: Eq. 6.
 
-    Polytropic. phase: the end's; space: between piston and cover (m); clearance: what it was or
-    would have been at the end's own dead centre (m). The forces are those while valves are open.
+    space: between piston and cover (m); clearance: the same at the end's own dead centre.
     """
     if phase >= COMPRESSION:
         return suction_force * ((clearance + 2.0 * p.crank_radius) / space) ** p.gas_exponent
@@ -80,10 +74,7 @@ def end_force(phase, space, clearance, suction_force, discharge_force, p):
 
 @inline_llvm
 def cylinder_force(phase, x, p):
-    """Return the force (N) of the gas on both faces of a piston, less the back pressure's.
-
-    phase: the head end's plus four times the crank end's; x: of the crosshead (m).
-    """
+    """Return the force (N) of the gas on both faces of a piston, less the back pressure's."""
     space, clearance = head_space(phase, x, p)
     head = end_force(phase & 3, space, clearance, p.suction_force, p.discharge_force, p)
     crank = end_force(
@@ -95,11 +86,7 @@ def cylinder_force(phase, x, p):
 
 @inner
 def begin_stroke(t, deviation, i, phases, p):
-    """Write into the phase of segment i where the piston was at its last dead centre.
-
-    t: when the segment begins (s), deviation: of the crosshead from its ideal place then (m);
-    phases: of the run's segments, those before i written already. Only gas has it in its phases.
-    """
+    """Write into the phase of a segment where the piston was (m) at its last dead centre."""
     half_turns = p.omega * t / math.pi
     if abs(half_turns - math.floor(half_turns + 0.5)) < 1e-6:
         place = math.floor(deviation / PLACE_UNIT + 0.5)
@@ -110,11 +97,7 @@ def begin_stroke(t, deviation, i, phases, p):
 
 @inline_llvm
 def spring_force(phase, x, v, deviation, deviation_rate, p):
-    """Return the spring force (N) between piston and cam follower: Eq. 8-10, with the cam closed.
-
-    x (m), v (m/s) of the crosshead and their deviations from the ideal motion. While the follower
-    moves with the ideal piston the spring sees the deviation alone.
-    """
+    """Return the spring force (N) between piston and cam follower: Eq. 8-10, the cam closed."""
     late = phase >= COMPRESSION  # compared by size: LLVM makes no vector code of a `switch`
     if phase & 1:  # the follower dwells
         shortening = deviation + (p.spring_stroke if late else 0.0)
@@ -128,23 +111,46 @@ def spring_force(phase, x, v, deviation, deviation_rate, p):
 
 
 @inline_llvm
-def piston_force(phase, x, v, deviation, deviation_rate, p):
-    """Return the piston force (N), positive towards the crank, of the record's load."""
+def card_force(cos_theta, sin_theta, p):
+    """Return the force (N) of the gas, less the back pressure's, at a crank angle."""
+    place = math.atan2(sin_theta, cos_theta) / PER_NODE
+    if place < 0.0:
+        place += CARD_NODES
+    node = int(place)
+    s = place - node
+    node %= CARD_NODES
+    after = (node + 1) % CARD_NODES
+    rise = p.card[after, 0] - p.card[node, 0]
+    here, there = p.card[node, 1], p.card[after, 1]
+    bend = (1.0 - s) * (here - rise) + s * (rise - there)
+    return p.card[node, 0] + s * (rise + (1.0 - s) * bend)
+
+
+@inline_llvm
+def no_card(cos_theta, sin_theta, p):
+    """Return 0: records of the default forces have no card."""
+    return 0.0
+
+
+measured_force = dispatch_on_record(CHOSEN_FORCES, card_force, no_card)
+
+
+@inline_llvm
+def piston_force(phase, x, v, motion, deviation_rate, p):
+    """Return the piston force (N), positive towards the crank; x (m), v (m/s): of the crosshead."""
     if p.load == SPRING:
-        return spring_force(phase, x, v, deviation, deviation_rate, p)
+        return spring_force(phase, x, v, x - motion.x, deviation_rate, p)
     if p.load == GAS:
         return paper_force(phase, x, p) - p.back_force
     if p.load == CYLINDER:
         return cylinder_force(phase, x, p)
+    if p.load == CARD:
+        return measured_force(motion.cos_theta, motion.sin_theta, p)
     return 0.0
 
 
 def static_load(p):
-    """Return the greatest force (N) of the record's load on a piston that stands still.
-
-    p: a record, or a dict with its fields; the spring's at its full stroke (Eq. 8-10), or that of
-    the discharge pressure, of a cylinder at the end where it presses harder, or a card's greatest.
-    """
+    """Return the greatest force (N) of the load of a record or dict on a piston at rest."""
     if p["load"] == Load.SPRING:
         return p["preload"] + p["spring_stiffness"] * p["spring_stroke"]
     if p["load"] in (Load.GAS, Load.CARD):
@@ -157,10 +163,7 @@ def static_load(p):
 
 
 def greatest_load(p):
-    """Return an upper bound (N) of the load in the ideal machine.
-
-    p: a record, or a dict with its fields.
-    """
+    """Return an upper bound (N) of the load in the ideal machine; p: a record, or a dict."""
     if p["load"] == Load.SPRING:
         return static_load(p) + p["spring_damping"] * p["omega"] * p["crank_radius"]
     if p["load"] == Load.GAS:
@@ -168,21 +171,15 @@ def greatest_load(p):
     return static_load(p)
 
 
-def printed_corners():
-    """Return Eq. 13's corners (rad): 38.95, 180 and 294.2 degrees."""
-    return math.radians(38.95), math.pi, math.radians(294.2)
+def gas_corners(p):
+    """Return the ends (rad) of expansion, suction and compression of the ideal gas cycle, (3,).
 
-
-def gas_corners(p, pressure_ratio):
-    """Return the exact corners of the ideal gas cycle (rad), (3,).
-
-    The ends of expansion, suction and compression. `pressure_ratio`: p_d / p_s. Raises ValueError
-    when the gas left in the head clearance never expands to the suction pressure within the stroke.
+    Raises ValueError when the gas left never expands to the suction pressure within the stroke.
     """
     crank_radius, rod_length = p["crank_radius"], p["rod_length"]
     head_clearance, exponent = p["head_clearance"], float(p["gas_exponent"])
     head = rod_length + crank_radius + head_clearance
-    expansion_ratio = pressure_ratio ** (1.0 / exponent)
+    expansion_ratio = (p["discharge_force"] / p["suction_force"]) ** (1.0 / exponent)
     expansion = angle_at(head - head_clearance * expansion_ratio, crank_radius, rod_length)
     compressed_length = (2.0 * crank_radius + head_clearance) / expansion_ratio
     compression = angle_at(head - compressed_length, crank_radius, rod_length)
@@ -194,22 +191,8 @@ def has_cycle(p, end=""):
     return p[f"{end}discharge_force"] > p[f"{end}suction_force"]
 
 
-def head_corners(p):
-    """Return the corners (rad) of the head end of a cylinder, (3,); zeros where it has no cycle.
-
-    Raises ValueError as `gas_corners`.
-    """
-    if not has_cycle(p):
-        return 0.0, 0.0, 0.0
-    return gas_corners(p, p["discharge_force"] / p["suction_force"])
-
-
 def crank_corners(p):
-    """Return the corners (rad) of the crank end of a cylinder, (2,); zeros where it has no cycle.
-
-    Its discharge and its suction begin there; its compression does at 0, its expansion at pi.
-    Raises ValueError as `gas_corners`.
-    """
+    """Return the angles (rad) at which the crank end's discharge and suction begin, or zeros."""
     if not has_cycle(p, "crank_"):
         return 0.0, 0.0
     crank_radius, rod_length, clearance = p["crank_radius"], p["rod_length"], p["crank_clearance"]
@@ -223,10 +206,7 @@ def crank_corners(p):
 
 
 def cam_corners(crank_radius, rod_length, stroke):
-    """Return the corners (rad) of the closed cam, whose follower dwells for `stroke` (m) each way.
-
-    84.2608, 180 and 275.7392 degrees in the paper. Raises ValueError unless 0 < stroke < 2R.
-    """
+    """Return the corners (rad) of the closed cam. Raises ValueError unless 0 < stroke < 2R."""
     if not 0.0 < stroke < 2.0 * crank_radius:
         raise ValueError(f"the stroke, {stroke} m, must lie within (0, {2 * crank_radius}) m")
     rise = angle_at(rod_length + crank_radius - stroke, crank_radius, rod_length)
@@ -235,21 +215,21 @@ def cam_corners(crank_radius, rod_length, stroke):
 
 
 def load_corners(p):
-    """Return the corners (rad) of the record's load in the ideal motion, (3,)."""
-    if p["load"] in (Load.NONE, Load.CARD):
-        return 0.0, 0.0, 0.0
+    """Return the corners (rad) of the record's load in the ideal motion, (3,).
+
+    Zeros of a cylinder whose head end has no cycle. Raises ValueError as `gas_corners`.
+    """
+    if p["load"] == Load.GAS:  # of Eq. 13: 38.95, 180 and 294.2 degrees
+        return math.radians(38.95), math.pi, math.radians(294.2)
     if p["load"] == Load.SPRING:
         return cam_corners(p["crank_radius"], p["rod_length"], p["spring_stroke"])
-    if p["load"] == Load.CYLINDER:
-        return head_corners(p)
-    return printed_corners()
+    if p["load"] == Load.CYLINDER and has_cycle(p):
+        return gas_corners(p)
+    return 0.0, 0.0, 0.0
 
 
 def complete(p):
-    """Fill the fields of a record that follow from its others, its corners as by `load_corners`.
-
-    p: a record, or a dict with its fields. Raises ValueError as `gas_corners` and `cam_corners`.
-    """
+    """Fill the fields that follow from others. Raises ValueError as `load_corners`."""
     p["corners"] = load_corners(p)
     if p["load"] == Load.CYLINDER:
         p["crank_corners"] = crank_corners(p)
@@ -257,26 +237,21 @@ def complete(p):
 
 
 def segments(p, duration):
-    """Return the segments into which the load's corners cut [0, duration] (s).
-
-    Returns edges, shape (n + 1,) in s, and phases, shape (n,), which are not to be written: other
-    runs have the same. Of gas between exact corners they are those of the ideal motion. A corner
-    closer than a billionth of a turn to the end opens no segment of its own.
-    """
+    """Return edges (s), (n + 1,), and phases, (n,), into which ideal corners cut [0, duration]."""
     if p["load"] in (Load.NONE, Load.CARD):
         return np.array([0.0, duration]), np.zeros(1, dtype=np.int64)
-    corners, phases = p["corners"].tobytes(), (0, 1, 2, 3)
+    angles, cycle = (0.0, *p["corners"]), (0, 1, 2, 3)
     if p["load"] == Load.CYLINDER:
-        angles, phases = cylinder_phases(p)
-        corners = np.array(angles[1:]).tobytes()
-    return _segments_between(corners, phases, float(p["omega"]), duration)
+        angles, cycle = cylinder_phases(p)
+    turn = 2.0 * math.pi / p["omega"]
+    revolutions = np.arange(math.ceil(duration / turn * (1 + 1e-9)))
+    starts = (revolutions[:, None] * turn + np.array(angles) / p["omega"]).ravel()
+    phases = np.array(cycle)[np.arange(starts.searchsorted(duration - 1e-9 * turn)) % len(cycle)]
+    return np.append(starts[: phases.size], duration), phases
 
 
 def cylinder_phases(p):
-    """Return the angles (rad), from 0 on, at which phases of a cylinder begin, and these.
-
-    Corners of its ends that are closer than a billionth of a turn are one.
-    """
+    """Return the angles (rad), from 0 on, at which phases of a cylinder begin, and these."""
     head = crank = [(0.0, SUCTION)]  # without a cycle: as where the suction valve stays open
     if has_cycle(p):
         head = [(angle, i) for i, angle in enumerate((0.0, *p["corners"]))]
@@ -296,28 +271,10 @@ def _phase_at(angle, corners):
     return [phase for begin, phase in corners if begin <= angle + 2e-9 * math.pi][-1]
 
 
-@lru_cache(maxsize=64)
-def _segments_between(corners, cycle, omega, duration):
-    """Return `segments` of a load's corners (rad, as bytes) at a speed (rad/s).
-
-    cycle: the phases of a revolution; the first begins at 0 and the others at corners.
-    """
-    turn = 2.0 * math.pi / omega
-    starts = np.zeros(len(cycle))
-    starts[1:] = np.frombuffer(corners) / omega
-    revolutions = np.arange(math.ceil(duration / turn * (1 + 1e-9)))
-    starts = (revolutions[:, None] * turn + starts).ravel()
-    phases = np.array(cycle)[np.arange(starts.searchsorted(duration - 1e-9 * turn)) % len(cycle)]
-    edges = np.full(phases.size + 1, duration)
-    edges[:-1] = starts[: phases.size]
-    return edges, phases
-
-
 def sample_segments(times, edges):
-    """Return the number of the segment of each sample, shape of times.
+    """Return the number of the segment of each sample; on a corner the one that begins there.
 
-    times, edges: s. On a corner it is the segment that begins there, at the end the last one. A
-    sample within a billionth of a segment of an edge counts as on it.
+    A sample within a billionth of a segment of an edge counts as on it.
     """
     slack = 1e-9 * (edges[1:] - edges[:-1]).min()
     numbers = np.searchsorted(edges[:-1], times + slack, side="right") - 1

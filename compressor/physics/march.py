@@ -20,6 +20,7 @@ from compressor.physics._jit import (
     jit,
     without_refcount,
 )
+from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.kinematics import crank_direction, ideal, ideal_after
 from compressor.physics.observe import (
     ACCELERATION,
@@ -41,7 +42,7 @@ from compressor.physics.runge_kutta import (
     STAGES,
     A,
     P,
-    combine,
+    add_stages,
     error_norm,
     extend,
     interpolate,
@@ -63,8 +64,9 @@ from compressor.physics.systems import (
     beyond_model,
     derivative_with_flows,
     enter_segment,
+    evaluate,
     observe_contact,
-    observe_with_energy,
+    write_row,
 )
 from compressor.physics.tally import (
     PEAKED,
@@ -134,9 +136,8 @@ STEPPER = np.dtype(
         ("steps", "i8"),
         ("evaluations", "i8"),
         ("rejected", "i8"),
-        ("onsets", "i8"),
+        ("onsets", "i8"),  # that steps have ended on
         ("attempts", "i8"),  # of a step: taken, refused, and cut short by an onset
-        ("watch", "i8"),  # whether onsets of contact are watched
         ("mode", "i8"),  # Mode
         ("stiff", "i8"),  # whether the present step is the stiff partner's
         ("stability_limited", "i8"),  # explicit steps in a row that stability has held
@@ -219,15 +220,15 @@ def try_step(w, base, h, z, work, atol, size, phase, p):
 def observe_step(w, base, h, z, work, phase, p, tally):
     """Observe the step's interpolant at its nodes and return their stride: 1 for all, 2 for three.
 
-    An explicit step is observed in its middle and at its ends, where its last stage has observed it
-    already; also between them if a peak may be beaten, or if contact may change, for which the
-    interpolant is computed.
+    Its last stage has observed an explicit step's end already; nodes between are looked at if a
+    peak may be beaten, or if contact may change.
     """
     last = NODES.size - 1
     n = work.y.size
     if w.stiff:
         rosenbrock_extend(z, work.new, work.k[1:], work.dense)
-        observe_with_energy(ideal(w.t + h, p), work.new[:n], phase, p, work.rows[last])
+        now = evaluate(ideal(w.t + h, p), work.new[:n], phase, p)
+        write_row(now, work.new[:n], p, work.rows[last])
     w.has_dense = w.stiff
     stride = 1 if w.stiff else MIDDLE
     for i in TO_OBSERVE:
@@ -241,7 +242,7 @@ def observe_step(w, base, h, z, work, phase, p, tally):
         elif w.stiff:
             interpolate(NODES[i], work.dense, work.y)
         elif i == MIDDLE or stride == 1:
-            combine(NODE_WEIGHTS[i], h, z, work.k, work.y)
+            add_stages(NODE_WEIGHTS[i], STAGES, h, z, work.k, work.y)
         else:
             break
         observe_contact(ideal_after(base, NODES[i] * h, p), work.y, phase, p, work.rows[i])
@@ -259,14 +260,13 @@ def observe_step(w, base, h, z, work, phase, p, tally):
 
 
 @inline_once
-def onset_ahead(w, h, stride, work, phase, p):
+def onset_ahead(w, h, work, phase, p):
     """Return whether contact begins within the step just tried, which must then end there.
 
-    Searched only where the nodes of the step let it be. The step after the landing is kept within
-    the pulse that begins, or to the contact's own time scale.
+    The step after the landing is kept within the pulse, or to the contact's own time scale.
     """
     must_land = False
-    if w.watch and w.has_dense and may_touch(work.rows, p):
+    if w.has_dense and may_touch(work.rows, p):
         begin, end, w.touches = first_onset(w.t, h, work.dense, phase, p, work.y)
         # a step that begins on an onset finds it again at its start: to land there would never end
         if begin < 1.0 and not (w.landed and begin < LANDING_FRACTION):
@@ -281,27 +281,20 @@ def onset_ahead(w, h, stride, work, phase, p):
 
 @inline_once
 def sample_grid(w, t_end, h, z, work, times, states):
-    """Fill the output samples up to t_end.
-
-    Most steps hold one sample or none, for which computing the whole interpolant is not worth it.
-    """
+    """Fill the output samples up to t_end; for one of a step without its whole interpolant."""
     while w.sample < times.size and times[w.sample] <= t_end:
         s = min(1.0, max(0.0, (times[w.sample] - w.t) / h))
         if w.has_dense:
             interpolate(s, work.dense, states[w.sample])
         else:
             weights_at(s, work.weights)
-            combine(work.weights, h, z, work.k, states[w.sample])
+            add_stages(work.weights, STAGES, h, z, work.k, states[w.sample])
         w.sample += 1
 
 
 @inline_llvm
 def measure_gap_fractions(w, h, stride, work, size, phase, p, tally):
-    """Write the share of a step that each joint is without contact.
-
-    Where contact changes between two nodes, up to where it does on the interpolant, if there is
-    one; the tally adds up how far that may move.
-    """
+    """Write the share of a step that each joint is without contact, and how far that may move."""
     for joint in range(2):
         gap_fraction = 0.0
         if p.clearance[joint] > 0.0:
@@ -331,7 +324,7 @@ def look_within(s, column, w, base, h, z, work, phase, p):
         interpolate(s, work.dense, work.y)
     else:
         weights_at(s, work.weights)
-        combine(work.weights, h, z, work.k, work.y)
+        add_stages(work.weights, STAGES, h, z, work.k, work.y)
     observe_contact(ideal_after(base, s * h, p), work.y, phase, p, work.row)
     return work.row[column]
 
@@ -346,8 +339,7 @@ def signed(value, sign):
 def find_top(column, sign, known, w, base, h, stride, z, work, phase, p):
     """Return the greater of `known` and the greatest value of a column over the step just taken.
 
-    The step's nodes count, and looks at the tops of parabolas, as long as these are above it.
-    sign: 1 or -1, or 0 for |value|.
+    By looks at the tops of parabolas. sign: 1 or -1, or 0 for |value|.
     """
     best, last = 0, NODES.size - 1
     for i in range(0, NODES.size, stride):
@@ -375,11 +367,6 @@ def find_top(column, sign, known, w, base, h, stride, z, work, phase, p):
     return known
 
 
-@inline_llvm
-def skip_tops(w, base, h, stride, z, work, phase, p, tally):
-    """Return at once: the tally's own peaks will do."""
-
-
 @inner
 def raise_tops(w, base, h, stride, z, work, phase, p, tally):
     """Raise the tally's peaks by `find_top` of the step just tallied."""
@@ -390,15 +377,11 @@ def raise_tops(w, base, h, stride, z, work, phase, p, tally):
             )
 
 
-look_for_peaks = dispatch_on_record(CHOSEN_FORCES, raise_tops, skip_tops)
-
-
 @inner
 def add_sides(low, high, before, after, w, base, h, z, work, phase, p):
     """Add to work.sides how much of a step, from low to high, the rod load is on each side.
 
-    before, after: the load (N) there. Where they are not on one side, each side reaches up to where
-    the load leaves it: between two sides it may be zero for a while.
+    before, after: the load (N) there; between two sides it may be zero for a while.
     """
     if before * after > 0.0:
         work.sides[0 if after > 0.0 else 1] += high - low
@@ -419,10 +402,7 @@ def add_sides(low, high, before, after, w, base, h, z, work, phase, p):
 
 @inner
 def measure_sides(w, base, h, stride, z, work, phase, p, tally):
-    """Write the step's shares and peaks of both sides of the rod load into work.sides.
-
-    A load that changes its side twice between two nodes is found by the parabola through three.
-    """
+    """Write the step's shares and peaks of both sides of the rod load into work.sides."""
     work.sides[0], work.sides[1] = 0.0, 0.0
     for side in range(2):
         sign, known = 1.0 - 2.0 * side, tally.side_peak[side]
@@ -459,8 +439,8 @@ def accumulate_metrics(w, base, h, stride, z, work, size, phase, p, tally):
     tally_step(
         h, NODES, weights, work.rows, stride, work.gap_fraction, work.sides, measured, tally, p
     )
-    if measured:
-        look_for_peaks(w, base, h, stride, z, work, phase, p, tally)
+    if measured and has_chosen_laws(p):
+        raise_tops(w, base, h, stride, z, work, phase, p, tally)
     last = NODES.size - 1
     for j in range(ACCELERATION, COLUMNS):
         work.row[j] = work.rows[last, j]
@@ -475,15 +455,6 @@ def keep_velocities(w, t, work, phase, p, tally):
 
 
 store_velocities = dispatch_on_record(CHOSEN_FORCES, store_approach_velocity, keep_velocities)
-
-
-@inline_once
-def finish_at_event(w, h, work, phase, p, tally):
-    """Return whether joints carry new speeds after a step of length h that ends on an onset."""
-    w.landing = 0.0
-    w.landed = 1
-    w.onsets += 1
-    return store_velocities(w, w.t + h, work, phase, p, tally)
 
 
 @inline_llvm
@@ -523,10 +494,7 @@ def is_finite(new):
 
 @inline_once
 def accept_step(w, z, work, reached, fresh, at_edge, segments):
-    """Move the stepper to the end of the step that was taken, and into the next segment.
-
-    fresh: whether its last stage is not the next step's first.
-    """
+    """Move the stepper on; fresh: the last stage of its step is not the next one's first."""
     for i in range(z.size):
         z[i] = work.new[i]
         work.k[0, i] = work.k[STAGES - 1, i]  # of an explicit pair: the next step's first stage
@@ -601,8 +569,11 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
             w.h = max(w.h, next_h) if h < w.h else next_h
         stride = observe_step(w, base, h, z, work, phase, p, tally)
         attempt[3] += TO_ONSET if landing else TAKEN
-        met = landing and finish_at_event(w, h, work, phase, p, tally)
-        if not landing and onset_ahead(w, h, stride, work, phase, p):
+        met = False  # whether joints carry new speeds
+        if landing:
+            w.landing, w.landed, w.onsets = 0.0, 1, w.onsets + 1
+            met = store_velocities(w, w.t + h, work, phase, p, tally)
+        elif onset_ahead(w, h, work, phase, p):
             attempt[3] += CUT_AT_ONSET - TAKEN
             continue
         at_edge = not landing and h == end - w.t

@@ -1,28 +1,17 @@
 """The general slider-crank: joints and guide with or without clearance, the rod elastic or rigid.
 
-One system for all combinations. The bodies' velocities (`BodyRow`) are linear in the rates of the
-coordinates (`record.Coordinate`), with a matrix of eleven columns; what a case does not name is a
-column less. The equations of motion are the bodies' own, projected on the columns that are left
-(Jourdain's principle), so that the forces of ideal joints drop out; these follow afterwards.
+physics/README.md, The general mechanism. The bodies' velocities (`BodyRow`) are linear in the rates
+of the coordinates (`record.Coordinate`), with a matrix of eleven columns; what a case does not name
+is a column less. Forces of ideal joints drop out; they follow afterwards.
 
-The position x of the crosshead is no coordinate: it follows from the rod's length. Angles of the
-crank, not times, are what integrators step through: with a speed that gives way, `t` is the crank's
-angle over the steady speed, and what passes in time passes the slower the faster the crank turns.
-So corners of the load and revolutions stay where they are.
+Angles of the crank, not times, are what integrators step through: with a speed that gives way, `t`
+is the crank's angle over the steady speed, and what passes in time passes the slower the faster the
+crank turns. So corners of the load and revolutions stay where they are.
 
-The rod as a body in the plane: rigid, or an elastic bar in a frame that floats with its ends. The
-frame's origin is the big end's bore, its first axis runs to the small end's. A point at the
-fraction s of the rod is displaced along it by two quadratic shapes, of its middle and of its small
-end, and across it by half a sine wave and a whole one: the modes of a bar with pinned ends. This is
-the model of Simeon's slider-crank (IVP test set, "crank"; linear stiffness). The mass of the
-displaced rod is spread evenly.
-
-Axes: u along the rod, (cos phi, -sin phi), and v across it, (sin phi, cos phi); the rod's spin is
-counter-clockwise, -phi'. Rows and columns of a mechanism's bodies: `mechanism.BodyRow`.
-
-The crosshead's guide: friction of an ideal one, contact of the four corners in one with play. The
-crosshead is a block about its pin, `guide_length` to either side along x and `guide_height` along
-y. Each corner meets the plane of its side by ADAMS's IMPACT, whatever the joints' law.
+The rod's frame floats with its ends: its origin is the big end's bore, u along the rod,
+(cos phi, -sin phi), and v across it, (sin phi, cos phi); its spin is counter-clockwise, -phi'. A
+point at the fraction s of an elastic rod is displaced along u by two quadratic shapes, of its
+middle and of its small end, and along v by half a sine wave and a whole one.
 """
 
 import math
@@ -31,11 +20,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import inline_llvm, inner, square_root
-from compressor.physics.card import measured_force
-from compressor.physics.contact import NO_CONTACT, ContactState
+from compressor.physics._jit import inline_llvm, inner, jit, square_root
+from compressor.physics.contact import (
+    NO_CONTACT,
+    ContactState,
+    friction_coefficient,
+    joint_contact,
+)
 from compressor.physics.contact_laws import power, rise
-from compressor.physics.film import oiled_joint
+from compressor.physics.kinematics import IdealMotion
 from compressor.physics.loads import piston_force
 from compressor.physics.record import BIG_END, SMALL_END, Coordinate
 
@@ -45,6 +38,8 @@ BIG_SLOPE = math.pi * np.array([1.0, 2.0, 0.0, 0.0])  # at the ends, times the l
 SMALL_SLOPE = math.pi * np.array([-1.0, 2.0, 0.0, 0.0])
 BENDING = math.pi**4 / 2.0 * np.array([1.0, 16.0])  # stiffness over E I / L^3
 AXIAL = np.array([[16.0, -8.0], [-8.0, 7.0]]) / 3.0  # over E A / L
+MAX_ROUNDS = 50  # in which friction and the forces that it depends on agree
+FRICTION_TOLERANCE = 1e-14  # of the friction
 
 
 def shapes(s):
@@ -111,10 +106,7 @@ def fill_rod(pose, p):
 
 @inner
 def fill_modes(axes, spin, q, rates, p):
-    """Write the rod's modes' inertia, their coupling and the material's forces.
-
-    axes: u_x, u_y, v_x, v_y; q, rates: of the modes, (4,).
-    """
+    """Write the rod's modes' inertia, their coupling and the material's forces."""
     ux, uy, vx, vy = axes
     m, mass, force = p.rod_mass, p.mass, p.own
     for i in range(MODES):
@@ -145,10 +137,7 @@ def material(i, q, p):
 
 @inline_llvm
 def material_work(q, other, p):
-    """Return the sum of the elastic forces of deflections q times others, both (4,).
-
-    Of q and q it is twice the energy (J).
-    """
+    """Return the elastic forces of deflections q times others; of q and q twice the energy (J)."""
     total = 0.0
     if p.elastic:
         for i in range(MODES):
@@ -179,10 +168,7 @@ def guide_coefficient(slip, p):
 
 @inner
 def corner_force(penetration, rate, p):
-    """Return the normal force (N) of a corner and its elastic part.
-
-    penetration in m, rate in m/s.
-    """
+    """Return the normal force (N) of a corner and its elastic part."""
     if penetration <= 0.0:
         return 0.0, 0.0
     elastic = p.guide_stiffness * power(penetration, p.guide_exponent)
@@ -264,12 +250,36 @@ class Joints(NamedTuple):
     pin_spin: float  # of the crosshead
 
 
+class Reactions(NamedTuple):
+    """Forces on the rod at both ends, of the guide upwards, and friction of what is ideal."""
+
+    big_x: float
+    big_y: float
+    small_x: float
+    small_y: float
+    guide: float  # on the crosshead along y, N
+    big_torque: float  # on the rod, N m
+    small_torque: float
+    rubbing: float  # of the guide on the crosshead along x, N
+
+
+class Solved(NamedTuple):
+    """A mechanism at one crank angle and state; SI.
+
+    What else `solve` finds stands in the record's scratch until something else is solved.
+    """
+
+    motion: IdealMotion  # ideal, of a steady crank
+    pose: Pose
+    joints: Joints
+    big: ContactState  # of the joints
+    small: ContactState
+    reactions: Reactions
+
+
 @inner
 def unpack(y, p):
-    """Write the coordinates and their rates; what is left out stays 0.
-
-    The crank has its slip in place of a coordinate.
-    """
+    """Write the coordinates and their rates; the crank has its slip in place of a coordinate."""
     n = p.freedoms
     p.w[0] = y[p.at[0]] if p.driven else 0.0
     p.rates[0] = p.omega * (1.0 + p.w[0])
@@ -298,10 +308,7 @@ def pose_of(motion, p):
 
 @inner
 def apply_jacobian(pose, rates, p, velocity):
-    """Write the bodies' velocities that follow from the coordinates' rates, (11,) both.
-
-    They are linear in the rates. Those of a rigid rod's modes stay 0.
-    """
+    """Write the bodies' velocities that follow from the coordinates' rates, (11,) both."""
     crank = p.crank_radius * rates[0]
     velocity[0] = rates[0]
     velocity[1] = -pose.sin_theta * crank - rates[1]
@@ -370,14 +377,13 @@ def joints_of(phase, y, motion, pose, p):
     big, small = NO_CONTACT, NO_CONTACT
     if p.clearance[0] > 0.0:
         eccentricity = w[1], w[2], rates[1], rates[2]
-        big = oiled_joint(BIG_END, eccentricity, (pose.speed, big_spin), y, p)
+        big = joint_contact(BIG_END, eccentricity, (pose.speed, big_spin), y, p)
     if p.clearance[1] > 0.0:
         eccentricity = w[3], w[4], rates[3], rates[4]
-        small = oiled_joint(SMALL_END, eccentricity, (pin_spin, small_spin), y, p)
+        small = joint_contact(SMALL_END, eccentricity, (pin_spin, small_spin), y, p)
     guide = corners(pose, p) if p.tilting else UNGUIDED
     ideal_v = motion.v * (1.0 + pose.slip)
-    load = piston_force(phase, pose.x, velocity[8], pose.x - motion.x, velocity[8] - ideal_v, p)
-    load += measured_force(motion.cos_theta, motion.sin_theta, p)
+    load = piston_force(phase, pose.x, velocity[8], motion, velocity[8] - ideal_v, p)
     return Joints(big, small, guide, load, big_spin, small_spin, pin_spin)
 
 
@@ -418,3 +424,165 @@ def motor_torque(pose, p):
     """Return the torque (N m) of the motor at the crank's speed: a line."""
     # by the slip: of a steep line the difference of two speeds would leave no digits
     return p.torque - p.torque_slope * p.omega * pose.slip
+
+
+@jit
+def factorize_positive(matrix, n):
+    """Write L and 1 / D of L D L' in the lower half of a symmetric matrix, or return False.
+
+    So it does where the matrix is not positive. n: rows and columns that count.
+    """
+    # sums, no updates of rows: LLVM makes vector code of those, which is slower for so few numbers
+    for i in range(n):
+        for j in range(i):
+            total = matrix[i, j]
+            for m in range(j):
+                total -= matrix[i, m] * matrix[j, m]
+            matrix[i, j] = total
+        total = matrix[i, i]
+        for j in range(i):
+            scaled = matrix[i, j] * matrix[j, j]
+            total -= matrix[i, j] * scaled
+            matrix[i, j] = scaled
+        if not total > 0.0:
+            return False
+        matrix[i, i] = 1.0 / total
+    return True
+
+
+@jit
+def substitute_positive(matrix, b):
+    """Solve with the factors of `factorize_positive`, b (n,) being overwritten by the solution."""
+    n = b.size
+    for i in range(n):
+        total = b[i]
+        for m in range(i):
+            total -= matrix[i, m] * b[m]
+        b[i] = total
+    for i in range(n - 1, -1, -1):
+        total = b[i] * matrix[i, i]
+        for m in range(i + 1, n):
+            total -= matrix[m, i] * b[m]
+        b[i] = total
+
+
+@inner
+def reduce_mass(pose, p):
+    """Write the mass matrix of the coordinates that move, its lower half."""
+    for i in range(p.degrees):
+        coordinate = p.coordinates[i]
+        p.unit[coordinate] = 1.0
+        apply_jacobian(pose, p.unit, p, p.column)
+        p.unit[coordinate] = 0.0
+        apply_mass(p.column, p, p.momentum)
+        apply_jacobian_transpose(pose, p.momentum, p, p.pushed)
+        for j in range(i + 1):
+            p.matrix[i, j] = p.pushed[p.coordinates[j]]
+
+
+@inner
+def friction_arms(pose, joints, p):
+    """Return the friction of what is ideal over its force: of both joints (m), and the guide's."""
+    big, small, guide = 0.0, 0.0, 0.0
+    if p.rubbing and not p.clearance[0] > 0.0:
+        big = p.pin_radius[0]
+        big *= friction_coefficient((pose.speed - joints.big_spin) * big, 0.0, p)
+    if p.rubbing and not p.clearance[1] > 0.0:
+        small = p.pin_radius[1]
+        small *= friction_coefficient((joints.pin_spin - joints.small_spin) * small, 0.0, p)
+    if not p.tilting:
+        guide = -guide_coefficient(p.velocity[8], p)
+    return big, small, guide
+
+
+@inner
+def reactions_of(pose, joints, arms, last, p):
+    """Return the `Reactions` that the motion needs, with their friction where joints rub.
+
+    last: those whose friction has made these accelerations; arms: as by `friction_arms`.
+    """
+    big, small = joints.big, joints.small
+    big_x, big_y, small_x, small_y = big.fx, big.fy, small.fx, small.fy
+    if not p.clearance[1] > 0.0:
+        pushed = joints.guide.fx + last.rubbing - joints.load
+        small_x = pushed - p.reciprocating_mass * p.body[8]
+        small_y = needed_of(2, p) - big.fy
+        if not p.clearance[0] > 0.0:
+            lever = (needed_of(3, p) - last.big_torque - last.small_torque) / pose.length
+            small_y = (lever - pose.sin_phi * small_x) / pose.cos_phi
+    if not p.clearance[0] > 0.0:
+        big_x, big_y = needed_of(1, p) - small_x, needed_of(2, p) - small_y
+    big_torque = arms[0] * square_root(big_x * big_x + big_y * big_y)
+    small_torque = arms[1] * square_root(small_x * small_x + small_y * small_y)
+    guide, rubbing = joints.guide.fy, 0.0
+    if not p.tilting:
+        guide = p.reciprocating_mass * p.gravity + small_y
+        rubbing = arms[2] * abs(guide)
+    return Reactions(big_x, big_y, small_x, small_y, guide, big_torque, small_torque, rubbing)
+
+
+@inner
+def needed_of(row, p):
+    """Return what the rod needs beside its weight, by the bodies' row: a force, or the moment."""
+    return dot_rows(p.mass[row], 1, 8 if p.elastic else 4, p.body) - p.own[row]
+
+
+@inner
+def friction_differs(one, other):
+    """Return whether the friction of two `Reactions` differs beyond rounding.
+
+    That of the guide goes by the pin's force: where its own passes through 0, it has no digits.
+    """
+    size = abs(other.big_torque) + abs(other.small_torque)
+    torque = abs(one.big_torque - other.big_torque) + abs(one.small_torque - other.small_torque)
+    force, most = abs(one.rubbing - other.rubbing), abs(other.small_x) + abs(other.small_y)
+    return torque > FRICTION_TOLERANCE * size or force > FRICTION_TOLERANCE * most
+
+
+@inner
+def solve(motion, y, phase, p):
+    """Return the mechanism `Solved` around the ideal motion, in the load's phase.
+
+    Friction of what is ideal depends on its forces, and these on it: both are found in rounds.
+    """
+    unpack(y, p)
+    pose = pose_of(motion, p)
+    apply_jacobian(pose, p.rates, p, p.velocity)
+    fill_bias(pose, p)
+    fill_rod(pose, p)
+    joints = joints_of(phase, y, motion, pose, p)
+    reduce_mass(pose, p)
+    regular = factorize_positive(p.matrix, p.degrees)
+    apply_mass(p.bias, p, p.momentum)
+    for row in range(ROWS):
+        p.steady[row] = p.own[row] - p.momentum[row]
+    add_forces(pose, joints, p, p.steady)
+    arms = friction_arms(pose, joints, p)
+    reactions = Reactions(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for _ in range(MAX_ROUNDS):
+        p.force[:] = p.steady
+        add_rubbing(pose, reactions, p, p.force)
+        apply_jacobian_transpose(pose, p.force, p, p.pushed)
+        for i in range(p.degrees):
+            p.solution[i] = p.pushed[p.coordinates[i]] if regular else math.nan
+        substitute_positive(p.matrix, p.solution[: p.degrees])
+        for i in range(p.degrees):
+            p.accelerations[p.coordinates[i]] = p.solution[i]
+        apply_jacobian(pose, p.accelerations, p, p.body)
+        for row in range(ROWS):
+            p.body[row] += p.bias[row]
+        last = reactions
+        reactions = reactions_of(pose, joints, arms, last, p)
+        if not friction_differs(last, reactions):
+            break
+    return Solved(motion, pose, joints, joints.big, joints.small, reactions)
+
+
+@inner
+def add_rubbing(pose, reactions, p, force):
+    """Add to the bodies' forces the friction of ideal joints and of an ideal guide."""
+    big, small = reactions.big_torque, reactions.small_torque
+    add_on_rod(pose, (0.0, 0.0, big), (0.0, 0.0, small), p, force)
+    force[0] -= big
+    force[8] += reactions.rubbing
+    force[10] -= small

@@ -5,8 +5,8 @@
 
 import math
 
-from compressor.physics._jit import inline_llvm, inner, square_root
-from compressor.physics.contact import LUGRE, bristle_rate, nearness
+from compressor.physics._jit import inline_llvm, inner
+from compressor.physics.contact import write_carried_rates
 from compressor.physics.kinematics import ideal
 from compressor.physics.mechanism import (
     ACROSS,
@@ -23,29 +23,24 @@ from compressor.physics.mechanism import (
 )
 from compressor.physics.observe import (
     ACCELERATION,
+    CRANK_SPEED,
     CRANK_TORQUE,
     DEVIATION,
     DISPLACEMENT,
     ECCENTRICITY,
-    FORCE,
-    FORCE_SIZE,
+    GUIDE_GAP,
     GUIDE_MOMENT,
     JOURNAL_ACCELERATION,
     KINETIC,
-    NEARNESS,
-    NORMAL,
-    PENETRATION,
+    MOTOR_TORQUE,
     PISTON_FORCE,
     POTENTIAL,
     ROD_ANGLE,
     VELOCITY,
-    Column,
     contact_power,
+    write_contacts,
     write_frame_forces,
 )
-
-GUIDE_GAP, CRANK_SPEED = int(Column.GUIDE_GAP), int(Column.CRANK_SPEED)
-MOTOR_TORQUE = int(Column.MOTOR_TORQUE)
 
 STALLED = 0.01  # of the steady speed: a crank that is slower has all but stopped
 IMPLAUSIBLE = 0.1  # of half the crosshead, or of the rod: more than any contact or bar bears
@@ -60,16 +55,12 @@ def pace_of(now, p):
 @inline_llvm
 def write_rates(now, y, p, out):
     """Write dy/dt, of a steady crank's t, into out."""
-    n, pace, place = p.freedoms, pace_of(now, p), 2 * p.freedoms
+    n, pace = p.freedoms, pace_of(now, p)
     for i in range(n):
         coordinate = p.coordinates[p.driven + i]
         out[i], out[n + i] = p.rates[coordinate] * pace, p.accelerations[coordinate] * pace
-    for i in range(place, y.size):
-        out[i] = 0.0
-    if p.friction == LUGRE and p.clearance[0] > 0.0:
-        out[place + 2] = bristle_rate(now.joints.big.slip, y[place + 2], p) * pace
-    if p.friction == LUGRE and p.clearance[1] > 0.0:
-        out[place + 3] = bristle_rate(now.joints.small.slip, y[place + 3], p) * pace
+    if p.carries:
+        write_carried_rates(now.big, now.small, pace, y, p, out)
     if p.driven:
         out[p.at[0] - 1] = pace - 1.0
         out[p.at[0]] = p.accelerations[0] / p.omega * pace
@@ -87,7 +78,7 @@ def rod_damping_power(now, p):
 @inline_llvm
 def crank_torque(now, p):
     """Return the torque (N m) that drives the crank against the rod."""
-    pose, forces, big = now.pose, now.reactions, now.joints.big
+    pose, forces, big = now.pose, now.reactions, now.big
     torque = p.crank_radius * (pose.cos_theta * forces.big_y - pose.sin_theta * forces.big_x)
     torque += forces.big_torque
     return torque - (p.pin_radius[0] - big.penetration) * big.friction - big.film_moment
@@ -95,16 +86,15 @@ def crank_torque(now, p):
 
 @inline_llvm
 def guide_moment(now, p):
-    """Return the moment (N m) of the crosshead on its guide about the crank's centre.
+    """Return the moment (N m) of the crosshead on its guide, counter-clockwise about the crank.
 
-    Counter-clockwise. An ideal guide lets no crosshead tilt: it bears the couple on the pin as
-    well.
+    An ideal guide lets no crosshead tilt: it bears the couple on the pin as well.
     """
     pose, guide, forces = now.pose, now.joints.guide, now.reactions
     moment = guide.moment - pose.height * (guide.fx + forces.rubbing)
     moment = -(pose.x * forces.guide + moment)
     if not p.tilting:
-        small = now.joints.small
+        small = now.small
         moment += (p.pin_radius[1] - small.penetration) * small.friction
         moment += small.film_moment - forces.small_torque
     return moment
@@ -113,7 +103,7 @@ def guide_moment(now, p):
 @inline_llvm
 def write_powers(now, y, p, row):
     """Write four powers (W) into row, (4,): of crank and load, into contacts, lost to friction."""
-    big, small, guide, pose = now.joints.big, now.joints.small, now.joints.guide, now.pose
+    big, small, guide, pose = now.big, now.small, now.joints.guide, now.pose
     forces = now.reactions
     torque = crank_torque(now, p) + p.unbalance * p.gravity * pose.cos_theta
     row[0] = (motor_torque(pose, p) if p.driven else torque) * pose.speed
@@ -142,31 +132,19 @@ def write_energies(now, y, p, row):
 
 
 @inline_llvm
-def ideal_acceleration(now, p):
-    """Return the acceleration (m/s^2) of an ideal machine's crosshead with this crank's motion."""
-    if not p.driven:
-        return now.motion.a
-    speed = 1.0 + now.pose.slip
-    return now.motion.a * speed * speed + now.motion.v / p.omega * p.accelerations[0]
-
-
-@inline_llvm
 def write_contact_columns(now, y, p, row):
     """Write the columns from ACCELERATION to GUIDE_MOMENT."""
-    forces = now.reactions
+    found = now.reactions
+    forces = found.big_x, found.big_y, found.small_x, found.small_y
+    write_contacts(forces, now.big, now.small, p, row)
     row[ACCELERATION] = p.body[8]
-    row[FORCE], row[FORCE + 1] = forces.big_x, forces.big_y
-    row[FORCE + 2], row[FORCE + 3] = forces.small_x, forces.small_y
-    row[FORCE_SIZE] = square_root(forces.big_x**2 + forces.big_y**2)
-    row[FORCE_SIZE + 1] = square_root(forces.small_x**2 + forces.small_y**2)
     row[JOURNAL_ACCELERATION] = p.accelerations[1]
     row[JOURNAL_ACCELERATION + 1] = p.accelerations[3]
-    row[DEVIATION] = p.body[8] - ideal_acceleration(now, p)
-    big, small = now.joints.big, now.joints.small
-    row[PENETRATION], row[PENETRATION + 1] = big.penetration, small.penetration
-    row[NORMAL], row[NORMAL + 1] = big.normal, small.normal
-    row[NEARNESS] = nearness(big, p.stiffness[0], p.clearance[0], p)
-    row[NEARNESS + 1] = nearness(small, p.stiffness[1], p.clearance[1], p)
+    ideal = now.motion.a
+    if p.driven:  # of an ideal machine's crosshead with this crank's motion
+        speed = 1.0 + now.pose.slip
+        ideal = ideal * speed * speed + now.motion.v / p.omega * p.accelerations[0]
+    row[DEVIATION] = p.body[8] - ideal
     row[CRANK_TORQUE], row[GUIDE_MOMENT] = crank_torque(now, p), guide_moment(now, p)
 
 
@@ -200,18 +178,11 @@ def write_frame(now, p, row):
     write_frame_forces((-(guide.fx + forces.rubbing), -forces.guide), turning, row)
 
 
-@inline_llvm
-def contacts_of(now, p):
-    """Return the `ContactState` of the big end and of the small end."""
-    return now.joints.big, now.joints.small
-
-
 @inner
 def beyond_model(y, p):
     """Return the number of what no machine can do in a state, or 0.
 
-    1 is a crank that has all but stopped, 2 a corner of the crosshead deep in its guide, 3 a rod
-    bent or pressed out of shape.
+    1: a crank that has all but stopped, 2: a corner deep in its guide, 3: a rod out of shape.
     """
     if p.driven and y[p.at[0]] <= STALLED - 1.0:
         return 1

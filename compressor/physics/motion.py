@@ -1,26 +1,20 @@
 """Equations of motion of the four scenes, in the joints' eccentricities.
 
-physics/README.md, Scenes and Contact.
-
-State y: the eccentricities of the joints with clearance, then their rates, then what contacts carry
-where laws were chosen. Where rod and crosshead are follows from the loop over both joints, so that
-a clearance of a nanometre keeps its digits.
-
-`systems` has what integrators call and what is observed, of scenes and of the mechanism.
+physics/README.md, Scenes and Contact. State y: the eccentricities of the joints with clearance,
+then their rates, then what contacts carry where laws were chosen. Where rod and crosshead are
+follows from the loop over both joints, so that a clearance of a nanometre keeps its digits.
 """
 
 from typing import NamedTuple
 
-from compressor.physics._jit import inline_llvm, inline_once, inner, square_root
-from compressor.physics.card import measured_force
+from compressor.physics._jit import inline_llvm, inner, square_root
 from compressor.physics.contact import (
-    LUGRE,
     NO_CONTACT,
     ContactState,
-    bristle_rate,
+    joint_contact,
+    write_carried_rates,
 )
 from compressor.physics.contact_laws import has_chosen_laws
-from compressor.physics.film import oiled_joint
 from compressor.physics.kinematics import IdealMotion, ideal
 from compressor.physics.loads import piston_force
 from compressor.physics.record import BIG_END as AT_BIG_END
@@ -46,10 +40,7 @@ class RodPlace(NamedTuple):
 
 @inline_llvm
 def eccentricities(y, p):
-    """Return both joints' eccentricities, x and y (m), with their rates; zeros of an ideal joint.
-
-    Journal centre less bore centre.
-    """
+    """Return both joints' eccentricities, x and y (m), with their rates; zeros of ideal ones."""
     ideal_joint = 0.0, 0.0, 0.0, 0.0
     if p.scene == BOTH:
         return (y[0], y[1], y[4], y[5]), (y[2], y[3], y[6], y[7])
@@ -72,13 +63,6 @@ def place_of(motion, y, p):
     x = p.crank_radius * motion.cos_theta + (small[0] - big[0]) + length * cos_phi
     v = (small[2] - big[2]) - crank * motion.sin_theta - length * sin_phi * rate
     return RodPlace(big, small, sin_phi, cos_phi, rate, x, v)
-
-
-@inline_llvm
-def load_force(phase, at, motion, p):
-    """Return the piston force (N) at a `RodPlace` around the ideal motion."""
-    load = piston_force(phase, at.x, at.v, at.x - motion.x, at.v - motion.v, p)
-    return load + measured_force(motion.cos_theta, motion.sin_theta, p)
 
 
 @inline_llvm
@@ -139,17 +123,14 @@ class Instant(NamedTuple):
 
 @inline_llvm
 def evaluate(motion, y, phase, p):
-    """Return the `Instant` of a state around the ideal motion, in the load's phase.
-
-    motion: `IdealMotion` at the time; y: zeros (4) in the ideal scene.
-    """
+    """Return the `Instant` of a state around the ideal motion; y: zeros (4) in the ideal scene."""
     at = place_of(motion, y, p)
-    load = load_force(phase, at, motion, p)
+    load = piston_force(phase, at.x, at.v, motion, at.v - motion.v, p)
     big, small = NO_CONTACT, NO_CONTACT
     if p.scene & BIG_END:  # once each, not once a scene: the machine code is half as long
-        big = oiled_joint(AT_BIG_END, at.big, (p.omega, -at.rate), y, p)
+        big = joint_contact(AT_BIG_END, at.big, (p.omega, -at.rate), y, p)
     if p.scene & SMALL_END:
-        small = oiled_joint(AT_SMALL_END, at.small, (0.0, -at.rate), y, p)
+        small = joint_contact(AT_SMALL_END, at.small, (0.0, -at.rate), y, p)
     a, spin_up = motion.a, motion.spin_up
     if p.scene == BIG_END:
         a, spin_up = solve_big_end(at, load, big, p)
@@ -178,11 +159,7 @@ def evaluate(motion, y, phase, p):
 
 @inline_llvm
 def joint_forces(big, small, load, accelerations, at, p):
-    """Return the forces (N) on the rod: big end x and y, small end x and y.
-
-    Those of a clearance joint are the contact's. At an ideal joint they follow by inverse dynamics:
-    Newton-Euler of the rod with the crosshead's x balance.
-    """
+    """Return the forces (N) on the rod, x and y at both ends; of ideal joints by Newton-Euler."""
     if p.scene == BOTH:
         return big.fx, big.fy, small.fx, small.fy
     a, spin_up, centre_x, centre_y = accelerations
@@ -194,26 +171,10 @@ def joint_forces(big, small, load, accelerations, at, p):
     if p.scene == BIG_END:
         return big.fx, big.fy, small_x, up - big.fy
     big_x = across - small_x
-    c = p.rod_centre
-    b = p.rod_length - c
+    c, b = p.rod_centre, p.rod_length - p.rod_centre
     small_y = -p.rod_inertia * spin_up + c * (at.cos_phi * up + at.sin_phi * big_x)
     small_y = (small_y - b * at.sin_phi * small_x) / (p.rod_length * at.cos_phi)
     return big_x, up - small_y, small_x, small_y
-
-
-@inline_once
-def write_carried_rates(now, y, p, out):
-    """Write the rates of what contacts carry: an approach speed stays until the bodies meet again.
-
-    Bristles bend while the bodies slide, also where they do not touch.
-    """
-    place = 2 * p.freedoms
-    out[place], out[place + 1], out[place + 2], out[place + 3] = 0.0, 0.0, 0.0, 0.0
-    if p.friction == LUGRE:
-        if p.clearance[0] > 0.0:
-            out[place + 2] = bristle_rate(now.big.slip, y[place + 2], p)
-        if p.clearance[1] > 0.0:
-            out[place + 3] = bristle_rate(now.small.slip, y[place + 3], p)
 
 
 @inline_llvm
@@ -229,19 +190,13 @@ def write_rates(now, y, p, out):
     if p.scene == BOTH:
         out[n + 2], out[n + 3] = now.small_away
     if has_chosen_laws(p) and p.carries:
-        write_carried_rates(now, y, p, out)
+        write_carried_rates(now.big, now.small, 1.0, y, p, out)
 
 
 @inline_llvm
 def pace_of(now, p):
     """Return the time that passes over that of a steady crank, which turns a scene: 1."""
     return 1.0
-
-
-@inline_llvm
-def contacts_of(now, p):
-    """Return the `ContactState` of the big end and of the small end."""
-    return now.big, now.small
 
 
 @inner

@@ -18,7 +18,7 @@ class Column(IntEnum):
     ROD_ANGLE = 2
     PISTON_FORCE = 3
     ECCENTRICITY = 4  # four: (joint, axis)
-    ACCELERATION = 8  # from here on: what `systems.observe_with_energy` writes
+    ACCELERATION = 8  # from here on: what `systems.write_row` writes
     FORCE = 9  # four: (joint, axis)
     FORCE_SIZE = 13  # two
     JOURNAL_ACCELERATION = 15  # two: along x, of a journal against its bore; 0 of an ideal joint
@@ -46,27 +46,19 @@ class Column(IntEnum):
 COLUMNS = int(Column.PACE) + 1  # that a march reads
 WIDE = int(Column.MOTOR_TORQUE) + 1  # that series are made of
 # numba wants plain integers
-DISPLACEMENT, VELOCITY, ACCELERATION = 0, 1, int(Column.ACCELERATION)
-ROD_ANGLE, PISTON_FORCE = int(Column.ROD_ANGLE), int(Column.PISTON_FORCE)
-FORCE, ECCENTRICITY = int(Column.FORCE), int(Column.ECCENTRICITY)
-PENETRATION, NORMAL = int(Column.PENETRATION), int(Column.NORMAL)
-NEARNESS = int(Column.NEARNESS)
-FORCE_SIZE, DEVIATION = int(Column.FORCE_SIZE), int(Column.DEVIATION)
-JOURNAL_ACCELERATION = int(Column.JOURNAL_ACCELERATION)
-CRANK_TORQUE, GUIDE_MOMENT = int(Column.CRANK_TORQUE), int(Column.GUIDE_MOMENT)
-CRANK_POWER, LOAD_POWER = int(Column.CRANK_POWER), int(Column.LOAD_POWER)
-FRICTION_POWER = int(Column.FRICTION_POWER)
-KINETIC, POTENTIAL = int(Column.KINETIC), int(Column.POTENTIAL)
-PACE, GUIDE_FORCE = int(Column.PACE), int(Column.GUIDE_FORCE)
-SHAKING_FORCE, BEARING_FORCE = int(Column.SHAKING_FORCE), int(Column.BEARING_FORCE)
+(
+    DISPLACEMENT, VELOCITY, ROD_ANGLE, PISTON_FORCE, ECCENTRICITY, ACCELERATION, FORCE, FORCE_SIZE,
+    JOURNAL_ACCELERATION, DEVIATION, PENETRATION, NORMAL, NEARNESS, CRANK_TORQUE, GUIDE_MOMENT,
+    CRANK_POWER, LOAD_POWER, CONTACT_POWER, FRICTION_POWER, KINETIC, POTENTIAL, PACE,
+    SHAKING_FORCE, BEARING_FORCE, GUIDE_FORCE, GUIDE_GAP, CRANK_SPEED, MOTOR_TORQUE,
+) = map(int, Column)  # fmt: skip
 
 
 @inline_llvm
 def contact_power(contact):
     """Return the power (W) that a contact takes in its normal direction: its spring's and its loss.
 
-    Both in one: while the force is held at 0 the spring gives its energy up to the loss, which a
-    long step through free flight does not resolve, and both are without effect on the motion.
+    While the force is held at 0 the spring gives its energy up to the loss, without any effect.
     """
     return contact.normal * contact.rate
 
@@ -75,11 +67,7 @@ def contact_power(contact):
 def torque_and_moment(crank, x, forces, friction, penetration, film, p):
     """Return the torque (N m) that drives the crank, and the moment of the crosshead on its guide.
 
-    The guide bears the crosshead's force at its lever and, since the crosshead cannot tilt, the
-    couple that the small end's friction puts on the pin.
-
-    crank: cosine and sine of its angle; x: of the crosshead, m; forces: `joint_forces`, N;
-    friction, penetration, film: of both contacts, N and m, and the films' moments on the journals.
+    The guide bears the crosshead's force at its lever and the couple of the small end's friction.
     """
     torque = p.crank_radius * (crank[0] * forces[1] - crank[1] * forces[0])
     if p.clearance[0] > 0.0:
@@ -92,11 +80,7 @@ def torque_and_moment(crank, x, forces, friction, penetration, film, p):
 
 @inner
 def write_frame_forces(guide, turning, row):
-    """Write what the machine does to its frame into a row that has the forces on its parts.
-
-    guide: of the crosshead on its guide, x and y, N; turning: on the crank, for its mass out of
-    balance to stay on its circle, x and y, N.
-    """
+    """Write the forces (N) on the frame, by those on its guide and on the crank's unbalance."""
     row[BEARING_FORCE] = -row[FORCE] - turning[0]
     row[BEARING_FORCE + 1] = -row[FORCE + 1] - turning[1]
     row[GUIDE_FORCE] = guide[1]
@@ -115,10 +99,7 @@ def write_scene_frame(cos_theta, sin_theta, p, row):
 
 @jit
 def frame_of_series(crank, friction, p, rows):
-    """Write a dry scene's torque, moment and forces on its frame into rows, (m, WIDE), by series.
-
-    crank: cosine and sine of its angle, (2, m); friction: of both contacts, (m, 2), N.
-    """
+    """Write a dry scene's torque, moment and forces on its frame into rows, (m, WIDE)."""
     for i in range(len(rows)):
         row = rows[i]
         forces, penetration = row[FORCE:FORCE_SIZE], row[PENETRATION:NORMAL]
@@ -128,23 +109,17 @@ def frame_of_series(crank, friction, p, rows):
         write_scene_frame(crank[0, i], crank[1, i], p, row)
 
 
-@inline_once
-def powers(now, y, p):
-    """Return the four powers (W): of crank and load, into contacts, lost to friction."""
+@inline_llvm
+def write_powers(now, y, p, out):
+    """Write four powers (W) into out, (4,): of crank and load, into contacts, lost to friction."""
     motion, big, small, forces = now.motion, now.big, now.small, now.forces
     crank = p.crank_radius * p.omega
     turning = crank * (motion.cos_theta * forces[1] - motion.sin_theta * forces[0])
     if p.clearance[0] > 0.0:
         turning -= p.omega * ((p.pin_radius[0] - big.penetration) * big.friction + big.film_moment)
-    pressing = -now.load * now.at.v
-    pressed = contact_power(big) + contact_power(small) + big.film_loss + small.film_loss
-    return turning, pressing, pressed, -big.friction * big.slip - small.friction * small.slip
-
-
-@inline_llvm
-def write_powers(now, y, p, out):
-    """Write the four `powers` (W) into out[0:4]."""
-    out[0], out[1], out[2], out[3] = powers(now, y, p)
+    out[0], out[1] = turning, -now.load * now.at.v
+    out[2] = contact_power(big) + contact_power(small) + big.film_loss + small.film_loss
+    out[3] = -big.friction * big.slip - small.friction * small.slip
 
 
 @inline_llvm
@@ -160,34 +135,32 @@ def write_energies(now, y, p, row):
     row[KINETIC], row[POTENTIAL] = 0.5 * kinetic, p.rod_mass * p.gravity * height
 
 
-@inline_once
-def observed_columns(now, y, p):
-    """Return the columns from ACCELERATION to GUIDE_MOMENT."""
-    big, small, forces = now.big, now.small, now.forces
-    motion, friction = now.motion, (big.friction, small.friction)
-    torque, moment = torque_and_moment(
-        (motion.cos_theta, motion.sin_theta), now.at.x, forces, friction,
-        (big.penetration, small.penetration), (big.film_moment, small.film_moment), p,
-    )  # fmt: skip
-    return (
-        now.a, forces[0], forces[1], forces[2], forces[3],
-        square_root(forces[0] * forces[0] + forces[1] * forces[1]),
-        square_root(forces[2] * forces[2] + forces[3] * forces[3]),
-        now.big_away[0] if p.clearance[0] > 0.0 else 0.0,
-        now.small_away[0] if p.clearance[1] > 0.0 else 0.0,
-        now.a - now.motion.a, big.penetration, small.penetration,
-        big.normal, small.normal,
-        nearness(big, p.stiffness[0], p.clearance[0], p),
-        nearness(small, p.stiffness[1], p.clearance[1], p), torque, moment,
-    )  # fmt: skip
+@inline_llvm
+def write_contacts(forces, big, small, p, row):
+    """Write the forces on the rod and what is seen of its contacts; forces: big end first, x, y."""
+    for i in range(4):
+        row[FORCE + i] = forces[i]
+    row[FORCE_SIZE] = square_root(forces[0] * forces[0] + forces[1] * forces[1])
+    row[FORCE_SIZE + 1] = square_root(forces[2] * forces[2] + forces[3] * forces[3])
+    row[PENETRATION], row[PENETRATION + 1] = big.penetration, small.penetration
+    row[NORMAL], row[NORMAL + 1] = big.normal, small.normal
+    row[NEARNESS] = nearness(big, p.stiffness[0], p.clearance[0], p)
+    row[NEARNESS + 1] = nearness(small, p.stiffness[1], p.clearance[1], p)
 
 
 @inline_llvm
 def write_contact_columns(now, y, p, row):
     """Write the columns from ACCELERATION to GUIDE_MOMENT into the row."""
-    columns = observed_columns(now, y, p)
-    for i in range(CRANK_POWER - ACCELERATION):
-        row[ACCELERATION + i] = columns[i]
+    big, small, motion = now.big, now.small, now.motion
+    write_contacts(now.forces, big, small, p, row)
+    row[ACCELERATION], row[DEVIATION] = now.a, now.a - motion.a
+    row[JOURNAL_ACCELERATION] = now.big_away[0] if p.clearance[0] > 0.0 else 0.0
+    row[JOURNAL_ACCELERATION + 1] = now.small_away[0] if p.clearance[1] > 0.0 else 0.0
+    row[CRANK_TORQUE], row[GUIDE_MOMENT] = torque_and_moment(
+        (motion.cos_theta, motion.sin_theta), now.at.x, now.forces,
+        (big.friction, small.friction), (big.penetration, small.penetration),
+        (big.film_moment, small.film_moment), p,
+    )  # fmt: skip
 
 
 @inline_llvm

@@ -27,10 +27,7 @@ NEVER = 2.0  # a fraction of the step beyond its end
 
 @inline_once
 def may_change(rows, p):
-    """Return whether contact may begin or end within a step, by its first, middle and last row.
-
-    Twice the range of their nearness is allowed for beyond them.
-    """
+    """Return whether contact may begin or end within a step, by three rows and their range."""
     middle, last = rows.shape[0] // 2, rows.shape[0] - 1
     for joint in range(2):
         if p.clearance[joint] > 0.0:
@@ -57,10 +54,8 @@ def range_of(rows, column):
 def may_touch(rows, p):
     """Return whether contact may begin within a step, by the rows at all its nodes.
 
-    A quartic, as the step's interpolant is, rises above its greatest value at five Lobatto nodes
-    by less than a third of their range; a whole range is allowed for here. With chosen laws also
-    where a journal may have flown between two nodes: the speed at which it comes back counts,
-    however short the flight was.
+    A quartic rises above five Lobatto nodes by less than a third of their range. With chosen laws
+    also where a journal may have flown: the speed at which it comes back counts.
     """
     for joint in range(2):
         if p.clearance[joint] > 0.0:
@@ -76,10 +71,7 @@ def may_touch(rows, p):
 
 @jit
 def nearness_at(joint, s, t, h, dense, phase, p, y):
-    """Return `nearness` of a joint at the fraction s of a step with interpolant `dense`.
-
-    y: scratch.
-    """
+    """Return `nearness` of a joint at the fraction s of a step with interpolant `dense`."""
     interpolate(s, dense, y)
     contact = contact_at(joint, t + s * h, y, phase, p)
     return nearness(contact, p.stiffness[joint], p.clearance[joint], p)
@@ -99,10 +91,7 @@ def locate_onset(joint, low, high, t, h, dense, phase, p, y):
 
 @inline_once
 def locate_contact_between(joint, low, high, t, h, dense, phase, p, y):
-    """Return a fraction in (low, high) at which there is contact, by golden section; NEVER if none.
-
-    For a bracket around a local maximum of the nearness whose ends are both apart.
-    """
+    """Return a fraction with contact around the top of a nearness, by golden section, or NEVER."""
     golden = 0.6180339887498949
     left = high - golden * (high - low)
     right = low + golden * (high - low)
@@ -136,11 +125,7 @@ def sample_fraction(i):
 
 @inline_once
 def joint_onset(joint, t, h, dense, phase, p, y):
-    """Return from where to where in a step a joint touches that was apart at its begin.
-
-    Fractions (begin, end) of the step: (NEVER, NEVER) without an onset, end = 1 where contact
-    outlasts the step.
-    """
+    """Return from where to where in a step a joint touches: to 1 where it lasts, NEVER without."""
     earlier = nearness_at(joint, 0.0, t, h, dense, phase, p, y)
     before = earlier
     begin = NEVER
@@ -185,8 +170,7 @@ def first_onset(t, h, dense, phase, p, y):
 def locate_change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
     """Return the fraction at which contact begins or ends between two others, to CHANGE_TOLERANCE.
 
-    at_low, at_high: the nearness at low and high, of different signs. Two samples where the line
-    through both ends crosses zero, then one halfway: where contact ends, the nearness has a corner.
+    By two looks on a line through both ends, then one halfway: the nearness may have a corner.
     """
     looks = 0
     # the secant alone stalls at the corner: one end of the bracket would never move
@@ -208,10 +192,8 @@ def locate_change(joint, low, high, at_low, at_high, t, h, dense, phase, p, y):
 def shift_of_change(joint, s, rate, t, h, dense, size, phase, p, y):
     """Return by how much of a step a change of contact moves for a state off by its natural size.
 
-    The motion's numbers count one by one, as a root of squares. rate: of the nearness, in steps;
-    size: natural size of each number of the motion, (n,); y: scratch. A journal that is pressed
-    out of its oil or off its bore slowly, under full damping, loses contact at a moment that a
-    speed wrong by some tolerances moves far.
+    The motion's numbers count one by one, as a root of squares. A journal that loses contact slowly
+    does so at a moment that a speed wrong by some tolerances moves far.
     """
     at, total = nearness_at(joint, s, t, h, dense, phase, p, y), 0.0
     for i in range(size.size):
@@ -227,9 +209,7 @@ def shift_of_change(joint, s, rate, t, h, dense, size, phase, p, y):
 def approach_at(joint, t, y, phase, p, rates, before):
     """Return a joint's penetration (m), and the speed (m/s) at which its gap closes.
 
-    Of a time and a state within a hair of the begin of contact. The speed is that of the moment at
-    which the gap closes: two motions that are a little apart meet a little apart in time. rates,
-    before: scratch, (n,).
+    At that very moment: two motions that are a little apart meet a little apart in time.
     """
     now = contact_at(joint, t, y, phase, p)
     # the landing lies near the onset, not on it: go back, or on, by the difference
@@ -244,11 +224,9 @@ def approach_at(joint, t, y, phase, p, rates, before):
 def store_approach_velocity(w, t, work, phase, p, tally):
     """Store the speed at which joints meet again after a flight; return whether one does.
 
-    At the time of a landing: the joint whose onset it is meets if its gap closes, since a force
-    that the clamp held off comes back while the bodies still part. Whether it was seen apart says
-    nothing: it may have left, flown and come back within the step. The other one meets too where it
-    was seen apart and its gap closes within `LANDING_FRACTION` of the next step. Laws with
-    restitution damp by this speed as long as the contact lasts.
+    The joint that is landed on meets if its gap closes: a clamped force comes back while bodies
+    part. The other one meets too where it was seen apart and its gap closes within
+    `LANDING_FRACTION` of the next step.
     """
     met = False
     n = work.y.size

@@ -84,7 +84,6 @@ FIELDS: list[tuple] = [
     ("law", "i8"),  # of contact_laws
     ("friction", "i8"),
     ("freedoms", "i8"),  # positions in a state; two in the ideal scene, zeros
-    ("wide", "i8"),  # whether angles may be beyond the series of `small_angle`
     # mechanism
     ("omega", "f8"),  # crank speed, rad/s
     ("crank_radius", "f8"),  # R, m
@@ -183,7 +182,7 @@ FEATURES: list[tuple] = [
     ("rod_loss", "i8"),  # place in a state of what that has taken; -1 of a rigid rod
 ]
 _EACH = (len(Coordinate),)  # the bodies have as many rows
-# What `mechanism_motion.solve` writes, so that no evaluation asks for memory. Two threads must not
+# What `mechanism.solve` writes, so that no evaluation asks for memory. Two threads must not
 # share such a record, and what was found at one instant goes as the next is solved.
 SCRATCH: list[tuple] = [
     ("w", "f8", _EACH),  # coordinates
@@ -215,21 +214,14 @@ def zero(kind: np.dtype) -> np.record:
 
 @cache
 def record_type(kind: np.dtype) -> np.dtype:
-    """Return the type of a kind's records, the same object each time.
-
-    Numba looks it up at each call: a type that it has not seen before it compares field by field.
-    """
+    """Return a kind's type, one object: numba compares a type that is new to it field by field."""
     return np.dtype((np.record, kind))
 
 
 def new_record(
     chosen: bool = False, featured: bool = False, values: dict[str, Any] | None = None
 ) -> np.record:
-    """Return a record with these values by field, and zeros elsewhere.
-
-    chosen: for forces but the default ones: other laws, oil, a card; featured: for a mechanism with
-    `FEATURES` and any forces.
-    """
+    """Return a record of these values: for any forces (chosen), or for a mechanism (featured)."""
     kind = FEATURED if featured else CHOSEN if chosen else RECORD
     if values is None:
         return zero(kind)
@@ -239,10 +231,7 @@ def new_record(
 
 
 def read_fields(p: np.record) -> dict[str, Any]:
-    """Return the fields of a record by name, as numbers of Python where they are no arrays.
-
-    To read one from the record takes ten times as long.
-    """
+    """Return the fields of a record by name; to read them one by one takes ten times as long."""
     return dict(zip(p.dtype.names or (), p.item(), strict=True))
 
 
@@ -298,10 +287,7 @@ def place_coordinates(p: np.record) -> None:
 
 
 def state_names(p: Fields) -> tuple[str, ...]:
-    """Return the names of the numbers of a record's state, each with its unit.
-
-    Coordinates, their rates, what contacts carry, a crank's lag and slip, and a rod's loss.
-    """
+    """Return the names of the numbers of a record's state, each with its unit."""
     positions = find_coordinates(p)
     coordinates = [COORDINATE_NAMES[c] for c in positions]
     names = tuple(f"{name}, {unit}" for name, unit in coordinates)
@@ -319,7 +305,7 @@ def carried_names(p: Fields) -> tuple[str, ...]:
 
 def derive(p: np.record) -> None:
     """Fill the fields of a record that follow from its others."""
-    p["freedoms"], p["wide"] = FREEDOMS[Scene(int(p["scene"]))] or 2, 1
+    p["freedoms"] = FREEDOMS[Scene(int(p["scene"]))] or 2
     if is_featured(p):
         place_coordinates(p)
     p["crank_ratio"] = p["crank_radius"] / p["rod_length"]

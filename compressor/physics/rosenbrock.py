@@ -1,14 +1,12 @@
 """The stiff partner: RODAS, a Rosenbrock method of order 4(3), six stages, stiffly accurate.
 
-Each step solves linear systems with one Jacobian of the compiled right-hand side, taken by
-differences; no iteration that could fail to converge. Coefficients: Hairer & Wanner, Solving
-Ordinary Differential Equations II, IV.7 and IV.10, with their continuous extension of order 3.
+One Jacobian by differences a step; no iteration that could fail to converge. Hairer & Wanner,
+Solving Ordinary Differential Equations II, IV.7 and IV.10, with an extension of order 3.
 """
 
 import numpy as np
 
 from compressor.physics._jit import inline_once, jit, square_root
-from compressor.physics.linear import factorize, substitute
 from compressor.physics.runge_kutta import FLOWS
 from compressor.physics.systems import derivative_with_flows
 
@@ -47,12 +45,48 @@ TIME_SHARE = 1e-3  # of a step, by which time is varied either way
 
 
 @inline_once
+def factorize(matrix, pivots):
+    """Write the LU factors of a small square matrix in place; return False if it is singular."""
+    n = pivots.size
+    for j in range(n):
+        best = j
+        for i in range(j + 1, n):
+            if abs(matrix[i, j]) > abs(matrix[best, j]):
+                best = i
+        pivots[j] = best
+        if not abs(matrix[best, j]) > 0.0:
+            return False
+        if best != j:
+            for m in range(n):
+                matrix[j, m], matrix[best, m] = matrix[best, m], matrix[j, m]
+        for i in range(j + 1, n):
+            matrix[i, j] /= matrix[j, j]
+            for m in range(j + 1, n):
+                matrix[i, m] -= matrix[i, j] * matrix[j, m]
+    return True
+
+
+@inline_once
+def substitute(matrix, pivots, b):
+    """Solve with the factors of `factorize`, b (n,) being overwritten by the solution."""
+    n = pivots.size
+    for j in range(n):
+        b[j], b[pivots[j]] = b[pivots[j]], b[j]
+    for i in range(n):
+        for m in range(i):
+            b[i] -= matrix[i, m] * b[m]
+    for i in range(n - 1, -1, -1):
+        for m in range(i + 1, n):
+            b[i] -= matrix[i, m] * b[m]
+        b[i] /= matrix[i, i]
+
+
+@inline_once
 def differentiate(t, h, z, rates, size, phase, p, scratch, column, jacobian, time_rate):
     """Write the Jacobian of motion and flows by the motion, (n + 4, n), and d/dt of dz/dt.
 
-    By forward differences from `rates`, dz/dt at (t, z), with `size` (n,) the natural size of
-    each unknown; in time by central ones, on which the method's order depends. Costs n + 2
-    evaluations.
+    By forward differences from `rates`, at natural sizes; in time by central ones, on which the
+    order depends.
     """
     n = z.size - FLOWS
     for i in range(z.size):
@@ -75,9 +109,7 @@ def differentiate(t, h, z, rates, size, phase, p, scratch, column, jacobian, tim
 def take_step(t, h, z, rates, size, phase, p, work, new, u, jacobian):
     """Take a step of length h from (t, z); return False where its linear system is singular.
 
-    Writes the state at its end into new and the increments, (6, n + 4), into u. rates: dz/dt at (t,
-    z); size: as in `differentiate`; jacobian: (n + 4, n), written. The last increment is the error
-    estimate.
+    Writes its end into new and the increments, (6, n + 4), the last of which is the error, into u.
     """
     n = z.size - FLOWS
     time_rate = np.empty(z.size)
@@ -118,15 +150,11 @@ def take_step(t, h, z, rates, size, phase, p, work, new, u, jacobian):
 
 @inline_once
 def spectral_radius(jacobian, size, v, w):
-    """Return an estimate of the largest eigenvalue's size (1/s) by a few power iterations.
-
-    v: a start (n,), overwritten; w: scratch (n,).
-    """
+    """Return an estimate of the largest eigenvalue's size (1/s) by power iterations from v."""
     n = size.size
     growth = 0.0
     for _ in range(POWER_ITERATIONS):
-        before = 0.0
-        after = 0.0
+        before, after = 0.0, 0.0
         for i in range(n):
             w[i] = 0.0
             for j in range(n):
@@ -153,13 +181,9 @@ def error_norm(z, new, u, rtol, atol):
 
 @inline_once
 def extend(z, new, u, dense):
-    """Write the coefficients of the step's cubic interpolant into dense, (5, n).
-
-    As in runge_kutta, with zeros for the fourth power.
-    """
+    """Write the coefficients of the step's cubic interpolant into dense, as of `runge_kutta`."""
     for i in range(dense.shape[1]):
-        first = 0.0
-        second = 0.0
+        first, second = 0.0, 0.0
         for j in range(STIFF_STAGES):
             first += DENSE[0, j] * u[j, i]
             second += DENSE[1, j] * u[j, i]

@@ -1,43 +1,29 @@
 """The explicit Runge-Kutta pair TSIT5 as a table, its step, and its dense output.
 
-Seven stages, the last being the next step's first, order 5 with an embedded error estimate of order
-4, and a continuous extension of order 4 without further stages. Tsitouras, Comput. Math. Appl. 62
-(2011).
+Order 5 with an error estimate of order 4, and a continuous extension of order 4 without further
+stages; the last of seven is the next step's first. Tsitouras, Comput. Math. Appl. 62 (2011).
 """
 
 import numpy as np
 
 from compressor.physics._jit import inline_llvm, inline_once, inner, square_root
 from compressor.physics.kinematics import ideal_after
-from compressor.physics.systems import write_flowing_derivative
+from compressor.physics.systems import evaluate, write_flowing_rates, write_row
 
 STAGES = 7
 FLOWS = 4
-
-
-def _lower(rows):
-    """Return a (STAGES, STAGES) strictly lower triangular table from its rows."""
-    full = np.zeros((STAGES, STAGES))
-    for i, row in enumerate(rows, 1):
-        full[i, : len(row)] = row
-    return full
-
-
-A = _lower(
-    [
-        [0.161],
-        [-0.008480655492356989, 0.335480655492357],
-        [2.8971530571054935, -6.359448489975075, 4.3622954328695815],
-        [5.325864828439257, -11.748883564062828, 7.4955393428898365, -0.09249506636175525],
-        [
-            5.86145544294642, -12.92096931784711, 8.159367898576159, -0.071584973281401,
-            -0.028269050394068383,
-        ],
-        [  # the weights of the step
-            0.09646076681806523, 0.01, 0.4798896504144996, 1.379008574103742,
-            -3.290069515436081, 2.324710524099774,
-        ],
-    ]
+A = np.zeros((STAGES, STAGES))
+A[1, :1] = 0.161
+A[2, :2] = -0.008480655492356989, 0.335480655492357
+A[3, :3] = 2.8971530571054935, -6.359448489975075, 4.3622954328695815
+A[4, :4] = 5.325864828439257, -11.748883564062828, 7.4955393428898365, -0.09249506636175525
+A[5, :5] = (
+    5.86145544294642, -12.92096931784711, 8.159367898576159, -0.071584973281401,
+    -0.028269050394068383,
+)  # fmt: skip
+A[6, :6] = (  # the weights of the step
+    0.09646076681806523, 0.01, 0.4798896504144996, 1.379008574103742, -3.290069515436081,
+    2.324710524099774,
 )  # fmt: skip
 C = A.sum(axis=1)
 C[-2:] = 1.0  # whose sums they are to rounding
@@ -65,7 +51,7 @@ P = np.array(
 def add_stages(weights, count, h, z, k, out):
     """Write z plus h times the first stages, `count` of them, by their weights into out, (m,).
 
-    Four numbers at a time, which LLVM makes vectors of: scenes have a multiple of four.
+    Four numbers at a time, which LLVM makes vectors of.
     """
     whole = out.size // 4 * 4
     for i in range(0, whole, 4):
@@ -88,27 +74,23 @@ def add_stages(weights, count, h, z, k, out):
 def take_step(base, h, z, k, phase, p, new, row):
     """Take a step of length h from z: write stages 1 to 6 into k, and its end's state into new.
 
-    base: cosine and sine of the crank angle at its begin; z and new: motion and flows, shape
-    (n + 4,); k: (7, n + 4), its first row already dz/dt; row: (COLUMNS,), observed at the step's
-    end, where the last stage stands.
-    Only the motion enters the right-hand side, so flows are summed at the end alone.
+    base: cosine and sine of the crank angle at its begin; row: observed at the step's end. Only the
+    motion enters the right-hand side, so flows are summed at the end alone.
     """
     n = z.size - FLOWS
     for stage in range(1, STAGES - 1):
         add_stages(A[stage], stage, h, z, k, new[:n])
-        motion = ideal_after(base, C[stage] * h, p)
-        write_flowing_derivative(motion, new, phase, p, k[stage], row, False)
+        now = evaluate(ideal_after(base, C[stage] * h, p), new[:n], phase, p)
+        write_flowing_rates(now, new[:n], p, k[stage])
     add_stages(A[STAGES - 1], STAGES - 1, h, z, k, new)
-    motion = ideal_after(base, h, p)
-    write_flowing_derivative(motion, new, phase, p, k[STAGES - 1], row, True)
+    now = evaluate(ideal_after(base, h, p), new[:n], phase, p)
+    write_flowing_rates(now, new[:n], p, k[STAGES - 1])
+    write_row(now, new[:n], p, row)
 
 
 @inline_once
 def error_norm(h, z, new, k, rtol, atol):
-    """Return the root mean square over the motion of the estimated error over its tolerance.
-
-    The larger of a number at both ends of the step sets its tolerance.
-    """
+    """Return the root mean square over the motion of the estimated error over its tolerance."""
     n = z.size - FLOWS
     total = 0.0
     for i in range(n):
@@ -126,12 +108,6 @@ def weights_at(s, weights):
     for stage in range(STAGES):
         a, b, c, d = P[stage, 0], P[stage, 1], P[stage, 2], P[stage, 3]
         weights[stage] = s * (s * (s * (s * d + c) + b) + a)
-
-
-@inline_llvm
-def combine(weights, h, z, k, out):
-    """Write the motion for these weights of the stages into out, (n,), without the interpolant."""
-    add_stages(weights, STAGES, h, z, k, out)
 
 
 @inner

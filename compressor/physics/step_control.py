@@ -7,8 +7,8 @@ a stepper turns to the stiff partner and back.
 import math
 from enum import IntEnum
 
-from compressor.physics import rosenbrock
 from compressor.physics._jit import inline_llvm, inline_once, jit, square_root
+from compressor.physics.rosenbrock import STIFF_STAGES, spectral_radius
 from compressor.physics.runge_kutta import FLOWS, STAGES, A
 from compressor.physics.systems import derivative_with_flows
 
@@ -26,8 +26,6 @@ TEST_INTERVAL = 4  # explicit steps from one test to the next
 STEPS_BEFORE_STIFF, STEPS_BEFORE_EXPLICIT = 15, 10  # in a row, before a change of method
 MIN_TEST_PAUSE, MAX_TEST_PAUSE = 50, 2000  # steps without a test after a change back
 
-spectral_radius = rosenbrock.spectral_radius
-
 
 class Mode(IntEnum):
     """Which methods a stepper may use."""
@@ -43,15 +41,10 @@ AUTO = int(Mode.AUTO)
 
 @jit
 def first_step(w, z, work, atol, phase, p, end):
-    """Return a length (s) for the first step of an order-5 method.
-
-    By the rates at its begin and after a small trial step (Hairer, Norsett, Wanner II.4); end: of
-    the segment (s).
-    """
+    """Return a length (s) for the first step of an order-5 method (Hairer & Wanner I, II.4)."""
     n = z.size - FLOWS
     rates, trial = work.k[0], work.column
-    size = 0.0
-    rate = 0.0
+    size, rate = 0.0, 0.0
     for i in range(n):
         scale = atol[i] + w.rtol * abs(z[i])
         size += (z[i] / scale) ** 2
@@ -99,17 +92,15 @@ def refuse(w, h, error):
 def stiff_rate(w, h, z, work, size):
     """Return an estimate of the largest eigenvalue's size (1/s) from the step just taken.
 
-    Explicit: the last two stages stand at the same time, so their rates differ by the Jacobian
-    times the difference of their states (Hairer & Wanner II, IV.2). Stiff partner: power
-    iterations with the Jacobian itself.
+    By the last two explicit stages, which stand at one time (Hairer & Wanner II, IV.2), or the
+    Jacobian.
     """
     n = size.size
     if w.stiff:
         for i in range(n):
-            work.y[i] = work.k[rosenbrock.STIFF_STAGES, i] + 1e-3 * size[i]
+            work.y[i] = work.k[STIFF_STAGES, i] + 1e-3 * size[i]
         return spectral_radius(work.jacobian, size, work.y, work.column[:n])
-    above = 0.0
-    below = 0.0
+    above, below = 0.0, 0.0
     for i in range(n):
         change = work.new[i] - z[i]
         for j in range(STAGES - 2):
@@ -136,7 +127,7 @@ def choose_method(w, h, z, work, size):
         return  # an estimate costs a tenth of an explicit step
     reach = h * stiff_rate(w, h, z, work, size) / STABILITY_LIMIT
     if w.stiff:
-        price = (size.size + rosenbrock.STIFF_STAGES + 0.2 * size.size**2) / (STAGES - 1)
+        price = (size.size + STIFF_STAGES + 0.2 * size.size**2) / (STAGES - 1)
         w.explicit_ok = w.explicit_ok + 1 if reach < price else 0
         w.steps_saved += reach - price
         if w.explicit_ok >= STEPS_BEFORE_EXPLICIT:

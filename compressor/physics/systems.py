@@ -1,12 +1,12 @@
 """What is integrated and what is observed, of one of the scenes or of the mechanism.
 
-Both have a handful of functions of the same names; which are called is settled by the record. What
-integrators and observers call stands here once. A scene is the mechanism with clearance at its
-joints and no other feature, written by hand for speed; that both agree is a test.
+Both have a handful of functions of the same names; which are called is settled by the record. A
+scene is the mechanism with clearance at its joints and no other feature, written by hand for speed;
+that both agree is a test.
 
 The right-hand side records nothing: outputs are recomputed from (t, y). The energy flows (work of
-crank and load, losses to damping and friction) are integrated beside the motion. Times are those
-of a steady crank: what passes in time is `pace_of` times that.
+crank and load, losses to damping and friction) are integrated beside the motion. Times are those of
+a steady crank: what passes in time is `pace_of` times that.
 """
 
 import functools
@@ -14,8 +14,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from compressor.physics import mechanism_motion, mechanism_rows, motion, observe
-from compressor.physics._jit import dispatch_on_record, inline_llvm, inner, jit, without_refcount
+from compressor.physics import mechanism, mechanism_rows, motion, observe
+from compressor.physics._jit import dispatch_on_record, inline_llvm, jit, without_refcount
 from compressor.physics.kinematics import crank_direction, ideal, ideal_at
 from compressor.physics.loads import CYLINDER, GAS, begin_stroke
 from compressor.physics.observe import CRANK_POWER, KINETIC, PACE, WIDE
@@ -24,10 +24,9 @@ from compressor.physics.record import MECHANISM, read_fields
 # of two functions, the mechanism's and a scene's, that of the record among the arguments
 choose = functools.partial(dispatch_on_record, MECHANISM)
 
-evaluate = choose(mechanism_motion.solve, motion.evaluate)
+evaluate = choose(mechanism.solve, motion.evaluate)
 write_rates = choose(mechanism_rows.write_rates, motion.write_rates)
 pace_of = choose(mechanism_rows.pace_of, motion.pace_of)
-contacts_of = choose(mechanism_rows.contacts_of, motion.contacts_of)
 write_place = choose(mechanism_rows.write_place, observe.write_place)
 write_contact_columns = choose(mechanism_rows.write_contact_columns, observe.write_contact_columns)
 write_powers = choose(mechanism_rows.write_powers, observe.write_powers)
@@ -39,11 +38,7 @@ beyond_model = choose(mechanism_rows.beyond_model, motion.is_within_model)
 
 @jit
 def start(offset, y, p):
-    """Write the state at top dead centre with journals shifted by `offset`, at rest, into y.
-
-    offset: (joint, axis) in m, shape (2, 2), of the journal from its bore's centre; only joints
-    with clearance are read. A rod is straight.
-    """
+    """Write the state at top dead centre into y, at rest, with journals shifted by `offset` (m)."""
     for i in range(y.size):
         y[i] = 0.0
     if p.carries:
@@ -65,55 +60,36 @@ def enter_segment(t, y, i, phases, p):
 
 @jit
 def derivative(t, y, phase, p, out):
-    """Write dy/dt into `out`, (n,): as many numbers as `state_names` of the record has.
-
-    phase: of the load, 0 to 3.
-    """
+    """Write dy/dt into `out`, (n,); phase: of the load, 0 to 3."""
     write_rates(evaluate(ideal(t, p), y, phase, p), y, p, out)
 
 
 @jit
 def derivative_with_flows(t, z, phase, p, out):
-    """Write dz/dt of the motion and of its four energy flows into out, z = (y, flows).
-
-    t: s, of a steady crank; z, out: (n + 4,); phase: of the load, 0 to 3.
-    """
-    write_flowing_derivative(ideal(t, p), z, phase, p, out, out, False)
+    """Write dz/dt of the motion and of its four energy flows into out, (n + 4,)."""
+    y = z[: z.size - 4]
+    write_flowing_rates(evaluate(ideal(t, p), y, phase, p), y, p, out)
 
 
 @inline_llvm
-def write_flowing_derivative(motion, z, phase, p, out, row, observed):
-    """Write `derivative_with_flows` around an ideal motion that is known.
-
-    Where `observed`, write `observe_with_energy` of the same evaluation into row.
-    """
-    n = z.size - 4
-    y = z[:n]
-    now = evaluate(motion, y, phase, p)
-    write_rates(now, y, p, out[:n])
-    if observed:
-        write_row(now, y, p, row)
-        for i in range(4):
-            out[n + i] = row[CRANK_POWER + i]
-    else:
-        write_powers(now, y, p, out[n:])
-    for i in range(n, z.size):
+def write_flowing_rates(now, y, p, out):
+    """Write the rates of the motion y and of its four energy flows, at an evaluated instant."""
+    write_rates(now, y, p, out[: y.size])
+    write_powers(now, y, p, out[y.size :])
+    for i in range(y.size, out.size):
         out[i] *= pace_of(now, p)
 
 
 @inline_llvm
 def contact_at(joint, t, y, phase, p):
-    """Return a joint's `ContactState` at a time and state.
-
-    Of which who calls it computes only what it reads: of a nearness no friction and no film.
-    """
-    big, small = contacts_of(evaluate(ideal(t, p), y, phase, p), p)
-    return big if joint == 0 else small
+    """Return a joint's `ContactState`; who calls it computes only what it reads."""
+    now = evaluate(ideal(t, p), y, phase, p)
+    return now.big if joint == 0 else now.small
 
 
 @inline_llvm
 def write_row(now, y, p, row):
-    """Write the columns from ACCELERATION to PACE."""
+    """Write the columns from ACCELERATION to PACE, by which a step is judged and audited."""
     write_contact_columns(now, y, p, row)
     write_powers(now, y, p, row[CRANK_POWER:KINETIC])
     write_energies(now, y, p, row)
@@ -128,19 +104,9 @@ def observe_contact(motion, y, phase, p, row):
     row[PACE] = pace_of(now, p)
 
 
-@inner
-def observe_with_energy(motion, y, phase, p, row):
-    """Write the columns from ACCELERATION on: what a step is judged, tallied and audited by."""
-    write_row(evaluate(motion, y, phase, p), y, p, row)
-
-
 @jit
 def observe_at(t, y, phase, p, row):
-    """Write all quantities of `Column` at time t (s) and state y into row.
-
-    row: (COLUMNS,), or (WIDE,) for the forces on the frame as well. Of ideal joints y is four
-    zeros.
-    """
+    """Write all quantities of `Column` into row, (COLUMNS,) or (WIDE,)."""
     now = evaluate(ideal(t, p), y, phase, p)
     write_place(now, y, p, row)
     write_row(now, y, p, row)
@@ -150,10 +116,7 @@ def observe_at(t, y, phase, p, row):
 
 @jit
 def observe_all(times, states, phases, p, rows):
-    """Write the rows of `observe_at` at m times (s).
-
-    states: (m, k); phases: of the load, (m,) integers; rows: (m, COLUMNS) or (m, WIDE).
-    """
+    """Write the rows of `observe_at` at m times (s), by phases of the load."""
     states, rows = without_refcount(states), without_refcount(rows)
     for i in range(times.size):
         observe_at(times[i], states[i], phases[i], p, rows[i])
@@ -162,9 +125,7 @@ def observe_all(times, states, phases, p, rows):
 def ideal_forces(times, phases, p):
     """Return the piston force and the joints' forces on the rod (N) of ideal joints, (m, 5).
 
-    Big end x and y, small end x and y. By plain Python: what is asked for one revolution need not
-    wait for machine code, which takes ten times as long to load. times: s, (m,); phases: of the
-    load, (m,) integers.
+    By plain Python: for one revolution machine code takes ten times as long to load.
     """
     fields, still = SimpleNamespace(**read_fields(p)), np.zeros(4)
     found = []

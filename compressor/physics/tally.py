@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compressor.physics._jit import dispatch_on_record, inline_llvm, inline_once, jit
-from compressor.physics.contact_laws import in_contact
+from compressor.physics._jit import inline_llvm, inline_once, jit
+from compressor.physics.contact_laws import has_chosen_laws, in_contact
 from compressor.physics.observe import (
     ACCELERATION,
     CRANK_POWER,
@@ -23,7 +23,7 @@ from compressor.physics.observe import (
     POTENTIAL,
     Column,
 )
-from compressor.physics.record import CHOSEN_FORCES, zero
+from compressor.physics.record import zero
 
 # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAK_NEARNESS = 0.98
@@ -31,10 +31,7 @@ ROD_LOAD = FORCE + 2  # force on the small end along x, positive in tension
 
 
 def lobatto(n):
-    """Return the nodes in [0, 1] and the weights of n-point Gauss-Lobatto quadrature, (n,) each.
-
-    Both ends are nodes. Exact for polynomials up to degree 2 n - 3. The arrays are read-only.
-    """
+    """Return nodes in [0, 1], both ends included, and weights of Gauss-Lobatto quadrature."""
     legendre = np.polynomial.legendre.Legendre.basis(n - 1)
     inner = np.sort(legendre.deriv().roots().real)
     nodes = np.concatenate(([-1.0], inner, [1.0]))
@@ -50,10 +47,7 @@ IN_STEPS = (*range(ACCELERATION, CRANK_POWER), PACE)
 
 
 def require_written(*columns):
-    """Return columns that are tallied, as plain integers for numba.
-
-    Raises ValueError for one that the nodes of a march's steps do not have: it would be 0 there.
-    """
+    """Return columns as integers. Raises ValueError for one that a step does not write."""
     for column in columns:
         if column not in IN_STEPS:
             raise ValueError(f"{Column(column).name} is not written at each node of a step")
@@ -68,10 +62,7 @@ SUM, PEAK, KEPT = "sum", "peak", "kept"
 
 
 class Field(NamedTuple):
-    """A number of a tally, or an array, and how parts of a run are merged.
-
-    `merge`: SUM or PEAK of what began anew at each cut, or KEPT on from the start of the run.
-    """
+    """A number of a tally; SUM or PEAK of what began anew at each cut, or KEPT from the start."""
 
     name: str
     merge: str
@@ -142,10 +133,7 @@ def merge_tallies(tallies):
 
 @inline_llvm
 def vertex(left, right, before, here, after):
-    """Return the top of the parabola through three values, or the middle one without a top there.
-
-    left, right: places of the outer values from the middle one's.
-    """
+    """Return the top of the parabola through three values, or the middle one without a top."""
     slope_left = (before - here) / left
     slope_right = (after - here) / right
     curvature = (slope_right - slope_left) / (right - left)
@@ -159,10 +147,7 @@ def vertex(left, right, before, here, after):
 
 @inline_llvm
 def extreme_of(left, right, before, here, after):
-    """Return the place and the value of the extreme of the parabola through three values.
-
-    nan of a straight line. left, right: places of the outer values from the middle one's.
-    """
+    """Return place and value of the extreme of the parabola through three values, or nan."""
     slope_left = (before - here) / left
     slope_right = (after - here) / right
     curvature = (slope_right - slope_left) / (right - left)
@@ -172,10 +157,7 @@ def extreme_of(left, right, before, here, after):
 
 @inline_llvm
 def may_exceed(top, known):
-    """Return whether a parabola through nodes whose greatest is `top` may rise above a known peak.
-
-    It rises to less than twice `top`.
-    """
+    """Return whether a parabola through nodes of greatest `top` may rise above a known peak."""
     return 2.0 * top >= known
 
 
@@ -183,8 +165,7 @@ def may_exceed(top, known):
 def peak_of(nodes, rows, every, column, known):
     """Return the greater of `known` and the largest value of a column over a step.
 
-    The step's nodes count, `every` first, second, ... of them, and the parabola through the best.
-    Of a column of GREATEST it is the largest |value|.
+    Of nodes, `every` first, second, ..., and the parabola through the best; of GREATEST |value|.
     """
     last, size = nodes.size - 1, column < DEVIATION
     best, top = 0, -math.inf
@@ -204,32 +185,20 @@ def peak_of(nodes, rows, every, column, known):
 
 @inline_llvm
 def add_peaks(nodes, rows, every, tally, p):
-    """Raise the tally's peaks by the nodes of a step, and by parabolas through them."""
+    """Raise the tally's peaks by the nodes of a step, and by parabolas through them.
+
+    Chosen forces, such as a card's, may ripple between nodes: a march looks for their tops.
+    """
     for k in range(PEAKED):
-        if may_exceed(tally.top[k], tally.peak[k]):
+        if has_chosen_laws(p):
+            tally.peak[k] = max(tally.peak[k], tally.top[k])
+        elif may_exceed(tally.top[k], tally.peak[k]):
             tally.peak[k] = peak_of(nodes, rows, every, ACCELERATION + k, tally.peak[k])
 
 
 @inline_llvm
-def add_peaks_of_nodes(nodes, rows, every, tally, p):
-    """Raise the tally's peaks by the nodes of a step alone.
-
-    Chosen forces, such as a card's, may ripple between them: who integrates looks for tops on the
-    dense solution, so that no sample of it lies above them.
-    """
-    for k in range(PEAKED):
-        tally.peak[k] = max(tally.peak[k], tally.top[k])
-
-
-peaks_of_step = dispatch_on_record(CHOSEN_FORCES, add_peaks_of_nodes, add_peaks)
-
-
-@inline_llvm
 def tally_energy(row, flows, tally):
-    """Write the energy flows so far, (4,) J in the order of the powers, and the worst imbalance.
-
-    `row` is observed at the end of a step; the first call, with flows of zero, sets the start.
-    """
+    """Write the energy flows so far, (4,) J, and the worst imbalance since the first call."""
     energy = row[KINETIC] + row[POTENTIAL]
     if not tally.started:
         tally.energy = energy
@@ -305,14 +274,10 @@ def tally_contact(joint, span, nodes, rows, every, gap_fraction, measured, tally
 def tally_step(span, nodes, weights, rows, every, gap_fraction, sides, measured, tally, p):
     """Add one step (or part of one) of length span (s) to the tally.
 
-    nodes, weights: (m,), both ends of the step and between them; rows: (m, COLUMNS), observed at
-    the nodes; every: 1, or 2 where only the first, third, ... row is filled, with `weights` zero
-    at the others; gap_fraction: (2,), share of the step without contact, by joint; sides: (4,),
-    share of it with the rod load above and below zero, and its greatest tension and compression
-    (N), read where that is tallied; measured: whether the metrics count (after settling); the depth
-    of contact over the whole run always does.
-
-    span is that of a steady crank; what is tallied are shares and means of the time that passes.
+    rows: at the nodes; every: 1, or 2 where only the first, third, ... is filled, with `weights`
+    zero at the others; gap_fraction: share without contact, by joint; sides: as of `measure_sides`;
+    measured: whether the metrics count. span is that of a steady crank; what is tallied are shares
+    and means of the time that passes.
     """
     more = 0.0
     for i in range(0, nodes.size, every):
@@ -335,7 +300,7 @@ def tally_step(span, nodes, weights, rows, every, gap_fraction, sides, measured,
             tally.square[k] += weight * rows[i, SQUARES[k]] ** 2
         for k in range(PEAKED):
             tally.top[k] = max(tally.top[k], abs(rows[i, ACCELERATION + k]))
-    peaks_of_step(nodes, rows, every, tally, p)
+    add_peaks(nodes, rows, every, tally, p)
     if tally.has_rod_load:
         for side in range(2):
             tally.side_seconds[side] += span * sides[side]

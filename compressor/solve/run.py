@@ -97,7 +97,7 @@ def march_through(
     stepper, work = new_stepper(COMPILED[request.method]), new_work(size.size)
     length, speed = contact_sizes(request.fields)
     stepper["rtol"], stepper["settle"] = request.rtol, settle
-    stepper["watch"], stepper["contact_step"] = 1, CONTACT_STEP * length / speed
+    stepper["contact_step"] = CONTACT_STEP * length / speed
     stepper["deepest"] = greatest_depth(request.fields)[0]
     while stepper.status == Status.RUNNING:
         left = request.max_steps - result.steps - result.rejected
@@ -168,14 +168,12 @@ FINER_POWER = 0.3  # power of the tolerance by which they become more
 class Solution:
     """A case's motion and what is known of it.
 
-    `rtol`: the tolerance it was integrated with; `metrics`: by name, empty where the run did not
-    reach its end; `bars`, `series_errors`: an error of each metric and of each time series, empty
+    `metrics`: by name, empty where the run did not reach its end; `bars`, `series_errors`: empty
     where none was estimated; `samples`: observed rows at the times at which runs are compared;
-    `reason` and `detail`: why the job failed, empty when it is ok; `promise`: whether what its
-    accuracy promises was `kept`, or `none` was given; `horizon` (s): nan where none was looked for;
-    `settle` (s): from where metrics count; `statistics`: of a chaotic motion; `regime`: of
-    `Regime`, or "" where nothing is known; `period`, `settled` (rev): of a periodic motion, nan of
-    others; `companions`: the runs that errors are estimated by.
+    `reason`, `detail`: why the job failed; `promise`: `kept`, or `none`; `horizon` (s): nan where
+    none was looked for; `settle` (s): from where metrics count; `statistics`: of a chaotic motion;
+    `regime`: or ""; `period`, `settled` (rev): of a periodic motion; `companions`: the runs that
+    errors come from.
     """
 
     p: np.record
@@ -209,11 +207,10 @@ def run_at_tolerance(
 ) -> Solution:  # fmt: skip
     """Return one run of a case at a tolerance, without errors, within a wall time (s).
 
-    `sampled`: whether on the output grid; steps do not land on it, so that metrics are the same
-    without. `state`: the motion at the start, top dead centre (`physics.state_names`), in place of
-    the case's own; no ideal scene has one. `cuts`, `enough`: as of a `Request`; metrics are of all
-    parts. `sampled_until`: the time (s) behind which a long run has no samples but its end. A run
-    that stops raises nothing: its `reason` says why.
+    `sampled`: on the output grid; steps do not land on it. `state`: the motion at the start in
+    place of the case's own. `cuts`, `enough`: as of a `Request`. `sampled_until`: the time (s)
+    behind which there are no samples but the end. A run that stops raises nothing: its `reason`
+    says why.
     """
     p, end = record(case), case.duration
     output, compared = (

@@ -4,7 +4,7 @@
 """
 
 EQUIVALENT: dict[str, str] = {
-    "linear.py, factorize: abs(matrix[i, j]) > abs(matrix[best, j]) -> "
+    "rosenbrock.py, factorize: abs(matrix[i, j]) > abs(matrix[best, j]) -> "
     "abs(matrix[i, j]) >= abs(matrix[best, j])": (
         "of two equally large pivots either may be taken"
     ),

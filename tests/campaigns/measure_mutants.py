@@ -43,12 +43,13 @@ COMPILED = ("invariances", "march", "integrate", "rosenbrock", "simulate", "accu
             "regime")  # fmt: skip
 LAWS = ("contact_laws", "friction_laws", "chosen_laws")
 TESTED_IN = {
-    **dict.fromkeys(("mechanism", "mechanism_motion"), ("general_mechanism",)),
+    "mechanism": ("general_mechanism", "linear_systems"),
     "mechanism_rows": ("general_mechanism", "feature_runs"),
     "march": ("march", "wear_stages"),
     "motion": ("motion", *LAWS),
     "contact": ("contact", *LAWS),
-    "card": ("card_curve", "card"),
+    "loads": ("loads", "card_curve", "card"),
+    "rosenbrock": ("rosenbrock", "linear_systems"),
 }  # where not in the module of the same name alone
 NO_JIT, JIT = "not slow and not compiled", "not slow"
 # s of processor time with the JIT off and on; a mutant that takes longer is caught: it never ends

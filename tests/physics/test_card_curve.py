@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from compressor.physics.card import card_force
+from compressor.physics.loads import card_force
 from compressor.physics.record import CARD_NODES, new_record
 from compressor.solve.measured_gas import card_nodes
 

@@ -10,8 +10,7 @@ import sympy
 from compressor.cases.case import Case
 from compressor.metrics import JOINTS
 from compressor.physics.kinematics import ideal
-from compressor.physics.mechanism import ACROSS, BIG_SLOPE, SMALL_SLOPE, shapes
-from compressor.physics.mechanism_motion import solve
+from compressor.physics.mechanism import ACROSS, BIG_SLOPE, SMALL_SLOPE, shapes, solve
 from compressor.physics.observe import COLUMNS, WIDE, Column
 from compressor.physics.record import (
     Coordinate,

@@ -140,7 +140,7 @@ DIMENSIONS = {
     "crank_suction_force": (1, 1, -2), "crank_discharge_force": (1, 1, -2),
     "crank_clearance": (1, 0, 0),
 }  # fmt: skip
-PURE_NUMBERS = {"scene", "load", "law", "friction", "freedoms", "wide", "carries", "exponent",
+PURE_NUMBERS = {"scene", "load", "law", "friction", "freedoms", "carries", "exponent",
                 "static", "dynamic", "corners", "crank_corners", "gas_exponent",
                 "hysteresis"}  # fmt: skip
 DERIVED = {"crank_ratio", "per_rod_length", "per_rod_mass", "per_rod_inertia",

@@ -3,12 +3,8 @@
 import numpy as np
 import pytest
 
-from compressor.physics.linear import (
-    factorize,
-    factorize_positive,
-    substitute,
-    substitute_positive,
-)
+from compressor.physics.mechanism import factorize_positive, substitute_positive
+from compressor.physics.rosenbrock import factorize, substitute
 
 
 @pytest.mark.parametrize("n", [4, 8])

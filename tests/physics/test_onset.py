@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
 from compressor.physics._jit import ENABLED, jit
 from compressor.physics.contact import NO_CONTACT, nearness
@@ -46,7 +45,6 @@ from compressor.physics.systems import (
     evaluate,
     observe_all,
     observe_contact,
-    start,
 )
 from compressor.physics.tally import new_tally
 from compressor.solve.run import COMPILED as METHODS
@@ -55,7 +53,6 @@ from compressor.solve.si_record import (
     initial_state,
     length_and_speed,
     natural_sizes,
-    offsets,
     record,
     scene,
 )
@@ -261,11 +258,9 @@ def contact_rate(y, n, speed, p):
 @pytest.mark.parametrize("rate", [-1.0, -0.05, 0.0, 0.05])
 def test_nearness_is_positive_where_the_contact_pushes(penetration, rate):
     p = parameters()
-    normal, elastic, unclamped = normal_force(
-        penetration, rate, 1.0, p.stiffness[1], p.clearance[1], p
-    )
+    normal, unclamped = normal_force(penetration, rate, 1.0, p.stiffness[1], p.clearance[1], p)
     contact = NO_CONTACT._replace(
-        normal=normal, penetration=penetration, rate=rate, elastic=elastic, unclamped=unclamped
+        normal=normal, penetration=penetration, rate=rate, unclamped=unclamped
     )
     assert (nearness(contact, p.stiffness[1], p.clearance[1], p) > 0) == (normal > 0)
 
@@ -353,7 +348,7 @@ def release(rng, length, joint, t, y, phase, p):
     stiffness = p.stiffness[joint]
 
     def force(speed):
-        return normal_force(speed * length, -speed, 1.0, stiffness, p.clearance[joint], p)[2]
+        return normal_force(speed * length, -speed, 1.0, stiffness, p.clearance[joint], p)[1]
 
     speed = brentq(force, 1e-3, 0.5 * p.full_damping / length)
     y = with_radial_rate(joint, t, y, phase, p, -speed)
@@ -403,12 +398,12 @@ def pulses():
     return made
 
 
-def walk(p, y, begin, edges, phases, rtol, watch, times=None, method=METHODS["TSIT5"]):
-    """March from y at `begin` to the last edge; returns stepper, states at `times` and impacts."""
+def walk(p, y, begin, edges, phases, rtol, times=None, method=METHODS["TSIT5"]):
+    """March from y at `begin` to the last edge; returns the stepper and states at `times`."""
     times = edges[-1:] if times is None else times
     stepper, work, size = new_stepper(method), new_work(y.size), natural_sizes(p)
     length, speed = length_and_speed(p)
-    stepper.rtol, stepper.watch, stepper.t = rtol, watch, begin
+    stepper.rtol, stepper.t = rtol, begin
     stepper.contact_step, stepper.deepest = CONTACT_STEP * length / speed, p.pin_radius[0]
     tally = new_tally()
     z, states = np.append(y, np.zeros(FLOWS)), np.empty((times.size, y.size))
@@ -416,25 +411,25 @@ def walk(p, y, begin, edges, phases, rtol, watch, times=None, method=METHODS["TS
         stepper, p, z, work, rtol * size, size, edges, phases, times, states, tally, 10**6
     )  # fmt: skip
     assert stepper.status == Status.DONE
-    return stepper, states, int(tally.impacts.sum())
+    return stepper, states
 
 
-def walk_pulse(pulse, rtol, watch, times=None, method=METHODS["TSIT5"]):
+def walk_pulse(pulse, rtol, times=None, method=METHODS["TSIT5"]):
     edges, phases = np.array([pulse.begin, pulse.end]), np.array([pulse.phase])
-    return walk(pulse.p, pulse.y, pulse.begin, edges, phases, rtol, watch, times, method)
+    return walk(pulse.p, pulse.y, pulse.begin, edges, phases, rtol, times, method)
 
 
 def passes_by(pulse, rtol, method):
     """Whether the computed motion itself, looked at every 0.2 microseconds, never touches."""
     times = np.linspace(pulse.begin, pulse.end, 20001)
-    _, states, _ = walk_pulse(pulse, rtol, 1, times, method)
+    _, states = walk_pulse(pulse, rtol, times, method)
     rows = np.empty((times.size, COLUMNS))
     observe_all(times, states, np.full(times.size, pulse.phase), pulse.p, rows)
     return not (rows[:, [Column.NORMAL, Column.NORMAL + 1]] > 0).any()
 
 
 def missed(pulses, rtol, method=METHODS["TSIT5"]):
-    return [q for q in pulses if walk_pulse(q, rtol, 1, None, method)[0].onsets == 0]
+    return [q for q in pulses if walk_pulse(q, rtol, None, method)[0].onsets == 0]
 
 
 @pytest.mark.slow
@@ -450,34 +445,3 @@ def test_no_constructed_pulse_is_stepped_over(pulses, method, rtol):
         assert not pulse.clamped
         assert pulse.depth < 10 * rtol * length_and_speed(pulse.p)[0]
         assert passes_by(pulse, rtol, METHODS[method])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("rtol", "share"), [(1e-3, 0.5), (1e-6, 0.4), (1e-9, 0.3)])
-def test_pulses_are_stepped_over_unless_watched(pulses, rtol, share):
-    """The constructed pulses are what they should be: short in comparison with the steps."""
-    over = 0
-    for pulse in pulses:
-        stepper, _, impacts = walk_pulse(pulse, rtol, 0)
-        assert stepper.onsets == 0
-        over += impacts == 0
-    assert over > share * len(pulses)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("rtol", TOLERANCES)
-def test_watching_costs_few_evaluations(rtol):
-    """In all over the paper's nine cases, with no step capped, at most 5 % more."""
-    evaluations = np.zeros(2)
-    for case in paper_cases().values():
-        if case.joint == "none":
-            continue
-        p = record(case)
-        y = np.zeros(2 * FREEDOMS[scene(case)])
-        start(offsets(case), y, p)
-        edges, phases = segments(p, case.duration)
-        for watch in (0, 1):
-            stepper, _, _ = walk(p, y, 0.0, edges, phases, rtol, watch)
-            evaluations[watch] += stepper.evaluations
-            assert (stepper.onsets > 0) == watch
-    assert evaluations[1] < 1.05 * evaluations[0]

@@ -14,7 +14,7 @@ from compressor.physics.runge_kutta import (
     C,
     E,
     P,
-    combine,
+    add_stages,
     error_norm,
     extend,
     interpolate,
@@ -82,7 +82,7 @@ def test_stages_combine_to_the_interpolant(s):
     interpolate(s, dense, y)
     weights = np.zeros(STAGES)
     weights_at(s, weights)
-    combine(weights, 0.3, z, k, combined)
+    add_stages(weights, STAGES, 0.3, z, k, combined)
     assert combined == pytest.approx(y, rel=1e-12)
 
 
