@@ -97,15 +97,14 @@ class Outcome:
             series[name] = Variable(dims, np.asarray(values, float if is_exact else "f4"), attrs)
         return replace(self, series=series, compress=compress)
 
-    def table(self, more: Mapping[str, tuple]) -> "DatasetParts":
-        """Return what the job's Dataset is made of: its own variables, and more of them."""
+    def table(self, more: Mapping[str, tuple]) -> "dict[str, Variable]":
+        """Return the variables of the job's Dataset: its own, and more of them."""
         variables = {**self.variables(), **more}
         variables |= coordinates(dim for dims, _, _ in variables.values() for dim in dims)
-        named = {
+        return {
             name: Variable(dims, np.asarray(values), attrs)
             for name, (dims, values, attrs) in variables.items()
         }
-        return DatasetParts(named, self.attributes)
 
     def variables(self) -> dict[str, tuple]:
         """Return the status, reason and numbers as xarray variables: (dims, values, attributes).
@@ -159,14 +158,6 @@ class Variable(NamedTuple):
 
     dims: tuple[str, ...]
     values: np.ndarray
-    attrs: dict[str, Any]
-
-
-@dataclass(frozen=True)
-class DatasetParts:
-    """What a Dataset is made of; xarray takes half a second to load, which storing a job spares."""
-
-    variables: dict[str, Variable]
     attrs: dict[str, Any]
 
 

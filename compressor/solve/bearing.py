@@ -30,9 +30,8 @@ def reynolds(
     """Return the Sommerfeld numbers of a film at an eccentricity, for B / D = ratio, (2,).
 
     Force over B D eta times a speed over psi^2: along the line of centres, away from the wall, and
-    across it, along the rotation. turning: w eps, squeeze: eps', both over that speed; where it
-    turns alone the numbers are over eps as well. near: cells that bore at an eccentricity nearby,
-    where the search for them begins; it is written.
+    along the rotation. turning: w eps, squeeze: eps', both over that speed; where it turns alone
+    the numbers are over eps. near: cells that bore at an eccentricity nearby; it is written.
     """
     near = {} if near is None else near
     coarse = _reynolds(eps, ratio, turning, squeeze, (grid[0] // 2, grid[1] // 2), near)
@@ -98,9 +97,8 @@ def _reynolds(
 def film_constants(ratio: float, share: float) -> tuple[np.ndarray, float]:
     """Return what a film's numbers are made of, and the squeeze's number at the wall.
 
-    The polynomials of `physics.film.short_bearing_shares`, (FILM_TERMS, 4), through Reynolds'
-    numbers at Chebyshev's points of sqrt(1 - eps) from the centre to the film's thinnest. ratio: B
-    / D; share: the film's last one, of the clearance.
+    Polynomials through Reynolds' numbers at Chebyshev's points of sqrt(1 - eps). ratio: B / D;
+    share: the film's last one, of the clearance.
     """
     thinnest = 0.5 * share
     least = np.sqrt(thinnest)
@@ -115,10 +113,7 @@ def film_constants(ratio: float, share: float) -> tuple[np.ndarray, float]:
 
 
 def _over_short(eps: float, ratio: float, near: Bearing) -> tuple[float, ...]:
-    """Return short numbers over Reynolds', times what they fall by to the wall; and the attitude.
-
-    Pressed, pulled apart, turned; tan(beta / 2) over that of Ocvirk's angle.
-    """
+    """Return short numbers over Reynolds' of a film pressed, pulled apart, turned; the attitude."""
     turned, ocvirk = reynolds(eps, ratio, near=near), short_film(eps, 1.0, 0.0)
     pressed, pulled = (abs(reynolds(eps, ratio, 0.0, way, near=near)[0]) for way in (1, -1))
     return (

@@ -36,8 +36,7 @@ BODY = {  # over time and these dimensions: (dimensions, unit, long name)
 def foundation(case: Case, solution: Solution) -> tuple[Variables, Metrics]:
     """Return the body's motion on the output grid, the sensor's record in time of its own, metrics.
 
-    A steady body is nan before the machine has settled; all is nan, and there is no record and no
-    metric, of a run that did not reach its end. `one_way_error`: see `one_way_errors`.
+    All is nan, without record and metrics, of a run that did not reach its end.
     """
     stride, times = finer(case), solution.trajectory.times
     shape = ((times.size - 1) // stride + 1, 2)
@@ -79,11 +78,10 @@ def sensor_variables(record: Record) -> Variables:
 
 
 def one_way_errors(case: Case, velocities: list[np.ndarray], step: float) -> np.ndarray:
-    """Return a bound by axis of the relative L2 error of the body's velocity.
+    """Return a bound by axis of the relative L2 error of the body's velocity: it is driven one way.
 
-    By leaving out what its motion does to the machine: of the order m / M away from resonances.
-    From the spectrum of each velocity at equal steps (s). A journal's chatter may come at other
-    moments on a body that gives way, so that no bound is stated of accelerations.
+    Of the order m / M away from resonances. A journal's chatter may come at other moments on a body
+    that gives way, so that no bound is stated of accelerations.
     """
     bounds = []
     for axis, values in zip("xy", velocities, strict=True):
@@ -118,8 +116,7 @@ def shake_by(case: Case, solution: Solution) -> Monitored:
 def measure_body(case: Case, solution: Solution, ours: Monitored) -> Metrics:
     """Return the metrics of a run and, as `<metric>_error`, their bars, the longest by companions.
 
-    Of a chaotic motion these are 95 % intervals of averages over revolutions, and inf of all else;
-    inf also without another run that reached its end. {} of a run whose energy does not balance.
+    Of a chaotic motion 95 % intervals of averages; inf of all else, and without another run.
     """
     if not solution.metrics:
         return {}
@@ -144,8 +141,7 @@ def bars_by(
 ) -> Metrics:
     """Return the bar of each metric by another run; share: of the difference that counts.
 
-    As `compressor.solve.error_bars` makes others: of the metric's own difference, and of what the
-    difference of the two signals measures. Of a share and of counts that is the record's distance.
+    Of the metric's own difference, and of what the difference of the two signals measures.
     """
     difference = replace(
         ours, velocity=ours.velocity - theirs.velocity, record=ours.record - theirs.record

@@ -1,16 +1,12 @@
 """Cautions about a case before it runs: natural scales, slips of units, laws left behind.
 
-Natural scales are closed formulas of a case's parameters alone. Forces are the sum of the greatest
-load and inertia, hence bounds; the deepest contact of the random cases
-(tests/campaigns/random_cases.py) is 0.6 to 1.6 times as deep as they say in nine of ten
+Natural scales are closed formulas of a case's parameters alone. Forces are bounds; the deepest
+contact of random cases is 0.6 to 1.6 times as deep as they say in nine of ten
 (tests/solve/test_scales.py).
 
 A key looks as if it were given in another unit where every value that it has in a study lies
-outside its usual range, and that unit would bring all of them inside. A sweep that reaches into the
-usual range is meant as it stands, however odd its ends are.
-
-An oddity is reported once a study. What cannot be simulated at all is refused by
-`compressor.cases.conflicts`.
+outside its usual range, and that unit would bring all of them inside. An oddity is reported once a
+study. What cannot be simulated at all is refused by `compressor.cases.conflicts`.
 """
 
 import itertools
@@ -38,7 +34,7 @@ from compressor.cases import (
 from compressor.metrics import JOINTS
 from compressor.physics import STABILITY_LIMIT, elastic_form, greatest_load, steepest
 from compressor.solve.dense_tally import closed_form
-from compressor.solve.measured_gas import card_noise, fit_polytrope, sensed_noise
+from compressor.solve.measured_gas import card_noise, fit_polytrope
 from compressor.solve.request import greatest_depth
 from compressor.solve.run import COMPILED
 from compressor.solve.run_metrics import metrics
@@ -77,8 +73,8 @@ class JointScales:
 def greatest_force(p: np.record, joint: str) -> float:
     """Return a bound of the force at a joint of the ideal machine (N): inertia and load.
 
-    m R omega^2 (1 + R / L) of what reciprocates, at the big end m R omega^2 (1 + a R / L^2) of the
-    rod as well, and the load's greatest value; in the machine they partly cancel.
+    m R omega^2 (1 + R / L) of what reciprocates, at the big end of the rod as well; they partly
+    cancel.
     """
     ratio, centripetal = p["crank_ratio"], p["crank_radius"] * p["omega"] ** 2
     inertia = p["reciprocating_mass"] * centripetal * (1 + ratio)
@@ -91,9 +87,8 @@ def greatest_force(p: np.record, joint: str) -> float:
 def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
     """Return the scales of a joint with clearance under a force (N).
 
-    p: the case's record; joint: `big_end` or `small_end`. A journal that the force holds against
-    its bore can roll to and fro on the wall, on a circle of radius e, clearance and penetration. It
-    swings like a pendulum, at sqrt(F / (m e)); m is what the rod's end weighs `across` the rod.
+    A journal held against its bore can roll to and fro on the wall: it swings like a pendulum, at
+    sqrt(F / (m e)); m is what the rod's end weighs `across` the rod.
     """
     number = JOINTS.index(joint)
     clearance, stiffness = p["clearance"][number].item(), p["stiffness"][number].item()
@@ -114,10 +109,7 @@ def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
 
 
 def across(p: np.record, joint: str) -> float:
-    """Return the mass (kg) of a rod's end that moves across the rod, the other end being held.
-
-    (J + m_r l^2) / L^2, l from the mass centre to the other end.
-    """
+    """Return the mass (kg) that moves across the rod at an end, the other end being held."""
     centre, length = p["rod_centre"].item(), p["rod_length"].item()
     lever = length - centre if joint == "big_end" else centre
     return (p["rod_inertia"].item() + p["rod_mass"].item() * lever**2) / length**2
@@ -139,10 +131,8 @@ def contact_scales(case: Case) -> Iterator[JointScales]:
 def expected_cost(case: Case, joints: Sequence[JointScales]) -> tuple[float, float]:
     """Return about how many steps a run of a case attempts, and how long they take (s).
 
-    Steps are good to a factor of four in random cases. As many as accuracy requires while the
-    contact rings, or as stability does where that is not more than the stiff partner's: a few a
-    radian. 0 where nothing is integrated. Far from the defaults only their order of magnitude
-    holds. Seconds are those without error bars, on a machine of 2024.
+    To a factor of four in random cases: as many as accuracy requires while the contact rings, or as
+    stability does where that is not more than the stiff partner's. 0 where nothing is integrated.
     """
     if not joints:
         return 0.0, 0.0
@@ -240,10 +230,7 @@ def values_of(case: Case, key: str) -> list[float]:
 
 
 def other_unit(key: str, values: Sequence[float]) -> str:
-    """Return the unit in which unusual values would all be usual, "" where there is none.
-
-    Of several, the one that brings them nearest to the key's default.
-    """
+    """Return the unit in which unusual values would all be usual, "" where there is none."""
     if not values or any(value <= 0 or is_usual(key, value) for value in values):
         return ""
     low, high, units = USUAL[key]
@@ -451,16 +438,12 @@ def _of_fit(case: Case, end: str) -> Iterator[tuple[str, str]]:
 def _of_noise(case: Case, end: str) -> Iterator[tuple[str, str]]:
     """Yield noise of a card, which a run makes vibration of."""
     noise, card = card_noise(case, end), open_card(case.gas.cards[end], end)
-    if noise <= MAX_NOISE * (max(card.pressures) - min(card.pressures)):
-        return
-    force = to_si(noise, "MPa") * math.pi * to_si(case.gas.piston_radius_mm, "mm") ** 2
-    text = f"noise or rounding of its samples is about {noise:.2g} MPa (rms), {force:.3g} N on the "
-    text += "piston"
-    level = sensed_noise(case, end)
-    if level > 0.0:
-        text += f", and makes about {level:.2g} m/s2 (rms) at the sensor of the sound machine"
-    smoothed = case.gas.smooth_deg or 0.0
-    yield "noise", f"{text}; smoothed over {smoothed:g} degrees: gas.smooth_deg"
+    if noise > MAX_NOISE * (max(card.pressures) - min(card.pressures)):
+        force = to_si(noise, "MPa") * math.pi * to_si(case.gas.piston_radius_mm, "mm") ** 2
+        yield "noise", (
+            f"noise or rounding of its samples is about {noise:.2g} MPa (rms), {force:.3g} N on "
+            f"the piston; smoothed over {case.gas.smooth_deg or 0.0:g} degrees: gas.smooth_deg"
+        )  # fmt: skip
 
 
 def _of_friction(case: Case, joints: Sequence[JointScales]) -> Remarks:
@@ -494,9 +477,8 @@ def _of_budgets(case: Case, joints: Sequence[JointScales]) -> Remarks:
 def cautions(study: Study, most: int = MAX_JOBS) -> list[Caution]:
     """Return what is odd about the selected jobs of a study, a `Caution` for each oddity.
 
-    A key whose values look like another unit's has that remark alone, with the judged range where
-    it leaves that. Of more than `most` jobs as many are looked at, drawn evenly and always the
-    same, so that a large sweep takes no longer.
+    Of more than `most` jobs as many are looked at, drawn evenly and always the same. A key whose
+    values look like another unit's has that remark alone.
     """
     numbers: Sequence[int] = study.selected
     if len(numbers) > most:

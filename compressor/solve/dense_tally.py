@@ -47,10 +47,7 @@ PIECES_PER_CHECK = 256  # of an ideal machine's quadrature between two looks at 
 def narrow(
     look: Look, low: np.ndarray, high: np.ndarray, rounds: int, pick: Callable
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return windows of time (s) after some rounds of looks into each, (k,) begins and ends.
-
-    pick: takes values (k, POINTS), returns the points at which the next windows begin and end.
-    """
+    """Return windows of time (s), (k,), after some rounds of looks into each."""
     for _ in range(rounds if low.size else 0):
         times = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, POINTS)
         begin, end = pick(look(times.ravel()).reshape(times.shape))
@@ -62,10 +59,7 @@ def narrow(
 def find_changes(
     look: Look, times: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return when (s) a function becomes positive or ceases to be so, and its rate there.
-
-    times, values: (m,), where it is known; the rate is that of a line between two of them.
-    """
+    """Return when (s) a function changes its sign, and the rate of a line there."""
 
     def pick(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # around the first change
         above = values > 0.0
@@ -78,10 +72,7 @@ def find_changes(
 
 
 def shares_above(steps: np.ndarray, begin: float, changes: np.ndarray) -> np.ndarray:
-    """Return the share of each step in which a function is positive, (m,).
-
-    steps: their ends, (m + 1,), s; begin: the function's value at the first; changes: s.
-    """
+    """Return the share of each step in which a function is positive, by its changes (s)."""
     times = np.concatenate((steps[:1], changes, steps[-1:]))
     passed = np.diff(times)
     passed[1 if begin > 0.0 else 0 :: 2] = 0.0
@@ -89,10 +80,7 @@ def shares_above(steps: np.ndarray, begin: float, changes: np.ndarray) -> np.nda
 
 
 def find_tops(look: Look, times: np.ndarray, values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return the greatest values of functions, (c,), at times (m,) and between them, or `known`.
-
-    look: takes (k,), returns (k, c); values: (m, c).
-    """
+    """Return the greatest values of functions, (c,), at times (m,) and between them, or `known`."""
     top = np.maximum(known, values.max(axis=0))
     inner = values[1:-1]
     high = (inner > NEAR_TOP * top) & (inner >= values[:-2]) & (inner >= values[2:])
@@ -114,10 +102,7 @@ def find_tops(look: Look, times: np.ndarray, values: np.ndarray, known: np.ndarr
 def tally_steps(
     p: np.record, tally: np.record, steps: np.ndarray, observe: Observer, measured: bool
 ) -> np.ndarray:
-    """Add steps of one phase of the load to a tally; measured: whether its metrics count.
-
-    steps: their ends, (m + 1,), s. Returns the rows at their NODES, (m, 9, COLUMNS).
-    """
+    """Add steps of one phase, by their ends (s), to a tally; return the rows, (m, 9, COLUMNS)."""
     spans = np.diff(steps)
     times = np.append((steps[:-1, None] + spans[:, None] * NODES[:-1]).ravel(), steps[-1])
     rows, gaps, sides = observe(times), np.zeros((spans.size, 2)), np.zeros((spans.size, 4))
@@ -157,10 +142,7 @@ def tally_steps(
 
 
 def shift_of_change(p: np.record, joint: int, observe: Observer, time: float, rate: float) -> float:
-    """Return by how much (s) a change of contact moves for a state off by its natural size.
-
-    The motion's numbers count one by one, as a root of squares. rate: of the nearness, a second.
-    """
+    """Return by how much (s) a change of contact moves for a state off by its natural size."""
     small = SMALL_CHANGE * np.diag(natural_sizes(p))
     moved = np.hstack((np.zeros((len(small), 1)), small))
     near = observe(np.full(1 + len(small), time), moved)[:, Column.NEARNESS + joint]
@@ -170,10 +152,7 @@ def shift_of_change(p: np.record, joint: int, observe: Observer, time: float, ra
 def find_missed_contact(
     p: np.record, rtol: float, steps: np.ndarray, rows: np.ndarray
 ) -> tuple[float, str] | None:
-    """Return where (s) the first step begins within which a whole contact lies, and words for it.
-
-    None where the impulses of such contacts are small errors. steps, rows: as of `tally_steps`.
-    """
+    """Return where (s) the first step begins that holds a whole contact of some impulse; words."""
     normal, spans = rows[..., Column.NORMAL : Column.NEARNESS], np.diff(steps)
     whole = (normal > 0.0).any(axis=1) & (normal[:, 0] <= 0.0) & (normal[:, -1] <= 0.0)
     if not whole.any():
@@ -194,9 +173,8 @@ def closed_form(
 ) -> Trajectory:  # fmt: skip
     """Return the trajectory of ideal joints over an output grid, without integration.
 
-    `pieces`: into which each stretch between load corners, or each revolution in it, is cut, but a
-    card's, which is cut at its nodes; `timeout`: wall time (s) that it may take; `has_rod_load`:
-    whether the rod load is tallied.
+    pieces: into which each stretch between load corners, or each revolution in it, is cut, but a
+    card's, which is cut at its nodes.
     """
     deadline, began = time.monotonic() + timeout, time.perf_counter()
     edges, phases = segments(p, float(times[-1]))

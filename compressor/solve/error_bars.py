@@ -1,12 +1,10 @@
-"""Error bars: how far the numbers of a run may lie from the exact ones.
+"""Error bars: how far the numbers of a run may lie from the exact ones (solve/README.md).
 
-The difference from a tighter run is mostly the run's own error, and a little more than it bounds
-that; of the difference from a looser run, which is mostly the looser one's error, a share does
-(`closeness`). A metric's own difference may be small by chance, as may the moment of a change of
-contact: the distance of the time series that it is taken from, and how far a state that is wrong by
-some tolerances moves it, stand beside it. The rules are those of solve/README.md; shares stand in
-`compressor.metrics`. Those and the ones below were chosen on random cases that judge nothing
-(tests/results/calibration.md).
+The difference from a tighter run is mostly the run's own error; of the difference from a looser one
+a share is (`closeness`). A metric's own difference may be small by chance, as may the moment of a
+change of contact: the distance of the time series that it is taken from, and how far a state that
+is wrong by some tolerances moves it, stand beside it. Shares stand in `compressor.metrics`; they
+and the numbers below were chosen on random cases that judge nothing (tests/results/calibration.md).
 """
 
 import math
@@ -36,10 +34,7 @@ AMPLIFIED_FACTOR = 50.0
 
 
 def closeness(ratio: float) -> float:
-    """Return the share of the distance to a run that bounds a run's own error.
-
-    ratio: the other run's tolerance over the run's. 1 of a tighter run.
-    """
+    """Return the share of the distance to a run that bounds a run's own error."""
     return 1.0 if ratio < 1.0 else LOOSER * (ratio / TEN) ** -FALL
 
 
@@ -59,10 +54,8 @@ def bars(
 ) -> Metrics:  # fmt: skip
     """Return the error bar of each metric of a run's tally, in its unit and shape, by another run.
 
-    theirs: its metrics; ratio: its tolerance over the run's; apart: the distance of each time
-    series of the two; residual: energy imbalance relative to what the contacts lose; switching: how
-    far some metrics move with changes of contact (`switch_errors`). Those of metrics with a unit
-    are inf where their series, or the acceleration, may be wrong by all of itself.
+    ratio: of that run's tolerance; apart: the distance of each time series; residual: of energy;
+    switching: as of `switch_errors`. inf where a series may be wrong by all of itself.
     """
     errors, share = {}, closeness(ratio)
     for name, value in metrics.items():
@@ -108,9 +101,8 @@ def switch_errors(
 ) -> Metrics:
     """Return how far a run's changes of contact may move the metrics that are shares of time.
 
-    Two runs may agree in the moment of one change by chance; how far a state that is off by the
-    tolerance moves it (`physics.onset.shift_of_change`) is known of each. `SWITCHING` holds for 99
-    of 100 changes at rtol 1e-5 to 1e-8, by runs at 1e-11.
+    Two runs may agree in the moment of one change by chance; how far a state off by the tolerance
+    moves it is known of each. `SWITCHING` holds for 99 of 100 changes at rtol 1e-5 to 1e-8.
     """
     if not metrics:
         return {}
@@ -128,10 +120,7 @@ LOOSER_FACTOR = 3.0  # times: the third run that is compared where a motion enla
 
 
 def overruns_friction(p: np.record, rtol: float) -> bool:
-    """Return whether explicit steps may run over friction's fast modes or its change of sign.
-
-    Then two explicit runs may agree on a force that friction never has.
-    """
+    """Return whether explicit steps may run over friction's fast modes, and so agree by chance."""
     if rtol > OVERRUN_RTOL:
         return True
     rubs = bool(p["friction"]) and bool(p["clearance"].any())
@@ -139,10 +128,9 @@ def overruns_friction(p: np.record, rtol: float) -> bool:
 
 
 def comparison_run(case: Case, solution: Solution, timeout: float) -> Solution:
-    """Return another run of a case, by which a run's errors are estimated.
+    """Return another run of a case, by which a run's errors are estimated: a tighter one.
 
-    A tighter one; a looser one only where the tolerance leaves no room below it.
-    Where explicit steps may run over friction, it is a run by the stiff method.
+    A looser one where no room is left; one by the stiff method where friction may be overrun.
     """
     rtol = solution.rtol
     if overruns_friction(solution.p, rtol):
@@ -157,10 +145,7 @@ def comparison_run(case: Case, solution: Solution, timeout: float) -> Solution:
 def looser_comparison_run(
     case: Case, solution: Solution, other: Solution, timeout: float
 ) -> Solution | None:
-    """Return a looser run, by which errors are estimated as well where the motion enlarges them.
-
-    other: its `comparison_run`. None where there is no need, or the run does not reach its end.
-    """
+    """Return a looser run where the motion enlarges errors, or None; other: `comparison_run`."""
     if other.reason or not is_amplified(solution.rtol, distances(solution.samples, other.samples)):
         return None
     looser = run_at_tolerance(case, LOOSER_FACTOR * solution.rtol, timeout, case.body is not None)
@@ -168,10 +153,7 @@ def looser_comparison_run(
 
 
 def estimate_errors(solution: Solution, *others: Solution) -> None:
-    """Write a run's error bars and the errors of its time series, by other runs of its case.
-
-    The longest by any of them; inf without one that reached its end.
-    """
+    """Write a run's error bars, the longest by any other run that reached its end; inf without."""
     for one in others:
         one.companions = ()  # so that the runs of a long search are not all in memory
     solution.companions = others

@@ -22,10 +22,7 @@ CLEARANCES = np.geomspace(0.005, 3.0, 400)  # of the swept volume, that are trie
 
 
 def gas_nodes(case: Case, end: str) -> np.ndarray:
-    """Return pressure (Pa, absolute) and its slope a node of an end's card, (m, 2).
-
-    end: head or crank. Raises CardError where the file is no longer so.
-    """
+    """Return pressure (Pa, absolute) and its slope a node of an end's card, (CARD_NODES, 2)."""
     gas = case.gas
     card = open_card(gas.cards[end], end)
     nodes = to_si(1.0, "MPa") * card_nodes(card.angles, card.pressures)
@@ -35,10 +32,7 @@ def gas_nodes(case: Case, end: str) -> np.ndarray:
 
 
 def card_nodes(angles: Sequence[float], values: Sequence[float]) -> np.ndarray:
-    """Return values, and slopes a node, of a card's curve at the table's angles: (CARD_NODES, 2).
-
-    angles: degrees in [0, 360), rising; values: at them.
-    """
+    """Return values, and slopes a node, of a card's curve at angles (degrees): (CARD_NODES, 2)."""
     from scipy.interpolate import Akima1DInterpolator  # of cases with a card alone
 
     around = np.add.outer([-360.0, 0.0, 360.0], angles).ravel()
@@ -65,8 +59,7 @@ def smooth_nodes(nodes: np.ndarray, degrees: float) -> np.ndarray:
 def card_noise(case: Case, end: str) -> float:
     """Return the standard deviation (MPa) of what differs from sample to sample in a card.
 
-    By the median of its fourth differences, which hold little of a pressure that valves and piston
-    make; at least that of rounding, where all pressures are multiples of a step.
+    By the median of fourth differences; at least that of rounding to multiples of a step.
     """
     card = open_card(case.gas.cards[end], end)
     values = np.array(card.pressures)
@@ -79,39 +72,11 @@ def card_noise(case: Case, end: str) -> float:
     return max(noise, float(step) / math.sqrt(12.0))
 
 
-def sensed_noise(case: Case, end: str) -> float:
-    """Return the acceleration (m/s2, rms) that a sensor has of the noise of an end's card.
-
-    Noise is here what a window smooths off the card as the case has it, smoothed already or not. It
-    moves the casing at the sensor, before its filter, of the machine with ideal joints; the frame
-    as a whole, and the guide along x, have no force of the gas, and 0.
-    """
-    machine, gas, body, sensor = case.machine, case.gas, case.body, case.sensor
-    if body is None or sensor is None or not body.casing or sensor.place == "body":
-        return 0.0
-    if (sensor.place, sensor.direction) == ("guide", "x"):
-        return 0.0
-    from compressor.vibration import casing_motion
-
-    nodes = gas_nodes(case, end)
-    rough = (nodes - smooth_nodes(nodes, NOISE_WINDOW))[:, 0]
-    rod = (gas.rod_diameter_mm or 0.0) / 2 if end == "crank" else 0.0
-    area = math.pi * (to_si(gas.piston_radius_mm, "mm") ** 2 - to_si(rod, "mm") ** 2)
-    force = area * np.append(rough, rough[0])
-    if sensor.direction == "y":  # by the slope of the rod
-        sines = np.sin(np.linspace(0.0, 2.0 * math.pi, force.size))
-        sines *= machine.crank_radius_mm / machine.rod_length_mm
-        force *= sines / np.sqrt(1.0 - sines**2)
-    moved = casing_motion(body, force, case.turn / rough.size, steady=True)
-    return float(np.sqrt(np.mean(moved.acceleration[:-1] ** 2)))
-
-
 def fit_polytrope(case: Case, end: str) -> tuple[float, float, float] | None:
-    """Return what fits both lines of an end's card: misfit, clearance and exponent; None without.
+    """Return misfit, clearance and exponent that fit both lines of a card; None without lines.
 
-    Misfit: rms of the pressure's logarithm; clearance: of the swept volume. Of the lines
-    p (c + s)^n = const, one each way, with the swept share s of the machine without clearance in
-    its joints.
+    Misfit: rms of the pressure's logarithm; clearance: of the swept volume; p (c + s)^n is
+    constant.
     """
     machine, pressure = case.machine, gas_nodes(case, end)[:, 0]
     angles = np.arange(pressure.size) * 2.0 * math.pi / pressure.size

@@ -58,11 +58,10 @@ class Request:
 class Trajectory:
     """States on the output grid, the tally of the dense solution, and how the run ended.
 
-    `states` has shape (m, k) and is nan from the sample at which an incomplete run stopped, by one
-    of the named reasons; `stop_time` and `stop_state` are where. `phases`: of the load, by sample.
-    `turns`: tallies of what lies before each cut and after the one before it; `turn_states`: the
-    motion at each. `last_steps`: of each of the last attempts of a step, begin and length (s),
-    error over its tolerance, nan where that is not known, and what became of it.
+    `states` is nan from the sample at which a run stopped; `phases`: of the load, by sample;
+    `turns`: tallies between cuts; `turn_states`: the motion at each; `last_steps`: of attempts:
+    begin and length (s), error over its tolerance, nan where that is not known, and what became of
+    it.
     """
 
     times: np.ndarray
@@ -100,20 +99,14 @@ class Trajectory:
 
 
 def revolutions(begin: float, end: float, turn: float) -> np.ndarray:
-    """Return the ends (s) of the whole revolutions between two times, (m,).
-
-    turn: the time of one (s).
-    """
+    """Return the ends (s) of the whole revolutions between two times, (m,)."""
     return begin + turn * np.arange(1, int((end - begin) / turn * (1 + SAME_TIME)) + 1)
 
 
 def split_segments(
     edges: np.ndarray, phases: np.ndarray, times: Sequence[float]
 ) -> tuple[np.ndarray, np.ndarray, list[float]]:
-    """Return segments that end at some times (s), too, and these times.
-
-    Where an edge lies already there is no other, and the time is that edge's.
-    """
+    """Return segments that end at some times (s), too, and these, an edge's where one is near."""
     exact = []
     for time in times:
         edge = float(edges[np.abs(edges - time).argmin()])
@@ -126,10 +119,7 @@ def split_segments(
 
 
 def passed_time(p: np.record, times: Any, states: np.ndarray) -> Any:
-    """Return the time (s) that has passed when the crank is where a steady one were at these times.
-
-    times: (...) in s; states: (..., n).
-    """
+    """Return the time (s) that has passed when the crank is where a steady one were at times."""
     driven = is_featured(p) and p["driven"]
     return times + states[..., p["at"][Coordinate.CRANK] - 1] if driven else times
 

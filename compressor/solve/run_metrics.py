@@ -1,13 +1,11 @@
 """The metrics of a run: from its tally, and averages where it is chaotic.
 
-How the rod load at the crosshead pin changes its side, which keeps the pin's bearing oiled. API 618
-(5th edition, 6.6.4) judges the combined rod load there: for how many degrees of a revolution it
-lies on its smaller side, and how great its peak on that side is beside the other one's.
+API 618 (5th edition, 6.6.4) judges how the rod load at the crosshead pin changes its side, which
+keeps the pin's bearing oiled: for how many degrees it lies on its smaller side, with which peak.
 
-What is known of a chaotic motion: averages and peaks over revolutions, with standard errors.
-Revolutions follow on each other and are no independent draws. So standard errors come from batch
-means (Schmeiser, Operations Research 30, 1982): of up to `MAX_BATCHES` batches of as many
-revolutions each.
+Of a chaotic motion averages and peaks over revolutions are known. These follow on each other and
+are no independent draws, so that standard errors come from batch means (Schmeiser, Operations
+Research 30, 1982): of up to `MAX_BATCHES` batches of as many revolutions each.
 """
 
 import math
@@ -77,10 +75,9 @@ class Tallied:
 
 
 def metrics(p: np.record, tally: np.record) -> Metrics:
-    """Return the metrics by name, from what was tallied after settling.
+    """Return the metrics of `compressor.metrics.TABLE` by name, from what was tallied.
 
-    In the units and shapes of `compressor.metrics.TABLE`: (), (joint,) or (joint, axis). Those of
-    contacts are 0 at ideal joints.
+    Those of contacts are 0 at ideal joints.
     """
     run, numbers = Tallied(p, tally), {}
     for row in of_source("tally"):
@@ -117,8 +114,7 @@ MAX_AUDIT_REPEATS = 2  # by tens of the tolerance, for a run that fails its audi
 def energy_residual(tally: np.record) -> float:
     """Return the worst imbalance of energy over what contacts take: losses, and what springs hold.
 
-    That counts as at least 1e-3 of the greatest kinetic energy; where nothing is lost, as with
-    ideal joints, whose motion is not integrated, as at least the crank's work.
+    At least over 1e-3 of the greatest kinetic energy; where nothing is lost over the crank's work.
     """
     lost = tally["contact_work"] + tally["friction_loss"]
     least = 1e-3 * tally["peak_kinetic"] if lost else abs(tally["crank_work"])
@@ -128,19 +124,14 @@ def energy_residual(tally: np.record) -> float:
 def allowed_residual(rtol: float, revolutions: float) -> float:
     """Return the greatest energy residual of a run that can be trusted at a tolerance.
 
-    The 200 random cases of tests/campaigns/random_cases.py leave a quarter of it at most at rtol
-    1e-4, a tenth at tighter ones (tests/results/accuracy.json). Runs beyond it, of extremes of
-    stiffness, stiction and mass ratio, mostly keep it at a tenth of the tolerance; those that never
-    do are far off (mu 0.5 at rtol 2e-8: 1.6e-4 of the acceleration).
+    Random cases leave a quarter of it at most (tests/results/accuracy.json). Runs beyond it mostly
+    keep it at a tenth of the tolerance; those that never do are far off.
     """
     return min(max(RESIDUAL_PER_REV * rtol * max(revolutions, 1.0), MIN_RESIDUAL), MAX_RESIDUAL)
 
 
 def next_audit_rtol(rtol: float, failures: int) -> float | None:
-    """Return the tolerance at which a run is tried again whose energy does not balance.
-
-    failures: runs of the case that did not, this one included. None where no more are tried.
-    """
+    """Return the next tolerance after so many runs whose energy does not balance, or None."""
     return None if failures > MAX_AUDIT_REPEATS or rtol < 9.9 * TIGHTEST else rtol / 10.0
 
 
@@ -211,10 +202,7 @@ def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
 
 
 def summarize_peaks(name: str, values: np.ndarray) -> Metrics:
-    """Return mean, with its standard error, and quantiles of the revolutions' greatest values.
-
-    values: (revolutions, ...).
-    """
+    """Return mean, its standard error and quantiles of the revolutions' greatest values."""
     means = np.array([part.mean(axis=0) for part in parts(values, MAX_BATCHES, 1)])
     return {
         f"{name}_mean": values.mean(axis=0),
@@ -224,10 +212,7 @@ def summarize_peaks(name: str, values: np.ndarray) -> Metrics:
 
 
 def parts(items: Sequence | np.ndarray, most: int, least: int) -> list:
-    """Return up to `most` batches of equally many items in a row, at least `least` in each.
-
-    The first items are left out where the batches do not take all.
-    """
+    """Return the last items as up to `most` batches of equal size, at least `least` in each."""
     size = max(least, math.ceil(len(items) / most))
     count = max(1, len(items) // size)
     skipped = max(0, len(items) - count * size)
@@ -242,10 +227,7 @@ def standard_error(means: np.ndarray) -> np.ndarray:
 
 
 def sure(error: np.ndarray, revolutions: int) -> np.ndarray:
-    """Return half the length of the interval that holds in 95 % of cases, by Student's t.
-
-    error: standard error of a mean by `parts` of so many revolutions.
-    """
+    """Return half the length of the 95 % interval of a mean by `parts`, by its standard error."""
     batches = len(parts(range(revolutions), MAX_BATCHES, 1))
     from scipy.special import stdtrit  # takes a tenth of a second, of chaotic motions alone
 
@@ -255,7 +237,7 @@ def sure(error: np.ndarray, revolutions: int) -> np.ndarray:
 def average_bar(error: np.ndarray, revolutions: int) -> np.ndarray:
     """Return the error bar of an average over a chaotic motion's revolutions: `sure`, or inf.
 
-    It is inf below `MIN_REVOLUTIONS`: batches that are alike by chance would tell of no error.
+    So below `MIN_REVOLUTIONS`: batches alike by chance would tell of no error.
     """
     if revolutions < MIN_REVOLUTIONS:
         return np.full(np.shape(error), math.inf)
@@ -263,28 +245,18 @@ def average_bar(error: np.ndarray, revolutions: int) -> np.ndarray:
 
 
 def count_bar(count: np.ndarray) -> np.ndarray:
-    """Return how far the mean of a Poisson count may lie above it in 95 % of cases.
-
-    By the score interval, also of 0: the least bar of a count of a chaotic motion's events.
-    """
+    """Return how far the mean of a Poisson count may lie above it in 95 % of cases, also of 0."""
     return 0.5 * NORMAL**2 + NORMAL * np.sqrt(count + 0.25 * NORMAL**2)
 
 
 def mean_bar(values: np.ndarray) -> float:
-    """Return half of the 95 % interval of the mean of a chaotic motion's values, by batch means.
-
-    values: (n,), of revolutions in a row. inf below `MIN_REVOLUTIONS`.
-    """
+    """Return half of the 95 % interval of the mean of a chaotic motion's values; inf of few."""
     means = np.array([part.mean() for part in parts(values, MAX_BATCHES, 1)])
     return float(average_bar(standard_error(means), len(values)))
 
 
 def chaotic_bars(p: np.record, turns: Sequence[np.record], numbers: Metrics) -> Metrics:
-    """Return the error bars of a chaotic run's metrics: of averages; greatest values have inf.
-
-    turns: tallies of its revolutions; numbers: the metrics. Those of contacts at ideal joints have
-    no error.
-    """
+    """Return the error bars of a chaotic run's metrics: of averages; greatest values have inf."""
     bars, count, errors = {}, len(turns), batch_errors(p, turns)
     for name, value in numbers.items():
         row = NUMBERS[name]

@@ -1,15 +1,13 @@
 """What the runs of a case may take, how long its motion can be foretold, and when it has settled.
 
-Two motions that start close to each other part sooner or later where a motion is chaotic; beyond
-that time, its horizon, a number that depends on the course of the motion has no error bar, though
-statistics have a meaning. Two runs are compared, one with its journals shifted, each with steps of
-its own, at a tolerance of their own: their errors must be small beside the shift that is followed.
-At 3e-13 the horizons of 14 of 16 clearances of the machine of tests/solve/test_search.py were those
-at 1e-13 to a hundredth, two others' to a tenth; at 1e-12 only seven were.
+Beyond the time at which two motions that start close to each other part, the horizon, no number of
+the course of a motion has an error bar. Two runs are compared, one with its journals shifted, each
+with steps of its own, at a tolerance of their own: their errors must be small beside the shift that
+is followed. At 3e-13 the horizons of 14 of 16 clearances were those at 1e-13 to a hundredth, at
+1e-12 only of seven (tests/solve/test_search.py).
 
 Where a case leaves to the program from which revolution on metrics count, a run is followed until
-the metrics of several revolutions in a row agree within what accuracy promises: each with the one
-before, or with the one a period earlier.
+those of several revolutions in a row agree within what accuracy promises, a period apart.
 """
 
 import math
@@ -42,22 +40,16 @@ def predictability_horizon(
 ) -> float:
     """Return the time (s) until a motion shifted by 1e-9 of the clearance is 1 % of it away.
 
-    The journal of each joint with clearance is shifted, as much along x as along y; the distance
-    is that of the eccentricities at the worse joint, or of the crosshead in a guide with play, at
-    every half degree. inf where the two are still close at the end of the case, or the joints are
-    ideal. Where a run stops before, as by `timeout` (s) or the case's max_steps, the time up to
-    there: no more is known.
-    The case's own method and tolerance do not count: the horizon belongs to the motion.
+    At the worse joint, or of the crosshead in a guide with play, at every half degree. inf where
+    the two are close at the end, or joints are ideal; where a run stops before, the time up to
+    there. The case's own method and tolerance do not count: the horizon belongs to the motion.
     """
     found = compare_shifted(case, case.duration, rtol, shift, timeout)
     return math.inf if found.whole else found.time
 
 
 class Parting(NamedTuple):
-    """Up to when (s) two motions were compared, whether they parted there, or came to the end.
-
-    `evaluations`: of all runs.
-    """
+    """Up to when (s) two motions were compared, whether they parted there, or came to the end."""
 
     time: float
     parted: bool
@@ -66,10 +58,7 @@ class Parting(NamedTuple):
 
 
 def compare_shifted(case: Case, end: float, rtol: float, shift: float, timeout: float) -> Parting:
-    """Compare a motion with one that is shifted, over ever longer spans up to an end (s).
-
-    Each run of a span has the case's max_steps; all of them a wall time (s).
-    """
+    """Compare a motion with one that is shifted, over ever longer spans up to an end (s)."""
     if is_ideal(case):
         return Parting(end, False, True)
     p, evaluations, deadline = record(case), 0, time.monotonic() + timeout
@@ -99,10 +88,7 @@ def compare_shifted(case: Case, end: float, rtol: float, shift: float, timeout: 
 
 
 def distance_over_clearance(p: np.record, one: Trajectory, other: Trajectory) -> np.ndarray:
-    """Return the distance of two runs at their times, (m,), as a share of the clearance.
-
-    At the worst joint, or in the guide where it has play; nan where one of them has stopped.
-    """
+    """Return the distance of two runs, (m,), over the clearance, at the worst joint or guide."""
     places = [block("eccentricity", rows_of(p, run, COLUMNS)) for run in (one, other)]
     worn = p["clearance"] > 0.0
     apart = np.linalg.norm(places[1] - places[0], axis=2)[:, worn] / p["clearance"][worn]
@@ -180,8 +166,8 @@ class Search:
     def parts(self, whole: bool) -> bool:
         """Return whether the motion parts from one that is shifted, as far as is known.
 
-        A short span suffices for most chaotic motions; the whole one is followed only where
-        `whole` says so. Where they part, tighter runs are to part there as well.
+        A short span first; the whole where asked. Where they part, tighter runs are to part as
+        well.
         """
         case = self.case
         if case.solve.horizon == "auto" and math.isnan(self.horizon) and not self.stopped:
@@ -215,9 +201,8 @@ def find_repetition(
 ) -> tuple[int, int] | None:
     """Return the revolution from which on a motion repeats itself, and its shortest period.
 
-    count: revolutions of the motion; is_same: of the number of a revolution, and a period: whether
-    the one a period later is the same. As many revolutions as a period and `more`, and at least
-    `least`, must be the same. None where no period up to `most` does.
+    is_same: of a revolution and a period; as many as a period and `more`, and at least `least`,
+    must be the same. None where no period up to `most` does.
     """
     for period in range(1, most + 1):
         first = count - period - max(least, period + more)
@@ -231,9 +216,8 @@ def repeats(
 ) -> tuple[int, float] | tuple[None, float]:
     """Return the period of a motion (rev), and the revolution from which on it repeats itself.
 
-    samples: observed rows at the times of `compressor.solve.series.compared_times`. Revolutions
-    are the same if no series is farther apart than both its errors. None and nan where the settled
-    part is too short, or does not repeat itself.
+    Revolutions are the same if no series is farther apart than both its errors. None and nan
+    without.
     """
     per_rev = compared_per_rev(case)
     count = len(samples) // per_rev if per_rev else 0
@@ -264,8 +248,7 @@ LOOKED_AT = 2 * MAX_PERIOD_REV  # revolutions, the last ones, by which that is s
 def find_span(search: Search) -> Solution | None:
     """Give the search's case numbers for `settle_rev: auto` and `duration_rev: auto`.
 
-    Within the case's wall time; what is known of where it settles is kept in the search. Return the
-    run of the case by which that was found, if it is one.
+    Return the run by which they were found, if it is one of that case.
     """
     case = search.case
     if case.solve.settle_rev != "auto":
@@ -308,10 +291,7 @@ def find_span(search: Search) -> Solution | None:
 
 
 def settled_part(run: Solution, longest: Case, case: Case) -> Solution | None:
-    """Return a run of the longest span as that of a case whose metrics count later.
-
-    None where it is of other times than the case's, or stopped.
-    """
+    """Return a longer run as that of a case whose metrics count later; None where it is not."""
     times, trajectory = output_times(case, is_sampled(case)), run.trajectory
     first, last = (round(time / case.turn) for time in (case.settle, case.duration))
     count, per_rev = times.size, compared_per_rev(case)
@@ -333,10 +313,7 @@ def settled_part(run: Solution, longest: Case, case: Case) -> Solution | None:
 
 
 def with_settle_rev(case: Case, settle: float, period: int, duration: float | None = None) -> Case:
-    """Return a case that settles at a number (rev), with a number also for `duration_rev: auto`.
-
-    period (rev): whole ones are measured; duration (rev): in place of the case's.
-    """
+    """Return a case that settles at a number (rev), and ends at one; period: whole ones count."""
     if duration is None and case.solve.duration_rev == "auto":
         duration = settle + period * math.ceil(MEASURED_REV / period)
     if duration is None and settle == case.solve.settle_rev:
@@ -351,20 +328,14 @@ def with_settle_rev(case: Case, settle: float, period: int, duration: float | No
 
 
 def least_promise(case: Case) -> float:
-    """Return the relative error that a case's accuracy promises: the least of several.
-
-    Of a case that promises none it is that of `standard`.
-    """
+    """Return the least relative error that a case's accuracy promises, or `standard` would."""
     if case.targets:
         return min(target for _, target in case.targets)
     return case.promise if math.isfinite(case.promise) else ACCURACY["standard"].promise
 
 
 def steady(turns: Sequence[Metrics], within: float) -> tuple[int, int] | None:
-    """Return the first of the last revolutions that agree, and their period (rev), or None.
-
-    turns: metrics of each revolution; within: the relative difference that agreement allows.
-    """
+    """Return the first of the last revolutions that agree, and their period (rev), or None."""
 
     def is_same(k: int, period: int) -> bool:
         return agree(turns[k], turns[k + period], within)
@@ -373,10 +344,7 @@ def steady(turns: Sequence[Metrics], within: float) -> tuple[int, int] | None:
 
 
 def agree(one: Metrics, other: Metrics, within: float) -> bool:
-    """Return whether the metrics of two revolutions differ by less than a share.
-
-    Forces by axis are compared with the joint's greatest.
-    """
+    """Return whether the metrics of two revolutions differ by less than a share, by joint."""
     for name, row in METRICS.items():
         difference, size = np.abs(np.subtract(one[name], other[name])), np.abs(one[name])
         if "axis" in row.dims:

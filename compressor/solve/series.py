@@ -1,16 +1,11 @@
 """The time series of a run, the forces on its frame, and how far apart two runs are.
 
-Two runs are compared at the same times, whatever is stored of either: `COMPARED_PER_REV` times in a
-revolution. Their distance is a relative L2 norm over the settled part,
-sqrt(sum |a - b|^2 / sum |a|^2); of a vector its length counts.
-
-Forces that the machine puts on its frame are those of `physics.observe.write_frame_forces`; what
-each is made of stands in docs/a-run.md. A drive's motor gives another torque than the rod needs:
-what is between them turns the flywheel.
+Two runs are compared at the same times, whatever is stored of either: their distance is a relative
+L2 norm over the settled part, sqrt(sum |a - b|^2 / sum |a|^2). What the forces on the frame are
+made of stands in docs/a-run.md.
 
 Contacts last less than a crank angle of 0.3 degrees, and so do the couples of their friction:
-values of a stored series are exact, means over one are not. `mean_crank_torque` and
-`mean_guide_moment` are of the dense solution.
+values of a stored series are exact, means over one are not.
 """
 
 import math
@@ -53,10 +48,7 @@ def rows_at(
 def rows_of(
     p: np.record, run: Trajectory, columns: int = WIDE, part: slice = slice(None)
 ) -> np.ndarray:
-    """Return the observed rows of a run at a part of its times, by default all: (m, columns).
-
-    nan from where it stopped.
-    """
+    """Return the observed rows of a run, or a part: (m, columns); nan from where it stopped."""
     rows = rows_at(p, run.times[part], run.states[part], run.phases[part], columns)
     if run.reason:
         rows[np.isnan(run.states[part]).any(axis=1)] = math.nan
@@ -64,10 +56,7 @@ def rows_of(
 
 
 def finer(case: Case) -> int:
-    """Return how many times finer than the output grid the body's forces are sampled.
-
-    As often as the body's fastest motion and its sensor need.
-    """
+    """Return how many times finer than the output grid the body's forces are sampled."""
     body = case.body
     if body is None:
         return 1
@@ -94,10 +83,9 @@ def block(name: str, rows: np.ndarray) -> np.ndarray:
 
 
 def compared_times(case: Case) -> np.ndarray:
-    """Return the times (s) at which runs of a case are compared, from where it has settled on.
+    """Return the times (s) at which runs of a case are compared; none without bars.
 
-    In each whole revolution at the same angles, so that revolutions can be compared, too. None
-    where no bars are wanted.
+    In each whole settled revolution at the same angles, so that revolutions can be compared.
     """
     if not case.wants_bars:
         return np.empty(0)
@@ -119,8 +107,7 @@ def compared_per_rev(case: Case) -> int:
 def distances(ours: np.ndarray, theirs: np.ndarray) -> Metrics:
     """Return the relative L2 distance of each time series of two runs, by joint where it has one.
 
-    ours, theirs: observed rows at the same times, (m, COLUMNS). A vector's squares are one sum; 0
-    where both are 0.
+    A vector's squares are one sum; 0 where both are 0.
     """
     error, size = (np.einsum("ij,ij->j", rows, rows).tolist() for rows in (ours - theirs, ours))
     found = {}
@@ -158,10 +145,7 @@ FEATURES: dict[str, tuple[Coordinate, str, str]] = {
 def features(
     p: np.record, states: np.ndarray, rows: np.ndarray
 ) -> dict[str, tuple[np.ndarray, str, str]]:
-    """Return the series that a mechanism's features add, by name: values (m,), unit, long name.
-
-    states: (m, n); rows: observed there, (m, WIDE).
-    """
+    """Return the series that a mechanism's features add, by name: values (m,), unit, long name."""
     series = {}
     for name, (coordinate, unit, phrase) in FEATURES.items():
         if p["at"][coordinate] >= 0:
@@ -181,11 +165,7 @@ def signals(rows: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def signals_of_scene(p: np.record, run: "xr.Dataset") -> dict[str, np.ndarray]:
-    """Return the `SIGNALS` by name from the time series of a run without features; SI.
-
-    The force on the rod is F_N n - F_t t with n along the eccentricity, and t a quarter turn from
-    it, counter-clockwise.
-    """
+    """Return the `SIGNALS` by name from the time series of a run without features; SI."""
     rows = np.empty((run.sizes["time"], WIDE))
     for name, (dims, _, _) in SERIES.items():
         block(name, rows)[...] = run[name].transpose("time", *dims).values

@@ -1,12 +1,7 @@
 """The SI record of a case, the sizes that tolerances are relative to, and its initial state.
 
 Gathered in a dict, for which the record is filled once: to read a field back would take ten times
-as long, for every job. What reads many fields of a record may be given `physics.read_fields` of it
-in its place.
-
-The motion at the start of a case: top dead centre, ideal rates, and an elastic rod bent as it is
-then, at rest in itself. Without this deflection under what moves it, it would ring from the first
-moment on.
+as long. What reads many fields may be given `physics.read_fields` in its place.
 """
 
 import math
@@ -52,11 +47,7 @@ def is_ideal(case: Case) -> bool:
 
 
 def record(case: Case) -> np.record:
-    """Return the record of a case, every number in SI.
-
-    Raises ValueError where the gas cycle or the cam has no corners, as `gas_corners` and
-    `cam_corners`.
-    """
+    """Return the record of a case, every number in SI. Raises ValueError as `complete`."""
     p: dict[str, Any] = {}  # what is not set stays zero
     p["scene"] = scene(case)
     exact = case.load == "gas" and case.gas.switching == "exact"
@@ -219,10 +210,9 @@ UNCONTROLLED = 1e12
 
 
 def natural_sizes(p: Fields) -> np.ndarray:
-    """Return the size of each number of the state, (n,): coordinates, then their rates.
+    """Return the size of each number of the state, (n,), SI.
 
-    In SI; then those of what contacts carry: speeds, bristles as they slide. Deflections are those
-    under the forces at hand.
+    Of deflections under the forces at hand; of what contacts carry as they slide.
     """
     sizes, n = np.ones(len(state_names(p))), int(p["freedoms"])
     length, speed = length_and_speed(p) if p["clearance"].any() else (1.0, 1.0)
@@ -280,9 +270,8 @@ def _guide_sizes(p: Fields, force: float) -> tuple[float, float]:
 def length_and_speed(p: Fields) -> tuple[float, float]:
     """Return the length (m) and speed (m/s) that absolute tolerances are relative to.
 
-    The length is the smaller of the clearance and the penetration under the forces at hand, but
-    not below a thousandth of the latter; the speed is that length at the contact's frequency, or
-    that at which a film against the wall gives way to the forces, if that is less.
+    The smaller of clearance and penetration under the forces at hand; the speed is that length at
+    the contact's frequency, or that at which a film at the wall gives way, if that is less.
     """
     moving = p["reciprocating_mass"]
     force = moving * p["crank_radius"] * p["omega"] ** 2 + static_load(p)
@@ -305,10 +294,7 @@ def is_oiled(p: Fields) -> bool:
 
 
 def film_damping(p: Fields) -> float:
-    """Return the damping (N s/m) of a film that is pressed against the wall; 0 of dry joints.
-
-    Of the joint with the smaller clearance, whose film is the stiffer one.
-    """
+    """Return the damping (N s/m) of the stiffer film pressed against the wall; 0 of dry joints."""
     if not is_oiled(p):
         return 0.0
     clearance, joint = min((one, j) for j, one in enumerate(p["clearance"].tolist()) if one > 0.0)
@@ -318,10 +304,7 @@ def film_damping(p: Fields) -> float:
 
 
 def contact_sizes(p: Fields) -> tuple[float, float]:
-    """Return the length (m) and speed (m/s) of the journals in their bores.
-
-    Of a mechanism with ideal joints no step need be as short as theirs.
-    """
+    """Return the length (m) and speed (m/s) of the journals; of ideal joints no limit to steps."""
     return length_and_speed(p) if p["clearance"].any() else (math.inf, 1.0)
 
 
@@ -336,10 +319,9 @@ MODE_SHIFT = 1e-7  # m, by which its modes are moved to learn how they answer
 
 
 def initial_state(case: Case, p: np.record, shift: np.ndarray | float = 0.0) -> np.ndarray:
-    """Return the state at time 0, (n,), as `physics.state_names` names it.
+    """Return the state at time 0, (n,): shift (m) of the journals beside the case's own offsets.
 
-    shift: of the journals (m), (joint, axis), beside the case's own offsets. An elastic rod is bent
-    as it is then, at rest in itself.
+    An elastic rod is bent as it is then, at rest in itself.
     """
     journals = offsets(case) + shift
     y = np.zeros(len(state_names(p)))

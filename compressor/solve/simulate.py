@@ -7,7 +7,7 @@ import numpy as np
 
 from compressor.cases import MODEL_VERSION, Case, require_case
 from compressor.metrics import SERIES
-from compressor.outcome import DatasetParts, Outcome, row, without_run, word_variables
+from compressor.outcome import Outcome, row, without_run, word_variables
 from compressor.physics import is_featured, state_names
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
@@ -63,16 +63,11 @@ def simulate(case: Case) -> "xr.Dataset":
     >>> run.contact_force.dims, run.contact_force.attrs["units"]
     (('time', 'joint', 'axis'), 'N')
     """
-    found, variables = observe(require_case(case))
-    table = found.table(variables)
-    return as_dataset(DatasetParts(table.variables | word_variables(table.attrs), table.attrs))
+    found, series = observe(require_case(case))
+    variables = found.table(series) | word_variables(found.attributes)
+    import xarray as xr  # takes half a second to load, which storing a job spares
 
-
-def as_dataset(table: DatasetParts) -> "xr.Dataset":
-    """Return the Dataset of a table."""
-    import xarray as xr
-
-    return xr.Dataset(dict(table.variables), attrs=dict(table.attrs))
+    return xr.Dataset(variables, attrs=found.attributes)
 
 
 def observe(case: Case) -> tuple[Outcome, Variables]:
@@ -84,10 +79,7 @@ def observe(case: Case) -> tuple[Outcome, Variables]:
 
 
 def with_series(case: Case, solution: Solution) -> tuple[Outcome, Variables]:
-    """Return the `Outcome` of a solution, with the metrics of body and sensor, and its time series.
-
-    There are none of a case that keeps metrics alone.
-    """
+    """Return the `Outcome` of a solution, with metrics of body and sensor, and its time series."""
     result, keeps_series = outcome(case, solution), case.output.keep == "series"
     variables = series(case, solution) if keeps_series else {}
     if case.body:

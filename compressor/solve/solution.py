@@ -36,10 +36,9 @@ MIN_TIGHTENING, MAX_TIGHTENING = 10.0, 1000.0  # times tighter that the next run
 def refine_until_accurate(case: Case, search: Search, first: Solution | None = None) -> Solution:
     """Return the first run that keeps its promise, or the last whole one as a failed job.
 
-    Each run is compared with one a little tighter, and with the run before it. The next one is as
-    much tighter as the errors need. Where those of the first are as large as the numbers, a shifted
-    run over a short span shows whether the motion is chaotic; that ends the search, and so does its
-    budget. first: the first run, if it was made already.
+    Each run is compared with one a little tighter, and with the run before it; the next one is as
+    much tighter as the errors need. Where a first one's are as large as the numbers, chaos is
+    looked for.
     """
     rtol, unsound = case.rtol, 0  # runs whose energy does not balance
     best: Solution | None = None  # the last whole run
@@ -85,8 +84,7 @@ def comparison_runs(
 ) -> list[Solution]:
     """Return the runs that a run's errors are estimated by: a tighter one, and the one before.
 
-    A first run has none before; where the motion enlarges errors, two runs may agree by chance, and
-    a looser one is made in its place.
+    For a first run a looser one where the motion enlarges errors: two may agree by chance.
     """
     runs = [comparison_run(case, now, search.left)]
     if before is None:
@@ -141,10 +139,7 @@ def fail(case: Case, best: Solution, detail: str, now: Solution | None = None) -
 
 
 def missed_promises(case: Case, solution: Solution) -> list[str]:
-    """Return a message for each promise that a run does not keep, of a metric at its worst joint.
-
-    A metric of 0, such as the penetration of an ideal joint, is met by a bar of 0 alone.
-    """
+    """Return a message for each promise that a run does not keep."""
     if not case.targets:
         error = solution.series_errors["acceleration"]
         return [f"acceleration: its error may be {error:.2g} of it, not {case.promise:g}"]
@@ -159,10 +154,7 @@ CHAOTIC_RTOL = 1e-6  # at the loosest, of the run that statistics are taken from
 
 
 def solve(case: Case) -> Solution:
-    """Return a case's motion, with errors, regime and horizon as far as they are wanted.
-
-    Raises nothing for a run that fails: its `reason` and `detail` say why.
-    """
+    """Return a case's motion, with errors, regime and horizon as far as they are wanted."""
     search = Search(case)
     first = find_span(search)
     case = search.case
@@ -189,7 +181,7 @@ def solve(case: Case) -> Solution:
 def is_in_doubt(case: Case, solution: Solution) -> bool:
     """Return whether a motion may be chaotic, by its errors; shares and counts are left out.
 
-    Not where the promise of a word is kept: two motions, a tolerance apart, stayed together.
+    Not where the promise of a word is kept: two motions stayed together.
     """
     if math.isfinite(case.promise) and solution.promise == "kept":
         return False
@@ -216,10 +208,7 @@ def name_regime(case: Case, solution: Solution, search: Search) -> None:
 
 
 def chaotic_solution(case: Case, solution: Solution, search: Search) -> Solution:
-    """Run a motion that cannot be foretold once more, for statistics over its revolutions.
-
-    No error of a single course is claimed; averages have their statistical one.
-    """
+    """Run a motion that cannot be foretold once more, for statistics over its revolutions."""
     horizon, ends = search.horizon, revolutions(case.settle, case.duration, case.turn)
     loosest = min(CHAOTIC_RTOL, case.rtol)
     for rtol in sorted({loosest, min(loosest, solution.rtol)}, reverse=True):

@@ -291,8 +291,8 @@ class Stored:
         position = self.position(key)
         if position is None:
             raise StoreError(self.folder, f"job {key} is not stored", "run its study first")
-        found = self.outcome(position).table(self.series(position))
-        return xr.Dataset(found.variables, attrs=found.attrs)
+        outcome = self.outcome(position)
+        return xr.Dataset(outcome.table(self.series(position)), attrs=outcome.attributes)
 
 
 def read_store(folder: Folder) -> Stored:

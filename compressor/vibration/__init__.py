@@ -5,7 +5,7 @@ from compressor.vibration.accelerometer import (
     analogue_rate,
     noisy,
 )
-from compressor.vibration.body import Forces, casing_motion
+from compressor.vibration.body import Forces
 from compressor.vibration.monitor import Monitored, measure_record, segment_levels, shake_body
 from compressor.vibration.record_files import encode_record, read_record, record_columns
 from compressor.vibration.spectra import (

@@ -75,8 +75,7 @@ def alone(case):
     found = run_at_tolerance(case, case.rtol, case.solve.timeout_s, sampled=True)
     assert not found.reason, found.detail
     outcome, variables = with_series(case, found)
-    table = outcome.table(variables)
-    return xr.Dataset(table.variables, attrs=table.attrs)
+    return xr.Dataset(outcome.table(variables), attrs=outcome.attributes)
 
 
 def rung(case, rtol, truth):

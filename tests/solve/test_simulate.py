@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from compressor.cases.case import Case, CaseError
 from compressor.cases.groups import Machine, PerJoint, Solve
 from compressor.metrics import NUMBERS
 from compressor.program import library_versions
-from compressor.solve.simulate import SERIES, as_dataset, measure, observe, simulate
+from compressor.solve.simulate import SERIES, measure, simulate
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}
 
@@ -184,20 +183,3 @@ def test_a_run_names_the_libraries_it_depends_on(faulty):
     assert versions["numpy"] == np.__version__
     for name, version in versions.items():
         assert f"{name} {version}" in faulty.attrs["libraries"].split(", ")
-
-
-def test_a_dataset_is_as_xarray_makes_it_and_shares_nothing_with_the_next():
-    """Also after one of the same shapes, and where only the time grid differs."""
-    for values in ({}, {"machine": {"speed_rpm": 400}}, {"machine": {"speed_rpm": 400}}, {}):
-        case = Case.from_values({**values, "solve": SHORT})
-        table, next_table = (found.table(of) for found, of in (observe(case), observe(case)))
-        expected = xr.Dataset(table.variables, attrs=table.attrs).copy(deep=True)
-        made, other = as_dataset(table), as_dataset(next_table)
-        other["peak_acceleration"][...] = math.nan
-        other["acceleration"][...] = math.nan
-        other["time"].attrs["units"] = "h"
-        other["status"].attrs["more"] = "none"
-        other.attrs["name"] = "other"
-        xr.testing.assert_identical(made, expected)
-        assert list(made.variables) == list(table.variables)
-        xr.testing.assert_identical(as_dataset(table), expected)
