@@ -8,7 +8,6 @@ from the measured trade of tests/results/accuracy.json (make accuracy), for `met
 """
 
 import dataclasses
-import inspect
 import math
 import re
 import reprlib
@@ -265,7 +264,6 @@ class Parameter:
     choices: tuple[str, ...] = ()
     optional: bool = False
     identity: bool = True  # whether it is part of a job's identity
-    aliases: tuple[tuple[str, str], ...] = ()  # other words, each with the choice it stands for
     judged: tuple[float, float] | None = None  # range that extreme scenes are drawn from
     read: tuple[str, ...] = ()  # conditions that all hold where a case reads it
     # whether it is of the machine: a file may give it though no job reads it, so that one file
@@ -333,10 +331,6 @@ class Parameter:
         default = self.default and 2 * self.default
         return dataclasses.replace(self, default=default, low=2 * self.low, high=2 * self.high)
 
-    def choice_of(self, value: Any) -> Any:
-        """Return the choice that an alias stands for, and any other value as it is."""
-        return next((choice for alias, choice in self.aliases if alias == value), value)
-
     def check(self, value: Any) -> str | None:
         """Return what is wrong with a scalar value of this parameter, or None."""
         try:
@@ -381,7 +375,7 @@ class Parameter:
         """Return the error of a value of another kind; words: of these one may be misspelt."""
         message = f"needs {self.needed}, not {quote_value(value)}"
         word = words[0][:MAX_WORD] if words and isinstance(words[0], str) else ""
-        lower = dict(self.aliases) | {choice.lower(): choice for choice in self.words}
+        lower = {choice.lower(): choice for choice in self.words}
         near = get_close_matches(word.lower(), lower, n=1)
         number = AS_NUMBER.fullmatch(word) if self.is_number else None
         if near and lower[near[0]] in self.needed:
@@ -469,9 +463,7 @@ def annotation_of(row: Parameter) -> Any:
     found: Any = kinds.get(row.kind)
     if words is not None and row.kind != "materials":
         found = words if found is None else words | found
-    if row.optional:
-        found = found | None
-    return Annotated[found, BeforeValidator(row.choice_of)] if row.aliases else found
+    return found | None if row.optional else found
 
 
 BY_METRIC: Any = None
@@ -589,13 +581,6 @@ else:
                 raise CaseError(problems_of(error, values, rows)) from None
 
         made.__init__ = __init__
-        made.__signature__ = inspect.Signature(
-            inspect.Parameter(
-                item.name, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=item.default,
-                annotation=own[item.name],
-            )
-            for item in fields(made)
-        )  # fmt: skip
         made.__annotations__ = own
         made.__doc__ = describe_fields(made)
         return made
