@@ -22,15 +22,12 @@ from compressor.cases.parameter import (
     PerJoint,
     PerMotion,
     PerValve,
-    Plausible,
     by_part,
     choice,
     flag,
-    from_to,
     integer,
     make_group,
     number,
-    times,
 )
 
 # conditions under which a case reads a key; others stand beside their only key
@@ -43,23 +40,6 @@ COMPILED = ("auto", "TSIT5", "RODAS")  # by `compressor.solve`; the others are S
 JUDGED_STIFFNESS = (1e8 / 1000**1.5, 1e12 / 1000**1.5)  # N/mm^1.5: judged on, 1e8 to 1e12 N/m^1.5
 PAPER_STIFFNESS = 3.36e5  # N/mm^1.5
 METHODS = (*COMPILED, "LSODA", "Radau", "BDF", "DOP853", "RK45")
-
-
-# how far plants' machines are from what a case has: see `Plausible`
-NO_MASS = Plausible("the paper prints no masses", times(0.5, 2))
-PRESSURE = Plausible("gauges, lines and the day", times(0.95, 1.05), times(0.95, 1.05))
-CYLINDER_CLEARANCE = Plausible(
-    "data sheets round it, pockets and worn valves change it", times(0.8, 1.25), times(0.8, 1.25)
-)  # fmt: skip
-VALVE_LOSS = Plausible(
-    "no nameplate has it; valves lose up to a tenth", from_to(0, 8), from_to(0, 8)
-)  # fmt: skip
-CONTACT_GUESS = Plausible("no joint's contact is known better", times(0.5, 2), times(0.5, 2))
-SMOOTHING = Plausible("a smoothing of the law, which nobody measures", times(0.3, 3))
-HALF_BALANCED = from_to(0, 0.5)
-BEARING_LENGTH = Plausible(
-    "grooves and holes shorten what bears", times(0.5, 1.25), times(0.5, 1.25)
-)  # fmt: skip
 
 
 shift = partial(number, 0.0, "[-1000, 1000]", unit="mm")
@@ -99,36 +79,26 @@ class Machine:
     rod_length_mm: float = number(600.0, "(0, 1e6]", "rod length L", "Table 1")
     speed_rpm: float = number(500.0, "(0, 1e5]", "crank speed", "Table 1", judged=(50, 6000))
     rod_mass_kg: float = number(
-        4.7, "(0, 1e6]", "rod mass", "assumed: a 600 x 40 x 25 mm steel bar", judged=(0.1, 200),
-        plausible=NO_MASS,
-    )  # fmt: skip
+        4.7, "(0, 1e6]", "rod mass", "assumed: a 600 x 40 x 25 mm steel bar", judged=(0.1, 200)
+    )
     rod_centre_mm: float | None = number(
-        None, "[0, 1e6]", "rod's mass centre, from the big end", "assumed: half the rod",
-        plausible=Plausible("a rod is heavier at its big end", times(0.6, 1), times(0.9, 1.1)),
-    )  # fmt: skip
+        None, "[0, 1e6]", "rod's mass centre, from the big end", "assumed: half the rod"
+    )
     rod_inertia_kg_m2: float | None = number(
-        None, "(0, 1e9]", "rod's inertia about its mass centre", "assumed: m L^2 / 12",
-        plausible=Plausible(
-            "drawn rods have 1.2 to 2 times that of a uniform bar", times(1, 2.5), times(0.8, 1.25)
-        ),
-    )  # fmt: skip
+        None, "(0, 1e9]", "rod's inertia about its mass centre", "assumed: m L^2 / 12"
+    )
     reciprocating_mass_kg: float = number(
-        14.0, "(0, 1e6]", "crosshead, piston rod and piston", "assumed", judged=(0.1, 200),
-        plausible=NO_MASS,
-    )  # fmt: skip
+        14.0, "(0, 1e6]", "crosshead, piston rod and piston", "assumed", judged=(0.1, 200)
+    )
     pin_radius_mm: PerJoint[float] = by_part(
         PerJoint, 10.0,
         number(
             10.0, "(0, 1e4]", "journal radius R_j", "inferred from Eq. 15 and Table 3",
             judged=(10, 100), fact=True,
-            plausible=Plausible("the paper does not print it", times(0.7, 1.5)),
         ),
         {joint: f"{own} or friction.ideal_joints == true" for joint, own in AT_JOINTS.items()},
     )  # fmt: skip
-    gravity_m_per_s2: float = number(
-        0.0, "[0, 1000]", "gravity, along -y", "assumed",
-        plausible=Plausible("it acts on a horizontal machine", from_to(0, 9.81)),
-    )  # fmt: skip
+    gravity_m_per_s2: float = number(0.0, "[0, 1000]", "gravity, along -y", "assumed")
     counterweight_kg_mm: float | None = number(
         None, "[0, 1e9]",
         "counterweight on the crank, opposite to its pin: mass times its centre's distance from "
@@ -139,7 +109,7 @@ class Machine:
         PerMotion, None,
         number(
             None, "[0, 1]", "share that a counterweight balances; in place of counterweight_kg_mm",
-            "none", plausible=Plausible("no nameplate has it", HALF_BALANCED, HALF_BALANCED),
+            "none",
         ),
     )  # fmt: skip
 
@@ -199,28 +169,21 @@ class Gas:
     piston_radius_mm: float = number(50.0, "(0, 1e4]", "piston radius", "Table 1")
     head_clearance_mm: float | None = number(
         20.0, "(0, 1e5]", "clearance of the cylinder head s0", "Eq. 13",
-        read=(CYCLE, HEAD_CLEARANCE), fact=True, plausible=CYLINDER_CLEARANCE,
+        read=(CYCLE, HEAD_CLEARANCE), fact=True,
     )  # fmt: skip
     suction_MPa: float = number(
-        0.105, "(0, 1e3]", "suction pressure (absolute)", "Table 1", read=CYCLE, fact=True,
-        plausible=PRESSURE,
-    )  # fmt: skip
+        0.105, "(0, 1e3]", "suction pressure (absolute)", "Table 1", read=CYCLE, fact=True
+    )
     discharge_MPa: float = number(
-        0.393, "(0, 1e3]", "discharge pressure (absolute)", "Table 1", read=CYCLE, fact=True,
-        plausible=PRESSURE,
-    )  # fmt: skip
-    exponent: float = number(
-        1.4, "[1, 5]", "isentropic exponent", "Eq. 13", read=CYCLE, fact=True,
-        plausible=Plausible("moist gas and cooled walls lower it", from_to(1.15, 1.4)),
-    )  # fmt: skip
+        0.393, "(0, 1e3]", "discharge pressure (absolute)", "Table 1", read=CYCLE, fact=True
+    )
+    exponent: float = number(1.4, "[1, 5]", "isentropic exponent", "Eq. 13", read=CYCLE, fact=True)
     back_pressure_MPa: float | None = number(
         None, "[0, 1e3]",
         "pressure on what no gas cycle presses: the piston's other face, or the rod's "
         "cross-section in a double-acting cylinder; 0 in the paper's rig, and the atmosphere, "
-        f"{ATMOSPHERE_MPA:g}, in {OWN_CYLINDER.format(other='switching')}", "assumed",
-        plausible=Plausible(
-            "a crankcase has the atmosphere's, or a little more", from_to(0.09, 0.15)
-        ),
+        f"{ATMOSPHERE_MPA:g}, in {OWN_CYLINDER.format(other='switching')}",
+        "assumed",
     )  # fmt: skip
     switching: str | None = choice(
         None, ("paper", "exact"),
@@ -239,7 +202,7 @@ class Gas:
         PerEnd, None,
         number(
             None, "(0, 1000]", "clearance volume over swept volume; in place of head_clearance_mm",
-            optional=True, fact=True, plausible=CYLINDER_CLEARANCE,
+            optional=True, fact=True,
         ),
         {"head": (CYCLE, HEAD_CLEARANCE), "crank": (CYCLE, CRANK_END)}, fill=None,
     )  # fmt: skip
@@ -247,7 +210,7 @@ class Gas:
         PerValve, None,
         number(
             None, "[0, 90]", "loss of absolute pressure while open; 0 without", read=CYCLE,
-            fact=True, plausible=VALVE_LOSS,
+            fact=True,
         ),
     )  # fmt: skip
     unloaded: str | None = choice(
@@ -389,7 +352,6 @@ class Contact:
     stiffness_N_per_mm15: float | None = number(
         PAPER_STIFFNESS, "(0, 1e15]", "contact stiffness K, in N/mm^exponent", "Table 3",
         read=(CLEARANCE, "contact.law != johnson and contact.law != liu"), judged=JUDGED_STIFFNESS,
-        plausible=CONTACT_GUESS,
     )  # fmt: skip
     materials: PerJoint[tuple[str, str]] | None = by_part(
         PerJoint, None,
@@ -412,12 +374,11 @@ class Contact:
     damping_N_s_per_mm: float = number(
         336.0, "[0, 1e9]", "greatest contact damping C_max", "Table 3",
         read=(*by_law("contact", "damping_N_s_per_mm"), or_own("damping_N_s_per_mm")),
-        judged=(0, 33600), plausible=CONTACT_GUESS,
+        judged=(0, 33600),
     )  # fmt: skip
     full_damping_mm: float = number(
         0.1, "(0, 1e3]", "penetration of full damping d_max", "Table 3",
         read=(*by_law("contact", "full_damping_mm"), or_own("full_damping_mm")),
-        plausible=CONTACT_GUESS._replace(given=None),
     )  # fmt: skip
     restitution: float | None = number(
         None, "(0, 1]", "coefficient of restitution, in laws that damp by it",
@@ -427,14 +388,11 @@ class Contact:
         None, "(0, 1e6]",
         "approach speed below which the damping stays that of this speed; 10 by default",
         read=(*by_law("contact", "least_approach_mm_per_s"), "contact.restitution > 0"),
-        judged=(1.0, 100.0), plausible=SMOOTHING,
+        judged=(1.0, 100.0),
     )  # fmt: skip
     length_mm: PerJoint[float] | None = by_part(
         PerJoint, None,
-        number(
-            None, "(0, 1e4]", "length (johnson, liu)", judged=(10.0, 100.0), fact=True,
-            plausible=BEARING_LENGTH,
-        ),
+        number(None, "(0, 1e4]", "length (johnson, liu)", judged=(10.0, 100.0), fact=True),
         {joint: (own, *by_law("contact", "length_mm")) for joint, own in AT_JOINTS.items()},
     )  # fmt: skip
     modulus_GPa: float | None = number(
@@ -474,20 +432,14 @@ class Friction:
     static: float = number(
         0.23, "[0, 10]", "static coefficient", "Table 3", read=by_law("friction", "static"),
         judged=(0, 0.5),
-        plausible=Plausible("metals scatter, and oil lowers it", times(0.7, 1.5), times(0.7, 1.5)),
     )  # fmt: skip
-    dynamic: float = number(
-        0.15, "[0, 10]", "dynamic coefficient", "Table 3", judged=(0, 0.5),
-        plausible=Plausible("metals scatter, and oil lowers it", times(0.5, 1.5), times(0.5, 1.5)),
-    )  # fmt: skip
+    dynamic: float = number(0.15, "[0, 10]", "dynamic coefficient", "Table 3", judged=(0, 0.5))
     stiction_velocity_mm_per_s: float = number(
-        10.0, "(0, 1e6]", "stiction transition velocity", "Table 3", judged=(0.1, 100),
-        plausible=SMOOTHING,
-    )  # fmt: skip
+        10.0, "(0, 1e6]", "stiction transition velocity", "Table 3", judged=(0.1, 100)
+    )
     friction_velocity_mm_per_s: float = number(
         100.0, "(0, 1e6]", "friction transition velocity", "Table 3",
         read=by_law("friction", "friction_velocity_mm_per_s"),
-        plausible=SMOOTHING._replace(left_out=times(0.5, 2)),
     )  # fmt: skip
     law: str | None = choice(
         None, FRICTION_LAWS, "friction law (adams where none is named)", "Eq. 16"
@@ -495,12 +447,10 @@ class Friction:
     bristle_stiffness_per_mm: float | None = number(
         None, "(0, 1e9]", "LuGre's sigma_0 over the normal force; 100 by default",
         read=by_law("friction", "bristle_stiffness_per_mm"), judged=(10.0, 1e4),
-        plausible=SMOOTHING,
     )  # fmt: skip
     bristle_damping_s_per_mm: float | None = number(
         None, "[0, 1e6]", "LuGre's sigma_1 over the normal force; 0.03 by default",
         read=by_law("friction", "bristle_damping_s_per_mm"), judged=(1e-3, 0.1),
-        plausible=SMOOTHING,
     )  # fmt: skip
     viscous_s_per_mm: float | None = number(
         None, "[0, 1e6]", "LuGre's sigma_2 over the normal force; 0 by default",

@@ -4,18 +4,15 @@ from dataclasses import replace
 from functools import partial
 from typing import ClassVar
 
-from compressor.cases.groups import AT_JOINTS, BEARING_LENGTH, SMOOTHING
+from compressor.cases.groups import AT_JOINTS
 from compressor.cases.parameter import (
     PerJoint,
-    Plausible,
     by_part,
     choice,
     flag,
-    from_to,
     integer,
     make_group,
     number,
-    times,
 )
 
 # conditions under which a case reads a key; others stand beside their only key
@@ -42,23 +39,15 @@ class Lubricant:
     viscosity_mPa_s: float = number(
         30.0, "(0, 1e6]", "dynamic viscosity", "ISO VG 100 at about 65 °C (ISO 3448)",
         judged=(3.0, 300.0), fact=True,
-        plausible=Plausible(
-            "it halves in 15 degrees, and a bearing's temperature is a guess",
-            times(0.5, 2), times(0.5, 2),
-        ),
     )  # fmt: skip
     bearing_length_mm: PerJoint[float] = by_part(
         PerJoint, 20.0,
-        number(
-            20.0, "(0, 1e4]", "length of the bearing", "assumed: as long as wide", fact=True,
-            plausible=BEARING_LENGTH,
-        ),
+        number(20.0, "(0, 1e4]", "length of the bearing", "assumed: as long as wide", fact=True),
         AT_JOINTS,
     )  # fmt: skip
     last_share: float = number(
         0.02, "[0.001, 0.5]", "share of the clearance below which the film gets no thinner",
         judged=(0.01, 0.1),
-        plausible=Plausible("nobody knows the roughness", times(0.5, 2), times(0.5, 2)),
     )  # fmt: skip
 
 
@@ -75,30 +64,25 @@ class Guide:
         0.0, "[0, 100]", "clearance of the guide, on each side of the crosshead", judged=(0.01, 0.2)
     )
     friction: float = number(
-        0.05, "[0, 10]", "friction coefficient of the oiled guide", judged=(0.01, 0.2),
-        plausible=Plausible("well oiled, or nearly dry", times(0.5, 3)),
-    )  # fmt: skip
+        0.05, "[0, 10]", "friction coefficient of the oiled guide", judged=(0.01, 0.2)
+    )
     stiction_velocity_mm_per_s: float = number(
         10.0, "(0, 1e6]", "speed at which friction is three quarters of its greatest",
-        "Table 3, of the joints", read="guide.friction > 0", plausible=SMOOTHING,
+        "Table 3, of the joints", read="guide.friction > 0",
     )  # fmt: skip
     crosshead_length_mm: float = number(
-        120.0, "[0.001, 1e4]", "length of the crosshead", read=PLAY, judged=(60.0, 250.0),
-        plausible=Plausible("the default's is of no machine", times(0.7, 1.5)),
-    )  # fmt: skip
+        120.0, "[0.001, 1e4]", "length of the crosshead", read=PLAY, judged=(60.0, 250.0)
+    )
     crosshead_height_mm: float = number(
-        80.0, "[0.001, 1e4]", "height of the crosshead", read=PLAY, judged=(40.0, 150.0),
-        plausible=Plausible("the default's is of no machine", times(0.7, 1.5)),
-    )  # fmt: skip
+        80.0, "[0.001, 1e4]", "height of the crosshead", read=PLAY, judged=(40.0, 150.0)
+    )
     crosshead_inertia_kg_m2: float | None = number(
         None, "(0, 1e9]", "inertia of the crosshead about its pin",
         "assumed: of a uniform block, m (l^2 + h^2) / 12", read=PLAY,
-        plausible=Plausible("a crosshead is no block", times(0.5, 2)),
     )  # fmt: skip
     stiffness_N_per_mm15: float = number(
         3.36e5, "(0, 1e15]", "contact stiffness of a corner, in N/mm^exponent",
         "Table 3, of the joints", read=PLAY, judged=(3e4, 3e6),
-        plausible=Plausible("no contact of a guide is known better", times(0.3, 3)),
     )  # fmt: skip
     exponent: float | None = number(
         None, "[1, 3]", "force exponent of a corner", "as the joints'", read=PLAY
@@ -121,14 +105,12 @@ class Drive:
     """
 
     flywheel_kg_m2: float = number(
-        5.0, "(0, 1e9]", "inertia of crank, flywheel and motor", judged=(1.0, 100.0),
-        plausible=Plausible("the default's is of no machine", times(0.5, 2)),
-    )  # fmt: skip
+        5.0, "(0, 1e9]", "inertia of crank, flywheel and motor", judged=(1.0, 100.0)
+    )
     torque_N_m: float = number(0.0, "[-1e9, 1e9]", "torque at machine.speed_rpm")
     slope_N_m_s: float = number(
-        100.0, "[0, 1e9]", "torque added for each rad/s that the speed falls", judged=(10.0, 1e4),
-        plausible=Plausible("motors differ by their size", times(0.3, 3)),
-    )  # fmt: skip
+        100.0, "[0, 1e9]", "torque added for each rad/s that the speed falls", judged=(10.0, 1e4)
+    )
     unbalance_kg_mm: float = number(
         0.0, "[0, 1e9]",
         "unbalance of the crank towards its pin: mass times its centre's distance from the axis. "
@@ -150,16 +132,14 @@ class Rod:
     depth_mm: float = number(
         40.0, "(0, 1e4]", "depth of the rod, in the plane of motion",
         "assumed: a 600 x 40 x 25 mm bar", judged=(20.0, 80.0),
-        plausible=Plausible("a rod is no bar", times(0.8, 1.25)),
     )  # fmt: skip
     width_mm: float = number(
         25.0, "(0, 1e4]", "width of the rod, across that plane", "assumed: a 600 x 40 x 25 mm bar",
-        judged=(10.0, 50.0), plausible=Plausible("a rod is no bar", times(0.8, 1.25)),
+        judged=(10.0, 50.0),
     )  # fmt: skip
     damping_ratio: float = number(
         0.005, "[0, 1]", "damping ratio of the first bending mode; others by stiffness",
         judged=(2e-3, 0.1),
-        plausible=Plausible("bolts and bushes damp more than steel", times(0.4, 4)),
     )  # fmt: skip
 
 
@@ -187,38 +167,26 @@ class Body:
     freedoms: str = choice(
         "xy", ("x", "y", "xy", "xy_rocking"), "directions in which the rigid body may move"
     )
-    mass_kg: float = number(
-        500.0, "(0, 1e7]", "mass of the body",
-        plausible=Plausible("the default's is of no machine", times(0.5, 2)),
-    )  # fmt: skip
+    mass_kg: float = number(500.0, "(0, 1e7]", "mass of the body")
     inertia_kg_m2: float = number(
-        40.0, "(0, 1e9]", "inertia of the body about its mass centre", read=ROCKING,
-        plausible=Plausible("the default's is of no machine", times(0.5, 2)),
-    )  # fmt: skip
+        40.0, "(0, 1e9]", "inertia of the body about its mass centre", read=ROCKING
+    )
     centre_x_mm: float = number(
-        300.0, "[-1e5, 1e5]", "x of the body's mass centre, from the crank's", read=ROCKING,
-        plausible=Plausible("the default's is of no machine", times(0.5, 1.5)),
-    )  # fmt: skip
+        300.0, "[-1e5, 1e5]", "x of the body's mass centre, from the crank's", read=ROCKING
+    )
     centre_y_mm: float = number(
-        -200.0, "[-1e5, 1e5]", "y of the body's mass centre, from the crank's", read=ROCKING,
-        plausible=Plausible("the default's is of no machine", times(0.5, 1.5)),
-    )  # fmt: skip
+        -200.0, "[-1e5, 1e5]", "y of the body's mass centre, from the crank's", read=ROCKING
+    )
     frequency_x_Hz: float = number(
-        60.0, "(0, 1e5]", "natural frequency along x", BOLTED, read=("body", "body.freedoms != y"),
-        plausible=Plausible("30 on a skid to 80 on rock", from_to(30, 80), times(0.7, 1.4)),
-    )  # fmt: skip
+        60.0, "(0, 1e5]", "natural frequency along x", BOLTED, read=("body", "body.freedoms != y")
+    )
     frequency_y_Hz: float = number(
-        60.0, "(0, 1e5]", "natural frequency along y", BOLTED, read=("body", "body.freedoms != x"),
-        plausible=Plausible("30 on a skid to 80 on rock", from_to(30, 80), times(0.7, 1.4)),
-    )  # fmt: skip
+        60.0, "(0, 1e5]", "natural frequency along y", BOLTED, read=("body", "body.freedoms != x")
+    )
     frequency_rocking_Hz: float = number(
-        20.0, "(0, 1e5]", "natural frequency of rocking", read=ROCKING,
-        plausible=Plausible("nobody computes it well", times(0.7, 1.4), times(0.7, 1.4)),
-    )  # fmt: skip
-    damping_ratio: float = number(
-        0.03, "(0, 0.99]", "damping ratio of the foundation",
-        plausible=Plausible("soil damps more than steel", times(0.3, 3)),
-    )  # fmt: skip
+        20.0, "(0, 1e5]", "natural frequency of rocking", read=ROCKING
+    )
+    damping_ratio: float = number(0.03, "(0, 0.99]", "damping ratio of the foundation")
     casing: bool = flag(
         True, "casing modes, one at the guide and one at the main bearing, which sensors feel",
         read=CASING_SENSED,
@@ -226,16 +194,13 @@ class Body:
     casing_mass_kg: float | None = number(
         None, "(0, 1e6]", "modal mass of a casing mode; the sensor's level goes as its inverse",
         "program: a 25th of the body's mass", read=CASING,
-        plausible=Plausible("nobody weighs what a mode moves", times(0.2, 2), times(0.5, 2)),
     )  # fmt: skip
     casing_frequency_Hz: float = number(
-        2000.0, "(0, 1e5]", "natural frequency of a casing mode", read=CASING,
-        plausible=Plausible("a hammer finds it", times(0.5, 2)),
-    )  # fmt: skip
+        2000.0, "(0, 1e5]", "natural frequency of a casing mode", read=CASING
+    )
     casing_damping_ratio: float = number(
-        0.02, "(0, 0.99]", "damping ratio of a casing mode", read=CASING,
-        plausible=Plausible("a hammer finds it", times(0.5, 2)),
-    )  # fmt: skip
+        0.02, "(0, 0.99]", "damping ratio of a casing mode", read=CASING
+    )
     start: str = choice(
         "steady", ("steady", "rest"),
         "start of the body; steady: as if the settled revolutions had always repeated; rest: at "
@@ -279,18 +244,14 @@ class Sensor:
     low_pass_Hz: float | None = number(
         None, "(0, 1e6]", "anti-aliasing filter's corner", "usual: rate_Hz / 2.56"
     )
-    mounting_Hz: float = number(
-        25000.0, "(0, 1e6]", "mounting resonance", "usual: on a stud",
-        plausible=Plausible("a magnet, or a hand, in place of a stud", times(0.2, 1)),
-    )  # fmt: skip
+    mounting_Hz: float = number(25000.0, "(0, 1e6]", "mounting resonance", "usual: on a stud")
     mounting_damping_ratio: float = number(0.03, "(0, 0.99]", "damping ratio of the mounting")
     range_m_per_s2: float = number(
         490.0, "(0, 1e6]", "range of the sensor; the signal is clipped beyond it", "usual: 50 g"
     )
     noise_m_per_s2: float = number(
-        0.0015, "[0, 1e6]", "rms of white noise up to half the rate", "usual: piezoelectric",
-        plausible=Plausible("cables, and a plant's own noise", times(1, 30)),
-    )  # fmt: skip
+        0.0015, "[0, 1e6]", "rms of white noise up to half the rate", "usual: piezoelectric"
+    )
     speed_jitter: float = number(
         0.0, "[0, 0.1]",
         "rms of the speed's relative deviation; drawn once a revolution and smooth between: 0.93 "

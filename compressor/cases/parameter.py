@@ -23,7 +23,6 @@ from typing import (
     Any,
     Generic,
     Literal,
-    NamedTuple,
     TypeVar,
     dataclass_transform,
     get_args,
@@ -40,6 +39,7 @@ from pydantic import (
 )
 
 from compressor.cases.card import CardError, mark_card
+from compressor.cases.plausible import PLAUSIBLE, Plausible
 from compressor.metrics import METRICS
 from compressor.program import CompsimError, did_you_mean
 
@@ -197,42 +197,6 @@ def to_si(value: float, unit: str) -> float:
     """
     numerator, denominator = UNITS[unit]
     return value * numerator / denominator
-
-
-class Span(NamedTuple):
-    """Two numbers that a value may well be: factors of it, or values in the case file's unit."""
-
-    low: float
-    high: float
-    are_factors: bool = True
-
-    def ends(self, value: float) -> list[float]:
-        """Return the two values around one, those that are not the value itself."""
-        each = [self.low * value, self.high * value] if self.are_factors else [self.low, self.high]
-        return [end for end in each if abs(end - value) > 1e-9 * abs(value)]
-
-    def __str__(self) -> str:
-        return f"{self.low:g} to {self.high:g}" + " times" * self.are_factors
-
-
-times = Span  # a span of factors
-from_to = partial(Span, are_factors=False)  # a span of values in the case file's unit
-
-
-class Plausible(NamedTuple):
-    """How far a number of a plant's machine may be from what a case has, and why.
-
-    `left_out`: where the file does not give it. `given`: where it does, of what a plant can only
-    guess; None of what is known where it is given. `compsim explain --models` varies both.
-    """
-
-    why: str
-    left_out: Span
-    given: Span | None = None
-
-    def __str__(self) -> str:
-        also = f"; given, {self.given}" if self.given else ""
-        return f"{self.left_out}{', given or not' if self.given == self.left_out else also}"
 
 
 # kind -> what it may be beside the words of its row: for a table, and in an error
@@ -636,6 +600,7 @@ def rows_of(
     optional = NoneType in get_args(annotation or item.type)
     units = [unit for name in key.split(".") if (unit := split_unit(name)[1])]
     shared = {"optional": optional and bool(whole), "unit": units[-1] if units else ""}
+    shared["plausible"] = PLAUSIBLE.get(key)
     for part, row in item.metadata.get("parts", whole).items():
         default = getattr(item.default, part, None) if part else item.default
         name = f"{key}.{part}" if part else key
@@ -705,7 +670,6 @@ def describe_fields(group: type) -> str:
         readers = dict.fromkeys(one.readers for one in rows if one.read)
         notes = f" Judged on {row.judged_on}." if row.judged else ""
         notes += f" Read with {'; or '.join(readers)}." if readers else ""
-        notes += f" Plausible: {row.plausible} ({row.plausible.why})." if row.plausible else ""
         lines.append(
             f"- `{item.name}`: {phrase}. Needs {needed}; default {default} ({row.source}).{notes}"
         )
