@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from compressor.cases.case import Case
-from compressor.cases.load import load_cases
 from compressor.cases.parameter import ACCURACY, CaseError, to_si
 from compressor.cases.table import table
 from compressor.program import CompsimError
@@ -241,8 +240,6 @@ def test_any_number_is_either_refused_or_reads_back(joint, numbers):
     [
         (simulate, None),
         (simulate, {}),
-        (load_cases, None),
-        (load_cases, 3),
         (Case.from_attribute, "{"),
         (Case.from_attribute, None),
         (Case.from_attribute, "[" * 10**5),
@@ -251,10 +248,3 @@ def test_any_number_is_either_refused_or_reads_back(joint, numbers):
 def test_values_of_another_kind_are_told(call, value):
     with pytest.raises(CompsimError, match="needs "):
         call(value)
-
-
-@pytest.mark.parametrize("text", ["5e-324", "1e-400", "1e-310"])
-def test_a_clearance_that_no_float_can_hold_in_metres_is_refused(text, tmp_path):
-    (tmp_path / "tiny.yaml").write_text(f"joint: big_end\nclearance_mm: {text}\n")
-    with pytest.raises(CompsimError, match="is too small to differ from 0: write 0, or a larger"):
-        load_cases(tmp_path / "tiny.yaml")
