@@ -182,7 +182,11 @@ stroke, 240 mm
         >>> case.machine.speed_rpm
         700.0
         """
-        return cls._of_values(values)
+        case = cls.resolve(values)
+        written = expand_synonyms(values)[0]
+        if unread := [*unread_values(case, values_given(written), find_given(written))]:
+            raise CaseError(name_as_written(written, unread))
+        return case
 
     @classmethod
     def resolve(cls, values: Mapping[str, Any]) -> "Case":
@@ -191,15 +195,10 @@ stroke, 240 mm
         Such are those of a job of a sweep over loads or laws, and what an older program has stored.
         Raises CaseError with everything else that is wrong.
         """
-        return cls._of_values(values, lenient=True)
-
-    @classmethod
-    def _of_values(cls, values: Mapping[str, Any], lenient: bool = False) -> "Case":
         if not isinstance(values, Mapping):
             message = f"needs a mapping of keys, such as {EXAMPLE}, not {quote_value(values)}"
             raise CaseError([Problem("", message)])
         whole, problems = plain_values(values)
-        given = find_given(whole)
         case = None
         try:
             case = adapter_of_case().validate_python(whole)
@@ -207,13 +206,9 @@ stroke, 240 mm
             problems += problems_of(error, whole, table(), describe_wrong)
             if any(one["type"] != "value_error" or len(one["loc"]) for one in error.errors()):
                 raise CaseError(name_as_written(whole, problems)) from None
-        problems += given_conflicts(str(whole.get("joint", "none")), given)
+        problems += given_conflicts(str(whole.get("joint", "none")), find_given(whole))
         if case is None or problems:
             raise CaseError(name_as_written(whole, problems), is_misfit=True)
-        if not lenient:
-            values = values_given(expand_synonyms(values)[0])
-            if unread := [*unread_values(case, values, given)]:
-                raise CaseError(name_as_written(whole, unread))
         return case
 
     def __post_init__(self) -> None:

@@ -21,7 +21,6 @@ from compressor.program import CompsimError, printable
 SEPARATORS = {";": "semicolon", "\t": "tab", ",": "comma", " ": "blanks"}
 DECIMALS = {".": "point", ",": "comma"}
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-PLAIN = re.compile(r"[0-9.eE+\-\n]*")  # cells in which float() reads what `NUMBER` does
 NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"),
          (codecs.BOM_UTF16_BE, "utf-16"))  # fmt: skip
@@ -90,21 +89,10 @@ class TextTable:
             lines.append(line)
             for text, column in zip(texts, cells_of, strict=True):
                 column.append(text)
-        columns = zip(numbers, cells_of, strict=True)
-        return lines, [self._column(texts, lines, at) for at, texts in columns]
-
-    def _column(self, texts: list[str], lines: Sequence[int], column: int) -> list[float]:
-        """Return cells as numbers: all at once where they are plain, else one by one."""
-        whole = "\n".join(texts)
-        if self.decimal == ",":
-            whole = whole.replace(".", "_").replace(",", ".")  # as `parse_number` does
-        if PLAIN.fullmatch(whole):
-            with contextlib.suppress(ValueError):
-                values = [float(text) for text in whole.split("\n")] if texts else []
-                if all(map(math.isfinite, values)):
-                    return values
-        rows = zip(texts, lines, strict=True)
-        return [self._number(text, line, column) for text, line in rows]
+        return lines, [
+            [self._number(text, line, at) for text, line in zip(texts, lines, strict=True)]
+            for at, texts in zip(numbers, cells_of, strict=True)
+        ]
 
     def _number(self, text: str, line: int, column: int) -> float:
         """Return a cell as a finite number. Raises TextTableError."""
@@ -177,8 +165,6 @@ def open_text_table(
 def decode_text(path: str | Path, data: bytes) -> tuple[str, str]:
     """Return a text and its encoding: UTF-8, UTF-16, or else Latin 1. Raises TextTableError."""
     encoding = next((name for mark, name in MARKS if data.startswith(mark)), "")
-    if not encoding and b"\0" in data[:200]:
-        encoding = "utf-16-le" if data[1:2] == b"\0" else "utf-16-be"
     try:
         text, encoding = data.decode(encoding or "utf-8"), encoding or "utf-8"
     except UnicodeDecodeError as error:
