@@ -18,7 +18,6 @@ from functools import lru_cache, partial
 from inspect import cleandoc
 from types import NoneType
 from typing import (
-    TYPE_CHECKING,
     Annotated,
     Any,
     Generic,
@@ -467,15 +466,13 @@ def problems_of(
             continue
         if not one["loc"]:
             raise cause  # an error of the program's own
-        key, named, value, rest = "", "", values, [*map(str, one["loc"])]
+        key, value, rest = "", values, [*map(str, one["loc"])]
         while rest and (inner := f"{key}.{rest[0]}".lstrip(".")) in known:
             if kind in NAMED_WRONGLY and not rest[1:]:
                 break
-            if isinstance(value, Mapping | BY_PART):  # no value that stands for all parts
-                named = inner
             key, value, rest = inner, _value_under(value, rest[0]), rest[1:]
         if key in rows:
-            found[rows[key].problem(named, value, rest, str(cause))] = None
+            found[rows[key].problem(key, value, rest, str(cause))] = None
         elif parts := {name: row for name in PART_WORDS if (row := rows.get(f"{key}.{name}"))}:
             found[_problem_of_parts(key, value, parts, str(cause))] = None
         elif kind in NAMED_WRONGLY:
@@ -517,37 +514,31 @@ def _value_under(value: Any, name: str) -> Any:
     return next((inner for known, inner in value.items() if str(known) == name), None)
 
 
-if TYPE_CHECKING:
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+def make_group(cls: type[Group]) -> type[Group]:
+    """Return a group of keys as a frozen dataclass that pydantic checks as it is made.
 
-    @dataclass_transform(frozen_default=True, field_specifiers=(field,))
-    def make_group(cls: type[Group]) -> type[Group]: ...
+    A group of wrong values raises CaseError with everything that is wrong. Its docstring has
+    its fields.
+    """
+    own = dict(cls.__annotations__)
+    for name, item in vars(cls).items():
+        if isinstance(item, dataclasses.Field):
+            cls.__annotations__[name] = annotation_of_field(name, item, own[name])
+    made: Any = pydantic.dataclasses.dataclass(frozen=True, config=ConfigDict(extra="forbid"))(cls)
+    rows = {row.key: row for item in fields(made) for row in rows_of(item.name, item)}
+    validate = made.__init__
 
-else:
+    def __init__(self: Any, *args: Any, **values: Any) -> None:
+        try:
+            validate(self, *args, **values)
+        except ValidationError as error:
+            raise CaseError(problems_of(error, values, rows)) from None
 
-    def make_group(cls):
-        """Return a group of keys as a frozen dataclass that pydantic checks as it is made.
-
-        A group of wrong values raises CaseError with everything that is wrong. Its docstring has
-        its fields.
-        """
-        own = dict(cls.__annotations__)
-        for name, item in vars(cls).items():
-            if isinstance(item, dataclasses.Field):
-                cls.__annotations__[name] = annotation_of_field(name, item, own[name])
-        made = pydantic.dataclasses.dataclass(frozen=True, config=ConfigDict(extra="forbid"))(cls)
-        rows = {row.key: row for item in fields(made) for row in rows_of(item.name, item)}
-        validate = made.__init__
-
-        def __init__(self, *args, **values):
-            try:
-                validate(self, *args, **values)
-            except ValidationError as error:
-                raise CaseError(problems_of(error, values, rows)) from None
-
-        made.__init__ = __init__
-        made.__annotations__ = own
-        made.__doc__ = describe_fields(made)
-        return made
+    made.__init__ = __init__
+    made.__annotations__ = own
+    made.__doc__ = describe_fields(made)
+    return made
 
 
 def annotation_of_field(name: str, item: Any, own: Any) -> Any:

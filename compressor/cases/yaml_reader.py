@@ -7,7 +7,6 @@ reading goes on; broken syntax, aliases and tags end it.
 
 import math
 import re
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -91,7 +90,9 @@ def read_file(path: str) -> Read:
         with open(path, "rb") as file:
             data = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
-        return None, [FileProblem(Place(path), "", _tell_unreadable(path, error))]
+        message = f"cannot be read: {getattr(error, 'strerror', None) or error}"
+        hint = f"; {START}" * isinstance(error, FileNotFoundError)
+        return None, [FileProblem(Place(path), "", message + hint)]
     if len(data) > MAX_BYTES:
         return None, [FileProblem(Place(path), "", "is larger than 1 MiB: no case file")]
     try:
@@ -100,15 +101,6 @@ def read_file(path: str) -> Read:
         place = _place_after(path, data[: error.start].decode())
         return None, [FileProblem(place, "", "is not UTF-8 text; a case file is YAML")]
     return read_text(text, Place(path, 1, 1))
-
-
-def _tell_unreadable(path: str, error: OSError | ValueError) -> str:
-    """Return why a file cannot be read, and what to give in its place."""
-    message = f"cannot be read: {getattr(error, 'strerror', None) or error}"
-    if isinstance(error, IsADirectoryError):
-        files = f"{shlex.quote(path.rstrip('/'))}/*.yaml"
-        return f"{message}; give the files in it, compsim run {files}"
-    return f"{message}; {START}" if isinstance(error, FileNotFoundError) else message
 
 
 def read_text(text: str, start: Place) -> Read:
