@@ -6,7 +6,6 @@ import json
 import os
 import shutil
 import signal
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -122,18 +121,6 @@ def once(tmp_path_factory):
         return base / name
 
     return made
-
-
-@pytest.fixture
-def ncdump():
-    """Calls ncdump and returns what it prints; the test is skipped where that is not installed."""
-    if not shutil.which("ncdump"):
-        pytest.skip("ncdump is not installed (Debian: netcdf-bin)")
-    return lambda *words: (
-        subprocess.run(
-            ["ncdump", *map(str, words)], capture_output=True, text=True, check=True
-        ).stdout
-    )
 
 
 @pytest.fixture
