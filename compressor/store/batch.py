@@ -265,9 +265,10 @@ def read_series(
             if "sample" in dims and name not in ABSCISSAE:  # stored as doubles beside others
                 singles = np.char.find(read_bytes(file["kept"]), b"double") < 0
             dims = [DIMENSIONS.get(dim, dim) for dim in dims]
+            source = data[()] if len(rows) == len(data) else data  # one read for all jobs
             for one, row in zip(found, rows, strict=True):
                 if row not in absent:
-                    values = data[(row, *(slice(int(count[row])) for count in counts))]
+                    values = source[(row, *(slice(int(count[row])) for count in counts))]
                     kind = np.dtype("f4") if singles[row] else data.dtype
                     one[name] = Variable(tuple(dims), values.astype(kind, copy=False), attrs)
     return found

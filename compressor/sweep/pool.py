@@ -115,8 +115,8 @@ class Batches:
         Jobs may wait again after that.
         """
         size = self.target_seconds / max(self.mean, 1e-9) if self.weight else 1.0
-        if self.left:
-            size = min(size, self.left / (2 * self.width))
+        if self.left:  # an eighth is enough to end together, and leaves few small files
+            size = max(size / 8, min(size, self.left / (2 * self.width)))
         count = min(max(1, math.ceil(size)), MAX_BATCH)
         if not self.waiting:
             new = [Job(*job) for job in itertools.islice(self.source, count)]

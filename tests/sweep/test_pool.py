@@ -88,7 +88,7 @@ def test_batches_take_their_time_and_are_small_at_first_and_towards_the_end():
     while batch := batches.next():
         sizes.append(len(batch))
     assert sizes[0] == 10
-    assert sizes[-1] == 1
+    assert sizes[-1] <= 2
     assert sizes == sorted(sizes, reverse=True)
     assert sum(sizes) == 99
 
