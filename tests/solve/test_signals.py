@@ -1,7 +1,6 @@
 """Forces on the frame: Newton's law of all moving parts, closed forms, energy, and the store."""
 
 import json
-import math
 
 import numpy as np
 import pytest
@@ -174,27 +173,6 @@ def test_a_sweep_of_metrics_keeps_no_series_of_body_and_signals(tmp_path, monkey
     assert np.isfinite(open_study(tmp_path / "results")["peak_rod_load_tension"].values).all()
     assert counted() == 2  # the series; signals stay
     assert counted(signals=True) == 0
-
-
-def test_a_stored_job_without_signals_runs_again_for_them(tmp_path, monkeypatch, in_process):
-    monkeypatch.chdir(tmp_path)
-    brief = {"duration_rev": 0.25, "settle_rev": 0, "output_step_deg": 0.9, "accuracy": "draft"}
-
-    def counted(**output):
-        values = {"joint": "big_end", "clearance_mm": [0.1, 0.2], "solve": brief}
-        (tmp_path / "s.yaml").write_text(json.dumps({**values, "output": output}))
-        found = sweep(load_studies(tmp_path / "s.yaml"), tmp_path / "results")
-        return found.run_now
-
-    assert counted() == 2
-    assert counted(signals=True) == 2
-    assert counted(signals=True) == 0
-    assert counted() == 0
-    study = open_study(tmp_path / "results")
-    assert {*SIGNALS} <= {*study.variables}
-    assert study["shaking_force"].dims == ("clearance_mm", "time", "axis")
-    assert math.isfinite(float(study["crank_torque"].sum()))
-    assert counted(signals=True, precision="double") == 0
 
 
 def test_cases_that_share_a_job_keep_what_both_ask_for(tmp_path):
