@@ -466,13 +466,15 @@ def problems_of(
             continue
         if not one["loc"]:
             raise cause  # an error of the program's own
-        key, value, rest = "", values, [*map(str, one["loc"])]
+        key, named, value, rest = "", "", values, [*map(str, one["loc"])]
         while rest and (inner := f"{key}.{rest[0]}".lstrip(".")) in known:
             if kind in NAMED_WRONGLY and not rest[1:]:
                 break
+            if isinstance(value, Mapping | BY_PART):  # no value that stands for all parts
+                named = inner
             key, value, rest = inner, _value_under(value, rest[0]), rest[1:]
         if key in rows:
-            found[rows[key].problem(key, value, rest, str(cause))] = None
+            found[rows[key].problem(named, value, rest, str(cause))] = None
         elif parts := {name: row for name in PART_WORDS if (row := rows.get(f"{key}.{name}"))}:
             found[_problem_of_parts(key, value, parts, str(cause))] = None
         elif kind in NAMED_WRONGLY:

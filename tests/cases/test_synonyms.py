@@ -1,9 +1,6 @@
 """Words of the trade: doubles of our keys are read, other units are answered with the number."""
 
-from dataclasses import replace
-
 import pytest
-from conftest import refused
 
 from compressor.cases.case import Case
 from compressor.cases.checks import DOUBLES
@@ -51,18 +48,3 @@ def test_a_block_and_the_command_line_replace_either_word(read):
     assert study.cases[0].machine.crank_radius_mm == 100
     study = read("load: none\nmachine: {stroke_mm: 200}", "machine.crank_radius_mm=80")
     assert study.cases[0].machine.crank_radius_mm == 80
-
-
-@pytest.mark.parametrize(("older", "word"), [("design", "spring"), ("typical", "gas")])
-def test_a_load_has_the_paper_s_word(read, older, word):
-    values = {"joint": "both", "clearance_mm": 0.2}
-    one, other = (Case.from_values({**values, "load": load}) for load in (older, word))
-    assert one == other == replace(Case.from_values(values), load=older)
-    assert one.load == word
-    text = one.attributes()["case"].replace(f'"load": "{word}"', f'"load": "{older}"')
-    assert older in text
-    assert Case.from_attribute(text) == one
-    study = read(f"load: [none, {older}]")
-    assert study.axes[0].values == ("none", word)
-    assert read(f"load: [none, {older}]\nexclude: load == {older}").jobs == 1
-    assert "twice" in refused(read, f"load: [{older}, {word}]")[0]
