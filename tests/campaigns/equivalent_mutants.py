@@ -4,10 +4,6 @@
 """
 
 EQUIVALENT: dict[str, str] = {
-    "rosenbrock.py, factorize: abs(matrix[i, j]) > abs(matrix[best, j]) -> "
-    "abs(matrix[i, j]) >= abs(matrix[best, j])": (
-        "of two equally large pivots either may be taken"
-    ),
     "contact_laws.py, solve_rising: rising(middle) < value -> rising(middle) <= value": (
         "where a middle has the value itself, both ends close in on it"
     ),
