@@ -7,6 +7,7 @@ reading goes on; broken syntax, aliases and tags end it.
 
 import math
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -92,6 +93,8 @@ def read_file(path: str) -> Read:
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         message = f"cannot be read: {getattr(error, 'strerror', None) or error}"
         hint = f"; {START}" * isinstance(error, FileNotFoundError)
+        if isinstance(error, IsADirectoryError):
+            hint = f"; give the files in it, compsim run {shlex.quote(path.rstrip('/'))}/*.yaml"
         return None, [FileProblem(Place(path), "", message + hint)]
     if len(data) > MAX_BYTES:
         return None, [FileProblem(Place(path), "", "is larger than 1 MiB: no case file")]
