@@ -33,7 +33,7 @@ def test_points_are_jobs_over_what_matters_most():
     assert one["a job"].jobs == tuple(f"k{n}" for n in range(60))
     assert (
         found["points"].caption
-        == "Every metric over the key that matters most for it, a point a job."
+        == "Every metric over the key that matters most for each, a point a job."
     )
 
 

@@ -160,7 +160,6 @@ def scale_map(scale: Scale, axis: PlottedAxis, words: Sequence[str]) -> None:
 COLUMNS = 4
 MAIN, TOTAL = "by itself (main effect)", "with its interactions (total effect)"
 RANK = "correlation of ranks"
-UNSURE = "whose intervals overlap"
 FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning
 Ranking = dict[Measure, Effects]
 
@@ -265,55 +264,18 @@ def part(effects: Effects, axis: int, name: str) -> tuple[float, float, float]:
     return float(values[axis]) * factor, float(low), float(high)
 
 
-def describe_ranking(sweep: PlottedSweep, found: Ranking) -> str:
-    """Return the strongest axis of each measure, a sentence an axis: how much it explains.
+def spell_strongest(sweep: PlottedSweep, effects: Effects) -> str:
+    """Return the two strongest axes and what each does, with its interval where it has one.
 
-    Or the axes that may be strongest.
+    A share of the spread, cut where sampling has it below 0 or above 1, or a correlation.
     """
-    groups: dict[tuple[int, ...], list[str]] = {}
-    for measure, effects in found.items():
-        group = groups.setdefault(tuple(first_ones(effects)), [])
-        strength = describe_strength(effects)
-        if effects.total is None:
-            group.append(f"{measure.title} ({strength})")
-            continue
-        what = "that" if group else "the spread"
-        group.append(f"{strength} of {what} of {measure.title}")
-    verb = "explains" if any(one.total is not None for one in found.values()) else "matters most"
-    parts = []
-    for axes, metrics in groups.items():
-        names = " or ".join(sweep.axes[n].phrase for n in axes)
-        unsure = "" if len(axes) == 1 else f" ({UNSURE})"
-        link = " for" if verb == "matters most" else " most:" if unsure else ""
-        text = f"{names[0].upper()}{names[1:]}{unsure} {verb}{link} {'; '.join(metrics)}."
-        parts.append(text)
-    return " ".join(parts)
-
-
-def first_ones(effects: Effects) -> list[int]:
-    """Return the strongest axis, and those whose intervals reach its own."""
-    first, *others = order_of(effects)
-    return [first, *(n for n in others if reaches(effects, n, first))]
-
-
-def reaches(effects: Effects, weaker: int, stronger: int) -> bool:
-    """Return whether the interval of an axis' strength overlaps that of a stronger one."""
-    ends = effects.main_ends if effects.total is None else effects.total_ends
-    if ends is None or np.isnan(ends[:, [weaker, stronger]]).any():
-        return False
-    low, high = ends[:, stronger]
-    least = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
-    return bool(abs(ends[:, weaker]).max() >= least)
-
-
-def describe_strength(effects: Effects) -> str:
-    """Return the strongest axis' share of the variance, or its correlation, in words."""
-    first = order_of(effects)[0]
-    if effects.total is None:
-        return f"{effects.main[first]:.2f}".replace("-", "−")
-    return share(float(effects.total[first]))
-
-
-def share(value: float) -> str:
-    """Return a share in percent; what is below 0 or above 1 by sampling is cut."""
-    return f"{100.0 * min(max(value, 0.0), 1.0):.0f} %"
+    form, sign = (".2f", "") if effects.total is None else (".0f", " %")
+    texts = []
+    for axis in order_of(effects)[:2]:
+        ends = part(effects, axis, RANK if effects.total is None else TOTAL)
+        value, low, high = (
+            f"{np.clip(end, -100.0 if not sign else 0.0, 100.0):{form}}" for end in ends
+        )
+        between = "" if math.isnan(ends[1]) else f" ({low} to {high})"
+        texts.append(f"{sweep.axes[axis].phrase} {value}{between}{sign}")
+    return ", ".join(texts).replace("-", "−")
