@@ -109,7 +109,8 @@ def _single_value(row: Parameter) -> Schema:
     """Return the schema of one value of a parameter."""
     if row.kind == "text":
         return {"type": "string", "pattern": rf"^(?!\.){NAME.pattern}$"}
-    return adapter_of(replace(row, optional=False)).json_schema()
+    words = (*row.choices, *(alias for alias, _ in row.aliases))
+    return adapter_of(replace(row, optional=False, choices=words)).json_schema()
 
 
 def _forms() -> Schema:

@@ -9,7 +9,7 @@ import itertools
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from compressor.cases.blocks import Block, plan_block, read_own
@@ -103,7 +103,12 @@ def load_studies(
         problems += wrong
         studies += [study] if study else []
         blocks += found
-    problems += _find_unread(blocks, bool(changes.values))
+    unread = _find_unread(blocks)
+    if changes.values and any(place.line for place, _ in unread):
+        # what the command line takes the reader from is the file's, and no mistake of it
+        alone = _find_unread(_blocks_alone(files, max_jobs))
+        unread = {at: one for at, one in unread.items() if not at[0].line or at in alone}
+    problems += unread.values()
     if not problems and not any(study.selected for study in studies):
         problems.append(FileProblem(selection, "", NONE_SELECTED))
     if problems:
@@ -332,22 +337,22 @@ def _check_cases(
 Where = tuple[Place, str]  # a key of a file, which may be given for several blocks or files
 
 
-def _find_unread(blocks: Sequence[Block], are_changed: bool) -> list[FileProblem]:
-    """Return the keys that no job reads of those that they are given for.
+def _blocks_alone(files: Sequence[CaseFile], max_jobs: int) -> list[Block]:
+    """Return the blocks that files have without the command line; none of a file that is wrong."""
+    plain = [replace(file, changes=Tree({}, {}), problems=[]) for file in files]
+    found = [_study(file, max_jobs, None, no_progress)[1] for file in plain]
+    return [block for blocks in found for block in blocks]
 
-    are_changed: whether the command line changes them; then of its own keys alone.
-    """
+
+def _find_unread(blocks: Sequence[Block]) -> dict[Where, FileProblem]:
+    """Return the keys that no job reads of those that they are given for."""
     read: set[Where] = set()
     unread: dict[Where, FileProblem] = {}
     for block in blocks:
         some, none = _read_in(block, read)
         read |= some
         unread |= none
-    return [
-        problem
-        for where, problem in unread.items()
-        if where not in read and not (are_changed and where[0].line)
-    ]
+    return {where: problem for where, problem in unread.items() if where not in read}
 
 
 def _read_in(block: Block, known: set[Where]) -> tuple[set[Where], dict[Where, FileProblem]]:

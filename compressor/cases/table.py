@@ -40,6 +40,7 @@ TOP: dict[str, Any] = {
     ),
     "load": choice(
         "spring", ("spring", "gas", "none"), "load on the piston", "§2.2-2.4",
+        aliases=(("design", "spring"), ("typical", "gas")),
     ),
     "joint": choice(
         "none", ("none", "big_end", "small_end", "both"), "joints with clearance", "§3.2"

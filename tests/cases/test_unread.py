@@ -247,7 +247,7 @@ def with_value(where: dict, key: str, value: object) -> dict:
 @cache
 def stored(text: str) -> dict[str, str]:
     """Return what is stored of a case by name; of one with wear, of its first two stages too."""
-    case = Case._of_values(json.loads(text), lenient=True)
+    case = Case.resolve(json.loads(text))
     run = simulate(case)
     found = {name: repr(item.values.tolist()) for name, item in run.variables.items()}
     del found["seconds"]

@@ -83,8 +83,8 @@ MISTAKES = [
     ("init wear", "wear.yaml exists, and is not overwritten: compsim init wear -o OTHER.yaml"),
     # folders of results
     ("status -r resluts", "resluts: there is no such folder of results; did you mean results?"),
-    ("verify -r again", "again: holds no study; did you mean results?"),
-    ("report -r results/batches", "did you mean results?"),
+    ("verify -r again", "again: holds no study; choose another folder"),
+    ("report -r results/batches", "holds no study; choose another folder"),
     ("status -r wear.yaml", "Folder 'wear.yaml' is a file"),
     ("report -o READONLY", "nothing may be written to READONLY", "another folder"),
     ("export -o READONLY/all.csv", "nothing may be written to READONLY", "another folder"),
