@@ -126,7 +126,7 @@ TABLE = (
         # journal and bore move alike in a machine without clearance, so that it is 0 there
         "knock", ("joint",), "1",
         "force of the hardest blow of a journal on its bore over the greatest joint force; above "
-        f"{KNOCKS:g} the joint knocks", "journal_acceleration", Bar(path=1.0, relative=False),
+        f"{KNOCKS:g} the joint knocks", "contact_force", Bar(relative=False),
         shown=Shown(f"knock (above {KNOCKS:g} it knocks)", ""), contact=True, kind="greatest",
         limit=KNOCKS, made=lambda t: t.ratio(t.blow, t.greatest("FORCE_SIZE", 2)),
     ),

@@ -224,10 +224,9 @@ def repeats(
     turns = [samples[k * per_rev : (k + 1) * per_rev] for k in range(count)]
 
     def is_same(k: int, period: int) -> bool:
-        apart = distances(turns[k], turns[k + period])
         return all(
-            (apart[name] <= 2.0 * np.asarray(error) + SAME_REVOLUTION).all()
-            for name, error in errors.items()
+            (distance <= 2.0 * np.asarray(errors[name]) + SAME_REVOLUTION).all()
+            for name, distance in distances(turns[k], turns[k + period]).items()
         )
 
     repetition = find_repetition(count, count // 2, is_same)

@@ -26,8 +26,6 @@ COLUMN = {"contact_force": Column.FORCE, "rod_load": Column.FORCE + 2}  # others
 COMPARED_PER_REV = 150  # times a revolution at which two runs are compared
 SAMPLES_PER_BAND = 2.56  # samples of the forces in a period of the highest frequency requested
 SAMPLES_PER_PERIOD = 24  # samples of the forces in one of the body's fastest motion
-# observed for the bars of metrics alone: dimensions
-BARRED = {"journal_acceleration": ("joint",)}
 MIN_COMPARED, MAX_COMPARED = 64, 20_000  # of these times over a settled part
 
 
@@ -109,11 +107,11 @@ def compared_per_rev(case: Case) -> int:
 def distances(ours: np.ndarray, theirs: np.ndarray) -> Metrics:
     """Return the relative L2 distance of each time series of two runs, by joint where it has one.
 
-    And of `BARRED`. A vector's squares are one sum; 0 where both are 0.
+    A vector's squares are one sum; 0 where both are 0.
     """
     error, size = (np.einsum("ij,ij->j", rows, rows).tolist() for rows in (ours - theirs, ours))
     found = {}
-    for name, dims in ({name: dims for name, (dims, *_) in SERIES.items()} | BARRED).items():
+    for name, (dims, _, _) in SERIES.items():
         first, count = column_of(name), math.prod(SIZES[dim] for dim in dims)
         each = count // SIZES["joint"] if "joint" in dims else count
         parts = [slice(k, k + each) for k in range(first, first + count, each)]

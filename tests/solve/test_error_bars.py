@@ -21,7 +21,6 @@ from compressor.solve.error_bars import (
     ratio_of,
     series_errors,
 )
-from compressor.solve.series import BARRED
 from compressor.solve.si_record import record
 from compressor.solve.simulate import measure, simulate
 from compressor.solve.solution import solve
@@ -33,7 +32,6 @@ BOTH = {"joint": "both", "clearance_mm": 0.2}
 EIGHT = random_cases(8)
 ERRORS = [f"{name}_error" for name in (*METRICS, *SERIES)]
 APART = {name: np.zeros(2) if "joint" in dims else 0.0 for name, (dims, _, _) in SERIES.items()}
-APART |= {name: np.zeros(2) for name in BARRED}
 
 
 def run(values, **solve):
