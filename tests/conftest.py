@@ -73,7 +73,7 @@ TOGETHER = {
 # once: the march, chosen laws, mechanisms
 LONG = (
     "physics/test_march", "physics/test_contact_laws", "solve/test_chosen_laws",
-    "solve/test_feature_runs", "sweep/test_cluster", "sweep/test_execution",
+    "solve/test_feature_runs", "sweep/test_cluster",
     "report/test_report", "cases/test_card", "campaigns/test_chaos_files", "cmd/test_cli",
     "sweep/test_sweep", "solve/test_integrate", "test_newcomer", "store/test_damage",
     "studies/follow/test_lyapunov", "test_systems", "studies/compare/test_compare",

@@ -115,10 +115,12 @@ def read_overrides(texts: Sequence[str]) -> tuple[Tree, list[FileProblem]]:
             message = "needs the form key=value, such as joint=both"
             problems.append(FileProblem(place, "", message))
             continue
+        if path in values:
+            problems.append(FileProblem(place, key, "is set twice"))
         tree, wrong = read_text(value, place)
         problems += wrong
         if tree:
-            values = {one: v for one, v in values.items() if one != path} | {path: tree.values}
+            values[path] = tree.values
             places |= {path + inner: spots for inner, spots in tree.places.items()}
             places |= {path[:n]: (place, place) for n in range(1, len(path))}
     return Tree(values, places), problems

@@ -83,6 +83,7 @@ MISTAKES = [
     ("init wear", "wear.yaml exists, and is not overwritten: compsim init wear -o OTHER.yaml"),
     # folders of results
     ("status -r resluts", "resluts: there is no such folder of results; did you mean results?"),
+    ("plan wear.yaml --set joint=both --set joint=none", "--set joint=none: joint: is set twice"),
     ("verify -r again", "again: holds no study; choose another folder"),
     ("report -r results/batches", "holds no study; choose another folder"),
     ("status -r wear.yaml", "Folder 'wear.yaml' is a file"),

@@ -3,6 +3,6 @@
 from compressor.report.figures.diagnosis import Shakings, measure_shaking
 from compressor.report.figures.drawing import Drawing
 from compressor.report.figures.rows import SweptRow
-from compressor.report.figures.table import FIGURES, Figure, Shown
+from compressor.report.figures.table import FIGURES, DrawnFigure, Figure
 
 FIGURES["paper"] = dict(sorted(FIGURES["paper"].items()))  # by number, whatever function they share

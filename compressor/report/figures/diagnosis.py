@@ -39,7 +39,7 @@ from compressor.report.figures.job import (
 from compressor.report.figures.paper import AT, sizes
 from compressor.report.figures.rows import SweptRow, plot_modes, rows_modes
 from compressor.report.figures.style import BLUE, BY_CLEARANCE, GOLD, IDEAL, RED, LineStyle, fill
-from compressor.report.figures.table import Shown, figure, spell
+from compressor.report.figures.table import DrawnFigure, figure, spell
 
 Shakings = Mapping[str, Shaking]  # by label of the paper's cases
 
@@ -60,7 +60,7 @@ def measure_shaking(runs: Runs) -> Shakings:
 
 
 @figure("diagnosis", "diagnosis-spectra", "Diagnosis 1: orders of the force on the frame", *NEEDS)
-def draw_spectra(runs: Runs) -> Shown:
+def draw_spectra(runs: Runs) -> DrawnFigure:
     """Return X over orders: healthy, and each joint at the greatest clearance.
 
     Rms over clearance.
@@ -102,11 +102,11 @@ def draw_spectra(runs: Runs) -> Shown:
                 spell(forces, "N"),
             )
         )
-    return Shown(figure, sentence, numbers)
+    return DrawnFigure(figure, sentence, numbers)
 
 
 @figure("diagnosis", "diagnosis-orbits", "Diagnosis 2: orbits of the journals", *NEEDS)
-def draw_orbits(runs: Runs) -> Shown:
+def draw_orbits(runs: Runs) -> DrawnFigure:
     """Return the journals' orbits of each joint at three clearances, all to one scale."""
     figure, panels = make_grid(len(SINGLE_FAULTS), len(CLEARANCES), 7.2)
     for row, joint in zip(panels, SINGLE_FAULTS, strict=True):
@@ -131,12 +131,12 @@ def draw_orbits(runs: Runs) -> Shown:
         numbers.append((f"off its wall at the {SPOKEN[joint]}, {AT}", spell(off, "% of the time")))
         laps = [one["laps"] for one in each]
         numbers.append(("turns a revolution, counter-clockwise positive", spell(laps)))
-    return Shown(figure, sentence, numbers)
+    return DrawnFigure(figure, sentence, numbers)
 
 
 @figure("diagnosis", "diagnosis-angles",
         "Diagnosis 3: when the frame shakes, and the contact modes", *NEEDS)  # fmt: skip
-def draw_angles(runs: Runs) -> Shown:
+def draw_angles(runs: Runs) -> DrawnFigure:
     """Return X's high orders and the joints' contact modes over the crank angle."""
     found = measure_shaking(runs)
     figure, panels = make_grid(2 * len(SINGLE_FAULTS), 1, 8.4, heights=(2.6, 1) * 2)
@@ -173,7 +173,7 @@ def draw_angles(runs: Runs) -> Shown:
             ("elsewhere", spell(rest, "N")),
             ("in flight", spell(flight, "% of the time")),
         ]
-    return Shown(figure, sentence, numbers)
+    return DrawnFigure(figure, sentence, numbers)
 
 
 def plot_profiles(panel: Panel, found: Shakings, joint: str) -> None:

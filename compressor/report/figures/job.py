@@ -54,7 +54,7 @@ from compressor.report.figures.style import (
     fill,
     mark,
 )
-from compressor.report.figures.table import Number, Shown, figure, spell, spell_span
+from compressor.report.figures.table import DrawnFigure, Number, figure, spell, spell_span
 from compressor.units import unit_in
 
 # flight, impact, following: lightness 30, 54, 90
@@ -135,7 +135,7 @@ SIGNALS = (
 
 
 @figure("job", "analyst", "a revolution as an analyst reads it")
-def draw_analyst(run: xr.Dataset, twin: Twin) -> Shown:
+def draw_analyst(run: xr.Dataset, twin: Twin) -> DrawnFigure:
     """Return a revolution as an analyst reads it: events, vibration and rod load.
 
     twin: the ideal machine, with the same sensor where the run has one.
@@ -174,7 +174,7 @@ def draw_analyst(run: xr.Dataset, twin: Twin) -> Shown:
     if twin is not None:
         peak, _ = loudest(read_cycle(twin))
         numbers.insert(2, ("greatest without clearance", spell(peak, "m/s²")))
-    return Shown(figure, sentence + film(run) + caution(run), numbers)
+    return DrawnFigure(figure, sentence + film(run) + caution(run), numbers)
 
 
 def number_analyst(found: Cycle, contact: str) -> list[Number]:
@@ -215,7 +215,7 @@ LOADS = (
 
 
 @figure("job", "loads", "gas load, inertia and rod load over crank angle")
-def draw_loads(run: xr.Dataset, twin: Twin) -> Shown:
+def draw_loads(run: xr.Dataset, twin: Twin) -> DrawnFigure:
     """Return the gas load, inertia and rod load over a revolution, with the ideal machine's."""
     figure, panels = make_grid(3, 1, 7.2)
     for one, line, name in ((twin, TWIN, NAMES["twin"]), (run, THIS, NAMES["this"])):
@@ -238,11 +238,11 @@ def draw_loads(run: xr.Dataset, twin: Twin) -> Shown:
         for key, load in read_loads(one)[1].items()
     ]  # fmt: skip
     sentence = "Loads of the last settled revolution over crank angle; tension is positive."
-    return Shown(figure, sentence + caution(run), numbers)
+    return DrawnFigure(figure, sentence + caution(run), numbers)
 
 
 @figure("job", "signals", "acceleration, forces and torque over crank angle")
-def draw_signals(run: xr.Dataset, twin: Twin) -> Shown:
+def draw_signals(run: xr.Dataset, twin: Twin) -> DrawnFigure:
     """Return six panels of a run's last settled revolution, with the ideal machine's."""
     figure, panels = make_grid(3, 2, 8.6)
     for one, line, name in ((twin, TWIN, NAMES["twin"]), (run, THIS, NAMES["this"])):
@@ -269,7 +269,7 @@ def draw_signals(run: xr.Dataset, twin: Twin) -> Shown:
         ideal = last_revolution(twin)[1]["acceleration"].values
         numbers.insert(1, ("without clearance", spell_span(ideal, "m/s²")))
     sentence = "The last settled revolution over crank angle, at stored samples."
-    return Shown(figure, sentence + caution(run), numbers)
+    return DrawnFigure(figure, sentence + caution(run), numbers)
 
 
 def split_events(events: Sequence[tuple[float, str]]) -> dict[str, list[tuple[float, float]]]:
@@ -322,7 +322,7 @@ BY_END = {"head": LineStyle(BLUE, "-", 1.5, 2.3), "crank": LineStyle(RED, "--", 
 
 
 @figure("job", "cards", "indicator cards", "gas")
-def draw_cards(run: xr.Dataset, twin: Twin) -> Shown:
+def draw_cards(run: xr.Dataset, twin: Twin) -> DrawnFigure:
     """Return the pressure in each end over gas volume and over crank angle, a revolution."""
     figure, panels = make_grid(1, 2, 4.6)
     over_volume, over_angle = panels.flat
@@ -348,11 +348,11 @@ def draw_cards(run: xr.Dataset, twin: Twin) -> Shown:
         "Pressure of the gas over its volume and over crank angle, in the last settled revolution, "
         "as it presses on the piston."
     )
-    return Shown(figure, sentence + caution(run), numbers)
+    return DrawnFigure(figure, sentence + caution(run), numbers)
 
 
 @figure("job", "spectra", "order spectra")
-def draw_spectra(run: xr.Dataset, twin: Twin) -> Shown:
+def draw_spectra(run: xr.Dataset, twin: Twin) -> DrawnFigure:
     """Return the order spectra of X and of the crosshead's deviation.
 
     With a sensor, of its envelope.
@@ -385,7 +385,7 @@ def draw_spectra(run: xr.Dataset, twin: Twin) -> Shown:
     if sensor and (text := sensor.report_clipping(clipped)):
         above.append(("record", text))
     sentence = "Peak amplitudes over the settled revolutions."
-    return Shown(figure, sentence + caution(run), above)
+    return DrawnFigure(figure, sentence + caution(run), above)
 
 
 def plot_lines(
@@ -432,7 +432,7 @@ def plot_envelope(
 
 
 @figure("job", "orbits", "orbits of the journals", "clearance")
-def draw_orbits(run: xr.Dataset, twin: Twin) -> Shown:
+def draw_orbits(run: xr.Dataset, twin: Twin) -> DrawnFigure:
     """Return the journal's orbit in each bore with clearance over the last revolution."""
     joints = joints_with_clearance(run)
     figure, panels = make_grid(1, len(joints), 5.4)
@@ -451,7 +451,7 @@ def draw_orbits(run: xr.Dataset, twin: Twin) -> Shown:
             ("turns a revolution, counter-clockwise positive", spell(one["laps"])),
         ]
     sentence = "Journal centres in their bores to scale, in the last settled revolution."
-    return Shown(figure, sentence + film(run) + caution(run), numbers)
+    return DrawnFigure(figure, sentence + film(run) + caution(run), numbers)
 
 
 def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
@@ -477,7 +477,7 @@ def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
 
 
 @figure("job", "modes", "contact modes over crank angle", "clearance")
-def draw_modes(run: xr.Dataset, twin: Twin) -> Shown:
+def draw_modes(run: xr.Dataset, twin: Twin) -> DrawnFigure:
     """Return contact modes over the crank angle, as shares of the revolutions, and penetration."""
     joints = joints_with_clearance(run)
     shares, words = angle_modes(run), OILED_MODES if case_of(run).lubricant else MODES
@@ -501,7 +501,7 @@ def draw_modes(run: xr.Dataset, twin: Twin) -> Shown:
         for joint in joints for mode, word in zip(MODES, words, strict=True)
     ]  # fmt: skip
     sentence = "Contact modes over crank angle; numbers are shares of the settled time."
-    return Shown(figure, sentence + film(run) + caution(run), numbers)
+    return DrawnFigure(figure, sentence + film(run) + caution(run), numbers)
 
 
 def share_turn(panels: Sequence[Panel], step: float = 45.0) -> None:
@@ -542,7 +542,7 @@ def mode_entries(words: Sequence[str] = MODES) -> list[Trace]:
 
 
 @figure("job", "impacts", "contacts that begin, over crank angle", "clearance")
-def draw_impacts(run: xr.Dataset, twin: Twin) -> Shown:
+def draw_impacts(run: xr.Dataset, twin: Twin) -> DrawnFigure:
     """Return the approach speed of the impacts of all settled revolutions over the crank angle.
 
     Of oiled joints, whose film takes the blow, it is that of dry contacts that begin.
@@ -577,4 +577,4 @@ def draw_impacts(run: xr.Dataset, twin: Twin) -> Shown:
     share_turn([panel])
     figure.legend = [one for one in panel.traces if one.name]
     sentence = "Contacts that begin after settling: their approach speed over crank angle."
-    return Shown(figure, sentence + film(run) + caution(run), numbers)
+    return DrawnFigure(figure, sentence + film(run) + caution(run), numbers)

@@ -53,7 +53,7 @@ from compressor.report.figures.style import (
     fill,
     mark,
 )
-from compressor.report.figures.table import Shown, figure, spell
+from compressor.report.figures.table import DrawnFigure, figure, spell
 
 SERIES = ("displacement", "velocity", "acceleration")
 WORDS = "displacement, velocity and acceleration"
@@ -63,7 +63,7 @@ SAME_CURVE = 1e-9  # of a curve's range: what cannot be seen, and is rounding
 
 def paper_figure(
     number: int, title: str, *needs: str, **options: str
-) -> Callable[[Callable[..., Shown]], Callable[..., Shown]]:
+) -> Callable[[Callable[..., DrawnFigure]], Callable[..., DrawnFigure]]:
     """Return a decorator that enters a figure of the paper into the table."""
     return figure("paper", f"figure-{number:02d}", f"Figure {number}: {title}", *needs, **options)
 
@@ -86,7 +86,7 @@ MOTION = (
 
 
 @paper_figure(6, "Response of the design and the typical model", "design", "typical")
-def draw_load_response(runs: Runs) -> Shown:
+def draw_load_response(runs: Runs) -> DrawnFigure:
     """Return figure 6: the design and the typical model without clearance."""
     curves = load_curves(runs)
     figure, panels = make_grid(3, 2, 9.6)
@@ -104,7 +104,7 @@ def draw_load_response(runs: Runs) -> Shown:
     )
     shares = spell(np.where(np.array(away) <= SAME_CURVE, 0.0, 100.0 * np.array(away)))
     numbers = [(f"greatest difference of {WORDS}", f"{shares} % of the range")]
-    return Shown(finish_figure(figure, panels[-1]), sentence, numbers)
+    return DrawnFigure(finish_figure(figure, panels[-1]), sentence, numbers)
 
 
 @paper_figure(8, "Response with clearance at the big end", *sizes("big_end", "design"),
@@ -112,7 +112,7 @@ def draw_load_response(runs: Runs) -> Shown:
 @paper_figure(11, "Response with clearance at the small end", *sizes("small_end", "design"),
               fault="small_end")  # fmt: skip
 @paper_figure(14, "Response with clearance at both joints", *sizes("both", "design"), fault="both")
-def draw_fault_response(runs: Runs, fault: str) -> Shown:
+def draw_fault_response(runs: Runs, fault: str) -> DrawnFigure:
     """Return figure 8, 11 or 14: no clearance, and three clearances of one fault.
 
     Acceleration oscillates fast: it has a row a clearance.
@@ -139,7 +139,7 @@ def draw_fault_response(runs: Runs, fault: str) -> Shown:
     for joint in faulty_joints(fault):
         lost = [100.0 * run["contact_loss_fraction"].sel(joint=joint) for run in worn]
         numbers.append((f"time without contact at the {SPOKEN[joint]}", spell(lost, "%")))
-    return Shown(finish_figure(figure, [panels[-1, 0], enlarged]), sentence, numbers)
+    return DrawnFigure(finish_figure(figure, [panels[-1, 0], enlarged]), sentence, numbers)
 
 
 def differences_from_ideal(run: xr.Dataset) -> list[float]:
@@ -188,7 +188,7 @@ PISTON = Quantity(
 
 
 @paper_figure(7, "Piston force of the design and the typical model", "design", "typical")
-def draw_piston_force(runs: Runs) -> Shown:
+def draw_piston_force(runs: Runs) -> DrawnFigure:
     """Return figure 7: the piston force of the design and the typical model."""
     figure, panels = make_grid(1, 1, 4.2)
     plot(panels[0, 0], load_curves(runs), PISTON)
@@ -202,7 +202,7 @@ def draw_piston_force(runs: Runs) -> Shown:
         peak = float(runs[load]["piston_force"].max()) * KILONEWTON
         numbers.append((f"greatest force of the {name}", spell(peak, "kN")))
         numbers.append((f"corners of the {name}", spell_angles(load_corners(runs[load]))))
-    return Shown(finish_figure(figure, panels[0]), sentence, numbers)
+    return DrawnFigure(finish_figure(figure, panels[0]), sentence, numbers)
 
 
 @paper_figure(9, "Contact force at the big end", *sizes("big_end"), fault="big_end",
@@ -213,7 +213,7 @@ def draw_piston_force(runs: Runs) -> Shown:
               fault="both", joint="big_end")  # fmt: skip
 @paper_figure(16, "Contact force at the small end, clearance at both joints", *sizes("both"),
               fault="both", joint="small_end")  # fmt: skip
-def draw_contact_force(runs: Runs, fault: str, joint: str) -> Shown:
+def draw_contact_force(runs: Runs, fault: str, joint: str) -> DrawnFigure:
     """Return figure 9, 12, 15 or 16: contact force at one joint, a row a clearance.
 
     Both ways in each row: along the cylinder and across it.
@@ -245,7 +245,7 @@ def draw_contact_force(runs: Runs, fault: str, joint: str) -> Shown:
                  for c in CLEARANCES]  # fmt: skip
         values = spell(np.array(peaks) * KILONEWTON, "kN")
         numbers.append((f"greatest {words} at {AT}", values))
-    return Shown(finish_figure(figure, [panels[-1, 0], enlarged]), sentence, numbers)
+    return DrawnFigure(finish_figure(figure, [panels[-1, 0], enlarged]), sentence, numbers)
 
 
 def first_joint(fault: str) -> str:
@@ -264,7 +264,7 @@ def contact_force(joint: str, axis: str) -> Quantity:
               joint="big_end")  # fmt: skip
 @paper_figure(13, "Acceleration against horizontal contact force, small end", *sizes("small_end"),
               joint="small_end")  # fmt: skip
-def draw_relation(runs: Runs, joint: str) -> Shown:
+def draw_relation(runs: Runs, joint: str) -> DrawnFigure:
     """Return one panel a clearance: every stored sample, the regression line, r and r²."""
     figure, panels = make_grid(1, 3, 4.0)
     for panel, letter, clearance in zip(panels.flat, "abc", CLEARANCES, strict=True):
@@ -286,7 +286,7 @@ def draw_relation(runs: Runs, joint: str) -> Shown:
         (f"slope at {AT}", spell([one.slope for one in found], "kg")),
         ("r²", spell([one.r2 for one in found])),
     ]
-    return Shown(figure, sentence, numbers)
+    return DrawnFigure(figure, sentence, numbers)
 
 
 def scatter(panel: Panel, run: xr.Dataset, joint: str, color: str, name: str) -> None:
@@ -320,7 +320,7 @@ BASE = LineStyle("#707070", (0, (1, 1.2)), 1.2, 2.1)
 
 
 @paper_figure(3, "The ideal p–V diagram", "typical")
-def draw_pressure_volume(runs: Runs) -> Shown:
+def draw_pressure_volume(runs: Runs) -> DrawnFigure:
     """Return figure 3: cylinder pressure over volume, with phases and direction."""
     run = settled_part(runs["typical"])
     volume, pressure = gas_state(run)
@@ -341,7 +341,7 @@ def draw_pressure_volume(runs: Runs) -> Shown:
         ("the phases change at", spell_angles(used)),
         ("off the ideal gas's corners by up to", spell_angles(np.abs(used - exact).max())),
     ]
-    return Shown(figure, sentence, numbers)
+    return DrawnFigure(figure, sentence, numbers)
 
 
 def gas_state(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
@@ -373,7 +373,7 @@ def name_phases(panel: Panel, run: xr.Dataset, volume: np.ndarray, pressure: np.
 
 
 @paper_figure(4, "The cam of the spring load", "design")
-def draw_cam(runs: Runs) -> Shown:
+def draw_cam(runs: Runs) -> DrawnFigure:
     """Return figure 4: the cam's contour, and its follower's displacement.
 
     Beside the displacement stands the one that Eq. 10 gives as printed.
@@ -394,7 +394,7 @@ def draw_cam(runs: Runs) -> Shown:
         ("the closed cam, each way, by", spell(1e3 * cam.height, "mm")),
         ("both are the same from", spell_angles(cam.printed_fall)),
     ]
-    return Shown(figure, sentence, numbers)
+    return DrawnFigure(figure, sentence, numbers)
 
 
 def draw_contour(panel: Panel, cam: Cam, angles: np.ndarray) -> None:

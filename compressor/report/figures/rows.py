@@ -31,7 +31,7 @@ from compressor.report.figures.job import (
     share_turn,
 )
 from compressor.report.figures.style import BLACK, BLUE, GOLD, RED, LineStyle, mark, palette
-from compressor.report.figures.table import Number, Shown, figure, spell
+from compressor.report.figures.table import DrawnFigure, Number, figure, spell
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ def finish_map(figure: Drawing, values: np.ndarray, title: str, top: float) -> D
 
 
 @figure("study", "cycles", "vibration over crank angle")
-def draw_cycles(rows: Sequence[SweptRow], title: str) -> Shown:
+def draw_cycles(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
     """Return the vibration in each degree, a row a value, in colour; beside them its peaks.
 
     Marks: the rod load changes its side; valves open and close, or the cam's follower stops.
@@ -199,11 +199,11 @@ def draw_cycles(rows: Sequence[SweptRow], title: str) -> Shown:
         ("the greatest comes at", f"{at:.0f}°, {spell(G * np.nanmax(loud), 'g')}"),
         ("changes of the rod load's side a revolution", ", ".join(map(str, sorted({*counts})))),
     ]
-    return Shown(finish_map(figure, peaks, "peak (m/s²)", 1.08 * top), sentence, numbers)
+    return DrawnFigure(finish_map(figure, peaks, "peak (m/s²)", 1.08 * top), sentence, numbers)
 
 
 @figure("study", "segments", "vibration in segments of 10°")
-def draw_segments(rows: Sequence[SweptRow], title: str) -> Shown:
+def draw_segments(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
     """Return the rms in segments of 10 degrees over the healthy machine's, a row a value.
 
     In colour, with marks where a segment is over its limit; beside them the greatest rms.
@@ -232,7 +232,7 @@ def draw_segments(rows: Sequence[SweptRow], title: str) -> Shown:
         f"without clearance, {describe_rows(rows, title)}. The model has no noise of valves, so "
         f"that a sound machine is quieter than a real one.{left_out(rows)}"
     )
-    return Shown(drawing, sentence, number_segments(rows))
+    return DrawnFigure(drawing, sentence, number_segments(rows))
 
 
 def number_segments(rows: Sequence[SweptRow]) -> list[Number]:
@@ -269,7 +269,7 @@ def segment_words(place: int) -> str:
 
 
 @figure("study", "waterfall", "order spectra of the force on the frame along the cylinder")
-def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Shown:
+def draw_waterfall(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
     """Return order spectra of X, a row a value, in colour; beside them the rms above `ORDER`."""
     found = [row.shaking for row in rows]
     size = min(MAX_MAP_ORDERS, *(one.spectrum.orders.size - 1 for one in found if one))
@@ -290,11 +290,11 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str) -> Shown:
     drawing = finish_map(figure, above, words, max(1.0, 1.08 * np.nanmax(above)))
     numbers = spell_ends(f"rms of X above order {ORDER}", above, rows, "N")
     sentence = f"Order spectra of X, {describe_rows(rows, title)}.{left_out(rows)}"
-    return Shown(drawing, sentence, numbers)
+    return DrawnFigure(drawing, sentence, numbers)
 
 
 @figure("study", "map", "most frequent contact mode over crank angle")
-def draw_map(rows: Sequence[SweptRow], title: str) -> Shown:
+def draw_map(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
     """Return the most frequent contact mode over the crank angle, a row a value, for each joint."""
     modes = rows_modes(rows)
     figure, panels = make_grid(1, len(modes), height(len(rows)) + 0.9)
@@ -315,7 +315,7 @@ def draw_map(rows: Sequence[SweptRow], title: str) -> Shown:
         f"The most frequent contact mode in each degree, {describe_rows(rows, title)}."
         f"{FILM if any(row.lubricated for row in rows) else ''}{left_out(rows)}"
     )
-    return Shown(figure, sentence, numbers)
+    return DrawnFigure(figure, sentence, numbers)
 
 
 def describe_rows(rows: Sequence[SweptRow], title: str) -> str:

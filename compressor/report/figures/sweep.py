@@ -42,7 +42,7 @@ from compressor.report.figures.sweep_panels import (
     grouping,
     roles_of,
 )
-from compressor.report.figures.table import Shown
+from compressor.report.figures.table import DrawnFigure
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.units import Units
 
@@ -219,7 +219,7 @@ def draw_ranked(
         f"{'; '.join(left)}." if left else "",
     )  # fmt: skip
     numbers = [(measure.title, spell_strongest(sweep, one)) for measure, one in found.items()]
-    drawn = Shown(draw_ranking(sweep, found), join_sentences(*words), numbers)
+    drawn = DrawnFigure(draw_ranking(sweep, found), join_sentences(*words), numbers)
     title = "what explains the spread of each metric"
     yield SweepFigure("ranking", title, drawn.caption, drawn.drawing)
 

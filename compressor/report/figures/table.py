@@ -19,7 +19,7 @@ NOTHING = 1e-6  # in any unit of a figure: below it a number is rounding
 Number = tuple[str, str]  # a label, and what is measured, with its unit
 
 
-class Shown(NamedTuple):
+class DrawnFigure(NamedTuple):
     """A figure: what is drawn, a sentence on what is shown, and labelled numbers of it."""
 
     drawing: Drawing
@@ -45,7 +45,7 @@ class Figure:
     name: str
     title: str
     needs: tuple[str, ...]
-    make: Callable[..., Shown]
+    make: Callable[..., DrawnFigure]
 
 
 FIGURES: dict[Kind, dict[str, Figure]] = {"paper": {}, "diagnosis": {}, "job": {}, "study": {}}
@@ -53,10 +53,10 @@ FIGURES: dict[Kind, dict[str, Figure]] = {"paper": {}, "diagnosis": {}, "job": {
 
 def figure(
     kind: Kind, name: str, title: str, *needs: str, **options: Any
-) -> Callable[[Callable[..., Shown]], Callable[..., Shown]]:
+) -> Callable[[Callable[..., DrawnFigure]], Callable[..., DrawnFigure]]:
     """Return a decorator that enters a function into the table; options: given to it."""
 
-    def enter(make: Callable[..., Shown]) -> Callable[..., Shown]:
+    def enter(make: Callable[..., DrawnFigure]) -> Callable[..., DrawnFigure]:
         FIGURES[kind][name] = Figure(name, title, needs, partial(make, **options))
         return make
 
