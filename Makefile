@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench throughput sweep-bench peers tradeoff ladders chaotic regimes identify calibrate nameplate stress chaos mutants measurements pages docs release lock alarms clean
+.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench throughput sweep-bench peers tradeoff chaotic regimes identify calibrate nameplate stress chaos mutants measurements pages docs release lock alarms clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -93,10 +93,7 @@ peers: install  ## time other tools and ours in turn on one problem (about six m
 tradeoff: install  ## measure speed against accuracy, and what the model's features do (ten minutes)
 	$(CAMPAIGN)/measure_tradeoff.py tests/results/tradeoff.json
 
-ladders: install  ## measure error against tolerance, and the limit of no clearance (a minute)
-	$(CAMPAIGN)/measure_ladders.py tests/results/ladders.json
-
-chaotic: install  ## compare chaotic motions' statistics by two integrators (a quarter of an hour)
+chaotic: install  ## compare averages of chaotic motions by two integrators (ten minutes)
 	$(CAMPAIGN)/measure_chaotic.py tests/results/chaotic.json
 
 regimes: install  ## follow a machine over its clearance, up and down (three minutes)
@@ -123,7 +120,7 @@ nameplate: install  ## run the case file of compsim init machine, for its page (
 mutants: install  ## plant bugs and see whether the fast tests catch them (half an hour)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: test-oldest calibration accuracy validation wear claims page tradeoff ladders chaotic regimes identify nameplate store-bench throughput sweep-bench peers pages  ## all of these (about three hours)
+measurements: test-oldest calibration accuracy validation wear claims page tradeoff chaotic regimes identify nameplate store-bench throughput sweep-bench peers pages  ## all of these (about three hours)
 
 pages: install  ## write the pages' generated tables, compressor/API.md, the tutorial's notebook
 	$(BIN)/python tests/page_tables.py

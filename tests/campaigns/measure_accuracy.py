@@ -12,12 +12,11 @@ import argparse
 import json
 import time
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import reference
-import xarray as xr
-from campaign_figures import draw_kept_error
 from joblib import Parallel, delayed
 from random_cases import load_equations, strangers
 from result_pages import keep, provenance
@@ -26,7 +25,9 @@ from compressor.cases.case import Case
 from compressor.cases.parameter import ACCURACY
 from compressor.metrics import METRICS
 from compressor.outcome import Regime
+from compressor.report.figures.drawing import Note, entry, make_grid
 from compressor.report.figures.pictures import render
+from compressor.report.figures.style import CYCLE, GREY, LineStyle, mark
 from compressor.solve.search import LOOK_SHIFT, predictability_horizon
 from compressor.solve.simulate import simulate
 
@@ -39,6 +40,7 @@ CONFIRMED = 4  # random cases that DOP853 runs again
 CONFIRMED_RTOL = 1e-10
 CONTACT = tuple(name for name, row in METRICS.items() if row.contact)
 EXACT = 1e-12  # of a metric: an error below it is rounding
+PROMISED = LineStyle(GREY, (0, (3.7, 1.6)), 1.2, 2)
 TRADED = 5  # one of so many cases is run at a ladder of tolerances, too
 
 
@@ -226,19 +228,27 @@ def bar_row(word, name, measured):
 
 
 def drawing(measured):
-    """The figure of what the words cost and keep."""
-    rows = [[case["words"][word] for case in measured] for word in ACCURACY]
-    error = [[row["error"] if row["promise"] == "kept" else np.nan for row in of] for of in rows]
-    return draw_kept_error(
-        xr.Dataset(
-            {
-                "seconds": (("word", "case"), [[row["seconds"] for row in of] for of in rows]),
-                "error": (("word", "case"), error),
-                "promise": ("word", [tier.promise for tier in ACCURACY.values()]),
-            },
-            {"word": list(ACCURACY)},
-        )
-    )
+    """The figure of what the words cost and keep: error over the time of a run, a colour a word.
+
+    Of runs that keep their promise, which is dashed; large: both medians.
+    """
+    figure, grid = make_grid(1, 1, 6.0)
+    panel = grid[0, 0]
+    for scale in (panel.x, panel.y):
+        scale.log, scale.margin = True, 0.06
+    panel.title = "error of acceleration, relative L2"
+    panel.x.title = "time of a run with its check (ms)"
+    for (word, tier), line in zip(ACCURACY.items(), CYCLE, strict=False):
+        rows = [case["words"][word] for case in measured]
+        rows = [row for row in rows if row["promise"] == "kept" and row["error"] > 0]
+        times, errors_ = [1e3 * row["seconds"] for row in rows], [row["error"] for row in rows]
+        panel.plot(times, errors_, mark(line.color, "o", 2.2, edge_width=0.0))
+        middle = mark(line.color, "D", 10, edge="#ffffff")
+        panel.plot(np.median(times), np.median(errors_), middle, word)
+        panel.notes.append(Note(y=tier.promise, style=replace(PROMISED, color=line.color)))
+    figure.legend = [one for one in panel.traces if one.name]
+    figure.legend.append(entry("its promise", PROMISED))
+    return figure
 
 
 def broken(word, cases, measured):

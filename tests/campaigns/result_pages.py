@@ -333,38 +333,8 @@ def sweep(found):
     return {"sweep": kills + "\n" + listed(numbers | peaks)}
 
 
-def ladders(found):
-    rows, slopes = found["ladder"], []
-    scenes = [*dict.fromkeys(row["scene"] for row in rows)]
-    names = {"error": "error_acceleration", "energy residual": "energy_residual"}
-    steps = [{"rtol": rtol, **{row["scene"]: row for row in rows if row["rtol"] == rtol}}
-             for rtol in dict.fromkeys(row["rtol"] for row in rows)]  # fmt: skip
-    columns = {"rtol": "rtol:.0e"} | {
-        f"{what}, {scene.replace('_', ' ')}": lambda step, s=scene, n=name: f"{step[s][n]:.1e}"
-        for what, name in names.items() for scene in scenes
-    }  # fmt: skip
-    for scene, slope in found["slopes"].items():
-        of = [row for row in found["limit"] if row["scene"] == scene]
-        first, last = (row["deviation"] / row["clearance"] for row in (of[0], of[-1]))
-        slopes.append({"scene": scene.replace("_", " "), **slope, "first": first, "last": last,
-                       "worst": max(row["residual"] for row in of)})  # fmt: skip
-    return {"ladders": table(steps, columns), "limit": table(slopes, {
-        "joint": "scene", "slope": "fitted:.3f",
-        "slopes of single decades": lambda row: f"{row['least']:.3f} to {row['greatest']:.3f}",
-        "deviation / c at 1 mm": "first:.3g", "at 1 nm": "last:.3g",
-        "largest energy residual / bound": "worst:.2g",
-    })}  # fmt: skip
-
-
 def chaotic(found):
-    scenes, row = [], found["random"]
-    for scene, one in found["scenes"].items():
-        (other,) = one["others"]
-        for name, apart in other["standard_errors"].items():
-            means = (one["means"][method][name] for method in (one["against"], other["method"]))
-            scenes.append({"scene": scene, "horizon": one["horizon_rev"], **other, "name": name,
-                           "apart": apart, "means": ", ".join(
-                               f"{mean:.3g} ± {error:.1g}" for mean, error in means)})  # fmt: skip
+    row = found["random"]
     numbers = {
         "random cases": row["drawn"], "reported as chaotic": row["regimes"]["chaotic"],
         f"chaotic cases solved again by {row['method']}": row["judged"],
@@ -378,16 +348,8 @@ def chaotic(found):
         f"the first {len(row['scipy']['apart'])} against SciPy's {row['scipy']['method']}: "
         "difference in standard errors": ", ".join(f"{one:.1f}" for one in row["scipy"]["apart"]),
     }  # fmt: skip
-    return {
-        "chaotic-cases": markdown(["quantity", "value"], [[k, str(v)] for k, v in numbers.items()]),
-        "chaotic": table(scenes, {
-            "case": "scene", "horizon, rev": "horizon:.2g",
-            "distance before the horizon": "within:.1e", "after it": "beyond:.2g",
-            "statistic": "name", "means by the two methods": "means",
-            "difference, standard errors": "apart:.1f",
-            "distance of the peaks' distributions": "peaks_distance:.2f",
-        }),
-    }  # fmt: skip
+    rows = [[name, str(value)] for name, value in numbers.items()]
+    return {"chaotic-cases": markdown(["quantity", "value"], rows)}
 
 
 def share(row):
@@ -564,7 +526,6 @@ CAMPAIGNS = {
     "peers": ("How does it compare with other programs?", peers),
     "accuracy": ("Are results as accurate as promised?", accuracy),
     "calibration": ("How is the error estimated?", calibration),
-    "ladders": ("Does the error fall with the tolerance, and the motion become ideal?", ladders),
     "tradeoff": ("Which method is fastest, and what does a feature of the model change?", tradeoff),
     "stress": ("What happens in extreme cases?", stress),
     "chaotic": ("Can averages of chaotic motion be trusted?", chaotic),
