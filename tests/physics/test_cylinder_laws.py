@@ -4,9 +4,8 @@ import math
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
 from compressor.cases.case import Case
@@ -15,12 +14,9 @@ from compressor.physics.contact_laws import (
     FLATTEST,
     JOHNSON_DEEPEST,
     johnson,
-    johnson_energy,
     johnson_form,
     liu,
-    liu_energy,
     liu_form,
-    solve_rising,
 )
 from compressor.solve.request import greatest_depth
 from compressor.solve.si_record import record
@@ -61,22 +57,6 @@ def test_liu_s_force_is_his_formula(depth):
     assert liu(depth, SOFT, CLEARANCE) == pytest.approx(0.5 * LINE * depth * expected, rel=1e-13)
 
 
-@pytest.mark.parametrize("depth", [1e-12, 1e-6, 1.99e-6, 2.01e-6, 1e-5, EDGE, 6e-5, 1e-4])
-def test_energies_are_the_work_of_the_forces(depth):
-    """Also beside the switches between two formulas; by the root of the depth, which is smooth."""
-
-    def work(force):
-        return quad(lambda s: 2.0 * s * force(s * s), 0.0, math.sqrt(depth), epsabs=0)[0]
-
-    elastic = johnson(depth, LINE, CLEARANCE)
-    assert johnson_energy(elastic, depth, LINE, CLEARANCE) == pytest.approx(
-        work(lambda x: johnson(x, LINE, CLEARANCE) if x else 0.0), rel=1e-8
-    )
-    assert liu_energy(depth, SOFT, CLEARANCE) == pytest.approx(
-        work(lambda x: liu(x, SOFT, CLEARANCE)), rel=1e-10
-    )
-
-
 @pytest.mark.parametrize("form", [johnson_form(LINE, CLEARANCE), liu_form(SOFT, CLEARANCE)])
 def test_an_impact_takes_as_long_as_its_motion(form):
     """A free mass against the force: by SciPy's integrator, until it comes back."""
@@ -110,12 +90,6 @@ def test_the_page_has_the_forces_of_the_laws():
             johnson(depth, line, CLEARANCE), liu(depth, soft, CLEARANCE), 1.0625e10 * depth**1.5,
         )  # fmt: skip
         assert [float(one) for one in forces] == pytest.approx([f / 1e3 for f in known], abs=0.051)
-
-
-def test_what_rises_is_solved_to_rounding():
-    for length in np.logspace(-12, -2, 6):
-        assert solve_rising(lambda x: x**2.5, length**2.5) == pytest.approx(length, rel=1e-14)
-    assert solve_rising(lambda x: x, 0.0) == 0.0
 
 
 @pytest.mark.parametrize(("law", "share"), [("johnson", 0.5e-4), ("liu", 1e-3)])

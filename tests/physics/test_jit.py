@@ -1,6 +1,5 @@
 """One source, compiled or not: the JIT switched off gives the same numbers."""
 
-import gc
 import json
 import math
 import os
@@ -12,10 +11,8 @@ import pytest
 
 from compressor import program
 from compressor.physics import _jit
-from compressor.physics._jit import dispatch_on_record, inline_llvm, jit, square_root
-from compressor.physics.record import new_record
+from compressor.physics._jit import square_root
 
-COMPRESSOR = Path(program.__file__).parent
 PROBE = """
 import json
 import numpy as np
@@ -97,20 +94,6 @@ def test_a_named_folder_that_takes_no_file_is_replaced_with_a_remark(kind, tmp_p
     assert program.machine_code_folder() == found  # without a remark, also in workers
 
 
-def test_a_user_without_a_home_may_name_a_folder(tmp_path, monkeypatch):
-    for name in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
-        monkeypatch.setenv(name, "")  # so that it is put back, and then gone
-        monkeypatch.delenv(name)
-    monkeypatch.setattr(os.path, "expanduser", lambda path: path)
-    monkeypatch.setattr(program, "COMPILED", Path("/proc"))  # where nothing may be written
-    monkeypatch.setattr(program, "sources_hash", lambda _: "0" * 16)  # processes come and go there
-    with pytest.warns(program.CompsimWarning, match="again next time"):
-        assert "compsim-" in str(program.machine_code_folder())
-    assert not Path("~").exists()
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert program.machine_code_folder().parent == tmp_path / "compsim"
-
-
 @pytest.mark.compiled
 def test_a_negative_number_has_no_square_root_either_way():
     numba = pytest.importorskip("numba")
@@ -124,52 +107,3 @@ def test_a_negative_number_has_no_square_root_either_way():
         assert math.isnan(compiled(number))
         assert math.isnan(square_root(number))  # from Python
     assert compiled(2.25) == square_root(2.25) == 1.5
-
-
-@inline_llvm
-def product(x, p):
-    return x * p.omega
-
-
-@inline_llvm
-def of_no_field(x, p):
-    return x + p.no_such_field
-
-
-either = dispatch_on_record("viscosity", of_no_field, product)
-
-
-@jit
-def one_more(x, p):
-    return either(x, p) + 1.0
-
-
-def test_a_function_by_record_is_that_of_its_kind():
-    """The other is not even compiled: it reads a field that no record has."""
-    p = new_record()
-    p["omega"] = 3.0
-    assert (either(2.0, p), one_more(2.0, p)) == (6.0, 7.0)
-    wrong = new_record(chosen=True)
-    with pytest.raises(Exception, match="no_such_field"):
-        one_more(2.0, wrong)
-
-
-@pytest.mark.skipif(not _jit.ENABLED, reason="nothing is compiled")
-def test_garbage_is_collected_seldom_while_numba_compiles_and_as_before_afterwards():
-    import numba
-    from numba.core.event import Event, EventStatus, broadcast
-
-    before, during = gc.get_threshold(), []
-    _jit.load_numba()
-    compiling = [Event("numba:compile", status) for status in EventStatus]
-    for event in (compiling[0], compiling[0]):  # a function, and one that it calls
-        broadcast(event)
-        during.append(gc.get_threshold())
-    broadcast(compiling[1])
-    during.append(gc.get_threshold())
-    broadcast(compiling[1])
-    assert during == [_jit.COLLECTING] * 3
-    assert gc.get_threshold() == before
-    with pytest.raises(numba.TypingError):
-        jit(lambda x: x + "text")(1.0)
-    assert gc.get_threshold() == before

@@ -7,7 +7,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.physics.observe import COLUMNS, Column
-from compressor.physics.systems import derivative, observe_all, observe_at, start
+from compressor.physics.systems import derivative, observe_at, start
 from compressor.solve.si_record import offsets, record
 
 JOINTS = ("big_end", "small_end", "both")
@@ -126,21 +126,3 @@ def test_initial_offset_shifts_the_journal(joint):
     found = row_at(p, 0.0, y, 0)[Column.ECCENTRICITY : Column.ECCENTRICITY + 4].reshape(2, 2)
     expected = offsets(one) * (p.clearance[:, None] > 0)
     assert found == pytest.approx(expected, abs=1e-17)
-
-
-def test_rows_of_a_free_flight_show_no_contact():
-    p = record(case("big_end"))
-    row = row_at(p, 0.0, np.zeros(4), 0)
-    assert row[Column.PENETRATION] == pytest.approx(-2e-4)
-    assert row[Column.NORMAL] == 0
-    assert row[Column.FORCE : Column.FORCE + 2].tolist() == [0, 0]
-
-
-def test_observe_all_is_observe_at_in_turn():
-    p, rng = record(case("both")), np.random.default_rng(5)
-    times = np.linspace(0, 0.1, 5)
-    states = np.array([random_state("both", rng) for _ in times])
-    rows = np.empty((5, COLUMNS))
-    observe_all(times, states, np.array([0, 1, 2, 3, 0]), p, rows)
-    for i, phase in enumerate((0, 1, 2, 3, 0)):
-        assert rows[i].tolist() == row_at(p, times[i], states[i], phase).tolist()

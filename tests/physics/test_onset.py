@@ -9,7 +9,6 @@ from scipy.optimize import brentq
 
 from compressor.cases.case import Case
 from compressor.physics._jit import ENABLED, jit
-from compressor.physics.contact import NO_CONTACT, nearness
 from compressor.physics.contact_laws import normal_force
 from compressor.physics.kinematics import crank_direction, ideal
 from compressor.physics.loads import segments
@@ -24,20 +23,14 @@ from compressor.physics.march import (
 from compressor.physics.observe import COLUMNS, Column
 from compressor.physics.onset import (
     CHANGE_TOLERANCE,
-    INTERVALS,
-    MAX_SAMPLE,
     NEVER,
-    STEP_EDGE,
     approach_at,
-    first_onset,
     joint_onset,
     locate_change,
     locate_contact_between,
-    locate_onset,
     nearness_at,
-    sample_fraction,
 )
-from compressor.physics.record import BIG_END, FREEDOMS, SMALL_END
+from compressor.physics.record import FREEDOMS, SMALL_END
 from compressor.physics.runge_kutta import FLOWS, STAGES, interpolate, take_step
 from compressor.physics.systems import (
     derivative,
@@ -93,13 +86,6 @@ def small_end_only(coefficients):
     return dense
 
 
-def both_ends(big, small):
-    dense = np.zeros((5, 8))
-    dense[:, 0], dense[:, 4] = path(big)
-    dense[:, 2], dense[:, 6] = path(small)
-    return dense
-
-
 APART, INSIDE = [0.5 * CLEARANCE], [1.1 * CLEARANCE]
 CLOSING = [0.5 * CLEARANCE, CLEARANCE]  # touches at s = 0.5
 RELEASE = [1.2 * CLEARANCE, -0.4 * CLEARANCE]  # at 0.08 m/s, out at s = 0.5
@@ -134,13 +120,6 @@ def test_first_onset_of_a_joint(coefficients, begin, end):
         assert until == pytest.approx(end, abs=1e-9)
 
 
-def test_crossing_is_found_to_the_last_digits():
-    dense = small_end_only(CLOSING)
-    found = locate_onset(SMALL_END, 0.25, 1.0, 0.0, H, dense, 0, parameters(), np.zeros(4))
-    assert found == pytest.approx(0.5, abs=1e-11)
-    assert nearness_at(SMALL_END, found, 0.0, H, dense, 0, parameters(), np.zeros(4)) > 0
-
-
 @pytest.mark.parametrize(
     ("coefficients", "low", "high", "at"),
     [(CLOSING, 0.2, 0.9, 0.5), (LEAVING, 0.0, 1.0, 0.05), (RELEASE, 0.0, 0.49, RELEASED),
@@ -172,52 +151,12 @@ def test_the_share_of_a_step_without_contact_ends_where_contact_does(coefficient
     assert work.gap_fraction == pytest.approx([0.0, apart], abs=2 * CHANGE_TOLERANCE)
 
 
-@pytest.mark.parametrize("height", [PULSE, 1e-14, -1e-14, -PULSE])
-def test_a_maximum_is_searched_for_contact(height):
-    dense = small_end_only(hump(0.37, height, WIDTH))
-    found = locate_contact_between(SMALL_END, 0.2, 0.5, 0.0, H, dense, 0, parameters(), np.zeros(4))
-    if height > 0:
-        assert found == pytest.approx(0.37, abs=WIDTH)
-    else:
-        assert found == NEVER
-
-
 def test_a_journal_that_rests_at_the_edge_does_not_touch():
     """F_N = 0 at a penetration of 0."""
     dense, p, y = small_end_only([CLEARANCE]), parameters(), np.zeros(4)
     assert nearness_at(SMALL_END, 0.5, 0.0, H, dense, 0, p, y) == 0.0
     assert joint_onset(SMALL_END, 0.0, H, dense, 0, p, y) == (NEVER, NEVER)
     assert locate_contact_between(SMALL_END, 0.2, 0.5, 0.0, H, dense, 0, p, y) == NEVER
-
-
-def test_looks_stand_evenly_and_beside_both_ends():
-    looks = [sample_fraction(i) for i in range(MAX_SAMPLE + 1)]
-    inner = [i / INTERVALS for i in range(1, INTERVALS)]
-    assert looks == pytest.approx([0.0, STEP_EDGE, *inner, 1.0 - STEP_EDGE, 1.0], abs=1e-15)
-
-
-FIRST = {
-    "neither": (APART, APART, NEVER, -1),
-    "big end": (hump(0.4, PULSE, WIDTH), APART, 0.4 - WIDTH, BIG_END),
-    "small end": (APART, hump(0.4, PULSE, WIDTH), 0.4 - WIDTH, SMALL_END),
-    "big end first": (hump(0.4, PULSE, WIDTH), CLOSING, 0.4 - WIDTH, BIG_END),
-    "small end first": (CLOSING, hump(0.4, PULSE, WIDTH), 0.4 - WIDTH, SMALL_END),
-    "one stays inside": (INSIDE, CLOSING, 0.5, SMALL_END),
-}
-
-
-@pytest.mark.parametrize(("big", "small", "begin", "joint"), FIRST.values(), ids=FIRST)
-def test_first_onset_of_both_joints(big, small, begin, joint):
-    p = parameters("both")
-    found, _, touches = first_onset(0.0, H, both_ends(big, small), 0, p, np.zeros(8))
-    assert found == pytest.approx(begin, abs=1e-6)
-    assert touches == joint
-
-
-def test_an_ideal_joint_never_touches():
-    p = parameters("both")
-    p.clearance[SMALL_END] = 0.0
-    assert first_onset(0.0, H, both_ends(APART, CLOSING), 0, p, np.zeros(8))[:2] == (NEVER, NEVER)
 
 
 @pytest.mark.parametrize("late", [-2e-6, -1e-6, 1e-6, 2e-6])
@@ -252,30 +191,6 @@ def contact_rate(y, n, speed, p):
     if speed is not None:
         moved[n] = speed
     return contact_at(SMALL_END, 0.0, moved, 0, p).rate
-
-
-@pytest.mark.parametrize("penetration", [-1e-3, -1e-9, 0.0, 1e-9, 1e-6, 2e-5, 5e-5, 2e-4])
-@pytest.mark.parametrize("rate", [-1.0, -0.05, 0.0, 0.05])
-def test_nearness_is_positive_where_the_contact_pushes(penetration, rate):
-    p = parameters()
-    normal, unclamped = normal_force(penetration, rate, 1.0, p.stiffness[1], p.clearance[1], p)
-    contact = NO_CONTACT._replace(
-        normal=normal, penetration=penetration, rate=rate, unclamped=unclamped
-    )
-    assert (nearness(contact, p.stiffness[1], p.clearance[1], p) > 0) == (normal > 0)
-
-
-@pytest.mark.parametrize("exponent", [1.5, 2.0])
-def test_a_clamped_force_counts_as_a_length(exponent):
-    """As the penetration of full damping, when it pulls as much as the spring would push there."""
-    p = parameters()
-    p.exponent = exponent
-    pull = p.stiffness[1] * p.full_damping**exponent
-    for share in (1.0, 0.01):
-        contact = NO_CONTACT._replace(penetration=1e-6, rate=-1.0, unclamped=-share * pull)
-        assert nearness(contact, p.stiffness[1], p.clearance[1], p) == pytest.approx(
-            -share * p.full_damping
-        )
 
 
 # ---- constructed re-engagements: a free flight drawn backwards from its contact

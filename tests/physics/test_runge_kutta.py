@@ -14,8 +14,6 @@ from compressor.physics.runge_kutta import (
     C,
     E,
     P,
-    add_stages,
-    error_norm,
     extend,
     interpolate,
     take_step,
@@ -59,31 +57,8 @@ def test_order_conditions():
     assert (b - E) @ c**4 != pytest.approx(1 / 5, abs=1e-4)  # the estimate is of order 4
 
 
-@pytest.mark.parametrize("n", [4, 8])
-def test_the_error_is_a_root_mean_square_over_the_tolerance(n):
-    """Of every number of the motion, none of the flows."""
-    rng = np.random.default_rng(n)
-    z, new, k = (rng.normal(size=shape) for shape in (n + FLOWS, n + FLOWS, (STAGES, n + FLOWS)))
-    atol, rtol, h = rng.uniform(0.1, 1, n), 0.3, 0.01
-    scale = atol + rtol * np.maximum(np.abs(z), np.abs(new))[:n]
-    expected = np.sqrt(np.mean((h * E @ k[:, :n] / scale) ** 2))
-    assert error_norm(h, z, new, k, rtol, atol) == pytest.approx(expected, rel=1e-12)
-
-
 def test_dense_output_ends_at_the_step():
     assert P.sum(axis=1) == pytest.approx(A[-1], abs=1e-13)
-
-
-@pytest.mark.parametrize("s", [0.0, 0.1, 0.5, 0.93, 1.0])
-def test_stages_combine_to_the_interpolant(s):
-    k = np.sin(np.arange(7.0 * 12)).reshape(STAGES, 12)
-    z, dense, y, combined = np.arange(12.0), np.zeros((5, 8)), np.zeros(8), np.zeros(8)
-    extend(0.3, z, k, dense)
-    interpolate(s, dense, y)
-    weights = np.zeros(STAGES)
-    weights_at(s, weights)
-    add_stages(weights, STAGES, 0.3, z, k, combined)
-    assert combined == pytest.approx(y, rel=1e-12)
 
 
 def test_the_weights_of_the_nodes_are_stored():

@@ -13,13 +13,10 @@ from compressor.physics.tally import (
     IN_STEPS,
     add_flows,
     cut_tally,
-    gap_fraction_between,
     lobatto,
-    may_beat_peaks,
     merge_tallies,
     new_tally,
     peak_of,
-    require_written,
     tally_energy,
     tally_step,
 )
@@ -101,15 +98,6 @@ def test_contact_begins_after_flight_or_inside_the_penetration(penetration, impa
     assert not tally.flown.any()
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "share"),
-    [(2.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, -1.0, 1.0), (-1.0, -2.0, 1.0), (3.0, -1.0, 0.25),
-     (-1.0, 3.0, 0.25), (0.0, 0.0, 1.0)],
-)  # fmt: skip
-def test_contact_is_a_positive_nearness(before, after, share):
-    assert gap_fraction_between(before, after) == pytest.approx(share)
-
-
 def test_the_rod_load_is_tallied_by_its_sides():
     p, rows = record(Case.from_values({})), steady_rows(NODES.size)
     plain, tally = new_tally(), new_tally(True)
@@ -120,41 +108,6 @@ def test_the_rod_load_is_tallied_by_its_sides():
     assert tally.side_peak.tolist() == [30.0, 8.0]
     assert not plain.side_peak.any()
     assert not plain.side_seconds.any()
-
-
-def test_every_other_node_of_a_step_will_do():
-    p = record(Case.from_values({"joint": "both", "clearance_mm": 0.2}))
-    rows = np.sin(np.arange(NODES.size * COLUMNS)).reshape(NODES.size, COLUMNS)
-    weights = np.zeros(NODES.size)
-    weights[::2] = np.linspace(1, 2, 5)
-    whole, sparse = new_tally(), new_tally()
-    tally_step(
-        1e-4, NODES[::2].copy(), weights[::2].copy(), rows[::2].copy(), 1, APART, SIDES, True,
-        whole, p,
-    )  # fmt: skip
-    rows[1::2] = np.nan
-    tally_step(1e-4, NODES, weights, rows, 2, APART, SIDES, True, sparse, p)
-    assert sparse == whole
-
-
-@pytest.mark.parametrize("column", [Column.ACCELERATION, Column.FORCE_SIZE, Column.PENETRATION])
-@pytest.mark.parametrize("node", [0, 4, 8])
-def test_a_step_near_a_record_is_told(node, column):
-    p = record(Case.from_values({"joint": "both", "clearance_mm": 0.2}))
-    tally, rows = new_tally(), steady_rows(NODES.size)
-    rows[:, Column.ACCELERATION : Column.NORMAL + 2] = 1.0
-    tally_step(1e-4, NODES, WEIGHTS, rows, 1, APART, SIDES, True, tally, p)
-    rows *= 0.97
-    assert not may_beat_peaks(rows, 4, tally)
-    rows[node, column] = 0.99
-    assert may_beat_peaks(rows, 4, tally)
-
-
-def test_a_column_that_steps_do_not_have_is_refused():
-    assert require_written(Column.ACCELERATION, Column.GUIDE_MOMENT) == (8, 25)
-    for column in (Column.VELOCITY, Column.CRANK_POWER, Column.KINETIC, Column.GUIDE_FORCE):
-        with pytest.raises(ValueError, match=f"{column.name} is not written"):
-            require_written(Column.ACCELERATION, column)
 
 
 MECHANISM = {"guide": {"clearance_mm": 0.1}, "drive": {"flywheel_kg_m2": 1}}

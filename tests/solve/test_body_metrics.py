@@ -1,21 +1,18 @@
 """Metrics of the body and of the sensor's record: plain NumPy of what is stored, and error bars."""
 
-import json
 import math
 import sys
 
 import numpy as np
 import pytest
-from compsim import cli
-from conftest import CHAOTIC, keep, store
+from conftest import CHAOTIC
 
-from compressor.cases.case import Case, CaseError
-from compressor.metrics import NUMBERS, of_source
+from compressor.cases.case import Case
+from compressor.metrics import of_source
 from compressor.solve import body
 from compressor.solve import run as run_module
 from compressor.solve.series import finer
-from compressor.solve.simulate import measure, observe, simulate
-from compressor.store.reader import read_store
+from compressor.solve.simulate import observe, simulate
 
 TURNS = {"duration_rev": 3, "settle_rev": 1, "accuracy": "draft"}
 BODY = {"body": {"frequency_x_Hz": 4.0, "frequency_y_Hz": 30.0}}
@@ -24,7 +21,6 @@ SENSED = {
     "sensor": {"threshold_m_per_s2": 10.0, "second_threshold_m_per_s2": 20.0},
 }  # fmt: skip
 OF_BODY = [row.name for row in of_source("body")]
-OF_SENSOR = [name for name in OF_BODY if name.startswith("sensor")]
 
 
 @pytest.fixture(scope="module")
@@ -70,14 +66,6 @@ def test_the_body_s_number_is_that_of_the_stored_velocity(sensed):
     inside = (frequency >= 2) & (frequency <= 1000)
     expected = np.sqrt(lines[inside].sum(axis=0))
     np.testing.assert_allclose(sensed["body_velocity_rms"].values, expected, rtol=1e-5)
-
-
-def test_a_band_is_that_of_the_case():
-    """Above the force's orders 1 and 2 next to nothing is left of ideal joints."""
-    whole = measured({"solve": TURNS, **BODY})["body_velocity_rms"]
-    high = {"frequency_x_Hz": 4.0, "frequency_y_Hz": 30.0, "band_low_Hz": 100, "band_high_Hz": 800}
-    above = measured({"solve": TURNS, "body": high})["body_velocity_rms"]
-    assert (above < 1e-3 * whole).all()
 
 
 def measured(values):
@@ -156,20 +144,6 @@ def test_a_bar_is_of_numerics_and_not_of_noise():
     assert loud["sensor_rms_error"] < 2 * quiet["sensor_rms_error"] < 0.2
 
 
-def test_a_longer_record_repeats_the_same_numbers():
-    """Without noise and jitter; with jitter counts and segments stay near."""
-    one = measured({**SENSED, "sensor": {"noise_m_per_s2": 0, "threshold_m_per_s2": 10}})
-    long = {"noise_m_per_s2": 0, "threshold_m_per_s2": 10, "length_rev": 7}
-    more = measured({**SENSED, "sensor": long})
-    shaken = measured({**SENSED, "sensor": {**long, "speed_jitter": 0.002}})
-    for name in OF_SENSOR:
-        kept = np.isfinite(one[name])
-        np.testing.assert_allclose(more[name][kept], one[name][kept], rtol=0.05, err_msg=name)
-    for name in ("sensor_rms", "sensor_counts_per_rev"):
-        kept = np.isfinite(one[name])
-        np.testing.assert_allclose(shaken[name][kept], one[name][kept], rtol=0.1, err_msg=name)
-
-
 @pytest.mark.parametrize("start", ["steady", "rest"])
 def test_settled_revolutions_need_not_begin_at_top_dead_centre(start):
     """Segments are those of the crank; the tacho has its pulses at top dead centre."""
@@ -188,19 +162,6 @@ def test_settled_revolutions_need_not_begin_at_top_dead_centre(start):
         assert apart < 0.05 * whole[name].values.max()
 
 
-def test_from_rest_the_settled_revolutions_count():
-    values = {
-        **SENSED,
-        "body": {**BODY["body"], "start": "rest"},
-        "solve": {**TURNS, "settle_rev": 1.5},
-    }
-    run = simulate(Case.from_values(values))
-    turns = run["sensor_time"].values / 0.12
-    record = run["sensor_acceleration"].values[(turns >= 1.5 - 1e-9) & (turns < 2.5 - 1e-9)]
-    assert float(run["sensor_peak"]) == np.abs(record).max()
-    assert float(run["sensor_rms"]) == pytest.approx(np.sqrt(np.mean(record**2)), rel=1e-12)
-
-
 def test_a_chaotic_motion_has_intervals_of_its_averages():
     """Batch means over revolutions; peaks and what is made of them are not known."""
     values = {**CHAOTIC, **BODY, "sensor": {"threshold_m_per_s2": 50.0},
@@ -216,60 +177,3 @@ def test_a_chaotic_motion_has_intervals_of_its_averages():
     assert float(run["sensor_rms_error"]) == pytest.approx(error / (2 * rms), rel=1e-3)
     bar = float(run["sensor_counts_per_rev_error"].sel(threshold="first"))
     assert 0 < bar < 0.5 * float(run["sensor_counts_per_rev"].sel(threshold="first"))
-
-
-def test_without_body_or_sensor_there_is_nothing_of_them(tmp_path):
-    plain = {"joint": "big_end", "clearance_mm": 0.2, "solve": TURNS}
-    numbers = measure(Case.from_values(plain)).numbers
-    assert all(np.isnan(numbers[name]).all() for name in OF_BODY)
-    keep(tmp_path / "plain", simulate(Case.from_values(plain)))
-    assert not {*OF_BODY} & read_store(tmp_path / "plain").given
-    bare = measured({**plain, **BODY})
-    assert np.isfinite(bare["body_velocity_rms"]).all()
-    assert all(np.isnan(bare[name]).all() for name in OF_SENSOR)
-    no_bars = measured({**SENSED, "solve": {**TURNS, "error_bars": False}})
-    assert np.isfinite(no_bars["sensor_peak"])
-    assert np.isnan(no_bars["sensor_peak_error"])
-
-
-def test_a_run_that_stops_has_none():
-    numbers = measured({**SENSED, "solve": {**TURNS, "max_steps": 60}})
-    assert all(np.isnan(numbers[name]).all() for name in OF_BODY)
-
-
-def test_keys_of_cases_stay_valid():
-    """Those of before there were bands and thresholds; one that gives them is another job."""
-    key = "6225cc03d60adfe1ac8b"
-    body = {"frequency_x_Hz": 20, "frequency_y_Hz": 20}
-    assert Case.from_values({"body": body, "sensor": True}).key == key
-    assert Case.from_values({"body": {"band_low_Hz": 10}, "sensor": True}).key != key
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"body": {"band_low_Hz": 2000}}, "would be 2000 to 1000 Hz"),
-        ({"body": {"band_high_Hz": 1}}, "body.band_high_Hz: the band"),
-        ({"body": True, "sensor": {"second_threshold_m_per_s2": 3}}, "sensor.threshold_m_per_s2"),
-    ],
-)
-def test_what_does_not_fit_together(values, message):
-    with pytest.raises(CaseError, match=message.replace(".", r"\.")):
-        Case.from_values(values)
-
-
-def test_they_are_stored_shown_and_found(tmp_path, capsys, sensed):
-    (tmp_path / "sensed.yaml").write_text(json.dumps(SENSED))
-    store(tmp_path / "results", tmp_path / "sensed.yaml")
-    key = sensed.attrs["key"]
-    job = read_store(tmp_path / "results").job(key)
-    for name in OF_BODY:
-        np.testing.assert_array_equal(job[name], sensed[name])
-        assert job[name].dims == NUMBERS[name].dims
-    assert cli.main(["show", key, "-r", str(tmp_path / "results")]) == 0
-    out = capsys.readouterr().out
-    at = float(sensed["segment"][int(np.argmax(sensed["sensor_segment_rms"].values))])
-    assert f"sensor segment rms, {at:g} to {at + 10:g} deg" in out
-    assert out.count("sensor segment") == 2
-    assert "body velocity rms, x" in out
-    assert "sensor counts, second" in out

@@ -110,27 +110,6 @@ def test_what_is_not_run_is_not_odd():
     assert odd(solve={"max_steps": 1}) == []  # nothing is integrated
 
 
-def test_a_crank_of_usual_length_is_not_odd():
-    assert odd(machine={"crank_radius_mm": 90, "rod_length_mm": 300}) == []
-
-
-@pytest.mark.parametrize("command", ["run", "plan", "explain"])
-def test_commands_say_what_is_outside_the_judged_range(
-    tmp_path, monkeypatch, capsys, in_process, command
-):
-    monkeypatch.chdir(tmp_path)
-    text = "load: none\nmachine: {rod_mass_kg: [262, 5]}\nsolve: {duration_rev: 1, settle_rev: 0}\n"
-    (tmp_path / "k1.yaml").write_text(text, encoding="utf-8")
-    assert cli.main([command, "k1.yaml", "-j", "1"]) == 0
-    expected = (
-        "k1.yaml: warning: machine.rod_mass_kg: 262 kg is outside the range that the program was "
-        "judged on, 0.1 to 200 kg (1 of 2 jobs)"
-    )
-    err = capsys.readouterr().err
-    assert expected in unwrapped(err)
-    assert all(len(line) <= screen.WIDTH for line in err.splitlines())
-
-
 def study(tmp_path, text):
     path = tmp_path / "odd.yaml"
     path.write_text(text, encoding="utf-8")
@@ -165,13 +144,6 @@ def test_a_large_sweep_is_sampled_evenly_and_always_the_same(tmp_path):
     assert found == cautions(many)
     assert deep.of == 500
     assert 0.4 < deep.jobs / deep.of < 0.6
-
-
-def test_only_selected_jobs_are_told_of(tmp_path):
-    path = tmp_path / "odd.yaml"
-    path.write_text("joint: both\nclearance_mm: [0.2, 0.0001]\n", encoding="utf-8")
-    (one,) = load_studies(path, only="clearance_mm > 0.1")
-    assert cautions(one) == []
 
 
 def unwrapped(text):

@@ -15,13 +15,11 @@ from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness
 from compressor.metrics import METRICS
 from compressor.physics.record import CARRIED
-from compressor.solve.cautions import remarks
 from compressor.solve.run import run_at_tolerance
 from compressor.solve.search import (
     predictability_horizon,
 )
 from compressor.solve.simulate import simulate
-from compressor.studies.tradeoff.explain import terms, unknown_names
 
 pytestmark = pytest.mark.compiled
 
@@ -137,22 +135,6 @@ def test_pins_in_bores_by_three_integrators(law):
         assert np.linalg.norm(run["acceleration"].values - first) < 1e-3 * np.linalg.norm(first)
 
 
-def test_a_pin_that_is_pressed_deeper_than_johnson_knows_is_told_of():
-    """Of a joint that is far too short for its forces."""
-    values = {
-        "joint": "big_end",
-        "clearance_mm": 0.1,
-        "contact": {"law": "johnson", "length_mm": 0.05, "materials": ["steel", "copper"]},
-    }
-    run = simulate(Case.resolve(values))
-    assert run["status"].item() == "failed"
-    assert run["reason"].item() == "penetration_implausible"
-    assert "half the clearance" in run.attrs["detail"]
-    deep = [one for one in remarks(Case.resolve(values)) if one.kind == "deep"]
-    assert [one.key for one in deep] == ["contact.length_mm"]
-    assert "half the clearance" in deep[0].message
-
-
 def test_error_bars_hold_with_laws():
     """Of the default promise, by far tighter runs. With six restitutions each, 95 % of 500 do.
 
@@ -181,26 +163,6 @@ def test_error_bars_hold_with_laws():
     assert chaotic <= 1
     assert len(shares) > 225
     assert np.mean(np.array(shares) <= 1.0) > 0.85
-
-
-def test_explain_names_laws_and_bristles():
-    values = {"joint": "both", "clearance_mm": 0.2, "friction": {"law": "lugre"},
-              "contact": {"law": "flores", "restitution": 0.8}}  # fmt: skip
-    case = Case.resolve(values)
-    active, _ = terms(case)
-    assert active["contact"].startswith("flores")
-    assert active["contact"].endswith("restitution 0.8 (given)")
-    assert active["friction"].startswith("lugre, static 0.23")
-    pin = {"law": "johnson", "length_mm": 20, "modulus_GPa": 110}
-    active, _ = terms(Case.resolve({**values, "contact": pin}))
-    assert active["contact"] == "johnson, E* = 110 GPa, 20 mm long, undamped"
-    assert unknown_names(case)[-2:] == (
-        "bristles at the big end, m",
-        "bristles at the small end, m",
-    )
-    one = Case.resolve({**values, "joint": "big_end"})
-    assert unknown_names(one)[2:] == ("bristles at the big end, m",)
-    assert len(unknown_names(Case.resolve({"joint": "both", "clearance_mm": 0.2}))) == 4
 
 
 def test_bristles_start_without_a_jump():

@@ -1,19 +1,15 @@
 """A counterweight on the crank: what it takes off the force on the frame, by hand, and no more."""
 
-import json
 import math
 
 import numpy as np
 import pytest
 
-from compressor.cases.case import Case, CaseError, with_ideal_joints
+from compressor.cases.case import Case, with_ideal_joints
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
 from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
-from compressor.store.reader import open_study
-from compressor.studies.tradeoff.explain import counterweight_words
-from compressor.sweep.sweep import sweep
 
 TURN = {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 0.3}
 WORN = {"joint": "big_end", "clearance_mm": 0.2}
@@ -67,23 +63,6 @@ def test_a_steady_crank_s_motion_stays_to_the_bit():
         np.testing.assert_allclose(away, -0.9 * OMEGA**2 * crank, atol=1e-8)
 
 
-def test_the_body_shakes_less():
-    """Order 1 of its velocity falls as that of the force on it does."""
-    plain, other = (run(weight, **WORN, body=True) for weight in (None, 1000.0))
-    for axis in ("x", "y"):
-        force, velocity = (
-            abs(orders(other, axis, name)[1] / orders(plain, axis, name)[1])
-            for name in ("shaking_force", "body_velocity")
-        )
-        assert velocity == pytest.approx(force, rel=1e-3)
-    squares, lines = [], []
-    for one in (plain, other):
-        squares.append(float((one["body_velocity"].sel(axis="x")[1200:2400] ** 2).mean()))
-        lines.append(abs(orders(one, "x", "body_velocity")[1]) ** 2 / 2)
-    assert squares[1] < 0.7 * squares[0]
-    assert squares[0] - squares[1] == pytest.approx(lines[0] - lines[1], rel=1e-6)
-
-
 def test_a_drive_s_unbalance_and_the_counterweight_are_one_number():
     def case(unbalance, weight):
         drive = {"flywheel_kg_m2": 2, "unbalance_kg_mm": unbalance}
@@ -93,28 +72,6 @@ def test_a_drive_s_unbalance_and_the_counterweight_are_one_number():
     assert record(case(800, 800)) == record(case(0, 0))
     assert record(case(300, 800))["unbalance"] == -0.5
     assert record(case(800, 300))["unbalance"] == 0.5
-
-
-def test_none_is_as_without_the_key():
-    plain, none = (
-        Case.from_values(WORN | {"machine": {"speed_rpm": 700, **more}})
-        for more in ({}, {"counterweight_kg_mm": 0})
-    )
-    assert plain == none
-    assert plain.key == none.key
-    some = Case.from_values(WORN | {"machine": {"speed_rpm": 700, "counterweight_kg_mm": 9}})
-    assert some.key != plain.key
-    assert Case.from_values(some.values()) == some
-
-
-def test_explain_says_what_it_comes_to():
-    some = Case.from_values({"machine": {"counterweight_kg_mm": 1000}})
-    assert counterweight_words(some) == "1000 kg mm opposite to the crank pin, 2742 N"
-    shared = Case.from_values({"machine": {"balance": BALANCE}})
-    assert counterweight_words(shared) == (
-        "1263 kg mm opposite to the crank pin, 3463 N: 1 of what turns with the pin and 0.5 of "
-        "what reciprocates"
-    )
 
 
 def test_a_share_of_the_masses_is_balanced():
@@ -129,16 +86,6 @@ def test_a_share_of_the_masses_is_balanced():
     assert Case.from_attribute(case.attributes()["case"]).key == case.key
 
 
-def test_one_number_is_the_share_of_both():
-    one, two = (
-        Case.from_values({"machine": {"balance": balance}})
-        for balance in (0.5, {"rotating": 0.5, "reciprocating": 0.5})
-    )
-    assert one == two
-    assert one.key == two.key
-    assert one.counterweight == pytest.approx(0.5 * 120 * (14 + 4.7), rel=1e-14)
-
-
 def test_what_turns_with_the_pin_has_the_crank_s_own_unbalance():
     drive = {"unbalance_kg_mm": 700}
     case = Case.from_values(
@@ -146,41 +93,6 @@ def test_what_turns_with_the_pin_has_the_crank_s_own_unbalance():
     )
     assert case.counterweight == pytest.approx(700 + ROTATING, rel=1e-14)
     assert case.unbalance == pytest.approx(-ROTATING, rel=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("machine", "key", "words"),
-    [
-        ({"balance": {"rotating": 1}}, "machine.balance", "needs both, rotating and reciprocating"),
-        ({"balance": 1, "counterweight_kg_mm": 9}, "machine.balance", "give one of the two"),
-        ({"balance": 1.5}, "machine.balance", "outside"),
-    ],
-)
-def test_what_is_wrong_with_a_balance_is_told(machine, key, words):
-    with pytest.raises(CaseError) as error:
-        Case.from_values({"machine": machine})
-    assert any(one.key == key and words in one.message for one in error.value.problems)
-
-
-def test_a_study_sweeps_counterweights_and_shares(tmp_path, monkeypatch, in_process):
-    monkeypatch.chdir(tmp_path)
-    brief = {"duration_rev": 0.25, "settle_rev": 0, "output_step_deg": 0.9, "accuracy": "draft"}
-    machines = {
-        "given": {"counterweight_kg_mm": [0, 500]},
-        "shared": {"balance": {"rotating": 1.0, "reciprocating": [0.5, 1.0]}},
-    }
-    for name, machine in machines.items():
-        values = {"machine": machine, "solve": brief, "output": {"signals": True}}
-        (tmp_path / f"{name}.yaml").write_text(json.dumps(values))
-        sweep(load_studies(tmp_path / f"{name}.yaml"), tmp_path / "results")
-    given = open_study(tmp_path / "results", "given")
-    assert given["counterweight_kg_mm"].values.tolist() == [0, 500]
-    shared = open_study(tmp_path / "results", "shared")
-    assert shared["balance_reciprocating"].values.tolist() == [0.5, 1.0]
-    first = float(shared["bearing_force"].sel(axis="x").isel(time=0, balance_reciprocating=0))
-    last = float(shared["bearing_force"].sel(axis="x").isel(time=0, balance_reciprocating=1))
-    half = 1e-3 * 120 * 0.5 * (14 + 2.35)  # at top dead centre it pulls towards the crank
-    assert last - first == pytest.approx(-half * OMEGA**2, rel=1e-9)
 
 
 def test_orders_of_the_nameplate_machine_by_hand():

@@ -8,15 +8,12 @@ import pytest
 from compressor.cases.case import Case
 from compressor.physics import COLUMNS, Column, new_tally
 from compressor.solve.dense_tally import (
-    KICK,
-    WEIGHTS,
     find_changes,
-    find_missed_contact,
     find_tops,
     shares_above,
     tally_steps,
 )
-from compressor.solve.si_record import length_and_speed, record
+from compressor.solve.si_record import record
 
 STEPS = np.array([0.0, 0.1, 0.4, 0.5, 1.0])
 
@@ -85,28 +82,3 @@ def test_a_tally_of_known_rows(method_steps):
     fresh = new_tally()
     tally_steps(p, fresh, steps, observe, False)
     assert fresh["seconds"] == fresh["loss_seconds"][1] == fresh["peak"][3] == 0.0
-
-
-@pytest.mark.parametrize(
-    ("forces", "within"),
-    [
-        ([0, 0, 5, 0, 0, 0, 0, 0, 0], True),
-        ([0, 5, 5, 5, 5, 5, 5, 5, 0], True),
-        ([5, 0, 5, 0, 0, 0, 0, 0, 0], False),
-        ([0, 0, 5, 5, 5, 5, 5, 5, 5], False),
-        ([0, 0, 0, 0, 0, 0, 0, 0, 0], False),
-    ],
-)
-def test_a_contact_within_a_step_is_missed_where_its_impulse_counts(forces, within):
-    p = record(Case.from_values({"joint": "small_end", "clearance_mm": 0.2}))
-    rows, steps = np.zeros((2, 9, COLUMNS)), np.array([0.0, 0.1, 0.3])
-    rows[1, :, Column.NORMAL + 1] = forces
-    found = find_missed_contact(p, 1e-5, steps, rows)
-    assert (found is not None) == within
-    if found:
-        assert found[0] == 0.1
-        assert "5 N within one step of 0.2 s from 0.1 s" in found[1]
-        speed = 0.2 * WEIGHTS @ forces / min(p.rod_mass, p.reciprocating_mass)
-        enough = speed / (KICK * length_and_speed(p)[1])
-        assert find_missed_contact(p, 0.99 * enough, steps, rows)
-        assert not find_missed_contact(p, 1.01 * enough, steps, rows)

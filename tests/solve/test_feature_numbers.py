@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from compressor.cases.case import Case, CaseError
+from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5}
@@ -115,12 +115,6 @@ def test_lugre_without_coefficients_is_no_friction():
     assert found["friction_loss"] == 0.0
     bar = found["rms_acceleration_error"] + none["rms_acceleration_error"]
     assert abs(found["rms_acceleration"] - none["rms_acceleration"]) <= bar
-
-
-@pytest.mark.parametrize("key", ["static", "dynamic"])
-def test_lugre_with_one_coefficient_of_0_is_refused(key):
-    with pytest.raises(CaseError, match=f"friction.{key}: is 0 and the other"):
-        Case.from_values({"friction": {"law": "lugre", key: 0}})
 
 
 @pytest.mark.parametrize(

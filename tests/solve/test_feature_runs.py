@@ -7,7 +7,6 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.solve import measure, simulate
-from compressor.solve.search import predictability_horizon
 
 BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
 GUIDE, RUBBING = {"guide": {"clearance_mm": 0.1}}, {"friction": {"ideal_joints": True}}
@@ -110,32 +109,3 @@ def test_the_time_of_a_speed_that_gives_way_is_its_own():
     assert t[-1] > Case.from_values(free).turn * 2
     rate = np.gradient(theta, t, edge_order=2)
     assert rate == pytest.approx(found.crank_speed.values, rel=1e-4)
-
-
-def test_a_crank_that_stops_ends_its_run_and_says_so():
-    values = {"load": "gas", "drive": {"flywheel_kg_m2": 0.1, "slope_N_m_s": 0}}
-    solve = {"duration_rev": 4, "settle_rev": 0}
-    found = simulate(Case.from_values({**values, "solve": solve}))
-    assert found.status == "failed"
-    assert found.reason == "crank_stalled"
-    assert "the flywheel has 0.1 kg m2" in found.attrs["detail"]
-
-
-def test_a_play_in_the_guide_may_be_chaotic_by_itself():
-    """Twins are shifted in the guide, and compared there."""
-    values = {**GUIDE, "load": "none", "machine": {"gravity_m_per_s2": 9.81}}
-    case = Case.from_values({**values, "solve": {"duration_rev": 1, "settle_rev": 0}})
-    assert predictability_horizon(case) > 0.0
-
-
-def test_what_is_not_named_is_absent():
-    """Same key, no further series."""
-    plain = Case.from_values(BIG_END)
-    for group in ("guide", "drive", "lubricant", "rod"):
-        assert group not in plain.values()
-    no_rubbing = Case.from_values({**BIG_END, "friction": {"ideal_joints": False}})
-    assert no_rubbing.key == plain.key
-    found = run(BIG_END)
-    assert {"guide_height", "crank_speed", "rod_bend"}.isdisjoint(found)
-    more = run({**BIG_END, **GUIDE, "drive": True, "rod": {"damping_ratio": 0.05}})
-    assert {"guide_height", "guide_tilt", "guide_gap", "crank_speed", "rod_bend"} <= {*more}

@@ -128,41 +128,6 @@ def test_methods_agree_beyond_a_corner():
         assert one[name].values == pytest.approx(other[name].values, rel=1e-4, abs=1e-12)
 
 
-def deviation(clearance_mm):
-    """Greatest |x - x_ideal| (m), contact scaled along (physics/README.md, Reference numbers)."""
-    size = clearance_mm / 0.2
-    contact = {
-        "stiffness_N_per_mm15": 3.36e5 * size**-1.5,
-        "full_damping_mm": 0.1 * size,
-        "damping_N_s_per_mm": 336 * size**-0.5,
-    }
-    values = {"joint": "both", "clearance_mm": clearance_mm, "contact": contact}
-    solve = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft"}
-    found = simulate(Case.from_values({**values, "solve": solve}))
-    ideal = simulate(Case.from_values({"solve": solve}))
-    return float(np.abs(found["displacement"] - ideal["displacement"]).max())
-
-
-@pytest.mark.slow
-def test_scaled_limit_of_vanishing_clearance():
-    sizes = np.array([1.0, 0.1, 0.01, 0.001])
-    moved = np.array([deviation(size) for size in sizes])
-    slopes = np.diff(np.log(moved)) / np.diff(np.log(sizes))
-    assert np.abs(slopes - 1).max() <= 0.1
-
-
-@pytest.mark.compiled
-@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
-def test_output_grid_does_not_touch_the_motion(joint):
-    coarse, fine = (
-        run(joint, 0.2, duration_rev=0.5, settle_rev=0, output_step_deg=step) for step in (3, 0.3)
-    )
-    same = fine.isel(time=slice(None, None, 10))
-    assert coarse["time"].values.tolist() == same["time"].values.tolist()
-    assert apart(coarse["acceleration"].values, same["acceleration"].values) < 1e-13
-    assert float(coarse["peak_acceleration"]) == float(fine["peak_acceleration"])
-
-
 @pytest.mark.parametrize("joint", ["big_end", "both"])
 def test_tolerances_scale_with_the_clearance(joint):
     small, large = (

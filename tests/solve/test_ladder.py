@@ -1,7 +1,6 @@
 """What accuracy promises is kept run by run, or the job says that it is not."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,17 +16,11 @@ from compressor.solve import run as run_module
 from compressor.solve.error_bars import (
     AMPLIFIED_FACTOR,
     ORDER,
-    closeness,
     is_amplified,
-    ratio_of,
 )
 from compressor.solve.series import distances
 from compressor.solve.simulate import measure, simulate
 from compressor.solve.solution import (
-    ERROR_AIM,
-    MAX_TIGHTENING,
-    MIN_TIGHTENING,
-    missed_promises,
     solve,
 )
 
@@ -177,35 +170,6 @@ def test_later_runs_that_agree_by_chance_keep_no_promise(
         assert distances(exact.samples, found.samples)["acceleration"] <= case.promise
 
 
-def test_each_run_has_a_tighter_one_beside_it_and_the_one_before(asked):
-    found = solve(of(ILL, accuracy="standard"))
-    pairs = np.reshape([rtol for rtol in asked if rtol <= ACCURACY["standard"].rtol], (-1, 2))
-    np.testing.assert_allclose(pairs[:, 1], pairs[:, 0] / error_bars.TIGHTER_FACTOR)
-    assert (pairs[1:, 0] <= pairs[:-1, 0] / MIN_TIGHTENING * 1.01).all()
-    beside, before = found.companions
-    assert (found.rtol, beside.rtol, before.rtol) == pytest.approx((*pairs[-1], pairs[-2, 0]))
-
-
-def test_a_witness_that_fails_is_not_heard(monkeypatch):
-    case = of(ILL, rtol=1e-5)
-    two = (
-        run_module.run_at_tolerance(case, 1e-5, 60.0, False),
-        run_module.run_at_tolerance(case, 4e-6, 60.0, False),
-    )
-    assert error_bars.looser_comparison_run(case, *two, 60.0) is not None
-    original = error_bars.run_at_tolerance
-    monkeypatch.setattr(
-        error_bars,
-        "run_at_tolerance",
-        lambda *asked: replace(original(*asked), reason="step_underflow"),
-    )
-    assert error_bars.looser_comparison_run(case, *two, 60.0) is None
-    assert (
-        error_bars.looser_comparison_run(case, two[0], replace(two[1], reason="non_finite"), 60.0)
-        is None
-    )
-
-
 @pytest.mark.parametrize("word", ACCURACY)
 def test_errors_are_enlarged_beyond_ten_times_the_usual(word):
     """By the random cases of `make accuracy`, and the paper's nine, which are far from it."""
@@ -245,14 +209,6 @@ def test_the_ideal_machine_keeps_every_word(load):
     assert (found.status, found.attributes["promise"]) == ("ok", "kept")
     for name in (f"{one}_error" for one in SERIES):
         assert not found.numbers[name].any()
-
-
-def test_a_run_so_much_tighter_has_its_error_where_it_is_aimed():
-    """By its distance from the run before, which is mostly that run's error."""
-    for excess in (2.0, 3.0, 30.0):
-        ratio = ratio_of(ERROR_AIM / excess)
-        assert MIN_TIGHTENING < ratio < MAX_TIGHTENING
-        assert closeness(ratio) * excess == pytest.approx(ERROR_AIM)
 
 
 # Accuracy by number
@@ -308,22 +264,3 @@ def test_time_that_runs_out_on_the_ladder_can_be_raised():
         {**BOTH, "solve": SHORT | {"accuracy": {"peak_acceleration": 1e-4}, "timeout_s": 1e-9}}
     )
     assert measure(case).reason == "budget_seconds"
-
-
-def test_ideal_joints_meet_any_number():
-    solve = SHORT | {"accuracy": {"max_penetration": 1e-6, "impact_count": 1e-6}}
-    found = measure(Case.from_values({"solve": solve}))
-    assert found.status == "ok"
-    assert found.numbers["max_penetration_error"].tolist() == [0, 0]
-    one = measure(Case.from_values({"joint": "big_end", "clearance_mm": 0.2, "solve": solve}))
-    assert one.status == "ok"
-
-
-def test_unmet_names_the_worst_joint():
-    found = SimpleNamespace(
-        metrics={"max_penetration": np.array([2.0, 0.0])},
-        bars={"max_penetration": np.array([0.1, 0.0])},
-    )
-    assert missed_promises(of(BOTH, accuracy={"max_penetration": 0.1}), found) == []
-    (said,) = missed_promises(of(BOTH, accuracy={"max_penetration": 0.01}), found)
-    assert said == "max_penetration: its error bar is 0.05 of it, not 0.01"

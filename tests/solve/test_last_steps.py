@@ -8,12 +8,9 @@ import pytest
 from compressor.cases.case import Case
 from compressor.cases.groups import METHODS
 from compressor.physics import LAST_STEPS
-from compressor.solve import run as run_module
-from compressor.solve.run import COMPILED, integrate
-from compressor.solve.simulate import measure, simulate
+from compressor.solve.simulate import measure
 
 BOTH = {"joint": "both", "clearance_mm": 0.3}
-SCIPY = [name for name in METHODS if name not in COMPILED]
 
 
 def stopped(**values):
@@ -51,55 +48,6 @@ def test_the_history_of_a_slowing_crank_has_the_time_that_passed(method):
     assert found["stop_time"] > 1.0004 * turned  # the crank is behind a steady one
 
 
-@pytest.mark.parametrize("method", ["auto", "TSIT5", "RODAS"])
-def test_a_history_is_that_of_the_run(method, monkeypatch):
-    """Looked at step by step from the start, or only from the last chunk on: the same."""
-    solve = {"max_steps": 300, "method": method}
-    found = stopped(solve=solve)
-    monkeypatch.setattr(run_module, "CHUNK", 40)
-    again = stopped(solve=solve)
-    for name in ("time", "step", "error"):
-        assert again[f"stop_history_{name}"].tolist() == found[f"stop_history_{name}"].tolist()
-    assert again["stop_history_words"] == found["stop_history_words"]
-    assert again["stop_state"].tolist() == found["stop_state"].tolist()
-    expected = {"auto": "TSIT5"}.get(method, method)
-    assert {text.split()[0] for text in words(found)} == {expected}
-
-
-def test_the_errors_are_those_that_the_control_saw(monkeypatch):
-    """After a step that is taken the control remembers the logarithm of its error's norm."""
-    now = []
-    original = run_module.read_last_steps
-
-    def looking(stepper, work):
-        now.append(float(stepper.error))
-        return original(stepper, work)
-
-    monkeypatch.setattr(run_module, "read_last_steps", looking)
-    steps = integrate(simulate_request(max_steps=60)).last_steps
-    last = [error for _, _, error, words in steps if "taken" in words][-1]
-    assert math.log(max(last, 1e-4)) == pytest.approx(now[0], abs=1e-9)
-
-
-def simulate_request(max_steps):
-    from compressor.physics.systems import start
-    from compressor.solve.si_record import offsets, record
-
-    case = Case.from_values(BOTH)
-    p, y = record(case), np.zeros(8)
-    start(offsets(case), y, p)
-    times = np.array([0.0, case.duration])
-    return run_module.Request(p, y, times, 0.0, case.rtol, max_steps=max_steps)
-
-
-def test_a_step_that_leaves_the_numbers_is_refused():
-    gas = {"head_clearance_mm": 0.601, "switching": "exact"}
-    solve = {"duration_rev": 1.25, "accuracy": "draft"}
-    found = simulate(Case.from_values({**BOTH, "load": "gas", "gas": gas, "solve": solve}))
-    assert words(found.attrs)[-1].endswith("refused")
-    assert not np.isfinite(found.attrs["stop_history_error"][-1])
-
-
 @pytest.mark.parametrize(
     ("values", "rates"),
     [
@@ -119,11 +67,6 @@ def test_each_rate_of_a_stopped_state_has_a_name_of_its_own(values, rates):
     assert names[len(rates) : 2 * len(rates)] == rates
 
 
-def test_a_run_that_ends_well_has_no_history():
-    found = measure(Case.from_values({**BOTH, "solve": {"duration_rev": 0.1, "settle_rev": 0}}))
-    assert not [name for name in found.attributes if name.startswith("stop")]
-
-
 @pytest.mark.parametrize("method", [*METHODS])
 @pytest.mark.parametrize("most", [1, 37])
 def test_the_budget_of_steps_is_kept_exactly(method, most):
@@ -131,13 +74,6 @@ def test_the_budget_of_steps_is_kept_exactly(method, most):
     assert found.reason == "budget_steps"
     assert found.numbers["steps"] + found.numbers["rejected"] == most
     assert len(words(found.attributes)) == min(most, LAST_STEPS)
-
-
-@pytest.mark.parametrize("method", SCIPY)
-def test_steps_of_scipy_s_methods_are_told_without_errors(method):
-    found = stopped(solve={"max_steps": 20, "method": method})
-    assert words(found) == [f"{method} taken"] * LAST_STEPS
-    assert np.isnan(found["stop_history_error"]).all()
 
 
 def test_a_contact_that_lies_within_one_step_is_named(monkeypatch):

@@ -16,12 +16,10 @@ from compressor.physics import COLUMNS, Column
 from compressor.solve import search as search_module
 from compressor.solve.request import Trajectory
 from compressor.solve.search import (
-    FIRST_SPAN_REV,
     LOOK_RTOL,
     LOOK_SHIFT,
     MIN_WORK,
     SURE_FACTOR,
-    WORK,
     Parting,
     Search,
     predictability_horizon,
@@ -138,30 +136,6 @@ def compared(monkeypatch, *found, needs=1000):
 TIGHTER = pytest.approx(LOOK_RTOL / SURE_FACTOR)
 
 
-def test_a_short_span_is_looked_at_first(monkeypatch):
-    of = case()
-    parted = Parting(0.1 * of.turn, True, False)
-    asked = compared(monkeypatch, parted)
-    search = searched(of, 600_000)
-    assert search.parts(whole=False)
-    assert search.horizon == parted.time
-    expected = [(FIRST_SPAN_REV, LOOK_RTOL), (pytest.approx(0.15), TIGHTER)]
-    assert [row[:2] for row in asked] == expected
-    assert search.parts(whole=True)
-    assert len(asked) == 2  # it is known
-
-
-def test_motions_that_stay_together_to_the_end_do_not_part(monkeypatch):
-    of = case()
-    asked = compared(monkeypatch, Parting(of.duration, False, True))
-    search = searched(of, 600_000)
-    assert not search.parts(whole=False)
-    assert math.isnan(search.horizon)
-    assert not search.parts(whole=True)
-    assert search.horizon == math.inf
-    assert [row[:2] for row in asked] == [(FIRST_SPAN_REV, LOOK_RTOL), (4.0, LOOK_RTOL)]
-
-
 def test_motions_that_part_at_a_loose_tolerance_alone_are_no_chaos(monkeypatch):
     """Nor is it known that they never part."""
     of = case()
@@ -186,30 +160,6 @@ def test_a_search_takes_no_more_than_its_budget(monkeypatch, needs):
     assert asked
     assert search.stopped == (needs > 1000)
     assert search.horizon == math.inf or search.stopped
-
-
-def test_runs_have_twenty_times_the_first_run_s_work_and_shifted_ones_again(monkeypatch):
-    """Or two seconds' worth, if that is more; a first run has the case's limit alone."""
-    of = case()
-    assert Search(of).within_budget() is of
-    assert searched(of, 6000).within_budget().solve.max_steps == (MIN_WORK - 6000) // 6
-    asked = compared(monkeypatch, Parting(0.0, False, True), needs=10**9)
-    search = searched(of, 6_000_000, 90_000_000)
-    left = WORK * 6_000_000 - 96_000_000
-    assert search.within_budget().solve.max_steps == min(left // 6, of.solve.max_steps)
-    search.count(run_of(42_000_000))
-    assert search.within_budget().solve.max_steps == 1
-    search.parts(whole=True)
-    assert asked == [(4.0, LOOK_RTOL, of.solve.max_steps)]
-    assert search.stopped
-
-
-def test_a_run_that_the_budget_ended_says_so():
-    search = searched(case(), 6000)
-    ended = run_of(6_000_000, reason="budget_steps")
-    assert search.limit_of(ended).startswith("more than 2e+07 evaluations in all, the budget")
-    assert search.limit_of(run_of(6 * 5_000_000, reason="budget_steps")) == ""
-    assert search.limit_of(run_of(6000, reason="budget_seconds")) == ""
 
 
 def test_a_case_that_needs_more_than_its_budget_is_refused_in_these_words(monkeypatch):

@@ -176,15 +176,6 @@ def test_no_sample_lies_above_a_peak(tmp_path):
         assert max(top, 0.0) <= float(run[f"peak_rod_load_{name}"]) * (1 + 1e-12)
 
 
-def test_a_run_without_signals_or_with_a_stop_has_none():
-    plain = measure(Case.from_values({"solve": TURN})).numbers
-    short = {**TURN, "max_steps": 40}
-    stopped = {"joint": "big_end", "clearance_mm": 0.2, "solve": short, **SIGNALLED}
-    for numbers in (plain, measure(Case.from_values(stopped)).numbers):
-        assert math.isnan(numbers["rod_load_reversal_angle"])
-        assert math.isnan(numbers["rod_load_reversal_share_error"])
-
-
 def test_a_reversal_that_is_not_known_is_not_judged():
     found = SimpleNamespace(numbers={
         f"rod_load_reversal_{name}{end}": value

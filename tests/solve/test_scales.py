@@ -1,14 +1,11 @@
 """Scales known before a run, against closed forms, compiled constants and runs."""
 
-import math
-
 import numpy as np
 import pytest
 from random_cases import random_cases
 from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case
-from compressor.cases.materials import contact_stiffness
 from compressor.metrics import JOINTS
 from compressor.physics.contact_laws import Power
 from compressor.physics.step_control import STABILITY_LIMIT
@@ -20,25 +17,8 @@ from compressor.solve.cautions import (
 )
 from compressor.solve.request import Stop, check_depth
 from compressor.solve.run import run_at_tolerance
-from compressor.solve.si_record import record, stiffness_of
+from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
-
-HERTZ = Power(3.36e5 * 1000**1.5, 1.5)
-BOTH = {"joint": "both", "clearance_mm": 0.2}
-
-
-def test_static_penetrations_of_the_paper():
-    """0.018 mm at 825 N, 0.044 mm at 3087 N (physics/README.md, Reference numbers)."""
-    assert HERTZ.static_depth(825) == pytest.approx(0.018e-3, rel=0.02)
-    assert HERTZ.static_depth(3087) == pytest.approx(0.044e-3, rel=0.01)
-
-
-def test_hertz_s_bounce():
-    """Contact time 2.9432 depth / speed (physics/README.md, Reference numbers)."""
-    depth = HERTZ.impact_depth(5.0, 0.3)
-    assert depth == pytest.approx((5 * 5.0 * 0.3**2 / (4 * HERTZ.stiffness)) ** 0.4, rel=1e-12)
-    assert HERTZ.impact_time(depth, 0.3) == pytest.approx(2.9432 * depth / 0.3, rel=1e-4)
-    assert HERTZ.impact_time(0.0, 0.0) == math.inf
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.2])
@@ -68,17 +48,6 @@ def test_the_greatest_force_bounds_the_ideal_machine_s(load, speed):
     found = simulate(case)["peak_contact_force"].values
     for joint, force in zip(JOINTS, found, strict=True):
         assert force <= greatest_force(record(case), joint) <= 3 * force
-
-
-def test_stiffness_is_given_or_of_the_materials():
-    squared = Case.resolve({**BOTH, "contact": {"exponent": 2}})
-    mixed = Case.resolve({**BOTH, "contact": {"materials": ["steel", "copper"]}})
-    pin = 0.01
-    bores = [pin + getattr(mixed.clearance_mm, joint) / 1e3 for joint in JOINTS]
-    expected = [contact_stiffness("steel", "copper", pin, bore) for bore in bores]
-    for case, values in ((squared, [3.36e11, 3.36e11]), (mixed, expected)):
-        assert [stiffness_of(case, joint) for joint in JOINTS] == pytest.approx(values, rel=1e-12)
-        assert record(case)["stiffness"].tolist() == pytest.approx(values, rel=1e-12)
 
 
 def test_the_ideal_machine_has_no_scales_and_no_cost():

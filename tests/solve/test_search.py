@@ -109,12 +109,6 @@ def test_a_motion_that_can_be_foretold_keeps_its_bars():
         assert np.array_equal(asked[name], plain[name]), name
 
 
-def test_a_failed_job_has_no_horizon():
-    found = measure(brief(REGULAR, horizon=True, max_steps=5))
-    assert found.reason == "budget_steps"
-    assert math.isnan(found.numbers["predictability_horizon"])
-
-
 def test_a_horizon_is_kept_and_asked_for_beside_a_job_s_identity(tmp_path):
     plain, asked = (brief(CHAOTIC, horizon=asked, rtol=1e-9) for asked in (False, True))
     assert plain.key == asked.key

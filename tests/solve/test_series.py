@@ -6,18 +6,14 @@ import pytest
 from compressor.cases.case import Case
 from compressor.metrics import NUMBERS, SERIES
 from compressor.physics import COLUMNS, Column
-from compressor.solve.run import run_at_tolerance
 from compressor.solve.series import (
     COMPARED_PER_REV,
     MAX_COMPARED,
     MIN_COMPARED,
-    block,
     compared_per_rev,
     compared_times,
     distances,
-    rows_of,
 )
-from compressor.solve.simulate import simulate
 
 BOTH = {"joint": "both", "clearance_mm": 0.2}
 
@@ -51,23 +47,6 @@ def test_revolutions_are_compared_at_the_same_angles():
     np.testing.assert_allclose(angles[1:], angles[:1].repeat(2, axis=0), atol=1e-12)
 
 
-def test_the_times_do_not_depend_on_what_is_stored():
-    np.testing.assert_array_equal(compared_times(case()), compared_times(case(output_step_deg=7.2)))
-
-
-def test_samples_are_those_of_a_run_at_these_times():
-    """At some of its times alone."""
-    of = case(duration_rev=0.25, settle_rev=0.1)
-    run = run_at_tolerance(of, 1e-5, 60.0, True)
-    whole, states = run.trajectory.times, run.trajectory.states.copy()
-    rows = rows_of(run.p, run.trajectory, COLUMNS)
-    taken = rows_of(run.p, run.trajectory.at(whole[5:9]), COLUMNS)
-    np.testing.assert_array_equal(taken, rows[5:9])
-    some = run.trajectory.at(whole[::30])
-    np.testing.assert_array_equal(some.times, whole[::30])
-    np.testing.assert_array_equal(some.states, states[::30])
-
-
 def test_distances_are_relative_and_by_joint():
     ours, theirs = np.zeros((4, COLUMNS)), np.zeros((4, COLUMNS))
     ours[:, Column.ACCELERATION] = [3, 0, 4, 0]
@@ -83,11 +62,3 @@ def test_distances_are_relative_and_by_joint():
     for name, value in found.items():
         joint = (2,) if "joint" in NUMBERS[f"{name}_error"].dims else ()
         assert np.shape(value) == joint, name
-
-
-def test_a_block_is_what_is_stored():
-    of = case(duration_rev=0.25, settle_rev=0)
-    stored, run = simulate(of), run_at_tolerance(of, of.rtol, 60.0, True)
-    rows = rows_of(run.p, run.trajectory)
-    for name in SERIES:
-        np.testing.assert_array_equal(stored[name].values, block(name, rows))

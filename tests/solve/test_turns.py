@@ -5,12 +5,9 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
-from compressor.physics import merge_tallies
 from compressor.solve.request import revolutions
 from compressor.solve.run import run_at_tolerance
 from compressor.solve.run_metrics import metrics
-
-TALLIED = ("seconds", "square", "integral", "loss_seconds", "impacts")
 
 
 def case(joint, method, **solve):
@@ -62,19 +59,3 @@ def test_a_run_ends_where_enough_is_known():
     assert len(found.trajectory.turns) == 1
     assert found.trajectory.tally["seconds"] == pytest.approx(of.turn, rel=1e-9)
     assert found.trajectory.steps < 0.6 * run(of).trajectory.steps
-
-
-def test_cuts_are_whole_revolutions_from_settling_on():
-    np.testing.assert_allclose(revolutions(0.1, 0.56, 0.12), [0.22, 0.34, 0.46])
-    np.testing.assert_allclose(revolutions(0.12, 0.48, 0.12), [0.24, 0.36, 0.48])
-    assert revolutions(0.4, 0.48, 0.12).size == 0
-
-
-def test_tallies_are_merged_by_sums_and_greatest_values():
-    of = case("both", "auto")
-    one, two = turns = run(of, ends(of)).trajectory.turns
-    both = merge_tallies(turns)
-    for name in TALLIED:
-        np.testing.assert_allclose(both[name], one[name] + two[name])
-    np.testing.assert_array_equal(both["peak"], np.maximum(one["peak"], two["peak"]))
-    assert both["crank_work"] == two["crank_work"]
