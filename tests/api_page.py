@@ -1,6 +1,6 @@
-"""The page of the Python interface, compressor/API.md: written from the public docstrings.
+"""The page of the Python interface, compressor/API.md: signatures and first sentences.
 
-`make pages` writes it; tests/test_api_page.py compares, and runs every example.
+`make pages` writes it; tests/test_api_page.py compares, and runs the examples of the docstrings.
 """
 
 import inspect
@@ -24,12 +24,10 @@ SECTIONS = {
         "StoreWarning",
     ),
 }  # fmt: skip
-INTRODUCTION = {
-    "Groups of a case": "A field has the name of its key in a case file. Tables, equations and "
-    "sections (§) are those of Xiao et al. 2021, *Dynamic Analysis for a Reciprocating Compressor "
-    "System with Clearance Fault*; [keys](../configs/README.md#keys) says what *assumed*, "
-    "*inferred* and *program* mean."
-}
+HELP = (
+    "`help(compressor.simulate)` and the like show parameters, units, errors and examples. "
+    "The fields of a group are the [keys of a case file](../configs/README.md#keys).\n"
+)
 
 
 def public():
@@ -51,34 +49,14 @@ def members(owner):
 
 
 def signature(made):
-    """How a function is called, as Markdown has it in one line."""
+    """How a function is called, or the type of a property, in one line."""
+    if isinstance(made, property | cached_property):
+        function = made.fget if isinstance(made, property) else made.func
+        return signature(function).replace("() ->", ":")
+    made = made.__func__ if isinstance(made, classmethod) else made
     text = str(inspect.signature(made)).replace("'", "").replace("xr.", "xarray.")
-    return re.sub(r"\b(collections\.abc|typing|compressor(\.\w+)+)\.(?=[A-Z])", "", text)
-
-
-def markdown(text):
-    """A docstring: its examples fenced, the pages that it names linked."""
-    lines, fenced = [], False
-    for line in inspect.cleandoc(text).splitlines():
-        if line.startswith(">>>") and not fenced:
-            lines.append("```pycon")
-            fenced = True
-        elif fenced and not line:
-            lines.append("```")
-            fenced = False
-        lines.append(line if fenced else linked(line))
-    return "\n".join([*lines, *(["```"] if fenced else [])]) + "\n"
-
-
-def linked(line):
-    """A line with a link in place of each page in backquotes."""
-    return re.sub(r"`((?:[a-z]+/)?[A-Za-z-]+\.md)`", lambda page: link(page[1]), line)
-
-
-def link(page):
-    """A page of the repository, seen from ours."""
-    up = "" if (PAGE.parent / page).exists() else "../"
-    return f"[{page.removesuffix('/README.md')}]({up}{page})"
+    text = re.sub(r"\b(collections\.abc|typing|compressor(\.\w+)+)\.(?=[A-Z])", "", text)
+    return re.sub(r"^\((self|cls)(, )?", "(", text)
 
 
 def summary(made):
@@ -86,45 +64,25 @@ def summary(made):
     return inspect.cleandoc(made.__doc__).partition("\n\n")[0]
 
 
-def entry(name):
-    """What the page says of one public name."""
-    made = getattr(compressor, name)
-    called = f"```py\n{name}{signature(made)}\n```\n\n" if inspect.isfunction(made) else ""
-    text = f"### {name}\n\n{called}{markdown(made.__doc__)}"
-    if made is compressor.Case:
-        text += "\n" + "\n".join(member(*found) for found in members(made))
-    return text
-
-
-def member(name, made):
-    """What the page says of a method or a property of `Case`."""
-    if isinstance(made, property | cached_property):
-        function = made.fget if isinstance(made, property) else made.func
-        kind = signature(function).partition("-> ")[2]
-        return f"#### Case.{name}\n\n```py\nCase.{name}: {kind}\n```\n\n{markdown(made.__doc__)}"
-    function = made.__func__ if isinstance(made, classmethod) else made
-    called = re.sub(r"^\((self|cls)(, )?", "(", signature(function))
-    return f"#### Case.{name}\n\n```py\nCase.{name}{called}\n```\n\n{markdown(function.__doc__)}"
+def entry(name, made):
+    """A line for one public name; classes are called with keywords, so they have no signature."""
+    called = "" if inspect.isclass(made) else signature(made)
+    return f"- `{name}{called}`: {summary(made)}\n"
 
 
 def page():
     """The whole page."""
-    rows = [
-        f"| [`{name}`](#{name.lower()}) | {summary(getattr(compressor, name))} |"
-        for names in SECTIONS.values()
-        for name in names
-    ]
-    parts = [
-        "<!-- generated from the docstrings by make pages -->",
-        "# The Python interface\n",
-        markdown(compressor.__doc__),
-        "| name | what it is |\n|---|---|\n" + "\n".join(rows) + "\n",
-    ]
+    head, example = inspect.cleandoc(compressor.__doc__).split("\n\n", 1)
+    example, rest = re.split(r"\n\n(?=What)", example)
+    example = example.replace(">>> import", "```pycon\n>>> import", 1) + "\n```"
+    parts = ["<!-- generated from the docstrings by make pages -->", "# The Python interface\n",
+             f"{head}\n", f"{example}\n", f"{rest}\n", HELP]  # fmt: skip
     for title, names in SECTIONS.items():
         parts.append(f"## {title}\n")
-        if title in INTRODUCTION:
-            parts.append(f"{INTRODUCTION[title]}\n")
-        parts += [entry(name) for name in names]
+        parts.append("".join(entry(name, getattr(compressor, name)) for name in names))
+        if title == "Cases":
+            parts.append("`Case` has these methods and properties:\n")
+            parts.append("".join(entry(f"Case.{n}", made) for n, made in members(compressor.Case)))
     return "\n".join(parts)
 
 

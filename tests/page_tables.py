@@ -8,7 +8,9 @@ import math
 import re
 from pathlib import Path
 
-from compressor.cases.table import table
+from compressor.cases.laws import CLEARANCE
+from compressor.cases.parameter import PART_WORDS
+from compressor.cases.table import GROUPS, READ, parts_by_key, table
 from compressor.reasons import Reason
 
 ROOT = Path(__file__).parent.parent
@@ -141,22 +143,53 @@ def choose_table():
     return markdown(["you want", "choose, in `solve`", "error", "time of a run"], rows)
 
 
-def parameter_table(rows):
-    """The table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
-    heads = (
-        "key", "unit", "default", "range", "judged on", "source", "what it is", "read with",
-        "plausible",
-    )  # fmt: skip
-    lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
+def default_of(row):
+    """The default as a cell: a value, or what stands in its place, and whether it is assumed."""
+    word, _, text = row.source.partition(": ")
+    if row.default is None or row.kind == "text":
+        return text or ("as the joints'" if row.source == "as the joints'" else "")
+    shown = str(row.default).lower() if row.kind == "boolean" else str(row.default)
+    assumed = ", assumed" if word == "assumed" else ", inferred" if "inferred" in word else ""
+    return shown.removesuffix(".0") + assumed
+
+
+def key_rows(rows):
+    """One row for the parts of a key, such as the two joints: its name and its phrase."""
+    found = {}
     for row in rows:
-        default = "" if row.default is None or row.kind == "text" else str(row.default)
-        default = default.lower() if row.kind == "boolean" else default.removesuffix(".0")
-        cells = (
-            f"`{row.key}`", row.unit, default, row.range, row.judged_on, row.source, row.phrase,
-            row.readers, f"{row.plausible}: {row.plausible.why}" if row.plausible else "",
-        )  # fmt: skip
-        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    return "\n".join(lines) + "\n"
+        whole, _, part = row.key.rpartition(".")
+        if part in parts_by_key().get(whole, ()):
+            name = f"{whole}.{{{', '.join(parts_by_key()[whole])}}}"
+            found.setdefault(name, (row, row.phrase.replace(f" {PART_WORDS[part]}", "")))
+        else:
+            found[row.key] = (row, row.phrase)
+    return found
+
+
+def needs_of(row, group):
+    """The conditions under which a case reads a key, but for those of its group."""
+    known = (CLEARANCE, group, *READ.get(group, ()))
+    mine = [
+        one for one in row.readers.split("; ") if one and not (one in known or CLEARANCE in one)
+    ]
+    return f"; needs `{' and '.join(mine)}`" if mine else ""
+
+
+def parameter_table(rows, group):
+    """The table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
+    head = ["key", "unit", "default", "range", "what it is", "plausible"]
+    lines = []
+    for name, (row, phrase) in key_rows(rows).items():
+        needs = needs_of(row, group) if name == row.key and group else ""
+        tested = f"; tested {row.judged_on}" if row.judged else ""
+        cells = (f"`{name}`", row.unit, default_of(row), row.range + tested, phrase + needs,
+                 str(row.plausible or ""))  # fmt: skip
+        lines.append([cell.replace("|", "\\|") for cell in cells])
+    used = [place for place in range(len(head)) if any(line[place] for line in lines)]
+    needed = " and ".join(READ.get(group, ())).replace(CLEARANCE, "a joint with clearance")
+    return (f"Needs {needed}.\n\n" if needed else "") + markdown(
+        [head[place] for place in used], [[line[place] for place in used] for line in lines]
+    )
 
 
 def parameter_tables():
@@ -166,7 +199,10 @@ def parameter_tables():
         group, dot, _ = row.key.partition(".")
         alone = not dot or group in ("clearance_mm", "healthy_clearance_mm", "initial_offset_mm")
         rows.setdefault("Load and joints" if alone else group, []).append(row)
-    return "\n".join(f"### {group}\n\n{parameter_table(of)}\n" for group, of in rows.items())
+    return "\n".join(
+        f"### {group}\n\n{parameter_table(of, group if group in GROUPS else '')}"
+        for group, of in rows.items()
+    )
 
 
 def identify_words():
