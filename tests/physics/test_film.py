@@ -2,8 +2,6 @@
 
 import functools
 import math
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,12 +15,9 @@ from compressor.solve.si_record import record
 
 CLEARANCE = 5e-5  # m
 SPEED = 60.0  # rad/s
-PAGE = Path(__file__).parents[2] / "compressor" / "physics" / "README.md"
-# rows of the page's table of errors in all directions: eccentricity, and four greatest errors (%)
-ROW = re.compile(
-    r"^  \| (0\.\d+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \| ([\d.]+) \|$", re.MULTILINE
-)
-DIRECTIONS = [tuple(map(float, row)) for row in ROW.findall(PAGE.read_text(encoding="utf-8"))]
+# eccentricity, and the greatest error (%) in all directions: of the force where the film is
+# pressed, of the force of turning alone where it is pulled apart; the page has the greatest of all
+DIRECTIONS = ((0.1, 7.9, 8.0), (0.3, 5.5, 5.5), (0.6, 2.6, 2.5), (0.9, 0.5, 1.3), (0.97, 0.4, 4.1))
 
 
 @functools.cache  # its constants take a second, which collecting the tests need not wait for
@@ -174,26 +169,20 @@ def test_beyond_the_wall_the_film_stays_what_it_is_there():
 
 
 def both_at_once(p, eps, angle):
-    """Numbers of the film at a direction of its velocity: the model's, Holland's, Reynolds'."""
-    ratio, constants = 0.5 * p["film_length"][0] / p["pin_radius"][0], p["film_constants"][0]
+    """Numbers of the film at a direction of its velocity: the model's, Reynolds'."""
+    ratio = 0.5 * p["film_length"][0] / p["pin_radius"][0]
     turning, closing = math.cos(angle), math.sin(angle)
     rate = (closing * CLEARANCE, 0.0)
     fx, fy = force((eps * CLEARANCE, 0.0), rate, (turning / eps, 0.0), p)[:2]
     ours = np.array([-fx, fy]) * CLEARANCE**2
     ours /= 2.0 * p["film_length"][0] * p["pin_radius"][0] ** 3 * p["viscosity"]
-    size, beta = rotation(eps, constants)
-    pressed = squeeze(math.copysign(eps, closing), constants) * closing
-    holland = (
-        size * abs(turning) * math.cos(beta) + pressed,
-        size * turning * math.sin(beta),
-    )
-    return ours, np.array(holland), reynolds(eps, ratio, turning, closing)
+    return ours, reynolds(eps, ratio, turning, closing)
 
 
 @pytest.mark.parametrize(
     ("eps", "wedge", "closing"),
     # of a worn crosshead pin, 127 mm stroke at 985 rpm, at 84, 90, 102 and 112 degrees; and where
-    # Holland's sum bears 11.8 kN and Reynolds' film 0.4
+    # a sum of turning and squeeze would bear 11.8 kN and Reynolds' film 0.4
     [(0.9707, 28.0, -0.45), (0.9696, 37.0, -1.8), (0.9616, 54.8, -5.6), (0.9326, 164.5, -54.4),
      (0.9652, 22.7, -11.4)],
 )  # fmt: skip
@@ -218,22 +207,19 @@ def test_a_short_bearing_that_turns_and_is_squeezed_is_the_closed_form():
             assert np.linalg.norm(found - exact) < 0.02 * np.linalg.norm(exact), (eps, angle)
 
 
-@pytest.mark.parametrize("row", DIRECTIONS)
-def test_the_film_in_all_directions_is_as_near_to_reynolds_as_the_page_says(row):
+@pytest.mark.parametrize(("eps", "pressed", "apart"), DIRECTIONS)
+def test_the_film_in_all_directions_is_near_to_reynolds(eps, pressed, apart):
     """Relative where it is pressed; where it is pulled apart, of the force of turning alone."""
-    eps = row[0]
-    errors = {"ours": ([], []), "holland": ([], [])}
+    errors = [], []
     for ratio in (0.25, 1.0):
         p = record_of(ratio)
         turning = np.linalg.norm(reynolds(eps, ratio, 1.0, 0.0))
         for angle in np.radians([*np.arange(0.0, 360.0, 22.5), 350.0, 355.0, 357.5]):
-            ours, other, exact = both_at_once(p, eps, angle)
+            ours, exact = both_at_once(p, eps, angle)
             back = int(angle > 3.15)
             size = turning if back else np.linalg.norm(exact)
-            errors["ours"][back].append(np.linalg.norm(ours - exact) / size)
-            errors["holland"][back].append(np.linalg.norm(other - exact) / size)
-    most = [100.0 * max(errors[name][back]) for back in (0, 1) for name in ("ours", "holland")]
-    assert most == pytest.approx(row[1:], abs=0.1)
+            errors[back].append(100.0 * np.linalg.norm(ours - exact) / size)
+    assert [max(of) for of in errors] == pytest.approx([pressed, apart], abs=0.1)
 
 
 def test_a_journal_settles_where_its_sommerfeld_number_is_the_load_s():
