@@ -254,8 +254,8 @@ def film_words():
 
     (force, at), (sensor, loudest) = spread("peak_contact_force"), spread("sensor_rms")
     return (
-        f"From {span(nameplate_films())} the peak force changes by {100 * (force - 1):.2g} % at most "
-        f"(at {at:g} mm), and the sensor's rms by a factor of {sensor:.2g} (at {loudest:g} mm).\n"
+        f"From {span(nameplate_films())} the peak force changes by {100 * force - 100:.2g} % at "
+        f"most (at {at:g} mm), the sensor's rms by a factor of {sensor:.2g} (at {loudest:g} mm).\n"
     )
 
 
