@@ -23,10 +23,12 @@ from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.metrics import NUMBERS, SIZES
 from compressor.outcome import ROW, Outcome
+from compressor.physics._jit import ENABLED
 from compressor.solve.simulate import simulate
 from compressor.store.batch import write_batch
 from compressor.store.stored import read_store
 from compressor.store.studies import read_studies, write_study
+from compressor.sweep.warm_up import Needs, compile_once
 from compressor.sweep.worker import JobResult
 
 # nohup ignores SIGHUP, and a shell SIGINT of what it runs behind: tests that send them, and the
@@ -47,74 +49,49 @@ CHAOTIC = {  # light, fast and without damping: it can be foretold for half a re
 CONFIGS = sorted((Path(__file__).parent.parent / "configs").glob("*.yaml"))
 
 
-# one process runs them after each other: only there is compiled, or derived, what they share
-TOGETHER = {
-    "tests/physics/test_contact_laws.py": "laws",
-    "tests/physics/test_friction_laws.py": "laws",
-    "tests/physics/test_restitution.py": "laws",
-    "tests/solve/test_chosen_laws.py": "laws",
-    "tests/test_pages.py": "features",
-    "tests/cases/test_unread.py": "features",
-    "tests/studies/tradeoff/test_variants.py": "features",
-    "tests/campaigns/test_validation.py": "features",
-    "tests/physics/test_general_mechanism.py": "features",
-    "tests/solve/test_feature_runs.py": "features",
-    "tests/physics/test_film.py": "features",
-    "tests/solve/test_lubricated.py": "features",
-    "tests/solve/test_model_version.py": "features",
-    "tests/solve/test_references.py": "features",
-    "tests/studies/test_judge.py": "features",
-    "tests/studies/test_wear_stages.py": "features",
-    "tests/studies/test_wear.py": "features",
-    "tests/campaigns/test_wear_campaign.py": "features",
-}
-# modules that take long; the others, in small pieces, then even out the processes. The first
-# ones compile each its own part of the equations, so that two processes do not compile the same at
-# once: the march, chosen laws, mechanisms
-LONG = (
-    "physics/test_march", "physics/test_contact_laws", "solve/test_chosen_laws",
-    "solve/test_feature_runs", "sweep/test_cluster",
-    "report/test_report", "cases/test_card", "campaigns/test_chaos_files", "cmd/test_cli",
-    "sweep/test_sweep", "solve/test_integrate", "test_newcomer", "store/test_damage",
-    "studies/follow/test_lyapunov", "test_systems", "studies/compare/test_compare",
-    "studies/calibrate/test_calibrate_command", "campaigns/test_calibrate_campaign",
-    "test_tutorial", "report/test_own_figures",
-)  # fmt: skip
+PARTS = ("plain", "features", "laws")  # of the equations, the longest two first
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(items):
-    """Long modules come first."""
-    place = {f"tests/{name}.py": number for number, name in enumerate(LONG)}
-    items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(LONG)))
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config, log):
-    """All tests of a module in one process, since they share what they make.
-
-    pytest-xdist 3.8 no longer sees its own groups with pytest 9.2.
-    """
-    from xdist.scheduler import LoadScopeScheduling
-
-    class Modules(LoadScopeScheduling):
-        def _split_scope(self, nodeid):
-            module = nodeid.partition("::")[0]
-            return TOGETHER.get(module, module)
-
-    config.option.loadscopereorder = False
-    return Modules(config, log)
+def pytest_configure(config):
+    """All tests of a module run in one process, since they share what they make."""
+    if getattr(config.option, "dist", "no") == "load":  # which -n alone asks for
+        config.option.dist, config.option.loadscopereorder = "loadfile", False
 
 
 @pytest.fixture(scope="session")
-def once(tmp_path_factory):
+def base(tmp_path_factory):
+    """The folder that all processes of a session share."""
+    own = tmp_path_factory.getbasetemp()
+    return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+
+@contextlib.contextmanager
+def locked(path):
+    """One process at a time is inside."""
+    with open(path, "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def equations(base):
+    """Of several processes each compiles another part of the equations first, and all wait.
+
+    Else two would compile the same at once. A single process compiles what its tests need.
+    """
+    if int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")) > 1 and ENABLED:
+        first = int(os.environ["PYTEST_XDIST_WORKER"].removeprefix("gw")) % len(PARTS)
+        for part in (*PARTS[first:], *PARTS[:first]):
+            with locked(base / f"{part}.lock"):
+                compile_once(Needs(("auto",), (part,)), lambda remark: None)
+
+
+@pytest.fixture(scope="session")
+def once(base):
     """Fill a folder once a session, whichever process comes first: once(name, fill) -> folder."""
-    base = tmp_path_factory.getbasetemp()
-    base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
 
     def made(name, fill):
-        with open(base / f"{name}.lock", "w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        with locked(base / f"{name}.lock"):
             if not (base / f"{name}.done").exists():
                 fill(base / name)
                 (base / f"{name}.done").touch()
