@@ -1,6 +1,6 @@
 """A case -> its outcome: motion, metrics, error bars, reasons."""
 
-from compressor.solve.cautions import JointScales, cautions, expected_cost, joint_scales
+from compressor.solve.cautions import JointScales, cautions, joint_scales
 from compressor.solve.measured_gas import gas_nodes
 from compressor.solve.request import Metrics, Request, Trajectory, revolutions
 from compressor.solve.run import integrate, run_at_tolerance

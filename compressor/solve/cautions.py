@@ -32,26 +32,18 @@ from compressor.cases import (
     with_ideal_joints,
 )
 from compressor.metrics import JOINTS
-from compressor.physics import STABILITY_LIMIT, elastic_form, greatest_load, steepest
+from compressor.physics import elastic_form, greatest_load
 from compressor.solve.dense_tally import closed_form
 from compressor.solve.measured_gas import card_noise, fit_polytrope
 from compressor.solve.request import greatest_depth
-from compressor.solve.run import COMPILED
 from compressor.solve.run_metrics import metrics
 from compressor.solve.si_record import record
 
-# Attempts of a step for each radian of the contact's ringing at rtol 1; measured on random cases.
-PER_RADIAN = {"big_end": 0.3, "small_end": 0.5, "both": 0.7}
-# of the steps that stability requires: joints are not in contact, or deep, always
-STABILITY_SHARE = 0.5
-ORDER = 5
-STEP_SECONDS = {"big_end": 3.5e-6, "small_end": 3.5e-6, "both": 4.5e-6}  # of compiled methods
 EXPONENTS = (1.0, 1.5)  # that gas is compressed with
 LEAST_PRESSURE = 0.07  # MPa, absolute, that a compressor takes in; less is a vacuum pump
 MAX_MISFIT = 0.05  # of a card's lines, rms of the pressure's logarithm
 MAX_UNLIKE = 0.25  # by which a card's clearance may differ from what is given
 MAX_NOISE = 5e-4  # of a card's range of pressure
-SCIPY_SECONDS = 6e-4  # of a step of SciPy's methods, with its tally: 4.7e-4 to 8.8e-4 by method
 
 
 @dataclass(frozen=True)
@@ -64,10 +56,6 @@ class JointScales:
     penetration: float  # m, at rest under the force
     damping_ratio: float  # of the lighter body on the contact at rest; above 1 it does not ring
     swing_frequency: float  # Hz, of the journal swinging about the line of the force in its bore
-    friction_rate: float  # 1/s: dmu/dv F / m where it is greatest; 1.5 mu_s F / (m v_s) of ADAMS's
-    explicit_step: float  # s, the stability limit by the fastest of stiffness, damping, friction
-    limited_by: str
-    implicit_step: float  # s: the contact's own time scale, which no method can do without
 
 
 def greatest_force(p: np.record, joint: str) -> float:
@@ -96,16 +84,10 @@ def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
     mass = min(p["rod_mass"], p["reciprocating_mass"]).item()
     depth = float(contact.static_depth(force))
     natural, damping = math.sqrt(contact.tangent(depth) / mass), contact.damping(depth)
-    friction = steepest(p) * force / mass if p["friction"] else 0.0
-    rates = {
-        "contact stiffness": natural, "contact damping": damping / mass, "friction": friction,
-    }  # fmt: skip
-    fastest = max(rates, key=rates.__getitem__)
     swing = math.sqrt(force / (across(p, joint) * (clearance + depth)))
     return JointScales(
-        joint, clearance, force, depth, damping / (2.0 * mass * natural), swing / (2.0 * math.pi),
-        friction, STABILITY_LIMIT / rates[fastest], fastest, 1.0 / natural,
-    )  # fmt: skip
+        joint, clearance, force, depth, damping / (2.0 * mass * natural), swing / (2.0 * math.pi)
+    )
 
 
 def across(p: np.record, joint: str) -> float:
@@ -126,22 +108,6 @@ def contact_scales(case: Case) -> Iterator[JointScales]:
     if worn:
         p = dry_record(case)
         yield from (joint_scales(p, joint, greatest_force(p, joint)) for joint in worn)
-
-
-def expected_cost(case: Case, joints: Sequence[JointScales]) -> tuple[float, float]:
-    """Return about how many steps a run of a case attempts, and how long they take (s).
-
-    To a factor of four in random cases: as many as accuracy requires while the contact rings, or as
-    stability does where that is not more than the stiff partner's. 0 where nothing is integrated.
-    """
-    if not joints:
-        return 0.0, 0.0
-    joint = joints[0].joint if len(joints) == 1 else "both"
-    radians = case.duration / min(one.implicit_step for one in joints)
-    accurate = PER_RADIAN[joint] * case.rtol ** (-1.0 / ORDER)
-    stable = STABILITY_SHARE * case.duration / min(one.explicit_step for one in joints)
-    steps = max(radians * accurate, min(stable, radians * max(accurate, 2.0)))
-    return steps, steps * (STEP_SECONDS[joint] if case.solve.method in COMPILED else SCIPY_SECONDS)
 
 
 METRES, MICROMETRES = {"m": 1e3}, {"µm": 1e-3}
@@ -251,7 +217,6 @@ HEAVY_ENDS = 2.0
 LONGEST_CRANK = 0.35  # of the rod's length; 0.15 to 0.3 is usual
 MIN_STICTION = 0.1  # mm/s: below it, friction all but sticks
 MAX_JOBS = 500  # of a study that are looked at
-SHORT_BUDGET = 4.0  # a budget this many times below what is expected; so far is that to be trusted
 NEAR_BUCKLING = 0.5  # of Euler's load; beyond it a rod bends by more than its inertia requires
 TURN_PIECES = 8  # of the quadrature over a revolution of the ideal machine
 DENSITIES = 1000.0, 20_000.0  # kg/m3, of what rods are made of
@@ -270,7 +235,6 @@ def remarks(case: Case) -> Iterator[Caution]:
         _of_rod(case),
         _of_load(case),
         _of_friction(case, joints),
-        _of_budgets(case, joints),
     ):
         yield Caution(key, text, kind)
 
@@ -461,17 +425,6 @@ def _of_friction(case: Case, joints: Sequence[JointScales]) -> Remarks:
     if joints and 0 < speed < MIN_STICTION:
         text = f"{speed:g} mm/s, below {MIN_STICTION:g} mm/s: friction all but sticks, and steps"
         yield "friction.stiction_velocity_mm_per_s", "stiction", f"{text} get short"
-
-
-def _of_budgets(case: Case, joints: Sequence[JointScales]) -> Remarks:
-    """Yield the budgets that are likely to run out."""
-    solve, (steps, seconds) = case.solve, expected_cost(case, joints)
-    if steps > SHORT_BUDGET * solve.max_steps:
-        text = f"{solve.max_steps} steps, but about {steps:.1g} are expected"
-        yield "solve.max_steps", "steps", text
-    if seconds > SHORT_BUDGET * solve.timeout_s:
-        text = f"{solve.timeout_s:g} s, but about {seconds:.1g} s are expected"
-        yield "solve.timeout_s", "seconds", text
 
 
 def cautions(study: Study, most: int = MAX_JOBS) -> list[Caution]:

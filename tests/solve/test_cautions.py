@@ -42,8 +42,6 @@ def test_nothing_is_odd_about_the_paper_s_cases(study):
          ("machine.crank_radius_mm", "proportion")),
         ({"machine": {"rod_mass_kg": 262}}, ("machine.rod_mass_kg", "judged")),
         (BIG_END | {"clearance_mm": 1.5}, ("clearance_mm", "judged")),
-        (BIG_END | {"solve": {"max_steps": 200}}, ("solve.max_steps", "steps")),
-        (BIG_END | {"solve": {"timeout_s": 1e-4}}, ("solve.timeout_s", "seconds")),
     ],
 )  # fmt: skip
 def test_what_is_odd(values, expected):
@@ -106,10 +104,6 @@ def test_what_is_given_or_goes_with_the_defaults_is_not_told_of(values):
     assert not keys & {key for key, _ in odd(**values)}
 
 
-def test_what_is_not_run_is_not_odd():
-    assert odd(solve={"max_steps": 1}) == []  # nothing is integrated
-
-
 def study(tmp_path, text):
     path = tmp_path / "odd.yaml"
     path.write_text(text, encoding="utf-8")
@@ -157,7 +151,7 @@ def test_the_command_line_warns_in_a_few_lines(tmp_path, capsys):
         "joint: both\nclearance_mm: [0.3, 0.4]\nload: none\n"
         "machine: {rod_length_mm: 6, crank_radius_mm: 1, pin_radius_mm: 0.4, speed_rpm: 52.36,\n"
         "          rod_inertia_kg_m2: 5}\n"
-        "friction: {stiction_velocity_mm_per_s: 0.01}\nsolve: {max_steps: 1}\n",
+        "friction: {stiction_velocity_mm_per_s: 0.01}\n",
         encoding="utf-8",
     )
     screen.caution(load_studies(path))
@@ -167,11 +161,11 @@ def test_the_command_line_warns_in_a_few_lines(tmp_path, capsys):
         f"{path}: warning: machine.crank_radius_mm: 1 mm is unusual (5 to 1000 is usual); read as "
         "m, it is 1000 mm (2 of 2 jobs)"
     )
-    assert told[-1] == f"{path}: and 3 more warnings, which compsim plan {path} lists"
+    assert told[-1] == f"{path}: and 2 more warnings, which compsim plan {path} lists"
     cli.main(["plan", str(path), "-r", str(tmp_path / "results")])
     whole = [line for line in unwrapped(capsys.readouterr().err) if str(path) in line]
     assert whole[:5] == told[:5]
-    assert len(whole) == 8
+    assert len(whole) == 7
 
 
 def test_wear_is_said_to_be_of_its_own_command(tmp_path):

@@ -30,7 +30,6 @@ from compressor.physics import state_names
 from compressor.program import Progress, duration, no_progress
 from compressor.solve import (
     JointScales,
-    expected_cost,
     joint_scales,
     record,
     simulate,
@@ -72,9 +71,6 @@ def explain(
     active, absent = terms(case)
     if case.body and good:
         active["body"] = body_words(case, run)
-    scales = [*ideal_scales(case)]
-    unknown = case.needs_mechanism or case.lubricant
-    steps, expected = (0.0, 0.0) if unknown else expected_cost(case, scales)
     advice: Sequence[dict[str, Any]] = ()
     if good and run["steps"] > 0:
         paid = [one for one in variants(case) if one.left_out]
@@ -89,9 +85,7 @@ def explain(
         "unknowns": unknown_names(case),
         "active": active,
         "absent": absent,
-        "scales": scales,
-        "expected_steps": steps,
-        "expected_seconds": expected,
+        "scales": [*ideal_scales(case)],
         "accuracy": requested_accuracy(case),
         "rtol": case.rtol,
         "promise": promise(case),
@@ -340,11 +334,6 @@ def scale_lines(joint: JointScales) -> Iterator[str]:
         f"in contact: damping ratio {joint.damping_ratio:.2g} (it bounces below 1); the journal "
         f"swings sideways in its bore at about {hertz:.0f} Hz, once in {1e3 / hertz:.2f} ms"
     )
-    yield (
-        f"longest time steps: explicit about {joint.explicit_step * 1e6:.3g} µs, limited by "
-        f"{joint.limited_by}; implicit about {joint.implicit_step * 1e6:.3g} µs, limited by the "
-        f"stiffness of the contact"
-    )
 
 
 def cost_lines(facts: dict[str, Any]) -> Iterator[str]:
@@ -354,17 +343,14 @@ def cost_lines(facts: dict[str, Any]) -> Iterator[str]:
     rest = f", the rest for {', '.join(facts['other_work'])}" if facts["other_work"] else ""
     solved = short_time(facts["solution_seconds"])
     yield f"{solved} of it for the solution (`seconds` in show){rest}"
-    if facts["expected_steps"]:
-        seconds = short_time(facts["expected_seconds"], 1)
-        yield f"by the scales alone about {facts['expected_steps']:.1g} steps, {seconds}"
     if facts["jobs"] > 1:
         by = f"{plural(facts['jobs'])} with {plural(facts['workers'], 'worker')}"
         yield f"{facts['sweep_seconds']:.2g} s for {by}, if all cost the same"
 
 
-def short_time(seconds: float, digits: int = 3) -> str:
-    """Return a time in ms to some digits, or as `duration` does from a second on."""
-    return duration(seconds) if seconds >= 1 else f"{1e3 * seconds:.{digits}g} ms"
+def short_time(seconds: float) -> str:
+    """Return a time in ms to three digits, or as `duration` does from a second on."""
+    return duration(seconds) if seconds >= 1 else f"{1e3 * seconds:.3g} ms"
 
 
 def advice_row(advice: dict[str, Any]) -> tuple[str, ...]:

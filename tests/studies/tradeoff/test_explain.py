@@ -103,15 +103,12 @@ def test_scales_follow_the_contact():
     big, small = ideal_scales(both)
     assert (big.joint, small.joint) == ("big_end", "small_end")
     assert big.penetration == pytest.approx((big.force / 1.0625e10) ** (2 / 3), rel=1e-3)
-    assert big.limited_by == "contact damping"
     stiff = Case.from_values(
         {"joint": "big_end", "clearance_mm": 0.2, "friction": False,
          "contact": {"stiffness_N_per_mm15": 3.36e7, "damping_N_s_per_mm": 0}}
     )  # fmt: skip
     (found,) = ideal_scales(stiff)
-    assert found.limited_by == "contact stiffness"
-    # the contact's own rate goes as K^(1/2 + (p - 1)(-1/p) / 2) = K^(1/3) at a given force
-    assert big.implicit_step / found.implicit_step == pytest.approx(100 ** (1 / 3), rel=1e-9)
+    assert big.penetration / found.penetration == pytest.approx(100 ** (2 / 3), rel=1e-9)
     assert (big.damping_ratio > 1, found.damping_ratio) == (True, 0.0)
 
 
