@@ -3,35 +3,25 @@
 Each of the thirty planted bugs and sixty drawn mutants is tried in a copy of the tree: with the JIT
 off first, which needs no minute of compiling, and what no test caught then with the JIT on against
 tests of whole runs. Writes a small JSON file; what escaped is listed there and in the README.
-
-Tests run in forks of this process, in which their libraries, and the independent reference with
-all that sympy derives for it, are loaded already; the program is not, so that each fork loads its
-own copy.
 """
 
 import argparse
 import json
-import multiprocessing
 import os
+import re
 import resource
 import shutil
-import signal
+import subprocess
 import sys
 import tempfile
 import time
-import traceback
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from queue import Queue
 
-import numba
-import numpy as np
-import pytest
-import reference
-import scipy.optimize  # noqa: F401
-import xarray  # noqa: F401
-from equivalent_mutants import EQUIVALENT
-from mutation import PHYSICS, ROOT, SEED, drawn
+from mutation import EQUIVALENT, PHYSICS, ROOT, SEED, drawn
 from planted_bugs import bugs
+from result_pages import keep, provenance
 
 COPIED = ("compressor", "cmd", "tests", "configs", "pyproject.toml", "README.md", "Makefile")
 DRAWN = 60
@@ -51,9 +41,42 @@ TESTED_IN = {
     "loads": ("loads", "card_curve", "card"),
     "rosenbrock": ("rosenbrock", "linear_systems"),
 }  # where not in the module of the same name alone
+OPTIONS = (
+    "-o addopts= -x -v --tb=no --hypothesis-seed=0 "
+    "-p no:xdist -p no:faulthandler -p no:cacheprovider"
+)
 NO_JIT, JIT = "not slow and not compiled", "not slow"
 # s of processor time with the JIT off and on; a mutant that takes longer is caught: it never ends
-PATIENCE = {False: 120, True: 900}
+PATIENCE = {False: 150, True: 900}
+BEGAN = re.compile(r"^(?:tests/)?(\S+::.*?)(?: (PASSED|FAILED|ERROR|SKIPPED|XFAIL)\b.*)? *$", re.M)
+
+
+class CannotBeLoaded(Exception):
+    """No test ran: nothing can be said of the mutant."""
+
+
+def first_failure(folder, files, jit, cache):
+    """The first failing test of some files of a folder, "" if none fails; raises CannotBeLoaded.
+
+    cache: folder of machine code. A test that the process did not outlive counts as failed.
+    """
+    environment = os.environ | {
+        "COMPSIM_JIT": str(int(jit)),
+        "NUMBA_CACHE_DIR": str(folder / cache),
+        "PYTHONPATH": f"{folder}:{folder / 'cmd'}",
+    }
+    call = [sys.executable, "-m", "pytest", *OPTIONS.split(), "-m", JIT if jit else NO_JIT]
+    done = subprocess.run(
+        [*call, *files], cwd=folder, env=environment, stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT, text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, 2 * (PATIENCE[jit],)),
+    )  # fmt: skip
+    tests = BEGAN.findall(done.stdout)
+    if done.returncode == 1:
+        return next(name for name, end in tests if end in ("FAILED", "ERROR"))
+    if not tests or done.returncode > 0:
+        raise CannotBeLoaded(f"{done.stdout[-1000:]}exit code {done.returncode}")
+    return f"{tests[-1][0]}: ended by signal {-done.returncode}" if done.returncode else ""
 
 
 class Copy:
@@ -77,6 +100,7 @@ class Copy:
             return first_failure(self.folder, files, jit, "machine-code")
         path = self.folder / mutant.file
         whole, stamp = path.read_bytes(), path.stat()
+        shutil.rmtree(self.folder / "other-code", ignore_errors=True)
         try:
             write(path, mutant.source(self.folder))
             physics = mutant.file.startswith(PHYSICS)
@@ -87,83 +111,6 @@ class Copy:
             os.utime(path, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
 
 
-class CannotBeLoaded(Exception):
-    """No test ran: nothing can be said of the mutant."""
-
-
-class Notes:
-    """A plugin of pytest that notes at once which tests begin and which fail."""
-
-    def __init__(self, path):
-        self.file = open(path, "w", buffering=1, encoding="utf-8")
-
-    def pytest_runtest_logstart(self, nodeid):
-        self.file.write(f"began {nodeid}\n")
-
-    def pytest_runtest_logreport(self, report):
-        if report.failed:
-            self.file.write(f"failed {report.nodeid}\n")
-
-
-def first_failure(folder, files, jit, cache):
-    """The first failing test of some files of a folder, "" if none fails; raises CannotBeLoaded.
-
-    They run in a fork; machine code is kept in the folder `cache`.
-    """
-    for made in (folder / "other-code", folder / ".hypothesis"):
-        shutil.rmtree(made, ignore_errors=True)
-    notes, output = folder / "notes.txt", folder / "output.txt"
-    notes.write_text("")
-    child = os.fork()
-    if not child:
-        code = 99
-        try:
-            become(folder, output, jit, cache)
-            call = ["-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider"]
-            call += ["--hypothesis-seed=0", "-m", JIT if jit else NO_JIT]
-            code = pytest.main(call + files, plugins=[Notes(notes)])
-        except BaseException:
-            traceback.print_exc()
-        finally:
-            sys.stdout.flush()
-            sys.stderr.flush()
-            os._exit(code)
-    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    return verdict(notes.read_text("utf-8").splitlines(), code, output)
-
-
-def verdict(notes, code, output):
-    """The test that failed or was never done, by a fork's notes and exit code; "" if none.
-
-    Raises CannotBeLoaded, with the end of the fork's output, where no test ran.
-    """
-    told = [(what, test.removeprefix("tests/")) for what, test in (n.split(" ", 1) for n in notes)]
-    for what, test in told:
-        if what == "failed":
-            return test
-    if not told or code > 0:
-        raise CannotBeLoaded(f"{output.read_text('utf-8')[-1000:]}exit code {code}")
-    if code < 0:
-        endless = -code in (signal.SIGXCPU, signal.SIGKILL)
-        return f"{told[-1][1]}: {'no end' if endless else f'ended by signal {-code}'}"
-    return ""
-
-
-def become(folder, output, jit, cache):
-    """Make of this process one that tests a copy, and writes what it says to a file."""
-    resource.setrlimit(resource.RLIMIT_CPU, (PATIENCE[jit], PATIENCE[jit]))
-    out = os.open(output, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-    os.dup2(out, 1)
-    os.dup2(out, 2)
-    os.chdir(folder)
-    kept = [path for path in sys.path if not Path(path or ".").resolve().is_relative_to(ROOT)
-            or ".venv" in path]  # fmt: skip
-    sys.path[:] = [str(folder), str(folder / "cmd"), *kept]
-    # workers that a test starts are no forks: they go by the environment
-    os.environ |= {"COMPSIM_JIT": str(int(jit)), "NUMBA_CACHE_DIR": str(folder / cache)}
-    numba.config.CACHE_DIR = str(folder / cache)
-
-
 def write(path, source):
     """Write a source, and remove its bytecode: Python tells sources apart by whole seconds."""
     path.write_bytes(source)
@@ -171,32 +118,16 @@ def write(path, source):
         stale.unlink()
 
 
-def load_reference():
-    """Let sympy derive, and numba compile, what tests ask of the independent reference."""
-    for joint in ("big_end", "small_end", "both"):
-        params = reference.paper_params("gas", joint, 2e-4)
-        y = np.zeros(len(reference.COORDINATES[joint]))
-        reference.joint_forces(joint, y, y, 0.0, 0, params)
-        reference.reference_solution(params, joint, np.array([0.0, 1e-5]), rtol=1e-3)
-    reference.ideal_joint_forces(0.0, 0, reference.paper_params("none", "none", 0.0))
-
-
 def put_first(own, modules):
     """Modules of tests, a mutant's own first."""
     return [*own, *(name for name in modules if name not in own)]
 
 
-def own_modules(mutant):
-    """The modules of tests of a mutant's file."""
-    stem = Path(mutant.file).stem
-    return TESTED_IN.get(stem, (stem,))
-
-
 def try_mutant(mutant, tree, pure, compiled):
     """What became of a mutant: its row of the kept measurement."""
-    began = time.monotonic()
+    began, stem = time.monotonic(), Path(mutant.file).stem
     row = {"kind": mutant.kind, "mutant": mutant.identity, "jit": False, "caught_by": ""}
-    own, reason = own_modules(mutant), EQUIVALENT.get(mutant.identity)
+    own, reason = TESTED_IN.get(stem, (stem,)), EQUIVALENT.get(mutant.identity)
     if reason:
         row["equivalent"] = reason
     try:
@@ -208,78 +139,46 @@ def try_mutant(mutant, tree, pure, compiled):
             row["caught_by"] = tree.attempt(mutant, True, put_first(own, compiled))
     except CannotBeLoaded as error:
         row["cannot_be_loaded"] = str(error)
-    tell(began, f"{mutant.identity}\n        {outcome(row)}")
+    end = row.get("cannot_be_loaded") or row["caught_by"] or row.get("equivalent") or "ESCAPED"
+    print(f"{time.monotonic() - began:4.0f} s  {mutant.identity}\n        {end}", flush=True)
     return row
 
 
-def outcome(row):
-    """What became of a mutant, in words."""
-    if "cannot_be_loaded" in row:
-        return f"CANNOT BE LOADED: {row['cannot_be_loaded']}"
-    return row["caught_by"] or (f"equivalent: {row['equivalent']}" if "equivalent" in row
-                                else "ESCAPED")  # fmt: skip
-
-
-def tell(began, what):
-    print(f"{time.monotonic() - began:4.0f} s  {what}", file=sys.stderr, flush=True)
-
-
-WORKER = []  # a worker process's own: its copy, and the modules of tests
-
-
-def prepare(folder, pure, compiled):
-    """Give a worker its copy, and see that the tests pass there without a mutant."""
-    tree = Copy(Path(folder) / str(os.getpid()))
-    for jit, modules in ((False, pure), (True, compiled)):
-        began = time.monotonic()
-        failed = modules and tree.attempt(None, jit, modules)
-        if failed:
-            raise RuntimeError(f"without a mutant {failed} fails: mend that first")
-        tell(began, f"without a mutant, JIT {'on' if jit else 'off'}")
-    WORKER[:] = tree, pure, compiled
-
-
-def tried(mutant):
-    return try_mutant(mutant, *WORKER)
-
-
 def campaign(mutants, jobs, pure=PURE, compiled=COMPILED):
-    """Rows of mutants, `jobs` at a time, tried on modules of tests with the JIT off, then on.
+    """Rows of mutants, `jobs` at a time, tried on modules of tests with the JIT off, then on."""
+    trees = Queue()
 
-    Raises BrokenProcessPool where the sources without a mutant fail or cannot be loaded.
-    """
-    fork = multiprocessing.get_context("fork")
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        ProcessPoolExecutor(jobs, fork, prepare, (folder, pure, compiled)) as pool,
-    ):
+    def tried(mutant):
+        tree = trees.get()
+        try:
+            return try_mutant(mutant, tree, pure, compiled)
+        finally:
+            trees.put(tree)
+
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(jobs) as pool:
+        for number in range(jobs):
+            trees.put(tree := Copy(Path(folder, f"{number}")))
+        for jit, modules in ((False, pure), (True, compiled)):
+            if failed := modules and tree.attempt(None, jit, modules):
+                sys.exit(f"without a mutant {failed} fails: mend that first")
         return list(pool.map(tried, mutants))
 
 
-def earlier(target, rows, mutants):
-    """The whole campaign of a file, if any: these rows, and its own of the other mutants."""
-    if not Path(target).exists():
-        return {}
-    whole = json.loads(Path(target).read_text(encoding="utf-8"))
-    known = {row["mutant"]: row for row in [*whole["mutants"], *rows]}
-    rows = [known[mutant.identity] for mutant in mutants if mutant.identity in known]
-    return {"minutes": whole["minutes"], "mutants": rows}
+def merge_earlier(target, rows, mutants):
+    """These rows, and those of the other mutants that a file has, if there is one."""
+    whole = json.loads(Path(target).read_text("utf-8")) if Path(target).exists() else {}
+    known = {row["mutant"]: row for row in [*whole.get("mutants", ()), *rows]}
+    return [known[mutant.identity] for mutant in mutants if mutant.identity in known]
 
 
 def main(target, jobs, only, pure, compiled):
     everyone = [*bugs(), *drawn(DRAWN)]
     mutants = [m for m in everyone if any(text in m.identity for text in only)]
     began = time.monotonic()
-    if {"motion", "march"} & {*pure}:
-        load_reference()
     rows = campaign(mutants, jobs, pure, compiled)
     minutes = round((time.monotonic() - began) / 60, 1)
-    from result_pages import keep, provenance  # which loads the program
-
-    kept = {**provenance("make mutants"), "seed": SEED, "minutes": minutes, "mutants": rows}
-    if only != [""]:
-        kept |= earlier(target, rows, everyone)
-    keep(target, kept)
+    every = rows if only == [""] else merge_earlier(target, rows, everyone)
+    keep(target, {**provenance("make mutants"), "seed": SEED, "minutes": minutes, "mutants": every})
     sys.exit(judge(rows, minutes) or 0)
 
 
