@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench throughput sweep-bench peers tradeoff chaotic regimes identify calibrate nameplate stress chaos mutants measurements pages docs release lock alarms clean
+.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench sweep-bench peers tradeoff chaotic regimes identify calibrate nameplate stress chaos mutants measurements pages docs release lock alarms clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -71,10 +71,7 @@ page: install  ## test the report's page in a browser, measure how it is written
 store-bench: install  ## measure writing and opening 100,000 stored jobs (under a minute)
 	$(CAMPAIGN)/measure_store.py tests/results/store.json
 
-throughput: install  ## measure starting up, 10,000 jobs, and all beside an earlier commit (six minutes)
-	$(CAMPAIGN)/measure_throughput.py tests/results/throughput.json
-
-sweep-bench: install  ## measure 100,000 jobs, killed three times and resumed (three minutes)
+sweep-bench: install  ## measure start-up and 100,000 jobs, killed three times and resumed (three minutes)
 	$(CAMPAIGN)/measure_sweep.py tests/results/sweep.json
 
 validation: install  ## compare with what others have published (a minute)
@@ -120,7 +117,7 @@ nameplate: install  ## run the case file of compsim init machine, for its page (
 mutants: install  ## plant bugs and see whether the fast tests catch them (half an hour)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: test-oldest calibration accuracy validation wear claims page tradeoff chaotic regimes identify nameplate store-bench throughput sweep-bench peers pages  ## all of these (about three hours)
+measurements: test-oldest calibration accuracy validation wear claims page tradeoff chaotic regimes identify nameplate store-bench sweep-bench peers pages  ## all of these (about three hours)
 
 pages: install  ## write the pages' generated tables, compressor/API.md, the tutorial's notebook
 	$(BIN)/python tests/page_tables.py

@@ -1,37 +1,80 @@
-"""Measure a sweep of 100,000 jobs that is killed at random three times and resumed.
+"""Measure start-up, and a sweep of 100,000 jobs that is killed three times and resumed.
 
     python tests/campaigns/measure_sweep.py tests/results/sweep.json [jobs]  (make sweep-bench)
 
-The sweep runs through the real command on two workers, once undisturbed and once killed (SIGKILL of
-the parent alone, or with its workers) and resumed; both stores must hold the same, to the bit,
-timings apart. Memory is each process's greatest resident set, as /proc tells it while they run.
+Start-up times are of whole processes, medians of a few in turn. The sweep has no error bars, so
+that the times which its jobs store are all of the solver's work. It runs through the real command
+on two workers, once undisturbed and once killed (SIGKILL of the parent alone, or with its workers)
+and resumed; both stores must hold the same, to the bit, timings apart. Memory is each process's
+greatest resident set, as /proc tells it while they run.
 """
 
 import contextlib
 import json
+import math
 import random
 import re
 import shutil
 import signal
+import statistics
+import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
 from chaos.common import contents, damage
 from chaos.processes import Run, members
 from measure_store import timed
-from measure_throughput import WORKERS, many
 from result_pages import keep, provenance
 
 from compressor.store.reader import open_study, read_store
 
+CONFIGS = sorted(map(str, (Path(__file__).parents[2] / "configs").glob("*.yaml")))
+ONE_CASE = (
+    "compressor.simulate(compressor.Case.from_values({'joint': 'both', 'clearance_mm': 0.1}))"
+)
+COMMANDS = {
+    "compsim --help": ["-m", "compsim", "--help"],
+    # xarray imports dask where it finds it, as where the tests run; a plain install has none
+    "first simulate in a new process": [
+        "-c", f"import sys; sys.modules['dask'] = None; import compressor; {ONE_CASE}",
+    ],
+    "the same with the extra dask installed": ["-c", f"import compressor; {ONE_CASE}"],
+    "compsim run configs/*.yaml": ["-m", "compsim", "run", *CONFIGS, "-j", "2", "--quiet"],
+}  # fmt: skip
+ROUNDS = 5
+WORKERS = 2
 JOBS = 100_000
 KILLS = 3
 SEED = 1
 LONGEST = 4 * 3600.0  # s
 LOOK = 0.5  # s between two looks at memory
 PEAK = re.compile(r"VmHWM:\s*(\d+) kB")
+
+
+def time_startup():
+    """Return the median wall time (s) of each command, its caches warm."""
+    times = {name: [] for name in COMMANDS}
+    for _ in range(ROUNDS + 1):
+        for name, arguments in COMMANDS.items():
+            with tempfile.TemporaryDirectory() as folder:
+                began = time.perf_counter()
+                subprocess.run([sys.executable, *arguments], cwd=folder, check=True,
+                               capture_output=True)  # fmt: skip
+                times[name].append(time.perf_counter() - began)
+    # the first round warms the caches
+    return {name: round(statistics.median(found[1:]), 3) for name, found in times.items()}
+
+
+def many(jobs):
+    """Return a case file of jobs without time series or error bars."""
+    side = next(n for n in range(math.isqrt(jobs), 0, -1) if jobs % n == 0)
+    values = {"name": "many", "joint": "big_end", "solve": {"error_bars": False}}
+    values |= {"clearance_mm": np.linspace(0.1, 0.3, side).tolist()}
+    values |= {"machine": {"rod_mass_kg": np.linspace(3, 5, jobs // side).tolist()}}
+    return json.dumps(values | {"output": {"keep": "metrics"}})
 
 
 class Sweep:
@@ -106,12 +149,14 @@ def main(target, jobs=JOBS):
     try:
         calm, torn = Sweep(place / "undisturbed", jobs), Sweep(place / "killed", jobs)
         seconds = calm.complete()
+        again = calm.complete()
         kills, last = disturbed(torn, seconds)
         results = place / "killed" / "results"
         assert not damage(results), damage(results)
         opened, study = timed(lambda: open_study(results))
-        count = int((study.status == "ok").sum())
-        assert count == study.status.size == len(read_store(results)), "not complete"
+        count, stored = int((study.status == "ok").sum()), read_store(results)
+        assert count == study.status.size == len(stored), "not complete"
+        solver = stored.numbers(np.arange(count), ["seconds"])["seconds"].sum()
         same = contents(place / "undisturbed" / "results") == contents(results)
         assert same, "the resumed study differs from the undisturbed one"
         total, files = size(results)
@@ -120,10 +165,13 @@ def main(target, jobs=JOBS):
     peaks = {name: max(calm.peaks[name], torn.peaks[name]) for name in calm.peaks}
     kept = {
         **provenance("make sweep-bench"),
+        "start": time_startup(),
         "jobs": count,
         "workers": WORKERS,
         "wall_s": round(seconds, 1),
         "jobs_per_s": round(count / seconds, 1),
+        "again_s": round(again, 2),
+        "kernel_share": round(float(solver) / WORKERS / seconds, 3),
         "kills": kills,
         "last_run_s": round(last, 1),
         "bit_equal": same,

@@ -295,18 +295,6 @@ def tradeoff(found):
             "modelling": markdown(["change of the model", *heads], changes)}  # fmt: skip
 
 
-def throughput(found):
-    start = [{"name": name, "seconds": seconds} for name, seconds in found["start"].items()]
-    numbers = [{"name": name, **one} for name, one in found["compared"].items()]
-    return {"throughput": "\n".join([
-        table(start, {"whole process, code compiled before": "name", "seconds": "seconds:.2g"}),
-        listed(found["sweep"]),
-        table(numbers, {"quantity": "name", "now": "now:.3g",
-                        f"commit {found['before']}": "before:.3g",
-                        "then / now": "times as fast:.2f"}),
-    ])}  # fmt: skip
-
-
 def page(found):
     rows = [{"name": f"{name}, {one['figures']} figures", **one}
             for name, one in found["stores"].items()]  # fmt: skip
@@ -330,7 +318,9 @@ def sweep(found):
     numbers = {name: value for name, value in found.items()
                if isinstance(value, int | float) and not isinstance(value, bool)}  # fmt: skip
     peaks = {f"peak memory of a {name}, MB": size for name, size in found["peak_MB"].items()}
-    return {"sweep": kills + "\n" + listed(numbers | peaks)}
+    times = [[name, number(value, 2)] for name, value in found["start"].items()]
+    start = markdown(["whole process, code compiled before", "seconds"], times)
+    return {"sweep": "\n".join((start, listed(numbers | peaks), kills))}
 
 
 def chaotic(found):
@@ -537,8 +527,7 @@ CAMPAIGNS = {
     "calibrate": ("Does `compsim calibrate` find a machine's parameters?", calibrate),
     "chaos": ("Do results survive kills, power cuts and damage?", chaos),
     "mutants": ("Would the tests notice a bug?", mutants),
-    "sweep": ("Does an interrupted sweep lose a job?", sweep),
-    "throughput": ("How many jobs a second?", throughput),
+    "sweep": ("How many jobs a second, and does an interrupted sweep lose one?", sweep),
     "store": ("How large and fast is the store?", store),
     "page": ("How fast is the report?", page),
     "nameplate": ("What does the case file of `compsim init machine` give?", nameplate),
