@@ -177,19 +177,15 @@ def needs_of(row, group):
 
 def parameter_table(rows, group):
     """The table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
-    head = ["key", "unit", "default", "range", "what it is", "plausible"]
+    head = ["key", "default", "range", "what it is"]
     lines = []
     for name, (row, phrase) in key_rows(rows).items():
         needs = needs_of(row, group) if name == row.key and group else ""
         tested = f"; tested {row.judged_on}" if row.judged else ""
-        cells = (f"`{name}`", row.unit, default_of(row), row.range + tested, phrase + needs,
-                 str(row.plausible or ""))  # fmt: skip
+        cells = (f"`{name}`", default_of(row), row.range + tested, phrase + needs)
         lines.append([cell.replace("|", "\\|") for cell in cells])
-    used = [place for place in range(len(head)) if any(line[place] for line in lines)]
     needed = " and ".join(READ.get(group, ())).replace(CLEARANCE, "a joint with clearance")
-    return (f"Needs {needed}.\n\n" if needed else "") + markdown(
-        [head[place] for place in used], [[line[place] for place in used] for line in lines]
-    )
+    return (f"Needs {needed}.\n\n" if needed else "") + markdown(head, lines)
 
 
 def parameter_tables():

@@ -31,16 +31,15 @@ def explain(configs, jobs, models, every, vary, folder, as_json, **how) -> int:
     compsim explain machine.yaml
     compsim explain machine.yaml --models
 
-    Runs the job of each case file with the greatest contact force that is stored, or the one with
-    the greatest clearance where none is, and again without each feature that costs time.
+    Runs the job with the greatest stored contact force, or else the greatest clearance, of each
+    case file. Then runs it again without each feature that costs time.
 
-    With --models it runs that job again with one thing otherwise at a time: each number that the
-    file does not give, or that a plant can only guess, at both ends of its plausible range (the
-    table of keys has them), and other laws of contact and friction, oil, an elastic rod and play in
-    the guide, or without where the case has them. It says what moves each metric most. The table
-    is kept in models/ of the folder of results, and its report shows it.
+    With --models it runs that job again with one change at a time: each number that the file does
+    not give, or that a plant can only guess, at both ends of its plausible range; other laws of
+    contact and friction; oil, an elastic rod and play in the guide added or removed. It ranks what
+    changes each metric most. The report shows this table, from models/ in the folder of results.
 
-    --set clearance_mm=0.3 chooses another job. Exit code 3 where such a job fails.
+    --set clearance_mm=0.3 chooses another job. Exit code 3 if such a job fails.
     """
     if (vary or every) and not models:
         raise click.UsageError("--vary and --all say what --models varies: add --models")
@@ -62,7 +61,7 @@ def explain(configs, jobs, models, every, vary, folder, as_json, **how) -> int:
         job, which = choose_job(study, folder)
         at = next(itertools.islice(points(study), job, None))
         place = "".join(f", {key} = {value}" for key, value in at.items())
-        screen.say_wrapped(f"running {which} of {study.name}{place}, and with one thing otherwise")
+        screen.say_wrapped(f"running {which} of {study.name}{place}, and with one change at a time")
         with ProgressReporter(False, "variants") as progress:
             if models:
                 data = explain_models(study, job, vary, every, progress)
@@ -99,5 +98,5 @@ def check_varied(keys: Sequence[str]) -> None:
         if row is None:
             raise click.UsageError(f"--vary {key}: unknown key{suggestion(part, whole)}")
         if row.plausible is None:
-            missing = "the table of keys has no plausible range of it"
+            missing = "it has no plausible range"
             raise click.UsageError(f"--vary {key}: {missing}: sweep it, as in --set {key}=[...]")

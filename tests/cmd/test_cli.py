@@ -251,7 +251,7 @@ def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, capsys):
     assert re.search(r"no friction [+-]\S+ % [+-]\S+ % × \S+ needed", flat)
     assert err.startswith(
         "running the one of 2 jobs with the greatest clearance, as none with a known\n"
-        "  force is stored of two, clearance_mm = 0.2, and with one thing otherwise\n"
+        "  force is stored of two, clearance_mm = 0.2, and with one change at a time\n"
     )
 
 
@@ -321,7 +321,7 @@ def test_explain_models_prints_and_stores(case_file, capsys, monkeypatch):
     lines = out.splitlines()
     told = (
         "running the one of 2 jobs with the greatest stored contact force of worn, clearance_mm = "
-        f"{greatest}, and with one thing otherwise"
+        f"{greatest}, and with one change at a time"
     )
     assert told in " ".join(err.split())
     assert re.search(r"kept/models/worn-[0-9a-f]{8}\.nc\n$", err)

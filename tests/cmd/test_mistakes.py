@@ -117,7 +117,7 @@ MISTAKES = [
     ("explain good.yaml --models --vary machine.rod_mas_kg", "did you mean machine.rod_mass_kg?"),
     ("explain good.yaml --models --vary machine.pin_radius_mm.small", "pin_radius_mm.small_end?"),
     ("explain good.yaml --models --vary machine.pin.radius", "unknown key"),
-    ("explain good.yaml --models --vary solve.max_steps", "has no plausible range of it: sweep it"),
+    ("explain good.yaml --models --vary solve.max_steps", "it has no plausible range: sweep it"),
     ("explain", "Missing argument 'CONFIG...'"),
     ("tradeoff again/wear.yaml", "again/wear.yaml: a job of wear has no joint with clearance"),
     ("tradeoff", "Missing argument 'CONFIG...'"),

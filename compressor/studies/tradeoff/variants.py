@@ -2,7 +2,7 @@
 
 `FEATURES` has a row for each feature of the model, `variants` makes cases of the rows, and
 `vary_numbers` of the numbers in doubt: those that the file does not give, or that a plant can only
-guess (`Plausible` in the table of keys), at both ends of their range. `run_variants` runs them.
+guess (`Plausible` of `cases`), at both ends of their range. `run_variants` runs them.
 """
 
 import math
