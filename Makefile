@@ -144,6 +144,6 @@ lock:  ## write the versions that a fresh environment for tests and site gets: .
 	    echo "# pip install -c .ci/requirements.lock -e '.[dev,docs]'"; \
 	    "$$place/bin/python" -m pip --disable-pip-version-check freeze --exclude-editable; } > .ci/requirements.lock
 
-clean:  ## remove results, report, claims, stress, alarms, site, dist and caches; .venv stays
-	rm -rf results report claims stress alarms site dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+clean:  ## remove results, report, claims, stress, alarms, identify, site, dist and caches; .venv stays
+	rm -rf results report claims stress alarms identify site dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

@@ -7,14 +7,13 @@ how long they would be. From these the shares of `compressor.metrics` and
 `compressor.solve.error_bars` were chosen; `make accuracy` judges them on other seeds.
 """
 
-import argparse
 import json
 
 import numpy as np
 from joblib import Parallel, delayed
 from measure_accuracy import CONTACT, EXACT, percentiles, short
 from random_cases import strangers
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
@@ -98,13 +97,13 @@ def metric_row(rows, name, ratio):
     }
 
 
-def main(target, jobs, count):
-    cases = [values for seed in SEEDS for values in strangers(seed, count)]
-    found = Parallel(n_jobs=jobs)(delayed(one_case)(values) for values in cases)
+def main(target, jobs=2, cases=350):
+    drawn = [values for seed in SEEDS for values in strangers(seed, cases)]
+    found = Parallel(n_jobs=jobs)(delayed(one_case)(values) for values in drawn)
     rows = [row for case in found for row in case]
     result = {
         **provenance("make calibration"),
-        "cases": {"seeds": SEEDS, "of_each": count, "percentiles": LIMITS},
+        "cases": {"seeds": SEEDS, "of_each": cases, "percentiles": LIMITS},
         "series": [series_row(rows, ratio) for ratio in RATIOS],
         "metrics": {
             name: [metric_row(rows, name, ratio) for ratio in RATIOS] for name in METRICS
@@ -115,9 +114,4 @@ def main(target, jobs, count):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("target", help="file to write")
-    parser.add_argument("--jobs", type=int, default=2, help="worker processes")
-    parser.add_argument("--cases", type=int, default=350, help="cases of each seed")
-    asked = parser.parse_args()
-    main(asked.target, asked.jobs, asked.cases)
+    run_campaign(main)

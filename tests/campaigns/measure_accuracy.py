@@ -4,30 +4,23 @@
 reference of reference.py; 1,000 random cases, of seeds that chose nothing, by our own run at rtol
 1e-12, which SciPy's DOP853 confirms on a few of them. Errors of acceleration are relative L2 errors
 after settling; energy residuals are in units of their bound, 10 rtol a revolution. Cases that say
-they are chaotic are confirmed by a shifted run at rtol 1e-12. The figure beside the file shows what
-the words cost and keep.
+they are chaotic are confirmed by a shifted run at rtol 1e-12.
 """
 
-import argparse
 import json
 import time
 from collections import Counter
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import reference
 from joblib import Parallel, delayed
 from random_cases import load_equations, strangers
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.cases.case import Case
 from compressor.cases.parameter import ACCURACY
 from compressor.metrics import METRICS
 from compressor.outcome import Regime
-from compressor.report.figures.drawing import Note, entry, make_grid
-from compressor.report.figures.pictures import render
-from compressor.report.figures.style import CYCLE, GREY, LineStyle, mark
 from compressor.solve.search import LOOK_SHIFT, predictability_horizon
 from compressor.solve.simulate import simulate
 
@@ -40,7 +33,6 @@ CONFIRMED = 4  # random cases that DOP853 runs again
 CONFIRMED_RTOL = 1e-10
 CONTACT = tuple(name for name, row in METRICS.items() if row.contact)
 EXACT = 1e-12  # of a metric: an error below it is rounding
-PROMISED = LineStyle(GREY, (0, (3.7, 1.6)), 1.2, 2)
 TRADED = 5  # one of so many cases is run at a ladder of tolerances, too
 
 
@@ -227,30 +219,6 @@ def bar_row(word, name, measured):
     }
 
 
-def drawing(measured):
-    """The figure of what the words cost and keep: error over the time of a run, a colour a word.
-
-    Of runs that keep their promise, which is dashed; large: both medians.
-    """
-    figure, grid = make_grid(1, 1, 6.0)
-    panel = grid[0, 0]
-    for scale in (panel.x, panel.y):
-        scale.log, scale.margin = True, 0.06
-    panel.title = "error of acceleration, relative L2"
-    panel.x.title = "time of a run with its check (ms)"
-    for (word, tier), line in zip(ACCURACY.items(), CYCLE, strict=False):
-        rows = [case["words"][word] for case in measured]
-        rows = [row for row in rows if row["promise"] == "kept" and row["error"] > 0]
-        times, errors_ = [1e3 * row["seconds"] for row in rows], [row["error"] for row in rows]
-        panel.plot(times, errors_, mark(line.color, "o", 2.2, edge_width=0.0))
-        middle = mark(line.color, "D", 10, edge="#ffffff")
-        panel.plot(np.median(times), np.median(errors_), middle, word)
-        panel.notes.append(Note(y=tier.promise, style=replace(PROMISED, color=line.color)))
-    figure.legend = [one for one in panel.traces if one.name]
-    figure.legend.append(entry("its promise", PROMISED))
-    return figure
-
-
 def broken(word, cases, measured):
     """The runs that say `kept` and are not, with what they say."""
     return [
@@ -266,7 +234,7 @@ def broken(word, cases, measured):
     ]
 
 
-def main(target, jobs, count, seeds):
+def main(target, jobs=2, count=334, seeds=SEEDS):
     cases = [values for seed in seeds for values in strangers(seed, count)]
     with Parallel(n_jobs=jobs) as parallel:
         paper = parallel(delayed(paper_case)(*case) for case in NINE)
@@ -288,15 +256,8 @@ def main(target, jobs, count, seeds):
         "trade": trade(measured),
     }
     keep(target, result)
-    Path(target).with_suffix(".svg").write_bytes(render(drawing(measured), "svg"))
     print(json.dumps({"words": words, "bars": bars}, indent=1))
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("target", help="file to write")
-    parser.add_argument("--jobs", type=int, default=2, help="worker processes")
-    parser.add_argument("--cases", type=int, default=334, help="random cases of each seed")
-    parser.add_argument("--seeds", type=int, nargs="*", default=SEEDS, help="seeds of the draws")
-    asked = parser.parse_args()
-    main(asked.target, asked.jobs, asked.cases, asked.seeds)
+    run_campaign(main)

@@ -8,16 +8,14 @@ lead times. Writes a small JSON file, with a digest of the jobs' keys: other cas
 model, make other keys, and tests/campaigns/test_alarms_campaign.py then asks for a new run.
 """
 
-import argparse
 import hashlib
 import json
 import math
-import tempfile
 from pathlib import Path
 
 import numpy as np
 import yaml
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.cases import Wear
 from compressor.cases.load import load_studies
@@ -166,7 +164,8 @@ def rounded(value):
     return float(f"{value:.3g}") if math.isfinite(value) else None
 
 
-def main(target, place, jobs):
+def main(target, results="alarms", jobs=2):
+    place = Path(results)
     place.mkdir(parents=True, exist_ok=True)
     for name, text in (("plant", case_text()), ("worn", wear_text())):
         (place / f"{name}.yaml").write_text(text, encoding="utf-8")
@@ -191,13 +190,4 @@ def main(target, place, jobs):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("target", help="file to write")
-    parser.add_argument("--results", type=Path, help="folder of the jobs, else a temporary one")
-    parser.add_argument("-j", "--jobs", type=int, default=2, help="processes")
-    given = parser.parse_args()
-    if given.results:
-        main(given.target, given.results, given.jobs)
-    else:
-        with tempfile.TemporaryDirectory() as folder:
-            main(given.target, Path(folder), given.jobs)
+    run_campaign(main)

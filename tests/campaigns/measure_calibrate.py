@@ -8,7 +8,6 @@ does not: pins that rub, another exponent of the gas. The constants of the fit w
 machines of another seed. Writes a small JSON file.
 """
 
-import argparse
 import json
 import math
 import tempfile
@@ -16,13 +15,12 @@ from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 from scipy.stats import binomtest
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
-from compressor.studies.calibrate.calibrate import Unknown, calibrate
-from compressor.studies.calibrate.words import POOR_FIT
+from compressor.studies.calibrate import POOR_FIT, Unknown, calibrate
 from compressor.vibration import Record
 
 SEED, MACHINES = 3101, 34
@@ -112,12 +110,12 @@ def judge(fits):
     }  # fmt: skip
 
 
-def main(target, count, jobs, seed):
+def main(target, machines=MACHINES, seed=SEED, jobs=2):
     kept = {}
     with Parallel(n_jobs=jobs) as parallel:
         for name, other in OTHERS.items():
             rng = np.random.default_rng(seed)  # the same machines each time
-            drawn = [machine(rng) for _ in range(count)]
+            drawn = [machine(rng) for _ in range(machines)]
             kept[name] = judge(parallel(delayed(fit)(*one, other) for one in drawn))
     result = {
         **provenance("make calibrate"), "seed": seed, "ranges": RANGES, "fixed": FIXED,
@@ -128,10 +126,4 @@ def main(target, count, jobs, seed):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("target", help="file to write")
-    parser.add_argument("--machines", type=int, default=MACHINES, help="of each kind")
-    parser.add_argument("--seed", type=int, default=SEED)
-    parser.add_argument("-j", "--jobs", type=int, default=2, help="processes")
-    given = parser.parse_args()
-    main(given.target, given.machines, given.jobs, given.seed)
+    run_campaign(main)

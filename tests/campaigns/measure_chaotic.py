@@ -8,7 +8,6 @@ one by SciPy. Its error is by batch means: revolutions follow on each other, so 
 no independent draws. Writes a small JSON file.
 """
 
-import argparse
 import json
 import math
 from collections import Counter
@@ -16,7 +15,7 @@ from collections import Counter
 import numpy as np
 from joblib import Parallel, delayed
 from random_cases import strangers
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.cases.case import Case
 from compressor.outcome import Regime
@@ -105,16 +104,11 @@ def random_row(drawn, wanted):
     }
 
 
-def main(target, drawn, wanted):
+def main(target, drawn=DRAWN, wanted=WANTED):
     kept = {**provenance("make chaotic"), "random": random_row(drawn, wanted)}
     keep(target, kept)
     print(json.dumps(kept, indent=1))
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("target", help="file to write")
-    parser.add_argument("--drawn", type=int, default=DRAWN, help="random cases")
-    parser.add_argument("--wanted", type=int, default=WANTED, help="chaotic ones that are judged")
-    asked = parser.parse_args()
-    main(asked.target, asked.drawn, asked.wanted)
+    run_campaign(main)

@@ -6,11 +6,10 @@ goes on. Writes a small JSON file.
 """
 
 import json
-import sys
 import time
 from pathlib import Path
 
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.analysis import RULES, cases_of
 from compressor.cases.case import Case
@@ -103,4 +102,4 @@ def counted(found):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    run_campaign(main)

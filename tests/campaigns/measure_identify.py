@@ -7,18 +7,16 @@ with other friction show how much worse it becomes where the model is wrong. The
 on machines of other seeds. Writes a small JSON file.
 """
 
-import argparse
 import copy
 import json
 import os
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 from scipy.stats import binomtest, qmc
 
 from compressor.cases.case import Case
@@ -172,7 +170,7 @@ def studied(folder, count, seed, jobs):
     return Identifier.fit(read_library(results, "machines"))
 
 
-def main(target, count, many, folder, jobs, seeds):
+def main(target, folder="identify", count=STUDY, many=JUDGED, seeds=(SEED, JUDGE), jobs=2):
     identifier = studied(folder, count, seeds[0], jobs)
     drawn = machines(many, seeds[1])
     kept = {}
@@ -195,14 +193,4 @@ def main(target, count, many, folder, jobs, seeds):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("target", help="file to write")
-    parser.add_argument("--machines", type=int, default=STUDY, help="of the study")
-    parser.add_argument("--judged", type=int, default=JUDGED, help="records of each model")
-    parser.add_argument("--folder", help="of the study, kept; run again, it goes on")
-    parser.add_argument("--seeds", type=int, nargs=2, default=(SEED, JUDGE))
-    parser.add_argument("-j", "--jobs", type=int, default=2, help="processes")
-    asked = parser.parse_args()
-    with tempfile.TemporaryDirectory() as place:
-        folder = asked.folder or place
-        main(asked.target, asked.machines, asked.judged, folder, asked.jobs, asked.seeds)
+    run_campaign(main)

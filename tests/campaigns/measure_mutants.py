@@ -5,7 +5,6 @@ off first, which needs no minute of compiling, and what no test caught then with
 tests of whole runs. Writes a small JSON file; what escaped is listed there and in the README.
 """
 
-import argparse
 import json
 import os
 import re
@@ -21,7 +20,7 @@ from queue import Queue
 
 from mutation import EQUIVALENT, PHYSICS, ROOT, SEED, drawn
 from planted_bugs import bugs
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 COPIED = ("compressor", "cmd", "tests", "configs", "pyproject.toml", "README.md", "Makefile")
 DRAWN = 60
@@ -171,13 +170,13 @@ def merge_earlier(target, rows, mutants):
     return [known[mutant.identity] for mutant in mutants if mutant.identity in known]
 
 
-def main(target, jobs, only, pure, compiled):
+def main(target, jobs=2, only=("",), pure=PURE, compiled=COMPILED):
     everyone = [*bugs(), *drawn(DRAWN)]
     mutants = [m for m in everyone if any(text in m.identity for text in only)]
     began = time.monotonic()
     rows = campaign(mutants, jobs, pure, compiled)
     minutes = round((time.monotonic() - began) / 60, 1)
-    every = rows if only == [""] else merge_earlier(target, rows, everyone)
+    every = rows if [*only] == [""] else merge_earlier(target, rows, everyone)
     keep(target, {**provenance("make mutants"), "seed": SEED, "minutes": minutes, "mutants": every})
     sys.exit(judge(rows, minutes) or 0)
 
@@ -198,16 +197,4 @@ def judge(rows, minutes):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("target", help="JSON file to write")
-    parser.add_argument("-j", "--jobs", type=int, default=2, help="mutants at a time")
-    parser.add_argument(
-        "--only",
-        nargs="*",
-        default=[""],
-        help="try mutants whose identity has one of these texts, and keep the target's others",
-    )
-    parser.add_argument("--pure", nargs="*", default=PURE, help="tests to run with the JIT off")
-    parser.add_argument("--compiled", nargs="*", default=COMPILED, help="tests to run with it on")
-    arguments = parser.parse_args()
-    main(*vars(arguments).values())
+    run_campaign(main)

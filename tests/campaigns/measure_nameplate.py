@@ -8,14 +8,13 @@ both ends of its plausible range, as `compsim explain --models` takes them, and 
 of foundations.
 """
 
-import sys
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from compsim import cli
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 import compressor
 from compressor.cases.examples import example
@@ -122,4 +121,4 @@ def main(target):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    run_campaign(main)

@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "report"))
 from browsing import browser, lacking, live, wait_for
@@ -155,4 +155,4 @@ def opened(report):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], *map(int, sys.argv[2:]))
+    run_campaign(main)

@@ -2,9 +2,9 @@
 
 Writes a small JSON file. All run on one core, in rounds: each tool, then ours at the loosest
 tolerance whose error is no greater than that tool's. Nothing here has threads or waits, so that
-CPU time is the wall time of a core without other work, and says more on a busy machine; wall time
-is kept too. A call starts from the problem's numbers and
-ends with the crosshead's acceleration on the output grid of 0.1 ms; ours is the whole
+CPU time is the wall time of a core without other work, and says more on a busy machine. A call
+starts from the problem's numbers and ends with the crosshead's acceleration on the output grid of
+0.1 ms; ours is the whole
 `simulate(case)`, with all its series, metrics and energy balance, the kernel's own seconds beside
 it. Errors are against the reference of reference.py. What is not installed, or fails, is a
 row with its reason.
@@ -12,9 +12,7 @@ row with its reason.
 
 import json
 import os
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -26,7 +24,7 @@ from typing import NamedTuple
 import reference
 from peers import multibody, notebook, soda
 from peers.mechanism import DURATION, SCENES, case_values, error, loosest, output_grid, params
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
@@ -37,15 +35,6 @@ ROUNDS = 5
 LEAST_CPU = 0.2  # s of a contest's round: one call of some milliseconds says little
 LIBRARIES = ("exudyn", "numbalsoda")
 TIGHT = 1e-9  # tolerance of Exudyn's run that verifies ours
-FIRST_CALL = """
-import json, sys, time
-from compressor.cases.case import Case
-from compressor.solve.simulate import simulate
-case = Case.from_values(json.loads(sys.argv[1]))
-began = time.perf_counter()
-simulate(case)
-print(time.perf_counter() - began)
-"""
 
 
 class Peer(NamedTuple):
@@ -84,12 +73,11 @@ def ours(scene, rtol):
 
 
 def first_call(peer, scene, truth):
-    """(error, CPU seconds) of a peer's first run of a scene, or the reason why there is none."""
+    """The error of a peer's first run of a scene, or the reason why there is none."""
     try:
-        found, seconds, _ = timed(lambda: peer.run(scene))
+        return error(peer.run(scene), truth)
     except Exception as fault:  # any failure of a foreign tool is a row
         return f"{type(fault).__name__}: {fault}"
-    return error(found, truth), seconds
 
 
 @dataclass
@@ -99,10 +87,9 @@ class Contest:
     peer: Peer
     scene: str
     error: float
-    first: float  # CPU seconds of the peer's first call
     rtol: float | None  # ours
     theirs: list[tuple] = field(default_factory=list)
-    ours: list[tuple] = field(default_factory=list)
+    ours: list[float] = field(default_factory=list)
     kernel: list[float] = field(default_factory=list)  # wall seconds of our solver alone
 
     def round(self):
@@ -119,48 +106,24 @@ class Contest:
 
     def time_ours(self):
         if self.rtol is not None:
-            found, *seconds = timed(lambda: ours(self.scene, self.rtol))
-            self.ours.append(tuple(seconds))
+            found, cpu, _ = timed(lambda: ours(self.scene, self.rtol))
+            self.ours.append(cpu)
             self.kernel.append(float(found["seconds"]))
 
     def row(self, our_errors):
         """Medians and ratios."""
         cpu, wall = map(median, zip(*self.theirs, strict=True))
-        found = {
-            "seconds": rounded(cpu),
-            "wall_seconds": rounded(wall),
-            "setup_seconds": rounded(max(0.0, self.first - cpu)),
-            "error": rounded(self.error),
-        }
+        found = {"seconds": rounded(cpu), "error": rounded(self.error)}
         if self.rtol is None:
             return found | {"reason": "none of our tolerances is as exact"}
-        our_cpu, our_wall = map(median, zip(*self.ours, strict=True))
-        kernel = median(self.kernel)
+        our_cpu = median(self.ours)
         return found | {
             "our_rtol": self.rtol,
             "our_error": rounded(our_errors[self.rtol]),
             "our_seconds": rounded(our_cpu),
-            "our_wall_seconds": rounded(our_wall),
-            "our_kernel_wall_seconds": rounded(kernel),
             "ratio": rounded(cpu / our_cpu),
-            "wall_ratio": rounded(wall / our_wall),
-            "kernel_wall_ratio": rounded(wall / kernel),
+            "kernel_wall_ratio": rounded(wall / median(self.kernel)),
         }
-
-
-def compile_seconds():
-    """Our first call in a new process (s): with nothing compiled yet, and with the code on disk."""
-    found = {}
-    with tempfile.TemporaryDirectory() as folder:
-        environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
-        values = json.dumps(case_values("both", rtol=1e-5))
-        for name in ("nothing_compiled", "code_on_disk"):
-            done = subprocess.run(
-                [sys.executable, "-c", FIRST_CALL, values],
-                env=environment, capture_output=True, text=True, check=True,
-            )  # fmt: skip
-            found[name] = rounded(float(done.stdout))
-    return found
 
 
 def agreement(scene, truth):
@@ -194,8 +157,7 @@ def contests(scene, truth, our_errors):
             rows.append({"tool": peer.tool, "settings": peer.settings, "scene": scene,
                          "reason": tried})  # fmt: skip
             continue
-        rtol = loosest(our_errors, tried[0])
-        taking_part.append(Contest(peer, scene, *tried, rtol))
+        taking_part.append(Contest(peer, scene, tried, loosest(our_errors, tried)))
     return taking_part, rows
 
 
@@ -234,11 +196,10 @@ def main(target):
     rows.sort(key=lambda row: (order.index(row["tool"]), SCENES.index(row["scene"])))
     kept = provenance("make peers")
     kept["versions"] |= versions()
-    kept |= {"rounds": ROUNDS, "our_first_call_seconds": compile_seconds()}
-    kept |= {"agreement": checks, "numbalsoda_tightened": tighter, "rows": rows}
+    kept |= {"rounds": ROUNDS, "agreement": checks, "numbalsoda_tightened": tighter, "rows": rows}
     keep(target, kept)
     print(json.dumps(rows, indent=1))
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    run_campaign(main)

@@ -14,13 +14,12 @@ import itertools
 import json
 import shutil
 import statistics
-import sys
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.cases.case import Case
 from compressor.store.batch import (
@@ -159,7 +158,7 @@ def main(target, jobs=100_000):
     try:
         kept = {
             **provenance("make store-bench"),
-            "rows": rows(place / "many", int(jobs)),
+            "rows": rows(place / "many", jobs),
             "series": series(place / "series"),
             "selection": selection(place / "selection"),
         }
@@ -170,4 +169,4 @@ def main(target, jobs=100_000):
 
 
 if __name__ == "__main__":
-    main(*itertools.islice(sys.argv, 1, 3))
+    run_campaign(main)

@@ -4,14 +4,13 @@ Jobs are kept in a folder of results, from which the same command goes on. Write
 for the pages.
 """
 
-import argparse
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 from compsim import cli
 from compsim.screen import DONE, SOME_FAILED
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
@@ -60,7 +59,7 @@ def seconds(folder):
     return float(taken.sum()), float(taken.max())
 
 
-def main(target, folder, workers, overrides):
+def main(target, folder="stress", workers=2, overrides=()):
     settings = [word for text in overrides for word in ("--set", text)]
     code = cli.main(["run", str(example(STUDY)), "-r", folder, "-j", str(workers), *settings])
     if code not in (DONE, SOME_FAILED):
@@ -84,10 +83,4 @@ def main(target, folder, workers, overrides):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("target", help="file to write")
-    parser.add_argument("-j", "--jobs", type=int, default=2, help="worker processes")
-    parser.add_argument("-o", "--output", default="stress", help="folder of the campaign")
-    parser.add_argument("--set", dest="overrides", action="append", default=[])
-    asked = parser.parse_args()
-    main(asked.target, asked.output, asked.jobs, asked.overrides)
+    run_campaign(main)

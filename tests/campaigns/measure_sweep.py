@@ -27,7 +27,7 @@ import numpy as np
 from chaos.common import contents, damage
 from chaos.processes import Run, members
 from measure_store import timed
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.store.reader import open_study, read_store
 
@@ -145,7 +145,7 @@ def size(folder):
 
 
 def main(target, jobs=JOBS):
-    jobs, place = int(jobs), Path(tempfile.mkdtemp(prefix="sweep-bench-", dir=".")).absolute()
+    place = Path(tempfile.mkdtemp(prefix="sweep-bench-", dir=".")).absolute()
     try:
         calm, torn = Sweep(place / "undisturbed", jobs), Sweep(place / "killed", jobs)
         seconds = calm.complete()
@@ -185,4 +185,4 @@ def main(target, jobs=JOBS):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    run_campaign(main)

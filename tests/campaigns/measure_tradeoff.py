@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 from compsim import cli
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.analysis.runs import settled_part
 from compressor.cases.load import load_studies
@@ -106,4 +106,4 @@ def main(target):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    run_campaign(main)

@@ -39,7 +39,7 @@ from published import (
     rubbing,
     simeon,
 )
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.analysis import rubbing_work
 from compressor.cases.case import Case
@@ -203,9 +203,9 @@ def main(target):
     keep(target, kept)
     bad = [one for one in rows if not math.fabs(one["found"] - one["expected"]) <= one["within"]]
     print(f"{len(rows)} numbers, {len(bad)} beyond what they may differ by", *bad, sep="\n")
-    return 1 if bad else 0
+    sys.exit(1 if bad else 0)
 
 
 if __name__ == "__main__":
     np.seterr(all="ignore")
-    sys.exit(main(sys.argv[1]))
+    run_campaign(main)

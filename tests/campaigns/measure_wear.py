@@ -5,11 +5,10 @@ of each range, judge it.
 """
 
 import random
-import sys
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.cases.case import Case
 from compressor.studies.wear import Worn, first_stage, life, next_stage, stages_dataset
@@ -83,4 +82,4 @@ def main(target):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    run_campaign(main)

@@ -3,9 +3,12 @@
 `keep` writes both and the lists of tests/results/README.md; `make pages` writes the pages again.
 """
 
+import argparse
+import inspect
 import json
 import platform
 import subprocess
+import sys
 from collections import Counter
 from datetime import date
 from importlib import metadata
@@ -57,6 +60,20 @@ def keep(target, found):
     if target.resolve().parent == RESULTS and target.stem in CAMPAIGNS:
         write_page(target.stem)
         write_lists()
+
+
+def run_campaign(main):
+    """Call a campaign by the command line: the file to write, and an option for each default."""
+    parser = argparse.ArgumentParser(description=sys.modules["__main__"].__doc__)
+    for name, one in inspect.signature(main).parameters.items():
+        if one.default is one.empty:
+            parser.add_argument(name)
+        else:
+            many = isinstance(one.default, tuple)
+            kind = type((*one.default, "")[0] if many else one.default)
+            parser.add_argument(f"--{name}", default=one.default, type=kind,
+                                nargs="*" if many else None)  # fmt: skip
+    main(**vars(parser.parse_args()))
 
 
 # ---- tables: one a page
