@@ -38,9 +38,8 @@ def calibrate(record, config, ranges, hints, overrides, folder, jobs, as_json, q
     """
     from compressor.cases import to_yaml
     from compressor.store import find_record
-    from compressor.studies.calibrate.calibrate import Unknown
-    from compressor.studies.calibrate.calibrate import calibrate as fit_case
-    from compressor.studies.calibrate.words import jsonable_fit, list_fit
+    from compressor.studies.calibrate import Unknown, jsonable_fit, list_fit
+    from compressor.studies.calibrate import calibrate as fit_case
     from compressor.sweep import cores
 
     unknowns = [Unknown.written(text) for text in ranges]

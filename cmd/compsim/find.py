@@ -64,9 +64,8 @@ def find(config, over, folder, jobs, units, as_json, quiet, **asked) -> int:
     given = [(kind, text) for kind in KINDS if (text := asked.pop(kind)) is not None]
     if len(given) != 1:
         raise click.UsageError("give one of --first, --greatest and --least")
-    from compressor.studies.search.find import find as search
-    from compressor.studies.search.find import jsonable_answer, list_answer
-    from compressor.studies.search.question import read_question
+    from compressor.studies.find import find as search
+    from compressor.studies.find import jsonable_answer, list_answer, read_question
     from compressor.sweep import cores
 
     ((kind, goal),) = given

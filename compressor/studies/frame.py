@@ -5,14 +5,19 @@ resume, `compsim status`, shards and a cluster serve it, too.
 """
 
 import contextlib
+import hashlib
+import json
 import math
+import re
 import shlex
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from compressor.cases import Case, CaseFileError, Study, load_studies, points
 from compressor.outcome import Outcome
@@ -24,18 +29,32 @@ from compressor.store import (
     StoreError,
     healthy_clearance,
     job_record,
+    read_dataset,
     read_store,
     read_studies,
 )
 from compressor.sweep import Options, in_this_process, sweep
 from compressor.vibration import Record, check_record, resample_angle, turns_at
 
+RANGE = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*(?::\s*(\d+)\s*)?")
 DIGITS = 12  # of a key's value: enough for any derivative, and short to read
 MAX_NAME = 64  # characters of a study's name
 USABLE = 2.56  # sampling rate over the highest frequency that it holds well (ISO 13373-1)
 RECORD_REMEDY = "write `body: true` and `sensor: {{length_rev: {length}}}` into {file}, keep series"
 
 Point = tuple[float, ...]  # values of keys, in the case file's units
+
+
+def read_range(text: str) -> tuple[str, float, float, int | None] | None:
+    """Return key, ends and count of a text KEY=LOW:HIGH or KEY=LOW:HIGH:N; None of another text."""
+    parts = RANGE.fullmatch(text)
+    try:
+        low, high = map(float, parts.groups()[1:3]) if parts else (math.nan, math.nan)
+    except ValueError:
+        return None
+    if parts is None or not (math.isfinite(low) and math.isfinite(high)):
+        return None
+    return parts[1], low, high, int(parts[4]) if parts[4] else None
 
 
 class GrowingStudy:
@@ -167,6 +186,47 @@ def records(
             left["without_record"] += 1
         else:
             yield RecordedJob(key, point, *found, record)
+
+
+Row = dict[str, Any]  # of a study's file that grows row by row
+Numbers = Mapping[str, tuple[tuple[str, ...], str, str]]  # name -> dims, unit, long name
+
+
+def hash_key(identity: Any) -> str:
+    """Return the hash of what decides numbers, as JSON has it, by which their file is named."""
+    return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:20]
+
+
+def rows_dataset(
+    rows: Sequence[Row], dim: str, texts: Mapping[str, str], numbers: Numbers
+) -> xr.Dataset:
+    """Return rows as a Dataset along a dimension; texts: name -> long name."""
+    found: dict[str, tuple] = {}
+    for name, phrase in texts.items():
+        found[name] = dim, np.array([row[name] for row in rows], object), {"long_name": phrase}
+    for name, (dims, unit, phrase) in numbers.items():
+        values = np.array([row[name] for row in rows], float)
+        found[name] = (dim, *dims), values, {"units": unit, "long_name": phrase}
+    return xr.Dataset(found)
+
+
+def read_file_rows(
+    path: Path, key: str, texts: Iterable[str], numbers: Iterable[str], remedy: str
+) -> list[Row]:
+    """Return the rows of a file by `rows_dataset`, none where there is no file.
+
+    Raises StoreError where it is not the file of that key.
+    """
+    if not path.exists():
+        return []
+    found, names = read_dataset(path, remedy), (*texts, *numbers)
+    if found.attrs.get("key") != key or not {*names} <= {*found.variables}:
+        raise StoreError(path, "does not hold what its name says", remedy)
+    columns = {name: found[name].values for name in names}
+    return [
+        {name: str(column[n]) if name in texts else column[n] for name, column in columns.items()}
+        for n in range(len(columns[names[0]]))
+    ]
 
 
 class StudyError(CompsimError):

@@ -6,8 +6,6 @@ after each of them; the same command goes on from it.
 """
 
 import contextlib
-import hashlib
-import json
 import math
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -37,6 +35,7 @@ from compressor.reasons import Reason
 from compressor.report import BLACK, CYCLE, GREY, Drawing, LineStyle, Note, fill, make_grid
 from compressor.solve import simulate
 from compressor.store import Folder, StoreError, read_dataset, writable_folder, write_dataset
+from compressor.studies.frame import hash_key, read_file_rows, rows_dataset
 from compressor.sweep import JobLost, Needs, run_here
 
 FOLDER = "wear"
@@ -59,6 +58,7 @@ NUMBERS: dict[str, tuple[tuple[str, ...], str, str]] = {
 AT_MOST = 100_000  # motions, whose wall time a machine may take
 MAX_DRAWN = len(CYCLE)  # machines in a figure
 
+TEXTS = {"reason": "why it ended early", "detail": "what is known of that"}
 Stage = dict[str, Any]
 
 
@@ -83,8 +83,7 @@ class Worn:
     @cached_property
     def key(self) -> str:
         """Return the hash of what decides the numbers."""
-        identity = [self.case.key, self.case.values()["wear"], SCHEMA]
-        return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:20]
+        return hash_key([self.case.key, self.case.values()["wear"], SCHEMA])
 
     @property
     def clearances(self) -> np.ndarray:
@@ -186,37 +185,14 @@ def next_stage(machine: Worn, stage: Stage) -> Stage:
 
 def stages_dataset(machine: Worn, stages: list[Stage]) -> xr.Dataset:
     """Return the stages of a machine, with the dimension `stage`."""
-    found: dict[str, tuple] = {}
-    for name, phrase in (("reason", "why it ended early"), ("detail", "what is known of that")):
-        texts = np.array([stage[name] for stage in stages], object)
-        found[name] = ("stage",), texts, {"long_name": phrase}
-    for name, (dims, unit, phrase) in NUMBERS.items():
-        values = np.array([stage[name] for stage in stages], float)
-        found[name] = ("stage", *dims), values, {"units": unit, "long_name": phrase}
-    worn = found["clearance"][1] - machine.clearances
+    found = rows_dataset(stages, "stage", TEXTS, NUMBERS)
+    worn = found["clearance"].values - machine.clearances
     about = {"units": "m3", "long_name": "volume that is worn off"}
     found["worn_volume"] = ("stage", "joint"), worn * machine.bore_area, about
     where = {"joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"})}
     attrs = {"key": machine.key, "program": PROGRAM, "model_version": MODEL_VERSION}
     attrs["case"] = machine.case.attributes()["case"]
-    return xr.Dataset(found, where, attrs)
-
-
-def read_kept_stages(machine: Worn, path: Path) -> list[Stage]:
-    """Return the stages of an earlier run, none where there is no file. Raises StoreError."""
-    if not path.exists():
-        return []
-    found = read_dataset(path, REMEDY)
-    names = {*NUMBERS, "reason", "detail"}
-    if found.attrs.get("key") != machine.key or not names <= {*found.variables}:
-        raise StoreError(path, "does not hold the machine that its name says", REMEDY)
-    columns = {name: found[name].values for name in names}
-    stages = [
-        {name: column[n] for name, column in columns.items()} for n in range(found.sizes["stage"])
-    ]
-    for stage in stages:
-        stage["reason"], stage["detail"] = str(stage["reason"]), str(stage["detail"])
-    return stages
+    return found.assign_coords(where).assign_attrs(attrs)
 
 
 def wear_file(folder: Folder, case: Case) -> Path:
@@ -345,7 +321,7 @@ def run_wear(
 
 def stored_stages(worn: Worn, folder: Folder, rerun: bool = False) -> list[Stage]:
     """Return the stages of a machine that are kept; rerun: without failed ones."""
-    stages = read_kept_stages(worn, worn.path(folder))
+    stages = read_file_rows(worn.path(folder), worn.key, TEXTS, NUMBERS, REMEDY)
     return [stage for stage in stages if not (rerun and stage["reason"])]
 
 

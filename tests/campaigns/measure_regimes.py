@@ -5,11 +5,10 @@ of each value and direction what was found. Writes a small JSON file.
 """
 
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
-from result_pages import keep, provenance
+from result_pages import keep, provenance, run_campaign
 
 from compressor.cases.examples import example
 from compressor.report.figures.pictures import render
@@ -35,21 +34,12 @@ def main(target):
                 "error": none(one["lyapunov_exponent_error"]),
             })  # fmt: skip
     found = {
-        **provenance("make regimes"), "over": over, "rows": rows, "differ": differing(data),
+        **provenance("make regimes"), "over": over, "rows": rows,
+        "differ": data[over].values[data["differs"].values == 1].tolist(),
     }  # fmt: skip
     keep(target, found)
     Path(target).with_suffix(".svg").write_bytes(render(draw_followed(data), "svg"))
     print(*table(data), sep="\n")
-
-
-def differing(data):
-    """Where up and down differ, and whether further simulation reached two motions there."""
-    some = data.isel({data.attrs["over"]: data["differs"].values == 1})
-    values, confirmed = some[data.attrs["over"]].values, some["confirmed"].values
-    return [
-        {"value": value.item(), "confirmed": bool(yes)}
-        for value, yes in zip(values, confirmed, strict=True)
-    ]
 
 
 def none(value):
@@ -70,4 +60,4 @@ def distinct(one, clearance):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    run_campaign(main)

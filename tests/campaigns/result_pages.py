@@ -404,9 +404,8 @@ def regimes(found):
         "motion": lambda rows: motion(rows[0]), "Poincaré points": span("points", "g"),
         "Lyapunov exponent, 1/rev": span("exponent", ".2f"), "its error": span("error", ".2g"),
     })  # fmt: skip
-    differ = ", ".join(f"{row['value']:.4g}" for row in found["differ"])
-    twice = ", ".join(f"{row['value']:.4g}" for row in found["differ"] if row["confirmed"])
-    return f"{text}\nUp and down differ at {differ or 'no'} mm; confirmed at {twice or 'none'}.\n"
+    differ = ", ".join(f"{value:.4g}" for value in found["differ"])
+    return f"{text}\nUp and down differ at {differ or 'no'} mm.\n"
 
 
 def nameplate(found):

@@ -38,8 +38,8 @@ def test_the_period_is_the_number_of_points(rows):
 
 
 def test_up_and_down_differ_where_their_motions_do(rows):
-    for one in kept("regimes.json")["differ"]:
-        up, down = (row for row in rows if row["value"] == one["value"])
+    for value in kept("regimes.json")["differ"]:
+        up, down = (row for row in rows if row["value"] == value)
         assert (up["regime"], up["period"]) != (down["regime"], down["period"])
 
 

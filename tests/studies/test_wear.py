@@ -84,7 +84,7 @@ def test_a_killed_machine_goes_on_and_ends_in_the_same_bits(told, tmp_path):
     wear.first_stage(worn)  # loads the equations, which forked processes share
     path = worn.path(tmp_path)
     for _ in range(30):
-        before = len(wear.read_kept_stages(worn, path))
+        before = len(wear.stored_stages(worn, tmp_path))
         stops.append(before)
         process = multiprocessing.get_context("fork").Process(
             target=follow_wear, args=(worn, tmp_path)
@@ -171,7 +171,7 @@ def test_a_file_of_something_else_is_told(told, tmp_path):
     place = Worn(cases[1]).path(tmp_path)
     place.parent.mkdir(parents=True)
     place.write_bytes(wear_file(out, cases[0]).read_bytes())
-    with pytest.raises(StoreError, match="does not hold the machine that its name says"):
-        wear.read_kept_stages(Worn(cases[1]), place)
+    with pytest.raises(StoreError, match="does not hold what its name says"):
+        wear.stored_stages(Worn(cases[1]), tmp_path)
     with pytest.raises(StoreError, match="compsim wear the case file"):
         open_wear(tmp_path / "nowhere", cases[0])

@@ -86,13 +86,10 @@ def table(machine: xr.Dataset) -> list[str]:
         where, rate = " to ".join(ends), " to ".join(rates)
         cells.append([one.direction, where, str(one.values), one.motion, rate])
     lines = align_columns(cells)
-    for name, words in (
-        ("differs", "up and down differ"),
-        ("confirmed", "two motions are confirmed"),
-    ):
-        if name in machine and (marked := machine[name].values == 1).any():
-            listed = ", ".join(f"{value:.4g}" for value in over.values[marked])
-            lines.append(f"{words} at {int(marked.sum())} of {over.size} values: {listed}")
+    if "differs" in machine and (marked := machine["differs"].values == 1).any():
+        listed = ", ".join(f"{value:.4g}" for value in over.values[marked])
+        where = f"{int(marked.sum())} of {over.size} values: {listed}"
+        lines.append(f"up and down differ (two motions, or a long transient) at {where}")
     return lines
 
 

@@ -5,17 +5,12 @@
 
 A chain is named by a hash of all that decides its numbers. Its file is rewritten every few seconds
 and is whole or absent; a chain that was interrupted goes on from the last value in it, and ends in
-the same numbers to the bit. Where a machine that is followed up and down ends differently, that may
-be a transient which is not over: a chain of its own runs both motions on, and starts the machine
-from other places, too.
+the same numbers to the bit.
 """
 
 import contextlib
-import hashlib
 import itertools
-import json
 import math
-import re
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -46,7 +41,6 @@ from compressor.store import (
     Folder,
     StoreError,
     coordinate_names,
-    read_dataset,
     swept_column,
     writable_folder,
     write_dataset,
@@ -61,6 +55,7 @@ from compressor.studies.follow.motion import (
     empty_row,
     run_value,
 )
+from compressor.studies.frame import hash_key, read_file_rows, read_range, rows_dataset
 from compressor.sweep import JobLost, Needs, run_here
 
 FOLDER = "follow"
@@ -69,10 +64,6 @@ SCHEMA = 3  # of a row's numbers: a change of what they mean makes chains again
 SECONDS_BETWEEN_WRITES = 2.0  # s between two writings of what is finished
 SECONDS_BETWEEN_LOOKS = 0.5  # s between two looks at what chains have written
 RUNS = 4  # of a value, each with the case's own wall time at most, and some more
-FURTHER = 200  # rev that motions run on before they are compared again
-STARTS, SEED = 8, 13  # from other places, and of these
-START_ROOM = 0.9  # of the clearance, within which they lie
-OVER = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d+)\s*")
 FORM = "KEY=LOW:HIGH:N, such as clearance_mm=0.01:1:60"
 # groups whose keys are not followed: of the run and its start, or of what the machine shakes
 NOT_FOLLOWED = ("solve", "output", "body", "sensor", "initial_offset_mm")
@@ -107,14 +98,9 @@ class KeyRange:
 
 def read_over(text: str, **more: Any) -> KeyRange:
     """Return what a text KEY=LOW:HIGH:N asks for; more: other fields. Raises FollowError."""
-    parts = OVER.fullmatch(text)
-    try:
-        low, high = map(float, parts.groups()[1:3]) if parts else (math.nan, math.nan)
-    except ValueError:
-        low = high = math.nan
-    if parts is None or not (math.isfinite(low) and math.isfinite(high)):
+    key, low, high, count = read_range(text) or ("", math.nan, math.nan, None)
+    if count is None:
         raise FollowError(f"--over {text}: write {FORM}")
-    key, count = parts[1], int(parts[4])
     row = row_of(key)
     if row is None:
         problem = f"{key} is no key of a number{suggestion(key, '') or ', such as clearance_mm'}"
@@ -168,21 +154,17 @@ def load_values(
 class Chain:
     """Cases that are run one after the other, each from the last one's end.
 
-    `values`: of the key that is followed; `states`: where the cases begin instead, if any; None is
-    a case's own start.
+    `values`: of the key that is followed.
     """
 
     cases: tuple[Case, ...]
     values: tuple[float, ...]
     plan: ValuePlan
-    states: tuple[np.ndarray | None, ...] = ()
 
     @cached_property
     def key(self) -> str:
         """Return the hash of what decides the numbers."""
-        starts = ["" if state is None else state.tobytes().hex() for state in self.states]
-        identity = [[case.key for case in self.cases], astuple(self.plan), starts, SCHEMA]
-        return hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:20]
+        return hash_key([[case.key for case in self.cases], astuple(self.plan), SCHEMA])
 
     def path(self, folder: Folder) -> Path:
         """Return the path of its file."""
@@ -190,8 +172,6 @@ class Chain:
 
     def begin(self, rows: Sequence[Row]) -> np.ndarray | None:
         """Return the state that the next value begins from; None: from its own start."""
-        if self.states:
-            return self.states[len(rows)]
         state = rows[-1]["end_state"] if rows else None
         return None if state is None or np.isnan(state).any() else state
 
@@ -275,13 +255,7 @@ def follow(
         [rows_to_show(chain, folder, lost.get(chain.key)) for chain in machine.chains]
         for machine in every
     ]
-    doubts = find_doubts(every, rows)
-    if doubts:
-        text = f"up and down differ at {len(doubts)} of the values: motions are run on"
-        progress(0, len(doubts), text)
-        run_chains([*doubts.values()], folder, workers, progress, rerun)
-    confirmed = {where: has_two(doubt, folder) for where, doubt in doubts.items()}
-    data = followed_dataset(study, along, every, rows, confirmed)
+    data = followed_dataset(study, along, every, rows)
     path = Path(folder) / FOLDER / f"{study.name}-{along.key}.nc"
     write_dataset(path, data)
     return Followed(sum(len(chain.cases) for chain in chains), before, data, path)
@@ -321,30 +295,14 @@ def rows_to_show(chain: Chain, folder: Folder, end: JobLost | None) -> list[Row]
 
 def chain_dataset(chain: Chain, rows: Sequence[Row]) -> xr.Dataset:
     """Return the rows of a chain, with the dimension `value` in the order of running."""
-    found: dict[str, tuple] = {}
-    for name, phrase in TEXTS.items():
-        texts = np.array([row[name] for row in rows], object)
-        found[name] = "value", texts, {"long_name": phrase}
-    for name, (dims, unit, phrase) in NUMBERS.items():
-        numbers = np.array([row[name] for row in rows], float)
-        found[name] = ("value", *dims), numbers, {"units": unit, "long_name": phrase}
     attrs = {"key": chain.key, "case": chain.cases[0].attributes()["case"], "program": PROGRAM}
-    return xr.Dataset(found, {"value": ("value", list(chain.values[: len(rows)]))}, attrs)
+    found = rows_dataset(rows, "value", TEXTS, NUMBERS)
+    return found.assign_coords(value=[*chain.values[: len(rows)]]).assign_attrs(attrs)
 
 
 def read_rows(chain: Chain, folder: Folder) -> list[Row]:
     """Return the stored rows of a chain, none where there is no file. Raises StoreError."""
-    path = chain.path(folder)
-    if not path.exists():
-        return []
-    found = read_dataset(path, REMEDY)
-    if found.attrs.get("key") != chain.key:
-        raise StoreError(path, "is not the chain that its name says", REMEDY)
-    columns = {name: found[name].values for name in (*TEXTS, *NUMBERS)}
-    return [
-        {name: str(column[n]) if name in TEXTS else column[n] for name, column in columns.items()}
-        for n in range(found.sizes["value"])
-    ]
+    return read_file_rows(chain.path(folder), chain.key, TEXTS, NUMBERS, REMEDY)
 
 
 def run_chains(
@@ -407,47 +365,15 @@ class ChainWatch:
         progress(sum(self.counts.values()), self.total, remark)
 
 
-Where = tuple[int, float]  # the number of a machine, and a value
-
-
-def find_doubts(
-    every: Sequence[FollowedMachine], rows: Sequence[list[list[Row]]]
-) -> dict[Where, Chain]:
-    """Return a chain for each value at which up and down differ: both motions and other starts."""
-    found: dict[Where, Chain] = {}
-    for number, (machine, (up, *others)) in enumerate(zip(every, rows, strict=True)):
-        down = dict(zip(machine.chains[-1].values, others[0] if others else [], strict=False))
-        chain = machine.chains[0]
-        for case, value, one in zip(chain.cases, chain.values, up, strict=False):
-            other = down.get(value)
-            if other and differ(case, one, other):
-                cases = (case, case, *other_starts(case))
-                states = (one["end_state"], other["end_state"], *[None] * STARTS)
-                plan = replace(chain.plan, further=FURTHER)
-                found[number, value] = Chain(cases, (value,) * len(cases), plan, states)
-    return found
-
-
-def other_starts(case: Case) -> Iterator[Case]:
-    """Yield the case with its journals starting elsewhere, always at the same places.
-
-    They are evenly drawn from a disk within each clearance.
-    """
-    rng = np.random.default_rng(SEED)
-    for _ in range(STARTS):
-        shift: dict[str, float] = {}
-        for joint in JOINTS:
-            radius, angle = math.sqrt(rng.random()), 2.0 * math.pi * rng.random()
-            size = START_ROOM * getattr(case.clearance_mm, joint) * radius
-            shift[f"{joint}_x"] = size * math.cos(angle)
-            shift[f"{joint}_y"] = size * math.sin(angle)
-        yield replace(case, initial_offset_mm=replace(case.initial_offset_mm, **shift))
-
-
-def has_two(doubt: Chain, folder: Folder) -> bool:
-    """Return whether two of the motions that a chain ran on are different ones."""
-    pairs = itertools.combinations(read_rows(doubt, folder), 2)
-    return any(differ(doubt.cases[0], *pair) for pair in pairs)
+def differing(machine: FollowedMachine, up: Sequence[Row], down: Sequence[Row]) -> set[float]:
+    """Return the values at which a machine ends in different motions on its ways up and down."""
+    first, last = machine.chains
+    other = dict(zip(last.values, down, strict=False))
+    return {
+        value
+        for case, value, row in zip(first.cases, first.values, up, strict=False)
+        if value in other and differ(case, row, other[value])
+    }
 
 
 def followed_dataset(
@@ -455,16 +381,13 @@ def followed_dataset(
     along: KeyRange,
     every: Sequence[FollowedMachine],
     rows: Sequence[list[list[Row]]],
-    confirmed: dict[Where, bool],
 ) -> xr.Dataset:
     """Return the rows of all chains as one Dataset.
 
     Dims: `job` (a machine), `direction` (up, down), the key by its coordinate's name, which stands
     in the attribute `over`, going up, and those of the variables (`motion.NUMBERS`). `differs`: up
-    and down end differently; `confirmed`: two motions were reached by running on. A value that a
-    machine does not have is `missing`, with numbers of nan.
-
-    rows: by machine and way; confirmed: whether two motions were reached, where up and down differ.
+    and down end differently. A value that a machine does not have is `missing`, with numbers of
+    nan. rows: by machine and way.
     """
     parts = [
         [
@@ -480,14 +403,10 @@ def followed_dataset(
     data = data.sortby("value").transpose("job", "direction", "value", ...)
     values = data["value"].values.tolist()
     if along.both:
-        for name, phrase in {
-            "differs": "1: up and down end in different motions here",
-            "confirmed": "1: two different motions were reached by further simulation here",
-        }.items():
-            marks = np.zeros((len(every), len(values)), int)
-            for (job, value), is_confirmed in confirmed.items():
-                marks[job, values.index(value)] = name == "differs" or is_confirmed
-            data[name] = ("job", "value"), marks, {"units": "1", "long_name": phrase}
+        marks = [differing(machine, *ways) for machine, ways in zip(every, rows, strict=True)]
+        marked = [[int(value in mine) for value in values] for mine in marks]
+        about = {"units": "1", "long_name": "1: up and down end in different motions here"}
+        data["differs"] = ("job", "value"), marked, about
     keys = [*dict.fromkeys(key for machine in every for key in machine.point)]
     names = coordinate_names([*keys, along.key])
     swept = {key: [machine.point.get(key) for machine in every] for key in keys}

@@ -83,13 +83,11 @@ class ValuePlan:
     """How a value is run.
 
     `points`: Poincaré points of a motion that does not repeat itself; `exponent`: whether the
-    largest Lyapunov exponent is looked for; `further`: revolutions that are dropped, 0 where it is
-    as many as the motion takes to settle.
+    largest Lyapunov exponent is looked for.
     """
 
     points: int = 64
     exponent: bool = True
-    further: int = 0
 
 
 @dataclass
@@ -119,10 +117,7 @@ def run_value(case: Case, state: np.ndarray | None, plan: ValuePlan) -> Row:
     row, deadline = empty_row(case, plan.points), time.monotonic() + case.solve.timeout_s
     if state is not None:
         row["end_state"] = state
-    if plan.further:
-        run, since = follow_revolutions(case, state, plan.further, deadline), math.nan
-    else:
-        run, since = settle_motion(case, state, deadline)
+    run, since = settle_motion(case, state, deadline)
     if run.reason:
         return failed_row(row, run)
     within, clearance = tolerance(case), record(case)["clearance"].copy()

@@ -13,12 +13,10 @@ from typing import Any
 
 import xarray as xr
 
-from compressor.analysis import cylinder_words, describe_machine, healthy_body_velocity_rms
+from compressor.analysis import describe_machine, healthy_body_velocity_rms
 from compressor.cases import (
     ACCURACY,
-    CYLINDRICAL,
     Case,
-    Contact,
     Study,
     points,
     to_si,
@@ -33,7 +31,6 @@ from compressor.solve import (
     joint_scales,
     record,
     simulate,
-    stiffness_of,
 )
 from compressor.studies.tradeoff.page import ModelTable, model_table, percent
 from compressor.studies.tradeoff.variants import (
@@ -207,10 +204,9 @@ def terms(case: Case) -> tuple[dict[str, str], list[str]]:
     shown = [row for row in FEATURES if not (row.word or row.key.startswith(own_keys))]
     active = {row.name: paid_value(case, row) for row in shown if row.is_in(case)}
     absent = [row.name for row in shown if row.name not in active]
-    if case.load == "gas" and case.gas.switching == "exact":
-        active["cylinder"] = cylinder_words(case)
     if case.counterweight:
-        active["counterweight"] = counterweight_words(case)
+        force = to_si(case.counterweight, "kg mm") * case.omega**2
+        active["counterweight"] = f"{case.counterweight:g} kg mm, {force:.4g} N"
     if ideal:
         return active, [*absent, "clearance", "contact"]
     widths = [f"{getattr(case.clearance_mm, joint):g} mm at the {joint.replace('_', ' ')}"
@@ -218,7 +214,7 @@ def terms(case: Case) -> tuple[dict[str, str], list[str]]:
     active["clearance"] = ", ".join(widths)
     if case.worn_joint != case.joint:
         active["clearance"] += f"; worn: {case.worn_joint.replace('_', ' ')}"
-    active["contact"] = contact_words(case)
+    active["contact"] = list_fields(case.contact)
     return active, absent
 
 
@@ -230,9 +226,14 @@ def paid_value(case: Case, feature: Feature) -> str:
         return f"{law}static {case.friction.static:g}, dynamic {case.friction.dynamic:g}"
     value = getattr(getattr(case, group), name) if dot else getattr(case, group)
     if not dot and hasattr(value, "__dataclass_fields__"):
-        fields = {key: one for key, one in vars(value).items() if one is not None}
-        value = ", ".join(f"{key} {format_value(one)}" for key, one in fields.items())
+        value = list_fields(value)
     return f"{feature.key} = {value}"
+
+
+def list_fields(group: Any) -> str:
+    """Return the keys of a group of a case that have a value, as text."""
+    fields = {key: one for key, one in vars(group).items() if one is not None}
+    return ", ".join(f"{key} {format_value(one)}" for key, one in fields.items())
 
 
 def body_words(case: Case, run: xr.Dataset) -> str:
@@ -242,55 +243,6 @@ def body_words(case: Case, run: xr.Dataset) -> str:
     both = run["body_velocity_rms"].values, healthy_body_velocity_rms(case)
     own, healthy = (" and ".join(f"{1e3 * one:.3g}" for one in rms) for rms in both)
     return f"{own} mm/s rms along x and y, with ideal joints {healthy}"
-
-
-def counterweight_words(case: Case) -> str:
-    """Return what a counterweight comes to in words, and by how much it lowers order 1."""
-    force = to_si(case.counterweight, "kg mm") * case.omega**2
-    words = f"{case.counterweight:g} kg mm opposite to the crank pin, {force:.4g} N"
-    share = case.machine.balance
-    if share is None:
-        return words
-    return (
-        f"{words}: {share.rotating:g} of what turns with the pin and {share.reciprocating:g} of "
-        "what reciprocates"
-    )
-
-
-def contact_words(case: Case) -> str:
-    """Return the law, stiffness, exponent and damping of a contact in words, with their sources."""
-    contact, usual = case.contact, Contact()
-    shape = f"p = {contact.exponent:g}"
-    pairs = dict.fromkeys(
-        contact.materials.at(joint) for joint in faulty(case) if contact.materials
-    )
-    material = " and ".join(" on ".join(pair) for pair in pairs)
-    if contact.law in CYLINDRICAL:
-        material = material or f"E* = {contact.modulus_GPa:g} GPa"
-        lengths = dict.fromkeys(
-            contact.length_mm.at(joint) for joint in faulty(case) if contact.length_mm
-        )
-        shape = f"{' and '.join(f'{length:g}' for length in lengths)} mm long"
-    elif contact.materials:
-        where = "in their bores" if contact.geometry == "internal" else "as of two discs"
-        each = {
-            f"{stiffness_of(case, joint) / 1000.0**contact.exponent:.4g}" for joint in faulty(case)
-        }
-        stiffness = f"K = {' and '.join(sorted(each))} N/mm^p"
-        material = f"{stiffness} (Eq. 15, pins {where}: {material})"
-    else:
-        paper = contact.stiffness_N_per_mm15 == usual.stiffness_N_per_mm15
-        source = "Table 3, of a pin of 10 mm radius" if paper else "given"
-        material = f"K = {contact.stiffness_N_per_mm15:g} N/mm^p ({source})"
-    if contact.law != "impact":
-        restitution = contact.restitution
-        damped = "undamped" if restitution is None else f"restitution {restitution:g} (given)"
-    else:
-        damping = contact.damping_N_s_per_mm, contact.full_damping_mm
-        paper = damping == (usual.damping_N_s_per_mm, usual.full_damping_mm)
-        damped = f"C_max = {damping[0]:g} N s/mm from {damping[1]:g} mm on "
-        damped += "(Table 3)" if paper else "(given)"
-    return f"{contact.law}, {material}, {shape}, {damped}"
 
 
 # ---- as text ------------------------------------------------------------------------------------

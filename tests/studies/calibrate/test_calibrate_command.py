@@ -13,8 +13,7 @@ from conftest import jobs_here
 from compressor.cases.load import load_cases
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
-from compressor.studies.calibrate.calibrate import Unknown
-from compressor.studies.calibrate.orders import CalibrationError
+from compressor.studies.calibrate import CalibrationError, Unknown
 
 CASE = {
     "load": "gas",

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from compressor.studies.calibrate.fit import MODEL_ERROR, fit_orders
-from compressor.studies.calibrate.orders import orders_of
+from compressor.studies.calibrate import MODEL_ERROR, fit_orders, orders_of
 from compressor.vibration import Record
 
 ORDERS = np.arange(1, 25)

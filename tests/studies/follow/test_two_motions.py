@@ -1,4 +1,4 @@
-"""Where up and down differ, and whether two motions are confirmed."""
+"""What makes two motions of a machine different ones."""
 
 import math
 
@@ -7,22 +7,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.solve.si_record import record
-from compressor.studies.follow import follow
-from compressor.studies.follow.follow import (
-    find_doubts,
-    has_two,
-    load_values,
-    machines,
-    read_over,
-    run_chain,
-)
-from compressor.studies.follow.motion import (
-    APART_TOLERANCES,
-    TOLERANCE,
-    ValuePlan,
-    differ,
-    empty_row,
-)
+from compressor.studies.follow.motion import APART_TOLERANCES, TOLERANCE, differ, empty_row
 
 CASE = Case.from_values({"joint": "both", "clearance_mm": 0.2})
 
@@ -74,34 +59,3 @@ TURNED = TWO | {"section": np.concatenate((TWO["section"][1::-1], TWO["section"]
 def test_what_makes_two_motions_different(one, other, expected):
     assert differ(CASE, one, other) is expected
     assert differ(CASE, other, one) is expected
-
-
-@pytest.fixture
-def two(tmp_path):
-    """The machine of a file with two motions, one of one revolution and one of two."""
-    path = tmp_path / "two.yaml"
-    path.write_text("""
-joint: big_end
-machine: {rod_mass_kg: 2}
-contact: {damping_N_s_per_mm: 60}
-solve: {accuracy: draft, output_step_deg: 1}
-""")
-    along = read_over(
-        "clearance_mm=0.7536:1.024:3", log=True, both=True, plan=ValuePlan(exponent=False)
-    )
-    (machine,) = machines(load_values(path, along), along)
-    return machine
-
-
-def test_a_machine_with_two_motions_is_found_and_confirmed(two, tmp_path, monkeypatch):
-    """Going up from a motion of two revolutions, and down from one of one: two of one meet."""
-    monkeypatch.setattr(follow, "FURTHER", 20)
-    monkeypatch.setattr(follow, "STARTS", 2)
-    for chain in two.chains:
-        assert run_chain(chain, tmp_path) is None
-    rows = [[follow.read_rows(chain, tmp_path) for chain in two.chains]]
-    (((_, value), doubt),) = find_doubts([two], rows).items()
-    assert value == two.chains[0].values[1]
-    assert len(doubt.cases) == 4
-    assert run_chain(doubt, tmp_path) is None
-    assert has_two(doubt, tmp_path)

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from compressor.outcome import ROW
-from compressor.studies.search.find import Point, find_extremum, find_first
-from compressor.studies.search.question import (
+from compressor.studies.find import (
     Goal,
     JobReading,
+    Point,
     QuestionError,
     comparison,
+    find_extremum,
+    find_first,
     goal_of,
 )
 

@@ -112,9 +112,9 @@ def test_scales_follow_the_contact():
     assert (big.damping_ratio > 1, found.damping_ratio) == (True, 0.0)
 
 
-def test_power_is_told_of_every_cylinder_with_exact_corners():
-    """The efficiency is 1 + c - c r^(1/n) of a clearance of 20 mm in a stroke of 240."""
-    own = terms(Case.from_values({"load": "gas", "gas": {"discharge_MPa": 0.5}}))[0]
-    efficiency = 1 + 20 / 240 * (1 - (0.5 / 0.105) ** (1 / 1.4))
-    assert f"at a volumetric efficiency of {efficiency:.3g}" in own["cylinder"]
-    assert "cylinder" not in terms(Case.from_values({"load": "gas"}))[0]  # the paper's corners
+def test_a_term_has_its_values():
+    pairs = {"big_end": ["steel", "steel"], "small_end": ["steel", "copper"]}
+    values = {"joint": "both", "clearance_mm": 0.2, "contact": {"materials": pairs}}
+    active = terms(Case.from_values(values))[0]
+    assert "big_end steel on steel, small_end steel on copper" in active["contact"]
+    assert active["friction"].endswith("static 0.23, dynamic 0.15")

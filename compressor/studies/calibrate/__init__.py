@@ -1,1 +1,0 @@
-"""What is not known of a sound machine, fitted to a record of it."""
