@@ -13,7 +13,6 @@ import json
 import math
 from pathlib import Path
 
-import numpy as np
 import yaml
 from result_pages import keep, provenance, run_campaign
 
@@ -21,7 +20,7 @@ from compressor.cases import Wear
 from compressor.cases.load import load_studies
 from compressor.metrics import JOINTS
 from compressor.program import no_progress
-from compressor.store import find_study, open_study
+from compressor.store import find_study
 from compressor.studies.alarms.alarms import add_hours, judge_alarms, rank_alarms, read_wear
 from compressor.studies.wear import Worn, run_wear
 from compressor.sweep.sweep import Options, sweep
@@ -40,7 +39,6 @@ DRAWN = {  # about the nameplate: speed by 5 %, pressure by 10 %, oil by 20 %
     "gas": {"discharge_MPa": [0.63, 0.77]},
     "lubricant": {"viscosity_mPa_s": [32, 48]},
 }
-LOOSER = 0.05  # rate of false alarms, beside the default one
 NOISE = (0.0, 1.0, 5.0)  # m/s2 rms, beside the sensor's own
 SOLVE = {
     "accuracy": "draft", "error_bars": False, "settle_rev": 2, "duration_rev": 5,
@@ -99,40 +97,13 @@ def judge(folder, study, run=None, revolutions=5):
     """What the command says of a stored study: best alarms by joint and noise, with their rates."""
     found = judge_alarms(folder, study, noise=NOISE, revolutions=revolutions)
     found = found if run is None else add_hours(found, run)
-    looser = judge_alarms(folder, study, false_alarms=LOOSER, revolutions=revolutions)
     return {
-        "looser": LOOSER, "at_looser": [
-            {name: row[name] for name in ("joint", "alarm", "filter", "limit", "clearances",
-                                          "first", "first_low", "first_high")}
-            for joint in looser["joint"].values.tolist() for row in rows_of(looser, joint)
-        ],
-        "peaks": peaks(folder, study),
         "sound_draws": int(found.attrs["sound_draws"]), "jobs": len(find_study(folder, study).keys),
         "worn_jobs": int(found.attrs["worn_jobs"]), "left_out": json.loads(found.attrs["left_out"]),
         "attainable": rounded(found.attrs["rate"]), "detected": found.attrs["detected"],
         "alarms": found.sizes["alarm"], "clipped": int(found.attrs["clipped"]),
         "rows": [row for joint in found["joint"].values.tolist() for row in rows_of(found, joint)],
         "wear_end": rounded(found.attrs.get("wear_end", math.nan)),
-    }  # fmt: skip
-
-
-def peaks(folder, study):
-    """Peaks of the records, without added noise: medians, and the greatest of sound draws."""
-    dataset = open_study(folder, study)
-    with dataset:
-        peak = dataset["sensor_peak"].values
-        clearance = {joint: dataset[f"clearance_mm_{joint}"].values for joint in JOINTS}
-    worn = {joint: clearance[joint] > HEALTHY[joint] for joint in JOINTS}
-    sound = np.sort(peak[~(worn["big_end"] | worn["small_end"])])
-    medians = {
-        joint: [rounded(np.median(peak[worn[joint] & (clearance[joint] == one)]))
-                for one in clearances]
-        for joint, clearances in WORN.items()
-    }  # fmt: skip
-    usual = np.median(sound)
-    return {
-        "sound": rounded(usual), "worn": medians, "clearances": WORN,
-        "greatest": [rounded(one / usual) for one in sound[:-3:-1]],
     }  # fmt: skip
 
 

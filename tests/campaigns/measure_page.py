@@ -9,7 +9,6 @@ a network, from the start of the navigation to the end of `load`, and until the 
 interactive; without a chromium it is left out. Medians of a few.
 """
 
-import resource
 import shutil
 import statistics
 import subprocess
@@ -95,7 +94,7 @@ def many(folder, jobs):
 
 
 def measured(folder, rounds):
-    """Seconds to write, of the wall and of all cores, bytes, and seconds to open."""
+    """Seconds to write, bytes, and seconds to open."""
     written, again = [], []
     for _ in range(rounds):
         shutil.rmtree(folder / "report", ignore_errors=True)
@@ -113,7 +112,8 @@ def measured(folder, rounds):
         else (None, None)
     )
     return {
-        **medians("write", written), **medians("rewrite", again),
+        "write_seconds": round(statistics.median(written), 2),
+        "rewrite_seconds": round(statistics.median(again), 2),
         "figures": len([name for name in files if name.endswith(".png")]),
         "page_bytes": of[".html"], "data_bytes": of[".js"], "library_bytes": files[LIBRARY],
         "csv_bytes": of[".csv"], "picture_bytes": of[".png"],
@@ -122,18 +122,10 @@ def measured(folder, rounds):
 
 
 def writing(folder):
-    """Wall and CPU seconds of writing the report, of all its processes."""
-    before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    """Seconds of writing the report."""
+    began = time.perf_counter()
     compsim(folder, "report")
-    seconds = time.perf_counter() - began
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return seconds, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-
-def medians(name, pairs):
-    """The medians of wall and CPU seconds, by name."""
-    wall, cpu = (round(statistics.median(column), 2) for column in zip(*pairs, strict=True))
-    return {f"{name}_seconds": wall, f"{name}_cpu_seconds": cpu}
+    return time.perf_counter() - began
 
 
 def opened(report):

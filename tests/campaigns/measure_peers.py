@@ -137,16 +137,6 @@ def agreement(scene, truth):
     return found | {"exudyn_rtol": TIGHT, "exudyn_to_ours": rounded(error(tight, best))}
 
 
-def tightened(scene, truth):
-    """Errors of numbalsoda's LSODA as its tolerance is tightened: it may step over contacts."""
-    found = {"scene": scene}
-    try:
-        runs = {rtol: soda.acceleration(scene, rtol) for rtol in (1e-6, 1e-7, 1e-8)}
-    except Exception as fault:
-        return found | {"reason": f"{type(fault).__name__}: {fault}"}
-    return found | {f"{rtol:g}": rounded(error(a, truth)) for rtol, a in runs.items()}
-
-
 def contests(scene, truth, our_errors):
     """The scene's contests, and the rows of the peers that cannot take part."""
     taking_part, rows = [], []
@@ -174,7 +164,7 @@ def versions():
 
 def main(target):
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    errors, contestants, rows, checks, tighter = {}, [], [], [], []
+    errors, contestants, rows, checks = {}, [], [], []
     for scene in SCENES:
         print(f"{scene}: reference, errors", file=sys.stderr)
         truth = reference.reference_solution(params(scene), scene, output_grid(DURATION))["a"]
@@ -184,7 +174,6 @@ def main(target):
         taking_part, absent = contests(scene, truth, errors[scene])
         contestants, rows = contestants + taking_part, rows + absent
         checks.append(agreement(scene, truth))  # after the first calls, whose setup is timed
-        tighter.append(tightened(scene, truth))
     for number in range(ROUNDS):
         print(f"round {number + 1} of {ROUNDS}", file=sys.stderr)
         for contest in contestants:
@@ -196,7 +185,7 @@ def main(target):
     rows.sort(key=lambda row: (order.index(row["tool"]), SCENES.index(row["scene"])))
     kept = provenance("make peers")
     kept["versions"] |= versions()
-    kept |= {"rounds": ROUNDS, "agreement": checks, "numbalsoda_tightened": tighter, "rows": rows}
+    kept |= {"rounds": ROUNDS, "agreement": checks, "rows": rows}
     keep(target, kept)
     print(json.dumps(rows, indent=1))
 

@@ -22,7 +22,6 @@ from compressor.studies.tradeoff.variants import faulty, run_variants, scale_con
 from compressor.studies.tradeoff.work_precision import (
     VARIABLES,
     draw_work_precision,
-    fastest,
     tabulate,
 )
 
@@ -97,10 +96,6 @@ def main(target):
         moved = [row for case in study.cases for row in changes(f"{case.joint} 0.2", case)]
     found = rounds[0].assign(seconds=xr.concat([one["seconds"] for one in rounds], "n").min("n"))
     kept = {**provenance("make tradeoff"), "points": [*points(found)], "changes": moved}
-    kept["fastest"] = [
-        {name: digits(value) for name, value in row.items()} | {"scene": f"{row['scene']} 0.2"}
-        for row in fastest(found)
-    ]
     keep(target, kept)
     Path(target).with_suffix(".svg").write_bytes(figure(kept))
 
