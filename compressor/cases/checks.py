@@ -134,6 +134,15 @@ def halve(value: Any) -> Any:
     return value / 2 if is_number(value) else value
 
 
+def row_of_double(key: str) -> Parameter:
+    """Return the row of a key of `DOUBLES`."""
+    row = table()[DOUBLES[key]]
+    return dataclasses.replace(
+        row, key=key, phrase=f"twice {row.key}, in its place", low=2 * row.low,
+        high=2 * row.high, default=row.default and 2 * row.default,
+    )  # fmt: skip
+
+
 def check_double(key: str, value: Any) -> str | None:
     """Return what is wrong with a value of a key of `DOUBLES`, in its own numbers; None if nothing.
 
@@ -141,7 +150,7 @@ def check_double(key: str, value: Any) -> str | None:
     """
     if isinstance(value, Mapping | list | tuple) or hasattr(value, "ndim") or value is None:
         return None
-    return table()[DOUBLES[key]].doubled().check(value)
+    return row_of_double(key).check(value)
 
 
 def expand_synonyms(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:

@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from compressor.cases.blocks import Sample
-from compressor.cases.checks import DOUBLES, phrase_of, row_of
+from compressor.cases.checks import DOUBLES, phrase_of, row_of, row_of_double
 from compressor.cases.load import WHOLE_FILE, Report
 from compressor.cases.parameter import NAME, Parameter, adapter_of, rows_of
 from compressor.cases.swept import FORMS, SAMPLED
@@ -30,13 +30,13 @@ def case_schema() -> Schema:
     group = {"type": "array", "items": swept, "minItems": 2, "uniqueItems": True}
     text = {"type": "string"}
     found |= {
-        "sample": _own(Sample),
+        "sample": _group_of_file(Sample),
         "zip": {"description": "keys whose values advance together", **_list(group)},
         "exclude": {
             "description": "comparisons; jobs for which one holds are left out",
             "anyOf": [text, _list(text)],
         },
-        "report": _own(Report),
+        "report": _group_of_file(Report),
     }
     block = _mapping({key: item for key, item in found.items() if key not in WHOLE_FILE})
     about = "sets of jobs, one after the other; each over the keys of the file"
@@ -55,7 +55,7 @@ def _list(items: Schema) -> Schema:
     return {"type": "array", "items": items}
 
 
-def _own(of: type) -> Schema:
+def _group_of_file(of: type) -> Schema:
     """Return the schema of a group of a file that is no part of a case."""
     rows = [row for item in fields(of) for row in rows_of(item.name, item)]
     about = (of.__doc__ or "").partition("\n")[0]
@@ -67,10 +67,9 @@ def _group(name: str) -> Schema:
     own = [key for key in table() if key.startswith(f"{name}.")]
     keys = dict.fromkeys(".".join(key.split(".")[:2]) for key in own)
     found = {key.partition(".")[2]: _value_or_parts(key) for key in keys}
-    for double, key in DOUBLES.items():
+    for double in DOUBLES:
         if double.startswith(f"{name}."):
-            row = replace(table()[key], key=double, phrase=f"twice {key}, in its place")
-            found[double.partition(".")[2]] = _value(row.doubled())
+            found[double.partition(".")[2]] = _value(row_of_double(double))
     mapping = _mapping(found)
     about = (GROUPS[name].__doc__ or "").partition("\n")[0]
     if name in WORDS:

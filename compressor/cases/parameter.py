@@ -290,11 +290,6 @@ class Parameter:
         needed = [one for one in self.read if not any(o != one and o in one for o in self.read)]
         return "; ".join(dict.fromkeys(needed))
 
-    def doubled(self) -> "Parameter":
-        """Return the row of twice its value."""
-        default = self.default and 2 * self.default
-        return dataclasses.replace(self, default=default, low=2 * self.low, high=2 * self.high)
-
     def choice_of(self, value: Any) -> Any:
         """Return the choice that an alias stands for, and any other value as it is."""
         return next((choice for alias, choice in self.aliases if alias == value), value)

@@ -8,6 +8,7 @@ one job in whatever study.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from fractions import Fraction
 from statistics import NormalDist
 from typing import Any
@@ -72,10 +73,11 @@ def sweep_of(path: Path, value: Any, is_whole: bool = False) -> Sweep:
         return Sweep(path, "list", len(value), lambda: value)
     words, log = [word for word in value if word != "log"], value.get("log")
     if len(words) != 1 or words[0] not in FORMS:
-        near = did_you_mean(words[0], FORMS) if words else ""
-        hint = f"; {near}" if near else ""
+        near = get_close_matches(words[0], FORMS, 1) if len(words) == 1 else []
+        meant = near[0] if near else "range" if "step" in words else "linspace"
         raise NoSweep(
-            f"needs a value, a list of values or a mapping with one of {' '.join(FORMS)}{hint}"
+            f"needs a value, a list of values or a form such as {{{meant}: {FORMS[meant]}}}; there "
+            f"are {', '.join(FORMS)}"
         )
     (word,) = words
     if log is not None and (word not in SAMPLED or not isinstance(log, bool)):
