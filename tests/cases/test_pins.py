@@ -11,7 +11,6 @@ from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.materials import composite_modulus, contact_stiffness
 from compressor.cases.parameter import PerJoint
 from compressor.physics.film import film
-from compressor.solve.cautions import remarks
 from compressor.solve.si_record import record
 
 WORN = {"joint": "both", "clearance_mm": 0.2}
@@ -146,15 +145,3 @@ def test_a_default_length_is_refused_as_a_default():
     assert problem.key == "lubricant.bearing_length_mm"
     remedy = "20 mm is the default, of the paper's pin: give the length that bears"
     assert problem.message.endswith(remedy)
-
-
-def test_the_paper_s_stiffness_at_another_pin_is_told_with_that_of_the_pin():
-    odd = case(machine={"pin_radius_mm": {"big_end": 10, "small_end": 35}})
-    (found,) = (one for one in remarks(odd) if one.kind == "default")
-    inside, discs = (
-        contact_stiffness("steel", "steel", 0.035, 0.0352, internal) / 1000**1.5
-        for internal in (True, False)
-    )
-    assert found.key == "contact.stiffness_N_per_mm15"
-    assert f"gives {inside:.3g} for one of 35 mm in its bore ({discs:.3g} as of" in found.message
-    assert "contact.materials" in found.message
