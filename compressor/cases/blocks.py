@@ -28,11 +28,12 @@ from compressor.cases.keys import drop, key_of, leaves, path_of, put
 from compressor.cases.parameter import CaseError, integer, make_group, quote_value
 from compressor.cases.swept import FORMS, NoSweep, Sweep, design, design_size, sweep_of
 from compressor.cases.table import OF_JOINTS, outside_identity
-from compressor.cases.yaml_reader import FileProblem, Tree
+from compressor.cases.yaml_reader import FileProblem, Place, Tree
 
 RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
 
 Factors = list[tuple[str, ...]]  # keys that advance together
+Located = dict[tuple[Place, str], FileProblem]  # by the place and the key that a problem is about
 
 
 @dataclass(frozen=True)
@@ -132,32 +133,28 @@ class Block:
         for number in range(max(map(len, self.columns.values()), default=1)):
             yield {key: number % len(column) for key, column in self.columns.items() if column}
 
-    def locate(self, error: CaseError, rows: Mapping[str, int]) -> dict[Any, FileProblem]:
-        """Return a case's problems at the values that they are about, by what tells them apart.
+    def locate(self, error: CaseError, rows: Mapping[str, int]) -> "Located":
+        """Return a case's problems at the values that they are about, one of each value.
 
-        Of wrong values that a form has made that is their key: the first is enough. rows: of the
-        case's swept keys.
+        rows: of the case's swept keys.
         """
-        found: dict[Any, FileProblem] = {}
+        found: Located = {}
         for problem in error.problems:
             doubles = (double for double, half in DOUBLES.items() if half == problem.key)
             key = next((one for one in doubles if path_of(one) in self.tree.places), problem.key)
             message = problem.message
-            once: Any = problem
             parts = [key] if (key,) in self.tree.places else key.split(".")
             above = (".".join(parts[:n]) for n in range(len(parts), 0, -1))
             swept = next((own for one in above if (own := DOUBLES.get(one, one)) in rows), "")
             if swept:
                 sweep, row = self.sweeps[swept], rows[swept]
                 place = self.tree.at(*sweep.path, *[row] * (sweep.kind == "list"))[1]
-                if not error.is_misfit and sweep.kind != "list":
-                    once = swept
                 if not error.is_misfit and not sweep.has_ends:
                     message = tell_draw(row + 1, len(self.columns[swept]), message)
             else:
                 is_value = tuple(parts) in self.tree.places and not is_of_key(message)
                 place = self.tree.at(*parts)[is_value]
-            found.setdefault(once, FileProblem(place, key, message))
+            found.setdefault((place, key), FileProblem(place, key, message))
         return found
 
     def find_repeated(self) -> Iterator[FileProblem]:

@@ -2,7 +2,7 @@
 
 A file has a column `crank_angle_deg` (0 at top dead centre, any step, rising) and a pressure for
 each end that it is of: `pressure_bar`, or `head_pressure_bar` and `crank_pressure_bar`; other units
-stand in `UNITS`, and a `g` behind one says that it counts from the ambient pressure. It has one
+stand in `IN_MPA`, and a `g` behind one says that it counts from the ambient pressure. It has one
 revolution or several, which are averaged on the first one's angles. A case holds where a card is
 and a digest of its numbers, `/data/head.csv@0123456789abcdef0123`; the digest is what a job's key
 has of it.
@@ -21,9 +21,10 @@ from typing import NamedTuple
 from compressor.cases.text_table import TextTableError, open_text_table
 from compressor.program import CompsimError
 
-UNITS = {"mpa": 1.0, "kpa": 1e-3, "bar": 0.1, "psi": 6.894757293168e-3}  # MPa
+IN_MPA = {"mpa": 1.0, "kpa": 1e-3, "bar": 0.1, "psi": 6.894757293168e-3}
+ATMOSPHERE_MPA = 0.101325
 ANGLE = re.compile(r"(crank_)?angle(_deg|_degrees)?")  # names of columns, as `_plain` writes them
-PRESSURE = re.compile(rf"((head|he|crank|ce)_(end_)?)?(pressure|p)_({'|'.join(UNITS)})([ag]?)")
+PRESSURE = re.compile(rf"((head|he|crank|ce)_(end_)?)?(pressure|p)_({'|'.join(IN_MPA)})([ag]?)")
 NEEDED = (
     "a card needs crank_angle_deg and pressure_bar, or head_pressure_bar and crank_pressure_bar; "
     "or MPa, kPa, psi, all absolute; with a g, as in pressure_barg, they count from the ambient "
@@ -131,7 +132,7 @@ def _find_columns(path: str, names: Sequence[str], end: str) -> tuple[int, int, 
             number = "no column" if not columns else f"{len(columns)} columns"
             raise CardError(f"{path}: has {number} for the {what}; it has {given}; {NEEDED}")
     place, match = pressures[0]
-    return angles[0], place, UNITS[match[5]], match[6] == "g"
+    return angles[0], place, IN_MPA[match[5]], match[6] == "g"
 
 
 def _check_angles(path: str, rows: Sequence[Row]) -> None:

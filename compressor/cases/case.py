@@ -15,12 +15,12 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from compressor.cases.card import CardError, open_card
+from compressor.cases.card import ATMOSPHERE_MPA, CardError, open_card
 from compressor.cases.checks import (
     describe_wrong,
     expand_synonyms,
+    getter,
     stands_for,
-    value_of,
     values_given,
 )
 from compressor.cases.comparison import condition
@@ -34,7 +34,6 @@ from compressor.cases.conflicts import (
     values_read,
 )
 from compressor.cases.groups import (
-    ATMOSPHERE_MPA,
     Contact,
     Friction,
     Gas,
@@ -198,7 +197,7 @@ stroke, 240 mm
         if not isinstance(values, Mapping):
             message = f"needs a mapping of keys, such as {EXAMPLE}, not {quote_value(values)}"
             raise CaseError([Problem("", message)])
-        whole, problems = plain_values(values)
+        whole, problems, given = plain_values(values)
         case = None
         try:
             case = adapter_of_case().validate_python(whole)
@@ -206,7 +205,7 @@ stroke, 240 mm
             problems += problems_of(error, whole, table(), describe_wrong)
             if any(one["type"] != "value_error" or len(one["loc"]) for one in error.errors()):
                 raise CaseError(name_as_written(whole, problems)) from None
-        problems += given_conflicts(str(whole.get("joint", "none")), find_given(whole))
+        problems += given_conflicts(str(whole.get("joint", "none")), given)
         if case is None or problems:
             raise CaseError(name_as_written(whole, problems), is_misfit=True)
         return case
@@ -437,11 +436,14 @@ def adapter_of_case() -> TypeAdapter[Case]:
     return TypeAdapter(Case)
 
 
-def plain_values(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
-    """Return nested values without synonyms, and with what follows from others; and problems.
+def plain_values(
+    values: Mapping[str, Any],
+) -> tuple[dict[str, Any], list[Problem], frozenset[str]]:
+    """Return nested values without synonyms, and with what follows from others; problems; keys.
 
-    That is the geometry of materials, and the corners and the back pressure of a cylinder of one's
-    own, which a value of it that is the paper's by chance leaves one's own.
+    The keys are those given (`find_given`). What follows is the geometry of materials, and the
+    corners and the back pressure of a cylinder of one's own, which a value of it that is the
+    paper's by chance leaves one's own.
     """
     whole, problems = expand_synonyms(values)
     given = find_given(whole)
@@ -452,7 +454,7 @@ def plain_values(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Proble
     if has_own_cylinder(whole, given) and isinstance(group, Mapping):
         followed = {"switching": "exact", "back_pressure_MPa": ATMOSPHERE_MPA}
         whole["gas"] = followed | dict(group)
-    return whole, problems
+    return whole, problems, given
 
 
 def find_given(values: Mapping[str, Any]) -> frozenset[str]:
@@ -524,19 +526,14 @@ def _identity_of_group(name: str, group: Any) -> dict[str, Any]:
 
 
 def _facts_read(case: Case) -> dict[str, Any]:
-    """Return the facts that a case has and reads; each condition is tried once."""
-    found, held = {}, {}
-    for key in FACT_KEYS:
-        value = value_of(case, key)
-        for _, needed in conditions(key) if value is not None else ():
-            if needed not in held:
-                held[needed] = condition(needed)(case)
-            if not held[needed]:
-                break
-        else:
-            if value is not None:
-                found[key] = value
-    return found
+    """Return the facts that a case has and reads."""
+    holds = cache(lambda needed: condition(needed)(case))  # many facts need the same
+    return {
+        key: value
+        for key in FACT_KEYS
+        if (value := getter(key)(case)) is not None
+        and all(holds(needed) for _, needed in conditions(key))
+    }
 
 
 def _plain_parts(value: Any) -> Any:

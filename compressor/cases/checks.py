@@ -9,25 +9,28 @@ an unknown key names what was probably meant, or else what there is.
 """
 
 import dataclasses
+import operator
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 from pydantic import ValidationError
 
-from compressor.cases.card import UNITS
-from compressor.cases.groups import ATMOSPHERE_MPA
 from compressor.cases.parameter import (
+    OTHER_UNITS,
     PART_WORDS,
     Parameter,
     Problem,
     adapter_of,
+    convert_other,
+    is_number,
     quote_value,
     split_unit,
 )
 from compressor.cases.table import GROUPS, OF_JOINTS, TOP, WORDS, parts_by_key, table
+from compressor.program import MAX_MEANT
 
 
 @lru_cache(1024)  # asked for of each key of each job
@@ -75,9 +78,20 @@ def value_of(case: Any, key: str) -> Any:
         return getattr(case, key) is not None
     if parts := stands_for(key):
         return single(key, (value_of(case, part) for part in parts))
-    value: Any = case
-    for part in key.split("."):
-        value = getattr(value, part, None)
+    return getter(key)(case)
+
+
+@cache
+def getter(key: str) -> Callable[[Any], Any]:
+    """Return the function that gives a case's value of a dotted key, None without its group."""
+    get = operator.attrgetter(key)
+
+    def value(case: Any) -> Any:
+        try:
+            return get(case)
+        except AttributeError:
+            return None
+
     return value
 
 
@@ -101,12 +115,6 @@ DOUBLES = {
     "machine.stroke_mm": "machine.crank_radius_mm",
     "gas.bore_mm": "gas.piston_radius_mm",
 }
-# unit at the end of an unknown key -> the unit of ours, and what one of it is there
-OTHER_UNITS = {
-    **{f"{unit}{end}": ("MPa", UNITS[unit]) for unit in ("bar", "psi") for end in ("", "a", "g")},
-    "kPa": ("MPa", UNITS["kpa"]), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3), "cm": ("mm", 10.0),
-    "m": ("mm", 1e3), "in": ("mm", 25.4), "inch": ("mm", 25.4), "kN": ("N", 1e3),
-}  # fmt: skip
 # words in the name of a diameter -> what to write of its value, half or whole
 DIAMETERS = (
     (r"clearance", "clearance_mm: {half}, which is radial"),
@@ -122,11 +130,6 @@ DIAMETERS = (
 DIAMETER = re.compile(r"(?i)(\w*_)?(diameter|diametral|dia)(_\w*)?")
 PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
 TWICE = "stands in place of {}: give one of the two"
-
-
-def is_number(value: Any) -> bool:
-    """Return whether a value is a number."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def halve(value: Any) -> Any:
@@ -174,16 +177,8 @@ def expand_synonyms(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Pro
 def in_our_unit(name: str, value: Any, allowed: list[str]) -> str:
     """Return the hint at a key in another unit, such as "; write suction_MPa: 0.2"; or ""."""
     stem, _, unit = name.rpartition("_")
-    ours, factor = OTHER_UNITS.get(unit, ("", 1.0))
-    if not stem or f"{stem}_{ours}" not in allowed:
-        return ""
-    is_pressure = ours == "MPa"
-    more = ATMOSPHERE_MPA if is_pressure and unit.endswith("g") else 0.0
-    is_told = is_pressure and unit not in ("bara", "psia")
-    note = f", absolute: a gauge's and the atmosphere's {ATMOSPHERE_MPA:g}" * is_told
-    each = f"..., 1 {unit} being {factor:g} {ours}"
-    amount = f"{value * factor + more:.4g}" if is_number(value) else each
-    return f"; write {stem}_{ours}: {amount}{note}"
+    ours = f"{stem}_{OTHER_UNITS[unit][0]}" if stem and unit in OTHER_UNITS else ""
+    return f"; write {ours}: {convert_other(value, unit)}" if ours in allowed else ""
 
 
 def of_other_quantity(name: str, group: str, value: Any) -> str:
@@ -203,7 +198,6 @@ def of_other_quantity(name: str, group: str, value: Any) -> str:
 # keys of a case file that are no part of a case: how values are swept together, what the page of
 # the report says of the machine
 SWEEP = ("sample", "zip", "exclude", "blocks", "report")
-MAX_MEANT = 3  # keys that an unknown one may have meant
 
 
 def known_keys(group: str) -> list[str]:

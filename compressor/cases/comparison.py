@@ -16,7 +16,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from compressor.cases.checks import row_of, suggestion
+from compressor.cases.checks import getter, row_of, suggestion
 from compressor.cases.parameter import quote_value
 from compressor.cases.yaml_reader import resolve_scalar
 from compressor.program import ignore_warnings
@@ -53,10 +53,10 @@ def condition(text: str) -> Callable[[Any], bool]:
 
     def compare(node: ast.expr) -> Callable[[Any], bool]:
         if isinstance(node, ast.Name | ast.Attribute):
-            get = _getter(ast.unparse(node))
+            get = getter(ast.unparse(node))
             return lambda case: bool(get(case))
         key, sign, wanted = _parts(node)
-        return _compare(_getter(key), sign, resolve_scalar(wanted))
+        return _compare(getter(key), sign, resolve_scalar(wanted))
 
     return _test(_tree(text), compare)
 
@@ -115,23 +115,10 @@ def _compare_job(key: str, sign: Any, text: str) -> Test:
     if wanted not in row.choices and (
         type(wanted) not in (int, float) if is_number else row.check(wanted)
     ):
-        raise NoComparison(f"{key} needs {'a number' if is_number else row.range}, not {text}")
+        raise NoComparison(f"{key} needs {'a number' if is_number else row.needed}, not {text}")
     if isinstance(wanted, str) and sign not in (operator.eq, operator.ne):
         raise NoComparison(f"{wanted} is a word: compare it by == or !=")
     return _compare(lambda value: value(key), sign, wanted)
-
-
-def _getter(key: str) -> Callable[[Any], Any]:
-    """Return the function that gives a case's value of a dotted key, None without its group."""
-    get = operator.attrgetter(key)
-
-    def value(case: Any) -> Any:
-        try:
-            return get(case)
-        except AttributeError:
-            return None
-
-    return value
 
 
 def _compare(get: Callable[[Any], Any], sign: Any, wanted: Any) -> Callable[[Any], bool]:

@@ -53,9 +53,10 @@ def moving_mass(case: Case) -> float:
 
 
 LED = "gas.indicator"  # key whose one value is that of its first part alone
-FOLLOWING = ("contact.modulus_GPa", "contact.stiffness_N_per_mm15", "contact.geometry")  # facts
+# what two materials make, and so facts, too
+OF_MATERIALS = ("contact.modulus_GPa", "contact.stiffness_N_per_mm15", "contact.geometry")
 # what is part of a job's key only where the job reads it: facts, and what follows from them
-FACT_KEYS = [key for key, row in table().items() if row.fact or key in FOLLOWING]
+FACT_KEYS = [key for key, row in table().items() if row.fact or key in OF_MATERIALS]
 
 
 def needs_of_given(key: str, given: Container[str]) -> list[tuple[str, str]]:

@@ -7,6 +7,7 @@ units, which stand in the field's name; `compressor.solve.si_record` turns them 
 from collections.abc import Mapping
 from functools import partial
 
+from compressor.cases.card import ATMOSPHERE_MPA
 from compressor.cases.laws import (
     CLEARANCE,
     CONTACT_LAWS,
@@ -127,7 +128,6 @@ class Machine:
 
 # ends of a cylinder, and the actions by which the gas in them presses
 ENDS = {"head": ("single", "double"), "crank": ("double", "crank_end")}
-ATMOSPHERE_MPA = 0.101325
 # what the paper's gas load has not; any of them makes a cylinder of one's own
 CYLINDER_KEYS = (
     "action", "rod_diameter_mm", "clearance_percent", "valve_loss_percent", "unloaded",

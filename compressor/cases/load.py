@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from compressor.cases.blocks import Block, plan_block, read_own
+from compressor.cases.blocks import Block, Located, plan_block, read_own
 from compressor.cases.case import Case
 from compressor.cases.checks import DOUBLES, expand_synonyms, halve, row_of, stands_for, value_of
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
@@ -210,27 +210,24 @@ def _blocks(file: CaseFile, max_jobs: int) -> tuple[list[Block], list[FileProble
     problems += [problem for _, wrong in plans for problem in wrong]
     if too_many := _find_too_many(blocks, max_jobs):
         return [], [*problems, too_many]
+    told = {one.key for one in file.problems}
     for block in blocks:
-        repeated = [*block.find_repeated()]
+        repeated = [one for one in block.find_repeated() if one.key not in told]
         problems += repeated
         if math.prod(block.sizes().values()) and not (repeated or block.numbers):
             problems.append(block.tree.problem(("exclude",), "leaves no job"))
     if not problems and not file.problems:
         return blocks, []
-    found: dict[Any, FileProblem] = {}  # what is wrong with single values is told in the same run
+    found: Located = {}  # what is wrong with single values is told in the same run
     for block in blocks:
         for rows in block.each_value():
             try:
                 Case.resolve(block.values_at(rows))
             except CaseError as error:
                 found |= {} if error.is_misfit else block.locate(error, rows)
-    keys = {one.key for one in problems}
-    texts = {(one.place, one.message) for one in [*problems, *file.problems]}
-    return [], problems + [  # but for what follows from a sweep or a null that is told
-        one
-        for one in found.values()
-        if (one.place, one.message) not in texts and not any(covers(one.key, key) for key in keys)
-    ]
+    told |= {one.key for one in problems}  # from which more may follow
+    left = [one for one in found.values() if not any(covers(one.key, key) for key in told)]
+    return [], problems + left
 
 
 def _block_trees(file: CaseFile, max_jobs: int) -> tuple[list[Tree], list[FileProblem]]:
@@ -303,8 +300,8 @@ def _check_cases(
     file: CaseFile, cases: Cases, columns: Sequence[str], progress: Progress
 ) -> tuple[tuple[str, ...], dict[str, list[Any]], list[FileProblem]]:
     """Return the key of each case, its value of each swept key, and what is wrong with values."""
-    found: dict[Any, FileProblem] = {}
-    misfits: dict[Any, FileProblem] = {}  # told once each value is good
+    found: Located = {}
+    misfits: Located = {}  # told once each value is good
     keys: list[str] = []
     values: dict[str, list[Any]] = {key: [] for key in columns}
     total = len(cases)
@@ -327,7 +324,7 @@ def _check_cases(
                 values[key].append(value_of(case, key))
     progress(total, total, "")
     found = found or misfits
-    problems = [*itertools.islice(dict.fromkeys(found.values()), MAX_CONFLICTS)]
+    problems = [*itertools.islice(found.values(), MAX_CONFLICTS)]
     if len(found) > MAX_CONFLICTS:
         message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
         problems.append(FileProblem(Place(file.path), "", message))

@@ -37,7 +37,7 @@ from pydantic import (
     ValidationError,
 )
 
-from compressor.cases.card import CardError, mark_card
+from compressor.cases.card import ATMOSPHERE_MPA, IN_MPA, CardError, mark_card
 from compressor.cases.plausible import PLAUSIBLE, Plausible
 from compressor.metrics import METRICS
 from compressor.program import CompsimError, did_you_mean
@@ -65,6 +65,12 @@ WRITTEN = {"%": "percent", "N/mm^p": "N_per_mm15", "1/mm": "per_mm", "h": "hours
            "mm3/(N m)": "mm3_per_N_m"}  # fmt: skip
 ENDS = {
     WRITTEN.get(unit) or unit.replace(" ", "_").replace("/", "_per_"): unit for unit in UNITS
+}  # fmt: skip
+# other units that people write -> that of our keys, and what one of it is there
+OTHER_UNITS = {
+    **{f"{unit}{end}": ("MPa", IN_MPA[unit]) for unit in ("bar", "psi") for end in ("", "a", "g")},
+    "kPa": ("MPa", IN_MPA["kpa"]), "Pa": ("MPa", 1e-6), "um": ("mm", 1e-3), "cm": ("mm", 10.0),
+    "m": ("mm", 1e3), "in": ("mm", 25.4), "inch": ("mm", 25.4), "kN": ("N", 1e3),
 }  # fmt: skip
 
 Group = TypeVar("Group")
@@ -198,17 +204,27 @@ def to_si(value: float, unit: str) -> float:
     return value * numerator / denominator
 
 
-# kind -> what it may be beside the words of its row: for a table, and in an error
+def is_number(value: Any) -> bool:
+    """Return whether a value is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def convert_other(value: Any, unit: str) -> str:
+    """Return what to write of a value in a unit of `OTHER_UNITS`."""
+    ours, factor = OTHER_UNITS[unit]
+    is_told = ours == "MPa" and unit not in ("bara", "psia")
+    note = f", absolute: a gauge's and the atmosphere's {ATMOSPHERE_MPA:g}" * is_told
+    more = ATMOSPHERE_MPA if unit in ("barg", "psig") else 0.0
+    each = f"..., 1 {unit} being {factor:g} {ours}"
+    return (f"{value * factor + more:.4g}" if is_number(value) else each) + note
+
+
+# kind -> what it may be beside the words of its row
 OTHERWISE = {
-    "accuracy": (
-        "{metric: relative error}", "errors by metric such as {peak_acceleration: 0.01}"
-    ),
-    "text": ("[A-Za-z0-9._-], at most 64", "text"),
-    "card": (
-        "path of a CSV file",
-        "the path of a CSV file with columns crank_angle_deg and pressure_bar",
-    ),
-}  # fmt: skip
+    "accuracy": "errors by metric such as {peak_acceleration: 0.01}",
+    "text": "text",
+    "card": "the path of a CSV file with columns crank_angle_deg and pressure_bar",
+}
 
 
 @dataclass(frozen=True)
@@ -256,14 +272,6 @@ class Parameter:
         return f"{'(' if self.above else '['}{self.low:g}, {self.high:g}]"
 
     @property
-    def range(self) -> str:
-        """Return the allowed values, for a table or an error."""
-        if self.kind == "materials":
-            return "two of " + ", ".join(self.choices)
-        more = self.span if self.is_number else OTHERWISE.get(self.kind, ("", ""))[0]
-        return " | ".join([*self.words, *filter(None, [more])])
-
-    @property
     def needed(self) -> str:
         """Return the allowed values in words, with their unit."""
         if self.is_number:
@@ -274,7 +282,7 @@ class Parameter:
         words = join_with_or(self.words)
         if self.kind == "materials":
             return f"a pair of materials, {words}, such as [steel, steel]"
-        return ", or ".join(filter(None, [words, OTHERWISE.get(self.kind, ("", ""))[1]]))
+        return ", or ".join(filter(None, [words, OTHERWISE.get(self.kind)]))
 
     @property
     def judged_on(self) -> str:
@@ -308,10 +316,10 @@ class Parameter:
         if value is None or cause:
             return cause or NO_VALUE
         if self.is_number and type(value) in (int, float):
-            if not _is_finite(value):
+            if not math.isfinite(to_python(value)):
                 return f"must be finite: {self._refuse(value)}"
             if self.kind == "number" or value == int(value):
-                return f"{value:g} is outside {self.range} {self.unit}".rstrip()
+                return f"{value:g} is outside {self.span} {self.unit}".rstrip()
         if self.kind != "materials":
             return self._refuse(value, value)
         pair = value if isinstance(value, tuple | list) and len(value) == 2 else ()
@@ -343,22 +351,19 @@ class Parameter:
         number = AS_NUMBER.fullmatch(word) if self.is_number else None
         if near and lower[near[0]] in self.needed:
             return f"{message}; did you mean {lower[near[0]]}?"
-        if number and number[2] not in ("", self.unit):
+        if not number:
+            return message
+        plain = number[1].replace(",", ".")
+        if OTHER_UNITS.get(number[2], ("none",))[0] == self.unit:
+            return f"{message}; write {convert_other(float(plain), number[2])}"
+        if number[2] not in ("", self.unit):
             return f"{message}; write a number alone" + (self.unit and f", in {self.unit}")
-        return f"{message}; write {number[1].replace(',', '.')}" if number else message
+        return f"{message}; write {plain}"
 
 
 def join_with_or(words: Sequence[str]) -> str:
     """Return the words as a sentence lists them: a, b or c."""
     return " or ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
-
-
-def _is_finite(value: float) -> bool:
-    """Return whether a number fits a float, also for integers that are too large for `math`."""
-    try:
-        return math.isfinite(value)
-    except OverflowError:
-        return False
 
 
 def to_python(value: Any) -> Any:

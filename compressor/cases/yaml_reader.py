@@ -20,6 +20,7 @@ START = "compsim init writes a case file to start from"
 MAX_BYTES = 1 << 20
 
 DECIMALS = re.compile(r"0\d+")  # behind a decimal comma, as in [0,05]
+DECIMAL_COMMA = "a decimal comma? write {}.{}; commas separate values"
 NULLS = {"", "~", "null", "Null", "NULL"}
 BOOLEANS = {"true": True, "True": True, "TRUE": True}
 BOOLEANS |= {"false": False, "False": False, "FALSE": False}
@@ -185,6 +186,9 @@ class _Reader:
             whole = (*path, name)
             if not isinstance(name, str) or not name or not name.isprintable():
                 self.note(name_node, path, "a key must be plain text")
+            elif found and name.isdecimal() and inner.value == "":
+                last = [*found][-1]
+                self.note(name_node, (*path, last), DECIMAL_COMMA.format(found[last], name))
             elif name in found:
                 first = self.places[whole][0]
                 line = f" at line {first.line}" if first.line else ""
@@ -199,8 +203,7 @@ class _Reader:
         for number, item in enumerate(node.value):
             text = item.value if isinstance(item, yaml.ScalarNode) and not item.style else ""
             if found and DECIMALS.fullmatch(text):
-                hint = f"a decimal comma? write {found[-1]}.{text}; commas separate values"
-                self.note(item, path, hint)
+                self.note(item, path, DECIMAL_COMMA.format(found[-1], text))
             found.append(self.plain(item, (*path, number), self.place(item)))
         return found
 
