@@ -5,7 +5,7 @@ records, cases outside the range that the program was judged on, and where jobs 
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,18 @@ from compressor.store.studies import StoredStudy, swept_column
 MIN_FAILED = 3  # failed jobs, and good ones, for a tree of where jobs fail
 MIN_GAIN = 0.02  # of impurity that a split must bring
 MAX_LOOKED_AT = 16  # stored jobs of a study, for what only their cases show: a millisecond each
-AUTO = "solve: {settle_rev: auto, duration_rev: auto} waits for that"
-LONGER_REMEDY = "a longer run may give other numbers, or be chaotic"
+UNREPEATED = (
+    "the motion was not seen to repeat; a longer run may give other numbers, or be chaotic; "
+    "solve: {settle_rev: auto, duration_rev: auto} waits for that"
+)
+LATE = (
+    "the motion settled after solve.settle_rev, with start-up in the metrics; "
+    "solve.settle_rev: auto leaves it out"
+)
+CLIPPED = (
+    "the sensor's record is clipped, at worst {worst:.3g} % of its samples: raise "
+    "sensor.range_m_per_s2"
+)
 
 
 def study_caveats(stored: Stored, study: StoredStudy) -> list[str]:
@@ -46,37 +56,34 @@ def run_caveats(stored: Stored, study: StoredStudy) -> list[str]:
     if not positions.size:
         return []
     numbers = stored.numbers(positions, ("settled_rev", "clipped_fraction"))
-    regimes, settled = stored.words("regime")[positions], numbers["settled_rev"]
     fixed = value_in(study.fixed, "solve.settle_rev")
     begins = [point.get("solve.settle_rev", fixed) for point in points(study)]
     begin = np.array([b if isinstance(b, int | float) else math.nan for b in begins], float)[there]
-    jobs = f"{positions.size} {'job' if positions.size == 1 else 'jobs'}"
-    found = []
-    if count := int(is_unrepeated(regimes, settled).sum()):
-        was = "was" if count == 1 else "were"
-        found.append(f"{count} of {jobs} {was} not seen to repeat; {LONGER_REMEDY}; {AUTO}")
-    if count := int(is_late(regimes, settled, begin).sum()):
-        found.append(
-            f"{count} of {jobs} settled after solve.settle_rev, with start-up in the metrics; "
-            "solve.settle_rev: auto leaves it out"
-        )
-    shares = numbers["clipped_fraction"]
-    if count := int((shares >= Sensor.REPORTED).sum()):
-        found.append(
-            f"{count} of {(shares >= 0.0).sum()} sensor records are clipped, at worst "
-            f"{100 * np.nanmax(shares):.3g} % of their samples: raise sensor.range_m_per_s2"
-        )
-    return found
+    regimes, shares = stored.words("regime")[positions], numbers["clipped_fraction"]
+    return describe_runs(regimes, numbers["settled_rev"], begin, shares)
 
 
-def is_unrepeated(regime: Any, settled: Any) -> Any:
-    """Return whether motions were not seen to repeat; settled (rev): also where `auto` found it."""
-    return (np.asarray(regime) == Regime.PREDICTABLE) & np.isnan(settled)
+def describe_runs(
+    regimes: np.ndarray, settled: np.ndarray, begin: np.ndarray, shares: np.ndarray
+) -> list[str]:
+    """Return what to know of runs that are ok, a sentence for those that it is true of.
 
-
-def is_late(regime: Any, settled: Any, settle: Any) -> Any:
-    """Return whether periodic motions settled after metrics began to count, at `settle` (rev)."""
-    return (np.asarray(regime) == Regime.PERIODIC) & (np.asarray(settled) > settle)
+    regimes, (jobs,) as all of these; settled: rev from which a motion repeats, also where `auto`
+    found that; begin: rev from which metrics count; shares: of clipped samples. nan: not known.
+    """
+    clipped = shares >= Sensor.REPORTED
+    worst = 100 * np.max(shares, where=clipped, initial=0.0)
+    texts = (
+        ((regimes == Regime.PREDICTABLE) & np.isnan(settled), UNREPEATED),
+        ((regimes == Regime.PERIODIC) & (settled > begin), LATE),
+        (clipped, CLIPPED.format(worst=worst)),
+    )
+    jobs = len(regimes)
+    return [
+        text if jobs == 1 else f"{some.sum()} of {jobs} jobs: {text}"
+        for some, text in texts
+        if some.any()
+    ]
 
 
 def job_caveats(numbers: Mapping[str, Any], attributes: Mapping[str, Any]) -> list[str]:
@@ -88,29 +95,15 @@ def job_caveats(numbers: Mapping[str, Any], attributes: Mapping[str, Any]) -> li
         case = Case.from_attribute(attributes["case"])
     except (KeyError, CaseError):
         return []  # of another version of the program
+    begin = math.nan if case.solve.settle_rev == "auto" else case.solve.settle_rev
+    values = (
+        attributes.get("regime", ""),
+        numbers["settled_rev"],
+        begin,
+        numbers["clipped_fraction"],
+    )
     of_case = (*paper_notes(case).items(), *outside_judged(case.values()).items())
-    of_run = _of_run(case, numbers, attributes.get("regime", ""))
-    return [*of_run, *(f"{key}: {text}" for key, text in of_case)]
-
-
-def _of_run(case: Case, numbers: Mapping[str, Any], regime: str) -> Iterator[str]:
-    """Yield the caveats of a job's run."""
-    settled = float(numbers.get("settled_rev", math.nan))
-    begin = math.nan if case.solve.settle_rev == "auto" else float(case.solve.settle_rev)
-    if is_unrepeated(regime, settled):
-        within = "its settled revolutions"
-        if case.solve.duration_rev != "auto":
-            count = (case.duration - case.settle) / case.turn
-            within = f"{count:.3g} settled revolution{'s' * (round(count, 9) != 1)}"
-        yield f"the motion was not seen to repeat within {within}; {LONGER_REMEDY}; {AUTO}"
-    if is_late(regime, settled, begin):
-        yield (
-            f"the motion repeats from revolution {settled:g} on, and metrics count from "
-            f"{begin:g} on: start-up is in them; solve.settle_rev: auto leaves it out"
-        )
-    clipped = float(numbers.get("clipped_fraction", math.nan))
-    if case.sensor and (text := case.sensor.report_clipping(clipped)):
-        yield text
+    return [*describe_runs(*map(np.atleast_1d, values)), *(f"{k}: {text}" for k, text in of_case)]
 
 
 def _of_failures(stored: Stored, study: StoredStudy) -> list[str]:

@@ -3,13 +3,12 @@
 import json
 import math
 
+import numpy as np
 import pytest
 from compsim import cli
 from conftest import jobs_here
 
-from compressor.cases.case import Case
-from compressor.solve.simulate import simulate
-from compressor.store.caveats import is_late, is_unrepeated, job_caveats
+from compressor.store.caveats import describe_runs
 from compressor.store.reader import open_study
 from compressor.store.status import report_job, standings
 
@@ -53,9 +52,9 @@ def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder
     late = sum(numbers_["settled_rev"] > 0 for numbers_ in numbers)
     unrepeated = sum(math.isnan(numbers_["settled_rev"]) for numbers_ in numbers)
     assert late + unrepeated == 2
-    counts = f"{unrepeated} of 2 jobs were not seen to repeat" if unrepeated else f"{late} of 2"
+    counts = f"{unrepeated or late} of 2 jobs: the motion"
     worst = 100 * max(numbers_["clipped_fraction"] for numbers_ in numbers)
-    clipped = f"2 of 2 sensor records are clipped, at worst {worst:.3g} % of their samples"
+    clipped = f"2 of 2 jobs: the sensor's record is clipped, at worst {worst:.3g} % of its samples"
     for text in (out, err):
         assert counts in text
         assert ("solve: {settle_rev: auto, duration_rev: auto}" in text) == bool(unrepeated)
@@ -66,23 +65,30 @@ def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder
     assert standings(folder)[0].caveats[-1] == OUTSIDE
 
 
-def test_what_is_seen_to_repeat_in_time_is_no_caveat():
-    values = {"joint": "big_end", "clearance_mm": 0.2, "solve": SOLVE}
-    run = simulate(Case.from_values(values))
-    calm = {"settled_rev": 0.0, "clipped_fraction": 1e-4}
-    assert job_caveats(calm, run.attrs | {"regime": "periodic"}) == []
-    (late,) = job_caveats(calm | {"settled_rev": 2.0}, run.attrs | {"regime": "periodic"})
-    assert late.startswith("the motion repeats from revolution 2 on, and metrics count from 0 on")
-    (never,) = job_caveats({"settled_rev": math.nan}, run.attrs | {"regime": "predictable"})
-    assert never.startswith("the motion was not seen to repeat within 3 settled revolutions; ")
-    for regime in ("chaotic", "undecided", ""):  # these say so themselves, or are of old stores
-        assert job_caveats({"settled_rev": math.nan}, run.attrs | {"regime": regime}) == []
+@pytest.mark.parametrize(
+    ("regime", "settled", "begin", "said"),
+    [
+        ("periodic", 0.0, 0.0, None),
+        ("periodic", 2.0, 0.0, "the motion settled after solve.settle_rev"),
+        ("predictable", math.nan, 0.0, "the motion was not seen to repeat"),
+        # where `auto` found the metrics to agree, numbers begin
+        ("predictable", 3.0, 0.0, None),
+        ("periodic", 3.0, math.nan, None),
+        # these say so themselves
+        ("chaotic", math.nan, 0.0, None),
+        ("undecided", math.nan, 0.0, None),
+    ],
+)
+def test_what_is_seen_to_repeat_in_time_is_no_caveat(regime, settled, begin, said):
+    found = describe_runs(*map(np.atleast_1d, (regime, settled, begin, 1e-4)))
+    assert bool(found) == bool(said)
+    assert all(text.startswith(said) for text in found)
 
 
-def test_auto_is_no_caveat():
-    """It gives where the metrics agree; then numbers begin there."""
-    assert not is_unrepeated("predictable", 3.0)
-    assert not is_late("periodic", 3.0, math.nan)
-    assert is_late(["periodic", "periodic", "chaotic"], [2.0, 1.0, 2.0], 1.0).tolist() == [
-        True, False, False,
-    ]  # fmt: skip
+def test_caveats_count_the_jobs_that_they_are_true_of():
+    found = describe_runs(
+        np.array(["periodic", "periodic", "chaotic"]), np.array([2.0, 1.0, 2.0]), np.ones(3),
+        np.array([0.2, 0.1, math.nan]),
+    )  # fmt: skip
+    assert [text.partition(": ")[0] for text in found] == ["1 of 3 jobs", "2 of 3 jobs"]
+    assert "at worst 20 % of its samples" in found[1]
