@@ -2,7 +2,6 @@
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,35 +19,31 @@ from compressor.store.netcdf import DamagedFile
 from compressor.store.stored import Stored
 from compressor.store.studies import StoredStudy, coordinate_names, swept_column
 
-
-@dataclass(frozen=True)
-class Layout:
-    """How jobs are laid out in a Dataset: their keys over named dimensions, and coordinates."""
-
-    dims: tuple[str, ...]
-    keys: np.ndarray
-    coordinates: dict[str, xr.Variable]
+KEY = {"long_name": "a job's identity"}
+JOB_WORDS = {  # what a missing job has of each, and what it is
+    "status": ("missing", "ok, failed or missing"),
+    "reason": ("", "why a run failed"),
+} | {name: ("", one.attrs["long_name"]) for name, one in word_variables({}).items()}
 
 
-def lay_out(studies: Sequence[StoredStudy]) -> Layout:
-    """Return the layout of studies: of one that is a grid by its axes, else one of jobs."""
+def lay_out(studies: Sequence[StoredStudy]) -> xr.Dataset:
+    """Return the keys of studies' jobs, of one that is a grid over its axes, else in a list."""
     if len(studies) != 1 or not studies[0].is_grid:
         return lay_out_jobs(studies)
     (study,) = studies
     names = coordinate_names([axis.key for axis in study.axes])
-    axes = {
-        name: xr.Variable(name, *swept_column(axis.key, axis.values))
-        for axis in study.axes
-        for name in [names[axis.key]]
-    }
-    shape = tuple(len(axis.values) for axis in study.axes)
-    return Layout(tuple(axes), np.array(study.keys).reshape(shape), axes)
+    axes = {name: (name, *swept_column(a.key, a.values))
+            for a in study.axes for name in [names[a.key]]}  # fmt: skip
+    keys = np.reshape(study.keys, [len(axis.values) for axis in study.axes])
+    return xr.Dataset({"key": ([*axes], keys, KEY)}, axes)
 
 
-def lay_out_jobs(studies: Sequence[StoredStudy]) -> Layout:
-    """Return the layout of studies with one dimension, `job`."""
+def lay_out_jobs(studies: Sequence[StoredStudy]) -> xr.Dataset:
+    """Return the keys of studies' jobs with one dimension, `job`, and what is swept."""
     swept = dict.fromkeys(axis.key for study in studies for axis in study.axes)
-    found = {"study": xr.Variable("job", [study.name for study in studies for _ in study.keys])}
+    found: dict[str, Any] = {
+        "study": ("job", [study.name for study in studies for _ in study.keys])
+    }
     for key, name in coordinate_names([*{"joint": 0, "load": 0} | swept]).items():
         column: list[Any] = []
         for study in studies:
@@ -56,45 +51,37 @@ def lay_out_jobs(studies: Sequence[StoredStudy]) -> Layout:
                 column += [point.get(key) for point in points(study)]
             else:
                 column += [value_in(study.fixed, key)] * study.jobs
-        found[name] = xr.Variable("job", *swept_column(key, column))
-    return Layout(("job",), np.array([key for study in studies for key in study.keys]), found)
+        found[name] = ("job", *swept_column(key, column))
+    keys = np.array([key for study in studies for key in study.keys])
+    return xr.Dataset({"key": ("job", keys, KEY)}, found)
 
 
-def label_jobs(layout: Layout, stored: Stored, with_series: bool = False) -> xr.Dataset:
-    """Return the Dataset of a layout from the jobs of a store, with their time series if wanted."""
-    positions = stored.find(layout.keys)
+def label_jobs(layout: xr.Dataset, stored: Stored, with_series: bool = False) -> xr.Dataset:
+    """Return the Dataset of laid out jobs of a store, with their time series if wanted."""
+    dims, positions = layout["key"].dims, stored.find(layout["key"].values)
     found = positions[positions >= 0]
-    variables = _words(layout, stored, positions)
+    variables: dict[Any, xr.Variable] = {"key": layout["key"].variable} | {
+        name: xr.Variable(
+            dims,
+            np.append(stored.words(name), otherwise)[positions],  # the last one at -1
+            {"long_name": phrase},
+        )
+        for name, (otherwise, phrase) in JOB_WORDS.items()
+    }
     if (stored.columns["reason"][found] != Reason.INTERNAL_ERROR.encode()).any():
         given = [name for name in NUMBERS if name in stored.given]
         numbers = stored.numbers(positions, given)
         for name, metric in NUMBERS.items():
             if name in given and metric.is_given(numbers[name]):
-                dims = (*layout.dims, *metric.dims)
-                variables[name] = xr.Variable(dims, numbers[name], metric.attributes)
+                place = (*dims, *metric.dims)
+                variables[name] = xr.Variable(place, numbers[name], metric.attributes)
         axes = coordinates(dim for one in variables.values() for dim in one.dims)
         variables |= {name: xr.Variable(*parts) for name, parts in axes.items()}
     if with_series:
-        variables |= _series(layout, stored, positions)
-    dataset = xr.Dataset(variables | layout.coordinates)
-    names = ["key", "study", *SIZES, "time", *layout.coordinates]
+        variables |= _series(dims, stored, positions)
+    names = ["study", *SIZES, "time", *layout.variables]
+    dataset = xr.Dataset(variables | {**layout.variables})
     return dataset.set_coords([name for name in names if name in dataset])
-
-
-def _words(layout: Layout, stored: Stored, positions: np.ndarray) -> dict[Any, xr.Variable]:
-    """Return the key, status, reason, promise and regime of every job."""
-
-    def variable(name: str, otherwise: str, phrase: str) -> xr.Variable:
-        values = np.append(stored.words(name), otherwise)[positions]  # the last one at -1
-        return xr.Variable(layout.dims, values, {"long_name": phrase})
-
-    return {
-        "key": xr.Variable(layout.dims, layout.keys, {"long_name": "a job's identity"}),
-        "status": variable("status", "missing", "ok, failed or missing"),
-        "reason": variable("reason", "", "why a run failed"),
-    } | {
-        name: variable(name, "", one.attrs["long_name"]) for name, one in word_variables({}).items()
-    }
 
 
 def mask_untrusted(dataset: xr.Dataset) -> xr.Dataset:
@@ -114,7 +101,7 @@ def mask_untrusted(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(masked)
 
 
-def machine_constants(studies: Sequence[StoredStudy], layout: Layout) -> dict[str, xr.Variable]:
+def machine_constants(studies: Sequence[StoredStudy], layout: xr.Dataset) -> dict[str, xr.Variable]:
     """Return the numbers of `machine` that have a default, as a case file gives or leaves them.
 
     Of one study those that it does not sweep, without dimensions; of several along `job`. Numbers
@@ -129,7 +116,7 @@ def machine_constants(studies: Sequence[StoredStudy], layout: Layout) -> dict[st
     for row, name in zip(rows, coordinate_names([row.key for row in rows]).values(), strict=True):
         given = [value_in(study.fixed, row.key) for study in studies]
         values = [np.nan if value is None else value for value in given]
-        if name in layout.coordinates or not all(isinstance(one, int | float) for one in values):
+        if name in layout or not all(isinstance(one, int | float) for one in values):
             continue
         attrs = {"units": row.unit or "1", "long_name": row.label, "case_key": row.key}
         jobs = np.repeat(np.array(values, float), [study.jobs for study in studies])
@@ -139,7 +126,7 @@ def machine_constants(studies: Sequence[StoredStudy], layout: Layout) -> dict[st
     return found
 
 
-def _series(layout: Layout, stored: Stored, positions: np.ndarray) -> dict[str, xr.Variable]:
+def _series(dims: tuple[Any, ...], stored: Stored, positions: np.ndarray) -> dict[str, xr.Variable]:
     """Return the time series of all jobs; none but those of one of the longest are read yet."""
     samples, ends = stored.columns["samples"], stored.columns["end_time"]
     found = np.unique(positions[positions >= 0])
@@ -157,8 +144,8 @@ def _series(layout: Layout, stored: Stored, positions: np.ndarray) -> dict[str, 
             lazy = indexing.LazilyIndexedArray(
                 StudySeries(stored, name, positions, item.values.shape)
             )
-            dims = (*layout.dims, dim, *item.dims[1:])
-            variables[name] = xr.Variable(dims, lazy, item.attrs)
+            place = (*dims, dim, *item.dims[1:])
+            variables[name] = xr.Variable(place, lazy, item.attrs)
     return variables
 
 
