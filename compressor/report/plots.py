@@ -126,7 +126,7 @@ def write_plots(
     PlotError where it cannot be drawn; StoreError where the store cannot be read or the files not
     be written.
     """
-    stored, studies = read_store(results).warned(), read_studies(results)
+    stored, studies = read_store(results, warn=True), read_studies(results)
     named = {study.name: study for study in studies}
     of_job = bool(choice.what) and {*choice.what} <= {*JOB}
     if len(words) == 1 and words[0] in named and not (of_job and named[words[0]].jobs == 1):

@@ -160,7 +160,7 @@ def build_report(
 
     limits, units, names: of studies, see `write_report`.
     """
-    studies, stored = choose_studies(results, names), read_store(results).warned()
+    studies, stored = choose_studies(results, names), read_store(results, warn=True)
     paper = find_paper_runs(stored, studies)
     papers = [study for study in studies if is_of_paper(stored, study)]
     if not papers:

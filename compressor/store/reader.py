@@ -80,7 +80,7 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     studies = read_studies(folder)
     if name is not None:
         studies = [find_study(folder, name, studies)]
-    stored = read_store(folder).warned()
+    stored = read_store(folder, warn=True)
     while True:
         try:
             dataset = label_studies(stored, studies, trusted)

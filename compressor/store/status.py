@@ -154,7 +154,7 @@ class JobReport:
 
 def standings(folder: Folder) -> list[StudyProgress]:
     """Return the progress of each study of a folder. Raises WrongName where there is none."""
-    studies, stored = read_studies(folder), read_store(folder).warned()
+    studies, stored = read_studies(folder), read_store(folder, warn=True)
     found = []
     for study in studies:
         positions = stored.find(study.keys)
@@ -191,7 +191,7 @@ def report_job(folder: Folder, *words: str) -> JobReport:
     until one job is left. Raises WrongName where they name none or several, DamagedFile where its
     batch is damaged.
     """
-    studies, stored = read_studies(folder), read_store(folder).warned()
+    studies, stored = read_studies(folder), read_store(folder, warn=True)
     key = find_job(folder, words, studies, stored.keys())
     mine = find_owners(studies, [key])[key]
     again = tuple(study.again for study in studies if study.name in mine)

@@ -113,20 +113,13 @@ class Stored:
         bars = {f"{NAMES[label]}_error" for label in labels & ERRORS.keys()}
         return ALWAYS | {NAMES[label] for label in labels} | bars
 
-    def warned(self) -> "Stored":
-        """Return this store, after a StoreWarning of each damage, whose jobs count as missing."""
-        for damage in self.damaged:
-            text = f"{damage}: its jobs count as missing"
-            warnings.warn(text, StoreWarning, stacklevel=3)
-        return self
-
     def without(self, damage: DamagedFile) -> "Stored":
         """Return this store less a damaged batch, after a StoreWarning. Raises other damage."""
         batches = self.places[0]
         left = [batch for batch in batches if os.fspath(batch.path) != damage.path]
         if len(left) == len(batches):
             raise damage
-        Stored(self.folder, (), [damage]).warned()
+        _warn_of([damage])
         return Stored(self.folder, left, [*self.damaged, damage])
 
     # ---- how they ended -------------------------------------------------------------------------
@@ -295,10 +288,17 @@ class Stored:
         return xr.Dataset(outcome.table(self.series(position)), attrs=outcome.attributes)
 
 
-def read_store(folder: Folder) -> Stored:
+def _warn_of(damaged: Sequence[DamagedFile]) -> None:
+    """Give a StoreWarning of each damaged batch."""
+    for damage in damaged:
+        warnings.warn(f"{damage}: its jobs count as missing", StoreWarning, stacklevel=4)
+
+
+def read_store(folder: Folder, warn: bool = False) -> Stored:
     """Return what a folder holds; damaged batches are listed in `damaged`.
 
-    Raises StoreError, also where runs change the folder faster than it can be read.
+    warn: give a StoreWarning of each. Raises StoreError, also where runs change the folder faster
+    than it can be read.
     """
     folder = Path(os.path.abspath(folder))
     for _ in range(ATTEMPTS):
@@ -313,5 +313,7 @@ def read_store(folder: Folder) -> Stored:
             continue  # merged with others meanwhile
         except OSError as error:
             raise system_error(folder, error) from error
+        if warn:
+            _warn_of(damaged)
         return Stored(folder, batches, damaged)
     raise StoreError(folder, "changes faster than it can be read", "try again")

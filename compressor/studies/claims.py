@@ -119,7 +119,7 @@ def judge_machines(
     coordinates, in the case file's unit. Raises ClaimsError and StoreError.
     """
     found = machines(source)
-    stored = read_store(folder).warned()
+    stored = read_store(folder, warn=True)
     rows = []
     for jobs in report_progress([*found.values()], progress):
         runs, problems = {}, [f"{name}: missing" for name in LABELS if name not in jobs]

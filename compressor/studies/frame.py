@@ -171,7 +171,7 @@ def records(
 
     left: counts the others by reason. A joint counts as sound by the study's healthy clearance.
     """
-    stored, healthy = read_store(folder).warned(), healthy_clearance(source)
+    stored, healthy = read_store(folder, warn=True), healthy_clearance(source)
     own = dict(zip(source.keys, points(source), strict=True))
     for key, point in report_progress([*own.items()], progress):
         try:

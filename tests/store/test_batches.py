@@ -162,8 +162,8 @@ def test_numbers_and_series_of_batches_that_were_merged_since_are_found(mixed, m
     expected, jobs = open_study(mixed).load(), held(read_store(mixed))
     stored, lazy = read_store(mixed), open_study(mixed)
 
-    def merged_after(folder):
-        found = read_store(folder)
+    def merged_after(folder, warn):
+        found = read_store(folder, warn)
         merge_all(mixed)
         return found
 

@@ -127,7 +127,7 @@ def compare_record(
     mine = by_revolutions(record)
     check_orders(mine.highest, name)
     own = {mine.highest: curves(mine.lines(mine.highest))}  # by the highest order
-    stored = read_store(folder).warned()
+    stored = read_store(folder, warn=True)
     wanted = dict(wanted_jobs(words, folder, key))
     jobs = []
     for number, (one, swept) in enumerate(wanted.items()):
