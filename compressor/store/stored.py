@@ -138,22 +138,6 @@ class Stored:
         samples = int(self.columns["samples"][position])
         return JobStatus(key, status, reason, detail, samples, frozenset(kept.split()))
 
-    def serving(self, positions: np.ndarray, case: Case) -> np.ndarray:
-        """Return whether each of the jobs at some positions needs no new run for a case, boolean.
-
-        Jobs of one kind, in all that `JobStatus.satisfies` reads, are checked once.
-        """
-        first, kinds = self._kinds
-        satisfied = np.array([self.status_at(at).satisfies(case) for at in first.tolist()], bool)
-        return satisfied[kinds[positions]] if len(positions) else np.zeros(0, bool)
-
-    @cached_property
-    def _kinds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the position of the first job of each kind, and the kind of each job, (jobs,)."""
-        kinds = np.rec.fromarrays([self.columns[name] for name in ("status", "reason", "kept")])
-        _, first, kind = np.unique(kinds, return_index=True, return_inverse=True)
-        return first, kind
-
     def find_ok(self, key: str, healthy: PerJoint) -> tuple[Case, Outcome] | str:
         """Return the case and outcome of a job that is ok, else why there are none, in a word.
 

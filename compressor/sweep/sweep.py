@@ -19,7 +19,7 @@ from compressor.store import Folder, merge_batches, read_store, write_batch, wri
 from compressor.sweep.pool import Input, Workers, require_posix, run_batches
 from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Needs, compile_once, load
-from compressor.sweep.worker import End, JobResult, Store, attempt, describe_error, store_results
+from compressor.sweep.worker import End, JobLost, Store, attempt, describe_error, store_results
 
 MANY_JOBS = 100_000  # jobs whose cases take a while to be made
 GRACE = 5.0  # s beyond its time in which a job may end by itself, before its worker is killed
@@ -144,7 +144,10 @@ def run_missing(
     running = (options.backend or partial(run_locally, workers))(folder, jobs, tell)
     try:
         for end in running:
-            ends[end.id] = store_lost(folder, jobs[end.id], end)
+            if isinstance(end, JobLost):
+                ends[end.id] = store_lost(folder, jobs[end.id], end)
+            else:
+                ends[end.id] = end.result
             failed += ends[end.id].status != "ok"
             if time.monotonic() - told > REPORT_SECONDS or len(ends) == total:
                 tell()
@@ -152,10 +155,8 @@ def run_missing(
         running.close()
 
 
-def store_lost(folder: Path, case: Case, end: End) -> JobEnd:
-    """Return how a job ended that has been stored; store it first if it has no result."""
-    if isinstance(end, JobResult):
-        return end.result
+def store_lost(folder: Path, case: Case, end: JobLost) -> JobEnd:
+    """Store that a job has no result; return how it ended."""
     more = {"traceback": end.traceback} if end.traceback else {}
     outcome = without_run(case.attributes(), end.reason, end.detail, **more)
     write_batch(folder, [outcome])

@@ -3,8 +3,6 @@
 from collections.abc import Container, Hashable, Iterator, Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from compressor.cases import Case, Study
 from compressor.outcome import Outcome
 from compressor.store import Stored, serving_both
@@ -71,22 +69,23 @@ class RequestedJobs:
         A case whose job is to be run again goes on keeping the time series that its job has, as
         exact as they are.
         """
-        alike: dict[Hashable, list[str]] = {}  # keys of jobs whose `solve` and `output` are equal
-        for key, (study, number) in self.places.items():
-            kind = key if key in self.own else (study.name, study.solver_of(number))
-            alike.setdefault(kind, []).append(key)
         found: dict[str, JobEnd] = {}
-        for keys in alike.values():
-            places = stored.find(keys)
-            indices = np.flatnonzero(places >= 0)
-            serving = stored.serving(places[indices], self[keys[0]]).tolist()
-            for at, serves in zip(indices.tolist(), serving, strict=True):
-                key, position = keys[at], places[at]
-                if not (serves and stored.intact(position)):
-                    self.own[key] = stored.status_at(position).with_stored_outputs(self[key])
-                elif stored.columns["status"][position] == b"ok":
-                    found[key] = JobEnd("ok")
-                else:
-                    end = stored.status_at(position)
-                    found[key] = JobEnd(end.status, end.reason, end.detail)
+        verdicts: dict[Hashable, bool] = {}  # by what a verdict depends on
+        columns = (stored.columns[name].tolist() for name in ("status", "reason", "kept"))
+        ends = [*zip(*columns, strict=True)]
+        positions = stored.find([*self.places]).tolist()
+        for (key, (study, number)), position in zip(self.places.items(), positions, strict=True):
+            if position < 0:
+                continue
+            kind = key if key in self.own else (study.name, study.solver_of(number))
+            about = kind, ends[position]
+            if about not in verdicts:
+                verdicts[about] = stored.status_at(position).satisfies(self[key])
+            if not (verdicts[about] and stored.intact(position)):
+                self.own[key] = stored.status_at(position).with_stored_outputs(self[key])
+            elif ends[position][0] == b"ok":
+                found[key] = JobEnd("ok")
+            else:
+                end = stored.status_at(position)
+                found[key] = JobEnd(end.status, end.reason, end.detail)
         return found

@@ -1,6 +1,5 @@
 """Jobs in batches: they come back as they were, to compsim and to other programs."""
 
-import itertools
 import json
 from dataclasses import replace
 
@@ -195,22 +194,3 @@ def test_what_a_stored_job_serves(row, ideal, tmp_path):
     kinds = {exact for keeps, exact in (row[:2], (asks, exact)) if keeps == "series"}
     assert again.keep == ("series" if kinds else "metrics")
     assert again.precision == min(kinds, default="double")
-
-
-def test_many_jobs_serve_as_each_does(ideal, tmp_path):
-    """Jobs of one kind are asked once, and kinds differ in all that decides."""
-    for number, row in enumerate([*SERVING, *SERVING[::2]]):
-        stored_as(row, ideal, tmp_path, key(number))
-    keep(tmp_path, simulate(Case.from_values({"solve": SHORT | {"error_bars": False}})))
-    stored, told = read_store(tmp_path), set()
-    positions = np.arange(len(stored))[::-1]
-    for keeps, precision, bars in itertools.product(
-        ("series", "metrics"), ("double", "single"), (True, False)
-    ):
-        output = {"keep": keeps, "precision": precision}
-        case = Case.resolve({"output": output, "solve": {"error_bars": bars}})
-        each = [stored.status_at(position).satisfies(case) for position in positions]
-        assert stored.serving(positions, case).tolist() == each
-        told |= {*each}
-    assert told == {True, False}
-    assert stored.serving(positions[:0], case).tolist() == []
