@@ -116,11 +116,12 @@ def test_status_shows_where_jobs_fail_by_a_tree_of_scikit_learn_s(tmp_path, monk
     """Where that is installed."""
     folder = budget(tmp_path)
     assert cli.main(["status", "-r", folder]) == 0
-    out = " ".join(capsys.readouterr().out.split())
-    assert "where jobs fail (jobs of each class in weights):" in out
-    assert (
-        "|--- solve.max_steps <= 2500002.5000 | |--- weights: [6.0000, 0.0000] class: failed" in out
-    )
+    lines = capsys.readouterr().out.splitlines()
+    first = lines.index("    where jobs fail (jobs of each class in weights):")
+    assert lines[first + 1 : first + 3] == [
+        "      |--- solve.max_steps <= 2500002.5000",
+        "      |   |--- weights: [6.0000, 0.0000] class: failed",
+    ]
     monkeypatch.setitem(sys.modules, "sklearn.tree", None)
     assert cli.main(["status", "-r", folder]) == 0
     out = capsys.readouterr().out
