@@ -250,6 +250,8 @@ def read_series(
 ) -> list[dict[str, Variable]]:
     """Return time series of some jobs by name: those of `names`, or all, that each has."""
     found: list[dict[str, Variable]] = [{} for _ in rows]
+    if not found:
+        return []
     with open_netcdf(path) as file:
         for name in names_of(file) if names is None else names:
             if name not in file:
