@@ -3,10 +3,11 @@
     python tests/campaigns/measure_sweep.py tests/results/sweep.json [jobs]  (make sweep-bench)
 
 Start-up times are of whole processes, medians of a few in turn. The sweep has no error bars, so
-that the times which its jobs store are all of the solver's work. It runs through the real command
-on two workers, once undisturbed and once killed (SIGKILL of the parent alone, or with its workers)
-and resumed; both stores must hold the same, to the bit, timings apart. Memory is each process's
-greatest resident set, as /proc tells it while they run.
+that the times which its jobs store are all of the solver's work, and its jobs are short, since the
+sweep is what is measured. It runs through the real command on two workers, once undisturbed and
+once killed (SIGKILL of the parent alone, or with its workers) and resumed; both stores must hold
+the same, to the bit, timings apart. Memory is each process's greatest resident set, as /proc tells
+it while they run.
 """
 
 import contextlib
@@ -48,6 +49,7 @@ ROUNDS = 5
 WORKERS = 2
 JOBS = 100_000
 KILLS = 3
+SHORT = {"settle_rev": 0, "duration_rev": 1}
 SEED = 1
 LONGEST = 4 * 3600.0  # s
 LOOK = 0.5  # s between two looks at memory
@@ -71,7 +73,7 @@ def time_startup():
 def many(jobs):
     """Return a case file of jobs without time series or error bars."""
     side = next(n for n in range(math.isqrt(jobs), 0, -1) if jobs % n == 0)
-    values = {"name": "many", "joint": "big_end", "solve": {"error_bars": False}}
+    values = {"name": "many", "joint": "big_end", "solve": {"error_bars": False} | SHORT}
     values |= {"clearance_mm": np.linspace(0.1, 0.3, side).tolist()}
     values |= {"machine": {"rod_mass_kg": np.linspace(3, 5, jobs // side).tolist()}}
     return json.dumps(values | {"output": {"keep": "metrics"}})
@@ -167,6 +169,7 @@ def main(target, jobs=JOBS):
         **provenance("make sweep-bench"),
         "start": time_startup(),
         "jobs": count,
+        "revolutions_a_job": SHORT["duration_rev"],
         "workers": WORKERS,
         "wall_s": round(seconds, 1),
         "jobs_per_s": round(count / seconds, 1),
