@@ -11,7 +11,7 @@ import json
 
 import numpy as np
 from joblib import Parallel, delayed
-from measure_accuracy import CONTACT, EXACT, percentiles, short
+from measure_accuracy import CONTACT, EXACT, percentiles
 from random_cases import strangers
 from result_pages import keep, provenance, run_campaign
 
@@ -81,7 +81,7 @@ def series_row(rows, ratio):
         "ratio": ratio,
         "pairs": len(over),
         "error_over_distance": percentiles(over, LIMITS),
-        "share": short(TIGHTER_DISTANCE_FACTOR * closeness(ratio)),
+        "share": TIGHTER_DISTANCE_FACTOR * closeness(ratio),
     }
 
 
@@ -92,8 +92,8 @@ def metric_row(rows, name, ratio):
     wrong = error > 0
     return {
         "ratio": ratio,
-        "within": short(np.mean(error <= bar)),
-        "tightness": short(np.median(bar[wrong] / error[wrong])),
+        "within": np.mean(error <= bar),
+        "tightness": np.median(bar[wrong] / error[wrong]),
     }
 
 
@@ -109,7 +109,7 @@ def main(target, jobs=2, cases=350):
             name: [metric_row(rows, name, ratio) for ratio in RATIOS] for name in METRICS
         },
     }  # fmt: skip
-    keep(target, result)
+    keep(target, result, 4)
     print(json.dumps(result, indent=1))
 
 

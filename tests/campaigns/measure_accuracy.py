@@ -117,11 +117,7 @@ def confirmed(values):
 
 
 def percentiles(numbers, of=PERCENTILES):
-    return [short(value) for value in np.percentile(numbers, of)]
-
-
-def short(value):
-    return float(f"{value:.3g}")
+    return np.percentile(numbers, of).tolist()
 
 
 def word_row(word, paper, measured):
@@ -134,10 +130,10 @@ def word_row(word, paper, measured):
         "rtol": tier.rtol,
         "promise": tier.promise,
         "nine": {
-            "error": short(max(row["error"] for row in nine)),
-            "told": short(max(row["told"] for row in nine)),
+            "error": max(row["error"] for row in nine),
+            "told": max(row["told"] for row in nine),
             "kept": sum(row["promise"] == "kept" for row in nine),
-            "cost": short(max(row["cost"] for row in nine)),
+            "cost": max(row["cost"] for row in nine),
         },
         "kept": len(kept),
         "broken": sum(row["error"] > tier.promise for row in kept),
@@ -149,14 +145,12 @@ def word_row(word, paper, measured):
         ),
         "refused": dict(Counter(row["reason"] for row in rows if row["reason"])),
         "error": percentiles([row["error"] for row in kept]),
-        "told_over_error": short(
-            np.median([row["told"] / row["error"] for row in kept if row["error"] > 0])
-        ),
-        "bare_kept": short(np.mean([row["bare_error"] <= tier.promise for row in rows])),
+        "told_over_error": np.median([r["told"] / r["error"] for r in kept if r["error"] > 0]),
+        "bare_kept": np.mean([row["bare_error"] <= tier.promise for row in rows]),
         "seconds": percentiles([row["seconds"] for row in rows], (50, 90)),
         "cost": {
-            "mean": short(np.mean([row["cost"] for row in rows])),
-            "median": short(np.median([row["cost"] for row in rows])),
+            "mean": np.mean([row["cost"] for row in rows]),
+            "median": np.median([row["cost"] for row in rows]),
         },
     }
 
@@ -182,8 +176,8 @@ def bar_row(word, name, measured):
     error, bar = np.concatenate(errors_), np.concatenate(bars)
     wrong = error > 0
     return {
-        "within": short(np.mean(error <= bar)),
-        "tightness": short(np.median(bar[wrong] / error[wrong])) if wrong.sum() >= 10 else None,
+        "within": np.mean(error <= bar),
+        "tightness": np.median(bar[wrong] / error[wrong]) if wrong.sum() >= 10 else None,
         "wrong": int(wrong.sum()),
         "of": error.size,
     }
@@ -195,8 +189,8 @@ def broken(word, cases, measured):
         {
             **values["machine"],
             **{key: values[key] for key in ("load", "joint", "clearance_mm")},
-            "error": short(case["words"][word]["error"]),
-            "told": short(case["words"][word]["told"]),
+            "error": case["words"][word]["error"],
+            "told": case["words"][word]["told"],
         }
         for values, case in zip(cases, measured, strict=True)
         if case["words"][word]["promise"] == "kept"
@@ -216,12 +210,12 @@ def main(target, jobs=2, count=334, seeds=SEEDS):
     result = {
         **provenance("make accuracy"),
         "random": {"cases": len(cases), "seeds": seeds, "percentiles": PERCENTILES},
-        "truth": {"rtol": TRUTH, "DOP853": CONFIRMED_RTOL, "apart": [short(x) for x in distance]},
+        "truth": {"rtol": TRUTH, "DOP853": CONFIRMED_RTOL, "apart": distance},
         "words": words,
         "bars": bars,
         "broken": {word: broken(word, cases, measured) for word in ACCURACY},
     }
-    keep(target, result)
+    keep(target, result, 4)
     print(json.dumps({"words": words, "bars": bars}, indent=1))
 
 

@@ -100,10 +100,10 @@ def judge(folder, study, run=None, revolutions=5):
     return {
         "sound_draws": int(found.attrs["sound_draws"]), "jobs": len(find_study(folder, study).keys),
         "worn_jobs": int(found.attrs["worn_jobs"]), "left_out": json.loads(found.attrs["left_out"]),
-        "attainable": rounded(found.attrs["rate"]), "detected": found.attrs["detected"],
+        "attainable": found.attrs["rate"], "detected": found.attrs["detected"],
         "alarms": found.sizes["alarm"], "clipped": int(found.attrs["clipped"]),
         "rows": [row for joint in found["joint"].values.tolist() for row in rows_of(found, joint)],
-        "wear_end": rounded(found.attrs.get("wear_end", math.nan)),
+        "wear_end": found.attrs.get("wear_end", math.nan),
     }  # fmt: skip
 
 
@@ -115,24 +115,18 @@ def rows_of(found, joint):
             one = found.isel(alarm=place, noise=level).sel(joint=joint)
             row = {
                 "joint": joint, "noise": noise, "alarm": one["kind"].item(),
-                "filter": one["filter"].item(), "limit": rounded(one["limit"]),
+                "filter": one["filter"].item(), "limit": one["limit"].item(),
                 "clearances": one["clearance"].values[mine].tolist(),
                 "draws": one["draws"].values[mine].tolist(),
             }  # fmt: skip
             for ending, end in (("", "value"), ("_low", "low"), ("_high", "high")):
                 of = one.sel(end=end)
-                row[f"detection{ending}"] = [rounded(n) for n in of["detection"].values[mine]]
-                row[f"false_alarms{ending}"] = rounded(of["false_alarms"])
-                row[f"first{ending}"] = rounded(of["first_clearance"])
+                row[f"detection{ending}"] = of["detection"].values[mine].tolist()
+                row[f"false_alarms{ending}"] = of["false_alarms"].item()
+                row[f"first{ending}"] = of["first_clearance"].item()
                 if "hours" in found:
-                    row[f"lead_hours{ending}"] = rounded(of["hours"])
+                    row[f"lead_hours{ending}"] = of["hours"].item()
             yield row
-
-
-def rounded(value):
-    """Three digits; None of what is at no clearance, or not known."""
-    value = float(value)
-    return float(f"{value:.3g}") if math.isfinite(value) else None
 
 
 def main(target, results="alarms", jobs=2):
@@ -146,7 +140,7 @@ def main(target, results="alarms", jobs=2):
     run = read_wear(place / "worn")
     kept = judge(place / "plant", "plant", run)
     opened = 1e3 * run["clearance"].transpose("stage", "joint").values[-1]
-    stages = {joint: rounded(one) for joint, one in zip(JOINTS, opened, strict=True)}
+    stages = dict(zip(JOINTS, opened.tolist(), strict=True))
     wear = {
         "end": kept.pop("wear_end"), "limit_mm": WEAR["limit_mm"],
         "factor": Wear().coefficient_factor, "clearances": stages,
@@ -155,7 +149,7 @@ def main(target, results="alarms", jobs=2):
         **provenance("make alarms"), "keys": digest_keys(studies, worn),
         "failed": len(summary.failed), **kept, "wear": wear,
     }  # fmt: skip
-    keep(target, result)
+    keep(target, result, 3)
     for row in kept["rows"]:
         print({name: one for name, one in row.items() if not isinstance(one, list)})
 

@@ -39,11 +39,6 @@ def batch_mean(values):
     return float(means.mean()), float(means.std(ddof=1) / math.sqrt(BATCHES))
 
 
-def short(value):
-    """A number to three digits."""
-    return float(f"{value:.3g}")
-
-
 def compare_rms(values, method):
     """What a case says of itself, and how its rms differs from another integrator's."""
     values = {**values, "contact": {"damping_N_s_per_mm": DAMPING}}
@@ -83,7 +78,7 @@ def random_row(drawn, wanted):
         few = parallel(delayed(compare_rms)(row["values"], SCIPY) for row in judged[:FEW])
 
     def spread(name, *of):
-        return [short(value) for value in np.percentile([row[name] for row in judged], of)]
+        return np.percentile([row[name] for row in judged], of).tolist()
 
     return {
         "seed": SEED,
@@ -96,7 +91,7 @@ def random_row(drawn, wanted):
         "stopped": dict(Counter(row["other"] for row in rows if "other" in row)),
         "judged": len(judged),
         "within": {str(k): sum(row["apart"] <= k for row in judged) for k in (1, 2, 3)},
-        "scipy": {"method": SCIPY, "apart": [short(row["apart"]) for row in few]},
+        "scipy": {"method": SCIPY, "apart": [row["apart"] for row in few]},
         "relative": spread("relative", 50, 90, 100),
         "known": spread("known", 50, 90, 100),
         "horizon_rev": spread("horizon_rev", 50, 90, 100),
@@ -106,7 +101,7 @@ def random_row(drawn, wanted):
 
 def main(target, drawn=DRAWN, wanted=WANTED):
     kept = {**provenance("make chaotic"), "random": random_row(drawn, wanted)}
-    keep(target, kept)
+    keep(target, kept, 4)
     print(json.dumps(kept, indent=1))
 
 

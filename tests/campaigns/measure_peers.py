@@ -55,11 +55,6 @@ PEERS = (
 )  # fmt: skip
 
 
-def rounded(value):
-    """A number to three digits."""
-    return float(f"{value:.3g}")
-
-
 def timed(call):
     """What a call returns, its CPU time and its wall time (s)."""
     wall, cpu = time.perf_counter(), time.process_time()
@@ -113,28 +108,28 @@ class Contest:
     def row(self, our_errors):
         """Medians and ratios."""
         cpu, wall = map(median, zip(*self.theirs, strict=True))
-        found = {"seconds": rounded(cpu), "error": rounded(self.error)}
+        found = {"seconds": cpu, "error": self.error}
         if self.rtol is None:
             return found | {"reason": "none of our tolerances is as exact"}
         our_cpu = median(self.ours)
         return found | {
             "our_rtol": self.rtol,
-            "our_error": rounded(our_errors[self.rtol]),
-            "our_seconds": rounded(our_cpu),
-            "ratio": rounded(cpu / our_cpu),
-            "kernel_wall_ratio": rounded(wall / median(self.kernel)),
+            "our_error": our_errors[self.rtol],
+            "our_seconds": our_cpu,
+            "ratio": cpu / our_cpu,
+            "kernel_wall_ratio": wall / median(self.kernel),
         }
 
 
 def agreement(scene, truth):
     """How far ours at 1e-11 lies from the reference, and Exudyn at TIGHT from ours."""
     best = ours(scene, 1e-11)["acceleration"].values
-    found = {"scene": scene, "ours_to_reference": rounded(error(best, truth))}
+    found = {"scene": scene, "ours_to_reference": error(best, truth)}
     try:
         tight = multibody.acceleration(scene, rtol=TIGHT)
     except Exception as fault:
         return found | {"reason": f"{type(fault).__name__}: {fault}"}
-    return found | {"exudyn_rtol": TIGHT, "exudyn_to_ours": rounded(error(tight, best))}
+    return found | {"exudyn_rtol": TIGHT, "exudyn_to_ours": error(tight, best)}
 
 
 def contests(scene, truth, our_errors):
@@ -186,7 +181,7 @@ def main(target):
     kept = provenance("make peers")
     kept["versions"] |= versions()
     kept |= {"rounds": ROUNDS, "agreement": checks, "rows": rows}
-    keep(target, kept)
+    keep(target, kept, 3)
     print(json.dumps(rows, indent=1))
 
 

@@ -31,17 +31,12 @@ def kinds(overrides):
     return dict(zip(study.keys, each, strict=True))
 
 
-def plain(value):
-    """A number to three digits, None for nan."""
-    return None if value != value else float(f"{value:.3g}")
-
-
 def shown(job):
     """A job's verdict, and the metric that is farthest from its judge's."""
     vote = job.deciding
     return {
         "job": job.key, "verdict": job.verdict, "worst_metric": vote.metric,
-        "excess": plain(vote.ratio), "error": plain(vote.error), "bar": plain(vote.bar),
+        "excess": vote.ratio, "error": vote.error, "bar": vote.bar,
         "judges": [one.method for one in job.votes],
     }  # fmt: skip
 
@@ -70,16 +65,16 @@ def main(target, folder="stress", workers=2, overrides=()):
     ok = [job for job in drawn if job.verdict == "ok"]
     (own, slowest), (judging, _) = seconds(folder), seconds(Path(folder, FOLDER))
     found = {
-        **provenance("make stress"), "workers": workers, "work_s": plain(own + judging),
+        **provenance("make stress"), "workers": workers, "work_s": own + judging,
         "scenes": len(drawn), "silent_wrong": Counter(j.verdict for j in drawn)["silent_wrong"],
-        "at_most": plain(3.0 / len(drawn)),  # 95 % bound where none was found
+        "at_most": 3.0 / len(drawn),  # 95 % bound where none was found
         "ends": {name: count_ends(by_kind[name]) for name in ("supported", "whole")},
         "unforeseeable": sum(job.is_chaotic for job in ok),
         "worst": [shown(job) for job in rank(drawn)[:WORST]],
-        "slowest_s": plain(slowest),
+        "slowest_s": slowest,
         "fresh": [{"drawn": name, **group(by_kind[name])} for name in ("laws", "features")],
     }  # fmt: skip
-    keep(target, found)
+    keep(target, found, 3)
 
 
 if __name__ == "__main__":

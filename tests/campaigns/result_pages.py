@@ -6,6 +6,7 @@
 import argparse
 import inspect
 import json
+import math
 import platform
 import subprocess
 import sys
@@ -53,9 +54,23 @@ def provenance(command):
     }
 
 
-def keep(target, found):
-    """Write what a campaign found, and its page if the file lies beside one."""
-    target = Path(target)
+def rounded(found, digits):
+    """Return numbers in lists and mappings to some digits, None where they are not finite."""
+    if isinstance(found, dict):
+        return {name: rounded(one, digits) for name, one in found.items()}
+    if isinstance(found, list | tuple):
+        return [rounded(one, digits) for one in found]
+    if isinstance(found, float):
+        return float(f"{found:.{digits}g}") if math.isfinite(found) else None
+    return found
+
+
+def keep(target, found, digits=0):
+    """Write what a campaign found, and its page if the file lies beside one.
+
+    digits: of numbers that are not whole; 0: all of them.
+    """
+    target, found = Path(target), rounded(found, digits) if digits else found
     target.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     if target.resolve().parent == RESULTS and target.stem in CAMPAIGNS:
         write_page(target.stem)
