@@ -17,7 +17,6 @@ SWING = 12  # order up to which a machine without clearance shakes; the envelope
 FINE = 4  # points on a curve for each cycle of its highest order
 SMALLEST = 1e-6  # share of the mean square that a band counts with at least: -60 dB
 MIN_FOR_ERRORS = 3  # revolutions
-STEPS = 3600  # angles at which a shift of one record against the other is tried
 # weights in `difference`, dB, of the mean revolution's orders, of one less both correlations and of
 # the logarithm of the ratio of rms: calibrated, and judged by other records (docs/diagnosis.md)
 MEAN_ORDERS, MEAN_SHAPE, BURSTS, LEVEL = 0.5, 3.0, 10.0, 3.0
@@ -25,7 +24,6 @@ NEAR_DEG = 5  # by which a tacho may be off: shapes and bursts count where they 
 MIN_LINES = 8  # of a third octave, by which noise is known
 QUIET = 1e-4  # share of the loudest third octave below which none is compared
 SAME_BAND = 0.5  # dB, to which a third octave of a job is taken as known
-LOUD = 0.1  # share of the greatest peak from which a segment is compared
 
 
 @dataclass(frozen=True)
@@ -84,24 +82,17 @@ class Likeness:
 
     difference: dB, from 0: all of the numbers together, by which jobs are ordered (`_difference`).
     correlation: of the mean revolutions, -1 to 1: 1 is the same shape at the same angles, whatever
-    the size; shift_deg: by how many degrees the record comes later where it is most alike, and
-    shifted: the correlation there. envelope: correlation of the envelopes over crank angle, -1 to
-    1: 1 is the same bursts at the same angles, whatever rings in them. rms_ratio: of the record
-    over the job, from 0: 1 is as strong. spectral_distance: dB, from 0 to 60: rms difference of the
-    shares of third octaves of orders in the mean square; 3 dB is a factor of 2, whatever the size.
-    segment: the first degree of the 10 whose peaks differ most, beside the usual ratio;
-    segment_ratio: the record's peak there over the job's.
+    the size. envelope: correlation of the envelopes over crank angle, -1 to 1: 1 is the same bursts
+    at the same angles, whatever rings in them. rms_ratio: of the record over the job, from 0: 1 is
+    as strong. spectral_distance: dB, from 0 to 60: rms difference of the shares of third octaves of
+    orders in the mean square; 3 dB is a factor of 2, whatever the size.
     """
 
     difference: Measured
     correlation: Measured
-    shift_deg: float
-    shifted: float
     envelope: Measured
     rms_ratio: Measured
     spectral_distance: Measured
-    segment: int
-    segment_ratio: float
 
 
 def compare_lines(record: np.ndarray, job: np.ndarray, mine: Curves, other: Curves) -> Likeness:
@@ -110,22 +101,12 @@ def compare_lines(record: np.ndarray, job: np.ndarray, mine: Curves, other: Curv
     Errors are of the jackknife: each revolution of the record is left out in turn (Efron and Stein,
     Annals of Statistics 9, 1981), from three on.
     """
-    shift, shifted = _best_shift(record.mean(axis=0), job.mean(axis=0))
     found, errors = np.array(_numbers(record, mine, job, other)), np.full(5, math.nan)
     if (count := len(record)) >= MIN_FOR_ERRORS:
         rests = (np.arange(count) != k for k in range(count))
         left = np.array([_numbers(record[rest], mine.part(rest), job, other) for rest in rests])
         errors = np.sqrt((count - 1) / count * ((left - left.mean(axis=0)) ** 2).sum(axis=0))
-    apart, alike, bursts, ratio, distance = map(Measured, found.tolist(), errors.tolist())
-    loud = np.maximum(mine.peak / mine.peak.max(), other.peak / other.peak.max()) >= LOUD
-    ratios = mine.peak / np.maximum(other.peak, np.finfo(float).tiny)
-    # the level is another number: the segment is that whose share of the peaks is most another one
-    odd = np.where(loud, np.abs(np.log(np.maximum(ratios, 1e-300) / np.median(ratios))), -1.0)
-    worst = int(odd.argmax())
-    return Likeness(
-        apart, alike, shift, shifted, bursts, ratio, distance, worst * 360 // SEGMENTS,
-        float(ratios[worst]),
-    )  # fmt: skip
+    return Likeness(*map(Measured, found.tolist(), errors.tolist()))
 
 
 def _numbers(
@@ -214,22 +195,6 @@ def _bands_apart(record: Powers, job: Powers) -> float:
     unsure = (scale * noise[heard] / first) ** 2 + (scale * others[heard] / second) ** 2
     weight = 1.0 / (unsure + SAME_BAND**2)
     return math.sqrt(float(weight @ (scale * np.log(first / second)) ** 2 / weight.sum()))
-
-
-def _best_shift(record: np.ndarray, job: np.ndarray) -> tuple[float, float]:
-    """Return by how many degrees a record comes later where it is most alike, and how alike.
-
-    record, job: lines of the mean revolutions, (orders,).
-    """
-    size = math.sqrt(float((np.abs(record) ** 2).sum() * (np.abs(job) ** 2).sum()))
-    if not size:
-        return math.nan, math.nan
-    steps = max(STEPS, FINE * (record.size + 1))
-    cross = np.zeros(steps, complex)
-    cross[1 : record.size + 1] = record * job.conj()
-    alike = np.fft.ifft(cross).real * (steps / size)
-    best = int(alike.argmax())
-    return (360.0 * best / steps + 180.0) % 360.0 - 180.0, float(alike[best])
 
 
 def third_octaves(orders: int) -> np.ndarray:

@@ -19,30 +19,18 @@ CASE = {
 }  # fmt: skip
 OTHERS = {  # in words -> what differs
     "itself, with other noise": {"sensor": HEARD | {"seed": 2}},
-    "the same with noise of 2 m/s²": {"sensor": HEARD | {"noise_m_per_s2": 2.0, "seed": 2}},
     "the same with noise of 10 m/s²": {"sensor": HEARD | {"noise_m_per_s2": 10.0, "seed": 2}},
     "a clearance of 0.1 mm": {"clearance_mm": 0.1},
     "a clearance of 0.3 mm": {"clearance_mm": 0.3},
-    "Threlfall's friction law": {"friction": {"law": "threlfall"}},
-    "a friction of 0.1, not 0.15 (static 0.15, not 0.23)": {
-        "friction": {"static": 0.15, "dynamic": 0.1},
-    },
-    "Flores' contact law, restitution 0.7": {
-        "contact": {"law": "flores", "restitution": 0.7},
-    },
     "no friction": {"friction": False},
     "520 rpm, not 500": {"machine": {"speed_rpm": 520}},
 }
 LIKENESS = {  # as measured once: correlation, envelope, ratio of rms, distance of spectra (dB)
     "itself, with other noise": (1.00, 1.00, 1.00, 0.1),
-    "the same with noise of 2 m/s²": (0.99, 1.00, 0.95, 16.7),
     "the same with noise of 10 m/s²": (0.88, 0.93, 0.51, 23.4),
     "a clearance of 0.1 mm": (0.50, 0.66, 3.02, 5.7),
     "a clearance of 0.3 mm": (-0.15, 0.80, 1.06, 4.0),
-    "Threlfall's friction law": (1.00, 1.00, 1.00, 0.0),
-    "a friction of 0.1, not 0.15 (static 0.15, not 0.23)": (0.32, 0.94, 1.10, 2.0),
     "no friction": (-0.70, 0.86, 0.57, 3.7),
-    "Flores' contact law, restitution 0.7": (0.26, 0.94, 2.61, 8.5),
     "520 rpm, not 500": (0.08, 0.87, 0.96, 1.7),
 }
 TOLERANCE = {"correlation": 0.1, "envelope": 0.05, "rms_ratio": 0.05, "spectral_distance": 0.3}
@@ -117,8 +105,7 @@ def test_a_unit_that_was_perhaps_mistaken_is_named(unit, told, folder, capsys):
     assert told in run(folder, capsys, path, folder[1], *words, unit)
     assert "perhaps" not in run(folder, capsys, path, folder[1], *words, "in/s2")
     (job,) = json.loads(run(folder, capsys, path, folder[1], *words, "m/s2", "--json"))["jobs"]
-    assert job["shift_deg"] == pytest.approx(20.0, abs=0.2)
-    assert job["shifted"] == pytest.approx(1.0, abs=0.01)
+    assert job["rms_ratio"]["value"] == pytest.approx(1.0, rel=0.01)
 
 
 @pytest.mark.compiled
@@ -128,7 +115,7 @@ def test_the_figure_has_the_curves_of_both(folder, capsys, tmp_path):
     assert ET.parse(picture).getroot().tag.endswith("svg")
     assert out.splitlines()[-1].strip() == CAPTION
     found = json.loads(run(folder, capsys, folder[1], "others", "-o", str(table), "--json"))
-    assert f"inside the range of the 10 jobs at {found['envelope_inside']:.0%} of crank" in out
+    assert f"inside the range of the 6 jobs at {found['envelope_inside']:.0%} of crank" in out
     with open(table, newline="", encoding="utf-8") as file:
         head, *rows = csv.reader(file)
     peaks = [float(row[at]) for at in [head.index(next(

@@ -70,8 +70,6 @@ def test_a_shift_and_a_size_are_found_apart(degrees):
     power = {k: a**2 for k, a in waves}
     cosine = sum(p * math.cos(math.radians(k * degrees)) for k, p in power.items())
     assert found.correlation.value == pytest.approx(cosine / sum(power.values()), abs=1e-3)
-    assert found.shift_deg == pytest.approx(degrees, abs=0.11)
-    assert found.shifted == pytest.approx(1.0, abs=1e-3)
     assert found.rms_ratio.value == pytest.approx(3.0, rel=1e-3)
     assert found.spectral_distance.value == pytest.approx(0.0, abs=0.2)
 
@@ -81,7 +79,7 @@ def test_a_record_is_like_itself():
     found = likeness(one, one)
     assert found.correlation.value == pytest.approx(1.0)
     assert found.envelope.value == pytest.approx(1.0)
-    assert (found.shift_deg, found.rms_ratio.value, found.segment_ratio) == (0.0, 1.0, 1.0)
+    assert found.rms_ratio.value == 1.0
     assert found.spectral_distance.value == 0.0
 
 
