@@ -13,7 +13,7 @@ import numpy as np
 from compressor.cases import Case, CaseError, Sensor, outside_judged, paper_notes, points, value_in
 from compressor.outcome import Regime
 from compressor.store.stored import Stored
-from compressor.store.studies import StoredStudy, swept_column
+from compressor.store.studies import StoredStudy
 
 MIN_FAILED = 3  # failed jobs, and good ones, for a tree of where jobs fail
 MIN_GAIN = 0.02  # of impurity that a split must bring
@@ -117,18 +117,13 @@ def _of_failures(stored: Stored, study: StoredStudy) -> list[str]:
         from sklearn.tree import DecisionTreeClassifier, export_text
     except ImportError:
         return []
-    swept = [*points(study)]
-    columns: dict[str, np.ndarray] = {}
-    for axis in study.axes:
-        values = swept_column(axis.key, [point.get(axis.key) for point in swept])[0][there]
-        if values.dtype.kind == "U":  # of words a column each
-            columns |= {f"{axis.key} is {word}": values == word for word in np.unique(values)}
-        else:
-            columns[axis.key] = values
+    import pandas as pd
+
+    table = pd.get_dummies(pd.DataFrame(points(study))[there], prefix_sep=" is ")
     tree = DecisionTreeClassifier(
         max_depth=2, min_samples_leaf=MIN_FAILED, min_impurity_decrease=MIN_GAIN, random_state=0
-    ).fit(np.array([*columns.values()], float).T, np.where(failed, "failed", "ok"))
+    ).fit(table.to_numpy(float), np.where(failed, "failed", "ok"))
     if tree.get_depth() == 0:
         return []
-    text = export_text(tree, feature_names=[*columns], decimals=4, show_weights=True)
+    text = export_text(tree, feature_names=[*table], decimals=4, show_weights=True)
     return [f"where jobs fail (jobs of each class in weights):\n{text.rstrip()}"]
