@@ -33,7 +33,7 @@ def verify(folder, as_json) -> int:
     if not damages:
         screen.say("no damage")
         return screen.DONE
-    lost = len({key for damage in damages for key in damage.keys})
+    lost = len({key for damage in damages for key in damage.studies})
     screen.say(f"{plural(len(damages), 'damaged file')}, {plural(lost)} lost")
     for command in screen.run_commands((one for damage in damages for one in damage.again), folder):
         screen.say(f"to repair: {command}")

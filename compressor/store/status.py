@@ -48,13 +48,12 @@ def find_owners(studies: Iterable[StoredStudy], keys: Iterable[str]) -> dict[str
 class Damage:
     """A file of a store that is gone or not what was written, and the jobs that are lost with it.
 
-    keys: of the lost jobs; studies: those of each of them. A run of `again` computes them again;
-    `remedy` is what else is to be done, or "".
+    studies: those of each of the lost jobs by key. A run of `again` computes them again; `remedy`
+    is what else is to be done, or "".
     """
 
     path: Path
     problem: str
-    keys: tuple[str, ...]
     remedy: str
     studies: dict[str, Owners]
     again: tuple[Again, ...]
@@ -67,8 +66,7 @@ class Damage:
         belong = find_owners(studies, keys)
         names = {name for owners in belong.values() for name in owners}
         again = tuple(study.again for study in studies if study.name in names)
-        remedy = "" if belong else remedy
-        return cls(Path(error.path), error.problem, tuple(belong), remedy, belong, again)
+        return cls(Path(error.path), error.problem, "" if belong else remedy, belong, again)
 
 
 def verify(folder: Folder) -> list[Damage]:

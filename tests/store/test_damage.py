@@ -140,7 +140,7 @@ def test_every_flipped_bit_of_a_batch_is_told_or_changes_nothing(samples, tmp_pa
         if found is None:
             told += 1
             (damage,) = verify(tmp_path)
-            assert (damage.path, damage.keys) == (path, (key(0), key(1), key(2)))
+            assert (damage.path, [*damage.studies]) == (path, [key(0), key(1), key(2)])
             assert {*damage.studies[key(1)]} == {"made"}
     assert told > 400
     path.write_bytes(good)
@@ -154,7 +154,7 @@ def test_every_flipped_bit_of_a_study_is_found(tmp_path):
     for at in range(len(good)):
         path.write_bytes(flipped(good, at, rng.randrange(8)))
         (damage,) = verify(tmp_path)
-        assert (damage.path, damage.keys) == (path, ())
+        assert (damage.path, damage.studies) == (path, {})
         assert damage.remedy == "run its case file again"
 
 
@@ -202,8 +202,8 @@ def test_jobs_in_a_damaged_batch_count_as_missing_with_a_warning(tmp_path, capsy
         found = open_study(tmp_path)
     assert [sum(path.name in str(one.message) for one in told) for path in paths] == [1, 0, 1]
     assert found.status.values[:3].tolist() == ["missing", "ok", "missing"]
-    lost = {damage.path: damage.keys for damage in verify(tmp_path)}
-    assert lost == {paths[0]: (key(0),), paths[2]: (*map(key, range(2, 400)),)}
+    lost = {damage.path: [*damage.studies] for damage in verify(tmp_path)}
+    assert lost == {paths[0]: [key(0)], paths[2]: [*map(key, range(2, 400))]}
     assert cli.main(["verify", "-r", str(tmp_path), "--json"]) == 5
     assert {one["path"] for one in json.loads(capsys.readouterr().out)} == {*map(str, lost)}
     stored = read_store(tmp_path)
