@@ -235,7 +235,7 @@ def _unit(key: str) -> str:
     return (row.unit or "1") if row and row.kind in ("number", "integer") else ""
 
 
-SAME_VALUE = 1e-9  # relative; the decimal fractions of a case file are not meant to the last bit
+AS_PRINTED = 1e-5  # relative; values are shown to six digits
 
 
 def find_study(
@@ -329,23 +329,16 @@ def find_value(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]
     axis = find_axis(folder, study, name)
     row = row_of(axis.key)
     text = row.choice_of(text) if row else text
-    number = math.nan
+    meant = {in_words(value): value for value in axis.values}
+    numbers = [value for value in axis.values if isinstance(value, int | float)]
     with contextlib.suppress(ValueError):
-        number = float(text)
-    for is_meant in (
-        lambda value: text == in_words(value),
-        lambda value: _is_number(value) and math.isclose(number, value, rel_tol=SAME_VALUE),
-        lambda value: isinstance(value, float) and text == f"{value:g}",  # as it is printed
-    ):
-        same = dict.fromkeys(filter(is_meant, axis.values))
-        if len(same) == 1:
-            return axis.key, next(iter(same))
+        near = min(numbers, key=lambda value: abs(value - float(text)), default=math.nan)
+        if math.isclose(near, float(text), rel_tol=AS_PRINTED):
+            meant.setdefault(text, near)
+    if text in meant:
+        return axis.key, meant[text]
     problem = f"no job of {study.name} has {axis.key}={text}"
     raise WrongName(folder, problem, f"there are {_name_values(axis.values)}")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _name_axes(study: StoredStudy) -> str:
