@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from compressor.cases import MODEL_VERSION
+from compressor.outcome import Outcome
 from compressor.program import COMPILED, VERSION, CompsimError, library_versions, sources_hash
 from compressor.reasons import Reason
 from compressor.store import encode_batch, publish_batch
@@ -23,7 +24,7 @@ from compressor.sweep.pool import Batches, Job
 from compressor.sweep.sweep import run_job
 from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Needs, load
-from compressor.sweep.worker import End, JobLost, JobResult, attempt
+from compressor.sweep.worker import End, JobLost, JobResult, attempt, store_results
 
 WITH_PORT = re.compile(r":\d+/?$|^inproc://")
 CONNECT_SECONDS = 8.0  # s until a scheduler that does not answer counts as not there
@@ -49,21 +50,25 @@ def versions() -> dict[str, str]:
     } | library_versions("numpy", "scipy", "numba", "llvmlite")  # fmt: skip
 
 
-def run_cases(ours: dict[str, str], needs: Needs, cases: bytes) -> str | tuple[list[End], bytes]:
-    """Return how pickled cases ended, and their encoded batch, on a worker of the cluster.
+def run_cases(
+    ours: dict[str, str], needs: Needs, cases: bytes
+) -> str | tuple[list[End], list[bytes]]:
+    """Return how pickled cases ended, and their batches, on a worker of the cluster.
 
     Return where its versions are others, if they are.
     """
+    batches: list[bytes] = []
+
+    def keep(outcomes: list[Outcome]) -> list[JobEnd]:
+        batches.append(encode_batch(outcomes))
+        return [JobEnd.of(outcome) for outcome in outcomes]
+
     theirs = versions()
     if theirs != ours:
         names = [name for name in ours if ours[name] != theirs[name]]
         return ", ".join(f"{name} {theirs[name]} in place of {ours[name]}" for name in names)
     load_once(needs)
-    ends = [attempt(run_job, case) for case in pickle.loads(cases)]
-    ran = [end.result for end in ends if isinstance(end, JobResult)]
-    data = encode_batch(ran) if ran else b""
-    ended = iter([JobEnd.of(outcome) for outcome in ran])
-    return [replace(e, result=next(ended)) if isinstance(e, JobResult) else e for e in ends], data
+    return store_results(keep, [attempt(run_job, case) for case in pickle.loads(cases)]), batches
 
 
 load_once = functools.cache(load)  # in each process of the cluster, so that no job's time has it
@@ -148,8 +153,8 @@ class Cluster:
         if isinstance(problem, str):
             remedy = "have the same programs on all machines, then start its workers again"
             raise ClusterError(f"a worker of the cluster has {problem}; {remedy}") from error
-        ends, data = future.result()
-        if data:
+        ends, written = future.result()
+        for data in written:
             publish_batch(folder, data)
         for job, end in zip(batch, ends, strict=True):
             if isinstance(end, JobResult):
