@@ -62,13 +62,13 @@ class Forecast:
     bytes: int = 0
 
 
+@dataclass(frozen=True)
 class Ahead:
     """What is ahead of some studies: `counts` is a Forecast without times and bytes."""
 
-    def __init__(self, counts: Forecast, missing: dict[str, list[str]], cases: RequestedJobs):
-        self.counts = counts
-        self.missing = missing  # keys, by study
-        self.cases = cases
+    counts: Forecast
+    missing: dict[str, list[str]]  # keys, by study
+    cases: RequestedJobs
 
     def with_times(self, workers: int, remark: Callable[[str], None]) -> Forecast:
         """Return the whole forecast, for so many processes; `remark` is called about compiling."""

@@ -21,7 +21,6 @@ from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Needs, compile_once, load
 from compressor.sweep.worker import End, JobLost, Store, attempt, describe_error, store_results
 
-MANY_JOBS = 100_000  # jobs whose cases take a while to be made
 GRACE = 5.0  # s beyond its time in which a job may end by itself, before its worker is killed
 REPORT_SECONDS = 0.1  # s between two reports of progress, or more
 
@@ -99,9 +98,6 @@ def sweep(
     folder = Path(folder).absolute()
     if options.part is not None:
         studies = [study.shard(*options.part) for study in studies]
-    jobs = sum(len(study.selected) for study in studies)
-    if jobs > MANY_JOBS:
-        progress(0, jobs, f"preparing {jobs} jobs")
     wanted, stored = RequestedJobs(studies), read_store(folder)
     ends = wanted.stored_ends(stored)
     if options.rerun_failed:

@@ -1,7 +1,6 @@
 """What is ahead of a sweep: counts at once, and costs from some of its jobs."""
 
 import json
-import sys
 
 import pytest
 from compsim import cli, progress
@@ -148,10 +147,3 @@ def test_counts_are_told_before_anything_is_timed(studies, monkeypatch, capsys):
     assert cli.main(["plan", "one.yaml", "-j", "1"]) == 0
     assert [" ".join(out.split()) for out in seen] == ["one 9 jobs 0 done 9 missing"]
     assert capsys.readouterr().out.startswith("about ")
-
-
-def test_a_study_that_is_prepared_for_long_says_so(studies, monkeypatch):
-    told = []
-    monkeypatch.setattr(sys.modules["compressor.sweep.sweep"], "MANY_JOBS", 8)
-    sweep(studies(one=NINE), "results", 1, lambda *event: told.append(event))
-    assert told[0] == (0, 9, "preparing 9 jobs")
