@@ -21,7 +21,7 @@ FAST = Path("/dev/shm")  # in memory, where there is one: what is tried is not t
 CAMPAIGNS = {  # name: (module of chaos/, trials, trials of a sample)
     "kill": ("kill", 300, 5),
     "power": ("power", 100, 1),
-    "faults": ("faults", 10_000, 1),
+    "faults": ("faults", 200, 1),
     "poison": ("poison", 200, 4),
     "flips": ("flips", 3000, 5),
     "concurrent": ("concurrent", 100, 3),

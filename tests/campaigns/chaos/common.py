@@ -7,8 +7,8 @@ import itertools
 import json
 import multiprocessing
 import os
-import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -32,6 +32,8 @@ SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides 
 FORK = multiprocessing.get_context("fork")
 SECONDS = 60.0  # in which a trial must end; what hangs takes for ever
 TIMED = "seconds"
+MASSES = [4 + n / 100 for n in range(24)]  # of rods, kg
+FOREIGN = ("case", "name")  # attributes that depend on which of several studies ran a job
 LEAN = {  # of a quick job
     "duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9,
     "error_bars": False,
@@ -107,7 +109,7 @@ def complete_store(folder):
 def contents(folder, foreign=()):
     """Key -> a digest of all that is stored of a job but the seconds that it took.
 
-    foreign: attributes that depend on which of several studies ran it.
+    foreign: attributes that do not count.
     """
     stored, found = read_store(folder), {}
     for position, key in enumerate(stored.columns["job"]):
@@ -146,11 +148,26 @@ def damage(folder):
 @contextlib.contextmanager
 def fresh(folder):
     """An empty folder for a trial, gone after it."""
-    place = Path(tempfile.mkdtemp(prefix="trial-", dir=folder))
+    with tempfile.TemporaryDirectory(dir=folder, ignore_cleanup_errors=True) as place:
+        yield Path(place)
+
+
+def call(*words, good=(0,)):
+    """Call a program; raises RuntimeError with what it says, OSError where it is not installed."""
+    done = subprocess.run([*map(str, words)], capture_output=True, text=True, check=False)
+    if done.returncode not in good:
+        raise RuntimeError(f"{words[0]}: {done.returncode}: {done.stdout}{done.stderr}")
+
+
+@contextlib.contextmanager
+def mounted(place, *words):
+    """A file system on a folder, as words of mount say."""
+    place.mkdir(exist_ok=True)
+    call("mount", *words, place)
     try:
         yield place
     finally:
-        shutil.rmtree(place, ignore_errors=True)
+        call("umount", "-l", place)
 
 
 # ---- forks and commands -------------------------------------------------------------------------

@@ -7,16 +7,14 @@ that it was asked for in the store, to the bit, whatever the others have done of
 import random
 import time
 
-from chaos.common import Tally, contents, damage, fresh, rods_file
+from chaos.common import FOREIGN, MASSES, Tally, contents, damage, fresh, rods_file
 from chaos.kill import hurried
-from chaos.processes import Run
+from chaos.processes import Run, undisturbed
 from compressor.cases.load import load_studies
 from compressor.store.studies import read_studies
 
 WHAT = "two to four runs on one store at once"
-MASSES = [4 + n / 100 for n in range(24)]  # rod masses, kg; a study has a stretch of them
 KEEPS = ("metrics", "series")
-FOREIGN = ("case", "name")  # they tell which of the studies ran a job
 LATEST = 0.4  # s after the first start
 REAL = 10  # one trial in so many is of real commands
 
@@ -83,15 +81,6 @@ def trial(folder, expected, draw, counts, real):
         problems.append("the same commands, once more, do not leave all as it was")
     counts.update("a shard" if "--shard" in command else "a whole run" for command in commands)
     return "; ".join(problems)
-
-
-def undisturbed(folder, keep):
-    """What a run alone stores of each job that keeps time series or not."""
-    with fresh(folder) as place:
-        rods_file(place, "one", MASSES, keep)
-        _, codes = together(place, [["one.yaml"]], random.Random(0), False)
-        assert codes == [0]
-        return contents(place / "out", FOREIGN)
 
 
 def campaign(trials, seed, folder):

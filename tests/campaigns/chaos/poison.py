@@ -11,17 +11,15 @@ from functools import cache, partial
 
 from sweep.bad_jobs import LEAST, POISON
 
-from chaos.common import SWEEP, Tally, contents, damage, fresh, rods_file
-from chaos.processes import Run
+from chaos.common import FOREIGN, MASSES, SWEEP, Tally, contents, damage, fresh, rods_file
+from chaos.processes import Run, undisturbed
 from compressor.cases.load import load_studies
 from compressor.store.stored import read_store
 from compressor.sweep import pool
 
 WHAT = "jobs that crash, leave, hang, stand still or eat memory, among good ones"
-GOOD = [4 + n / 100 for n in range(24)]  # rod masses, kg
 MAX_BAD = 5
 SECONDS = 0.3  # that a job which never ends may take
-FOREIGN = ("case", "name")  # they hold the time that a job may take, and its study
 SOME_FAILED = 3
 
 
@@ -53,7 +51,7 @@ def mixed(folder, draw):
     Returns the files' names, what they keep, the keys of good jobs, the kinds of bad ones by key.
     """
     keep = draw.choice(["metrics", "series"])
-    jobs = [(mass, "") for mass in draw.sample(GOOD, draw.randint(1, len(GOOD)))]
+    jobs = [(mass, "") for mass in draw.sample(MASSES, draw.randint(1, len(MASSES)))]
     kinds = [draw.choice(list(KINDS)) for _ in range(draw.randint(1, MAX_BAD))]
     jobs += [(5 + n / 100, kind) for n, kind in enumerate(kinds)]
     draw.shuffle(jobs)
@@ -95,15 +93,6 @@ def trial(folder, expected, draw, counts):
     counts.update(bad.values())
     counts["good jobs"] += len(good)
     return "; ".join(problems)
-
-
-def undisturbed(folder, keep):
-    """What is stored of the good jobs in a sweep without bad ones: key -> digest."""
-    with fresh(folder) as place:
-        rods_file(place, "good", GOOD, keep)
-        run = Run(["run", "good.yaml", "-r", "out", "-j", "2"], place)
-        assert run.finish() == 0, run.text()
-        return contents(place / "out", FOREIGN)
 
 
 def campaign(trials, seed, folder):

@@ -18,17 +18,18 @@ import select
 import shutil
 import signal
 import struct
-import subprocess
 import time
 
 from chaos.common import (
     FORK,
     SWEEP,
     Tally,
+    call,
     case_file,
     differing,
     forked,
     fresh,
+    mounted,
     run_here,
     whole,
 )
@@ -60,30 +61,12 @@ def unable(image):
         call("mkfs.ext4", "-q", "-F", "-E", "lazy_itable_init=0,lazy_journal_init=0", image)
         with fresh(image.parent) as trial:
             shutil.copyfile(image, trial / "disk.img")
-            with mounted(trial / "disk.img", trial / "disk", "commit=5") as disk:
+            with mounted(trial / "disk", "-o", "loop", trial / "disk.img") as disk:
                 cut(disk)
             call("e2fsck", "-fy", trial / "disk.img", good=(0, 1))
     except (RuntimeError, OSError) as error:
         return str(error)
     return ""
-
-
-@contextlib.contextmanager
-def mounted(image, place, options):
-    """An image's file system on a folder."""
-    place.mkdir()
-    call("mount", "-o", f"loop,{options}", image, place)
-    try:
-        yield place
-    finally:
-        call("umount", place)
-
-
-def call(*words, good=(0,)):
-    """Call a program; raises RuntimeError with what it says, OSError where it is not installed."""
-    done = subprocess.run([*map(str, words)], capture_output=True, text=True, check=False)
-    if done.returncode not in good:
-        raise RuntimeError(f"{words[0]}: {done.returncode}: {done.stdout}{done.stderr}")
 
 
 def cut(place):
@@ -157,7 +140,7 @@ class Campaign:
         options, wait = rng.choice(OPTIONS), rng.uniform(0, MAX_SECONDS)
         promptly = bool(control) or rng.random() < 0.5  # upon an acknowledgement
         reader, channel = os.pipe()
-        with mounted(trial / "disk.img", trial / "disk", options) as disk:
+        with mounted(trial / "disk", "-o", f"loop,{options}", trial / "disk.img") as disk:
             arguments = disk / "store", channel, control, rng.choice((0, 8))
             child = FORK.Process(target=self.write, args=arguments)
             child.start()
@@ -182,7 +165,7 @@ class Campaign:
         with fresh(self.folder) as trial:
             acknowledged = self.disturb(trial, rng, control)
             call("e2fsck", "-fy", trial / "cut.img", good=(0, 1))
-            with mounted(trial / "cut.img", trial / "copy", "commit=5") as disk:
+            with mounted(trial / "copy", "-o", "loop", trial / "cut.img") as disk:
                 ended = forked(lambda: acknowledged - intact(disk / "store"))
                 lost = acknowledged if ended.death else ended.result
                 if control:

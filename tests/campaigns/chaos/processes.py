@@ -18,6 +18,8 @@ from pathlib import Path
 
 from compsim.cli import main
 
+from chaos.common import FOREIGN, MASSES, contents, fresh, rods_file
+
 PROGRESS = re.compile(rb"(\d+) of \d+ jobs, \d+ %")
 
 
@@ -99,6 +101,15 @@ class Run:
     def text(self):
         """All that its terminal has shown."""
         return self.terminal.decode(errors="replace")
+
+
+def undisturbed(folder, keep):
+    """What a run that nobody disturbs stores of a job of each of `MASSES`: key -> digest."""
+    with fresh(folder) as place:
+        rods_file(place, "one", MASSES, keep)
+        run = Run(["run", "one.yaml", "-r", "out", "-j", "2"], place)
+        assert run.finish() == 0, run.text()
+        return contents(place / "out", FOREIGN)
 
 
 def become(arguments, folder, terminal, real, prepare):
