@@ -9,7 +9,6 @@ import logging
 import os
 import pickle
 import platform
-import re
 from collections.abc import Callable, Generator
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +25,6 @@ from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Needs, load
 from compressor.sweep.worker import End, JobLost, JobResult, attempt, store_results
 
-WITH_PORT = re.compile(r":\d+/?$|^inproc://")
 CONNECT_SECONDS = 8.0  # s until a scheduler that does not answer counts as not there
 TARGET_SECONDS = 0.5  # of a batch
 BATCHES_AHEAD = 3  # that a thread of the cluster has at most: one at work, others on their way
@@ -89,14 +87,12 @@ class Cluster:
         except ImportError as error:
             needs = "--scheduler needs dask.distributed: pip install 'compsim[dask]'"
             raise ClusterError(needs) from error
-        if not WITH_PORT.search(self.address):
-            raise ClusterError(f"{self.address}: names no port; write tcp://host:8786")
         for name in ("distributed", "tornado"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # we speak for it
         try:
             self.client = Client(self.address, timeout=CONNECT_SECONDS, set_as_default=False)
         except Exception as error:
-            remedy = "is one running there? `dask scheduler` starts one, and prints its address"
+            remedy = "`dask scheduler` starts one, and prints its address, such as tcp://host:8786"
             raise ClusterError(f"{self.address}: no scheduler answers; {remedy}") from error
         return self
 

@@ -163,14 +163,6 @@ def impatient(monkeypatch):
     monkeypatch.setattr(cluster, "CONNECT_SECONDS", 1.0)
 
 
-@pytest.mark.parametrize("address", ["tcp://127.0.0.1", "localhost"])
-def test_an_address_without_a_port_is_refused_before_it_is_called(address, monkeypatch):
-    """It was called for a quarter of a minute, on a port that nobody had named."""
-    monkeypatch.setattr(distributed, "Client", pytest.fail)
-    with pytest.raises(ClusterError, match=f"^{address}: names no port; write tcp://host:8786$"):
-        Cluster(address).__enter__()
-
-
 def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path):
     told = []
     with distributed.LocalCluster(
