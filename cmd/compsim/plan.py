@@ -34,17 +34,16 @@ def plan(configs, folder, jobs, as_json, **how) -> int:
     Jobs that are stored already are not run again. Times one job of each study, and takes the
     others to cost as much for every revolution; stores nothing.
     """
-    from compressor.analysis import describe_machine
     from compressor.sweep import cores, forecast
 
     studies = read_cases(configs, **how)
-    screen.caution(studies, None)
-    screen.say_machines(studies)
+    machines = screen.caution(studies, None)
+    screen.say_machines(machines)
     found, workers = forecast(studies, folder, FIRST), jobs or cores()
     if as_json:
-        machines = {one.name: dataclasses.asdict(describe_machine(one)) for one in studies}
+        plain = {study: dataclasses.asdict(machine) for study, machine in machines.items()}
         times = dataclasses.asdict(found.with_times(workers, screen.say))
-        screen.print_json(times | {"machines": machines})
+        screen.print_json(times | {"machines": plain})
         return screen.DONE
     rows = []
     for one in found.counts.studies:

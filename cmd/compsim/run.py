@@ -61,9 +61,9 @@ def run(command, configs, folder, jobs, rerun, shard, scheduler, quiet, **how) -
     if how["only"] and not quiet:
         selected = sum(len(study.selected) for study in studies)
         screen.say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
-    screen.caution(studies)
+    machines = screen.caution(studies)
     cluster: Any = Cluster(scheduler) if scheduler else nullcontext()
-    opening = partial(screen.say_machines, studies)  # where there are jobs to run
+    opening = partial(screen.say_machines, machines)  # where there are jobs to run
     with ProgressReporter(quiet, "jobs", folder, opening) as progress, cluster as elsewhere:
         asked = Options(
             command, how["overrides"], bool(rerun), shard, elsewhere, progress.count_failed

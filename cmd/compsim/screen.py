@@ -20,6 +20,7 @@ from compressor.program import THREAD_VARIABLES, duration, printable
 from compsim import options
 
 if TYPE_CHECKING:
+    from compressor.analysis import MachineDescription
     from compressor.cases import Study
     from compressor.store import Again
 
@@ -183,14 +184,20 @@ def run_commands(studies: "Iterable[Again]", folder: str) -> list[str]:
     return commands
 
 
-def caution(studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS) -> None:
-    """Report once what is odd about case files, in at most `most` warnings a file."""
+def caution(
+    studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS
+) -> "dict[str, MachineDescription]":
+    """Return what each study says of its machine; report what is odd about case files.
+
+    In at most `most` warnings a file.
+    """
     from compressor.analysis import describe_machine
     from compressor.solve import cautions
 
+    machines = {study.name: describe_machine(study) for study in studies}
     for study in studies:
         found = cautions(study)
-        implausible = describe_machine(study).remarks({one.key for one in found})
+        implausible = machines[study.name].remarks({one.key for one in found})
         texts = [f"{key}: {text}" for key, text in implausible.items()]
         for one in found:
             looked = "" if one.of == len(study.selected) else " that were looked at"
@@ -202,13 +209,12 @@ def caution(studies: "Sequence[Study]", most: int | None = MAX_CAUTIONS) -> None
             more = plural(len(texts) - most, "more warning")
             command = f"compsim plan {shlex.quote(study.path)}"
             say_wrapped(f"{study.path}: and {more}, which {command} lists")
+    return machines
 
 
-def say_machines(studies: "Sequence[Study]") -> None:
-    """Report what case files say of their machines: loads, power, pressures, pins."""
-    from compressor.analysis import describe_machine
-
-    for study in studies:
-        say(f"{study.name}: its machine, without clearance")
-        for line in align_columns(describe_machine(study).lines()):
+def say_machines(machines: "Mapping[str, MachineDescription]") -> None:
+    """Report what studies, by name, say of their machines: loads, power, pressures, pins."""
+    for study, machine in machines.items():
+        say(f"{study}: its machine, without clearance")
+        for line in align_columns(machine.lines()):
             say("\n".join(wrap_value(f"  {line}")))

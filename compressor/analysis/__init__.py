@@ -20,7 +20,11 @@ from compressor.analysis.effects import (
     saltelli_design,
     sampled_effects,
 )
-from compressor.analysis.machine_numbers import describe_cases, describe_machine
+from compressor.analysis.machine_numbers import (
+    MachineDescription,
+    describe_cases,
+    describe_machine,
+)
 from compressor.analysis.margins import mean_peak
 from compressor.analysis.orbit import orbit
 from compressor.analysis.runs import (

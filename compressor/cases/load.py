@@ -306,7 +306,7 @@ def _check_cases(
     values: dict[str, list[Any]] = {key: [] for key in columns}
     total = len(cases)
     progress = progress if total >= MANY_CASES else no_progress
-    for number, (block, place) in enumerate(cases.combinations):
+    for number, (block, place) in enumerate(cases.places()):
         if number % 1000 == 0:
             progress(number, total, "" if number else f"{file.name}: {total} jobs")
         try:

@@ -1,6 +1,7 @@
 """A study: the jobs of one case file, each built when it is used."""
 
 import itertools
+from bisect import bisect_right
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, overload
@@ -53,14 +54,14 @@ class Study:
     def given(self, number: int) -> dict[str, Any]:
         """Return what the file gives of a job, nested as a case file has it."""
         assert isinstance(self.cases, Cases)
-        block, place = self.cases.combinations[number]
+        block, place = self.cases.place_of(number)
         return {**expand_synonyms(block.values_of(place))[0], "name": block.name}
 
     def solver_of(self, number: int) -> Hashable:
         """Return what jobs share only if their cases have equal groups `solve` and `output`."""
         if not isinstance(self.cases, Cases):
             return number
-        block, place = self.cases.combinations[number]
+        block, place = self.cases.place_of(number)
         return id(block), block.solver_of(place)
 
     def shard(self, number: int, of: int) -> "Study":
@@ -79,13 +80,22 @@ class Cases(Sequence[Case]):
     `keys`: of all of them, as soon as they are known.
     """
 
-    def __init__(self, parts: Sequence[Block]):
-        self.parts = parts
-        self.combinations = [(part, number) for part in parts for number in part.numbers]
+    def __init__(self, blocks: Sequence[Block]):
+        self.blocks = blocks
+        self.ends = [*itertools.accumulate(len(block.numbers) for block in blocks)]
         self.keys: Sequence[str] = ()
 
     def __len__(self) -> int:
-        return len(self.combinations)
+        return self.ends[-1]
+
+    def place_of(self, index: int) -> tuple[Block, int]:
+        """Return the block of a case, and the number of its combination there."""
+        at = bisect_right(self.ends, index)
+        return self.blocks[at], self.blocks[at].numbers[index - self.ends[at]]
+
+    def places(self) -> Iterator[tuple[Block, int]]:
+        """Yield the block and the number in it of each case."""
+        return ((block, number) for block in self.blocks for number in block.numbers)
 
     @overload
     def __getitem__(self, index: int) -> Case: ...
@@ -95,7 +105,7 @@ class Cases(Sequence[Case]):
         numbers = range(len(self))[index]
         if isinstance(numbers, range):
             return tuple(self[number] for number in numbers)
-        block, place = self.combinations[numbers]
+        block, place = self.place_of(numbers)
         case = block.case(place)
         if self.keys:
             vars(case)["key"] = self.keys[numbers]
@@ -103,7 +113,7 @@ class Cases(Sequence[Case]):
 
     def where(self, test: Test) -> list[int]:
         """Return the numbers of the cases for which a comparison holds."""
-        jobs = (reader(block.values_of(place)) for block, place in self.combinations)
+        jobs = (reader(block.values_of(place)) for block, place in self.places())
         return [number for number, job in enumerate(jobs) if test(job)]
 
 
