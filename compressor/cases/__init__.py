@@ -48,6 +48,6 @@ from compressor.cases.parameter import (
 )
 from compressor.cases.study import Axis, Study, points
 from compressor.cases.swept import design
-from compressor.cases.table import OF_JOINTS, table
+from compressor.cases.table import table
 from compressor.cases.text_table import open_text_table
 from compressor.cases.yaml_reader import CaseFileError

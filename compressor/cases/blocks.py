@@ -27,7 +27,7 @@ from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.keys import drop, key_of, leaves, path_of, put
 from compressor.cases.parameter import CaseError, integer, make_group, quote_value
 from compressor.cases.swept import FORMS, NoSweep, Sweep, design, design_size, sweep_of
-from compressor.cases.table import OF_JOINTS, outside_identity
+from compressor.cases.table import outside_identity
 from compressor.cases.yaml_reader import FileProblem, Place, Tree
 
 RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
@@ -115,8 +115,7 @@ class Block:
         """Return the values of one combination, nested as a case file has them."""
         values = self.values_at(self.rows_of(number))
         if "joint" in self.sweeps and values["joint"] == "none":
-            for key in OF_JOINTS:
-                values = drop(values, (key,))
+            return drop(values, ("clearance_mm",))
         return values
 
     def case(self, number: int) -> Case:

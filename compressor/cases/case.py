@@ -69,7 +69,6 @@ from compressor.cases.parameter import (
 )
 from compressor.cases.table import (
     GROUPS,
-    OF_JOINTS,
     TOP,
     WORDS,
     outside_identity,
@@ -264,10 +263,10 @@ stroke, 240 mm
         True
         """
         found: dict[str, Any] = {}
-        for name in ("name", "load", "joint", *OF_JOINTS, "healthy_clearance_mm", *GROUPS):
+        for name in ("name", "load", "joint", "clearance_mm", "healthy_clearance_mm", *GROUPS):
             value = getattr(self, name)
             is_default = (value is None and WORDS[name]) or value == SOUND
-            if is_default or (self.joint == "none" and name in OF_JOINTS):
+            if is_default or (self.joint == "none" and name == "clearance_mm"):
                 continue
             if name in GROUPS:
                 found[name] = _plain_value(value)
@@ -470,7 +469,8 @@ def name_as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> l
     for one in problems:
         whole = one.key.rpartition(".")[0]
         value = _value_at(whole, values) if whole in parts_by_key() else {}
-        by_part = isinstance(value, Mapping | BY_PART) or (value is None and whole in OF_JOINTS)
+        by_part = isinstance(value, Mapping | BY_PART)
+        by_part |= value is None and whole == "clearance_mm"
         by_part |= whole == LED and one.key != stands_for(whole)[0]
         found[one if by_part else Problem(whole, one.message)] = None
     return [*found]

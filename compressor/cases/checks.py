@@ -29,7 +29,7 @@ from compressor.cases.parameter import (
     quote_value,
     split_unit,
 )
-from compressor.cases.table import GROUPS, OF_JOINTS, TOP, WORDS, parts_by_key, table
+from compressor.cases.table import GROUPS, TOP, WORDS, parts_by_key, table
 from compressor.program import MAX_MEANT
 
 
@@ -55,7 +55,8 @@ def phrase_of(key: str) -> str:
 
 def single(key: str, values: Iterable[Any]) -> Any:
     """Return the one value that all parts of a key have, but for ideal joints; or None."""
-    found = {value for value in values if value is not None and (value or key not in OF_JOINTS)}
+    may_be_0 = key != "clearance_mm"
+    found = {value for value in values if value is not None and (value or may_be_0)}
     return found.pop() if len(found) == 1 else None
 
 

@@ -92,7 +92,7 @@ class Machine:
         14.0, "(0, 1e6]", "crosshead, piston rod and piston", "assumed", judged=(0.1, 200)
     )
     pin_radius_mm: PerJoint[float] = by_part(
-        PerJoint, 10.0,
+        PerJoint,
         number(
             10.0, "(0, 1e4]", "journal radius R_j", "inferred from Eq. 15 and Table 3",
             judged=(10, 100), fact=True,
@@ -107,7 +107,7 @@ class Machine:
         "none",
     )  # fmt: skip
     balance: PerMotion[float] | None = by_part(
-        PerMotion, None,
+        PerMotion,
         number(
             None, "[0, 1]", "share that a counterweight balances; in place of counterweight_kg_mm",
             "none",
@@ -199,7 +199,7 @@ class Gas:
         read=CRANK_END, fact=True,
     )  # fmt: skip
     clearance_percent: PerEnd[float | None] | None = by_part(
-        PerEnd, None,
+        PerEnd,
         number(
             None, "(0, 1000]", "clearance volume over swept volume; in place of head_clearance_mm",
             optional=True, fact=True,
@@ -207,7 +207,7 @@ class Gas:
         {"head": (CYCLE, HEAD_CLEARANCE), "crank": (CYCLE, CRANK_END)}, fill=None,
     )  # fmt: skip
     valve_loss_percent: PerValve[float] | None = by_part(
-        PerValve, None,
+        PerValve,
         number(
             None, "[0, 90]", "loss of absolute pressure while open; 0 without", read=CYCLE,
             fact=True,
@@ -220,7 +220,7 @@ class Gas:
         read=CYCLE,
     )  # fmt: skip
     indicator: PerEnd[str | None] | None = by_part(
-        PerEnd, None,
+        PerEnd,
         choice(
             None, (), "card; in place of pressures, exponent and clearance", "measured",
             kind="card", optional=True,
@@ -354,7 +354,7 @@ class Contact:
         read=(CLEARANCE, "contact.law != johnson and contact.law != liu"), judged=JUDGED_STIFFNESS,
     )  # fmt: skip
     materials: PerJoint[tuple[str, str]] | None = by_part(
-        PerJoint, None,
+        PerJoint,
         choice(
             None, ("steel", "copper"), "two materials; in place of a stiffness", "Table 2, Eq. 15",
             kind="materials", fact=True,
@@ -391,7 +391,7 @@ class Contact:
         judged=(1.0, 100.0),
     )  # fmt: skip
     length_mm: PerJoint[float] | None = by_part(
-        PerJoint, None,
+        PerJoint,
         number(None, "(0, 1e4]", "length (johnson, liu)", judged=(10.0, 100.0), fact=True),
         {joint: (own, *by_law("contact", "length_mm")) for joint, own in AT_JOINTS.items()},
     )  # fmt: skip

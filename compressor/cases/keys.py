@@ -6,7 +6,7 @@ from typing import Any
 
 from compressor.cases.checks import DOUBLES, SWEEP, stands_for
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.table import GROUPS, OF_JOINTS, WORDS, parts_by_key
+from compressor.cases.table import GROUPS, WORDS, parts_by_key
 from compressor.cases.yaml_reader import FileProblem, Path, Place, Tree, read_text, shorten
 
 
@@ -89,7 +89,7 @@ def override(file: Tree, changes: Tree) -> Tree:
     given |= {part for key in given for part in stands_for(key)}
     rivals = IN_PLACE_OF + tuple(DOUBLES.items())
     gone = [pair[pair[0] in given] for pair in rivals if len(given.intersection(pair)) == 1]
-    gone += OF_JOINTS if changes.values.get(("joint",)) == "none" else ()
+    gone += ["clearance_mm"] if changes.values.get(("joint",)) == "none" else []
     for key in gone:
         if not any(covers(key, one) for one in given):
             values = drop(values, path_of(key))

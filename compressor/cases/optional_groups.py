@@ -41,7 +41,7 @@ class Lubricant:
         judged=(3.0, 300.0), fact=True,
     )  # fmt: skip
     bearing_length_mm: PerJoint[float] = by_part(
-        PerJoint, 20.0,
+        PerJoint,
         number(20.0, "(0, 1e4]", "length of the bearing", "assumed: as long as wide", fact=True),
         AT_JOINTS,
     )  # fmt: skip

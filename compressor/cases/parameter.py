@@ -415,7 +415,7 @@ def annotation_of(row: Parameter) -> Any:
     kinds: dict[str, Any] = {
         "number": Annotated[
             float, Field(strict=True, allow_inf_nan=False, **ends), BeforeValidator(to_python),
-            AfterValidator(lambda value: value + 0.0),  # of -0
+            AfterValidator(lambda value: value or 0.0),  # of -0
         ],
         "integer": Annotated[int, Field(strict=True, **ends), BeforeValidator(to_whole)],
         "boolean": Annotated[bool, Field(strict=True), BeforeValidator(to_python)],
@@ -566,7 +566,6 @@ def annotation_of_field(name: str, item: Any, own: Any) -> Any:
 
 def by_part(
     of: type,
-    default: Any,
     row: Any,
     read: Mapping[str, Any] | None = None,
     fill: Any = ...,
@@ -585,7 +584,7 @@ def by_part(
         head = re.split(r"[:;,]| \(", own["phrase"])[0]
         own["phrase"] = f"{head} {PART_WORDS[name]}{own['phrase'][len(head) :]}"
         parts[name] = own
-    whole = None if default is None else of(*[default] * len(parts))
+    whole = None if row.default is None else of(*[row.default] * len(parts))
     return field(default=whole, metadata={"of": of, "parts": parts, "fill": fill, "first": first})
 
 

@@ -31,8 +31,6 @@ from compressor.cases.parameter import (
 )
 from compressor.metrics import JOINTS
 
-# groups that no joint reads with `joint: none`
-OF_JOINTS = ("clearance_mm",)
 # what a case has beside its groups
 TOP: dict[str, Any] = {
     "name": choice(
@@ -46,13 +44,13 @@ TOP: dict[str, Any] = {
         "none", ("none", "big_end", "small_end", "both"), "joints with clearance", "§3.2"
     ),
     "clearance_mm": by_part(
-        PerJoint, 0.0,
+        PerJoint,
         number(0.0, "[0, 1000]", "radial clearance", "§3.2", judged=(1e-3, 1.0)),
         {joint: ("joint != none", f"joint == {joint} or joint == both") for joint in JOINTS},
         fill=0.0,
     ),
     "healthy_clearance_mm": by_part(
-        PerJoint, 0.0,
+        PerJoint,
         number(
             0.0, "[0, 1000]",
             "clearance up to which a joint counts as sound; it moves nothing, and 0 calls any worn",

@@ -25,7 +25,6 @@ import xarray as xr
 
 from compressor.cases import (
     MODEL_VERSION,
-    OF_JOINTS,
     Case,
     CaseFileError,
     Output,
@@ -214,7 +213,7 @@ def objection(along: KeyRange, cases: Sequence[Case]) -> str:
     if len(worn) > 1:
         return f"--over begins at {along.key} = {along.low:g}, where a joint is ideal: begin above"
     if not any(*worn):
-        return f"no joint has clearance, so that nothing is to follow: set joint and {OF_JOINTS[0]}"
+        return "no joint has clearance, so that nothing is to follow: set joint and clearance_mm"
     if len(cases) < 2:
         one = f"--over {along.key} has one value of this machine"
         return f"{one}: give more, or mend --only, exclude or zip"
