@@ -1,27 +1,22 @@
 """What `compsim identify` is worth (make identify): other machines, and another friction law.
 
-A study of random machines goes through the store as a user's would. Then records of other machines
-with other noise are identified: how often the joint is right, how often the true clearance lies in
-its 90 % interval, how wide that is, and how often nothing is said to fit. The same machines again
-with other friction show how much worse it becomes where the model is wrong. The method was chosen
-on machines of other seeds. Writes a small JSON file.
+A study of random machines is run as a user's would be. Then records of other machines with other
+noise, studies too, are identified: how often the joint is right, how often the true clearance lies
+in its 90 % interval, how wide that is, and how often nothing is said to fit. The same machines
+again with other friction show how much worse it becomes where the model is wrong. The method was
+chosen on machines of other seeds. Writes a small JSON file.
 """
 
-import copy
+import itertools
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, delayed
+from compsim import cli
+from compsim.screen import DONE, SOME_FAILED
 from result_pages import keep, provenance, run_campaign
-from scipy.stats import binomtest, qmc
+from scipy.stats import binomtest
 
-from compressor.cases.case import Case
-from compressor.solve.simulate import simulate
-from compressor.studies.diagnosis.features import FEATURES, features
 from compressor.studies.diagnosis.identify import SIDES, Identifier, read_library
 
 STUDY, SEED, JUDGE = 3000, 2103, 2104  # machines of the study; seeds of it and of the judged
@@ -46,71 +41,33 @@ OTHERS = {  # what records come from, beside the study's own model
 }
 
 
-def short(value):
-    """A number to four digits, so that a case can be written into a file."""
-    return float(f"{value:.4g}")
+def case_text(name, count, seed, other):
+    """A case file of random machines, equally many of each joint and load; other: than FIXED."""
+    spans = {"rod_mass_kg": ROD, "reciprocating_mass_kg": MASS, "speed_rpm": SPEED}
+    blocks = []
+    for number, (load, joint) in enumerate(itertools.product(LOADS, JOINTS)):
+        sample = {"n": count // (len(LOADS) * len(JOINTS)), "seed": seed + number}
+        block = {"load": load, "joint": joint, "sample": sample}
+        if joint != "none":  # ideal joints have no friction to change
+            worn = [side for side in SIDES if joint in (side, "both")]
+            block |= {"clearance_mm": {side: {"lhs": CLEARANCE, "log": True} for side in worn}}
+            block |= other
+        blocks.append(block)
+    return json.dumps(FIXED | {
+        "name": name, "machine": {key: {"lhs": span} for key, span in spans.items()},
+        "sensor": FIXED["sensor"] | {"seed": {"lhs": [0, 2**31 - 1]}},
+        "output": {"precision": "single"}, "blocks": blocks,
+    })  # fmt: skip
 
 
-def machines(count, seed):
-    """Machines of a Latin hypercube, equally many of each joint, as values of a case file."""
-    drawn = qmc.LatinHypercube(6, seed=seed).random(count)
-    rng = np.random.default_rng(seed)
-    joints = rng.permutation(np.arange(count) % len(JOINTS))
-    found = []
-    for (rod, mass, speed, big, small, load), number in zip(drawn, joints, strict=True):
-        joint, (low, high) = JOINTS[number], CLEARANCE
-        ends = [short(low * (high / low) ** share) for share in (big, small)]
-        sides = {
-            side: end for side, end in zip(SIDES, ends, strict=True) if joint in (side, "both")
-        }
-        found.append({
-            "load": LOADS[int(len(LOADS) * load)], "joint": joint, "clearance_mm": sides,
-            "machine": {
-                "rod_mass_kg": short(ROD[0] + (ROD[1] - ROD[0]) * rod),
-                "reciprocating_mass_kg": short(MASS[0] + (MASS[1] - MASS[0]) * mass),
-                "speed_rpm": short(SPEED[0] + (SPEED[1] - SPEED[0]) * speed),
-            },
-            "sensor": {"seed": int(rng.integers(2**31))},
-        })  # fmt: skip
-    return found
-
-
-def case_file(drawn):
-    """A case file with these machines as its jobs, all keys advancing together."""
-    values = copy.deepcopy(FIXED)
-    values |= {name: [one[name] for one in drawn] for name in ("load", "joint")}
-    values["clearance_mm"] = {
-        side: [one["clearance_mm"].get(side, 0) for one in drawn] for side in SIDES
-    }
-    values["machine"] = {
-        name: [one["machine"][name] for one in drawn] for name in drawn[0]["machine"]
-    }
-    values["sensor"]["seed"] = [one["sensor"]["seed"] for one in drawn]
-    together = [f"clearance_mm.{side}" for side in SIDES]
-    together += [f"machine.{name}" for name in values["machine"]]
-    values["zip"] = [["load", "joint", *together, "sensor.seed"]]
-    return values | {"output": {"precision": "single"}}
-
-
-def case_of(machine, other):
-    """A machine's case; `other`: what of the model is changed."""
-    values = {**copy.deepcopy(FIXED), **copy.deepcopy(machine)}
-    values["sensor"] = FIXED["sensor"] | machine["sensor"]
-    if values["clearance_mm"]:  # ideal joints have no friction to change
-        values |= other
-    else:
-        del values["clearance_mm"]
-    return Case.from_values(values)
-
-
-def row_of(machine, other):
-    """The features of a machine's record; `other`: what of the model is changed."""
-    run = simulate(case_of(machine, other))
-    times, heard, tacho = (
-        run[name].values for name in ("sensor_time", "sensor_acceleration", "tacho_time")
-    )
-    found = features(times, heard, tacho)
-    return np.array([found[name] for name in FEATURES])
+def read_records(folder, name, text, jobs):
+    """The library of a study that is run, by the command line, into a folder."""
+    path = Path(folder, f"{name}.yaml")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    words = ["run", str(path), "-r", f"{folder}/results", "-j", str(jobs), "--max-jobs", "100000"]
+    assert cli.main([*words, "--quiet"]) in (DONE, SOME_FAILED)
+    return read_library(f"{folder}/results", name)
 
 
 def share(held, of):
@@ -118,19 +75,21 @@ def share(held, of):
     if not of:
         return {"share": None, "of": 0}
     low, high = binomtest(int(held), int(of)).proportion_ci(method="wilson")
-    return {"share": short(held / of), "of": int(of), "low": short(low), "high": short(high)}
+    return {"share": held / of, "of": int(of), "low": low, "high": high}
 
 
-def judged(identifier, drawn, rows):
-    """How answers compare with what machines are.
+def judged(identifier, records):
+    """How answers compare with what the machines of a library are.
 
     `covered`: of the clearances of joints that were told right; `covered_all`: of all, in the
     intervals of the joint that is worn, whatever is ranked first; `factor`: upper over lower end.
     """
     right, said, false, missed, told, always, factors = [], [], [], [], [], [], []
     confused = {joint: dict.fromkeys(JOINTS, 0) for joint in JOINTS}
-    for machine, row in zip(drawn, rows, strict=True):
-        answer, joint = identifier.identify(row), machine["joint"]
+    for joint, opened, row in zip(
+        records.joints, records.clearances, records.features, strict=True
+    ):
+        answer = identifier.identify(row)
         first = answer.candidates[0].joint
         right.append(first == joint)
         said.append(not answer.fits)
@@ -138,19 +97,19 @@ def judged(identifier, drawn, rows):
         (false if joint == "none" else missed).append((first != "none") == (joint == "none"))
         own = next(one for one in answer.candidates if one.joint == joint)
         for side, interval in own.clearances.items():
-            held = interval.low <= machine["clearance_mm"][side] <= interval.high
+            held = interval.low <= opened[SIDES.index(side)] <= interval.high
             always.append(held)
             if first == joint:
                 told.append(held)
                 factors.append(interval.high / interval.low)
-    worn = np.array([machine["joint"] != "none" for machine in drawn])
+    worn = np.array([joint != "none" for joint in records.joints])
     return {
-        "records": len(drawn),
+        "records": len(worn),
         "right": share(sum(right), len(right)),
         "right_where_worn": share(np.sum(np.array(right)[worn]), worn.sum()),
         "covered": share(sum(told), len(told)),
         "covered_all": share(sum(always), len(always)),
-        "factor": [short(value) for value in np.percentile(factors, (25, 50, 75))],
+        "factor": np.percentile(factors, (25, 50, 75)).tolist(),
         "nothing_fits": share(sum(said), len(said)),
         "nothing_fits_where_worn": share(np.sum(np.array(said)[worn]), worn.sum()),
         "false_alarms": share(sum(false), len(false)),
@@ -159,25 +118,14 @@ def judged(identifier, drawn, rows):
     }
 
 
-def studied(folder, count, seed, jobs):
-    """An identifier of a study that was run, by the command line, into a folder."""
-    path = Path(folder, "machines.yaml")
-    path.write_text(json.dumps(case_file(machines(count, seed))), encoding="utf-8")
-    code = "import sys; from compsim.cli import main; sys.exit(main())"
-    results = os.path.join(folder, "results")
-    words = ["run", os.fspath(path), "-r", results, "-j", str(jobs), "--quiet"]
-    subprocess.run([sys.executable, "-c", code, *words], check=True)
-    return Identifier.fit(read_library(results, "machines"))
-
-
 def main(target, folder="identify", count=STUDY, many=JUDGED, seeds=(SEED, JUDGE), jobs=2):
-    identifier = studied(folder, count, seeds[0], jobs)
-    drawn = machines(many, seeds[1])
+    text = case_text("machines", count, seeds[0], {})
+    identifier = Identifier.fit(read_records(folder, "machines", text, jobs))
     kept = {}
-    with Parallel(n_jobs=jobs) as parallel:
-        for name, other in OTHERS.items():
-            rows = parallel(delayed(row_of)(machine, other) for machine in drawn)
-            kept[name] = judged(identifier, drawn, rows)
+    for number, (name, other) in enumerate(OTHERS.items()):
+        study = f"records-{number}"
+        text = case_text(study, many, seeds[1], other)
+        kept[name] = judged(identifier, read_records(folder, study, text, jobs))
     result = {
         **provenance("make identify"),
         "seeds": list(seeds),
@@ -185,10 +133,10 @@ def main(target, folder="identify", count=STUDY, many=JUDGED, seeds=(SEED, JUDGE
                    "speed_rpm": SPEED},
         "fixed": FIXED,
         "study": {"jobs": len(identifier.library.keys), "of": count,
-                  "right": short(identifier.right)},
+                  "right": identifier.right},
         "models": kept,
     }  # fmt: skip
-    keep(target, result)
+    keep(target, result, 4)
     print(json.dumps(result, indent=1))
 
 
