@@ -1,37 +1,26 @@
 """Print the numbers by which the source is compared with that of others.
 
-`measure_house.py [TREE]`: files and lines, what a module imports of its own program, names of
-functions by one participle, docstrings that open with a verb, names of classes with several
-meanings, comments that have a line of their own, `# fmt: skip`.
+`measure_house.py [TREE ...]`: files and lines of each room, of the tests, words of the pages; of
+the source its types, its longest function, and what a module imports of its own program.
 """
 
 import argparse
 import ast
-import re
 from collections import Counter
 from pathlib import Path
+from statistics import mean
 
 ROOT = Path(__file__).parents[2]
-PARTICIPLES = {
-    "told", "kept", "made", "asked", "said", "shown", "drawn", "found", "known", "given", "taken",
-    "held", "laid", "lost", "met", "read", "seen", "worn", "left", "built", "cut", "begun", "gone",
-    "put", "sent", "written", "chosen", "broken", "driven", "spoken", "bent", "heard", "meant",
-}  # fmt: skip
-NO_VERBS = {
-    "a", "an", "the", "what", "whether", "how", "which", "where", "who", "why", "when", "that",
-    "all", "as", "of", "about", "for", "in", "by", "its", "those", "each", "some", "one", "time",
-}  # fmt: skip
+ROOMS = ("cmd", "compressor", "tests")
 
 
-def modules(tree: Path) -> dict[str, ast.Module]:
-    """Return the parsed modules of the program in a tree, by their path."""
-    paths = [*(tree / "compressor").rglob("*.py"), *(tree / "cmd").rglob("*.py")]
-    return {
-        str(path.relative_to(tree)): ast.parse(path.read_text(encoding="utf-8")) for path in paths
-    }
+def read_modules(tree: Path) -> dict[Path, str]:
+    """Return the text of each module of a tree, by its path from there."""
+    paths = (path for top in ROOMS for path in sorted((tree / top).rglob("*.py")))
+    return {path.relative_to(tree): path.read_text(encoding="utf-8") for path in paths}
 
 
-def own_imports(module: ast.Module) -> int:
+def count_own_imports(module: ast.Module) -> int:
     """Return how many names a module imports from the program itself."""
     return sum(
         len(node.names)
@@ -41,55 +30,38 @@ def own_imports(module: ast.Module) -> int:
     )
 
 
-def is_participle(name: str) -> bool:
-    """Return whether a function is named by one participle."""
-    return name in PARTICIPLES or bool(re.fullmatch(r"[a-z]{2,}[^e]ed", name))
-
-
-def opens_with_a_verb(text: str) -> bool:
-    """Return whether a docstring opens with a verb in the imperative, as far as words tell."""
-    word = re.split(r"\W", text, maxsplit=1)[0]
-    return word[:1].isupper() and word.lower() not in NO_VERBS and not word.endswith("s")
-
-
-def house_numbers(tree: Path) -> dict[str, float]:
+def house_numbers(tree: Path) -> dict[str, float | str]:
     """Return the numbers of a tree by name."""
-    found = modules(tree)
-    texts = [(tree / name).read_text(encoding="utf-8") for name in found]
-    lines = [line.strip() for text in texts for line in text.splitlines()]
-    functions = [
-        node for one in found.values() for node in one.body if isinstance(node, ast.FunctionDef)
-    ]
-    every = [
-        node for one in found.values() for node in ast.walk(one)
-        if isinstance(node, ast.FunctionDef)
-    ]  # fmt: skip
-    documented = [text for node in every if (text := ast.get_docstring(node))]
-    classes = Counter(
-        node.name for one in found.values() for node in ast.walk(one)
-        if isinstance(node, ast.ClassDef)
-    )  # fmt: skip
-    imports = [own_imports(one) for one in found.values()]
-    named = sum(is_participle(node.name) for node in functions)
-    verbs = sum(map(opens_with_a_verb, documented))
+    texts = read_modules(tree)
+    lines: Counter[str] = Counter()
+    for path, text in texts.items():
+        inner = path.parts[0] == "compressor" and len(path.parts) > 2
+        lines["/".join(path.parts[: 1 + inner])] += text.count("\n")
+    source = [ast.parse(text) for path, text in texts.items() if path.parts[0] != "tests"]
+    nodes = [node for module in source for node in ast.walk(module)]
+    functions = [node for node in nodes if isinstance(node, ast.FunctionDef)]
+    longest = max(functions, key=lambda one: (one.end_lineno or 0) - one.lineno)
+    imports = [count_own_imports(module) for module in source]
+    pages = [path for path in tree.rglob("*.md") if ".venv" not in path.parts]
+    of_source = {room: count for room, count in lines.items() if room != "tests"}
     return {
-        "files": len(found),
-        "lines": len(lines),
-        "own names that a module imports, mean": sum(imports) / len(imports),
-        "own names that a module imports, most": max(imports),
-        "functions named by one participle, %": 100 * named / len(functions),
-        "docstrings that open with a verb, %": 100 * verbs / len(documented),
-        "class names with several meanings": sum(count > 1 for count in classes.values()),
-        "comments with a line of their own, %": (
-            100 * sum(line.startswith("#") for line in lines) / len(lines)
+        **{f"lines of {room}": count for room, count in lines.items()},
+        "lines of the source": sum(of_source.values()),
+        "files of the source": len(source),
+        "types": sum(isinstance(node, ast.ClassDef) for node in nodes),
+        f"lines of the longest function, {longest.name}": (
+            (longest.end_lineno or 0) - longest.lineno + 1
         ),
-        "# fmt: skip": sum("# fmt: skip" in line for line in lines),
+        "own names that a module imports, mean": round(mean(imports), 1),
+        "own names that a module imports, most": max(imports),
+        "words of the pages": sum(len(path.read_text("utf-8").split()) for path in pages),
     }
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("tree", nargs="*", type=Path, default=[ROOT], help="checkouts to compare")
-    columns = [house_numbers(tree) for tree in parser.parse_args().tree]
-    for name in columns[0]:
-        print(f"{name:<42}", *(f"{one[name]:>10.4g}" for one in columns))
+    for checkout in parser.parse_args().tree:
+        print(checkout)
+        for name, number in house_numbers(checkout).items():
+            print(f"  {name:<52} {number:>8,}")
