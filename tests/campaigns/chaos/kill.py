@@ -51,8 +51,8 @@ def undisturbed(folder, keep, is_real):
     """The seconds of a sweep that nobody disturbs, and what is stored then."""
     with fresh(folder) as place:
         began, run = time.monotonic(), start(place, keep, is_real)
-        code = run.finish()
-        assert code == 0, run.text()
+        code = run.finish(600)  # it may have to compile
+        assert code == 0, f"{code}: {run.text()[-500:]}"
         return time.monotonic() - began, contents(place / "out")
 
 
