@@ -83,6 +83,7 @@ def _label_numbers() -> tuple[dict[str, int], dict[str, int], dict[str, str]]:
 
 
 VALUES, ERRORS, NAMES = _label_numbers()
+ALL = np.arange(ROW.itemsize // 8)  # places of all numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,14 +223,25 @@ def read_batch(path: Path) -> Batch:
 
 
 @lru_cache(maxsize=4)
-def read_numbers(batch: Batch) -> np.ndarray:
-    """Return numbers of all jobs of a batch in the order of ROW, (jobs, columns)."""
-    with open_netcdf(batch.path) as file:
+def read_tables(path: Path) -> np.ndarray:
+    """Return values, error bars and a column of nan side by side, (jobs, columns)."""
+    with open_netcdf(path) as file:
         values, errors = (file[name][()] for name in TABLES)
-    found = np.full((len(batch), ROW.itemsize // 8 + 1), np.nan)
-    found[:, [ERRORS.get(label, -1) for label in batch.labels]] = errors
-    found[:, [VALUES[label] for label in batch.labels]] = values
-    return found[:, :-1]
+    return np.column_stack([values, errors, np.full(len(values), np.nan)])
+
+
+@lru_cache(maxsize=4)
+def columns_of(labels: tuple[str, ...]) -> np.ndarray:
+    """Return the column in `read_tables` of each place in a row of all numbers."""
+    count, columns = len(labels), np.full(len(ALL) + 1, -1)
+    columns[[ERRORS.get(label, -1) for label in labels]] = range(count, 2 * count)
+    columns[[VALUES[label] for label in labels]] = range(count)
+    return columns
+
+
+def read_numbers(batch: Batch, rows: Sequence[int], places: np.ndarray) -> np.ndarray:
+    """Return numbers of some jobs at some places in a row of all, nan where there are none."""
+    return read_tables(batch.path)[np.ix_(rows, columns_of(batch.labels)[places])]
 
 
 @lru_cache(maxsize=4)
@@ -278,7 +290,7 @@ def read_series(
 
 def read_outcomes(batch: Batch) -> list[Outcome]:
     """Return all that a batch holds, to be merged with others."""
-    numbers = read_numbers(batch)
+    numbers = read_numbers(batch, range(len(batch)), ALL)
     series = iter(read_series(batch.path, np.flatnonzero(batch.columns["samples"]).tolist()))
     return [
         Outcome(

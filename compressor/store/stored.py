@@ -204,7 +204,7 @@ class Stored:
 
         def fill() -> None:
             for batch, places, rows in self._by_batch(flat):
-                found[places] = read_numbers(batch)[rows][:, wanted]
+                found[places] = read_numbers(batch, rows, wanted)
 
         self._read(fill)
         kind = np.dtype([(name, ROW[name]) for name in names])

@@ -10,7 +10,7 @@ from conftest import keep
 from compressor.cases.load import load_studies
 from compressor.outcome import ROW, Outcome
 from compressor.solve.simulate import simulate
-from compressor.store.batch import read_lines, read_numbers
+from compressor.store.batch import read_lines, read_tables
 from compressor.store.reader import read_store
 from compressor.store.studies import StoredAxis, StoredStudy, encode, write_study
 
@@ -69,7 +69,7 @@ def plan(folder, count):
 def forget():
     """Forget what was read of batches."""
     read_lines.cache_clear()
-    read_numbers.cache_clear()
+    read_tables.cache_clear()
 
 
 def held(stored):
