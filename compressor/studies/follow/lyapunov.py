@@ -5,7 +5,7 @@ away; after each revolution the growth ln(d / d0) is taken, and the difference i
 along itself. It turns into the direction that grows fastest. Each run has steps of its own, at a
 tolerance far below d0. A difference that grows too large within a revolution to be a small one is
 followed up to there alone. On periodic motions the exponent is the logarithm of the largest Floquet
-multiplier (tests/studies/regimes/test_lyapunov.py).
+multiplier (tests/studies/follow/test_lyapunov.py).
 """
 
 import math
