@@ -354,6 +354,8 @@ class Parameter:
         if not number:
             return message
         plain = number[1].replace(",", ".")
+        if number[2].startswith(","):
+            return f"{message}; several values are a list: write [{word}]"
         if OTHER_UNITS.get(number[2], ("none",))[0] == self.unit:
             return f"{message}; write {convert_other(float(plain), number[2])}"
         if number[2] not in ("", self.unit):

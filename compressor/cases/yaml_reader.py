@@ -21,6 +21,7 @@ MAX_BYTES = 1 << 20
 
 DECIMALS = re.compile(r"0\d+")  # behind a decimal comma, as in [0,05]
 DECIMAL_COMMA = "a decimal comma? write {}.{}; commas separate values"
+NO_LIST = "several values are a list: write [{}, {}]"
 NULLS = {"", "~", "null", "Null", "NULL"}
 BOOLEANS = {"true": True, "True": True, "TRUE": True}
 BOOLEANS |= {"false": False, "False": False, "FALSE": False}
@@ -181,14 +182,17 @@ class _Reader:
     def mapping(self, node: Any, path: Path) -> dict[str, Any]:
         """Return the values of a mapping by key."""
         found: dict[str, Any] = {}
+        before = node.start_mark.index  # where the item before ends
         for name_node, inner in node.value:
-            name = name_node.value
+            name, apart = name_node.value, name_node.start_mark.index - before
+            before = inner.end_mark.index
             whole = (*path, name)
             if not isinstance(name, str) or not name or not name.isprintable():
                 self.note(name_node, path, "a key must be plain text")
             elif found and name.isdecimal() and inner.value == "":
                 last = [*found][-1]
-                self.note(name_node, (*path, last), DECIMAL_COMMA.format(found[last], name))
+                told = DECIMAL_COMMA if apart == 1 else NO_LIST
+                self.note(name_node, (*path, last), told.format(found[last], name))
             elif name in found:
                 first = self.places[whole][0]
                 line = f" at line {first.line}" if first.line else ""
