@@ -24,7 +24,6 @@ THREAD_VARIABLES = (
     "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS",
     "BLIS_NUM_THREADS", "NUMBA_NUM_THREADS", "NUMEXPR_NUM_THREADS",
 )  # fmt: skip
-MAX_MEANT = 3  # words that may have been meant
 MAX_WORD_LENGTH = 100  # characters of a word that others are compared with
 
 
@@ -105,19 +104,17 @@ def printable(text: str) -> str:
 
 
 def did_you_mean(word: str, known: Iterable[str], texts: Mapping[str, object] | None = None) -> str:
-    """Return what an unknown word probably meant, as `did you mean A or B?`; "" without a guess.
+    """Return what an unknown word probably meant, as `did you mean A?`; "" without a guess.
 
     texts: what to print for each known word, itself by default. A path or a file's name stands for
     its stem, too; upper and lower case are the same.
     """
     names = {name.casefold(): name for name in known}
-    spellings = [word[:MAX_WORD_LENGTH].casefold()]
-    spellings.append(Path(spellings[0]).stem)
-    matches = (get_close_matches(spelling, names, MAX_MEANT) for spelling in spellings)
-    similar = next(filter(None, matches), [])
-    exact = next(([spelling] for spelling in spellings if spelling in names), [])
-    guesses = [str((texts or {}).get(names[name], names[name])) for name in exact or similar]
-    return f"did you mean {' or '.join(guesses)}?" if guesses else ""
+    whole = word[:MAX_WORD_LENGTH].casefold()
+    spellings = (whole, Path(whole).stem)
+    near = [one for one in spellings if one in names]
+    near += [one for spelling in spellings for one in get_close_matches(spelling, names, 1)]
+    return f"did you mean {(texts or {}).get(names[near[0]], names[near[0]])}?" if near else ""
 
 
 def library_versions(*names: str) -> dict[str, str]:

@@ -30,7 +30,6 @@ from compressor.cases.parameter import (
     split_unit,
 )
 from compressor.cases.table import GROUPS, TOP, WORDS, parts_by_key, table
-from compressor.program import MAX_MEANT
 
 
 @lru_cache(1024)  # asked for of each key of each job
@@ -199,6 +198,9 @@ def of_other_quantity(name: str, group: str, value: Any) -> str:
 # keys of a case file that are no part of a case: how values are swept together, what the page of
 # the report says of the machine
 SWEEP = ("sample", "zip", "exclude", "blocks", "report")
+
+
+MAX_MEANT = 3  # keys of one name, or with the same words in it, that are told
 
 
 def known_keys(group: str) -> list[str]:

@@ -54,7 +54,7 @@ MISTAKES = [
     ("results", "No such command 'results'"),
     ("rnu good.yaml", "No such command 'rnu'"),
     ("status --jsn", "No such option '--jsn'"),
-    ("init waer", "there is no template 'waer'; did you mean wear or"),
+    ("init waer", "there is no template 'waer'; did you mean wear?"),
     ("init xyzzy", "there is no template 'xyzzy'; there are paper, machine, "),
     ("init wear -o 'my wear.yaml'", "'my wear.yaml' gives the study no name"),
     ("init wear -o good.yaml/wear.yaml", "good.yaml: is a file, where a folder is needed"),
