@@ -175,6 +175,19 @@ def needs_of(row, group):
     return f"; needs `{' and '.join(mine)}`" if mine else ""
 
 
+# kind -> what a value may be beside the words of its row
+OTHERWISE = {"accuracy": "{metric: relative error}", "text": "[A-Za-z0-9._-], at most 64",
+             "card": "path of a CSV file"}  # fmt: skip
+
+
+def range_of(row):
+    """The allowed values of a row, such as auto | (0, 5]."""
+    if row.kind == "materials":
+        return "two of " + ", ".join(row.choices)
+    more = row.span if row.is_number else OTHERWISE.get(row.kind, "")
+    return " | ".join([*row.words, *filter(None, [more])])
+
+
 def parameter_table(rows, group):
     """The table of parameters in Markdown; `compressor.cases.table.table` has the rows."""
     head = ["key", "default", "range", "what it is"]
@@ -182,7 +195,7 @@ def parameter_table(rows, group):
     for name, (row, phrase) in key_rows(rows).items():
         needs = needs_of(row, group) if name == row.key and group else ""
         tested = f"; tested {row.judged_on}" if row.judged else ""
-        cells = (f"`{name}`", default_of(row), row.range + tested, phrase + needs)
+        cells = (f"`{name}`", default_of(row), range_of(row) + tested, phrase + needs)
         lines.append([cell.replace("|", "\\|") for cell in cells])
     needed = " and ".join(READ.get(group, ())).replace(CLEARANCE, "a joint with clearance")
     return (f"Needs {needed}.\n\n" if needed else "") + markdown(head, lines)

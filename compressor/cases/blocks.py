@@ -132,7 +132,7 @@ class Block:
         for number in range(max(map(len, self.columns.values()), default=1)):
             yield {key: number % len(column) for key, column in self.columns.items() if column}
 
-    def locate(self, error: CaseError, rows: Mapping[str, int]) -> "Located":
+    def locate(self, error: CaseError, rows: Mapping[str, int]) -> Located:
         """Return a case's problems at the values that they are about, one of each value.
 
         rows: of the case's swept keys.
@@ -157,18 +157,21 @@ class Block:
         return found
 
     def find_repeated(self) -> Iterator[FileProblem]:
-        """Yield the values that keys have twice."""
+        """Yield the values that keys have twice; of values that were made the first one."""
         for keys in self.factors:
             sweep = self.sweeps[keys[0]]
-            texts = [*map(repr, zip(*(self.columns[key] for key in keys), strict=True))]
-            for number in range(len(texts)) if len({*texts}) < len(texts) else ():
-                if texts[number] in texts[:number]:
-                    is_list = sweep.kind == "list"
-                    where = "in the list" if is_list else "among its values"
-                    listed = ", ".join(quote_value(self.columns[key][number]) for key in keys)
+            seen: set[str] = set()
+            is_list = sweep.kind == "list"
+            where = "in the list" if is_list else "among its values"
+            columns = (self.columns[key] for key in keys)
+            for number, values in enumerate(zip(*columns, strict=True)):
+                if (text := repr(values)) in seen:
                     place = self.tree.at(*sweep.path, *[number] * is_list)[1]
-                    message = f"{listed} is {where} twice"
+                    message = f"{', '.join(map(quote_value, values))} is {where} twice"
                     yield FileProblem(place, " with ".join(keys), message)
+                    if not is_list:
+                        break
+                seen.add(text)
 
 
 def is_of_key(message: str) -> bool:

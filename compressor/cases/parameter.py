@@ -212,11 +212,14 @@ def is_number(value: Any) -> bool:
 def convert_other(value: Any, unit: str) -> str:
     """Return what to write of a value in a unit of `OTHER_UNITS`."""
     ours, factor = OTHER_UNITS[unit]
-    is_told = ours == "MPa" and unit not in ("bara", "psia")
-    note = f", absolute: a gauge's and the atmosphere's {ATMOSPHERE_MPA:g}" * is_told
-    more = ATMOSPHERE_MPA if unit in ("barg", "psig") else 0.0
+    is_gauge, note = unit in ("barg", "psig"), ""
+    if is_gauge:
+        note = f", absolute: with the atmosphere's {ATMOSPHERE_MPA:g}"
+    elif ours == "MPa" and unit not in ("bara", "psia"):
+        note = f"; if a gauge shows it, add the atmosphere's {ATMOSPHERE_MPA:g}"
     each = f"..., 1 {unit} being {factor:g} {ours}"
-    return (f"{value * factor + more:.4g}" if is_number(value) else each) + note
+    absolute = f"{value * factor + is_gauge * ATMOSPHERE_MPA:.4g}" if is_number(value) else each
+    return absolute + note
 
 
 # kind -> what it may be beside the words of its row
