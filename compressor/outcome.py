@@ -42,11 +42,10 @@ class Regime(StrEnum):
 
 # the one source of what a regime means, wherever one is shown
 REGIME_WORDS = {
-    Regime.PERIODIC: "repeats itself within its error bars, or within what accuracy promises where "
-    "auto waited for that",
+    Regime.PERIODIC: "repeats within its error bars, or with auto within the accuracy target",
     Regime.PREDICTABLE: "errors do not grow up to the run's end; not seen to repeat",
-    Regime.CHAOTIC: "close motions part: averages hold, single peaks do not",
-    Regime.UNDECIDED: "errors are large, and the search for chaos came to its limit",
+    Regime.CHAOTIC: "close motions separate: averages are valid, single peaks are not",
+    Regime.UNDECIDED: "errors are large, and the search for chaos reached its limit",
 }
 
 
@@ -124,7 +123,7 @@ class Outcome:
 
 # words on a job, as attributes of its Dataset and as variables, with what they mean
 WORDS = {
-    "promise": "whether what accuracy promises was kept; none given",
+    "promise": "kept: the accuracy target was reached; none: there is no target",
     "regime": "; ".join(map(regime_words, Regime)),
 }
 

@@ -48,11 +48,12 @@ def members(owner):
                 yield name, made
 
 
+def is_property(made):
+    return isinstance(made, property | cached_property)
+
+
 def signature(made):
-    """How a function is called, or the type of a property, in one line."""
-    if isinstance(made, property | cached_property):
-        function = made.fget if isinstance(made, property) else made.func
-        return signature(function).replace("() ->", ":")
+    """Return how a function is called, in one line."""
     made = made.__func__ if isinstance(made, classmethod) else made
     text = str(inspect.signature(made)).replace("'", "").replace("xr.", "xarray.")
     text = re.sub(r"\b(collections\.abc|typing|compressor(\.\w+)+)\.(?=[A-Z])", "", text)
@@ -81,8 +82,9 @@ def page():
         parts.append(f"## {title}\n")
         parts.append("".join(entry(name, getattr(compressor, name)) for name in names))
         if title == "Cases":
-            parts.append("`Case` has these methods and properties:\n")
-            parts.append("".join(entry(f"Case.{n}", made) for n, made in members(compressor.Case)))
+            methods = [(n, made) for n, made in members(compressor.Case) if not is_property(made)]
+            parts.append("`Case` has these methods, and properties that `help` lists:\n")
+            parts.append("".join(entry(f"Case.{n}", made) for n, made in methods))
     return "\n".join(parts)
 
 

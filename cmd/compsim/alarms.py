@@ -60,14 +60,14 @@ def alarms(study, folder, output, run, quiet, **how) -> int:
     \b
     compsim alarms plant --noise 0,1 -o alarms
 
-    STUDY has jobs with a sensor's record, of sound machines and of worn ones. What it varies beside
-    joint and clearance, such as load and speed, is a draw. Alarms are peak, rms, crest factor and
+    STUDY has jobs with a sensor's record, of sound and of worn machines. Each combination of what
+    else it varies, such as load and speed, is a draw. Alarms are peak, rms, crest factor and
     kurtosis of the record, peak and rms of segments of 10 degrees, counts of peaks, and velocity;
-    each on the record as it is and behind band passes. Sound jobs set what is usual, and the limit.
-    The table lists alarms, the first to see wear on top, each with its best filter: the limit over
-    what is usual, the false alarms that were counted on sound draws which did not set it, and the
-    clearance from which on it detects, each with a 95 % interval. "> 0.4" is beyond the study's
-    greatest clearance. RUN is a file of compsim wear, or its folder of results.
+    each with and without band passes. Sound jobs set the usual reading and the limit. The table
+    lists the alarms, the earliest first, each with its best filter: the limit over the usual
+    reading, the rate of false alarms, counted on sound draws that did not set the limit, and the
+    clearance from which on it detects, with 95 % intervals. "> 0.4" is beyond the study's greatest
+    clearance. RUN is a file of compsim wear, or its folder of results.
     """
     from compressor.digits import align_columns
     from compressor.store import read_studies, writable_folder

@@ -26,15 +26,14 @@ def calibrate(record, config, ranges, hints, overrides, folder, jobs, as_json, q
         --fit machine.reciprocating_mass_kg=10:20 \\
         --fit body.frequency_y_Hz=15:30 > sound.yaml
 
-    Each key is fitted within its range, in its own unit. CONFIG makes one case, with body and
-    sensor, and joints as they are in the sound machine. It runs at the record's mean speed.
-    Compared are the orders of the mean revolution, amplitude and phase, each relative to its size.
-    What is printed is the case file with the values that fit best; comments say their 95 %
-    intervals, and what the record cannot separate. Copies of this file with worn joints make a
-    study for `compsim identify`.
+    Fits each key within its range, in its own unit. CONFIG gives one case, with body and sensor and
+    the joints of the sound machine. It runs at the record's mean speed. Amplitude and phase of the
+    orders of the mean revolution are compared, each relative to its size. Prints the case file with
+    the values that fit best; comments give their 95 % intervals, and what the record cannot
+    separate. Copies of this file with worn joints make a study for `compsim identify`.
 
-    Every point is a job of the study CONFIG-calibrate in the folder of results: it is stored, and
-    not run again. Exit code 0 also where the machine does not fit: that is an answer.
+    Each point is a stored job of the study CONFIG-calibrate. Exit code 0 also if the machine does
+    not fit: that is an answer.
     """
     from compressor.cases import to_yaml
     from compressor.store import find_record

@@ -21,10 +21,10 @@ def claims(study, folder, quiet) -> int:
     compsim run claims.yaml
     compsim claims claims
 
-    A STUDY holds the paper's eleven cases of each machine, with time series. The table has, for
-    each claim, the machines in which it holds and its margins, 0 at the threshold; of machines that
-    {saltelli: ...} drew also the assumption that decides most of it. Writes the margins into
-    claims/ of the folder, with a map over both masses or a figure of what decides.
+    STUDY has the paper's eleven cases of each machine, with time series. Prints, for each claim,
+    the machines in which it holds and its margins, 0 at the threshold; for a {saltelli: ...} study
+    also the assumption with the largest effect. Writes the margins and a figure into claims/ of the
+    folder of results.
 
     Exit code 3 if a machine has no verdict.
     """

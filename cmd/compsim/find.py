@@ -47,18 +47,16 @@ def find(config, over, folder, jobs, units, as_json, quiet, **asked) -> int:
     compsim find worn.yaml --over clearance_mm=0.08:0.3 \\
         --first 'peak_contact_force.small_end > 1.5 * base' --units plant
 
-    VALUE of --first is in SI, or has its unit, as 166 kN, or is a factor of the metric at LOW, as
-    1.5 * base. CONFIG makes one case once the key is given. The answer of --first is an interval:
-    at its lower end the comparison does not hold, at its upper end it does. Of --greatest and
-    --least it is the best point. Every point has a row: whether the comparison holds there (yes,
-    no), or how the point compares with the best (best, as good as far as error bars show, worse);
-    what error bars leave open, or whose job failed, is open, and stays inside the interval. A later
-    change from yes to no is as wide as the scan shows it; a narrower --over narrows it down.
-    Structure that is finer than the scan may be missed. In a chaotic motion a peak stands for its
-    mean over revolutions.
+    VALUE of --first is in SI, has a unit (166 kN), or is a factor of the metric at LOW
+    (1.5 * base). CONFIG must give one case with the key set. The answer of --first is an interval:
+    the comparison is false at its lower end and true at its upper end. The answer of --greatest and
+    --least is the best point. Each point has a row: yes or no, or how it compares with the best.
+    Points that error bars cannot decide, or whose jobs failed, are open, inside the interval. Only
+    the first change is narrowed down; the scan misses two changes between two of its points.
+    For a chaotic motion the mean of a peak over revolutions counts.
 
-    Every point is a job of the study CONFIG-find-KEY in the folder of results: it is stored, and
-    not run again. --json has all numbers in SI. Exit code 3 if any point's job failed.
+    Each point is a stored job of the study CONFIG-find-KEY. --json has all numbers in SI. Exit
+    code 3 if the job of any point failed.
     """
     options.check_json_units(as_json, units)
     given = [(kind, text) for kind in KINDS if (text := asked.pop(kind)) is not None]

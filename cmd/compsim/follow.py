@@ -47,11 +47,11 @@ def follow(config, over, both, log, points, no_exponent, rerun, folder, jobs, qu
     compsim follow light.yaml --over clearance_mm=0.01:1:80 --log --both
     compsim follow worn.yaml --over machine.speed_rpm=300:900:60
 
-    Each value's run starts from the end of the last one's, so that a motion is followed as long as
-    it exists. Whatever else CONFIG sweeps makes machines, each of which is followed on its own. At
-    each value the motion settles by itself: solve.settle_rev and duration_rev, body and sensor of
-    CONFIG do not count here. A table for each machine goes to stdout, a figure and one Dataset into
-    follow/ of the folder; what was interrupted goes on from there.
+    Each run starts from the end of the run before, so that a motion is followed as long as it
+    exists. Each combination of the other swept keys of CONFIG is a machine, followed by itself.
+    Each value settles: solve.settle_rev and duration_rev, body and sensor of CONFIG are not used.
+    Prints a table for each machine; writes figures and a Dataset into follow/ of the folder of
+    results. The same command continues what was interrupted.
     """
     from compressor.report import render, title_figure
     from compressor.store import publish

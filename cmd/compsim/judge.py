@@ -23,12 +23,12 @@ def judge(study, folder, jobs, as_json, quiet) -> int:
     compsim run extremes.yaml
     compsim judge extremes
 
-    Each job that is ok is run again by another integrator at a hundredth of its tolerance; by a
-    second one where that does not agree, and by a third where these differ. The majority counts. A
-    job ends ok; silent_wrong, where a number is off by more than ten error bars and a thousand
-    times the tolerance (5 % at most); or unjudged. Of a chaotic motion averages are compared.
-    Counts and the worst jobs go to stdout; what judges ran is kept in judge/ of the folder, and the
-    same command goes on from there.
+    Runs each job that is ok again by another integrator at a hundredth of its tolerance; if that
+    disagrees by a second one, and if these differ by a third. The majority counts. The verdict of a
+    job is ok; silent_wrong, if a number is off by more than ten error bars and a thousand times the
+    tolerance (5 % at most); or unjudged. For a chaotic motion it compares averages. Prints counts
+    and the worst jobs; stores the runs in judge/ of the folder of results. The same command
+    continues what was interrupted.
 
     Exit code 3 if a number is wrong without a warning.
     """

@@ -32,10 +32,9 @@ def report(command, names, folder, output, single, limits, units, **places) -> i
     compsim report bearing-wear --single -o for-the-plant
     compsim report -r /data/results -o page --limit 'body_velocity_rms=2,5 mm/s'
 
-    Prints the path of the page, which a browser opens without a server. Named studies stand on it
-    in this order; without names all do, those of compsim find and calibrate last. --units is of
-    figures and tables. Columns and axes with the name of a key keep its unit, and sentences say
-    theirs.
+    Prints the path of the page, which a browser opens without a server. It has the named studies in
+    this order, or all of them, those of compsim find and calibrate last. --units applies to figures
+    and tables, but not to columns and axes with the name of a key.
     """
     from compressor.store import read_studies, writable_folder
 

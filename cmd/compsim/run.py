@@ -44,14 +44,14 @@ def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple
 @options.quiet
 @click.pass_obj
 def run(command, configs, folder, jobs, rerun, shard, scheduler, quiet, **how) -> int:
-    """Simulate what case files ask for, and store the results.
+    """Simulate the jobs of case files, and store the results.
 
     \b
     compsim run machine.yaml
     compsim run wear.yaml --set machine.speed_rpm=300 -r results-300
 
-    Jobs that are stored already are not run again, so a run that was interrupted goes on where it
-    ended. A summary line for each study goes to stdout.
+    Stored jobs are not run again, so the same command continues a run that was interrupted. Prints
+    a summary line for each study.
     """
     if scheduler and jobs:
         raise click.UsageError("-j counts processes here; a dask cluster uses all its workers")

@@ -5,7 +5,7 @@ import click
 from compressor.digits import align_columns, plural
 from compsim import options, screen
 
-PROMISES = {"kept": "kept what accuracy promises", "none": "without a promise"}
+PROMISES = {"kept": "reached their accuracy target", "none": "without an accuracy target"}
 
 
 @click.command()
@@ -18,9 +18,9 @@ def status(folder, as_json) -> int:
     compsim status
     compsim status -r /data/results
 
-    One line a study. Of those that are ok, also how many keep what their accuracy promises, how
-    many move periodically, predictably or chaotically, how many were not seen to repeat, whose
-    sensor record is clipped, and which keys are outside the range that the program was judged on.
+    One line a study. Of those that are ok, also how many reached their accuracy target, how many
+    move periodically, predictably or chaotically, how many were not seen to repeat, whose sensor
+    record is clipped, and which keys are outside the range in which the program was tested.
     """
     from compressor.outcome import regime_words
     from compressor.reasons import remedy

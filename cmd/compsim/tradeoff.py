@@ -28,10 +28,10 @@ def tradeoff(configs, folder, jobs, overrides, quiet) -> int:
     compsim tradeoff machine.yaml
     compsim tradeoff machine.yaml --set 'solve.method=[auto, RODAS]'
 
-    Every job of the case files by every solve.method at each of some solve.rtol: a study that is
-    stored as any other, which takes minutes; --set gives other lists, and solve.timeout_s, the
-    seconds of a job, 4 without. Errors are those against the tightest job of another method. The
-    fastest method for each error goes to stdout, numbers and figure into tradeoff/ of the folder.
+    Runs each job of the case files by each solve.method at several solve.rtol, which takes minutes,
+    and stores them as a study. --set gives other lists, and another solve.timeout_s than 4 s.
+    Errors are against the tightest job of another method. Prints the fastest method for each error;
+    writes numbers and figure into tradeoff/ of the folder of results.
     """
     from compressor.report import render
     from compressor.store import publish, write_dataset

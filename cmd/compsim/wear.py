@@ -23,12 +23,11 @@ def wear(configs, folder, jobs, rerun, as_json, quiet, **how) -> int:
     \b
     compsim wear life.yaml
 
-    CONFIG has a group `wear`. Motion and wear take turns: what rubs in a run at the clearances as
-    they are opens them evenly, by Archard's law, and stands for all revolutions until one has grown
-    by wear.step_mm. One line a machine goes to stdout: the hours until a clearance reaches
-    wear.limit_mm, with the least and the greatest coefficient beside them. Clearances and metrics
-    of the runs are kept in wear/ of the folder, with a figure of each study; what was interrupted
-    goes on from there.
+    CONFIG has a group `wear`. Motion and wear take turns: one run at the present clearances gives
+    the wear of all revolutions, by Archard's law, until a clearance has grown by wear.step_mm.
+    Prints a line for each machine: the hours until a clearance reaches wear.limit_mm, also with the
+    least and the greatest coefficient. Writes clearances, metrics and a figure of each study into
+    wear/ of the folder of results. The same command continues what was interrupted.
     """
     from compressor.report import render, title_figure
     from compressor.store import publish

@@ -48,7 +48,7 @@ WORDS = {
     "physics_key": "hash of what a job simulates, not how",
     "status": "ok or failed",
     "reason": "why a run failed, by a stable name",
-    "promise": "whether what accuracy promises was kept",
+    "promise": "kept: the accuracy target was reached",
     "regime": "how far the motion is predictable",
     "kept": "what is kept of a job: bars, horizon, signals, series, and these in double precision",
 }

@@ -113,6 +113,9 @@ def test_status_counts_by_promise_and_by_regime(ring, capsys):
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 80
     out = " ".join(out.split())
-    assert "of those ok: 1 without a promise, 1 kept what accuracy promises of those ok" in out
+    assert (
+        "of those ok: 1 without an accuracy target, 1 reached their accuracy target of those ok"
+        in out
+    )
     for regime in ("chaotic", "periodic"):
         assert f"of those ok: 1 {regime} ({REGIME_WORDS[Regime(regime)]})" in out
