@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from conftest import part_of
 
+from compressor.physics.contact_laws import Law
+
 ROOT = Path(__file__).parents[1]
 LAWS, WORDS = "compressor/physics/contact_laws.py", "compressor/cases/laws.py"
 PUBLISHED = "tests/published.py"
@@ -172,10 +174,10 @@ def test_the_page_on_contact_laws_is_right(tmp_path):
     copy_of_the_program(tmp_path, "tests")
     member, damping, words, given, force, choice = blocks()
     chosen = branches(choice)
-    number = int(member.split("=")[1])
+    name, number = member.split("=")[0], max(Law) + 1
     changed(
         tmp_path, LAWS,
-        (indented(member + f"\nLINEAR = {number + 1}"), "    LIU = 8\n", True),
+        (indented(f"{name}= {number}\nLINEAR = {number + 1}"), "    IMPACT = 0", False),
         (indented(damping), "    Law.LIU: lambda e: 0.75 * (1.0 - e**2),\n", True),
         ("LINEAR = int(Law.LINEAR)\n\n\n" + force,
          "\n\n@inline_llvm\ndef may_choose_laws(p)", False),
@@ -183,7 +185,7 @@ def test_the_page_on_contact_laws_is_right(tmp_path):
           ("normal_force", "elastic_force", "elastic_form")),
     )  # fmt: skip
     laws = (tmp_path / WORDS).read_text(encoding="utf-8")
-    laws = re.sub(r"^RESTITUTING = .*?\)\n", words, laws, count=1, flags=re.DOTALL | re.MULTILINE)
+    laws = laws.replace("RESTITUTING = (", f"RESTITUTING = ({words.strip()} ")
     laws = laws.replace('("impact", "hertz", *', '("impact", "hertz", "linear", *')
     laws = laws.replace('"damping_N_s_per_mm": ("impact",)',
                         '"damping_N_s_per_mm": ("impact", "linear")')  # fmt: skip

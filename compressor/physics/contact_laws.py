@@ -16,7 +16,7 @@ Liu, Zhang and Yang, Mech. Mach. Theory 42 (2007): K delta^1.5 / sqrt(1 + delta 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, unique
 
 import numpy as np
 
@@ -156,6 +156,7 @@ def liu_form(stiffness: float, clearance: float) -> Conformal:
     )  # fmt: skip
 
 
+@unique
 class Law(IntEnum):
     """The normal contact laws."""
 

@@ -205,7 +205,7 @@ def list_comparison(found: Comparison) -> Iterator[str]:
     for job in found.jobs[:MAX_LISTED]:
         numbers = (format_number(getattr(job.likeness, name)) for name in NUMBERS)
         rows.append((job.key[:KEY_DIGITS], job.what, f"{job.rpm:.4g}", *numbers))
-    yield from align_columns(rows, "<<>>>>>>")
+    yield from align_columns(rows, "<<" + ">" * (1 + len(NUMBERS)))
     if more > 0:
         yield f"and {more} less alike, which --json lists"
     if found.left_out:

@@ -101,7 +101,8 @@ def compare_lines(record: np.ndarray, job: np.ndarray, mine: Curves, other: Curv
     Errors are of the jackknife: each revolution of the record is left out in turn (Efron and Stein,
     Annals of Statistics 9, 1981), from three on.
     """
-    found, errors = np.array(_numbers(record, mine, job, other)), np.full(5, math.nan)
+    found = np.array(_numbers(record, mine, job, other))
+    errors = np.full(found.size, math.nan)
     if (count := len(record)) >= MIN_FOR_ERRORS:
         rests = (np.arange(count) != k for k in range(count))
         left = np.array([_numbers(record[rest], mine.part(rest), job, other) for rest in rests])
@@ -109,10 +110,8 @@ def compare_lines(record: np.ndarray, job: np.ndarray, mine: Curves, other: Curv
     return Likeness(*map(Measured, found.tolist(), errors.tolist()))
 
 
-def _numbers(
-    record: np.ndarray, mine: Curves, job: np.ndarray, other: Curves
-) -> tuple[float, float, float, float, float]:
-    """Return difference, both correlations, ratio of rms and distance of lines, (n, orders)."""
+def _numbers(record: np.ndarray, mine: Curves, job: np.ndarray, other: Curves) -> tuple[float, ...]:
+    """Return the numbers of a `Likeness` in their order, by lines, (n, orders) each."""
     one, two = record.mean(axis=0), job.mean(axis=0)
     size = math.sqrt(float((np.abs(one) ** 2).sum() * (np.abs(two) ** 2).sum()))
     correlation = float((one * two.conj()).real.sum()) / size if size else math.nan

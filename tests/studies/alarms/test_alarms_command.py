@@ -14,6 +14,9 @@ from compressor.report.page import document
 from compressor.store import read_dataset, read_studies
 from compressor.studies.alarms.alarms import list_rows, rank_alarms
 from compressor.studies.alarms.page import CAPTION, add, draw_alarms
+from compressor.studies.alarms.readings import ALARMS
+
+KINDS = len(ALARMS) - 1  # without the body's velocity, which no job here has
 
 
 def run(folder, capsys, *words, code=0):
@@ -46,7 +49,7 @@ def test_the_table_has_the_first_alarm_of_each_joint_first(written):
     ):  # fmt: skip
         assert f"{line}\n" in out
     rows = [line for line in out.splitlines() if line.startswith(("big_end ", "small_", "both "))]
-    assert len(rows) == 3 * 9  # kinds of alarm, but the body's velocity, which no job has
+    assert len(rows) == 3 * KINDS
     for joint in ("big_end", "small_end", "both"):
         first = next(row for row in rows if row.startswith(joint))
         best = found.isel(alarm=rank_alarms(found, joint)[0], noise=0).sel(joint=joint)
@@ -92,10 +95,10 @@ def test_the_report_has_a_section_of_its_study(written, worn_store):
     (chapter,) = made.chapters
     page = document([chapter.section])
     assert "Which alarm sees wear first in study worn" in page
-    assert page.count("<tr") == 1 + 3 * 9
+    assert page.count("<tr") == 1 + 3 * KINDS
     assert "<strong>Unit 3</strong>" in page
     assert '<p class="notes">A.</p>' in page
-    for row in list_rows(read_dataset(written[0] / "alarms.nc"))[1::9]:
+    for row in list_rows(read_dataset(written[0] / "alarms.nc"))[1::KINDS]:
         assert all(html.escape(text) in page for text in row)
     assert "sound machines: 60 jobs of 60 draws" in page
     assert html.escape(CAPTION) in page
