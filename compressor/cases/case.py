@@ -263,7 +263,7 @@ stroke, 240 mm
         True
         """
         found: dict[str, Any] = {}
-        for name in ("name", "load", "joint", "clearance_mm", "healthy_clearance_mm", *GROUPS):
+        for name in (*TOP, *GROUPS):
             value = getattr(self, name)
             is_default = (value is None and WORDS[name]) or value == SOUND
             if is_default or (self.joint == "none" and name == "clearance_mm"):

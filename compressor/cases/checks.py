@@ -25,11 +25,11 @@ from compressor.cases.parameter import (
     Problem,
     adapter_of,
     convert_other,
-    is_number,
     quote_value,
     split_unit,
 )
 from compressor.cases.table import GROUPS, TOP, WORDS, parts_by_key, table
+from compressor.cases.yaml_reader import is_number
 
 
 @lru_cache(1024)  # asked for of each key of each job
@@ -238,12 +238,10 @@ def no_mapping(key: str, value: Any) -> str:
 def _example(group: str) -> str:
     """Return a key of a group with its default, such as crank_radius_mm: 120."""
     for name in known_keys(group) if group in GROUPS else ():
-        row = table()[f"{group}.{name}"]
-        if row.default is not None:
-            value = (
-                f"{row.default:g}" if isinstance(row.default, float) else quote_value(row.default)
-            )
-            return f", such as {{{name}: {value.strip(chr(39))}}}"
+        default = table()[f"{group}.{name}"].default
+        if default is not None:
+            value = f"{default:g}" if isinstance(default, float) else default
+            return f", such as {{{name}: {value}}}"
     return ""
 
 
@@ -264,11 +262,7 @@ def suggestion(name: str, group: str) -> str:
 
 def probable_keys(name: str, group: str) -> list[str]:
     """Return the dotted keys that an unknown one probably means; in a group, those of the group."""
-    parts = [*table()]
-    wholes = (
-        whole if (whole := key.rpartition(".")[0]) in parts_by_key() else key for key in parts
-    )
-    every = [*dict.fromkeys([*wholes, *DOUBLES])]
+    every = [*keys_of(lambda key: key), *DOUBLES]
     if exact := [key for key in every if _leaf(key) == name]:
         return exact
     near = _nearest(name, known_keys(group), 0.6)
@@ -279,7 +273,7 @@ def probable_keys(name: str, group: str) -> list[str]:
     words = {word for word in name.lower().split("_") if word}
     return [key for key in own if _leaf(key) == near] or [
         key
-        for key in parts
+        for key in table()
         if key.startswith(group) and words and words <= {*re.split("[_.]", key.lower())}
     ]
 

@@ -24,6 +24,7 @@ from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
 from compressor.cases.parameter import IMPLAUSIBLE, Problem
 from compressor.cases.table import GROUPS, READ, WORDS, table
+from compressor.cases.yaml_reader import is_number
 from compressor.metrics import AXES, JOINTS
 
 Case = Any  # that of `compressor.cases.case`, which needs these rules
@@ -168,8 +169,7 @@ def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
     ideal = values.get("joint") == "none"
     for key, row in table().items():
         value, whole = value_in(values, key), key.rpartition(".")[0]
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if row.judged is None or not is_number or (ideal and key.startswith(OF_CONTACT)):
+        if row.judged is None or not is_number(value) or (ideal and key.startswith(OF_CONTACT)):
             continue
         if not value and (key in ABSENT_AT_ZERO or whole == "clearance_mm"):
             continue

@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from compressor.cases.blocks import Sample
-from compressor.cases.checks import DOUBLES, phrase_of, row_of, row_of_double
+from compressor.cases.checks import DOUBLES, keys_of, phrase_of, row_of, row_of_double
 from compressor.cases.load import WHOLE_FILE, Report
 from compressor.cases.parameter import NAME, Parameter, adapter_of, rows_of
 from compressor.cases.swept import FORMS, SAMPLED
@@ -64,9 +64,8 @@ def _group_of_file(of: type) -> Schema:
 
 def _group(name: str) -> Schema:
     """Return the schema of a group of keys."""
-    own = [key for key in table() if key.startswith(f"{name}.")]
-    keys = dict.fromkeys(".".join(key.split(".")[:2]) for key in own)
-    found = {key.partition(".")[2]: _value_or_parts(key) for key in keys}
+    own = [key for key in keys_of(lambda key: key) if key.startswith(f"{name}.")]
+    found = {key.partition(".")[2]: _value_or_parts(key) for key in own}
     for double in DOUBLES:
         if double.startswith(f"{name}."):
             found[double.partition(".")[2]] = _value(row_of_double(double))

@@ -39,6 +39,7 @@ from pydantic import (
 
 from compressor.cases.card import ATMOSPHERE_MPA, IN_MPA, CardError, mark_card
 from compressor.cases.plausible import PLAUSIBLE, Plausible
+from compressor.cases.yaml_reader import is_number
 from compressor.metrics import METRICS
 from compressor.program import CompsimError, did_you_mean
 
@@ -202,11 +203,6 @@ def to_si(value: float, unit: str) -> float:
     """
     numerator, denominator = UNITS[unit]
     return value * numerator / denominator
-
-
-def is_number(value: Any) -> bool:
-    """Return whether a value is a number."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def convert_other(value: Any, unit: str) -> str:

@@ -13,7 +13,7 @@ from fractions import Fraction
 from statistics import NormalDist
 from typing import Any
 
-from compressor.cases.yaml_reader import Path
+from compressor.cases.yaml_reader import Path, is_number
 from compressor.program import did_you_mean, ignore_warnings
 
 # designs of samples, which draw several keys together
@@ -73,8 +73,9 @@ def sweep_of(path: Path, value: Any, is_whole: bool = False) -> Sweep:
         return Sweep(path, "list", len(value), lambda: value)
     words, log = [word for word in value if word != "log"], value.get("log")
     if len(words) != 1 or words[0] not in FORMS:
-        near = get_close_matches(words[0], FORMS, 1) if len(words) == 1 else []
-        meant = near[0] if near else "range" if "step" in words else "linspace"
+        near = [word for word in words if word in FORMS]
+        near += get_close_matches(words[0], FORMS, 1) if len(words) == 1 else []
+        meant = [*near, "range" if "step" in words else "linspace"][0]
         raise NoSweep(
             f"needs a value, a list of values or a form such as {{{meant}: {FORMS[meant]}}}; there "
             f"are {', '.join(FORMS)}"
@@ -103,8 +104,7 @@ def _numbers(form: str, values: Any, word: str) -> list[Fraction]:
 
 def is_finite(value: object) -> bool:
     """Return whether a value is a finite number."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and math.isfinite(value)  # type: ignore[arg-type]
+    return is_number(value) and math.isfinite(value)  # type: ignore[arg-type]
 
 
 def _made_sweep(path: Path, word: str, numbers: list[Fraction]) -> Sweep:

@@ -182,23 +182,22 @@ class _Reader:
     def mapping(self, node: Any, path: Path) -> dict[str, Any]:
         """Return the values of a mapping by key."""
         found: dict[str, Any] = {}
-        before = node.start_mark.index  # where the item before ends
+        before, last = node.start_mark.index, None  # where the item before ends, and its value
         for name_node, inner in node.value:
             name, apart = name_node.value, name_node.start_mark.index - before
             before = inner.end_mark.index
             whole = (*path, name)
             if not isinstance(name, str) or not name or not name.isprintable():
                 self.note(name_node, path, "a key must be plain text")
-            elif found and name.isdecimal() and inner.value == "":
-                last = [*found][-1]
-                told = DECIMAL_COMMA if apart == 1 else NO_LIST
-                self.note(name_node, (*path, last), told.format(found[last], name))
+            elif is_number(last) and is_number(resolve_scalar(name)) and inner.value == "":
+                told = DECIMAL_COMMA if apart == 1 and name.isdecimal() else NO_LIST
+                self.note(name_node, (*path, [*found][-1]), told.format(last, name))
             elif name in found:
                 first = self.places[whole][0]
                 line = f" at line {first.line}" if first.line else ""
                 self.note(name_node, whole, f"is given twice; first{line}")
             else:
-                found[name] = self.plain(inner, whole, self.place(name_node))
+                found[name] = last = self.plain(inner, whole, self.place(name_node))
         return found
 
     def items(self, node: Any, path: Path) -> list[Any]:
@@ -257,6 +256,11 @@ KEY = re.compile(r"\s*[A-Za-z]\w*\s*:(\s|$)")
 def _place_after(path: str, before: str) -> Place:
     """Return the place that follows the text `before`."""
     return Place(path, before.count("\n") + 1, len(before) - before.rfind("\n"))
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a value is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def resolve_scalar(text: str) -> Any:
