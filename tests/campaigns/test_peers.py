@@ -5,7 +5,7 @@ import json
 import measure_peers
 import page_tables
 import pytest
-from peers import mechanism, multibody, notebook, soda
+from peers import mechanism, notebook
 
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
@@ -33,26 +33,6 @@ def test_agreement_would_show_a_wrong_lever_arm(exact, monkeypatch):
     monkeypatch.setattr(mechanism, "BORE", mechanism.PIN)
     found = notebook.acceleration("small_end", 1e-9, SHORT)
     assert mechanism.error(found, exact["small_end"]) > 1e-3
-
-
-@pytest.mark.parametrize("scene", mechanism.SCENES)
-def test_exudyn_agrees(exact, scene):
-    pytest.importorskip("exudyn", reason="exudyn is not installed (make peers)")
-    found = multibody.acceleration(scene, rtol=1e-9, duration=SHORT)
-    assert mechanism.error(found, exact[scene]) < 1e-4
-
-
-def test_exudyn_agrees_with_fixed_steps(exact):
-    pytest.importorskip("exudyn", reason="exudyn is not installed (make peers)")
-    found = multibody.acceleration("both", step=2e-6, duration=SHORT)
-    assert mechanism.error(found, exact["both"]) < 2e-3
-
-
-@pytest.mark.parametrize("scene", mechanism.SCENES)
-def test_numbalsoda_agrees(exact, scene):
-    pytest.importorskip("numbalsoda", reason="numbalsoda is not installed (make peers)")
-    found = soda.acceleration(scene, 1e-9, SHORT)
-    assert mechanism.error(found, exact[scene]) < 1e-4
 
 
 def test_kept_contests_are_at_equal_or_better_error():
