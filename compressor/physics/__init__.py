@@ -61,6 +61,6 @@ from compressor.physics.tally import (
     lobatto,
     merge_tallies,
     new_tally,
+    tally_each,
     tally_energy,
-    tally_step,
 )

@@ -305,3 +305,12 @@ def tally_step(span, nodes, weights, rows, every, gap_fraction, sides, measured,
         for side in range(2):
             tally.side_seconds[side] += span * sides[side]
             tally.side_peak[side] = max(tally.side_peak[side], sides[2 + side])
+
+
+@jit
+def tally_each(spans, nodes, weights, rows, gap_fraction, sides, measured, tally, p):
+    """Add steps one after the other as `tally_step` adds one; arrays have a row for each step."""
+    for n in range(spans.size):
+        tally_step(
+            spans[n], nodes, weights, rows[n], 1, gap_fraction[n], sides[n], measured, tally, p
+        )

@@ -21,8 +21,8 @@ from compressor.physics import (
     new_tally,
     sample_segments,
     segments,
+    tally_each,
     tally_energy,
-    tally_step,
 )
 from compressor.reasons import Reason
 from compressor.solve.request import Trajectory, overdue
@@ -136,8 +136,7 @@ def tally_steps(
         sides[:, 2:] = find_tops(loads, times, both, tally["side_peak"])
     last = NODES.size - 1
     of_steps = rows[last * np.arange(spans.size)[:, None] + np.arange(NODES.size)]
-    for span, row, gap, load_sides in zip(spans, of_steps, gaps, sides, strict=True):
-        tally_step(span, NODES, WEIGHTS, row, 1, gap, load_sides, measured, tally, p)
+    tally_each(spans, NODES, WEIGHTS, of_steps, gaps, sides, measured, tally, p)
     return of_steps
 
 
