@@ -18,7 +18,7 @@ from compressor.sweep.wanted import RequestedJobs
 from compressor.sweep.warm_up import Needs, compile_once, compile_seconds
 
 ROW_BYTES = 700  # of one job in a merged batch without time series
-MAX_CASES = 10_000  # of the missing jobs of a study that are looked at, drawn evenly
+MAX_CASES = 1_000  # of the missing jobs of a study that are looked at, drawn evenly
 LONG_JOB = 10.0  # s of a job that is not run twice for what loading was in it
 
 
