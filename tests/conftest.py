@@ -1,5 +1,6 @@
 """Fixtures that several test modules share; what is slow is made once for all test processes."""
 
+import base64
 import contextlib
 import fcntl
 import json
@@ -331,3 +332,15 @@ def in_process():
     """No worker starts in a test: where it matters how processes end, a test does without this."""
     with jobs_here():
         yield
+
+
+def decoded(packed):
+    """The numbers of an array as plotly's JSON has it."""
+    shape = [int(part) for part in packed.get("shape", "-1").split(",")]
+    return np.frombuffer(base64.b64decode(packed["bdata"]), packed["dtype"]).reshape(shape)
+
+
+def listed(figure):
+    """The names in a figure's legend, in its order."""
+    named = [trace for trace in figure.data if trace.showlegend]
+    return [trace.name for trace in sorted(named, key=lambda one: one.legendrank)]

@@ -61,6 +61,7 @@ LIBRARIES = {  # library -> the modules that may import it
     "h5py": {"compressor.store.netcdf"},
     "jinja2": {"compressor.report.page"},
     "matplotlib": {"compressor.report.figures"},
+    "plotly": {"compressor.report"},
     "contourpy": {"compressor.report.figures.contours"},
     "click": {"compsim"},
     "rich": {"compsim.progress"},

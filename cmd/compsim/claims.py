@@ -41,8 +41,8 @@ def claims(study, folder, quiet) -> int:
     screen.print_text(str(write_dataset(path, found)))
     drawn = draw(found, effects)
     if drawn:
-        drawing, sentence = drawn
+        figure, sentence = drawn
         for kind in ("png", "svg"):
-            publish(path.with_suffix(f".{kind}"), render(drawing, kind))
+            publish(path.with_suffix(f".{kind}"), render(figure, kind))
         screen.print_text(f"{path.with_suffix('.png')}: {sentence}")
     return screen.SOME_FAILED if (found["failed"] != "").any() else screen.DONE

@@ -78,7 +78,7 @@ def follow(config, over, both, log, points, no_exponent, rerun, folder, jobs, qu
         if (machine["status"] == "ok").any() and drawn < MAX_DRAWN:
             path = found.path.with_name(f"{found.path.stem}-{number + 1}.png")
             title = title_figure(study.title or study.name, "motion", where)
-            publish(path, render(draw_followed(machine, title), "png"))
+            publish(path, render(draw_followed(machine, title)))
             screen.print_text(str(path))
             drawn += 1
     screen.print_text(str(found.path))

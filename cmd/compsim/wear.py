@@ -48,9 +48,9 @@ def wear(configs, folder, jobs, rerun, as_json, quiet, **how) -> int:
     for study in studies:
         mine = [one for one in summary.machines if one.study == study.name]
         if any(one.life for one in mine):
-            drawing, path = draw_wear(mine), Path(folder, "wear", f"{study.name}.png")
-            drawing.title = title_figure(study.title or study.name, "wear of the bores", [])
-            publish(path, render(drawing, "png"))
+            title = title_figure(study.title or study.name, "wear of the bores")
+            path = Path(folder, "wear", f"{study.name}.png")
+            publish(path, render(draw_wear(mine, title)))
             if not quiet:
                 screen.say(str(path))
     failed = [

@@ -2,18 +2,13 @@
 
 from compressor.report.figures.contours import contour_area, contour_lines
 from compressor.report.figures.drawing import (
-    ColorScale,
-    Drawing,
-    Note,
     Panel,
-    Trace,
+    PlotlyFigure,
     as_csv,
-    box,
-    entry,
     join_with_gaps,
     make_grid,
-    map_cells,
     midway,
+    rectangle,
     share_scales,
 )
 from compressor.report.figures.pictures import render

@@ -14,15 +14,16 @@ from importlib.resources import files
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import plotly.graph_objects as go
 from jinja2 import ChoiceLoader, Environment, FunctionLoader, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from compressor.digits import PAGE_DIGITS, by_bar, setting
 from compressor.outcome import Regime
-from compressor.report.figures.drawing import Drawing, as_csv
+from compressor.report.figures.drawing import INCH, as_csv, describe_figure
 from compressor.report.figures.pictures import DPI
 from compressor.report.figures.sweep_data import Measure
-from compressor.report.interactive import describe_figure, script
+from compressor.report.interactive import script
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.store import Folder, StoredStudy
 
@@ -177,22 +178,24 @@ class Plate:
     name: str
     heading: str
     caption: str
-    drawing: Drawing
+    figure: go.Figure
 
     @property
     def size(self) -> tuple[int, int]:
         """Return width and height of the PNG in pixels."""
-        return int(self.drawing.width * DPI), int(self.drawing.height * DPI)
+        layout = self.figure.layout
+        return int(layout.width * DPI / INCH), int(layout.height * DPI / INCH)
 
     @property
     def alt(self) -> str:
         """Return the figure in words."""
-        return describe_figure(self.drawing)
+        return describe_figure(self.figure)
 
     @property
     def jobs(self) -> Iterator[str]:
         """Return the keys of the jobs that its points are."""
-        return (key for panel in self.drawing.panels for t in panel.traces for key in t.jobs)
+        for trace in self.figure.data:
+            yield from [] if trace.customdata is None else np.ravel(trace.customdata).tolist()
 
     @property
     def opens_jobs(self) -> bool:
@@ -202,8 +205,10 @@ class Plate:
     @property
     def texts(self) -> dict[str, str]:
         """Return the files beside the page that are no pictures, by their names."""
-        drawing = self.drawing
-        return {f"{self.name}.csv": as_csv(drawing), f"{self.name}.js": script(self.name, drawing)}
+        return {
+            f"{self.name}.csv": as_csv(self.figure),
+            f"{self.name}.js": script(self.name, self.figure),
+        }
 
 
 class JobFacts(NamedTuple):

@@ -159,7 +159,7 @@ class OwnFigures:
     sections: Sequence[Section]
 
 
-def own_figures(stored: Stored, study: StoredStudy) -> OwnFigures:
+def own_figures(stored: Stored, study: StoredStudy, units: Units) -> OwnFigures:
     """Return the paper's figures and claims of the machine of a study's last job.
 
     A figure needs those of the paper's cases that it shows among the study's jobs.
@@ -171,7 +171,7 @@ def own_figures(stored: Stored, study: StoredStudy) -> OwnFigures:
     plates = [
         replace(plate, name=file_name(study.name, plate.name),
                 heading=f"{study.name}: {plate.heading}")
-        for plate in (draw_paper(runs) if alike else ())
+        for plate in (draw_paper(runs, units) if alike else ())
     ]  # fmt: skip
     numbers = ", ".join(one.title.partition(":")[0].removeprefix("Figure ") for one in lacking)
     why = f", but not Figures {numbers}, whose cases are not among its jobs" * bool(lacking)
@@ -314,13 +314,13 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
     yield Section("missing", "Figures that could not be drawn", "missing.html", content)
 
 
-def draw_paper(runs: Mapping[str, xr.Dataset], kind: Kind = "paper") -> list[Plate]:
+def draw_paper(runs: Mapping[str, xr.Dataset], units: Units, kind: Kind = "paper") -> list[Plate]:
     """Return every figure of the paper, or of the diagnosis, whose cases are there."""
     plates = []
     for one in FIGURES[kind].values():
         if runs.keys() >= {*one.needs}:
-            shown = one.make(runs)
-            plates.append(Plate(one.name, one.title, shown.caption, shown.drawing))
+            shown = one.make(runs, units=units)
+            plates.append(Plate(one.name, one.title, shown.caption, shown.figure))
     return plates
 
 

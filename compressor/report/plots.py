@@ -7,6 +7,7 @@ from textwrap import wrap
 from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
 import xarray as xr
 
 from compressor.analysis import (
@@ -23,9 +24,8 @@ from compressor.cases import points, row_of, with_ideal_joints
 from compressor.metrics import JOINTS
 from compressor.program import CompsimError
 from compressor.reasons import remedy
-from compressor.report.figures import FIGURES, Drawing, SweptRow
+from compressor.report.figures import FIGURES, SweptRow
 from compressor.report.figures.pictures import render
-from compressor.report.figures.plant_units import in_units
 from compressor.report.figures.sweep_data import name_in_words
 from compressor.report.study_section import file_name
 from compressor.store import (
@@ -85,23 +85,13 @@ def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tup
     return tuple(what) or tuple(known)
 
 
-def publish_drawings(
-    drawn: Iterable[tuple[str, str, Drawing]],
-    output: Folder,
-    stem: str,
-    choice: PlotChoice,
-    title: str = "",
+def publish_figures(
+    drawn: Iterable[tuple[str, str, go.Figure]], output: Folder, stem: str
 ) -> Iterator[Plotted]:
-    """Write drawings with their names and captions as files; yields each. Raises StoreError.
-
-    One without a title has that of its file, or of its machine. choice: of units; title: of the
-    machine.
-    """
-    for name, caption, usual in drawn:
-        drawing = in_units(usual, choice.units)
-        drawing.title = drawing.title or title_figure(title or stem, name.replace("-", " "))
+    """Write figures with their names and captions as files; yields each. Raises StoreError."""
+    for name, caption, figure in drawn:
         path = Path(output) / f"{file_name(stem, name)}.png"
-        publish(path, render(drawing))
+        publish(path, render(figure))
         yield Plotted(path, caption)
 
 
@@ -136,13 +126,13 @@ def write_plots(
         key = find_job(results, words, studies, stored.keys())
         drawn = job_figures(stored, studies, key, choice)
         stem = key[:KEY_DIGITS]
-    yield from publish_drawings(drawn, output, stem, choice)
+    yield from publish_figures(drawn, output, stem)
 
 
 def job_figures(
     stored: Stored, studies: Sequence[StoredStudy], key: str, choice: PlotChoice
-) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield the names, captions and drawings of a job that has time series."""
+) -> Iterator[tuple[str, str, go.Figure]]:
+    """Yield the names, captions and figures of a job that has time series."""
     figures = choose_figures(choice.what, [*JOB], f"job {key}")
     if choice.over or choice.at or choice.limit:
         raise PlotError(f"{key} is one job: --over, --at and --limit are for studies")
@@ -165,9 +155,9 @@ def job_figures(
     try:
         for name in figures:
             if all(has[need] for need in JOB[name].needs):
-                shown = JOB[name].make(run, twins[name])
-                shown.drawing.title = job_title(studies, key, JOB[name].title)
-                yield name, shown.caption, shown.drawing
+                shown = JOB[name].make(run, twins[name], units=choice.units)
+                shown.figure.layout.title = job_title(studies, key, JOB[name].title)
+                yield name, shown.caption, shown.figure
     except NoSeriesError as error:
         raise PlotError(f"job {key}: {error}") from error
 
@@ -188,8 +178,8 @@ def drawable(stored: Stored, studies: Sequence[StoredStudy], key: str) -> xr.Dat
 
 def study_figures(
     stored: Stored, study: StoredStudy, choice: PlotChoice
-) -> Iterator[tuple[str, str, Drawing]]:
-    """Yield the names, captions and drawings of a study along one axis."""
+) -> Iterator[tuple[str, str, go.Figure]]:
+    """Yield the names, captions and figures of a study along one axis."""
     if choice.what and {*choice.what} <= {*JOB}:
         first = study.keys[0][:KEY_DIGITS]
         raise PlotError(
@@ -221,9 +211,9 @@ def study_figures(
                 raise PlotError(f"no joint of {study.name} has clearance: there is no mode map")
             continue
         kept = keep_sensed(rows) if name == "cycles" else rows
-        shown = STUDY[name].make(kept, axis_words(over))
-        shown.drawing.title = study_title(study, STUDY[name].title, where)
-        yield name, shown.caption + where, shown.drawing
+        shown = STUDY[name].make(kept, axis_words(over), units=choice.units)
+        shown.figure.layout.title = study_title(study, STUDY[name].title, where)
+        yield name, shown.caption + where, shown.figure
 
 
 def whole_twin(run: xr.Dataset, sensed: bool = False) -> xr.Dataset | None:
@@ -262,7 +252,9 @@ def title_figure(machine: str, what: str, parts: Sequence[str] = ()) -> str:
 
 def in_lines(first: str, parts: Sequence[str]) -> str:
     """Return a title: a line that says what is drawn, and below it what of."""
-    return "\n".join(line for text in (first, "; ".join(parts)) for line in wrap(text, TITLE_WIDTH))
+    return "<br>".join(
+        line for text in (first, "; ".join(parts)) for line in wrap(text, TITLE_WIDTH)
+    )
 
 
 def axis_words(key: str) -> str:
@@ -326,8 +318,10 @@ def with_segments(
 MAX_PAGE_ROWS = 12  # of a study's jobs whose series a page reads
 
 
-def page_figures(stored: Stored, study: StoredStudy) -> Iterator[tuple[str, str, str, Drawing]]:
-    """Yield what a page draws of a study over the crank angle: name, title, caption, drawing.
+def page_figures(
+    stored: Stored, study: StoredStudy, units: Units
+) -> Iterator[tuple[str, str, str, go.Figure]]:
+    """Yield what a page draws of a study over the crank angle: name, title, caption, figure.
 
     The vibration along an axis, and the revolution of the job where it is greatest. Nothing of a
     study that kept no series.
@@ -344,21 +338,21 @@ def page_figures(stored: Stored, study: StoredStudy) -> Iterator[tuple[str, str,
         return
     if len(known) > 1:
         title = f"vibration over crank angle and {axis_words(over)}"
-        shown = STUDY["cycles"].make(rows, axis_words(over))
-        yield "cycles", title, shown.caption + drawn, shown.drawing
+        shown = STUDY["cycles"].make(rows, axis_words(over), units=units)
+        yield "cycles", title, shown.caption + drawn, shown.figure
     loudest = max(known, key=lambda n: np.abs(known[n].vibration).max())
     run = stored.job(jobs[loudest][1])
     case = case_of(run)
     is_worn = case.joint != "none"
     twin = whole_twin(run, sensed="sensor_acceleration" in run) if is_worn else None
     value = f"{over} {rows[loudest].value}" if jobs[loudest][0] != "" else rows[loudest].value
-    shown = JOB["analyst"].make(run, twin)
+    shown = JOB["analyst"].make(run, twin, units=units)
     title = f"{JOB['analyst'].title}, {value}"
     note = " It is the job with the greatest vibration of these." if len(known) > 1 else ""
-    yield "analyst", title, shown.caption + note + drawn, shown.drawing
+    yield "analyst", title, shown.caption + note + drawn, shown.figure
     if case.load == "gas":
-        shown, title = JOB["cards"].make(run, twin), f"{JOB['cards'].title}, {value}"
-        yield "cards", title, shown.caption + where, shown.drawing
+        shown, title = JOB["cards"].make(run, twin, units=units), f"{JOB['cards'].title}, {value}"
+        yield "cards", title, shown.caption + where, shown.figure
 
 
 def keep_sensed(rows: Sequence[SweptRow]) -> list[SweptRow]:

@@ -7,7 +7,6 @@ report which is interrupted leaves the one before as it was.
 import contextlib
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -31,7 +30,6 @@ from compressor.report.answer import (
 )
 from compressor.report.figures import FIGURES
 from compressor.report.figures.pictures import render_all
-from compressor.report.figures.plant_units import in_units
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.interactive import (
     LIBRARY,
@@ -111,7 +109,7 @@ def write_report(
     folder, zones = Path(report), read_limits(limits, units)
     contents = build_report(results, command, add, zones, units, studies)
     plates = contents.plates
-    pictures = render_all([(plate.heading, plate.drawing) for plate in plates])
+    pictures = render_all([(plate.heading, plate.figure) for plate in plates])
     files = {f"{one.name}.png": png for one, png in zip(plates, pictures, strict=True)}
     for plate in plates:
         files |= {name: text.encode() for name, text in plate.texts.items()}
@@ -165,12 +163,9 @@ def build_report(
     papers = [study for study in studies if is_of_paper(stored, study)]
     if not papers:
         paper = PaperRuns({}, {}, {})  # a few like runs in a sweep of one's own are no reproduction
-    of_paper = plates_in(draw_paper(paper.usable), units)
-    of_own = {one.name: own_figures(stored, one) for one in studies if one.figures}
-    of_own = {
-        name: replace(one, plates=plates_in(one.plates, units)) for name, one in of_own.items()
-    }
-    of_faults = plates_in(draw_paper(paper.usable, "diagnosis"), units)
+    of_paper = draw_paper(paper.usable, units)
+    of_own = {one.name: own_figures(stored, one, units) for one in studies if one.figures}
+    of_faults = draw_paper(paper.usable, units, "diagnosis")
     own = [study for study in studies if not repeats_paper(study, paper)]
     added = [one(results, studies) for one in add]
     drawn = [
@@ -186,7 +181,7 @@ def build_report(
     later = [
         *chain(*(one.plates for one in of_own.values()), of_faults, *(one.plates for one in drawn))
     ]
-    later += [plate for chapter in chapters for plate in plates_in(chapter.plates, units)]
+    later += [plate for chapter in chapters for plate in chapter.plates]
     caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored, one)]
     judged = claims(paper.usable) if paper.stored else []
     figures, tables = paper_sections(paper, of_paper, judged, caveats, units)
@@ -223,11 +218,6 @@ def choose_studies(results: Folder, names: Sequence[str]) -> list[StoredStudy]:
     return [find_study(results, name, known) for name in dict.fromkeys(names)]
 
 
-def plates_in(plates: Sequence[Plate], units: Units) -> list[Plate]:
-    """Return figures in chosen units."""
-    return [replace(plate, drawing=in_units(plate.drawing, units)) for plate in plates]
-
-
 class DrawnStudy(NamedTuple):
     """What the page has of a user's own study.
 
@@ -261,10 +251,9 @@ def drawn_study(
             for one in ([] if study.figures else draw_sweep(data, limits, units))
         ]  # fmt: skip
         plates += [
-            Plate(file_name(name, study.name), f"{study.name}: {title}", words,
-                  in_units(drawing, units))
-            for name, title, words, drawing in (
-                [] if study.figures else page_figures(stored, study)
+            Plate(file_name(name, study.name), f"{study.name}: {title}", words, figure)
+            for name, title, words, figure in (
+                [] if study.figures else page_figures(stored, study, units)
             )
         ]  # fmt: skip
         figures, table = study_sections(stored, study, data, plates, notes, limits, units)

@@ -7,7 +7,6 @@ Margins are taken from the stored jobs by the rules of the report, 0 at a claim'
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,20 +21,17 @@ from compressor.report import (
     BLUE,
     GREY,
     RED,
-    ColorScale,
-    Drawing,
     LineStyle,
     Panel,
-    Trace,
+    PlotlyFigure,
     contour_area,
     contour_lines,
     fill,
-    join_with_gaps,
     make_grid,
-    map_cells,
     mark,
     midway,
     palette,
+    rectangle,
     share_scales,
 )
 from compressor.store import (
@@ -308,7 +304,7 @@ MAP = "blue: the claim holds, red: it does not, by its margin; ring: the default
 BARS = "shares of the variance of a claim's margin by an assumption, with 95 % intervals"
 
 
-def draw(found: xr.Dataset, effects: xr.Dataset | None) -> tuple[Drawing, str] | None:
+def draw(found: xr.Dataset, effects: xr.Dataset | None) -> tuple[PlotlyFigure, str] | None:
     """Return the figure of machines and a sentence on it; None where they are neither kind.
 
     A map over both masses, or what decides each claim.
@@ -319,44 +315,35 @@ def draw(found: xr.Dataset, effects: xr.Dataset | None) -> tuple[Drawing, str] |
     return (draw_sensitivity(effects), BARS) if effects is not None else None
 
 
-def draw_map(plane: xr.Dataset) -> Drawing:
+def draw_map(plane: xr.Dataset) -> PlotlyFigure:
     """Return each claim's margin over rod and reciprocating mass, and how many claims hold."""
-    figure, panels = make_grid(2, 4, 5.6)
+    drawing, panels = make_grid(2, 4, 5.6)
     x, y = (midway(plane[name].values) for name in (ROD, RECIPROCATING))
-    colors = ColorScale(palette("RdBu"), -REACH, REACH, side="")
-    *shown, number, best = figure.panels
+    *shown, number, best = drawing.panels
     for claim, panel in zip(OF_MASSES, shown, strict=True):
         margin = plane["margin"].sel(claim=claim).transpose(RECIPROCATING, ROD).values
-        panel.traces.append(map_cells(x, y, margin, colors))
+        panel.map(x, y, margin, palette("RdBu"), (-REACH, REACH), "margin",
+                  has_scale=panel is panels[0, 3])  # fmt: skip
         border(panel, plane, margin >= 0.0, BLACK)
         panel.title = f"claim {claim}"
-    bar = replace(colors, side="right", aspect=40, beside_column=True, pointed=True,
-                  bar_title="margin, relative to the threshold; holds above 0")  # fmt: skip
-    last = panels[0, 3].traces
-    last[0] = replace(last[0], scale=bar)
     count = (plane["margin"] >= 0.0).transpose("claim", RECIPROCATING, ROD).sum("claim").values
-    steps = ColorScale(palette("cividis", 7), 1.5, 8.5, side="bottom", aspect=18,
-                       ticks=(*range(2, 9),))  # fmt: skip
-    number.traces.append(map_cells(x, y, count.astype(float), steps))
+    number.map(x, y, count.astype(float), palette("cividis", 7), (1.5, 8.5))
     number.title = "how many of eight hold"
     most = int(count.max())
-    best.ground = fill("#f4f4f4")
+    best.fill(*rectangle(x, y), fill("#f4f4f4"))
     masses = plane[ROD].values, plane[RECIPROCATING].values
     around = contour_area(*masses, (count == most).astype(float), 0.5, 1.5)
-    best.plot(*around, fill(BLUE, 0.35), kind="band")
+    best.fill(*around, fill(BLUE, 0.35, 1.5))
     border(best, plane, count == most, BLUE)
     best.title = f"most of them: {most} hold"
     default = Case.from_values({}).machine
-    for panel in figure.panels:
-        ring = mark(RED, "o", 6, is_hollow=True, edge_width=1.8)
+    for panel in drawing.panels:
+        ring = mark(RED, "circle", 6, is_hollow=True, edge_width=1.8)
         panel.plot(default.rod_mass_kg, default.reciprocating_mass_kg, ring)
-        panel.grid = ""
-    for panel in panels[1]:
-        panel.x.title = "rod mass (kg)"
-    for panel in panels[:, 0]:
-        panel.y.title = "reciprocating mass (kg)"
-    share_scales(figure.panels, "x", "y")
-    return figure
+        panel.x.showgrid = panel.y.showgrid = False
+        panel.x.title, panel.y.title = "rod mass (kg)", "reciprocating mass (kg)"
+    share_scales(drawing.panels, "x", "y")
+    return drawing.figure()
 
 
 def border(panel: Panel, plane: xr.Dataset, inside: np.ndarray, color: str) -> None:
@@ -367,29 +354,25 @@ def border(panel: Panel, plane: xr.Dataset, inside: np.ndarray, color: str) -> N
         panel.plot(*line, LineStyle(color, linewidth=1.0))
 
 
-def draw_sensitivity(effects: xr.Dataset) -> Drawing:
+def draw_sensitivity(effects: xr.Dataset) -> PlotlyFigure:
     """Return main and total effect of each assumption on each claim's margin, with intervals."""
     names = [str(name).replace("_", " ") for name in effects["assumption"].values]
     claims = [claim for claim in CLAIMS if effects["total_order"].sel(claim=claim).notnull().any()]
     rows = -(-len(claims) // 4)
-    figure, _ = make_grid(rows, 4, 0.8 + rows * (0.9 + 0.21 * len(names)), len(claims))
+    drawing, _ = make_grid(rows, 4, 0.8 + rows * (0.9 + 0.21 * len(names)), len(claims))
     place = np.arange(len(names), dtype=float)
-    for panel, claim in zip(figure.panels, claims, strict=True):
+    for panel, claim in zip(drawing.panels, claims, strict=True):
         for variable, color, shift, name in EFFECTS:
             one = effects.sel(claim=claim)
             value, at = one[variable].values, place - shift
             low, high = (one[f"{variable}_{end}"].values for end in ("low", "high"))
-            ends = (np.minimum(value, low), np.maximum(value, high))
-            pairs = np.stack([np.stack([end, at], axis=1) for end in ends], axis=1)
-            x, y = join_with_gaps(pairs)
-            bars = Trace(np.maximum(value, 0.0), at, fill(color), name, "bars", thick=0.36)
-            panel.traces += [bars, Trace(x, y, LineStyle(BLACK, linewidth=0.9))]
+            ends = np.nan_to_num([value - low, high - value]).clip(min=0.0)
+            panel.bars(np.maximum(value, 0.0), at, fill(color), name, 0.36, errors=ends)
         panel.title = f"claim {claim}"
         panel.x.title = "share of the variance"
-        panel.x.span(0.0, 1.25)
-    first = figure.panels[0]
-    first.y.name(names)
-    first.y.span(*first.limits("y")[::-1])
-    share_scales(figure.panels, "y")
-    figure.legend = [trace for trace in first.traces if trace.name]
-    return figure
+        panel.span("x", 0.0, 1.25)
+    first = drawing.panels[0]
+    first.name_ticks("y", names)
+    first.span("y", *first.limits("y")[::-1])
+    share_scales(drawing.panels, "y")
+    return drawing.figure()

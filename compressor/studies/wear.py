@@ -32,7 +32,7 @@ from compressor.cases import (
 from compressor.metrics import JOINTS, METRICS
 from compressor.program import PROGRAM, CompsimError, Progress
 from compressor.reasons import Reason
-from compressor.report import BLACK, CYCLE, GREY, Drawing, LineStyle, Note, fill, make_grid
+from compressor.report import BLACK, CYCLE, GREY, LineStyle, PlotlyFigure, fill, make_grid
 from compressor.solve import simulate
 from compressor.store import Folder, StoreError, read_dataset, writable_folder, write_dataset
 from compressor.studies.frame import hash_key, read_file_rows, rows_dataset
@@ -394,12 +394,12 @@ def to_row(one: WornMachine, folder: Folder) -> dict[str, Any]:
     return found
 
 
-def draw_wear(machines: Iterable[WornMachine]) -> Drawing:
+def draw_wear(machines: Iterable[WornMachine], title: str = "") -> PlotlyFigure:
     """Return two panels: clearance and greatest force of each machine's worst joint by hours.
 
     Of the first machines that have a life. Shaded: with the least and the greatest coefficient.
     """
-    figure, grid = make_grid(1, 2, 3.6)
+    drawing, grid = make_grid(1, 2, 3.6)
     opening, force = grid.flat
     drawn = [one for one in machines if one.life][:MAX_DRAWN]
     last = 1e-9
@@ -410,22 +410,20 @@ def draw_wear(machines: Iterable[WornMachine]) -> Drawing:
         at, opened = stages["hours"].values, 1e3 * stages["clearance"].values
         opening.plot(at, opened, line)
         around = np.concatenate([at / factor, at[::-1] * factor])
-        opening.plot(
-            around, np.concatenate([opened, opened[::-1]]), fill(line.color, 0.15), kind="band"
-        )
+        opening.fill(around, np.concatenate([opened, opened[::-1]]), fill(line.color, 0.15))
         peaks = 1e-3 * stages["peak_contact_force"].values
         force.plot(at, peaks, line, f"{name_of(one)}, {one.life.joint.replace('_', ' ')}")
         last = max(last, float(at[-1]))
     for limit in {1e3 * one.worn.limit for one in drawn if math.isfinite(one.worn.limit)}:
-        opening.notes.append(Note(y=limit, style=LineStyle(BLACK, linewidth=0.8)))
-        opening.notes.append(Note("limit", 0.02 * last, limit, shift=(0, 2), size=8.5))
+        opening.rule(LineStyle(BLACK, linewidth=0.8), y=limit)
+        opening.write("limit", 0.02 * last, limit, shift=(0, 2), size=8.5)
     opening.x.title = force.x.title = "operating hours"
-    opening.x.span(0.0, last)
+    opening.span("x", 0.0, last)
     opening.y.title = "clearance (mm)"
     force.y.title = "greatest contact force (kN)"
-    force.y.span(low=0.0)
-    figure.legend = force.traces
+    force.span("y", low=0.0)
     for panel, letter in zip(grid.flat, "ab", strict=True):
         panel.title = f"({letter})"
-        panel.notes.append(Note(y=0.0, style=LineStyle(GREY, linewidth=0.5, zorder=0)))
-    return figure
+        panel.rule(LineStyle(GREY, linewidth=0.5, zorder=0), y=0.0)
+    drawing.title = title
+    return drawing.figure()

@@ -5,13 +5,14 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from conftest import listed
 
 from compressor.analysis.contacts import impacts
 from compressor.analysis.cycle import _reversals, read_cycle, read_loads
 from compressor.analysis.runs import record_of
 from compressor.analysis.shaking import NoSeriesError, frame_forces, healthy_twin
 from compressor.cases.case import Case
-from compressor.report.figures.drawing import as_csv
+from compressor.report.figures.drawing import as_csv, views_of
 from compressor.report.figures.job import draw_analyst, split_events
 from compressor.report.figures.rows import SweptRow, draw_segments, number_segments
 from compressor.report.figures.table import spell
@@ -163,24 +164,22 @@ def test_the_caption_has_the_numbers(sensed):
 
 
 def test_all_that_is_marked_is_in_the_table(sensed):
-    drawing = draw_analyst(sensed, healthy_twin(sensed, sensed=True)).drawing
+    figure = draw_analyst(sensed, healthy_twin(sensed, sensed=True)).figure
     found = read_cycle(sensed)
-    strip, vibration, load = drawing.panels
+    strip, vibration, load = views_of(figure)
     lanes = ["suction", "discharge", "impacts, big end", "reversals"]
-    assert [*strip.y.words.values()] == lanes
+    assert [*strip.y.ticktext] == lanes
     angles = {name: angle for angle, name in found.events}
     open_at = {trace.name: trace.x.tolist() for trace in strip.traces[:2]}
     assert open_at == {
         "suction": [angles["suction opens"], angles["suction closes"]],
         "discharge": [angles["discharge opens"], 360.0],
     }
-    lines = [note.x for note in load.notes if note.is_line and not math.isnan(note.x)]
+    lines = [rule.x0 for rule in load.rules if "domain" in rule.yref]
     assert sorted(lines) == sorted([*found.reversals, *(angle for angle, _ in found.events)])
     assert vibration.title == "record of the sensor: guide, along y"
-    assert [one.name for one in drawing.legend] == [
-        "this job", "the same machine without clearance",
-    ]  # fmt: skip
-    head = as_csv(drawing).splitlines()[0]
+    assert listed(figure) == ["this job", "the same machine without clearance"]
+    head = as_csv(figure).splitlines()[0]
     for text in ("a (m/s²)", "F_r (kN)", "reversals", "impacts, big end"):
         assert text in head
 
@@ -218,13 +217,13 @@ def test_segments_over_their_limits_are_told():
     assert "the first over it" not in told
     free = [row.with_segments(run, np.full(36, 3.0), None) for row in rows]
     assert [*dict(number_segments(free))] == ["greatest rms"]
-    drawing = draw_segments(rows, "clearance_mm").drawing
-    over, doubtful = drawing.legend
+    figure = draw_segments(rows, "clearance_mm").figure
+    over, doubtful = (one for one in figure.data if one.showlegend)
     assert (over.name, over.x.tolist(), over.y.tolist()) == (
         "over its limit", [325.0, 85.0, 325.0], [1.0, 2.0, 2.0],
     )  # fmt: skip
     assert (doubtful.x.tolist(), doubtful.y.tolist()) == ([85.0], [1.0])
-    np.testing.assert_allclose(drawing.panels[0].traces[0].z[2, 32], 9.5 / 3)
+    np.testing.assert_allclose(10.0 ** figure.data[0].z[2, 32], 9.5 / 3)
 
 
 def test_gas_and_inertia_make_the_rod_load():

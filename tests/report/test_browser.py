@@ -135,7 +135,7 @@ def test_curves_can_be_switched_off(driver, page):
     live(driver, "figure-08")
     shown = (
         "return document.querySelector('#figure-08 .plot').data"
-        ".filter(t => t.meta && t.visible).map(t => t.meta)"
+        ".filter(t => t.name && t.visible).map(t => t.name)"
     )
     names = {*driver.execute_script(shown)}
     assert len(names) == 4
@@ -179,7 +179,7 @@ def test_a_click_on_a_job_tells_of_it(driver, own):
     box = driver.find_element("css selector", "#job")
     wait_for(driver, "return document.querySelector('#job figure.live') !== null")
     shown = driver.execute_script(
-        "return document.querySelector('#job .plot').data.map(trace => trace.meta)"
+        "return document.querySelector('#job .plot').data.map(trace => trace.name)"
     )
     assert shown == ["acceleration", "big end", "small end"]
     key = driver.execute_script("return document.querySelector('tr[data-job]').dataset.job")

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from conftest import listed
 
 from compressor.analysis.contacts import OILED_MODES, angle_modes
 from compressor.analysis.cycle import Cycle
@@ -146,7 +147,7 @@ def test_captions_of_oiled_joints_speak_of_dry_contact():
     assert numbers(told["impacts"])["dry contacts a revolution at the big end"] == [0.0]
     analyst = draw_analyst(full, None)
     assert dict(analyst.numbers)["dry contact at the big end"] == "none"
-    assert "dry contact, big end" in analyst.drawing.panels[0].y.words.values()
+    assert "dry contact, big end" in analyst.figure.layout.yaxis.ticktext
     nearest = 1e6 * float(full["penetration"].sel(joint="big_end").values[2 * 720 :].max())
     assert numbers(told["orbits"])["big end, off its wall"] == [100.0]
     assert numbers(told["orbits"])["deepest, below 0 a gap"][0] == pytest.approx(nearest, rel=1e-3)
@@ -154,7 +155,7 @@ def test_captions_of_oiled_joints_speak_of_dry_contact():
     assert FILM in found.caption
     assert numbers(found)["film alone at the big end"] == [100.0]
     for one in (told["modes"], found):
-        assert [trace.name for trace in one.drawing.legend] == [*OILED_MODES]
+        assert listed(one.figure) == [*OILED_MODES]
 
 
 def test_a_chaotic_motion_is_told(paper_runs):
@@ -194,8 +195,7 @@ def test_a_map_names_the_marks_that_it_has():
     def names(events, reversals):
         vibration = np.ones(360)
         cycle = Cycle(ANGLES, vibration, True, ANGLES, vibration, reversals, events, {})
-        panel = draw_cycles([SweptRow("0.1", cycle=cycle)], "clearance").drawing.panels[0]
-        return [trace.name for trace in panel.traces if trace.style.marker]
+        return listed(draw_cycles([SweptRow("0.1", cycle=cycle)], "clearance").figure)
 
     assert names(((9.0, "suction opens"),), ()) == ["a valve opens or closes"]
     cam = names(((9.0, "cam: dwell ends"),), (40.0,))

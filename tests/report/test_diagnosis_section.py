@@ -66,7 +66,7 @@ def test_both_shares_are_told(drawn, paper_runs, found):
         told = shares[2 * place : 2 * place + 2]
         assert np.array(told) == pytest.approx(np.array(expected), rel=0.01, abs=1)
     assert numbers(shown, "in flight") == [[0.0] * 3] * 2
-    profile = shown.drawing.panels[0].traces[0].y
+    profile = next(one for one in shown.figure.data if one.name == "0.1 mm").y
     whole = np.sqrt(np.mean(profile[:-1] ** 2))
     assert profile.size == 360 / BIN + 1
     assert whole == pytest.approx(rms(high(paper_runs["big_end 0.1"])), rel=5e-3)
@@ -84,5 +84,5 @@ def test_the_table_has_every_case(found, paper_runs):
 
 def test_nothing_is_drawn_where_a_case_is_missing(paper_runs):
     some = {name: run for name, run in paper_runs.items() if name != "both 0.2"}
-    assert draw_paper(some, "diagnosis") == []
+    assert draw_paper(some, "usual", "diagnosis") == []
     assert not [*diagnosis_sections(some, [])]

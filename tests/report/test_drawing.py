@@ -1,47 +1,35 @@
-"""Figures as data: their limits, and what the renderers of table and page make of them."""
+"""Figures as plotly's: the limits of panels, what is read of a figure, and what the page gets."""
 
-import base64
 import csv
 import io
 import json
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
+from conftest import decoded
 
 from compressor.report.figures.contours import contour_area, contour_lines
 from compressor.report.figures.drawing import (
-    ColorScale,
-    Drawing,
-    Note,
     Panel,
-    Scale,
     as_csv,
+    describe_figure,
     make_grid,
-    map_cells,
     midway,
+    outline_cells,
     share_scales,
 )
 from compressor.report.figures.style import LineStyle, fill, mark, palette
 from compressor.report.interactive import (
     MAX_POINTS,
     content,
-    describe_figure,
     extremes,
-    link_scales,
     publish_library,
     script,
 )
 
 X = np.linspace(0.0, 360.0, 721)
-BLUE, RED = LineStyle("#1f4488", (0, (4, 2)), 1.5), LineStyle("#d0583b")
-
-
-def numbers(packed):
-    """What the page makes of packed numbers."""
-    if isinstance(packed, list):
-        first, step, count = packed
-        return first + step * np.arange(count)
-    return np.frombuffer(base64.b64decode(packed), "<f4")
+BLUE, RED = LineStyle("#1f4488", (4, 2), 1.5), LineStyle("#d0583b")
 
 
 @pytest.fixture
@@ -49,19 +37,20 @@ def drawing():
     """Two panels of curves side by side, below them a map and bars."""
     drawing, ((left, right), (low, bars)) = make_grid(2, 2, 4.8)
     for panel, title, ends in ((left, "whole", (0, 360)), (right, "enlarged", (90, 120))):
+        panel.label("x", "angle ({})", "°")
+        panel.label("y", "F<sub>x</sub> ({})", "kN")
         panel.plot(X, np.sin(np.radians(X)), BLUE, "sine")
         panel.plot(X, np.cos(np.radians(X)), RED, "cosine")
-        panel.notes.append(Note(y=0.0))
-        panel.title, panel.x.title, panel.y.title = title, "angle (°)", "$F_x$ (kN)"
-        panel.x.span(*ends)
-    scale = ColorScale(palette("cividis"), 1.0, 100.0, True, "peak (kN)")
+        panel.rule(RED, y=0.0)
+        panel.title = title
+        panel.span("x", *ends)
     edges, z = (np.array([1.0, 2, 4]), np.array([0.0, 1, 2])), np.array([[1, 10], [100, np.nan]])
-    low.traces.append(map_cells(*edges, z, scale, jobs=("a", "b", "c", "d")))
+    low.map(*edges, z, palette("cividis"), (1.0, 100.0), "peak ({})", "kN", is_log=True,
+            jobs=("a", "b", "c", "d"))  # fmt: skip
     ends = np.array([[0.1, 0.2], [0.1, 0.1]])
-    bars.plot([0.25, 0.75], [0, 1], fill("#000000"), "main effect", kind="bars", errors=ends,
-              across=True, thick=0.5)  # fmt: skip
-    bars.y.name(["speed", "clearance"])
-    bars.plot([0.1, 0.2], [0.5, 0.6], mark("#000000", "o", 3), "jobs",
+    bars.bars([0.25, 0.75], [0, 1], fill("#000000"), "main effect", errors=ends, thick=0.5)
+    bars.name_ticks("y", ["speed", "clearance"])
+    bars.plot([0.1, 0.2], [0.5, 0.6], mark("#000000", "circle", 3), "jobs",
               errors=np.array([[0.1, 0.2], [0.3, 0.4]]))  # fmt: skip
     return drawing
 
@@ -71,11 +60,11 @@ def test_limits_follow_what_is_drawn(drawing):
     assert whole.limits("y") == pytest.approx((-1.1, 1.1))  # a twentieth of room
     assert enlarged.limits("x") == (90, 120)
     assert (low.limits("x"), low.limits("y")) == ((1, 4), (0, 2))  # a map has none
-    assert bars.limits("x") == (0, 0.75)
+    assert bars.limits("x") == pytest.approx((-0.0375, 0.7875))  # room beside marks
     assert bars.limits("y") == pytest.approx((-0.325, 1.325))  # bars are half a unit thick
-    whole.notes.append(Note(y=9.0))
+    whole.rule(RED, y=9.0)
     assert whole.limits("y") == pytest.approx((-1.5, 9.5))
-    whole.y.span(low=0.0)
+    whole.span("y", low=0.0)
     assert whole.limits("y") == pytest.approx((0.0, 9.5))
 
 
@@ -85,7 +74,8 @@ def test_limits_follow_what_is_drawn(drawing):
      ([np.nan, np.inf], False, (-0.05, 1.05)), ([0, 1, 100], True, (10**-0.1, 10**2.1))],
 )  # fmt: skip
 def test_limits_of_odd_values(values, is_log, ends):
-    panel = Panel((0, 1), (0, 1), y=Scale(log=is_log, margin=0.05))
+    panel = Panel((0, 1), (0, 1))
+    panel.y.type = "log" if is_log else "linear"
     panel.plot(np.arange(len(values)), values, RED)
     assert panel.limits("y") == pytest.approx(ends)
 
@@ -94,18 +84,17 @@ def test_shared_scales_show_the_whole_and_have_numbers_outside():
     drawing, grid = make_grid(2, 2, 4.0, count=3)
     for number, panel in enumerate(drawing.panels):
         panel.plot([0, 1 + number], [0, 1], RED)
-    drawing.panels[0].y.name(["speed", "mass"])
+    drawing.panels[0].name_ticks("y", ["speed", "mass"])
     share_scales(drawing.panels, "x", "y")
     assert {panel.limits("x") for panel in drawing.panels} == {(0, 3)}
-    assert [panel.x.bare for panel in drawing.panels] == [True, False, False]
-    assert [panel.y.bare for panel in drawing.panels] == [False, True, False]
-    words = [panel["y"]["words"] for panel in content(drawing)["panels"]]
-    assert words == [[[0.0, "speed"], [1.0, "mass"]]] * 3
+    assert [panel.x.showticklabels for panel in drawing.panels] == [False, True, True]
+    assert [panel.y.showticklabels for panel in drawing.panels] == [True, False, True]
+    assert [panel.y.ticktext for panel in drawing.panels] == [("speed", "mass")] * 3
     assert grid.shape == (2, 2)
 
 
 def test_a_csv_has_every_number_once(drawing):
-    head, *rows = csv.reader(io.StringIO(as_csv(drawing)))
+    head, *rows = csv.reader(io.StringIO(as_csv(drawing.figure())))
     assert head[:3] == [
         "whole: sine: angle (°)",
         "whole: sine: F_x (kN)",
@@ -130,7 +119,7 @@ def test_panels_of_the_same_jobs_share_columns_and_name_their_axes():
         panel.x.title = f"x{column}" if row == 1 else ""
         panel.y.title = "" if column else f"y{row}"
     share_scales(drawing.panels, "x", "y")
-    head, *rows = csv.reader(io.StringIO(as_csv(drawing)))
+    head, *rows = csv.reader(io.StringIO(as_csv(drawing.figure())))
     assert [title for title in head if title.endswith("job")] == ["1: a job: job"]
     assert [title.rpartition(" ")[2] for title in head] == [
         "x0", "y0", "job", "x1", "y0", "x0", "y1", "x1", "y1"
@@ -139,34 +128,57 @@ def test_panels_of_the_same_jobs_share_columns_and_name_their_axes():
 
 
 def test_the_page_gets_what_was_drawn(drawing):
-    found = content(drawing)
-    whole, enlarged, low, bars = found["panels"]
-    sine, cosine = whole["traces"]
-    assert sine["x"] == [0.0, 0.5, 721]
-    assert numbers(sine["y"]) == pytest.approx(np.sin(np.radians(X)), abs=1e-7)
-    assert (sine["color"], sine["dash"], cosine["dash"]) == ("#1f4488", [6.0, 3.0], [])
-    part = numbers(enlarged["traces"][0]["x"])
-    assert (part[0], part[-1]) == (89.5, 120.5)  # what the panel shows, and a point on either side
-    (cells,) = low["traces"]
-    assert numbers(cells["z"]).tolist()[:3] == [0, 1, 2]
-    assert [found["jobs"][int(n)] for n in numbers(cells["jobs"])] == ["a", "b", "c", "d"]
-    assert cells["limits"] == (0.0, 2.0)
-    assert (len(cells["color"]), cells["color"][-1]) == (33, palette("cividis")[-1])
-    kinds = [(trace["kind"], trace["across"]) for trace in bars["traces"]]
-    assert kinds == [("bars", True), ("points", False)]
-    assert bars["y"]["words"] == [[0.0, "speed"], [1.0, "clearance"]]
-    assert [panel["x"]["link"] for panel in found["panels"]] == [0, 1, 2, 3]
-    assert found["aspect"] == 0.5
-    assert not found["unified"]  # a map is no curve
-    assert (whole["x"]["unit"], whole["y"]["unit"]) == ("°", "kN")
+    found = content(drawing.figure())
+    figure = go.Figure(found)  # plotly itself takes it
+    sine, cosine, part, _, cells, bars, jobs = found["data"]
+    assert (sine["x0"], sine["dx"]) == (0.0, 0.5)
+    assert decoded(sine["y"]) == pytest.approx(np.sin(np.radians(X)), abs=1e-7)
+    assert (sine["line"]["color"], sine["line"]["dash"]) == ("#1f4488", "8.0px,4.0px")
+    assert cosine["line"]["dash"] == "solid"
+    assert part["x0"] == 89.5  # what the panel shows, and a point on either side
+    assert decoded(part["y"]).size == 63
+    assert decoded(cells["z"]).ravel().tolist()[:3] == [0, 1, 2]
+    assert np.ravel(cells["customdata"]).tolist() == ["a", "b", "c", "d"]
+    assert (cells["zmin"], cells["zmax"]) == (0.0, 2.0)
+    assert cells["colorbar"]["ticktext"] == ["1", "3", "10", "30", "100"]
+    assert (bars["type"], bars["orientation"], jobs["mode"]) == ("bar", "h", "markers")
+    assert figure.layout.yaxis4.ticktext == ("speed", "clearance")
+    assert figure.layout.hovermode == "closest"  # a map is no curve
+    assert figure.layout.meta["units"] == ["°", "°", "", ""]
+    assert "kN" in sine["hovertemplate"]
 
 
 def test_panels_of_the_same_span_are_zoomed_together():
     drawing, grid = make_grid(3, 1, 4.0)
     for panel in grid.flat:
         panel.plot([0, 1], [0, 1], RED)
-    grid[1, 0].x.span(0.2, 0.4)
-    assert link_scales(drawing, "x") == [0, 1, 0]
+    grid[1, 0].span("x", 0.2, 0.4)
+    layout = drawing.figure().layout
+    assert [layout[f"xaxis{n}"].matches for n in ("", 2, 3)] == [None, None, "x"]
+
+
+def test_axes_read_in_the_unit_that_is_wanted():
+    """Values, error bars, spans, rules and notes follow; what is no quantity stays."""
+    drawing, (panel, image) = (made := make_grid(1, 2, 3.0, units="plant"))[0], made[1].flat
+    panel.label("x", "crank angle ({})", "°")
+    panel.label("y", "a ({})", "m/s²")
+    panel.plot([0.0, 90.0], [9.80665, -19.6133], RED, "a", errors=np.full((2, 2), 9.80665))
+    panel.span("y", -29.41995, 29.41995)
+    panel.rule(RED, y=9.80665)
+    panel.write("inside", 45.0, 0.5, inside="y")
+    image.map(np.arange(3.0), np.arange(2.0), np.array([[1.0, 4.0]]), palette("cividis"),
+              (1.0, 4.0), "force ({})", "N")  # fmt: skip
+    figure = drawing.figure()
+    curve, cells = figure.data
+    assert (figure.layout.yaxis.title.text, figure.layout.xaxis.title.text) == (
+        "a (g)", "crank angle (°)")  # fmt: skip
+    assert curve.x.tolist() == [0.0, 90.0]
+    assert curve.y == pytest.approx([1.0, -2.0])
+    assert curve.error_y.array == pytest.approx([1.0, 1.0])
+    assert figure.layout.yaxis.range == pytest.approx((-3.0, 3.0))
+    assert figure.layout.shapes[0].y0 == pytest.approx(1.0)
+    assert (figure.layout.annotations[0].x, figure.layout.annotations[0].y) == (45.0, 0.5)
+    assert (cells.z.tolist(), cells.colorbar.title.text) == ([[1e-3, 4e-3]], "force (kN)")
 
 
 def test_long_curves_keep_their_extremes():
@@ -182,19 +194,19 @@ def test_long_curves_keep_their_extremes():
 
 
 def test_a_script_breaks_out_of_nothing():
-    panel = Panel((0, 1), (0, 1))
-    panel.plot([0, 1], [0, np.nan], RED, "</script><script>alert(1)</script>")
-    text = script("one", Drawing([panel], 3.0))
+    drawing, grid = make_grid(1, 1, 3.0)
+    grid[0, 0].plot([0, 1], [0, np.nan], RED, "</script><script>alert(1)</script>")
+    text = script("one", drawing.figure())
     assert "<" not in text
     name, _, data = text.removeprefix("compsimFigure(").removesuffix(");\n").partition(",")
     assert json.loads(name) == "one"
-    (trace,) = json.loads(data)["panels"][0]["traces"]
+    (trace,) = json.loads(data)["data"]
     assert trace["name"] == "</script><script>alert(1)</script>"
 
 
 def test_what_is_seen_is_said_in_words(drawing):
-    assert describe_figure(drawing).startswith("4 panels. whole: sine, cosine; enlarged: sine")
-    assert describe_figure(Drawing([], 1.0)) == ""
+    words = describe_figure(drawing.figure())
+    assert words.startswith("4 panels. whole: sine, cosine; enlarged: sine")
 
 
 def test_the_library_lies_beside_the_page(tmp_path):
@@ -209,14 +221,20 @@ def test_the_library_lies_beside_the_page(tmp_path):
     assert path.stat().st_size > 1e6
 
 
-def test_a_word_beside_a_line_stands_where_the_line_does():
-    panel = Panel((0, 1), (0, 1))
-    panel.x.span(0, 200)
-    panel.notes.append(Note("order 12", 12, 1, inside="y", shift=(4, -4)))
-    (note,) = content(Drawing([panel], 3.0))["panels"][0]["notes"]
-    assert (note["text"], note["inside"]) == ("order 12", True)
-    assert (note["x"], note["y"]) == pytest.approx((0.06, 1.0))
-    assert (note["shift"], note["side"], note["level"]) == ((4, -4), "left", "baseline")
+def test_a_word_on_a_log_axis_stands_where_plotly_wants_it():
+    drawing, grid = make_grid(1, 1, 3.0)
+    grid[0, 0].y.type = "log"
+    grid[0, 0].plot([0, 1], [1, 1000], RED)
+    grid[0, 0].write("100", 0.5, 100.0)
+    assert drawing.figure().layout.annotations[0].y == pytest.approx(2.0)
+
+
+def test_outlines_hold_the_cells_that_are_in():
+    x, y = outline_cells(np.arange(4.0), np.arange(3.0), np.array([[1, 1, 0], [0, 0, 1]], bool))
+    first, second = np.split(np.stack([x, y]), np.flatnonzero(np.isnan(x)), axis=1)
+    assert (first.min(axis=1).tolist(), first.max(axis=1).tolist()) == ([0, 0], [2, 1])
+    assert np.nanmin(second, axis=1).tolist() == [2, 1]
+    assert np.nanmax(second, axis=1).tolist() == [3, 2]
 
 
 @pytest.mark.parametrize("is_log", [False, True])
@@ -239,6 +257,6 @@ def test_what_has_no_points_has_no_columns():
     drawing, grid = make_grid(1, 1, 4.0)
     grid[0, 0].plot([], [], RED, "none")
     grid[0, 0].plot([0, 1], [2, 3], RED, "two")
-    head = as_csv(drawing).splitlines()[0]
+    head = as_csv(drawing.figure()).splitlines()[0]
     assert "two" in head
     assert "none" not in head

@@ -10,6 +10,7 @@ import xarray as xr
 from compsim import cli
 from conftest import store, without_pictures
 
+from compressor.report.figures.drawing import views_of
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.sweep_data import MEASURES
 from compressor.report.figures.sweep_maps import LIMIT
@@ -120,8 +121,7 @@ def test_the_page_and_the_curves_show_the_zones(tmp_path, capsys):
     sentence = f"A below {middle} m/s², B from {middle} m/s² on."
     assert page.count(sentence) == 2  # of the table, and in the caption of the curves
     (figure,) = draw_sweep(study, read_limits([f"sensor_peak={middle} m/s2"]))
-    lines = {one.title: [note.y for note in one.notes if note.is_line] for one in
-             figure.figure.panels}  # fmt: skip
+    lines = {one.title: [rule.y0 for rule in one.rules] for one in views_of(figure.figure)}
     assert lines["sensor peak"] == [float(middle)]
     assert not lines["sensor rms"]
     capsys.readouterr()
@@ -131,6 +131,11 @@ def test_the_page_and_the_curves_show_the_zones(tmp_path, capsys):
         assert cli.main(report) == 0
     assert "zone-" not in re.sub("<style>.*?</style>", "", (
         tmp_path / "out" / "index.html").read_text(encoding="utf-8"), flags=re.DOTALL)  # fmt: skip
+
+
+def of_limit(figure):
+    curves = (one for one in views_of(figure)[0].traces if one.type == "scatter")
+    return [one for one in curves if one.line.color == LIMIT.color]
 
 
 def test_limits_are_lines_in_maps_of_two_numbers():
@@ -149,9 +154,9 @@ def test_limits_are_lines_in_maps_of_two_numbers():
     )
     (figure,) = [one for one in draw_sweep(data, read_limits(["sensor_peak=3.5,99 m/s2"]))
                  if one.name == "map"]  # fmt: skip
-    (line,) = [one for one in figure.figure.panels[0].traces if one.style == LIMIT]
+    (line,) = of_limit(figure.figure)
     known = np.isfinite(line.x)
     np.testing.assert_allclose(line.x[known] * line.y[known], 3.5, rtol=0.02)
     assert "A below 3.5 m/s²" in figure.caption
     bare = next(one for one in draw_sweep(data) if one.name == "map")
-    assert not [one for one in bare.figure.panels[0].traces if one.style == LIMIT]
+    assert not of_limit(bare.figure)

@@ -14,7 +14,7 @@ from jinja2 import PackageLoader, UndefinedError
 from compressor.analysis.claims import Claim
 from compressor.report import page
 from compressor.report.answer import Assumptions, FirstScreen, MetricChange, Provenance, StudyLine
-from compressor.report.figures.drawing import Drawing, Panel
+from compressor.report.figures.drawing import make_grid
 from compressor.report.inputs import Inputs
 from compressor.report.page import (
     Cell,
@@ -57,8 +57,9 @@ def strings(source):
 
 
 def markup(source):
-    """The texts of a module that hold a tag or an entity."""
-    return [text for text in strings(source) if re.search(r"<[/!]|<[A-Za-z{]|&#?\w+;", text)]
+    """The texts of a module that hold a tag or an entity, but for those that plotly reads."""
+    texts = (re.sub(r"</?(br|sub|extra)>", "", text) for text in strings(source))
+    return [text for text in texts if re.search(r"<[/!]|<[A-Za-z{]|&#?\w+;", text)]
 
 
 class Hostile:
@@ -74,7 +75,10 @@ class Hostile:
 
 
 def plate(evil):
-    return Plate("drawn", evil(), evil(), Drawing([Panel((0, 1), (0, 1), evil())], 1.0))
+    drawing, grid = make_grid(1, 1, 1.0)
+    grid[0, 0].title = evil()
+    figure = drawing.figure()
+    return Plate("drawn", evil(), evil(), figure)
 
 
 def table(evil):
@@ -98,7 +102,7 @@ def contents(evil):
     return {
         "answer.html": answer,
         "assumptions.html": Assumptions([evil()], True, True, True, [evil()]),
-        "cases.html": PaperCasesContent([evil], table(evil)),
+        "cases.html": PaperCasesContent([evil()], table(evil)),
         "claims.html": claims,
         "diagnosis.html": DiagnosisContent(12, table(evil), [plate(evil)]),
         "figures.html": [plate(evil), plate(evil)],

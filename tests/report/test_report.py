@@ -10,6 +10,7 @@ import sys
 from dataclasses import replace
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
 import xarray as xr
 from compsim import cli
@@ -169,6 +170,19 @@ def test_every_csv_has_the_curves_of_its_figure(full):
         head, *rows = path.read_text(encoding="utf-8").splitlines()
         assert head, path.name
         assert len(rows) > 100, path.name
+
+
+def test_plotly_takes_every_figure(full, own, tmp_path):
+    """Of the paper, of a sweep and of single jobs; plotly refuses what it does not know."""
+    with without_pictures():
+        write_report(own, tmp_path / "out")
+    scripts = [*full.glob("*.js"), *(tmp_path / "out").glob("*.js")]
+    scripts = [path for path in scripts if path.name != "plotly.min.js"]
+    assert len(scripts) >= 18
+    for path in scripts:
+        text = path.read_text(encoding="utf-8").removeprefix("compsimFigure(")
+        name, _, content = text.removesuffix(");\n").partition(",")
+        assert go.Figure(json.loads(content)).data, name
 
 
 def test_the_first_screen_is_the_answer(full, paper_runs):

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from conftest import listed
 from swept_made import grid
 
+from compressor.report.figures.drawing import views_of
 from compressor.report.figures.sweep import draw_sweep
 
 CLEARANCES = [0.1, 0.2, 0.3, 0.4]
@@ -12,16 +14,17 @@ CLEARANCES = [0.1, 0.2, 0.3, 0.4]
 def test_a_point_a_job_with_its_bar_and_key():
     data = grid({"clearance_mm": CLEARANCES}, lambda c: 1000 * c)
     (drawn,) = draw_sweep(data)
-    peak, rms = drawn.figure.panels
+    peak, rms = views_of(drawn.figure)
     (curve,) = peak.traces
-    assert (peak.title, peak.y.title) == ("peak acceleration", "m/s²")
-    assert drawn.figure.x_title == "clearance (mm)"
+    assert (peak.title, peak.y.title.text) == ("peak acceleration", "m/s²")
+    assert peak.x.title.text == "clearance (mm)"
     assert curve.name == "peak acceleration"
     assert curve.x.tolist() == CLEARANCES
     assert curve.y == pytest.approx([100, 200, 300, 400])
-    assert curve.errors == pytest.approx(np.array([[1, 2, 3, 4]] * 2))
-    assert curve.jobs == ("k0", "k1", "k2", "k3")
-    assert rms.traces[0].errors is None  # its bars of 0.01 % are not seen
+    assert curve.error_y.array == pytest.approx([1, 2, 3, 4])
+    assert curve.error_y.arrayminus == pytest.approx([1, 2, 3, 4])
+    assert [*curve.customdata] == ["k0", "k1", "k2", "k3"]
+    assert rms.traces[0].error_y.array is None  # its bars of 0.01 % are not seen
 
 
 def test_failed_missing_and_chaotic_jobs_are_marked():
@@ -29,31 +32,30 @@ def test_failed_missing_and_chaotic_jobs_are_marked():
     regime = ["predictable", "", "", "chaotic"]
     data = grid({"clearance_mm": CLEARANCES}, lambda c: 1000 * c, status=status, regime=regime)
     (drawn,) = draw_sweep(data)
-    panel = drawn.figure.panels[0]
+    panel = views_of(drawn.figure)[0]
     marks = {trace.name: trace for trace in panel.traces}
     assert marks["a job failed here"].x == 0.2
-    assert marks["a job failed here"].jobs == ("k1",)
+    assert [*marks["a job failed here"].customdata] == ["k1"]
     assert marks["a job was not run"].x == 0.3
     ring = marks["chaotic: a greatest value holds for this run only"]
-    assert (ring.x, ring.y, ring.jobs) == (0.4, 400, ("k3",))
-    assert panel.limits("y")[0] < marks["a job failed here"].y < 100
+    assert (*ring.x, *ring.y, *ring.customdata) == (0.4, 400, "k3")
+    assert panel.y.range[0] < marks["a job failed here"].y < 100
     assert "A cross: a job failed here" in drawn.caption
-    names = {one.name for one in drawn.figure.legend}
-    assert names == {*marks} - {"peak acceleration"}
+    assert {*listed(drawn.figure)} == {*marks} - {"peak acceleration"}
 
 
 def test_words_are_points_above_their_ticks():
     (drawn,) = draw_sweep(grid({"load": ["spring", "gas"]}, lambda load: 5 + load))
-    panel = drawn.figure.panels[0]
-    assert panel.x.words == {0.0: "spring", 1.0: "gas"}
-    assert panel.traces[0].is_points
+    panel = views_of(drawn.figure)[0]
+    assert panel.x.ticktext == ("spring", "gas")
+    assert panel.traces[0].mode == "markers"
 
 
 def test_what_is_the_same_at_every_job_is_said():
     data = grid({"clearance_mm": CLEARANCES}, lambda c: 1000 * c)
     data["rms_acceleration"] = 0 * data["rms_acceleration"] + 7.5
     (drawn,) = draw_sweep(data)
-    assert [panel.title for panel in drawn.figure.panels] == ["peak acceleration"]
+    assert [panel.title for panel in views_of(drawn.figure)] == ["peak acceleration"]
     assert "not drawn: rms acceleration (7.5 m/s²)." in drawn.caption
 
 
@@ -65,7 +67,7 @@ def test_where_nothing_ran_nothing_is_drawn():
 
 def test_of_very_many_values_some_are_drawn():
     (drawn,) = draw_sweep(grid({"clearance_mm": np.linspace(0.1, 1, 100_000)}, lambda c: c))
-    (curve,) = drawn.figure.panels[0].traces
+    (curve,) = views_of(drawn.figure)[0].traces
     assert curve.x.size == 1000
     assert (curve.x[0], curve.x[-1]) == (0.1, 1.0)
     assert "Of 100000 values of clearance 1000 are shown." in drawn.caption

@@ -4,8 +4,10 @@ import time
 
 import numpy as np
 import pytest
+from conftest import listed
 from swept_made import grid
 
+from compressor.report.figures.drawing import views_of
 from compressor.report.figures.sweep import draw_sweep
 
 AXES = {"clearance_mm": [0.1, 0.2, 0.4, 0.5], "speed_rpm": [300.0, 400.0, 500.0]}
@@ -13,8 +15,15 @@ AXES = {"clearance_mm": [0.1, 0.2, 0.4, 0.5], "speed_rpm": [300.0, 400.0, 500.0]
 
 def traces(data):
     _, drawn = draw_sweep(data)  # the ranking is the first
-    panel = drawn.figure.panels[0]
-    kinds = ("points" if one.is_points else one.kind for one in panel.traces)
+    panel = views_of(drawn.figure)[0]
+    kinds = (
+        "map"
+        if one.type == "heatmap"
+        else "area"
+        if one.fill
+        else {"lines": "line", "markers": "points"}[one.mode]
+        for one in panel.traces
+    )
     names = (f"{kind}:{one.name}" for kind, one in zip(kinds, panel.traces, strict=True))
     return drawn, panel, dict(zip(names, panel.traces, strict=True))
 
@@ -27,10 +36,16 @@ def test_cells_are_jobs():
     assert cells.x.tolist() == pytest.approx(
         [0.05, 0.15, 0.3, 0.45, 0.55]
     )  # halfway between values
-    assert cells.jobs[:5] == ("k0", "k3", "k6", "k9", "k1")  # in C order of the cells
-    assert (drawn.figure.x_title, drawn.figure.y_title) == ("clearance (mm)", "speed (rpm)")
-    assert panel.limits("x") == pytest.approx((0.05, 0.55))
-    assert cells.scale.title == "m/s²"
+    assert (*cells.customdata.ravel()[:5],) == (
+        "k0",
+        "k3",
+        "k6",
+        "k9",
+        "k1",
+    )  # in C order of the cells
+    assert (panel.x.title.text, panel.y.title.text) == ("clearance (mm)", "speed (rpm)")
+    assert panel.x.range == pytest.approx((0.05, 0.55))
+    assert cells.colorbar.title.text == "m/s²"
     assert drawn.name == "map"
 
 
@@ -78,7 +93,7 @@ def test_a_metric_that_a_job_lacks_is_drawn():
     data["rms_acceleration"][0, 0] = np.nan
     drawn, _, _ = traces(data)
     assert "The same at every job" not in drawn.caption
-    assert [one.name for one in drawn.figure.legend] == ["the job lacks this metric"]
+    assert listed(drawn.figure) == ["the job lacks this metric"]
 
 
 def test_jobs_that_failed_with_numbers_are_drawn():
@@ -90,14 +105,15 @@ def test_jobs_that_failed_with_numbers_are_drawn():
 
 def test_a_few_values_stand_at_their_cells():
     _, panel, _ = traces(grid(AXES, lambda c, n: n + c))
-    assert panel.x.words == {0.1: "0.1", 0.2: "0.2", 0.4: "0.4", 0.5: "0.5"}
-    assert panel.y.words == {300.0: "300", 400.0: "400", 500.0: "500"}
+    assert dict(zip(panel.x.tickvals, panel.x.ticktext, strict=True)) == {
+        0.1: "0.1", 0.2: "0.2", 0.4: "0.4", 0.5: "0.5"}  # fmt: skip
+    assert panel.y.ticktext == ("300", "400", "500")
     close = AXES | {"clearance_mm": [0.1, 0.11, 0.4]}  # their texts would overlap
     _, panel, _ = traces(grid(close, lambda c, n: n + c))
-    assert not panel.x.words
+    assert not panel.x.ticktext
     many = AXES | {"clearance_mm": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]}
     _, panel, _ = traces(grid(many, lambda c, n: n + c))
-    assert not panel.x.words
+    assert not panel.x.ticktext
 
 
 def test_failed_and_missing_cells_are_marked():
@@ -105,8 +121,8 @@ def test_failed_and_missing_cells_are_marked():
     status[1, 2], status[3, 0] = "failed", "missing"
     _, _, found = traces(grid(AXES, lambda c, n: 10 * c + n, status=status))
     failed, missing = found["points:a job failed here"], found["points:a job was not run"]
-    assert (failed.x, failed.y, failed.jobs) == (0.2, 500, ("k5",))
-    assert (missing.x, missing.y, missing.jobs) == (0.5, 300, ("k9",))
+    assert (*failed.x, *failed.y, *failed.customdata) == (0.2, 500, "k5")
+    assert (*missing.x, *missing.y, *missing.customdata) == (0.5, 300, "k9")
     assert np.isnan(found["map:peak acceleration"].z).sum() == 2
 
 
@@ -114,17 +130,16 @@ def test_values_and_axes_over_decades_are_logarithmic():
     axes = {"clearance_mm": [0.01, 0.1, 1.0], "speed_rpm": [300.0, 400.0, 500.0]}
     _, panel, found = traces(grid(axes, lambda c, n: c * n))
     cells = found["map:peak acceleration"]
-    assert panel.x.log
-    assert cells.scale.log
-    assert cells.z[0] == pytest.approx([3, 30, 300])
+    assert panel.x.type == "log"
+    assert 10.0 ** cells.z[0] == pytest.approx([3, 30, 300])
     assert cells.x[1:3].tolist() == pytest.approx([10**-1.5, 10**-0.5])
 
 
 def test_words_have_no_lines_between_them():
     axes = {"fault": ["big_end", "small_end", "both"], "load": ["spring", "gas", "none"]}
     _, panel, found = traces(grid(axes, lambda joint, load: joint + load))
-    assert [*found] == ["map:peak acceleration"]
-    assert panel.x.words == {0.0: "big\nend", 1.0: "small\nend", 2.0: "both\njoints"}
+    assert [*found] == ["area:", "map:peak acceleration"]
+    assert panel.x.ticktext == ("big<br>end", "small<br>end", "both<br>joints")
 
 
 def test_large_grids_are_thinned_with_a_word():

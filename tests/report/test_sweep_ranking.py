@@ -7,6 +7,7 @@ import pytest
 from swept_made import grid, listed
 
 from compressor.cases.swept import design
+from compressor.report.figures.drawing import views_of
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.sweep_data import measures, sweep_of
 from compressor.report.figures.sweep_maps import leading, ranking
@@ -23,7 +24,7 @@ def bars(drawn):
     """The shares of an axis' panel by the kind of effect."""
     return {
         panel.title: {trace.name.partition("(")[2].rstrip(")"): trace.x for trace in panel.traces}
-        for panel in drawn.figure.panels
+        for panel in views_of(drawn.figure)
     }
 
 
@@ -39,9 +40,9 @@ def test_bars_and_caption_are_the_exact_shares():
         assert found["load"][kind] == pytest.approx([0, 0])
     words = f"Peak acceleration: speed {share:.0f} %, clearance {100 - share:.0f} %; rms"
     assert words in drawn.caption
-    panel = drawn.figure.panels[0]
-    assert panel.y.words == {0.0: "peak acceleration", 1.0: "rms acceleration"}
-    assert panel.x.title == "share of variance (%)"
+    panel = views_of(drawn.figure)[0]
+    assert panel.y.ticktext == ("peak acceleration", "rms acceleration")
+    assert panel.x.title.text == "share of variance (%)"
 
 
 def test_interactions_are_in_total_effects_alone():
@@ -88,11 +89,11 @@ def test_correlations_are_told_with_their_intervals():
     assert low < second <= first < high
     drawn = plan(listed(columns, 1 - 0.9 * points[:, 0] + 0.02 * points[:, 1]))["ranking"]
     assert "Peak acceleration: clearance −1.00 (−1.00 to −1.00), speed" in drawn.caption
-    panel = drawn.figure.panels[0]
-    (found,) = (trace for trace in panel.traces if trace.kind == "bars")
+    panel = views_of(drawn.figure)[0]
+    (found,) = (trace for trace in panel.traces if trace.type == "bar")
     assert panel.title == "clearance"
     assert found.x[0] == pytest.approx(-1.0, abs=0.01)
-    assert found.errors is not None
+    assert found.error_x.array is not None
 
 
 def test_saltelli_s_designs_have_sobol_s_indices():

@@ -4,10 +4,11 @@ import time
 
 import numpy as np
 import pytest
+from conftest import listed as legend
 from swept_made import listed
 
+from compressor.report.figures.drawing import views_of
 from compressor.report.figures.sweep import draw_sweep
-from compressor.report.interactive import content
 
 RNG = np.random.default_rng(5)
 CLEARANCE, SPEED = RNG.random((2, 60)) + 1.0
@@ -25,12 +26,12 @@ def traces(panel):
 def test_points_are_jobs_over_what_matters_most():
     found = plan(listed(COLUMNS, 2 + SPEED**2))
     assert [*found] == ["ranking", "points", "scatter"]
-    panel = found["points"].figure.panels[0]
-    assert panel.x.title == "speed (rpm)"  # what matters most
+    panel = views_of(found["points"].figure)[0]
+    assert panel.x.title.text == "speed (rpm)"  # what matters most
     one = traces(panel)
     assert one["a job"].x.tolist() == SPEED.tolist()
     assert one["a job"].y == pytest.approx(2 + SPEED**2)
-    assert one["a job"].jobs == tuple(f"k{n}" for n in range(60))
+    assert [*one["a job"].customdata] == [f"k{n}" for n in range(60)]
     assert (
         found["points"].caption
         == "Every metric over the key that matters most for each, a point a job."
@@ -38,27 +39,27 @@ def test_points_are_jobs_over_what_matters_most():
 
 
 def test_each_key_has_a_column_and_each_metric_a_row():
-    panels = plan(listed(COLUMNS, 2 + SPEED + CLEARANCE))["scatter"].figure.panels
+    panels = views_of(plan(listed(COLUMNS, 2 + SPEED + CLEARANCE))["scatter"].figure)
     assert [(p.row[0], p.column[0]) for p in panels] == [(0, 0), (0, 1), (1, 0), (1, 1)]
     for panel, column in zip(panels[2:], (0, 1), strict=True):
-        assert panel.x.title in ("speed (rpm)", "clearance (mm)")
-        assert panels[column].x.words == panel.x.words
+        assert panel.x.title.text in ("speed (rpm)", "clearance (mm)")
+        assert panels[column].x.ticktext == panel.x.ticktext
 
 
 def test_words_are_colours():
     load = np.array(["spring", "gas"] * 30)
     values = np.where(load == "spring", SPEED, 5 - SPEED)
-    panel = plan(listed(COLUMNS | {"load": load}, values))["points"].figure.panels[0]
+    panel = views_of(plan(listed(COLUMNS | {"load": load}, values))["points"].figure)[0]
     one = traces(panel)
     assert one["load spring"].y == pytest.approx(values[::2])
-    assert one["load gas"].style.color != one["load spring"].style.color
+    assert one["load gas"].marker.color != one["load spring"].marker.color
 
 
 def test_a_caption_speaks_of_what_is_drawn():
     """Of four jobs there is no ranking."""
     few = plan(listed({name: values[:4] for name, values in COLUMNS.items()}, SPEED[:4]))["points"]
     assert few.caption == "Every metric over a key, a point a job."
-    assert [one.name for one in few.figure.legend] == ["a job"]
+    assert legend(few.figure) == ["a job"]
     assert few.title == "metrics over a key"
     load = np.array(["spring", "gas"] * 30)
     found = plan(listed(COLUMNS | {"load": load}, np.where(load == "spring", SPEED, 9 - SPEED)))
@@ -72,15 +73,13 @@ def test_what_is_not_known_is_marked():
     values = 2 + SPEED**2
     values[7] = 60.0
     panel = plan(listed(COLUMNS, values, status=status, regime=regime))["points"].figure
-    one = traces(panel.panels[0])
-    assert one["a job failed here"].jobs == ("k3",)
+    one = traces(views_of(panel)[0])
+    assert [*one["a job failed here"].customdata] == ["k3"]
     ring = next(trace for name, trace in one.items() if name.startswith("chaotic"))
-    assert (ring.y, ring.jobs) == (60.0, ("k7",))
-    size = ring.style.markersize + ring.style.edge_width
-    assert ring.style.is_hollow
-    assert size <= one["a job"].style.markersize + 1e-9  # it covers no point
-    marks = content(panel)["panels"][0]["traces"]
-    assert [mark.get("hollow", False) for mark in marks if mark["name"] == ring.name] == [True]
+    assert (*ring.y, *ring.customdata) == (60.0, "k7")
+    assert ring.marker.symbol == "circle-open"
+    size = ring.marker.size + ring.marker.line.width
+    assert size <= one["a job"].marker.size + 1e-2  # it covers no point
 
 
 def test_many_jobs_are_thinned_with_a_word():
@@ -91,6 +90,6 @@ def test_many_jobs_are_thinned_with_a_word():
     found = plan(data)
     assert time.process_time() - start < 5.0
     for name in ("points", "scatter"):
-        for panel in found[name].figure.panels:
+        for panel in views_of(found[name].figure):
             assert traces(panel)["a job"].x.size == 2000
         assert "2,000 of 100,000 jobs are drawn" in found[name].caption

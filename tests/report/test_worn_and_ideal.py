@@ -154,16 +154,13 @@ def failing_twin(run, sensed=False):
 def test_a_twin_that_fails_stands_nowhere(swept, study, monkeypatch):
     """The job is drawn alone."""
     (stored, data), (own,) = study, read_studies(swept)
-    drawn = {name: drawing for name, _, _, drawing in page_figures(stored, own)}
+    drawn = {name: figure for name, _, _, figure in page_figures(stored, own, "usual")}
     monkeypatch.setattr(side_by_side, "healthy_twin", failing_twin)
     monkeypatch.setattr(plots, "healthy_twin", failing_twin)
     assert compare_healthy(stored, data) is None
-    alone = {name: drawing for name, _, _, drawing in page_figures(stored, own)}
+    alone = {name: figure for name, _, _, figure in page_figures(stored, own, "usual")}
     assert [*alone] == [*drawn]
-    names = [
-        {trace.name for panel in figures["analyst"].panels for trace in panel.traces}
-        for figures in (drawn, alone)
-    ]
+    names = [{trace.name for trace in figures["analyst"].data} for figures in (drawn, alone)]
     assert names[0] - names[1] == {NAMES["twin"]}
     assert NAMES["this"] in names[1]
     choice = plots.PlotChoice(what=("analyst", "signals"))

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.lib.stride_tricks import sliding_window_view
 
 from compressor.analysis import CLEARANCES, NoSeriesError, label, last_revolution, settled_part
-from compressor.report.figures.drawing import Panel, box
+from compressor.report.figures.drawing import Panel
 from compressor.report.figures.style import BLACK, BY_CLEARANCE, BY_LOAD, IDEAL, LineStyle
 
 Runs = Mapping[str, xr.Dataset]
@@ -37,14 +37,15 @@ class Quantity:
 
     series: str
     title: str
-    axis: str
-    factor: float = 1.0  # from SI to the unit of the axis
+    axis: str  # its title, without the unit
+    unit: str
+    factor: float = 1.0  # from SI to the unit
     window: float = 40.0
     steep: bool = False
     where: tuple[tuple[str, str], ...] = ()  # joint and axis of a force
 
     def values(self, run: xr.Dataset) -> np.ndarray:
-        """Return a run's samples in the unit of the axis."""
+        """Return a run's samples in the unit."""
         return run[self.series].sel(dict(self.where)).values * self.factor
 
 
@@ -85,16 +86,16 @@ def turn(run: xr.Dataset) -> xr.Dataset:
         return settled_part(run)
 
 
-def plot(panel: Panel, curves: Sequence[Curve], quantity: Quantity) -> None:
-    """Draw all curves of one quantity over the revolution."""
+def plot(panel: Panel, curves: Sequence[Curve], quantity: Quantity, listed: bool = True) -> None:
+    """Draw all curves of one quantity over the revolution; listed: in the legend."""
+    panel.label("y", f"{quantity.axis} ({{}})", quantity.unit)
     for curve in curves:
         x, y = degrees(curve.run), quantity.values(curve.run)
-        panel.plot(x, y, curve.line, curve.name)
+        panel.plot(x, y, curve.line, curve.name, listed=listed)
     angle = degrees(curves[0].run)
-    panel.x.span(angle[0], angle[-1])
-    panel.x.step = TICK
+    panel.span("x", angle[0], angle[-1])
+    panel.x.dtick, panel.unit["x"] = TICK, "°"
     panel.title = quantity.title
-    panel.y.title = quantity.axis
 
 
 def plot_rows(
@@ -104,14 +105,14 @@ def plot_rows(
     ideal = [curve for curve in curves if curve.line is IDEAL]
     worn = [curve for curve in curves if curve.line is not IDEAL]
     for panel, curve in zip(panels, worn, strict=True):
-        alone = replace(curve, line=replace(curve.line, linestyle="-", linewidth=1.0))
-        plot(panel, [*ideal, alone], quantity)
+        alone = replace(curve, line=replace(curve.line, dash=(), linewidth=1.0))
+        plot(panel, [*ideal, alone], quantity, listed=False)
         panel.title = curve.name
     panels[0].title = f"{quantity.title}, {worn[0].name}"
     ends = np.array([panel.limits("y") for panel in panels])
     for panel in panels:
-        panel.y.span(ends.min(), ends.max())
-        panel.x.bare = panel is not panels[-1]
+        panel.span("y", ends.min(), ends.max())
+        panel.x.showticklabels = panel is panels[-1]
 
 
 def plot_enlarged(
@@ -123,20 +124,20 @@ def plot_enlarged(
 ) -> None:
     """Draw the same curves over a part of the span, which is marked in the full panels."""
     plot(enlarged, curves, quantity)
-    enlarged.x.step = 10 if quantity.window > 30 else 5
+    enlarged.x.dtick = 10 if quantity.window > 30 else 5
     angle = degrees(curves[0].run)[part]
     values = np.array([quantity.values(curve.run)[part] for curve in curves])
     margin = 0.06 * np.ptp(values)
     low, high = values.min() - margin, values.max() + margin
-    enlarged.x.span(angle[0], angle[-1])
-    enlarged.y.span(low, high)
+    enlarged.span("x", angle[0], angle[-1])
+    enlarged.span("y", low, high)
     bottom, top = full[0].limits("y")
     lift = max(0.0, MIN_MARK * (top - bottom) - (high - low)) / 2
     low, high = low - lift, high + lift
     room = 0.01 * (top - bottom)
     for panel in full:
-        panel.y.span(min(bottom, low - room), max(top, high + room))
-        panel.traces.append(box((angle[0], angle[-1]), (low, high), WINDOW, "line"))
+        panel.span("y", min(bottom, low - room), max(top, high + room))
+        panel.box((angle[0], angle[-1]), (low, high), WINDOW)
 
 
 def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, bool]:

@@ -22,16 +22,14 @@ from compressor.analysis import (
 )
 from compressor.report.figures.curves import ANGLE_AXIS, Runs
 from compressor.report.figures.drawing import (
-    Note,
+    WAYS,
     Panel,
-    band,
-    entry,
     make_grid,
     share_scales,
 )
 from compressor.report.figures.job import (
     ORDERS_AXIS,
-    mode_entries,
+    list_modes,
     plot_lines,
     plot_orbit,
     share_turn,
@@ -40,14 +38,15 @@ from compressor.report.figures.paper import AT, sizes
 from compressor.report.figures.rows import SweptRow, plot_modes, rows_modes
 from compressor.report.figures.style import BLUE, BY_CLEARANCE, GOLD, IDEAL, RED, LineStyle, fill
 from compressor.report.figures.table import DrawnFigure, figure, spell
+from compressor.units import Units
 
 Shakings = Mapping[str, Shaking]  # by label of the paper's cases
 
 SINGLE_FAULTS = FAULTS[:2]  # clearance at one joint
 BY_FAULT = {
-    "big_end": LineStyle(BLUE, "-", 1.2, 2.3, "o"),
-    "small_end": LineStyle(RED, (0, (6, 1.2)), 1.2, 2.2, "D"),
-    "both": LineStyle(GOLD, (0, (6, 1, 1.2, 1)), 1.8, 2.1, "s"),
+    "big_end": LineStyle(BLUE, (), 1.2, 2.3, "circle"),
+    "small_end": LineStyle(RED, (6, 1.2), 1.2, 2.2, "diamond"),
+    "both": LineStyle(GOLD, (6, 1, 1.2, 1), 1.8, 2.1, "square"),
 }
 NEEDS = sizes("big_end", "design") + sizes("small_end") + sizes("both")
 BIN = 5.0  # degrees over which the rms is taken
@@ -60,34 +59,36 @@ def measure_shaking(runs: Runs) -> Shakings:
 
 
 @figure("diagnosis", "diagnosis-spectra", "Diagnosis 1: orders of the force on the frame", *NEEDS)
-def draw_spectra(runs: Runs) -> DrawnFigure:
+def draw_spectra(runs: Runs, units: Units = "usual") -> DrawnFigure:
     """Return X over orders: healthy, and each joint at the greatest clearance.
 
     Rms over clearance.
     """
     found = measure_shaking(runs)
-    figure, panels = make_grid(1, 2, 4.6, widths=(2.3, 1))
+    drawing, panels = make_grid(1, 2, 4.6, widths=(2.3, 1), units=units)
     lines, trend = panels.flat
+    lines.label("y", "amplitude of X ({})", "N")
+    trend.label("x", "clearance ({})", "mm")
+    trend.label("y", "rms ({})", "N")
+    drawing.list_line("no clearance", IDEAL)
     names = {f: SPOKEN[f] + ("" if f in SINGLE_FAULTS else ", (b) only") for f in BY_FAULT}
     for fault in SINGLE_FAULTS:
         spectrum = found[label(fault, CLEARANCES[-1])].spectrum
         plot_lines(lines, spectrum.lines, replace(BY_FAULT[fault], marker=""), names[fault])
     ends = lines.limits("y")
     plot_lines(lines, found["design"].spectrum.lines, IDEAL, "no clearance")
-    lines.y.span(*ends)
+    lines.span("y", *ends)
     lines.title = f"(a) force on the frame along the cylinder, {CLEARANCES[-1]:g} mm"
-    lines.x.title, lines.y.title = ORDERS_AXIS, "amplitude of X (N)"
+    lines.x.title = ORDERS_AXIS
     sizes = np.array(CLEARANCES)
     for fault, line in BY_FAULT.items():
         above = np.array([found[label(fault, c)].spectrum.above for c in CLEARANCES])
         trend.plot(sizes, above, line, names[fault])
-    trend.notes.append(Note(y=found["design"].spectrum.above, style=IDEAL))
+    trend.rule(IDEAL, y=found["design"].spectrum.above)
     trend.title = f"(b) rms of X above order {ORDER}"
-    trend.x.title, trend.x.ticks = "clearance (mm)", CLEARANCES
-    trend.x.span(CLEARANCES[0] - 0.03, CLEARANCES[-1] + 0.03)
-    trend.y.title = "rms (N)"
-    trend.y.span(low=0)
-    figure.legend = [entry("no clearance", IDEAL), *trend.traces]
+    trend.x.tickvals = trend.at("x", CLEARANCES)
+    trend.span("x", CLEARANCES[0] - 0.03, CLEARANCES[-1] + 0.03)
+    trend.span("y", low=0)
     sentence = (
         "(a) Order spectra of X, the force on the frame along the cylinder, over the settled "
         f"revolutions; dashed: order {ORDER}. (b) The rms above it over clearance."
@@ -102,24 +103,21 @@ def draw_spectra(runs: Runs) -> DrawnFigure:
                 spell(forces, "N"),
             )
         )
-    return DrawnFigure(figure, sentence, numbers)
+    return DrawnFigure(drawing.figure(), sentence, numbers)
 
 
 @figure("diagnosis", "diagnosis-orbits", "Diagnosis 2: orbits of the journals", *NEEDS)
-def draw_orbits(runs: Runs) -> DrawnFigure:
+def draw_orbits(runs: Runs, units: Units = "usual") -> DrawnFigure:
     """Return the journals' orbits of each joint at three clearances, all to one scale."""
-    figure, panels = make_grid(len(SINGLE_FAULTS), len(CLEARANCES), 7.2)
+    drawing, panels = make_grid(len(SINGLE_FAULTS), len(CLEARANCES), 7.2, units=units)
     for row, joint in zip(panels, SINGLE_FAULTS, strict=True):
         for panel, clearance in zip(row, CLEARANCES, strict=True):
             plot_orbit(panel, runs[label(joint, clearance)], joint)
             panel.title = f"{SPOKEN[joint]}, {clearance:g} mm"
-            panel.x.title = panel.x.title if joint == SINGLE_FAULTS[-1] else ""
-            panel.y.title = panel.y.title if clearance == CLEARANCES[0] else ""
-    room = 1.08 * max(trace.extent("x").max() for one in figure.panels for trace in one.traces)
-    for scale in (panels[0, 0].x, panels[0, 0].y):
-        scale.span(-room, room)
-    share_scales(figure.panels, "x", "y")
-    figure.legend = [one for one in panels[0, 0].traces if one.is_points]
+    room = max(panel.limits("x")[1] for panel in drawing.panels)
+    for way in WAYS:
+        panels[0, 0].span(way, -room, room)
+    share_scales(drawing.panels, "x", "y")
     sentence = (
         "The journal's centre in its bore over the last revolution, all to one scale; without "
         "clearance it is a point. Outside the circle it is pressed in."
@@ -131,30 +129,30 @@ def draw_orbits(runs: Runs) -> DrawnFigure:
         numbers.append((f"off its wall at the {SPOKEN[joint]}, {AT}", spell(off, "% of the time")))
         laps = [one["laps"] for one in each]
         numbers.append(("turns a revolution, counter-clockwise positive", spell(laps)))
-    return DrawnFigure(figure, sentence, numbers)
+    return DrawnFigure(drawing.figure(), sentence, numbers)
 
 
 @figure("diagnosis", "diagnosis-angles",
         "Diagnosis 3: when the frame shakes, and the contact modes", *NEEDS)  # fmt: skip
-def draw_angles(runs: Runs) -> DrawnFigure:
+def draw_angles(runs: Runs, units: Units = "usual") -> DrawnFigure:
     """Return X's high orders and the joints' contact modes over the crank angle."""
     found = measure_shaking(runs)
-    figure, panels = make_grid(2 * len(SINGLE_FAULTS), 1, 8.4, heights=(2.6, 1) * 2)
+    drawing, panels = make_grid(2 * len(SINGLE_FAULTS), 1, 8.4, heights=(2.6, 1) * 2, units=units)
     for joint, profile, strip in zip(SINGLE_FAULTS, panels[::2, 0], panels[1::2, 0], strict=True):
         plot_profiles(profile, found, joint)
         rows = [SweptRow(f"{c:g}", modes=angle_modes(runs[label(joint, c)])) for c in CLEARANCES]
         plot_modes(strip, rows_modes(rows)[joint])
-        strip.y.name([row.value for row in rows])
+        strip.name_ticks("y", [row.value for row in rows])
         strip.y.title = "mm"
         strip.title = f"contact mode, clearance at the {SPOKEN[joint]}"
     top = max(panel.limits("y")[1] for panel in panels[::2, 0])
     for joint, panel in zip(SINGLE_FAULTS, panels[::2, 0], strict=True):
-        panel.y.span(0, top)
+        panel.span("y", 0, top)
         mark_turns(panel, found[label(joint, CLEARANCES[-1])])
     panels[-1, 0].x.title = ANGLE_AXIS
-    share_turn(figure.panels)
-    figure.legend = [entry(f"{c:g} mm", BY_CLEARANCE[c]) for c in CLEARANCES]
-    figure.legend += [entry("the force turns", NEAR, "band"), *mode_entries()]
+    share_turn(drawing.panels)
+    drawing.list_area("the force turns", NEAR)
+    list_modes(drawing)
     sentence = (
         f"The part of X above order {ORDER} over crank angle; shaded: from {BEFORE:g}° before to "
         f"{AFTER:g}° after a change of direction of the joint's force along the cylinder, at "
@@ -173,11 +171,12 @@ def draw_angles(runs: Runs) -> DrawnFigure:
             ("elsewhere", spell(rest, "N")),
             ("in flight", spell(flight, "% of the time")),
         ]
-    return DrawnFigure(figure, sentence, numbers)
+    return DrawnFigure(drawing.figure(), sentence, numbers)
 
 
 def plot_profiles(panel: Panel, found: Shakings, joint: str) -> None:
     """Draw the rms of X above `ORDER` over bins of crank angle."""
+    panel.label("y", "rms ({})", "N")
     for clearance in CLEARANCES:
         one = found[label(joint, clearance)]
         count = round(360.0 / BIN)
@@ -187,7 +186,6 @@ def plot_profiles(panel: Panel, found: Shakings, joint: str) -> None:
         line = replace(BY_CLEARANCE[clearance], is_step=True)
         panel.plot(np.arange(count + 1) * BIN, values, line, f"{clearance:g} mm")
     panel.title = f"rms of X above order {ORDER} in {BIN:g}°, clearance at the {SPOKEN[joint]}"
-    panel.y.title = "rms (N)"
 
 
 def mark_turns(panel: Panel, one: Shaking) -> None:
@@ -199,4 +197,4 @@ def mark_turns(panel: Panel, one: Shaking) -> None:
     for part in np.split(np.arange(fine.size), ends):
         if is_near[part[0]]:
             flat = np.ones(part.size)
-            panel.traces.append(band(fine[part], low * flat, high * flat, NEAR))
+            panel.between(fine[part], low * flat, high * flat, NEAR)

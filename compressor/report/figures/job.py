@@ -34,15 +34,13 @@ from compressor.analysis import (
 from compressor.metrics import JOINTS
 from compressor.report.figures.curves import ANGLE_AXIS, KILONEWTON
 from compressor.report.figures.drawing import (
-    Note,
+    WAYS,
+    Drawing,
     Panel,
-    Trace,
     circle,
-    entry,
     join_with_gaps,
     make_grid,
     share_scales,
-    strokes,
 )
 from compressor.report.figures.style import (
     BLACK,
@@ -55,16 +53,16 @@ from compressor.report.figures.style import (
     mark,
 )
 from compressor.report.figures.table import DrawnFigure, Number, figure, spell, spell_span
-from compressor.units import unit_in
+from compressor.units import Units, unit_in
 
 # flight, impact, following: lightness 30, 54, 90
 MODE_COLORS = dict(zip(MODES, (BLUE, RED, "#dde3ee"), strict=True))
 UNSEEN = fill("#ffffff", edge=GREY, is_hatched=True)
-PATH = LineStyle(BLUE, "-", 0.9, 2.3)
+PATH = LineStyle(BLUE, (), 0.9, 2.3)
 ZERO = LineStyle(BLACK, linewidth=0.8)
-BY_JOINT = dict(zip(JOINTS, ((BLUE, "o"), (RED, "D")), strict=True))
-CORNERS = {0: ("top dead centre", "o"), 90: ("90°", "^"), 180: ("bottom dead centre", "s"),
-           270: ("270°", "v")}  # fmt: skip
+BY_JOINT = dict(zip(JOINTS, ((BLUE, "circle"), (RED, "diamond")), strict=True))
+CORNERS = {0: ("top dead centre", "circle"), 90: ("90°", "triangle-up"),
+           180: ("bottom dead centre", "square"), 270: ("270°", "triangle-down")}  # fmt: skip
 MICROMETRE = 1e6
 MAX_ANGLES = 12  # that a caption lists
 _, G = unit_in("m/s²", "plant")  # from m/s2 to g
@@ -92,11 +90,11 @@ def film(run: xr.Dataset) -> str:
 
 Forces = dict[str, np.ndarray]
 
-THIS = LineStyle(BLUE, "-", 1.1, 2.3)
-TWIN = LineStyle(GOLD, "-", 2.2, 2.1)  # broader and lighter, below
-MARK = LineStyle(RED, (0, (4, 1.5)), 1.0, 2.2)
-EVENT = LineStyle(GREY, ":", 1.0, 2.0)
-OPEN = LineStyle(BLACK, "-", 4.0)
+THIS = LineStyle(BLUE, (), 1.1, 2.3)
+TWIN = LineStyle(GOLD, (), 2.2, 2.1)  # broader and lighter, below
+MARK = LineStyle(RED, (4, 1.5), 1.0, 2.2)
+EVENT = LineStyle(GREY, (1, 1.65), 1.0, 2.0)
+OPEN = LineStyle(BLACK, (), 4.0)
 BEGINS = ("opens", "begins")  # words of events; the others end what has begun
 NAMES = {"this": "this job", "twin": "the same machine without clearance"}
 MAX_ORDERS = 200  # that are drawn
@@ -111,31 +109,27 @@ class Signal:
     """A panel of the page of signals."""
 
     title: str
-    axis: str
+    axis: str  # its title, without the unit
+    unit: str
     values: Callable[[xr.Dataset, Forces], np.ndarray]
-
-    @property
-    def unit(self) -> str:
-        """Return the unit of the axis."""
-        return self.axis.partition("(")[2].removesuffix(")")
 
 
 SIGNALS = (
-    Signal("acceleration of the crosshead", "a (m/s²)", lambda run, _: run["acceleration"].values),
-    Signal("force on the frame along the cylinder", "X (kN)",
+    Signal("acceleration of the crosshead", "a", "m/s²", lambda run, _: run["acceleration"].values),
+    Signal("force on the frame along the cylinder", "X", "kN",
            lambda _, force: force["shaking_force"][:, 0] * KILONEWTON),
-    Signal("force on the frame across the cylinder", "Y (kN)",
+    Signal("force on the frame across the cylinder", "Y", "kN",
            lambda _, force: force["shaking_force"][:, 1] * KILONEWTON),
-    Signal("force of the crosshead on its guide, upwards", "$F_g$ (kN)",
+    Signal("force of the crosshead on its guide, upwards", "F<sub>g</sub>", "kN",
            lambda _, force: force["guide_force"] * KILONEWTON),
-    Signal("torque that drives the crank", "T (N m)", lambda _, force: force["crank_torque"]),
-    Signal("rod load at the crosshead pin, tension positive", "$F_r$ (kN)",
+    Signal("torque that drives the crank", "T", "N m", lambda _, force: force["crank_torque"]),
+    Signal("rod load at the crosshead pin, tension positive", "F<sub>r</sub>", "kN",
            lambda _, force: force["rod_load"] * KILONEWTON),
 )  # fmt: skip
 
 
 @figure("job", "analyst", "a revolution as an analyst reads it")
-def draw_analyst(run: xr.Dataset, twin: Twin) -> DrawnFigure:
+def draw_analyst(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return a revolution as an analyst reads it: events, vibration and rod load.
 
     twin: the ideal machine, with the same sensor where the run has one.
@@ -143,9 +137,13 @@ def draw_analyst(run: xr.Dataset, twin: Twin) -> DrawnFigure:
     found = read_cycle(run)
     spans = split_events(found.events)
     lanes = 1 + len(spans) + len(found.struck)
-    figure, panels = make_grid(3, 1, 6.4 + 0.2 * lanes, heights=(0.34 * lanes, 3.4, 2.0))
+    drawing, panels = make_grid(
+        3, 1, 6.4 + 0.2 * lanes, heights=(0.34 * lanes, 3.4, 2.0), units=units
+    )
     strip, vibration, load = panels[:, 0]
-    for one, line, name in ((twin, TWIN, NAMES["twin"]), (run, THIS, NAMES["this"])):
+    vibration.label("y", "a ({})", "m/s²")
+    load.label("y", "F<sub>r</sub> ({})", "kN")
+    for one, line, name in ((run, THIS, NAMES["this"]), (twin, TWIN, NAMES["twin"])):
         if one is None:
             continue
         cycle = read_cycle(one)
@@ -156,25 +154,24 @@ def draw_analyst(run: xr.Dataset, twin: Twin) -> DrawnFigure:
     struck = {f"{word}, {SPOKEN[joint]}": (at, joint) for joint, at in found.struck.items()}
     plot_events(strip, spans, struck, found.reversals)
     for panel in (strip, vibration, load):
-        panel.notes += [Note(x=angle, style=EVENT) for angle, _ in found.events]
-        panel.notes += [Note(x=angle, style=MARK) for angle in found.reversals]
-    load.notes.append(Note(y=0.0, style=ZERO))
+        for angle, _ in found.events:
+            panel.rule(EVENT, x=angle)
+        for angle in found.reversals:
+            panel.rule(MARK, x=angle)
+    load.rule(ZERO, y=0.0)
     vibration.title = "acceleration of the crosshead"
     sensor = case_of(run).sensor
     if found.is_sensed and sensor:
         vibration.title = f"record of the sensor: {sensor.place}, along {sensor.direction}"
-    vibration.y.title = "a (m/s²)"
     load.title = "rod load at the crosshead pin, tension positive; dashed: it changes its side"
-    load.y.title = "$F_r$ (kN)"
     load.x.title = ANGLE_AXIS
-    share_turn(figure.panels)
-    figure.legend = [] if twin is None else vibration.traces[::-1]
+    share_turn(drawing.panels)
     sentence = f"The last settled revolution: {vibration.title}, and rod load below."
     numbers = number_analyst(found, word)
     if twin is not None:
         peak, _ = loudest(read_cycle(twin))
         numbers.insert(2, ("greatest without clearance", spell(peak, "m/s²")))
-    return DrawnFigure(figure, sentence + film(run) + caution(run), numbers)
+    return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)
 
 
 def number_analyst(found: Cycle, contact: str) -> list[Number]:
@@ -208,57 +205,59 @@ def loudest(found: Cycle) -> tuple[float, float]:
 
 
 LOADS = (
-    ("load of gas or spring on the piston, tension positive", "$F_g$ (kN)", "gas"),
-    ("inertia of what reciprocates", "$F_i$ (kN)", "inertia"),
-    ("rod load at the crosshead pin: both combined", "$F_r$ (kN)", "rod"),
+    ("load of gas or spring on the piston, tension positive", "F<sub>g</sub> ({})", "gas"),
+    ("inertia of what reciprocates", "F<sub>i</sub> ({})", "inertia"),
+    ("rod load at the crosshead pin: both combined", "F<sub>r</sub> ({})", "rod"),
 )
 
 
 @figure("job", "loads", "gas load, inertia and rod load over crank angle")
-def draw_loads(run: xr.Dataset, twin: Twin) -> DrawnFigure:
+def draw_loads(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return the gas load, inertia and rod load over a revolution, with the ideal machine's."""
-    figure, panels = make_grid(3, 1, 7.2)
-    for one, line, name in ((twin, TWIN, NAMES["twin"]), (run, THIS, NAMES["this"])):
+    drawing, panels = make_grid(3, 1, 7.2, units=units)
+    for panel, (title, axis, _) in zip(panels[:, 0], LOADS, strict=True):
+        panel.title = title
+        panel.label("y", axis, "kN")
+    for one, line, name in ((run, THIS, NAMES["this"]), (twin, TWIN, NAMES["twin"])):
         if one is None:
             continue
         degrees, loads = read_loads(one)
-        for panel, (title, axis, key) in zip(panels[:, 0], LOADS, strict=True):
+        for panel, (_, _, key) in zip(panels[:, 0], LOADS, strict=True):
             panel.plot(degrees, loads[key] * KILONEWTON, line, name)
-            panel.title, panel.y.title = title, axis
-        panels[0, 0].x.span(degrees[0], degrees[-1])
-    panels[0, 0].x.step = 90.0
+        panels[0, 0].span("x", degrees[0], degrees[-1])
+    panels[0, 0].x.dtick = 90.0
     panels[-1, 0].x.title = ANGLE_AXIS
     for panel in panels[:, 0]:
-        panel.notes.append(Note(y=0.0, style=ZERO))
-    share_scales(figure.panels, "x")
-    figure.legend = [] if twin is None else panels[0, 0].traces[::-1]
+        panel.rule(ZERO, y=0.0)
+    share_scales(drawing.panels, "x")
     numbers = [
         (f"{key}{where}", spell_span(load * KILONEWTON, "kN"))
         for one, where in ((run, ""), (twin, " without clearance")) if one is not None
         for key, load in read_loads(one)[1].items()
     ]  # fmt: skip
     sentence = "Loads of the last settled revolution over crank angle; tension is positive."
-    return DrawnFigure(figure, sentence + caution(run), numbers)
+    return DrawnFigure(drawing.figure(), sentence + caution(run), numbers)
 
 
 @figure("job", "signals", "acceleration, forces and torque over crank angle")
-def draw_signals(run: xr.Dataset, twin: Twin) -> DrawnFigure:
+def draw_signals(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return six panels of a run's last settled revolution, with the ideal machine's."""
-    figure, panels = make_grid(3, 2, 8.6)
-    for one, line, name in ((twin, TWIN, NAMES["twin"]), (run, THIS, NAMES["this"])):
+    drawing, panels = make_grid(3, 2, 8.6, units=units)
+    for panel, signal in zip(panels.flat, SIGNALS, strict=True):
+        panel.title = signal.title
+        panel.label("y", f"{signal.axis} ({{}})", signal.unit)
+    for one, line, name in ((run, THIS, NAMES["this"]), (twin, TWIN, NAMES["twin"])):
         if one is None:
             continue
         degrees, revolution = last_revolution(one)
         forces = frame_forces(revolution)
         for panel, signal in zip(panels.flat, SIGNALS, strict=True):
             panel.plot(degrees, signal.values(revolution, forces), line, name)
-            panel.title, panel.y.title = signal.title, signal.axis
-        panels[0, 0].x.span(degrees[0], degrees[-1])
-    panels[0, 0].x.step = 90.0
+        panels[0, 0].span("x", degrees[0], degrees[-1])
+    panels[0, 0].x.dtick = 90.0
     for panel in panels[-1]:
         panel.x.title = ANGLE_AXIS
-    share_scales(figure.panels, "x")
-    figure.legend = [] if twin is None else panels[0, 0].traces[::-1]
+    share_scales(drawing.panels, "x")
     _, revolution = last_revolution(run)
     forces = frame_forces(revolution)
     numbers = [
@@ -269,7 +268,7 @@ def draw_signals(run: xr.Dataset, twin: Twin) -> DrawnFigure:
         ideal = last_revolution(twin)[1]["acceleration"].values
         numbers.insert(1, ("without clearance", spell_span(ideal, "m/s²")))
     sentence = "The last settled revolution over crank angle, at stored samples."
-    return DrawnFigure(figure, sentence + caution(run), numbers)
+    return DrawnFigure(drawing.figure(), sentence + caution(run), numbers)
 
 
 def split_events(events: Sequence[tuple[float, str]]) -> dict[str, list[tuple[float, float]]]:
@@ -306,38 +305,39 @@ def plot_events(
     lanes = [*spans]
     for number, own in enumerate(spans.values()):
         x, y = join_with_gaps(np.array([(at, -number) for at in span]) for span in sorted(own))
-        panel.plot(x, y, OPEN, lanes[number])
+        panel.plot(x, y, OPEN, lanes[number], listed=False)
     marks = [(name, at, *BY_JOINT[joint]) for name, (at, joint) in struck.items()]
-    for name, angles, color, shape in [*marks, ("reversals", np.array(reversals), RED, "s")]:
-        panel.plot(angles, np.full(angles.size, -float(len(lanes))), mark(color, shape, 5), name)
+    for name, angles, color, shape in [*marks, ("reversals", np.array(reversals), RED, "square")]:
+        y = np.full(angles.size, -float(len(lanes)))
+        panel.plot(angles, y, mark(color, shape, 5), name, listed=False)
         lanes.append(name)
     if spans:
         panel.title = f"bars: {'the cam dwells' if 'cam: dwell' in spans else 'a valve is open'}"
-    panel.y.words = {-float(number): name for number, name in enumerate(lanes)}
-    panel.y.span(0.6 - len(lanes), 0.8)
-    panel.grid = ""
+    panel.name_ticks("y", lanes, -np.arange(len(lanes)))
+    panel.span("y", 0.6 - len(lanes), 0.8)
+    panel.x.showgrid = panel.y.showgrid = False
 
 
-BY_END = {"head": LineStyle(BLUE, "-", 1.5, 2.3), "crank": LineStyle(RED, "--", 1.5, 2.3)}
+BY_END = {"head": LineStyle(BLUE, (), 1.5, 2.3), "crank": LineStyle(RED, (3.7, 1.6), 1.5, 2.3)}
 
 
 @figure("job", "cards", "indicator cards", "gas")
-def draw_cards(run: xr.Dataset, twin: Twin) -> DrawnFigure:
+def draw_cards(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return the pressure in each end over gas volume and over crank angle, a revolution."""
-    figure, panels = make_grid(1, 2, 4.6)
+    drawing, panels = make_grid(1, 2, 4.6, units=units)
     over_volume, over_angle = panels.flat
+    measured = case_of(run).gas.is_measured
+    over_volume.label("x", "displaced volume (litres)" if measured else "gas volume V (litres)")
+    for panel in panels.flat:
+        panel.label("y", "pressure ({}, absolute)", "MPa")
     degrees, revolution = last_revolution(run)
     for end, gas in end_states(revolution).items():
         over_volume.plot(gas.volume, gas.pressure, BY_END[end], f"{end} end")
         over_angle.plot(degrees, gas.pressure, BY_END[end], f"{end} end")
-    measured = case_of(run).gas.is_measured
-    over_volume.x.title = "displaced volume (litres)" if measured else "gas volume V (litres)"
-    over_volume.y.title = "pressure (MPa, absolute)"
-    over_angle.x.title = ANGLE_AXIS
-    over_angle.x.span(degrees[0], degrees[-1])
-    over_angle.x.step = 90.0
-    share_scales(figure.panels, "y")
-    figure.legend = over_volume.traces
+    over_angle.x.title, over_angle.x.dtick = ANGLE_AXIS, 90.0
+    over_angle.unit["x"] = "°"
+    over_angle.span("x", degrees[0], degrees[-1])
+    share_scales(drawing.panels, "y")
     seconds = float(revolution["time"][-1] - revolution["time"][0])
     numbers = [
         (f"indicated power, {end} end", spell(1e-3 * gas.work / seconds, "kW"))
@@ -348,31 +348,31 @@ def draw_cards(run: xr.Dataset, twin: Twin) -> DrawnFigure:
         "Pressure of the gas over its volume and over crank angle, in the last settled revolution, "
         "as it presses on the piston."
     )
-    return DrawnFigure(figure, sentence + caution(run), numbers)
+    return DrawnFigure(drawing.figure(), sentence + caution(run), numbers)
 
 
 @figure("job", "spectra", "order spectra")
-def draw_spectra(run: xr.Dataset, twin: Twin) -> DrawnFigure:
+def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return the order spectra of X and of the crosshead's deviation.
 
     With a sensor, of its envelope.
     """
     envelope = sensor_envelope(run)
     rows = 2 if envelope is None else 3
-    figure, panels = make_grid(rows, 1, 2.7 * rows + 0.5)
+    drawing, panels = make_grid(rows, 1, 2.7 * rows + 0.5, units=units)
     force, deviation = panels[:2, 0]
+    force.label("y", "amplitude of X ({})", "N")
+    deviation.label("y", "amplitude ({})", "m/s²")
+    plot_lines(force, shaking(run).spectrum.lines, THIS, NAMES["this"])
     if twin is not None:
         plot_lines(force, shaking(twin).spectrum.lines, TWIN, NAMES["twin"])
-    plot_lines(force, shaking(run).spectrum.lines, THIS, NAMES["this"])
-    force.title, force.y.title = "force on the frame along the cylinder", "amplitude of X (N)"
     plot_deviation(deviation, deviation_spectrum(run).lines)
+    force.title = "force on the frame along the cylinder"
     deviation.title = "acceleration of the crosshead less that of ideal joints"
-    deviation.y.title = "amplitude (m/s²)"
     if envelope is not None:
         plot_envelope(panels[2, 0], (envelope.orders, envelope.amplitudes), envelope.band)
     for panel in panels.flat:
         panel.x.title = ORDERS_AXIS
-    figure.legend = [] if twin is None else force.traces[::-1]
     above = [(f"rms of X above order {ORDER}", spell(shaking(run).spectrum.above, "N"))]
     if twin is not None:
         above.append(("without clearance", spell(shaking(twin).spectrum.above, "N")))
@@ -385,7 +385,7 @@ def draw_spectra(run: xr.Dataset, twin: Twin) -> DrawnFigure:
     if sensor and (text := sensor.report_clipping(clipped)):
         above.append(("record", text))
     sentence = "Peak amplitudes over the settled revolutions."
-    return DrawnFigure(figure, sentence + caution(run), above)
+    return DrawnFigure(drawing.figure(), sentence + caution(run), above)
 
 
 def plot_lines(
@@ -395,16 +395,14 @@ def plot_lines(
     shown = (lines[0] >= 1) & (lines[0] <= MAX_ORDERS)
     orders, amplitudes = (values[shown] for values in lines)
     panel.plot(orders, amplitudes, line, name)
-    top = max(one.y.max() for one in panel.traces)
-    panel.y.log = True
+    panel.y.type, (_, before) = "log", panel.ends["y"]
+    top = max(amplitudes.max(), np.nan_to_num(before) / panel.factors["y"] / 3.0)
     if top > 0:
-        panel.y.span(top * 10.0**-DECADES, 3 * top)
-    panel.x.span(0, orders[-1])
-    if not panel.notes:
-        panel.notes = [
-            Note(x=ORDER, style=MARK),
-            Note(f"order {ORDER}", ORDER, 1, LineStyle(RED), "y", (4, -4), level="top", size=8.5),
-        ]
+        panel.span("y", top * 10.0**-DECADES, 3 * top)
+    panel.span("x", 0, orders[-1])
+    if not panel.rules:
+        panel.rule(MARK, x=ORDER)
+        panel.write(f"order {ORDER}", ORDER, 1, RED, "y", (4, -4), level="top", size=8.5)
 
 
 def plot_deviation(panel: Panel, lines: tuple[np.ndarray, np.ndarray]) -> None:
@@ -413,9 +411,9 @@ def plot_deviation(panel: Panel, lines: tuple[np.ndarray, np.ndarray]) -> None:
         plot_lines(panel, lines, THIS, NAMES["this"])
         return
     text = "none: the motion is that of ideal joints"
-    panel.notes.append(Note(text, 0.5, 0.5, inside="xy", side="center"))
-    panel.x.span(0, MAX_ORDERS)
-    panel.y.ticks = ()
+    panel.write(text, 0.5, 0.5, inside="xy", side="center")
+    panel.span("x", 0, MAX_ORDERS)
+    panel.y.tickvals = ()
 
 
 def plot_envelope(
@@ -423,22 +421,21 @@ def plot_envelope(
 ) -> None:
     """Draw a sensor's envelope spectrum, orders and amplitudes (k,), without mean; band in Hz."""
     shown = (lines[0] > 0.01) & (lines[0] <= MAX_ENVELOPE)
+    panel.label("y", "amplitude ({})", "m/s²")
     panel.plot(lines[0][shown], lines[1][shown], THIS, NAMES["this"])
     low, high = (edge / 1e3 for edge in band)
     panel.title = f"envelope of the sensor between {low:.3g} and {high:.3g} kHz"
-    panel.y.title = "amplitude (m/s²)"
-    panel.y.span(low=0)
-    panel.x.span(0, MAX_ENVELOPE)
+    panel.span("y", low=0)
+    panel.span("x", 0, MAX_ENVELOPE)
 
 
 @figure("job", "orbits", "orbits of the journals", "clearance")
-def draw_orbits(run: xr.Dataset, twin: Twin) -> DrawnFigure:
+def draw_orbits(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return the journal's orbit in each bore with clearance over the last revolution."""
     joints = joints_with_clearance(run)
-    figure, panels = make_grid(1, len(joints), 5.4)
+    drawing, panels = make_grid(1, len(joints), 5.4, units=units)
     for panel, joint in zip(panels.flat, joints, strict=True):
         plot_orbit(panel, run, joint)
-    figure.legend = [one for one in panels[0, 0].traces if one.is_points]
     found, (_, revolution) = orbit(run), last_revolution(run)
     numbers = []
     for joint in joints:
@@ -451,7 +448,7 @@ def draw_orbits(run: xr.Dataset, twin: Twin) -> DrawnFigure:
             ("turns a revolution, counter-clockwise positive", spell(one["laps"])),
         ]
     sentence = "Journal centres in their bores to scale, in the last settled revolution."
-    return DrawnFigure(figure, sentence + film(run) + caution(run), numbers)
+    return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)
 
 
 def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
@@ -461,7 +458,9 @@ def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
         revolution["eccentricity"].sel(joint=joint).transpose("time", "axis").values * MICROMETRE
     )
     clearance = joints_with_clearance(run)[joint] * MICROMETRE
-    panel.traces.append(circle(clearance, LineStyle(BLACK, linewidth=1.0, zorder=1.0), "line"))
+    panel.label("x", "e<sub>x</sub> ({}), along the cylinder", "µm")
+    panel.label("y", "e<sub>y</sub> ({})", "µm")
+    panel.plot(*circle(clearance), LineStyle(BLACK, linewidth=1.0, zorder=1.0))
     panel.plot(place[:, 0], place[:, 1], PATH, "path of the journal's centre")
     for angle, (name, shape) in CORNERS.items():
         nearest = np.argmin(np.abs((degrees - angle + 180) % 360 - 180))
@@ -470,44 +469,46 @@ def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
     room = 1.08 * max(clearance, np.linalg.norm(place, axis=1).max())
     panel.is_square = True
     panel.title = f"{SPOKEN[joint]}; circle: clearance {clearance / 1e3:.3g} mm"
-    panel.x.title, panel.y.title = "$e_x$ (µm), along the cylinder", "$e_y$ (µm)"
-    for scale in (panel.x, panel.y):
-        scale.span(-room, room)
-        scale.max_ticks = 5
+    for way in WAYS:
+        panel.span(way, -room, room)
+        panel.axis(way).nticks = 5
 
 
 @figure("job", "modes", "contact modes over crank angle", "clearance")
-def draw_modes(run: xr.Dataset, twin: Twin) -> DrawnFigure:
+def draw_modes(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return contact modes over the crank angle, as shares of the revolutions, and penetration."""
     joints = joints_with_clearance(run)
     shares, words = angle_modes(run), OILED_MODES if case_of(run).lubricant else MODES
     rows = 2 * len(joints)
-    figure, panels = make_grid(rows, 1, 1.45 * rows + 0.9, heights=(1.0, 2.2) * len(joints))
+    drawing, panels = make_grid(
+        rows, 1, 1.45 * rows + 0.9, heights=(1.0, 2.2) * len(joints), units=units
+    )
     for joint, strip, depth in zip(joints, panels[::2, 0], panels[1::2, 0], strict=True):
         plot_strip(strip, shares, joint, words)
+        depth.label("y", "δ ({})", "µm")
         degrees, revolution = last_revolution(run)
         values = revolution["penetration"].sel(joint=joint).values * MICROMETRE
         order = np.argsort(degrees % 360.0, kind="stable")
         depth.plot((degrees % 360.0)[order], values[order], PATH)
-        depth.notes.append(Note(y=0.0, style=ZERO))
+        depth.rule(ZERO, y=0.0)
         depth.title = f"penetration, {SPOKEN[joint]}, last revolution; below 0 a gap"
-        depth.y.title = "δ (µm)"
     panels[-1, 0].x.title = ANGLE_AXIS
-    share_turn(figure.panels)
-    figure.legend = mode_entries(words)
+    share_turn(drawing.panels)
     of_time = 100.0 * mode_shares(contact_modes(run))["share"]
     numbers = [
         (f"{word}, {SPOKEN[joint]}", spell(of_time.sel(joint=joint, mode=mode), "%"))
         for joint in joints for mode, word in zip(MODES, words, strict=True)
     ]  # fmt: skip
     sentence = "Contact modes over crank angle; numbers are shares of the settled time."
-    return DrawnFigure(figure, sentence + film(run) + caution(run), numbers)
+    return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)
 
 
 def share_turn(panels: Sequence[Panel], step: float = 45.0) -> None:
     """Show one turn of the crank in all panels."""
-    panels[0].x.span(0.0, 360.0)
-    panels[0].x.step = step
+    panels[0].span("x", 0.0, 360.0)
+    panels[0].x.dtick = step
+    for panel in panels:
+        panel.unit["x"] = "°"
     share_scales(panels, "x")
 
 
@@ -527,22 +528,23 @@ def stack_modes(
     words: Sequence[str] = MODES,
 ) -> None:
     """Draw the shares of the contact modes one above the other, over the middles of bins."""
+    panel.y.title, panel.y.tickvals = "share", (0, 1)
     foot = np.zeros(x.size)
     for word, color, height in zip(words, MODE_COLORS.values(), heights, strict=True):
-        panel.plot(x, foot + height, fill(color), word, kind="columns", thick=width, foot=foot)
+        panel.bars(x, foot + height, fill(color), word, width, foot, is_upright=True)
         foot = foot + np.nan_to_num(height)
-    panel.y.title, panel.y.ticks, panel.grid = "share", (0, 1), ""
-    panel.y.span(0, 1)
+    panel.x.showgrid = panel.y.showgrid = False
+    panel.span("y", 0, 1)
 
 
-def mode_entries(words: Sequence[str] = MODES) -> list[Trace]:
-    """Return the modes' colours, for a legend."""
-    looks = [fill(color, edge=BLACK, edge_width=0.4) for color in MODE_COLORS.values()]
-    return [entry(word, look, "band") for word, look in zip(words, looks, strict=True)]
+def list_modes(drawing: Drawing, words: Sequence[str] = MODES) -> None:
+    """Name the modes by their colours in the legend."""
+    for word, color in zip(words, MODE_COLORS.values(), strict=True):
+        drawing.list_area(word, fill(color))
 
 
 @figure("job", "impacts", "contacts that begin, over crank angle", "clearance")
-def draw_impacts(run: xr.Dataset, twin: Twin) -> DrawnFigure:
+def draw_impacts(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return the approach speed of the impacts of all settled revolutions over the crank angle.
 
     Of oiled joints, whose film takes the blow, it is that of dry contacts that begin.
@@ -551,15 +553,16 @@ def draw_impacts(run: xr.Dataset, twin: Twin) -> DrawnFigure:
     kind, none = "impacts", "no impact: no journal came back from flight"
     if case_of(run).lubricant:
         kind, none = "dry contacts", "no dry contact begins"
-    figure, panels = make_grid(1, 1, 3.6)
+    drawing, panels = make_grid(1, 1, 3.6, units=units)
     (panel,) = panels.flat
+    panel.label("y", "approach speed ({})", "m/s")
     turns, numbers = settled_revolutions(run), []
     for joint in joints_with_clearance(run):
         color, shape = BY_JOINT[joint]
         mine = found.isel(impact=found["joint"].values == joint)
         angle, speed = mine["crank_angle"].values, mine["approach_speed"].values
         name = f"{SPOKEN[joint]}: {angle.size / turns:.3g} {kind} a revolution"
-        panel.traces.append(strokes(angle, 0.0, speed, LineStyle(color, linewidth=0.8)))
+        panel.strokes(angle, 0.0, speed, LineStyle(color, linewidth=0.8))
         panel.plot(angle, speed, mark(color, shape, 5), name)
         numbers.append((f"{kind} a revolution at the {SPOKEN[joint]}", spell(angle.size / turns)))
         if angle.size:
@@ -568,13 +571,12 @@ def draw_impacts(run: xr.Dataset, twin: Twin) -> DrawnFigure:
             lost = float(mine["lost_energy"].sum())
             numbers += [("the fastest", text), ("together they lost", spell(lost, "J"))]
     if not found.sizes["impact"]:
-        panel.notes.append(Note(none, 180, 0.5, side="center"))
-        panel.y.span(0, 1)
-        panel.y.ticks = ()
+        panel.write(none, 180, 0.5, inside="y", side="center")
+        panel.span("y", 0, 1)
+        panel.y.tickvals = ()
     else:
-        panel.y.span(low=0)
-    panel.x.title, panel.y.title = ANGLE_AXIS, "approach speed (m/s)"
+        panel.span("y", low=0)
+    panel.x.title = ANGLE_AXIS
     share_turn([panel])
-    figure.legend = [one for one in panel.traces if one.name]
     sentence = "Contacts that begin after settling: their approach speed over crank angle."
-    return DrawnFigure(figure, sentence + film(run) + caution(run), numbers)
+    return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)

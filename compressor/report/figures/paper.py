@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import plotly.graph_objects as go
 import xarray as xr
 from numpy.typing import ArrayLike
 
@@ -34,13 +35,12 @@ from compressor.report.figures.curves import (
     plot_rows,
 )
 from compressor.report.figures.drawing import (
+    WAYS,
     Drawing,
-    Note,
     Panel,
     circle,
     make_grid,
     share_scales,
-    strokes,
 )
 from compressor.report.figures.style import (
     BLACK,
@@ -54,6 +54,7 @@ from compressor.report.figures.style import (
     mark,
 )
 from compressor.report.figures.table import DrawnFigure, figure, spell
+from compressor.units import Units
 
 SERIES = ("displacement", "velocity", "acceleration")
 WORDS = "displacement, velocity and acceleration"
@@ -79,17 +80,17 @@ def spell_angles(found: ArrayLike) -> str:
 
 
 MOTION = (
-    Quantity("displacement", "displacement", "displacement (mm)", 1e3, window=24.0, steep=True),
-    Quantity("velocity", "velocity", "velocity (m/s)", steep=True),
-    Quantity("acceleration", "acceleration", "acceleration (m/s²)"),
+    Quantity("displacement", "displacement", "displacement", "mm", 1e3, window=24.0, steep=True),
+    Quantity("velocity", "velocity", "velocity", "m/s", steep=True),
+    Quantity("acceleration", "acceleration", "acceleration", "m/s²"),
 )
 
 
 @paper_figure(6, "Response of the design and the typical model", "design", "typical")
-def draw_load_response(runs: Runs) -> DrawnFigure:
+def draw_load_response(runs: Runs, units: Units = "usual") -> DrawnFigure:
     """Return figure 6: the design and the typical model without clearance."""
     curves = load_curves(runs)
-    figure, panels = make_grid(3, 2, 9.6)
+    drawing, panels = make_grid(3, 2, 9.6, units=units)
     for (full, enlarged), quantity, letters in zip(panels, MOTION, ("ab", "cd", "ef"), strict=True):
         plot(full, curves, quantity)
         enlarge([full], enlarged, curves, quantity, letters)
@@ -104,7 +105,7 @@ def draw_load_response(runs: Runs) -> DrawnFigure:
     )
     shares = spell(np.where(np.array(away) <= SAME_CURVE, 0.0, 100.0 * np.array(away)))
     numbers = [(f"greatest difference of {WORDS}", f"{shares} % of the range")]
-    return DrawnFigure(finish_figure(figure, panels[-1]), sentence, numbers)
+    return DrawnFigure(finish_figure(drawing, panels[-1]), sentence, numbers)
 
 
 @paper_figure(8, "Response with clearance at the big end", *sizes("big_end", "design"),
@@ -112,17 +113,17 @@ def draw_load_response(runs: Runs) -> DrawnFigure:
 @paper_figure(11, "Response with clearance at the small end", *sizes("small_end", "design"),
               fault="small_end")  # fmt: skip
 @paper_figure(14, "Response with clearance at both joints", *sizes("both", "design"), fault="both")
-def draw_fault_response(runs: Runs, fault: str) -> DrawnFigure:
+def draw_fault_response(runs: Runs, fault: str, units: Units = "usual") -> DrawnFigure:
     """Return figure 8, 11 or 14: no clearance, and three clearances of one fault.
 
     Acceleration oscillates fast: it has a row a clearance.
     """
     curves = fault_curves(runs, fault, ideal=True)
-    figure, panels = make_grid(5, 2, 11.5, heights=(3, 3, 2, 2, 2))
+    drawing, panels = make_grid(5, 2, 11.5, heights=(3, 3, 2, 2, 2), units=units)
     for (full, enlarged), quantity, letters in zip(panels, MOTION[:2], ("ab", "cd"), strict=False):
         plot(full, curves, quantity)
         enlarge([full], enlarged, curves, quantity, letters)
-    enlarged = beside(figure, panels, slice(2, 5))
+    enlarged = beside(drawing, panels, slice(2, 5))
     plot_rows(panels[2:, 0], curves, MOTION[2])
     enlarge(panels[2:, 0], enlarged, curves, MOTION[2], "ef")
     sentence = (
@@ -139,7 +140,7 @@ def draw_fault_response(runs: Runs, fault: str) -> DrawnFigure:
     for joint in faulty_joints(fault):
         lost = [100.0 * run["contact_loss_fraction"].sel(joint=joint) for run in worn]
         numbers.append((f"time without contact at the {SPOKEN[joint]}", spell(lost, "%")))
-    return DrawnFigure(finish_figure(figure, [panels[-1, 0], enlarged]), sentence, numbers)
+    return DrawnFigure(finish_figure(drawing, [panels[-1, 0], enlarged]), sentence, numbers)
 
 
 def differences_from_ideal(run: xr.Dataset) -> list[float]:
@@ -151,11 +152,11 @@ def differences_from_ideal(run: xr.Dataset) -> list[float]:
     ]
 
 
-def beside(figure: Drawing, panels: np.ndarray, rows: slice) -> Panel:
+def beside(drawing: Drawing, panels: np.ndarray, rows: slice) -> Panel:
     """Return one panel in place of those in the second column of some rows."""
-    figure.panels = [one for one in figure.panels if one not in panels[rows, 1]]
-    wide = Panel((rows.start, rows.stop), (1, 2))
-    figure.panels.append(wide)
+    drawing.panels = [one for one in drawing.panels if one not in panels[rows, 1]]
+    wide = Panel((rows.start, rows.stop), (1, 2), panels[0, 0].units)
+    drawing.panels.append(wide)
     return wide
 
 
@@ -174,25 +175,24 @@ def enlarge(
     enlarged.title = f"({letters[1]}) {quantity.title}, enlarged{remark}"
 
 
-def finish_figure(figure: Drawing, lowest: Sequence[Panel] | np.ndarray) -> Drawing:
-    """Return the figure with the titles of its lowest axes, and a legend of the last of them."""
+def finish_figure(drawing: Drawing, lowest: Sequence[Panel] | np.ndarray) -> go.Figure:
+    """Return the figure with titles of its lowest axes."""
     for panel in lowest:
         panel.x.title = ANGLE_AXIS
-    figure.legend = lowest[-1].traces
-    return figure
+    return drawing.figure()
 
 
 PISTON = Quantity(
-    "piston_force", "force on the piston, towards the crank", "force (kN)", KILONEWTON
+    "piston_force", "force on the piston, towards the crank", "force", "kN", KILONEWTON
 )
 
 
 @paper_figure(7, "Piston force of the design and the typical model", "design", "typical")
-def draw_piston_force(runs: Runs) -> DrawnFigure:
+def draw_piston_force(runs: Runs, units: Units = "usual") -> DrawnFigure:
     """Return figure 7: the piston force of the design and the typical model."""
-    figure, panels = make_grid(1, 1, 4.2)
+    drawing, panels = make_grid(1, 1, 4.2, units=units)
     plot(panels[0, 0], load_curves(runs), PISTON)
-    panels[0, 0].y.span(low=0)
+    panels[0, 0].span("y", low=0)
     sentence = (
         "The force on the piston over the last revolution. Steps of the spring's force are its "
         "damping, which acts only while the follower rests."
@@ -202,7 +202,7 @@ def draw_piston_force(runs: Runs) -> DrawnFigure:
         peak = float(runs[load]["piston_force"].max()) * KILONEWTON
         numbers.append((f"greatest force of the {name}", spell(peak, "kN")))
         numbers.append((f"corners of the {name}", spell_angles(load_corners(runs[load]))))
-    return DrawnFigure(finish_figure(figure, panels[0]), sentence, numbers)
+    return DrawnFigure(finish_figure(drawing, panels[0]), sentence, numbers)
 
 
 @paper_figure(9, "Contact force at the big end", *sizes("big_end"), fault="big_end",
@@ -213,7 +213,7 @@ def draw_piston_force(runs: Runs) -> DrawnFigure:
               fault="both", joint="big_end")  # fmt: skip
 @paper_figure(16, "Contact force at the small end, clearance at both joints", *sizes("both"),
               fault="both", joint="small_end")  # fmt: skip
-def draw_contact_force(runs: Runs, fault: str, joint: str) -> DrawnFigure:
+def draw_contact_force(runs: Runs, fault: str, joint: str, units: Units = "usual") -> DrawnFigure:
     """Return figure 9, 12, 15 or 16: contact force at one joint, a row a clearance.
 
     Both ways in each row: along the cylinder and across it.
@@ -221,12 +221,12 @@ def draw_contact_force(runs: Runs, fault: str, joint: str) -> DrawnFigure:
     All enlarged views show the window in which the horizontal forces at the fault's first joint
     differ most, so that those of both joints show the same angles.
     """
-    figure, panels = make_grid(6, 2, 11.5, widths=(2, 1))
+    drawing, panels = make_grid(6, 2, 11.5, widths=(2, 1), units=units)
     curves = fault_curves(runs, fault, ideal=False)
     part, _ = differing_part(curves, contact_force(first_joint(fault), "x"))
     for rows, axis, letter in zip((slice(0, 3), slice(3, 6)), "xy", "ab", strict=True):
         quantity = contact_force(joint, axis)
-        enlarged = beside(figure, panels, rows)
+        enlarged = beside(drawing, panels, rows)
         plot_rows(panels[rows, 0], curves, quantity)
         plot_enlarged(panels[rows, 0], enlarged, curves, quantity, part)
         top = panels[rows, 0][0]
@@ -245,7 +245,7 @@ def draw_contact_force(runs: Runs, fault: str, joint: str) -> DrawnFigure:
                  for c in CLEARANCES]  # fmt: skip
         values = spell(np.array(peaks) * KILONEWTON, "kN")
         numbers.append((f"greatest {words} at {AT}", values))
-    return DrawnFigure(finish_figure(figure, [panels[-1, 0], enlarged]), sentence, numbers)
+    return DrawnFigure(finish_figure(drawing, [panels[-1, 0], enlarged]), sentence, numbers)
 
 
 def first_joint(fault: str) -> str:
@@ -257,26 +257,25 @@ def contact_force(joint: str, axis: str) -> Quantity:
     """Return the force on the rod at a joint along an axis, kN."""
     title = {"x": "horizontal force on the rod", "y": "vertical force on the rod"}[axis]
     where = (("joint", joint), ("axis", axis))
-    return Quantity("contact_force", title, "force (kN)", KILONEWTON, where=where)
+    return Quantity("contact_force", title, "force", "kN", KILONEWTON, where=where)
 
 
 @paper_figure(10, "Acceleration against horizontal contact force, big end", *sizes("big_end"),
               joint="big_end")  # fmt: skip
 @paper_figure(13, "Acceleration against horizontal contact force, small end", *sizes("small_end"),
               joint="small_end")  # fmt: skip
-def draw_relation(runs: Runs, joint: str) -> DrawnFigure:
+def draw_relation(runs: Runs, joint: str, units: Units = "usual") -> DrawnFigure:
     """Return one panel a clearance: every stored sample, the regression line, r and r²."""
-    figure, panels = make_grid(1, 3, 4.0)
+    drawing, panels = make_grid(1, 3, 4.0, units=units)
     for panel, letter, clearance in zip(panels.flat, "abc", CLEARANCES, strict=True):
         run = runs[label(joint, clearance)]
         name = f"{clearance:g} mm"
+        panel.label("x", "horizontal force on the rod ({})", "kN")
+        panel.label("y", "acceleration ({})", "m/s²")
         scatter(panel, settled_part(run), joint, BY_CLEARANCE[clearance].color, name)
         regress(panel, run, joint)
         panel.title = f"({letter}) {name}"
-        panel.x.title = "horizontal force on the rod (kN)"
-        panel.x.margin = 0.05
-    panels[0, 0].y.title = "acceleration (m/s²)"
-    share_scales(figure.panels, "x", "y")
+    share_scales(drawing.panels, "x", "y")
     found = [force_relation(runs[label(joint, c)], joint) for c in CLEARANCES]
     sentence = (
         "A dot for each stored sample; the line is the least-squares fit of force on acceleration, "
@@ -286,14 +285,14 @@ def draw_relation(runs: Runs, joint: str) -> DrawnFigure:
         (f"slope at {AT}", spell([one.slope for one in found], "kg")),
         ("r²", spell([one.r2 for one in found])),
     ]
-    return DrawnFigure(figure, sentence, numbers)
+    return DrawnFigure(drawing.figure(), sentence, numbers)
 
 
 def scatter(panel: Panel, run: xr.Dataset, joint: str, color: str, name: str) -> None:
     """Draw a dot for every stored sample."""
     force = contact_force(joint, "x").values(run)
-    dots = mark(color, "o", 2.2, edge_width=0.0, alpha=0.45)
-    panel.plot(force, run["acceleration"].values, dots, name)
+    dots = mark(color, "circle", 2.2, edge_width=0.0, alpha=0.45)
+    panel.plot(force, run["acceleration"].values, dots, name, listed=False)
 
 
 def regress(panel: Panel, run: xr.Dataset, joint: str) -> None:
@@ -302,7 +301,7 @@ def regress(panel: Panel, run: xr.Dataset, joint: str) -> None:
     a = settled_part(run)["acceleration"].values
     ends = np.array([a.min(), a.max()])
     force = (relation.slope * ends + relation.intercept) * KILONEWTON
-    panel.plot(force, ends, LineStyle(BLACK, linewidth=1.1), "fit")
+    panel.plot(force, ends, LineStyle(BLACK, linewidth=1.1), "fit", listed=False)
     r = math.copysign(math.sqrt(relation.r2), relation.slope)
     sign = "−" if relation.intercept < 0 else "+"
     numbers = (
@@ -310,28 +309,28 @@ def regress(panel: Panel, run: xr.Dataset, joint: str) -> None:
         f"F = {relation.slope:.1f} kg · a {sign} {abs(relation.intercept) * KILONEWTON:.2f} kN"
     ).replace("-", "−")
     at, side = (0.03, "left") if relation.slope > 0 else (0.97, "right")
-    panel.notes.append(Note(numbers, at, 0.98, inside="xy", side=side, level="top", size=8.5))
+    panel.write(numbers, at, 0.98, inside="xy", side=side, level="top", size=8.5)
 
 
 PHASES = ("expansion", "suction", "compression", "discharge")
-CLOSED = LineStyle(BLUE, "-", 1.8, 2.3)
-PRINTED = LineStyle(GOLD, "-", 1.6, 2.2)
-BASE = LineStyle("#707070", (0, (1, 1.2)), 1.2, 2.1)
+CLOSED = LineStyle(BLUE, (), 1.8, 2.3)
+PRINTED = LineStyle(GOLD, (), 1.6, 2.2)
+BASE = LineStyle("#707070", (1, 1.2), 1.2, 2.1)
 
 
 @paper_figure(3, "The ideal p–V diagram", "typical")
-def draw_pressure_volume(runs: Runs) -> DrawnFigure:
+def draw_pressure_volume(runs: Runs, units: Units = "usual") -> DrawnFigure:
     """Return figure 3: cylinder pressure over volume, with phases and direction."""
     run = settled_part(runs["typical"])
     volume, pressure = gas_state(run)
-    figure, panels = make_grid(1, 1, 5.2)
+    drawing, panels = make_grid(1, 1, 5.2, units=units)
     (panel,) = panels.flat
+    panel.label("x", "gas volume V ({})", "litres")
+    panel.label("y", "pressure p ({}, absolute)", "MPa")
     panel.plot(volume, pressure, CLOSED, "gas in the cylinder")
     name_phases(panel, run, volume, pressure)
-    panel.x.title = "gas volume V (litres)"
-    panel.x.span(0, 1.05 * volume.max())
-    panel.y.title = "pressure p (MPa, absolute)"
-    panel.y.span(0, 1.15 * pressure.max())
+    panel.span("x", 0, 1.05 * volume.max())
+    panel.span("y", 0, 1.15 * pressure.max())
     sentence = (
         "Cylinder pressure over gas volume in the typical model, from the stored piston force and "
         "displacement; arrows point in the direction of time."
@@ -341,7 +340,7 @@ def draw_pressure_volume(runs: Runs) -> DrawnFigure:
         ("the phases change at", spell_angles(used)),
         ("off the ideal gas's corners by up to", spell_angles(np.abs(used - exact).max())),
     ]
-    return DrawnFigure(figure, sentence, numbers)
+    return DrawnFigure(drawing.figure(), sentence, numbers)
 
 
 def gas_state(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
@@ -365,22 +364,22 @@ def name_phases(panel: Panel, run: xr.Dataset, volume: np.ndarray, pressure: np.
         middle = here[np.argmin(np.abs(volume[here] - volume[here].mean()))]
         places = [middle + here.size // 14, middle - here.size // 14, middle]
         (x, tail_x, at), (y, tail_y, beside) = volume[places], pressure[places]
-        panel.notes.append(Note("", x, y, LineStyle(BLUE), tail=(tail_x, tail_y)))
+        panel.point_to(x, y, (tail_x, tail_y), BLUE)
         side = "left" if name in ("expansion", "compression") else "center"
         level = "top" if name == "suction" else "bottom"
         shift = offsets.get(name, (0, 10))
-        panel.notes.append(Note(name, at, beside, shift=shift, side=side, level=level, size=11))
+        panel.write(name, at, beside, shift=shift, side=side, level=level, size=11)
 
 
 @paper_figure(4, "The cam of the spring load", "design")
-def draw_cam(runs: Runs) -> DrawnFigure:
+def draw_cam(runs: Runs, units: Units = "usual") -> DrawnFigure:
     """Return figure 4: the cam's contour, and its follower's displacement.
 
     Beside the displacement stands the one that Eq. 10 gives as printed.
     """
     cam = Cam(runs["design"])
     angles = np.radians(np.linspace(0, 360, 1441))
-    figure, panels = make_grid(1, 2, 4.9, widths=(1, 1.25))
+    drawing, panels = make_grid(1, 2, 4.9, widths=(1, 1.25), units=units)
     draw_contour(panels[0, 0], cam, angles)
     draw_follower(panels[0, 1], cam, angles)
     sentence = (
@@ -394,24 +393,25 @@ def draw_cam(runs: Runs) -> DrawnFigure:
         ("the closed cam, each way, by", spell(1e3 * cam.height, "mm")),
         ("both are the same from", spell_angles(cam.printed_fall)),
     ]
-    return DrawnFigure(figure, sentence, numbers)
+    return DrawnFigure(drawing.figure(), sentence, numbers)
 
 
 def draw_contour(panel: Panel, cam: Cam, angles: np.ndarray) -> None:
     """Draw the closed cam's pitch curve around its base circle, with rays at every quarter turn."""
     x, y = cam.contour(angles, cam.base_radius)
-    panel.traces.append(circle(cam.base_radius * 1e3, fill("#f1f1f1"), "band"))
+    panel.title, panel.is_square = "(a) contour of the closed cam", True
+    panel.label("x", "x ({})", "mm")
+    panel.label("y", "y ({})", "mm")
+    panel.fill(*circle(cam.base_radius * 1e3), fill("#f1f1f1"))
     turns = np.radians([0, 90, 180, 270])
     for degrees, rim_x, rim_y in zip((0, 90, 180, 270), *cam.contour(turns, 0.0), strict=True):
         mark_ray(panel, degrees, math.hypot(rim_x, rim_y) + cam.base_radius)
     rim = cam.base_radius * 1e3 * np.array([np.cos(angles), np.sin(angles)])
     panel.plot(rim[0], rim[1], BASE, f"base circle, {cam.base_radius * 1e3:g} mm")
     panel.plot(x * 1e3, y * 1e3, CLOSED, "roller's path")
-    panel.is_square = panel.fills_box = True
-    panel.title = "(a) contour of the closed cam"
-    for scale, title in ((panel.x, "x (mm)"), (panel.y, "y (mm)")):
-        scale.title, scale.margin = title, 0.06
-    panel.legend = panel.traces[:-3:-1]
+    for way, values in zip(WAYS, (x, y), strict=True):
+        room = 0.06 * np.ptp(values)
+        panel.span(way, 1e3 * (values.min() - room), 1e3 * (values.max() + room))
 
 
 def mark_ray(panel: Panel, degrees: float, radius: float) -> None:
@@ -422,12 +422,14 @@ def mark_ray(panel: Panel, degrees: float, radius: float) -> None:
     panel.plot(along[0] * ends, along[1] * ends, LineStyle(GREY, linewidth=0.8))
     x, y = (1e3 * radius - 45) * along
     upright = degrees in (90, 270)
-    shift, side, level = ((5, 0), "left", "center") if upright else ((0, 4), "center", "bottom")
-    panel.notes.append(Note(f"{degrees:g}°", x, y, shift=shift, side=side, level=level))
+    shift, side, level = ((5, 0), "left", "middle") if upright else ((0, 4), "center", "bottom")
+    panel.write(f"{degrees:g}°", x, y, shift=shift, side=side, level=level)
 
 
 def draw_follower(panel: Panel, cam: Cam, angles: np.ndarray) -> None:
     """Draw the follower displacement of the closed cam, and of Eq. 10 taken literally."""
+    panel.label("x", "cam angle (°)")
+    panel.label("y", "s ({})", "mm")
     fall = cam.printed_fall
     before, after = angles[angles < fall], np.append(fall, angles[angles >= fall])
     for part in (before, after):
@@ -435,26 +437,23 @@ def draw_follower(panel: Panel, cam: Cam, angles: np.ndarray) -> None:
         panel.plot(np.degrees(part), s, PRINTED, "as printed, Eq. 10")
     s = cam.follower(angles) * 1e3
     panel.plot(np.degrees(angles), s, CLOSED, "closed cam, as simulated")
-    panel.legend = panel.traces[:0:-1]
     height, left = (float(cam.printed_follower(turn)) * 1e3 for turn in (math.pi, fall))
     where = math.degrees(fall)
-    dots = LineStyle(RED, (0, (1, 1.65)), 1.5)
-    panel.traces.append(strokes(np.array([where]), left, np.array([height]), dots))
+    dots = LineStyle(RED, (1, 1.65), 1.5)
+    panel.strokes(np.array([where]), left, np.array([height]), dots)
     write_at(panel, f"printed: rises by {height:.1f} mm", (150, height), (0, 5), "left")
     write_at(
         panel, f"and falls by {left:.1f} mm:\nit does not close", (where, 165), (-6, 0), "right"
     )
     stroke = float(cam.follower(math.pi)) * 1e3
     write_at(panel, f"{stroke:.0f} mm each way", (183, stroke), (0, 5), "left")
-    panel.title = "(b) follower displacement"
-    panel.x.title, panel.x.step = "cam angle (°)", 60.0
-    panel.x.span(0, 360)
-    panel.y.title = "s (mm)"
-    panel.y.span(-6, 1.12 * height)
+    panel.title, panel.x.dtick = "(b) follower displacement", 60.0
+    panel.span("x", 0, 360)
+    panel.span("y", -6, 1.12 * height)
 
 
 def write_at(
     panel: Panel, text: str, point: tuple[float, float], shift: tuple[float, float], side: str
 ) -> None:
     """Draw a remark beside a point of a panel, shifted in points (1/72 inch)."""
-    panel.notes.append(Note(text, *point, shift=shift, side=side, size=9))
+    panel.write(text, *point, shift=shift, side=side, size=9)

@@ -1,4 +1,4 @@
-"""Pictures of drawings by matplotlib, by two processes where there are cores for them.
+"""Pictures of figures by matplotlib, by two processes where there are cores for them.
 
 Figures are made on the Agg canvas without pyplot, and inside a style context, so that neither a
 user's matplotlibrc nor a user's own figures are touched.
@@ -8,6 +8,7 @@ import contextlib
 import io
 import multiprocessing
 import os
+import re
 import signal
 import sys
 import threading
@@ -17,31 +18,35 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
 from matplotlib import style
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, LogNorm, Normalize
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullFormatter
+from matplotlib.ticker import MultipleLocator
 
-from compressor.report.figures.drawing import WAYS, Drawing, Note, Panel, Trace, Way
-from compressor.report.figures.style import LineStyle
+from compressor.report.figures.drawing import INCH, WAYS, Trace, View, Way, views_of
+from compressor.report.figures.style import PIXEL
 
 DPI = 150
-SVG_DPI = 200  # of what is pixels in an SVG: 1920 across a page, twice those of a usual screen
 LEGEND_WIDTH = 130  # characters, in a row of a legend
-PLAIN_DECADES = 2.5  # of a log axis with plain numbers, up to which it has ticks at 2 and 5 as well
+MARKERS = {
+    "circle": "o", "square": "s", "diamond": "D", "triangle-up": "^", "triangle-down": "v",
+    "triangle-left": "<", "triangle-right": ">", "pentagon": "p", "x-thin": "x",
+}  # fmt: skip
 
 STYLE: dict[str, Any] = {
     "font.size": 9.5,
     "axes.titlelocation": "left",
     "axes.titley": 1.0,  # found again for each drawing it takes a tenth of the time
+    "axes.titlesize": 10.0,
     "axes.labelsize": 9.5,
     "axes.linewidth": 0.7,
     "axes.spines.top": False,
@@ -63,34 +68,48 @@ STYLE: dict[str, Any] = {
 
 
 @style.context(STYLE, after_reset=True)
-def render(drawing: Drawing, kind: str = "png") -> bytes:
-    """Return a drawing as the bytes of a `png` or `svg` file, without a time stamp.
+def render(figure: go.Figure, kind: str = "png") -> bytes:
+    """Return a figure as the bytes of a `png` or `svg` file, without a time stamp.
 
     Its layout is found once: `savefig` would find it twice.
     """
-    figure = paint(drawing)
-    layout = figure.get_layout_engine()
+    painted = paint(figure)
+    layout = painted.get_layout_engine()
     assert layout
-    layout.execute(figure)
-    figure.set_layout_engine("none")
+    layout.execute(painted)
+    painted.set_layout_engine("none")
     stream = io.BytesIO()
     if kind == "png":
-        FigureCanvasAgg(figure).print_png(stream)
+        FigureCanvasAgg(painted).print_png(stream)
     else:
-        figure.savefig(stream, format=kind, dpi=SVG_DPI, metadata={"Date": None})
+        painted.savefig(stream, format=kind, metadata={"Date": None})
     return stream.getvalue()
 
 
-def render_reported(heading: str, drawing: Drawing) -> bytes:
-    """Return the PNG of a drawing; say what is drawn in one write, since two share stderr."""
+TO_DRAW: list[tuple[str, go.Figure]] = []  # of a copy of this process, with what each is called
+
+
+def start_copy(figures: Sequence[tuple[str, go.Figure]]) -> None:
+    """Prepare a copy: pickled to it, a figure would lose its arrays. Ctrl-C ends it silently."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    TO_DRAW[:] = figures
+
+
+def render_numbered(number: int) -> bytes:
+    """Return the PNG of a figure that the copy has."""
+    return render_reported(*TO_DRAW[number])
+
+
+def render_reported(heading: str, figure: go.Figure) -> bytes:
+    """Return the PNG of a figure; say what is drawn in one write, since two share stderr."""
     with contextlib.suppress(OSError):
         sys.stderr.write(f"drawing {heading}\n")
         sys.stderr.flush()
-    return render(drawing)
+    return render(figure)
 
 
-def render_all(drawings: Sequence[tuple[str, Drawing]]) -> list[bytes]:
-    """Return the PNG of drawings, each with what it is called on stderr.
+def render_all(figures: Sequence[tuple[str, go.Figure]]) -> list[bytes]:
+    """Return the PNG of figures, each with what it is called on stderr.
 
     They are drawn two at a time, by copies of this process; one after the other where the system
     makes no copies, or threads run, whose locks a copy would take along.
@@ -98,197 +117,192 @@ def render_all(drawings: Sequence[tuple[str, Drawing]]) -> list[bytes]:
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     can_fork = cores > 1 and "fork" in multiprocessing.get_all_start_methods()
-    if can_fork and threading.active_count() == 1 and len(drawings) > 1:
-        context, ignored = multiprocessing.get_context("fork"), (signal.SIGINT, signal.SIG_DFL)
-        # a copy has died, such as for want of memory: all is drawn here
-        with (
+    if can_fork and threading.active_count() == 1 and len(figures) > 1:
+        with (  # if a copy dies, such as for want of memory, all is drawn here
             contextlib.suppress(BrokenProcessPool),
-            ProcessPoolExecutor(2, context, signal.signal, ignored) as pool,
+            ProcessPoolExecutor(
+                2, multiprocessing.get_context("fork"), start_copy, (figures,)
+            ) as pool,
         ):
-            return [*pool.map(render_reported, *zip(*drawings, strict=True))]
-    return [render_reported(*one) for one in drawings]
+            return [*pool.map(render_numbered, range(len(figures)))]
+    return [render_reported(*one) for one in figures]
 
 
-def paint(drawing: Drawing) -> Figure:
-    """Return a drawing as a figure of matplotlib."""
-    layout = ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.06, wspace=0.03)
-    figure = Figure(figsize=(drawing.width, drawing.height), dpi=DPI, layout=layout)
-    FigureCanvasAgg(figure)
-    heights, widths = drawing.heights, drawing.widths
-    grid = figure.add_gridspec(
-        len(heights), len(widths), height_ratios=heights, width_ratios=widths
-    )
-    places = [figure.add_subplot(grid[slice(*p.row), slice(*p.column)]) for p in drawing.panels]
-    columns: dict[tuple[int, int], list[Axes]] = {}
-    for panel, axes in zip(drawing.panels, places, strict=True):
-        columns.setdefault(panel.column, []).append(axes)
-    for panel, axes in zip(drawing.panels, places, strict=True):
-        paint_panel(axes, panel, columns[panel.column])
-    if drawing.x_title:
-        figure.supxlabel(drawing.x_title, fontsize="medium")
-    if drawing.y_title:
-        figure.supylabel(drawing.y_title, fontsize="medium")
-    if drawing.title:
-        figure.suptitle(drawing.title, x=0.02, ha="left", fontsize="medium")
-    if drawing.legend:
-        longest = max(len(one.name) for one in drawing.legend)
-        across = min(len(drawing.legend), max(1, LEGEND_WIDTH // (longest + 9)))
-        handles = [*map(legend_handle, drawing.legend)]
-        figure.legend(
-            handles=handles, ncols=across,
-            loc="outside lower center" if drawing.title else "outside upper center",
-        )  # fmt: skip
-    return figure
+def paint(figure: go.Figure) -> Figure:
+    """Return a figure of plotly as one of matplotlib."""
+    layout, grid = figure.layout, figure.layout.meta
+    engine = ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.06, wspace=0.03)
+    size = layout.width / INCH, layout.height / INCH
+    painted = Figure(figsize=size, dpi=DPI, layout=engine)
+    FigureCanvasAgg(painted)
+    cells = painted.add_gridspec(
+        len(grid["rows"]), len(grid["columns"]),
+        height_ratios=grid["rows"], width_ratios=grid["columns"],
+    )  # fmt: skip
+    for panel in views_of(figure):
+        axes = painted.add_subplot(cells[slice(*panel.row), slice(*panel.column)])
+        paint_panel(axes, panel)
+    if layout.title.text:
+        painted.suptitle(words(layout.title.text), x=0.02, ha="left", fontsize="medium")
+    listed = sorted((one for one in figure.data if one.showlegend), key=lambda one: one.legendrank)
+    is_needed = any(isinstance(one, go.Scatter) and "lines" not in one.mode for one in listed)
+    if is_needed or len(listed) > 1:
+        longest = max(len(one.name) for one in listed)
+        across = min(len(listed), max(1, LEGEND_WIDTH // (longest + 9)))
+        place: Any = f"outside {'lower' if layout.title.text else 'upper'} center"
+        painted.legend(handles=[*map(legend_handle, listed)], loc=place, ncols=across)
+    return painted
 
 
-def paint_panel(axes: Axes, panel: Panel, column: Sequence[Axes]) -> None:
-    """Draw a panel on axes. column: the axes of its column, for a scale of colours beside all."""
-    axes.set_title(panel.title, fontsize=panel.title_size)
-    if panel.ground:
-        ground = patch_properties(panel.ground)
-        axes.patch.set(**{name: ground[name] for name in ("facecolor", "edgecolor", "hatch")})
-    if panel.is_square:
-        axes.set_aspect("equal", adjustable="datalim" if panel.fills_box else "box")
-    for trace in panel.traces:
-        if trace.kind == "map":
-            paint_map(axes, trace, column)
-        elif trace.kind == "band":
-            axes.add_patch(PathPatch(outline(trace), **patch_properties(trace.style)))
-        elif trace.kind in ("bars", "columns"):
-            paint_bars(axes, trace)
-        else:
-            look = line_properties(trace.style)
-            if trace.errors is None:
-                axes.plot(trace.x, trace.y, **look)
-            else:
-                axes.errorbar(trace.x, trace.y, **error_properties(trace), elinewidth=1.0, **look)
+def words(text: str) -> str:
+    """Return a text of plotly as matplotlib writes it."""
+    text = text.replace("$", r"\$").replace("<br>", "\n")
+    return re.sub(r"(\w)<sub>(\w+)</sub>", r"$\1_{\2}$", text)
+
+
+def paint_panel(axes: Axes, panel: View) -> None:
+    """Draw a panel on axes."""
+    axes.set_title(words(panel.title))
+    for height, trace in enumerate(panel.traces):
+        paint_trace(axes, trace, 2.0 + 0.01 * height)
+    for rule in panel.rules:
+        (at, way) = (rule.x0, "x") if "domain" in rule.yref else (rule.y0, "y")
+        look = line_look(rule.line) | {"zorder": 1.9 if rule.layer == "below" else 2.9}
+        (axes.axvline if way == "x" else axes.axhline)(at, **look)
     for note in panel.notes:
-        paint_note(axes, note, panel.limits("y"))
+        is_inside = ["domain" in ref for ref in (note.xref, note.yref)]
+        at = [10.0**end if scale.type == "log" and not inside else end for end, scale, inside
+              in zip((note.x, note.y), (panel.x, panel.y), is_inside, strict=True)]  # fmt: skip
+        if note.showarrow:
+            arrow = {"arrowstyle": "-|>", "color": note.arrowcolor, "mutation_scale": 22,
+                     "shrinkB": 0}  # fmt: skip
+            axes.annotate("", (at[0], at[1]), (note.ax, note.ay), arrowprops=arrow)
+            continue
+        frame, level = ("axes fraction" if inside else "data" for inside in is_inside), note.yanchor
+        axes.annotate(
+            words(note.text), (at[0], at[1]), (note.xshift / PIXEL, note.yshift / PIXEL),
+            xycoords=(next(frame), next(frame)), textcoords="offset points", ha=note.xanchor,
+            va="center" if level == "middle" else level, fontsize=note.font.size / PIXEL,
+            color=note.font.color,
+        )  # fmt: skip
     for way in WAYS:
-        paint_scale(axes, way, panel)
-        if way not in panel.grid:
-            axes.grid(visible=False, axis=way)
-    if panel.legend:
-        handles = [*map(legend_handle, panel.legend)]
-        axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
+        paint_axis(axes, way, panel.x if way == "x" else panel.y)
+    if panel.y.scaleanchor:
+        axes.set_aspect("equal", adjustable="box")
 
 
-def paint_scale(axes: Axes, way: Way, panel: Panel) -> None:
+def paint_axis(axes: Axes, way: Way, scale: Any) -> None:
     """Draw the title, the ends and the ticks of the axis `x` or `y`."""
-    axis, scale = (axes.xaxis, panel.x) if way == "x" else (axes.yaxis, panel.y)
-    low, high = panel.limits(way)
-    axis.set_label_text(scale.title)
-    if not scale.title:
+    axis, title = axes.xaxis if way == "x" else axes.yaxis, words(scale.title.text or "")
+    axis.set_label_text(title)
+    if not title:
         axis.set_label_coords(0.5, 0.5)  # else its place is found from all ticks, at each drawing
-    if scale.log:
+    ends = scale.range
+    if scale.type == "log":
         (axes.set_xscale if way == "x" else axes.set_yscale)("log")
-    if scale.words:
-        axis.set_ticks([*scale.words], [*scale.words.values()])
-    elif scale.ticks is not None:
-        axis.set_ticks(scale.ticks)
-    elif scale.step:
-        axis.set_major_locator(MultipleLocator(scale.step))
-    elif scale.max_ticks:
-        axis.set_major_locator(MaxNLocator(scale.max_ticks))
-    if scale.plain:
-        is_fine = np.log10(high / low) <= PLAIN_DECADES
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if is_fine else (1.0,)))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_minor_formatter(NullFormatter())
-    (axes.set_xlim if way == "x" else axes.set_ylim)(low, high, auto=panel.fills_box)
-    if scale.bare:
-        axis.set_tick_params(which="both", labelbottom=False, labelleft=False)
+        ends = [10.0**end for end in ends]
+    if scale.ticktext:
+        axis.set_ticks(scale.tickvals, [words(text) for text in scale.ticktext])
+    elif scale.tickvals is not None:
+        axis.set_ticks(scale.tickvals)
+    elif scale.dtick:
+        axis.set_major_locator(MultipleLocator(scale.dtick))
+    (axes.set_xlim if way == "x" else axes.set_ylim)(*ends)
+    axis.set_tick_params(which="both", labelbottom=scale.showticklabels is not False,
+                         labelleft=scale.showticklabels is not False)  # fmt: skip
+    if scale.showgrid is False:
+        axes.grid(visible=False, axis=way)
 
 
-def line_properties(look: LineStyle) -> dict[str, Any]:
+def line_look(line: Any) -> dict[str, Any]:
     """Return the keywords of a line of matplotlib."""
-    return {
-        "color": look.color, "linestyle": look.linestyle, "linewidth": look.linewidth,
-        "zorder": look.zorder, "marker": look.marker, "markersize": look.markersize,
-        "markeredgecolor": look.edge or look.color, "markeredgewidth": look.edge_width,
-        "markerfacecolor": "none" if look.is_hollow else look.color, "alpha": look.alpha,
-        "drawstyle": "steps-post" if look.is_step else "default",
-    }  # fmt: skip
+    width = line.width / PIXEL
+    parts = [float(part[:-2]) / line.width for part in (line.dash or "").split(",") if "px" in part]
+    return {"color": line.color, "linewidth": width, "linestyle": (0, parts) if parts else "-"}
 
 
-def error_properties(trace: Trace) -> dict[str, Any]:
-    """Return the keywords of matplotlib's error bars."""
-    return {"xerr" if trace.across else "yerr": trace.errors, "capsize": trace.caps}
+def curve_look(trace: go.Scatter) -> dict[str, Any]:
+    """Return the keywords of a curve of matplotlib: its line, its marks or both."""
+    marks, symbol = trace.marker, trace.marker.symbol or ""
+    look = line_look(trace.line) if "lines" in trace.mode else {"linestyle": "none"}
+    look |= {
+        "alpha": trace.opacity,
+        "drawstyle": "steps-post" if trace.line.shape == "hv" else None,
+    }
+    if "markers" in trace.mode:
+        is_open = symbol.endswith("-open")
+        look |= {
+            "marker": MARKERS[symbol.removesuffix("-open")], "markersize": marks.size / PIXEL,
+            "markerfacecolor": "none" if is_open else marks.color,
+            "markeredgecolor": marks.line.color, "markeredgewidth": marks.line.width / PIXEL,
+        }  # fmt: skip
+    return look
 
 
-def patch_properties(look: LineStyle) -> dict[str, Any]:
+def area_look(trace: Trace) -> dict[str, Any]:
     """Return the keywords of an area of matplotlib."""
+    if isinstance(trace, go.Bar):
+        return {"facecolor": trace.marker.color, "linewidth": 0.0}
+    is_hatched = bool(trace.fillpattern.shape)
     return {
-        "facecolor": look.color, "edgecolor": look.edge or "none", "zorder": look.zorder,
-        "linewidth": look.edge_width if look.edge else 0.0, "alpha": look.alpha,
-        "hatch": "////" if look.is_hatched else None,
+        "facecolor": trace.fillcolor, "linewidth": 0.0, "alpha": trace.opacity,
+        "edgecolor": trace.fillpattern.fgcolor if is_hatched else "none",
+        "hatch": "////" if is_hatched else None,
     }  # fmt: skip
 
 
 def legend_handle(trace: Trace) -> Artist:
     """Return an entry of a legend."""
-    if trace.kind == "line":
-        return Line2D([], [], label=trace.name, **line_properties(trace.style))
-    return Patch(label=trace.name, **patch_properties(trace.style))
+    if isinstance(trace, go.Scatter) and trace.fill is None:
+        return Line2D([], [], label=trace.name, **curve_look(trace))
+    return Patch(label=trace.name, **area_look(trace))
 
 
-def outline(trace: Trace) -> Path:
-    """Return the outlines of a band; those inside another one are holes."""
-    ends = np.flatnonzero(np.isnan(trace.x))
-    rings = np.split(np.column_stack([trace.x, trace.y]), ends)
-    rings = [ring[np.isfinite(ring).all(axis=1)] for ring in rings]
-    return Path.make_compound_path(*(Path(ring, closed=True) for ring in rings if ring.size))
-
-
-def paint_bars(axes: Axes, trace: Trace) -> None:
-    """Draw bars, lying or standing."""
-    look = patch_properties(trace.style) | {"linewidth": 0.0}
-    foot = 0.0 if trace.foot is None else trace.foot
-    if trace.errors is not None:
-        look |= error_properties(trace) | {"ecolor": "#303030"}
-    if trace.kind == "bars":
-        axes.barh(trace.y, trace.x - foot, trace.thick, foot, **look)
+def paint_trace(axes: Axes, trace: Trace, height: float) -> None:
+    """Draw a curve, an area, bars or a map."""
+    if isinstance(trace, go.Heatmap):
+        paint_map(axes, trace)
+    elif isinstance(trace, go.Bar):
+        is_lying = trace.orientation == "h"
+        error = trace.error_x if is_lying else trace.error_y
+        look = area_look(trace) | {"zorder": height}
+        if error.array is not None:
+            look |= {"xerr" if is_lying else "yerr": [error.arrayminus, error.array],
+                     "capsize": 2.0, "ecolor": "#303030"}  # fmt: skip
+        if is_lying:
+            axes.barh(trace.y, trace.x, trace.width, trace.base, **look)
+        else:
+            axes.bar(trace.x, trace.y, trace.width, trace.base, **look)
+    elif trace.fill:
+        path = outline(trace.x, trace.y)
+        if path:
+            axes.add_patch(PathPatch(path, zorder=height - 1.0, **area_look(trace)))
+    elif trace.error_y.array is not None:
+        ends = [trace.error_y.arrayminus, trace.error_y.array]
+        axes.errorbar(trace.x, trace.y, ends, capsize=2.0, elinewidth=1.0, zorder=height,
+                      **curve_look(trace))  # fmt: skip
     else:
-        axes.bar(trace.x, trace.y - foot, trace.thick, foot, **look)
+        axes.plot(trace.x, trace.y, zorder=height, **curve_look(trace))
 
 
-def paint_map(axes: Axes, trace: Trace, column: Sequence[Axes]) -> None:
+def outline(x: np.ndarray, y: np.ndarray) -> Path | None:
+    """Return the outlines of an area; those inside another one are holes."""
+    rings = np.split(np.column_stack([x, y]), np.flatnonzero(np.isnan(x)))
+    paths = [Path(np.vstack([ring, ring[:1]]), closed=True) for one in rings
+             if (ring := one[np.isfinite(one).all(axis=1)]).size]  # fmt: skip
+    return Path.make_compound_path(*paths) if paths else None
+
+
+def paint_map(axes: Axes, trace: go.Heatmap) -> None:
     """Draw the cells of a map, and the bar of its colours."""
-    scale, look = trace.scale, trace.style
-    assert scale is not None
-    assert trace.z is not None
-    norm = (LogNorm if scale.log else Normalize)(scale.low, scale.high)
-    colors = ListedColormap(scale.colors)
-    edges: dict[str, Any] = {"edgecolors": look.edge, "linewidth": look.edge_width}
+    norm = Normalize(trace.zmin, trace.zmax)
+    stops = [(float(at), color) for at, color in trace.colorscale]
+    colors = LinearSegmentedColormap.from_list("", stops)
     axes.pcolormesh(trace.x, trace.y, np.ma.masked_invalid(trace.z), norm=norm, cmap=colors,
-                    rasterized=True, **(edges if look.edge else {}))  # fmt: skip
-    if not scale.side:
-        return
-    figure, places = axes.figure, [*column] if scale.beside_column else axes
-    bar = figure.colorbar(
-        ScalarMappable(norm, colors), ax=places, pad=0.02, location=scale.side, aspect=scale.aspect,
-        label=scale.bar_title or scale.title, extend="both" if scale.pointed else "neither",
-        ticks=scale.ticks,
-    )  # fmt: skip
-    if scale.levels:
-        bar.add_lines([*scale.levels], ["white"] * len(scale.levels), [0.9] * len(scale.levels))
-
-
-def paint_note(axes: Axes, note: Note, limits: tuple[float, float]) -> None:
-    """Draw a text, an arrow or a straight line; limits: of the y axis."""
-    look = note.style
-    if note.tail is not None:
-        arrow = {"arrowstyle": "-|>", "color": look.color, "mutation_scale": 22, "shrinkB": 0}
-        axes.annotate("", (note.x, note.y), note.tail, arrowprops=arrow)
-    elif note.text:
-        x_frame, y_frame = ("axes fraction" if way in note.inside else "data" for way in WAYS)
-        axes.annotate(
-            note.text, (note.x, note.y), note.shift, xycoords=(x_frame, y_frame),
-            textcoords="offset points", ha=note.side, va=note.level, fontsize=note.size,
-            color=look.color, alpha=look.alpha,
-        )  # fmt: skip
-    elif np.isnan(note.x):
-        low, high = limits
-        axes.axhline(note.y, clip_on=not low <= note.y <= high, **line_properties(look))
-    else:
-        axes.axvline(note.x, **line_properties(look))
+                    rasterized=True, zorder=1.5)  # fmt: skip
+    if trace.showscale is not False:
+        scale = trace.colorbar
+        bar = axes.figure.colorbar(ScalarMappable(norm, colors), ax=axes, pad=0.02, aspect=14)
+        bar.set_label(words(scale.title.text or ""))
+        if scale.tickvals is not None:
+            bar.set_ticks(scale.tickvals, labels=scale.ticktext)

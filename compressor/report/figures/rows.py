@@ -4,20 +4,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import plotly.graph_objects as go
 import xarray as xr
 
 from compressor.analysis import MODES, OILED_MODES, ORDER, SPOKEN, UNKNOWN, Cycle, Shaking
 from compressor.metrics import JOINTS
 from compressor.report.figures.curves import ANGLE_AXIS
 from compressor.report.figures.drawing import (
-    ColorScale,
     Drawing,
-    Note,
     Panel,
-    entry,
     join_with_gaps,
     make_grid,
-    map_cells,
+    outline_cells,
     share_scales,
 )
 from compressor.report.figures.job import (
@@ -26,12 +24,13 @@ from compressor.report.figures.job import (
     ORDERS_AXIS,
     UNSEEN,
     G,
+    list_modes,
     loudest,
-    mode_entries,
     share_turn,
 )
 from compressor.report.figures.style import BLACK, BLUE, GOLD, RED, LineStyle, mark, palette
 from compressor.report.figures.table import DrawnFigure, Number, figure, spell
+from compressor.units import Units
 
 
 @dataclass(frozen=True)
@@ -129,35 +128,36 @@ ROW, LEAST = 0.24, 3.4  # inches: of a row, and of all
 
 def start_map(
     rows: Sequence[SweptRow], title: str, x: np.ndarray, table: np.ndarray,
-    ends: tuple[float, float], name: str,
+    ends: tuple[float, float], name: str, unit: str, units: Units,
 ) -> tuple[Drawing, Panel]:  # fmt: skip
-    """Return a figure with a table in colour, a row a value, and the panel of that.
+    """Return a drawing with a table in colour, a row a value, and the panel of that.
 
-    title: of the rows; x: edges of the table's columns; ends: of the colours, which `name` titles.
+    title: of the rows; x: edges of the table's columns; ends: of the colours, which `name` titles,
+    with `{}` for the unit.
     """
-    figure, panels = make_grid(1, 2, height(len(rows)) + 0.9, widths=(3, 1))
-    image = panels[0, 0]
-    colors = ColorScale(palette("cividis"), *ends, True, name, "top", 50, pointed=True)
-    edges = np.arange(len(rows) + 1) - 0.5
-    image.traces.append(map_cells(x, edges, np.maximum(table, ends[0]), colors))
+    drawing, panels = make_grid(1, 2, height(len(rows)) + 0.9, widths=(3, 1), units=units)
+    image, edges = panels[0, 0], np.arange(len(rows) + 1) - 0.5
+    shown = np.clip(table, *ends)  # nan stays
+    image.map(x, edges, shown, palette("cividis"), ends, name, unit, is_log=True)
     label_rows(image, rows, title)
-    return figure, image
+    return drawing, image
 
 
-def finish_map(figure: Drawing, values: np.ndarray, title: str, top: float) -> Drawing:
-    """Return a figure of `start_map` with a number a row beside the map, and a legend of marks."""
-    image, beside = figure.panels
-    dots = LineStyle(BLUE, linewidth=1.5, marker="o", markersize=3.5)
+def finish_map(
+    drawing: Drawing, values: np.ndarray, title: str, unit: str, top: float
+) -> go.Figure:
+    """Return a figure of `start_map` with a number a row beside the map; top: of its axis."""
+    _, beside = drawing.panels
+    dots = LineStyle(BLUE, linewidth=1.5, marker="circle", markersize=3.5)
+    beside.label("x", title, unit)
     beside.plot(values, np.arange(values.size, dtype=float), dots)
-    beside.x.title = title
-    beside.x.span(0, top)
-    share_scales(figure.panels, "y")
-    figure.legend = [one for one in image.traces if one.is_points]
-    return figure
+    beside.span("x", 0, top)
+    share_scales(drawing.panels, "y")
+    return drawing.figure()
 
 
 @figure("study", "cycles", "vibration over crank angle")
-def draw_cycles(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
+def draw_cycles(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> DrawnFigure:
     """Return the vibration in each degree, a row a value, in colour; beside them its peaks.
 
     Marks: the rod load changes its side; valves open and close, or the cam's follower stops.
@@ -166,14 +166,15 @@ def draw_cycles(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
     table = np.array([one.degree_peaks if one else np.full(360, np.nan) for one in found])
     top = np.nanmax(table)
     ends = top * 10.0**-CYCLE_DECADES, top
-    figure, image = start_map(rows, title, np.arange(361.0), table, ends, "|a| (m/s²)")
+    drawing, image = start_map(rows, title, np.arange(361.0), table, ends, "|a| ({})", "m/s²",
+                               units)  # fmt: skip
     corners = [[at for at, _ in one.events] if one else [] for one in found]
     reversals = [one.reversals if one else () for one in found]
     has_cam = any(event.startswith("cam") for one in found if one for _, event in one.events)
     corner = "corner of the load" if has_cam else "a valve opens or closes"
     for name, shape, color, angles in (
-        (corner, "v", "#ffffff", corners),
-        ("rod load changes its side", "s", RED, reversals),
+        (corner, "triangle-down", "#ffffff", corners),
+        ("rod load changes its side", "square", RED, reversals),
     ):
         if not any(len(some) for some in angles):
             continue
@@ -199,11 +200,13 @@ def draw_cycles(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
         ("the greatest comes at", f"{at:.0f}°, {spell(G * np.nanmax(loud), 'g')}"),
         ("changes of the rod load's side a revolution", ", ".join(map(str, sorted({*counts})))),
     ]
-    return DrawnFigure(finish_map(figure, peaks, "peak (m/s²)", 1.08 * top), sentence, numbers)
+    return DrawnFigure(
+        finish_map(drawing, peaks, "peak ({})", "m/s²", 1.08 * top), sentence, numbers
+    )
 
 
 @figure("study", "segments", "vibration in segments of 10°")
-def draw_segments(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
+def draw_segments(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> DrawnFigure:
     """Return the rms in segments of 10 degrees over the healthy machine's, a row a value.
 
     In colour, with marks where a segment is over its limit; beside them the greatest rms.
@@ -211,11 +214,11 @@ def draw_segments(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
     found = [row.segments for row in rows]
     table = np.array([one.ratio if one else np.full(36, np.nan) for one in found])
     top = max(float(np.nanmax(table)), 1.1)
-    figure, image = start_map(rows, title, 10.0 * np.arange(37), table, (1.0, top),
-                              "rms over that without clearance")  # fmt: skip
+    drawing, image = start_map(rows, title, 10.0 * np.arange(37), table, (1.0, top),
+                               "rms over that without clearance", "", units)  # fmt: skip
     for name, shape, color, over in (
-        ("over its limit", "s", RED, [o.over_limit if o else None for o in found]),
-        ("perhaps over it, by the bar", "o", GOLD, [o.doubtful if o else None for o in found]),
+        ("over its limit", "square", RED, [o.over_limit if o else None for o in found]),
+        ("perhaps over it, by the bar", "circle", GOLD, [o.doubtful if o else None for o in found]),
     ):
         marks = [(10.0 * at + 5.0, float(n)) for n, some in enumerate(over) if some is not None
                  for at in np.flatnonzero(some)]  # fmt: skip
@@ -225,14 +228,14 @@ def draw_segments(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
     image.x.title = ANGLE_AXIS
     share_turn([image], 90.0)
     greatest = np.array([np.nanmax(one.rms) if one else np.nan for one in found])
-    words = "greatest rms of a\nsegment (m/s²)"
-    drawing = finish_map(figure, greatest, words, 1.08 * float(np.nanmax(greatest)))
+    words = "greatest rms of a<br>segment ({})"
+    figure = finish_map(drawing, greatest, words, "m/s²", 1.08 * float(np.nanmax(greatest)))
     sentence = (
         "The rms of the sensor's record in 36 segments of 10°, over that of the same machine "
         f"without clearance, {describe_rows(rows, title)}. The model has no noise of valves, so "
         f"that a sound machine is quieter than a real one.{left_out(rows)}"
     )
-    return DrawnFigure(drawing, sentence, number_segments(rows))
+    return DrawnFigure(figure, sentence, number_segments(rows))
 
 
 def number_segments(rows: Sequence[SweptRow]) -> list[Number]:
@@ -269,7 +272,7 @@ def segment_words(place: int) -> str:
 
 
 @figure("study", "waterfall", "order spectra of the force on the frame along the cylinder")
-def draw_waterfall(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
+def draw_waterfall(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> DrawnFigure:
     """Return order spectra of X, a row a value, in colour; beside them the rms above `ORDER`."""
     found = [row.shaking for row in rows]
     size = min(MAX_MAP_ORDERS, *(one.spectrum.orders.size - 1 for one in found if one))
@@ -281,32 +284,32 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
     if top < 1e-9 * np.nanmax(table):  # ideal joints: rounding
         top = np.nanmax(table)
     ends = top * 10.0**-MAP_DECADES, top
-    figure, image = start_map(rows, title, np.arange(size + 1) + 0.5, table, ends,
-                              "amplitude of X (N)")  # fmt: skip
-    image.notes.append(Note(x=ORDER + 0.5, style=LineStyle(RED, (0, (4, 1.5)))))
+    drawing, image = start_map(rows, title, np.arange(size + 1) + 0.5, table, ends,
+                               "amplitude of X ({})", "N", units)  # fmt: skip
+    image.rule(LineStyle(RED, (4, 1.5)), x=ORDER + 0.5)
     image.x.title = ORDERS_AXIS + f"; dashed: order {ORDER}"
     above = np.array([one.spectrum.above if one else np.nan for one in found])
-    words = f"rms of X above\norder {ORDER} (N)"
-    drawing = finish_map(figure, above, words, max(1.0, 1.08 * np.nanmax(above)))
+    words = f"rms of X above<br>order {ORDER} ({{}})"
+    figure = finish_map(drawing, above, words, "N", max(1.0, 1.08 * np.nanmax(above)))
     numbers = spell_ends(f"rms of X above order {ORDER}", above, rows, "N")
     sentence = f"Order spectra of X, {describe_rows(rows, title)}.{left_out(rows)}"
-    return DrawnFigure(drawing, sentence, numbers)
+    return DrawnFigure(figure, sentence, numbers)
 
 
 @figure("study", "map", "most frequent contact mode over crank angle")
-def draw_map(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
+def draw_map(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> DrawnFigure:
     """Return the most frequent contact mode over the crank angle, a row a value, for each joint."""
     modes = rows_modes(rows)
-    figure, panels = make_grid(1, len(modes), height(len(rows)) + 0.9)
+    drawing, panels = make_grid(1, len(modes), height(len(rows)) + 0.9, units=units)
     for panel, (joint, table) in zip(panels.flat, modes.items(), strict=True):
         plot_modes(panel, table)
         panel.title = SPOKEN[joint]
         panel.x.title = ANGLE_AXIS
     label_rows(panels[0, 0], rows, title)
-    share_scales(figure.panels, "y")
-    figure.legend = mode_entries(row_modes_words(rows))
+    share_scales(drawing.panels, "y")
+    list_modes(drawing, row_modes_words(rows))
     if any((table < 0).any() for table in modes.values()):
-        figure.legend += [entry("no series, or no clearance", UNSEEN, "band")]
+        drawing.list_area("no series, or no clearance", UNSEEN)
     away, numbers = row_modes_words(rows)[0], []
     for joint, table in modes.items():
         share = 100.0 * (table == MODES.index("flight")).mean(axis=1)
@@ -315,7 +318,7 @@ def draw_map(rows: Sequence[SweptRow], title: str) -> DrawnFigure:
         f"The most frequent contact mode in each degree, {describe_rows(rows, title)}."
         f"{FILM if any(row.lubricated for row in rows) else ''}{left_out(rows)}"
     )
-    return DrawnFigure(figure, sentence, numbers)
+    return DrawnFigure(drawing.figure(), sentence, numbers)
 
 
 def describe_rows(rows: Sequence[SweptRow], title: str) -> str:
@@ -346,24 +349,24 @@ def left_out(rows: Sequence[SweptRow]) -> str:
 def plot_modes(panel: Panel, table: np.ndarray) -> None:
     """Draw modes, (rows, bins) of integers as in `mode_map`, in their colours; below 0 hatched."""
     edges = np.linspace(0, 360, table.shape[1] + 1), np.arange(len(table) + 1) - 0.5
-    colors = ColorScale((*MODE_COLORS.values(),), -0.5, len(MODES) - 0.5, side="")
-    known = np.where(table < 0, np.nan, table)
-    panel.ground, panel.grid = UNSEEN, ""
-    panel.traces.append(map_cells(*edges, known, colors))
+    known, ends = np.where(table < 0, np.nan, table), (-0.5, len(MODES) - 0.5)
+    panel.x.showgrid = panel.y.showgrid = False
+    panel.fill(*outline_cells(*edges, table < 0), UNSEEN)
+    panel.map(*edges, known, [*MODE_COLORS.values()], ends, has_scale=False)
     if len(table) < 40:
         between = [np.array([[0.0, edge], [360.0, edge]]) for edge in edges[1][1:-1]]
         panel.plot(*join_with_gaps(between), LineStyle("#ffffff", linewidth=0.8))
-    panel.x.span(0, 360)
-    panel.x.step = 90.0
+    panel.span("x", 0, 360)
+    panel.x.dtick = 90.0
 
 
 def label_rows(panel: Panel, rows: Sequence[SweptRow], title: str) -> None:
     """Draw the swept values at some of the rows, with what became of those that have no series."""
     each = -(-len(rows) // MAX_TICKS)
     words = [f"{row.value} ({row.problem})" if row.problem else row.value for row in rows]
-    panel.y.words = {float(n): words[n] for n in range(0, len(rows), each)}
-    panel.y.span(-0.5, len(rows) - 0.5)
-    panel.y.title, panel.grid = title, ""
+    panel.name_ticks("y", words[::each], range(0, len(rows), each))
+    panel.span("y", -0.5, len(rows) - 0.5)
+    panel.y.title, panel.x.showgrid, panel.y.showgrid = title, False, False
 
 
 def height(rows: int) -> float:

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import plotly.graph_objects as go
 import xarray as xr
 
-from compressor.report.figures.drawing import Drawing, Note
 from compressor.report.figures.sweep_data import (
     Measure,
     PlottedAxis,
@@ -16,7 +16,6 @@ from compressor.report.figures.sweep_data import (
     sweep_of,
 )
 from compressor.report.figures.sweep_maps import (
-    LIMIT,
     MAX_CELLS,
     Ranking,
     draw_maps,
@@ -76,7 +75,7 @@ class SweepFigure(NamedTuple):
     name: str
     title: str
     caption: str
-    figure: Drawing
+    figure: go.Figure
 
 
 def draw_sweep(
@@ -101,15 +100,13 @@ def draw_sweep(
     if len(sweep.axes) == 1:
         (axis,) = sweep.axes
         title = f"metrics against {axis.phrase}"
-        drawing = draw_curves(sweep, shown)
-        for panel, measure in zip(drawing.panels, shown, strict=False):
-            panel.notes += [Note(y=limit, style=LIMIT) for limit in limits.of(measure)]
+        figure = draw_curves(sweep, shown, limits)
         words = (
             f"Every metric against {axis.phrase}, a point a job, with error bars where one is long "
             "enough to be seen.",
             describe_thinning(axis, MAX_JOBS), *marks, *zone_words(shown, limits),
         )  # fmt: skip
-        return [SweepFigure(axis.name, title, join_sentences(*words), drawing)]
+        return [SweepFigure(axis.name, title, join_sentences(*words), figure)]
     return [*draw_grid(sweep, shown, marks, limits)]
 
 
@@ -132,8 +129,7 @@ def draw_grid(
     if len(sweep.axes) == 2 and first.is_words == second.is_words:
         title = f"metrics over {first.phrase} and {second.phrase}"
         figure = draw_maps(sweep, shown, limits)
-        traces = (trace for panel in figure.panels for trace in panel.traces)
-        has_lines = any(one.scale and one.scale.levels for one in traces)
+        has_lines = any(one.type == "scatter" and not (one.name or one.fill) for one in figure.data)
         lines = (
             "; white: lines of equal value, which stand in the scale of colours, too" * has_lines
         )
@@ -221,7 +217,7 @@ def draw_ranked(
     numbers = [(measure.title, spell_strongest(sweep, one)) for measure, one in found.items()]
     drawn = DrawnFigure(draw_ranking(sweep, found), join_sentences(*words), numbers)
     title = "what explains the spread of each metric"
-    yield SweepFigure("ranking", title, drawn.caption, drawn.drawing)
+    yield SweepFigure("ranking", title, drawn.caption, drawn.figure)
 
 
 def join_sentences(*parts: str) -> str:

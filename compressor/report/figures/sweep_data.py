@@ -16,8 +16,8 @@ from compressor.report.figures.style import RED, mark
 from compressor.units import Units, unit_in
 
 MARKS = {
-    "failed": mark(RED, "x", 7, 4, edge_width=1.8),
-    "missing": mark("#606060", "o", 6, 4, is_hollow=True),
+    "failed": mark(RED, "x-thin", 7, 4, edge_width=1.8),
+    "missing": mark("#606060", "circle", 6, 4, is_hollow=True),
 }
 NAMES = {"failed": "a job failed here", "missing": "a job was not run"}
 FOOT = {"failed": 0.04, "missing": 0.11}  # height in a panel

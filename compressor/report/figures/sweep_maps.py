@@ -6,25 +6,22 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import plotly.graph_objects as go
 from matplotlib.ticker import LogLocator, MaxNLocator
 
 from compressor.analysis import Effects, grid_effects, sampled_effects
 from compressor.metrics import BARRED
 from compressor.report.figures.contours import contour_lines
 from compressor.report.figures.drawing import (
-    ColorScale,
-    Drawing,
-    Note,
     Panel,
-    Scale,
-    entry,
+    Way,
     make_grid,
-    map_cells,
     midway,
+    outline_cells,
     share_scales,
     thin_places,
 )
-from compressor.report.figures.style import BLUE, GOLD, GREY, RED, LineStyle, fill, palette
+from compressor.report.figures.style import BLUE, GOLD, GREY, LineStyle, fill, palette
 from compressor.report.figures.sweep_data import (
     MARKS,
     NAMES,
@@ -35,17 +32,16 @@ from compressor.report.figures.sweep_data import (
 )
 from compressor.report.figures.sweep_panels import (
     CHAOTIC,
+    LIMIT,
     RING,
     in_lines,
     job_keys,
     mark_points,
-    marks_shown,
     metric_panels,
 )
 from compressor.report.limits import NO_LIMITS, Limits
 
 COLORS = "cividis"
-LIMIT = LineStyle(RED, (0, (4, 1.5)), 1.4, 2.4)  # of a metric
 MAX_CELLS = 64  # along an axis
 MAX_CONTOURS = 5
 MAX_NAMED_VALUES, MIN_NAMED_GAP = 6, 0.15  # of an axis; share of what it spans
@@ -73,7 +69,7 @@ class Cells(NamedTuple):
 
 def draw_maps(
     sweep: PlottedSweep, measures: Sequence[Measure], limits: Limits = NO_LIMITS
-) -> Drawing:
+) -> go.Figure:
     """Return a map of every measure over both axes of a grid, a cell a job.
 
     At most MAX_CELLS along an axis. Over two axes of numbers, limits of a measure are lines.
@@ -87,24 +83,25 @@ def draw_maps(
 
     status, chaotic = table(sweep.status), table(sweep.chaotic)
     cells = Cells((x, y), (x.places[chosen[1]], y.places[chosen[0]]), table(sweep.keys))
-    figure, panels = metric_panels(measures, 2.6)
+    drawing = metric_panels(measures, 2.6)
     tables = [table(sweep.values(measure)) for measure in measures]
-    for panel, measure, values in zip(panels, measures, tables, strict=True):
+    for panel, measure, values in zip(drawing.panels, measures, tables, strict=True):
+        panel.label("y", "")  # the colours have the unit
         plot_map(panel, cells, values, measure)
         plot_limits(panel, cells, values, limits.of(measure))
         mark_cells(panel, cells, status, chaotic)
-        scale_map(panel.x, x, in_lines(x.words))
-        scale_map(panel.y, y, y.words)
-    figure.x_title, figure.y_title = x.title, y.title
-    figure.legend = marks_shown(status, chaotic)
+        scale_map(panel, "x", x, in_lines(x.words))
+        scale_map(panel, "y", y, y.words)
+    drawing.label_outside("x", x.title)
+    drawing.label_outside("y", y.title)
     if any((np.isnan(values) & (status == "ok")).any() for values in tables):
-        figure.legend.append(entry("the job lacks this metric", NOTHING, "band"))
-    return figure
+        drawing.list_area("the job lacks this metric", NOTHING)
+    return drawing.figure()
 
 
 def plot_map(panel: Panel, cells: Cells, table: np.ndarray, measure: Measure) -> None:
     """Draw a measure's cells with their colour scale and, over numbers, lines of equal value."""
-    panel.ground, panel.grid = NOTHING, ""
+    panel.x.showgrid = panel.y.showgrid = False
     low, high = float(np.nanmin(table)), float(np.nanmax(table))
     is_log = spans_decades(table)
     locator = LogLocator(subs=(1.0, 3.0)) if is_log else MaxNLocator(MAX_CONTOURS + 1)
@@ -113,9 +110,12 @@ def plot_map(panel: Panel, cells: Cells, table: np.ndarray, measure: Measure) ->
     inside = inside[:: -(-inside.size // MAX_CONTOURS)] if inside.size else inside
     levels = (*inside.tolist(),) if has_lines(table, cells.axes) else ()
     top = high if high > low else low + (abs(low) or 1.0)
-    colors = ColorScale(palette(COLORS), low, top, is_log, measure.unit, levels=levels)
     x, y = (midway(c, axis.is_log) for c, axis in zip(cells.centres, cells.axes, strict=True))
-    panel.traces.append(map_cells(x, y, table, colors, measure.title, jobs=job_keys(cells.keys)))
+    panel.fill(*outline_cells(x, y, np.isnan(table)), NOTHING)
+    panel.map(
+        x, y, table, palette(COLORS), (low, top), "{}", measure.unit, is_log, measure.title,
+        job_keys(cells.keys),
+    )  # fmt: skip
     if levels:
         lines = contour_lines(*cells.centres, table, levels)
         panel.plot(*lines, LineStyle("#ffffff", linewidth=0.9))
@@ -146,15 +146,16 @@ def mark_cells(panel: Panel, cells: Cells, status: np.ndarray, chaotic: np.ndarr
         mark_points(panel, x[columns], y[rows], cells.keys[here], mark, name)
 
 
-def scale_map(scale: Scale, axis: PlottedAxis, words: Sequence[str]) -> None:
+def scale_map(panel: Panel, way: Way, axis: PlottedAxis, words: Sequence[str]) -> None:
     """Set the x or the y axis of a map: words or a few values in its cells, or a log scale."""
-    scale.log = axis.is_log
     if axis.is_words:
-        scale.name(words)
-    elif not axis.is_log and 1 < len(words) <= MAX_NAMED_VALUES:
+        panel.name_ticks(way, words)
+    elif axis.is_log:
+        panel.axis(way).type = "log"
+    elif 1 < len(words) <= MAX_NAMED_VALUES:
         gaps = np.diff(np.sort(axis.places))
         if gaps.min() >= MIN_NAMED_GAP * gaps.sum():  # else their texts overlap
-            scale.words = dict(zip(axis.places.tolist(), words, strict=True))
+            panel.name_ticks(way, words, axis.places)
 
 
 COLUMNS = 4
@@ -210,7 +211,7 @@ def order_by_mean_strength(found: Ranking) -> list[int]:
     return np.argsort(-np.mean(strengths, axis=0), kind="stable").tolist()
 
 
-def draw_ranking(sweep: PlottedSweep, found: Ranking) -> Drawing:
+def draw_ranking(sweep: PlottedSweep, found: Ranking) -> go.Figure:
     """Return a panel an axis, the strongest first, with a row a measure.
 
     Bars with 95 % intervals.
@@ -218,22 +219,21 @@ def draw_ranking(sweep: PlottedSweep, found: Ranking) -> Drawing:
     order = order_by_mean_strength(found)
     rows, columns = math.ceil(len(order) / COLUMNS), min(COLUMNS, len(order))
     each = 0.26 * len(found) + 0.75
-    figure, _ = make_grid(rows, columns, rows * each + 0.7, len(order))
+    drawing, _ = make_grid(rows, columns, rows * each + 0.7, len(order))
     correlated = any(effects.total is None for effects in found.values())
-    for panel, axis in zip(figure.panels, order, strict=True):
+    for panel, axis in zip(drawing.panels, order, strict=True):
         plot_bars(panel, list(found.values()), axis)
         panel.title = sweep.axes[axis].phrase
         panel.x.title = RANK if correlated else "share of variance (%)"
-        panel.x.span(-1.05 if correlated else 0.0, 1.05 if correlated else 105.0)
-        panel.grid = "x"
+        panel.span("x", -1.05 if correlated else 0.0, 1.05 if correlated else 105.0)
+        panel.y.showgrid = False
         if correlated:
-            panel.notes.append(Note(x=0.0, style=LineStyle("#606060", linewidth=0.8)))
-    first = figure.panels[0]
-    first.y.name([measure.title for measure in found])
-    first.y.span(len(found) - 0.5, -0.5)
-    share_scales(figure.panels, "y")
-    figure.legend = first.traces
-    return figure
+            panel.rule(LineStyle("#606060", linewidth=0.8), x=0.0)
+    first = drawing.panels[0]
+    first.name_ticks("y", [measure.title for measure in found])
+    first.span("y", len(found) - 0.5, -0.5)
+    share_scales(drawing.panels, "y")
+    return drawing.figure()
 
 
 def plot_bars(panel: Panel, found: Sequence[Effects], axis: int) -> None:
@@ -246,10 +246,8 @@ def plot_bars(panel: Panel, found: Sequence[Effects], axis: int) -> None:
     for name, shift, height, color in bars:
         values, low, high = np.array([part(effects, axis, name) for effects in found]).T
         errors = np.nan_to_num([values - low, high - values]).clip(min=0.0)
-        panel.plot(
-            np.nan_to_num(values), places + shift, fill(color), name, kind="bars", across=True,
-            errors=errors if errors.any() else None, thick=height,
-        )  # fmt: skip
+        panel.bars(np.nan_to_num(values), places + shift, fill(color), name, height,
+                   errors=errors if errors.any() else None)  # fmt: skip
 
 
 def part(effects: Effects, axis: int, name: str) -> tuple[float, float, float]:

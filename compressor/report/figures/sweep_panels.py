@@ -6,17 +6,16 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import plotly.graph_objects as go
 
 from compressor.report.figures.drawing import (
     Drawing,
     Panel,
-    Trace,
-    entry,
     make_grid,
     share_scales,
     thin_places,
 )
-from compressor.report.figures.style import BLUE, CYCLE, LineStyle, mark, palette
+from compressor.report.figures.style import BLUE, CYCLE, RED, LineStyle, mark, palette
 from compressor.report.figures.sweep_data import (
     MARKS,
     NAMES,
@@ -27,16 +26,18 @@ from compressor.report.figures.sweep_data import (
     name_value,
     spans_decades,
 )
+from compressor.report.limits import NO_LIMITS, Limits
 
 COLUMNS = 3
 MAX_LINES = 12  # in a panel
 MAX_KEYS = 2000  # jobs of a study that clicks show
 PANEL_MARGIN = 0.18  # of a panel's height, below and above its values
 VISIBLE = 0.004  # of a panel's height: an error bar that is seen
-MARKERS = "osD^v"
+MARKERS = ("circle", "square", "diamond", "triangle-up", "triangle-down")
 FEET = {"failed": 0.03, "missing": 0.08}  # of a panel's height
 CHAOTIC = "chaotic: a greatest value holds for this run only"
-RING = mark("#d633a8", "o", 4.5, 5, is_hollow=True, edge_width=0.8)
+LIMIT = LineStyle(RED, (4, 1.5), 1.4, 2.4)  # of a metric
+RING = mark("#d633a8", "circle", 4.5, 5, is_hollow=True, edge_width=0.8)
 
 
 def ring_around(size: float) -> LineStyle:
@@ -44,14 +45,15 @@ def ring_around(size: float) -> LineStyle:
     return replace(RING, markersize=size - RING.edge_width)
 
 
-def metric_panels(measures: Sequence[Measure], height: float) -> tuple[Drawing, list[Panel]]:
-    """Return a figure with a panel for each measure, titled; height of a row in inches."""
+def metric_panels(measures: Sequence[Measure], height: float) -> Drawing:
+    """Return a drawing with a panel for each measure, titled; height of a row in inches."""
     rows = math.ceil(len(measures) / COLUMNS)
     columns = min(COLUMNS, len(measures))
-    figure, _ = make_grid(rows, columns, max(3.2, height * rows + 0.8), len(measures))
-    for panel, measure in zip(figure.panels, measures, strict=True):
+    drawing, _ = make_grid(rows, columns, max(3.2, height * rows + 0.8), len(measures))
+    for panel, measure in zip(drawing.panels, measures, strict=True):
         panel.title = measure.title
-    return figure, figure.panels
+        panel.label("y", "{}", measure.unit)
+    return drawing
 
 
 def job_keys(keys: np.ndarray) -> tuple[str, ...]:
@@ -61,14 +63,17 @@ def job_keys(keys: np.ndarray) -> tuple[str, ...]:
 
 def plot_jobs(
     panel: Panel, points: tuple[np.ndarray, np.ndarray, np.ndarray], keys: np.ndarray, name: str,
-    line: LineStyle, span: float,
+    line: LineStyle, span: float, listed: bool = True,
 ) -> None:  # fmt: skip
-    """Draw a line through jobs (x, y, bars), with error bars where any is seen beside the span."""
+    """Draw a line through jobs (x, y, bars), with error bars where any is seen beside the span.
+
+    listed: in the legend.
+    """
     x, y, bars = points
     finite = np.where(np.isfinite(bars), bars, 0.0)
     ends = np.where(np.isfinite(y), finite, np.nan)
     errors = np.stack([ends, ends]) if (finite > VISIBLE * span).any() else None
-    panel.plot(x, y, line, name, errors=errors, jobs=job_keys(keys))
+    panel.plot(x, y, line, name, errors, job_keys(keys), listed)
 
 
 def mark_points(
@@ -84,7 +89,7 @@ def mark_feet(panel: Panel, x: np.ndarray, status: np.ndarray, keys: np.ndarray)
     low, high = panel.limits("y")
     for word, look in MARKS.items():
         here = status == word
-        if panel.y.log:
+        if panel.y.type == "log":
             foot = low * (high / low) ** FEET[word]
         else:
             foot = low + FEET[word] * (high - low)
@@ -92,26 +97,19 @@ def mark_feet(panel: Panel, x: np.ndarray, status: np.ndarray, keys: np.ndarray)
         mark_points(panel, x[here], feet, keys[here], look, NAMES[word])
 
 
-def marks_shown(status: np.ndarray, chaotic: np.ndarray) -> list[Trace]:
-    """Return the legend's entries of the marks that are there."""
-    found = [entry(NAMES[word], look) for word, look in MARKS.items() if word in status]
-    return found + ([entry(CHAOTIC, RING)] if chaotic.any() else [])
-
-
 def scale_x(panel: Panel, axis: PlottedAxis) -> None:
     """Set words at ticks, and a log scale where numbers span decades."""
     if axis.is_words:
-        panel.x.name(in_lines(axis.words))
-        panel.x.span(-0.3, len(axis.words) - 0.7)
+        panel.name_ticks("x", in_lines(axis.words))
+        panel.span("x", -0.3, len(axis.words) - 0.7)
         return
     low, high = np.nanmin(axis.places), np.nanmax(axis.places)
-    panel.x.log = axis.is_log
     if axis.is_log:
-        room = (high / low) ** 0.05
-        panel.x.span(low / room, high * room)
+        panel.x.type, room = "log", (high / low) ** 0.05
+        panel.span("x", low / room, high * room)
     else:
         room = 0.05 * (high - low)
-        panel.x.span(low - room, high + room)
+        panel.span("x", low - room, high + room)
 
 
 def in_lines(words: Sequence[str]) -> list[str]:
@@ -127,12 +125,11 @@ def scale_y(panel: Panel, values: np.ndarray) -> float:
     values = values[np.isfinite(values)]
     low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)
     if spans_decades(values):
-        panel.y.log = True
-        room = (high / low) ** PANEL_MARGIN
-        panel.y.span(low / room, high * room)
+        panel.y.type, room = "log", (high / low) ** PANEL_MARGIN
+        panel.span("y", low / room, high * room)
         return float(low)
     room = PANEL_MARGIN * (high - low) or 0.5 * abs(high) or 1.0
-    panel.y.span(low - room, high + room)
+    panel.span("y", low - room, high + room)
     return float(high - low + 2.0 * room)
 
 
@@ -146,35 +143,37 @@ def lines_for(axis: PlottedAxis, chosen: Iterable[int]) -> list[LineStyle]:
     if len(numbers) <= len(CYCLE) and (axis.is_words or len(numbers) == 1):
         return list(CYCLE[: len(numbers)])
     shares = np.linspace(0.0, 0.88, len(numbers))
-    return [LineStyle(palette("viridis")[int(256 * share)], "-", 1.5) for share in shares]
+    return [LineStyle(palette("viridis", 256)[int(256 * share)], (), 1.5) for share in shares]
 
 
-PLAIN_LINE = LineStyle(BLUE, "-", 1.4, marker="o", markersize=3.8)
+PLAIN_LINE = LineStyle(BLUE, (), 1.4, marker="circle", markersize=3.8)
 MAX_JOBS = 1000
 
 
-def draw_curves(sweep: PlottedSweep, measures: Sequence[Measure]) -> Drawing:
+def draw_curves(
+    sweep: PlottedSweep, measures: Sequence[Measure], limits: Limits = NO_LIMITS
+) -> go.Figure:
     """Return every measure over the one axis of a grid, a point a job; over words without a line.
 
-    Of more than MAX_JOBS jobs as many are drawn.
+    Of more than MAX_JOBS jobs as many are drawn. limits: of measures, which are lines.
     """
     sweep = coarse(sweep, 0, MAX_JOBS)
     (axis,) = sweep.axes
     x, status, chaotic, keys = axis.places, sweep.status, sweep.chaotic, sweep.keys
-    figure, panels = metric_panels(measures, 2.35)
-    line = replace(PLAIN_LINE, linestyle="none") if axis.is_words else PLAIN_LINE
-    for panel, measure in zip(panels, measures, strict=True):
+    drawing = metric_panels(measures, 2.35)
+    line = replace(PLAIN_LINE, linewidth=0.0) if axis.is_words else PLAIN_LINE
+    for panel, measure in zip(drawing.panels, measures, strict=True):
         values, bars = sweep.values(measure), sweep.bars(measure)
         scale_x(panel, axis)
         span = scale_y(panel, values)
-        plot_jobs(panel, (x, values, bars), keys, measure.title, line, span)
+        plot_jobs(panel, (x, values, bars), keys, measure.title, line, span, listed=False)
         ring = ring_around(line.markersize)
         mark_points(panel, x[chaotic], values[chaotic], keys[chaotic], ring, CHAOTIC)
         mark_feet(panel, x, status, keys)
-        panel.y.title = measure.unit
-    figure.x_title = axis.title
-    figure.legend = marks_shown(status, chaotic)
-    return figure
+        for limit in limits.of(measure):
+            panel.rule(LIMIT, y=limit)
+    drawing.label_outside("x", axis.title)
+    return drawing.figure()
 
 
 MAX_COLUMNS = 4
@@ -215,26 +214,17 @@ def roles_of(sweep: PlottedSweep, order: Sequence[int]) -> Roles:
     return Roles(x, next(n for n in order if n != x))
 
 
-def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]) -> Drawing:
+def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure]) -> go.Figure:
     """Return every measure over two axes, as lines; means over the others, if there are any.
 
     What is not known within its error bar is no part of a mean.
     """
     sweep = coarse(sweep, role.x, MAX_PLACES)
-    figure, panels = metric_panels(measures, 2.35)
-    for panel, measure in zip(panels, measures, strict=True):
+    drawing = metric_panels(measures, 2.35)
+    for panel, measure in zip(drawing.panels, measures, strict=True):
         plot_parts(panel, sweep, role, whole_part(sweep, measure))
-        panel.y.title = measure.unit
-    figure.x_title = sweep.axes[role.x].title
-    figure.legend = named_lines(figure)
-    return figure
-
-
-def named_lines(figure: Drawing) -> list[Trace]:
-    """Return a legend of all lines by name, and behind them of the marks of jobs."""
-    named = {trace.name: trace for panel in figure.panels for trace in panel.traces}
-    ranks = {name: rank for rank, name in enumerate((*NAMES.values(), CHAOTIC), 1)}
-    return sorted(named.values(), key=lambda one: ranks.get(one.name, 0))
+    drawing.label_outside("x", sweep.axes[role.x].title)
+    return drawing.figure()
 
 
 def whole_part(sweep: PlottedSweep, measure: Measure) -> MeasuredPoints:
@@ -268,9 +258,9 @@ def plot_parts(panel: Panel, sweep: PlottedSweep, role: Roles, whole: MeasuredPo
     values = whole.values if parts[0].is_jobs else np.stack([mean_of(p.values) for p in parts])
     span = scale_y(panel, values)
     for n, part, line in zip(chosen, parts, lines_for(color, chosen), strict=True):
-        marker = MARKERS[int(n) % len(MARKERS)] if color.is_words else "o"
+        marker = MARKERS[int(n) % len(MARKERS)] if color.is_words else "circle"
         style = replace(line, marker=marker, markersize=3.4)
-        style = replace(style, linestyle="none") if axis.is_words else style
+        style = replace(style, linewidth=0.0) if axis.is_words else style
         plot_part(panel, x, part, color.value_text(int(n)), style, span)
     if not parts[0].is_jobs:
         return
@@ -304,34 +294,33 @@ MAX_POINTS = 2000  # in a panel
 POINT = 3.0  # size of a job
 
 
-def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]) -> Drawing:
+def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]) -> go.Figure:
     """Return every measure over the axis that matters most for it.
 
     axes: their numbers, one a measure.
     """
-    figure, panels = metric_panels(measures, 2.35)
-    for panel, axis, measure in zip(panels, axes, measures, strict=True):
+    drawing = metric_panels(measures, 2.35)
+    for panel, axis, measure in zip(drawing.panels, axes, measures, strict=True):
         plot_points(panel, sweep, axis, measure)
         panel.x.title = sweep.axes[axis].title
-        panel.y.title = measure.unit
-    figure.legend = scatter_entries(sweep)
-    return figure
+    return drawing.figure()
 
 
-def draw_scatter(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]) -> Drawing:
+def draw_scatter(
+    sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]
+) -> go.Figure:
     """Return the measures in rows over axes in columns."""
-    figure, grid = make_grid(len(measures), len(axes), 2.3 * len(measures) + 0.9)
+    drawing, grid = make_grid(len(measures), len(axes), 2.3 * len(measures) + 0.9)
     for row, measure in zip(grid, measures, strict=True):
         for panel, axis in zip(row, axes, strict=True):
+            panel.label("x", sweep.axes[axis].title)
+            panel.label("y", "{}", measure.unit)
             plot_points(panel, sweep, axis, measure)
         row[0].title = measure.title
-        row[0].y.title = measure.unit
         share_scales(row, "y")
-    for column, axis in zip(grid.T, axes, strict=True):
-        column[-1].x.title = sweep.axes[axis].title
+    for column in grid.T:
         share_scales(column, "x")
-    figure.legend = scatter_entries(sweep)
-    return figure
+    return drawing.figure()
 
 
 def grouping(sweep: PlottedSweep) -> tuple[str, list[Any], np.ndarray]:
@@ -364,15 +353,3 @@ def plot_points(panel: Panel, sweep: PlottedSweep, axis: int, measure: Measure) 
     ring = shown & sweep.chaotic
     mark_points(panel, x[ring], y[ring], keys[ring], ring_around(POINT), CHAOTIC)
     mark_feet(panel, x[shown], sweep.status[shown], keys[shown])
-
-
-def scatter_entries(sweep: PlottedSweep) -> list[Trace]:
-    """Return the legend of a scatter diagram."""
-    phrase, words, _ = grouping(sweep)
-    found = []
-    for n, word in enumerate(words):
-        color = CYCLE[n].color if phrase else BLUE
-        found.append(
-            entry(name_value(phrase, word) if phrase else "a job", mark(color, MARKERS[n], 4.5))
-        )
-    return found + marks_shown(sweep.status, sweep.chaotic)

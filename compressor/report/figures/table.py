@@ -10,9 +10,8 @@ from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import plotly.graph_objects as go
 from numpy.typing import ArrayLike
-
-from compressor.report.figures.drawing import Drawing
 
 Kind = Literal["paper", "diagnosis", "job", "study"]
 NOTHING = 1e-6  # in any unit of a figure: below it a number is rounding
@@ -22,7 +21,7 @@ Number = tuple[str, str]  # a label, and what is measured, with its unit
 class DrawnFigure(NamedTuple):
     """A figure: what is drawn, a sentence on what is shown, and labelled numbers of it."""
 
-    drawing: Drawing
+    figure: go.Figure
     sentence: str
     numbers: Sequence[Number] = ()
 

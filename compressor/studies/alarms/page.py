@@ -13,11 +13,10 @@ from compressor.report import (
     Additions,
     Cell,
     Chapter,
-    Drawing,
     LineStyle,
-    Note,
     PageTable,
     Plate,
+    PlotlyFigure,
     Section,
     StudyNote,
     TableRow,
@@ -38,13 +37,13 @@ CAPTION = (
 )
 
 
-def draw_alarms(found: xr.Dataset) -> Drawing:
+def draw_alarms(found: xr.Dataset, title: str = "") -> PlotlyFigure:
     """Return a panel a joint: the share of windows in which alarms trip, by clearance.
 
     Of the first level of noise, and of the kinds that see wear first over all joints.
     """
     joints = found["joint"].values.tolist()
-    figure, grid = make_grid(1, len(joints), 3.6)
+    drawing, grid = make_grid(1, len(joints), 3.6)
     kinds = found["kind"].values
     best = {joint: {kinds[place]: place for place in rank_alarms(found, joint)} for joint in joints}
     first = sorted(
@@ -54,23 +53,20 @@ def draw_alarms(found: xr.Dataset) -> Drawing:
         mine = found.isel(noise=0, state=np.flatnonzero(found["worn_joint"].values == joint))
         for kind, line in zip(first[:MAX_KINDS], CYCLE, strict=False):
             shares = mine["detection"].isel(alarm=best[joint][kind]).sel(end="value").values
-            style = replace(line, marker="o", markersize=3.5)
+            style = replace(line, marker="circle", markersize=3.5)
             panel.plot(mine["clearance"].values, shares, style, kind)
-        style = LineStyle(GREY, linewidth=0.8, linestyle="--")
-        panel.notes.append(Note(y=found.attrs["detected"], style=style))
+        panel.rule(LineStyle(GREY, (3.7, 1.6), 0.8), y=found.attrs["detected"])
         panel.title = f"({'abc'[joints.index(joint)]}) {joint.replace('_', ' ')}"
-        panel.x.title, panel.x.margin = "clearance (mm)", 0.04
-        panel.y.span(-0.02, 1.04)
-    grid.flat[0].y.title = "windows in which it trips"
-    figure.legend = grid.flat[0].traces
-    return figure
+        panel.x.title = "clearance (mm)"
+        panel.span("y", -0.02, 1.04)
+    grid.flat[0].y.title, drawing.title = "windows in which it trips", title
+    return drawing.figure()
 
 
 def write_alarms(found: xr.Dataset, output: Folder, title: str) -> list[Path]:
     """Write a result as netCDF and as a figure; return their paths. title: of the machine."""
-    drawing = draw_alarms(found)
-    drawing.title = title_figure(title, "alarms by clearance", [])
-    publish(Path(output, FIGURE), render(drawing, "png"))
+    figure = draw_alarms(found, title_figure(title, "alarms by clearance"))
+    publish(Path(output, FIGURE), render(figure))
     return [write_dataset(Path(output, FILE), found), Path(output, FIGURE)]
 
 

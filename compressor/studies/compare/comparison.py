@@ -16,8 +16,8 @@ from compressor.report import (
     BLACK,
     CYCLE,
     GREY,
-    Drawing,
     LineStyle,
+    PlotlyFigure,
     as_csv,
     fill,
     make_grid,
@@ -240,9 +240,9 @@ def jsonable_comparison(found: Comparison) -> dict[str, Any]:
 # ---- the figure ---------------------------------------------------------------------------------
 
 
-def draw_comparison(found: Comparison) -> Drawing:
+def draw_comparison(found: Comparison) -> PlotlyFigure:
     """Return the four panels of a comparison, the record's curves in black."""
-    figure, grid = make_grid(2, 2, 7.4)
+    drawing, grid = make_grid(2, 2, 7.4)
     shown = [(found.name, found.curves, RECORD), *(
         (f"{job.key[:KEY_DIGITS]}: {job.what}", job.curves, line)
         for job, line in zip(found.jobs[:MAX_DRAWN], CYCLE, strict=False)
@@ -253,32 +253,32 @@ def draw_comparison(found: Comparison) -> Drawing:
         several = np.array([job.curves.envelope for job in found.jobs])
         around = np.concatenate([degrees, degrees[::-1]])
         edge = np.concatenate([several.min(axis=0), several.max(axis=0)[::-1]])
-        envelope.plot(around, edge, fill(GREY, 0.5), f"range of {len(several)} jobs", kind="band")
+        envelope.fill(around, edge, fill(GREY, 0.5), f"range of {len(several)} jobs", listed=False)
     steps = np.repeat(np.arange(SEGMENTS + 1) * (360.0 / SEGMENTS), 2)[1:-1]
     for name, one, line in shown:
         mean.plot(one.angle, one.mean, line, name)
         segments.plot(steps, np.repeat(one.peak, 2), line, name)
-        segments.plot(steps, np.repeat(one.rms, 2), replace(line, alpha=0.45), f"{name}, rms")
+        faint = replace(line, alpha=0.45)
+        segments.plot(steps, np.repeat(one.rms, 2), faint, f"{name}, rms", listed=False)
         orders.plot(np.arange(1, one.spectrum.size + 1), one.spectrum, line, name)
         envelope.plot(degrees, one.envelope, line, name)
-    figure.legend = mean.traces
     for panel in (mean, segments, envelope):
-        panel.x.title, panel.x.ticks = "crank angle (deg)", range(0, 361, 60)
-        panel.x.span(0.0, 360.0)
+        panel.x.title, panel.x.dtick = "crank angle (deg)", 60
+        panel.span("x", 0.0, 360.0)
     mean.y.title = "mean revolution (m/s²)"
     segments.y.title = "peak and rms of 10° segments (m/s²)"
     orders.x.title, orders.y.title = "order of the speed", "rms of an order (m/s²)"
-    orders.x.log = orders.y.log = True
-    orders.x.span(1.0, found.orders)
+    orders.x.type = orders.y.type = "log"
+    orders.span("x", 1.0, found.orders)
     envelope.y.title = f"envelope above order {SWING} (m/s²)"
     for panel in (segments, envelope):
-        panel.y.span(low=0.0)
+        panel.span("y", low=0.0)
     for panel, letter in zip(grid.flat, "abcd", strict=True):
         panel.title = f"({letter})"
-    return figure
+    return drawing.figure()
 
 
-def write_figure(drawing: Drawing, output: str, kind: str) -> None:
+def write_figure(figure: PlotlyFigure, output: str, kind: str) -> None:
     """Write a figure as a picture, or its numbers as CSV."""
-    data = as_csv(drawing).encode() if kind == ".csv" else render(drawing, kind[1:])
+    data = as_csv(figure).encode() if kind == ".csv" else render(figure, kind[1:])
     publish(Path(output), data)

@@ -21,11 +21,9 @@ from compressor.report import (
     FOOT,
     MARKS,
     RED,
-    Drawing,
     LineStyle,
-    Note,
     Panel,
-    entry,
+    PlotlyFigure,
     make_grid,
     mark,
     midway,
@@ -99,13 +97,13 @@ def title_key(over: xr.DataArray) -> str:
     return f"{name} ({unit})" if unit != "1" else name
 
 
-def draw_followed(machine: xr.Dataset, title: str = "") -> Drawing:
+def draw_followed(machine: xr.Dataset, title: str = "") -> PlotlyFigure:
     """Return one machine over the key: Poincaré points, period, exponent, time without contact."""
     over, joints = machine.attrs["over"], joints_with_points(machine)
     x, log = positions(machine, over), bool(machine.attrs["log"])
     ratios = [2.2] * len(joints) + [1.2, 1.4] + [0.8] * len(joints)
-    figure, _ = make_grid(len(ratios), 1, 1.35 * sum(ratios) + 1.2, heights=ratios)
-    panels = figure.panels
+    drawing, _ = make_grid(len(ratios), 1, 1.35 * sum(ratios) + 1.2, heights=ratios)
+    panels = drawing.panels
     for joint, panel in zip(joints, panels, strict=False):
         plot_points(panel, machine, joint)
     plot_periods(panels[len(joints)], machine)
@@ -113,19 +111,16 @@ def draw_followed(machine: xr.Dataset, title: str = "") -> Drawing:
     for joint, panel in zip(joints, panels[len(joints) + 2 :], strict=True):
         plot_gaps(panel, machine, joint)
     low, *_, high = midway(np.sort(x), log)
-    panels[0].x.log = panels[0].x.plain = log
-    panels[0].x.span(low, high)
+    panels[0].x.type = "log" if log else None
+    panels[0].span("x", low, high)
     share_scales(panels, "x")
     has_failed = (machine["status"] == "failed").any("direction").values
     for panel in panels if has_failed.any() else ():
         bottom, top = panel.limits("y")
         foot = np.full(has_failed.sum(), bottom + FOOT["failed"] * (top - bottom))
         panel.plot(x[has_failed], foot, FAILED, FAILED_NAME)
-    panels[-1].x.title = title_key(machine[over])
-    figure.legend = [entry(name, look) for name, look in direction_styles(machine, 1.6).items()]
-    figure.legend += [entry(FAILED_NAME, FAILED)] if has_failed.any() else []
-    figure.title = title
-    return figure
+    panels[-1].x.title, drawing.title = title_key(machine[over]), title
+    return drawing.figure()
 
 
 def joints_with_points(machine: xr.Dataset) -> list[str]:
@@ -139,7 +134,7 @@ def direction_styles(machine: xr.Dataset, times: float = 1.0) -> dict[str, LineS
     """Return the marks of the directions that there are, so many times their size."""
     found = {str(name): BY_DIRECTION[str(name)] for name in machine["direction"].values}
     return {
-        name: mark(color, "o", times * size, zorder, edge_width=0.0)
+        name: mark(color, "circle", times * size, zorder, edge_width=0.0)
         for name, (color, size, zorder) in found.items()
     }
 
@@ -147,13 +142,13 @@ def direction_styles(machine: xr.Dataset, times: float = 1.0) -> dict[str, LineS
 def plot_points(panel: Panel, machine: xr.Dataset, joint: str) -> None:
     """Draw the journal's place along the cylinder, once a revolution, at each value."""
     over = machine.attrs["over"]
+    panel.label("y", "e<sub>x</sub> (mm)")
     for direction, look in direction_styles(machine, 0.7).items():
         points = machine["section"].sel(direction=direction, joint=joint, coordinate="x")
         points = points.transpose(over, "revolution")
         x = np.repeat(positions(machine, over), points.sizes["revolution"])
         panel.plot(x, MILLI * points.values.ravel(), look, direction)
     panel.title = f"journal's place along the cylinder, {SPOKEN[joint]}, once a revolution"
-    panel.y.title = "$e_x$ (mm)"
     leave_room(panel)
 
 
@@ -162,8 +157,9 @@ def plot_periods(panel: Panel, machine: xr.Dataset) -> None:
     x = positions(machine, machine.attrs["over"])
     for direction, look in direction_styles(machine, 1.2).items():
         panel.plot(x, period_rows(machine.sel(direction=direction)), look, direction)
-    panel.y.words = {row: str(word) for word, row in (PERIODS | ROWS_OF).items()}
-    panel.y.span(-1.3, max(ROWS_OF.values()) + 0.6)
+    rows = PERIODS | ROWS_OF
+    panel.name_ticks("y", [*map(str, rows)], [*rows.values()])
+    panel.span("y", -1.3, max(ROWS_OF.values()) + 0.6)
     panel.title = "period (revolutions)"
 
 
@@ -185,8 +181,8 @@ def plot_exponents(panel: Panel, machine: xr.Dataset) -> None:
         bars = chain["lyapunov_exponent_error"].values
         bars = np.where(np.isfinite(bars), bars, np.nan)
         exponents = chain["lyapunov_exponent"].values
-        panel.plot(x, exponents, look, direction, errors=np.stack([bars, bars]), caps=0.0)
-    panel.notes.append(Note(y=0.0, style=LineStyle(BLACK, linewidth=0.8)))
+        panel.plot(x, exponents, look, direction, np.stack([bars, bars]))
+    panel.rule(LineStyle(BLACK, linewidth=0.8), y=0.0)
     panel.title = "largest Lyapunov exponent, with its 95 % bar; above 0 close motions part"
     panel.y.title = "per revolution"
     leave_room(panel)
@@ -205,9 +201,5 @@ def plot_gaps(panel: Panel, machine: xr.Dataset, joint: str) -> None:
 
 def leave_room(panel: Panel) -> None:
     """Leave room below the points for marks, and a little above them."""
-    values = np.concatenate([trace.extent("y") for trace in panel.traces])
-    values = values[np.isfinite(values)]
-    if values.size:
-        low, high = values.min(), values.max()
-        span = (high - low) or 0.1 * abs(high) or 1.0
-        panel.y.span(low - 0.16 * span, high + 0.08 * span)
+    low, high = panel.limits("y")
+    panel.span("y", low - 0.1 * (high - low), high)

@@ -20,15 +20,13 @@ from compressor.report import (
     BLACK,
     BLUE,
     GOLD,
-    Drawing,
     LineStyle,
-    Note,
     Panel,
-    box,
-    entry,
+    PlotlyFigure,
     fill,
     make_grid,
     mark,
+    rectangle,
     share_scales,
 )
 from compressor.store import Folder, read_job, read_store
@@ -209,20 +207,20 @@ WORDS_ROOM = 4.0  # times left of the fastest point, for the words
 MID, LIGHT = "#7d7d7d", "#ababab"
 # compiled methods are solid and coloured, SciPy's grey and dashed
 LOOKS = {
-    "auto": (LineStyle(BLUE, "-", 1.7, 3.2, "o", 3.8), "auto (TSIT5)"),
-    "RODAS": (LineStyle(GOLD, "-", 1.6, 3.0, "D", 3.8), "RODAS"),
-    "DOP853": (LineStyle(BLACK, (0, (1, 1.2)), 1.2, 2.5, "^", 3.8), "SciPy DOP853"),
-    "RK45": (LineStyle(MID, (0, (4, 1.5)), 1.1, 2.4, "v", 3.8), "SciPy RK45"),
-    "LSODA": (LineStyle(BLACK, (0, (6, 1.5)), 1.0, 2.3, "<", 3.8), "SciPy LSODA"),
-    "Radau": (LineStyle(LIGHT, (0, (6, 1.2, 1.2, 1.2)), 1.3, 2.2, ">", 3.8), "SciPy Radau"),
-    "BDF": (LineStyle(MID, (0, (1, 1.2)), 1.2, 2.1, "p", 3.8), "SciPy BDF"),
+    "auto": (LineStyle(BLUE, (), 1.7, 3.2, "circle", 3.8), "auto (TSIT5)"),
+    "RODAS": (LineStyle(GOLD, (), 1.6, 3.0, "diamond", 3.8), "RODAS"),
+    "DOP853": (LineStyle(BLACK, (1, 1.2), 1.2, 2.5, "triangle-up", 3.8), "SciPy DOP853"),
+    "RK45": (LineStyle(MID, (4, 1.5), 1.1, 2.4, "triangle-down", 3.8), "SciPy RK45"),
+    "LSODA": (LineStyle(BLACK, (6, 1.5), 1.0, 2.3, "triangle-left", 3.8), "SciPy LSODA"),
+    "Radau": (LineStyle(LIGHT, (6, 1.2, 1.2, 1.2), 1.3, 2.2, "triangle-right", 3.8), "SciPy Radau"),
+    "BDF": (LineStyle(MID, (1, 1.2), 1.2, 2.1, "pentagon", 3.8), "SciPy BDF"),
 }
-OTHER = (LineStyle(MID, "-", 1.0, 2.0, ".", 3.8), "")
-TIER = mark(BLUE, "o", 9.5, 4, is_hollow=True)
-DISAGREE = fill("#f0f0f0", zorder=0, edge="#c9c9c9", edge_width=0.0, is_hatched=True)
+OTHER = (LineStyle(MID, (), 1.0, 2.0, "circle", 3.8), "")
+TIER = mark(BLUE, "circle", 9.5, 4, is_hollow=True)
+DISAGREE = fill("#f0f0f0", zorder=0, edge="#c9c9c9", is_hatched=True)
 
 
-def draw_work_precision(study: xr.Dataset) -> Drawing:
+def draw_work_precision(study: xr.Dataset) -> PlotlyFigure:
     """Return a panel a scene: error of acceleration over wall time, a line a method.
 
     Rings mark the tolerances behind the words of `accuracy`; in the hatched band the references
@@ -230,29 +228,26 @@ def draw_work_precision(study: xr.Dataset) -> Drawing:
     """
     count = study.sizes["scene"]
     rows = -(-count // COLUMNS)
-    figure, _ = make_grid(rows, min(COLUMNS, count), 4.1 * rows + 0.7, count)
-    for number, panel in enumerate(figure.panels):
+    drawing, _ = make_grid(rows, min(COLUMNS, count), 4.1 * rows + 0.7, count)
+    for number, panel in enumerate(drawing.panels):
         one = study.isel(scene=number)
         draw_scene(panel, one)
         panel.title = str(one["scene"].item()).replace("_", " ")
-        panel.x.log = panel.y.log = True
-        panel.x.margin = 0.06
-    first, ends = figure.panels[0], limits(study)
-    first.y.span(*ends)
-    first.x.span(study["seconds"].min().item() / WORDS_ROOM)
-    share_scales(figure.panels, "x", "y")
-    for number, panel in enumerate(figure.panels):
+        panel.x.type = panel.y.type = "log"
+        panel.x.title = "wall time of the solution (s)"
+        panel.y.title = "relative L2 error of acceleration"
+    first, ends = drawing.panels[0], limits(study)
+    first.span("y", *ends)
+    first.span("x", study["seconds"].min().item() / WORDS_ROOM)
+    share_scales(drawing.panels, "x", "y")
+    for number, panel in enumerate(drawing.panels):
         apart = study["reference_uncertainty"].values[number].item()
         if apart > ends[0]:
-            panel.traces.append(box(panel.limits("x"), (ends[0], apart), DISAGREE, "band"))
-    figure.x_title = "wall time of the solution (s)"
-    figure.y_title = "relative L2 error of acceleration"
-    figure.legend = [
-        *(trace for trace in first.traces if trace.name),
-        entry("a word of solve.accuracy", TIER),
-        entry("the references disagree", DISAGREE, "band"),
-    ]
-    return figure
+            around = np.array(panel.limits("x")), np.array([ends[0], apart])
+            panel.fill(*rectangle(*around), DISAGREE)
+    drawing.list_line("a word of solve.accuracy", TIER)
+    drawing.list_area("the references disagree", DISAGREE)
+    return drawing.figure()
 
 
 def draw_scene(panel: Panel, one: xr.Dataset) -> None:
@@ -267,10 +262,7 @@ def draw_scene(panel: Panel, one: xr.Dataset) -> None:
             point = one.sel({"method": "auto", "rtol": tier.rtol})
             x, y = point["seconds"].item(), point["error_acceleration"].item()
             panel.plot(x, y, TIER)
-            panel.notes.append(
-                Note(word, x, y, LineStyle(BLUE), shift=(-11, -2), side="right", level="top",
-                     size=8.5)
-            )  # fmt: skip
+            panel.write(word, x, y, BLUE, shift=(-11, -2), side="right", level="top", size=8.5)
 
 
 def limits(study: xr.Dataset) -> tuple[float, float]:

@@ -10,6 +10,7 @@ import pytest
 from compsim import cli
 from test_lead import CASE, write_run
 
+from compressor.report.figures.drawing import views_of
 from compressor.report.page import document
 from compressor.store import read_dataset, read_studies
 from compressor.studies.alarms.alarms import list_rows, rank_alarms
@@ -76,15 +77,15 @@ def test_the_figure_has_the_shares_of_each_joint(written):
     folder, _ = written
     found = read_dataset(folder / "alarms.nc")
     assert (folder / "alarms.png").read_bytes()[:4] == b"\x89PNG"
-    drawing = draw_alarms(found)
-    for panel, joint in zip(drawing.panels, found["joint"].values, strict=True):
+    panels = views_of(draw_alarms(found))
+    for panel, joint in zip(panels, found["joint"].values, strict=True):
         mine = found["worn_joint"].values == joint
         for trace in panel.traces:
             best = next(
                 n for n in rank_alarms(found, joint) if found["kind"].values[n] == trace.name
             )
             np.testing.assert_array_equal(trace.y, found["detection"].values[best, 0, mine, 0])
-        assert [note.y for note in panel.notes] == [0.9]
+        assert [rule.y0 for rule in panel.rules] == [0.9]
 
 
 def test_the_report_has_a_section_of_its_study(written, worn_store):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from compressor.program import no_progress
+from compressor.report.figures.drawing import views_of
 from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.work_precision import (
@@ -141,11 +142,11 @@ def test_nothing_is_fastest_below_what_the_references_know():
 
 
 def test_the_figure_draws_what_is_there(study):
-    drawing = draw_work_precision(study)
-    (panel,) = drawing.panels
-    assert panel.x.log
-    assert panel.y.log
+    figure = draw_work_precision(study)
+    (panel,) = views_of(figure)
+    assert panel.x.type == panel.y.type == "log"
     lines = [trace.y for trace in panel.traces if trace.y.size == 4 and trace.name]
     assert len(lines) == len(METHODS)
-    assert lines[0] == pytest.approx(study["error_acceleration"].values[0, 0])
-    assert render(drawing, "svg").startswith(b"<?xml")
+    first = study["error_acceleration"].values[0, 0]
+    assert any(line == pytest.approx(first) for line in lines)
+    assert render(figure, "svg").startswith(b"<?xml")
