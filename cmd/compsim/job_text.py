@@ -167,7 +167,7 @@ def notes(found: "JobReport") -> Iterator[str]:
     """Yield how forces and counts are meant of a job that has oil, and how far to trust numbers."""
     if found.case.lubricant:
         yield "contact forces include the force of the oil film"
-        yield "where it takes a blow there is no dry contact: knock tells whether a joint knocks"
+        yield "an impact that the film cushions is no dry contact: see knock"
     regime = found.attributes.get("regime")
     if regime == "undecided":
         yield (

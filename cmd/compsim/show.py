@@ -49,7 +49,7 @@ def show(words, folder, case, reversal, units, as_json) -> int:
     compsim show bearing-wear clearance_mm=0.2 machine.rod_mass_kg=3
 
     It prints which studies the job belongs to and where in them, how it ended and why, its numbers
-    with their error bars, how it was run, and the values of its case that are not the usual ones.
+    with their error bars, how it was run, and the values of its case other than the defaults.
     Of a job with signals, it says whether the rod load at the crosshead pin changes its side as API
     618 requires, by 15 degrees and 3 percent, or as a maker does. --json has all numbers in SI.
     """
@@ -79,13 +79,13 @@ def show(words, folder, case, reversal, units, as_json) -> int:
         if lines and heading:
             screen.print_text(heading)
         screen.print_lines(f"  {line}" for line in lines)
-    screen.print_text("the values of its case that are not the usual ones (--case prints it whole)")
+    screen.print_text("values of its case other than the defaults (--case prints all)")
     screen.print_text(*(f"  {line}" for line in changed_values(found.case)))
     return screen.DONE
 
 
 def changed_values(case: "Case") -> Iterator[str]:
-    """Yield the values of a case that are not the usual ones, as --set takes them."""
+    """Yield the values of a case other than the defaults, as --set takes them."""
     from functools import partial
 
     from compressor.cases import Case, keys_of, row_of, value_in

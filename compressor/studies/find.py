@@ -497,7 +497,7 @@ def list_answer(
     head["between" if is_limit else "worse from"] = " and ".join(ends)
     if answer.base:
         head["base"] = f"{read(answer.base, unit, factor)}, times {goal.times:g}"
-    head["scan"] = f"{question.scan} points {step}: what is finer may be missed"
+    head["scan"] = f"{question.scan} points {step}: finer changes may be missed"
     head["jobs"] = f"{len(answer.points)}, {answer.run_now} of them run now, in study "
     head["jobs"] += f"{answer.study} of {folder}"
     yield from align_columns(head.items())

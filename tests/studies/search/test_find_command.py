@@ -92,7 +92,7 @@ def test_a_second_search_computes_nothing(found, folder, capsys):
     assert [" ".join(line.split()) for line in head] == [
         f"contact_loss_fraction.small_end > {LIMIT}: found",
         f"between {low} and {high}",
-        "scan 5 points a factor 3.162 apart: what is finer may be missed",
+        "scan 5 points a factor 3.162 apart: finer changes may be missed",
         f"jobs {len(keys)}, 0 of them run now, in study worn-find-clearance_mm of results",
     ]
     assert rows[0] == ["clearance_mm", "contact_loss_fraction", "job"]
