@@ -204,6 +204,26 @@ def loudest(found: Cycle) -> tuple[float, float]:
     return float(np.abs(found.vibration[place])), float(found.angle[place])
 
 
+def plot_beside_twin(
+    panels: Sequence[Panel], run: xr.Dataset, twin: Twin,
+    read: Callable[[xr.Dataset], tuple[np.ndarray, Sequence[np.ndarray]]],
+) -> None:  # fmt: skip
+    """Draw curves of a run and of its twin over a revolution, one a panel.
+
+    read: the angles of a run (degrees), and its curves.
+    """
+    for one, line, name in ((run, THIS, NAMES["this"]), (twin, TWIN, NAMES["twin"])):
+        if one is None:
+            continue
+        degrees, curves = read(one)
+        for panel, values in zip(panels, curves, strict=True):
+            panel.plot(degrees, values, line, name)
+            panel.x.title, panel.unit["x"] = ANGLE_AXIS, "°"
+        panels[0].span("x", degrees[0], degrees[-1])
+    panels[0].x.dtick = 90.0
+    share_scales(panels, "x")
+
+
 LOADS = (
     ("load of gas or spring on the piston, tension positive", "F<sub>g</sub> ({})", "gas"),
     ("inertia of what reciprocates", "F<sub>i</sub> ({})", "inertia"),
@@ -218,18 +238,14 @@ def draw_loads(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
     for panel, (title, axis, _) in zip(panels[:, 0], LOADS, strict=True):
         panel.title = title
         panel.label("y", axis, "kN")
-    for one, line, name in ((run, THIS, NAMES["this"]), (twin, TWIN, NAMES["twin"])):
-        if one is None:
-            continue
-        degrees, loads = read_loads(one)
-        for panel, (_, _, key) in zip(panels[:, 0], LOADS, strict=True):
-            panel.plot(degrees, loads[key] * KILONEWTON, line, name)
-        panels[0, 0].span("x", degrees[0], degrees[-1])
-    panels[0, 0].x.dtick = 90.0
-    panels[-1, 0].x.title = ANGLE_AXIS
     for panel in panels[:, 0]:
         panel.rule(ZERO, y=0.0)
-    share_scales(drawing.panels, "x")
+
+    def read(one: xr.Dataset) -> tuple[np.ndarray, list[np.ndarray]]:
+        degrees, loads = read_loads(one)
+        return degrees, [loads[key] * KILONEWTON for _, _, key in LOADS]
+
+    plot_beside_twin(drawing.panels, run, twin, read)
     numbers = [
         (f"{key}{where}", spell_span(load * KILONEWTON, "kN"))
         for one, where in ((run, ""), (twin, " without clearance")) if one is not None
@@ -246,23 +262,16 @@ def draw_signals(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     for panel, signal in zip(panels.flat, SIGNALS, strict=True):
         panel.title = signal.title
         panel.label("y", f"{signal.axis} ({{}})", signal.unit)
-    for one, line, name in ((run, THIS, NAMES["this"]), (twin, TWIN, NAMES["twin"])):
-        if one is None:
-            continue
+
+    def read(one: xr.Dataset) -> tuple[np.ndarray, list[np.ndarray]]:
         degrees, revolution = last_revolution(one)
         forces = frame_forces(revolution)
-        for panel, signal in zip(panels.flat, SIGNALS, strict=True):
-            panel.plot(degrees, signal.values(revolution, forces), line, name)
-        panels[0, 0].span("x", degrees[0], degrees[-1])
-    panels[0, 0].x.dtick = 90.0
-    for panel in panels[-1]:
-        panel.x.title = ANGLE_AXIS
-    share_scales(drawing.panels, "x")
-    _, revolution = last_revolution(run)
-    forces = frame_forces(revolution)
+        return degrees, [signal.values(revolution, forces) for signal in SIGNALS]
+
+    plot_beside_twin(drawing.panels, run, twin, read)
     numbers = [
-        (signal.title, spell_span(signal.values(revolution, forces), signal.unit))
-        for signal in SIGNALS
+        (signal.title, spell_span(values, signal.unit))
+        for signal, values in zip(SIGNALS, read(run)[1], strict=True)
     ]
     if twin is not None:
         ideal = last_revolution(twin)[1]["acceleration"].values
