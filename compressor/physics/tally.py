@@ -265,8 +265,7 @@ def tally_contact(joint, span, nodes, rows, every, gap_fraction, measured, tally
     tally.touching[joint], tally.flown[joint] = touching, flown
     if measured:
         known = tally.max_penetration[joint]
-        column = PENETRATION + joint
-        tally.max_penetration[joint] = peak_of(nodes, rows, every, column, known)
+        tally.max_penetration[joint] = peak_of(nodes, rows, every, PENETRATION + joint, known)
         tally.loss_seconds[joint] += gap_fraction[joint] * span
 
 
@@ -308,9 +307,7 @@ def tally_step(span, nodes, weights, rows, every, gap_fraction, sides, measured,
 
 
 @jit
-def tally_each(spans, nodes, weights, rows, gap_fraction, sides, measured, tally, p):
+def tally_each(spans, nodes, weights, rows, gaps, sides, measured, tally, p):
     """Add steps one after the other as `tally_step` adds one; arrays have a row for each step."""
     for n in range(spans.size):
-        tally_step(
-            spans[n], nodes, weights, rows[n], 1, gap_fraction[n], sides[n], measured, tally, p
-        )
+        tally_step(spans[n], nodes, weights, rows[n], 1, gaps[n], sides[n], measured, tally, p)

@@ -295,7 +295,7 @@ POINT = 3.0  # size of a job
 
 
 def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]) -> go.Figure:
-    """Return every measure over the axis that matters most for it.
+    """Return every measure of a list of jobs over the axis that matters most for it.
 
     axes: their numbers, one a measure.
     """
