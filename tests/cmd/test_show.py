@@ -93,7 +93,7 @@ def test_numbers_may_be_in_plant_units_or_si(paper_store, show):
 
 def test_the_case_is_shown_so_that_it_makes_the_same_job(paper_store, show, tmp_path):
     key, path = report_job(paper_store, *HERE).key, tmp_path / "one.yaml"
-    changed = show(paper_store, *HERE).partition("(--case prints it whole)\n")[2].split()
+    changed = show(paper_store, *HERE).partition("(--case prints all)\n")[2].split()
     assert "clearance_mm=0.2" in changed
     assert "speed_rpm" not in "".join(changed)  # the usual one
     path.write_text("load: none\n")
@@ -141,7 +141,7 @@ def test_a_contact_force_with_oil_says_so(oil):
     lines = [*notes(SimpleNamespace(case=case, attributes={}))]
     assert lines[:1] == ["contact forces include the force of the oil film"] * len(oil)
     assert (lines[1:] != []) == bool(oil)
-    assert all("knock tells" in line for line in lines[1:])
+    assert all("see knock" in line for line in lines[1:])
 
 
 @pytest.mark.parametrize(
