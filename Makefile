@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-oldest test-pure check format oracle calibration accuracy validation wear claims page store-bench sweep-bench peers tradeoff chaotic regimes identify calibrate nameplate stress chaos mutants measurements pages docs release lock alarms clean
+.PHONY: help install run figures test test-bare test-oldest test-pure check format calibration accuracy validation wear claims page store-bench sweep-bench peers tradeoff chaotic regimes identify calibrate nameplate stress chaos mutants measurements pages docs release lock alarms clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -49,9 +49,6 @@ check: install  ## ruff (format and lint) and mypy
 format: install  ## let ruff format and mend what it can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
-
-oracle: install  ## write what 500 cases give to oracle.json.xz, to the bit, and compare it with the numbers kept, within both error bars (5 minutes)
-	$(CAMPAIGN)/write_oracle.py oracle.json.xz --against tests/results/oracle.json.xz --within
 
 calibration: install  ## measure what estimates of errors are worth, on cases that judge nothing (8 minutes)
 	$(CAMPAIGN)/calibrate_errors.py tests/results/calibration.json
