@@ -68,7 +68,7 @@ page: install  ## test the report's page in a browser, measure how it is written
 store-bench: install  ## measure writing and opening 100,000 stored jobs (under a minute)
 	$(CAMPAIGN)/measure_store.py tests/results/store.json
 
-sweep-bench: install  ## measure start-up and 100,000 short jobs, killed three times and resumed (six minutes)
+sweep-bench: install  ## measure start-up and 100,000 short jobs, killed three times and resumed (ten minutes or more)
 	$(CAMPAIGN)/measure_sweep.py tests/results/sweep.json
 
 validation: install  ## compare with what others have published (a minute)
