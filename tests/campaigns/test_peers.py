@@ -10,7 +10,7 @@ from peers import mechanism, notebook
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 
-SHORT = 0.03  # s: a quarter of a revolution, with landings and two phases of the load
+SHORT = 0.07  # s: past the dead centre that shuts the gas in, with landings
 
 
 @pytest.fixture(scope="module")

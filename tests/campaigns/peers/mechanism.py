@@ -88,8 +88,6 @@ HEAD = L + R + PARAMS["head_clearance"]  # the cylinder head's position, m
 GAS_EXPONENT = PARAMS["exponent"]
 SUCTION = PARAMS["suction"] * PARAMS["piston_area"]  # N
 DISCHARGE = PARAMS["discharge"] * PARAMS["piston_area"]
-EXPANSION = DISCHARGE * PARAMS["head_clearance"] ** GAS_EXPONENT
-COMPRESSION = SUCTION * (2 * R + PARAMS["head_clearance"]) ** GAS_EXPONENT
 
 # coordinates, then their rates, at top dead centre; phi is the rod's angle, clockwise
 START = {
@@ -136,20 +134,24 @@ def contact(ex, ey, ux, uy, journal_spin, rod_spin):
     return normal * nx + tangential * ny, normal * ny - tangential * nx, -BORE * tangential
 
 
-@register_jitable
-def gas(x, phase):
-    """Piston force (N) towards the crank."""
-    if phase == 0:
-        return EXPANSION * (HEAD - x) ** -GAS_EXPONENT
-    if phase == 1:
-        return SUCTION
-    if phase == 2:
-        return COMPRESSION * (HEAD - x) ** -GAS_EXPONENT
-    return DISCHARGE
+def load_of(phase, x):
+    """Constants of the piston force in a phase that begins with the piston at x (m): see `gas`.
+
+    Gas is shut in at a dead centre, with the space that is there.
+    """
+    if phase in (1, 3):
+        return 0.0, SUCTION if phase == 1 else DISCHARGE
+    return (SUCTION if phase == 2 else DISCHARGE) * (HEAD - x) ** GAS_EXPONENT, 0.0
 
 
 @register_jitable
-def big_end(t, x, phi, v, w, phase):
+def gas(x, shut, still):
+    """Piston force (N) towards the crank: shut in, shut / (HEAD - x)^n, or a constant one."""
+    return shut * (HEAD - x) ** -GAS_EXPONENT if shut > 0.0 else still
+
+
+@register_jitable
+def big_end(t, x, phi, v, w, shut, still):
     """x'' and phi'' of a rod that hangs on the crosshead."""
     s, c = math.sin(phi), math.cos(phi)
     px, py = R * math.cos(OMEGA * t), R * math.sin(OMEGA * t)
@@ -158,7 +160,7 @@ def big_end(t, x, phi, v, w, phase):
     )
     coupling = M_ROD * B * s
     turning = I_ROD + M_ROD * B * B
-    force = fx - gas(x, phase) - M_ROD * B * c * w * w
+    force = fx - gas(x, shut, still) - M_ROD * B * c * w * w
     torque = L * (s * fx + c * fy) - moment
     total = M_CROSS + M_ROD
     determinant = total * turning - coupling * coupling
@@ -169,7 +171,7 @@ def big_end(t, x, phi, v, w, phase):
 
 
 @register_jitable
-def small_end(t, x, phi, v, w, phase):
+def small_end(t, x, phi, v, w, shut, still):
     """x'' and phi'' of a crosshead and of a rod that hangs on the crankpin."""
     s, c = math.sin(phi), math.cos(phi)
     px, py = R * math.cos(OMEGA * t), R * math.sin(OMEGA * t)
@@ -178,11 +180,11 @@ def small_end(t, x, phi, v, w, phase):
     )
     carried = M_ROD * A * OMEGA * OMEGA * (px * s + py * c)
     torque = -L * (s * fx + c * fy) - moment - carried
-    return (-gas(x, phase) - fx) / M_CROSS, torque / (I_ROD + M_ROD * A * A)
+    return (-gas(x, shut, still) - fx) / M_CROSS, torque / (I_ROD + M_ROD * A * A)
 
 
 @register_jitable
-def both(t, x, X, Y, phi, v, U, V, w, phase):
+def both(t, x, X, Y, phi, v, U, V, w, shut, still):
     """x'', X'', Y'', phi'' of a crosshead and of a rod between two clearance joints."""
     s, c = math.sin(phi), math.cos(phi)
     px, py = R * math.cos(OMEGA * t), R * math.sin(OMEGA * t)
@@ -195,7 +197,7 @@ def both(t, x, X, Y, phi, v, U, V, w, phase):
     )
     torque = A * (s * bx + c * by) - B * (s * sx + c * sy) - big_moment - small_moment
     return (
-        (-gas(x, phase) - sx) / M_CROSS,
+        (-gas(x, shut, still) - sx) / M_CROSS,
         (bx + sx) / M_ROD,
         (by + sy) / M_ROD,
         torque / I_ROD,

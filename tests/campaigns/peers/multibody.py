@@ -28,11 +28,8 @@ import numpy as np
 from peers.mechanism import (
     BORE,
     CLEARANCE,
-    COMPRESSION,
     DAMPING,
-    DISCHARGE,
     DURATION,
-    EXPANSION,
     FULL_DAMPING,
     GAS_EXPONENT,
     HEAD,
@@ -43,13 +40,13 @@ from peers.mechanism import (
     MU_STATIC,
     OMEGA,
     STIFFNESS,
-    SUCTION,
     V_FRICTION,
     V_STICTION,
     A,
     B,
     L,
     R,
+    load_of,
     output_grid,
     pieces,
 )  # fmt: skip
@@ -67,6 +64,7 @@ class Model(NamedTuple):
 
     mbs: object
     gas: object  # the connector of the piston force
+    crosshead: object  # its node
     sensors: tuple  # of the crosshead's coordinate, velocity and acceleration
     keep: list
 
@@ -231,7 +229,7 @@ class Builder:
             for kind in (kinds.Coordinates_t, kinds.Coordinates_tt)
         )
         self.mbs.Assemble()
-        return Model(self.mbs, gas, sensors, self.keep)
+        return Model(self.mbs, gas, node, sensors, self.keep)
 
 
 def build(scene):
@@ -276,10 +274,12 @@ def settings(rtol, step):
 
 
 def set_phase(model, phase):
-    """Give the gas connector the parameters of the load's phase."""
-    stiffness = {0: EXPANSION, 2: COMPRESSION}.get(phase, 0.0)
+    """Give the gas connector the parameters of the load's phase, which begins now."""
+    kind = modules()[0].OutputVariableType.Coordinates
+    moved = np.ravel(model.mbs.GetNodeOutput(model.crosshead, kind))[0]
+    stiffness, offset = load_of(phase, R + L + moved)
     model.mbs.SetObjectParameter(model.gas, "stiffness", stiffness)
-    model.mbs.SetObjectParameter(model.gas, "offset", {1: SUCTION, 3: DISCHARGE}.get(phase, 0.0))
+    model.mbs.SetObjectParameter(model.gas, "offset", offset)
 
 
 def acceleration(scene, rtol=None, step=None, duration=DURATION):

@@ -6,25 +6,33 @@ and the acceleration recomputed from the states on the output grid.
 """
 
 import numpy as np
-from peers.mechanism import ACCELERATIONS, DURATION, START, output_grid, pieces, tolerances
+from peers.mechanism import (
+    ACCELERATIONS,
+    DURATION,
+    START,
+    load_of,
+    output_grid,
+    pieces,
+    tolerances,
+)
 from scipy.integrate import solve_ivp
 
 
-def plain_rates(scene, phase):
+def plain_rates(scene, load):
     """(t, y) -> y' as a tuple of floats."""
     accelerate, n = ACCELERATIONS[scene], len(START[scene]) // 2
 
     def rates(t, y):
         y = y.tolist()
-        return (*y[n:], *accelerate(t, *y, phase))
+        return (*y[n:], *accelerate(t, *y, *load))
 
     return rates
 
 
-def by_scipy(scene, phase, times, y, rtol):
+def by_scipy(scene, load, times, y, rtol):
     """States at `times` (ascending, the first is the start) by SciPy's LSODA."""
     found = solve_ivp(
-        plain_rates(scene, phase), (times[0], times[-1]), y, "LSODA", times,
+        plain_rates(scene, load), (times[0], times[-1]), y, "LSODA", times,
         rtol=rtol, atol=tolerances(scene, rtol),
     )  # fmt: skip
     if not found.success:
@@ -37,10 +45,11 @@ def acceleration(scene, rtol, duration=DURATION):
     accelerate = ACCELERATIONS[scene]
     a, y = np.empty(output_grid(duration).size), np.array(START[scene])
     for samples, times, wanted, phase in pieces(duration):
-        states = by_scipy(scene, phase, times, y, rtol)
+        load = load_of(phase, y[0])
+        states = by_scipy(scene, load, times, y, rtol)
         y = states[-1].copy()
         a[samples] = [
-            accelerate(t, *row, phase)[0]
+            accelerate(t, *row, *load)[0]
             for t, row in zip(times[wanted].tolist(), states[wanted].tolist(), strict=True)
         ]
     return a
