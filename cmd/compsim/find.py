@@ -68,7 +68,7 @@ def find(config, over, folder, jobs, units, as_json, quiet, **asked) -> int:
 
     ((kind, goal),) = given
     question = read_question(config, over, goal, kind, **asked)
-    study = question.checked()
+    study = question.load_first()
     if not quiet:
         screen.caution([study])
     with ProgressReporter(quiet, "points") as progress:

@@ -181,9 +181,11 @@ class MachineNumber:
 
 @dataclass(frozen=True)
 class MachineDescription:
-    """The `numbers` of a machine, as plain data, and what there is to say of them."""
+    """The `numbers` of a machine, of `looked_at` of its `jobs`, and what is to be said of them."""
 
     numbers: tuple[MachineNumber, ...]
+    looked_at: int
+    jobs: int
 
     def lines(self, units: Units = "usual") -> list[tuple[str, str]]:
         """Return a line for each thing: its name, and its numbers in words."""
@@ -229,12 +231,13 @@ def describe_machine(study: Study) -> MachineDescription:
     if len(numbers) > MAX_CASES:
         drawn = random.Random(0).sample(numbers, MAX_CASES)
         numbers = sorted({numbers[0], *drawn, numbers[-1]})  # the ends of an axis
-    return describe_cases([study.cases[number] for number in numbers])
+    cases = [study.cases[number] for number in numbers]
+    return MachineDescription(machine_numbers(cases), len(cases), len(study.selected))
 
 
 def describe_cases(cases: Sequence[Case]) -> MachineDescription:
     """Return what cases say of their machine."""
-    return MachineDescription(machine_numbers(cases))
+    return MachineDescription(machine_numbers(cases), len(cases), len(cases))
 
 
 def machine_numbers(cases: Sequence[Case]) -> tuple[MachineNumber, ...]:

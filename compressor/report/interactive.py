@@ -59,14 +59,14 @@ def content(figure: go.Figure) -> dict[str, Any]:
         axis = figure.layout[f"xaxis{trace.xaxis[1:]}"]
         ends = [10.0**end for end in axis.range] if axis.type == "log" else axis.range
         data.append(trace_data(trace, ends))
-    return {"data": data, "layout": packed(figure.layout.to_plotly_json())}
+    return {"data": data, "layout": encode_arrays(figure.layout.to_plotly_json())}
 
 
 def trace_data(trace: Trace, ends: Sequence[float]) -> dict[str, Any]:
     """Return a trace as plotly's JSON; ends: of what its panel shows of x."""
     found = trace.to_plotly_json()
     if trace.type != "scatter" or trace.fill:
-        return packed(found)
+        return encode_arrays(found)
     part = visible(trace, ends)
     for of in (found, found.get("error_y", {})):
         for name in ("x", "y", "customdata", "array", "arrayminus"):
@@ -78,15 +78,15 @@ def trace_data(trace: Trace, ends: Sequence[float]) -> dict[str, Any]:
         if step and np.abs(x - (x[0] + step * np.arange(x.size))).max() <= EVEN * abs(step):
             del found["x"]
             found |= {"x0": float(x[0]), "dx": float(step)}
-    return packed(found)
+    return encode_arrays(found)
 
 
-def packed(given: Any) -> Any:
+def encode_arrays(given: Any) -> Any:
     """Return what JSON holds of a value: arrays of numbers as plotly has them in base64."""
     if isinstance(given, dict):
-        return {name: packed(one) for name, one in given.items()}
+        return {name: encode_arrays(one) for name, one in given.items()}
     if isinstance(given, list | tuple):
-        return [packed(one) for one in given]
+        return [encode_arrays(one) for one in given]
     if not isinstance(given, np.ndarray):
         return given.item() if isinstance(given, np.generic) else given
     if given.dtype.kind not in "fiu":

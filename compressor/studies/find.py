@@ -212,7 +212,7 @@ class Question:
             value = self.low + share * (self.high - self.low)
         return float(f"{value:.{DIGITS}g}")
 
-    def checked(self) -> Study:
+    def load_first(self) -> Study:
         """Return the study of the first look, after a check that the file makes one case a value.
 
         Raises QuestionError, and CaseFileError with what is wrong in the file.
@@ -389,7 +389,7 @@ def find_extremum(
     known = {point.share: point for point in points}
     worst = max(factor * point.reading.value for point in usable)
 
-    def cost(share: float) -> float:
+    def cost_at(share: float) -> float:
         share = float(share)
         if share not in known:
             (known[share],) = evaluate([share])
@@ -398,7 +398,7 @@ def find_extremum(
 
     at = points.index(min(usable, key=lambda point: factor * point.reading.value))
     bounds = (points[max(at - 1, 0)].share, points[min(at + 1, len(points) - 1)].share)
-    minimize_scalar(cost, bounds=bounds, method="bounded",
+    minimize_scalar(cost_at, bounds=bounds, method="bounded",
                     options={"xatol": tolerance, "maxiter": MAX_POINTS})  # fmt: skip
     return bracket_best(known.values(), factor)
 
@@ -434,7 +434,7 @@ def find(
     the points of earlier questions that are of the same case. Raises QuestionError, CaseFileError,
     StoreError and WorkersFailed.
     """
-    question.checked()
+    question.load_first()
     study = GrowingStudy(
         question.path, [question.key], f"-find-{question.key}", folder, question.overrides,
         workers, progress,

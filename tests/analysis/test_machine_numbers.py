@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from compsim import screen
 from test_layers import ROOT
 
 from compressor.analysis.machine_numbers import (
@@ -185,6 +186,16 @@ def test_what_a_plausible_machine_could_have_shows_in_its_numbers(read):
 def test_no_example_is_remarked_on(path):
     for study in load_studies(path):
         assert describe_machine(study).remarks() == {}
+
+
+def test_of_many_jobs_both_ends_are_looked_at_and_the_part_is_told(read, capsys):
+    study = read("load: none\nmachine: {speed_rpm: {linspace: [300, 600, 101]}}\n")
+    machine = describe_machine(study)
+    (speed,) = (one for one in machine.numbers if one.name == "piston, mean speed")
+    assert (speed.low, speed.high) == pytest.approx((2.4, 4.8), rel=1e-3)  # 0.48 m a revolution
+    assert 50 <= machine.looked_at <= 52
+    screen.say_machines({"swept": machine})
+    assert f"without clearance (by {machine.looked_at} of 101 jobs)" in capsys.readouterr().err
 
 
 def test_a_sweep_that_reaches_into_what_is_usual_is_meant(read):
