@@ -1,6 +1,7 @@
 """`compsim compare`: a measured record beside simulated ones."""
 
 import os
+from pathlib import Path
 
 import click
 
@@ -36,24 +37,22 @@ def compare(record, names, folder, hints, output, as_json, quiet) -> int:
     envelope     correlation of the envelopes above order 12: 1 is the
                  same bursts at the same angles
     rms ratio    of the record over the job: 1 is as strong
-    distance     of the spectra in third octaves, scaled to one level, in dB
 
     A number's error, behind +-, is the standard error by the record's revolutions; it needs at
     least three. A unit that was perhaps mistaken is named. A file does not say where its sensor
-    was; --json has the jobs' places, and by how many degrees the record comes later where it is
-    most alike.
+    was; --json has the jobs' places.
     """
     kind = os.path.splitext(output or "")[1]
     if output and kind not in KINDS:
         raise click.UsageError(f"-o {output}: end the name in {', '.join(KINDS)}")
-    from compressor.store import writable_folder
-    from compressor.studies.compare.comparison import (
+    from compressor.report import as_csv, render
+    from compressor.store import publish, writable_folder
+    from compressor.studies.compare import (
         CAPTION,
         compare_record,
         draw_comparison,
         jsonable_comparison,
         list_comparison,
-        write_figure,
     )
 
     if output:
@@ -65,6 +64,8 @@ def compare(record, names, folder, hints, output, as_json, quiet) -> int:
     else:
         screen.print_text(*list_comparison(found))
     if output:
-        write_figure(draw_comparison(found), output, kind)
+        figure = draw_comparison(found)
+        data = as_csv(figure).encode() if kind == ".csv" else render(figure, kind[1:])
+        publish(Path(output), data)
         screen.say(output) if as_json else screen.print_text(output, f"  {CAPTION}")
     return screen.DONE
