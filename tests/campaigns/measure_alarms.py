@@ -5,7 +5,7 @@ sound pins drawn at random: sound draws that set limits and count false alarms, 
 big or the small end worn to each of some clearances. They are simulated into a store, and judged by
 the command's own call, at several levels of noise. Beside it, one machine whose bores wear, for
 lead times. Writes a small JSON file, with a digest of the jobs' keys: other cases, or another
-model, make other keys, and tests/campaigns/test_alarms_campaign.py then asks for a new run.
+model, make other keys, and tests/campaigns/test_kept_results.py then asks for a new run.
 """
 
 import hashlib

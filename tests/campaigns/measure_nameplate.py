@@ -1,7 +1,7 @@
 """Keep what the case file of `compsim init machine` gives (make nameplate, about five minutes).
 
 Writes a small JSON file with the numbers that compressor/docs/my-machine.md shows, and the keys of
-the jobs: another case file or model makes others, and tests/test_pages.py then asks for a new run.
+the jobs: another case file or model makes others, and test_kept_results.py then asks for a new run.
 The same is run with other shares of the clearance in which the oil film gets no thinner: how far
 the answer depends on that assumption. What decides it: numbers that a plant can only guess, each at
 both ends of its plausible range, as `compsim explain --models` takes them, and natural frequencies

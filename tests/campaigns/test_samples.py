@@ -1,0 +1,62 @@
+"""Samples of campaigns, run again: they give what is kept."""
+
+import measure_validation
+import measure_wear
+import pytest
+from measure_chaotic import OTHER, compare_rms
+from measure_claims import CLAIMS, judged_alone
+from measure_regimes import ALONG
+from page_tables import kept
+
+from compressor.cases.case import Case
+from compressor.cases.examples import example
+from compressor.studies.follow.follow import load_values, machines
+from compressor.studies.follow.motion import run_value
+
+
+@pytest.mark.compiled
+def test_published_numbers_come_out_again():
+    """What is kept was found by this code, to the digits that are shown."""
+    found = {(one["what"], one["source"]): one["found"] for one in kept("validation.json")["rows"]}
+    again = [*measure_validation.play(), *measure_validation.elastic_rod()]
+    again += [*measure_validation.bearing(), *measure_validation.wear()]
+    for one in again:
+        same = found[one["what"], one["source"]]
+        assert one["found"] == pytest.approx(same, rel=1e-6, abs=one["within"])
+        assert abs(one["found"] - one["expected"]) <= one["within"]
+    assert len(again) >= 16
+
+
+def test_the_default_machine_has_its_margins_of_claims():
+    stored, found = kept("claims.json")["default"], judged_alone(Case.from_values({}))
+    for claim in CLAIMS:
+        both = stored["error"][claim - 1] + found.error[claim - 1] + 1e-9
+        assert abs(stored["margin"][claim - 1] - found.margin[claim - 1]) <= both, claim
+
+
+def test_the_first_value_that_is_followed_has_its_exponent():
+    (machine,) = machines(load_values(example("regimes"), ALONG), ALONG)
+    found = run_value(machine.chains[0].cases[0], None, ALONG.plan)
+    row = kept("regimes.json")["rows"][0]
+    assert found["regime"] == row["regime"] == "periodic"
+    assert float(found["period"]) == row["period"]
+    away = abs(float(found["lyapunov_exponent"]) - row["exponent"])
+    assert away <= float(found["lyapunov_exponent_error"]) + row["error"]
+
+
+@pytest.mark.slow
+def test_a_chaotic_case_says_so_and_knows_its_rms():
+    row = compare_rms({"joint": "both", "clearance_mm": 0.2}, OTHER)
+    assert row["regime"] == "chaotic"
+    assert row["apart"] < 4.0  # standard errors
+    assert row["known"] < 0.1
+
+
+@pytest.mark.slow
+def test_a_machine_that_wears_has_its_hours():
+    rows = kept("wear.json")["machines"]
+    row = min(rows, key=lambda row: row["values"]["clearance_mm"])  # fewest steps
+    again = measure_wear.judged(row["values"])
+    # last bits of a run move the hours by 1e-4
+    assert again["hours"] == pytest.approx(row["hours"], rel=1e-3)
+    assert again["error"] == pytest.approx(row["error"], abs=1e-3)
