@@ -1,7 +1,4 @@
-"""What `Case.from_values` says of mistakes: key, what was given, what is allowed, what to do.
-
-Each is compared with what a case file with the same mistake is told, where a file can have it.
-"""
+"""What `Case.from_values` says of values that no file holds: mistakes.json has the others."""
 
 import numpy as np
 import pytest
@@ -33,11 +30,9 @@ def told(values) -> list[str]:
         ({"machine": {"speed_rpm": {"range": [300, 500, 50]}}},
          "machine.speed_rpm: needs a number in (0, 100000] rpm, not {'range': [300, 500, 50]}"),
         ({"sample": {"n": 64}}, f"sample: unknown key; a case has {AT_TOP}"),
-        ({"qqq": 1}, f"qqq: unknown key; a case has {AT_TOP}"),
         ({1: 2}, f"1: unknown key; a case has {AT_TOP}"),
         ({"machine": {1: 2}}, f"machine.1: unknown key; machine has {IN_MACHINE}"),
         ({"machine": None}, "machine: has no value; leave the key out to get its default"),
-        ({"name": 5}, "name: needs text, not 5"),
         ({"solve": {"accuracy": []}},
          "solve.accuracy: needs draft, standard, fine or reference, or errors by metric such as "
          "{peak_acceleration: 0.01}, not []"),
@@ -46,8 +41,6 @@ def told(values) -> list[str]:
         ({"machine": {"rod_mass_kg": 10**400}},
          "machine.rod_mass_kg: must be finite: needs a number in (0, 1e+06] kg, not "
          f"1{'0' * 27}...{'0' * 29}"),
-        ({"machine": {"rod_mass_kg": float("nan")}},
-         "machine.rod_mass_kg: must be finite: needs a number in (0, 1e+06] kg, not nan"),
     ],
     ids=lambda part: str(part)[:40],
 )  # fmt: skip
@@ -61,32 +54,6 @@ def test_what_is_no_mapping_is_told_how_one_looks(values):
     assert message.startswith(
         "needs a mapping of keys, such as {'joint': 'big_end', 'clearance_mm': 0.2}, not "
     )
-
-
-# All at once
-
-
-def test_mistakes_are_told_at_once():
-    assert told({
-        "name": "a/b",
-        "laod": "none",
-        "joint": "both",
-        "clearance_mm": {"big_end": -0.1},
-        "machine": {"rod_mass": 3, "crank_radius_mm": 700, "speed_rpm": "500 rpm"},
-        "contact": {"geometry": "internal", "exponent": 5},
-        "friction": {"friction_velocity_mm_per_s": 1},
-        "solve": {"duration_s": 0.48, "duration_rev": 4, "rtol": 1},
-        "body": 3,
-    }) == [
-        "name: 'a/b' is no name: use [A-Za-z0-9._-], at most 64, no leading dot",
-        "clearance_mm.big_end: -0.1 is outside [0, 1000] mm",
-        "machine.speed_rpm: needs a number in (0, 100000] rpm, not '500 rpm'; write 500",
-        "machine.rod_mass: unknown key; did you mean machine.rod_mass_kg?",
-        "contact.exponent: 5 is outside [1, 3]",
-        "body: needs true or a mapping of keys, such as {freedoms: xy}, not 3",
-        "solve.rtol: 1 is outside [1e-13, 0.1]",
-        "laod: unknown key; did you mean load?",
-    ]  # fmt: skip
 
 
 def test_the_error_is_one_of_the_program_and_of_a_value():

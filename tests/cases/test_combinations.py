@@ -163,16 +163,3 @@ def test_designs_and_blocks_are_what_their_jobs_are(text, tmp_path):
     (study,) = load_studies(path)
     for axis in study.axes:
         assert list(axis.values) == [value_of(case, axis.key) for case in study.cases]
-
-
-def test_blocks_that_differ_in_a_part_have_axes_of_the_parts(tmp_path):
-    path = tmp_path / "b.yaml"
-    parts = "{balance: {rotating: 0.3, reciprocating: 0}}"
-    path.write_text(
-        f"blocks: [{{machine: {{balance: 0.3}}}}, {{machine: {parts}}}]", encoding="utf-8"
-    )
-    (study,) = load_studies(str(path))
-    assert {axis.key: axis.values for axis in study.axes} == {
-        "machine.balance.rotating": (0.3, 0.3),
-        "machine.balance.reciprocating": (0.3, 0.0),
-    }

@@ -19,15 +19,6 @@ def refused(gas, **more):
     return str(caught.value)
 
 
-@pytest.mark.parametrize("gas", [{}, {"switching": "exact"}, DOUBLE, {"action": "crank_end",
-                         "rod_diameter_mm": 30, "clearance_percent": 12}, {"unloaded": "head"},
-                         {**DOUBLE, "clearance_percent": {"head": 12, "crank": 14}}])  # fmt: skip
-def test_values_read_back(gas):
-    one = case(gas)
-    assert Case.from_values(one.values()) == one
-    assert Case.from_attribute(one.attributes()["case"]).key == one.key
-
-
 def test_what_is_so_by_default_makes_no_other_job():
     whole = {"unloaded": "none", "valve_loss_percent": 0, "switching": "exact"}
     assert case(DOUBLE).key == case(DOUBLE | whole).key
@@ -52,7 +43,6 @@ def test_a_crank_end_alone_takes_its_clearance_in_every_form(clearance):
     """Facts of a cylinder: two of the forms were refused, with opposite advice."""
     one = case({"action": "crank_end", "rod_diameter_mm": 20, "clearance_percent": clearance})
     assert record(one)["crank_clearance"] == pytest.approx(0.14 * 0.24)
-    assert Case.from_values(one.values()) == one
     both = {"head": 12, "crank": 14}
     single = case({"action": "single", "clearance_percent": both})
     assert record(single)["head_clearance"] == pytest.approx(0.0288)

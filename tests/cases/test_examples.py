@@ -1,18 +1,14 @@
 """The examples that are installed with the program."""
 
 import re
-from pathlib import Path
 
 import pytest
 
-from compressor.analysis.runs import FAULT_LABELS, cases_of
-from compressor.cases.case import Case
 from compressor.cases.examples import FOLDER, STARTS, example, templates
 from compressor.cases.load import load_studies
 from compressor.solve.cautions import cautions
 from compressor.solve.simulate import simulate
 
-ROOT = Path(__file__).parent.parent.parent
 NAMES = sorted(path.stem for path in FOLDER.glob("*.yaml"))
 
 
@@ -46,10 +42,3 @@ def test_templates_come_first_and_say_what_they_answer():
         assert verb in ("run", "wear", "follow")
         assert (verb == "wear") is ("\nwear:" in one.path.read_text())
         assert one.next.startswith(f"compsim {verb} {one.name}.yaml")
-
-
-def test_the_consistent_machine_has_the_paper_s_faults():
-    (study,) = load_studies(example("consistent"))
-    cases = cases_of(study.cases[-1])
-    assert {*study.keys} == {cases[name].key for name in ("design", *FAULT_LABELS)}
-    assert study.cases[0].machine != Case().machine

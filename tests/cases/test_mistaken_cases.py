@@ -1,8 +1,9 @@
-"""The table of mistakes: what is answered to each, as a file, as values and by --set.
+"""The table of mistakes: what is answered to each, as a file, as values, by --set, by the schema.
 
 mistakes.json has a row a mistake: the text of a file, the lines that answer it, and the other ways
 in which the same is said without a place: "values" (`Case.from_values`) and "set" (--set beside a
-file `{}`). `python tests/cases/test_mistaken_cases.py` writes it anew, where answers change.
+file `{}`); "schema" where the JSON Schema sees that something is wrong.
+`python tests/cases/test_mistaken_cases.py` writes it anew, where answers change.
 """
 
 import json
@@ -10,14 +11,17 @@ import re
 import tempfile
 from pathlib import Path
 
+import jsonschema
 import pytest
 
 from compressor.cases.case import Case, CaseError
+from compressor.cases.json_schema import case_schema
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.cases.yaml_reader import Place, read_text
 
 TABLE = Path(__file__).with_name("mistakes.json")
 ROWS = json.loads(TABLE.read_text("utf-8"))
+SCHEMA = jsonschema.Draft202012Validator(case_schema())
 
 
 def told(text, folder, overrides=()):
@@ -66,6 +70,12 @@ def test_a_mistake_is_answered_with_place_key_and_remedy(text, lines, ways, tmp_
     if "set" in ways:
         by_set = told("{}", tmp_path, [*settings(values_of(text))])
         assert without_places(by_set) == without_places(lines)
+    assert ("schema" in ways) is marked(values_of(text))
+
+
+def marked(values):
+    """Whether an editor marks a file of these values."""
+    return values is not None and not SCHEMA.is_valid(values)
 
 
 def row(text, folder):
@@ -77,6 +87,8 @@ def row(text, folder):
             ways.append("values")
         if without_places(told("{}", folder, [*settings(values)])) == without_places(lines):
             ways.append("set")
+    if marked(values):
+        ways.append("schema")
     return [text, lines, ways]
 
 

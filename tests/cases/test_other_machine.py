@@ -5,7 +5,6 @@ from dataclasses import replace
 
 from compsim import cli
 
-from compressor.cases.case import Case
 from compressor.cases.materials import contact_stiffness, paper_notes
 
 # single throw, stroke 180 mm, rod 450 mm, 740 rpm, bore 220 mm, 2 to 7 bar
@@ -25,18 +24,6 @@ gas:
   discharge_MPa: 0.7
   switching: exact
 """
-
-
-def test_with_the_load_it_is_the_machine_that_was_meant(read):
-    (case,) = read("load: gas" + MACHINE).cases
-    assert case == Case.from_values({
-        "name": "case", "load": "gas", "joint": "small_end", "clearance_mm": 0.2,
-        "machine": {"crank_radius_mm": 90, "rod_length_mm": 450, "speed_rpm": 740,
-                    "reciprocating_mass_kg": 85, "rod_mass_kg": 62, 
-                    "pin_radius_mm": {"big_end": 60, "small_end": 35}},
-        "gas": {"piston_radius_mm": 110, "suction_MPa": 0.2, "discharge_MPa": 0.7,
-                "switching": "exact"},
-    })  # fmt: skip
 
 
 def test_its_contact_is_told_to_be_of_another_pin(read):

@@ -1,7 +1,6 @@
 """The grammar of sweeps: how values are made, joined and left out, and what is refused."""
 
 import re
-import time
 import tracemalloc
 
 import numpy as np
@@ -16,7 +15,6 @@ from compressor.cases.study import points
 from compressor.cases.swept import design, design_size, sweep_of
 
 ONE = "joint: big_end\n"
-SHORT = "solve: {duration_rev: 0.25, settle_rev: 0, accuracy: draft, output_step_deg: 0.9}\n"
 
 
 def rows(study):
@@ -290,11 +288,3 @@ def test_any_sweep_is_planned_or_refused(read, text):
         message = ""
         assert len(rows(study)) == len(study.cases) == len([*study.cases]) > 0
     assert all(line.startswith("case.yaml") for line in message.splitlines())
-
-
-def test_the_largest_sweep_is_planned_soon(read):
-    start = time.process_time()
-    axes = "rod_mass_kg: {linspace: [1, 5, 100]}, speed_rpm: {range: [1, 100, 1]}"
-    study = read(f"machine: {{{axes}}}\nexclude: machine.rod_mass_kg > 4.99\n")
-    assert len(study.cases) == 9900
-    assert time.process_time() - start < 30  # under 2 s

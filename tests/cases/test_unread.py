@@ -278,11 +278,6 @@ def test_every_key_with_a_reader_is_refused_somewhere():
     ]
 
 
-def test_two_runs_of_one_case_store_the_same():
-    text = json.dumps(HEARD | WORN)
-    assert stored(text) == stored.__wrapped__(text)
-
-
 @pytest.mark.parametrize("key", ENTRIES)
 def test_a_key_changes_what_is_stored(key):
     value, where, _ = ENTRIES[key]
@@ -343,27 +338,6 @@ def test_a_fact_of_the_machine_may_be_given_and_makes_no_other_job(key, where, t
     path.write_text(json.dumps(with_value(where, key, two)))
     with pytest.raises(CaseFileError, match="nothing reads this"):  # swept in vain
         load_cases(path)
-
-
-def test_one_file_serves_the_machine_with_clearance_and_without(tmp_path):
-    machine = {
-        "machine": {"pin_radius_mm": {"big_end": 60, "small_end": 35}},
-        "contact": {"materials": {"big_end": ["steel", "steel"], "small_end": ["steel", "copper"]}},
-        "lubricant": {"viscosity_mPa_s": 40, "bearing_length_mm": {"big_end": 70, "small_end": 50}},
-        "healthy_clearance_mm": 0.1, "load": "gas",
-        "gas": {"bore_mm": 220, "rod_diameter_mm": 60, "action": "single"},
-    }  # fmt: skip
-    keys = {}
-    for joint in ("none", "big_end", "small_end", "both"):
-        worn = {} if joint == "none" else {"clearance_mm": 0.1}
-        path = tmp_path / "case.yaml"
-        path.write_text(json.dumps(machine | worn | {"joint": joint}))
-        (case,) = load_cases(path)
-        keys[joint] = case.key
-        assert case.machine.pin_radius_mm.at("small_end") == 35
-    assert len({*keys.values()}) == 4
-    plain = {"load": "gas", "gas": {"bore_mm": 220, "action": "single"}}
-    assert keys["none"] == Case.from_values(plain).key
 
 
 IN_GAS = "nothing reads this group: it needs load == gas; set that, or leave the group out"

@@ -138,6 +138,18 @@ def test_stiffness_of_steel_on_steel(radii, stiffness):
     )
 
 
+@pytest.mark.parametrize("clearance", [0.1, 0.2, 0.3])
+def test_a_pin_in_a_bore_is_stiffer_by_the_root_of_the_radii_s_sum_over_their_difference(clearance):
+    """Hertz's other sign; an ideal joint beside it has no bore to differ from."""
+    stiffness = {}
+    for geometry in ("external", "internal"):
+        contact = {"materials": ["steel", "steel"], "geometry": geometry}
+        stiffness[geometry] = law(clearance_mm=clearance, contact=contact)["stiffness"]
+    big, small = stiffness["internal"] / stiffness["external"]
+    assert big == pytest.approx(math.sqrt((20.0 + clearance) / clearance))
+    assert small == pytest.approx(1.0)
+
+
 def test_materials_give_each_joint_its_stiffness():
     case = Case.from_values(
         {
