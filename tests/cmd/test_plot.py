@@ -136,13 +136,6 @@ def test_a_job_is_named_as_in_show(plot, folder, capsys, unpainted):
     assert shown == key(folder, "worn", 3)
 
 
-def test_chosen_figures_in_a_chosen_folder(plot, folder):
-    mine = key(folder, "worn")
-    code, found, _ = plot(mine, "--what", "orbits,impacts", "-o", "some")
-    assert code == 0
-    assert [*found] == [f"some/{mine[:10]}-{name}.png" for name in ("orbits", "impacts")]
-
-
 def test_a_study_is_drawn_along_an_axis(plot, folder, unpainted):
     code, found, _ = plot("worn", "--over", "speed_rpm", "--at", "clearance_mm=0.3")
     assert code == 0

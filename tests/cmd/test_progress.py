@@ -89,12 +89,3 @@ def test_a_log_gets_a_line_at_the_start_some_between_and_one_at_the_end(clock, c
     assert lines[0][1] == "0 of 900 jobs, 0 %\n"
     assert re.fullmatch(r"\d+ of 900 jobs, \d+ %, about \d+ min left\n", lines[10][1])
     assert capsys.readouterr().err == "899 of 900 jobs, 99 %\n"
-
-
-def test_quiet_is_quiet(clock, capsys):
-    with ProgressReporter(quiet=True) as progress:
-        for done in range(100):
-            clock[0] += 1
-            progress.count_failed(done)
-            progress(done, 100, "a remark")
-    assert capsys.readouterr().err == ""

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 from compsim import cli
-from compsim.job_text import knock_verdict, notes, numbers
+from compsim.job_text import knock_verdict, notes
 from conftest import CHAOTIC, store
 
 from compressor.cases.case import Case
@@ -62,17 +62,6 @@ def test_numbers_have_labels_units_and_error_bars(paper_store, show):
     assert not any("count" in label for label in told)  # counts grow with the run
     assert float(told["acceleration"]) == pytest.approx(stored["acceleration_error"], rel=0.05)
     assert told["friction loss"] == f"{stored['friction_loss']:.6g} J"
-
-
-def test_what_is_rounding_beside_the_other_axis_is_told_as_0():
-    """It was told as (10 ± 8)e-14 mm/s."""
-    found = SimpleNamespace(
-        case=Case(),
-        numbers={"body_velocity_rms": [9.79e-3, 1e-16], "body_velocity_rms_error": [1e-5, 8e-17]},
-    )
-    assert [*numbers(found, "usual", "body")] == [
-        ("body velocity rms, x", "9.79 ± 0.01 mm/s"), ("body velocity rms, y", "0 mm/s"),
-    ]  # fmt: skip
 
 
 def test_numbers_may_be_in_plant_units_or_si(paper_store, show):
@@ -151,11 +140,3 @@ def test_a_contact_force_with_oil_says_so(oil):
 )  # fmt: skip
 def test_a_knock_is_judged_by_its_limit_and_its_bar(value, error, text):
     assert knock_verdict(value, error) == text
-
-
-def test_a_knock_stands_beside_its_verdict(paper_store, show):
-    stored, told = report_job(paper_store, *HERE).numbers, values(show(paper_store, *HERE))
-    value, error = stored["knock"][0], stored["knock_error"][0]
-    said = f"{by_bar(value, error)}, {knock_verdict(value, error)}"
-    assert told["knock, big end"] == said
-    assert "knock, small end" not in told  # it is ideal

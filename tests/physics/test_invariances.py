@@ -324,8 +324,8 @@ def test_a_joint_without_clearance_costs_nothing(joint):
 @given(scenes())
 def test_a_clearance_that_vanishes_leaves_the_ideal_machine(values):
     """With the contact scaled along (K as c^-1.5, d_max as c, C_max as c^-0.5) the deviation goes
-    as c: slope 1 within 0.1 in every decade from 1 mm to 1 micrometre."""
-    sizes, moved = np.array([1.0, 0.1, 0.01, 0.001]), []
+    as c: slope 1 within 0.1 in every decade from 1 mm to 1 micrometre, and on to a nanometre."""
+    sizes, moved = np.array([1.0, 0.1, 0.01, 0.001, 1e-6]), []
     for size in sizes:
         contact = {
             "stiffness_N_per_mm15": 3.36e5 * size**-1.5,
@@ -337,6 +337,17 @@ def test_a_clearance_that_vanishes_leaves_the_ideal_machine(values):
         moved.append(np.abs(found.states[:, 0]).max())
     slopes = np.diff(np.log(moved)) / np.diff(np.log(sizes))
     assert slopes == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
+@pytest.mark.parametrize("clearance", [1e-6, 1.0])
+def test_a_nanometre_and_a_millimetre_pass_the_audit(joint, clearance):
+    """The paper's contact; in mm. At most ten tolerances a revolution are left of the energy."""
+    solve = {"duration_rev": 2, "error_bars": False}
+    case = Case.from_values({"joint": joint, "clearance_mm": clearance, "solve": solve})
+    found = measure(case)
+    assert (found.status, found.reason) == ("ok", "")
+    assert 0 < found.numbers["energy_residual"] < 10 * case.rtol * 2
 
 
 # ---- tolerance

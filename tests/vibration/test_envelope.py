@@ -35,14 +35,6 @@ def test_lines_of_the_envelope():
     assert np.sum(found > 1e-9) == 2
 
 
-def test_rings_come_back_at_their_rate():
-    values = rings(RATE, SIZE, 3000.0, 0.05) + 0.1 * noise(SIZE)
-    frequency, found = envelope_spectrum(values, RATE, (2500.0, 3500.0))
-    low = (frequency > 1.0) & (frequency < 200.0)
-    first = frequency[low][np.argsort(found[low])[-3:]]
-    assert sorted(first) == pytest.approx([20.0, 40.0, 60.0], abs=0.4)
-
-
 def test_bands_divide_the_range():
     frequency, bandwidth, kurtosis = kurtogram(noise(2**12), 2000.0, 3)
     parts = [1, 2, 3, 4, 6, 8]

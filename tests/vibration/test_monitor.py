@@ -41,16 +41,6 @@ def test_peaks_over_a_threshold(values, count):
     assert count_peaks(np.array(values, float), 3.0) == count
 
 
-def test_counts_against_a_plain_loop():
-    values = np.random.default_rng(8).normal(size=5000)
-    count, over = 0, False
-    for value in values:
-        if over and abs(value) <= 1.2:
-            count += 1
-        over = abs(value) > 1.2
-    assert count_peaks(values, 1.2) == count > 500
-
-
 def test_a_band_holds_its_lines_alone():
     """rms of lines at 10, 50 and 200 Hz of 3, 4 and 12: that of those inside, ends included."""
     time = np.arange(4000) / 4000

@@ -28,13 +28,6 @@ def noise(size: int, seed: int = 1) -> np.ndarray:
     return np.random.default_rng(seed).standard_normal(size)
 
 
-@pytest.mark.parametrize("begin", [0.0, 0.7, -40.0])
-def test_even_samples_stay_as_they_are(begin):
-    values = noise(3 * M)
-    found = resample_angle(even(3, begin=begin), values, M)
-    assert found == pytest.approx(values, abs=1e-9)
-
-
 @pytest.mark.parametrize(("extra", "turns"), [(-1, 2), (0, 3), (1, 3), (M - 1, 3), (M, 4)])
 def test_only_whole_revolutions_are_kept(extra, turns):
     angle = TURN * np.arange(3 * M + extra) / M

@@ -58,8 +58,3 @@ def test_a_straight_line_and_well_known_pulses_stay():
     uneven = np.array([0.0, 0.08, 0.161, 0.24, 0.322])
     found = smooth_pulses(uneven, np.array([1e-8, 1e-8, HALF, 1e-8, 1e-8]))
     assert np.abs(found - uneven)[[0, 1, 3, 4]].max() <= 1e-8
-
-
-def test_four_pulses_stay():
-    pulses = np.array([0.0, 0.08, 0.161, 0.24])
-    np.testing.assert_array_equal(smooth_pulses(pulses, np.full(4, HALF)), pulses)
