@@ -127,19 +127,6 @@ def test_random_sweeps_are_what_their_jobs_are(seed, tmp_path):
     assert bool(own) is bool(problems)
 
 
-def test_random_sweeps_are_of_both_kinds(tmp_path):
-    good = 0
-    for seed in range(60):
-        path = tmp_path / f"{seed}.yaml"
-        path.write_text(json.dumps(random_file(seed)))
-        try:
-            load_studies(path, max_jobs=1_000_000)
-            good += 1
-        except CaseFileError:
-            pass
-    assert 15 < good < 50
-
-
 TOGETHER = """
 joint: [big_end, both]
 clearance_mm: {random: [0.05, 0.4]}

@@ -88,16 +88,13 @@ def test_a_caller_may_say_what_is_found_otherwise(table):
     [
         ("t,a\n0,1\n1,1_0\n2,3\n", "x.csv:3:2: a: '1_0' is no number; write numbers wi"),
         ("t,a\n0,1_0\n1,1\n2,3\n", "x.csv:2:2: a: '1_0' is no number"),  # no second header
-        ("t;a\n0,5;1,5\n1,5;1.000,5\n2;3\n", "x.csv:3:2: a: '1.000,5' is no number; write num"),
         ("t;a\n0,0;600\n0,5;750\n1,0;1.800\n1,5;900\n", "x.csv:4:2: a: '1.800' is no number; write "
          "numbers with a decimal comma, without signs of thousands"),
         ("t,a\n0,1\n1,\n2,3\n", "x.csv:3:2: a: '' is no number"),
         ("t,a\n0,1\n1,1e999\n2,3\n", "x.csv:3:2: a: '1e999' is not finite"),
-        ("t,a\n0,1\n1,-inf\n2,3\n", "x.csv:3:2: a: '-inf' is not finite"),
         ("t,a\n0,1\n,\n2,3\n", "x.csv:3: the cells are empty, and the table goes on below"),
         ("t,a\n0,1,0,2\n0,3,0,4\n", "x.csv:2: 4 cells below a header of 2: commas separate cel"),
         ("hello\nworld\n", "holds no rows of numbers (its first line: 'hello'; separators tr"),
-        ("", "holds no rows of numbers (its first line: ''"),
         (b"\xff\xfe\x00", "is no text in UTF-16"),
         (b"abc\x01\x02", "is no text file"),
     ],
