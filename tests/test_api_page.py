@@ -1,13 +1,18 @@
-"""The public docstrings: what they say at least, that their examples run, and the page of them."""
+"""The public names: imports that type checkers see, docstrings whose examples run, their page."""
 
+import ast
 import doctest
 import inspect
 import re
 import warnings
+from importlib import import_module
+from pathlib import Path
 
 import api_page
 import pytest
 from compsim import cli
+
+import compressor
 
 PUBLIC = dict(api_page.public())
 TEXTS = {name: inspect.cleandoc(made.__doc__ or "") for name, made in PUBLIC.items()}
@@ -18,7 +23,15 @@ def test_the_page_is_what_the_docstrings_say():
     assert api_page.PAGE.read_text(encoding="utf-8") == api_page.page(), "stale: run make pages"
 
 
-# Examples
+def test_type_checkers_see_every_name_where_it_is_found():
+    tree = ast.parse(Path(compressor.__file__).read_text(encoding="utf-8"))
+    ifs = [one for one in tree.body if isinstance(one, ast.If)]
+    (block,) = (one for one in ifs if ast.unparse(one.test) == "TYPE_CHECKING")
+    seen = {alias.name: line.module for line in block.body for alias in line.names}
+    here = {"__version__", "CompsimError", "CompsimWarning"}
+    assert sorted({*seen} | here) == compressor.__all__
+    for name, module in seen.items():
+        assert getattr(compressor, name) is getattr(import_module(module), name)
 
 
 def run(name):
