@@ -33,6 +33,7 @@ from compressor.report.figures.sweep_data import (
 )
 from compressor.report.page import (
     Add,
+    AddedContent,
     Additions,
     Cell,
     Chapter,

@@ -10,12 +10,11 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.resources import files
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
-from jinja2 import ChoiceLoader, Environment, FunctionLoader, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from compressor.digits import PAGE_DIGITS, by_bar, setting
@@ -160,10 +159,7 @@ def column_title(measure: Measure) -> str:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the page: `template` prints its `content`, `anchor` is its id.
-
-    A template that lies in the folder `templates` of another package is named `package:file`.
-    """
+    """A part of the page: `template` prints its `content`, `anchor` is its id."""
 
     anchor: str
     title: str
@@ -247,7 +243,7 @@ def templates(files: Mapping[str, bytes] | None = None) -> Environment:
         return Markup(f"data:{kind};base64,{base64.b64encode(files[name]).decode()}")
 
     made = Environment(
-        loader=ChoiceLoader([PackageLoader(__package__), FunctionLoader(template_elsewhere)]),
+        loader=PackageLoader(__package__),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -256,12 +252,6 @@ def templates(files: Mapping[str, bytes] | None = None) -> Environment:
     )
     made.globals |= {"address": address, "single": bool(files)}
     return made
-
-
-def template_elsewhere(name: str) -> str | None:
-    """Return the text of a template `package:file`; None of a name without a package."""
-    package, _, file = name.rpartition(":")
-    return files(package).joinpath("templates", file).read_text("utf-8") if package else None
 
 
 def document(
@@ -295,6 +285,17 @@ class Chapter(NamedTuple):
 
     section: Section
     plates: Sequence[Plate] = ()
+
+
+class AddedContent(NamedTuple):
+    """What the section of a study prints, by `addition.html`; title, notes: of the machine."""
+
+    table: PageTable
+    paragraphs: Sequence[str] = ()
+    lines: Sequence[str] = ()
+    plates: Sequence[Plate] = ()
+    title: str = ""
+    notes: str = ""
 
 
 class Additions(NamedTuple):

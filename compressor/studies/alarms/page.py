@@ -10,6 +10,7 @@ import xarray as xr
 from compressor.report import (
     CYCLE,
     GREY,
+    AddedContent,
     Additions,
     Cell,
     Chapter,
@@ -88,10 +89,9 @@ def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Addit
     head, *rows = list_rows(found)
     table = PageTable(head, [TableRow([Cell(text) for text in row]) for row in rows], lead=3)
     lines = [*list_numbers(found), *list_warnings(found)]
-    content = {"lines": lines, "table": table, "plates": plates,
-               "title": study.title, "notes": study.notes}  # fmt: skip
+    content = AddedContent(table, (), lines, plates, study.title, study.notes)
     anchor, title = file_name("alarms-of", name), f"Which alarm sees wear first in study {name}"
-    section = Section(anchor, title, "compressor.studies.alarms:alarms.html", content)
+    section = Section(anchor, title, "addition.html", content)
     line = f"{found.sizes['alarm']} alarms were judged by its records."
     note = StudyNote(line, anchor, "Which alarm sees wear first")
     return Additions({name: note}, [Chapter(section, plates)])

@@ -19,6 +19,7 @@ from compressor.digits import PAGE_DIGITS, align_columns, by_bar, is_known
 from compressor.metrics import BARRED
 from compressor.outcome import Regime
 from compressor.report import (
+    AddedContent,
     Additions,
     Cell,
     Chapter,
@@ -239,14 +240,15 @@ def list_changes(place: str, table: ModelTable) -> Iterator[str]:
 # ---- on the page --------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class ModelsContent:
-    """What a page says of what was varied of a job: the job, main numbers, and a table."""
-
-    place: str
-    headline: str
-    unknown: str
-    table: PageTable
+LEGEND = """\
+The table is of {}: its metrics, with error bars where four digits show them, and below how much \
+each changes where one thing is otherwise: a number that the case file does not give, or that a \
+plant can only guess, at an end of its plausible range (the table of keys has them all), or \
+another model. What moves the first line’s number most comes first. “None seen”: no more than \
+both error bars. “Points”: percentage points of a share. “No contact”: the journal touches no \
+bore. “Chaotic”: such a motion has no peak to compare. The last column says why a number is in \
+doubt, and what another model assumes that the file does not give."""
+UNKNOWN = "No change is given of what is not known, or not above 0, of the case itself: {}."
 
 
 def models_file(folder: Folder, study: str, key: str) -> Path:
@@ -296,9 +298,10 @@ def models_section(anchor: str, study: StoredStudy, data: xr.Dataset) -> Section
     """Return the section on what was varied of a study's job."""
     table = model_table(data)
     place = place_text(study, data.attrs["key"])
-    content = ModelsContent(place, headline(table), ", ".join(table.unknown), page_table(table))
+    texts = [f"{headline(table)}.", LEGEND.format(place)]
+    texts += [UNKNOWN.format(", ".join(table.unknown))] if table.unknown else []
     title = f"What moves the numbers of study {place.rpartition(', ')[0]}"
-    return Section(anchor, title, "compressor.studies.tradeoff:models.html", content)
+    return Section(anchor, title, "addition.html", AddedContent(page_table(table), texts))
 
 
 def page_table(table: ModelTable) -> PageTable:
