@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
 
 import click
 
@@ -17,14 +16,11 @@ from compsim.progress import ProgressReporter, read_cases
 @click.option(
     "--all", "every", is_flag=True, help="With --models: toggle every other feature, too."
 )
-@click.option(
-    "--vary", multiple=True, metavar="KEY", help="With --models: vary this number of the file, too."
-)
 @options.results
 @options.set_keys
 @options.max_jobs
 @options.as_json
-def explain(configs, jobs, models, every, vary, folder, as_json, **how) -> int:
+def explain(configs, jobs, models, every, folder, as_json, **how) -> int:
     """Estimate the cost, scales and droppable features of a case.
 
     \b
@@ -41,9 +37,8 @@ def explain(configs, jobs, models, every, vary, folder, as_json, **how) -> int:
 
     --set clearance_mm=0.3 chooses another job. Exit code 3 if such a job fails.
     """
-    if (vary or every) and not models:
-        raise click.UsageError("--vary and --all say what --models varies: add --models")
-    check_varied(vary)
+    if every and not models:
+        raise click.UsageError("--all says what --models varies: add --models")
     from compressor.cases import points
     from compressor.store import writable_folder, write_dataset
     from compressor.studies.tradeoff.explain import explain as explain_job
@@ -64,7 +59,7 @@ def explain(configs, jobs, models, every, vary, folder, as_json, **how) -> int:
         screen.say_wrapped(f"running {which} of {study.name}{place}, and with one change at a time")
         with ProgressReporter(False, "variants") as progress:
             if models:
-                data = explain_models(study, job, vary, every, progress)
+                data = explain_models(study, job, every, progress)
             else:
                 found.append(explain_job(study, job, jobs or cores(), progress))
         if not models:
@@ -86,17 +81,3 @@ def explain(configs, jobs, models, every, vary, folder, as_json, **how) -> int:
     if as_json:
         screen.print_json(found)
     return code
-
-
-def check_varied(keys: Sequence[str]) -> None:
-    """Raise UsageError for a key that has no plausible range."""
-    from compressor.cases import row_of, suggestion
-
-    for key in keys:
-        whole, _, part = key.rpartition(".")
-        row = row_of(key)
-        if row is None:
-            raise click.UsageError(f"--vary {key}: unknown key{suggestion(part, whole)}")
-        if row.plausible is None:
-            missing = "it has no plausible range"
-            raise click.UsageError(f"--vary {key}: {missing}: sweep it, as in --set {key}=[...]")

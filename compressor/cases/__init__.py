@@ -2,6 +2,7 @@
 
 from compressor.cases.card import open_card
 from compressor.cases.case import (
+    FOLLOWING,
     MODEL_VERSION,
     Case,
     require_case,

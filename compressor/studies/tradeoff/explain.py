@@ -5,7 +5,6 @@ promises: model only what a scene requires.
 """
 
 import math
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
@@ -35,12 +34,11 @@ from compressor.solve import (
 from compressor.studies.tradeoff.page import ModelTable, model_table, percent
 from compressor.studies.tradeoff.variants import (
     FEATURES,
-    REPEATS,
-    SLOW_SECONDS,
     Feature,
     Variant,
     faulty,
     format_value,
+    run_fastest,
     run_variants,
     variants,
 )
@@ -63,7 +61,7 @@ def explain(
     pays for. progress: called with how many features have been tried, of how many.
     """
     case = study.cases[job]
-    run, seconds = time_case(case)
+    run, seconds = run_fastest(case, 2)  # the first one may load compiled code
     good = run["status"] == "ok"
     active, absent = terms(case)
     if case.body and good:
@@ -139,19 +137,6 @@ def unknown_names(case: Case) -> tuple[str, ...]:
         name for name, joint in zip(bristles, JOINTS, strict=False) if joint in faulty(case)
     )
     return found + tuple(name for name in names[2 * n :] if name.startswith("crank's lag"))
-
-
-def time_case(case: Case) -> tuple[xr.Dataset, float]:
-    """Run a case and return it with its wall time (s), the best of some runs if it is short."""
-    found: list[tuple[xr.Dataset, float]] = []
-    for _ in range(1 + REPEATS):
-        began = time.perf_counter()
-        run = simulate(case)
-        seconds = time.perf_counter() - began
-        found.append((run, seconds))
-        if run["status"] != "ok" or (len(found) > 1 and seconds > SLOW_SECONDS):
-            break  # the first one may load compiled code
-    return min(found, key=lambda one: one[1])
 
 
 def other_work(case: Case) -> list[str]:

@@ -6,7 +6,8 @@ guess (`Plausible` of `cases`), at both ends of their range. `run_variants` runs
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -16,6 +17,7 @@ import xarray as xr
 
 from compressor.cases import (
     CYLINDRICAL,
+    FOLLOWING,
     Case,
     CaseError,
     Output,
@@ -61,7 +63,6 @@ FRICTION_LAWS = {
 SCALES = {"÷ 2": 0.5, "× 2": 2.0}  # of the contact's stiffness and damping
 SCALED = ("contact.stiffness_N_per_mm15", "contact.damping_N_s_per_mm")
 SAME_STIFFNESS = 1.01  # stiffnesses of two joints
-FOLLOWING = ("switching", "back_pressure_MPa")
 OWN_CORNERS = (
     "cannot be: the paper prints the corners of its own cylinder alone; gas: {switching: exact, "
     "back_pressure_MPa: 0} has those of any"
@@ -358,26 +359,24 @@ def scaled_stiffness(case: Case, factor: float) -> tuple[Values, str]:
 # ---- numbers in doubt ---------------------------------------------------------------------------
 
 
-def vary_numbers(study: Study, job: int, named: Sequence[str] = ()) -> Iterator[Variant]:
+def vary_numbers(study: Study, job: int) -> Iterator[Variant]:
     """Yield a job with each number in doubt at both ends of its plausible range.
 
-    In doubt is what the file does not give, and what a plant can only guess; named: other keys that
-    are, though the file gives them. A key that the file sweeps is not varied, nor is the paper's
-    cylinder with the corners that the paper prints of it.
+    In doubt is what the file does not give, and what a plant can only guess. A key that the file
+    sweeps is not varied, nor is the paper's cylinder with the corners that the paper prints of it.
     """
     case, nested = study.cases[job], study.given(job)
     given, swept = values_given(nested), {axis.key for axis in study.axes}
-    for key in doubted_keys(case, named):
+    for key in keys_of(partial(value_of, case)):
         row, whole = row_of(key), key.rpartition(".")[0]
         names = {key, *stands_for(key)} | ({whole} if stands_for(whole) else set())
         doubt = row.plausible if row else None
-        if doubt is None or key in SCALED or not reads(case, key):
+        if doubt is None or key in SCALED or not reads(case, key) or names & swept:
             continue
-        is_named, is_given = not names.isdisjoint(named), not names.isdisjoint(given)
+        is_given = not names.isdisjoint(given)
         value = value_in(nested, key) if is_given else value_of(case, key)
         span = doubt.given if is_given else doubt.left_out
-        span = span or (doubt.left_out if is_named else None)
-        if span is None or value is None or (not names.isdisjoint(swept) and not is_named):
+        if span is None or value is None:
             continue
         base = nested
         if key.startswith("gas."):
@@ -385,7 +384,7 @@ def vary_numbers(study: Study, job: int, named: Sequence[str] = ()) -> Iterator[
                 yield Variant(key, None, OWN_CORNERS, key)
                 continue
             # which follow from what else is given of a cylinder, and are to stay
-            held = {name: getattr(case.gas, name) for name in FOLLOWING}
+            held = {key.removeprefix("gas."): value_of(case, key) for key in FOLLOWING}
             base = nested | {"gas": held | nested.get("gas", {})}
         if stands_for(whole) and not is_given:  # the other parts stay
             base = put(base, path_of(whole), value)
@@ -395,13 +394,6 @@ def vary_numbers(study: Study, job: int, named: Sequence[str] = ()) -> Iterator[
                 yield Variant(label, Case.resolve(put(base, path_of(key), end)), doubt.why, key)
             except CaseError as error:
                 yield Variant(label, None, f"cannot be: {error.problems[0]}", key)
-
-
-def doubted_keys(case: Case, named: Sequence[str]) -> Iterator[str]:
-    """Yield the keys of a case; of parts with one value in common each where one is named."""
-    for key in keys_of(partial(value_of, case)):
-        parts = stands_for(key)
-        yield from parts if {*parts}.intersection(named) else (key,)
 
 
 # ---- runs ---------------------------------------------------------------------------------------
@@ -433,20 +425,16 @@ def choose_job(study: Study, folder: Folder) -> tuple[int, str]:
 
 
 def explain_models(
-    study: Study,
-    job: int,
-    named: Sequence[str] = (),
-    every: bool = False,
-    progress: Progress = no_progress,
+    study: Study, job: int, every: bool = False, progress: Progress = no_progress
 ) -> xr.Dataset:
     """Run a job of a study, with every number in doubt, and by every other model of its machine.
 
-    named: as of `vary_numbers`; every: with all other features toggled, too. Returns the Dataset of
-    `run_variants` with the attributes `study` and `key` (of the job).
+    every: with all other features toggled, too. Returns the Dataset of `run_variants` with the
+    attributes `study` and `key` (of the job).
     """
     case = replace(study.cases[job], wear=None)  # which is of no single run
     models = [*variants(case), *scale_contact(case)] if every else [*other_models(case)]
-    data = run_variants(case, [*vary_numbers(study, job, named), *models], progress)
+    data = run_variants(case, [*vary_numbers(study, job), *models], progress)
     return data.assign_attrs({"study": study.name, "key": study.keys[job]})
 
 
@@ -464,13 +452,18 @@ def run_variants(
     needs = Needs.of([one.case for one in every if one.case])
     compile_once(needs, lambda remark: progress(0, len(every), remark))
     runs: list[xr.Dataset] = []
+    names = [name + end for name in COMPARED for end in ("", "_error")]
     for one in report_progress(every, progress):
         if one.case is None:
             runs.append(without_numbers(runs[0]))
             continue
         # the first run of the case itself may load compiled code
         limit, least = (MAX_SECONDS, 1) if runs else (math.inf, 2)
-        runs.append(compare_metrics(fastest_run(one.case, limit, least)))
+        seconds = min(one.case.solve.timeout_s, limit)
+        solve = replace(one.case.solve, error_bars=True, timeout_s=seconds)
+        output = Output("metrics", signals=one.case.output.signals)
+        run, _ = run_fastest(replace(one.case, wear=None, output=output, solve=solve), least)
+        runs.append(run[[*WORDS, *(name for name in names if name in run)]])
         if runs[0]["status"] != "ok":
             break
     lacking = without_numbers(runs[0])  # where a failed run has nothing of body and sensor
@@ -488,27 +481,19 @@ def run_variants(
     return table.assign_attrs(attrs | {"detail": runs[0].attrs.get("detail", "")})
 
 
-def fastest_run(case: Case, limit: float, least: int) -> xr.Dataset:
-    """Run a case with error bars and without series, in limited time (s).
+def run_fastest(case: Case, least: int) -> tuple[xr.Dataset, float]:
+    """Run a case as often as `least`, and again where it is short.
 
-    As often as `least`, and again where it is short; return the run of the least wall time.
+    Returns the run whose solution took the least wall time, and its own wall time with all else, s.
     """
-    seconds = min(case.solve.timeout_s, limit)
-    solve = replace(case.solve, error_bars=True, timeout_s=seconds)
-    output = Output("metrics", signals=case.output.signals)
-    bare = replace(case, wear=None, output=output, solve=solve)
-    runs: list[xr.Dataset] = []
-    while len(runs) < least or (len(runs) < REPEATS and runs[-1]["seconds"] < SLOW_SECONDS):
-        runs.append(simulate(bare))
-        if runs[-1]["status"] != "ok":
+    runs: list[tuple[xr.Dataset, float]] = []
+    while len(runs) < least or (len(runs) < REPEATS and runs[-1][0]["seconds"] < SLOW_SECONDS):
+        began = time.perf_counter()
+        run = simulate(case)
+        runs.append((run, time.perf_counter() - began))
+        if run["status"] != "ok":
             break
-    return min(runs, key=lambda one: one["seconds"].item())
-
-
-def compare_metrics(run: xr.Dataset) -> xr.Dataset:
-    """Return what is compared of a run."""
-    names = (name + end for name in COMPARED for end in ("", "_error"))
-    return run[[*WORDS, *(name for name in names if name in run)]]
+    return min(runs, key=lambda one: one[0]["seconds"].item())
 
 
 def without_numbers(run: xr.Dataset) -> xr.Dataset:

@@ -132,10 +132,10 @@ def read_study(tmp_path, text=PLANT):
     return load_studies(path)[0]
 
 
-def ends(study, **more):
+def ends(study):
     """The values at which each number in doubt is run, by its key."""
     found = {}
-    for one in vary_numbers(study, 1, **more):
+    for one in vary_numbers(study, 1):
         assert one.name.startswith(f"{one.varied} ")
         found.setdefault(one.varied, []).append(float(one.name.removeprefix(one.varied)))
     return found
@@ -157,29 +157,6 @@ def test_what_the_file_leaves_out_or_can_only_guess_is_varied(tmp_path):
         "guide.friction", "friction.bristle_stiffness_per_mm", "clearance_mm.small_end",
     }  # fmt: skip  # given as known, scaled elsewhere, not read, or swept
     assert not lacking & {*found}
-
-
-@pytest.mark.parametrize(
-    ("machine", "name", "varied"),
-    [
-        ("{pin_radius_mm: 40}", "machine.pin_radius_mm.small_end", {"small_end": [28, 60]}),
-        ("{}", "machine.pin_radius_mm.small_end", {"big_end": [7, 15], "small_end": [7, 15]}),
-        ("{pin_radius_mm: {big_end: 60, small_end: 40}}", "machine.pin_radius_mm",
-         {"big_end": [42, 90], "small_end": [28, 60]}),
-        ("{pin_radius_mm: {big_end: 40, small_end: [40, 50]}}", "machine.rod_mass_kg", {}),
-    ],
-)  # fmt: skip
-def test_a_part_is_varied_by_its_own_name_and_with_its_whole(tmp_path, machine, name, varied):
-    path = tmp_path / "pins.yaml"
-    path.write_text(f"joint: both\nclearance_mm: 0.2\nmachine: {machine}\n", encoding="utf-8")
-    (study,) = load_studies(str(path))
-    pins, found = vars(study.cases[0].machine.pin_radius_mm), {}
-    for one in vary_numbers(study, 0, [name]):
-        for part, value in vars(one.case.machine.pin_radius_mm).items():
-            if value != pins[part]:
-                assert one.name == f"machine.pin_radius_mm.{part} {value:.4g}"
-                found.setdefault(part, []).append(value)
-    assert {part: pytest.approx(values) for part, values in found.items()} == varied
 
 
 PAPER_RIG = "joint: big_end\nclearance_mm: 0.2\nload: gas\n"
