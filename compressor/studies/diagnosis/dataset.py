@@ -147,8 +147,7 @@ def stack_rows(
                         {"long_name": "tacho pulse that a window begins with"}),
         "split": ("window", np.where(test, "test", "train"),
                   {"long_name": "train or test, by machine"}),
-        "feature_unit": ("feature", [one.unit or "1" for one in FEATURES.values()]),
-        "feature_phrase": ("feature", [one.phrase for one in FEATURES.values()]),
+        "feature_phrase": ("feature", [*FEATURES.values()]),
     }  # fmt: skip
     if rows[0]["signal"] is not None:
         sizes = np.array([row["signal"].size for row in rows])
@@ -303,8 +302,7 @@ def write_card(dataset: xr.Dataset) -> str:
         "seed of noise and split": attrs["seed"],
         **{f"jobs left out: {reason}": count for reason, count in left.items()},
     }
-    features_ = zip(*(dataset[n].values for n in ("feature", "feature_unit", "feature_phrase")),
-                    strict=True)  # fmt: skip
+    described = zip(dataset["feature"].values, dataset["feature_phrase"].values, strict=True)
     return CARD.format(
         study=attrs["study"], program=attrs["program"], case_file=attrs["case_file"],
         windows_file=WINDOWS, table_file=TABLE,
@@ -315,7 +313,7 @@ def write_card(dataset: xr.Dataset) -> str:
         labels=tabulate(("label", "unit", "what it is", "values"),
                         [(name, one.unit, one.phrase, list_values(dataset[name].values.tolist()))
                          for name, one in LABELS.items()]),
-        features=tabulate(("feature", "unit", "what it is"), features_),
+        features=tabulate(("feature", "what it is"), described),
         swept=tabulate(("key", "unit", "values"), json.loads(attrs["axes"])),
         case=tabulate(("key", "value"), case),
     )  # fmt: skip

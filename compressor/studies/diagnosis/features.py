@@ -7,7 +7,6 @@ Whole revolutions count alone, from the first tacho pulse to the last.
 
 import itertools
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -30,40 +29,22 @@ BEATS = (1, 2, 3, 4)  # orders of the envelope
 SMALLEST = 1e-6  # share that the logarithm of a share is taken of at least
 
 
-class SignalFeature(NamedTuple):
-    """A feature's unit and phrase."""
-
-    unit: str
-    phrase: str
-
-
 ABOVE = f"the energy above order {SWING:g}"
-FEATURES = {
-    "level": SignalFeature("", "log10 of the rms in m/s2"),
-    "speed": SignalFeature("", "log10 of the speed in rev/s"),
-    "crest_factor": SignalFeature("1", "greatest magnitude over rms"),
-    "kurtosis": SignalFeature("1", "fourth central moment over the square of the second"),
-    "gini": SignalFeature("1", "Gini index of magnitudes"),
-    "energy_angle": SignalFeature("1", f"share of angle with 90 % of {ABOVE}"),
-    "above_swing": SignalFeature("", f"log10 of the share of {ABOVE}"),
-    "synchronous": SignalFeature("1", f"of {ABOVE}, that every turn repeats"),
-    **{
-        f"band_{low:g}": SignalFeature(
-            "", f"log10 of the share of the energy, {low:g} to {high:g} Hz"
-        )
-        for low, high in itertools.pairwise((*BANDS, math.inf))
-    },
-    **{
-        f"sector_{begin}": SignalFeature(
-            "", f"log10 of the share of {ABOVE}, from {begin} degrees on"
-        )
-        for begin in range(0, 360, 360 // SECTORS)
-    },
-    **{
-        f"envelope_{beat}": SignalFeature("1", f"order {beat} of the envelope over its mean")
-        for beat in BEATS
-    },
-}
+FEATURES = {  # name -> phrase
+    "level": "log10 of the rms in m/s2",
+    "speed": "log10 of the speed in rev/s",
+    "crest_factor": "greatest magnitude over rms",
+    "kurtosis": "fourth central moment over the square of the second",
+    "gini": "Gini index of magnitudes",
+    "energy_angle": f"share of angle with 90 % of {ABOVE}",
+    "above_swing": f"log10 of the share of {ABOVE}",
+    "synchronous": f"of {ABOVE}, that every turn repeats",
+    **{f"band_{low:g}": f"log10 of the share of the energy, {low:g} to {high:g} Hz"
+       for low, high in itertools.pairwise((*BANDS, math.inf))},
+    **{f"sector_{begin}": f"log10 of the share of {ABOVE}, from {begin} degrees on"
+       for begin in range(0, 360, 360 // SECTORS)},
+    **{f"envelope_{beat}": f"order {beat} of the envelope over its mean" for beat in BEATS},
+}  # fmt: skip
 
 
 def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[str, float]:

@@ -6,7 +6,7 @@ coordinate `attrs["over"]` names, and those of the variables.
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -39,6 +39,7 @@ ROWS_OF = {"chaotic": 6.2, "undecided": 7.2}
 FAILED = replace(MARKS["failed"], color=BLACK, markersize=5, edge_width=1.3)
 FAILED_NAME = "a run failed here"
 MILLI = 1e3
+NO_BARS: Mapping[str, np.ndarray] = {}
 
 
 class Stretch(NamedTuple):
@@ -99,17 +100,30 @@ def title_key(over: xr.DataArray) -> str:
 
 def draw_followed(machine: xr.Dataset, title: str = "") -> PlotlyFigure:
     """Return one machine over the key: Poincaré points, period, exponent, time without contact."""
-    over, joints = machine.attrs["over"], joints_with_points(machine)
+    over, known = machine.attrs["over"], machine["section"].notnull()
+    known = known.any([dim for dim in known.dims if dim != "joint"])
+    joints = [str(joint) for joint in machine["joint"].values[known.values]]
     x, log = positions(machine, over), bool(machine.attrs["log"])
     ratios = [2.2] * len(joints) + [1.2, 1.4] + [0.8] * len(joints)
     drawing, _ = make_grid(len(ratios), 1, 1.35 * sum(ratios) + 1.2, heights=ratios)
     panels = drawing.panels
+    chains = {str(name): machine.sel(direction=name) for name in machine["direction"].values}
     for joint, panel in zip(joints, panels, strict=False):
-        plot_points(panel, machine, joint)
-    plot_periods(panels[len(joints)], machine)
-    plot_exponents(panels[len(joints) + 1], machine)
+        points = {name: chain["section"].sel(joint=joint, coordinate="x").transpose(over, ...)
+                  for name, chain in chains.items()}  # fmt: skip
+        panel.label("y", "e<sub>x</sub> (mm)")
+        plot(panel, x, {name: MILLI * one.values for name, one in points.items()}, 0.7)
+        panel.title = f"journal's place along the cylinder, {SPOKEN[joint]}, once a revolution"
+        leave_room(panel)
+    plot_periods(panels[len(joints)], x, chains)
+    plot_exponents(panels[len(joints) + 1], x, chains)
     for joint, panel in zip(joints, panels[len(joints) + 2 :], strict=True):
-        plot_gaps(panel, machine, joint)
+        shares = {name: 100.0 * chain["contact_loss_fraction"].sel(joint=joint).values
+                  for name, chain in chains.items()}  # fmt: skip
+        plot(panel, x, shares)
+        panel.title = f"time without dry contact, {SPOKEN[joint]}"
+        panel.y.title = "%"
+        leave_room(panel)
     low, *_, high = midway(np.sort(x), log)
     panels[0].x.type = "log" if log else None
     panels[0].span("x", low, high)
@@ -123,40 +137,27 @@ def draw_followed(machine: xr.Dataset, title: str = "") -> PlotlyFigure:
     return drawing.figure()
 
 
-def joints_with_points(machine: xr.Dataset) -> list[str]:
-    """Return the joints that have Poincaré points."""
-    known = machine["section"].notnull()
-    known = known.any([dim for dim in known.dims if dim != "joint"])
-    return [str(joint) for joint in machine["joint"].values[known.values]]
+def plot(
+    panel: Panel,
+    x: np.ndarray,
+    of: dict[str, np.ndarray],
+    times: float = 1.0,
+    bars: Mapping[str, np.ndarray] = NO_BARS,
+) -> None:
+    """Draw numbers at each value, (values,) or (values, n), by direction, in marks of its own.
+
+    times: size of the marks.
+    """
+    for name, numbers in of.items():
+        color, size, zorder = BY_DIRECTION[name]
+        look = mark(color, "circle", times * size, zorder, edge_width=0.0)
+        at = np.repeat(x, numbers[0].size)
+        panel.plot(at, numbers.ravel(), look, name, bars.get(name))
 
 
-def direction_styles(machine: xr.Dataset, times: float = 1.0) -> dict[str, LineStyle]:
-    """Return the marks of the directions that there are, so many times their size."""
-    found = {str(name): BY_DIRECTION[str(name)] for name in machine["direction"].values}
-    return {
-        name: mark(color, "circle", times * size, zorder, edge_width=0.0)
-        for name, (color, size, zorder) in found.items()
-    }
-
-
-def plot_points(panel: Panel, machine: xr.Dataset, joint: str) -> None:
-    """Draw the journal's place along the cylinder, once a revolution, at each value."""
-    over = machine.attrs["over"]
-    panel.label("y", "e<sub>x</sub> (mm)")
-    for direction, look in direction_styles(machine, 0.7).items():
-        points = machine["section"].sel(direction=direction, joint=joint, coordinate="x")
-        points = points.transpose(over, "revolution")
-        x = np.repeat(positions(machine, over), points.sizes["revolution"])
-        panel.plot(x, MILLI * points.values.ravel(), look, direction)
-    panel.title = f"journal's place along the cylinder, {SPOKEN[joint]}, once a revolution"
-    leave_room(panel)
-
-
-def plot_periods(panel: Panel, machine: xr.Dataset) -> None:
+def plot_periods(panel: Panel, x: np.ndarray, chains: dict[str, xr.Dataset]) -> None:
     """Draw the period at each value; above it where there is none."""
-    x = positions(machine, machine.attrs["over"])
-    for direction, look in direction_styles(machine, 1.2).items():
-        panel.plot(x, period_rows(machine.sel(direction=direction)), look, direction)
+    plot(panel, x, {name: period_rows(chain) for name, chain in chains.items()}, 1.2)
     rows = PERIODS | ROWS_OF
     panel.name_ticks("y", [*map(str, rows)], [*rows.values()])
     panel.span("y", -1.3, max(ROWS_OF.values()) + 0.6)
@@ -173,29 +174,18 @@ def period_rows(chain: xr.Dataset) -> np.ndarray:
     return np.where(is_ok, rows, np.nan)
 
 
-def plot_exponents(panel: Panel, machine: xr.Dataset) -> None:
+def plot_exponents(panel: Panel, x: np.ndarray, chains: dict[str, xr.Dataset]) -> None:
     """Draw the largest Lyapunov exponent with its error at each value."""
-    x = positions(machine, machine.attrs["over"])
-    for direction, look in direction_styles(machine).items():
-        chain = machine.sel(direction=direction)
-        bars = chain["lyapunov_exponent_error"].values
-        bars = np.where(np.isfinite(bars), bars, np.nan)
-        exponents = chain["lyapunov_exponent"].values
-        panel.plot(x, exponents, look, direction, np.stack([bars, bars]))
+    bars = {}
+    for name, chain in chains.items():
+        size = chain["lyapunov_exponent_error"].values
+        bars[name] = np.stack([np.where(np.isfinite(size), size, np.nan)] * 2)
+    plot(
+        panel, x, {name: one["lyapunov_exponent"].values for name, one in chains.items()}, bars=bars
+    )
     panel.rule(LineStyle(BLACK, linewidth=0.8), y=0.0)
     panel.title = "largest Lyapunov exponent, with its 95 % bar; above 0 close motions part"
     panel.y.title = "per revolution"
-    leave_room(panel)
-
-
-def plot_gaps(panel: Panel, machine: xr.Dataset, joint: str) -> None:
-    """Draw the share of time in which a joint has no dry contact."""
-    x = positions(machine, machine.attrs["over"])
-    for direction, look in direction_styles(machine).items():
-        shares = machine["contact_loss_fraction"].sel(direction=direction, joint=joint)
-        panel.plot(x, 100.0 * shares.values, look, direction)
-    panel.title = f"time without dry contact, {SPOKEN[joint]}"
-    panel.y.title = "%"
     leave_room(panel)
 
 

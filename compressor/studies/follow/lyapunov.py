@@ -19,7 +19,6 @@ from compressor.cases import Case
 from compressor.solve import (
     Request,
     integrate,
-    is_ideal,
     natural_sizes,
     parts,
     record,
@@ -53,14 +52,13 @@ class Exponent(NamedTuple):
 
 
 class Growth(NamedTuple):
-    """How a difference grew within a span: ln(d / d0), the span's revolutions, its last direction.
+    """How a difference grew within a span: ln(d / d0), and the span's revolutions.
 
     `lost`: it shrank to what errors make; `growth` is then a bound from above.
     """
 
     growth: float
     span: float
-    difference: np.ndarray
     lost: bool
 
 
@@ -71,13 +69,8 @@ def largest_exponent(case: Case, state: np.ndarray, revolutions: int, timeout: f
     `Request.start` takes it; revolutions: how many are counted, after `MIN_TURNING_REV` or a
     quarter as many in which the difference turns, fewer than 8 give no error (inf); timeout: wall
     time (s). The case's own method, tolerance and max_steps do not count. The same call gives the
-    same numbers to the bit, unless the time is up. Raises ValueError where all joints are ideal:
-    there is no motion of theirs.
+    same numbers to the bit, unless the time is up.
     """
-    if is_ideal(case):
-        raise ValueError("all joints are ideal: the crank alone moves the machine")
-    if revolutions < 1:
-        raise ValueError(f"{revolutions} revolutions: an exponent needs one at least")
     p, deadline = record(case), time.monotonic() + timeout
     size, times = natural_sizes(p), case.turn * np.arange(INTERVALS + 1) / INTERVALS
     # positions and rates alone: what else a state holds, such as a crank's lag, need not fade
@@ -128,7 +121,7 @@ def growths(
         growth = math.log(max(lengths[last], LOST_DISTANCE) / close)
         if lengths[-1] > 0.0:
             difference = differences[-1] * (close / lengths[-1])
-        found.append(Growth(growth, (last + 1) / len(lengths), difference, lost))
+        found.append(Growth(growth, (last + 1) / len(lengths), lost))
     return found
 
 

@@ -127,12 +127,3 @@ def test_explicit_steps_that_stability_holds_do_not_part_motions():
     made = case({"joint": "small_end", "clearance_mm": 0.2, "contact": heavy})
     found = largest_exponent(made, settled(made, 4, 1e-6), 4, math.inf)
     assert -1.1 < found.value < -0.8
-
-
-def test_what_has_no_exponent_is_refused():
-    ideal = case({"joint": "none"})
-    with pytest.raises(ValueError, match="all joints are ideal"):
-        largest_exponent(ideal, np.zeros(4), 8, math.inf)
-    made = case(LIGHT)
-    with pytest.raises(ValueError, match="0 revolutions"):
-        largest_exponent(made, at_rest(made), 0, math.inf)
