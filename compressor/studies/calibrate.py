@@ -16,19 +16,20 @@ range's width, and its keys are named.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from compressor.cases import Case, design, load_studies, row_of
-from compressor.program import CompsimError, Progress, no_progress
+from compressor.program import Progress, no_progress
 from compressor.store import Folder, job_record, read_store
 from compressor.studies.frame import (
     DIGITS,
     USABLE,
     GrowingStudy,
     Point,
+    StudyError,
     by_revolutions,
     read_range,
     replace_settings,
@@ -38,12 +39,6 @@ from compressor.vibration import Record
 # ---- a record's orders
 
 AROUND = 9  # orders over which noise is taken to be alike
-
-
-class CalibrationError(CompsimError):
-    """A question by which no machine can be fitted."""
-
-    exit_code = 2
 
 
 @dataclass(frozen=True)
@@ -58,12 +53,6 @@ class Orders:
     errors: np.ndarray
     revolutions: int
     speed: float
-
-    def up_to(self, highest: int) -> "Orders":
-        """Return the orders from 1 to `highest`."""
-        return Orders(
-            self.amplitudes[:highest], self.errors[:highest], self.revolutions, self.speed
-        )
 
 
 def orders_of(record: Record) -> Orders:
@@ -116,11 +105,6 @@ class Fit:
     misfit: float
     explained: float
     noise: float
-
-    def interval(self, place: int) -> tuple[float, float]:
-        """Return the ends of an unknown's 95 % interval, as shares, within its range."""
-        half = SURE * self.deviations[place]
-        return max(0.0, self.shares[place] - half), min(1.0, self.shares[place] + half)
 
 
 def weigh(amplitudes: np.ndarray, errors: np.ndarray) -> np.ndarray:
@@ -254,19 +238,19 @@ class Unknown:
 
     @classmethod
     def written(cls, text: str) -> "Unknown":
-        """Return the unknown of a text KEY=LOW:HIGH. Raises CalibrationError."""
+        """Return the unknown of a text KEY=LOW:HIGH. Raises StudyError."""
         parts = read_range(text)
         if parts is None or parts[3] is not None or not parts[1] < parts[2]:
-            raise CalibrationError(
+            raise StudyError(
                 f"{text!r} is no range: write KEY=LOW:HIGH, such as "
                 "machine.reciprocating_mass_kg=10:20"
             )
         key, low, high, _ = parts
         row = row_of(key)
         if row is None or row.kind != "number":
-            raise CalibrationError(f"{key!r} is no key with a number that can be fitted")
+            raise StudyError(f"{key!r} is no key with a number that can be fitted")
         if row.key == SPEED:
-            raise CalibrationError(f"{SPEED} is the record's own: leave it out of --fit")
+            raise StudyError(f"{SPEED} is the record's own: leave it out of --fit")
         return cls(key, low, high)
 
     def value(self, share: float) -> float:
@@ -274,18 +258,27 @@ class Unknown:
         return float(f"{self.low + share * (self.high - self.low):.{DIGITS}g}")
 
 
+class Fitted(NamedTuple):
+    """A key's value, and the ends of its 95 % interval within its range, in the file's unit."""
+
+    value: float
+    low: float
+    high: float
+
+
 @dataclass(frozen=True)
 class Calibration:
     """What a record says of a case's unknown keys.
 
-    case: with the fitted values, and the record's speed; unknowns and `fit`: in the same order;
-    orders: how many were compared; revolutions, speed (rev/s): of the record; rpm_given: the speed
-    that the case file has; jobs: points that were looked at, `run_now` of them run now, in study
-    `study`.
+    case: with the fitted values, and the record's speed; keys: in the order of `fit`; at_end: those
+    at an end of their range; orders: how many were compared; revolutions, speed (rev/s): of the
+    record; rpm_given: the speed that the case file has; jobs: points that were looked at, `run_now`
+    of them run now, in study `study`.
     """
 
     case: Case
-    unknowns: tuple[Unknown, ...]
+    keys: dict[str, Fitted]
+    at_end: tuple[str, ...]
     fit: Fit
     orders: int
     revolutions: int
@@ -295,11 +288,11 @@ class Calibration:
     run_now: int
     study: str
 
-    def interval(self, place: int) -> tuple[float, float]:
-        """Return the ends of a key's 95 % interval, in the case file's unit."""
-        one = self.unknowns[place]
-        low, high = self.fit.interval(place)
-        return one.value(low), one.value(high)
+    @property
+    def open_keys(self) -> list[list[str]]:
+        """Return the keys that the record does not separate, or does not determine."""
+        names = [*self.keys]
+        return [[names[place] for place in group] for group in self.fit.open_directions]
 
 
 class FitJobs:
@@ -317,7 +310,7 @@ class FitJobs:
         self.highest = 0  # order that is compared
         self.middle = self.case_at(np.full(len(unknowns), 0.5))
         if self.middle.body is None or self.middle.sensor is None:
-            raise CalibrationError(
+            raise StudyError(
                 f"{path} has no sensor to compare a record with: add body and sensor to it"
             )
 
@@ -332,13 +325,13 @@ class FitJobs:
         return tuple(one.value(share) for one, share in pairs)
 
     def case_at(self, shares: np.ndarray) -> Case:
-        """Return the case at shares of the ranges. Raises CaseFileError and CalibrationError."""
+        """Return the case at shares of the ranges. Raises CaseFileError and StudyError."""
         pairs = zip(self.unknowns, self.point(shares), strict=True)
         texts = replace_settings(self.plain, *(f"{one.key}={value!r}" for one, value in pairs))
         (found,) = load_studies(self.study.path, overrides=texts)
         if found.jobs != 1:
             axes = ", ".join(axis.key for axis in found.axes)
-            raise CalibrationError(
+            raise StudyError(
                 f"{self.study.path} makes {found.jobs} jobs where one machine is fitted, by "
                 f"{axes}: choose one case by --set"
             )
@@ -369,10 +362,10 @@ def calibrate(
 
     The case runs at the record's mean speed, without noise; compared are complex orders of the mean
     revolution, up to what the record's and the case's sampling rate hold, by bounded least squares.
-    Raises CaseFileError, CalibrationError, StoreError and WorkersFailed.
+    Raises CaseFileError, StudyError, StoreError and WorkersFailed.
     """
     if not unknowns:
-        raise CalibrationError("nothing is to be fitted: give --fit KEY=LOW:HIGH")
+        raise StudyError("nothing is to be fitted: give --fit KEY=LOW:HIGH")
     measured = orders_of(record)
     jobs = FitJobs(path, unknowns, overrides, folder, workers, progress)
     rpm_given = jobs.middle.machine.speed_rpm
@@ -381,18 +374,22 @@ def calibrate(
     assert sensor is not None
     corner = sensor.low_pass_Hz or sensor.rate_Hz / USABLE  # the highest order that both hold
     jobs.highest = min(len(measured.amplitudes), int(corner / measured.speed))
-    measured = measured.up_to(jobs.highest)
     starts = np.array(design("lhs", POINTS_A_KEY * len(unknowns), len(unknowns), SEED))
-    fit = fit_orders(jobs, measured.amplitudes, measured.errors, starts)
+    amplitudes, errors = measured.amplitudes[: jobs.highest], measured.errors[: jobs.highest]
+    fit = fit_orders(jobs, amplitudes, errors, starts)
     study = jobs.study
     if not study.jobs:
         raise next(iter(study.refused.values()))  # no point of the ranges makes a case
     if fit is None:
-        raise CalibrationError(f"each job of study {study.name} failed: compsim status shows why")
-    case = jobs.case_at(fit.shares)
+        raise StudyError(f"each job of study {study.name} failed: compsim status shows why")
+    ends = np.clip([[0.0], [-SURE], [SURE]] * fit.deviations + fit.shares, 0.0, 1.0)
+    keys = {one.key: Fitted(*map(one.value, column))
+            for one, column in zip(unknowns, ends.T.tolist(), strict=True)}  # fmt: skip
+    is_end = np.minimum(fit.shares, 1.0 - fit.shares) < 1e-3
+    at_end = tuple(one.key for one, ends in zip(unknowns, is_end, strict=True) if ends)
     return Calibration(
-        case, tuple(unknowns), fit, jobs.highest, measured.revolutions, measured.speed, rpm_given,
-        len(study.jobs), study.run_now, study.name,
+        jobs.case_at(fit.shares), keys, at_end, fit, jobs.highest, measured.revolutions,
+        measured.speed, rpm_given, len(study.jobs), study.run_now, study.name,
     )  # fmt: skip
 
 
@@ -406,38 +403,32 @@ def list_fit(record: str, config: str, found: Calibration) -> Iterator[str]:
     fit, rpm = found.fit, f"{60 * found.speed:.6g} rpm, in place of the file's {found.rpm_given:g}"
     turns = f"{found.revolutions} revolutions at {rpm}; orders 1 to {found.orders}"
     yield f"{config}, fitted to {record}: {turns}"
-    for place, one in enumerate(found.unknowns):
-        low, high = found.interval(place)
-        share = fit.shares[place]
-        more = "; at an end of its range: widen it" if min(share, 1.0 - share) < 1e-3 else ""
-        yield f"{one.key}: {one.value(share):.4g}, 95 % interval {low:.4g} to {high:.4g}{more}"
+    for key, one in found.keys.items():
+        more = "; at an end of its range: widen it" if key in found.at_end else ""
+        yield f"{key}: {one.value:.4g}, 95 % interval {one.low:.4g} to {one.high:.4g}{more}"
     explained = f"{fit.explained:.2%} of the mean revolution's mean square"
     yield f"the machine explains {explained}; noise is {fit.noise:.2g} of it"
     if fit.misfit >= POOR_FIT:
         times = f"{fit.misfit:.3g} times what a model may err; intervals are widened by as much"
         yield f"THE MACHINE DOES NOT FIT: orders are off by {times}"
-    for group in fit.open_directions:
-        keys = " and ".join(found.unknowns[place].key for place in group)
+    for group in found.open_keys:
         how = "are not separated" if len(group) > 1 else "is not determined"
-        yield f"{keys} {how}: the record narrows their range by less than half"
+        yield f"{' and '.join(group)} {how}: the record narrows their range by less than half"
 
 
 def jsonable_fit(record: str, found: Calibration) -> dict[str, Any]:
     """Return what was fitted as JSON says it."""
-    fit, keys = found.fit, {}
-    for place, one in enumerate(found.unknowns):
-        low, high = found.interval(place)
-        keys[one.key] = {"value": one.value(fit.shares[place]), "low": low, "high": high}
+    fit = found.fit
     return {
         "record": record,
         "study": found.study,
-        "keys": keys,
+        "keys": {key: one._asdict() for key, one in found.keys.items()},
         "misfit": fit.misfit,
         "explained": fit.explained,
         "noise": fit.noise,
         "orders": found.orders,
         "revolutions": found.revolutions,
         "speed_rpm": 60 * found.speed,
-        "not_told_apart": [[found.unknowns[p].key for p in group] for group in fit.open_directions],
+        "not_told_apart": found.open_keys,
         "case": found.case.values(),
     }

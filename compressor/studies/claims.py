@@ -15,7 +15,7 @@ import xarray as xr
 from compressor.analysis import LOADS, RULES, claim_margins, label, paper_cases, saltelli_design
 from compressor.cases import Case, points
 from compressor.digits import setting
-from compressor.program import CompsimError, Progress, no_progress, report_progress
+from compressor.program import Progress, no_progress, report_progress
 from compressor.report import (
     BLACK,
     BLUE,
@@ -42,6 +42,7 @@ from compressor.store import (
     read_store,
     swept_column,
 )
+from compressor.studies.frame import StudyError
 
 CLAIMS = tuple(range(1, len(RULES) + 1))
 SHORT = (
@@ -65,12 +66,6 @@ REMEDY = "compsim init claims writes a case file with all eleven cases of each m
 Key = tuple[tuple[str, Any], ...]  # swept values of a machine
 
 
-class ClaimsError(CompsimError, ValueError):
-    """A study that makes no machines to judge."""
-
-    exit_code = 2
-
-
 class Margins(NamedTuple):
     """How far a machine is from each claim's threshold; nan where jobs are missing or failed.
 
@@ -89,7 +84,7 @@ class Margins(NamedTuple):
 def machines(source: StoredStudy) -> dict[Key, dict[str, str]]:
     """Return the keys of the jobs of each machine, by the labels of the paper's cases.
 
-    Jobs that are none of these are left aside. Raises ClaimsError without a machine that has all.
+    Jobs that are none of these are left aside. Raises StudyError without a machine that has all.
     """
     ideal = {load: name for name, load in LOADS.items()}
     found: dict[Key, dict[str, str]] = {}
@@ -102,7 +97,7 @@ def machines(source: StoredStudy) -> dict[Key, dict[str, str]]:
         if name in LABELS:
             found.setdefault(machine, {})[name] = key
     if not any(len(jobs) == len(LABELS) for jobs in found.values()):
-        raise ClaimsError(f"study {source.name} has no machine with the paper's cases: {REMEDY}")
+        raise StudyError(f"study {source.name} has no machine with the paper's cases: {REMEDY}")
     return found
 
 
@@ -112,7 +107,7 @@ def judge_machines(
     """Return the margins of each machine of a stored study, with the dimension machine.
 
     `margin`, `error` over claim; `share_margin`, `share_error` over share; swept keys are
-    coordinates, in the case file's unit. Raises ClaimsError and StoreError.
+    coordinates, in the case file's unit. Raises StudyError and StoreError.
     """
     found = machines(source)
     stored = read_store(folder, warn=True)

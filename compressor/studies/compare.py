@@ -15,7 +15,7 @@ import numpy as np
 
 from compressor.cases import Case, points
 from compressor.digits import align_columns, plural
-from compressor.program import CompsimError, Progress, no_progress
+from compressor.program import Progress, no_progress
 from compressor.report import BLACK, CYCLE, GREY, LineStyle, PlotlyFigure, fill, make_grid
 from compressor.store import (
     Folder,
@@ -26,7 +26,7 @@ from compressor.store import (
     read_studies,
     report_job,
 )
-from compressor.studies.frame import Revolutions, by_revolutions
+from compressor.studies.frame import Revolutions, StudyError, by_revolutions
 from compressor.vibration import RecordError, segment_levels
 
 SEGMENTS = 36
@@ -49,12 +49,6 @@ MISTAKES = {  # ratio of rms -> what was probably mistaken
 MAX_LISTED = 20  # jobs
 MAX_DRAWN = 3  # jobs with a line of their own; the others are in the range alone
 KEY_DIGITS = 10
-
-
-class CompareError(CompsimError):
-    """A comparison that cannot be made."""
-
-    exit_code = 2
 
 
 # ---- how alike two records are ------------------------------------------------------------------
@@ -285,7 +279,7 @@ def compare_record(
     """Return a record, a file or a stored job's, beside the jobs that words name.
 
     words: beginnings of jobs' keys, and names of studies, in which a record's own job is left out;
-    hints: of `find_record`. Raises RecordError, StoreError, and CompareError where no job is left
+    hints: of `find_record`. Raises RecordError, StoreError, and StudyError where no job is left
     or orders are too few.
     """
     key, record = find_record(name, folder, hints)
@@ -313,7 +307,7 @@ def compare_record(
             jobs.append(Compared(one, what, theirs.rpm, place, orders, likeness, drawn))
     if not jobs:
         text = f"none of the {len(wanted)} jobs has a sensor's record of two revolutions"
-        raise CompareError(f"{text}: run them with body: true, sensor: true and series kept")
+        raise StudyError(f"{text}: run them with body: true, sensor: true and series kept")
     jobs.sort(key=lambda job: np.nan_to_num(job.likeness["difference"].value, nan=math.inf))
     several = np.array([job.curves.envelope for job in jobs])
     ratio = jobs[0].likeness["rms_ratio"].value
@@ -326,10 +320,10 @@ def compare_record(
 
 
 def check_orders(orders: int, what: str) -> None:
-    """Raise CompareError where a sampling rate holds too few orders."""
+    """Raise StudyError where a sampling rate holds too few orders."""
     if orders <= SWING:
         text = f"{what}: the sampling rate holds the orders up to {orders} alone"
-        raise CompareError(f"{text}: record with more than {SWING + 1} times 2.56 samples a turn")
+        raise StudyError(f"{text}: record with more than {SWING + 1} times 2.56 samples a turn")
 
 
 def describe_job(case: Case, swept: Mapping[str, Any]) -> str:

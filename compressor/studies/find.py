@@ -20,10 +20,10 @@ from scipy.optimize import minimize_scalar
 from compressor.cases import Study, load_studies, row_of
 from compressor.digits import align_columns, by_bar
 from compressor.metrics import AXES, BARRED, JOINTS, NUMBERS, SEGMENTS, THRESHOLDS
-from compressor.program import CompsimError, Progress, did_you_mean, no_progress
+from compressor.program import Progress, did_you_mean, no_progress
 from compressor.solve import average_bar
 from compressor.store import Folder, StoreError, read_store
-from compressor.studies.frame import DIGITS, GrowingStudy, read_range
+from compressor.studies.frame import DIGITS, GrowingStudy, StudyError, read_range
 from compressor.units import READABLE, Units, read_quantity, split_number, unit_in
 
 # ---- the question
@@ -35,12 +35,6 @@ WORDS = {
     "joint": JOINTS, "axis": AXES, "threshold": THRESHOLDS,
     "segment": tuple(f"{degrees:g}" for degrees in SEGMENTS),
 }  # fmt: skip
-
-
-class QuestionError(CompsimError, ValueError):
-    """A question that cannot be answered."""
-
-    exit_code = 2
 
 
 @dataclass(frozen=True)
@@ -88,10 +82,10 @@ class Goal:
     def beside(self, base: JobReading) -> "Goal":
         """Return the goal with its limit, from the reading at the range's lower end.
 
-        Raises QuestionError where that says nothing.
+        Raises StudyError where that says nothing.
         """
         if base.reason:
-            raise QuestionError(f"base, {self.name} at the range's lower end: {base.reason}")
+            raise StudyError(f"base, {self.name} at the range's lower end: {base.reason}")
         return replace(self, limit=self.times * base.value, slack=abs(self.times) * base.bar)
 
     def unit_shown(self, units: Units | None) -> tuple[str, float]:
@@ -143,13 +137,13 @@ class Goal:
 
 
 def comparison(text: str) -> Goal:
-    """Return the goal of a comparison such as `peak_acceleration > 600`. Raises QuestionError."""
+    """Return the goal of a comparison such as `peak_acceleration > 600`. Raises StudyError."""
     parts = COMPARISON.fullmatch(text)
     beside = BESIDE.fullmatch(parts[3]) if parts else None
     times = _number(beside[1] or "1") if beside else math.nan
     number = split_number(parts[3])[0] if parts and not beside else None
     if parts is None or (number is None and math.isnan(times)):
-        raise QuestionError(f"{text!r} is no comparison: write METRIC[.JOINT], one of "
+        raise StudyError(f"{text!r} is no comparison: write METRIC[.JOINT], one of "
                             f"{' '.join(SIGNS)}, and a number in SI, such as "
                             "'contact_loss_fraction.small_end > 0.001', a number and its unit, "
                             "such as 166 kN, or a factor, such as 1.5 * base")  # fmt: skip
@@ -159,22 +153,22 @@ def comparison(text: str) -> Goal:
     try:
         limit = read_quantity(parts[3], goal.unit or BARRED[goal.metric].unit)
     except ValueError as error:
-        raise QuestionError(f"{text!r}: {error}") from error
+        raise StudyError(f"{text!r}: {error}") from error
     unit = split_number(parts[3])[1]
     return replace(goal, limit=math.nan if limit is None else limit, limit_unit=unit)
 
 
 def goal_of(text: str, sign: str) -> Goal:
-    """Return the goal of a metric's name, METRIC or METRIC.JOINT. Raises QuestionError."""
+    """Return the goal of a metric's name, METRIC or METRIC.JOINT. Raises StudyError."""
     metric, *place = text.strip().split(".")
     if metric not in BARRED:
         hint = did_you_mean(metric, BARRED) or f"there are {', '.join(BARRED)}"
-        raise QuestionError(f"unknown metric {metric!r}; {hint}")
+        raise StudyError(f"unknown metric {metric!r}; {hint}")
     dims = BARRED[metric].dims
     good = len(place) == len(dims) and all(w in WORDS[d] for w, d in zip(place, dims, strict=True))
     if not good:
         words = "".join(f".{'|'.join(WORDS[dim])}" for dim in dims)
-        raise QuestionError(f"{text!r}: write {metric}{words}")
+        raise StudyError(f"{text!r}: write {metric}{words}")
     return Goal(metric, tuple(place), sign)
 
 
@@ -215,25 +209,25 @@ class Question:
     def load_first(self) -> Study:
         """Return the study of the first look, after a check that the file makes one case a value.
 
-        Raises QuestionError, and CaseFileError with what is wrong in the file.
+        Raises StudyError, and CaseFileError with what is wrong in the file.
         """
         if not self.low < self.high:
-            raise QuestionError(f"{self.key}={self.low:g}:{self.high:g} is no range: "
+            raise StudyError(f"{self.key}={self.low:g}:{self.high:g} is no range: "
                                 "write the lower end first")  # fmt: skip
         if self.logarithmic and self.low <= 0.0:
-            raise QuestionError(f"a range even in the logarithm needs ends above 0: {self.low:g}")
+            raise StudyError(f"a range even in the logarithm needs ends above 0: {self.low:g}")
         row = row_of(self.key)
         if row is not None and row.kind != "number":
-            raise QuestionError(f"{self.key} cannot be searched over: it is no continuous number")
+            raise StudyError(f"{self.key} cannot be searched over: it is no continuous number")
         ends = [self._load(f"{value!r}") for value in (self.low, self.high)]
         if row is None:
-            raise QuestionError(f"{self.key} is no single number")
+            raise StudyError(f"{self.key} is no single number")
         if ends[0].jobs > 1:
             axes = ", ".join(axis.key for axis in ends[0].axes)
-            raise QuestionError(f"{self.path} makes {ends[0].jobs} jobs for one {self.key}, it "
+            raise StudyError(f"{self.path} makes {ends[0].jobs} jobs for one {self.key}, it "
                                 f"sweeps {axes}: choose one case by --set")  # fmt: skip
         if ends[0].keys == ends[1].keys:
-            raise QuestionError(f"{self.key} changes nothing in the case of {self.path}")
+            raise StudyError(f"{self.key} changes nothing in the case of {self.path}")
         return self._load(f"[{', '.join(repr(self.argument(share)) for share in self.shares)}]")
 
     def _load(self, value: str) -> Study:
@@ -248,13 +242,11 @@ def read_question(
     """Return the question that texts ask.
 
     over: KEY=LOW:HIGH; goal: a comparison, or with `which` greatest or least a metric; more: other
-    fields. Raises QuestionError.
+    fields. Raises StudyError.
     """
     parts = read_range(over)
     if parts is None or parts[3] is not None:
-        raise QuestionError(
-            f"{over!r} is no range: write KEY=LOW:HIGH, such as clearance_mm=0.01:0.3"
-        )
+        raise StudyError(f"{over!r} is no range: write KEY=LOW:HIGH, such as clearance_mm=0.01:0.3")
     sought = comparison(goal) if which == "first" else goal_of(goal, which)
     return Question(path, *parts[:3], sought, **more)  # type: ignore[arg-type]
 
@@ -431,7 +423,7 @@ def find(
     """Return a question with its limit in SI, and its answer, by jobs in a folder's store.
 
     Jobs that it holds are not run again. The study is called after the file and the key. It keeps
-    the points of earlier questions that are of the same case. Raises QuestionError, CaseFileError,
+    the points of earlier questions that are of the same case. Raises StudyError, CaseFileError,
     StoreError and WorkersFailed.
     """
     question.load_first()

@@ -6,15 +6,18 @@ resume, `compsim status`, shards and a cluster serve it, too.
 
 import contextlib
 import hashlib
+import itertools
 import json
 import math
 import re
 import shlex
+import threading
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import xarray as xr
@@ -32,8 +35,9 @@ from compressor.store import (
     read_dataset,
     read_store,
     read_studies,
+    write_dataset,
 )
-from compressor.sweep import Options, in_this_process, sweep
+from compressor.sweep import JobLost, Needs, Options, in_this_process, run_here, sweep
 from compressor.vibration import Record, check_record, resample_angle, turns_at
 
 RANGE = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*(?::\s*(\d+)\s*)?")
@@ -188,7 +192,12 @@ def records(
             yield RecordedJob(key, point, *found, record)
 
 
-Row = dict[str, Any]  # of a study's file that grows row by row
+# ---- files that grow row by row -----------------------------------------------------------------
+
+REMADE = "delete it: the same command makes it again"
+SECONDS_BETWEEN_LOOKS = 0.5  # s between two looks at what is written
+
+Row = dict[str, Any]
 Numbers = Mapping[str, tuple[tuple[str, ...], str, str]]  # name -> dims, unit, long name
 
 
@@ -210,27 +219,119 @@ def rows_dataset(
     return xr.Dataset(found)
 
 
-def read_file_rows(
-    path: Path, key: str, texts: Iterable[str], numbers: Iterable[str], remedy: str
-) -> list[Row]:
-    """Return the rows of a file by `rows_dataset`, none where there is no file.
+class GrowingRows(Protocol):
+    """Rows that are made one after the other, each from those before, and their file.
+
+    key: hash of what decides them, an attribute of the file; texts, numbers: names of columns, with
+    `reason` among the texts, "" of a row that is good; cases: that are run; seconds: that they may
+    take; size: of the whole, of which `count_done` is a part.
+    """
+
+    @property
+    def key(self) -> str: ...
+    @property
+    def texts(self) -> Mapping[str, str]: ...
+    @property
+    def numbers(self) -> Numbers: ...
+    @property
+    def cases(self) -> Sequence[Case]: ...
+    @property
+    def seconds(self) -> float: ...
+    @property
+    def size(self) -> int: ...
+    def path(self, folder: Folder) -> Path: ...
+    def count_done(self, rows: Sequence[Row]) -> int: ...
+    def make_row(self, rows: Sequence[Row]) -> Row: ...
+    def to_dataset(self, rows: Sequence[Row]) -> xr.Dataset: ...
+
+
+def stored_rows(growing: GrowingRows, folder: Folder, rerun: bool = False) -> list[Row]:
+    """Return the rows of a file, none where there is none; rerun: those before the first failed.
 
     Raises StoreError where it is not the file of that key.
     """
+    path = growing.path(folder)
     if not path.exists():
         return []
-    found, names = read_dataset(path, remedy), (*texts, *numbers)
-    if found.attrs.get("key") != key or not {*names} <= {*found.variables}:
-        raise StoreError(path, "does not hold what its name says", remedy)
+    found, names = read_dataset(path, REMADE), (*growing.texts, *growing.numbers)
+    if found.attrs.get("key") != growing.key or not {*names} <= {*found.variables}:
+        raise StoreError(path, "does not hold what its name says", REMADE)
     columns = {name: found[name].values for name in names}
-    return [
-        {name: str(column[n]) if name in texts else column[n] for name, column in columns.items()}
+    rows = [
+        {name: str(one[n]) if name in growing.texts else one[n] for name, one in columns.items()}
         for n in range(len(columns[names[0]]))
     ]
+    return [*itertools.takewhile(lambda row: not row["reason"], rows)] if rerun else rows
 
 
-class StudyError(CompsimError):
-    """A study by which what is asked cannot be answered: and what to do."""
+def make_rows(growing: GrowingRows, folder: Folder, rerun: bool = False) -> None:
+    """Make and store what a file does not hold yet, in a worker. Raises StoreError."""
+    rows = stored_rows(growing, folder, rerun)
+    while growing.count_done(rows) < growing.size:
+        rows.append(growing.make_row(rows))
+        write_dataset(growing.path(folder), growing.to_dataset(rows))
+
+
+def run_rows(
+    every: Sequence[GrowingRows],
+    folder: Folder,
+    workers: int,
+    progress: Progress,
+    rerun: bool = False,
+) -> tuple[int, dict[str, JobLost]]:
+    """Make what is missing of files, side by side; return what was done before, and what was lost.
+
+    Those that were lost by their keys. Progress counts as `count_done`. Whatever ends it early,
+    what was stored stays, and the same call goes on. Raises StoreError and WorkersFailed.
+    """
+    place = Path(folder).absolute()
+    whole = {growing.key: growing for growing in every}
+    done = {key: one.count_done(stored_rows(one, place, rerun)) for key, one in whole.items()}
+    before, seen = sum(done[growing.key] for growing in every), dict.fromkeys(whole, 0)
+    missing = [one for key, one in whole.items() if done[key] < one.size]
+
+    def look(remark: str = "") -> None:
+        for one in missing:
+            with contextlib.suppress(OSError):  # no file yet
+                changed = one.path(place).stat().st_mtime_ns
+                if seen[one.key] != changed:
+                    seen[one.key], done[one.key] = changed, one.count_done(stored_rows(one, place))
+        progress(sum(done.values()), sum(one.size for one in whole.values()), remark)
+
+    look()
+    jobs = [(one.key, one, one.seconds) for one in missing]
+    needs = Needs.of(case for one in missing for case in one.cases)
+    running = run_here(partial(make_rows, folder=place, rerun=rerun), jobs, needs, workers, look)
+    with contextlib.closing(running), calling_often(look):
+        lost = {end.id: end for end in running if isinstance(end, JobLost)}
+    look()
+    return before, lost
+
+
+@contextlib.contextmanager
+def calling_often(look: Callable[[], object]) -> Iterator[None]:
+    """Call a function about twice a second, in a thread: files end long after their rows."""
+    ended = threading.Event()
+
+    def call() -> None:
+        while not ended.wait(SECONDS_BETWEEN_LOOKS):
+            with contextlib.suppress(StoreError):  # which the last look raises again
+                look()
+
+    thread = threading.Thread(target=call, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+# ---- records ------------------------------------------------------------------------------------
+
+
+class StudyError(CompsimError, ValueError):
+    """A question that a study cannot answer: and what to do."""
 
     exit_code = 2
 

@@ -5,12 +5,11 @@ evenly, by Archard's law, until the next stage. A machine's stages are one file,
 after each of them; the same command goes on from it.
 """
 
-import contextlib
 import math
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,16 +29,22 @@ from compressor.cases import (
     to_si,
 )
 from compressor.metrics import JOINTS, METRICS
-from compressor.program import PROGRAM, CompsimError, Progress
+from compressor.program import PROGRAM, Progress
 from compressor.reasons import Reason
 from compressor.report import BLACK, CYCLE, GREY, LineStyle, PlotlyFigure, fill, make_grid
 from compressor.solve import simulate
-from compressor.store import Folder, StoreError, read_dataset, writable_folder, write_dataset
-from compressor.studies.frame import hash_key, read_file_rows, rows_dataset
-from compressor.sweep import JobLost, Needs, run_here
+from compressor.store import Folder, StoreError, read_dataset, writable_folder
+from compressor.studies.frame import (
+    REMADE,
+    StudyError,
+    hash_key,
+    rows_dataset,
+    run_rows,
+    stored_rows,
+)
+from compressor.sweep import JobLost
 
 FOLDER = "wear"
-REMEDY = "delete it: the same command makes it again"
 SCHEMA = 2  # of a stage's numbers: a change of what they mean makes them again
 MAX_STEP_DEG = 0.3  # of the crank, between the samples by which what rubs is summed
 SHOWN = (
@@ -62,17 +67,13 @@ TEXTS = {"reason": "why it ended early", "detail": "what is known of that"}
 Stage = dict[str, Any]
 
 
-class NoWear(CompsimError):
-    """A case that has nothing to wear."""
-
-    exit_code = 2
-
-
 @dataclass(frozen=True)
 class Worn:
-    """One machine whose bores wear."""
+    """One machine whose bores wear, stage by stage (`frame.GrowingRows`)."""
 
     case: Case
+    texts, numbers = TEXTS, NUMBERS
+    size = 1
 
     @property
     def wear(self) -> Wear:
@@ -139,6 +140,35 @@ class Worn:
         late = bool(stage["hours"] >= self.most_hours)
         return bool(stage["reason"]) or late or bool((stage["clearance"] >= self.limit).any())
 
+    @property
+    def cases(self) -> tuple[Case]:
+        """Return the case that is run."""
+        return (self.case,)
+
+    @property
+    def seconds(self) -> float:
+        """Return the wall time that it may take."""
+        return AT_MOST * self.case.solve.timeout_s
+
+    def count_done(self, rows: Sequence[Stage]) -> int:
+        """Return 1 if all its stages are there, else 0."""
+        return int(bool(rows) and self.over(rows[-1]))
+
+    def make_row(self, rows: Sequence[Stage]) -> Stage:
+        """Run the next stage, or that of unworn bores."""
+        return next_stage(self, rows[-1]) if rows else follow_stage(self, 0.0, self.clearances)
+
+    def to_dataset(self, rows: Sequence[Stage]) -> xr.Dataset:
+        """Return its stages, with the dimension `stage`."""
+        found = rows_dataset(rows, "stage", TEXTS, NUMBERS)
+        worn = found["clearance"].values - self.clearances
+        about = {"units": "m3", "long_name": "volume that is worn off"}
+        found["worn_volume"] = ("stage", "joint"), worn * self.bore_area, about
+        where = {"joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"})}
+        attrs = {"key": self.key, "program": PROGRAM, "model_version": MODEL_VERSION}
+        attrs["case"] = self.case.attributes()["case"]
+        return found.assign_coords(where).assign_attrs(attrs)
+
 
 def follow_stage(machine: Worn, hours: float, clearances: np.ndarray) -> Stage:
     """Return the stage at clearances (m) that were worn in some hours: a run, and what it rubs."""
@@ -161,11 +191,6 @@ def follow_stage(machine: Worn, hours: float, clearances: np.ndarray) -> Stage:
     }  # fmt: skip
 
 
-def first_stage(machine: Worn) -> Stage:
-    """Return the stage of unworn bores."""
-    return follow_stage(machine, 0.0, machine.clearances)
-
-
 def next_stage(machine: Worn, stage: Stage) -> Stage:
     """Return the stage after one that is not the last; by the midpoint rule."""
     opened, rate = stage["clearance"], machine.depth_per_work * stage["rubbing_work"]
@@ -183,18 +208,6 @@ def next_stage(machine: Worn, stage: Stage) -> Stage:
     return follow_stage(machine, hours, opened)
 
 
-def stages_dataset(machine: Worn, stages: list[Stage]) -> xr.Dataset:
-    """Return the stages of a machine, with the dimension `stage`."""
-    found = rows_dataset(stages, "stage", TEXTS, NUMBERS)
-    worn = found["clearance"].values - machine.clearances
-    about = {"units": "m3", "long_name": "volume that is worn off"}
-    found["worn_volume"] = ("stage", "joint"), worn * machine.bore_area, about
-    where = {"joint": ("joint", list(JOINTS), {"long_name": "joint of the rod"})}
-    attrs = {"key": machine.key, "program": PROGRAM, "model_version": MODEL_VERSION}
-    attrs["case"] = machine.case.attributes()["case"]
-    return found.assign_coords(where).assign_attrs(attrs)
-
-
 def wear_file(folder: Folder, case: Case) -> Path:
     """Return the path at which the stages of a case with wear are stored."""
     return Worn(case).path(folder)
@@ -209,7 +222,7 @@ def open_wear(folder: Folder, case: Case) -> xr.Dataset:
     path = wear_file(folder, case)
     if not path.exists():
         raise StoreError(path, "is not there", "compsim wear the case file")
-    return read_dataset(path, REMEDY)
+    return read_dataset(path, REMADE)
 
 
 class Life(NamedTuple):
@@ -269,18 +282,18 @@ class WearSummary(NamedTuple):
 
 
 def check_wear(studies: Sequence[Study]) -> None:
-    """Raise NoWear unless each case wears, and is measured over whole revolutions."""
+    """Raise StudyError unless each case wears, and is measured over whole revolutions."""
     for study, case in ((one, case) for one in studies for case in one.cases):
         if case.joint == "none":
-            raise NoWear(f"{study.path}: joint: none has no bore that wears: leave none out")
+            raise StudyError(f"{study.path}: joint: none has no bore that wears: leave none out")
         if not case.wear:
             remedy = "write wear: true, or keys of it (compsim schema)"
-            raise NoWear(f"{study.path}: has no wear: {remedy}")
+            raise StudyError(f"{study.path}: has no wear: {remedy}")
         if case.solve.duration_rev == "auto":
             continue
         turns = (case.duration - case.settle) / case.turn
         if abs(turns - round(turns)) > 1e-9 or turns < 1.0 - 1e-9:
-            raise NoWear(
+            raise StudyError(
                 f"{study.path}: solve.duration_rev: {turns:g} after settle_rev must be whole "
                 "revolutions, one at least"
             )
@@ -302,52 +315,20 @@ def run_wear(
         for study in studies
         for point, case in zip(points(study), study.cases, strict=True)
     ]
-    machines = {worn.key: worn for _, _, worn in listed}
-    missing = [one for one in machines.values() if not is_complete(one, folder, rerun)]
-    done, total, lost = len(machines) - len(missing), len(machines), {}
-    work = partial(follow_wear, folder=folder, rerun=rerun)
-    jobs = [(worn.key, worn, AT_MOST * worn.case.solve.timeout_s) for worn in missing]
-    needs = Needs.of(worn.case for worn in missing)
-    progress(done, total, "")
-    running = run_here(work, jobs, needs, workers, partial(progress, done, total))
-    with contextlib.closing(running):
-        for count, end in enumerate(running, done + 1):
-            if isinstance(end, JobLost):
-                lost[end.id] = end
-            progress(count, total, "")
+    done, lost = run_rows([worn for _, _, worn in listed], folder, workers, progress, rerun)
     found = [worn_machine(*one, folder, lost.get(one[2].key)) for one in listed]
     return WearSummary(found, done, time.monotonic() - began)
-
-
-def stored_stages(worn: Worn, folder: Folder, rerun: bool = False) -> list[Stage]:
-    """Return the stages of a machine that are kept; rerun: without failed ones."""
-    stages = read_file_rows(worn.path(folder), worn.key, TEXTS, NUMBERS, REMEDY)
-    return [stage for stage in stages if not (rerun and stage["reason"])]
-
-
-def is_complete(worn: Worn, folder: Folder, rerun: bool = False) -> bool:
-    """Return whether all stages of a machine are stored. Raises StoreError."""
-    stages = stored_stages(worn, folder, rerun)
-    return bool(stages) and worn.over(stages[-1])
-
-
-def follow_wear(worn: Worn, folder: Folder, rerun: bool = False) -> None:
-    """Run and store what is missing of a machine, in a worker. Raises StoreError."""
-    stages = stored_stages(worn, folder, rerun)
-    while not stages or not worn.over(stages[-1]):
-        stages.append(next_stage(worn, stages[-1]) if stages else first_stage(worn))
-        write_dataset(worn.path(folder), stages_dataset(worn, stages))
 
 
 def worn_machine(
     study: str, point: dict[str, Any], worn: Worn, folder: Folder, end: JobLost | None
 ) -> WornMachine:
     """Return a machine of a study by its stored stages; end: how its worker was lost, if it was."""
-    kept = stored_stages(worn, folder)
+    kept = stored_rows(worn, folder)
     if not kept:
         why = (str(end.reason), end.detail) if end else ("", "")
         return WornMachine(study, point, worn, None, None, *why)
-    stages, last = stages_dataset(worn, kept), kept[-1]
+    stages, last = worn.to_dataset(kept), kept[-1]
     why = (str(end.reason), end.detail) if end else (last["reason"], last["detail"])
     return WornMachine(study, point, worn, stages, life(worn, stages), *why)
 

@@ -82,10 +82,8 @@ def fit(truth, known, other):
         path.write_text(json.dumps(merge(FIXED, known)))
         found = calibrate(record, str(path), unknowns, Path(place, "results"), workers=1)
     rows = {}
-    for place, one in enumerate(unknowns):
-        low, high = found.interval(place)
-        best = one.value(found.fit.shares[place])
-        rows[one.key] = {"truth": truth[one.key], "best": best, "low": low, "high": high}
+    for key, one in found.keys.items():
+        rows[key] = {"truth": truth[key], "best": one.value, "low": one.low, "high": one.high}
     return rows, found.fit.misfit, found.jobs
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from result_pages import keep, provenance, run_campaign
 
 from compressor.cases.case import Case
-from compressor.studies.wear import Worn, first_stage, life, next_stage, stages_dataset
+from compressor.studies.wear import Worn, life
 
 ONE = {"joint": "both", "clearance_mm": 0.2}
 LIMIT = 1.5  # clearances, at which it ends
@@ -25,10 +25,10 @@ def followed(values, step_mm):
     """Hours to the limit, clearances (mm) where it is passed, and why it failed."""
     wear = {"hours": 1e8, "limit_mm": LIMIT * values["clearance_mm"], "step_mm": step_mm}
     of = Worn(Case.from_values({**values, "solve": SOLVE, "wear": wear}))
-    stages = [first_stage(of)]
+    stages = [of.make_row([])]
     while not of.over(stages[-1]):
-        stages.append(next_stage(of, stages[-1]))
-    found = stages_dataset(of, stages)
+        stages.append(of.make_row(stages))
+    found = of.to_dataset(stages)
     hours = life(of, found).hours
     opened = [float(np.interp(hours, found["hours"], 1e3 * one)) for one in found["clearance"].T]
     return hours, opened, stages[-1]["reason"]

@@ -16,7 +16,7 @@ from compressor.cases.parameter import CaseError
 from compressor.cases.table import parts_by_key, table
 from compressor.solve import simulate
 from compressor.store.batch import encode_batch
-from compressor.studies.wear import Worn, first_stage, life, next_stage, stages_dataset
+from compressor.studies.wear import Worn, life
 
 SHORT = {"duration_rev": 1, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 5,
          "error_bars": False, "horizon": False}  # fmt: skip
@@ -259,8 +259,8 @@ def stored(text: str) -> dict[str, str]:
     found["file"] = str(len(encode_batch([outcome_of(run)])) // 10_000)
     if case.wear:
         worn = Worn(case)
-        begun = first_stage(worn)
-        stages = stages_dataset(worn, [begun, next_stage(worn, begun)])
+        begun = worn.make_row([])
+        stages = worn.to_dataset([begun, worn.make_row([begun])])
         found |= {name: repr(item.values.tolist()) for name, item in stages.variables.items()}
         found["life"] = repr((life(worn, stages), worn.limit))
     return found

@@ -22,7 +22,7 @@ from compressor.studies.claims import (
     RECIPROCATING,
     ROD,
     SHARES,
-    ClaimsError,
+    StudyError,
     draw,
     judge_machines,
     machines,
@@ -110,7 +110,7 @@ def test_a_study_without_the_papers_cases_is_refused(tmp_path):
     path = tmp_path / "one.yaml"
     path.write_text("joint: both\nclearance_mm: [0.1, 0.2]\nload: spring\n")
     (study,) = load_studies(path)
-    with pytest.raises(ClaimsError, match=r"study one has no machine .* compsim init claims"):
+    with pytest.raises(StudyError, match=r"study one has no machine .* compsim init claims"):
         machines(study)
 
 

@@ -15,7 +15,8 @@ from conftest import assert_same_bits, jobs_here
 from compressor.cases.load import load_cases
 from compressor.store.files import StoreError
 from compressor.studies import wear
-from compressor.studies.wear import Worn, follow_wear, hours, open_wear, wear_file
+from compressor.studies.frame import make_rows, stored_rows
+from compressor.studies.wear import Worn, hours, open_wear, wear_file
 
 TEXT = """
 joint: both
@@ -81,13 +82,13 @@ def test_a_killed_machine_goes_on_and_ends_in_the_same_bits(told, tmp_path):
     """SIGKILL at random, until all stages are there."""
     cases, out = told
     worn, rng, stops = Worn(cases[0]), np.random.default_rng(3), []
-    wear.first_stage(worn)  # loads the equations, which forked processes share
+    worn.make_row([])  # loads the equations, which forked processes share
     path = worn.path(tmp_path)
     for _ in range(30):
-        before = len(wear.stored_stages(worn, tmp_path))
+        before = len(stored_rows(worn, tmp_path))
         stops.append(before)
         process = multiprocessing.get_context("fork").Process(
-            target=follow_wear, args=(worn, tmp_path)
+            target=make_rows, args=(worn, tmp_path)
         )
         process.start()
         seen = path.stat().st_mtime_ns if path.exists() else 0
@@ -119,11 +120,11 @@ def test_a_failed_machine_is_told_and_goes_on_when_asked(
     monkeypatch.setattr(wear, "follow_stage", failing)
     (case,) = load_cases(file)
     worn = Worn(case)
-    follow_wear(worn, tmp_path)
-    kept = wear.stored_stages(worn, tmp_path)
+    make_rows(worn, tmp_path)
+    kept = stored_rows(worn, tmp_path)
     assert (kept[-1]["reason"], kept[-1]["detail"]) == ("budget_seconds", "slow")
-    follow_wear(worn, tmp_path)
-    assert len(wear.stored_stages(worn, tmp_path)) == len(kept)
+    make_rows(worn, tmp_path)
+    assert len(stored_rows(worn, tmp_path)) == len(kept)
     assert main(["wear", str(file), "-r", str(tmp_path)]) == 3
     said = capsys.readouterr()
     assert "failing: budget_seconds: slow" in said.err
@@ -140,7 +141,7 @@ def test_a_failed_machine_is_told_and_goes_on_when_asked(
 
 def whole(worn, folder):
     """The stages of an undisturbed run."""
-    follow_wear(worn, folder)
+    make_rows(worn, folder)
     return open_wear(folder, worn.case)
 
 
@@ -172,6 +173,6 @@ def test_a_file_of_something_else_is_told(told, tmp_path):
     place.parent.mkdir(parents=True)
     place.write_bytes(wear_file(out, cases[0]).read_bytes())
     with pytest.raises(StoreError, match="does not hold what its name says"):
-        wear.stored_stages(Worn(cases[1]), tmp_path)
+        stored_rows(Worn(cases[1]), tmp_path)
     with pytest.raises(StoreError, match="compsim wear the case file"):
         open_wear(tmp_path / "nowhere", cases[0])

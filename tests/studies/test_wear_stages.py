@@ -10,11 +10,8 @@ from compressor.cases.case import Case
 from compressor.solve import simulate
 from compressor.studies.wear import (
     Worn,
-    first_stage,
     follow_stage,
     life,
-    next_stage,
-    stages_dataset,
 )
 
 VALUES = {"joint": "big_end", "clearance_mm": 0.2, "solve": {"accuracy": "draft"}}
@@ -23,9 +20,9 @@ VALUES = {"joint": "big_end", "clearance_mm": 0.2, "solve": {"accuracy": "draft"
 def followed(wear, **values):
     """A machine, and its stages up to the last."""
     of = Worn(Case.from_values({**VALUES, **values, "wear": {"limit_mm": 0.26, **wear}}))
-    stages = [first_stage(of)]
+    stages = [of.make_row([])]
     while not of.over(stages[-1]):
-        stages.append(next_stage(of, stages[-1]))
+        stages.append(of.make_row(stages))
     return of, stages
 
 
@@ -37,7 +34,7 @@ def machine():
 def test_a_volume_is_the_coefficient_times_what_has_slid(machine):
     """V = k N |v| t: by the runs midway, made again."""
     of, stages = machine
-    found = stages_dataset(of, stages)
+    found = of.to_dataset(stages)
     k = 1e-8 * 1e-9  # m3/(N m)
     volume = 0.0
     for before, after in itertools.pairwise(stages):
@@ -83,7 +80,7 @@ def test_a_coefficient_is_a_scale_of_hours(machine):
     of, stages = machine
     tenfold, faster = followed({"step_mm": 0.01, "coefficient_mm3_per_N_m": 1e-7})
     one, other = (life(*pair) for pair in (
-        (of, stages_dataset(of, stages)), (tenfold, stages_dataset(tenfold, faster))))  # fmt: skip
+        (of, of.to_dataset(stages)), (tenfold, tenfold.to_dataset(faster))))  # fmt: skip
     assert other.hours == pytest.approx(one.hours / 10, rel=1e-5)
     assert (one.low, one.high) == pytest.approx((one.hours / 2, one.hours * 2))
     assert one.joint == "big_end"
@@ -92,13 +89,13 @@ def test_a_coefficient_is_a_scale_of_hours(machine):
 def test_a_life_beyond_the_hours_is_not_told(machine):
     """Where even the greatest coefficient does not wear a joint out, no hours are named."""
     of, stages = followed({"hours": 1.0})
-    found = life(of, stages_dataset(of, stages))
+    found = life(of, of.to_dataset(stages))
     assert [math.isnan(v) for v in (found.low, found.hours, found.high)] == [True] * 3
     assert stages[-1]["hours"] == 2.0  # of the given coefficient: as the greatest wears in one
     assert found.clearance > 0.2e-3
-    whole = life(machine[0], stages_dataset(*machine))
+    whole = life(machine[0], machine[0].to_dataset(machine[1]))
     of, stages = followed({"step_mm": 0.01, "hours": 0.75 * whole.hours})
-    found = life(of, stages_dataset(of, stages))
+    found = life(of, of.to_dataset(stages))
     assert found.low == pytest.approx(whole.low, rel=1e-3)
     assert math.isnan(found.hours)
     assert math.isnan(found.high)
@@ -114,7 +111,7 @@ def test_a_motion_that_fails_ends_its_machine():
 def test_a_speed_that_gives_way_takes_longer_for_a_revolution():
     soft = {"drive": {"slope_N_m_s": 10.0, "flywheel_kg_m2": 5.0}, "load": "gas"}
     of = Worn(Case.from_values({**VALUES, **soft, "wear": True}))
-    found = first_stage(of)
+    found = of.make_row([])
     assert not found["reason"]
     assert found["turn"] > 1.001 * of.case.turn
 

@@ -3,19 +3,15 @@
     RESULTS/follow/chains/KEY.nc    the finished values of a chain, in the order of their running
     RESULTS/follow/STUDY-KEY.nc     all chains of a study over a key, as one labelled Dataset
 
-A chain is named by a hash of all that decides its numbers. Its file is rewritten every few seconds
+A chain is named by a hash of all that decides its numbers. Its file is rewritten after each value
 and is whole or absent; a chain that was interrupted goes on from the last value in it, and ends in
 the same numbers to the bit.
 """
 
-import contextlib
-import itertools
 import math
-import threading
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -35,10 +31,9 @@ from compressor.cases import (
     suggestion,
 )
 from compressor.metrics import JOINTS
-from compressor.program import PROGRAM, CompsimError, Progress, no_progress
+from compressor.program import PROGRAM, Progress, no_progress
 from compressor.store import (
     Folder,
-    StoreError,
     coordinate_names,
     swept_column,
     writable_folder,
@@ -54,24 +49,22 @@ from compressor.studies.follow.motion import (
     empty_row,
     run_value,
 )
-from compressor.studies.frame import hash_key, read_file_rows, read_range, rows_dataset
-from compressor.sweep import JobLost, Needs, run_here
+from compressor.studies.frame import (
+    StudyError,
+    hash_key,
+    read_range,
+    rows_dataset,
+    run_rows,
+    stored_rows,
+)
+from compressor.sweep import JobLost
 
 FOLDER = "follow"
-REMEDY = "delete it: the same command makes it again"
 SCHEMA = 3  # of a row's numbers: a change of what they mean makes chains again
-SECONDS_BETWEEN_WRITES = 2.0  # s between two writings of what is finished
-SECONDS_BETWEEN_LOOKS = 0.5  # s between two looks at what chains have written
 RUNS = 4  # of a value, each with the case's own wall time at most, and some more
 FORM = "KEY=LOW:HIGH:N, such as clearance_mm=0.01:1:60"
 # groups whose keys are not followed: of the run and its start, or of what the machine shakes
 NOT_FOLLOWED = ("solve", "output", "body", "sensor", "initial_offset_mm")
-
-
-class FollowError(CompsimError, ValueError):
-    """A key that cannot be followed, or a machine that cannot be followed along it."""
-
-    exit_code = 2
 
 
 @dataclass(frozen=True)
@@ -96,10 +89,10 @@ class KeyRange:
 
 
 def read_over(text: str, **more: Any) -> KeyRange:
-    """Return what a text KEY=LOW:HIGH:N asks for; more: other fields. Raises FollowError."""
+    """Return what a text KEY=LOW:HIGH:N asks for; more: other fields. Raises StudyError."""
     key, low, high, count = read_range(text) or ("", math.nan, math.nan, None)
     if count is None:
-        raise FollowError(f"--over {text}: write {FORM}")
+        raise StudyError(f"--over {text}: write {FORM}")
     row = row_of(key)
     if row is None:
         problem = f"{key} is no key of a number{suggestion(key, '') or ', such as clearance_mm'}"
@@ -117,7 +110,7 @@ def read_over(text: str, **more: Any) -> KeyRange:
         problem = "--log needs ends above 0"
     else:
         return KeyRange(key, low, high, count, **more)
-    raise FollowError(f"--over {text}: {problem}")
+    raise StudyError(f"--over {text}: {problem}")
 
 
 def load_values(
@@ -151,7 +144,7 @@ def load_values(
 
 @dataclass(frozen=True)
 class Chain:
-    """Cases that are run one after the other, each from the last one's end.
+    """Cases that are run one after the other, each from the last one's end (`frame.GrowingRows`).
 
     `values`: of the key that is followed.
     """
@@ -159,6 +152,7 @@ class Chain:
     cases: tuple[Case, ...]
     values: tuple[float, ...]
     plan: ValuePlan
+    texts, numbers = TEXTS, NUMBERS
 
     @cached_property
     def key(self) -> str:
@@ -169,10 +163,31 @@ class Chain:
         """Return the path of its file."""
         return Path(folder) / FOLDER / "chains" / f"{self.key}.nc"
 
-    def begin(self, rows: Sequence[Row]) -> np.ndarray | None:
-        """Return the state that the next value begins from; None: from its own start."""
+    @property
+    def size(self) -> int:
+        """Return the number of its values."""
+        return len(self.cases)
+
+    @property
+    def seconds(self) -> float:
+        """Return the wall time that it may take."""
+        return RUNS * sum(case.solve.timeout_s for case in self.cases)
+
+    def count_done(self, rows: Sequence[Row]) -> int:
+        """Return the number of its values that are run."""
+        return len(rows)
+
+    def make_row(self, rows: Sequence[Row]) -> Row:
+        """Run the next value, from the last one's end, or from its own start without one."""
         state = rows[-1]["end_state"] if rows else None
-        return None if state is None or np.isnan(state).any() else state
+        begin = None if state is None or np.isnan(state).any() else state
+        return run_value(self.cases[len(rows)], begin, self.plan)
+
+    def to_dataset(self, rows: Sequence[Row]) -> xr.Dataset:
+        """Return its rows, with the dimension `value` in the order of running."""
+        attrs = {"key": self.key, "case": self.cases[0].attributes()["case"], "program": PROGRAM}
+        found = rows_dataset(rows, "value", TEXTS, NUMBERS)
+        return found.assign_coords(value=[*self.values[: len(rows)]]).assign_attrs(attrs)
 
 
 class FollowedMachine(NamedTuple):
@@ -183,7 +198,7 @@ class FollowedMachine(NamedTuple):
 
 
 def machines(study: Study, along: KeyRange) -> list[FollowedMachine]:
-    """Return the machines of the selected jobs of `load_values`. Raises FollowError."""
+    """Return the machines of the selected jobs of `load_values`. Raises StudyError."""
     selected, listed = {*study.selected}, []
     found: dict[str, tuple[dict[str, Any], list[tuple[float, Case]]]] = {}
     for number, point in enumerate(points(study)):
@@ -194,7 +209,7 @@ def machines(study: Study, along: KeyRange) -> list[FollowedMachine]:
     for point, jobs in found.values():
         if problem := objection(along, [case for _, case in jobs]):
             where = ", ".join(f"{key} {value}" for key, value in point.items())
-            raise FollowError(f"{study.path}: {problem}{f' ({where})' if where else ''}")
+            raise StudyError(f"{study.path}: {problem}{f' ({where})' if where else ''}")
         jobs.sort(key=itemgetter(0))
         ways = ((*zip(*one, strict=True),) for one in (jobs, jobs[::-1])[: len(along.ways)])
         chains = (Chain(cases, values, along.plan) for values, cases in ways)
@@ -242,14 +257,13 @@ def follow(
     """Run and store what is missing of the chains of a study, and write its Dataset.
 
     study: of `load_values`; rerun: chains are run again from their first failed value on. Progress
-    counts values. Raises FollowError, StoreError and WorkersFailed; whatever ends it early, what
+    counts values. Raises StudyError, StoreError and WorkersFailed; whatever ends it early, what
     was stored stays, and the same call goes on.
     """
     every = machines(study, along)
     writable_folder(folder)
     chains = [chain for machine in every for chain in machine.chains]
-    before = sum(len(read_rows(chain, folder)) for chain in chains)
-    lost = run_chains(chains, folder, workers, progress, rerun)
+    before, lost = run_rows(chains, folder, workers, progress, rerun)
     rows = [
         [rows_to_show(chain, folder, lost.get(chain.key)) for chain in machine.chains]
         for machine in every
@@ -257,111 +271,17 @@ def follow(
     data = followed_dataset(study, along, every, rows)
     path = Path(folder) / FOLDER / f"{study.name}-{along.key}.nc"
     write_dataset(path, data)
-    return Followed(sum(len(chain.cases) for chain in chains), before, data, path)
-
-
-def run_chain(chain: Chain, folder: Path, rerun: bool = False) -> None:
-    """Run what a chain's file does not hold yet, in a worker; rerun: from its first failed value.
-
-    Raises StoreError.
-    """
-    rows = rows_to_keep(chain, folder, rerun)
-    written = time.monotonic()
-    for number in range(len(rows), len(chain.cases)):
-        rows.append(run_value(chain.cases[number], chain.begin(rows), chain.plan))
-        is_last = len(rows) == len(chain.cases)
-        if is_last or time.monotonic() - written > SECONDS_BETWEEN_WRITES:
-            write_dataset(chain.path(folder), chain_dataset(chain, rows))
-            written = time.monotonic()
-
-
-def rows_to_keep(chain: Chain, folder: Path, rerun: bool) -> list[Row]:
-    """Return the stored rows of a chain that a run does not make again."""
-    rows = read_rows(chain, folder)
-    good = itertools.takewhile(lambda row: row["status"] == "ok", rows)
-    return [*good] if rerun else rows
+    return Followed(sum(chain.size for chain in chains), before, data, path)
 
 
 def rows_to_show(chain: Chain, folder: Folder, end: JobLost | None) -> list[Row]:
     """Return the rows of a chain, at least one; end: how it was lost, at the value after them."""
-    rows = read_rows(chain, folder)
+    rows = stored_rows(chain, folder)
     blank = empty_row(chain.cases[0], chain.plan.points) | {"status": "missing"}
     if end and len(rows) < len(chain.cases):
         failed = {"status": "failed", "reason": str(end.reason), "detail": end.detail}
         return [*rows, blank | failed]
     return rows or [blank]
-
-
-def chain_dataset(chain: Chain, rows: Sequence[Row]) -> xr.Dataset:
-    """Return the rows of a chain, with the dimension `value` in the order of running."""
-    attrs = {"key": chain.key, "case": chain.cases[0].attributes()["case"], "program": PROGRAM}
-    found = rows_dataset(rows, "value", TEXTS, NUMBERS)
-    return found.assign_coords(value=[*chain.values[: len(rows)]]).assign_attrs(attrs)
-
-
-def read_rows(chain: Chain, folder: Folder) -> list[Row]:
-    """Return the stored rows of a chain, none where there is no file. Raises StoreError."""
-    return read_file_rows(chain.path(folder), chain.key, TEXTS, NUMBERS, REMEDY)
-
-
-def run_chains(
-    chains: Sequence[Chain], folder: Folder, workers: int, progress: Progress, rerun: bool
-) -> dict[str, JobLost]:
-    """Run what is missing of chains, side by side; return those that were lost, by their keys."""
-    place = Path(folder).absolute()
-    missing = [c for c in chains if len(rows_to_keep(c, place, rerun)) < len(c.cases)]
-    jobs = [(c.key, c, RUNS * sum(case.solve.timeout_s for case in c.cases)) for c in missing]
-    needs = Needs.of(case for chain in missing for case in chain.cases)
-    look = partial(ChainWatch(chains, place).report, progress)
-    lost: dict[str, JobLost] = {}
-    look("")
-    work = partial(run_chain, folder=place, rerun=rerun)
-    running = run_here(work, jobs, needs, workers, look)
-    with contextlib.closing(running) as ends, calling_often(partial(look, "")):
-        for end in ends:
-            if isinstance(end, JobLost):
-                lost[end.id] = end
-    look("")
-    return lost
-
-
-@contextlib.contextmanager
-def calling_often(look: Callable[[], object]) -> Iterator[None]:
-    """Call a function about once a second, in a thread: chains end long after their values."""
-    ended = threading.Event()
-
-    def call() -> None:
-        while not ended.wait(SECONDS_BETWEEN_LOOKS):
-            with contextlib.suppress(StoreError):  # which the last look raises again
-                look()
-
-    thread = threading.Thread(target=call, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
-
-
-class ChainWatch:
-    """How many values of chains are stored, from their files."""
-
-    def __init__(self, chains: Iterable[Chain], folder: Path):
-        self.chains = {chain.path(folder): chain for chain in chains}
-        self.folder, self.total = folder, sum(len(chain.cases) for chain in self.chains.values())
-        self.seen: dict[Path, int] = {}
-        self.counts: dict[Path, int] = {}
-
-    def report(self, progress: Progress, remark: str) -> None:
-        """Report the number; read the files that have changed."""
-        for path, chain in self.chains.items():
-            with contextlib.suppress(OSError):
-                changed = path.stat().st_mtime_ns
-                if self.seen.get(path) != changed:
-                    self.counts[path] = len(read_rows(chain, self.folder))
-                    self.seen[path] = changed
-        progress(sum(self.counts.values()), self.total, remark)
 
 
 def differing(machine: FollowedMachine, up: Sequence[Row], down: Sequence[Row]) -> set[float]:
@@ -390,8 +310,8 @@ def followed_dataset(
     """
     parts = [
         [
-            chain_dataset(*one).drop_vars("end_state")
-            for one in zip(machine.chains, ways, strict=True)
+            chain.to_dataset(its).drop_vars("end_state")
+            for chain, its in zip(machine.chains, ways, strict=True)
         ]
         for machine, ways in zip(every, rows, strict=True)
     ]

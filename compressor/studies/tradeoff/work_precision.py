@@ -15,7 +15,7 @@ import xarray as xr
 from compressor.cases import ACCURACY, METHODS, Study, load_studies, points
 from compressor.digits import align_columns
 from compressor.metrics import JOINTS
-from compressor.program import PROGRAM, CompsimError, Progress, no_progress
+from compressor.program import PROGRAM, Progress, no_progress
 from compressor.report import (
     BLACK,
     BLUE,
@@ -30,7 +30,7 @@ from compressor.report import (
     share_scales,
 )
 from compressor.store import Folder, read_job, read_store
-from compressor.studies.frame import MAX_NAME, replace_settings
+from compressor.studies.frame import MAX_NAME, StudyError, replace_settings
 from compressor.sweep import Options, sweep
 
 ENDING = "-tradeoff"  # of the study's name
@@ -63,24 +63,18 @@ VARIABLES = {  # of a point -> attributes
 }  # fmt: skip
 
 
-class NothingIntegrated(CompsimError):
-    """A case without clearance, whose motion is known in closed form."""
-
-    exit_code = 2
-
-
 def load_methods(
     path: str, overrides: Sequence[str], folder: Folder, progress: Progress = no_progress
 ) -> tuple[Study, list[str]]:
     """Return the study of a case file by methods and tolerances, and what it sets in the file.
 
     Where the file lets a run find its own length, it is run, and all methods get the longest one.
-    Raises NothingIntegrated and CaseFileError.
+    Raises StudyError and CaseFileError.
     """
     of_file = without_keys(overrides, ["solve.method", "solve.rtol"])
     (own,) = load_studies(path, overrides=of_file)
     if not all(any(vars(case.clearance_mm).values()) for case in own.cases):
-        raise NothingIntegrated(
+        raise StudyError(
             f"{path}: a job of {own.name} has no joint with clearance, so nothing is integrated: "
             "set joint and clearance_mm"
         )

@@ -9,7 +9,7 @@ import xarray as xr
 from compressor.cases import Case
 from compressor.store import StoreError, write_dataset
 from compressor.studies.alarms.alarms import StudyError, add_hours, read_wear
-from compressor.studies.wear import Worn, stages_dataset
+from compressor.studies.wear import Worn
 
 CASE = {
     "joint": "both", "clearance_mm": 0.1,
@@ -32,7 +32,7 @@ def write_run(folder, case=CASE, hours=(0.0, 400.0, 1000.0)):
         })  # fmt: skip
     path = worn.path(folder)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_dataset(path, stages_dataset(worn, stages))
+    write_dataset(path, worn.to_dataset(stages))
     return path
 
 

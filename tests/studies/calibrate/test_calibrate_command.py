@@ -13,7 +13,7 @@ from conftest import jobs_here
 from compressor.cases.load import load_cases
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
-from compressor.studies.calibrate import CalibrationError, Unknown
+from compressor.studies.calibrate import StudyError, Unknown
 
 CASE = {
     "load": "gas",
@@ -95,7 +95,7 @@ def test_what_is_printed_is_a_case_file(fitted, monkeypatch):
     ],
 )
 def test_what_is_no_range_is_refused(text, what):
-    with pytest.raises(CalibrationError, match=what):
+    with pytest.raises(StudyError, match=what):
         Unknown.written(text)
 
 

@@ -7,14 +7,12 @@ from compressor.store import read_dataset, write_dataset
 from compressor.store.files import StoreError
 from compressor.studies.follow import motion
 from compressor.studies.follow.follow import (
-    chain_dataset,
     load_values,
     machines,
     read_over,
-    read_rows,
-    run_chain,
 )
 from compressor.studies.follow.motion import ValuePlan
+from compressor.studies.frame import make_rows, stored_rows
 
 TEXT = """
 joint: big_end
@@ -43,7 +41,7 @@ def whole(chains, tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(motion, "SETTLE_REV", 3)
-        assert run_chain(chains[1], folder) is None
+        assert make_rows(chains[1], folder) is None
     return chains[1], folder
 
 
@@ -58,8 +56,8 @@ def test_a_chain_has_its_values_in_the_order_of_running(chains, whole):
 def test_a_chain_goes_on_from_its_last_value_and_ends_in_the_same_bits(whole, tmp_path):
     """As after a kill: a file is whole or absent (tests/studies/test_wear.py)."""
     chain, folder = whole
-    write_dataset(chain.path(tmp_path), chain_dataset(chain, read_rows(chain, folder)[:4]))
-    run_chain(chain, tmp_path)
+    write_dataset(chain.path(tmp_path), chain.to_dataset(stored_rows(chain, folder)[:4]))
+    make_rows(chain, tmp_path)
     assert_same_bits(read_dataset(chain.path(tmp_path)), read_dataset(chain.path(folder)))
 
 
@@ -69,4 +67,4 @@ def test_another_file_of_its_name_is_refused(whole, tmp_path):
     wrong.parent.mkdir(parents=True)
     wrong.write_bytes(chain.path(folder).read_bytes()[:-9])
     with pytest.raises(StoreError, match="delete it"):
-        run_chain(chain, tmp_path)
+        make_rows(chain, tmp_path)

@@ -8,7 +8,7 @@ from conftest import jobs_here
 
 from compressor.cases import CaseFileError
 from compressor.studies.follow.follow import (
-    FollowError,
+    StudyError,
     load_values,
     machines,
     read_over,
@@ -172,7 +172,7 @@ def test_a_chain_reads_at_its_last_value_what_it_does_not_at_its_first(tmp_path)
     ],
 )
 def test_mistakes_in_the_option_are_told(over, more, message):
-    with pytest.raises(FollowError) as caught:
+    with pytest.raises(StudyError) as caught:
         read_over(over, **more)
     assert str(caught.value).startswith(f"--over {over}: {message}")
 
@@ -199,6 +199,6 @@ def test_mistakes_in_the_option_are_told(over, more, message):
 )  # fmt: skip
 def test_mistakes_in_the_file_are_told(tmp_path, text, over, message):
     path = write(tmp_path / "case.yaml", text)
-    with pytest.raises((FollowError, CaseFileError)) as caught:
+    with pytest.raises((StudyError, CaseFileError)) as caught:
         followed(path, over)
     assert message in str(caught.value)

@@ -10,7 +10,7 @@ from compressor.studies.find import (
     Goal,
     JobReading,
     Point,
-    QuestionError,
+    StudyError,
     comparison,
     find_extremum,
     find_first,
@@ -50,7 +50,7 @@ def test_a_limit_may_have_a_unit_or_be_a_factor():
     readings = [JobReading(value, 0.2) for value in (14.4, 14.6, 15.4, 15.6)]
     assert [goal.holds(one) for one in readings] == [False, None, None, True]
     assert comparison("peak_acceleration > base").times == 1.0
-    with pytest.raises(QuestionError, match=r"base, peak_acceleration at .*: the job failed"):
+    with pytest.raises(StudyError, match=r"base, peak_acceleration at .*: the job failed"):
         goal.beside(FAILED)
 
 
@@ -235,6 +235,6 @@ def test_a_limit_without_a_bar_is_decided(sign, there):
     ],
 )
 def test_what_is_no_comparison_is_refused(text, told):
-    with pytest.raises(QuestionError) as refusal:
+    with pytest.raises(StudyError) as refusal:
         comparison(text)
     assert told in str(refusal.value)

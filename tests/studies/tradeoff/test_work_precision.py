@@ -12,7 +12,7 @@ from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.work_precision import (
     ERRORS,
-    NothingIntegrated,
+    StudyError,
     draw_work_precision,
     fastest,
     load_methods,
@@ -116,7 +116,7 @@ def test_a_run_that_finds_its_own_length_gives_it_to_all(tmp_path, in_process):
 def test_an_ideal_machine_is_refused(tmp_path):
     path = tmp_path / "calm.yaml"
     path.write_text("load: gas\n")
-    with pytest.raises(NothingIntegrated, match="a job of calm has no joint with clearance"):
+    with pytest.raises(StudyError, match="a job of calm has no joint with clearance"):
         load_methods(str(path), [], tmp_path)
 
 
