@@ -242,60 +242,56 @@ def judge_alarms(
     )  # fmt: skip
 
 
+RATES = {  # name -> dims beside alarm and noise, unit, long name
+    "limit": ((), "1", "limit, times the usual reading of a sound machine"),
+    "detection": (("state", "end"), "1", "share of windows in which the alarm trips"),
+    "false_alarms": (("end",), "1", "share of windows of sound machines in which it trips"),
+    "first_clearance": (("joint", "end"), "mm", "least clearance from which on it detects"),
+}
+
+
 def judge_windows(
     windows: Windows, noise: Sequence[float], false_alarms: float, factor: float | None,
     detected: float,
 ) -> xr.Dataset:  # fmt: skip
-    """Return the rates of all alarms whose reading all sound windows have."""
+    """Return the `RATES` of all alarms whose reading all sound windows have."""
     sound, draws, readings = windows.joints == SOUND, windows.draws, windows.readings
     states = [*list_states(windows)]
     joint_of = np.array([joint for joint, _ in states])
-    joints = [*dict.fromkeys(joint_of.tolist())]
     sizes = [windows.clearances[rows] for _, rows in states]
     middle = np.array([np.median(size) for size in sizes])
+    of_joint = {joint: joint_of == joint for joint in joint_of.tolist()}
     order = np.random.default_rng(SEED).permutation(sorted({*draws[sound].tolist()})).tolist()
     fold = np.array([order.index(one) % FOLDS if one in order else -1 for one in draws.tolist()])
-    listed: list[tuple[Alarm, str]] = []
-    numbers: dict[str, list[Any]] = defaultdict(list)
-    for alarm in ALARMS:
-        for name in dict.fromkeys(name for _, name in readings):
-            usual = readings[0, name].get(alarm.reading, np.full(sound.shape, math.nan))[sound]
-            if not np.isfinite(usual).all() or (name != RECORD and not alarm.is_filtered):
-                continue
-            listed.append((alarm, name))
-            for level in range(len(noise)):
-                own = readings[level, name]
 
-                def trip(setting: np.ndarray, alarm=alarm, own=own) -> tuple[float, np.ndarray]:
-                    scores = alarm.score(own, setting)
-                    limit = factor or find_limit(scores[setting], draws[setting], false_alarms)
-                    return limit, scores > limit
+    def trip(alarm: Alarm, own: Readings, setting: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the limit that sound windows set, and which windows are above it."""
+        scores = alarm.score(own, setting)
+        limit = factor or find_limit(scores[setting], draws[setting], false_alarms)
+        return limit, scores > limit
 
-                limit, trips = trip(sound)
-                rates = np.array([compute_rate(trips[rows], draws[rows]) for _, rows in states])
-                for k in range(FOLDS):
-                    trips[fold == k] = trip(sound & (fold != k))[1][fold == k]
-                numbers["limit"].append(limit)
-                numbers["detection"].append(rates)
-                numbers["false_alarms"].append(compute_rate(trips[sound], draws[sound]))
-                numbers["first_clearance"].append([
-                    find_onset(middle[joint_of == joint], rates[joint_of == joint], detected)
-                    for joint in joints
-                ])  # fmt: skip
-    of = {
-        "limit": ((), "1", "limit, times the usual reading of a sound machine"),
-        "detection": (("state", "end"), "1", "share of windows in which the alarm trips"),
-        "false_alarms": (("end",), "1", "share of windows of sound machines in which it trips"),
-        "first_clearance": (("joint", "end"), "mm", "least clearance from which on it detects"),
-    }
+    def judge(alarm: Alarm, own: Readings) -> dict[str, Any]:
+        limit, trips = trip(alarm, own, sound)
+        rates = np.array([compute_rate(trips[rows], draws[rows]) for _, rows in states])
+        for k in range(FOLDS):
+            trips[fold == k] = trip(alarm, own, sound & (fold != k))[1][fold == k]
+        false = compute_rate(trips[sound], draws[sound])
+        first = [find_onset(middle[at], rates[at], detected) for at in of_joint.values()]
+        return dict(zip(RATES, (limit, rates, false, first), strict=True))
+
+    def is_judged(alarm: Alarm, name: str) -> bool:
+        usual = readings[0, name].get(alarm.reading, np.full(sound.shape, math.nan))[sound]
+        return bool(np.isfinite(usual).all()) and (name == RECORD or alarm.is_filtered)
+
+    filters = [*dict.fromkeys(name for _, name in readings)]
+    listed = [(alarm, name) for alarm in ALARMS for name in filters if is_judged(alarm, name)]
+    judged = [[judge(alarm, readings[level, name]) for level in range(len(noise))]
+              for alarm, name in listed]  # fmt: skip
     found = {
-        name: (
-            ("alarm", "noise", *dims),
-            np.reshape(numbers[name], (len(listed), len(noise), *np.shape(numbers[name])[1:])),
-            {"units": unit, "long_name": phrase},
-        )
-        for name, (dims, unit, phrase) in of.items()
-    }
+        rate: (("alarm", "noise", *dims), np.array([[one[rate] for one in row] for row in judged]),
+               {"units": unit, "long_name": phrase})
+        for rate, (dims, unit, phrase) in RATES.items()
+    }  # fmt: skip
     size = {"units": "mm", "long_name": "clearance of the worn joint"}
     where = {
         "alarm": [f"{alarm.title}, {name}" if alarm.is_filtered else alarm.title
@@ -303,7 +299,7 @@ def judge_windows(
         "kind": ("alarm", [alarm.title for alarm, _ in listed]),
         "filter": ("alarm", [name for _, name in listed]),
         "noise": ("noise", np.array(noise, float), {"units": "m/s2", "long_name": "added noise"}),
-        "joint": joints, "end": [*ENDS], "worn_joint": ("state", joint_of),
+        "joint": [*of_joint], "end": [*ENDS], "worn_joint": ("state", joint_of),
         "clearance": ("state", middle, size),
         "clearance_low": ("state", np.array([one.min() for one in sizes]), size),
         "clearance_high": ("state", np.array([one.max() for one in sizes]), size),
