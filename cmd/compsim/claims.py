@@ -28,8 +28,8 @@ def claims(study, folder, quiet) -> int:
 
     Exit code 3 if a machine has no verdict.
     """
-    from compressor.report import render
-    from compressor.store import find_study, publish, write_dataset
+    from compressor.report import write_figure
+    from compressor.store import find_study, write_dataset
     from compressor.studies.claims import draw, judge_machines, numbers, sensitivity, table
 
     with ProgressReporter(quiet, "machines") as progress:
@@ -42,7 +42,7 @@ def claims(study, folder, quiet) -> int:
     drawn = draw(found, effects)
     if drawn:
         figure, sentence = drawn
-        for kind in ("png", "svg"):
-            publish(path.with_suffix(f".{kind}"), render(figure, kind))
+        for kind in (".png", ".svg"):
+            write_figure(path.with_suffix(kind), figure)
         screen.print_text(f"{path.with_suffix('.png')}: {sentence}")
     return screen.SOME_FAILED if (found["failed"] != "").any() else screen.DONE

@@ -42,11 +42,10 @@ def compare(record, names, folder, hints, output, as_json, quiet) -> int:
     least three. A unit that was perhaps mistaken is named. A file does not say where its sensor
     was; --json has the jobs' places.
     """
-    kind = os.path.splitext(output or "")[1]
-    if output and kind not in KINDS:
+    if output and Path(output).suffix not in KINDS:
         raise click.UsageError(f"-o {output}: end the name in {', '.join(KINDS)}")
-    from compressor.report import as_csv, render
-    from compressor.store import publish, writable_folder
+    from compressor.report import write_figure
+    from compressor.store import writable_folder
     from compressor.studies.compare import (
         CAPTION,
         compare_record,
@@ -64,8 +63,6 @@ def compare(record, names, folder, hints, output, as_json, quiet) -> int:
     else:
         screen.print_text(*list_comparison(found))
     if output:
-        figure = draw_comparison(found)
-        data = as_csv(figure).encode() if kind == ".csv" else render(figure, kind[1:])
-        publish(Path(output), data)
+        write_figure(Path(output), draw_comparison(found))
         screen.say(output) if as_json else screen.print_text(output, f"  {CAPTION}")
     return screen.DONE

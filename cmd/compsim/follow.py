@@ -53,8 +53,7 @@ def follow(config, over, both, log, points, no_exponent, rerun, folder, jobs, qu
     Prints a table for each machine; writes figures and a Dataset into follow/ of the folder of
     results. The same command continues what was interrupted.
     """
-    from compressor.report import render, title_figure
-    from compressor.store import publish
+    from compressor.report import title_figure, write_figure
     from compressor.studies.follow.figure import draw_followed, table
     from compressor.studies.follow.follow import follow as run_chains
     from compressor.studies.follow.follow import load_values, read_over
@@ -78,8 +77,7 @@ def follow(config, over, both, log, points, no_exponent, rerun, folder, jobs, qu
         if (machine["status"] == "ok").any() and drawn < MAX_DRAWN:
             path = found.path.with_name(f"{found.path.stem}-{number + 1}.png")
             title = title_figure(study.title or study.name, "motion", where)
-            publish(path, render(draw_followed(machine, title)))
-            screen.print_text(str(path))
+            screen.print_text(str(write_figure(path, draw_followed(machine, title))))
             drawn += 1
     screen.print_text(str(found.path))
     if not quiet:

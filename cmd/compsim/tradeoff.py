@@ -33,8 +33,8 @@ def tradeoff(configs, folder, jobs, overrides, quiet) -> int:
     Errors are against the tightest job of another method. Prints the fastest method for each error;
     writes numbers and figure into tradeoff/ of the folder of results.
     """
-    from compressor.report import render
-    from compressor.store import publish, write_dataset
+    from compressor.report import write_figure
+    from compressor.store import write_dataset
     from compressor.studies.tradeoff.work_precision import (
         draw_work_precision,
         list_fastest,
@@ -51,8 +51,7 @@ def tradeoff(configs, folder, jobs, overrides, quiet) -> int:
         found = work_precision(folder, study)
         screen.print_text(*list_fastest(found))
         path = Path(folder, "tradeoff", study.name)
-        write_dataset(path.with_suffix(".nc"), found)
-        for kind in ("png", "svg"):
-            publish(path.with_suffix(f".{kind}"), render(draw_work_precision(found), kind))
-        screen.print_text(*(f"{path}.{kind}" for kind in ("png", "svg", "nc")))
+        figure = draw_work_precision(found)
+        paths = [write_figure(path.with_suffix(kind), figure) for kind in (".png", ".svg")]
+        screen.print_text(*map(str, (*paths, write_dataset(path.with_suffix(".nc"), found))))
     return screen.DONE

@@ -29,8 +29,7 @@ def wear(configs, folder, jobs, rerun, as_json, quiet, **how) -> int:
     least and the greatest coefficient. Writes clearances, metrics and a figure of each study into
     wear/ of the folder of results. The same command continues what was interrupted.
     """
-    from compressor.report import render, title_figure
-    from compressor.store import publish
+    from compressor.report import title_figure, write_figure
     from compressor.studies.wear import check_wear, draw_wear, run_wear, table, to_row
     from compressor.sweep import cores
 
@@ -49,8 +48,7 @@ def wear(configs, folder, jobs, rerun, as_json, quiet, **how) -> int:
         mine = [one for one in summary.machines if one.study == study.name]
         if any(one.life for one in mine):
             title = title_figure(study.title or study.name, "wear of the bores")
-            path = Path(folder, "wear", f"{study.name}.png")
-            publish(path, render(draw_wear(mine, title)))
+            path = write_figure(Path(folder, "wear", f"{study.name}.png"), draw_wear(mine, title))
             if not quiet:
                 screen.say(str(path))
     failed = [

@@ -4,14 +4,12 @@ from compressor.report.figures.contours import contour_area, contour_lines
 from compressor.report.figures.drawing import (
     Panel,
     PlotlyFigure,
-    as_csv,
     join_with_gaps,
     make_grid,
     midway,
     rectangle,
     share_scales,
 )
-from compressor.report.figures.pictures import render
 from compressor.report.figures.style import (
     BLACK,
     BLUE,
@@ -47,6 +45,7 @@ from compressor.report.page import (
 from compressor.report.plots import (
     PlotChoice,
     title_figure,
+    write_figure,
     write_plots,
 )
 from compressor.report.report import write_report

@@ -25,6 +25,7 @@ from compressor.metrics import JOINTS
 from compressor.program import CompsimError
 from compressor.reasons import remedy
 from compressor.report.figures import FIGURES, SweptRow
+from compressor.report.figures.drawing import as_csv
 from compressor.report.figures.pictures import render
 from compressor.report.figures.sweep_data import name_in_words
 from compressor.report.study_section import file_name
@@ -90,9 +91,17 @@ def publish_figures(
 ) -> Iterator[Plotted]:
     """Write figures with their names and captions as files; yields each. Raises StoreError."""
     for name, caption, figure in drawn:
-        path = Path(output) / f"{file_name(stem, name)}.png"
-        publish(path, render(figure))
-        yield Plotted(path, caption)
+        yield Plotted(write_figure(Path(output) / f"{file_name(stem, name)}.png", figure), caption)
+
+
+def write_figure(path: Path, figure: go.Figure) -> Path:
+    """Write a figure as the end of its path says, .png, .svg or .csv; return the path.
+
+    Raises StoreError.
+    """
+    kind = path.suffix[1:]
+    publish(path, as_csv(figure).encode() if kind == "csv" else render(figure, kind))
+    return path
 
 
 JOB, STUDY = FIGURES["job"], FIGURES["study"]

@@ -23,10 +23,10 @@ from compressor.report import (
     TableRow,
     file_name,
     make_grid,
-    render,
     title_figure,
+    write_figure,
 )
-from compressor.store import Folder, StoredStudy, publish, read_dataset, write_dataset
+from compressor.store import Folder, StoredStudy, read_dataset, write_dataset
 from compressor.studies.alarms.alarms import list_numbers, list_rows, list_warnings, rank_alarms
 
 FILE, FIGURE = "alarms.nc", "alarms.png"
@@ -67,8 +67,8 @@ def draw_alarms(found: xr.Dataset, title: str = "") -> PlotlyFigure:
 def write_alarms(found: xr.Dataset, output: Folder, title: str) -> list[Path]:
     """Write a result as netCDF and as a figure; return their paths. title: of the machine."""
     figure = draw_alarms(found, title_figure(title, "alarms by clearance"))
-    publish(Path(output, FIGURE), render(figure))
-    return [write_dataset(Path(output, FILE), found), Path(output, FIGURE)]
+    path = write_figure(Path(output, FIGURE), figure)
+    return [write_dataset(Path(output, FILE), found), path]
 
 
 def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:
