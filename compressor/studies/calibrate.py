@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from compressor.cases import Case, design, load_studies, row_of
+from compressor.cases import Case, design, load_studies
 from compressor.program import Progress, no_progress
 from compressor.store import Folder, job_record, read_store
 from compressor.studies.frame import (
@@ -239,17 +239,8 @@ class Unknown:
     @classmethod
     def written(cls, text: str) -> "Unknown":
         """Return the unknown of a text KEY=LOW:HIGH. Raises StudyError."""
-        parts = read_range(text)
-        if parts is None or parts[3] is not None or not parts[1] < parts[2]:
-            raise StudyError(
-                f"{text!r} is no range: write KEY=LOW:HIGH, such as "
-                "machine.reciprocating_mass_kg=10:20"
-            )
-        key, low, high, _ = parts
-        row = row_of(key)
-        if row is None or row.kind != "number":
-            raise StudyError(f"{key!r} is no key with a number that can be fitted")
-        if row.key == SPEED:
+        key, low, high, _ = read_range("--fit", text)
+        if key == SPEED:
             raise StudyError(f"{SPEED} is the record's own: leave it out of --fit")
         return cls(key, low, high)
 

@@ -42,7 +42,7 @@ from compressor.store import (
     read_store,
     swept_column,
 )
-from compressor.studies.frame import StudyError
+from compressor.studies.frame import StudyError, rows_dataset
 
 CLAIMS = tuple(range(1, len(RULES) + 1))
 SHORT = (
@@ -60,7 +60,14 @@ ROD, RECIPROCATING = "rod_mass_kg", "reciprocating_mass_kg"
 CUT = 1.0  # margins beyond this are cut: how far beyond decides no claim
 ORDERS = ("first_order", "total_order")
 INTERVALS = tuple(f"{order}{end}" for order in ORDERS for end in ("", "_low", "_high"))
-UNIT = {"units": "1"}
+NUMBERS = {  # name -> dims, unit, long name
+    "margin": (("claim",), "1", "how far a claim is from its threshold, relative to it"),
+    "error": (("claim",), "1", "how far the margin may be off"),
+    "share_margin": (("share",), "1", "margin of claim 7 by one share of the revolution alone"),
+    "share_error": (("share",), "1", "how far that margin may be off"),
+    "chaotic": ((), "1", "how many of the cases are chaotic"),
+}
+TEXTS = {"failed": "cases there are not, and why"}
 REMEDY = "compsim init claims writes a case file with all eleven cases of each machine"
 
 Key = tuple[tuple[str, Any], ...]  # swept values of a machine
@@ -149,26 +156,13 @@ def measure(runs: Mapping[str, xr.Dataset], failed: str = "") -> Margins:
 
 def machines_dataset(rows: list[Margins], coords: Mapping[str, tuple]) -> xr.Dataset:
     """Return margins with the dimension machine; coords: of the swept keys."""
-    phrases = {
-        "margin": ("claim", "how far a claim is from its threshold, relative to it"),
-        "error": ("claim", "how far the margin may be off"),
-        "share_margin": ("share", "margin of claim 7 by one share of the revolution alone"),
-        "share_error": ("share", "how far that margin may be off"),
-    }
-    variables: dict[str, tuple] = {
-        name: (("machine", dim), [getattr(row, name) for row in rows], UNIT | {"long_name": phrase})
-        for name, (dim, phrase) in phrases.items()
-    }
-    about = {"long_name": "how many of the cases are chaotic", **UNIT}
-    variables["chaotic"] = "machine", [row.chaotic for row in rows], about
-    texts = np.array([row.failed for row in rows], object)
-    variables["failed"] = "machine", texts, {"long_name": "cases there are not, and why"}
+    found = rows_dataset([row._asdict() for row in rows], "machine", TEXTS, NUMBERS)
     own = {
         "claim": ("claim", np.array(CLAIMS), {"long_name": "claim of the paper"}),
         "share": ("share", np.array(SHARES, object), {"long_name": "measure of claim 7"}),
     }
     thresholds = "; ".join(f"{n}. {rule.threshold}" for n, rule in zip(CLAIMS, RULES, strict=True))
-    return xr.Dataset(variables, {**coords, **own}, {"thresholds": thresholds})
+    return found.assign_coords({**coords, **own}).assign_attrs(thresholds=thresholds)
 
 
 def assumptions(found: xr.Dataset) -> list[str]:

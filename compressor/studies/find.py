@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from compressor.cases import Study, load_studies, row_of
+from compressor.cases import Study, load_studies
 from compressor.digits import align_columns, by_bar
 from compressor.metrics import AXES, BARRED, JOINTS, NUMBERS, SEGMENTS, THRESHOLDS
 from compressor.program import Progress, did_you_mean, no_progress
@@ -211,17 +211,7 @@ class Question:
 
         Raises StudyError, and CaseFileError with what is wrong in the file.
         """
-        if not self.low < self.high:
-            raise StudyError(f"{self.key}={self.low:g}:{self.high:g} is no range: "
-                                "write the lower end first")  # fmt: skip
-        if self.logarithmic and self.low <= 0.0:
-            raise StudyError(f"a range even in the logarithm needs ends above 0: {self.low:g}")
-        row = row_of(self.key)
-        if row is not None and row.kind != "number":
-            raise StudyError(f"{self.key} cannot be searched over: it is no continuous number")
         ends = [self._load(f"{value!r}") for value in (self.low, self.high)]
-        if row is None:
-            raise StudyError(f"{self.key} is no single number")
         if ends[0].jobs > 1:
             axes = ", ".join(axis.key for axis in ends[0].axes)
             raise StudyError(f"{self.path} makes {ends[0].jobs} jobs for one {self.key}, it "
@@ -244,11 +234,9 @@ def read_question(
     over: KEY=LOW:HIGH; goal: a comparison, or with `which` greatest or least a metric; more: other
     fields. Raises StudyError.
     """
-    parts = read_range(over)
-    if parts is None or parts[3] is not None:
-        raise StudyError(f"{over!r} is no range: write KEY=LOW:HIGH, such as clearance_mm=0.01:0.3")
+    span = read_range("--over", over, log=bool(more.get("logarithmic")))
     sought = comparison(goal) if which == "first" else goal_of(goal, which)
-    return Question(path, *parts[:3], sought, **more)  # type: ignore[arg-type]
+    return Question(path, *span[:3], sought, **more)  # type: ignore[arg-type]
 
 
 def _number(text: str) -> float:

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import xarray as xr
 
-from compressor.cases import Case, CaseFileError, Study, load_studies, points
+from compressor.cases import Case, CaseFileError, Study, load_studies, points, row_of, suggestion
 from compressor.outcome import Outcome
 from compressor.program import CompsimError, Progress, no_progress, report_progress
 from compressor.store import (
@@ -49,16 +49,43 @@ RECORD_REMEDY = "write `body: true` and `sensor: {{length_rev: {length}}}` into 
 Point = tuple[float, ...]  # values of keys, in the case file's units
 
 
-def read_range(text: str) -> tuple[str, float, float, int | None] | None:
-    """Return key, ends and count of a text KEY=LOW:HIGH or KEY=LOW:HIGH:N; None of another text."""
+class StudyError(CompsimError, ValueError):
+    """A question that a study cannot answer: and what to do."""
+
+    exit_code = 2
+
+
+def read_range(
+    option: str, text: str, is_counted: bool = False, log: bool = False
+) -> tuple[str, float, float, int]:
+    """Return key, ends and count of a text KEY=LOW:HIGH, or KEY=LOW:HIGH:N, 0 without.
+
+    log: values are to be spaced with even ratios. Raises StudyError with the option's name.
+    """
     parts = RANGE.fullmatch(text)
+    key, low, high, count = parts.groups() if parts else ("", "nan", "nan", None)
     try:
-        low, high = map(float, parts.groups()[1:3]) if parts else (math.nan, math.nan)
+        ends = float(low), float(high)
     except ValueError:
-        return None
-    if parts is None or not (math.isfinite(low) and math.isfinite(high)):
-        return None
-    return parts[1], low, high, int(parts[4]) if parts[4] else None
+        ends = math.nan, math.nan
+    row = row_of(key)
+    if not all(map(math.isfinite, ends)) or (count is not None) != is_counted:
+        form = "KEY=LOW:HIGH:N, such as clearance_mm=0.01:1:60"
+        problem = f"write {form if is_counted else form.replace(':N', '').replace(':60', '')}"
+    elif row is None:
+        problem = f"{key} is no key of a number{suggestion(key, '') or ', such as clearance_mm'}"
+    elif row.kind != "number":
+        numbers = "clearance_mm or machine.speed_rpm"
+        problem = f"{key} is no continuous number: give a key such as {numbers}"
+    elif wrong := row.check(ends[0]) or row.check(ends[1]):
+        problem = f"{key}: {wrong}"
+    elif ends[0] >= ends[1]:
+        problem = "write the lower end first"
+    elif log and ends[0] <= 0.0:
+        problem = "--log needs ends above 0"
+    else:
+        return key, *ends, int(count or 0)
+    raise StudyError(f"{option} {text}: {problem}")
 
 
 class GrowingStudy:
@@ -328,12 +355,6 @@ def calling_often(look: Callable[[], object]) -> Iterator[None]:
 
 
 # ---- records ------------------------------------------------------------------------------------
-
-
-class StudyError(CompsimError, ValueError):
-    """A question that a study cannot answer: and what to do."""
-
-    exit_code = 2
 
 
 def no_records(source: StoredStudy, left: Mapping[str, int], revolutions: int) -> StudyError:

@@ -27,8 +27,6 @@ from compressor.cases import (
     Study,
     load_studies,
     points,
-    row_of,
-    suggestion,
 )
 from compressor.metrics import JOINTS
 from compressor.program import PROGRAM, Progress, no_progress
@@ -62,7 +60,6 @@ from compressor.sweep import JobLost
 FOLDER = "follow"
 SCHEMA = 3  # of a row's numbers: a change of what they mean makes chains again
 RUNS = 4  # of a value, each with the case's own wall time at most, and some more
-FORM = "KEY=LOW:HIGH:N, such as clearance_mm=0.01:1:60"
 # groups whose keys are not followed: of the run and its start, or of what the machine shakes
 NOT_FOLLOWED = ("solve", "output", "body", "sensor", "initial_offset_mm")
 
@@ -90,27 +87,13 @@ class KeyRange:
 
 def read_over(text: str, **more: Any) -> KeyRange:
     """Return what a text KEY=LOW:HIGH:N asks for; more: other fields. Raises StudyError."""
-    key, low, high, count = read_range(text) or ("", math.nan, math.nan, None)
-    if count is None:
-        raise StudyError(f"--over {text}: write {FORM}")
-    row = row_of(key)
-    if row is None:
-        problem = f"{key} is no key of a number{suggestion(key, '') or ', such as clearance_mm'}"
-    elif row.kind != "number":
-        problem = f"{key} is no number: give a key such as clearance_mm or machine.speed_rpm"
-    elif key.partition(".")[0] in NOT_FOLLOWED:
+    key, low, high, count = read_range("--over", text, True, more.get("log", False))
+    if key.partition(".")[0] in NOT_FOLLOWED:
         problem = f"{key} is nothing of the machine: give a key such as clearance_mm"
-    elif wrong := row.check(low) or row.check(high):
-        problem = f"{key}: {wrong}"
-    elif count < 2:
-        problem = f"{count} value: give 2 at least"
-    elif low >= high:
-        problem = f"write the lower end first, and --both to go down as well: {FORM}"
-    elif more.get("log") and low <= 0.0:
-        problem = "--log needs ends above 0"
-    else:
-        return KeyRange(key, low, high, count, **more)
-    raise StudyError(f"--over {text}: {problem}")
+        raise StudyError(f"--over {text}: {problem}")
+    if count < 2:
+        raise StudyError(f"--over {text}: {count} value: give 2 at least")
+    return KeyRange(key, low, high, count, **more)
 
 
 def load_values(

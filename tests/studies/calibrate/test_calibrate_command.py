@@ -87,9 +87,9 @@ def test_what_is_printed_is_a_case_file(fitted, monkeypatch):
     ("text", "what"),
     [
         ("machine.rod_mass_kg", "write KEY=LOW:HIGH"),
-        ("machine.rod_mass_kg=8:3", "write KEY=LOW:HIGH"),
+        ("machine.rod_mass_kg=8:3", "write the lower end first"),
         ("machine.rod_mass=3:8", "is no key"),
-        ("solve.method=1:2", "is no key with a number"),
+        ("solve.method=1:2", "is no continuous number"),
         ("machine.rod_mass_kg=3:inf", "write KEY=LOW:HIGH"),
         ("machine.speed_rpm=400:500", "is the record's own"),
     ],
