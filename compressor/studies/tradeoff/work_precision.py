@@ -127,17 +127,15 @@ def tabulate(rows: Sequence[Mapping[str, Any]]) -> xr.Dataset:
     relative distance in acceleration of the tightest jobs of two methods.
     """
     dims = ("scene", "method", "rtol")
-    each = [[*dict.fromkeys(row[dim] for row in rows)] for dim in dims]
-    each[2].sort(reverse=True)
-    places = [tuple(values.index(row[dim]) for dim, values in zip(dims, each, strict=True))
-              for row in rows]  # fmt: skip
-    variables: dict[str, tuple] = {}
+    order = {dim: [*dict.fromkeys(row[dim] for row in rows)] for dim in dims}
+    order["rtol"].sort(reverse=True)
+    last = {tuple(row[dim] for dim in dims): row for row in rows}.values()
+    columns: dict[str, tuple] = {dim: ("row", [row[dim] for row in last]) for dim in dims}
     for name, attrs in VARIABLES.items():
-        array = np.full([*map(len, each)], "" if name in WORDS else math.nan, object)
-        for place, row in zip(places, rows, strict=True):
-            array[place] = row.get(name, array[place])
-        variables[name] = dims, array if name in WORDS else array.astype(float), attrs
-    found = xr.Dataset(variables, dict(zip(dims, each, strict=True)))
+        kind, blank = (object, "") if name in WORDS else (float, math.nan)
+        columns[name] = "row", np.array([row.get(name, blank) for row in last], kind), attrs
+    table = xr.Dataset(columns).set_index(row=[*dims])
+    found = table.unstack("row", fill_value=dict.fromkeys(WORDS, "")).reindex(order)
     found["reference_uncertainty"] = found["reference_uncertainty"].max(dims[1:], keep_attrs=True)
     return found
 
