@@ -1,10 +1,11 @@
 """The house: which package may import which, one door a package, one door a library.
 
-Imports count wherever they stand, inside functions and for types alone. `broken_rules` lists what
-breaks a rule, so that a planted fault shows that the rule bites.
+The rules are the two tables of compressor/README.md. Imports count wherever they stand, inside
+functions and for types alone; a planted fault shows that a rule bites.
 """
 
 import ast
+import re
 import tomllib
 from fnmatch import fnmatch
 from pathlib import Path
@@ -12,73 +13,40 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
+PAGE = (ROOT / "compressor/README.md").read_text(encoding="utf-8")
+
+
+def read_table(head):
+    """Return the cells of a table of the page, a list a row; head: how its first row begins."""
+    rows = PAGE.partition(f"\n| {head} ")[2].partition("\n\n")[0].split("\n")[2:]
+    return [row.strip("| ").split(" | ") for row in rows]
+
+
+def quoted(cell):
+    """Return the dotted names of what a cell has in code."""
+    names = [f"compressor/{name}" for name in re.findall(r"`([\w/]+)`", cell)]
+    return [name.replace("compressor/cmd/", "").replace("/", ".") for name in names]
+
+
+PACKAGES = {quoted(row[0])[0].partition(".")[2]: re.findall(r"\w+", row[2])
+            for row in read_table("package")[1:]}  # fmt: skip
+ROOT_MODULES = ("program", "metrics", "digits", "units", "reasons", "outcome")
+EVERY = {*PACKAGES, *ROOT_MODULES}
 # package or root module -> what it may import of ours, beside the root module `program`
-MAY_IMPORT = {
+MAY_IMPORT = dict.fromkeys(ROOT_MODULES, ()) | PACKAGES | {
     # the public calls, found when they are first used, and the table of studies
     "": {"cases", "solve", "store", "studies"},
-    "program": set(),
-    "metrics": set(),
-    "digits": set(),
-    "units": set(),
-    "reasons": set(),
-    "outcome": {"metrics", "reasons"},
-    "cases": {"metrics"},
-    "physics": set(),
-    "vibration": {"cases"},
-    "solve": {"cases", "physics", "vibration", "outcome", "metrics", "reasons"},
-    "store": {"cases", "vibration", "outcome", "metrics", "reasons", "digits", "units"},
-    "sweep": {"cases", "solve", "store", "outcome", "reasons"},
-    "analysis": {"cases", "physics", "solve", "vibration", "metrics", "units"},
-    "report": {"analysis", "cases", "store", "outcome", "metrics", "reasons", "digits", "units"},
-    "studies": {"analysis", "cases", "digits", "metrics", "outcome", "physics",
-                "reasons", "report", "solve", "store", "sweep", "units", "vibration"},
-    "compsim": {"analysis", "cases", "digits", "metrics", "outcome", "physics", "reasons", "report",
-                "solve", "store", "studies", "sweep", "units"},
+    "outcome": {"metrics", "reasons"}, "studies": EVERY, "compsim": EVERY,
 }  # fmt: skip
-PACKAGES = (
-    "cases", "physics", "vibration", "solve", "store", "sweep", "analysis", "report", "studies",
-)  # fmt: skip
 LIBRARIES = {  # library -> the modules that may import it
-    "numba": {"compressor.physics._jit"},
-    # designs, sparse systems, integrators, Student's t, splines, root finder and minimiser, spectra
-    "scipy": {
-        "compressor.analysis.orbit",
-        "compressor.analysis.effects",
-        "compressor.analysis.contacts",
-        "compressor.cases.swept",
-        "compressor.studies.find",
-        "compressor.studies.calibrate",
-        "compressor.solve.bearing",
-        "compressor.solve.measured_gas",
-        "compressor.solve.scipy_driver",
-        "compressor.solve.run_metrics",
-        "compressor.vibration",
-    },
-    "yaml": {"compressor.cases.load", "compressor.cases.yaml_reader"},
-    "pydantic": {"compressor.cases"},
-    "joblib": {"compressor.sweep"},
-    "distributed": {"compressor.sweep"},
-    "h5py": {"compressor.store.netcdf"},
-    "jinja2": {"compressor.report.page"},
-    "matplotlib": {"compressor.report.figures"},
-    "plotly": {"compressor.report"},
-    "contourpy": {"compressor.report.figures.contours"},
-    "click": {"compsim"},
-    "rich": {"compsim.progress"},
-    "pyarrow": {"compressor.studies.diagnosis"},
-    "sklearn": {"compressor.store.caveats", "compressor.studies.diagnosis.identify"},
-}  # fmt: skip
-OF_PHYSICS = {
-    "numpy",
-    "math",
-    "enum",
-    "typing",
-    "types",
-    "dataclasses",
-    "collections",
-    "functools",
-    "compressor",
+    library.partition(".")[2]: quoted(places)
+    for libraries, places in read_table("library")
+    for library in quoted(libraries)
 }
+OF_PHYSICS = {
+    "numpy", "math", "enum", "typing", "types", "dataclasses", "collections", "functools",
+    "compressor",
+}  # fmt: skip
 
 
 def read_sources():
