@@ -12,14 +12,6 @@ from compressor.solve.simulate import simulate
 NAMES = sorted(path.stem for path in FOLDER.glob("*.yaml"))
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_examples_can_be_run(name):
-    (study,) = load_studies(example(name))
-    assert study.name == name
-    (said,) = re.findall(r"^([\d,]+) (?:jobs|machines?)\b", templates()[name].jobs)
-    assert study.jobs == int(said.replace(",", ""))
-
-
 @pytest.mark.parametrize("name", STARTS)
 def test_templates_run_without_a_warning(name):
     """Two jobs of each, short ones: the axes' ends."""

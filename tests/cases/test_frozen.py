@@ -5,11 +5,13 @@
 
 import hashlib
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 from compressor.cases.case import Case
+from compressor.cases.examples import templates
 from compressor.cases.load import load_studies
 
 ROOT = Path(__file__).parents[2]
@@ -34,6 +36,13 @@ def test_keys_of_random_cases_are_those_kept():
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
 def test_our_files_have_the_jobs_axes_and_keys_kept(path):
     assert kept_of(path) == FROZEN["files"][path.name]
+
+
+def test_examples_have_the_jobs_that_they_say():
+    for name, one in templates().items():
+        (said,) = re.findall(r"^([\d,]+) (?:jobs|machines?)\b", one.jobs)
+        kept = FROZEN["files"][f"{name}.yaml"]
+        assert (kept["name"], kept["jobs"]) == (name, int(said.replace(",", "")))
 
 
 def write_kept():
