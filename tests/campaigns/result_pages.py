@@ -18,10 +18,10 @@ from pathlib import Path
 from statistics import median
 
 from page_tables import (
+    FINDINGS,
     RESULTS,
     kept,
     markdown,
-    silent,
     within_bars,
     write_blocks,
 )
@@ -452,92 +452,8 @@ CAMPAIGNS = {
     "nameplate": ("What does the case file of `compsim init machine` give?", nameplate),
 }  # fmt: skip
 
-# ---- the ten findings: words, and of a campaign's numbers (measured, required, whether it passes)
+# ---- pages
 
-KEPT_PROMISES, WITHIN_BARS = 0.99, 0.95  # required; what the error bars are designed for
-
-
-def judge_published(found):
-    good = sum(abs(row["found"] - row["expected"]) <= row["within"] for row in found["rows"])
-    return (
-        f"{good} of {len(found['rows'])} within their tolerance",
-        "all",
-        good == len(found["rows"]),
-    )
-
-
-def compare_peers(found):
-    apart = max(one["exudyn_to_ours"] for one in found["agreement"])
-    times = sorted(r["ratio"] for r in found["rows"] if r["tool"].startswith("Exudyn DOPRI5"))
-    return (f"Exudyn's acceleration differs by at most {apart:.1e} (relative L2); its fastest "
-            f"solver, with no smaller error, takes {times[0]:.0f} to {times[-1]:.0f} times our CPU "
-            "time"), "", None  # fmt: skip
-
-
-def judge_promises(found):
-    claimed = sum(row["kept"] for row in found["words"].values())
-    good = claimed - sum(row["broken"] for row in found["words"].values())
-    return (f"{good:,} of {claimed:,} runs ({good / claimed:.2%})", f"{KEPT_PROMISES:.0%}",
-            good >= KEPT_PROMISES * claimed)  # fmt: skip
-
-
-def judge_bars(found):
-    shares = [within_bars(metrics) for metrics in found["bars"].values()]
-    return (f"{min(shares):.1%} to {max(shares):.1%}, by accuracy level", f"{WITHIN_BARS:.0%}",
-            min(shares) >= WITHIN_BARS)  # fmt: skip
-
-
-def judge_extremes(found):
-    cases = found["scenes"] + sum(one["scenes"] for one in found["fresh"])
-    wrong, ends = found["silent_wrong"] + silent(found["fresh"]), found["ends"]["supported"]
-    good = ends["ok"] / sum(ends.values())
-    return (f"{wrong} of {cases:,} (in the supported range {good:.1%} give a confirmed result, "
-            "the others stop with a reason)"), "none", not wrong  # fmt: skip
-
-
-def count_averages(found):
-    row = found["random"]
-    return f"{row['within']['2']} of {row['judged']}", "about 95", None
-
-
-def judge_faults(found):
-    rows = [row for row in found["campaigns"].values() if "skipped" not in row]
-    failed, trials = (sum(row[name] for row in rows) for name in ("failed", "trials"))
-    return f"{failed} of {trials:,} trials", "none", not failed
-
-
-def judge_mutants(found):
-    rows = [row for row in found["mutants"] if "equivalent" not in row]
-    caught = sum(bool(row["caught_by"]) for row in rows)
-    return f"{caught} of {len(rows)}", "all", caught == len(rows)
-
-
-def count_claims(found):
-    margins, plane = found["default"]["margin"], found["map"]
-    held = sum(margin >= 0.0 for margin in margins)
-    return (f"{held} of {len(margins)} at the default masses; all {len(margins)} in {plane['all']} "
-            f"of {plane['judged']:,} machines with other masses"), "", None  # fmt: skip
-
-
-def count_identified(found):
-    own, *others = (row["right_where_worn"]["share"] for row in found["models"].values())
-    return (f"{own:.1%} of records of worn machines of the study's own model; {min(others):.0%} to "
-            f"{max(others):.0%} if the machine has another friction law"), "", None  # fmt: skip
-
-
-FINDINGS = (
-    ("validation", "Published numbers are reproduced", judge_published),
-    ("peers", "Another program agrees, and takes longer", compare_peers),
-    ("accuracy", "Runs that are reported as accurate are accurate", judge_promises),
-    ("accuracy", "True errors lie within their error bars", judge_bars),
-    ("stress", "Extreme cases that are wrong without a warning", judge_extremes),
-    ("chaotic", "Averages of chaotic motions agree between two integrators, within two standard "
-                "errors", count_averages),
-    ("chaos", "Kills, power cuts and damaged files that lose or change a result", judge_faults),
-    ("mutants", "Planted bugs are caught by the tests", judge_mutants),
-    ("claims", "Claims of the paper that hold", count_claims),
-    ("identify", "`compsim identify` names the worn joint", count_identified),
-)  # fmt: skip
 VERDICTS = {None: "number", True: "pass", False: "**fail**"}
 
 
@@ -546,9 +462,6 @@ def findings(read=kept):
     for name, words, find in FINDINGS:
         measured, required, passed = find(read(f"{name}.json"))
         yield [f"[{words}]({name}.md)", measured, required or "–", VERDICTS[passed]]
-
-
-# ---- pages
 
 
 def measured_by(found):

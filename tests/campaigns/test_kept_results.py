@@ -8,9 +8,8 @@ import measure_identify
 import measure_peers
 import measure_wear
 import pytest
-from page_tables import kept
+from page_tables import FINDINGS, kept
 from peers import mechanism
-from result_pages import FINDINGS
 
 from compressor.cases import Wear
 from compressor.cases.examples import example
