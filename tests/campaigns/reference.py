@@ -41,11 +41,11 @@ Record = namedtuple(
 # ---------------------------------------------------------------- parameters
 
 
-def paper_params(load="spring", joint="both", clearance=1e-4, exact=False, **changes) -> dict:
+def paper_params(load="spring", joint="both", clearance=1e-4, **changes) -> dict:
     """The default parameters as a dict in SI units; `changes` replaces any key.
 
     clearance [m] goes to the joints of the scene `joint`, the others get 0; a dict is taken as it
-    is. The corners follow from the changed values; `exact` asks for the exact ones (see `corners`).
+    is. The corners follow from the changed values.
     """
     if not isinstance(clearance, dict):
         clearance = {name: clearance if joint in (name, "both") else 0.0 for name in JOINTS}
@@ -66,22 +66,18 @@ def paper_params(load="spring", joint="both", clearance=1e-4, exact=False, **cha
         "mu_static": 0.23, "mu_dynamic": 0.15, "stiction_velocity": 0.01, "friction_velocity": 0.1,
     }  # fmt: skip
     params = machine | loads | contact | changes
-    return {"corners": corners(params, exact)} | params
+    return {"corners": corners(params)} | params
 
 
-def corners(params, exact=False) -> tuple:
+def corners(params) -> tuple:
     """The crank angles [rad] at which phases 1, 2 and 3 begin; phase 0 begins at top dead centre.
 
-    The gas load has the paper's printed angles unless `exact`; the design cam's are exact.
+    The gas load has the paper's printed angles; the design cam's are exact.
     """
-    R, L, s0 = (params[k] for k in ("crank_radius", "rod_length", "head_clearance"))
-    if params["load"] == "gas" and not exact:
-        return math.radians(38.95), math.pi, math.radians(294.2)
     if params["load"] == "gas":
-        ratio = (params["discharge"] / params["suction"]) ** (1 / params["exponent"])
-        first, third = L + R + s0 - s0 * ratio, L + R + s0 - (2 * R + s0) / ratio
-    else:
-        first, third = L + R - params["stroke"], L - R + params["stroke"]
+        return math.radians(38.95), math.pi, math.radians(294.2)
+    R, L = params["crank_radius"], params["rod_length"]
+    first, third = L + R - params["stroke"], L - R + params["stroke"]
     return (
         math.acos((first**2 + R**2 - L**2) / (2 * first * R)),
         math.pi,
@@ -416,7 +412,7 @@ def _tolerances(scene, params, rtol):
     return rtol * np.concatenate([clearance * scale, 0.01 * scale])
 
 
-def _integrate(params, scene, t_grid, rtol, method, max_step):
+def _integrate(params, scene, t_grid, rtol, method):
     """The state at the grid's times, each sample's phase, and `beyond` there."""
     rates, beyond = _right_hand_side(scene), np.zeros(len(t_grid))
     atol, y = _tolerances(scene, params, rtol), _start(scene, params)
@@ -431,7 +427,7 @@ def _integrate(params, scene, t_grid, rtol, method, max_step):
         times = np.append(np.clip(t_grid[inside], start, stop), stop)
         found = solve_ivp(
             rates, (start, stop), y, method, np.unique(times), args=(phase, p),
-            rtol=3e-14, atol=atol, max_step=max_step,
+            rtol=3e-14, atol=atol, max_step=LONGEST_STEP,
         )  # fmt: skip
         assert found.success, found.message
         states[inside] = found.y.T[np.searchsorted(found.t, times[:-1])]
@@ -439,27 +435,23 @@ def _integrate(params, scene, t_grid, rtol, method, max_step):
     return states, phases, beyond
 
 
-def reference_solution(
-    params, scene, t_grid, rtol=1e-11, method="DOP853", max_step=1e-5, forces=False
-) -> dict:
+# without it DOP853 steps over returns of contact. Measured: a relative L2 error in a of 2e-2 in the
+# case with a 144 us pulse; none (under 1e-8) in the paper's nine cases. LSODA at 1e-12 without a
+# limit agrees to 3e-9 in all of these, in half the time. Halving rtol changes a by less than 3e-9
+LONGEST_STEP = 1e-5  # s
+
+
+def reference_solution(params, scene, t_grid, rtol=1e-11, method="DOP853") -> dict:
     """The motion from top dead centre at t = 0 on `t_grid` [s] (n, ascending, from >= 0).
 
-    Arrays (n): x, v, a, phi, phi_rate and phase; with `forces` also joint_force (n, joint, axis).
-    The tolerance is absolute (see `_tolerances`): a relative one on x would be coarse beside c.
+    Arrays (n): x, v and a. The tolerance is absolute (see `_tolerances`): a relative one on x would
+    be coarse beside c.
     """
-    # max_step: without it DOP853 steps over returns of contact. Measured: a relative L2 error in a
-    # of 2e-2 in the case with a 144 us pulse; none (under 1e-8) in the paper's nine cases.
-    # LSODA at 1e-12 without a limit agrees with the default to 3e-9 in all of these, in half the
-    # time. Halving rtol changes a by less than 3e-9.
     t_grid = np.asarray(t_grid, dtype=float)
-    states, phases, beyond = _integrate(params, scene, t_grid, rtol, method, max_step)
+    states, phases, beyond = _integrate(params, scene, t_grid, rtol, method)
     n = states.shape[1] // 2
-    evaluated = [
-        _evaluate(scene, y[:n], y[n:], t, phase, params | {"beyond": place}, "math")
+    a = [
+        _evaluate(scene, y[:n], y[n:], t, phase, params | {"beyond": place}, "math")[0][0]
         for y, t, phase, place in zip(states, t_grid, phases, beyond, strict=True)
     ]
-    result = {"x": states[:, 0], "v": states[:, n], "a": np.array([e[0][0] for e in evaluated])}
-    result |= {"phi": states[:, n - 1], "phi_rate": states[:, -1], "phase": phases}
-    if forces:
-        result["joint_force"] = np.array([e[2] for e in evaluated]).reshape(-1, 2, 2)
-    return result
+    return {"x": states[:, 0], "v": states[:, n], "a": np.array(a)}
