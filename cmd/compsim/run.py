@@ -55,14 +55,14 @@ def run(command, configs, folder, jobs, rerun, shard, scheduler, quiet, **how) -
     """
     if scheduler and jobs:
         raise click.UsageError("-j counts processes here; a dask cluster uses all its workers")
-    from compressor.sweep import Cluster, Options, cores, sweep
+    from compressor.sweep import Options, connect_cluster, cores, sweep
 
     studies = read_cases(configs, quiet, **how)
     if how["only"] and not quiet:
         selected = sum(len(study.selected) for study in studies)
         screen.say(f"--only selects {selected} of {plural(sum(study.jobs for study in studies))}")
     machines = screen.caution(studies)
-    cluster: Any = Cluster(scheduler) if scheduler else nullcontext()
+    cluster: Any = connect_cluster(scheduler) if scheduler else nullcontext()
     opening = partial(screen.say_machines, machines)  # where there are jobs to run
     with ProgressReporter(quiet, "jobs", folder, opening) as progress, cluster as elsewhere:
         asked = Options(

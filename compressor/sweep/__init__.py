@@ -1,6 +1,6 @@
 """Run the jobs that are missing."""
 
-from compressor.sweep.cluster import Cluster
+from compressor.sweep.cluster import connect_cluster
 from compressor.sweep.plan import Forecast, forecast
 from compressor.sweep.pool import cores
 from compressor.sweep.sweep import Options, Summary, in_this_process, run_here, sweep

@@ -20,7 +20,7 @@ from compressor.store import reader as store
 from compressor.store.files import StoreError
 from compressor.store.status import verify
 from compressor.sweep import cluster
-from compressor.sweep.cluster import Cluster, ClusterError
+from compressor.sweep.cluster import ClusterError, connect_cluster
 from compressor.sweep.sweep import Options, sweep
 
 TIMES = ("seconds",)  # what two runs of a job may differ in
@@ -109,7 +109,7 @@ def watched(backend, after, act):
 
 def test_a_worker_that_is_killed_costs_nothing(dask, studies, locally, tmp_path):
     victim = dask.workers[0].process.pid
-    with Cluster(dask.scheduler_address) as backend:
+    with connect_cluster(dask.scheduler_address) as backend:
         killing = watched(backend, 8, lambda: os.kill(victim, signal.SIGKILL))
         summary = sweep(studies, tmp_path / "out", options=Options(backend=killing))
     assert (summary.run_now, summary.failed) == (70, ())
@@ -122,7 +122,7 @@ def test_a_job_that_fells_its_workers_is_lost_alone(dask, studies, locally, tmp_
     monkeypatch.setattr(dask.scheduler, "allowed_failures", 0)
     monkeypatch.setattr(cluster, "run_job", bad_jobs.felling)
     monkeypatch.setattr(cluster, "run_cases", bad_jobs.run_felling_cases)
-    with Cluster(dask.scheduler_address) as backend:
+    with connect_cluster(dask.scheduler_address) as backend:
         summary = sweep(studies, tmp_path / "out", options=Options(backend=backend))
     (lost,) = summary.failed
     assert lost.coordinates["clearance_mm"] == pytest.approx(0.2017, abs=0.001)
@@ -137,7 +137,7 @@ def test_a_result_that_cannot_be_stored_here_ends_the_sweep(dask, studies, tmp_p
 
     monkeypatch.setattr(cluster, "publish_batch", full)
     with (
-        Cluster(dask.scheduler_address) as backend,
+        connect_cluster(dask.scheduler_address) as backend,
         pytest.raises(StoreError, match="No space left on device"),
     ):
         sweep(studies[1:], tmp_path / "out", options=Options(backend=backend))
@@ -154,7 +154,10 @@ def test_workers_with_other_programs_are_refused(dask, studies, tmp_path, monkey
     others = cluster.versions() | {"numpy": "1.0"}
     monkeypatch.setattr(cluster, "versions", lambda: others)
     there = rf"worker of the cluster has numpy {np.__version__} in place of 1\.0; have the same"
-    with Cluster(dask.scheduler_address) as backend, pytest.raises(ClusterError, match=there):
+    with (
+        connect_cluster(dask.scheduler_address) as backend,
+        pytest.raises(ClusterError, match=there),
+    ):
         sweep(studies[1:], tmp_path / "out", options=Options(backend=backend))
 
 
@@ -167,7 +170,7 @@ def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path)
     told = []
     with distributed.LocalCluster(
         n_workers=0, processes=False, dashboard_address=":0", silence_logs=50
-    ) as empty, Cluster(empty.scheduler_address) as backend:  # fmt: skip
+    ) as empty, connect_cluster(empty.scheduler_address) as backend:  # fmt: skip
 
         def remark(done, total, text):
             told.append(text)
@@ -181,7 +184,10 @@ def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path)
 
 def test_without_distributed_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ClusterError, match=r"pip install 'compsim\[dask\]'"), Cluster("tcp://a:1"):
+    with (
+        pytest.raises(ClusterError, match=r"pip install 'compsim\[dask\]'"),
+        connect_cluster("tcp://a:1"),
+    ):
         pass
 
 
