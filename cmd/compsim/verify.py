@@ -16,7 +16,8 @@ def verify(folder, as_json) -> int:
     compsim verify -r results
 
     Damaged files are listed with the jobs that are lost with them, by study and swept values, and
-    with the command that computes them again. Exit code 5 if any is damaged.
+    with the command that computes them again; batches of jobs are renamed to .damaged. Exit code 5
+    if any is damaged.
     """
     from compressor.store import verify as compare
 

@@ -23,7 +23,6 @@ import time
 import uuid
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -50,7 +49,7 @@ WORDS = {
     "reason": "why a run failed, by a stable name",
     "promise": "kept: the accuracy target was reached",
     "regime": "how far the motion is predictable",
-    "kept": "what is kept of a job: bars, horizon, signals, series, and these in double precision",
+    "kept": "what is kept: bars, horizon, signals, series, these in double precision, compressed",
 }
 LABELS = {
     "joint": JOINTS, "axis": AXES, "quantile": QUANTILES, "segment": SEGMENTS,
@@ -59,6 +58,7 @@ LABELS = {
 SAMPLES = {"time": "sample", "sensor_time": "sensor_sample"}  # dimensions as batches call them
 DIMENSIONS = {short: dim for dim, short in SAMPLES.items()}
 TABLES = ("value", "error")
+OF_JOBS = (*TABLES, "attributes")  # what is not read at once, but for time series
 PLACES = np.arange(ROW.itemsize // 8.0).view(ROW)[0]  # of each number in a row of all
 
 
@@ -67,36 +67,30 @@ def places_of(names: Sequence[str]) -> np.ndarray:
     return np.concatenate([np.ravel(PLACES[name]) for name in names]).astype(int)
 
 
-def _label_numbers() -> tuple[dict[str, int], dict[str, int], dict[str, str]]:
-    """Return places of values and of error bars by label, and the number of each label."""
+def _label_numbers() -> tuple[dict[str, int], dict[str, int]]:
+    """Return places of values and of error bars by label, which begins with the number's name."""
     values: dict[str, int] = {}
     errors: dict[str, int] = {}
-    names: dict[str, str] = {}
     for name, row in NUMBERS.items():
         bare = name.removesuffix("_error") if row.source == "error" else name
         every = itertools.product(*(LABELS[dim] for dim in row.dims))
         for parts, place in zip(every, places_of([name]).tolist(), strict=True):
             label = ".".join([bare, *(f"{p:g}" if isinstance(p, float) else str(p) for p in parts)])
             (errors if row.source == "error" else values)[label] = place
-            names[label] = bare
-    return values, errors, names
+    return values, errors
 
 
-VALUES, ERRORS, NAMES = _label_numbers()
+VALUES, ERRORS = _label_numbers()
+
+
+def name_of(label: str) -> str:
+    """Return the name of a labelled number, without joint, axis and so on."""
+    return label.partition(".")[0]
+
+
 ALL = np.arange(ROW.itemsize // 8)  # places of all numbers
 
-
-@dataclass(frozen=True, eq=False)
-class Batch:
-    """What is read of a batch at once: all but its numbers, attributes and time series."""
-
-    path: Path
-    columns: dict[str, np.ndarray]  # job, `WORDS`, samples and end_time, (jobs,) each
-    labels: tuple[str, ...]  # of the columns of numbers
-    is_compressed: bool  # whether its time series are
-
-    def __len__(self) -> int:
-        return len(self.columns["job"])
+Rows = tuple[dict[str, np.ndarray], list[str]]  # job, `WORDS`, samples, end_time; labels of numbers
 
 
 # ---- writing ------------------------------------------------------------------------------------
@@ -114,7 +108,6 @@ def encode_batch(outcomes: Sequence[Outcome]) -> bytes:
     times = [one.series["time"].values if one.series else np.zeros(0) for one in outcomes]
     words = [_words(one) for one in outcomes]
     series = _join_series(outcomes)
-    compress = any(one.compress for one in outcomes)
     variables: dict[str, Any] = {
         "job": (("job",), [one.key for one in outcomes], {"long_name": "a job's identity"}),
         **{
@@ -124,7 +117,11 @@ def encode_batch(outcomes: Sequence[Outcome]) -> bytes:
         "samples": (("job",), [len(one) for one in times], {}),
         "end_time": (("job",), [one[-1] if len(one) else 0.0 for one in times], {"units": "s"}),
         "metric": (("metric",), np.array(labels, "U"), {}),
-        "unit": (("metric",), np.array([NUMBERS[NAMES[label]].unit for label in labels], "U"), {}),
+        "unit": (
+            ("metric",),
+            np.array([NUMBERS[name_of(label)].unit for label in labels], "U"),
+            {},
+        ),
         "value": (("job", "metric"), numbers[:, [VALUES[label] for label in labels]], {}),
         "error": (
             ("job", "metric"),
@@ -135,8 +132,8 @@ def encode_batch(outcomes: Sequence[Outcome]) -> bytes:
         **coordinates(dim for dims, _, _ in series.values() for dim in dims),
         **series,
     }
-    attributes = {"comment": "SI units", "compressed": compress}
-    return encode_netcdf(variables, attributes, series if compress else ())
+    compress = any(one.compress for one in outcomes)
+    return encode_netcdf(variables, {"comment": "SI units"}, series if compress else ())
 
 
 def _words(outcome: Outcome) -> dict[str, str]:
@@ -148,6 +145,7 @@ def _words(outcome: Outcome) -> dict[str, str]:
         "signals": attributes.get("signals"),
         "series": series,
         "double": series and series.values.dtype.char == "d",
+        "compressed": series and outcome.compress,
     }
     return {
         "physics_key": str(attributes.get("physics_key", "")),
@@ -207,41 +205,37 @@ def write_batch(folder: Folder, outcomes: Sequence[Outcome]) -> Path:
 # ---- reading: each raises DamagedFile, and FileNotFoundError ------------------------------------
 
 
-def read_batch(path: Path) -> Batch:
-    """Return a batch, without its numbers, attributes and time series."""
+def read_batch(path: Path) -> Rows:
+    """Return what there is of each job but its numbers, attributes and time series."""
     with open_netcdf(path) as file:
         columns = {name: read_bytes(file[name]) for name in ("job", *WORDS)}
         columns |= {name: file[name][()] for name in ("samples", "end_time")}
-        labels = tuple(read_bytes(file["metric"]).astype(str).tolist())
-        batch = Batch(path, columns, labels, bool(file.attrs["compressed"]))
-        shape = len(batch), len(labels)
-        if {len(values) for values in columns.values()} != {len(batch)} or any(
-            file[name].shape != shape for name in TABLES
-        ):
+        labels = read_bytes(file["metric"]).astype(str).tolist()
+        shapes = {values.shape for values in columns.values()}
+        if {(*shape, len(labels)) for shape in shapes} != {file[name].shape for name in TABLES}:
             raise ValueError
-        return batch
+        return columns, labels
 
 
-@lru_cache(maxsize=4)
-def read_tables(path: Path) -> np.ndarray:
-    """Return values, error bars and a column of nan side by side, (jobs, columns)."""
+@lru_cache(maxsize=1)
+def read_tables(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Return values, error bars and a column of nan side by side, (jobs, columns).
+
+    With the column of each place in a row of all numbers.
+    """
     with open_netcdf(path) as file:
         values, errors = (file[name][()] for name in TABLES)
-    return np.column_stack([values, errors, np.full(len(values), np.nan)])
-
-
-@lru_cache(maxsize=4)
-def columns_of(labels: tuple[str, ...]) -> np.ndarray:
-    """Return the column in `read_tables` of each place in a row of all numbers."""
+        labels = read_bytes(file["metric"]).astype(str).tolist()
     count, columns = len(labels), np.full(len(ALL) + 1, -1)
     columns[[ERRORS.get(label, -1) for label in labels]] = range(count, 2 * count)
     columns[[VALUES[label] for label in labels]] = range(count)
-    return columns
+    return np.column_stack([values, errors, np.full(len(values), np.nan)]), columns
 
 
-def read_numbers(batch: Batch, rows: Sequence[int], places: np.ndarray) -> np.ndarray:
+def read_numbers(path: Path, rows: Sequence[int], places: np.ndarray) -> np.ndarray:
     """Return numbers of some jobs at some places in a row of all, nan where there are none."""
-    return read_tables(batch.path)[np.ix_(rows, columns_of(batch.labels)[places])]
+    table, columns = read_tables(path)
+    return table[np.ix_(rows, columns[places])]
 
 
 @lru_cache(maxsize=4)
@@ -288,20 +282,21 @@ def read_series(
     return found
 
 
-def read_outcomes(batch: Batch) -> list[Outcome]:
+def read_outcomes(path: Path) -> list[Outcome]:
     """Return all that a batch holds, to be merged with others."""
-    numbers = read_numbers(batch, range(len(batch)), ALL)
-    series = iter(read_series(batch.path, np.flatnonzero(batch.columns["samples"]).tolist()))
+    columns, _ = read_batch(path)
+    numbers = read_numbers(path, range(len(columns["job"])), ALL)
+    series = iter(read_series(path, np.flatnonzero(columns["samples"]).tolist()))
     return [
         Outcome(
-            batch.columns["status"][row].decode(),
-            batch.columns["reason"][row].decode(),
-            numbers[row].view(ROW)[0],
-            read_attributes_of(batch.path, row),
-            next(series) if batch.columns["samples"][row] else {},
-            batch.is_compressed,
+            columns["status"][row].decode(),
+            columns["reason"][row].decode(),
+            values.view(ROW)[0],
+            read_attributes_of(path, row),
+            next(series) if columns["samples"][row] else {},
+            b"compressed" in columns["kept"][row],
         )
-        for row in range(len(batch))
+        for row, values in enumerate(numbers)
     ]
 
 

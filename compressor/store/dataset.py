@@ -107,19 +107,16 @@ def machine_constants(studies: Sequence[StoredStudy], layout: xr.Dataset) -> dic
     Of one study those that it does not sweep, without dimensions; of several along `job`. Numbers
     without a default, such as the rod's inertia or a counterweight, are not among them.
     """
-    rows = [
-        row
-        for key, row in table().items()
+    keys = [
+        key for key, row in table().items()
         if key.startswith("machine.") and row.kind == "number" and not row.optional
-    ]
+    ]  # fmt: skip
     found = {}
-    for row, name in zip(rows, coordinate_names([row.key for row in rows]).values(), strict=True):
-        given = [value_in(study.fixed, row.key) for study in studies]
-        values = [np.nan if value is None else value for value in given]
-        if name in layout or not all(isinstance(one, int | float) for one in values):
+    for key, name in coordinate_names(keys).items():
+        values, attrs = swept_column(key, [value_in(study.fixed, key) for study in studies])
+        if name in layout or values.dtype.kind != "f":
             continue
-        attrs = {"units": row.unit or "1", "long_name": row.label, "case_key": row.key}
-        jobs = np.repeat(np.array(values, float), [study.jobs for study in studies])
+        jobs = np.repeat(values, [study.jobs for study in studies])
         found[name] = xr.Variable((), jobs[0], attrs) if len(studies) == 1 else (
             xr.Variable(("job",), jobs, attrs)
         )  # fmt: skip

@@ -6,7 +6,6 @@ What the file system refuses is a StoreError, which says where and what to do ab
 import contextlib
 import errno
 import os
-import re
 import time
 import uuid
 from collections.abc import Iterator
@@ -15,8 +14,6 @@ from pathlib import Path
 from compressor.program import CompsimError, CompsimWarning, did_you_mean
 
 Folder = str | os.PathLike[str]
-
-KEY = re.compile("[0-9a-f]{20}")  # of a job
 
 LEFTOVER_AGE = 3600.0  # s; a temporary file this old belongs to a writer that died
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from compressor.store.batch import Batch, encode_batch, publish_batch, read_outcomes
+from compressor.store.batch import encode_batch, publish_batch, read_outcomes
 from compressor.store.files import Folder, discard_leftovers, refusals
 from compressor.store.netcdf import DamagedFile
 from compressor.store.stored import read_store
@@ -14,7 +14,7 @@ from compressor.store.stored import read_store
 MAX_JOBS, MAX_BYTES = 4096, 32_000_000  # of a merged batch; one with a quarter of either is small
 MAX_SMALL = 8  # small batches that may stay
 
-Counting = tuple[Batch, list[int]]  # a batch, and its rows that count
+Counting = tuple[Path, list[int]]  # a batch, and its rows that count
 
 
 def merge_batches(folder: Folder) -> None:
@@ -29,29 +29,35 @@ def merge_batches(folder: Folder) -> None:
     with refusals(folder):
         discard_leftovers(folder)
         stored = read_store(folder)
-        for damage in stored.damaged:  # nobody reads it again; its jobs count as missing
-            with contextlib.suppress(FileNotFoundError):
-                Path(damage.path).rename(f"{damage.path}.damaged")
-        batches, source, row = stored.places
+        for damage in stored.damaged:
+            set_aside(Path(damage.path))
+        paths, source, row = stored.places
         small: dict[object, list[Counting]] = defaultdict(list)
-        for number, batch in enumerate(batches):
-            rows = np.sort(row[source == number]).tolist()
-            if not rows:
-                batch.path.unlink(missing_ok=True)
-            elif len(batch) < MAX_JOBS // 4 and 0 < _size(batch) < MAX_BYTES // 4:
+        for number, path in enumerate(paths):
+            mine = np.flatnonzero(source == number)
+            if not mine.size:
+                path.unlink(missing_ok=True)
+            elif mine.size < MAX_JOBS // 4 and 0 < _size(path) < MAX_BYTES // 4:
                 # of one length and kind, lest time series grow
-                kinds = {b"double" in k for k in batch.columns["kept"].tolist() if b"series" in k}
-                length = int(batch.columns["samples"].max())
-                small[length, batch.is_compressed, frozenset(kinds)].append((batch, rows))
+                kept = {*stored.columns["kept"][mine].tolist()}
+                kinds = {(b"double" in k, b"compressed" in k) for k in kept if b"series" in k}
+                length = int(stored.columns["samples"][mine].max())
+                small[length, frozenset(kinds)].append((path, np.sort(row[mine]).tolist()))
         if sum(map(len, small.values())) > MAX_SMALL:
             for alike in small.values():
                 _merge_alike(folder, alike)
 
 
-def _size(batch: Batch) -> int:
+def set_aside(path: Path) -> None:
+    """Rename a damaged batch, where that may be: its jobs count as missing, also for a run."""
+    with contextlib.suppress(OSError):
+        path.rename(f"{path}.damaged")
+
+
+def _size(path: Path) -> int:
     """Return the bytes of a batch; 0 where another run has merged it."""
     with contextlib.suppress(FileNotFoundError):
-        return batch.path.stat().st_size
+        return path.stat().st_size
     return 0
 
 
@@ -59,9 +65,9 @@ def _merge_alike(folder: Path, batches: list[Counting]) -> None:
     """Merge batches in groups that are large enough."""
     group: list[Counting] = []
     jobs = size = 0
-    for number, (batch, rows) in enumerate(batches, 1):
-        group.append((batch, rows))
-        jobs, size = jobs + len(batch), size + _size(batch)
+    for number, (path, rows) in enumerate(batches, 1):
+        group.append((path, rows))
+        jobs, size = jobs + len(rows), size + _size(path)
         if jobs >= MAX_JOBS or size >= MAX_BYTES or number == len(batches):
             if len(group) > 1:
                 _merge_group(folder, group)
@@ -72,9 +78,9 @@ def _merge_group(folder: Path, group: list[Counting]) -> None:
     """Write one batch in place of several; none is replaced where one is damaged or gone."""
     outcomes = []
     with contextlib.suppress(DamagedFile, FileNotFoundError):
-        for batch, rows in group:
-            found = read_outcomes(batch)
+        for path, rows in group:
+            found = read_outcomes(path)
             outcomes += [found[row] for row in rows]
-        publish_batch(folder, encode_batch(outcomes), group[-1][0].path.name[:20])
-        for batch, _ in group:
-            batch.path.unlink(missing_ok=True)
+        publish_batch(folder, encode_batch(outcomes), group[-1][0].name[:20])
+        for path, _ in group:
+            path.unlink(missing_ok=True)

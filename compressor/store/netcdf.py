@@ -8,7 +8,7 @@ a disk fills up while it writes. Only this module imports h5py.
 
 import contextlib
 import uuid
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -199,9 +199,9 @@ def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
         return xr.Dataset(found, attrs=read_attributes(file))
 
 
-def check_file(path: Path) -> None:
-    """Read each value of a file. Raises DamagedFile where its checksum is wrong."""
+def check_file(path: Path, names: Sequence[str] = ()) -> None:
+    """Read the values of a file, all or those of some names. Raises DamagedFile."""
     with open_netcdf(path) as file:
-        for name in file:
+        for name in names or file:
             file[name][()]
         read_attributes(file)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from compressor.outcome import word_variables
 from compressor.store.files import Folder, StoreWarning
-from compressor.store.netcdf import DamagedFile
 from compressor.store.stored import Stored, read_store
 from compressor.store.studies import StoredStudy, find_study, read_studies
 
@@ -81,12 +80,7 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     if name is not None:
         studies = [find_study(folder, name, studies)]
     stored = read_store(folder, warn=True)
-    while True:
-        try:
-            dataset = label_studies(stored, studies, trusted)
-            break
-        except DamagedFile as damage:
-            stored = stored.without(damage)
+    dataset = stored.use(lambda sound: label_studies(sound, studies, trusted))
     if "fault" in dataset.dims and "joint" in dataset.dims:
         warnings.warn(BOTH_JOINTS, StoreWarning, stacklevel=2)
     return dataset

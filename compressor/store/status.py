@@ -1,8 +1,8 @@
 """How many jobs of a store are done, what is known of each, and what is damaged.
 
 Jobs in a damaged batch count as missing, with a StoreWarning. `verify` reads every file, whose
-values HDF5 compares with their checksums, and names the jobs that damage costs. There is no index:
-jobs whose batch is gone are missing.
+values HDF5 compares with their checksums, names the jobs that damage costs, and sets their batches
+aside, so that a run computes them again. There is no index: jobs whose batch is gone are missing.
 """
 
 import os
@@ -17,8 +17,10 @@ import numpy as np
 
 from compressor.cases import Case, points
 from compressor.metrics import NUMBERS
+from compressor.store.batch import FOLDER as BATCHES
 from compressor.store.caveats import job_caveats, study_caveats
 from compressor.store.files import Folder, StoreError, no_results, refusals
+from compressor.store.merge import set_aside
 from compressor.store.netcdf import DamagedFile, check_file
 from compressor.store.stored import read_store
 from compressor.store.studies import (
@@ -72,7 +74,7 @@ class Damage:
 def verify(folder: Folder) -> list[Damage]:
     """Return all damage to a store: to batches, studies and the files of studies.
 
-    Raises StoreError for a folder that cannot be read.
+    Damaged batches are set aside. Raises StoreError for a folder that cannot be read.
     """
     place = Path(os.path.abspath(folder))  # as batches have it
     studies: list[StoredStudy] = []
@@ -83,7 +85,7 @@ def verify(folder: Folder) -> list[Damage]:
         except StoreError as error:
             found.append(Damage.of(error, (), "run its case file again", ()))
     stored = read_store(place)
-    batches, source, _ = stored.places
+    paths, source, _ = stored.places
     absent = {key for study in studies for key in study.keys} - stored.keys()
     found += [  # even their keys cannot be read
         Damage.of(error, sorted(absent), "delete it: no job needs it", studies)
@@ -91,9 +93,9 @@ def verify(folder: Folder) -> list[Damage]:
     ]
     with refusals(place):
         others = sorted(place.glob("**/*.nc"))
-    if not (studies or found or batches or others):
+    if not (studies or found or paths or others):
         raise no_results(folder)
-    for number, path in enumerate([*(batch.path for batch in batches), *others]):
+    for number, path in enumerate([*paths, *others]):
         try:
             check_file(path)
         except FileNotFoundError:
@@ -102,6 +104,9 @@ def verify(folder: Folder) -> list[Damage]:
             keys = [key.decode() for key in stored.columns["job"][source == number]]
             remedy = "delete it: the command that made it makes it again"
             found.append(Damage.of(error, keys, remedy, studies))
+    for damage in found:
+        if damage.path.parent.name == BATCHES:
+            set_aside(damage.path)
     return found
 
 

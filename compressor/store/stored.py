@@ -14,7 +14,6 @@ import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -25,10 +24,11 @@ from compressor.metrics import ALWAYS, NUMBERS
 from compressor.outcome import ROW, Outcome, Variable
 from compressor.store.batch import (
     ERRORS,
-    NAMES,
+    OF_JOBS,
     WORDS,
-    Batch,
+    Rows,
     batch_paths,
+    name_of,
     places_of,
     read_attributes_of,
     read_batch,
@@ -36,7 +36,7 @@ from compressor.store.batch import (
     read_series,
 )
 from compressor.store.demands import WORTH, JobStatus
-from compressor.store.files import KEY, Folder, StoreError, StoreWarning, system_error
+from compressor.store.files import Folder, StoreError, StoreWarning, system_error
 from compressor.store.netcdf import DamagedFile, check_file
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ Found = TypeVar("Found")
 def completeness(columns: dict[str, np.ndarray]) -> np.ndarray:
     """Return how complete rows are, (rows,): failed 0, ok 1 and more for what is kept (`WORTH`)."""
     kinds, kind = np.unique(columns["kept"], return_inverse=True)
-    worth = [sum(map(WORTH.__getitem__, one.decode().split())) for one in kinds]
+    worth = [sum(WORTH.get(name, 0) for name in one.decode().split()) for one in kinds]
     return (columns["status"] == b"ok") * (1 + np.array(worth, int)[kind])
 
 
@@ -57,28 +57,36 @@ class Stored:
     """The jobs that a folder held when it was read, in the order of their keys.
 
     Of several rows of a job the most complete one counts (`completeness`), of equals the one that
-    was written later. `columns`: those of batches (`batch.Batch`), a value a job; `damaged`: the
-    batches that cannot be read. Jobs are named by their positions; methods that read a batch raise
-    DamagedFile, and StoreError where a job is gone meanwhile.
+    was written later. `columns`: those of batches (`batch.Rows`), a value a job; `given`: the names
+    of the numbers that every job has, or some batch; `damaged`: the batches that cannot be read.
+    Jobs are named by their positions; methods that read a batch raise DamagedFile, and StoreError
+    where a job is gone meanwhile.
     """
 
-    def __init__(self, folder: Path, batches: Sequence[Batch], damaged: Sequence[DamagedFile] = ()):
+    def __init__(
+        self, folder: Path, batches: dict[Path, Rows], damaged: Sequence[DamagedFile] = ()
+    ):
         self.folder, self.damaged = folder, damaged
         self.checked: dict[Path, bool] = {}
-        empty = {name: np.zeros(0, "S1") for name in ("job", *WORDS)}
-        empty |= {"samples": np.zeros(0, int), "end_time": np.zeros(0)}
-        columns = {
-            name: np.concatenate([none, *(batch.columns[name] for batch in batches)])
-            for name, none in empty.items()
-        }
-        source = np.repeat(np.arange(len(batches)), [len(batch) for batch in batches])
-        row = np.concatenate([np.zeros(0, int), *(np.arange(len(batch)) for batch in batches)])
-        order = np.lexsort((source, completeness(columns), columns["job"]))
-        keys = columns["job"][order]
+        found = {name: [np.zeros(0, "S1")] for name in ("job", *WORDS)}
+        found |= {"samples": [np.zeros(0, int)], "end_time": [np.zeros(0)]}
+        labels: set[str] = set()
+        for columns, more in batches.values():
+            labels.update(more)
+            for name, values in columns.items():
+                found[name].append(values)
+        counts = [*map(len, found["job"][1:])]
+        whole = {name: np.concatenate(found.pop(name)) for name in [*found]}
+        source = np.repeat(np.arange(len(counts)), counts)
+        row = np.concatenate([np.zeros(0, int), *map(np.arange, counts)])
+        order = np.lexsort((source, completeness(whole), whole["job"]))
+        keys = whole["job"][order]
         at = order[np.append(keys[1:] != keys[:-1], True)[: len(keys)]]
-        self.columns = {name: values[at] for name, values in columns.items()}
+        self.columns = {name: values[at] for name, values in whole.items()}
         # where each job is: all batches, index of its batch, of the row in it; replaced as one
         self.places = tuple(batches), source[at], row[at]
+        bars = {f"{name_of(label)}_error" for label in labels & ERRORS.keys()}
+        self.given = ALWAYS | {name_of(label) for label in labels} | bars
 
     def __len__(self) -> int:
         return len(self.columns["job"])
@@ -91,7 +99,7 @@ class Stored:
 
     def find(self, keys: np.ndarray | Sequence[str]) -> np.ndarray:
         """Return the positions of jobs by key, in the shape of `keys`; -1 where there is none."""
-        wanted, mine = np.asarray(keys).astype("S20"), self.columns["job"]
+        wanted, mine = np.char.encode(np.asarray(keys, "U")), self.columns["job"]
         if not len(self):
             return np.full(wanted.shape, -1)
         places = np.minimum(np.searchsorted(mine, wanted), len(self) - 1)
@@ -106,21 +114,18 @@ class Stored:
         """Return a word of every job, of `batch.WORDS`, as text, (jobs,)."""
         return self.columns[name].astype(str)
 
-    @cached_property
-    def given(self) -> frozenset[str]:
-        """Return the names of the numbers that every job has, or some batch."""
-        labels = {label for batch in self.places[0] for label in batch.labels}
-        bars = {f"{NAMES[label]}_error" for label in labels & ERRORS.keys()}
-        return ALWAYS | {NAMES[label] for label in labels} | bars
+    def use(self, make: Callable[["Stored"], Found]) -> Found:
+        """Return what `make` gives of this store, less batches that it finds to be damaged.
 
-    def without(self, damage: DamagedFile) -> "Stored":
-        """Return this store less a damaged batch, after a StoreWarning. Raises other damage."""
-        batches = self.places[0]
-        left = [batch for batch in batches if os.fspath(batch.path) != damage.path]
-        if len(left) == len(batches):
-            raise damage
-        _warn_of([damage])
-        return Stored(self.folder, left, [*self.damaged, damage])
+        Each has a StoreWarning. Raises other damage.
+        """
+        try:
+            return make(self)
+        except DamagedFile as damage:
+            if Path(damage.path) not in self.places[0]:
+                raise
+            _warn_of([damage])
+            return read_store(self.folder, damaged=[*self.damaged, damage]).use(make)
 
     # ---- how they ended -------------------------------------------------------------------------
 
@@ -167,26 +172,29 @@ class Stored:
             self.places = batches, source[at], row[at]
         raise StoreError(self.folder, "changes faster than it can be read", "try again")
 
-    def _by_batch(self, positions: np.ndarray) -> Iterator[tuple[Batch, list[int], list[int]]]:
+    def _by_batch(self, positions: np.ndarray) -> Iterator[tuple[Path, list[int], list[int]]]:
         """Yield each batch of jobs at positions, the places among these, and rows; without -1."""
-        batches, source, row = self.places
+        paths, source, row = self.places
         stored = np.flatnonzero(positions >= 0)
         order = stored[np.argsort(source[positions[stored]], kind="stable")].tolist()
         for number, places in itertools.groupby(order, lambda at: int(source[positions[at]])):
             mine = [*places]
-            yield batches[number], mine, row[positions[mine]].tolist()
+            yield paths[number], mine, row[positions[mine]].tolist()
 
     def batch_of(self, position: int) -> tuple[Path, int]:
         """Return the batch with a job, and the row in it."""
-        batches, source, row = self.places
-        return batches[source[position]].path, int(row[position])
+        paths, source, row = self.places
+        return paths[source[position]], int(row[position])
 
     def intact(self, position: int) -> bool:
-        """Return whether the batch of a job is as it was written."""
+        """Return whether the batch of a job is as it was written, but for its time series.
+
+        These may be many gigabytes; `verify` and who uses them read them.
+        """
         path, _ = self.batch_of(position)
         if path not in self.checked:
             try:
-                self._read(lambda: check_file(self.batch_of(position)[0]))
+                self._read(lambda: check_file(self.batch_of(position)[0], OF_JOBS))
                 self.checked[path] = True
             except DamagedFile:
                 self.checked[path] = False
@@ -203,8 +211,8 @@ class Stored:
         found = np.full((flat.size, wanted.size), np.nan)
 
         def fill() -> None:
-            for batch, places, rows in self._by_batch(flat):
-                found[places] = read_numbers(batch, rows, wanted)
+            for path, places, rows in self._by_batch(flat):
+                found[places] = read_numbers(path, rows, wanted)
 
         self._read(fill)
         kind = np.dtype([(name, ROW[name]) for name in names])
@@ -246,8 +254,8 @@ class Stored:
         def read() -> list[tuple[int, np.ndarray]]:
             return [
                 (place, one[name].values)
-                for batch, places, rows in self._by_batch(whole)
-                for place, one in zip(places, read_series(batch.path, rows, [name]), strict=True)
+                for path, places, rows in self._by_batch(whole)
+                for place, one in zip(places, read_series(path, rows, [name]), strict=True)
                 if name in one
             ]
 
@@ -263,8 +271,6 @@ class Stored:
         """Return a stored job's Dataset. Raises StoreError where it is missing or damaged."""
         import xarray as xr  # half a second
 
-        if not KEY.fullmatch(key):
-            raise StoreError(self.folder, f"{key!r} is no key", "a key is 20 hexadecimal digits")
         position = self.position(key)
         if position is None:
             raise StoreError(self.folder, f"job {key} is not stored", "run its study first")
@@ -278,26 +284,27 @@ def _warn_of(damaged: Sequence[DamagedFile]) -> None:
         warnings.warn(f"{damage}: its jobs count as missing", StoreWarning, stacklevel=4)
 
 
-def read_store(folder: Folder, warn: bool = False) -> Stored:
+def read_store(folder: Folder, warn: bool = False, damaged: Sequence[DamagedFile] = ()) -> Stored:
     """Return what a folder holds; damaged batches are listed in `damaged`.
 
-    warn: give a StoreWarning of each. Raises StoreError, also where runs change the folder faster
-    than it can be read.
+    warn: give a StoreWarning of each; damaged: of batches that are not read. Raises StoreError,
+    also where runs change the folder faster than it can be read.
     """
-    folder = Path(os.path.abspath(folder))
+    folder, known = Path(os.path.abspath(folder)), {Path(one.path) for one in damaged}
     for _ in range(ATTEMPTS):
-        batches, damaged = [], []
+        batches, found = {}, [*damaged]
         try:
             for path in batch_paths(folder):
                 try:
-                    batches.append(read_batch(path))
+                    if path not in known:
+                        batches[path] = read_batch(path)
                 except DamagedFile as error:
-                    damaged.append(error)
+                    found.append(error)
         except FileNotFoundError:
             continue  # merged with others meanwhile
         except OSError as error:
             raise system_error(folder, error) from error
         if warn:
-            _warn_of(damaged)
-        return Stored(folder, batches, damaged)
+            _warn_of(found)
+        return Stored(folder, batches, found)
     raise StoreError(folder, "changes faster than it can be read", "try again")

@@ -8,7 +8,7 @@ import xarray as xr
 from made_jobs import batches, forget, held, key, made, peaks, plan
 
 from compressor.store import merge, reader
-from compressor.store.batch import read_batch, write_batch
+from compressor.store.batch import read_batch, read_outcomes, write_batch
 from compressor.store.files import StoreError
 from compressor.store.merge import merge_batches
 from compressor.store.reader import open_study, read_store
@@ -126,7 +126,7 @@ def test_rows_that_do_not_count_go_and_damaged_batches_are_set_aside(tmp_path):
     write_batch(tmp_path, [made(2, 12)])
     write_batch(tmp_path, [made(3)]).write_bytes(b"torn")
     merge_batches(tmp_path)
-    assert [len(read_batch(path)) for path in batches(tmp_path)] == [1, 1]
+    assert [len(read_outcomes(path)) for path in batches(tmp_path)] == [1, 1]
     assert peaks(tmp_path) == {1: 11, 2: 12}
     (aside,) = (tmp_path / "batches").glob("*.damaged")
     assert aside.read_bytes() == b"torn"

@@ -47,22 +47,25 @@ def hurt(data, rng):
 
 def look(store, file, reader, was, expected):
     """What is wrong with what is told of a damaged store, or "", and whether damage is found."""
-    told = command("verify", "-r", store)
+    said = command(*reader.split(), "-r", store)
+    try:
+        problem = (different := differing(whole(store), expected)) and f"silent: {different}"
+        unreadable = False
+    except StoreError:
+        problem, unreadable = "", True
+    told = command("verify", "-r", store)  # last: it sets the file aside
     is_found = told.code == 5 and str(store / file) in told.out
     if told.code not in (0, 5) or is_found != (told.code == 5):
-        return f"not named: {told}", is_found
-    if is_found and file.parent.name == "batches" and "  job " not in told.out:
-        return f"no job is named: {told}", is_found
-    said = command(*reader.split(), "-r", store)
-    if said.code not in (0, 5) or "Traceback" in said.err:
-        return str(said), is_found
-    if said.code == 0 and "damaged" not in said.err and said.out != was.out:
-        return f"a silent difference: {said} was {was}", is_found
-    try:
-        different = differing(whole(store), expected)
-    except StoreError:
-        return ("" if is_found else "unreadable, and verify finds nothing"), is_found
-    return (f"silent: {different}" if different else ""), is_found
+        problem = f"not named: {told}"
+    elif is_found and file.parent.name == "batches" and "  job " not in told.out:
+        problem = f"no job is named: {told}"
+    elif said.code not in (0, 5) or "Traceback" in said.err:
+        problem = str(said)
+    elif said.code == 0 and "damaged" not in said.err and said.out != was.out:
+        problem = f"a silent difference: {said} was {was}"
+    elif unreadable and not is_found:
+        problem = "unreadable, and verify finds nothing"
+    return problem, is_found
 
 
 def mend(store, cases, expected):

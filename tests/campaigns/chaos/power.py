@@ -35,6 +35,7 @@ from chaos.common import (
 )
 from compressor.cases.load import load_studies
 from compressor.store import merge
+from compressor.store.status import verify
 from compressor.store.stored import read_store
 
 SHUTDOWN = 0x8004587D  # FS_IOC_SHUTDOWN, _IOR('X', 125, __u32) of linux/fs.h
@@ -181,8 +182,7 @@ class Campaign:
 
 def intact(store):
     """The keys of a store's jobs, without those whose batches are damaged."""
-    stored = read_store(store)
-    return {key.decode() for at, key in enumerate(stored.columns["job"]) if stored.intact(at)}
+    return read_store(store).keys().difference(*(damage.studies for damage in verify(store)))
 
 
 def campaign(trials, seed, folder):
