@@ -3,7 +3,7 @@
 from compressor.store.batch import encode_batch, publish_batch, write_batch
 from compressor.store.caveats import run_caveats, study_caveats
 from compressor.store.demands import serving_both
-from compressor.store.export import ExportOptions, export
+from compressor.store.export import export
 from compressor.store.files import (
     Folder,
     StoreError,

@@ -77,7 +77,6 @@ MISTAKES = [
     ("show", "Missing argument 'JOB | STUDY [AXIS=VALUE]...'"),
     ("export gird -o x.csv", "holds no study 'gird'; it holds big-end, wear"),
     ("export wear -o k.xlsx", "k.xlsx: no files of the type .xlsx are written: end the"),
-    ("export wear -o x.csv --format netcdf", "x.csv is no name for netcdf: end it in .nc"),
     ("plot waer", "and no study is called so", "did you mean wear?"),
     ("plot wear --what orbit", "there is no figure 'orbit'; did you mean orbits?"),
     ("plot wear --over sped_rpm", "wear has no axis 'sped_rpm'; its axes are clearance_mm, "),

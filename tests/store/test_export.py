@@ -1,9 +1,7 @@
 """Results for other programs: what `compsim export` writes reads back as what is stored."""
 
 import csv
-import itertools
 import json
-import os
 import shutil
 
 import h5py
@@ -16,7 +14,7 @@ from conftest import keep
 from compressor.cases.load import load_studies
 from compressor.metrics import METRICS, SIZES
 from compressor.solve.simulate import simulate
-from compressor.store.export import ExportError, ExportOptions, export
+from compressor.store.export import ExportError, export
 from compressor.store.files import StoreError
 from compressor.store.reader import open_study, read_job, read_store
 from compressor.store.studies import write_study
@@ -62,10 +60,8 @@ def number(cell):
 
 
 def test_metrics_in_csv_are_the_stored_ones_to_the_bit(results, tmp_path):
-    ((one,), damaged) = export(results, ["grid"], tmp_path / "grid.csv")
+    assert export(results, ["grid"], tmp_path / "grid.csv") == (4, "job")
     rows = table(tmp_path / "grid.csv")
-    assert (one.kind, one.rows, damaged) == ("metrics", 4, [])
-    assert one.bytes == os.path.getsize(tmp_path / "grid.csv")
     study = open_study(results, "grid")
     for row in rows:
         where = {"clearance_mm": float(row["clearance_mm"]), "max_steps": int(row["max_steps"])}
@@ -83,11 +79,8 @@ def test_metrics_in_csv_are_the_stored_ones_to_the_bit(results, tmp_path):
 
 
 def test_csv_may_have_plant_units(results, tmp_path):
-    """Swept keys stay in those of the case file. Another format, which has SI, is refused."""
-    options = ExportOptions(units="plant")
-    export(results, ["grid"], tmp_path / "grid.csv", options)
-    with pytest.raises(ExportError, match="plant units are of CSV alone"):
-        export(results, ["grid"], tmp_path / "grid.nc", options)
+    """Swept keys stay in those of the case file."""
+    export(results, ["grid"], tmp_path / "grid.csv", units="plant")
     row = table(tmp_path / "grid.csv")[1]
     study = open_study(results, "grid")
     one = study.isel(clearance_mm=0, max_steps=1)
@@ -156,29 +149,6 @@ def stored(results, key):
         return False
 
 
-def test_a_folder_gets_a_file_each(results, tmp_path, capsys):
-    out = tmp_path / "out"
-    command = ["export", "-r", str(results), "-o", str(out), "--series", "--format", "csv"]
-    assert cli.main(command) == 0
-    told = capsys.readouterr().out.split("\n")
-    jobs = {path.stem for path in (out / "grid").iterdir()}
-    assert {*table(out / "grid.csv")[0]} > {"key", "clearance_mm", "max_steps", "status"}
-    assert jobs == {row["key"] for row in table(out / "grid.csv") if row["status"] != "missing"}
-    assert told[0].startswith(f"{out / 'grid.csv'}  4 jobs, ")
-    assert told[1].startswith(f"{out / 'grid'}/")
-    assert len(told) == 8  # three jobs, the other study and its two, and the end of the last line
-    assert cli.main(command) == 2
-    assert f"{out / 'grid.csv'} exists: --force replaces it" in capsys.readouterr().err
-    (out / "list.csv").write_text("old")
-    assert cli.main([*command, "--force", "--quiet"]) == 0
-    found = capsys.readouterr()
-    assert found.err == ""
-    assert {line.split("  ")[0] for line in found.out.splitlines()} == set(
-        map(str, out.rglob("*.csv"))
-    )
-    assert len(table(out / "list.csv")) == 2
-
-
 @pytest.mark.parametrize(
     ("suffix", "hints"),
     [(".wav", {"channel": "1", "tacho": "2", "unit": "m/s2"}), (".mat", {})],
@@ -187,7 +157,7 @@ def test_a_record_alone_is_what_analysts_open(suffix, hints, worn, tmp_path, cap
     """Values to the digits of the type, whatever the job's own samples are."""
     stored = read_store(worn)
     recorded = (key for key in sorted(stored.keys()) if "sensor_time" in stored.job(key))
-    one, two = itertools.islice(recorded, 2)
+    one = next(recorded)
     job, path = stored.job(one), tmp_path / f"job{suffix}"
     assert cli.main(["export", one, "-r", str(worn), "-o", str(path)]) == 0
     assert f"{job.sizes['sensor_time']} samples" in capsys.readouterr().out
@@ -195,40 +165,43 @@ def test_a_record_alone_is_what_analysts_open(suffix, hints, worn, tmp_path, cap
     np.testing.assert_allclose(found.times, job.sensor_time, atol=1e-5)
     np.testing.assert_allclose(found.values, job.sensor_acceleration, rtol=6e-8, atol=1e-12)
     np.testing.assert_allclose(found.tacho, job.tacho_time, atol=1e-5)
-    folder, words = tmp_path / "all", ["--format", suffix[1:], "--quiet"]
-    assert cli.main(["export", one, two, "-r", str(worn), "-o", str(folder), *words]) == 0
-    assert {file.name for file in folder.iterdir()} == {f"{one}{suffix}", f"{two}{suffix}"}
-    assert (folder / f"{one}{suffix}").read_bytes() == path.read_bytes()
 
 
 @pytest.mark.parametrize(
     ("names", "file", "more", "message"),
     [
-        ([], "x.csv", {"series": True}, "x.csv is one file, and this needs several"),
-        (["grid", "KEY"], "x.nc", {}, "x.nc is one file, and this needs several"),
-        (["grid"], "x.csv", {"form": "netcdf"}, "x.csv is no name for netcdf: end it in .nc"),
+        (["grid", "KEY"], "x.nc", {}, "x.nc has studies, or one job: export each job to a file"),
+        (["grid"], "x.wav", {}, "x.wav is for the sensor's record of one job: name it by its key"),
+        (["grid"], "x.nc", {"units": "plant"}, "plant units are of CSV alone"),
+        (["grid"], "x.xls", {}, r"no files of the type .xls are written: end the name in .nc or"),
+        (["grid"], "x", {}, "no folders are written: end the name in .nc or .csv, or for a job's"),
+        (["grid"], "grid.csv", {}, "grid.csv exists: --force replaces it"),
     ],
 )
 def test_what_does_not_fit_is_refused(results, names, file, more, message, tmp_path):
     key = open_study(results, "list").key.values[0]
     names = [key if name == "KEY" else name for name in names]
+    (tmp_path / "grid.csv").touch()
     with pytest.raises(ExportError, match=message):
-        export(results, names, tmp_path / file, ExportOptions(**more))
-    assert not any(tmp_path.iterdir())
+        export(results, names, tmp_path / file, **more)
+    assert [path.name for path in tmp_path.iterdir()] == ["grid.csv"]
+    export(results, ["grid"], tmp_path / "grid.csv", force=True)
+    assert len(table(tmp_path / "grid.csv")) == 4
 
 
-def test_damaged_series_are_left_out_and_told(results, tmp_path, capsys):
+def test_damaged_jobs_are_told(results, tmp_path, capsys):
+    """Damaged series are an error; damaged numbers leave their jobs out of a study's table."""
     copy = tmp_path / "results"
     shutil.copytree(results, copy)
     stored = read_store(copy)
-    whole = {key: stored.values(key, ["acceleration"]) for key in stored.keys()}  # noqa: SIM118
-    hurt = min(whole)
+    hurt = min(stored.keys())
     path, _ = stored.batch_of(stored.position(hurt))
-    data = bytearray(path.read_bytes())
-    data[data.index(whole[hurt]["acceleration"].tobytes())] ^= 1
-    path.write_bytes(data)
-    out = tmp_path / "out"
-    assert cli.main(["export", "-r", str(copy), "-o", str(out), "--series"]) == 5
+    whole, values = path.read_bytes(), stored.values(hurt, ["acceleration"])["acceleration"]
+    path.write_bytes(whole.replace(values.tobytes(), bytes(values.nbytes)))
+    assert cli.main(["export", hurt, "-r", str(copy), "-o", str(tmp_path / "x.csv")]) == 5
     assert f"{path}: is damaged" in capsys.readouterr().err
-    assert {path.stem for path in out.rglob("*/*.nc")} == whole.keys() - {hurt}
-    assert cli.main(["export", hurt, "-r", str(copy), "-o", str(out)]) == 5
+    path.write_bytes(whole[:-1])
+    assert cli.main(["export", "-r", str(copy), "-o", str(tmp_path / "x.csv")]) == 0
+    assert f"{path}: is damaged" in " ".join(capsys.readouterr().err.split())
+    found = {row["key"]: row["status"] for row in table(tmp_path / "x.csv")}
+    assert found[hurt] == "missing"

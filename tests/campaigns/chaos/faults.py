@@ -24,7 +24,7 @@ from chaos.common import (
     whole,
 )
 from compressor.store import merge
-from compressor.store.batch import read_batch, read_outcomes, write_batch
+from compressor.store.batch import read_outcomes, write_batch
 
 # of a tmpfs beyond what is there; a complete store has 70 kB
 ROOM = [("pages", n) for n in range(0, 40, 2)] + [("files", n) for n in range(12)]
@@ -36,7 +36,7 @@ SCENES = {
     "a new store": ("nothing", RUN),
     "a store with leftovers": ("grown", RUN),
     "a damaged store": ("damaged", RUN),
-    "export": ("complete", "export -r FOLDER -o FOLDER/out --series --force"),
+    "export": ("complete", "export -r FOLDER -o FOLDER/out.nc --force"),
     "status": ("complete", "status -r FOLDER"),
     "verify": ("complete", "verify -r FOLDER"),
     "show": ("complete", "show KEY -r FOLDER"),
@@ -67,7 +67,7 @@ class Campaign:
             first.rename(leftover := first.with_name(f".{first.name}.tmp"))
             os.utime(leftover, (0, 0))
             for path in others:
-                for outcome in read_outcomes(read_batch(path)):
+                for outcome in read_outcomes(path):
                     write_batch(store, [outcome])
 
     def say(self, name, store):
