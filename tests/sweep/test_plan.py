@@ -46,18 +46,11 @@ def test_counts_follow_from_the_store_and_shared_jobs_count_once(studies):
     ]  # fmt: skip
     assert len(forecast(both, "results", 50).counts.first) == 7
 
-
-def test_only_selected_jobs_are_ahead(studies):
-    found = forecast(studies("machine.rod_mass_kg > 4", one=NINE), "results", 1)
-    assert counts(found) == [("one", 4, 0, 4)]
-    assert found.counts.first[0].coordinates == {"machine.rod_mass_kg": 4.25}
-
-
-def test_a_job_that_is_stored_and_does_not_serve_is_missing(studies):
-    sweep(studies(one=NINE), "results", 1)
-    assert counts(forecast(studies(one=NINE), "results", 0)) == [("one", 9, 9, 0)]
-    series = studies(one={**NINE, "output": {"keep": "series"}})
+    series = studies(one={**NINE, "output": {"keep": "series"}})  # which stored jobs do not serve
     assert counts(forecast(series, "results", 0)) == [("one", 9, 0, 9)]
+    selected = forecast(studies("machine.rod_mass_kg > 4", one=NINE), "results", 1)
+    assert counts(selected) == [("one", 4, 0, 4)]
+    assert selected.counts.first[0].coordinates == {"machine.rod_mass_kg": 4.25}
 
 
 def timed_as(monkeypatch, seconds, size=0):
@@ -83,6 +76,10 @@ def test_one_job_of_each_study_tells_the_time_of_all(studies, monkeypatch):
     assert found.seconds == pytest.approx(18 * 4 / 2)
     assert found.bytes == 18 * plan.ROW_BYTES
     assert forecast(studies(one=NINE), "results", 0).with_times(300, str).seconds == 9.0  # 4 cores
+    monkeypatch.setattr(plan, "MAX_CASES", 3)  # of the missing jobs that are looked at
+    some = forecast(studies(one=NINE), "results", 0).with_times(1, str)
+    assert some.missing == 9
+    assert some.seconds == pytest.approx(9 * made[-1].machine.rod_mass_kg)
 
 
 def test_time_follows_revolutions_and_bytes_samples(studies, monkeypatch):
@@ -91,13 +88,6 @@ def test_time_follows_revolutions_and_bytes_samples(studies, monkeypatch):
     found = forecast(studies(one=axes), "results", 0).with_times(1, str)
     assert found.seconds == pytest.approx(3.0 * 1.75)
     assert found.bytes == pytest.approx(3 * plan.ROW_BYTES + 1000 * 3.5, rel=0.01)
-
-
-def test_of_many_missing_jobs_some_are_looked_at(studies, monkeypatch):
-    timed_as(monkeypatch, lambda case: 1.0)
-    monkeypatch.setattr(plan, "MAX_CASES", 3)
-    found = forecast(studies(one=NINE), "results", 0).with_times(1, str)
-    assert (found.seconds, found.missing) == (pytest.approx(9.0), 9)
 
 
 def test_a_job_that_is_timed_is_a_job_of_the_sweep(studies, monkeypatch):
