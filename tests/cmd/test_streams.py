@@ -32,7 +32,6 @@ def compsim(paper_store, tmp_path):
     ("words", "code"),
     [
         (["status", "-r", "STORE"], 141),
-        (["schema"], 141),
         (["--help"], 141),
         ([*STORED, "STORE"], 0),  # what was to be done is done
     ],
