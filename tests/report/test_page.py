@@ -17,6 +17,7 @@ from compressor.report.answer import Assumptions, FirstScreen, MetricChange, Pro
 from compressor.report.figures.drawing import make_grid
 from compressor.report.inputs import Inputs
 from compressor.report.page import (
+    AddedContent,
     Cell,
     JobFacts,
     JobsToOpen,
@@ -35,14 +36,11 @@ from compressor.report.paper_sections import (
 from compressor.report.side_by_side import HealthyAndWorn
 from compressor.report.study_section import JobsContent, StudyContent
 from compressor.store.studies import StoredStudy
-from compressor.studies.tradeoff.page import ModelsContent
 
 ROOT = Path(__file__).parents[2]
 HOME = Path(page.__file__).parent
 SOURCES = [*HOME.rglob("*.py")]
 KINDS = ("word", "number", "code")
-
-STUDIES = "compressor.studies"  # whose templates are named package:file
 
 
 def strings(source):
@@ -100,6 +98,9 @@ def contents(evil):
     )
     study = StoredStudy(evil(), evil(), (), (evil(), evil()), {}, evil(), {evil(): evil()}, evil())
     return {
+        "addition.html": AddedContent(
+            table(evil), [evil()], [evil()], [plate(evil)], evil(), evil()
+        ),
         "answer.html": answer,
         "assumptions.html": Assumptions([evil()], True, True, True, [evil()]),
         "cases.html": PaperCasesContent([evil()], table(evil)),
@@ -108,7 +109,6 @@ def contents(evil):
         "figures.html": [plate(evil), plate(evil)],
         "jobs.html": JobsContent(evil(), 9, table(evil), [evil()]),
         "missing.html": MissingFigures([evil()], [evil()], evil()),
-        f"{STUDIES}.tradeoff:models.html": ModelsContent(evil(), evil(), evil(), table(evil)),
         "printed.html": table(evil),
         "provenance.html": Provenance(*(evil() for _ in range(6)), [study]),
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [plate(evil)],
