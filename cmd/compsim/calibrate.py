@@ -37,11 +37,12 @@ def calibrate(record, config, ranges, hints, overrides, folder, jobs, as_json, q
     """
     from compressor.cases import to_yaml
     from compressor.store import find_record
-    from compressor.studies.calibrate import Unknown, jsonable_fit, list_fit
     from compressor.studies.calibrate import calibrate as fit_case
+    from compressor.studies.calibrate import jsonable_fit, list_fit
+    from compressor.studies.frame import read_range
     from compressor.sweep import cores
 
-    unknowns = [Unknown.written(text) for text in ranges]
+    unknowns = [read_range("--fit", text) for text in ranges]
     _, measured = find_record(record, folder, hints)
     with ProgressReporter(quiet, "points") as progress:
         found = fit_case(measured, config, unknowns, folder, overrides, jobs or cores(), progress)

@@ -29,7 +29,7 @@ KINDS = ("first", "greatest", "least")
 @click.option(
     "--scan", type=click.IntRange(3, 1000), default=9, help="Run so many even points first."
 )
-@click.option("--log", "logarithmic", is_flag=True, help="Space points evenly in the logarithm.")
+@click.option("--log", is_flag=True, help="Space points evenly in the logarithm.")
 @options.units("that of VALUE, else SI")
 @options.set_keys
 @options.results

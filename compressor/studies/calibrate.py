@@ -29,9 +29,9 @@ from compressor.studies.frame import (
     USABLE,
     GrowingStudy,
     Point,
+    Span,
     StudyError,
     by_revolutions,
-    read_range,
     replace_settings,
 )
 from compressor.vibration import Record
@@ -228,27 +228,6 @@ SPEED = "machine.speed_rpm"
 QUIET = ("sensor.noise_m_per_s2=0", "sensor.speed_jitter=0", "output.keep=series")
 
 
-@dataclass(frozen=True)
-class Unknown:
-    """A key of the case and the range that it lies in, in the case file's unit."""
-
-    key: str
-    low: float
-    high: float
-
-    @classmethod
-    def written(cls, text: str) -> "Unknown":
-        """Return the unknown of a text KEY=LOW:HIGH. Raises StudyError."""
-        key, low, high, _ = read_range("--fit", text)
-        if key == SPEED:
-            raise StudyError(f"{SPEED} is the record's own: leave it out of --fit")
-        return cls(key, low, high)
-
-    def value(self, share: float) -> float:
-        """Return the key's value at a share of its range."""
-        return float(f"{self.low + share * (self.high - self.low):.{DIGITS}g}")
-
-
 class Fitted(NamedTuple):
     """A key's value, and the ends of its 95 % interval within its range, in the file's unit."""
 
@@ -290,7 +269,7 @@ class FitJobs:
     """Evaluates orders of a case at values of its unknown keys, by jobs of one study."""
 
     def __init__(
-        self, path: str, unknowns: Sequence[Unknown], overrides: Sequence[str],
+        self, path: str, unknowns: Sequence[Span], overrides: Sequence[str],
         folder: Folder, workers: int, progress: Progress,
     ):  # fmt: skip
         self.unknowns, self.folder, self.plain = tuple(unknowns), folder, [*overrides]
@@ -346,7 +325,7 @@ class FitJobs:
 
 
 def calibrate(
-    record: Record, path: str, unknowns: Sequence[Unknown], folder: Folder,
+    record: Record, path: str, unknowns: Sequence[Span], folder: Folder,
     overrides: Sequence[str] = (), workers: int = 2, progress: Progress = no_progress,
 ) -> Calibration:  # fmt: skip
     """Return what a record of a sound machine says of a case's unknown keys.
@@ -357,6 +336,8 @@ def calibrate(
     """
     if not unknowns:
         raise StudyError("nothing is to be fitted: give --fit KEY=LOW:HIGH")
+    if any(one.key == SPEED for one in unknowns):
+        raise StudyError(f"{SPEED} is the record's own: leave it out of --fit")
     measured = orders_of(record)
     jobs = FitJobs(path, unknowns, overrides, folder, workers, progress)
     rpm_given = jobs.middle.machine.speed_rpm

@@ -23,7 +23,7 @@ from compressor.metrics import AXES, BARRED, JOINTS, NUMBERS, SEGMENTS, THRESHOL
 from compressor.program import Progress, did_you_mean, no_progress
 from compressor.solve import average_bar
 from compressor.store import Folder, StoreError, read_store
-from compressor.studies.frame import DIGITS, GrowingStudy, StudyError, read_range
+from compressor.studies.frame import GrowingStudy, Span, StudyError, read_range
 from compressor.units import READABLE, Units, read_quantity, split_number, unit_in
 
 # ---- the question
@@ -174,69 +174,56 @@ def goal_of(text: str, sign: str) -> Goal:
 
 @dataclass(frozen=True)
 class Question:
-    """Where between low and high of a case file's key (in its unit there) a goal is met.
+    """Where in a span of a case file's key a goal is met.
 
-    logarithmic: evenly in the logarithm of the key; tolerance: of the answer, relative to the
-    range, in the logarithm where that is even; scan: points that are looked at first; overrides:
-    `key=value` of other keys.
+    tolerance: of the answer, relative to the span, in the logarithm where that is even; scan:
+    points that are looked at first; overrides: `key=value` of other keys.
     """
 
     path: str
-    key: str
-    low: float
-    high: float
+    span: Span
     goal: Goal
-    logarithmic: bool = False
     tolerance: float = 1e-3
     scan: int = 9
     overrides: tuple[str, ...] = ()
 
     @property
     def shares(self) -> list[float]:
-        """Return the shares of the range at which to look first: 0 to 1, evenly."""
+        """Return the shares of the span at which to look first: 0 to 1, evenly."""
         return [number / (self.scan - 1) for number in range(self.scan)]
-
-    def argument(self, share: float) -> float:
-        """Return the key's value at a share of the range."""
-        if share in (0.0, 1.0):
-            return self.high if share else self.low
-        if self.logarithmic:
-            value = self.low * (self.high / self.low) ** share
-        else:
-            value = self.low + share * (self.high - self.low)
-        return float(f"{value:.{DIGITS}g}")
 
     def load_first(self) -> Study:
         """Return the study of the first look, after a check that the file makes one case a value.
 
         Raises StudyError, and CaseFileError with what is wrong in the file.
         """
-        ends = [self._load(f"{value!r}") for value in (self.low, self.high)]
+        key, value = self.span.key, self.span.value
+        ends = [self._load(f"{value(share)!r}") for share in (0.0, 1.0)]
         if ends[0].jobs > 1:
             axes = ", ".join(axis.key for axis in ends[0].axes)
-            raise StudyError(f"{self.path} makes {ends[0].jobs} jobs for one {self.key}, it "
-                                f"sweeps {axes}: choose one case by --set")  # fmt: skip
+            raise StudyError(f"{self.path} makes {ends[0].jobs} jobs for one {key}, it sweeps "
+                             f"{axes}: choose one case by --set")  # fmt: skip
         if ends[0].keys == ends[1].keys:
-            raise StudyError(f"{self.key} changes nothing in the case of {self.path}")
-        return self._load(f"[{', '.join(repr(self.argument(share)) for share in self.shares)}]")
+            raise StudyError(f"{key} changes nothing in the case of {self.path}")
+        return self._load(f"[{', '.join(repr(value(share)) for share in self.shares)}]")
 
     def _load(self, value: str) -> Study:
         """Return the study of the file with the key set, too."""
-        (study,) = load_studies(self.path, overrides=[*self.overrides, f"{self.key}={value}"])
+        texts = [*self.overrides, f"{self.span.key}={value}"]
+        (study,) = load_studies(self.path, overrides=texts)
         return study
 
 
 def read_question(
-    path: str, over: str, goal: str, which: str = "first", **more: object
+    path: str, over: str, goal: str, which: str = "first", log: bool = False, **more: Any
 ) -> Question:
     """Return the question that texts ask.
 
     over: KEY=LOW:HIGH; goal: a comparison, or with `which` greatest or least a metric; more: other
     fields. Raises StudyError.
     """
-    span = read_range("--over", over, log=bool(more.get("logarithmic")))
     sought = comparison(goal) if which == "first" else goal_of(goal, which)
-    return Question(path, *span[:3], sought, **more)  # type: ignore[arg-type]
+    return Question(path, read_range("--over", over, log=log), sought, **more)
 
 
 def _number(text: str) -> float:
@@ -415,14 +402,15 @@ def find(
     StoreError and WorkersFailed.
     """
     question.load_first()
+    span = question.span
     study = GrowingStudy(
-        question.path, [question.key], f"-find-{question.key}", folder, question.overrides,
+        question.path, [span.key], f"-find-{span.key}", folder, question.overrides,
         workers, progress,
     )  # fmt: skip
-    study.find_earlier((question.low,))
+    study.find_earlier((span.low,))
 
     def evaluate(shares: Sequence[float]) -> list[Point]:
-        values = [question.argument(share) for share in shares]
+        values = [span.value(share) for share in shares]
         keys = study.run([(value,) for value in values])
         store, found = read_store(folder), []
         for share, value, key in zip(shares, values, keys, strict=True):
@@ -465,11 +453,11 @@ def list_answer(
     """
     goal, (unit, factor) = question.goal, question.goal.unit_shown(units)
     ends = [f"{one.argument:.9g}" if one else "none" for one in (answer.low, answer.high)]
-    steps = question.scan - 1
-    if question.logarithmic:
-        step = f"a factor {(question.high / question.low) ** (1 / steps):.4g} apart"
+    span, steps = question.span, question.scan - 1
+    if span.log:
+        step = f"a factor {(span.high / span.low) ** (1 / steps):.4g} apart"
     else:
-        step = f"{(question.high - question.low) / steps:.4g} apart"
+        step = f"{(span.high - span.low) / steps:.4g} apart"
     is_limit = goal.sign not in ("greatest", "least")
     limit = f" {factor * goal.limit:g} {unit}".rstrip() if is_limit else ""
     yield f"{goal.name} {goal.sign}{limit}: {answer.kind}"
@@ -482,7 +470,7 @@ def list_answer(
     head["jobs"] += f"{answer.study} of {folder}"
     yield from align_columns(head.items())
     title = f"{goal.metric} ({unit})" if unit else goal.metric
-    rows = [(question.key, title, "", "job")]
+    rows = [(span.key, title, "", "job")]
     for point in answer.points:
         text = point.reading.reason or read(point.reading, "", factor)
         rows.append((f"{point.argument:.9g}", text, verdict(goal, answer, point), point.key[:8]))

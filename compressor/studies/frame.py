@@ -55,12 +55,34 @@ class StudyError(CompsimError, ValueError):
     exit_code = 2
 
 
-def read_range(
-    option: str, text: str, is_counted: bool = False, log: bool = False
-) -> tuple[str, float, float, int]:
-    """Return key, ends and count of a text KEY=LOW:HIGH, or KEY=LOW:HIGH:N, 0 without.
+@dataclass(frozen=True)
+class Span:
+    """A key and the ends of its values, in the case file's unit; log: spaced with even ratios.
 
-    log: values are to be spaced with even ratios. Raises StudyError with the option's name.
+    count: of the values, where a text gives it, else 0.
+    """
+
+    key: str
+    low: float
+    high: float
+    log: bool = False
+    count: int = 0
+
+    def value(self, share: float) -> float:
+        """Return the key's value at a share of its span."""
+        if share in (0.0, 1.0):
+            return self.high if share else self.low
+        if self.log:
+            value = self.low * (self.high / self.low) ** share
+        else:
+            value = self.low + share * (self.high - self.low)
+        return float(f"{value:.{DIGITS}g}")
+
+
+def read_range(option: str, text: str, is_counted: bool = False, log: bool = False) -> Span:
+    """Return the span of a text KEY=LOW:HIGH, or KEY=LOW:HIGH:N.
+
+    Raises StudyError with the option's name.
     """
     parts = RANGE.fullmatch(text)
     key, low, high, count = parts.groups() if parts else ("", "nan", "nan", None)
@@ -84,7 +106,7 @@ def read_range(
     elif log and ends[0] <= 0.0:
         problem = "--log needs ends above 0"
     else:
-        return key, *ends, int(count or 0)
+        return Span(key, *ends, log, int(count or 0))
     raise StudyError(f"{option} {text}: {problem}")
 
 

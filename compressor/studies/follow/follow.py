@@ -48,6 +48,7 @@ from compressor.studies.follow.motion import (
     run_value,
 )
 from compressor.studies.frame import (
+    Span,
     StudyError,
     hash_key,
     read_range,
@@ -65,17 +66,12 @@ NOT_FOLLOWED = ("solve", "output", "body", "sensor", "initial_offset_mm")
 
 
 @dataclass(frozen=True)
-class KeyRange:
-    """A key, the ends of its values and how many there are, and how they are followed.
+class KeyRange(Span):
+    """The values of a key, and how they are followed.
 
-    `log`: with even ratios; `both`: up and then down, each from its own start.
+    `both`: up and then down, each from its own start.
     """
 
-    key: str
-    low: float
-    high: float
-    n: int
-    log: bool = False
     both: bool = False
     plan: ValuePlan = field(default_factory=ValuePlan)
 
@@ -85,15 +81,15 @@ class KeyRange:
         return ("up", "down") if self.both else ("up",)
 
 
-def read_over(text: str, **more: Any) -> KeyRange:
+def read_over(text: str, log: bool = False, **more: Any) -> KeyRange:
     """Return what a text KEY=LOW:HIGH:N asks for; more: other fields. Raises StudyError."""
-    key, low, high, count = read_range("--over", text, True, more.get("log", False))
-    if key.partition(".")[0] in NOT_FOLLOWED:
-        problem = f"{key} is nothing of the machine: give a key such as clearance_mm"
+    span = read_range("--over", text, True, log)
+    if span.key.partition(".")[0] in NOT_FOLLOWED:
+        problem = f"{span.key} is nothing of the machine: give a key such as clearance_mm"
         raise StudyError(f"--over {text}: {problem}")
-    if count < 2:
-        raise StudyError(f"--over {text}: {count} value: give 2 at least")
-    return KeyRange(key, low, high, count, **more)
+    if span.count < 2:
+        raise StudyError(f"--over {text}: {span.count} value: give 2 at least")
+    return KeyRange(**vars(span), **more)
 
 
 def load_values(
@@ -109,13 +105,13 @@ def load_values(
     Raises CaseFileError, in which the values stand under --over.
     """
     form = "logspace" if along.log else "linspace"
-    values = f"{along.key}={{{form}: [{along.low!r}, {along.high!r}, {along.n}]}}"
+    values = f"{along.key}={{{form}: [{along.low!r}, {along.high!r}, {along.count}]}}"
     try:
         (study,) = load_studies(
             path, overrides=[*overrides, values], max_jobs=max_jobs, only=only, progress=progress
         )
     except CaseFileError as error:
-        asked = f"--over {along.key}={along.low:g}:{along.high:g}:{along.n}"
+        asked = f"--over {along.key}={along.low:g}:{along.high:g}:{along.count}"
         ours = f"--set {along.key}={{{form}"
         raise CaseFileError([
             replace(problem, place=replace(problem.place, file=asked))
