@@ -8,7 +8,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Callable, Iterable, Mapping, Set
 from dataclasses import field, replace
 from functools import cache, cached_property, lru_cache, partial
 from typing import Any
@@ -86,7 +86,7 @@ FOLLOWING = ("gas.switching", "gas.back_pressure_MPa")  # from what else is give
 OWN_GAS = {key for key in (*table(), *parts_by_key()) if key.startswith("gas.")} - {*FOLLOWING}
 IN_KEY_IF_READ = {".".join(key.split(".")[:2]) for key in FACT_KEYS}
 EXAMPLE = {"joint": "big_end", "clearance_mm": 0.2}
-KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
+KEY_TEXT = json.JSONEncoder(sort_keys=True, separators=(",", ":"), check_circular=False)
 # the groups with a key that results depend on; of `solve` the span and the solver are parts
 IDENTITY_GROUPS = tuple(
     name
@@ -527,13 +527,24 @@ def _identity_of_group(name: str, group: Any) -> dict[str, Any]:
 
 def _facts_read(case: Case) -> dict[str, Any]:
     """Return the facts that a case has and reads."""
-    holds = cache(lambda needed: condition(needed)(case))  # many facts need the same
-    return {
-        key: value
+    holds = frozenset(needed for needed, test in _fact_conditions().items() if test(case))
+    return {key: value for key, get in _facts_where(holds) if (value := get(case)) is not None}
+
+
+@cache
+def _fact_conditions() -> dict[str, Callable[[Any], bool]]:
+    """Return the tests of what facts are read with, by their texts: many need the same."""
+    return {needed: condition(needed) for key in FACT_KEYS for _, needed in conditions(key)}
+
+
+@cache
+def _facts_where(holds: frozenset[str]) -> list[tuple[str, Callable[[Any], Any]]]:
+    """Return the facts that are read where some conditions hold, and how a case gives each."""
+    return [
+        (key, getter(key))
         for key in FACT_KEYS
-        if (value := getter(key)(case)) is not None
-        and all(holds(needed) for _, needed in conditions(key))
-    }
+        if all(needed in holds for _, needed in conditions(key))
+    ]
 
 
 def _plain_parts(value: Any) -> Any:
