@@ -12,8 +12,9 @@ study. What cannot be simulated at all is refused by `compressor.cases.conflicts
 import itertools
 import math
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,18 +30,13 @@ from compressor.cases import (
     stands_for,
     to_si,
     value_of,
-    with_ideal_joints,
 )
 from compressor.metrics import JOINTS
 from compressor.physics import elastic_form, greatest_load
-from compressor.solve.dense_tally import closed_form
 from compressor.solve.measured_gas import card_noise, fit_polytrope
-from compressor.solve.request import greatest_depth
-from compressor.solve.run_metrics import metrics
 from compressor.solve.si_record import record
 
 EXPONENTS = (1.0, 1.5)  # that gas is compressed with
-LEAST_PRESSURE = 0.07  # MPa, absolute, that a compressor takes in; less is a vacuum pump
 MAX_MISFIT = 0.05  # of a card's lines, rms of the pressure's logarithm
 MAX_UNLIKE = 0.25  # by which a card's clearance may differ from what is given
 MAX_NOISE = 5e-4  # of a card's range of pressure
@@ -123,6 +119,7 @@ USUAL = {
     "machine.rod_length_mm": (20.0, 1e4, METRES),
     "machine.speed_rpm": (120.0, 6e3, {"rad/s": 30 / math.pi, "Hz": 60.0}),
     "machine.rod_mass_kg": (0.02, 500.0, GRAMS),
+    "machine.rod_inertia_kg_m2": (1e-6, 1e3, {"kg mm2": 1e-6, "kg cm2": 1e-4}),
     "machine.reciprocating_mass_kg": (0.05, 5e3, GRAMS),
     "machine.pin_radius_mm": (1.0, 500.0, METRES),
     "gas.piston_radius_mm": (5.0, 1e3, METRES),
@@ -143,18 +140,13 @@ USUAL = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Caution:
-    """What is odd about a case or a study: the key it is about, and the words for the first job.
-
-    `kind`: the same for all cases with the same oddity; `jobs`: that have it, `of` jobs looked at.
-    """
+class Caution(NamedTuple):
+    """What is odd about a study: the key it is about, the words for the first of `jobs` of `of`."""
 
     key: str
     message: str
-    kind: str
-    jobs: int = 1
-    of: int = 1
+    jobs: int
+    of: int
 
 
 def is_usual(key: str, value: float) -> bool:
@@ -181,7 +173,7 @@ def slips(cases: Sequence[Case]) -> list[Caution]:
             f"{given} {unit} {is_} unusual ({usual_low:g} to {usual_high:g} is usual); read as "
             f"{other}, {they_are} {meant} {unit}"
         )
-        found.append(Caution(key, text, "slip", len(read), len(cases)))
+        found.append(Caution(key, text, len(read), len(cases)))
     return found
 
 
@@ -215,70 +207,57 @@ UNEVEN_ROD = 0.02  # of the rod's length: its centre is so far from the middle
 # which is 0.43 to 0.89 of m a b, that of two masses at the bores
 HEAVY_ENDS = 2.0
 LONGEST_CRANK = 0.35  # of the rod's length; 0.15 to 0.3 is usual
-MIN_STICTION = 0.1  # mm/s: below it, friction all but sticks
 MAX_JOBS = 500  # of a study that are looked at
 NEAR_BUCKLING = 0.5  # of Euler's load; beyond it a rod bends by more than its inertia requires
-TURN_PIECES = 8  # of the quadrature over a revolution of the ideal machine
-DENSITIES = 1000.0, 20_000.0  # kg/m3, of what rods are made of
 NEAR_RESONANCE = 0.1  # of an order's frequency: nearer, the body's motion is a resonance's
 
-
-def remarks(case: Case) -> Iterator[Caution]:
-    """Yield what is odd about a case by itself; nothing about the defaults."""
-    joints = list(contact_scales(case))
-    for key, kind, text in itertools.chain(
-        _of_machine(case),
-        ((key, "judged", text) for key, text in outside_judged(case.values()).items()),
-        ((key, "default", note) for key, note in paper_notes(case).items()),
-        _of_body(case),
-        *(_of_depth(case, joint) for joint in joints),
-        _of_rod(case),
-        _of_load(case),
-        _of_friction(case, joints),
-    ):
-        yield Caution(key, text, kind)
+Remarks = Iterator[tuple[str, str]]  # of a case: a key, and what is odd about it
 
 
-Remarks = Iterator[tuple[str, str, str]]  # of each the key, the kind, and the words
+def check_judged(case: Case) -> Remarks:
+    """Yield values outside the range that the program was judged on."""
+    yield from outside_judged(case.values()).items()
 
 
-def _of_machine(case: Case) -> Remarks:
-    """Yield an inertia that no rod has, or few, and a stroke that is given as the crank radius."""
+def check_paper_pin(case: Case) -> Remarks:
+    """Yield defaults that belong to the paper's pin, beside another pin."""
+    yield from paper_notes(case).items()
+
+
+def check_machine(case: Case) -> Remarks:
+    """Yield a default inertia that few rods have, and a stroke given as the crank radius."""
     machine, key = case.machine, "machine.rod_inertia_kg_m2"
-    inertia, centre = machine.rod_inertia_kg_m2 or 0.0, machine.rod_centre_mm or 0.0
+    centre = machine.rod_centre_mm or 0.0
     radius, length = machine.crank_radius_mm, machine.rod_length_mm
-    most = machine.rod_mass_kg * (length / 1000) ** 2
-    if inertia > most:
-        yield key, "unit", f"{inertia:g} kg m2 is more than all mass a rod apart, {most:.3g}"
     apart = machine.rod_mass_kg * centre * (length - centre) / 1e6
     bar = replace(machine, rod_inertia_kg_m2=None).rod_inertia_kg_m2 or 0.0
     if abs(centre / length - 0.5) > UNEVEN_ROD and machine.rod_inertia_kg_m2 == bar < apart:
-        yield key, "default", (
+        yield key, (
             f"{bar:.3g} kg m2 is the default, of a uniform bar, whose centre is in its middle, and "
             f"that of yours is not: drawn rods have up to {HEAVY_ENDS:g} times as much, and at "
             f"most {apart:.3g}, with all mass in their bores; it moves the forces across the rod"
         )  # fmt: skip
     if radius > LONGEST_CRANK * length:
-        yield "machine.crank_radius_mm", "proportion", (
+        yield "machine.crank_radius_mm", (
             f"{radius:g} mm is {radius / length:.2g} of the rod's length, more than the usual "
             f"{LONGEST_CRANK:g}: the crank radius is half the stroke"
         )  # fmt: skip
 
 
-def _of_body(case: Case) -> Remarks:
+def check_body(case: Case) -> Remarks:
     """Yield what decides the levels of a body of one's own, and nobody gave or measured."""
     body, speed, key = case.body, case.machine.speed_rpm / 60.0, "body.casing_mass_kg"
     if body is None or body.mass_kg == Body().mass_kg:
         return
     default = replace(body, casing_mass_kg=None).casing_mass_kg
     if reads(case, key) and body.casing_mass_kg == default:
-        yield key, "default", (
+        yield key, (
             f"{default:g} kg is the default, a 25th of the body: levels of the sensor "
             "go as its inverse, so that they compare states of one machine, and set no alarm in "
             "m/s²; compsim calibrate finds it by a record"
         )  # fmt: skip
     if not case.counterweight:
-        yield "machine.balance", "default", (
+        yield "machine.balance", (
             "nothing balances what turns with the crank, and the body moves by all of it: give the "
             "counterweight that a machine has, here or as counterweight_kg_mm"
         )  # fmt: skip
@@ -286,35 +265,28 @@ def _of_body(case: Case) -> Remarks:
         key, turning = f"frequency_{axis}_Hz", order * speed
         natural = getattr(body, key)
         if abs(natural - turning) < NEAR_RESONANCE * turning:
-            yield f"body.{key}", "resonance", (
+            yield f"body.{key}", (
                 f"{natural:g} Hz is near {turning:.3g} Hz, order {order} of the speed: "
                 "the body's velocity is a resonance's, and follows its frequency and damping, "
                 "which have to be measured"
             )  # fmt: skip
 
 
-def _of_depth(case: Case, joint: JointScales) -> Remarks:
-    """Yield the penetrations for which the contact law is not meant."""
-    depth, clearance = 1000 * joint.penetration, 1000 * joint.clearance
-    most, limit = greatest_depth(dry_record(case))
-    if joint.penetration > most:
-        is_cylinder = case.contact.length_mm is not None
-        yield f"contact.{'length_mm' if is_cylinder else 'stiffness_N_per_mm15'}", "deep", (
-            f"forces of about {joint.force:.3g} N press {depth:.3g} mm deep, more than {limit}, at "
-            "which a run stops: check stiffness, masses, speed and their units"
-        )  # fmt: skip
-    elif depth > SHALLOW_CLEARANCES * clearance:
-        yield "clearance_mm", "shallow", (
-            f"{clearance:g} mm is less than the contact gives way, about {depth:.2g} mm: the joint "
-            "acts as a spring more than as a gap; check the stiffness (contact.materials), or "
-            "raise the clearance"
-        )  # fmt: skip
+def check_depth(case: Case) -> Remarks:
+    """Yield penetrations beside which a clearance is small."""
+    for joint in contact_scales(case):
+        depth, clearance = 1000 * joint.penetration, 1000 * joint.clearance
+        if depth > SHALLOW_CLEARANCES * clearance:
+            yield "clearance_mm", (
+                f"{clearance:g} mm is less than the contact gives way, about {depth:.2g} mm: the "
+                "joint acts as a spring more than as a gap; check the stiffness "
+                "(contact.materials), or raise the clearance"
+            )  # fmt: skip
 
 
-def _of_rod(case: Case) -> Remarks:
-    """Yield an elastic rod that would buckle, or whose mass is not that of its section."""
-    rod, mass, length = case.rod, case.machine.rod_mass_kg, case.machine.rod_length_mm
-    if rod is None:
+def check_rod(case: Case) -> Remarks:
+    """Yield an elastic rod that would buckle."""
+    if case.rod is None:
         return
     p = dry_record(case)
     euler = math.pi**2 * float(p["bending_stiffness"]) * float(p["rod_length"])
@@ -322,130 +294,106 @@ def _of_rod(case: Case) -> Remarks:
     if force > NEAR_BUCKLING * euler:
         near = "come near" if force < euler else "are above"
         text = f"forces of up to about {force:.3g} N {near} Euler's load, {euler:.3g} N"
-        yield "rod.depth_mm", "buckling", f"{text}: this rod is linear and does not buckle"
-    density = mass / (length * rod.depth_mm * rod.width_mm / 1e9)
-    if not DENSITIES[0] <= density <= DENSITIES[1]:
-        section = f"{rod.width_mm:g} x {rod.depth_mm:g} x {length:g} mm"
-        text = f"{mass:g} kg in {section} are {density:.3g} kg/m3: check mass and section"
-        yield "machine.rod_mass_kg", "density", text
+        yield "rod.depth_mm", f"{text}: this rod is linear and does not buckle"
 
 
-def _of_load(case: Case) -> Remarks:
-    """Yield a motor that cannot bear the load, and gas that is not what its keys say."""
-    gas, drive = case.gas, case.drive
-    if drive is not None and case.load != "none":  # by the mean torque of the ideal machine
-        p, turn = record(with_ideal_joints(case, features=False)), case.turn
-        tally = closed_form(p, np.array([0.0, turn]), 0.0, TURN_PIECES).tally
-        needed = metrics(p, tally)["mean_crank_torque"]
-        most = drive.torque_N_m + drive.slope_N_m_s * case.omega
-        if needed > 0.0 and needed > most:
-            text = f"the load takes {needed:.3g} N m on average, more than the motor ever gives, "
-            yield "drive.torque_N_m", "load", f"{text}{most:.3g} N m: the crank will stall"
-    if case.load != "gas":
-        return
-    for end in gas.cards:
-        for kind, text in (*_of_card(case, end), *_of_fit(case, end), *_of_noise(case, end)):
-            yield f"gas.indicator.{end}", kind, text
-    alone = gas.clearance_percent is not None and gas.clearance_percent.head is None
-    if alone and gas.action == "double" and not gas.is_measured:
-        text = f"of the crank end alone: the head end has {gas.head_clearance_mm:g} mm"
-        yield "gas.clearance_percent.crank", "clearance", text
+def check_cards(case: Case) -> Remarks:
+    """Yield what the samples of a card are, and whether they fit its cylinder."""
+    for end in case.gas.cards if case.load == "gas" else ():
+        texts = [text for text in (*_tell_samples(case, end), _tell_fit(case, end)) if text]
+        if texts:
+            yield f"gas.indicator.{end}", "; ".join(texts)
 
 
-def _of_card(case: Case, end: str) -> Iterator[tuple[str, str]]:
-    """Yield what a card's samples are: of how many revolutions, from which pressure on."""
-    card = open_card(case.gas.cards[end], end)
-    least, most = min(card.pressures), max(card.pressures)
+def _tell_samples(case: Case, end: str) -> Iterator[str]:
+    """Yield how many revolutions a card is of, where its pressures begin, and its noise."""
+    card, noise = open_card(case.gas.cards[end], end), card_noise(case, end)
+    span = max(card.pressures) - min(card.pressures)
     if card.revolutions > 1:
-        yield "scatter", (
+        yield (
             f"{card.revolutions} revolutions were averaged; they scatter by {card.scatter:.2g} MPa "
-            f"(rms), {100 * card.scatter / (most - least or math.inf):.2g} % of the card's range"
-        )  # fmt: skip
+            f"(rms), {100 * card.scatter / (span or math.inf):.2g} % of the card's range"
+        )
     if card.is_gauge and case.gas.ambient_MPa is None:
         text = "its gauge pressures count from 1 atmosphere, 1.01325 bar"
-        yield "gauge", f"{text}; set gas.ambient_MPa for another"
-    if least < LEAST_PRESSURE and not card.is_gauge:
-        yield "vacuum", (
-            f"its least pressure is {least:.2g} MPa absolute, below the {LEAST_PRESSURE:g} that "
-            "compressors take in: gauge pressures have a g behind the unit of their column, as in "
-            "pressure_barg"
-        )  # fmt: skip
-
-
-def _of_fit(case: Case, end: str) -> Iterator[tuple[str, str]]:
-    """Yield that a card's compression and expansion do not fit its gas and clearance volume."""
-    fit = fit_polytrope(case, end)
-    if fit is None:
-        return
-    misfit, clearance, exponent = fit
-    doubt = (
-        "are its pressures of the unit that the column says, absolute or gauge, its angle 0 at top "
-        "dead centre, the stroke the machine's?"
-    )
-    stroke, given_by = 2 * case.machine.crank_radius_mm, case.gas.clearance_key(end)
-    given = case.gas.clearance(end, stroke) / stroke
-    value, row = value_of(case, given_by), row_of(given_by)
-    is_given = row is not None and value != row.default
-    says = (
-        f"compression and expansion fit a clearance of {100 * clearance:.3g} % at an exponent of "
-        f"{exponent:.3g}"
-    )
-    if misfit > MAX_MISFIT:
-        text = "its compression and expansion fit no polytropic lines, whatever the clearance"
-        yield "fit", f"{text}: {doubt}"
-    elif not EXPONENTS[0] <= exponent <= EXPONENTS[1]:
-        yield "fit", f"{says}: {doubt}"
-    elif is_given and abs(clearance / given - 1) > MAX_UNLIKE:
-        yield "fit", f"{says}, and {given_by} gives {100 * given:.3g} %"
-
-
-def _of_noise(case: Case, end: str) -> Iterator[tuple[str, str]]:
-    """Yield noise of a card, which a run makes vibration of."""
-    noise, card = card_noise(case, end), open_card(case.gas.cards[end], end)
-    if noise > MAX_NOISE * (max(card.pressures) - min(card.pressures)):
+        yield f"{text}; set gas.ambient_MPa for another"
+    if noise > MAX_NOISE * span:
         force = to_si(noise, "MPa") * math.pi * to_si(case.gas.piston_radius_mm, "mm") ** 2
-        yield "noise", (
+        yield (
             f"noise or rounding of its samples is about {noise:.2g} MPa (rms), {force:.3g} N on "
             f"the piston; smoothed over {case.gas.smooth_deg or 0.0:g} degrees: gas.smooth_deg"
-        )  # fmt: skip
+        )
 
 
-def _of_friction(case: Case, joints: Sequence[JointScales]) -> Remarks:
-    """Yield wear, which a run leaves out, and coefficients and speeds that friction rarely has."""
+def _tell_fit(case: Case, end: str) -> str:
+    """Return how a card's compression and expansion misfit its gas and clearance volume, or ""."""
+    misfit, clearance, exponent = fit_polytrope(case, end) or (0.0, 0.0, math.nan)
+    if misfit > MAX_MISFIT:
+        says = "its compression and expansion fit no polytropic lines, whatever the clearance"
+    else:
+        says = (
+            f"compression and expansion fit a clearance of {100 * clearance:.3g} % at an exponent "
+            f"of {exponent:.3g}"
+        )
+    if misfit > MAX_MISFIT or exponent < EXPONENTS[0] or exponent > EXPONENTS[1]:
+        return (
+            f"{says}: are its pressures of the unit that the column says, absolute or gauge, its "
+            "angle 0 at top dead centre, the stroke the machine's?"
+        )
+    stroke, key = 2 * case.machine.crank_radius_mm, case.gas.clearance_key(end)
+    given, row = case.gas.clearance(end, stroke) / stroke, row_of(key)
+    is_given = row is not None and value_of(case, key) != row.default
+    is_unlike = abs(clearance / given - 1) > MAX_UNLIKE and not math.isnan(exponent)
+    return f"{says}, and {key} gives {100 * given:.3g} %" if is_given and is_unlike else ""
+
+
+def check_friction(case: Case) -> Remarks:
+    """Yield wear, which a run leaves out, and coefficients that friction rarely has."""
     if case.wear:
-        text = "compsim wear alone reads it: a run has the clearances that are given"
-        yield "wear", "unread", text
+        yield "wear", "compsim wear alone reads it: a run has the clearances that are given"
     friction = case.friction
-    if friction is None:
-        return
-    if friction.law in (None, "lugre") and friction.static < friction.dynamic:
+    if friction and friction.law in (None, "lugre") and friction.static < friction.dynamic:
         text = f"{friction.static:g} is below the dynamic one, {friction.dynamic:g}"
-        yield "friction.static", "coefficients", f"{text}: friction grows as bodies slide"
-    speed = friction.stiction_velocity_mm_per_s
-    if joints and 0 < speed < MIN_STICTION:
-        text = f"{speed:g} mm/s, below {MIN_STICTION:g} mm/s: friction all but sticks, and steps"
-        yield "friction.stiction_velocity_mm_per_s", "stiction", f"{text} get short"
+        yield "friction.static", f"{text}: friction grows as bodies slide"
+
+
+Check = Callable[[Case], Remarks]
+CHECKS: tuple[Check, ...] = (
+    check_machine, check_judged, check_paper_pin, check_body, check_depth, check_rod, check_cards,
+    check_friction,
+)  # fmt: skip
+
+
+def remarks(case: Case) -> Iterator[tuple[Check, str, str]]:
+    """Yield what is odd about a case by itself, nothing about the defaults: check, key, words."""
+    for check in CHECKS:
+        for key, message in dict(check(case)).items():
+            yield check, key, message
 
 
 def cautions(study: Study, most: int = MAX_JOBS) -> list[Caution]:
     """Return what is odd about the selected jobs of a study, a `Caution` for each oddity.
 
     Of more than `most` jobs as many are looked at, drawn evenly and always the same. A key whose
-    values look like another unit's has that remark alone.
+    values look like another unit's has that remark alone, and no forces are told then.
     """
     numbers: Sequence[int] = study.selected
     if len(numbers) > most:
         numbers = sorted(random.Random(0).sample(numbers, most))
     cases = [study.cases[number] for number in numbers]
     units = {one.key: one for one in slips(cases)}
-    found: dict[tuple[str, str], Caution] = {}
+    found: dict[tuple[Check, str], Caution] = {}
     for case in cases:
-        for (key, kind), one in {(one.key, one.kind): one for one in remarks(case)}.items():
-            known = found.get((key, kind), replace(one, jobs=0, of=len(cases)))
-            found[key, kind] = replace(known, jobs=known.jobs + 1)
-    others = sorted(found.values(), key=lambda one: -one.jobs)
-    for one in others:
-        if one.key in units and one.kind == "judged":
-            slip = units[one.key]
-            units[one.key] = replace(slip, message=f"{slip.message}; {one.message}")
-    return [*units.values(), *(one for one in others if one.key not in units)]
+        for check, key, message in remarks(case):
+            one = found.get((check, key), Caution(key, message, 0, len(cases)))
+            found[check, key] = one._replace(jobs=one.jobs + 1)
+    others = sorted(found.items(), key=lambda item: -item[1].jobs)
+    for (check, key), one in others:
+        if key in units and check is check_judged:
+            message = f"{units[key].message}; {one.message}"
+            units[key] = units[key]._replace(message=message)
+    told = [
+        one for (check, key), one in others
+        if key not in units and not (units and check is check_depth)
+    ]  # fmt: skip
+    return [*units.values(), *told]

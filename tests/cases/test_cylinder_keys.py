@@ -3,7 +3,6 @@
 import pytest
 
 from compressor.cases.case import Case, CaseError
-from compressor.solve.cautions import remarks
 from compressor.solve.si_record import record
 
 DOUBLE = {"action": "double", "rod_diameter_mm": 30}
@@ -46,8 +45,6 @@ def test_a_crank_end_alone_takes_its_clearance_in_every_form(clearance):
     both = {"head": 12, "crank": 14}
     single = case({"action": "single", "clearance_percent": both})
     assert record(single)["head_clearance"] == pytest.approx(0.0288)
-    (told,) = remarks(case(DOUBLE | {"clearance_percent": {"crank": 14}}))
-    assert told.message == "of the crank end alone: the head end has 20 mm"
 
 
 def test_a_piston_that_would_reach_a_cover():

@@ -34,6 +34,7 @@ SLIPS = [
     ("clearance_mm", 5, {"joint": "both"}, "µm", "0.005 mm"),
     ("machine.pin_radius_mm", 0.01, {"friction": {"ideal_joints": True}}, "m", "10 mm"),
     ("machine.rod_mass_kg", 4700, {}, "g", "4.7 kg"),
+    ("machine.rod_inertia_kg_m2", 141000, {}, "kg mm2", "0.141 kg m2"),
     ("gas.head_clearance_mm", 0.02, GAS, "m", "20 mm"),
     ("friction.stiction_velocity_mm_per_s", 0.01, WORN, "m/s", "10 mm/s"),
 ]  # fmt: skip
