@@ -5,10 +5,10 @@ changes of sign are looked for in windows of time: at POINTS times in each, then
 neighbours of what is found.
 """
 
-import itertools
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from compressor.physics import (
     tally_energy,
 )
 from compressor.reasons import Reason
-from compressor.solve.request import Trajectory, overdue
+from compressor.solve.request import SAME_TIME, Trajectory, overdue, revolutions, split_segments
 from compressor.solve.series import rows_at
 from compressor.solve.si_record import length_and_speed, natural_sizes
 
@@ -41,7 +41,6 @@ FOR_CHANGES, FOR_TOPS = 8, 4  # rounds: windows shrink 16-fold in each, or 8-fol
 SMALL_CHANGE = 1e-6  # of a state's natural size: by which a change of contact is moved
 KICK = 30.0  # tolerances of speed: what a contact within one step may add unseen
 NEAR_TOP = 0.99  # of the greatest value known: nodes below are under no greater top
-PIECES_PER_CHECK = 256  # of an ideal machine's quadrature between two looks at the clock
 
 
 def narrow(
@@ -106,34 +105,26 @@ def tally_steps(
     spans = np.diff(steps)
     times = np.append((steps[:-1, None] + spans[:, None] * NODES[:-1]).ravel(), steps[-1])
     rows, gaps, sides = observe(times), np.zeros((spans.size, 2)), np.zeros((spans.size, 4))
+
+    def above(column: int, sign: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the share of each step in which a column is positive, its changes and rates."""
+        values = sign * rows[:, column]
+        found = find_changes(lambda at: sign * observe(at)[:, column], times, values)
+        return shares_above(steps, values[0], found[0]), *found
+
+    def tops(look: Callable[[np.ndarray], np.ndarray], known: np.ndarray) -> np.ndarray:
+        return find_tops(lambda at: look(observe(at)), times, look(rows), known)
+
     if measured:
-        tally["peak"] = find_tops(
-            lambda at: np.abs(observe(at)[:, PEAKED]), times, np.abs(rows[:, PEAKED]), tally["peak"]
-        )
+        tally["peak"] = tops(lambda rows: np.abs(rows[:, PEAKED]), tally["peak"])
         for joint in np.flatnonzero(p["clearance"] > 0.0).tolist():
-
-            def nearness(at: np.ndarray, column: int = Column.NEARNESS + joint) -> np.ndarray:
-                return observe(at)[:, column]
-
-            values = rows[:, Column.NEARNESS + joint]
-            changes, rates = find_changes(nearness, times, values)
-            gaps[:, joint] = 1.0 - shares_above(steps, values[0], changes)
+            shares, changes, rates = above(Column.NEARNESS + joint)
+            gaps[:, joint] = 1.0 - shares
             for change in zip(changes, rates, strict=True):
                 tally["switch_shift"][joint] += shift_of_change(p, joint, observe, *change)
-    if measured and tally["has_rod_load"]:
-
-        def loads(at: np.ndarray) -> np.ndarray:  # without load the rod is on neither side
-            return observe(at)[:, [ROD_LOAD]] * (1.0, -1.0)
-
-        both = rows[:, [ROD_LOAD]] * (1.0, -1.0)
-        for side in range(2):
-
-            def load(at: np.ndarray, side: int = side) -> np.ndarray:
-                return loads(at)[:, side]
-
-            changes, _ = find_changes(load, times, both[:, side])
-            sides[:, side] = shares_above(steps, both[0, side], changes)
-        sides[:, 2:] = find_tops(loads, times, both, tally["side_peak"])
+    if measured and tally["has_rod_load"]:  # without load the rod is on neither side
+        sides[:, 0], sides[:, 1] = above(ROD_LOAD)[0], above(ROD_LOAD, -1.0)[0]
+        sides[:, 2:] = tops(lambda rows: rows[:, [ROD_LOAD]] * (1.0, -1.0), tally["side_peak"])
     last = NODES.size - 1
     of_steps = rows[last * np.arange(spans.size)[:, None] + np.arange(NODES.size)]
     tally_each(spans, NODES, WEIGHTS, of_steps, gaps, sides, measured, tally, p)
@@ -167,48 +158,41 @@ def find_missed_contact(
 
 
 def closed_form(
-    p: np.record, times: np.ndarray, settle: float, pieces: int, timeout: float = math.inf,
-    has_rod_load: bool = False,
-) -> Trajectory:  # fmt: skip
+    p: np.record, times: np.ndarray, settle: float, pieces: int, timeout: float, has_rod_load: bool
+) -> Trajectory:
     """Return the trajectory of ideal joints over an output grid, without integration.
 
     pieces: into which each stretch between load corners, or each revolution in it, is cut, but a
     card's, which is cut at its nodes.
     """
     deadline, began = time.monotonic() + timeout, time.perf_counter()
+    turn, states = math.tau / float(p["omega"]), np.zeros((times.size, 4))
     edges, phases = segments(p, float(times[-1]))
-    result = Trajectory(
-        times, np.zeros((times.size, 4)), phases[sample_segments(times, edges)],
-        new_tally(has_rod_load),
-    )  # fmt: skip
-    turn = 2.0 * math.pi / p.omega
+    at_samples = phases[sample_segments(times, edges)]
+    result = Trajectory(times, states, at_samples, new_tally(has_rod_load))
+    cuts = settle, *revolutions(0.0, times[-1], turn)
+    edges, phases, (settle, *_) = split_segments(edges, phases, cuts)
+    nodes = np.empty(0)
     if p["load"] == Load.CARD:  # whose curve is of pieces between its nodes
-        edges = np.arange(0.0, edges[-1] / turn, 1.0 / len(p["card"])) * turn
-        edges, phases = np.append(edges, times[-1]), np.zeros(edges.size, dtype=np.int64)
-        pieces = 1
-    grids = [
-        np.linspace(begin, end, pieces * math.ceil((end - begin) / turn - 1e-9) + 1)
-        for begin, end in itertools.pairwise(edges)
-    ]
-    cuts = np.unique(np.concatenate((edges, [settle], *grids)))
-    owner, measured = sample_segments((cuts[:-1] + cuts[1:]) / 2, edges), cuts[:-1] >= settle
-    changes = 1 + np.flatnonzero(np.diff(owner) | np.diff(measured))
-    blocks = np.union1d(np.arange(0, owner.size, PIECES_PER_CHECK), changes)
-    flows, phase = np.zeros(FLOWS), 0
+        nodes = np.arange(0.0, times[-1] / turn, 1.0 / len(p["card"])) * turn
+    flows = np.zeros(FLOWS)
 
-    def observe(times: np.ndarray) -> np.ndarray:
+    def observe(phase: int, times: np.ndarray) -> np.ndarray:
         return rows_at(p, times, np.zeros((times.size, 4)), phase)
 
-    for first, last in itertools.pairwise([*blocks, owner.size]):
+    tally_energy(observe(phases[0], times[:1])[0], flows, result.tally)
+    for begin, end, phase in zip(edges[:-1], edges[1:], phases, strict=True):
         if time.monotonic() > deadline:
-            result.reason = Reason.BUDGET_SECONDS
-            result.detail, result.stop_time = overdue(timeout), float(cuts[first])
-            result.states[times >= cuts[first]] = math.nan
+            result.reason, result.detail = Reason.BUDGET_SECONDS, overdue(timeout)
+            result.stop_time, states[times >= begin] = float(begin), math.nan
             break
-        steps, phase = cuts[first : last + 1], int(phases[owner[first]])
-        rows = tally_steps(p, result.tally, steps, observe, bool(measured[first]))
+        steps = np.linspace(begin, end, pieces + 1)
+        if nodes.size:
+            inside = nodes[(nodes > begin + SAME_TIME * turn) & (nodes < end - SAME_TIME * turn)]
+            steps = np.array([begin, *inside, end])
+        look = partial(observe, phase)
+        rows = tally_steps(p, result.tally, steps, look, bool(begin >= settle))
         for span, row in zip(np.diff(steps), rows, strict=True):
-            tally_energy(row[0], flows, result.tally)
             add_flows(row, WEIGHTS, span, flows)
             tally_energy(row[-1], flows, result.tally)
     result.seconds = time.perf_counter() - began
