@@ -7,14 +7,12 @@ reports success with nan, and its Runge-Kutta methods hang on inf.
 
 import math
 import time
-from collections import deque
 from typing import Any
 
 import numpy as np
 
 from compressor.physics import (
     FLOWS,
-    LAST_STEPS,
     Column,
     approach_at,
     derivative_with_flows,
@@ -23,15 +21,7 @@ from compressor.physics import (
 )
 from compressor.reasons import Reason
 from compressor.solve.dense_tally import find_missed_contact, tally_steps
-from compressor.solve.request import (
-    Request,
-    Stop,
-    Trajectory,
-    check_depth,
-    check_state,
-    overdue,
-    passed_time,
-)
+from compressor.solve.request import Request, Stop, Trajectory, check_depth, check_state, overdue
 from compressor.solve.series import rows_at
 from compressor.solve.si_record import absolute_tolerances
 
@@ -67,9 +57,8 @@ class ScipyRun:
 
     def __init__(self, request: Request, result: Trajectory, settle: float):
         self.request, self.result, self.settle, self.p = request, result, settle, request.p
-        self.phase, self.bad, self.last = 0, 0, (0.0, request.start)
+        self.phase, self.bad, self.last = 0, 0, 0.0
         self.deadline = time.monotonic() + request.timeout
-        self.steps = result.last_steps = deque(maxlen=LAST_STEPS)
         # by joint whose law reads the speed at which bodies meet: whether they have met
         joints = np.flatnonzero((self.p["clearance"] > 0.0) & (self.p["hysteresis"] != 0.0))
         self.touches = dict.fromkeys(joints.tolist(), False)
@@ -92,16 +81,14 @@ class ScipyRun:
 
     def watch(self, t: float, z: np.ndarray) -> float:
         """Count and judge each step's end: an event that never comes. Raises Stop."""
-        result, last, self.last = self.result, self.last, (t, z.copy())
-        if t == last[0]:
+        result, last, self.last = self.result, self.last, t
+        if t == last:  # of an integration's begin
             return 1.0
         if not np.isfinite(z).all():
             raise Stop(Reason.NON_FINITE, "the state is no longer finite")
         result.stop_time, result.stop_state, result.steps = t, z[:-FLOWS].copy(), result.steps + 1
-        since, now = (float(passed_time(self.p, *at)) for at in (last, self.last))
-        self.steps.append((since, now - since, math.nan, f"{self.request.method} taken"))
         row = self.observe(np.array([t]), z[:, None])[0]
-        tally_energy(row, self.last[1][-FLOWS:], result.tally)
+        tally_energy(row, np.array(z[-FLOWS:]), result.tally)
         check_depth(float(row[Column.PENETRATION : Column.NORMAL].max()), self.p)
         check_state(self.p, z)
         most = self.request.max_steps
@@ -121,38 +108,38 @@ class ScipyRun:
 
     def go(self, t: float, end: float, z: np.ndarray) -> np.ndarray:
         """Return motion and flows at an edge, from those at the edge before. Raises Stop."""
-        from scipy.integrate import solve_ivp  # a third of the time of a short run
-
-        request, result, p, bound = self.request, self.result, self.p, end
-        rtol = max(request.rtol * LOCAL.get(request.method, 1.0), MIN_RTOL)
-        meeting: list[int] = []  # joints, at `bound`
+        p, result = self.p, self.result
         while t < end:
-            watched, self.last = {} if meeting else self.touches, (t, z)
-            try:
-                path = solve_ivp(
-                    self.differentiate, (t, bound), z, request.method, rtol=rtol,
-                    atol=absolute_tolerances(p, rtol), dense_output=True,
-                    events=[self.watch, *map(self.meeting, watched)],
-                )  # fmt: skip
-            except ValueError as error:  # of a matrix with nan
-                raise Stop(Reason.NON_FINITE, str(error)) from error
-            met = [joint for joint, at in zip(watched, path.t_events[1:], strict=True) if at.size]
-            reached = path.t.size - 1 - bool(met)
-            self.take(np.unique(path.t[: reached + 1]), path.sol)
-            if not path.success:
-                raise Stop(Reason.STEP_UNDERFLOW, path.message)
-            t, z, bound = path.t[reached], path.y[:, reached].copy(), path.t[-1] if met else end
-            if met:  # beyond, the law has another speed: the step is taken again, up to there
+            path, met = self.advance(t, end, z, [*self.touches])
+            if met:  # beyond it the law has another speed: the step is taken again, up to there
                 result.steps, result.rejected = result.steps - 1, result.rejected + 1
-                self.steps[-1] = (*self.steps[-1][:3], f"{request.method} cut at an onset")
-            for joint in meeting:
+                path, _ = self.advance(path.t[-2], path.t[-1], path.y[:, -2].copy(), [])
+            t, z = path.t[-1], path.y[:, -1].copy()
+            for joint in met:
                 self.touches[joint] = not self.touches[joint]
                 if self.touches[joint]:
                     y, (rates, scratch) = z[:-FLOWS].copy(), np.empty((2, z.size - FLOWS))
                     _, speed = approach_at(joint, t, y, self.phase, p, rates, scratch)
                     z[2 * p["freedoms"] + joint] = max(speed, p["least_approach"])
-            meeting = met
         return z
+
+    def advance(self, t: float, end: float, z: np.ndarray, joints: list) -> tuple[Any, list[int]]:
+        """Return SciPy's path up to where bodies meet, tallied up to the step before; joints."""
+        from scipy.integrate import solve_ivp  # a third of the time of a short run
+
+        method, self.last = self.request.method, t
+        rtol = max(self.request.rtol * LOCAL.get(method, 1.0), MIN_RTOL)
+        atol, watched = absolute_tolerances(self.p, rtol), [self.watch, *map(self.meeting, joints)]
+        how: dict[str, Any] = {"rtol": rtol, "atol": atol, "events": watched, "dense_output": True}
+        try:
+            path = solve_ivp(self.differentiate, (t, end), z, method, **how)
+        except ValueError as error:  # of a matrix with nan
+            raise Stop(Reason.NON_FINITE, str(error)) from error
+        met = [joint for joint, at in zip(joints, path.t_events[1:], strict=True) if at.size]
+        self.take(np.unique(path.t[:-1] if met else path.t), path.sol)
+        if not path.success:
+            raise Stop(Reason.STEP_UNDERFLOW, path.message)
+        return path, met
 
     def take(self, steps: np.ndarray, dense: Any) -> None:
         """Tally steps, by their ends (s), and sample the output grid within them. Raises Stop."""

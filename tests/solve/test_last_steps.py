@@ -8,6 +8,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.cases.groups import METHODS
 from compressor.physics import LAST_STEPS
+from compressor.solve.run import COMPILED
 from compressor.solve.simulate import measure
 
 BOTH = {"joint": "both", "clearance_mm": 0.3}
@@ -34,11 +35,8 @@ def test_the_history_ends_where_the_run_stopped():
     assert (errors[[text.endswith("taken") for text in words(found)]] <= 1).all()
 
 
-@pytest.mark.parametrize("method", ["auto", "RK45"])
-def test_the_history_of_a_slowing_crank_has_the_time_that_passed(method):
-    drive = {"torque_N_m": 1, "flywheel_kg_m2": 1}
-    solve = {"max_steps": 400 if method == "auto" else 100, "method": method}
-    found = stopped(drive=drive, solve=solve)
+def test_the_history_of_a_slowing_crank_has_the_time_that_passed():
+    found = stopped(drive={"torque_N_m": 1, "flywheel_kg_m2": 1}, solve={"max_steps": 400})
     times, steps = found["stop_history_time"], found["stop_history_step"]
     taken = np.array([text.endswith(("taken", "to an onset")) for text in words(found)])
     ends = times + np.where(taken, steps, 0)
@@ -73,7 +71,8 @@ def test_the_budget_of_steps_is_kept_exactly(method, most):
     found = measure(Case.from_values({**BOTH, "solve": {"max_steps": most, "method": method}}))
     assert found.reason == "budget_steps"
     assert found.numbers["steps"] + found.numbers["rejected"] == most
-    assert len(words(found.attributes)) == min(most, LAST_STEPS)
+    told = min(most, LAST_STEPS) if method in COMPILED else 0
+    assert len(found.attributes["stop_history_time"]) == told
 
 
 def test_a_contact_that_lies_within_one_step_is_named(monkeypatch):
