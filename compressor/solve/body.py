@@ -9,21 +9,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from compressor.cases import Case, back_action
+from compressor.cases import Case
 from compressor.metrics import NUMBERS
 from compressor.outcome import Regime
 from compressor.solve.error_bars import closeness, longest_bars
 from compressor.solve.request import Metrics
 from compressor.solve.run import Solution
-from compressor.solve.run_metrics import (
-    MAX_BATCHES,
-    average_bar,
-    count_bar,
-    parts,
-    standard_error,
-)
+from compressor.solve.run_metrics import average_bar, count_bar, parts, standard_error
 from compressor.solve.series import Variables, finer, rows_of, signals, variable
-from compressor.vibration import Forces, Monitored, Record, line_amplitudes, shake_body
+from compressor.vibration import Forces, Monitored, Record, shake_body
 
 BODY = {  # over time and these dimensions: (dimensions, unit, long name)
     "body_displacement": (("axis",), "m", "displacement of the body's mass centre"),
@@ -54,9 +48,6 @@ def foundation(case: Case, solution: Solution) -> tuple[Variables, Metrics]:
         values[f"body_{name}"][-len(both) :] = both
     rocking = motion["rocking"].displacement[grid][::stride]
     values["body_rocking"][-len(rocking) :] = rocking
-    phrase = "bound of the relative error of the body's velocity: it is driven one way"
-    errors = one_way_errors(case, [axis.velocity[:-1] for axis in axes], times[1])
-    variables["one_way_error"] = variable(("axis",), errors, "1", phrase)
     numbers = measure_body(case, solution, shaken)
     if shaken.recorded:
         variables |= sensor_variables(shaken.recorded)
@@ -75,23 +66,6 @@ def sensor_variables(record: Record) -> Variables:
         ),
         "tacho_time": variable(("pulse",), record.tacho, "s", passes),
     }
-
-
-def one_way_errors(case: Case, velocities: list[np.ndarray], step: float) -> np.ndarray:
-    """Return a bound by axis of the relative L2 error of the body's velocity: it is driven one way.
-
-    Of the order m / M away from resonances. A journal's chatter may come at other moments on a body
-    that gives way, so that no bound is stated of accelerations.
-    """
-    bounds = []
-    for axis, values in zip("xy", velocities, strict=True):
-        amplitudes = line_amplitudes(values, values.size, True)
-        frequencies = np.arange(amplitudes.size) / (values.size * step)
-        back = np.abs(back_action(case, axis, frequencies))
-        error = np.where(back < 1.0, back / np.maximum(1.0 - back, 1e-12), np.inf)
-        shares = amplitudes**2 / ((amplitudes**2).sum() or 1.0)
-        bounds.append(float(np.sqrt((shares * error**2).sum())) if values.any() else 0.0)
-    return np.array(bounds)
 
 
 def first_sample(case: Case, solution: Solution) -> int:
@@ -161,7 +135,7 @@ def scatter_bars(ours: Monitored, metrics: Metrics, counted: tuple) -> Metrics:
     """Return the bars of a chaotic motion: of averages by batch means, inf of all else."""
     bars = {name: np.full(np.shape(value), math.inf) for name, value in metrics.items()}
     per_turn = [one.measure(counted) for one in ours.cut()]
-    batches, count = parts(per_turn, MAX_BATCHES, 1), len(per_turn)
+    batches, count = parts(per_turn), len(per_turn)
     for name, value in metrics.items():
         kind, size = NUMBERS[name].kind, np.asarray(value)
         if kind not in ("root", "rate") or count < 2:

@@ -169,7 +169,7 @@ def batch_errors(p: np.record, turns: Sequence[np.record]) -> Metrics:
     inf where there are too few revolutions.
     """
     whole, errors = metrics(p, merge_tallies(turns)), {}
-    batches = [metrics(p, merge_tallies(part)) for part in parts(turns, MAX_BATCHES, 1)]
+    batches = [metrics(p, merge_tallies(part)) for part in parts(turns)]
     for name, value in whole.items():
         kind, averages = NUMBERS[name].kind, np.array([one[name] for one in batches])
         if kind == "root":  # the mean square is what is averaged
@@ -203,7 +203,7 @@ def statistics(p: np.record, turns: Sequence[np.record]) -> Metrics:
 
 def summarize_peaks(name: str, values: np.ndarray) -> Metrics:
     """Return mean, its standard error and quantiles of the revolutions' greatest values."""
-    means = np.array([part.mean(axis=0) for part in parts(values, MAX_BATCHES, 1)])
+    means = np.array([part.mean(axis=0) for part in parts(values)])
     return {
         f"{name}_mean": values.mean(axis=0),
         f"{name}_mean_standard_error": standard_error(means),
@@ -211,7 +211,7 @@ def summarize_peaks(name: str, values: np.ndarray) -> Metrics:
     }
 
 
-def parts(items: Sequence | np.ndarray, most: int, least: int) -> list:
+def parts(items: Sequence | np.ndarray, most: int = MAX_BATCHES, least: int = 1) -> list:
     """Return the last items as up to `most` batches of equal size, at least `least` in each."""
     size = max(least, math.ceil(len(items) / most))
     count = max(1, len(items) // size)
@@ -228,7 +228,7 @@ def standard_error(means: np.ndarray) -> np.ndarray:
 
 def sure(error: np.ndarray, revolutions: int) -> np.ndarray:
     """Return half the length of the 95 % interval of a mean by `parts`, by its standard error."""
-    batches = len(parts(range(revolutions), MAX_BATCHES, 1))
+    batches = len(parts(range(revolutions)))
     from scipy.special import stdtrit  # takes a tenth of a second, of chaotic motions alone
 
     return np.asarray(error) * float(stdtrit(max(batches - 1, 1), T_QUANTILE))
@@ -251,7 +251,7 @@ def count_bar(count: np.ndarray) -> np.ndarray:
 
 def mean_bar(values: np.ndarray) -> float:
     """Return half of the 95 % interval of the mean of a chaotic motion's values; inf of few."""
-    means = np.array([part.mean() for part in parts(values, MAX_BATCHES, 1)])
+    means = np.array([part.mean() for part in parts(values)])
     return float(average_bar(standard_error(means), len(values)))
 
 

@@ -1,17 +1,13 @@
-"""The body in a case: what a run stores of it, and how wrong it is to be driven one way."""
+"""The body in a case: what a run stores of it."""
 
 import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from compressor.analysis.shaking import healthy_body_velocity_rms
 from compressor.cases.case import Case
-from compressor.physics import COLUMNS, derivative_with_flows
-from compressor.physics.systems import observe_at
 from compressor.solve.body import BODY
-from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
 
 TURN = {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 0.3}
@@ -23,59 +19,10 @@ def run(**values):
     return simulate(Case.from_values({**LOOSE, **values}))
 
 
-def coupled(case, revolutions):
-    """Velocities of a body coupled both ways, by SciPy on machine and body together, (m, 2).
-
-    In the frame of the body the machine feels -m a on each of its parts. Contact forces follow
-    from the state alone, so that nothing but the crosshead's weight is implicit.
-    """
-    p, body = record(case), case.body
-    stiffness, damping = [
-        np.array([what(2 * math.pi * getattr(body, f"frequency_{axis}_Hz")) for axis in "xy"])
-        for what in (lambda w: w**2, lambda w: 2 * body.damping_ratio * w)
-    ]
-    row, rate = np.zeros(COLUMNS), np.zeros(12)
-    masses = body.mass_kg + np.array([0.0, case.machine.reciprocating_mass_kg])
-
-    def accelerations(t, z):
-        observe_at(t, z[:8], 0, p, row)
-        shaking = np.array([-row[9] + row[3], -row[10] - row[12]])
-        return (shaking - body.mass_kg * (stiffness * z[8:10] + damping * z[10:])) / masses
-
-    def slope(t, z):
-        moved = accelerations(t, z)
-        derivative_with_flows(t, np.append(z[:8], np.zeros(4)), 0, p, rate)
-        felt = np.array([moved[0], moved[0], moved[1], 0.0])
-        return np.concatenate([rate[:4], rate[4:8] - felt, z[10:], moved])
-
-    times = np.linspace(0, revolutions * case.turn, 1201)
-    start = np.zeros(12)
-    found = solve_ivp(slope, (0, times[-1]), start, "LSODA", times, rtol=1e-4, atol=1e-7)
-    return found.y[10:].T
-
-
-@pytest.mark.slow
-def test_a_body_coupled_both_ways_lies_within_the_stated_bound():
-    """The bound is not idle, either: a tenth of it is reached."""
-    solve = {"duration_rev": 2, "settle_rev": 0, "output_step_deg": 0.6}
-    case = Case.from_values({
-        "joint": "both", "clearance_mm": 0.1, "load": "none", "solve": solve,
-        "body": {"mass_kg": 300.0, "frequency_x_Hz": 12.0, "frequency_y_Hz": 12.0, "start": "rest"},
-    })  # fmt: skip
-    found = simulate(case)
-    other = coupled(case, 2)
-    ours = found["body_velocity"].values
-    apart = np.linalg.norm(ours - other, axis=0) / np.linalg.norm(other, axis=0)
-    bound = found["one_way_error"].values
-    assert (apart < bound).all()
-    assert (apart > 0.1 * bound).all()
-    assert (bound < 1.2).all()
-
-
 def test_the_body_changes_nothing_of_the_machine():
     plain, more = run(), run(body=True)
     measured = {"body_velocity_rms", "body_velocity_rms_error"}
-    assert {*more.variables} - {*plain.variables} == {*BODY, "one_way_error", *measured}
+    assert {*more.variables} - {*plain.variables} == {*BODY, *measured}
     for name in plain.variables:
         if name != "seconds":
             np.testing.assert_array_equal(plain[name], more[name])
