@@ -17,17 +17,6 @@ def run(joint, lubricant=True, clearance=0.05, **solve):
     return found
 
 
-def test_three_integrators_agree():
-    """Explicit steps, stiff ones and SciPy's LSODA share the equations alone."""
-    short = {"duration_rev": 0.15, "settle_rev": 0, "error_bars": False, "rtol": 1e-7}
-    runs = [run("both", method=method, **short) for method in ("TSIT5", "RODAS", "LSODA")]
-    one = runs[0].acceleration.values
-    for other in runs[1:]:
-        apart = np.linalg.norm(other.acceleration.values - one) / np.linalg.norm(one)
-        assert apart < 2e-4
-    assert max(float(each.energy_residual) for each in runs) < 1e-5
-
-
 @pytest.mark.parametrize("joint", JOINTS)
 def test_the_film_s_loss_closes_the_energy(joint):
     found = run(joint, duration_rev=2)
