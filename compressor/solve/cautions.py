@@ -163,17 +163,12 @@ def slips(cases: Sequence[Case]) -> list[Caution]:
         values = sorted({value for several in read for value in several})
         if not (other := other_unit(key, values)):
             continue
-        row, low, high = row_of(key), values[0], values[-1]
-        unit, factor = (row.unit if row else "").replace("^p", "^1.5"), units[other]
-        given, is_, they_are = f"{low:g} to {high:g}", "are", "they are"
-        meant = f"{low * factor:.4g} to {high * factor:.4g}"
-        if low == high:
-            given, is_, they_are, meant = f"{low:g}", "is", "it is", f"{low * factor:.4g}"
-        text = (
-            f"{given} {unit} {is_} unusual ({usual_low:g} to {usual_high:g} is usual); read as "
-            f"{other}, {they_are} {meant} {unit}"
-        )
-        found.append(Caution(key, text, len(read), len(cases)))
+        row, ends = row_of(key), (values[0], values[-1])
+        unit = (row.unit if row else "").replace("^p", "^1.5")
+        given = " to ".join(dict.fromkeys(f"{one:g}" for one in ends))
+        meant = " to ".join(dict.fromkeys(f"{one * units[other]:.4g}" for one in ends))
+        text = f"{given} {unit}, where {usual_low:g} to {usual_high:g} is usual; read as {other}: "
+        found.append(Caution(key, f"{text}{meant} {unit}", len(read), len(cases)))
     return found
 
 
@@ -327,7 +322,10 @@ def _tell_samples(case: Case, end: str) -> Iterator[str]:
 
 def _tell_fit(case: Case, end: str) -> str:
     """Return how a card's compression and expansion misfit its gas and clearance volume, or ""."""
-    misfit, clearance, exponent = fit_polytrope(case, end) or (0.0, 0.0, math.nan)
+    fit = fit_polytrope(case, end)
+    if fit is None:
+        return ""
+    misfit, clearance, exponent = fit
     if misfit > MAX_MISFIT:
         says = "its compression and expansion fit no polytropic lines, whatever the clearance"
     else:
@@ -335,7 +333,7 @@ def _tell_fit(case: Case, end: str) -> str:
             f"compression and expansion fit a clearance of {100 * clearance:.3g} % at an exponent "
             f"of {exponent:.3g}"
         )
-    if misfit > MAX_MISFIT or exponent < EXPONENTS[0] or exponent > EXPONENTS[1]:
+    if misfit > MAX_MISFIT or not EXPONENTS[0] <= exponent <= EXPONENTS[1]:
         return (
             f"{says}: are its pressures of the unit that the column says, absolute or gauge, its "
             "angle 0 at top dead centre, the stroke the machine's?"
@@ -343,8 +341,8 @@ def _tell_fit(case: Case, end: str) -> str:
     stroke, key = 2 * case.machine.crank_radius_mm, case.gas.clearance_key(end)
     given, row = case.gas.clearance(end, stroke) / stroke, row_of(key)
     is_given = row is not None and value_of(case, key) != row.default
-    is_unlike = abs(clearance / given - 1) > MAX_UNLIKE and not math.isnan(exponent)
-    return f"{says}, and {key} gives {100 * given:.3g} %" if is_given and is_unlike else ""
+    is_unlike = is_given and abs(clearance / given - 1) > MAX_UNLIKE
+    return f"{says}, and {key} gives {100 * given:.3g} %" if is_unlike else ""
 
 
 def check_friction(case: Case) -> Remarks:
@@ -387,13 +385,11 @@ def cautions(study: Study, most: int = MAX_JOBS) -> list[Caution]:
         for check, key, message in remarks(case):
             one = found.get((check, key), Caution(key, message, 0, len(cases)))
             found[check, key] = one._replace(jobs=one.jobs + 1)
-    others = sorted(found.items(), key=lambda item: -item[1].jobs)
-    for (check, key), one in others:
+    told = []
+    for (check, key), one in sorted(found.items(), key=lambda item: -item[1].jobs):
         if key in units and check is check_judged:
             message = f"{units[key].message}; {one.message}"
             units[key] = units[key]._replace(message=message)
-    told = [
-        one for (check, key), one in others
-        if key not in units and not (units and check is check_depth)
-    ]  # fmt: skip
+        elif key not in units and not (units and check is check_depth):
+            told.append(one)
     return [*units.values(), *told]

@@ -120,7 +120,7 @@ def test_a_sweep_is_told_of_once(tmp_path):
 def test_a_unit_is_told_of_once_and_in_place_of_what_follows_from_it(tmp_path):
     text = "joint: big_end\nclearance_mm: [0.2, 0.3]\ncontact: {stiffness_N_per_mm15: 336}\n"
     told = (
-        "336 N/mm^1.5 is unusual (10000 to 1e+07 is usual); read as kN/mm^1.5, it is 3.36e+05 "
+        "336 N/mm^1.5, where 10000 to 1e+07 is usual; read as kN/mm^1.5: 3.36e+05 "
         "N/mm^1.5; 336 N/mm^1.5 is outside the range that the program was judged on, 3162.28 to "
         "3.16228e+07 N/mm^1.5"
     )
@@ -157,8 +157,8 @@ def test_the_command_line_warns_in_a_few_lines(tmp_path, capsys):
     told = unwrapped(capsys.readouterr().err)
     assert len(told) == 6
     assert told[0] == (
-        f"{path}: warning: machine.crank_radius_mm: 1 mm is unusual (5 to 1000 is usual); read as "
-        "m, it is 1000 mm (2 of 2 jobs)"
+        f"{path}: warning: machine.crank_radius_mm: 1 mm, where 5 to 1000 is usual; read as "
+        "m: 1000 mm (2 of 2 jobs)"
     )
     assert told[-1] == f"{path}: and 1 more warning, which compsim plan {path} lists"
     cli.main(["plan", str(path), "-r", str(tmp_path / "results")])
@@ -172,7 +172,7 @@ def test_a_slip_of_units_hides_no_value_outside_the_judged_range(tmp_path):
     path.write_text("joint: big_end\nclearance_mm: 0.2\nmachine: {speed_rpm: 24}\n")
     (found,) = cautions(*load_studies(path))
     assert found.message == (
-        "24 rpm is unusual (120 to 6000 is usual); read as rad/s, it is 229.2 rpm; 24 rpm is "
+        "24 rpm, where 120 to 6000 is usual; read as rad/s: 229.2 rpm; 24 rpm is "
         "outside the range that the program was judged on, 50 to 6000 rpm"
     )
 

@@ -69,7 +69,7 @@ def study(tmp_path, key, given, others):
 def test_what_is_in_another_unit_is_told(key, given, others, unit, meant, tmp_path):
     (found,) = slips(study(tmp_path, key, given, others).cases)
     assert found.key == key
-    assert f"; read as {unit}, " in found.message
+    assert f"; read as {unit}: " in found.message
     assert found.message.endswith(f" {meant}")
 
 
@@ -80,13 +80,10 @@ def test_what_is_usual_or_reaches_into_it_is_not(key, given, others, tmp_path):
 
 def test_the_words_for_one_value_and_for_several(tmp_path):
     (one,) = slips(study(tmp_path, SPEED, 52, {}).cases)
-    assert one.message == (
-        "52 rpm is unusual (120 to 6000 is usual); read as rad/s, it is 496.6 rpm"
-    )
+    assert one.message == ("52 rpm, where 120 to 6000 is usual; read as rad/s: 496.6 rpm")
     (two,) = slips(study(tmp_path, SPEED, [104, 52], {}).cases)
     assert (two.message, two.jobs) == (
-        "52 to 104 rpm are unusual (120 to 6000 is usual); read as rad/s, they are 496.6 to 993.1 "
-        "rpm",
+        "52 to 104 rpm, where 120 to 6000 is usual; read as rad/s: 496.6 to 993.1 rpm",
         2,
     )
 
