@@ -72,12 +72,14 @@ def alarms(study, folder, output, run, quiet, **how) -> int:
     from compressor.digits import align_columns
     from compressor.store import read_studies, writable_folder
     from compressor.studies.alarms.alarms import (
+        CAPTION,
         add_hours,
         judge_alarms,
         list_numbers,
         list_rows,
         list_warnings,
         read_wear,
+        write_alarms,
     )
 
     wear = read_wear(run) if run else None
@@ -90,8 +92,6 @@ def alarms(study, folder, output, run, quiet, **how) -> int:
     for text in list_warnings(found):
         screen.say_wrapped(f"warning: {text}")
     if output:
-        from compressor.studies.alarms.page import CAPTION, write_alarms
-
         titles = [one.title for one in read_studies(folder) if one.name == study]
         paths = write_alarms(found, output, "".join(titles) or study)
         screen.print_text(*map(str, paths), CAPTION)

@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from compressor.report import Add
     from compressor.store import Folder
 
-# study whose module `page` has `add`, what it adds to a report -> the folder of what it is made
+# study -> the module with `add`, what it adds to a report, and the folder of what that is made
 # from, by default; "" in that of results
-PAGES = {"tradeoff": "", "alarms": "alarms"}
+PAGES = {"tradeoff": ("tradeoff.page", ""), "alarms": ("alarms.alarms", "alarms")}
 
 
 def page_additions(folders: "Mapping[str, Folder]") -> "list[Add]":
     """Return the functions by which studies add to a report; folders: by the study's name."""
     return [
-        partial(import_module(f"{__name__}.{name}.page").add, place=folders.get(name, place))
-        for name, place in PAGES.items()
+        partial(import_module(f"{__name__}.{module}").add, place=folders.get(name, place))
+        for name, (module, place) in PAGES.items()
     ]

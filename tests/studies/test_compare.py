@@ -12,7 +12,7 @@ from conftest import store
 
 from compressor.studies.compare import CAPTION, curves, measure_likeness
 from compressor.studies.frame import by_revolutions
-from compressor.vibration import Record, RecordError
+from compressor.vibration import Record
 
 HEARD = {"length_rev": 10, "noise_m_per_s2": 0.05}
 CASE = {
@@ -264,8 +264,3 @@ def test_errors_are_those_of_the_revolutions():
     by_hand = squares.std(ddof=1) / 3.0 / (2.0 * math.sqrt(squares.mean())) / 2.0
     assert found.error == pytest.approx(by_hand, rel=0.02)
     assert math.isnan(measure_likeness(job, job, curves(job), curves(job))["rms_ratio"].error)
-
-
-def test_a_record_that_tells_nothing_is_refused():
-    with pytest.raises(RecordError, match="2 tacho pulses are too few"):
-        by_revolutions(Record(TIMES, 0 * TIMES, TACHO[:2], math.nan))

@@ -13,8 +13,7 @@ from test_lead import CASE, write_run
 from compressor.report.figures.drawing import views_of
 from compressor.report.page import document
 from compressor.store import read_dataset, read_studies
-from compressor.studies.alarms.alarms import list_rows, rank_alarms
-from compressor.studies.alarms.page import CAPTION, add, draw_alarms
+from compressor.studies.alarms.alarms import CAPTION, add, draw_alarms, list_rows, rank_alarms
 from compressor.studies.alarms.readings import ALARMS
 
 KINDS = len(ALARMS) - 1  # without the body's velocity, which no job here has

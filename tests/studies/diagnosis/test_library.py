@@ -8,8 +8,7 @@ from compressor.store.files import StoreError
 from compressor.store.reader import read_store
 from compressor.store.sensor_records import find_record
 from compressor.studies.diagnosis.features import features
-from compressor.studies.diagnosis.identify import StudyError, describe_record, read_library
-from compressor.vibration.accelerometer import Record
+from compressor.studies.diagnosis.identify import StudyError, read_library
 
 
 @pytest.fixture(scope="module")
@@ -29,13 +28,6 @@ def test_features_are_those_of_the_records(library):
     ends = [c for c in library.clearances[7].tolist() if c]
     expected = features(*struck(library.joints[7], ends, 7))
     np.testing.assert_allclose(library.features[7], list(expected.values()), rtol=1e-9)
-
-
-def test_a_job_gives_its_record_by_the_beginning_of_its_key(library, worn_store):
-    key, record = find_record(library.keys[7][:12], worn_store, {})
-    assert key == library.keys[7]
-    assert isinstance(record, Record)
-    np.testing.assert_array_equal(describe_record(record), library.features[7])
 
 
 def test_jobs_without_a_sensor_are_told(paper_store):
