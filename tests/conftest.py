@@ -343,4 +343,4 @@ def decoded(packed):
 def listed(figure):
     """The names in a figure's legend, in its order."""
     named = [trace for trace in figure.data if trace.showlegend]
-    return [trace.name for trace in sorted(named, key=lambda one: one.legendrank)]
+    return [trace.name for trace in named]

@@ -8,7 +8,6 @@ from compressor.report.figures.drawing import (
     make_grid,
     midway,
     rectangle,
-    share_scales,
 )
 from compressor.report.figures.style import (
     BLACK,

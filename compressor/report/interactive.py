@@ -5,9 +5,8 @@ scripts, but no data. Numbers are 32-bit floats in base64, or `x0` and `dx` wher
 spaced; curves have as many points as a screen can show.
 """
 
-import base64
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -27,8 +26,7 @@ from compressor.units import Units
 
 LIBRARY = "plotly.min.js"
 MAX_POINTS = 2400  # of a curve: some three for each pixel of a wide panel
-FLOAT = np.dtype("f4").newbyteorder("little")
-EVEN = 1e-6  # of a step: how far evenly spaced numbers may be off
+EVEN = 1e-3  # of a step: how far evenly spaced numbers may be off
 
 
 def library_path() -> Path:
@@ -47,87 +45,59 @@ def publish_library(folder: Path) -> None:
 
 def script(name: str, figure: go.Figure) -> str:
     """Return the script of a figure."""
-    data = json.dumps(content(figure), separators=(",", ":"), allow_nan=False)
-    data = data.replace("<", "\\u003c")
-    return f"compsimFigure({json.dumps(name)},{data});\n"
+    return f"compsimFigure({json.dumps(name)},{thinned(figure).to_json()});\n"
 
 
-def content(figure: go.Figure) -> dict[str, Any]:
-    """Return a figure as plotly's JSON, with the points that a screen can show."""
-    data = []
-    for trace in figure.data:
-        axis = figure.layout[f"xaxis{trace.xaxis[1:]}"]
-        ends = [10.0**end for end in axis.range] if axis.type == "log" else axis.range
-        data.append(trace_data(trace, ends))
-    return {"data": data, "layout": encode_arrays(figure.layout.to_plotly_json())}
+def thinned(figure: go.Figure) -> go.Figure:
+    """Return a figure with the points that a screen can show."""
+    data = [thin(trace, figure.layout[f"xaxis{trace.xaxis[1:]}"]) for trace in figure.data]
+    return go.Figure(data, figure.layout)
 
 
-def trace_data(trace: Trace, ends: Sequence[float]) -> dict[str, Any]:
-    """Return a trace as plotly's JSON; ends: of what its panel shows of x."""
+def thin(trace: Trace, axis: Any) -> dict[str, Any]:
+    """Return a trace with fewer points and numbers of 32 bits; axis: of x."""
     found = trace.to_plotly_json()
-    if trace.type != "scatter" or trace.fill:
-        return encode_arrays(found)
-    part = visible(trace, ends)
-    for of in (found, found.get("error_y", {})):
-        for name in ("x", "y", "customdata", "array", "arrayminus"):
-            if name in of:
-                of[name] = of[name][part]
+    part = visible(trace, axis) if trace.type == "scatter" and not trace.fill else slice(None)
+    for of in (found, found.get("error_y", {}), found.get("error_x", {})):
+        for name in (name for name, one in of.items() if isinstance(one, np.ndarray)):
+            values = of[name][part]
+            of[name] = values if values.dtype.kind in "OU" else values.astype(np.float32)
     x = found["x"]
-    if x.size > 8 and np.isfinite(x).all():
-        step = (x[-1] - x[0]) / (x.size - 1)
-        if step and np.abs(x - (x[0] + step * np.arange(x.size))).max() <= EVEN * abs(step):
+    if trace.type == "scatter" and x.size > 8 and np.isfinite(x).all():
+        step = float(x[-1] - x[0]) / (x.size - 1)
+        if step and np.ptp(x - x[0] - step * np.arange(x.size)) <= EVEN * abs(step):
             del found["x"]
-            found |= {"x0": float(x[0]), "dx": float(step)}
-    return encode_arrays(found)
+            found |= {"x0": float(x[0]), "dx": step}
+    return found
 
 
-def encode_arrays(given: Any) -> Any:
-    """Return what JSON holds of a value: arrays of numbers as plotly has them in base64."""
-    if isinstance(given, dict):
-        return {name: encode_arrays(one) for name, one in given.items()}
-    if isinstance(given, list | tuple):
-        return [encode_arrays(one) for one in given]
-    if not isinstance(given, np.ndarray):
-        return given.item() if isinstance(given, np.generic) else given
-    if given.dtype.kind not in "fiu":
-        return given.tolist()
-    shape = {"shape": ", ".join(map(str, given.shape))} if given.ndim > 1 else {}
-    data = base64.b64encode(given.astype(FLOAT).tobytes()).decode()
-    return {"dtype": "f4", "bdata": data} | shape
-
-
-def visible(trace: go.Scatter, ends: Sequence[float]) -> Any:
+def visible(trace: go.Scatter, axis: Any) -> Any:
     """Return the places of the points to draw: all, or of many the extremes of each pixel.
 
-    Of a curve in x from left to right only what lies in the panel, and a point on either side.
+    Of a curve in x from left to right only what the axis shows, and a point on either side.
     """
     x, y = trace.x, trace.y
     if x.size < 3 or not np.isfinite(x).all():
         return slice(None)
     if "lines" not in trace.mode or (np.diff(x) < 0).any():
         return thin_places(x.size, 2 * MAX_POINTS)
-    low, high = sorted(ends)
-    first = max(0, int(np.searchsorted(x, low, "left")) - 1)
-    last = min(x.size, int(np.searchsorted(x, high, "right")) + 1)
+    first, last = 0, x.size
+    if axis.range and None not in axis.range:
+        low, high = (10.0**end if axis.type == "log" else end for end in axis.range)
+        first = max(0, int(np.searchsorted(x, low, "left")) - 1)
+        last = min(x.size, int(np.searchsorted(x, high, "right")) + 1)
     if last - first <= MAX_POINTS:
         return slice(first, last)
     return first + extremes(y[first:last], MAX_POINTS // 2)
 
 
 def extremes(y: np.ndarray, count: int) -> np.ndarray:
-    """Return the places of the least and greatest value of each of `count` parts.
-
-    Also the two ends, and values that are not finite.
-    """
-    edges = np.linspace(0, y.size, count + 1).astype(int)[:-1]
-    filled = np.where(np.isfinite(y), y, 0.0)
-    least, greatest = np.minimum.reduceat(filled, edges), np.maximum.reduceat(filled, edges)
-    part = np.repeat(np.arange(count), np.diff([*edges, y.size]))
-    is_shown = (filled == least[part]) | (filled == greatest[part]) | ~np.isfinite(y)
-    is_shown[[0, -1]] = True
-    places = np.flatnonzero(is_shown)
-    # where a part's values are equal, all of them are its extremes
-    return places if places.size <= 4 * count else thin_places(y.size, 2 * count)
+    """Return the places of the least and greatest value of each of `count` parts, and both ends."""
+    parts = np.array_split(np.where(np.isfinite(y), y, 0.0), count)
+    starts = np.cumsum([0, *(part.size for part in parts[:-1])])
+    found = [start + at for start, part in zip(starts, parts, strict=True)
+             for at in (part.argmin(), part.argmax())]  # fmt: skip
+    return np.unique([0, *found, y.size - 1])
 
 
 MAX_SERIES = 60  # jobs of a study whose time series lie beside the page
@@ -181,14 +151,14 @@ def series_name(key: str) -> str:
 def draw_job(run: xr.Dataset, units: Units = "usual") -> go.Figure:
     """Return a job's acceleration and the size of its contact forces, over the last revolution."""
     angle, turn = last_revolution(run)
-    drawing, grid = make_grid(2, 1, 4.0, units=units)
+    drawing, grid = make_grid(2, 1, 4.0, units=units, share_x="all")
     sizes = 1e-3 * np.linalg.norm(turn["contact_force"].transpose("joint", "time", "axis"), axis=2)
     for panel, (title, unit) in zip(grid[:, 0], (ACCELERATION, FORCE), strict=True):
         panel.title = title
-        panel.label("x", ANGLE_AXIS)
+        panel.label("x", ANGLE_AXIS, "°")
         panel.label("y", f"{title} ({{}})", unit)
         panel.span("x", angle[0], angle[-1])
-        panel.x.dtick, panel.unit["x"] = 90.0, "°"
+        panel.x.dtick = 90.0
     above, below = grid[:, 0]
     above.plot(angle, turn["acceleration"].values, LineStyle(BLACK), "acceleration")
     for joint, size in zip(JOINTS, sizes, strict=True):

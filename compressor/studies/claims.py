@@ -32,7 +32,6 @@ from compressor.report import (
     midway,
     palette,
     rectangle,
-    share_scales,
 )
 from compressor.store import (
     DamagedFile,
@@ -306,7 +305,7 @@ def draw(found: xr.Dataset, effects: xr.Dataset | None) -> tuple[PlotlyFigure, s
 
 def draw_map(plane: xr.Dataset) -> PlotlyFigure:
     """Return each claim's margin over rod and reciprocating mass, and how many claims hold."""
-    drawing, panels = make_grid(2, 4, 5.6)
+    drawing, panels = make_grid(2, 4, 5.6, share_x="all", share_y="all")
     x, y = (midway(plane[name].values) for name in (ROD, RECIPROCATING))
     *shown, number, best = drawing.panels
     for claim, panel in zip(OF_MASSES, shown, strict=True):
@@ -331,7 +330,6 @@ def draw_map(plane: xr.Dataset) -> PlotlyFigure:
         panel.plot(default.rod_mass_kg, default.reciprocating_mass_kg, ring)
         panel.x.showgrid = panel.y.showgrid = False
         panel.x.title, panel.y.title = "rod mass (kg)", "reciprocating mass (kg)"
-    share_scales(drawing.panels, "x", "y")
     return drawing.figure()
 
 
@@ -348,7 +346,8 @@ def draw_sensitivity(effects: xr.Dataset) -> PlotlyFigure:
     names = [str(name).replace("_", " ") for name in effects["assumption"].values]
     claims = [claim for claim in CLAIMS if effects["total_order"].sel(claim=claim).notnull().any()]
     rows = -(-len(claims) // 4)
-    drawing, _ = make_grid(rows, 4, 0.8 + rows * (0.9 + 0.21 * len(names)), len(claims))
+    height = 0.8 + rows * (0.9 + 0.21 * len(names))
+    drawing, _ = make_grid(rows, 4, height, len(claims), share_y="all")
     place = np.arange(len(names), dtype=float)
     for panel, claim in zip(drawing.panels, claims, strict=True):
         for variable, color, shift, name in EFFECTS:
@@ -362,6 +361,5 @@ def draw_sensitivity(effects: xr.Dataset) -> PlotlyFigure:
         panel.span("x", 0.0, 1.25)
     first = drawing.panels[0]
     first.name_ticks("y", names)
-    first.span("y", *first.limits("y")[::-1])
-    share_scales(drawing.panels, "y")
+    first.span("y", len(names) - 0.5, -0.5)
     return drawing.figure()

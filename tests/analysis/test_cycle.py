@@ -12,7 +12,7 @@ from compressor.analysis.cycle import _reversals, read_cycle, read_loads
 from compressor.analysis.runs import record_of
 from compressor.analysis.shaking import NoSeriesError, frame_forces, healthy_twin
 from compressor.cases.case import Case
-from compressor.report.figures.drawing import as_csv, views_of
+from compressor.report.figures.drawing import as_csv, panels_of
 from compressor.report.figures.job import draw_analyst, split_events
 from compressor.report.figures.rows import SweptRow, draw_segments, number_segments
 from compressor.report.figures.table import spell
@@ -166,7 +166,7 @@ def test_the_caption_has_the_numbers(sensed):
 def test_all_that_is_marked_is_in_the_table(sensed):
     figure = draw_analyst(sensed, healthy_twin(sensed, sensed=True)).figure
     found = read_cycle(sensed)
-    strip, vibration, load = views_of(figure)
+    strip, vibration, load = panels_of(figure)
     lanes = ["suction", "discharge", "impacts, big end", "reversals"]
     assert [*strip.y.ticktext] == lanes
     angles = {name: angle for angle, name in found.events}

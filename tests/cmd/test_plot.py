@@ -12,7 +12,7 @@ from conftest import store
 from compressor.analysis.shaking import frame_forces
 from compressor.cases.case import Case
 from compressor.report.figures import FIGURES
-from compressor.report.figures.drawing import views_of
+from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.job import draw_spectra
 from compressor.report.figures.table import spell
 from compressor.solve.simulate import simulate
@@ -166,7 +166,7 @@ def test_a_study_is_drawn_along_an_axis(plot, folder, unpainted):
 
 def test_rounding_is_not_drawn_as_a_spectrum(folder):
     ideal, worn = (
-        views_of(draw_spectra(job(folder, name), None).figure)[1] for name in ("ideal", "worn")
+        panels_of(draw_spectra(job(folder, name), None).figure)[1] for name in ("ideal", "worn")
     )
     assert not ideal.traces
     assert "ideal joints" in ideal.notes[0].text

@@ -11,21 +11,20 @@ from conftest import decoded
 
 from compressor.report.figures.contours import contour_area, contour_lines
 from compressor.report.figures.drawing import (
-    Panel,
     as_csv,
     describe_figure,
     make_grid,
     midway,
     outline_cells,
-    share_scales,
+    panels_of,
 )
 from compressor.report.figures.style import LineStyle, fill, mark, palette
 from compressor.report.interactive import (
     MAX_POINTS,
-    content,
     extremes,
     publish_library,
     script,
+    thinned,
 )
 
 X = np.linspace(0.0, 360.0, 721)
@@ -55,42 +54,39 @@ def drawing():
     return drawing
 
 
-def test_limits_follow_what_is_drawn(drawing):
-    whole, enlarged, low, bars = drawing.panels
-    assert whole.limits("y") == pytest.approx((-1.1, 1.1))  # a twentieth of room
-    assert enlarged.limits("x") == (90, 120)
-    assert (low.limits("x"), low.limits("y")) == ((1, 4), (0, 2))  # a map has none
-    assert bars.limits("x") == pytest.approx((-0.0375, 0.7875))  # room beside marks
-    assert bars.limits("y") == pytest.approx((-0.325, 1.325))  # bars are half a unit thick
-    whole.rule(RED, y=9.0)
-    assert whole.limits("y") == pytest.approx((-1.5, 9.5))
+def test_ranges_are_plotlys_unless_a_figure_says(drawing):
+    whole, enlarged, low, _ = drawing.panels
+    assert (enlarged.x.range, whole.y.range) == ((90, 120), None)
     whole.span("y", low=0.0)
-    assert whole.limits("y") == pytest.approx((0.0, 9.5))
+    assert whole.y.range == (0, None)
+    low.x.type = "log"
+    low.span("x", 1.0, 100.0)
+    assert low.x.range == (0, 2)  # so plotly wants it
 
 
-@pytest.mark.parametrize(
-    ("values", "is_log", "ends"),
-    [([2, 3], False, (1.95, 3.05)), ([5, 5], False, (4.75 - 0.025, 5.25 + 0.025)),
-     ([np.nan, np.inf], False, (-0.05, 1.05)), ([0, 1, 100], True, (10**-0.1, 10**2.1))],
-)  # fmt: skip
-def test_limits_of_odd_values(values, is_log, ends):
-    panel = Panel((0, 1), (0, 1))
-    panel.y.type = "log" if is_log else "linear"
-    panel.plot(np.arange(len(values)), values, RED)
-    assert panel.limits("y") == pytest.approx(ends)
+def test_shared_scales_have_numbers_and_titles_outside():
+    drawing, grid = make_grid(2, 2, 4.0, count=3, share_x="all", share_y="rows")
+    for panel in drawing.panels:
+        panel.plot([0, 1], [0, 1], RED)
+        panel.x.title, panel.y.title = "x (mm)", "y (N)"
+    grid[0, 0].name_ticks("y", ["speed", "mass"])
+    grid[0, 0].span("x", 0, 3)
+    drawing.figure()
+    first, beside, below = drawing.panels
+    assert [one.x.title.text or "" for one in drawing.panels] == ["", "x (mm)", "x (mm)"]
+    assert [one.y.title.text or "" for one in drawing.panels] == ["y (N)", "", "y (N)"]
+    assert (first.x.matches, beside.x.matches, below.x.matches) == (None, "x", "x")
+    assert (first.y.matches, beside.y.matches, below.y.matches) == (None, "y", None)
+    assert (beside.y.ticktext, below.x.range) == (("speed", "mass"), (0, 3))
 
 
-def test_shared_scales_show_the_whole_and_have_numbers_outside():
-    drawing, grid = make_grid(2, 2, 4.0, count=3)
-    for number, panel in enumerate(drawing.panels):
-        panel.plot([0, 1 + number], [0, 1], RED)
-    drawing.panels[0].name_ticks("y", ["speed", "mass"])
-    share_scales(drawing.panels, "x", "y")
-    assert {panel.limits("x") for panel in drawing.panels} == {(0, 3)}
-    assert [panel.x.showticklabels for panel in drawing.panels] == [False, True, True]
-    assert [panel.y.showticklabels for panel in drawing.panels] == [True, False, True]
-    assert [panel.y.ticktext for panel in drawing.panels] == [("speed", "mass")] * 3
-    assert grid.shape == (2, 2)
+def test_a_tall_panel_stands_beside_several():
+    drawing, grid = make_grid(3, 2, 6.0, tall=[slice(1, 3)])
+    assert grid[1, 1] is grid[2, 1]
+    assert len(drawing.panels) == 5
+    low, high = grid[1, 1].y.domain
+    assert (low, high) == (grid[2, 0].y.domain[0], grid[1, 0].y.domain[1])
+    assert panels_of(drawing.figure())[-1].suffix == grid[1, 1].suffix
 
 
 def test_a_csv_has_every_number_once(drawing):
@@ -113,12 +109,11 @@ def test_a_csv_has_every_number_once(drawing):
 
 
 def test_panels_of_the_same_jobs_share_columns_and_name_their_axes():
-    drawing, grid = make_grid(2, 2, 4.0)
+    drawing, grid = make_grid(2, 2, 4.0, share_x="all", share_y="all")
     for (row, column), panel in np.ndenumerate(grid):
         panel.plot([row, 1], [column, 1], RED, "a job", jobs=("k1", "k2"))
         panel.x.title = f"x{column}" if row == 1 else ""
         panel.y.title = "" if column else f"y{row}"
-    share_scales(drawing.panels, "x", "y")
     head, *rows = csv.reader(io.StringIO(as_csv(drawing.figure())))
     assert [title for title in head if title.endswith("job")] == ["1: a job: job"]
     assert [title.rpartition(" ")[2] for title in head] == [
@@ -128,13 +123,14 @@ def test_panels_of_the_same_jobs_share_columns_and_name_their_axes():
 
 
 def test_the_page_gets_what_was_drawn(drawing):
-    found = content(drawing.figure())
+    found = json.loads(thinned(drawing.figure()).to_json())
     figure = go.Figure(found)  # plotly itself takes it
     sine, cosine, part, _, cells, bars, jobs = found["data"]
     assert (sine["x0"], sine["dx"]) == (0.0, 0.5)
     assert decoded(sine["y"]) == pytest.approx(np.sin(np.radians(X)), abs=1e-7)
     assert (sine["line"]["color"], sine["line"]["dash"]) == ("#1f4488", "8.0px,4.0px")
     assert cosine["line"]["dash"] == "solid"
+    assert (sine["showlegend"], part["showlegend"], part["legendgroup"]) == (True, False, "sine")
     assert part["x0"] == 89.5  # what the panel shows, and a point on either side
     assert decoded(part["y"]).size == 63
     assert decoded(cells["z"]).ravel().tolist()[:3] == [0, 1, 2]
@@ -144,17 +140,8 @@ def test_the_page_gets_what_was_drawn(drawing):
     assert (bars["type"], bars["orientation"], jobs["mode"]) == ("bar", "h", "markers")
     assert figure.layout.yaxis4.ticktext == ("speed", "clearance")
     assert figure.layout.hovermode == "closest"  # a map is no curve
-    assert figure.layout.meta["units"] == ["°", "°", "", ""]
+    assert figure.layout.xaxis.unifiedhovertitle.text == "%{x:.6~g} °"
     assert "kN" in sine["hovertemplate"]
-
-
-def test_panels_of_the_same_span_are_zoomed_together():
-    drawing, grid = make_grid(3, 1, 4.0)
-    for panel in grid.flat:
-        panel.plot([0, 1], [0, 1], RED)
-    grid[1, 0].span("x", 0.2, 0.4)
-    layout = drawing.figure().layout
-    assert [layout[f"xaxis{n}"].matches for n in ("", 2, 3)] == [None, None, "x"]
 
 
 def test_axes_read_in_the_unit_that_is_wanted():

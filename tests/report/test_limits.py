@@ -10,7 +10,7 @@ import xarray as xr
 from compsim import cli
 from conftest import store, without_pictures
 
-from compressor.report.figures.drawing import views_of
+from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.sweep_data import MEASURES
 from compressor.report.figures.sweep_maps import LIMIT
@@ -121,7 +121,7 @@ def test_the_page_and_the_curves_show_the_zones(tmp_path, capsys):
     sentence = f"A below {middle} m/s², B from {middle} m/s² on."
     assert page.count(sentence) == 2  # of the table, and in the caption of the curves
     (figure,) = draw_sweep(study, read_limits([f"sensor_peak={middle} m/s2"]))
-    lines = {one.title: [rule.y0 for rule in one.rules] for one in views_of(figure.figure)}
+    lines = {one.title: [rule.y0 for rule in one.rules] for one in panels_of(figure.figure)}
     assert lines["sensor peak"] == [float(middle)]
     assert not lines["sensor rms"]
     capsys.readouterr()
@@ -134,7 +134,7 @@ def test_the_page_and_the_curves_show_the_zones(tmp_path, capsys):
 
 
 def of_limit(figure):
-    curves = (one for one in views_of(figure)[0].traces if one.type == "scatter")
+    curves = (one for one in panels_of(figure)[0].traces if one.type == "scatter")
     return [one for one in curves if one.line.color == LIMIT.color]
 
 

@@ -11,7 +11,7 @@ from compressor.analysis.runs import CLEARANCES, FAULTS, case_of, cases_of, labe
 from compressor.cases.case import Case
 from compressor.cases.load import CaseFileError, load_studies
 from compressor.report.figures import FIGURES, pictures
-from compressor.report.figures.drawing import views_of
+from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.table import spell
 from compressor.report.paper_sections import comparable, find_runs, own_figures
 from compressor.report.report import write_report
@@ -94,7 +94,7 @@ def test_figures_and_captions_are_the_machine_s(heavy_store):
         f"Greatest along the cylinder at 0.1, 0.2, 0.3 mm: {spell(np.array(peaks) / 1e3)} kN"
         in (plate.caption)
     )
-    rows = [panel for panel in views_of(plate.figure) if panel.column[0] == 0][:3]
+    rows = [panel for panel in panels_of(plate.figure) if panel.x.domain[0] == 0][:3]
     drawn = [np.abs(one.y).max() for panel in rows for one in panel.traces if one.name]
     series = [run["contact_force"].sel(joint="big_end", axis="x").values[-1201:] for run in of]
     assert drawn == pytest.approx([np.abs(one).max() / 1e3 for one in series])

@@ -5,7 +5,7 @@ import pytest
 from conftest import listed
 from swept_made import grid
 
-from compressor.report.figures.drawing import views_of
+from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.sweep import draw_sweep
 
 CLEARANCES = [0.1, 0.2, 0.3, 0.4]
@@ -14,7 +14,7 @@ CLEARANCES = [0.1, 0.2, 0.3, 0.4]
 def test_a_point_a_job_with_its_bar_and_key():
     data = grid({"clearance_mm": CLEARANCES}, lambda c: 1000 * c)
     (drawn,) = draw_sweep(data)
-    peak, rms = views_of(drawn.figure)
+    peak, rms = panels_of(drawn.figure)
     (curve,) = peak.traces
     assert (peak.title, peak.y.title.text) == ("peak acceleration", "m/s²")
     assert peak.x.title.text == "clearance (mm)"
@@ -32,7 +32,7 @@ def test_failed_missing_and_chaotic_jobs_are_marked():
     regime = ["predictable", "", "", "chaotic"]
     data = grid({"clearance_mm": CLEARANCES}, lambda c: 1000 * c, status=status, regime=regime)
     (drawn,) = draw_sweep(data)
-    panel = views_of(drawn.figure)[0]
+    panel = panels_of(drawn.figure)[0]
     marks = {trace.name: trace for trace in panel.traces}
     assert marks["a job failed here"].x == 0.2
     assert [*marks["a job failed here"].customdata] == ["k1"]
@@ -46,7 +46,7 @@ def test_failed_missing_and_chaotic_jobs_are_marked():
 
 def test_words_are_points_above_their_ticks():
     (drawn,) = draw_sweep(grid({"load": ["spring", "gas"]}, lambda load: 5 + load))
-    panel = views_of(drawn.figure)[0]
+    panel = panels_of(drawn.figure)[0]
     assert panel.x.ticktext == ("spring", "gas")
     assert panel.traces[0].mode == "markers"
 
@@ -55,7 +55,7 @@ def test_what_is_the_same_at_every_job_is_said():
     data = grid({"clearance_mm": CLEARANCES}, lambda c: 1000 * c)
     data["rms_acceleration"] = 0 * data["rms_acceleration"] + 7.5
     (drawn,) = draw_sweep(data)
-    assert [panel.title for panel in views_of(drawn.figure)] == ["peak acceleration"]
+    assert [panel.title for panel in panels_of(drawn.figure)] == ["peak acceleration"]
     assert "not drawn: rms acceleration (7.5 m/s²)." in drawn.caption
 
 
@@ -67,7 +67,7 @@ def test_where_nothing_ran_nothing_is_drawn():
 
 def test_of_very_many_values_some_are_drawn():
     (drawn,) = draw_sweep(grid({"clearance_mm": np.linspace(0.1, 1, 100_000)}, lambda c: c))
-    (curve,) = views_of(drawn.figure)[0].traces
+    (curve,) = panels_of(drawn.figure)[0].traces
     assert curve.x.size == 1000
     assert (curve.x[0], curve.x[-1]) == (0.1, 1.0)
     assert "Of 100000 values of clearance 1000 are shown." in drawn.caption

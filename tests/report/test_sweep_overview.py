@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from swept_made import grid
 
-from compressor.report.figures.drawing import views_of
+from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.sweep import draw_sweep
 
 THREE = {"clearance_mm": [0.1, 0.2, 0.3], "speed_rpm": [300.0, 400.0],
@@ -25,7 +25,7 @@ def test_the_overview_shows_means_of_what_is_known():
     status, regime = (np.full((3, 2, 2), word, dtype="U11") for word in ("ok", "predictable"))
     status[0, 0, 0], regime[1, 1, 1] = "failed", "chaotic"
     drawn = plan(grid(THREE, peak, status=status, regime=regime))["overview"]
-    slow, fast = views_of(drawn.figure)[0].traces
+    slow, fast = panels_of(drawn.figure)[0].traces
     c = np.array([0.1, 0.2, 0.3])
     expected = peak(c, 300, 0.5)
     expected[0] = peak(0.1, 300, 1)
@@ -41,7 +41,7 @@ def test_two_axes_with_words_are_lines_of_jobs():
     axes = {"clearance_mm": THREE["clearance_mm"], "fault": THREE["fault"]}
     drawn = plan(grid(axes, lambda c, joint: 10 * c + joint))
     assert [*drawn] == ["ranking", "overview"]
-    first, second = views_of(drawn["overview"].figure)[0].traces
+    first, second = panels_of(drawn["overview"].figure)[0].traces
     assert (first.name, second.name) == ("joint big end", "both joints")
     assert second.y == pytest.approx([2, 3, 4])
     assert [*second.customdata] == ["k1", "k3", "k5"]
@@ -58,7 +58,7 @@ def test_four_axes_are_few_lines_in_few_panels(sizes, limit):
     assert time.process_time() - start < limit
     assert [*found] == ["ranking", "overview"]
     for drawn in found.values():
-        panels = views_of(drawn.figure)
+        panels = panels_of(drawn.figure)
         assert len(panels) <= 12
         for panel in panels:
             names = [trace.name for trace in panel.traces]
@@ -69,6 +69,6 @@ def test_four_axes_are_few_lines_in_few_panels(sizes, limit):
 def test_a_study_of_words_alone_is_points():
     axes = {"fault": ["big_end", "both"], "load": ["spring", "gas"], "law": ["one", "two"]}
     drawn = plan(grid(axes, lambda a, b, c: 1 + 4 * a + 2 * b + c))["overview"]
-    panel = views_of(drawn.figure)[0]
+    panel = panels_of(drawn.figure)[0]
     assert panel.x.ticktext == ("big<br>end", "both<br>joints")
     assert all(trace.mode == "markers" for trace in panel.traces)

@@ -7,7 +7,7 @@ import pytest
 from swept_made import grid, listed
 
 from compressor.cases.swept import design
-from compressor.report.figures.drawing import views_of
+from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.sweep_data import measures, sweep_of
 from compressor.report.figures.sweep_maps import leading, ranking
@@ -24,7 +24,7 @@ def bars(drawn):
     """The shares of an axis' panel by the kind of effect."""
     return {
         panel.title: {trace.name.partition("(")[2].rstrip(")"): trace.x for trace in panel.traces}
-        for panel in views_of(drawn.figure)
+        for panel in panels_of(drawn.figure)
     }
 
 
@@ -40,7 +40,7 @@ def test_bars_and_caption_are_the_exact_shares():
         assert found["load"][kind] == pytest.approx([0, 0])
     words = f"Peak acceleration: speed {share:.0f} %, clearance {100 - share:.0f} %; rms"
     assert words in drawn.caption
-    panel = views_of(drawn.figure)[0]
+    panel = panels_of(drawn.figure)[0]
     assert panel.y.ticktext == ("peak acceleration", "rms acceleration")
     assert panel.x.title.text == "share of variance (%)"
 
@@ -89,7 +89,7 @@ def test_correlations_are_told_with_their_intervals():
     assert low < second <= first < high
     drawn = plan(listed(columns, 1 - 0.9 * points[:, 0] + 0.02 * points[:, 1]))["ranking"]
     assert "Peak acceleration: clearance −1.00 (−1.00 to −1.00), speed" in drawn.caption
-    panel = views_of(drawn.figure)[0]
+    panel = panels_of(drawn.figure)[0]
     (found,) = (trace for trace in panel.traces if trace.type == "bar")
     assert panel.title == "clearance"
     assert found.x[0] == pytest.approx(-1.0, abs=0.01)

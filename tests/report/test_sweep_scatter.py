@@ -7,7 +7,7 @@ import pytest
 from conftest import listed as legend
 from swept_made import listed
 
-from compressor.report.figures.drawing import views_of
+from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.sweep import draw_sweep
 
 RNG = np.random.default_rng(5)
@@ -26,7 +26,7 @@ def traces(panel):
 def test_points_are_jobs_over_what_matters_most():
     found = plan(listed(COLUMNS, 2 + SPEED**2))
     assert [*found] == ["ranking", "points", "scatter"]
-    panel = views_of(found["points"].figure)[0]
+    panel = panels_of(found["points"].figure)[0]
     assert panel.x.title.text == "speed (rpm)"  # what matters most
     one = traces(panel)
     assert one["a job"].x.tolist() == SPEED.tolist()
@@ -39,8 +39,9 @@ def test_points_are_jobs_over_what_matters_most():
 
 
 def test_each_key_has_a_column_and_each_metric_a_row():
-    panels = views_of(plan(listed(COLUMNS, 2 + SPEED + CLEARANCE))["scatter"].figure)
-    assert [(p.row[0], p.column[0]) for p in panels] == [(0, 0), (0, 1), (1, 0), (1, 1)]
+    panels = panels_of(plan(listed(COLUMNS, 2 + SPEED + CLEARANCE))["scatter"].figure)
+    (left, below), (right, _), *_ = places = [(p.x.domain[0], p.y.domain[0]) for p in panels]
+    assert places == [(left, below), (right, below), (left, 0), (right, 0)]
     for panel, column in zip(panels[2:], (0, 1), strict=True):
         assert panel.x.title.text in ("speed (rpm)", "clearance (mm)")
         assert panels[column].x.ticktext == panel.x.ticktext
@@ -49,7 +50,7 @@ def test_each_key_has_a_column_and_each_metric_a_row():
 def test_words_are_colours():
     load = np.array(["spring", "gas"] * 30)
     values = np.where(load == "spring", SPEED, 5 - SPEED)
-    panel = views_of(plan(listed(COLUMNS | {"load": load}, values))["points"].figure)[0]
+    panel = panels_of(plan(listed(COLUMNS | {"load": load}, values))["points"].figure)[0]
     one = traces(panel)
     assert one["load spring"].y == pytest.approx(values[::2])
     assert one["load gas"].marker.color != one["load spring"].marker.color
@@ -73,7 +74,7 @@ def test_what_is_not_known_is_marked():
     values = 2 + SPEED**2
     values[7] = 60.0
     panel = plan(listed(COLUMNS, values, status=status, regime=regime))["points"].figure
-    one = traces(views_of(panel)[0])
+    one = traces(panels_of(panel)[0])
     assert [*one["a job failed here"].customdata] == ["k3"]
     ring = next(trace for name, trace in one.items() if name.startswith("chaotic"))
     assert (*ring.y, *ring.customdata) == (60.0, "k7")
@@ -90,6 +91,6 @@ def test_many_jobs_are_thinned_with_a_word():
     found = plan(data)
     assert time.process_time() - start < 5.0
     for name in ("points", "scatter"):
-        for panel in views_of(found[name].figure):
+        for panel in panels_of(found[name].figure):
             assert traces(panel)["a job"].x.size == 2000
         assert "2,000 of 100,000 jobs are drawn" in found[name].caption

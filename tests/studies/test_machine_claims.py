@@ -13,7 +13,7 @@ from compressor.cases.case import Case
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
 from compressor.cases.swept import design
-from compressor.report.figures.drawing import views_of
+from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
 from compressor.store.studies import find_study
@@ -164,7 +164,7 @@ def test_the_indices_of_ishigami_s_function(drawn):
     rows = [*table(drawn, found)]
     assert [row[-1].partition(" ")[0] for row in rows[1:4]] == ["-", "-", "rod_mass_kg"]
     figure, _ = draw(drawn, found)
-    assert [panel.title for panel in views_of(figure)] == ["claim 3"]
+    assert [panel.title for panel in panels_of(figure)] == ["claim 3"]
     assert render(figure, "png").startswith(b"\x89PNG")
 
 
@@ -194,8 +194,8 @@ def test_machines_are_counted(plane):
         "most consistent": "6 and 11 kg: claims 3, 4, 5, 6, 8 by 10 %",
     }  # fmt: skip
     figure, sentence = draw(plane, None)
-    assert len(views_of(figure)) == 8
-    assert views_of(figure)[-1].title == "most of them: 7 hold"
+    assert len(panels_of(figure)) == 8
+    assert panels_of(figure)[-1].title == "most of them: 7 hold"
     assert sentence.startswith("blue: the claim holds")
 
 

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.lib.stride_tricks import sliding_window_view
 
 from compressor.analysis import CLEARANCES, NoSeriesError, label, last_revolution, settled_part
-from compressor.report.figures.drawing import Panel
+from compressor.report.figures.drawing import ROOM, Panel, rectangle
 from compressor.report.figures.style import BLACK, BY_CLEARANCE, BY_LOAD, IDEAL, LineStyle
 
 Runs = Mapping[str, xr.Dataset]
@@ -88,13 +88,14 @@ def turn(run: xr.Dataset) -> xr.Dataset:
 
 def plot(panel: Panel, curves: Sequence[Curve], quantity: Quantity, listed: bool = True) -> None:
     """Draw all curves of one quantity over the revolution; listed: in the legend."""
+    panel.label("x", "", "°")
     panel.label("y", f"{quantity.axis} ({{}})", quantity.unit)
     for curve in curves:
         x, y = degrees(curve.run), quantity.values(curve.run)
         panel.plot(x, y, curve.line, curve.name, listed=listed)
     angle = degrees(curves[0].run)
     panel.span("x", angle[0], angle[-1])
-    panel.x.dtick, panel.unit["x"] = TICK, "°"
+    panel.x.dtick = TICK
     panel.title = quantity.title
 
 
@@ -109,10 +110,13 @@ def plot_rows(
         plot(panel, [*ideal, alone], quantity, listed=False)
         panel.title = curve.name
     panels[0].title = f"{quantity.title}, {worn[0].name}"
-    ends = np.array([panel.limits("y") for panel in panels])
+    values = np.array([quantity.values(curve.run) for curve in curves])
+    room = ROOM * np.ptp(values)
     for panel in panels:
-        panel.span("y", ends.min(), ends.max())
-        panel.x.showticklabels = panel is panels[-1]
+        panel.span("y", values.min() - room, values.max() + room)
+        panel.y.matches = None if panel is panels[0] else f"y{panels[0].suffix}"
+    for panel in panels[:-1]:
+        panel.x.showticklabels = False
 
 
 def plot_enlarged(
@@ -131,13 +135,11 @@ def plot_enlarged(
     low, high = values.min() - margin, values.max() + margin
     enlarged.span("x", angle[0], angle[-1])
     enlarged.span("y", low, high)
-    bottom, top = full[0].limits("y")
-    lift = max(0.0, MIN_MARK * (top - bottom) - (high - low)) / 2
-    low, high = low - lift, high + lift
-    room = 0.01 * (top - bottom)
+    whole = np.ptp([quantity.values(curve.run) for curve in curves])
+    lift = max(0.0, MIN_MARK * whole - (high - low)) / 2
+    outline = rectangle(angle[[0, -1]], np.array([low - lift, high + lift]))
     for panel in full:
-        panel.span("y", min(bottom, low - room), max(top, high + room))
-        panel.box((angle[0], angle[-1]), (low, high), WINDOW)
+        panel.plot(*outline, WINDOW)
 
 
 def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, bool]:

@@ -20,19 +20,14 @@ from compressor.analysis import (
     orbit,
     shaking,
 )
-from compressor.report.figures.curves import ANGLE_AXIS, Runs
-from compressor.report.figures.drawing import (
-    WAYS,
-    Panel,
-    make_grid,
-    share_scales,
-)
+from compressor.report.figures.curves import Runs
+from compressor.report.figures.drawing import WAYS, Panel, make_grid
 from compressor.report.figures.job import (
     ORDERS_AXIS,
     list_modes,
     plot_lines,
     plot_orbit,
-    share_turn,
+    show_turn,
 )
 from compressor.report.figures.paper import AT, sizes
 from compressor.report.figures.rows import SweptRow, plot_modes, rows_modes
@@ -75,9 +70,9 @@ def draw_spectra(runs: Runs, units: Units = "usual") -> DrawnFigure:
     for fault in SINGLE_FAULTS:
         spectrum = found[label(fault, CLEARANCES[-1])].spectrum
         plot_lines(lines, spectrum.lines, replace(BY_FAULT[fault], marker=""), names[fault])
-    ends = lines.limits("y")
+    ends = lines.y.range
     plot_lines(lines, found["design"].spectrum.lines, IDEAL, "no clearance")
-    lines.span("y", *ends)
+    lines.y.range = ends
     lines.title = f"(a) force on the frame along the cylinder, {CLEARANCES[-1]:g} mm"
     lines.x.title = ORDERS_AXIS
     sizes = np.array(CLEARANCES)
@@ -109,15 +104,16 @@ def draw_spectra(runs: Runs, units: Units = "usual") -> DrawnFigure:
 @figure("diagnosis", "diagnosis-orbits", "Diagnosis 2: orbits of the journals", *NEEDS)
 def draw_orbits(runs: Runs, units: Units = "usual") -> DrawnFigure:
     """Return the journals' orbits of each joint at three clearances, all to one scale."""
-    drawing, panels = make_grid(len(SINGLE_FAULTS), len(CLEARANCES), 7.2, units=units)
+    drawing, panels = make_grid(
+        len(SINGLE_FAULTS), len(CLEARANCES), 7.2, units=units, share_x="all", share_y="all"
+    )
     for row, joint in zip(panels, SINGLE_FAULTS, strict=True):
         for panel, clearance in zip(row, CLEARANCES, strict=True):
             plot_orbit(panel, runs[label(joint, clearance)], joint)
             panel.title = f"{SPOKEN[joint]}, {clearance:g} mm"
-    room = max(panel.limits("x")[1] for panel in drawing.panels)
     for way in WAYS:
-        panels[0, 0].span(way, -room, room)
-    share_scales(drawing.panels, "x", "y")
+        axes = [panel.axis(way) for panel in drawing.panels]
+        axes[0].range = max((axis.range for axis in axes), key=max)
     sentence = (
         "The journal's centre in its bore over the last revolution, all to one scale; without "
         "clearance it is a point. Outside the circle it is pressed in."
@@ -137,20 +133,21 @@ def draw_orbits(runs: Runs, units: Units = "usual") -> DrawnFigure:
 def draw_angles(runs: Runs, units: Units = "usual") -> DrawnFigure:
     """Return X's high orders and the joints' contact modes over the crank angle."""
     found = measure_shaking(runs)
-    drawing, panels = make_grid(2 * len(SINGLE_FAULTS), 1, 8.4, heights=(2.6, 1) * 2, units=units)
+    drawing, panels = make_grid(
+        2 * len(SINGLE_FAULTS), 1, 8.4, heights=(2.6, 1) * 2, units=units, share_x="all"
+    )
     for joint, profile, strip in zip(SINGLE_FAULTS, panels[::2, 0], panels[1::2, 0], strict=True):
         plot_profiles(profile, found, joint)
+        profile.span("y", low=0)
+        mark_turns(profile, found[label(joint, CLEARANCES[-1])])
         rows = [SweptRow(f"{c:g}", modes=angle_modes(runs[label(joint, c)])) for c in CLEARANCES]
         plot_modes(strip, rows_modes(rows)[joint])
         strip.name_ticks("y", [row.value for row in rows])
         strip.y.title = "mm"
         strip.title = f"contact mode, clearance at the {SPOKEN[joint]}"
-    top = max(panel.limits("y")[1] for panel in panels[::2, 0])
-    for joint, panel in zip(SINGLE_FAULTS, panels[::2, 0], strict=True):
-        panel.span("y", 0, top)
-        mark_turns(panel, found[label(joint, CLEARANCES[-1])])
-    panels[-1, 0].x.title = ANGLE_AXIS
-    share_turn(drawing.panels)
+    panels[2, 0].y.matches = f"y{panels[0, 0].suffix}"
+    for panel in drawing.panels:
+        show_turn(panel)
     drawing.list_area("the force turns", NEAR)
     list_modes(drawing)
     sentence = (
@@ -193,8 +190,6 @@ def mark_turns(panel: Panel, one: Shaking) -> None:
     fine = np.arange(0.0, 360.0, 0.5)
     is_near = one.is_near_turn(fine)
     ends = np.flatnonzero(np.diff(is_near)) + 1
-    low, high = panel.limits("y")
     for part in np.split(np.arange(fine.size), ends):
         if is_near[part[0]]:
-            flat = np.ones(part.size)
-            panel.between(fine[part], low * flat, high * flat, NEAR)
+            panel.shade("x", fine[part[0]], fine[part[-1]], NEAR)

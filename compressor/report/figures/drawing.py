@@ -1,8 +1,8 @@
 """Figures as plotly's own `Figure`: a grid of panels to fill, and what is read of one again.
 
-A figure function fills the panels of a `Drawing`, each axis in the unit that is wanted, and returns
+A figure function fills the panels of `make_grid`, each axis in the unit that is wanted, and returns
 `drawing.figure()`. `picture` makes the PNG of that, `as_csv` its table, and `report/interactive`
-the script of the page.
+the script of the page. Ranges and ticks are plotly's and matplotlib's own, unless a figure says.
 """
 
 import csv
@@ -15,14 +15,18 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
+from plotly.subplots import make_subplots
 
 from compressor.report.figures.style import BLACK, PIXEL, LineStyle
 from compressor.units import Units, unit_in
 
 WIDTH = 960  # pixels, of every figure
 INCH = 100  # pixels
+MARGIN = {"l": 68, "r": 16, "t": 28, "b": 46}  # pixels around the panels
+BETWEEN = {"x": 78, "y": 70}  # pixels between panels, with numbers and a title there
+BARE = {"x": 24, "y": 34}  # without
 ROOM = 0.05  # of a panel, above and below its curves, and beside marks
-GAP = 0.07  # between panels, of the figure
+SCALE = 74  # pixels that a scale of colours takes
 Way = Literal["x", "y"]  # an axis
 WAYS: tuple[Way, Way] = ("x", "y")
 PlotlyFigure: TypeAlias = go.Figure
@@ -31,29 +35,66 @@ Trace: TypeAlias = Any  # of plotly: go.Scatter, go.Bar or go.Heatmap
 
 
 class Panel:
-    """One of a figure's axes, while it is filled; row, column: of the grid, first and behind.
+    """One of a figure's axes, to fill and to read; suffix: of its axes in plotly, such as "2".
 
-    `x` and `y` are plotly's axes. What is drawn is in the units that `label` is given, and becomes
-    multiples of those in which the axes are read.
+    What is drawn is in the units that `label` is given, and becomes multiples of those in which the
+    axes are read.
     """
 
-    def __init__(self, row: tuple[int, int], column: tuple[int, int], units: Units = "usual"):
-        self.row, self.column, self.units = row, column, units
-        self.title, self.is_square = "", False
-        self.x, self.y = go.layout.XAxis(), go.layout.YAxis()
-        self.ends = dict.fromkeys(WAYS, (math.nan, math.nan))  # of axes, where they are chosen
+    def __init__(self, figure: go.Figure, suffix: str, units: Units = "usual"):
+        self.figure, self.suffix, self.units = figure, suffix, units
         self.factors, self.unit = dict.fromkeys(WAYS, 1.0), dict.fromkeys(WAYS, "")
-        self.traces: list[tuple[float, Trace]] = []  # with the height at which each lies
-        self.notes: list[go.layout.Annotation] = []
-        self.rules: list[go.layout.Shape] = []
 
     def axis(self, way: Way) -> Axis:
-        """Return the axis `x` or `y`."""
-        return self.x if way == "x" else self.y
+        """Return the axis `x` or `y`, of plotly."""
+        return self.figure.layout[f"{way}axis{self.suffix}"]
+
+    @property
+    def x(self) -> Axis:
+        """Return plotly's x axis."""
+        return self.axis("x")
+
+    @property
+    def y(self) -> Axis:
+        """Return plotly's y axis."""
+        return self.axis("y")
+
+    @property
+    def traces(self) -> list[Trace]:
+        """Return what is drawn from the lowest to the highest, bars first."""
+        mine = (one for one in self.figure.data if one.xaxis == f"x{self.suffix}")
+        return sorted(mine, key=lambda one: (one.type != "bar", one.zorder))
+
+    @property
+    def notes(self) -> list[Any]:
+        """Return plotly's annotations of the panel, but for its title."""
+        return [one for one in self.own("annotations") if one.name != "title"]
+
+    @property
+    def rules(self) -> list[Any]:
+        """Return plotly's shapes of the panel."""
+        return self.own("shapes")
+
+    def own(self, kind: str) -> list[Any]:
+        """Return the `annotations` or `shapes` of the panel."""
+        name = f"x{self.suffix}"
+        return [one for one in self.figure.layout[kind] if one.xref.partition(" ")[0] == name]
+
+    @property
+    def title(self) -> str:
+        """Return the text above the panel."""
+        return next((one.text for one in self.own("annotations") if one.name == "title"), "")
+
+    @title.setter
+    def title(self, text: str) -> None:
+        for note in self.own("annotations"):
+            if note.name == "title":
+                note.text = text
+                return
+        self.write(text, 0.0, 1.0, inside="xy", shift=(0.0, 3.0), size=10.0, name="title")
 
     def label(self, way: Way, title: str, unit: str = "") -> None:
         """Name an axis before anything is drawn; `{}` in the title stands for the unit."""
-        assert not self.traces, "what is drawn already would stay in another unit"
         self.unit[way], self.factors[way] = unit_in(unit, self.units)
         self.axis(way).title = title.format(self.unit[way])
 
@@ -61,17 +102,17 @@ class Panel:
         """Return places along an axis as they are read there."""
         return self.factors[way] * np.atleast_1d(np.asarray(values, float))
 
-    def add(self, made: Trace, height: float, jobs: Sequence[str]) -> None:
-        """Add what is drawn at a height; jobs: the keys of its points."""
+    def add(self, made: Trace, height: float, jobs: Sequence[str], name: str = "") -> None:
+        """Add what is drawn at a height; jobs: the keys of its points; name: in the legend."""
         if jobs:
             made.customdata = np.reshape(jobs, made.z.shape if made.type == "heatmap" else -1)
-        made.legendrank = 1000 + len(self.traces)
-        self.traces.append((height, made))
-
-    def in_order(self) -> list[Trace]:
-        """Return what is drawn from the lowest to the highest, bars first."""
-        ordered = sorted(self.traces, key=lambda one: (one[1].type != "bar", one[0]))
-        return [trace for _, trace in ordered]
+        if name:
+            made.showlegend = all(o.name != name or not o.showlegend for o in self.figure.data)
+        elif made.type != "heatmap":
+            made.showlegend = False
+        made.update(xaxis=f"x{self.suffix}", yaxis=f"y{self.suffix}", zorder=round(10 * height),
+                    legendgroup=made.name)  # fmt: skip
+        self.figure.add_trace(made)
 
     def plot(
         self, x: ArrayLike, y: ArrayLike, style: LineStyle, name: str = "",
@@ -82,14 +123,13 @@ class Panel:
         jobs: the key of each point's job; listed: in the legend by its name, if it has one.
         """
         made = go.Scatter(
-            x=self.at("x", x), y=self.at("y", y), name=name, opacity=style.alpha,
-            showlegend=listed and bool(name), line=style.line,
+            x=self.at("x", x), y=self.at("y", y), name=name, opacity=style.alpha, line=style.line,
             marker=style.marks if style.marker else None,
             mode="+".join(["lines"] * bool(style.linewidth) + ["markers"] * bool(style.marker)),
         )  # fmt: skip
         if errors is not None:
             made.error_y = error_bars(self.factors["y"] * errors)
-        self.add(made, style.zorder, jobs)
+        self.add(made, style.zorder, jobs, name * listed)
 
     def fill(
         self, x: ArrayLike, y: ArrayLike, style: LineStyle, name: str = "", listed: bool = True
@@ -97,20 +137,11 @@ class Panel:
         """Draw an area by its outlines, with nan between two of them."""
         made = go.Scatter(
             x=self.at("x", x), y=self.at("y", y), name=name, opacity=style.alpha, mode="none",
-            fill="toself", fillcolor=style.color, showlegend=listed and bool(name),
+            fill="toself", fillcolor=style.color,
         )  # fmt: skip
         if style.is_hatched:
             made.fillpattern = {"shape": "/", "fgcolor": style.edge, "bgcolor": style.color}
-        self.add(made, style.zorder, ())
-
-    def box(self, x: tuple[float, float], y: tuple[float, float], style: LineStyle) -> None:
-        """Draw a rectangle as a line."""
-        (left, right), (low, high) = x, y
-        self.plot([left, right, right, left, left], [low, low, high, high, low], style)
-
-    def between(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, style: LineStyle) -> None:
-        """Draw the area between two curves over x."""
-        self.fill(np.concatenate([x, x[::-1]]), np.concatenate([low, high[::-1]]), style)
+        self.add(made, style.zorder, (), name * listed)
 
     def strokes(self, x: np.ndarray, low: float, high: np.ndarray, style: LineStyle) -> None:
         """Draw a vertical line from `low` to `high` at each x."""
@@ -130,11 +161,11 @@ class Panel:
         ends[along] = ends[along] - base
         made = go.Bar(
             **ends, name=name, orientation="v" if is_upright else "h", base=base.tolist(),
-            width=width.copy(), marker={"color": style.color}, showlegend=bool(name),
+            width=width.copy(), marker={"color": style.color},
         )  # fmt: skip
         if errors is not None:
             made[f"error_{along}"] = error_bars(self.factors[along] * errors)
-        self.add(made, style.zorder, ())
+        self.add(made, style.zorder, (), name)
 
     def map(
         self, x: np.ndarray, y: np.ndarray, z: np.ndarray, colors: Sequence[str],
@@ -148,7 +179,14 @@ class Panel:
         """
         unit, factor = unit_in(unit, self.units)
         values, (low, high) = factor * z, (factor * end for end in ends)
-        scale: dict[str, Any] = {"title": {"text": title.format(unit), "side": "right"}}
+        left, right = self.x.domain
+        right -= has_scale * SCALE / (WIDTH - MARGIN["l"] - MARGIN["r"])
+        self.x.domain = left, right
+        down, up = self.y.domain
+        scale: dict[str, Any] = {
+            "title": {"text": title.format(unit), "side": "right"}, "thickness": 10, "x": right,
+            "xpad": 6, "y": 0.5 * (down + up), "len": up - down, "ypad": 0, "outlinewidth": 0,
+        }  # fmt: skip
         text = None
         if is_log:
             text = np.char.mod("%.4g", values)
@@ -167,59 +205,70 @@ class Panel:
     def write(
         self, text: str, x: float, y: float, color: str = BLACK, inside: str = "",
         shift: tuple[float, float] = (0.0, 0.0), side: str = "left", level: str = "bottom",
-        size: float = 9.5,
+        size: float = 9.5, name: str = "",
     ) -> None:  # fmt: skip
         """Write a text at x and y, shares of the panel along the axes in `inside`, such as "xy".
 
         shift: in points; side, level: of the text at its place; size: of its letters, in points.
         """
-        frames = {f"{way}ref": f"{way} domain" if way in inside else way for way in WAYS}
-        at = (share if way in inside else float(self.at(way, share)[0])
-              for way, share in zip(WAYS, (x, y), strict=True))  # fmt: skip
-        place = dict(zip(WAYS, at, strict=True)) | frames
-        self.notes.append(go.layout.Annotation(
+        place: dict[str, Any] = {}
+        for way, at in zip(WAYS, (x, y), strict=True):
+            place[f"{way}ref"] = f"{way}{self.suffix}" + " domain" * (way in inside)
+            at = at if way in inside else float(self.at(way, at)[0])
+            is_log = self.axis(way).type == "log" and way not in inside
+            place[way] = math.log10(at) if is_log else at  # so plotly wants it
+        self.figure.add_annotation(
             text=text.replace("\n", "<br>"), **place, showarrow=False, xanchor=side, yanchor=level,
-            xshift=PIXEL * shift[0], yshift=PIXEL * shift[1], align="left",
+            xshift=PIXEL * shift[0], yshift=PIXEL * shift[1], align="left", name=name,
             font={"color": color, "size": PIXEL * size},
-        ))  # fmt: skip
+        )  # fmt: skip
 
     def point_to(self, x: float, y: float, tail: tuple[float, float], color: str) -> None:
         """Draw an arrow from its tail to x and y."""
-        start = {f"a{way}": float(self.at(way, at)[0]) for way, at in zip(WAYS, tail, strict=True)}
-        self.notes.append(go.layout.Annotation(
-            text="", x=float(self.at("x", x)[0]), y=float(self.at("y", y)[0]), **start, xref="x",
-            yref="y", axref="x", ayref="y", showarrow=True, arrowhead=2, arrowcolor=color,
-        ))  # fmt: skip
+        ends: dict[str, Any] = {}
+        for way, at, start in zip(WAYS, (x, y), tail, strict=True):
+            ends |= {way: float(self.at(way, at)[0]), f"a{way}": float(self.at(way, start)[0])}
+            ends |= {f"{way}ref": f"{way}{self.suffix}", f"a{way}ref": f"{way}{self.suffix}"}
+        self.figure.add_annotation(**ends, showarrow=True, arrowhead=2, arrowcolor=color)
 
     def rule(self, style: LineStyle, x: float = math.nan, y: float = math.nan) -> None:
         """Draw a straight line across the panel, at x or at y."""
         way: Way = "x" if math.isnan(y) else "y"
+        at = x if way == "x" else y
+        line = {**style.line, "width": max(1.0, style.line["width"])}
+        self.shape(way, at, at, type="line", line=line,
+                   layer="below" if style.zorder < 1.0 else "above")  # fmt: skip
+
+    def shade(self, way: Way, low: float, high: float, style: LineStyle) -> None:
+        """Draw an area across the panel, from a lower to a higher x or y."""
+        self.shape(way, low, high, type="rect", layer="below", fillcolor=style.color,
+                   line={"width": 0})  # fmt: skip
+
+    def shape(self, way: Way, low: float, high: float, **look: Any) -> None:
+        """Draw what lies between two values along an axis, and across all of the panel."""
         other = WAYS[way == "x"]
-        at = float(self.at(way, x if way == "x" else y)[0])
-        self.rules.append(go.layout.Shape(
-            {f"{way}0": at, f"{way}1": at, f"{way}ref": way, f"{other}0": 0.0, f"{other}1": 1.0,
-             f"{other}ref": f"{other} domain"},
-            type="line", line={**style.line, "width": max(1.0, style.line["width"])},
-            layer="below" if style.zorder < 1.0 else "above",
-        ))  # fmt: skip
+        first, last = self.at(way, [low, high]).tolist()
+        self.figure.add_shape({
+            f"{way}0": first, f"{way}1": last, f"{way}ref": f"{way}{self.suffix}",
+            f"{other}0": 0.0, f"{other}1": 1.0, f"{other}ref": f"{other}{self.suffix} domain",
+        } | look)  # fmt: skip
 
     def span(self, way: Way, low: float = math.nan, high: float = math.nan) -> None:
         """Show what lies between two values; one that is not given follows from what is drawn."""
-        given = (self.factors[way] * low, self.factors[way] * high)
-        low, high = (old if math.isnan(new) else float(new)
-                     for old, new in zip(self.ends[way], given, strict=True))  # fmt: skip
-        self.ends[way] = low, high
+        axis, ends = self.axis(way), self.at(way, [low, high]).tolist()
+        if axis.type == "log":
+            ends = [math.log10(end) for end in ends]
+        axis.range = [None if math.isnan(end) else end for end in ends]
+
+    def scale_alike(self) -> None:
+        """Draw both axes to one scale."""
+        self.y.scaleanchor = f"x{self.suffix}"
 
     def name_ticks(self, way: Way, words: Sequence[str], places: ArrayLike = ()) -> None:
         """Set words as ticks at places, or at 0, 1, 2 and so on."""
         axis = self.axis(way)
         axis.tickvals = np.asarray(places, float).tolist() or [*range(len(words))]
         axis.ticktext = [word.replace("\n", "<br>") for word in words]
-
-    def limits(self, way: Way) -> tuple[float, float]:
-        """Return the ends of an axis, in the unit of the values that are drawn."""
-        low, high = shared_limits([self], way)
-        return low / self.factors[way], high / self.factors[way]
 
 
 def error_bars(ends: np.ndarray) -> dict[str, Any]:
@@ -245,82 +294,14 @@ def log_ticks(low: float, high: float) -> list[float]:
     return found if len(found) > 1 else [low, high]
 
 
-def extent(trace: Trace, way: Way) -> np.ndarray:
-    """Return the values that a panel must show of a trace along an axis."""
-    if isinstance(trace, go.Bar):
-        along = "x" if trace.orientation == "h" else "y"
-        at = np.asarray(trace[way])
-        if way == along:
-            return np.concatenate([trace.base, np.add(trace.base, at)])
-        return np.concatenate([at - trace.width / 2.0, at + trace.width / 2.0])
-    if isinstance(trace, go.Heatmap):
-        return trace[way]
-    at = np.where(np.isfinite(trace.x) & np.isfinite(trace.y), trace[way], np.nan)
-    if way == "y" and trace.error_y.array is not None:
-        return np.concatenate([at - trace.error_y.arrayminus, at + trace.error_y.array])
-    return at
-
-
-def shared_limits(panels: Sequence[Panel], way: Way) -> tuple[float, float]:
-    """Return the ends of an axis that panels share: what the first says, or what all show."""
-    first, ends = panels[0], panels[0].ends[way]
-    if not math.isnan(sum(ends)):
-        return ends
-    traces = [trace for panel in panels for _, trace in panel.traces]
-    rules = [rule[f"{way}0"] for panel in panels for rule in panel.rules
-             if rule[f"{way}ref"] == way]  # fmt: skip
-    values = np.concatenate([rules, *(extent(trace, way) for trace in traces)])
-    values = values[np.isfinite(values)]
-    is_log = first.axis(way).type == "log"
-    if is_log:
-        values = np.log(values[values > 0.0])
-    low, high = (values.min(), values.max()) if values.size else (0.0, 1.0)
-    if high - low <= 1e-15 * max(abs(low), abs(high)):
-        room = math.log(10.0) if is_log else ROOM * abs(low) or ROOM
-        low, high = low - room, high + room
-    is_map = any(isinstance(trace, go.Heatmap) for trace in traces)
-    is_marked = any(isinstance(one, go.Scatter) and "markers" in one.mode for one in traces)
-    room = 0.0 if is_map or (way == "x" and not is_marked) else ROOM * (high - low)
-    low, high = low - room, high + room
-    if is_log:
-        low, high = math.exp(low), math.exp(high)
-    low, high = (float(one) if math.isnan(end) else end
-                 for one, end in zip((low, high), ends, strict=True))  # fmt: skip
-    return low, high
-
-
-def share_scales(panels: Iterable[Panel], *ways: Way) -> None:
-    """Set one scale along `x`, `y` or both for panels: that of the first.
-
-    Only the outermost have numbers and a title: of x the lowest of a column, of y the first of a
-    row.
-    """
-    panels = list(panels)
-    for way in ways:
-        ends = shared_limits(panels, way)
-        look = panels[0].axis(way).to_plotly_json()
-        for panel in panels:
-            if way == "x":
-                inner = any(o.column == panel.column and o.row > panel.row for o in panels)
-            else:
-                inner = any(o.row == panel.row and o.column < panel.column for o in panels)
-            axis = panel.axis(way)
-            axis.update(look | {"title": {"text": "" if inner else axis.title.text}})
-            axis.showticklabels = not inner
-            panel.ends[way] = ends
+SHARED = ("range", "type", "dtick", "tickvals", "ticktext", "nticks", "showgrid")  # of axes
 
 
 class Drawing:
-    """A grid of panels that becomes a figure; rows, columns: their sizes, relative to each other.
+    """A grid of panels that becomes a figure; title: above all, in lines."""
 
-    height: of the figure, in inches; title: above all, in lines.
-    """
-
-    def __init__(
-        self, height: float, rows: Sequence[float], columns: Sequence[float], panels: list[Panel]
-    ) -> None:
-        self.height, self.rows, self.columns, self.panels = height, rows, columns, panels
-        self.title = ""
+    def __init__(self, panels: list[Panel]) -> None:
+        self.panels, self.drawn, self.title = panels, panels[0].figure, ""
 
     def list_area(self, name: str, style: LineStyle) -> None:
         """Name an area in the legend, whether one is drawn or not."""
@@ -330,86 +311,30 @@ class Drawing:
         """Name a line or marks in the legend, whether some are drawn or not."""
         self.panels[0].plot([math.nan], [math.nan], style, name)
 
-    def label_outside(self, way: Way, title: str) -> None:
-        """Name the axis `x` of the lowest panel of each column, or `y` of the first of each row."""
-        for panel in self.panels:
-            if way == "x":
-                inner = any(o.column == panel.column and o.row > panel.row for o in self.panels)
-            else:
-                inner = any(o.row == panel.row and o.column < panel.column for o in self.panels)
-            panel.axis(way).title = "" if inner else title
-
     def figure(self) -> go.Figure:
-        """Return the figure: panels with their ranges, and each name once in a legend.
+        """Return the figure, with what the page tells at its points.
 
-        The traces of a panel lie in it in their order, bars first. Axes that show the same span of
-        the same quantity are zoomed together. `meta`: the grid, for a page that is narrower, and
-        the units of x.
+        Axes that share a scale have the ticks of the first of them, and numbers and a title on the
+        outside: of x in the lowest panel of a column, of y in the first of a row.
         """
-        layout: dict[str, Any] = {}
-        data: list[Trace] = []
-        notes: list[go.layout.Annotation] = []
-        links: dict[tuple, str] = {}
-        for number, panel in enumerate(self.panels):
-            suffix = f"{number + 1}" if number else ""
-            for way, other in zip(WAYS, WAYS[::-1], strict=True):
-                axis, ends = panel.axis(way), shared_limits([panel], way)
-                is_log = axis.type == "log"
-                axis.range = [math.log10(end) for end in ends] if is_log else ends
-                axis.anchor, axis.domain = other + suffix, self.domain(panel, way)
-                key = way, ends, is_log, axis.title.text if way == "y" else ""
-                link = links.setdefault(key, way + suffix)
-                axis.matches = link if link != way + suffix else None
-                layout[f"{way}axis{suffix}"] = axis
-            if panel.is_square:
-                panel.y.scaleanchor = f"x{suffix}"
-            if panel.title:
-                panel.write(panel.title, 0.0, 1.0, inside="xy", shift=(0.0, 3.0), size=10.0)
-                panel.notes[-1].name = "title"
-            for note, way in itertools.product(panel.notes, WAYS):
-                if panel.axis(way).type == "log" and "domain" not in note[f"{way}ref"]:
-                    note[way] = math.log10(note[way])  # so plotly wants it
-            for one in (*panel.notes, *panel.rules):
-                refs = {name: ref.replace(name[-4], name[-4] + suffix)
-                        for name, ref in one.to_plotly_json().items() if "ref" in name}  # fmt: skip
-                one.update(refs)
-            notes += panel.notes
-            for trace in panel.in_order():
-                trace.update({"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"})
-                data.append(trace)
-        name_once(data)
-        is_unified = all(is_rising(trace) for trace in data if trace.name)
+        named = [one for one in self.drawn.data if one.name]
+        is_unified = all(is_rising(one) for one in named)
+        for panel, way in itertools.product(self.panels, WAYS):
+            axis = panel.axis(way)
+            if axis.matches:
+                first = self.drawn.layout[axis.matches.replace(way, f"{way}axis")]
+                axis.update({name: first[name] for name in SHARED if first[name] is not None})
+            if axis.showticklabels is False:
+                axis.title = ""
         for panel in self.panels:
-            for _, trace in panel.traces:
+            panel.x.unifiedhovertitle = {"text": f"%{{x:.6~g}} {panel.unit['x']}"}
+            for trace in panel.traces:
                 trace.update(hover_words(trace, panel, is_unified))
-        rules = [rule for panel in self.panels for rule in panel.rules]
-        places = [[*panel.row, *panel.column] for panel in self.panels]
-        return go.Figure(data, layout | {
-            "annotations": notes, "shapes": rules, "width": WIDTH, "height": INCH * self.height,
-            "template": {}, "barmode": "overlay",
-            "title": {"text": self.title.replace("\n", "<br>")},
-            "hovermode": "x unified" if is_unified else "closest",
-            "meta": {"rows": [*self.rows], "columns": [*self.columns], "places": places,
-                     "units": [panel.unit["x"] for panel in self.panels]},
-        })  # fmt: skip
-
-    def domain(self, panel: Panel, way: Way) -> list[float]:
-        """Return the part of the figure that a panel has along an axis."""
-        sizes, part = (self.columns, panel.column) if way == "x" else (self.rows, panel.row)
-        low, high = (sum(sizes[:end]) / sum(sizes) for end in part)
-        low, high = (low, high) if way == "x" else (1.0 - high, 1.0 - low)
-        gap = min(GAP, 0.4 * (high - low))
-        return [low + gap / 2.0, high - gap / 2.0]
-
-
-def name_once(data: Sequence[Trace]) -> None:
-    """Keep each name once in the legend, in the order in which it was first drawn."""
-    seen: set[str] = set()
-    for trace in sorted(data, key=lambda one: one.legendrank):
-        if trace.showlegend:
-            trace.showlegend = trace.name not in seen
-            seen.add(trace.name)
-            trace.legendgroup = trace.name
+        self.drawn.layout.update(
+            title={"text": self.title.replace("\n", "<br>")},
+            hovermode="x unified" if is_unified else "closest",
+        )
+        return self.drawn
 
 
 def is_rising(trace: Trace) -> bool:
@@ -433,18 +358,48 @@ def hover_words(trace: Trace, panel: Panel, is_unified: bool) -> dict[str, str]:
 
 def make_grid(
     rows: int, columns: int, height: float, count: int = 0, heights: Sequence[float] = (),
-    widths: Sequence[float] = (), units: Units = "usual",
+    widths: Sequence[float] = (), units: Units = "usual", share_x: str = "", share_y: str = "",
+    tall: Sequence[slice] = (),
 ) -> tuple[Drawing, np.ndarray]:  # fmt: skip
     """Return a drawing of empty panels, and these, shape (rows, columns).
 
     height: of all, in inches; count: of the panels that are there, from the first; units: in which
-    axes are read.
+    axes are read; share_x, share_y: which panels have one scale, in plotly's words: `all`, `rows`
+    or `columns`; tall: rows in whose last column there is one panel.
     """
+    specs: list[list[Any]] = [[{} for _ in range(columns)] for _ in range(rows)]
+    for part in tall:
+        specs[part.start][-1] = {"rowspan": part.stop - part.start}
+        for row in range(part.start + 1, part.stop):
+            specs[row][-1] = None
+    for place in range(count or rows * columns, rows * columns):
+        specs[place // columns][place % columns] = None
+    across, down = WIDTH - MARGIN["l"] - MARGIN["r"], INCH * height - MARGIN["t"] - MARGIN["b"]
+    figure = make_subplots(
+        rows, columns, specs=specs, row_heights=[*heights] or None, column_widths=[*widths] or None,
+        horizontal_spacing=min(0.6 / columns, (BARE if share_y else BETWEEN)["x"] / across),
+        vertical_spacing=min(0.6 / rows, (BARE if share_x else BETWEEN)["y"] / down),
+    )  # fmt: skip
+    figure.update_layout(
+        width=WIDTH, height=INCH * height, margin=MARGIN, template={}, barmode="overlay", bargap=0
+    )
     grid = np.empty((rows, columns), object)
     for row, column in itertools.product(range(rows), range(columns)):
-        grid[row, column] = Panel((row, row + 1), (column, column + 1), units)
-    sizes = tuple(heights) or (1.0,) * rows, tuple(widths) or (1.0,) * columns
-    return Drawing(height, *sizes, [*grid.flat][: count or None]), grid
+        if specs[row][column] is None:
+            continue
+        axis = figure.get_subplot(row + 1, column + 1).xaxis
+        grid[row, column] = panel = Panel(figure, axis.plotly_name.removeprefix("xaxis"), units)
+        has_below = any(below[column] is not None for below in specs[row + 1 :])
+        inner = {"x": has_below, "y": column > 0}
+        for way, share in zip(WAYS, (share_x, share_y), strict=True):
+            if share:
+                first = grid[row * (share == "rows"), column * (share == "columns")]
+                axis = panel.axis(way)
+                axis.matches = None if first is panel else f"{way}{first.suffix}"
+                axis.showticklabels = not inner[way]
+    for part in tall:
+        grid[part, -1] = grid[part.start, -1]
+    return Drawing([*dict.fromkeys(one for one in grid.flat if one)]), grid
 
 
 # ---- shapes of what is drawn --------------------------------------------------------------------
@@ -509,26 +464,11 @@ def midway(centres: np.ndarray, is_log: bool = False) -> np.ndarray:
 # ---- what is read of a figure again -------------------------------------------------------------
 
 
-class View:
-    """One of a finished figure's axes: its number from 0, title, axes, and traces in order."""
-
-    def __init__(self, figure: go.Figure, number: int):
-        suffix = f"{number + 1}" if number else ""
-        *row, first, last = figure.layout.meta["places"][number]
-        self.number, self.suffix, self.row, self.column = number, suffix, row, [first, last]
-        self.x, self.y = figure.layout[f"xaxis{suffix}"], figure.layout[f"yaxis{suffix}"]
-        notes = [one for one in figure.layout.annotations
-                 if one.xref.partition(" ")[0] == f"x{suffix}"]  # fmt: skip
-        self.title = next((one.text for one in notes if one.name == "title"), "")
-        self.notes = [one for one in notes if one.name != "title"]
-        self.rules = [one for one in figure.layout.shapes
-                      if one.xref.partition(" ")[0] == f"x{suffix}"]  # fmt: skip
-        self.traces = [one for one in figure.data if one.xaxis == f"x{suffix}"]
-
-
-def views_of(figure: go.Figure) -> list[View]:
-    """Return a figure's panels in their order."""
-    return [View(figure, number) for number in range(len(figure.layout.meta["places"]))]
+def panels_of(figure: go.Figure) -> list[Panel]:
+    """Return a figure's panels from the top, those of a row from the left."""
+    names = (name for name in figure.layout if name.startswith("xaxis"))
+    panels = [Panel(figure, name.removeprefix("xaxis")) for name in names]
+    return sorted(panels, key=lambda one: (-round(one.y.domain[0], 6), one.x.domain[0]))
 
 
 def one_line(title: str) -> str:
@@ -537,14 +477,14 @@ def one_line(title: str) -> str:
     return " ".join(text.split())
 
 
-def shared_title(panels: Sequence[View], panel: View, way: Way) -> str:
+def shared_title(panels: Sequence[Panel], panel: Panel, way: Way) -> str:
     """Return the title of a panel's axis, or of the one below or beside it that has its numbers."""
+    here = panels.index(panel)
     if way == "x":
-        alike = [p for p in panels if p.column == panel.column and p.row >= panel.row]
+        alike = [one for one in panels[here:] if one.x.domain[0] == panel.x.domain[0]]
     else:
-        alike = [panel, *(p for p in panels if p.row == panel.row and p.column <= panel.column)]
-    titles = (one_line(p.x.title.text or "" if way == "x" else p.y.title.text or "") for p in alike)
-    return next(filter(None, titles), "")
+        alike = [panel, *(one for one in panels[:here] if one.y.domain == panel.y.domain)]
+    return next(filter(None, (one_line(one.axis(way).title.text or "") for one in alike)), "")
 
 
 def as_csv(figure: go.Figure) -> str:
@@ -557,8 +497,8 @@ def as_csv(figure: go.Figure) -> str:
     columns: list[tuple[str, Sequence[str]]] = []
     last, seen = ("", b""), set()
     last_jobs: tuple[str, ...] = ()
-    panels = views_of(figure)
-    for panel in panels:
+    panels = panels_of(figure)
+    for number, panel in enumerate(panels, 1):
         x_title, y_title = (shared_title(panels, panel, way) for way in WAYS)
         for trace in panel.traces:
             x, y, *more = points(trace)
@@ -566,7 +506,7 @@ def as_csv(figure: go.Figure) -> str:
             is_drawn = np.isfinite(x).any() or bool(jobs)
             if not is_drawn or not (trace.name or jobs or isinstance(trace, go.Heatmap)):
                 continue
-            where = f"{one_line(panel.title) or panel.number + 1}: {trace.name or ''}"
+            where = f"{one_line(panel.title) or number}: {trace.name or ''}"
             where = where.removesuffix(": ")
             same = x.tobytes(), y.tobytes(), trace.name, *(values.tobytes() for _, values in more)
             if same in seen:
@@ -612,7 +552,7 @@ def texts(values: np.ndarray) -> list[str]:
 def describe_figure(figure: go.Figure) -> str:
     """Return a figure in words: its panels, their axes and curves."""
     found = []
-    for panel in views_of(figure):
+    for panel in panels_of(figure):
         curves = ", ".join(dict.fromkeys(one.name for one in panel.traces if one.name))
         titles = (one_line(axis.title.text or "") for axis in (panel.y, panel.x))
         axes = " over ".join(filter(None, titles))

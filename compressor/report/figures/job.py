@@ -40,7 +40,6 @@ from compressor.report.figures.drawing import (
     circle,
     join_with_gaps,
     make_grid,
-    share_scales,
 )
 from compressor.report.figures.style import (
     BLACK,
@@ -138,7 +137,7 @@ def draw_analyst(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     spans = split_events(found.events)
     lanes = 1 + len(spans) + len(found.struck)
     drawing, panels = make_grid(
-        3, 1, 6.4 + 0.2 * lanes, heights=(0.34 * lanes, 3.4, 2.0), units=units
+        3, 1, 6.4 + 0.2 * lanes, heights=(0.34 * lanes, 3.4, 2.0), units=units, share_x="all"
     )
     strip, vibration, load = panels[:, 0]
     vibration.label("y", "a ({})", "m/s²")
@@ -164,8 +163,8 @@ def draw_analyst(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     if found.is_sensed and sensor:
         vibration.title = f"record of the sensor: {sensor.place}, along {sensor.direction}"
     load.title = "rod load at the crosshead pin, tension positive; dashed: it changes its side"
-    load.x.title = ANGLE_AXIS
-    share_turn(drawing.panels)
+    for panel in drawing.panels:
+        show_turn(panel)
     sentence = f"The last settled revolution: {vibration.title}, and rod load below."
     numbers = number_analyst(found, word)
     if twin is not None:
@@ -217,11 +216,10 @@ def plot_beside_twin(
             continue
         degrees, curves = read(one)
         for panel, values in zip(panels, curves, strict=True):
+            panel.label("x", ANGLE_AXIS, "°")
             panel.plot(degrees, values, line, name)
-            panel.x.title, panel.unit["x"] = ANGLE_AXIS, "°"
         panels[0].span("x", degrees[0], degrees[-1])
     panels[0].x.dtick = 90.0
-    share_scales(panels, "x")
 
 
 LOADS = (
@@ -234,7 +232,7 @@ LOADS = (
 @figure("job", "loads", "gas load, inertia and rod load over crank angle")
 def draw_loads(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return the gas load, inertia and rod load over a revolution, with the ideal machine's."""
-    drawing, panels = make_grid(3, 1, 7.2, units=units)
+    drawing, panels = make_grid(3, 1, 7.2, units=units, share_x="all")
     for panel, (title, axis, _) in zip(panels[:, 0], LOADS, strict=True):
         panel.title = title
         panel.label("y", axis, "kN")
@@ -258,7 +256,7 @@ def draw_loads(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
 @figure("job", "signals", "acceleration, forces and torque over crank angle")
 def draw_signals(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return six panels of a run's last settled revolution, with the ideal machine's."""
-    drawing, panels = make_grid(3, 2, 8.6, units=units)
+    drawing, panels = make_grid(3, 2, 8.6, units=units, share_x="all")
     for panel, signal in zip(panels.flat, SIGNALS, strict=True):
         panel.title = signal.title
         panel.label("y", f"{signal.axis} ({{}})", signal.unit)
@@ -333,20 +331,19 @@ BY_END = {"head": LineStyle(BLUE, (), 1.5, 2.3), "crank": LineStyle(RED, (3.7, 1
 @figure("job", "cards", "indicator cards", "gas")
 def draw_cards(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
     """Return the pressure in each end over gas volume and over crank angle, a revolution."""
-    drawing, panels = make_grid(1, 2, 4.6, units=units)
+    drawing, panels = make_grid(1, 2, 4.6, units=units, share_y="all")
     over_volume, over_angle = panels.flat
     measured = case_of(run).gas.is_measured
     over_volume.label("x", "displaced volume (litres)" if measured else "gas volume V (litres)")
+    over_angle.label("x", ANGLE_AXIS, "°")
     for panel in panels.flat:
         panel.label("y", "pressure ({}, absolute)", "MPa")
     degrees, revolution = last_revolution(run)
     for end, gas in end_states(revolution).items():
         over_volume.plot(gas.volume, gas.pressure, BY_END[end], f"{end} end")
         over_angle.plot(degrees, gas.pressure, BY_END[end], f"{end} end")
-    over_angle.x.title, over_angle.x.dtick = ANGLE_AXIS, 90.0
-    over_angle.unit["x"] = "°"
+    over_angle.x.dtick = 90.0
     over_angle.span("x", degrees[0], degrees[-1])
-    share_scales(drawing.panels, "y")
     seconds = float(revolution["time"][-1] - revolution["time"][0])
     numbers = [
         (f"indicated power, {end} end", spell(1e-3 * gas.work / seconds, "kW"))
@@ -404,8 +401,9 @@ def plot_lines(
     shown = (lines[0] >= 1) & (lines[0] <= MAX_ORDERS)
     orders, amplitudes = (values[shown] for values in lines)
     panel.plot(orders, amplitudes, line, name)
-    panel.y.type, (_, before) = "log", panel.ends["y"]
-    top = max(amplitudes.max(), np.nan_to_num(before) / panel.factors["y"] / 3.0)
+    panel.y.type, before = "log", panel.y.range
+    others = 10.0 ** before[1] / panel.factors["y"] / 3.0 if before else 0.0
+    top = max(amplitudes.max(), others)
     if top > 0:
         panel.span("y", top * 10.0**-DECADES, 3 * top)
     panel.span("x", 0, orders[-1])
@@ -476,7 +474,7 @@ def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
         x, y = place[nearest]
         panel.plot(x, y, mark(GOLD, shape, 7, 4, edge=BLACK), name)
     room = 1.08 * max(clearance, np.linalg.norm(place, axis=1).max())
-    panel.is_square = True
+    panel.scale_alike()
     panel.title = f"{SPOKEN[joint]}; circle: clearance {clearance / 1e3:.3g} mm"
     for way in WAYS:
         panel.span(way, -room, room)
@@ -490,7 +488,7 @@ def draw_modes(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
     shares, words = angle_modes(run), OILED_MODES if case_of(run).lubricant else MODES
     rows = 2 * len(joints)
     drawing, panels = make_grid(
-        rows, 1, 1.45 * rows + 0.9, heights=(1.0, 2.2) * len(joints), units=units
+        rows, 1, 1.45 * rows + 0.9, heights=(1.0, 2.2) * len(joints), units=units, share_x="all"
     )
     for joint, strip, depth in zip(joints, panels[::2, 0], panels[1::2, 0], strict=True):
         plot_strip(strip, shares, joint, words)
@@ -501,8 +499,8 @@ def draw_modes(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
         depth.plot((degrees % 360.0)[order], values[order], PATH)
         depth.rule(ZERO, y=0.0)
         depth.title = f"penetration, {SPOKEN[joint]}, last revolution; below 0 a gap"
-    panels[-1, 0].x.title = ANGLE_AXIS
-    share_turn(drawing.panels)
+    for panel in drawing.panels:
+        show_turn(panel)
     of_time = 100.0 * mode_shares(contact_modes(run))["share"]
     numbers = [
         (f"{word}, {SPOKEN[joint]}", spell(of_time.sel(joint=joint, mode=mode), "%"))
@@ -512,13 +510,11 @@ def draw_modes(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
     return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)
 
 
-def share_turn(panels: Sequence[Panel], step: float = 45.0) -> None:
-    """Show one turn of the crank in all panels."""
-    panels[0].span("x", 0.0, 360.0)
-    panels[0].x.dtick = step
-    for panel in panels:
-        panel.unit["x"] = "°"
-    share_scales(panels, "x")
+def show_turn(panel: Panel, step: float = 45.0) -> None:
+    """Show one turn of the crank, with ticks so many degrees apart."""
+    panel.label("x", ANGLE_AXIS, "°")
+    panel.span("x", 0.0, 360.0)
+    panel.x.dtick = step
 
 
 def plot_strip(panel: Panel, shares: xr.Dataset, joint: str, words: Sequence[str]) -> None:
@@ -585,7 +581,6 @@ def draw_impacts(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
         panel.y.tickvals = ()
     else:
         panel.span("y", low=0)
-    panel.x.title = ANGLE_AXIS
-    share_turn([panel])
+    show_turn(panel)
     sentence = "Contacts that begin after settling: their approach speed over crank angle."
     return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)

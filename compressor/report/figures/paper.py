@@ -40,7 +40,6 @@ from compressor.report.figures.drawing import (
     Panel,
     circle,
     make_grid,
-    share_scales,
 )
 from compressor.report.figures.style import (
     BLACK,
@@ -119,11 +118,13 @@ def draw_fault_response(runs: Runs, fault: str, units: Units = "usual") -> Drawn
     Acceleration oscillates fast: it has a row a clearance.
     """
     curves = fault_curves(runs, fault, ideal=True)
-    drawing, panels = make_grid(5, 2, 11.5, heights=(3, 3, 2, 2, 2), units=units)
+    drawing, panels = make_grid(
+        5, 2, 11.5, heights=(3, 3, 2, 2, 2), units=units, tall=[slice(2, 5)]
+    )
     for (full, enlarged), quantity, letters in zip(panels, MOTION[:2], ("ab", "cd"), strict=False):
         plot(full, curves, quantity)
         enlarge([full], enlarged, curves, quantity, letters)
-    enlarged = beside(drawing, panels, slice(2, 5))
+    enlarged = panels[2, 1]
     plot_rows(panels[2:, 0], curves, MOTION[2])
     enlarge(panels[2:, 0], enlarged, curves, MOTION[2], "ef")
     sentence = (
@@ -150,14 +151,6 @@ def differences_from_ideal(run: xr.Dataset) -> list[float]:
         float(np.abs(settled[name].values - ideal).max() / np.ptp(ideal))
         for name, ideal in zip(SERIES, ideal_motion(settled), strict=True)
     ]
-
-
-def beside(drawing: Drawing, panels: np.ndarray, rows: slice) -> Panel:
-    """Return one panel in place of those in the second column of some rows."""
-    drawing.panels = [one for one in drawing.panels if one not in panels[rows, 1]]
-    wide = Panel((rows.start, rows.stop), (1, 2), panels[0, 0].units)
-    drawing.panels.append(wide)
-    return wide
 
 
 def enlarge(
@@ -221,12 +214,15 @@ def draw_contact_force(runs: Runs, fault: str, joint: str, units: Units = "usual
     All enlarged views show the window in which the horizontal forces at the fault's first joint
     differ most, so that those of both joints show the same angles.
     """
-    drawing, panels = make_grid(6, 2, 11.5, widths=(2, 1), units=units)
+    both = slice(0, 3), slice(3, 6)
+    drawing, panels = make_grid(
+        6, 2, 11.5, widths=(2, 1), units=units, share_x="columns", tall=both
+    )
     curves = fault_curves(runs, fault, ideal=False)
     part, _ = differing_part(curves, contact_force(first_joint(fault), "x"))
-    for rows, axis, letter in zip((slice(0, 3), slice(3, 6)), "xy", "ab", strict=True):
+    for rows, axis, letter in zip(both, "xy", "ab", strict=True):
         quantity = contact_force(joint, axis)
-        enlarged = beside(drawing, panels, rows)
+        enlarged = panels[rows.start, 1]
         plot_rows(panels[rows, 0], curves, quantity)
         plot_enlarged(panels[rows, 0], enlarged, curves, quantity, part)
         top = panels[rows, 0][0]
@@ -266,7 +262,7 @@ def contact_force(joint: str, axis: str) -> Quantity:
               joint="small_end")  # fmt: skip
 def draw_relation(runs: Runs, joint: str, units: Units = "usual") -> DrawnFigure:
     """Return one panel a clearance: every stored sample, the regression line, r and r²."""
-    drawing, panels = make_grid(1, 3, 4.0, units=units)
+    drawing, panels = make_grid(1, 3, 4.0, units=units, share_x="all", share_y="all")
     for panel, letter, clearance in zip(panels.flat, "abc", CLEARANCES, strict=True):
         run = runs[label(joint, clearance)]
         name = f"{clearance:g} mm"
@@ -275,7 +271,6 @@ def draw_relation(runs: Runs, joint: str, units: Units = "usual") -> DrawnFigure
         scatter(panel, settled_part(run), joint, BY_CLEARANCE[clearance].color, name)
         regress(panel, run, joint)
         panel.title = f"({letter}) {name}"
-    share_scales(drawing.panels, "x", "y")
     found = [force_relation(runs[label(joint, c)], joint) for c in CLEARANCES]
     sentence = (
         "A dot for each stored sample; the line is the least-squares fit of force on acceleration, "
@@ -399,7 +394,8 @@ def draw_cam(runs: Runs, units: Units = "usual") -> DrawnFigure:
 def draw_contour(panel: Panel, cam: Cam, angles: np.ndarray) -> None:
     """Draw the closed cam's pitch curve around its base circle, with rays at every quarter turn."""
     x, y = cam.contour(angles, cam.base_radius)
-    panel.title, panel.is_square = "(a) contour of the closed cam", True
+    panel.title = "(a) contour of the closed cam"
+    panel.scale_alike()
     panel.label("x", "x ({})", "mm")
     panel.label("y", "y ({})", "mm")
     panel.fill(*circle(cam.base_radius * 1e3), fill("#f1f1f1"))

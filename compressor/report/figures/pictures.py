@@ -6,6 +6,7 @@ user's matplotlibrc nor a user's own figures are touched.
 
 import contextlib
 import io
+import itertools
 import multiprocessing
 import os
 import re
@@ -22,17 +23,15 @@ import plotly.graph_objects as go
 from matplotlib import style
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import MultipleLocator
 
-from compressor.report.figures.drawing import INCH, WAYS, Trace, View, Way, views_of
+from compressor.report.figures.drawing import INCH, ROOM, WAYS, WIDTH, Panel, Trace, Way, panels_of
 from compressor.report.figures.style import PIXEL
 
 DPI = 150
@@ -69,20 +68,10 @@ STYLE: dict[str, Any] = {
 
 @style.context(STYLE, after_reset=True)
 def render(figure: go.Figure, kind: str = "png") -> bytes:
-    """Return a figure as the bytes of a `png` or `svg` file, without a time stamp.
-
-    Its layout is found once: `savefig` would find it twice.
-    """
-    painted = paint(figure)
-    layout = painted.get_layout_engine()
-    assert layout
-    layout.execute(painted)
-    painted.set_layout_engine("none")
+    """Return a figure as the bytes of a `png` or `svg` file, without a time stamp."""
     stream = io.BytesIO()
-    if kind == "png":
-        FigureCanvasAgg(painted).print_png(stream)
-    else:
-        painted.savefig(stream, format=kind, metadata={"Date": None})
+    paint(figure).savefig(stream, format=kind, bbox_inches="tight", pad_inches=0.1,
+                          metadata={"Date": None} if kind == "svg" else {})  # fmt: skip
     return stream.getvalue()
 
 
@@ -129,29 +118,40 @@ def render_all(figures: Sequence[tuple[str, go.Figure]]) -> list[bytes]:
 
 
 def paint(figure: go.Figure) -> Figure:
-    """Return a figure of plotly as one of matplotlib."""
-    layout, grid = figure.layout, figure.layout.meta
-    engine = ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.06, wspace=0.03)
-    size = layout.width / INCH, layout.height / INCH
-    painted = Figure(figsize=size, dpi=DPI, layout=engine)
-    FigureCanvasAgg(painted)
-    cells = painted.add_gridspec(
-        len(grid["rows"]), len(grid["columns"]),
-        height_ratios=grid["rows"], width_ratios=grid["columns"],
-    )  # fmt: skip
-    for panel in views_of(figure):
-        axes = painted.add_subplot(cells[slice(*panel.row), slice(*panel.column)])
-        paint_panel(axes, panel)
+    """Return a figure of plotly as one of matplotlib, its axes where plotly's layout has them."""
+    layout, axes = figure.layout, dict[str, Axes]()
+    painted = Figure((layout.width / INCH, layout.height / INCH), dpi=DPI)
+    panels = panels_of(figure)
+    for panel in panels:
+        axes[panel.suffix] = one = painted.add_axes(place(layout, panel))
+        if panel.x.matches:
+            one.sharex(axes[panel.x.matches[1:]])
+        if panel.y.matches:
+            one.sharey(axes[panel.y.matches[1:]])
+        paint_panel(one, panel)
+    for panel, way in itertools.product(panels, WAYS):
+        limit_axis(axes[panel.suffix], way, panel.axis(way))
     if layout.title.text:
-        painted.suptitle(words(layout.title.text), x=0.02, ha="left", fontsize="medium")
-    listed = sorted((one for one in figure.data if one.showlegend), key=lambda one: one.legendrank)
+        painted.text(0.02, 1.0, words(layout.title.text), va="bottom")
+    listed = [one for one in figure.data if one.showlegend]
     is_needed = any(isinstance(one, go.Scatter) and "lines" not in one.mode for one in listed)
     if is_needed or len(listed) > 1:
         longest = max(len(one.name) for one in listed)
         across = min(len(listed), max(1, LEGEND_WIDTH // (longest + 9)))
-        place: Any = f"outside {'lower' if layout.title.text else 'upper'} center"
-        painted.legend(handles=[*map(legend_handle, listed)], loc=place, ncols=across)
+        loc: Any
+        loc, at = ("upper center", 0.0) if layout.title.text else ("lower center", 1.0)
+        painted.legend(handles=[*map(legend_handle, listed)], loc=loc, ncols=across,
+                       bbox_to_anchor=(0.5, at))  # fmt: skip
     return painted
+
+
+def place(layout: go.Layout, panel: Panel) -> tuple[float, float, float, float]:
+    """Return left, bottom, width and height of a panel in the picture."""
+    margin, (left, right), (low, high) = layout.margin, panel.x.domain, panel.y.domain
+    across = (layout.width - margin.l - margin.r) / layout.width
+    down = (layout.height - margin.t - margin.b) / layout.height
+    return (margin.l / layout.width + across * left, margin.b / layout.height + down * low,
+            across * (right - left), down * (high - low))  # fmt: skip
 
 
 def words(text: str) -> str:
@@ -160,15 +160,26 @@ def words(text: str) -> str:
     return re.sub(r"(\w)<sub>(\w+)</sub>", r"$\1_{\2}$", text)
 
 
-def paint_panel(axes: Axes, panel: View) -> None:
+def paint_panel(axes: Axes, panel: Panel) -> None:
     """Draw a panel on axes."""
     axes.set_title(words(panel.title))
+    kinds = {"map" if isinstance(one, go.Heatmap) else getattr(one, "mode", None) or "bar"
+             for one in panel.traces}  # fmt: skip
+    is_marked = any("markers" in kind for kind in kinds)
+    axes.margins(x=ROOM if is_marked or "bar" in kinds else 0.0, y=0.0 if "map" in kinds else ROOM)
+    for way in WAYS:
+        paint_axis(axes, way, panel.axis(way))
     for height, trace in enumerate(panel.traces):
         paint_trace(axes, trace, 2.0 + 0.01 * height)
     for rule in panel.rules:
-        (at, way) = (rule.x0, "x") if "domain" in rule.yref else (rule.y0, "y")
-        look = line_look(rule.line) | {"zorder": 1.9 if rule.layer == "below" else 2.9}
-        (axes.axvline if way == "x" else axes.axhline)(at, **look)
+        way = "x" if "domain" in rule.yref else "y"
+        look = {"zorder": 1.9 if rule.layer == "below" else 2.9}
+        if rule.type == "rect":
+            area = axes.axvspan if way == "x" else axes.axhspan
+            area(rule[f"{way}0"], rule[f"{way}1"], color=rule.fillcolor, linewidth=0.0, **look)
+        else:
+            line = axes.axvline if way == "x" else axes.axhline
+            line(rule[f"{way}0"], **look, **line_look(rule.line))
     for note in panel.notes:
         is_inside = ["domain" in ref for ref in (note.xref, note.yref)]
         at = [10.0**end if scale.type == "log" and not inside else end for end, scale, inside
@@ -185,33 +196,36 @@ def paint_panel(axes: Axes, panel: View) -> None:
             va="center" if level == "middle" else level, fontsize=note.font.size / PIXEL,
             color=note.font.color,
         )  # fmt: skip
-    for way in WAYS:
-        paint_axis(axes, way, panel.x if way == "x" else panel.y)
     if panel.y.scaleanchor:
         axes.set_aspect("equal", adjustable="box")
 
 
 def paint_axis(axes: Axes, way: Way, scale: Any) -> None:
-    """Draw the title, the ends and the ticks of the axis `x` or `y`."""
+    """Draw the title, the ends and the ticks of the axis `x` or `y`; what is shared is there."""
     axis, title = axes.xaxis if way == "x" else axes.yaxis, words(scale.title.text or "")
     axis.set_label_text(title)
-    if not title:
-        axis.set_label_coords(0.5, 0.5)  # else its place is found from all ticks, at each drawing
-    ends = scale.range
+    has_numbers = scale.showticklabels is not False
+    axis.set_tick_params(which="both", labelbottom=has_numbers, labelleft=has_numbers)
+    if scale.showgrid is False:
+        axes.grid(visible=False, axis=way)
+    if scale.matches:
+        return
     if scale.type == "log":
         (axes.set_xscale if way == "x" else axes.set_yscale)("log")
-        ends = [10.0**end for end in ends]
     if scale.ticktext:
         axis.set_ticks(scale.tickvals, [words(text) for text in scale.ticktext])
     elif scale.tickvals is not None:
         axis.set_ticks(scale.tickvals)
     elif scale.dtick:
         axis.set_major_locator(MultipleLocator(scale.dtick))
-    (axes.set_xlim if way == "x" else axes.set_ylim)(*ends)
-    axis.set_tick_params(which="both", labelbottom=scale.showticklabels is not False,
-                         labelleft=scale.showticklabels is not False)  # fmt: skip
-    if scale.showgrid is False:
-        axes.grid(visible=False, axis=way)
+
+
+def limit_axis(axes: Axes, way: Way, scale: Any) -> None:
+    """Show what an axis says, after all is drawn; the rest follows from that."""
+    if scale.range and not scale.matches:
+        ends = [10.0**end if end is not None and scale.type == "log" else end
+                for end in scale.range]  # fmt: skip
+        (axes.set_xlim if way == "x" else axes.set_ylim)(*ends)
 
 
 def line_look(line: Any) -> dict[str, Any]:
@@ -302,7 +316,9 @@ def paint_map(axes: Axes, trace: go.Heatmap) -> None:
                     rasterized=True, zorder=1.5)  # fmt: skip
     if trace.showscale is not False:
         scale = trace.colorbar
-        bar = axes.figure.colorbar(ScalarMappable(norm, colors), ax=axes, pad=0.02, aspect=14)
+        box = axes.get_position()
+        beside = axes.figure.add_axes((box.x1 + 6 / WIDTH, box.y0, 10 / WIDTH, box.height))
+        bar = axes.figure.colorbar(ScalarMappable(norm, colors), cax=beside)
         bar.set_label(words(scale.title.text or ""))
         if scale.tickvals is not None:
             bar.set_ticks(scale.tickvals, labels=scale.ticktext)

@@ -9,14 +9,12 @@ import xarray as xr
 
 from compressor.analysis import MODES, OILED_MODES, ORDER, SPOKEN, UNKNOWN, Cycle, Shaking
 from compressor.metrics import JOINTS
-from compressor.report.figures.curves import ANGLE_AXIS
 from compressor.report.figures.drawing import (
     Drawing,
     Panel,
     join_with_gaps,
     make_grid,
     outline_cells,
-    share_scales,
 )
 from compressor.report.figures.job import (
     FILM,
@@ -26,7 +24,7 @@ from compressor.report.figures.job import (
     G,
     list_modes,
     loudest,
-    share_turn,
+    show_turn,
 )
 from compressor.report.figures.style import BLACK, BLUE, GOLD, RED, LineStyle, mark, palette
 from compressor.report.figures.table import DrawnFigure, Number, figure, spell
@@ -135,7 +133,9 @@ def start_map(
     title: of the rows; x: edges of the table's columns; ends: of the colours, which `name` titles,
     with `{}` for the unit.
     """
-    drawing, panels = make_grid(1, 2, height(len(rows)) + 0.9, widths=(3, 1), units=units)
+    drawing, panels = make_grid(
+        1, 2, height(len(rows)) + 0.9, widths=(3, 1), units=units, share_y="all"
+    )
     image, edges = panels[0, 0], np.arange(len(rows) + 1) - 0.5
     shown = np.clip(table, *ends)  # nan stays
     image.map(x, edges, shown, palette("cividis"), ends, name, unit, is_log=True)
@@ -152,7 +152,6 @@ def finish_map(
     beside.label("x", title, unit)
     beside.plot(values, np.arange(values.size, dtype=float), dots)
     beside.span("x", 0, top)
-    share_scales(drawing.panels, "y")
     return drawing.figure()
 
 
@@ -181,8 +180,7 @@ def draw_cycles(rows: Sequence[SweptRow], title: str, units: Units = "usual") ->
         x = np.array([at for some in angles for at in some])
         y = np.array([float(n) for n, some in enumerate(angles) for _ in some])
         image.plot(x, y, mark(color, shape, 4, edge=BLACK), name)
-    image.x.title = ANGLE_AXIS
-    share_turn([image], 90.0)
+    show_turn(image, 90.0)
     peaks = np.nanmax(np.where(np.isnan(table), -1.0, table), axis=1)
     peaks = np.where(peaks < 0, np.nan, peaks)
     sensed = any(one.is_sensed for one in found if one)
@@ -225,8 +223,7 @@ def draw_segments(rows: Sequence[SweptRow], title: str, units: Units = "usual") 
         if marks:
             x, y = np.array(marks).T
             image.plot(x, y, mark(color, shape, 4, edge=BLACK), name)
-    image.x.title = ANGLE_AXIS
-    share_turn([image], 90.0)
+    show_turn(image, 90.0)
     greatest = np.array([np.nanmax(one.rms) if one else np.nan for one in found])
     words = "greatest rms of a<br>segment ({})"
     figure = finish_map(drawing, greatest, words, "m/s²", 1.08 * float(np.nanmax(greatest)))
@@ -300,13 +297,12 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str, units: Units = "usual")
 def draw_map(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> DrawnFigure:
     """Return the most frequent contact mode over the crank angle, a row a value, for each joint."""
     modes = rows_modes(rows)
-    drawing, panels = make_grid(1, len(modes), height(len(rows)) + 0.9, units=units)
+    drawing, panels = make_grid(1, len(modes), height(len(rows)) + 0.9, units=units, share_y="all")
     for panel, (joint, table) in zip(panels.flat, modes.items(), strict=True):
         plot_modes(panel, table)
         panel.title = SPOKEN[joint]
-        panel.x.title = ANGLE_AXIS
+        show_turn(panel, 90.0)
     label_rows(panels[0, 0], rows, title)
-    share_scales(drawing.panels, "y")
     list_modes(drawing, row_modes_words(rows))
     if any((table < 0).any() for table in modes.values()):
         drawing.list_area("no series, or no clearance", UNSEEN)
@@ -356,8 +352,6 @@ def plot_modes(panel: Panel, table: np.ndarray) -> None:
     if len(table) < 40:
         between = [np.array([[0.0, edge], [360.0, edge]]) for edge in edges[1][1:-1]]
         panel.plot(*join_with_gaps(between), LineStyle("#ffffff", linewidth=0.8))
-    panel.span("x", 0, 360)
-    panel.x.dtick = 90.0
 
 
 def label_rows(panel: Panel, rows: Sequence[SweptRow], title: str) -> None:

@@ -18,7 +18,6 @@ from compressor.report.figures.drawing import (
     make_grid,
     midway,
     outline_cells,
-    share_scales,
     thin_places,
 )
 from compressor.report.figures.style import BLUE, GOLD, GREY, LineStyle, fill, palette
@@ -83,7 +82,7 @@ def draw_maps(
 
     status, chaotic = table(sweep.status), table(sweep.chaotic)
     cells = Cells((x, y), (x.places[chosen[1]], y.places[chosen[0]]), table(sweep.keys))
-    drawing = metric_panels(measures, 2.6)
+    drawing = metric_panels(measures, 2.6, "all", "all")
     tables = [table(sweep.values(measure)) for measure in measures]
     for panel, measure, values in zip(drawing.panels, measures, tables, strict=True):
         panel.label("y", "")  # the colours have the unit
@@ -92,8 +91,7 @@ def draw_maps(
         mark_cells(panel, cells, status, chaotic)
         scale_map(panel, "x", x, in_lines(x.words))
         scale_map(panel, "y", y, y.words)
-    drawing.label_outside("x", x.title)
-    drawing.label_outside("y", y.title)
+        panel.x.title, panel.y.title = x.title, y.title
     if any((np.isnan(values) & (status == "ok")).any() for values in tables):
         drawing.list_area("the job lacks this metric", NOTHING)
     return drawing.figure()
@@ -219,7 +217,7 @@ def draw_ranking(sweep: PlottedSweep, found: Ranking) -> go.Figure:
     order = order_by_mean_strength(found)
     rows, columns = math.ceil(len(order) / COLUMNS), min(COLUMNS, len(order))
     each = 0.26 * len(found) + 0.75
-    drawing, _ = make_grid(rows, columns, rows * each + 0.7, len(order))
+    drawing, _ = make_grid(rows, columns, rows * each + 0.7, len(order), share_y="all")
     correlated = any(effects.total is None for effects in found.values())
     for panel, axis in zip(drawing.panels, order, strict=True):
         plot_bars(panel, list(found.values()), axis)
@@ -232,7 +230,6 @@ def draw_ranking(sweep: PlottedSweep, found: Ranking) -> go.Figure:
     first = drawing.panels[0]
     first.name_ticks("y", [measure.title for measure in found])
     first.span("y", len(found) - 0.5, -0.5)
-    share_scales(drawing.panels, "y")
     return drawing.figure()
 
 

@@ -12,7 +12,6 @@ from compressor.report.figures.drawing import (
     Drawing,
     Panel,
     make_grid,
-    share_scales,
     thin_places,
 )
 from compressor.report.figures.style import BLUE, CYCLE, RED, LineStyle, mark, palette
@@ -45,11 +44,14 @@ def ring_around(size: float) -> LineStyle:
     return replace(RING, markersize=size - RING.edge_width)
 
 
-def metric_panels(measures: Sequence[Measure], height: float) -> Drawing:
+def metric_panels(
+    measures: Sequence[Measure], height: float, share_x: str = "", share_y: str = ""
+) -> Drawing:
     """Return a drawing with a panel for each measure, titled; height of a row in inches."""
     rows = math.ceil(len(measures) / COLUMNS)
     columns = min(COLUMNS, len(measures))
-    drawing, _ = make_grid(rows, columns, max(3.2, height * rows + 0.8), len(measures))
+    drawing, _ = make_grid(rows, columns, max(3.2, height * rows + 0.8), len(measures),
+                           share_x=share_x, share_y=share_y)  # fmt: skip
     for panel, measure in zip(drawing.panels, measures, strict=True):
         panel.title = measure.title
         panel.label("y", "{}", measure.unit)
@@ -86,13 +88,11 @@ def mark_points(
 
 def mark_feet(panel: Panel, x: np.ndarray, status: np.ndarray, keys: np.ndarray) -> None:
     """Draw marks at the foot of a panel where jobs failed or were not run; all of one shape."""
-    low, high = panel.limits("y")
+    low, high = panel.y.range
     for word, look in MARKS.items():
         here = status == word
-        if panel.y.type == "log":
-            foot = low * (high / low) ** FEET[word]
-        else:
-            foot = low + FEET[word] * (high - low)
+        foot = low + FEET[word] * (high - low)
+        foot = (10.0**foot if panel.y.type == "log" else foot) / panel.factors["y"]
         feet = np.full(here.sum(), foot)
         mark_points(panel, x[here], feet, keys[here], look, NAMES[word])
 
@@ -160,10 +160,11 @@ def draw_curves(
     sweep = coarse(sweep, 0, MAX_JOBS)
     (axis,) = sweep.axes
     x, status, chaotic, keys = axis.places, sweep.status, sweep.chaotic, sweep.keys
-    drawing = metric_panels(measures, 2.35)
+    drawing = metric_panels(measures, 2.35, "all")
     line = replace(PLAIN_LINE, linewidth=0.0) if axis.is_words else PLAIN_LINE
     for panel, measure in zip(drawing.panels, measures, strict=True):
         values, bars = sweep.values(measure), sweep.bars(measure)
+        panel.x.title = axis.title
         scale_x(panel, axis)
         span = scale_y(panel, values)
         plot_jobs(panel, (x, values, bars), keys, measure.title, line, span, listed=False)
@@ -172,7 +173,6 @@ def draw_curves(
         mark_feet(panel, x, status, keys)
         for limit in limits.of(measure):
             panel.rule(LIMIT, y=limit)
-    drawing.label_outside("x", axis.title)
     return drawing.figure()
 
 
@@ -220,10 +220,10 @@ def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure])
     What is not known within its error bar is no part of a mean.
     """
     sweep = coarse(sweep, role.x, MAX_PLACES)
-    drawing = metric_panels(measures, 2.35)
+    drawing = metric_panels(measures, 2.35, "all")
     for panel, measure in zip(drawing.panels, measures, strict=True):
+        panel.x.title = sweep.axes[role.x].title
         plot_parts(panel, sweep, role, whole_part(sweep, measure))
-    drawing.label_outside("x", sweep.axes[role.x].title)
     return drawing.figure()
 
 
@@ -310,16 +310,14 @@ def draw_scatter(
     sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]
 ) -> go.Figure:
     """Return the measures in rows over axes in columns."""
-    drawing, grid = make_grid(len(measures), len(axes), 2.3 * len(measures) + 0.9)
+    drawing, grid = make_grid(len(measures), len(axes), 2.3 * len(measures) + 0.9,
+                              share_x="columns", share_y="rows")  # fmt: skip
     for row, measure in zip(grid, measures, strict=True):
         for panel, axis in zip(row, axes, strict=True):
             panel.label("x", sweep.axes[axis].title)
             panel.label("y", "{}", measure.unit)
             plot_points(panel, sweep, axis, measure)
         row[0].title = measure.title
-        share_scales(row, "y")
-    for column in grid.T:
-        share_scales(column, "x")
     return drawing.figure()
 
 

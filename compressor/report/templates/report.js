@@ -163,15 +163,12 @@ const ON_DARK = {
   "#b5b5b5": "#6d737d", "#8c8c8c": "#a0a0a0", "#606060": "#b0b0b0", "#303030": "#d0d0d0",
 };
 const tone = (color) => (isDark() && ON_DARK[color]) || color;
-const looksOf = (trace) => trace.fill || trace.type === "bar" ? "band"
-  : !/lines/.test(trace.mode) ? (/open/.test(trace.marker.symbol) ? "ring" : "points")
-    : trace.line.dash === "solid" ? "line" : "dashed";
+const SCALE = 74; // px that a scale of colours takes
 
 class Figure {
   constructor(frame) {
     this.frame = frame;
     this.name = frame.id;
-    this.off = new Set(); // names of the curves that are switched off
   }
 
   async start() {
@@ -180,7 +177,12 @@ class Figure {
       await Promise.all([window.Plotly ?? script(LIBRARY),
         sheets.has(this.name) || script(`${this.name}.js`)]);
       this.sheet = sheets.get(this.name);
-      this.build();
+      this.place = document.createElement("div");
+      this.place.className = "plot";
+      this.frame.querySelector("img, figcaption").before(this.place);
+      new ResizeObserver(() => {
+        if (this.place.clientWidth && this.place.clientWidth !== this.width) this.redraw();
+      }).observe(this.place);
       drawn.push(this);
       await this.redraw();
       this.frame.classList.add("live");
@@ -193,85 +195,11 @@ class Figure {
     }
   }
 
-  build() {
-    const head = document.createElement("div");
-    head.className = "controls";
-    const listed = this.sheet.data.filter((trace) => trace.showlegend && trace.type !== "heatmap");
-    listed.sort((a, b) => a.legendrank - b.legendrank);
-    if (listed.length > 1 || listed.some((one) => looksOf(one) !== "line")) head.append(...listed.map((trace) => this.entry(trace)));
-    const whole = document.createElement("button");
-    whole.type = "button";
-    whole.textContent = "whole view";
-    whole.addEventListener("click", () => this.redraw());
-    head.append(whole);
-    this.place = document.createElement("div");
-    this.place.className = "plot";
-    this.place.tabIndex = 0;
-    this.place.setAttribute("role", "application");
-    this.place.setAttribute("aria-label", `${this.frame.dataset.title}, interactive: ` +
-      "plus and minus zoom, left and right arrows move, zero shows all");
-    this.place.addEventListener("keydown", (event) => this.key(event));
-    this.frame.querySelector("img, figcaption").before(head, this.place);
-    new ResizeObserver(() => {
-      if (this.place.clientWidth && this.place.clientWidth !== this.width) this.redraw();
-    }).observe(this.place);
-  }
-
-  entry(trace) {
-    const { name } = trace;
-    const button = document.createElement("button");
-    button.type = "button";
-    button.className = "curve";
-    button.setAttribute("aria-pressed", "true");
-    const swatch = document.createElement("span");
-    swatch.className = "swatch";
-    swatch.dataset.kind = looksOf(trace);
-    swatch.dataset.color = trace.fillcolor ??
-      (/lines/.test(trace.mode) ? trace.line : trace.marker).color;
-    button.append(swatch, name);
-    button.addEventListener("click", () => {
-      const on = this.off.has(name);
-      if (on) this.off.delete(name); else this.off.add(name);
-      button.setAttribute("aria-pressed", String(on));
-      Plotly.restyle(this.place, { visible: this.sheet.data.map((one) => !this.off.has(one.name)) });
-    });
-    return button;
-  }
-
-  key(event) {
-    const zoom = { "+": 0.7, "=": 0.7, "-": 1 / 0.7 }[event.key];
-    const move = { ArrowLeft: -0.15, ArrowRight: 0.15 }[event.key];
-    if (event.key === "0") { this.redraw(); return; }
-    if (!zoom && !move) return;
-    event.preventDefault();
-    const change = {};
-    Object.entries(this.place.layout).forEach(([key, axis]) => {
-      if (!/^xaxis/.test(key) || axis.matches) return;
-      const [low, high] = axis.range;
-      const [middle, half] = [(low + high) / 2 + (move ?? 0) * (high - low), (high - low) / 2];
-      change[`${key}.range`] = [middle - half * (zoom ?? 1), middle + half * (zoom ?? 1)];
-    });
-    Plotly.relayout(this.place, change);
-  }
-
-  // Ticks at whole quarters of a turn suit the whole view; a part of it has its own.
-  freeTicks(change) {
-    const { layout } = this.place;
-    const axes = Object.keys(change).map((key) => /^([xy]axis\d*)\.range/.exec(key)?.[1]);
-    if (!axes.some((axis) => axis && layout[axis].dtick)) return;
-    const fixed = Object.keys(layout).filter((key) => /^[xy]axis/.test(key) && layout[key].dtick);
-    Plotly.relayout(this.place, Object.fromEntries(fixed.flatMap((axis) =>
-      [[`${axis}.dtick`, null], [`${axis}.tickmode`, "auto"], [`${axis}.nticks`, 8]])));
-  }
-
   redraw() {
     if (!this.sheet) return Promise.resolve();
-    this.frame.querySelectorAll(".swatch").forEach((swatch) => {
-      const { color, kind } = swatch.dataset;
-      swatch.style.setProperty("--curve", kind === "band" ? color : tone(color));
-    });
     const { data, layout } = this.fitted();
-    const done = Plotly.react(this.place, data, layout, { displayModeBar: false, doubleClick: "reset" });
+    const done = Plotly.react(this.place, data, layout, { displaylogo: false,
+      doubleClick: "reset", modeBarButtons: [["zoom2d", "pan2d", "resetScale2d"]] });
     ["plotly_click", "plotly_relayout"].forEach((kind) => this.place.removeAllListeners?.(kind));
     this.place.on("plotly_relayout", (change) => this.freeTicks(change));
     this.place.on("plotly_click", (event) => {
@@ -281,48 +209,17 @@ class Figure {
     return done;
   }
 
-  // Each panel with its axes, and where it lies in shares of the figure: beside each other, or
-  // below where it is narrow.
-  places(data, layout, width) {
-    const { rows, columns, places, units } = layout.meta;
-    const narrow = width < 190 * columns.length || width < 560;
-    const across = narrow ? Math.max(1, Math.min(columns.length, Math.floor(width / 330))) : 0;
-    const down = narrow ? Math.ceil(places.length / across) : 0;
-    const most = rows.length === 1 ? 380 : 240 * rows.length;
-    const total = narrow ? down * 260
-      : Math.max(130 * rows.length, Math.min(width * layout.height / layout.width, most));
-    const sum = (part) => part.reduce((a, b) => a + b, 0);
-    const share = (sizes, ends) => ends.map((end) => sum(sizes.slice(0, end)) / sum(sizes));
-    const panels = places.map(([top, bottom, left, right], n) => {
-      const [x, y] = ["x", "y"].map((way) => `${way}${n ? n + 1 : ""}`);
-      const axes = { x: layout[x.replace("x", "xaxis")], y: layout[y.replace("y", "yaxis")] };
-      const letters = Math.max(0, ...(axes.y.ticktext ?? []).map((text) => text.length));
-      const at = [n % across, Math.floor(n / across)];
-      return { x, axes, letters, isFirst: left === 0 && !narrow, unit: units[n],
-        isBare: axes.y.showticklabels === false && !narrow,
-        room: Math.max(62, 24 + LETTER * 12 * letters), // that words at an axis take
-        scales: data.filter((trace) => trace.xaxis === x && trace.colorbar && trace.showscale),
-        column: narrow ? [at[0] / across, (at[0] + 1) / across] : share(columns, [left, right]),
-        row: narrow ? [at[1] / down, (at[1] + 1) / down] : share(rows, [top, bottom]) };
-    });
-    // what the words of the first column take is given by all columns
-    const first = panels.filter((panel) => panel.isFirst && !panel.isBare);
-    const lead = Math.min(0.4 * width, Math.max(62, ...first.map((panel) => panel.room))) - 62;
-    panels.forEach((panel) => {
-      const [from, to] = panel.column.map((end) => lead + end * (width - lead));
-      const wide = panel.isBare ? 24 : panel.isFirst ? 62 : Math.min(0.6 * (to - from), panel.room);
-      const given = wide + (panel.isFirst ? lead : 0) - 24;
-      panel.font = Math.max(8, 12 * Math.min(1, given / Math.max(1, LETTER * 12 * panel.letters)));
-      panel.axes.x.domain = [from + wide, to - 14 - 62 * Math.min(1, panel.scales.length)]
-        .map((at) => at / width);
-      const [top, bottom] = panel.row;
-      panel.axes.y.domain = [(1 - bottom) * total + 48, (1 - top) * total - 30]
-        .map((at) => at / total);
-    });
-    return { panels, total, narrow };
+  // Ticks at whole quarters of a turn suit the whole view; a part of it has its own.
+  freeTicks(change) {
+    const fixed = Object.entries(this.place.layout)
+      .filter(([key, axis]) => /^[xy]axis/.test(key) && axis.dtick);
+    if (!fixed.some(([key]) => `${key}.range[0]` in change)) return;
+    Plotly.relayout(this.place, Object.fromEntries(fixed.flatMap(([key]) =>
+      [[`${key}.dtick`, null], [`${key}.tickmode`, "auto"]])));
   }
 
-  // The figure in the width and colours of the page.
+  // The figure in the width and colours of the page; where that is narrow, its panels lie below
+  // each other.
   fitted() {
     const isArea = /^(\d+|fillcolor|bgcolor|bdata)$/; // of maps and areas, in their own colours
     const { data, layout } = JSON.parse(JSON.stringify(this.sheet), (key, value) =>
@@ -331,65 +228,82 @@ class Figure {
     const [ink, faint, paper] = ["--ink", "--grid", "--paper"].map((name) =>
       style.getPropertyValue(name).trim());
     const width = this.width = this.place.clientWidth || 900;
-    const { panels, total, narrow } = this.places(data, layout, width);
-    const axis = { gridcolor: faint, zeroline: false, linecolor: faint, showline: true,
-      ticks: "outside", ticklen: 3, tickcolor: faint, exponentformat: "power", tickangle: 0,
-      automargin: false, title: { standoff: 6 } };
-    data.forEach((trace) => {
-      trace.visible = !this.off.has(trace.name);
-      if (trace.fill && isDark()) trace.opacity = 0.35 * (trace.opacity ?? 1);
-    });
-    panels.forEach((panel) => {
-      const { x, y } = panel.axes;
-      Object.entries(panel.axes).forEach(([way, axis]) => {
-        const room = (axis.domain[1] - axis.domain[0]) * (way === "x" ? width : total);
-        const title = axis.title?.text ?? "";
-        // a title that is longer than its axis has smaller letters
-        const size = Math.max(9, Math.min(12, room / (LETTER * Math.max(1, title.length))));
-        axis.title = { text: title, font: { size } };
-        if (narrow) delete axis.showticklabels;
-        if (axis.dtick) {
-          const wanted = (axis.range[1] - axis.range[0]) / axis.dtick;
-          axis.dtick *= Math.ceil(wanted / (width < 640 ? 5 : 9));
-          axis.tick0 = 0;
-        } else axis.nticks = Math.max(2, Math.floor(room / (way === "x" ? 48 : 21)));
+    const panels = Object.keys(layout).filter((key) => key.startsWith("xaxis")).map((key) =>
+      ({ name: `x${key.slice(5)}`, x: layout[key], y: layout[key.replace("x", "y")] }));
+    panels.sort((a, b) => b.y.domain[0] - a.y.domain[0] || a.x.domain[0] - b.x.domain[0]);
+    const columns = new Set(panels.map(({ x }) => x.domain[0])).size;
+    const { margin } = layout;
+    const across = width - margin.l - margin.r;
+    if (width < Math.max(560, 190 * columns)) {
+      const total = panels.length * 250 - 70;
+      layout.height = total + margin.t + margin.b;
+      panels.forEach(({ name, x, y }, n) => {
+        const scale = data.find((one) => one.xaxis === name && one.colorbar && one.showscale);
+        x.domain = [0, scale ? 1 - SCALE / across : 1];
+        y.domain = [total - 250 * n - 180, total - 250 * n].map((at) => Math.max(0, at / total));
+        [x, y].forEach((axis) => delete axis.showticklabels);
+        if (scale) Object.assign(scale.colorbar,
+          { x: x.domain[1], y: (y.domain[0] + y.domain[1]) / 2, len: y.domain[1] - y.domain[0] });
       });
-      x.unifiedhovertitle = { text: `%{x:.6~g} ${panel.unit}` };
-      if (y.ticktext) y.tickfont = { size: panel.font };
-      panel.scales.forEach((map) => Object.assign(map.colorbar, { x: x.domain[1], xpad: 6,
-        y: (y.domain[0] + y.domain[1]) / 2, len: y.domain[1] - y.domain[0], thickness: 10,
-        outlinewidth: 0, tickfont: { size: 10 } }));
-      (layout.annotations ?? []).filter((note) => note.xref.split(" ")[0] === panel.x)
-        .forEach((note) => this.fit(note, x, width));
+    }
+    const listed = data.filter((trace) => trace.showlegend);
+    const showlegend = listed.length > 1 || listed.some((one) => !/lines/.test(one.mode));
+    const letters = listed.reduce((sum, one) => sum + 7 * one.name.length + 56, 0);
+    const legend = showlegend ? 6 + 23 * Math.ceil(1.1 * letters / width) : 0;
+    layout.height += legend;
+    layout.margin = { ...margin, t: margin.t + legend };
+    const axis = { gridcolor: faint, zeroline: false, linecolor: faint, showline: true,
+      ticks: "outside", ticklen: 3, tickcolor: faint, exponentformat: "power", tickangle: 0 };
+    panels.forEach(({ name, x, y }) => {
+      const room = across * (x.domain[1] - x.domain[0]);
+      const long = Math.max(1, ...(y.ticktext ?? []).map((text) => text.length));
+      y.tickfont = { size: Math.max(8, Math.min(12, 0.4 * width / (LETTER * long))) };
+      y.automargin = "left";
+      [[x, room], [y, 250]].forEach(([one, most]) => {
+        const text = one.title?.text ?? "";
+        // a title that is longer than its axis has smaller letters
+        const size = Math.max(9, Math.min(12, most / (LETTER * Math.max(1, text.length))));
+        one.title = { text, font: { size }, standoff: 6 };
+      });
+      if (x.dtick) {
+        x.dtick *= Math.ceil(40 * (x.range[1] - x.range[0]) / x.dtick / room);
+        x.tick0 = 0;
+      }
+      (layout.annotations ?? []).filter((note) => note.xref.split(" ")[0] === name)
+        .forEach((note) => this.fit(note, x, margin.l, across));
     });
-    return { data, layout: { ...layout, width, height: total, title: undefined,
-      margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, dragmode: "zoom", bargap: 0,
+    if (isDark()) {
+      data.filter((one) => one.fill).forEach((one) => { one.opacity = 0.35 * (one.opacity ?? 1); });
+    }
+    return { data, layout: { ...layout, width, title: undefined, showlegend, dragmode: "zoom",
+      legend: { orientation: "h", yref: "container", y: 1, yanchor: "top", x: 0 },
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { family: "system-ui, sans-serif", size: 12, color: ink },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: faint, activecolor: ink },
       hoverlabel: { bgcolor: paper, font: { color: ink } },
       template: { layout: { xaxis: axis, yaxis: axis } } } };
   }
 
-  // Break a note into lines of the room it has. One that runs out of the figure moves back as far
-  // as that takes, or stands before its place.
-  fit(note, axis, width) {
-    if (note.showarrow) return;
+  // Break a note into lines of the room it has. One that would run out of the figure moves back as
+  // far as that takes, or stands before its place.
+  fit(note, axis, start, across) {
+    if (note.showarrow !== false) return;
     const [left, right] = axis.domain;
     if (note.name === "title") {
-      const room = width * (right - left);
+      const room = across * (right - left);
       note.font.size = Math.max(9.2, Math.min(13, 1.75 * room / note.text.length));
       note.text = `<b>${wrapped(note.text, room + 12, note.font.size)}</b>`;
       return;
     }
-    const [inside, size] = [/domain/.test(note.xref), 11];
-    const [low, high] = axis.range;
+    const [inside, size, width] = [/domain/.test(note.xref), 11, start + across];
+    const [low, high] = axis.range ?? [0, 1];
     const share = inside ? note.x : (note.x - low) / (high - low);
-    const at = width * (left + share * (right - left)); // px from the figure's left
+    const at = start + across * (left + share * (right - left)); // px from the figure's left
     const wide = (LETTER * size + 0.5) * note.text.length;
     const over = note.xanchor === "left" ? Math.max(0, at + note.xshift + wide - width) : 0;
-    const moved = !inside && over > 0 && wide < width * (right - left) ? over : 0;
-    const before = inside && note.x > 0.5 || (over > moved && at > width / 2);
-    const room = (before || note.xanchor === "right" ? at - width * left : width - at) - 6;
+    const moved = !inside && over > 0 && wide < across * (right - left) ? over : 0;
+    const before = inside ? note.x > 0.5 : over > moved && at > width / 2;
+    const room = (before || note.xanchor === "right" ? at - start - across * left : width - at) - 6;
     note.font.size = size;
     note.text = wrapped(note.text, room + moved, size);
     note.xshift = before && note.xanchor === "left" ? -Math.abs(note.xshift) : note.xshift - moved;

@@ -28,7 +28,6 @@ from compressor.report import (
     mark,
     midway,
     positions,
-    share_scales,
 )
 
 # the second is smaller and lies on the first, so that both are seen where they agree
@@ -105,9 +104,11 @@ def draw_followed(machine: xr.Dataset, title: str = "") -> PlotlyFigure:
     joints = [str(joint) for joint in machine["joint"].values[known.values]]
     x, log = positions(machine, over), bool(machine.attrs["log"])
     ratios = [2.2] * len(joints) + [1.2, 1.4] + [0.8] * len(joints)
-    drawing, _ = make_grid(len(ratios), 1, 1.35 * sum(ratios) + 1.2, heights=ratios)
+    drawing, _ = make_grid(len(ratios), 1, 1.35 * sum(ratios) + 1.2, heights=ratios, share_x="all")
     panels = drawing.panels
     chains = {str(name): machine.sel(direction=name) for name in machine["direction"].values}
+    for panel in panels:
+        panel.x.type, panel.x.title = "log" if log else None, title_key(machine[over])
     for joint, panel in zip(joints, panels, strict=False):
         points = {name: chain["section"].sel(joint=joint, coordinate="x").transpose(over, ...)
                   for name, chain in chains.items()}  # fmt: skip
@@ -125,15 +126,13 @@ def draw_followed(machine: xr.Dataset, title: str = "") -> PlotlyFigure:
         panel.y.title = "%"
         leave_room(panel)
     low, *_, high = midway(np.sort(x), log)
-    panels[0].x.type = "log" if log else None
     panels[0].span("x", low, high)
-    share_scales(panels, "x")
     has_failed = (machine["status"] == "failed").any("direction").values
     for panel in panels if has_failed.any() else ():
-        bottom, top = panel.limits("y")
+        bottom, top = panel.y.range
         foot = np.full(has_failed.sum(), bottom + FOOT["failed"] * (top - bottom))
         panel.plot(x[has_failed], foot, FAILED, FAILED_NAME)
-    panels[-1].x.title, drawing.title = title_key(machine[over]), title
+    drawing.title = title
     return drawing.figure()
 
 
@@ -191,5 +190,7 @@ def plot_exponents(panel: Panel, x: np.ndarray, chains: dict[str, xr.Dataset]) -
 
 def leave_room(panel: Panel) -> None:
     """Leave room below the points for marks, and a little above them."""
-    low, high = panel.limits("y")
-    panel.span("y", low - 0.1 * (high - low), high)
+    drawn = np.concatenate([trace.y for trace in panel.traces])
+    low, high = (np.nanmin(drawn), np.nanmax(drawn)) if np.isfinite(drawn).any() else (0.0, 1.0)
+    room = 0.05 * (high - low) or 0.05 * abs(high) or 0.05
+    panel.span("y", low - 3.0 * room, high + room)

@@ -27,7 +27,6 @@ from compressor.report import (
     make_grid,
     mark,
     rectangle,
-    share_scales,
 )
 from compressor.store import Folder, read_job, read_store
 from compressor.studies.frame import MAX_NAME, StudyError, replace_settings
@@ -220,23 +219,23 @@ def draw_work_precision(study: xr.Dataset) -> PlotlyFigure:
     """
     count = study.sizes["scene"]
     rows = -(-count // COLUMNS)
-    drawing, _ = make_grid(rows, min(COLUMNS, count), 4.1 * rows + 0.7, count)
+    drawing, _ = make_grid(rows, min(COLUMNS, count), 4.1 * rows + 0.7, count,
+                           share_x="all", share_y="all")  # fmt: skip
     for number, panel in enumerate(drawing.panels):
         one = study.isel(scene=number)
+        panel.x.type = panel.y.type = "log"
         draw_scene(panel, one)
         panel.title = str(one["scene"].item()).replace("_", " ")
-        panel.x.type = panel.y.type = "log"
         panel.x.title = "wall time of the solution (s)"
         panel.y.title = "relative L2 error of acceleration"
     first, ends = drawing.panels[0], limits(study)
     first.span("y", *ends)
-    first.span("x", study["seconds"].min().item() / WORDS_ROOM)
-    share_scales(drawing.panels, "x", "y")
+    sides = study["seconds"].min().item() / WORDS_ROOM, 1.2 * study["seconds"].max().item()
+    first.span("x", *sides)
     for number, panel in enumerate(drawing.panels):
         apart = study["reference_uncertainty"].values[number].item()
         if apart > ends[0]:
-            around = np.array(panel.limits("x")), np.array([ends[0], apart])
-            panel.fill(*rectangle(*around), DISAGREE)
+            panel.fill(*rectangle(np.array(sides), np.array([ends[0], apart])), DISAGREE)
     drawing.list_line("a word of solve.accuracy", TIER)
     drawing.list_area("the references disagree", DISAGREE)
     return drawing.figure()

@@ -10,7 +10,7 @@ import pytest
 from compsim import cli
 from test_lead import CASE, write_run
 
-from compressor.report.figures.drawing import views_of
+from compressor.report.figures.drawing import panels_of
 from compressor.report.page import document
 from compressor.store import read_dataset, read_studies
 from compressor.studies.alarms.alarms import CAPTION, add, draw_alarms, list_rows, rank_alarms
@@ -76,7 +76,7 @@ def test_the_figure_has_the_shares_of_each_joint(written):
     folder, _ = written
     found = read_dataset(folder / "alarms.nc")
     assert (folder / "alarms.png").read_bytes()[:4] == b"\x89PNG"
-    panels = views_of(draw_alarms(found))
+    panels = panels_of(draw_alarms(found))
     for panel, joint in zip(panels, found["joint"].values, strict=True):
         mine = found["worn_joint"].values == joint
         for trace in panel.traces:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from compressor.program import no_progress
-from compressor.report.figures.drawing import views_of
+from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.work_precision import (
@@ -143,7 +143,7 @@ def test_nothing_is_fastest_below_what_the_references_know():
 
 def test_the_figure_draws_what_is_there(study):
     figure = draw_work_precision(study)
-    (panel,) = views_of(figure)
+    (panel,) = panels_of(figure)
     assert panel.x.type == panel.y.type == "log"
     lines = [trace.y for trace in panel.traces if trace.y.size == 4 and trace.name]
     assert len(lines) == len(METHODS)
