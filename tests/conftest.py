@@ -146,6 +146,15 @@ def keep(folder, *datasets):
         write_batch(folder, [outcome_of(dataset)])
 
 
+def flip(path, values):
+    """Flip a bit of the first of some values in a file; return what it held."""
+    whole = path.read_bytes()
+    data = bytearray(whole)
+    data[data.index(values.tobytes())] ^= 1
+    path.write_bytes(data)
+    return whole
+
+
 def damage_series(folder, key):
     """Flip a bit in each time series of a stored job; return its batch."""
     stored = read_store(folder)

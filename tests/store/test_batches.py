@@ -5,6 +5,7 @@ import shutil
 import numpy as np
 import pytest
 import xarray as xr
+from conftest import flip
 from made_jobs import batches, forget, held, key, made, peaks, plan
 
 from compressor.store import merge, reader
@@ -134,10 +135,7 @@ def test_rows_that_do_not_count_go_and_damaged_batches_are_set_aside(tmp_path):
 
 def test_a_batch_whose_values_are_damaged_stays_while_its_rows_count(mixed):
     path = max(batches(mixed), key=lambda one: one.stat().st_size)
-    data = bytearray(path.read_bytes())
-    series = made(5, samples=10).series["contact_force"].values.tobytes()
-    data[data.index(series)] ^= 1
-    path.write_bytes(data)
+    flip(path, made(5, samples=10).series["contact_force"].values)
     merge_all(mixed)
     assert path.exists()
     assert read_store(mixed).position(key(5)) is not None

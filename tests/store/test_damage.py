@@ -8,6 +8,7 @@ import random
 import pytest
 import xarray as xr
 from compsim import cli
+from conftest import flip
 from made_jobs import batches, held, key, made, plan
 
 from compressor.store.batch import write_batch
@@ -195,9 +196,7 @@ def test_jobs_in_a_damaged_batch_count_as_missing_with_a_warning(tmp_path, capsy
     paths = [write_batch(tmp_path, [made(n) for n in part]) for part in parts]
     plan(tmp_path, 400)
     paths[0].write_bytes(paths[0].read_bytes()[:-1])
-    data = paths[2].read_bytes()
-    at = data.index(made(2).numbers["peak_contact_force_axis"].tobytes())
-    paths[2].write_bytes(flipped(data, at, 0))
+    flip(paths[2], made(2).numbers["peak_contact_force_axis"])
     with pytest.warns(StoreWarning, match="is damaged.*count as missing") as told:
         found = open_study(tmp_path)
     assert [sum(path.name in str(one.message) for one in told) for path in paths] == [1, 0, 1]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from compsim import cli
-from conftest import keep
+from conftest import flip, keep
 
 from compressor.cases.load import load_studies
 from compressor.metrics import METRICS, SIZES
@@ -196,8 +196,7 @@ def test_damaged_jobs_are_told(results, tmp_path, capsys):
     stored = read_store(copy)
     hurt = min(stored.keys())
     path, _ = stored.batch_of(stored.position(hurt))
-    whole, values = path.read_bytes(), stored.values(hurt, ["acceleration"])["acceleration"]
-    path.write_bytes(whole.replace(values.tobytes(), bytes(values.nbytes)))
+    whole = flip(path, stored.values(hurt, ["acceleration"])["acceleration"])
     assert cli.main(["export", hurt, "-r", str(copy), "-o", str(tmp_path / "x.csv")]) == 5
     assert f"{path}: is damaged" in capsys.readouterr().err
     path.write_bytes(whole[:-1])

@@ -8,6 +8,7 @@ import sys
 import bad_jobs
 import numpy as np
 import pytest
+from conftest import flip
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
@@ -138,13 +139,6 @@ def test_shards_are_one_study_together(studies, tmp_path, in_process):
     assert verify(tmp_path / "out") == []
 
 
-def hurt(path, what):
-    """Flip a bit of some values in a file."""
-    data = bytearray(path.read_bytes())
-    data[data.index(what.tobytes())] ^= 1
-    path.write_bytes(data)
-
-
 def test_damaged_numbers_are_mended_with_series_as_exact_as_they_were(
     studies, tmp_path, in_process, monkeypatch
 ):
@@ -154,7 +148,7 @@ def test_damaged_numbers_are_mended_with_series_as_exact_as_they_were(
         (path,) = tmp_path.glob("out/batches/*.h5")
         made = studies(one={"output": rough})
         job = store.read_job(tmp_path / "out", made[0].cases[0].key)
-        hurt(path, job.peak_acceleration.values)
+        flip(path, job.peak_acceleration.values)
         assert sweep(made, tmp_path / "out", 1).run_now == 1
         assert sweep(made, tmp_path / "out", 1).run_now == 0
         again = store.read_job(tmp_path / "out", made[0].cases[0].key)
@@ -166,7 +160,7 @@ def test_a_run_reads_no_series_and_mends_what_verify_has_found(studies, tmp_path
     made = studies(one={})
     sweep(made, tmp_path / "out", 1)
     (path,) = tmp_path.glob("out/batches/*.h5")
-    hurt(path, store.read_job(tmp_path / "out", made[0].cases[0].key).acceleration.values)
+    flip(path, store.read_job(tmp_path / "out", made[0].cases[0].key).acceleration.values)
     assert sweep(made, tmp_path / "out", 1).run_now == 0
     (damage,) = verify(tmp_path / "out")
     assert damage.path == path
