@@ -7,8 +7,6 @@ spaced; curves have as many points as a screen can show.
 
 import json
 from collections.abc import Iterable, Iterator
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,26 +19,11 @@ from compressor.report.figures.curves import ANGLE_AXIS
 from compressor.report.figures.drawing import Trace, make_grid, thin_places
 from compressor.report.figures.job import BY_JOINT
 from compressor.report.figures.style import BLACK, LineStyle
-from compressor.store import DamagedFile, Stored, publish
+from compressor.store import DamagedFile, Stored
 from compressor.units import Units
 
-LIBRARY = "plotly.min.js"
 MAX_POINTS = 2400  # of a curve: some three for each pixel of a wide panel
 EVEN = 1e-3  # of a step: how far evenly spaced numbers may be off
-
-
-def library_path() -> Path:
-    """Return where plotly.js is installed."""
-    source = find_spec("plotly")
-    (place,) = (source.submodule_search_locations or [""])[:1] if source else [""]
-    return Path(place) / "package_data" / LIBRARY
-
-
-def publish_library(folder: Path) -> None:
-    """Write plotly.js beside the page, unless it is there. Raises StoreError."""
-    path, library = folder / LIBRARY, library_path()
-    if not path.exists() or path.stat().st_size != library.stat().st_size:
-        publish(path, library.read_bytes())
 
 
 def script(name: str, figure: go.Figure) -> str:

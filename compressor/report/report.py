@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import xarray as xr
+from plotly.offline import get_plotlyjs
 
 from compressor.analysis import Claim, claims
 from compressor.outcome import Regime
@@ -32,10 +33,7 @@ from compressor.report.figures import FIGURES
 from compressor.report.figures.pictures import render_all
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.interactive import (
-    LIBRARY,
     job_scripts,
-    library_path,
-    publish_library,
     series_name,
 )
 from compressor.report.limits import Limits, read_limits
@@ -82,6 +80,7 @@ from compressor.store import (
 )
 from compressor.units import Units
 
+LIBRARY = "plotly.min.js"
 KINDS = ("png", "csv", "js")  # of files beside the page
 
 
@@ -114,13 +113,13 @@ def write_report(
     for plate in plates:
         files |= {name: text.encode() for name, text in plate.texts.items()}
     files |= {f"{series_name(key)}.js": text.encode() for key, text in contents.series.items()}
+    library = {LIBRARY: get_plotlyjs().encode()}
     if single:
-        page = contents.page({LIBRARY: library_path().read_bytes()} | files)
+        page = contents.page(library | files)
         publish(folder, page.encode(errors="backslashreplace"))
         return folder
-    for name, content in files.items():
+    for name, content in (library | files).items():
         publish_changed(folder / name, content)
-    publish_library(folder)
     publish(folder / "index.html", contents.page({}).encode(errors="backslashreplace"))
     remove_stale(folder, contents)
     return folder / "index.html"

@@ -22,7 +22,6 @@ from compressor.report.figures.style import LineStyle, fill, mark, palette
 from compressor.report.interactive import (
     MAX_POINTS,
     extremes,
-    publish_library,
     script,
     thinned,
 )
@@ -194,18 +193,6 @@ def test_a_script_breaks_out_of_nothing():
 def test_what_is_seen_is_said_in_words(drawing):
     words = describe_figure(drawing.figure())
     assert words.startswith("4 panels. whole: sine, cosine; enlarged: sine")
-
-
-def test_the_library_lies_beside_the_page(tmp_path):
-    publish_library(tmp_path)
-    path = tmp_path / "plotly.min.js"
-    assert b"plotly.js v" in path.read_bytes()[:200]
-    before = path.stat().st_mtime_ns
-    publish_library(tmp_path)
-    assert path.stat().st_mtime_ns == before
-    path.write_bytes(b"of another version")
-    publish_library(tmp_path)
-    assert path.stat().st_size > 1e6
 
 
 def test_a_word_on_a_log_axis_stands_where_plotly_wants_it():
