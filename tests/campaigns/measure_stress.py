@@ -26,7 +26,7 @@ BLOCKS = ("supported", "whole", "supported", "laws", "supported", *["features"] 
 def kinds(overrides):
     """The kind of each job, by key."""
     (study,) = load_studies(example(STUDY), overrides=overrides)
-    sizes = [len(block.numbers) for block in study.cases.parts]
+    sizes = [len(block.numbers) for block in study.cases.blocks]
     each = [kind for kind, size in zip(BLOCKS, sizes, strict=True) for _ in range(size)]
     return dict(zip(study.keys, each, strict=True))
 
