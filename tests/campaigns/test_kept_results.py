@@ -18,7 +18,9 @@ from compressor.cases.parameter import ACCURACY
 from compressor.metrics import METRICS
 
 
-@pytest.mark.parametrize(("name", "words", "find"), FINDINGS, ids=lambda part: str(part)[:40])
+@pytest.mark.parametrize(
+    ("name", "words", "find"), FINDINGS, ids=lambda part: getattr(part, "__name__", part)
+)
 def test_no_finding_fails(name, words, find):
     """But for extreme cases: their page lists what is wrong."""
     assert name == "stress" or find(kept(f"{name}.json"))[2] is not False
