@@ -24,7 +24,7 @@ from compressor.solve.series import distances
 SEEDS = (101, 102, 103)
 TRUTH = 1e-12
 RTOLS = (2e-5, 2e-6, 2e-7, 2e-8, 1e-9, 1e-10)
-RATIOS = (0.4, 3.0, 10.0)  # of the other run's tolerance: those that the program compares
+RATIOS = (0.4, 0.5, 3.0, 10.0, 30.0, 100.0, 1000.0)  # of the other run's tolerance
 LOOSEST = 1e-4  # of the other run: beyond it both may take the same wrong course
 SMALL = 0.1  # distances beyond are no estimates
 LIMITS = (50, 90, 95, 99, 99.5)
