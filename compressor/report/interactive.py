@@ -28,16 +28,16 @@ EVEN = 1e-3  # of a step: how far evenly spaced numbers may be off
 
 def script(name: str, figure: go.Figure) -> str:
     """Return the script of a figure."""
-    return f"compsimFigure({json.dumps(name)},{thinned(figure).to_json()});\n"
+    return f"compsimFigure({json.dumps(name)},{thin_figure(figure).to_json()});\n"
 
 
-def thinned(figure: go.Figure) -> go.Figure:
+def thin_figure(figure: go.Figure) -> go.Figure:
     """Return a figure with the points that a screen can show."""
-    data = [thin(trace, figure.layout[f"xaxis{trace.xaxis[1:]}"]) for trace in figure.data]
+    data = [thin_trace(trace, figure.layout[f"xaxis{trace.xaxis[1:]}"]) for trace in figure.data]
     return go.Figure(data, figure.layout)
 
 
-def thin(trace: Trace, axis: Any) -> dict[str, Any]:
+def thin_trace(trace: Trace, axis: Any) -> dict[str, Any]:
     """Return a trace with fewer points and numbers of 32 bits; axis: of x."""
     found = trace.to_plotly_json()
     part = visible(trace, axis) if trace.type == "scatter" and not trace.fill else slice(None)

@@ -28,8 +28,8 @@ from compressor.studies.frame import (
     DIGITS,
     USABLE,
     GrowingStudy,
+    KeySpan,
     Point,
-    Span,
     StudyError,
     by_revolutions,
     replace_settings,
@@ -269,7 +269,7 @@ class FitJobs:
     """Evaluates orders of a case at values of its unknown keys, by jobs of one study."""
 
     def __init__(
-        self, path: str, unknowns: Sequence[Span], overrides: Sequence[str],
+        self, path: str, unknowns: Sequence[KeySpan], overrides: Sequence[str],
         folder: Folder, workers: int, progress: Progress,
     ):  # fmt: skip
         self.unknowns, self.folder, self.plain = tuple(unknowns), folder, [*overrides]
@@ -325,7 +325,7 @@ class FitJobs:
 
 
 def calibrate(
-    record: Record, path: str, unknowns: Sequence[Span], folder: Folder,
+    record: Record, path: str, unknowns: Sequence[KeySpan], folder: Folder,
     overrides: Sequence[str] = (), workers: int = 2, progress: Progress = no_progress,
 ) -> Calibration:  # fmt: skip
     """Return what a record of a sound machine says of a case's unknown keys.

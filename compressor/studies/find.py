@@ -23,7 +23,7 @@ from compressor.metrics import AXES, BARRED, JOINTS, NUMBERS, SEGMENTS, THRESHOL
 from compressor.program import Progress, did_you_mean, no_progress
 from compressor.solve import average_bar
 from compressor.store import Folder, StoreError, read_store
-from compressor.studies.frame import GrowingStudy, Span, StudyError, read_range
+from compressor.studies.frame import GrowingStudy, KeySpan, StudyError, read_range
 from compressor.units import READABLE, Units, read_quantity, split_number, unit_in
 
 # ---- the question
@@ -181,7 +181,7 @@ class Question:
     """
 
     path: str
-    span: Span
+    span: KeySpan
     goal: Goal
     tolerance: float = 1e-3
     scan: int = 9

@@ -56,7 +56,7 @@ class StudyError(CompsimError, ValueError):
 
 
 @dataclass(frozen=True)
-class Span:
+class KeySpan:
     """A key and the ends of its values, in the case file's unit; log: spaced with even ratios.
 
     count: of the values, where a text gives it, else 0.
@@ -79,7 +79,7 @@ class Span:
         return float(f"{value:.{DIGITS}g}")
 
 
-def read_range(option: str, text: str, is_counted: bool = False, log: bool = False) -> Span:
+def read_range(option: str, text: str, is_counted: bool = False, log: bool = False) -> KeySpan:
     """Return the span of a text KEY=LOW:HIGH, or KEY=LOW:HIGH:N.
 
     Raises StudyError with the option's name.
@@ -106,7 +106,7 @@ def read_range(option: str, text: str, is_counted: bool = False, log: bool = Fal
     elif log and ends[0] <= 0.0:
         problem = "--log needs ends above 0"
     else:
-        return Span(key, *ends, log, int(count or 0))
+        return KeySpan(key, *ends, log, int(count or 0))
     raise StudyError(f"{option} {text}: {problem}")
 
 

@@ -21,7 +21,7 @@ from scipy.stats import binomtest
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 from compressor.studies.calibrate import POOR_FIT, calibrate
-from compressor.studies.frame import Span
+from compressor.studies.frame import KeySpan
 from compressor.vibration import Record
 
 SEED, MACHINES = 3101, 34
@@ -77,7 +77,7 @@ def fit(truth, known, other):
     assert run.status == "ok", run.attrs["detail"]
     names = ("sensor_time", "sensor_acceleration", "tacho_time")
     record = Record(*(run[name].values for name in names), math.nan)
-    unknowns = [Span(key, *span) for key, span in RANGES.items()]
+    unknowns = [KeySpan(key, *span) for key, span in RANGES.items()]
     with tempfile.TemporaryDirectory() as place:
         path = Path(place, "machine.yaml")
         path.write_text(json.dumps(merge(FIXED, known)))

@@ -23,7 +23,7 @@ from compressor.report.interactive import (
     MAX_POINTS,
     extremes,
     script,
-    thinned,
+    thin_figure,
 )
 
 X = np.linspace(0.0, 360.0, 721)
@@ -122,7 +122,7 @@ def test_panels_of_the_same_jobs_share_columns_and_name_their_axes():
 
 
 def test_the_page_gets_what_was_drawn(drawing):
-    found = json.loads(thinned(drawing.figure()).to_json())
+    found = json.loads(thin_figure(drawing.figure()).to_json())
     figure = go.Figure(found)  # plotly itself takes it
     sine, cosine, part, _, cells, bars, jobs = found["data"]
     assert (sine["x0"], sine["dx"]) == (0.0, 0.5)

@@ -192,4 +192,4 @@ def mark_turns(panel: Panel, one: Shaking) -> None:
     ends = np.flatnonzero(np.diff(is_near)) + 1
     for part in np.split(np.arange(fine.size), ends):
         if is_near[part[0]]:
-            panel.shade("x", fine[part[0]], fine[part[-1]], NEAR)
+            panel.draw_band("x", fine[part[0]], fine[part[-1]], NEAR)

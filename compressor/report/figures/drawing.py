@@ -68,14 +68,14 @@ class Panel:
     @property
     def notes(self) -> list[Any]:
         """Return plotly's annotations of the panel, but for its title."""
-        return [one for one in self.own("annotations") if one.name != "title"]
+        return [one for one in self.marks_of("annotations") if one.name != "title"]
 
     @property
     def rules(self) -> list[Any]:
         """Return plotly's shapes of the panel."""
-        return self.own("shapes")
+        return self.marks_of("shapes")
 
-    def own(self, kind: str) -> list[Any]:
+    def marks_of(self, kind: str) -> list[Any]:
         """Return the `annotations` or `shapes` of the panel."""
         name = f"x{self.suffix}"
         return [one for one in self.figure.layout[kind] if one.xref.partition(" ")[0] == name]
@@ -83,11 +83,11 @@ class Panel:
     @property
     def title(self) -> str:
         """Return the text above the panel."""
-        return next((one.text for one in self.own("annotations") if one.name == "title"), "")
+        return next((one.text for one in self.marks_of("annotations") if one.name == "title"), "")
 
     @title.setter
     def title(self, text: str) -> None:
-        for note in self.own("annotations"):
+        for note in self.marks_of("annotations"):
             if note.name == "title":
                 note.text = text
                 return
@@ -239,7 +239,7 @@ class Panel:
         self.shape(way, at, at, type="line", line=line,
                    layer="below" if style.zorder < 1.0 else "above")  # fmt: skip
 
-    def shade(self, way: Way, low: float, high: float, style: LineStyle) -> None:
+    def draw_band(self, way: Way, low: float, high: float, style: LineStyle) -> None:
         """Draw an area across the panel, from a lower to a higher x or y."""
         self.shape(way, low, high, type="rect", layer="below", fillcolor=style.color,
                    line={"width": 0})  # fmt: skip

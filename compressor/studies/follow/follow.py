@@ -48,7 +48,7 @@ from compressor.studies.follow.motion import (
     run_value,
 )
 from compressor.studies.frame import (
-    Span,
+    KeySpan,
     StudyError,
     hash_key,
     read_range,
@@ -66,7 +66,7 @@ NOT_FOLLOWED = ("solve", "output", "body", "sensor", "initial_offset_mm")
 
 
 @dataclass(frozen=True)
-class KeyRange(Span):
+class KeyRange(KeySpan):
     """The values of a key, and how they are followed.
 
     `both`: up and then down, each from its own start.
