@@ -9,16 +9,12 @@ import itertools
 
 import numpy as np
 import pytest
-from published import ASKED, DRY, GIVEN, MACHINE, STIFFNESS, drop, given_back
+from published import ASKED, DRY, GIVEN, drop, given_back
 
 from compressor.cases.case import Case
-from compressor.cases.materials import contact_stiffness
 from compressor.metrics import METRICS
 from compressor.physics.record import CARRIED
 from compressor.solve.run import run_at_tolerance
-from compressor.solve.search import (
-    predictability_horizon,
-)
 from compressor.solve.simulate import simulate
 
 pytestmark = pytest.mark.compiled
@@ -33,34 +29,12 @@ def undamped(**solve):
     return Case.resolve({**DRY, "contact": contact, "solve": solve})
 
 
-def test_the_ideal_machine_has_the_published_numbers():
-    """Acceleration at and beyond the dead centres, and the crank's torque."""
-    solve = {"duration_rev": 1, "settle_rev": 0, "output_step_deg": 0.25}
-    values = {"load": "none", "friction": False, "machine": MACHINE, "solve": solve}
-    run = simulate(Case.resolve({**values, "output": {"signals": True}}))
-    acceleration, torque = run["acceleration"].values, run["crank_torque"].values
-    assert acceleration.min() == pytest.approx(-19419, abs=0.5)
-    assert acceleration.max() == pytest.approx(9696, abs=0.5)
-    assert torque.max() == pytest.approx(138.5, abs=0.05)
-    assert torque.min() == pytest.approx(-138.5, abs=0.05)
-
-
-def test_the_published_stiffness_is_that_of_a_pin_in_a_bore():
-    """Eq. 15 of steel, with the difference of the radii; its constants are a little others."""
-    ours = contact_stiffness("steel", "steel", 0.0095, 0.0100, True)
-    assert ours == pytest.approx(STIFFNESS * (1 - 0.3**2) / (1 - 0.29**2), rel=1e-3)
-
-
 def test_the_dry_joint_keeps_its_energy_and_says_what_is_known_of_it():
-    """With its restitution the journal soon stays in contact; without damping it flies and hits,
-    and cannot be foretold for two revolutions.
-    """
+    """With its restitution the journal soon stays in contact; without damping it flies and hits."""
     run = simulate(dry(duration_rev=6, settle_rev=2))
     assert run["status"].item() == "ok"
     assert run.attrs["regime"] == "predictable"
     assert run["contact_loss_fraction"].sel(joint="small_end") < 0.05
-    case = undamped(duration_rev=3, settle_rev=0)
-    assert 1.5 * case.turn < predictability_horizon(case) < 1.8 * case.turn
     run = simulate(undamped(duration_rev=10, settle_rev=2))
     assert run["status"].item() == "ok"
     assert run.attrs["regime"] == "chaotic"
