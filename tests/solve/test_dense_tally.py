@@ -8,33 +8,10 @@ import pytest
 from compressor.cases.case import Case
 from compressor.physics import COLUMNS, Column, new_tally
 from compressor.solve.dense_tally import (
-    find_changes,
     find_tops,
-    shares_above,
     tally_steps,
 )
 from compressor.solve.si_record import record
-
-STEPS = np.array([0.0, 0.1, 0.4, 0.5, 1.0])
-
-
-def wave(times):
-    """Above zero for a while, zero from 0.45 to 0.65, below it."""
-    return np.where(times < 0.45, np.sin(20.0 * times), np.minimum(0.65 - times, 0.0))
-
-
-def test_changes_and_shares_are_those_of_a_known_function():
-    """Of which it is positive up to pi / 20, and from pi / 10 on until it is zero."""
-    times = np.linspace(0.0, 1.0, 33)[1:]
-    changes, rates = find_changes(wave, times, wave(times))
-    np.testing.assert_allclose(changes, (math.pi / 20, math.pi / 10, 0.45), rtol=1e-8)
-    assert np.sign(rates).tolist() == [-1.0, 1.0, -1.0]
-    shares = shares_above(STEPS, 1.0, changes)
-    above = math.pi / 20 - 0.1 + 0.4 - math.pi / 10
-    np.testing.assert_allclose(shares, (1.0, above / 0.3, 0.5, 0.0), rtol=1e-7)
-    np.testing.assert_allclose(shares_above(STEPS, 0.0, changes), 1.0 - shares, atol=1e-12)
-    assert find_changes(wave, times[24:], wave(times[24:]))[0].size == 0
-    assert (shares_above(STEPS, 0.0, changes[:0]) == 0.0).all()
 
 
 def test_the_top_of_several_is_found_wherever_nodes_lie():

@@ -2,21 +2,20 @@
 
 import numpy as np
 import pytest
-from conftest import keep
 from random_cases import random_cases
 
 from compressor.cases.case import Case
-from compressor.cases.parameter import ACCURACY, first_tolerance
-from compressor.metrics import METRICS, SERIES
+from compressor.metrics import METRICS, NUMBERS, SERIES
+from compressor.physics import COLUMNS, Column
 from compressor.solve import error_bars
 from compressor.solve import run as run_module
 from compressor.solve.error_bars import (
     FLOOR,
     bars,
 )
+from compressor.solve.series import distances
 from compressor.solve.simulate import measure, simulate
 from compressor.solve.solution import solve
-from compressor.store.reader import read_store
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5}
 BOTH = {"joint": "both", "clearance_mm": 0.2}
@@ -44,6 +43,23 @@ def within(found, truth, stretch=1.0):
 
 
 # ---- from two runs to bars
+
+
+def test_distances_are_relative_and_by_joint():
+    ours, theirs = np.zeros((4, COLUMNS)), np.zeros((4, COLUMNS))
+    ours[:, Column.ACCELERATION] = [3, 0, 4, 0]
+    theirs[:, Column.ACCELERATION] = [3, 0, 4, 0.5]
+    ours[:, Column.FORCE + 2] = [0, 2, 0, 0]  # of the small end, along x
+    theirs[:, Column.FORCE + 2] = [0, 2, 0.3, 0]
+    theirs[:, Column.FORCE + 3] = [0, 0.4, 0, 0]  # and y
+    found = distances(ours, theirs)
+    assert found.keys() == SERIES.keys()
+    assert found["acceleration"] == pytest.approx(0.1)
+    assert found["contact_force"].tolist() == pytest.approx([0.0, 0.25])
+    assert found["velocity"] == 0.0
+    for name, value in found.items():
+        joint = (2,) if "joint" in NUMBERS[f"{name}_error"].dims else ()
+        assert np.shape(value) == joint, name
 
 
 def test_runs_that_agree_by_chance_have_bars_by_their_series():
@@ -81,17 +97,6 @@ def test_the_energy_residual_is_a_floor():
     found = bars(metrics, metrics, 0.5, APART, 1e-3)
     assert found["rms_acceleration"] == pytest.approx(FLOOR * 1e-3 * 100.0)
     assert found["impact_count"].tolist() == [0.0, 0.0]
-
-
-def test_without_another_run_nothing_is_known():
-    case = Case.from_values({**BOTH, "solve": SHORT})
-    found = run_module.run_at_tolerance(case, 1e-5, 60.0, False)
-    error_bars.estimate_errors(found)
-    assert found.bars.keys() == found.metrics.keys()
-    assert all(np.isinf(bar).all() for bar in found.bars.values())
-    for name, value in found.series_errors.items():
-        assert np.shape(value) == np.shape(APART[name])
-        assert np.isinf(value).all()
 
 
 # ---- of whole runs
@@ -205,28 +210,3 @@ def test_bars_of_the_ideal_machine_cover_its_quadrature(load):
 
 
 # Accuracy as it is asked for
-
-
-def test_tiers_promise_more_for_tighter_tolerances():
-    tiers = list(ACCURACY.values())
-    assert [tier.rtol for tier in tiers] == sorted((t.rtol for t in tiers), reverse=True)
-    assert [tier.promise for tier in tiers] == sorted((t.promise for t in tiers), reverse=True)
-    assert first_tolerance((("peak_acceleration", 0.5),)) > ACCURACY["draft"].rtol
-
-
-def test_a_stored_job_without_bars_does_not_serve_a_case_that_wants_them(tmp_path):
-    solve = SHORT | {"duration_rev": 0.25, "settle_rev": 0}
-    plain, barred, by_number = (
-        Case.from_values({"solve": solve | more, "output": {"keep": "metrics"}})
-        for more in ({"error_bars": False}, {}, {"accuracy": {"rms_acceleration": 0.1}})
-    )
-    keep(tmp_path, simulate(plain))
-    stored = read_store(tmp_path).status(plain.key)
-    assert stored.satisfies(plain)
-    assert not stored.satisfies(barred)
-    keep(tmp_path, simulate(barred))
-    stored = read_store(tmp_path).status(plain.key)
-    assert stored.satisfies(plain)
-    assert stored.satisfies(barred)
-    keep(tmp_path, simulate(by_number))
-    assert read_store(tmp_path).status(by_number.key).satisfies(by_number)

@@ -120,3 +120,42 @@ def test_the_time_of_a_speed_that_gives_way_is_its_own():
     assert t[-1] > Case.from_values(free).turn * 2
     rate = np.gradient(theta, t, edge_order=2)
     assert rate == pytest.approx(found.crank_speed.values, rel=1e-4)
+
+
+# ---- an oil film
+
+
+def oiled(joint, viscosity=None, **solve):
+    values = {"joint": joint, "clearance_mm": 0.05}
+    film = {"viscosity_mPa_s": viscosity} if viscosity else True
+    return run(values | {"lubricant": film}, **solve)
+
+
+@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
+def test_the_film_s_loss_closes_the_energy(joint):
+    found = oiled(joint, duration_rev=2, settle_rev=1, error_bars=True)
+    assert float(found.energy_residual) < 1e-4
+    assert float(found.contact_damping_loss) > 0.0
+    assert found.attrs["promise"] == "kept"
+
+
+def test_a_thick_film_keeps_the_bodies_apart():
+    """A hundredfold viscosity bears the load: the dry contact never touches."""
+    thick, thin = (
+        oiled("big_end", viscosity, duration_rev=3, settle_rev=1).sel(joint="big_end")
+        for viscosity in (3000, 1)
+    )
+    assert float(thick.contact_loss_fraction) == 1.0
+    assert float(thick.max_penetration) < 0.0
+    assert float(thin.contact_loss_fraction) < 0.5
+
+
+def test_without_viscosity_the_joint_is_dry():
+    """The limit of no film, as the viscosity goes to zero."""
+    dry = run({"joint": "small_end", "clearance_mm": 0.05}, rtol=1e-8)
+    far = [
+        apart(dry, oiled("small_end", viscosity, rtol=1e-8), "acceleration")
+        for viscosity in (1e-3, 1e-4)
+    ]
+    assert far[0] / far[1] == pytest.approx(10.0, rel=0.3)
+    assert far[1] < 5e-3

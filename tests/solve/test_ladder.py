@@ -1,7 +1,5 @@
 """What accuracy promises is kept run by run, or the job says that it is not."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from page_tables import kept
@@ -10,12 +8,9 @@ from random_cases import random_cases
 from compressor.cases.case import Case
 from compressor.cases.parameter import ACCURACY, TIGHTEST, first_tolerance
 from compressor.metrics import METRICS, SERIES
-from compressor.physics import Column
-from compressor.solve import error_bars, solution
+from compressor.solve import error_bars
 from compressor.solve import run as run_module
 from compressor.solve.error_bars import (
-    AMPLIFIED_FACTOR,
-    ORDER,
     is_amplified,
 )
 from compressor.solve.series import distances
@@ -121,30 +116,6 @@ def test_where_errors_are_enlarged_a_looser_run_is_asked_as_well(asked):
         by_each.append(again.bars | again.series_errors)
     for name, bar in (found.bars | found.series_errors).items():
         np.testing.assert_array_equal(bar, np.maximum(*(one[name] for one in by_each)))
-
-
-def test_runs_that_agree_by_chance_keep_no_promise(monkeypatch, asked):
-    """Made to agree in all numbers, and nearly in their course; the looser run tells."""
-
-    def lucky(case, solution, timeout):
-        if solution.rtol < ACCURACY["draft"].rtol:
-            return error_bars.comparison_run(case, solution, timeout)
-        other = replace(solution, rtol=solution.rtol / error_bars.TIGHTER_FACTOR)
-        much = 1.2 * AMPLIFIED_FACTOR * solution.rtol**ORDER
-        other.samples = solution.samples.copy()
-        other.samples[:, Column.ACCELERATION] *= 1.0 + much
-        return other
-
-    alone = of(ILL, accuracy="draft", max_steps=20_000)
-    monkeypatch.setattr(solution, "comparison_run", lucky)
-    found = solve(alone)
-    first = ACCURACY["draft"].rtol
-    assert asked[:2] == pytest.approx([first, first * error_bars.LOOSER_FACTOR])
-    assert len(asked) > 2
-    assert min(asked) < 0.11 * first
-    assert found.promise == "kept"
-    monkeypatch.setattr(solution, "looser_comparison_run", lambda *_: None)
-    assert solve(alone).rtol == first  # which is not enough
 
 
 # their first runs keep no promise, and two later ones agree by chance: errors of 60 % and 3 % at

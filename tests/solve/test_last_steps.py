@@ -46,25 +46,6 @@ def test_the_history_of_a_slowing_crank_has_the_time_that_passed():
     assert found["stop_time"] > 1.0004 * turned  # the crank is behind a steady one
 
 
-@pytest.mark.parametrize(
-    ("values", "rates"),
-    [
-        ({"joint": "small_end"},
-         ["rate of small end eccentricity x, m/s", "rate of small end eccentricity y, m/s"]),
-        ({"joint": "big_end", "drive": True, "guide": {"clearance_mm": 0.1}},
-         ["rate of big end eccentricity x, m/s", "rate of big end eccentricity y, m/s",
-          "rate of height in the guide, m/s", "rate of tilt in the guide, rad/s"]),
-    ],
-)  # fmt: skip
-def test_each_rate_of_a_stopped_state_has_a_name_of_its_own(values, rates):
-    """Three and more numbers were called "its rate"."""
-    case = Case.from_values({**values, "clearance_mm": 0.2, "solve": {"max_steps": 5}})
-    attributes = measure(case).attributes
-    names = attributes["stop_state_names"].split("; ")
-    assert len(names) == len(attributes["stop_state"])
-    assert names[len(rates) : 2 * len(rates)] == rates
-
-
 @pytest.mark.parametrize("method", [*METHODS])
 @pytest.mark.parametrize("most", [1, 37])
 def test_the_budget_of_steps_is_kept_exactly(method, most):

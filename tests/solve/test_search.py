@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from conftest import CHAOTIC, keep
+from conftest import CHAOTIC
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
@@ -19,9 +19,7 @@ from compressor.solve.search import (
     predictability_horizon,
 )
 from compressor.solve.si_record import offsets, record, scene
-from compressor.solve.simulate import measure, simulate
-from compressor.store.demands import serving_both
-from compressor.store.reader import read_store
+from compressor.solve.simulate import measure
 
 REGULAR = {"joint": "both", "clearance_mm": 0.3}
 QUICK = {"duration_rev": 1.2, "settle_rev": 0}
@@ -75,10 +73,6 @@ def test_the_case_s_own_solver_does_not_count():
     assert predictability_horizon(case(CHAOTIC, method="LSODA", rtol=1e-3)) == ours
 
 
-def test_ideal_joints_never_part():
-    assert predictability_horizon(case({"joint": "none"})) == math.inf
-
-
 def test_a_run_that_stops_tells_how_far_it_came():
     stopped, later = (predictability_horizon(case(REGULAR, max_steps=n)) for n in (100, 1000))
     assert 0 < stopped < later < case(REGULAR).duration
@@ -94,31 +88,8 @@ def brief(values, **solve):
     return Case.from_values({**values, "solve": BRIEF | solve, "output": {"keep": "metrics"}})
 
 
-def test_a_horizon_is_looked_for_as_asked():
-    always, seldom = (measure(brief(CHAOTIC, horizon=asked)) for asked in (True, False))
-    assert always.numbers["predictability_horizon"] == predictability_horizon(brief(CHAOTIC))
-    assert always.attributes["regime"] == "chaotic"
-    assert math.isnan(seldom.numbers["predictability_horizon"])
-    assert seldom.attributes["regime"] != "chaotic"
-
-
 def test_a_motion_that_can_be_foretold_keeps_its_bars():
     plain, asked = (measure(brief(REGULAR, horizon=asked)).numbers for asked in (False, True))
     assert asked["predictability_horizon"] == math.inf
     for name in (*METRICS, *(f"{one}_error" for one in METRICS)):
         assert np.array_equal(asked[name], plain[name]), name
-
-
-def test_a_horizon_is_kept_and_asked_for_beside_a_job_s_identity(tmp_path):
-    plain, asked = (brief(CHAOTIC, horizon=asked, rtol=1e-9) for asked in (False, True))
-    assert plain.key == asked.key
-    assert serving_both(plain, asked).solve.horizon is True
-    keep(tmp_path, simulate(plain))
-    assert not read_store(tmp_path).status(plain.key).satisfies(asked)
-    keep(tmp_path, simulate(asked))
-    store = read_store(tmp_path)
-    stored = store.status(plain.key)
-    assert stored.satisfies(asked)
-    assert stored.satisfies(plain)
-    numbers = store.numbers([store.position(plain.key)])[0]
-    assert 0 < numbers["predictability_horizon"] < asked.duration

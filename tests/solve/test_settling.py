@@ -81,12 +81,6 @@ def test_the_time_series_end_with_the_run():
     assert found.sizes["time"] == 100 * round(turns) + 1
 
 
-def test_the_ideal_machine_is_settled_at_once():
-    found = measure(case({"joint": "none"}, **AUTO))
-    assert found.status == "ok"
-    assert found.numbers["settled_rev"] == 0
-
-
 @pytest.mark.parametrize("turns", [1, 2.5])
 def test_ideal_joints_repeat_in_a_run_of_any_length(turns):
     found = measure(case({"joint": "none", "load": "gas"}, settle_rev=0, duration_rev=turns))

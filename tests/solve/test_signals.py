@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from conftest import keep
 
 from compressor.cases.case import Case
-from compressor.metrics import NUMBERS, SERIES
+from compressor.metrics import NUMBERS
 from compressor.solve.series import SIGNALS
-from compressor.solve.simulate import measure, simulate
-from compressor.store.demands import serving_both
-from compressor.store.reader import read_store
+from compressor.solve.simulate import simulate
 
 TURN = {"duration_rev": 2, "settle_rev": 1, "output_step_deg": 0.3}
 SIGNALLED = {"output": {"signals": True}}
@@ -81,13 +78,3 @@ def test_metrics_of_signals_body_and_sensor_need_no_time_series(values):
     assert {"peak_rod_load_tension", "sensor_rms", "body_velocity_rms"} <= {*alone.variables}
     for name in {*NUMBERS} & {*whole.variables} - {"seconds"}:
         np.testing.assert_array_equal(alone[name], whole[name], err_msg=name)
-
-
-def test_cases_that_share_a_job_keep_what_both_ask_for(tmp_path):
-    one, other = (Case.from_values({"output": {"signals": asked}}) for asked in (False, True))
-    assert one.key == other.key
-    assert serving_both(one, other).output.signals
-    keep(tmp_path, simulate(one))
-    assert not read_store(tmp_path).status(one.key).satisfies(other)
-    assert measure(other).attributes["signals"] == 1
-    assert not SERIES.keys() & SIGNALS.keys()

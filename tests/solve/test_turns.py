@@ -50,12 +50,3 @@ def test_a_revolution_has_its_own_peaks():
     alone = run(case("big_end", "auto", settle_rev=1, duration_rev=2))
     for name in METRICS:
         np.testing.assert_allclose(each[1][name], alone.metrics[name], rtol=1e-4, atol=1e-9)
-
-
-def test_a_run_ends_where_enough_is_known():
-    of = case("big_end", "auto", settle_rev=0, duration_rev=2)
-    found = run(of, ends(of), lambda run: len(run.turns) == 1)
-    assert not found.reason
-    assert len(found.trajectory.turns) == 1
-    assert found.trajectory.tally["seconds"] == pytest.approx(of.turn, rel=1e-9)
-    assert found.trajectory.steps < 0.6 * run(of).trajectory.steps

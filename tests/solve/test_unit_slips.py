@@ -78,16 +78,6 @@ def test_what_is_usual_or_reaches_into_it_is_not(key, given, others, tmp_path):
     assert slips(study(tmp_path, key, given, others).cases) == []
 
 
-def test_the_words_for_one_value_and_for_several(tmp_path):
-    (one,) = slips(study(tmp_path, SPEED, 52, {}).cases)
-    assert one.message == ("52 rpm, where 120 to 6000 is usual; read as rad/s: 496.6 rpm")
-    (two,) = slips(study(tmp_path, SPEED, [104, 52], {}).cases)
-    assert (two.message, two.jobs) == (
-        "52 to 104 rpm, where 120 to 6000 is usual; read as rad/s: 496.6 to 993.1 rpm",
-        2,
-    )
-
-
 def test_defaults_are_usual():
     for key in USUAL:
         default = table()[key].default if key in table() else None

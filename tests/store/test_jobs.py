@@ -13,6 +13,7 @@ from made_jobs import SHORT, batches, held, key, made
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 from compressor.store.batch import read_outcomes, write_batch
+from compressor.store.demands import serving_both
 from compressor.store.files import StoreError
 from compressor.store.reader import read_job, read_store
 
@@ -196,3 +197,26 @@ def test_what_a_stored_job_serves(row, ideal, tmp_path):
     kinds = {exact for keeps, exact in (row[:2], (asks, exact)) if keeps == "series"}
     assert again.keep == ("series" if kinds else "metrics")
     assert again.precision == min(kinds, default="double")
+
+
+DEMANDS = {  # what a job is asked for beside its identity: less, and more
+    "bars": ({"solve": {"error_bars": False}}, {}),
+    "horizon": ({"solve": {"horizon": False}}, {"solve": {"horizon": True}}),
+    "signals": ({}, {"output": {"signals": True}}),
+}
+
+
+@pytest.mark.parametrize("name", DEMANDS)
+def test_a_job_that_holds_more_serves_both(name, tmp_path):
+    few, all_ = (
+        Case.from_values({**STUCK, "solve": SHORT | more.get("solve", {}),
+                          "output": {"keep": "metrics"} | more.get("output", {})})
+        for more in DEMANDS[name]
+    )  # fmt: skip
+    assert few.key == all_.key
+    keep(tmp_path, simulate(few))
+    stored = read_store(tmp_path).status(few.key)
+    assert (stored.satisfies(few), stored.satisfies(all_)) == (True, False)
+    keep(tmp_path, simulate(all_))
+    stored = read_store(tmp_path).status(few.key)
+    assert all(map(stored.satisfies, (few, all_, serving_both(few, all_), serving_both(all_, few))))
