@@ -182,15 +182,6 @@ def test_no_workers_are_told_and_a_lost_scheduler_is_an_error(studies, tmp_path)
     assert told.count(cluster.WAITING) == 1
 
 
-def test_without_distributed_the_extra_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    with (
-        pytest.raises(ClusterError, match=r"pip install 'compsim\[dask\]'"),
-        connect_cluster("tcp://a:1"),
-    ):
-        pass
-
-
 def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, impatient):
     options = ["--scheduler", "tcp://127.0.0.1:1"]
     assert main(["run", studies[0].path, "-r", str(tmp_path / "out"), *options]) == 2

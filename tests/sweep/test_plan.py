@@ -3,9 +3,8 @@
 import json
 
 import pytest
-from compsim import cli, progress
+from compsim import cli
 
-from compressor.cases import load as cases
 from compressor.cases.load import load_studies
 from compressor.sweep import plan, warm_up
 from compressor.sweep.plan import forecast
@@ -119,21 +118,3 @@ def test_nothing_ahead_costs_nothing(studies):
     sweep(made, "results", 1)
     found = forecast(made, "results", 5).with_times(2, pytest.fail)
     assert (found.missing, found.seconds, found.bytes, found.first) == (0, 0, 0, ())
-
-
-@pytest.mark.parametrize("command", ["plan", "run"])
-def test_large_files_are_counted_before_they_are_read(command, studies, monkeypatch, capsys):
-    studies(one=NINE)
-    monkeypatch.setattr(cases, "MANY_CASES", 9)
-    monkeypatch.setattr(progress, "FIRST_SECONDS", 0)
-    assert cli.main([command, "one.yaml", "-j", "1"]) == 0
-    assert capsys.readouterr().err.startswith("one: 9 jobs\n0 of 9 cases read, 0 %\n")
-
-
-def test_counts_are_told_before_anything_is_timed(studies, monkeypatch, capsys):
-    studies(one=NINE)
-    seen = []
-    monkeypatch.setattr(plan, "compile_once", lambda *_: seen.append(capsys.readouterr().out))
-    assert cli.main(["plan", "one.yaml", "-j", "1"]) == 0
-    assert [" ".join(out.split()) for out in seen] == ["one 9 jobs 0 done 9 missing"]
-    assert capsys.readouterr().out.startswith("about ")

@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from functools import partial
 from pathlib import Path
@@ -131,20 +130,6 @@ def test_what_is_prepared_is_not_timed(tmp_path):
     rules = Workers(2, partial(bad_jobs.prepare, tmp_path, 1.5), grace=0.2)
     ends = list(run_batches(partial(bad_jobs.is_prepared, tmp_path), jobs, rules))
     assert results(ends) == dict.fromkeys(range(4), True)
-
-
-def test_two_calls_at_once_do_not_mix():
-    first = run_batches(sleep, named([0.01 + n / 1e6 for n in range(40)]), Workers(1))
-    ends = [next(first)]
-    second = []
-    thread = threading.Thread(
-        target=lambda: second.extend(run_batches(work, named(range(5)), Workers(2)))
-    )
-    thread.start()
-    ends += first
-    thread.join()
-    assert len(results(ends)) == 40
-    assert results(second) == {n: n for n in range(5)}
 
 
 # ---- poison -------------------------------------------------------------------------------------

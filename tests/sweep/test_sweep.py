@@ -156,18 +156,6 @@ def test_damaged_numbers_are_mended_with_series_as_exact_as_they_were(
         assert verify(tmp_path / "out") == []
 
 
-def test_a_run_reads_no_series_and_mends_what_verify_has_found(studies, tmp_path, in_process):
-    made = studies(one={})
-    sweep(made, tmp_path / "out", 1)
-    (path,) = tmp_path.glob("out/batches/*.h5")
-    flip(path, store.read_job(tmp_path / "out", made[0].cases[0].key).acceleration.values)
-    assert sweep(made, tmp_path / "out", 1).run_now == 0
-    (damage,) = verify(tmp_path / "out")
-    assert damage.path == path
-    assert sweep(made, tmp_path / "out", 1).run_now == 1
-    assert verify(tmp_path / "out") == []
-
-
 HARM = {  # by load and rod mass: the reason, the detail
     ("none", 4): ("internal_error", "KeyError: 'the bug'"),
     ("none", 5): ("worker_died", ".*SIGSEGV.*ran again alone"),
@@ -194,13 +182,6 @@ def test_jobs_that_do_harm_are_failed_jobs(studies, tmp_path, monkeypatch):
     reasons = [reason for reason, _ in HARM.values()]
     assert found.reason.values.ravel().tolist() == [*reasons, ""]
     assert np.isnan(found.peak_acceleration).values.ravel().tolist() == [True] * 3 + [False]
-
-
-def test_a_job_that_ran_out_of_time_is_tried_again(studies, tmp_path, in_process):
-    for _ in range(2):
-        summary = sweep(studies(one=LATE), tmp_path / "out", 1)
-        assert summary.run_now == 1
-        assert summary.failed[0].reason == "budget_seconds"
 
 
 @pytest.fixture
@@ -230,16 +211,6 @@ def test_each_part_is_compiled_by_itself(uncompiled, monkeypatch):
     for text, seconds in zip(told, ("55 s", "28 s"), strict=True):
         assert text.startswith(f"compiling the equations, for about {seconds}, or longer on a slow")
     assert not needs.uncompiled
-
-
-def test_a_switch_against_compiling_is_told(uncompiled, monkeypatch):
-    told = []
-    warm_up.compile_once(warm_up.Needs(("auto",), ("plain",)), str)
-    for value in ("0", "1"):
-        monkeypatch.setenv("NUMBA_DISABLE_JIT", value)
-        warm_up.compile_once(warm_up.Needs(("auto",), ("plain",)), told.append)
-    (text,) = told
-    assert text.startswith("NUMBA_DISABLE_JIT is set: nothing is compiled")
 
 
 def test_only_what_cases_need_is_compiled(uncompiled):
