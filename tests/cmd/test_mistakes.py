@@ -70,6 +70,7 @@ MISTAKES = [
     ("show wear clearance=0.1", "wear has no axis 'clearance'; did you mean clearance_mm"),
     ("show wear clearance_mm=0.25", "no job of wear has clearance_mm=0.25; there are 0.1, 0.2"),
     ("show wear 0.1", "'0.1' is no AXIS=VALUE of wear; its axes are clearance_mm"),
+    ("show wear load=none", "wear has no axis 'load'; its axes are clearance_mm, machine.rod_"),
     ("show ffffffff", "no job's key begins with 'ffffffff'"),
     ("show wear --json --units plant", "--json has all numbers in SI", "leave out --units plant"),
     *((f"show ab --reversal {text}", "give degrees and percent, such as 30,25")

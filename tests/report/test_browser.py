@@ -70,45 +70,6 @@ def test_the_page_opens_from_disk_and_nothing_breaks(driver, page):
     assert outside == []
 
 
-def test_every_figure_says_what_is_seen(driver, page):
-    opened(driver, page)
-    alts = driver.execute_script("return [...document.images].map(image => image.alt)")
-    assert len(alts) >= 13
-    assert all(len(alt) > 40 for alt in alts)
-    assert len({*alts}) == len(alts)
-
-
-def test_zoom_is_linked_across_panels_that_share_a_scale(driver, page):
-    opened(driver, page)
-    live(driver, "figure-09")
-    ranges = (
-        "const l = document.querySelector('#figure-09 .plot').layout;"
-        "return Object.keys(l).filter(k => /^xaxis/.test(k)).map(k => l[k].range)"
-    )
-    before = driver.execute_script(ranges)
-    driver.execute_script(
-        "Plotly.relayout(document.querySelector('#figure-09 .plot'), {'xaxis.range': [30, 60]})"
-    )
-    after = driver.execute_script(ranges)
-    linked = [n for n, span in enumerate(before) if span == before[0]]
-    assert len(linked) >= 2
-    for n, (old, new) in enumerate(zip(before, after, strict=True)):
-        assert new == ([30, 60] if n in linked else old)
-
-
-def test_hovering_tells_value_and_unit(driver, page):
-    opened(driver, page)
-    live(driver, "figure-08")
-    from selenium.webdriver import ActionChains
-
-    panel = driver.find_element("css selector", "#figure-08 .plot .draglayer .xy .nsewdrag")
-    ActionChains(driver).move_to_element_with_offset(panel, 20, 10).perform()
-    layer = "document.querySelector('#figure-08 .plot .hoverlayer')"
-    told = wait_for(driver, f"return {layer}.textContent")
-    assert re.search(r"no clearance : [\d.]+ mm", told)
-    assert re.search(r"0.2 mm : [\d.]+ mm", told)
-
-
 def test_colours_over_decades_have_ones_and_threes_beside_them(driver, own):
     opened(driver, own)
     ids = driver.execute_script("return [...document.querySelectorAll('figure')].map(f => f.id)")
@@ -122,23 +83,6 @@ def test_colours_over_decades_have_ones_and_threes_beside_them(driver, own):
     for texts, low, high in maps:
         decades = (one * 10.0**ten for ten in range(-9, 10) for one in (1, 3))
         assert [*map(float, texts)] == [v for v in decades if 10**low <= v <= 10**high]
-
-
-def test_curves_can_be_switched_off(driver, page):
-    opened(driver, page)
-    live(driver, "figure-08")
-    toggle = driver.find_element("css selector", "#figure-08 .legendtoggle")
-    from selenium.webdriver import ActionChains
-
-    ActionChains(driver).move_to_element(toggle).click().perform()
-    hidden = (
-        "const names = document.querySelector('#figure-08 .plot').data"
-        ".filter(t => t.visible === 'legendonly').map(t => t.name);"
-        "return names.length && names"
-    )
-    names = wait_for(driver, hidden)
-    assert len(names) > 1  # in each panel
-    assert {*names} == {"no clearance"}
 
 
 def test_tables_sort_and_filter(driver, own):

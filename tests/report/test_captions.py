@@ -189,28 +189,3 @@ def test_a_sensor_and_a_crosshead_are_not_compared():
     alone = [row("0.1", 40.0, is_sensed=False), row("0.2", 642.0, is_sensed=False)]
     assert keep_sensed(alone) == alone
     assert "acceleration of the crosshead" in draw_cycles(alone, "joint").sentence
-
-
-def test_a_map_names_the_marks_that_it_has():
-    def names(events, reversals):
-        vibration = np.ones(360)
-        cycle = Cycle(ANGLES, vibration, True, ANGLES, vibration, reversals, events, {})
-        return listed(draw_cycles([SweptRow("0.1", cycle=cycle)], "clearance").figure)
-
-    assert names(((9.0, "suction opens"),), ()) == ["a valve opens or closes"]
-    cam = names(((9.0, "cam: dwell ends"),), (40.0,))
-    assert cam == ["corner of the load", "rod load changes its side"]
-    assert names((), ()) == []
-
-
-def test_one_row_has_no_least():
-    found = draw_cycles([row("0.1", 40.0)], "clearance (mm)")
-    assert dict(found.numbers)["greatest magnitude"] == "40 m/s²"
-    assert "a row for each value of clearance (mm)" in found.sentence
-
-
-def test_rows_are_jobs_where_values_repeat():
-    rows = [row("0.1", 40.0), row("0.1", 50.0), SweptRow("0.2", problem="failed")]
-    said = draw_cycles(rows, "clearance (mm)").sentence
-    assert "a row for each job, in the order of clearance (mm)" in said
-    assert said.endswith("Not drawn: 1 of 3 jobs (failed).")

@@ -9,7 +9,6 @@ from test_report import read
 
 from compressor.analysis.runs import CLEARANCES, FAULTS, case_of, cases_of, label, paper_cases
 from compressor.cases.case import Case
-from compressor.cases.load import CaseFileError, load_studies
 from compressor.report.figures import FIGURES, pictures
 from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.table import spell
@@ -117,14 +116,6 @@ def test_they_have_their_sections(heavy_store, tmp_path, undrawn):
     assert {*found.jobs} >= {*read_studies(heavy_store)[0].keys}  # its table
 
 
-def test_a_study_that_asks_for_nothing_has_its_sweep(tmp_path, undrawn):
-    folder = add(tmp_path, "heavy", machine=HEAVY, **NINE)
-    write_report(folder, tmp_path / "out")
-    names = {path.stem for path in (tmp_path / "out").glob("*.png")}
-    assert "sweep-heavy-overview" in names
-    assert not names & FILES
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [({"duration_rev": 0.5}, "are not drawn, whose runs do not settle"),
@@ -134,11 +125,3 @@ def test_what_could_not_be_drawn_is_told(tmp_path, changes, words):
     folder = add(tmp_path, "heavy", SHORT | changes, machine=HEAVY, report={"figures": "paper"},
                  joint="small_end", clearance_mm=[*CLEARANCES])  # fmt: skip
     assert words in own(folder).note.text
-
-
-@pytest.mark.parametrize("value", ["papers", True, ["paper"]])
-def test_other_figures_cannot_be_asked_for(tmp_path, value):
-    file = tmp_path / "own.yaml"
-    file.write_text(json.dumps({"report": {"figures": value}}))
-    with pytest.raises(CaseFileError, match=r"report\.figures: needs paper, not"):
-        load_studies(file)

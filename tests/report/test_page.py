@@ -1,18 +1,14 @@
 """The page's templates: they escape every text, lack nothing, and are where all markup stands."""
 
-import ast
 import html
 import html.parser
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
 
-import pytest
-from jinja2 import PackageLoader, UndefinedError
+from jinja2 import PackageLoader
 
 from compressor.analysis.claims import Claim
-from compressor.report import page
 from compressor.report.answer import Assumptions, FirstScreen, MetricChange, Provenance, StudyLine
 from compressor.report.figures.drawing import make_grid
 from compressor.report.inputs import Inputs
@@ -37,27 +33,7 @@ from compressor.report.side_by_side import HealthyAndWorn
 from compressor.report.study_section import JobsContent, StudyContent
 from compressor.store.studies import StoredStudy
 
-ROOT = Path(__file__).parents[2]
-HOME = Path(page.__file__).parent
-SOURCES = [*HOME.rglob("*.py")]
 KINDS = ("word", "number", "code")
-
-
-def strings(source):
-    """The texts of a module, docstrings too; what an f-string puts in is a brace."""
-    tree = ast.parse(source)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.JoinedStr):
-            parts = (n.value if isinstance(n, ast.Constant) else "{" for n in node.values)
-            yield "".join(parts)
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-            yield node.value
-
-
-def markup(source):
-    """The texts of a module that hold a tag or an entity, but for those that plotly reads."""
-    texts = (re.sub(r"</?(br|sub|extra)>", "", text) for text in strings(source))
-    return [text for text in texts if re.search(r"<[/!]|<[A-Za-z{]|&#?\w+;", text)]
 
 
 class Hostile:
@@ -181,23 +157,3 @@ def test_rows_are_marked_and_cells_have_their_class():
         f'<td class="prose">{long}</td><td class="prose"><code>{long}</code></td></tr>',
         "<tr><td></td><td><code>k</code></td></tr>",
     ]
-
-
-def test_a_verdict_has_its_class():
-    claims = [Claim(n, "", "", held) for n, held in enumerate((True, False, None))]
-    text = document([Section("a", "A", "claims.html", claims)])
-    assert re.findall(r"<span.*?</span>", text) == [
-        '<span class="held">held</span>',
-        '<span class="not-held">not held</span>',
-        '<span class="not-measured">not measured</span>',
-    ]
-
-
-def test_a_template_that_lacks_a_value_is_an_error():
-    with pytest.raises(UndefinedError, match="title"):
-        document([Section("a", "A", "study.html", object())])
-
-
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
-def test_no_markup_in_python(path):
-    assert not markup(path.read_text(encoding="utf-8"))

@@ -60,29 +60,6 @@ def test_lines_of_equal_value_lie_where_the_plane_has_them():
     assert all(np.ptp(one[np.isfinite(one)]) < 1e-9 for one in np.split(y, ends) if one.size > 1)
 
 
-def test_a_caption_speaks_of_lines_where_there_are_some():
-    drawn, _, found = traces(grid(AXES, lambda c, n: n + 0 * c))
-    assert "line:" in found
-    assert drawn.caption.startswith("A cell a job; white: lines of equal value")
-    few = {"clearance_mm": [0.1, 0.2, 0.4], "speed_rpm": [300.0, 400.0]}
-    drawn, _, found = traces(grid(few, lambda c, n: n + 0 * c))
-    assert "line:" not in found
-    assert drawn.caption.startswith("A cell a job.")
-
-
-def test_a_caption_names_the_marks_that_are_drawn():
-    status = np.full((4, 3), "ok", dtype="U7")
-    drawn, _, _ = traces(grid(AXES, lambda c, n: n + c, status=status))
-    assert "job failed" not in drawn.caption
-    status[1, 2] = "failed"
-    drawn, _, _ = traces(grid(AXES, lambda c, n: n + c, status=status))
-    assert "A cross: a job failed here. " in f"{drawn.caption} "
-    regime = np.full((4, 3), "predictable")
-    regime[0, 0] = "chaotic"
-    drawn, _, _ = traces(grid(AXES, lambda c, n: n + c, status=status, regime=regime))
-    assert "A cross: a job failed here; a pink ring: a chaotic job, whose" in drawn.caption
-
-
 def test_a_metric_that_a_job_lacks_is_drawn():
     """It was said to be the same at every job."""
     data = grid(AXES, lambda c, n: n + c)
@@ -100,19 +77,6 @@ def test_jobs_that_failed_with_numbers_are_drawn():
     data = grid(AXES, lambda c, n: n + c)
     data["status"][:] = "failed"
     assert draw_sweep(data)[-1].name == "map"
-
-
-def test_a_few_values_stand_at_their_cells():
-    _, panel, _ = traces(grid(AXES, lambda c, n: n + c))
-    assert dict(zip(panel.x.tickvals, panel.x.ticktext, strict=True)) == {
-        0.1: "0.1", 0.2: "0.2", 0.4: "0.4", 0.5: "0.5"}  # fmt: skip
-    assert panel.y.ticktext == ("300", "400", "500")
-    close = AXES | {"clearance_mm": [0.1, 0.11, 0.4]}  # their texts would overlap
-    _, panel, _ = traces(grid(close, lambda c, n: n + c))
-    assert not panel.x.ticktext
-    many = AXES | {"clearance_mm": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]}
-    _, panel, _ = traces(grid(many, lambda c, n: n + c))
-    assert not panel.x.ticktext
 
 
 def test_failed_and_missing_cells_are_marked():

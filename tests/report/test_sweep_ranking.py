@@ -53,20 +53,6 @@ def test_interactions_are_in_total_effects_alone():
         assert found[axis]["total effect"] == pytest.approx([total] * 2)
 
 
-def test_the_caption_follows_the_numbers():
-    def peak(c, n, load):
-        return 10 + 5 * c + n + 0 * load
-
-    assert (
-        "Peak acceleration: clearance 93 %, speed 7 %" in plan(grid(AXES, peak))["ranking"].caption
-    )
-    data = grid(AXES, peak)
-    data["rms_acceleration"] = data["rms_acceleration"] * 0 + data["speed_rpm"]
-    caption = plan(data)["ranking"].caption
-    assert "Peak acceleration: clearance 93 %, speed 7 %" in caption
-    assert "rms acceleration: speed 100 %, clearance 0 %" in caption
-
-
 def test_jobs_without_a_value_are_told():
     status = np.full((3, 4, 2), "ok", dtype="U7")
     status[1, 1, 0] = "failed"
@@ -139,11 +125,3 @@ def test_of_a_grid_with_large_gaps_nothing_is_ranked():
     assert ranking(sweep_of(data), measures(data)) == {}
     assert "ranking" not in plan(data)
     assert "overview" in plan(data)
-
-
-def test_of_a_large_design_the_first_points_are_told():
-    points = np.array(design("saltelli", 2048, 2, 1))
-    columns = {"clearance_mm": points[:, 0], "speed_rpm": points[:, 1]}
-    drawn = plan(listed(columns, 1 + points[:, 0] + 3 * points[:, 1]))["ranking"]
-    assert "of the first 1,024 whole blocks" in drawn.caption
-    assert bars(drawn)["speed"]["total effect"] == pytest.approx([90, 90], abs=1)

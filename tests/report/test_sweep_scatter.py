@@ -4,7 +4,6 @@ import time
 
 import numpy as np
 import pytest
-from conftest import listed as legend
 from swept_made import listed
 
 from compressor.report.figures.drawing import panels_of
@@ -54,18 +53,6 @@ def test_words_are_colours():
     one = traces(panel)
     assert one["load spring"].y == pytest.approx(values[::2])
     assert one["load gas"].marker.color != one["load spring"].marker.color
-
-
-def test_a_caption_speaks_of_what_is_drawn():
-    """Of four jobs there is no ranking."""
-    few = plan(listed({name: values[:4] for name, values in COLUMNS.items()}, SPEED[:4]))["points"]
-    assert few.caption == "Every metric over a key, a point a job."
-    assert legend(few.figure) == ["a job"]
-    assert few.title == "metrics over a key"
-    load = np.array(["spring", "gas"] * 30)
-    found = plan(listed(COLUMNS | {"load": load}, np.where(load == "spring", SPEED, 9 - SPEED)))
-    assert found["points"].caption.startswith("Every metric over the number that matters most for")
-    assert "over each number, a point a job" in found["scatter"].caption
 
 
 def test_what_is_not_known_is_marked():
