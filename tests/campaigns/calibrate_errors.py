@@ -7,8 +7,6 @@ how long they would be. From these the shares of `compressor.metrics` and
 `compressor.solve.error_bars` were chosen; `make accuracy` judges them on other seeds.
 """
 
-import json
-
 import numpy as np
 from joblib import Parallel, delayed
 from measure_accuracy import CONTACT, EXACT, percentiles
@@ -110,7 +108,6 @@ def main(target, jobs=2, cases=350):
         },
     }  # fmt: skip
     keep(target, result, 4)
-    print(json.dumps(result, indent=1))
 
 
 if __name__ == "__main__":

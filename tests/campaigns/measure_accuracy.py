@@ -6,7 +6,6 @@ reference of reference.py; 1,000 random cases, of seeds that chose nothing, by o
 after settling. Cases that say they are chaotic are confirmed by a shifted run at rtol 1e-12.
 """
 
-import json
 import time
 from collections import Counter
 
@@ -216,7 +215,6 @@ def main(target, jobs=2, count=334, seeds=SEEDS):
         "broken": {word: broken(word, cases, measured) for word in ACCURACY},
     }
     keep(target, result, 4)
-    print(json.dumps({"words": words, "bars": bars}, indent=1))
 
 
 if __name__ == "__main__":

@@ -121,7 +121,6 @@ def main(target, machines=MACHINES, seed=SEED, jobs=2):
         "others": kept,
     }  # fmt: skip
     keep(target, result)
-    print(json.dumps(result, indent=1))
 
 
 if __name__ == "__main__":

@@ -1,12 +1,11 @@
 """Inject faults, many of each kind, and count what did not survive: the campaigns of chaos/.
 
-    python tests/campaigns/measure_chaos.py [--sample] [--only NAME]... OUT.json        (make chaos)
+    python tests/campaigns/measure_chaos.py [--only NAME ...] OUT.json        (make chaos)
 
 Each campaign's result takes its place in the file as soon as it ends; the others stay, so that
 campaigns can be repeated one by one. Exit code 1 if anything failed. The power cuts need root.
 """
 
-import argparse
 import importlib
 import json
 import shutil
@@ -14,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from measure_accuracy import provenance
+from result_pages import keep, provenance, run_campaign
 
 SEED = 1
 FAST = Path("/dev/shm")  # in memory, where there is one: what is tried is not the disk
@@ -39,31 +38,20 @@ def run(name, sample, seed=SEED):
         shutil.rmtree(place, ignore_errors=True)
 
 
-def kept(path):
-    """What an earlier call left in the file."""
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"campaigns": {}}
-
-
-def main(target, names, sample):
-    failed = 0
-    for name in names:
+def main(target, only=()):
+    failed, path = 0, Path(target)
+    for name in only or CAMPAIGNS:
         print(f"{name} ...", file=sys.stderr, flush=True)
         made = provenance(f"make chaos, or python tests/campaigns/measure_chaos.py --only {name}")
-        found = {**run(name, sample), "sample": sample, "seed": SEED, **made}
-        others = kept(target)["campaigns"] | {name: found}
-        ordered = {n: others[n] for n in CAMPAIGNS if n in others}
-        target.write_text(json.dumps({"campaigns": ordered}, indent=1) + "\n", encoding="utf-8")
+        found = {**run(name, False), "sample": False, "seed": SEED, **made}
+        earlier = json.loads(path.read_text("utf-8"))["campaigns"] if path.exists() else {}
+        others = earlier | {name: found}
+        keep(target, {"campaigns": {one: others[one] for one in CAMPAIGNS if one in others}})
         print(f"{name}: {found['failed']} of {found['trials']} failed, {found['seconds']} s")
-        for text in found["failures"]:
-            print(text)
+        print(*found["failures"], sep="\n")
         failed += found["failed"]
-    return 1 if failed else 0
+    sys.exit(1 if failed else 0)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("target", type=Path, help="file to write")
-    parser.add_argument("--only", action="append", choices=CAMPAIGNS, help="a campaign")
-    parser.add_argument("--sample", action="store_true", help="some trials of each")
-    asked = parser.parse_args()
-    sys.exit(main(asked.target, asked.only or [*CAMPAIGNS], asked.sample))
+    run_campaign(main)

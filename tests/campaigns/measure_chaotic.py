@@ -8,7 +8,6 @@ one by SciPy. Its error is by batch means: revolutions follow on each other, so 
 no independent draws. Writes a small JSON file.
 """
 
-import json
 import math
 from collections import Counter
 
@@ -102,7 +101,6 @@ def random_row(drawn, wanted):
 def main(target, drawn=DRAWN, wanted=WANTED):
     kept = {**provenance("make chaotic"), "random": random_row(drawn, wanted)}
     keep(target, kept, 4)
-    print(json.dumps(kept, indent=1))
 
 
 if __name__ == "__main__":

@@ -137,7 +137,6 @@ def main(target, folder="identify", count=STUDY, many=JUDGED, seeds=(SEED, JUDGE
         "models": kept,
     }  # fmt: skip
     keep(target, result, 4)
-    print(json.dumps(result, indent=1))
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ it. Errors are against the reference of reference.py. What is not installed, or 
 row with its reason.
 """
 
-import json
 import os
 import sys
 import time
@@ -182,7 +181,6 @@ def main(target):
     kept["versions"] |= versions()
     kept |= {"rounds": ROUNDS, "agreement": checks, "rows": rows}
     keep(target, kept, 3)
-    print(json.dumps(rows, indent=1))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ working directory, so that its disk is what is measured. Series are of a default
 
 import dataclasses
 import hashlib
-import json
 import shutil
 import statistics
 import tempfile
@@ -143,7 +142,6 @@ def main(target, jobs=100_000):
     finally:
         shutil.rmtree(place)
     keep(target, kept)
-    print(json.dumps(kept, indent=1))
 
 
 if __name__ == "__main__":

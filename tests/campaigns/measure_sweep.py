@@ -184,7 +184,6 @@ def main(target, jobs=JOBS):
         "open_study_s": round(opened, 3),
     }
     keep(target, kept)
-    print(json.dumps(kept, indent=1))
 
 
 if __name__ == "__main__":
