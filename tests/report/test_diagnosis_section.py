@@ -9,6 +9,7 @@ from compressor.analysis.runs import CLEARANCES, FAULTS, label
 from compressor.analysis.shaking import frame_forces
 from compressor.report.figures import FIGURES
 from compressor.report.figures.diagnosis import BIN, NEEDS, measure_shaking
+from compressor.report.figures.drawing import panels_of
 from compressor.report.paper_sections import diagnosis_sections, draw_paper, force_table
 
 KEPT = slice(1200, 4800)  # three settled revolutions
@@ -70,6 +71,17 @@ def test_both_shares_are_told(drawn, paper_runs, found):
     whole = np.sqrt(np.mean(profile[:-1] ** 2))
     assert profile.size == 360 / BIN + 1
     assert whole == pytest.approx(rms(high(paper_runs["big_end 0.1"])), rel=5e-3)
+
+
+def test_no_shared_scale_has_an_open_end(drawn):
+    """Plotly would show -1 to 4 of it, whatever is drawn."""
+    for shown in drawn.values():
+        axes = [axis for panel in panels_of(shown.figure) for axis in (panel.x, panel.y)]
+        assert not [axis for axis in axes if axis.matches and None in (axis.range or ())]
+    *_, (low, high) = (one.y.range for one in panels_of(shown.figure)[::2])
+    drawn_to = max(one.y.max() for one in shown.figure.data if (one.name or "").endswith(" mm"))
+    assert low == 0
+    assert drawn_to < high < 1.1 * drawn_to
 
 
 def test_the_table_has_every_case(found, paper_runs):

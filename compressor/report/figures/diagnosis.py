@@ -21,7 +21,7 @@ from compressor.analysis import (
     shaking,
 )
 from compressor.report.figures.curves import Runs
-from compressor.report.figures.drawing import WAYS, Panel, make_grid
+from compressor.report.figures.drawing import ROOM, WAYS, Panel, make_grid
 from compressor.report.figures.job import (
     ORDERS_AXIS,
     list_modes,
@@ -138,13 +138,14 @@ def draw_angles(runs: Runs, units: Units = "usual") -> DrawnFigure:
     )
     for joint, profile, strip in zip(SINGLE_FAULTS, panels[::2, 0], panels[1::2, 0], strict=True):
         plot_profiles(profile, found, joint)
-        profile.span("y", low=0)
         mark_turns(profile, found[label(joint, CLEARANCES[-1])])
         rows = [SweptRow(f"{c:g}", modes=angle_modes(runs[label(joint, c)])) for c in CLEARANCES]
         plot_modes(strip, rows_modes(rows)[joint])
         strip.name_ticks("y", [row.value for row in rows])
         strip.y.title = "mm"
         strip.title = f"contact mode, clearance at the {SPOKEN[joint]}"
+    top = max(trace.y.max() for one in panels[::2, 0] for trace in one.traces)
+    panels[0, 0].y.range = (0.0, (1.0 + ROOM) * top)  # plotly shares no scale with an open end
     panels[2, 0].y.matches = f"y{panels[0, 0].suffix}"
     for panel in drawing.panels:
         show_turn(panel)

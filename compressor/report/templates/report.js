@@ -232,9 +232,17 @@ class Figure {
       ({ name: `x${key.slice(5)}`, x: layout[key], y: layout[key.replace("x", "y")] }));
     panels.sort((a, b) => b.y.domain[0] - a.y.domain[0] || a.x.domain[0] - b.x.domain[0]);
     const columns = new Set(panels.map(({ x }) => x.domain[0])).size;
+    const isNarrow = width < Math.max(560, 190 * columns);
     const { margin } = layout;
+    panels.forEach(({ x, y }) => {
+      const long = Math.max(1, ...(y.ticktext ?? []).map((text) => text.length));
+      const size = Math.max(8, Math.min(12, 0.4 * width / (LETTER * long)));
+      y.tickfont = { size };
+      const words = LETTER * size * long + (y.title?.text ? 30 : 12);
+      if (isNarrow || !x.domain[0]) margin.l = Math.max(margin.l, words);
+    });
     const across = width - margin.l - margin.r;
-    if (width < Math.max(560, 190 * columns)) {
+    if (isNarrow) {
       const total = panels.length * 250 - 70;
       layout.height = total + margin.t + margin.b;
       panels.forEach(({ name, x, y }, n) => {
@@ -256,14 +264,12 @@ class Figure {
       ticks: "outside", ticklen: 3, tickcolor: faint, exponentformat: "power", tickangle: 0 };
     panels.forEach(({ name, x, y }) => {
       const room = across * (x.domain[1] - x.domain[0]);
-      const long = Math.max(1, ...(y.ticktext ?? []).map((text) => text.length));
-      y.tickfont = { size: Math.max(8, Math.min(12, 0.4 * width / (LETTER * long))) };
       y.automargin = "left";
       [[x, room], [y, 250]].forEach(([one, most]) => {
         const text = one.title?.text ?? "";
         // a title that is longer than its axis has smaller letters
         const size = Math.max(9, Math.min(12, most / (LETTER * Math.max(1, text.length))));
-        one.title = { text, font: { size }, standoff: 6 };
+        one.title = text ? { text, font: { size }, standoff: 6 } : undefined; // "" takes room, too
       });
       if (x.dtick) {
         x.dtick *= Math.ceil(40 * (x.range[1] - x.range[0]) / x.dtick / room);
