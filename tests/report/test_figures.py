@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from matplotlib.colors import to_rgb
 
-from compressor.analysis import cam
+from compressor.analysis.cam import Cam
 from compressor.analysis.runs import paper_cases
 from compressor.report.figures import FIGURES, curves, pictures, style
 from compressor.report.figures.drawing import panels_of
@@ -145,18 +145,18 @@ def test_pressure_volume(drawn, paper_runs):
 
 def test_cam(drawn):
     contour, follower = panels_of(drawn[4])
-    p = record(paper_cases()["design"])
+    cam = Cam(record(paper_cases()["design"]))
     turn = np.radians(np.linspace(0, 360, 1441))
     path, circle = lines(contour)
     assert np.hypot(*circle) == pytest.approx(200)
-    np.testing.assert_allclose(path, np.multiply(cam.contour(p, turn, 0.2), 1000), atol=1e-9)
+    np.testing.assert_allclose(path, np.multiply(cam.contour(turn, 0.2), 1000), atol=1e-9)
     assert contour.y.scaleanchor == "x"
     before, after = (one for one in follower.traces if one.name == "as printed, Eq. 10")
     (closed,) = (one for one in follower.traces if one.name == "closed cam, as simulated")
-    np.testing.assert_allclose(closed.y, cam.cam_profile(p, turn) * 1000, atol=1e-9)
+    np.testing.assert_allclose(closed.y, cam.follower(turn) * 1000, atol=1e-9)
     for printed in (before, after):
         angle = np.radians(printed.x)
-        np.testing.assert_allclose(printed.y, cam.printed_profile(p, angle) * 1000)
+        np.testing.assert_allclose(printed.y, cam.printed_follower(angle) * 1000)
     assert before.y.max() == pytest.approx(208.7, abs=0.05)
     assert after.y.max() == pytest.approx(81.3, abs=0.05)
     words = " ".join(note.text for note in follower.notes)

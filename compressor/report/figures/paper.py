@@ -330,7 +330,7 @@ def draw_pressure_volume(runs: Runs, units: Units = "usual") -> DrawnFigure:
         "Cylinder pressure over gas volume in the typical model, from the stored piston force and "
         "displacement; arrows point in the direction of time."
     )
-    used, exact = load_corners(runs["typical"]), Cam(runs["typical"]).gas_corners
+    used, exact = load_corners(runs["typical"]), Cam.of(runs["typical"]).gas_corners
     numbers = [
         ("the phases change at", spell_angles(used)),
         ("off the ideal gas's corners by up to", spell_angles(np.abs(used - exact).max())),
@@ -372,7 +372,7 @@ def draw_cam(runs: Runs, units: Units = "usual") -> DrawnFigure:
 
     Beside the displacement stands the one that Eq. 10 gives as printed.
     """
-    cam = Cam(runs["design"])
+    cam = Cam.of(runs["design"])
     angles = np.radians(np.linspace(0, 360, 1441))
     drawing, panels = make_grid(1, 2, 4.9, widths=(1, 1.25), units=units)
     draw_contour(panels[0, 0], cam, angles)
@@ -386,7 +386,7 @@ def draw_cam(runs: Runs, units: Units = "usual") -> DrawnFigure:
     numbers = [
         ("as printed it rises and falls by", spell([1e3 * rise, 1e3 * fall], "mm")),
         ("the closed cam, each way, by", spell(1e3 * cam.height, "mm")),
-        ("both are the same from", spell_angles(cam.printed_fall)),
+        ("both are the same from", spell_angles(cam.gas_corners[2])),
     ]
     return DrawnFigure(drawing.figure(), sentence, numbers)
 
@@ -426,7 +426,7 @@ def draw_follower(panel: Panel, cam: Cam, angles: np.ndarray) -> None:
     """Draw the follower displacement of the closed cam, and of Eq. 10 taken literally."""
     panel.label("x", "cam angle (°)")
     panel.label("y", "s ({})", "mm")
-    fall = cam.printed_fall
+    fall = cam.gas_corners[2]
     before, after = angles[angles < fall], np.append(fall, angles[angles >= fall])
     for part in (before, after):
         s = cam.printed_follower(part) * 1e3
