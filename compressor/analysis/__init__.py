@@ -10,6 +10,7 @@ from compressor.analysis.contacts import (
     contact_modes,
     impacts,
     joints_with_clearance,
+    measure_orbit,
     mode_shares,
 )
 from compressor.analysis.cycle import Cycle, read_cycle, read_loads
@@ -26,7 +27,6 @@ from compressor.analysis.machine_numbers import (
     describe_machine,
 )
 from compressor.analysis.margins import mean_peak
-from compressor.analysis.orbit import orbit
 from compressor.analysis.runs import (
     CLEARANCES,
     FAULTS,
@@ -55,6 +55,7 @@ from compressor.analysis.shaking import (
     healthy_body_velocity_rms,
     healthy_twin,
     last_revolution,
+    near_a_turn,
     sensor_envelope,
     shaking,
 )

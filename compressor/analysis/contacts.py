@@ -19,8 +19,8 @@ modes are told apart in samples:
 """
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -114,32 +114,35 @@ def contact_spans(series: ContactSeries) -> list[ContactSpan]:
     return found
 
 
-def flights(series: ContactSeries) -> np.ndarray:
-    """Return which samples are in flight, (m,) booleans.
+class Orbit(NamedTuple):
+    """How a journal goes round its bore.
 
-    A flight has no contact and is off the bore at some time. A contact that is lost and found again
-    within the penetration leaves no flight.
+    `laps`: turns of the eccentricity in a revolution of the crank, counter-clockwise; to a whole
+    one where the journal passes near the centre between two samples. `off_wall`: share of samples
+    with the journal off its bore.
     """
-    flying = series.normal <= 0
-    edges = np.flatnonzero(np.diff(flying, prepend=False, append=False)).reshape(-1, 2)
-    for begin, beyond in edges.tolist():
-        flying[begin:beyond] = (series.depth[begin:beyond] < 0).any()
-    return flying
+
+    laps: float
+    off_wall: float
+
+
+def measure_orbit(run: "xr.Dataset", joint: str) -> Orbit:
+    """Return the `Orbit` of a joint with clearance after settling."""
+    series = contact_series(settled_part(run), joint)
+    turned = np.unwrap(np.arctan2(series.place[:, 1], series.place[:, 0]))
+    laps = (turned[-1] - turned[0]) / (series.angle[-1] - series.angle[0])
+    return Orbit(float(laps), float((series.depth < 0).mean()))
 
 
 STENCIL = 4  # samples that the journal's path before first touch is a polynomial through
 WORK_SAMPLES = 16  # points a sample step in which force times rate is summed
-COLUMNS = {  # over impact: unit, long name
-    "joint": ("", "joint of the impact"),
-    "time": ("s", "time of first touch"),
-    "crank_angle": ("deg", "crank angle of first touch, from top dead centre, 0 to 360"),
-    "revolution": ("1", "revolution of first touch, the run's first being 1"),
-    "approach_speed": ("m/s", "relative normal speed at first touch"),
-    "duration": ("s", "from first touch until the normal force vanishes"),
-    "impact_duration": ("s", "part of it that is impact and not following"),
-    "impulse": ("N s", "integral of the normal force over the contact"),
-    "lost_energy": ("J", "integral of normal force times penetration rate, less what is stored"),
-    "released": ("1", "whether the contact ended before the run did"),
+COLUMNS: dict[str, type | str] = {  # over impact, SI but for the angle: types
+    "joint": f"U{max(map(len, JOINTS))}",
+    "time": float,  # of first touch
+    "crank_angle": float,  # of first touch, degrees from top dead centre, 0 to 360
+    "revolution": int,  # of first touch, the run's first being 1
+    "approach_speed": float,  # relative normal speed at first touch
+    "lost_energy": float,  # integral of normal force times penetration rate, less what is stored
 }
 
 
@@ -155,11 +158,7 @@ class Impact:
     crank_angle: float
     revolution: int
     approach_speed: float
-    duration: float
-    impact_duration: float
-    impulse: float
     lost_energy: float
-    released: bool
     span: ContactSpan
     follows: int
 
@@ -171,32 +170,24 @@ def impacts(run: "xr.Dataset") -> "xr.Dataset":
     `impact_count`; one that lies between two samples is not seen. `lost_energy` is what the contact
     damping took, the clamp of the force at zero included, since the elastic energy is zero at both
     ends (physics/README.md, Energy); what a contact still stores where the run's end cuts it off is
-    taken from it. Integrals run over the whole contact, which may go on as following contact.
+    taken from it. The integral runs over the whole contact, which may go on as following contact.
     Raises ValueError for a run without time series or clearance.
     """
     import xarray as xr
 
-    found = [one for joint in joints_with_clearance(run) for one in impacts_of(run, joint)]
+    joints = joints_with_clearance(run)
+    found = [one for joint in joints for one in impacts_of(run, contact_series(run, joint))]
     found = [one for one in found if one.time >= run.attrs["settle"] * (1 - 1e-12)]
     found.sort(key=lambda one: one.time)
-    kinds: dict[str, type | str] = {
-        "joint": f"U{max(map(len, JOINTS))}",
-        "revolution": int,
-        "released": bool,
-    }
-    variables = {}
-    for name, (unit, phrase) in COLUMNS.items():
-        values = np.array([getattr(one, name) for one in found], dtype=kinds.get(name, float))
-        attrs = {"units": unit, "long_name": phrase} if unit else {"long_name": phrase}
-        variables[name] = ("impact", values, attrs)
-    return xr.Dataset(variables)
+    return xr.Dataset({
+        name: ("impact", np.array([getattr(one, name) for one in found], dtype=kind))
+        for name, kind in COLUMNS.items()
+    })  # fmt: skip
 
 
-def impacts_of(run: "xr.Dataset", joint: str) -> list[Impact]:
+def impacts_of(run: "xr.Dataset", series: ContactSeries) -> list[Impact]:
     """Return the impacts at one joint over the whole run, start-up included."""
-    series = contact_series(run, joint)
-    p = record_of(run)
-    number = JOINTS.index(joint)
+    p, number = record_of(run), JOINTS.index(series.joint)
     contact = elastic_form(float(p["stiffness"][number]), float(p["clearance"][number]), p)
     mass = float(p["rod_mass"] + p["reciprocating_mass"])
     found = []
@@ -205,11 +196,16 @@ def impacts_of(run: "xr.Dataset", joint: str) -> list[Impact]:
             continue
         begin, speed = touch(series, span)
         longest = contact.impact_time(contact.impact_depth(mass, speed), speed)
-        one = impact(series, span, (begin, speed), longest)
-        if not one.released:  # what is stored elastically is not lost
-            stored = contact.energy(float(series.depth[-1]))
-            one = replace(one, lost_energy=one.lost_energy - stored)
-        found.append(one)
+        lost = contact_work(series, span, begin, release(series, span))
+        if span.last + 1 == series.time.size:  # what is stored elastically is not lost
+            lost -= contact.energy(float(series.depth[-1]))
+        turns = np.interp(begin, series.time, series.angle) / (2 * np.pi)
+        found.append(
+            Impact(
+                series.joint, begin, float(360.0 * (turns % 1.0)), int(turns) + 1, speed, lost,
+                span, following_from(series, span, begin + longest),
+            )
+        )  # fmt: skip
     return found
 
 
@@ -257,32 +253,6 @@ def release(series: ContactSeries, span: ContactSpan) -> float:
     return float(time[last] + step * min(1.0, share))
 
 
-def impact(
-    series: ContactSeries, span: ContactSpan, touched: tuple[float, float], longest: float
-) -> Impact:
-    """Return the impact of a contact, from its first touch (s, m/s); `longest`: it may last, s."""
-    begin, speed = touched
-    end = release(series, span)
-    follows = following_from(series, span, begin + longest)
-    time = series.time
-    impulse, lost = impulse_and_loss(series, span, begin, end)
-    turns = np.interp(begin, time, series.angle) / (2 * np.pi)
-    return Impact(
-        series.joint,
-        begin,
-        float(360.0 * (turns % 1.0)),
-        int(turns) + 1,
-        speed,
-        end - begin,
-        (end if follows > span.last else min(end, float(time[follows]))) - begin,
-        impulse,
-        lost,
-        span.last + 1 < time.size,
-        span,
-        follows,
-    )  # fmt: skip
-
-
 def following_from(series: ContactSeries, span: ContactSpan, until: float) -> int:
     """Return the first sample of a contact that is no longer impact.
 
@@ -300,10 +270,8 @@ def following_from(series: ContactSeries, span: ContactSpan, until: float) -> in
     return max(span.first + 1, min(beyond, late))
 
 
-def impulse_and_loss(
-    series: ContactSeries, span: ContactSpan, begin: float, end: float
-) -> tuple[float, float]:
-    """Return the impulse (N s) and lost energy (J) of a contact from `begin` to `end`, s.
+def contact_work(series: ContactSeries, span: ContactSpan, begin: float, end: float) -> float:
+    """Return normal force times penetration rate of a contact, summed from `begin` to `end` (s), J.
 
     The force is a monotone cubic (Fritsch and Carlson) through the samples in contact and zero at
     both ends; the journal's path is a cubic spline through them and two samples on either side.
@@ -319,14 +287,14 @@ def impulse_and_loss(
     if end - time[-1] > least:
         time, normal = np.append(time, end), np.append(normal, 0.0)
     if time.size < 2:
-        return 0.0, 0.0
+        return 0.0
     force = PchipInterpolator(time, normal)
     around = slice(max(0, span.first - 2), span.last + 3)
     path = CubicSpline(series.time[around], series.place[around])
     fine = np.linspace(time[0], time[-1], WORK_SAMPLES * (time.size - 1) + 1)
     place = path(fine)
     rate = (place * path(fine, 1)).sum(axis=1) / np.linalg.norm(place, axis=1)
-    return float(force.integrate(time[0], time[-1])), float(np.trapezoid(force(fine) * rate, fine))
+    return float(np.trapezoid(force(fine) * rate, fine))
 
 
 MODES = ("flight", "impact", "following")
@@ -334,115 +302,83 @@ MODES = ("flight", "impact", "following")
 OILED_MODES = ("film alone", "dry contact begins", "dry contact")
 FLIGHT, IMPACT, FOLLOWING = range(len(MODES))
 UNKNOWN = -1  # of a bin without samples
+BINS = 360  # of the crank angle, a degree each
 
 
 def contact_modes(run: "xr.Dataset") -> "xr.Dataset":
     """Return the mode of each joint with clearance after settling: `mode` over (time, joint).
 
-    Integers with their meanings in `flag_values` and `flag_meanings`; `time` has the crank angle
-    (rad) as a coordinate. Raises ValueError for a run without time series or clearance.
+    It is the number of one of `MODES`; `time` has `crank_angle` (rad) as a coordinate. Raises
+    ValueError for a run without time series or clearance.
     """
     import xarray as xr
 
-    joints = [*joints_with_clearance(run)]
-    columns = [modes_of(run, joint) for joint in joints]
-    one = contact_series(run, joints[0])
-    attrs = {
-        "units": "1",
-        "long_name": "contact mode",
-        "flag_values": np.arange(len(MODES), dtype=np.int8),
-        "flag_meanings": " ".join(MODES),
+    each = [contact_series(run, joint) for joint in joints_with_clearance(run)]
+    modes = np.stack([modes_of(run, series) for series in each], axis=1)
+    where = {
+        "time": each[0].time,
+        "crank_angle": ("time", each[0].angle),
+        "joint": [series.joint for series in each],
     }
-    angle = {"units": "rad", "long_name": "crank angle from top dead centre"}
-    whole = xr.Dataset(
-        {"mode": (("time", "joint"), np.stack(columns, axis=1), attrs)},
-        {
-            "time": ("time", one.time, {"units": "s", "long_name": "time"}),
-            "crank_angle": ("time", one.angle, angle),
-            "joint": ("joint", list(joints)),
-        },
-        {"settle": run.attrs["settle"]},
-    )
-    return settled_part(whole)
+    settle = {"settle": run.attrs["settle"]}
+    return settled_part(xr.Dataset({"mode": (("time", "joint"), modes)}, where, settle))
 
 
-def modes_of(run: "xr.Dataset", joint: str) -> np.ndarray:
-    """Return the mode of a joint at each sample of the whole run, (m,) integers."""
-    series = contact_series(run, joint)
-    modes = np.where(flights(series), FLIGHT, FOLLOWING).astype(np.int8)
-    for one in impacts_of(run, joint):
+def modes_of(run: "xr.Dataset", series: ContactSeries) -> np.ndarray:
+    """Return the mode of a joint at each sample of the whole run, (m,) integers.
+
+    A flight has no contact and is off the bore at some time. A contact that is lost and found again
+    within the penetration leaves no flight.
+    """
+    modes = np.full(series.time.size, FOLLOWING, np.int8)
+    edges = np.flatnonzero(np.diff(series.normal <= 0, prepend=False, append=False)).reshape(-1, 2)
+    for begin, beyond in edges.tolist():
+        if (series.depth[begin:beyond] < 0).any():
+            modes[begin:beyond] = FLIGHT
+    for one in impacts_of(run, series):
         modes[one.span.first : one.follows] = IMPACT
     return modes
 
 
-def mode_shares(modes: "xr.Dataset") -> "xr.Dataset":
-    """Return the shares of time in each contact mode, from `contact_modes`.
+def mode_shares(run: "xr.Dataset") -> "xr.DataArray":
+    """Return the shares of settled time in each contact mode, over (joint, mode).
 
-    `share` over (joint, mode), and with two joints `combination_share` over (big_end_mode,
-    small_end_mode), nine numbers. Samples stand for the step that they begin.
+    Samples stand for the step that they begin. Raises ValueError as `contact_modes`.
     """
     import xarray as xr
 
-    mode = modes["mode"].isel(time=slice(None, -1)).values
-    each = mode[:, :, None] == np.arange(len(MODES))
-    attrs = {"units": "1", "long_name": "share of time in a contact mode"}
-    found = xr.Dataset(
-        {"share": (("joint", "mode"), each.mean(axis=0), attrs)},
-        {"joint": modes["joint"].values, "mode": list(MODES)},
-    )
-    if mode.shape[1] == 2:
-        both = (each[:, 0, :, None] & each[:, 1, None, :]).mean(axis=0)
-        attrs = {"units": "1", "long_name": "share of time in a combination of contact modes"}
-        dims = [f"{joint}_mode" for joint in modes["joint"].values]
-        found = found.assign_coords({dim: list(MODES) for dim in dims})
-        found["combination_share"] = (dims, both, attrs)
-    return found
+    modes = contact_modes(run)["mode"]
+    each = modes.values[:-1, :, None] == np.arange(len(MODES))
+    where = {"joint": modes["joint"].values, "mode": list(MODES)}
+    return xr.DataArray(each.mean(axis=0), where, ("joint", "mode"))
 
 
 def angle_modes(run: "xr.Dataset") -> "xr.Dataset":
-    """Return `mode_map` of a run's `contact_modes`, in bins of 1 degree.
-
-    Raises ValueError as they do.
-    """
+    """Return `mode_map` of a run's `contact_modes`. Raises ValueError as they do."""
     return mode_map(contact_modes(run))
 
 
-def mode_map(modes: "xr.Dataset", width_deg: float = 1.0) -> "xr.Dataset":
+def mode_map(modes: "xr.Dataset") -> "xr.Dataset":
     """Return the shares of each contact mode over the crank angle, all revolutions together.
 
-    modes: of `contact_modes`. Over bins of `width_deg`, with `angle` (deg, 0 to 360) the middle of
+    modes: of `contact_modes`. Over bins of a degree, with `angle` (deg, 0 to 360) the middle of
     each: `share` over (angle, joint, mode), and `majority` over (angle, joint), the mode with the
     greatest share, the first of equals. A bin without samples has shares of nan and the majority
-    -1. Raises ValueError where the width is no whole part of a revolution.
+    `UNKNOWN`.
     """
     import xarray as xr
 
-    count = round(360.0 / width_deg) if width_deg > 0 else 0
-    if count < 1 or abs(count * width_deg - 360.0) > 1e-6:
-        raise ValueError(f"width_deg = {width_deg:g} is no whole part of 360")
     samples = modes.isel(time=slice(None, -1))
     # a sample on an edge belongs to the bin that begins there, whatever its rounding
-    place = (
-        np.floor(np.degrees(samples["crank_angle"].values) / width_deg + 1e-6).astype(int) % count
-    )
-    counts = np.bincount(place, minlength=count)
+    place = np.floor(np.degrees(samples["crank_angle"].values) + 1e-6).astype(int) % BINS
+    counts = np.bincount(place, minlength=BINS)
     mode = samples["mode"].values
-    shares = np.full((count, mode.shape[1], len(MODES)), np.nan)
+    shares = np.full((BINS, mode.shape[1], len(MODES)), np.nan)
     for joint, number in np.ndindex(shares.shape[1:]):
-        found = np.bincount(place, mode[:, joint] == number, minlength=count)
+        found = np.bincount(place, mode[:, joint] == number, minlength=BINS)
         np.divide(found, counts, out=shares[:, joint, number], where=counts > 0)
     majority = np.where(np.isnan(shares[:, :, 0]), UNKNOWN, np.argmax(shares, axis=2))
-    flags = modes["mode"].attrs | {"long_name": "contact mode that is most frequent"}
-    share = {"units": "1", "long_name": "share of time in a contact mode"}
-    angle = {"units": "deg", "long_name": "crank angle from top dead centre, middle of the bin"}
     return xr.Dataset(
-        {
-            "share": (("angle", "joint", "mode"), shares, share),
-            "majority": (("angle", "joint"), majority.astype(np.int8), flags),
-        },
-        {
-            "angle": ("angle", (np.arange(count) + 0.5) * width_deg, angle),
-            "joint": modes["joint"].values,
-            "mode": list(MODES),
-        },
+        {"share": (("angle", "joint", "mode"), shares), "majority": (("angle", "joint"), majority)},
+        {"angle": np.arange(BINS) + 0.5, "joint": modes["joint"].values, "mode": list(MODES)},
     )

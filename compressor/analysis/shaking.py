@@ -6,6 +6,7 @@ of direction of a joint's force, where the journal crosses its bore and swings o
 the other lies elsewhere.
 """
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -13,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from compressor.analysis.contacts import joints_with_clearance
-from compressor.analysis.orbit import turning_points
 from compressor.analysis.runs import case_of, ideal_motion, record_of, settled_part
 from compressor.cases import Case, with_ideal_joints
 from compressor.solve import SIGNALS, signals_of_scene, simulate
@@ -102,6 +102,7 @@ def healthy_body_velocity_rms(case: Case) -> np.ndarray:
 
 
 ORDER = 12  # of the crank speed: above it the ideal machine's force has next to nothing
+SAME_TURN_DEGREES = 20.0  # changes of sign nearer to each other are one turn
 BEFORE, AFTER = 10.0, 50.0  # degrees about a change of direction that count as belonging to it
 SILENT_SHARE = 1e-9  # of the greatest force: what lies below is rounding
 LEVELS = 5  # of the kurtogram that chooses a sensor's band, at most
@@ -146,10 +147,6 @@ class Shaking:
     near_turns: float
     elsewhere: float
     ring: float
-
-    def is_near_turn(self, angle: np.ndarray) -> np.ndarray:
-        """Return whether crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` a turn."""
-        return near_a_turn(angle, self.turns)
 
 
 def shaking(run: "xr.Dataset") -> Shaking:
@@ -232,6 +229,25 @@ def directions_change(settled: "xr.Dataset") -> tuple[float, ...]:
     crank = np.degrees(settled["crank_angle"].values)
     forces = (settled["contact_force"].sel(joint=joint, axis="x").values for joint in joints)
     return tuple(sorted(turn for force in forces for turn in turning_points(crank, force)))
+
+
+def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
+    """Return the crank angles (degrees, 0 to 360) at which a force changes its sign.
+
+    angle: of the samples, (m,) degrees; changes of several revolutions, and of a force that
+    trembles about zero, are put together where they are nearer than `SAME_TURN_DEGREES`.
+    """
+    at = np.sort(angle[1:][np.diff(np.sign(force)) != 0] % 360.0)
+    if not at.size:
+        return ()
+    groups: list[list[float]] = [[at[0]]]
+    for one, other in itertools.pairwise(at):
+        if other - one > SAME_TURN_DEGREES:
+            groups.append([])
+        groups[-1].append(float(other))
+    if len(groups) > 1 and groups[0][0] + 360.0 - groups[-1][-1] <= SAME_TURN_DEGREES:
+        groups[0] = [one - 360.0 for one in groups.pop()] + groups[0]
+    return tuple(sorted(float(np.mean(group)) % 360.0 for group in groups))
 
 
 def near_a_turn(angle: np.ndarray, turns: tuple[float, ...]) -> np.ndarray:

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 import xarray as xr
-from bouncing import CONTACT, FLIGHT, bounce, pressed, run_of, times
+from bouncing import CONTACT, FLIGHT, TURN, bounce, pressed, run_of, times
 
 from compressor.analysis.contacts import (
     FOLLOWING,
     MODES,
     contact_modes,
     impacts,
+    measure_orbit,
     mode_map,
     mode_shares,
 )
@@ -22,16 +23,13 @@ IMPACTS = CONTACT / (CONTACT + FLIGHT)
 def test_shares_of_known_bounces():
     time = times(0.03, 8)
     run = run_of(time, {"big_end": bounce(time), "small_end": pressed(time)}, settle=0.12)
-    found = mode_shares(contact_modes(run))
-    big, small = found["share"].sel(joint="big_end"), found["share"].sel(joint="small_end")
+    found = mode_shares(run)
+    big, small = found.sel(joint="big_end"), found.sel(joint="small_end")
     assert big.values == pytest.approx([1 - IMPACTS, IMPACTS, 0.0], abs=2e-3)
     assert small.values.tolist() == [0.0, 0.0, 1.0]
-    both = found["combination_share"]
-    assert both.dims == ("big_end_mode", "small_end_mode")
-    assert both.shape == (3, 3)
-    assert float(both.sum()) == pytest.approx(1.0)
-    at = both.sel(big_end_mode="impact", small_end_mode="following")
-    assert float(at) == pytest.approx(IMPACTS, abs=2e-3)
+    big, small = (measure_orbit(run, joint) for joint in ("big_end", "small_end"))
+    assert big.laps == pytest.approx(small.laps) == pytest.approx(TURN * 0.12 / (2 * np.pi))
+    assert (big.off_wall, small.off_wall) == (pytest.approx(1 - IMPACTS, abs=0.01), 0.0)
 
 
 def test_a_landing_that_stays_is_impact_and_then_following():
@@ -70,15 +68,14 @@ def test_a_release_while_pressed_in_is_following():
     assert (found["mode"] == FOLLOWING).all()
 
 
-def map_of(mode, width):
-    """The map of a mode over (time, 1) that begins at top dead centre, 4 samples a degree."""
-    angle = np.radians(np.arange(mode.size) / 4)
+def map_of(mode, step=0.25):
+    """The map of a mode over (time, 1) that begins at top dead centre, samples a step apart."""
+    angle = np.radians(np.arange(mode.size) * step)
     return mode_map(
         xr.Dataset(
             {"mode": (("time", "joint"), mode[:, None].astype(np.int8))},
             {"crank_angle": ("time", angle), "joint": ["big_end"]},
-        ),
-        width,
+        )
     )
 
 
@@ -86,7 +83,7 @@ def test_a_map_puts_revolutions_together():
     """Flight from 90 to 180 degrees in one of three revolutions, following elsewhere."""
     mode = np.full(3 * 1440 + 1, FOLLOWING)
     mode[360:720] = 0
-    found = map_of(mode, 1.0)
+    found = map_of(mode)
     assert found["angle"].values[[0, -1]].tolist() == [0.5, 359.5]
     flight = found["share"].sel(joint="big_end", mode="flight").values
     np.testing.assert_allclose(flight[90:180], 1 / 3)
@@ -94,15 +91,13 @@ def test_a_map_puts_revolutions_together():
     assert (found["majority"] == FOLLOWING).all()
     np.testing.assert_allclose(found["share"].sum("mode"), 1.0)
     mode[1440 + 360 : 1440 + 720] = 0
-    assert (map_of(mode, 1.0)["majority"].values[90:180] == 0).all()
+    assert (map_of(mode)["majority"].values[90:180] == 0).all()
 
 
 def test_bins_without_samples_are_told():
-    found = map_of(np.full(1441, FOLLOWING), 0.125)
+    found = map_of(np.full(181, FOLLOWING), 2.0)
     assert (found["majority"].values[1::2] == -1).all()
     assert np.isnan(found["share"].values[1::2]).all()
-    with pytest.raises(ValueError, match="whole part"):
-        map_of(np.zeros(1441), 7.0)
 
 
 def test_shares_of_a_simulated_run_are_its_metrics():
@@ -111,17 +106,17 @@ def test_shares_of_a_simulated_run_are_its_metrics():
               "contact": {"damping_N_s_per_mm": 1},
               "solve": {"duration_rev": 2, "output_step_deg": 0.1}}  # fmt: skip
     run = simulate(Case.from_values(values))
-    found = mode_shares(contact_modes(run))
+    found = mode_shares(run)
     lost = run["contact_loss_fraction"].values
     assert lost.max() > 0.01
-    np.testing.assert_allclose(found["share"].sel(mode="flight"), lost, atol=1e-3)
+    np.testing.assert_allclose(found.sel(mode="flight"), lost, atol=1e-3)
 
 
 def test_the_paper_s_journals_only_follow(paper_runs):
-    found = mode_shares(contact_modes(paper_runs["both 0.3"]))
-    assert found["share"].sel(mode="following").values.tolist() == [1.0, 1.0]
-    both = found["combination_share"].sel(big_end_mode="following", small_end_mode="following")
-    assert float(both) == 1.0
+    found = mode_shares(paper_runs["both 0.3"])
+    assert found.sel(mode="following").values.tolist() == [1.0, 1.0]
+    for joint, way in (("big_end", 1.0), ("small_end", -1.0)):  # round it once a revolution
+        assert measure_orbit(paper_runs["both 0.3"], joint) == (pytest.approx(way, abs=0.01), 0.0)
 
 
 @pytest.mark.parametrize(("viscosity", "struck"), [(1, 4), (30, 4), (3000, 0)])
@@ -133,6 +128,6 @@ def test_a_film_is_no_contact(viscosity, struck):
         "solve": {"duration_rev": 3, "settle_rev": 1, "accuracy": "draft", "output_step_deg": 0.1},
     }))  # fmt: skip
     assert impacts(run).sizes["impact"] == run["impact_count"].sel(joint="big_end") == struck
-    flight = mode_shares(contact_modes(run))["share"].sel(joint="big_end", mode="flight")
+    flight = mode_shares(run).sel(joint="big_end", mode="flight")
     lost = run["contact_loss_fraction"].sel(joint="big_end")
     assert flight == pytest.approx(float(lost), abs=0.1)

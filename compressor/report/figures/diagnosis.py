@@ -14,10 +14,10 @@ from compressor.analysis import (
     SPOKEN,
     Shaking,
     angle_modes,
-    contact_modes,
     label,
+    measure_orbit,
     mode_shares,
-    orbit,
+    near_a_turn,
     shaking,
 )
 from compressor.report.figures.curves import Runs
@@ -120,10 +120,10 @@ def draw_orbits(runs: Runs, units: Units = "usual") -> DrawnFigure:
     )
     numbers = []
     for joint in SINGLE_FAULTS:
-        each = [orbit(runs[label(joint, c)]).sel(joint=joint) for c in CLEARANCES]
-        off = [100.0 * one["off_wall_share"] for one in each]
+        each = [measure_orbit(runs[label(joint, c)], joint) for c in CLEARANCES]
+        off = [100.0 * one.off_wall for one in each]
         numbers.append((f"off its wall at the {SPOKEN[joint]}, {AT}", spell(off, "% of the time")))
-        laps = [one["laps"] for one in each]
+        laps = [one.laps for one in each]
         numbers.append(("turns a revolution, counter-clockwise positive", spell(laps)))
     return DrawnFigure(drawing.figure(), sentence, numbers)
 
@@ -161,7 +161,7 @@ def draw_angles(runs: Runs, units: Units = "usual") -> DrawnFigure:
         forces = [found[label(joint, c)] for c in CLEARANCES]
         turns = ", ".join(f"{turn:.0f}°" for turn in forces[-1].turns) or "nowhere"
         near, rest = ([getattr(o, n) for o in forces] for n in ("near_turns", "elsewhere"))
-        shares = [mode_shares(contact_modes(runs[label(joint, c)]))["share"] for c in CLEARANCES]
+        shares = [mode_shares(runs[label(joint, c)]) for c in CLEARANCES]
         flight = [100.0 * one.sel(joint=joint, mode="flight") for one in shares]
         numbers += [
             (f"the force at the {SPOKEN[joint]} turns at", turns),
@@ -189,7 +189,7 @@ def plot_profiles(panel: Panel, found: Shakings, joint: str) -> None:
 def mark_turns(panel: Panel, one: Shaking) -> None:
     """Draw where the joint's force turns."""
     fine = np.arange(0.0, 360.0, 0.5)
-    is_near = one.is_near_turn(fine)
+    is_near = near_a_turn(fine, one.turns)
     ends = np.flatnonzero(np.diff(is_near)) + 1
     for part in np.split(np.arange(fine.size), ends):
         if is_near[part[0]]:

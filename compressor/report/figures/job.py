@@ -15,7 +15,6 @@ from compressor.analysis import (
     Cycle,
     angle_modes,
     case_of,
-    contact_modes,
     cylinder_words,
     deviation_spectrum,
     end_states,
@@ -23,8 +22,8 @@ from compressor.analysis import (
     impacts,
     joints_with_clearance,
     last_revolution,
+    measure_orbit,
     mode_shares,
-    orbit,
     read_cycle,
     read_loads,
     sensor_envelope,
@@ -443,16 +442,16 @@ def draw_orbits(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFig
     drawing, panels = make_grid(1, len(joints), 5.4, units=units)
     for panel, joint in zip(panels.flat, joints, strict=True):
         plot_orbit(panel, run, joint)
-    found, (_, revolution) = orbit(run), last_revolution(run)
+    _, revolution = last_revolution(run)
     numbers = []
     for joint in joints:
-        one = found.sel(joint=joint)
+        one = measure_orbit(run, joint)
         deepest = float(revolution["penetration"].sel(joint=joint).max())
-        off = spell(100.0 * one["off_wall_share"], "% of the time")
+        off = spell(100.0 * one.off_wall, "% of the time")
         numbers += [
             (f"{SPOKEN[joint]}, off its wall", off),
             ("deepest, below 0 a gap", spell(MICROMETRE * deepest, "µm")),
-            ("turns a revolution, counter-clockwise positive", spell(one["laps"])),
+            ("turns a revolution, counter-clockwise positive", spell(one.laps)),
         ]
     sentence = "Journal centres in their bores to scale, in the last settled revolution."
     return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)
@@ -501,7 +500,7 @@ def draw_modes(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
         depth.title = f"penetration, {SPOKEN[joint]}, last revolution; below 0 a gap"
     for panel in drawing.panels:
         show_turn(panel)
-    of_time = 100.0 * mode_shares(contact_modes(run))["share"]
+    of_time = 100.0 * mode_shares(run)
     numbers = [
         (f"{word}, {SPOKEN[joint]}", spell(of_time.sel(joint=joint, mode=mode), "%"))
         for joint in joints for mode, word in zip(MODES, words, strict=True)
