@@ -13,8 +13,8 @@ from test_layers import ROOT
 
 from compressor.analysis.machine_numbers import (
     USUAL,
+    describe_cases,
     describe_machine,
-    machine_numbers,
     revolution_loads,
 )
 from compressor.cases.case import Case, with_ideal_joints
@@ -228,10 +228,10 @@ def test_loads_are_those_of_a_run_without_clearance(load):
     case = Case.from_values({"load": load, "machine": {"gravity_m_per_s2": 9.81}})
     loads, run = revolution_loads(with_ideal_joints(case, features=False)), simulate(case)
     _, _, a = exact_motion(loads.angle, 0.12, 0.6, case.omega)
-    assert np.allclose(loads.inertia, -14.0 * a, atol=1e-6)
+    assert np.allclose(loads.rod - loads.gas, -14.0 * a, atol=1e-6)
     peak = float(run["peak_contact_force_axis"].sel(joint="small_end", axis="x"))
     assert np.abs(loads.rod).max() == pytest.approx(peak, rel=1e-5)
-    found = by_name(machine_numbers([case]))
+    found = by_name(describe_cases([case]).numbers)
     assert (f"{load} load, compression" in found) == (load != "none")
 
 
@@ -278,10 +278,9 @@ def test_features_and_clearance_leave_the_sound_machine_as_it_is():
         with_ideal_joints(case, features=False).physics_key
         == replace(plain, friction=None).physics_key
     )
-    two = by_name(machine_numbers([plain, case]))
+    two = by_name(describe_cases([plain, case]).numbers)
     assert two["rod load, tension"].low == two["rod load, tension"].high
 
 
 def test_every_limit_is_of_a_number_that_there_is(read):
-    found = by_name(describe_machine(read(NAMEPLATE)).numbers)
-    assert {*USUAL} == {name for name, one in found.items() if not math.isnan(one.usual_low)}
+    assert {*USUAL} <= {*by_name(describe_machine(read(NAMEPLATE)).numbers)}
