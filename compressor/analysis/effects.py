@@ -208,11 +208,11 @@ def sampled_effects(columns: Sequence[np.ndarray], values: np.ndarray) -> Effect
         first, all_orders = (found[order] for order in ORDERS)
         return Effects("saltelli", first, all_orders, main, total, lost, base)
     known = [good & (c == c) & (c != "" if c.dtype.kind == "U" else True) for c in columns]
-    rows = np.array([correlation(c[n], values[n]) for c, n in zip(columns, known, strict=True)])
+    rows = np.array([correlate_ranks(c[n], values[n]) for c, n in zip(columns, known, strict=True)])
     return Effects("rank", rows[:, 0], main_ends=rows[:, 1:].T, unknown=lost)
 
 
-def correlation(column: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
+def correlate_ranks(column: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
     """Return the correlation of ranks of a key and a quantity with the ends of its 95 % interval.
 
     Of numbers Spearman's, the interval by Bonett and Wright (Psychometrika 65, 2000, 23-28). Of

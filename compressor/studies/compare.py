@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from compressor.analysis import ORDER, faulty_joints
 from compressor.cases import Case, points
 from compressor.digits import align_columns, plural
 from compressor.program import Progress, no_progress
@@ -30,7 +31,6 @@ from compressor.studies.frame import Revolutions, StudyError, by_revolutions
 from compressor.vibration import RecordError, segment_levels
 
 SEGMENTS = 36
-SWING = 12  # order up to which a machine without clearance shakes; the envelope is of what is above
 FINE = 4  # points on a curve for each cycle of its highest order
 MIN_FOR_ERRORS = 3  # revolutions
 # weights in the difference, dB, of the mean revolution's orders, of one less both correlations and
@@ -60,7 +60,7 @@ class Curves:
 
     mean: m/s2 over `angle` (deg), its mean revolution, (m,); peak, rms: m/s2 of each segment,
     averaged over revolutions, (36,); spectrum: m/s2 rms of the orders 1, 2, ..., (orders,);
-    envelopes: m/s2 above order `SWING` of each revolution, averaged over each degree, (n, 360).
+    envelopes: m/s2 above order `ORDER` of each revolution, averaged over each degree, (n, 360).
     """
 
     angle: np.ndarray
@@ -83,7 +83,7 @@ def curves(lines: np.ndarray) -> Curves:
     whole = np.zeros((len(lines), size), complex)  # of the analytic signal
     whole[:, 1 : orders + 1] = lines * (math.sqrt(2.0) * size)
     each = np.fft.ifft(whole, axis=1).real
-    whole[:, : SWING + 1] = 0.0
+    whole[:, : ORDER + 1] = 0.0
     envelopes = np.abs(np.fft.ifft(whole, axis=1)).reshape(len(lines), 360, -1).mean(axis=2)
     angle = np.arange(size) * (360.0 / size)
     levels = np.array([segment_levels(angle, turn, SEGMENTS) for turn in each])
@@ -148,7 +148,7 @@ def _compare(
         return (math.nan,) * len(NUMBERS)
     product, ratio = mean * other_mean.conj(), math.sqrt(powers[0] / powers[1])
     correlation = float(product.real.sum()) / shape
-    if not size:  # nothing above `SWING`
+    if not size:  # nothing above `ORDER`
         return math.nan, correlation, math.nan, ratio
     alike = float((_near_turns(record.shape[1]) @ product).real.max()) / shape
     near = range(-NEAR_DEG, NEAR_DEG + 1)
@@ -321,14 +321,14 @@ def compare_record(
 
 def check_orders(orders: int, what: str) -> None:
     """Raise StudyError where a sampling rate holds too few orders."""
-    if orders <= SWING:
+    if orders <= ORDER:
         text = f"{what}: the sampling rate holds the orders up to {orders} alone"
-        raise StudyError(f"{text}: record with more than {SWING + 1} times 2.56 samples a turn")
+        raise StudyError(f"{text}: record with more than {ORDER + 1} times 2.56 samples a turn")
 
 
 def describe_job(case: Case, swept: Mapping[str, Any]) -> str:
     """Return a job's joint and clearance, and other values that its study sweeps, in words."""
-    ends = {"none": (), "both": ("big_end", "small_end")}.get(case.joint, (case.joint,))
+    ends = () if case.joint == "none" else faulty_joints(case.joint)
     words = [f"{end} {getattr(case.clearance_mm, end):g} mm" for end in ends] or ["no clearance"]
     others = {key: value for key, value in swept.items() if key.split(".")[0] not in UNSAID}
     return ", ".join([*words, *(f"{key} {value}" for key, value in others.items())])
@@ -393,7 +393,7 @@ RECORD = LineStyle(BLACK, linewidth=1.3, zorder=3.0)
 CAPTION = (
     "The record (black) beside the jobs most alike: (a) mean revolution; (b) peak and, paler, rms "
     "of each 10 degrees, on average over revolutions; (c) rms of the orders; (d) envelope above "
-    f"order {SWING}, in the range of all jobs."
+    f"order {ORDER}, in the range of all jobs."
 )
 
 
@@ -426,7 +426,7 @@ def draw_comparison(found: Comparison) -> PlotlyFigure:
     orders.x.title, orders.y.title = "order of the speed", "rms of an order (m/s²)"
     orders.x.type = orders.y.type = "log"
     orders.span("x", 1.0, found.orders)
-    envelope.y.title = f"envelope above order {SWING} (m/s²)"
+    envelope.y.title = f"envelope above order {ORDER} (m/s²)"
     for panel in (segments, envelope):
         panel.span("y", low=0.0)
     for panel, letter in zip(grid.flat, "abcd", strict=True):

@@ -203,8 +203,12 @@ class GrowingStudy:
 
 def replace_settings(overrides: Sequence[str], *new: str) -> list[str]:
     """Return overrides `key=value` with new ones in place of those of the same keys."""
-    keys = {text.partition("=")[0].strip() for text in new}
-    return [text for text in overrides if text.partition("=")[0].strip() not in keys] + [*new]
+    return [*without_keys(overrides, [text.partition("=")[0].strip() for text in new]), *new]
+
+
+def without_keys(overrides: Sequence[str], keys: Sequence[str]) -> list[str]:
+    """Return overrides `key=value` without those of some keys."""
+    return [text for text in overrides if text.partition("=")[0].strip() not in keys]
 
 
 class RecordedJob(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from compressor.analysis.effects import correlation, grid_effects, sampled_effects
+from compressor.analysis.effects import correlate_ranks, grid_effects, sampled_effects
 from compressor.cases.swept import design
 
 
@@ -90,7 +90,7 @@ def test_of_two_words_the_ratio_is_the_correlation():
     rng = np.random.default_rng(2)
     code = rng.integers(2, size=80)
     values = rng.normal(size=80) + code
-    found, low, high = correlation(np.array(["a", "b"])[code], values)
+    found, low, high = correlate_ranks(np.array(["a", "b"])[code], values)
     assert found == pytest.approx(spearmanr(code, values).statistic)
     assert math.isnan(low)
     assert math.isnan(high)
@@ -103,6 +103,6 @@ def test_intervals_of_correlations_hold_as_often_as_they_say():
     held = 0
     for _ in range(400):
         x, noise = rng.normal(size=(2, 60))
-        _, low, high = correlation(x, 0.6 * x + 0.8 * noise)
+        _, low, high = correlate_ranks(x, 0.6 * x + 0.8 * noise)
         held += low <= exact <= high
     assert held / 400 == pytest.approx(0.95, abs=0.033)

@@ -17,7 +17,8 @@ from compsim.screen import DONE, SOME_FAILED
 from result_pages import keep, provenance, run_campaign
 from scipy.stats import binomtest
 
-from compressor.studies.diagnosis.identify import SIDES, Identifier, read_library
+from compressor.metrics import JOINTS as SIDES
+from compressor.studies.diagnosis.identify import Identifier, read_library
 
 STUDY, SEED, JUDGE = 3000, 2103, 2104  # machines of the study; seeds of it and of the judged
 JUDGED = 200

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import interpolate_hours
+from compressor.analysis import faulty_joints, interpolate_hours
 from compressor.cases import Case, Sensor, Wear
 from compressor.metrics import JOINTS
 from compressor.program import PROGRAM, Progress, no_progress
@@ -123,7 +123,7 @@ def read_study(
                 one["body_velocity_rms"] = np.tile(velocity, (count, 1))
             readings[place].append(one)
         joint = case.worn_joint
-        sides = JOINTS if joint == "both" else (joint,)
+        sides = faulty_joints(joint)
         clearance = max(getattr(case.clearance_mm, side, math.nan) for side in sides)
         varied = {k: one for k, one in job.point.items() if k.partition(".")[0] not in NO_DRAW}
         rows += [(joint, clearance, json.dumps(varied, sort_keys=True), job.key)] * count

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from compressor.studies.frame import by_revolutions
+from compressor.analysis import ORDER
+from compressor.studies.frame import by_revolutions, cut_windows
 from compressor.vibration import (
     Record,
     RecordError,
@@ -21,7 +22,6 @@ from compressor.vibration import (
     shape,
 )
 
-SWING = 12.0  # order up to which a machine without clearance shakes
 SECTORS = 24  # of crank angle, 15 degrees each
 BANDS = (0.0, 200.0, 400.0, 700.0, 1100.0, 1700.0, 2300.0, 4000.0, 7000.0)  # edges, Hz
 ENVELOPE = (1700.0, 2300.0)  # Hz: the casing's mode; of another machine give its own
@@ -29,7 +29,7 @@ BEATS = (1, 2, 3, 4)  # orders of the envelope
 SMALLEST = 1e-6  # share that the logarithm of a share is taken of at least
 
 
-ABOVE = f"the energy above order {SWING:g}"
+ABOVE = f"the energy above order {ORDER}"
 FEATURES = {  # name -> phrase
     "level": "log10 of the rms in m/s2",
     "speed": "log10 of the speed in rev/s",
@@ -55,24 +55,22 @@ def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[s
     than two revolutions, pulses that do not increase or lie beyond the samples, and values that are
     not all numbers, or all zero.
     """
-    turned = by_revolutions(Record(times, values, tacho, math.nan), SECTORS)
+    record = Record(times, values, tacho, math.nan)
+    turned = by_revolutions(record, SECTORS)
     even, a_turn, speed = turned.values.ravel(), turned.values.shape[1], turned.speed
-    # from the last sample that is not after the first pulse to the first not before the last one
-    first = max(int(np.searchsorted(times, tacho[0], side="right")) - 1, 0)
-    inside = slice(first, int(np.searchsorted(times, tacho[-1])) + 1)
-    if not np.any(values[inside]):
+    ((_, whole),) = cut_windows(record, len(turned.values))
+    if not np.any(whole.values):
         raise RecordError("the record's values are all zero: they hold no signal")
-    rate = turned.rate
     size, *shapes = shape(even)
     found = {"level": math.log10(size), "speed": math.log10(speed)}
     found |= dict(zip(("crest_factor", "kurtosis", "gini"), shapes, strict=True))
-    high = high_pass_orders(even, a_turn, SWING)
+    high = high_pass_orders(even, a_turn, ORDER)
     each = high.reshape(-1, a_turn)
     energy = float(np.mean(high**2))
     found["energy_angle"] = energy_angle(high) if energy else math.nan
     found["above_swing"] = log_share(energy, float(np.mean(even**2)))
     found["synchronous"] = float(np.mean(each.mean(axis=0) ** 2)) / energy if energy else math.nan
-    found |= bands(values[inside], rate)
+    found |= bands(whole.values, turned.rate)
     sectors = (each**2).mean(axis=0).reshape(SECTORS, -1).sum(axis=1)
     for k, part in enumerate(sectors):
         found[f"sector_{360 * k // SECTORS}"] = log_share(float(part), float(sectors.sum()))

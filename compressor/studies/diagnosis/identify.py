@@ -23,6 +23,7 @@ from sklearn.model_selection import StratifiedGroupKFold, cross_val_predict
 from sklearn.neighbors import KNeighborsRegressor, NearestNeighbors
 
 from compressor.digits import align_columns
+from compressor.metrics import JOINTS
 from compressor.program import Progress, no_progress
 from compressor.store import Folder, find_study
 from compressor.studies.diagnosis.dataset import list_values, name_machine
@@ -34,8 +35,7 @@ MIN_JOBS, MIN_IN_ALL = 30, 200  # jobs of one joint, for it to be identified, an
 FOLDS = 10  # of machines
 LEVEL = 0.9  # of the intervals
 LIMIT = 0.01  # share of the study's own jobs that are as strange as what does not fit
-SIDES = ("big_end", "small_end")
-ENDS = {"none": (), "big_end": (0,), "small_end": (1,), "both": (0, 1)}  # places in SIDES
+ENDS = {"none": (), "big_end": (0,), "small_end": (1,), "both": (0, 1)}  # places in JOINTS
 IDENTIFIED = ("joint", "clearance_mm", "sensor")  # groups of keys that are no caution
 # least spread that a feature counts with: of one that the study does not vary, such as the speed, a
 # record's timing moves the last digits alone (a thousandth is 0.2 % of the speed)
@@ -85,7 +85,7 @@ def read_library(folder: Folder, study: str, progress: Progress = no_progress) -
         except RecordError:
             left["silent_record"] += 1
             continue
-        ends = [getattr(job.case.clearance_mm, side) for side in SIDES]
+        ends = [getattr(job.case.clearance_mm, side) for side in JOINTS]
         rows.append((job.key, job.case.worn_joint, ends, found, name_machine(job.case)))
     if not rows:
         raise no_records(source, left, MIN_REVOLUTIONS)
@@ -296,7 +296,7 @@ class Identifier:
         candidates = []
         for joint in sorted(self.joints, key=lambda joint: -chances[joint]):
             inside = self.clearances[joint].locate(point) if joint in self.clearances else []
-            ends = dict(zip([SIDES[end] for end in ENDS[joint]], inside, strict=True))
+            ends = dict(zip([JOINTS[end] for end in ENDS[joint]], inside, strict=True))
             candidates.append(Candidate(joint, chances[joint], ends))
         p_value, nearest = self.strangeness.judge(point)
         return Identification(

@@ -48,7 +48,7 @@ MORE = 4  # revolutions, beyond two periods, in which points are to repeat
 APART_TOLERANCES = 3.0
 APART_STANDARD_ERRORS = 3.0  # standard errors by which means of chaotic motions differ
 COORDINATES = (*AXES, *(f"{axis}_rate" for axis in AXES))
-SPLANN = (
+MEASURED = (
     "peak_acceleration", "rms_acceleration", "peak_contact_force", "contact_loss_fraction",
 )  # fmt: skip
 
@@ -72,7 +72,7 @@ NUMBERS: dict[str, tuple[tuple[str, ...], str, str]] = {
     "lyapunov_exponent_error": ((), "1/rev", "error of the largest Lyapunov exponent"),
     "settled_rev": ((), "rev", "revolution at this value from which on metrics agree"),
     "revolutions": ((), "rev", "revolutions that the numbers are of"),
-    **{name: (METRICS[name].dims, METRICS[name].unit, METRICS[name].phrase) for name in SPLANN},
+    **{name: (METRICS[name].dims, METRICS[name].unit, METRICS[name].phrase) for name in MEASURED},
     "rms_acceleration_standard_error": ((), "m/s2", "standard error of rms_acceleration"),
     "end_state": (("number",), "1", "motion at the end, as the solver holds it, in SI"),
 }  # fmt: skip
@@ -149,7 +149,7 @@ def run_value(case: Case, state: np.ndarray | None, plan: ValuePlan) -> Row:
     row["section"][: len(points), worn] = points[:, worn]
     measured = run.turns[-count:]
     together = metrics(run.p, merge_tallies(measured))
-    known = {name: together[name] for name in SPLANN} | {
+    known = {name: together[name] for name in MEASURED} | {
         "period": float(period or math.nan),
         "lyapunov_exponent": exponent,
         "lyapunov_exponent_error": error,

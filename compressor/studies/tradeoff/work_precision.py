@@ -29,7 +29,7 @@ from compressor.report import (
     rectangle,
 )
 from compressor.store import Folder, read_job, read_store
-from compressor.studies.frame import MAX_NAME, StudyError, replace_settings
+from compressor.studies.frame import MAX_NAME, StudyError, replace_settings, without_keys
 from compressor.sweep import Options, sweep
 
 ENDING = "-tradeoff"  # of the study's name
@@ -89,11 +89,6 @@ def load_methods(
     texts = replace_settings(settings, *overrides)
     (study,) = load_studies(path, overrides=texts)
     return study, texts
-
-
-def without_keys(overrides: Sequence[str], keys: Sequence[str]) -> list[str]:
-    """Return overrides `key=value` without those of some keys."""
-    return [text for text in overrides if text.partition("=")[0].strip() not in keys]
 
 
 def work_precision(folder: Folder, study: Study) -> xr.Dataset:
