@@ -7,6 +7,7 @@ from compressor.metrics import METRICS
 from compressor.outcome import Regime
 from compressor.reasons import Reason
 from compressor.solve.error_bars import (
+    ORDER,
     TIGHTER_FACTOR,
     comparison_run,
     estimate_errors,
@@ -63,8 +64,7 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
             continue
         if not case.wants_bars:
             return now
-        others = comparison_runs(case, now, before, search)
-        estimate_errors(now, *others)
+        others = compare_runs(case, now, before, search)
         excess = excess_over_promise(case, now)
         if excess <= 1.0:
             now.promise = "kept" if has_promise(case) else "none"
@@ -74,25 +74,38 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
             return now
         if rtol < 1.01 * LAST_RTOL or all(one.reason for one in others):
             return fail(case, now, others[0].detail or "no run is tighter")
+        # the next run is compared with this one: farther away than one a little tighter was
+        share = ERROR_AIM / excess * (1.0 if before else 1.0 - TIGHTER_FACTOR**-ORDER)
         before = now
-        tightening = min(max(ratio_of(ERROR_AIM / excess), MIN_TIGHTENING), MAX_TIGHTENING)
+        tightening = min(max(ratio_of(share), MIN_TIGHTENING), MAX_TIGHTENING)
         rtol = max(float(f"{rtol / tightening:.1e}"), LAST_RTOL)
 
 
-def comparison_runs(
+def compare_runs(
     case: Case, now: Solution, before: Solution | None, search: Search
 ) -> list[Solution]:
-    """Return the runs that a run's errors are estimated by: a tighter one, and the one before.
+    """Estimate a run's errors by others, by no more than its promise needs; return these.
 
-    For a first run a looser one where the motion enlarges errors: two may agree by chance.
+    The run before is there; a tighter one follows, and after a first run a looser one where the
+    motion enlarges errors, since two may agree by chance. Where one says that the promise is
+    missed, those after it could only confirm it.
     """
-    runs = [comparison_run(case, now, search.left)]
-    if before is None:
-        looser = looser_comparison_run(case, now, runs[0], search.left)
-        runs += [looser] if looser else []
-    for one in runs:
-        search.count(one.trajectory)
-    return runs + ([before] if before else [])
+    others = [before] if before else []
+    if before and now.rtol > 1.01 * LAST_RTOL:
+        estimate_errors(now, before)
+        if excess_over_promise(case, now) > 1.0:
+            return others
+    tighter = comparison_run(case, now, search.left)
+    search.count(tighter.trajectory)
+    others = [tighter, *others]
+    estimate_errors(now, *others)
+    if before is None and excess_over_promise(case, now) <= 1.0:
+        looser = looser_comparison_run(case, now, tighter, search.left)
+        if looser:
+            search.count(looser.trajectory)
+            others.append(looser)
+            estimate_errors(now, *others)
+    return others
 
 
 def has_promise(case: Case) -> bool:

@@ -10,14 +10,10 @@ from compressor.cases.parameter import ACCURACY, TIGHTEST, first_tolerance
 from compressor.metrics import METRICS, SERIES
 from compressor.solve import error_bars
 from compressor.solve import run as run_module
-from compressor.solve.error_bars import (
-    is_amplified,
-)
+from compressor.solve.error_bars import is_amplified
 from compressor.solve.series import distances
 from compressor.solve.simulate import measure, simulate
-from compressor.solve.solution import (
-    solve,
-)
+from compressor.solve.solution import excess_over_promise, solve
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5}
 BOTH = {"joint": "both", "clearance_mm": 0.2}
@@ -127,18 +123,31 @@ BY_CHANCE = (
 )
 
 
-@pytest.mark.parametrize(("word", "load", "joint", "clearance", "rod", "mass", "rpm"), BY_CHANCE)
-def test_later_runs_that_agree_by_chance_keep_no_promise(
-    word, load, joint, clearance, rod, mass, rpm
-):
+def drawn(word, load, joint, clearance, rod, mass, rpm):
     machine = {"rod_mass_kg": rod, "reciprocating_mass_kg": mass, "speed_rpm": rpm}
-    case = of({"load": load, "joint": joint, "clearance_mm": clearance, "machine": machine},
+    return of({"load": load, "joint": joint, "clearance_mm": clearance, "machine": machine},
               accuracy=word)  # fmt: skip
+
+
+@pytest.mark.parametrize("case", [drawn(*row) for row in BY_CHANCE])
+def test_later_runs_that_agree_by_chance_keep_no_promise(case):
     found = solve(case)
     assert found.promise == "kept" or found.regime == "chaotic"
     if found.promise == "kept":
         exact = run_module.run_at_tolerance(case, TIGHTEST, 60.0, False)
         assert distances(exact.samples, found.samples)["acceleration"] <= case.promise
+
+
+def test_a_run_that_the_one_before_belies_is_compared_with_no_other(asked):
+    case = drawn(*BY_CHANCE[0])
+    found = solve(case)
+    first, beside, missed, kept_at, last = asked
+    tighter = [first / error_bars.TIGHTER_FACTOR, kept_at / error_bars.TIGHTER_FACTOR]
+    assert [beside, last] == pytest.approx(tighter)
+    assert found.rtol == kept_at
+    one, before = (run_module.run_at_tolerance(case, rtol, 60.0, False) for rtol in (missed, first))
+    error_bars.estimate_errors(one, before)
+    assert excess_over_promise(case, one) > 1.0
 
 
 @pytest.mark.parametrize("word", ACCURACY)
