@@ -87,7 +87,8 @@ def values_of(found: "JobReport", row: metrics.Metric, units: Units) -> Iterator
             continue
         if abs(value) < ROUNDING * greatest:  # beside the other joint or axis
             value = error = 0.0
-        text = by_bar(value * factor, error * factor, relative)
+        # a pull of 0 is known, where the rod load keeps to the other side
+        text = by_bar(value * factor, error * factor, relative and value != 0.0)
         if text != UNKNOWN:
             text = f"{text} {unit}".rstrip() + ("" if math.isnan(error) else kind)
             verdict = f", {knock_verdict(value, error)}" if row.name == "knock" else ""
@@ -154,7 +155,7 @@ def reversal_verdict(found: "JobReport", degrees: float, percent: float) -> list
         if math.isinf(bar):
             return [("rod load", "its reversal is not known well enough to be judged")]
         bar = 0.0 if math.isnan(bar) else bar
-        texts.append(by_bar(value, bar) if bar else f"{value:.4g}")
+        texts.append(by_bar(value, bar, relative=False) if bar else f"{value:.4g}")
         clear = value - least
         worst = min(worst, math.copysign(1.0, clear) if clear and abs(clear) >= bar else 0.0)
     word = {1.0: "passes", 0.0: "cannot be distinguished from", -1.0: "fails"}[worst]

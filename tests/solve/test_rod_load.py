@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from compsim import cli
-from compsim.job_text import reversal_verdict
+from compsim.job_text import reversal_verdict, values_of
 from conftest import store
 
 from compressor.cases.case import Case
+from compressor.metrics import NUMBERS
 from compressor.physics import exact_motion
 from compressor.solve.simulate import measure, simulate
 
@@ -188,6 +189,19 @@ def test_a_reversal_that_is_not_known_is_not_judged():
             "rod_load_reversal_share_error": 0.01}  # fmt: skip
     ((_, line),) = reversal_verdict(SimpleNamespace(numbers=near), 15.0, 3.0)
     assert "cannot be distinguished from API 618's 15 degrees and 3 %" in line
+
+
+def test_a_load_without_reversal_is_told_by_its_bounds():
+    """It was "reversal of unknown degrees and unknown %", above a bound of the same angle."""
+    none = {"rod_load_reversal_angle": 0.0, "rod_load_reversal_share": 0.0,
+            "rod_load_reversal_angle_error": 1e-7, "rod_load_reversal_share_error": 5e-8,
+            "peak_rod_load_tension": 0.0, "peak_rod_load_tension_error": 3e-3}  # fmt: skip
+    found = SimpleNamespace(numbers=none)
+    ((_, line),) = reversal_verdict(found, 15.0, 3.0)
+    assert line.startswith("reversal of ≤ 6e-06 degrees and ≤ 5e-06 %: fails API 618's")
+    assert [*values_of(found, NUMBERS["peak_rod_load_tension"], "usual")] == [
+        ("peak rod load tension", "≤ 3e-06 kN")
+    ]
 
 
 def test_show_judges_the_reversal(tmp_path, capsys, monkeypatch):
