@@ -24,7 +24,9 @@ from compressor.program import CompsimError
 IN_MPA = {"mpa": 1.0, "kpa": 1e-3, "bar": 0.1, "psi": 6.894757293168e-3}
 ATMOSPHERE_MPA = 0.101325
 ANGLE = re.compile(r"(crank_)?angle(_deg|_degrees)?")  # names of columns, as `_plain` writes them
-PRESSURE = re.compile(rf"((head|he|crank|ce)_(end_)?)?(pressure|p)_({'|'.join(IN_MPA)})([ag]?)")
+PRESSURE = re.compile(  # of an end, or called so, or both: he_barg, pressure_bar, he_pressure_bar
+    rf"(?=.*_)((head|he|crank|ce)_(end_)?)?((pressure|p)_)?({'|'.join(IN_MPA)})([ag]?)"
+)
 NEEDED = (
     "a card needs crank_angle_deg and pressure_bar, or head_pressure_bar and crank_pressure_bar; "
     "or MPa, kPa, psi, all absolute; with a g, as in pressure_barg, they count from the ambient "
@@ -132,7 +134,7 @@ def _find_columns(path: str, names: Sequence[str], end: str) -> tuple[int, int, 
             number = "no column" if not columns else f"{len(columns)} columns"
             raise CardError(f"{path}: has {number} for the {what}; it has {given}; {NEEDED}")
     place, match = pressures[0]
-    return angles[0], place, IN_MPA[match[5]], match[6] == "g"
+    return angles[0], place, IN_MPA[match[6]], match[7] == "g"
 
 
 def _check_angles(path: str, rows: Sequence[Row]) -> None:

@@ -344,7 +344,7 @@ def card_rules(case: Case) -> Rules:
             yield (
                 f"gas.indicator.{end}",
                 f"is needed with action: {case.gas.action}, the other end being measured; write "
-                "indicator: {head: head.csv, crank: crank.csv}",
+                "indicator: {head: head.csv, crank: crank.csv}; a file of both may stand twice",
             )
             continue
         with contextlib.suppress(CardError):  # of a file that is gone, which a run tells

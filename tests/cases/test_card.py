@@ -204,6 +204,7 @@ def head(path, scale=1.0, more=0.0, name="pressure_MPa", **how):
         ("head_pressure_bara", 10.0, 0.0),
         ("Pressure [kPa]", 1e3, 0.0),
         ("HE Pressure (psi)", 145.0377377, 0.0),
+        ("HE [bar]", 10.0, 0.0),
         ("pressure_barg", 10.0, -1.01325),
         ("head_pressure_psig", 145.0377377, -14.69594878),
     ],
