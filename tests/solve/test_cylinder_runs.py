@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from test_feature_runs import apart
 
 from compressor.analysis.cylinder import end_states
 from compressor.cases.case import Case
@@ -29,11 +30,6 @@ def run(more, **solve):
     found = simulate(Case.from_values(values))
     assert found.status == "ok", found.attrs.get("detail")
     return found
-
-
-def apart(one, other, name="acceleration"):
-    a, b = one[name].values, other[name].values
-    return float(np.linalg.norm(a - b) / np.linalg.norm(a))
 
 
 @pytest.mark.parametrize("method", ["RODAS", "DOP853"])

@@ -19,16 +19,6 @@ def run(**values):
     return simulate(Case.from_values({**LOOSE, **values}))
 
 
-def test_the_body_changes_nothing_of_the_machine():
-    plain, more = run(), run(body=True)
-    measured = {"body_velocity_rms", "body_velocity_rms_error"}
-    assert {*more.variables} - {*plain.variables} == {*BODY, *measured}
-    for name in plain.variables:
-        if name != "seconds":
-            np.testing.assert_array_equal(plain[name], more[name])
-    assert plain.attrs["key"] != more.attrs["key"]
-
-
 def test_a_steady_body_follows_newton_s_law():
     """M a + c v + k x is the shaking force, on the settled part."""
     found = run(body=True, output={"signals": True})

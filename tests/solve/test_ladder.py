@@ -160,13 +160,6 @@ def test_errors_are_enlarged_beyond_ten_times_the_usual(word):
     assert is_amplified(rtol, {"acceleration": worst})
 
 
-def test_a_budget_that_ends_a_tighter_run_is_told():
-    found = measure(of(ILL, accuracy="fine", max_steps=20_000))
-    assert (found.status, found.reason) == ("failed", "accuracy_not_reached")
-    assert "; the next run: more than 20000 steps" in found.detail
-    assert found.numbers["acceleration_error"] > ACCURACY["fine"].promise
-
-
 def test_a_failed_companion_leaves_errors_unknown(monkeypatch):
     original = run_module.integrate
 

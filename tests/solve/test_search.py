@@ -63,11 +63,6 @@ def test_a_motion_that_starts_farther_away_parts_earlier():
     assert times[0] < 0.9 * times[2]
 
 
-@pytest.mark.parametrize("joint", ["big_end", "small_end", "both"])
-def test_the_paper_s_motions_are_regular(joint):
-    assert predictability_horizon(case({**REGULAR, "joint": joint})) == math.inf
-
-
 def test_the_case_s_own_solver_does_not_count():
     ours = predictability_horizon(case(CHAOTIC))
     assert predictability_horizon(case(CHAOTIC, method="LSODA", rtol=1e-3)) == ours

@@ -5,6 +5,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.metrics import NUMBERS
+from compressor.solve.body import BODY as BODY_SERIES
 from compressor.solve.series import SIGNALS
 from compressor.solve.simulate import simulate
 
@@ -47,17 +48,20 @@ def test_a_mirrored_machine_shakes_the_same_way():
     )
 
 
-def test_signals_are_absent_unless_asked_for_and_change_nothing():
+@pytest.mark.parametrize(
+    ("asked", "series", "when", "is_same"),
+    [(SIGNALLED, SIGNALS, "signals", True), ({"body": True}, BODY_SERIES, "body", False)],
+)
+def test_what_is_asked_for_besides_is_absent_else_and_changes_nothing(asked, series, when, is_same):
     values = {"joint": "big_end", "clearance_mm": 0.2, "solve": TURN}
-    plain, more = simulate(Case.from_values(values)), run(**values)
-    assert not SIGNALS.keys() & {*plain.variables}
-    numbers = {name for name, row in NUMBERS.items() if row.when == "signals"}
-    assert {*more.variables} - {*plain.variables} == {*SIGNALS} | numbers
-    assert plain.attrs["key"] == more.attrs["key"]
+    plain, more = (simulate(Case.from_values(values | one)) for one in ({}, asked))
+    numbers = {name for name, row in NUMBERS.items() if row.when == when}
+    assert {*more.variables} - {*plain.variables} == {*series} | numbers
+    assert (plain.attrs["key"] == more.attrs["key"]) == is_same
     for name in plain.variables:
         if name != "seconds":
             np.testing.assert_array_equal(plain[name], more[name])
-    for name, (dims, unit, _) in SIGNALS.items():
+    for name, (dims, unit, _) in series.items():
         assert more[name].dims == ("time", *dims)
         assert more[name].attrs["units"] == unit
 

@@ -6,13 +6,9 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case
-from compressor.metrics import NUMBERS
-from compressor.solve.simulate import measure, simulate
+from compressor.solve.simulate import simulate
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5, "accuracy": "draft"}
-
-
-USUAL = {name for name, row in NUMBERS.items() if not row.when}  # that every job has
 
 
 def run(**values):
@@ -32,14 +28,6 @@ def test_ideal_machine(load):
     assert int(found.steps) == int(found.evaluations) == 0
     peak = {"spring": 3346.7, "gas": 3086.6, "none": 0}[load]
     assert float(found.piston_force.max()) == pytest.approx(peak, abs=2)
-
-
-def test_an_outcome_is_the_dataset_without_its_series(faulty):
-    found = measure(Case.from_attribute(faulty.attrs["case"]))
-    assert found.key == faulty.attrs["key"]
-    assert (found.status, found.reason) == ("ok", "")
-    for name in USUAL - {"seconds"}:
-        np.testing.assert_array_equal(found.numbers[name], faulty[name].values)
 
 
 def test_dims_are_the_same_in_all_scenes(faulty):
