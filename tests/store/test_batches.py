@@ -86,21 +86,6 @@ def test_a_merge_changes_nothing_but_the_number_of_files(mixed):
     assert held(read_store(mixed)) == jobs
 
 
-def test_few_small_batches_and_large_ones_are_left_alone(tmp_path, monkeypatch):
-    for number in range(merge.MAX_SMALL):
-        write_batch(tmp_path, [made(number)])
-    merge_batches(tmp_path)
-    assert len(batches(tmp_path)) == merge.MAX_SMALL
-    monkeypatch.setattr(merge, "MAX_JOBS", 4)  # one with a job is no small one
-    write_batch(tmp_path, [made(100)])
-    merge_batches(tmp_path)
-    assert len(batches(tmp_path)) == merge.MAX_SMALL + 1
-    monkeypatch.setattr(merge, "MAX_JOBS", 8)
-    merge_batches(tmp_path)
-    assert len(batches(tmp_path)) == 2  # of eight jobs and one
-    assert peaks(tmp_path) == {n: n for n in (*range(merge.MAX_SMALL), 100)}
-
-
 def test_a_merge_does_not_make_an_old_row_new(tmp_path, monkeypatch):
     """Of other lengths, so that two merged batches hold the job; or where it is written amid."""
     write_batch(tmp_path, [made(1, reason="old"), made(2, samples=5)])

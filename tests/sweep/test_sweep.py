@@ -193,26 +193,6 @@ def uncompiled(tmp_path, monkeypatch):
     return loaded
 
 
-def test_each_part_is_compiled_by_itself(uncompiled, monkeypatch):
-    """What was finished before a stop is not compiled again."""
-    needs, told = warm_up.Needs(("auto", "Radau"), ("plain", "laws")), []
-
-    def load(alone):
-        uncompiled.append(alone)
-        if "laws" in alone.kinds and len(uncompiled) == 3:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(warm_up, "load", load)
-    with pytest.raises(KeyboardInterrupt):
-        warm_up.compile_once(needs, told.append)
-    assert [*needs.uncompiled] == ["laws"]
-    warm_up.compile_once(needs, told.append)
-    assert ["laws" in alone.kinds for alone in uncompiled] == [False, False, True, True]
-    for text, seconds in zip(told, ("55 s", "28 s"), strict=True):
-        assert text.startswith(f"compiling the equations, for about {seconds}, or longer on a slow")
-    assert not needs.uncompiled
-
-
 def test_only_what_cases_need_is_compiled(uncompiled):
     """A machine with oil in its joints needs no equations of dry ones."""
     oiled = {"joint": "both", "clearance_mm": 0.1, "lubricant": True}
@@ -221,14 +201,6 @@ def test_only_what_cases_need_is_compiled(uncompiled):
         (oiled | {"guide": True}, {"features"}),
     ):  # fmt: skip
         assert {*warm_up.Needs.of([Case.from_values(values)]).uncompiled} == parts
-
-
-def test_a_copied_folder_compiles_again(tmp_path, monkeypatch, uncompiled):
-    """Numba keeps machine code by path: the mark that came with a copy made each worker compile."""
-    for place in ("here", "here", "copy", "copy", "here"):
-        monkeypatch.setattr(warm_up, "COMPILED", tmp_path / place)
-        warm_up.compile_once(warm_up.Needs(("auto",), ("plain",)), lambda remark: None)
-    assert len(uncompiled) == 2
 
 
 def test_a_job_that_cannot_be_stored_ends_the_sweep(studies, tmp_path, in_process):
