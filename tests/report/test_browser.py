@@ -70,21 +70,6 @@ def test_the_page_opens_from_disk_and_nothing_breaks(driver, page):
     assert outside == []
 
 
-def test_colours_over_decades_have_ones_and_threes_beside_them(driver, own):
-    opened(driver, own)
-    ids = driver.execute_script("return [...document.querySelectorAll('figure')].map(f => f.id)")
-    (name,) = (one for one in ids if one.startswith("cycles-"))
-    live(driver, name)
-    maps = driver.execute_script(
-        f"return document.querySelector('#{name} .plot').data.filter(t => t.type === 'heatmap')"
-        ".map(t => [t.colorbar.ticktext, t.zmin, t.zmax])"
-    )
-    assert maps
-    for texts, low, high in maps:
-        decades = (one * 10.0**ten for ten in range(-9, 10) for one in (1, 3))
-        assert [*map(float, texts)] == [v for v in decades if 10**low <= v <= 10**high]
-
-
 def test_tables_sort_and_filter(driver, own):
     opened(driver, own)
     place = "document.querySelector('#jobs-worn table')"

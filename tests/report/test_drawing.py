@@ -14,9 +14,7 @@ from compressor.report.figures.drawing import (
     as_csv,
     describe_figure,
     make_grid,
-    midway,
     outline_cells,
-    panels_of,
 )
 from compressor.report.figures.style import LineStyle, fill, mark, palette
 from compressor.report.interactive import (
@@ -51,41 +49,6 @@ def drawing():
     bars.plot([0.1, 0.2], [0.5, 0.6], mark("#000000", "circle", 3), "jobs",
               errors=np.array([[0.1, 0.2], [0.3, 0.4]]))  # fmt: skip
     return drawing
-
-
-def test_ranges_are_plotlys_unless_a_figure_says(drawing):
-    whole, enlarged, low, _ = drawing.panels
-    assert (enlarged.x.range, whole.y.range) == ((90, 120), None)
-    whole.span("y", low=0.0)
-    assert whole.y.range == (0, None)
-    low.x.type = "log"
-    low.span("x", 1.0, 100.0)
-    assert low.x.range == (0, 2)  # so plotly wants it
-
-
-def test_shared_scales_have_numbers_and_titles_outside():
-    drawing, grid = make_grid(2, 2, 4.0, count=3, share_x="all", share_y="rows")
-    for panel in drawing.panels:
-        panel.plot([0, 1], [0, 1], RED)
-        panel.x.title, panel.y.title = "x (mm)", "y (N)"
-    grid[0, 0].name_ticks("y", ["speed", "mass"])
-    grid[0, 0].span("x", 0, 3)
-    drawing.figure()
-    first, beside, below = drawing.panels
-    assert [one.x.title.text or "" for one in drawing.panels] == ["", "x (mm)", "x (mm)"]
-    assert [one.y.title.text or "" for one in drawing.panels] == ["y (N)", "", "y (N)"]
-    assert (first.x.matches, beside.x.matches, below.x.matches) == (None, "x", "x")
-    assert (first.y.matches, beside.y.matches, below.y.matches) == (None, "y", None)
-    assert (beside.y.ticktext, below.x.range) == (("speed", "mass"), (0, 3))
-
-
-def test_a_tall_panel_stands_beside_several():
-    drawing, grid = make_grid(3, 2, 6.0, tall=[slice(1, 3)])
-    assert grid[1, 1] is grid[2, 1]
-    assert len(drawing.panels) == 5
-    low, high = grid[1, 1].y.domain
-    assert (low, high) == (grid[2, 0].y.domain[0], grid[1, 0].y.domain[1])
-    assert panels_of(drawing.figure())[-1].suffix == grid[1, 1].suffix
 
 
 def test_a_csv_has_every_number_once(drawing):
@@ -195,14 +158,6 @@ def test_what_is_seen_is_said_in_words(drawing):
     assert words.startswith("4 panels. whole: sine, cosine; enlarged: sine")
 
 
-def test_a_word_on_a_log_axis_stands_where_plotly_wants_it():
-    drawing, grid = make_grid(1, 1, 3.0)
-    grid[0, 0].y.type = "log"
-    grid[0, 0].plot([0, 1], [1, 1000], RED)
-    grid[0, 0].write("100", 0.5, 100.0)
-    assert drawing.figure().layout.annotations[0].y == pytest.approx(2.0)
-
-
 def test_outlines_hold_the_cells_that_are_in():
     x, y = outline_cells(np.arange(4.0), np.arange(3.0), np.array([[1, 1, 0], [0, 0, 1]], bool))
     first, second = np.split(np.stack([x, y]), np.flatnonzero(np.isnan(x)), axis=1)
@@ -211,26 +166,9 @@ def test_outlines_hold_the_cells_that_are_in():
     assert np.nanmax(second, axis=1).tolist() == [3, 2]
 
 
-@pytest.mark.parametrize("is_log", [False, True])
-def test_edges_lie_between_values(is_log):
-    edges = midway(np.array([1.0, 2.0, 4.0]), is_log)
-    assert (edges[:-1] < [1, 2, 4]).all()
-    assert (edges[1:] > [1, 2, 4]).all()
-    assert midway(np.array([3.0]), is_log).size == 2
-
-
 def test_lines_of_equal_value_lie_where_a_plane_has_them():
     plane = np.array([[0.0, 1, 2], [0, 1, 2]])
     x, _ = contour_lines(np.arange(3), np.arange(2), plane, [0.5, 1.5])
     assert {*x[np.isfinite(x)]} == {0.5, 1.5}
     x, y = contour_area(np.arange(3), np.arange(2), plane, 0.5, 1.5)
     assert (x.min(), x.max(), y.min(), y.max()) == (0.5, 1.5, 0, 1)
-
-
-def test_what_has_no_points_has_no_columns():
-    drawing, grid = make_grid(1, 1, 4.0)
-    grid[0, 0].plot([], [], RED, "none")
-    grid[0, 0].plot([0, 1], [2, 3], RED, "two")
-    head = as_csv(drawing.figure()).splitlines()[0]
-    assert "two" in head
-    assert "none" not in head

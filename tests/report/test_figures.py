@@ -6,14 +6,12 @@ import sys
 import matplotlib
 import numpy as np
 import pytest
-import xarray as xr
 from matplotlib.colors import to_rgb
 
 from compressor.analysis.cam import Cam
 from compressor.analysis.runs import paper_cases
-from compressor.report.figures import FIGURES, curves, pictures, style
+from compressor.report.figures import FIGURES, pictures, style
 from compressor.report.figures.drawing import panels_of
-from compressor.report.figures.paper import MOTION
 from compressor.solve.si_record import record
 
 FIGURE = {int(name[-2:]): figure for name, figure in FIGURES["paper"].items()}
@@ -190,24 +188,6 @@ def test_acceleration_is_enlarged_where_it_differs_most(drawn, number):
     left, right = enlarged.x.range
     inside = (angle >= left) & (angle <= right)
     assert spread[inside].max() >= 0.98 * spread.max()
-
-
-def made_curve(values):
-    """A curve of three revolutions, a degree a sample, of acceleration."""
-    angle = np.radians(np.arange(360, 1441))
-    run = xr.Dataset({"crank_angle": ("time", angle), "acceleration": ("time", values)})
-    return curves.Curve("", run, style.IDEAL)
-
-
-@pytest.mark.parametrize("place", [30, 333, 1050])
-def test_the_window_finds_a_bump(place):
-    angle = np.arange(1081.0)
-    smooth = 100 * np.cos(np.radians(angle))
-    bump = smooth + 40 * np.exp(-(((angle - place) / 3) ** 2))
-    part, differs = curves.differing_part([made_curve(smooth), made_curve(bump)], MOTION[2])
-    assert differs
-    assert part.start <= place < part.stop
-    assert part.stop - part.start == 41
 
 
 # ---- how they look ----------------------------------------------------------------------------

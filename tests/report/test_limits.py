@@ -47,18 +47,6 @@ def test_what_is_not_known_has_no_zone():
     assert measured_cell(PEAK, 3.0, math.inf, limits).zone == 0
 
 
-def test_limits_are_in_the_unit_of_the_page():
-    """Both axes of the velocity have them, in mm/s; a sensor's in g stand in g where it does."""
-    limits = read_limits(["body_velocity_rms=2.8,4.5,7.1 mm/s"])
-    assert [one.unit for one in VELOCITY] == ["mm/s", "mm/s"]
-    for one in VELOCITY:
-        assert limits.of(one) == pytest.approx((2.8, 4.5, 7.1))
-    assert limits.words == [
-        "Zones of body velocity rms, by limits that were given: A below 2.8 mm/s, B from 2.8 mm/s "
-        "on, C from 4.5 mm/s on, D from 7.1 mm/s on."
-    ]
-
-
 def test_limits_in_g_are_limits_in_m_per_s2():
     """They were refused on a page in g, which its own documentation said to write."""
     for units, words in (("plant", "A below 0.5 g, B from 0.5 g on, C from 2 g on."),

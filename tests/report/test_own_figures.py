@@ -114,14 +114,3 @@ def test_they_have_their_sections(heavy_store, tmp_path, undrawn):
     assert {*verdicts[2:]} <= {"held", "not held"}
     assert {"claims-heavy-1", "claims-heavy-8"} <= {*found.ids}
     assert {*found.jobs} >= {*read_studies(heavy_store)[0].keys}  # its table
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [({"duration_rev": 0.5}, "are not drawn, whose runs do not settle"),
-     ({}, "but not Figures 3, 4, 6, 7, 8, 9, 10, 11, 14, 15, 16, whose cases are not")],
-)  # fmt: skip
-def test_what_could_not_be_drawn_is_told(tmp_path, changes, words):
-    folder = add(tmp_path, "heavy", SHORT | changes, machine=HEAVY, report={"figures": "paper"},
-                 joint="small_end", clearance_mm=[*CLEARANCES])  # fmt: skip
-    assert words in own(folder).note.text

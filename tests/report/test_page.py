@@ -144,16 +144,3 @@ def test_an_attribute_ends_where_its_text_ends():
         "scope", "src", "tabindex", "data-copy", "data-job", "data-title",
         "data-value", "decoding", "download", "height", "hidden", "type", "width",
     }  # fmt: skip
-
-
-def test_rows_are_marked_and_cells_have_their_class():
-    long = "x" * 37
-    cells = [Cell("1 ± 2", "number", 1.25), Cell(long[1:]), Cell(long), Cell(long, "code")]
-    rows = [TableRow(cells, "failed", "k1"), TableRow([Cell("", "word"), Cell("k", "code")])]
-    text = document([Section("a", "A", "printed.html", PageTable(["head"] * 4, rows))])
-    assert re.findall("<tr.*?</tr>", text, re.DOTALL)[1:] == [
-        '<tr class="failed" data-job="k1"><td data-value="1.25">1 ± 2</td>'
-        f"<td>{long[1:]}</td>"
-        f'<td class="prose">{long}</td><td class="prose"><code>{long}</code></td></tr>',
-        "<tr><td></td><td><code>k</code></td></tr>",
-    ]

@@ -21,10 +21,9 @@ from compressor.analysis.shaking import last_revolution
 from compressor.cases.case import Case
 from compressor.cases.load import load_cases, load_studies
 from compressor.reasons import Reason
-from compressor.report import page
 from compressor.report.figures import FIGURES, pictures
 from compressor.report.figures.table import spell
-from compressor.report.paper_sections import find_paper_runs, paper_candidates
+from compressor.report.paper_sections import find_paper_runs
 from compressor.report.report import KINDS, write_report
 from compressor.store.caveats import study_caveats
 from compressor.store.files import StoreError, StoreWarning
@@ -357,27 +356,6 @@ def test_the_most_exact_run_is_shown(paper_store, tmp_path):
     )
 
 
-# ---- finding the paper's cases ----------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [("joint: big_end\nclearance_mm: 0.1\nmachine: {rod_mass_kg: [3, 4.7]}\n", 1),
-     ("joint: [big_end, both, small_end]\nclearance_mm: 0.2\n", 3),
-     ("solve: {rtol: [1e-4, 1e-5], duration_s: 0.48}\n", 2)],
-)  # fmt: skip
-def test_only_jobs_with_the_paper_s_physics_are_opened(tmp_path, text, found):
-    (tmp_path / "some.yaml").write_text(text)
-    store(tmp_path / "out", tmp_path / "some.yaml")
-    ours = {case.physics_key for case in paper_cases().values()}
-    stored = read_store(tmp_path / "out")
-    likely = paper_candidates(stored, read_studies(tmp_path / "out"), ours)
-    assert likely == [
-        case.key for case in load_cases(tmp_path / "some.yaml") if case.physics_key in ours
-    ]
-    assert len(likely) == found
-
-
 # ---- a user's own sweep -----------------------------------------------------------------------
 
 
@@ -420,7 +398,7 @@ def test_a_sweep_is_drawn_over_the_crank_angle(tmp_path):
     assert "<title>Unit 3</title>" in raw
     assert '<p class="notes">Rod weighed.</p>' in raw
     assert f", with <code>{'</code>, <code>'.join(settings)}</code>.</p>" in raw
-    healthy_and_worn(read(tmp_path / "out"), own)
+    assert "Without clearance and worn" in read(tmp_path / "out").text  # test_worn_and_ideal
     drawn = {"sweep-own-ranking", "sweep-own-map", "cycles-own", "analyst-own"}
     assert {p.stem for p in (tmp_path / "out").glob("*.png")} == drawn
     text = " ".join(read(tmp_path / "out").text.split())
@@ -457,29 +435,6 @@ def test_tables_and_figures_may_be_in_plant_units(own, tmp_path):
     assert "Zones of rms acceleration, by limits that were given: A below 0.101972 g" in found.text
     table = (tmp_path / "out" / "sweep-own-map.csv").read_text(encoding="utf-8")
     assert "peak acceleration: g" in table
-
-
-def healthy_and_worn(found, own):
-    """The machine without clearance stands beside its worn jobs, by its closed form."""
-    assert "Without clearance and worn" in found.text
-    assert "A sound bearing has some clearance" in found.text
-    head = next(cells for _, cells in found.rows if cells[1:2] == ["without clearance"])
-    sizes = {re.search("clearance (.*) mm", text)[1]: text for text in head[2:]}
-    assert [*sizes] == ["0.1", "0.2"]  # in this order
-    assert [sizes[size].endswith(" (counts as healthy)") for size in ("0.1", "0.2")] == [
-        True,
-        False,
-    ]
-    row = next(cells for _, cells in found.rows if cells[0] == "rms acceleration (m/s²)")
-    case = load_cases(own.parent / "own.yaml")[0]
-    crank, rod = case.machine.crank_radius_mm / 1e3, case.machine.rod_length_mm / 1e3
-    turn = np.linspace(0.0, 2.0 * np.pi, 20_001)
-    x = crank * np.cos(turn) + np.sqrt(rod**2 - (crank * np.sin(turn)) ** 2)
-    a = case.omega**2 * np.gradient(np.gradient(x, turn), turn)[2:-2]
-    assert float(row[1]) == pytest.approx(np.sqrt(np.mean(a**2)), rel=2e-3)
-    for text in row[2:]:
-        value, times = re.fullmatch(r"(\S+)(?: ± \S+)? \((\S+)×\)", text).groups()
-        assert float(times) == pytest.approx(float(value) / float(row[1]), abs=0.006)
 
 
 def section(folder, anchor):
@@ -635,16 +590,3 @@ def test_a_report_that_cannot_be_written_is_an_error(own, tmp_path):
     (tmp_path / "out").write_text("a file")
     with pytest.raises(StoreError, match="out"):
         write_report(own, tmp_path / "out")
-
-
-# ---- pieces of a page -------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("value", "shown"),
-    [(394.784, "394.8"), (1076.7, "1077"), (12345.6, "12350"), (0.0, "0"), (3.0, "3"),
-     (67.5, "67.50"), (0.20641, "0.2064"), (7.15e-12, "7.150e-12"), (float("nan"), "–"),
-     (-394.784, "-394.8"), (2.5e9, "2.500e+09"), (float("inf"), "inf")],
-)  # fmt: skip
-def test_numbers(value, shown):
-    assert page.number(value) == shown

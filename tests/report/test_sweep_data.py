@@ -49,9 +49,3 @@ def test_what_a_bar_does_not_vouch_for_is_not_known():
     assert np.isnan(sweep.known(PEAK)).tolist() == [False, True]
     assert np.isnan(sweep.known(RMS)).tolist() == [False, False]
     assert sweep.chaotic.tolist() == [False, True]
-
-
-@pytest.mark.parametrize(("values", "is_log"), [([0.01, 0.1, 1.0], True), ([0.1, 0.2], False),
-                                                ([0.0, 1.0, 1000.0], False)])  # fmt: skip
-def test_decades_are_logarithmic(values, is_log):
-    assert sweep_of(grid({"clearance_mm": values}, lambda c: c)).axes[0].is_log is is_log
