@@ -1,6 +1,7 @@
 """Solve a case: ever tighter runs until energy balances and what accuracy promises holds."""
 
 import math
+from collections.abc import Iterator
 
 from compressor.cases import TIGHTEST, Case
 from compressor.metrics import METRICS
@@ -37,9 +38,9 @@ MIN_TIGHTENING, MAX_TIGHTENING = 10.0, 1000.0  # times tighter that the next run
 def refine_until_accurate(case: Case, search: Search, first: Solution | None = None) -> Solution:
     """Return the first run that keeps its promise, or the last whole one as a failed job.
 
-    Each run is compared with one a little tighter, and with the run before it; the next one is as
-    much tighter as the errors need. Where a first one's are as large as the numbers, chaos is
-    looked for.
+    Each run is compared with the run before it, and with one a little tighter if that says that the
+    promise is kept; the next one is as much tighter as the errors need. Where a first one's are as
+    large as the numbers, chaos is looked for.
     """
     rtol, unsound = case.rtol, 0  # runs whose energy does not balance
     best: Solution | None = None  # the last whole run
@@ -64,8 +65,14 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
             continue
         if not case.wants_bars:
             return now
-        others = compare_runs(case, now, before, search)
-        excess = excess_over_promise(case, now)
+        others: list[Solution] = []
+        excess = 0.0
+        for other in comparison_runs(case, now, before, search):
+            others.append(other)
+            estimate_errors(now, *others)
+            excess = excess_over_promise(case, now)
+            if excess > 1.0 and rtol >= 1.01 * LAST_RTOL:
+                break  # more runs could only confirm it
         if excess <= 1.0:
             now.promise = "kept" if has_promise(case) else "none"
             return now
@@ -73,7 +80,7 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
         if before is None and is_far and search.parts(whole=False):
             return now
         if rtol < 1.01 * LAST_RTOL or all(one.reason for one in others):
-            return fail(case, now, others[0].detail or "no run is tighter")
+            return fail(case, now, others[-1].detail or "no run is tighter")
         # the next run is compared with this one: farther away than one a little tighter was
         share = ERROR_AIM / excess * (1.0 if before else 1.0 - TIGHTER_FACTOR**-ORDER)
         before = now
@@ -81,31 +88,21 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
         rtol = max(float(f"{rtol / tightening:.1e}"), LAST_RTOL)
 
 
-def compare_runs(
+def comparison_runs(
     case: Case, now: Solution, before: Solution | None, search: Search
-) -> list[Solution]:
-    """Estimate a run's errors by others, by no more than its promise needs; return these.
+) -> Iterator[Solution]:
+    """Yield the runs that tell of a run's errors: the one before it, and then a tighter one.
 
-    The run before is there; a tighter one follows, and after a first run a looser one where the
-    motion enlarges errors, since two may agree by chance. Where one says that the promise is
-    missed, those after it could only confirm it.
+    For a first run a looser one where the motion enlarges errors: two may agree by chance.
     """
-    others = [before] if before else []
-    if before and now.rtol > 1.01 * LAST_RTOL:
-        estimate_errors(now, before)
-        if excess_over_promise(case, now) > 1.0:
-            return others
+    if before:
+        yield before
     tighter = comparison_run(case, now, search.left)
     search.count(tighter.trajectory)
-    others = [tighter, *others]
-    estimate_errors(now, *others)
-    if before is None and excess_over_promise(case, now) <= 1.0:
-        looser = looser_comparison_run(case, now, tighter, search.left)
-        if looser:
-            search.count(looser.trajectory)
-            others.append(looser)
-            estimate_errors(now, *others)
-    return others
+    yield tighter
+    if before is None and (looser := looser_comparison_run(case, now, tighter, search.left)):
+        search.count(looser.trajectory)
+        yield looser
 
 
 def has_promise(case: Case) -> bool:
