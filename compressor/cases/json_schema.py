@@ -107,8 +107,7 @@ def _single_value(row: Parameter) -> Schema:
     """Return the schema of one value of a parameter."""
     if row.kind == "text":
         return {"type": "string", "pattern": rf"^(?!\.){NAME.pattern}$"}
-    words = (*row.choices, *(alias for alias, _ in row.aliases))
-    return adapter_of(replace(row, optional=False, choices=words)).json_schema()
+    return adapter_of(replace(row, optional=False)).json_schema()
 
 
 def _forms() -> Schema:
