@@ -16,6 +16,8 @@ from compressor.cases.checks import (
     DOUBLES,
     expand_synonyms,
     hold_value,
+    key_of,
+    leaves,
     no_mapping,
     row_of,
     stands_for,
@@ -24,7 +26,7 @@ from compressor.cases.checks import (
 )
 from compressor.cases.comparison import NoComparison, Test, comparison
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.keys import drop, key_of, leaves, path_of, put
+from compressor.cases.keys import drop, path_of, put
 from compressor.cases.parameter import CaseError, integer, make_group, quote_value
 from compressor.cases.swept import FORMS, NoSweep, Sweep, design, design_size, sweep_of
 from compressor.cases.table import outside_identity

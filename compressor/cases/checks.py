@@ -29,7 +29,7 @@ from compressor.cases.parameter import (
     split_unit,
 )
 from compressor.cases.table import GROUPS, TOP, WORDS, parts_by_key, table
-from compressor.cases.yaml_reader import is_number
+from compressor.cases.yaml_reader import Path, is_number
 
 
 @lru_cache(1024)  # asked for of each key of each job
@@ -198,8 +198,6 @@ def of_other_quantity(name: str, group: str, value: Any) -> str:
 # keys of a case file that are no part of a case: how values are swept together, what the page of
 # the report says of the machine
 SWEEP = ("sample", "zip", "exclude", "blocks", "report")
-
-
 MAX_MEANT = 3  # keys of one name, or with the same words in it, that are told
 
 
@@ -305,14 +303,26 @@ def hold_value(key: str, value: Any) -> Any:
 
 def values_given(values: Mapping[Any, Any]) -> dict[str, Any]:
     """Return the values that are set in nested values, by dotted key, of a key by part by part."""
-    found: dict[str, Any] = {}
-    for key, value in values.items():
-        if not isinstance(value, Mapping):
-            found[key] = value
-            continue
-        for name, item in value.items():
-            if isinstance(item, Mapping) and {*item} & {*parts_by_key().get(f"{key}.{name}", ())}:
-                found |= {f"{key}.{name}.{part}": one for part, one in item.items()}
-            elif item is not None:
-                found[f"{key}.{name}"] = item
-    return found
+    return {key_of(path): value for path, value in leaves(values) if value is not None}
+
+
+def key_of(path: Path) -> str:
+    """Return the dotted key of a path."""
+    return ".".join(map(str, path))
+
+
+def leaves(values: Mapping[Any, Any], above: Path = ()) -> Iterator[tuple[Path, Any]]:
+    """Yield the path and the value, or the sweep, of each key; of a value by part each part's."""
+    for name, value in values.items():
+        path, is_group = (*above, name), isinstance(value, Mapping) and not above and name in GROUPS
+        if is_group and not value:  # its defaults
+            yield path, WORDS.get(name) or value
+        elif is_group or is_by_part(key_of(path), value):
+            yield from leaves(value, path)
+        elif path[0] not in SWEEP:
+            yield path, value
+
+
+def is_by_part(key: str, value: Any) -> bool:
+    """Return whether a value is one for each part of a key, and no sweep of one for all."""
+    return isinstance(value, Mapping) and not value.keys().isdisjoint(parts_by_key().get(key, ()))

@@ -1,12 +1,12 @@
 """Values of a file, a block or a `key=value` by path, and one over another."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from compressor.cases.checks import DOUBLES, SWEEP, stands_for
+from compressor.cases.checks import DOUBLES, SWEEP, is_by_part, key_of, leaves, stands_for
 from compressor.cases.conflicts import IN_PLACE_OF
-from compressor.cases.table import GROUPS, WORDS, parts_by_key
+from compressor.cases.table import parts_by_key
 from compressor.cases.yaml_reader import FileProblem, Path, Place, Tree, read_text, shorten
 
 
@@ -15,33 +15,9 @@ def path_of(key: str) -> Path:
     return tuple(key.split("."))
 
 
-def key_of(path: Path) -> str:
-    """Return the dotted key of a path."""
-    return ".".join(map(str, path))
-
-
 def covers(outer: str, key: str) -> bool:
     """Return whether a key is another one, or in the group that the other names."""
     return f"{key}.".startswith(f"{outer}.")
-
-
-def leaves(values: Mapping[str, Any], above: Path = ()) -> Iterator[tuple[Path, Any]]:
-    """Yield the path and the value, or the sweep, of each key; of a value by part each part's."""
-    for name, value in values.items():
-        path = (*above, name)
-        if value == {} and name in GROUPS:  # its defaults
-            yield path, WORDS.get(name) or value
-        elif (isinstance(value, dict) and path[0] in GROUPS and not above) or is_by_part(
-            key_of(path), value
-        ):
-            yield from leaves(value, path)
-        elif path[0] not in SWEEP:
-            yield path, value
-
-
-def is_by_part(key: str, value: Any) -> bool:
-    """Return whether a value is one for each part of a key, and no sweep of one for all."""
-    return isinstance(value, dict) and not value.keys().isdisjoint(parts_by_key().get(key, ()))
 
 
 def put(values: Mapping[str, Any], path: Path, value: Any, above: str = "") -> dict[str, Any]:

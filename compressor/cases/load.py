@@ -9,17 +9,24 @@ import itertools
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from compressor.cases.blocks import Block, Located, plan_block, read_own
 from compressor.cases.case import Case
-from compressor.cases.checks import DOUBLES, expand_synonyms, halve, row_of, stands_for, value_of
+from compressor.cases.checks import (
+    DOUBLES,
+    expand_synonyms,
+    halve,
+    key_of,
+    row_of,
+    stands_for,
+    value_of,
+)
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
 from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
 from compressor.cases.keys import (
     covers,
-    key_of,
     merge_block,
     override,
     path_of,
@@ -47,6 +54,7 @@ IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
 WHOLE_FILE = ("name", "blocks", "report")
 AT_TOP = "needs keys at the top, such as `joint: big_end`, with a space after the colon"
 NO_BLOCKS = "needs a list of mappings, such as [{load: none}, {joint: both}]"
+NO_CHANGES, NOWHERE = Tree({}, {}), Place("")
 NO_DRAWS = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
 
 
@@ -94,20 +102,25 @@ def load_studies(
         except NoComparison as error:
             problems.append(FileProblem(selection, "", str(error)))
     mistaken = bool(problems)
-    files = [_read(os.fsdecode(path), Tree({}, {}) if mistaken else changes) for path in paths]
+    files = [_read(os.fsdecode(path), NO_CHANGES if mistaken else changes) for path in paths]
     problems += [problem for file in files for problem in file.problems]
     problems += _find_shared_names(files)
     studies, blocks = [], []
     for file in files if not mistaken else ():
-        study, found, wrong = _study(file, max_jobs, test, progress)
-        problems += wrong
-        studies += [study] if study else []
-        blocks += found
+        try:
+            study, found = _study(file, max_jobs, test, progress)
+        except CaseFileError as error:
+            problems += error.problems
+        else:
+            studies.append(study)
+            blocks += found
     unread = _find_unread(blocks)
     if changes.values and any(place.line for place, _ in unread):
         # what the command line takes the reader from is the file's, and no mistake of it
-        alone = _find_unread(_blocks_alone(files, max_jobs))
-        unread = {at: one for at, one in unread.items() if not at[0].line or at in alone}
+        alone = {(one.place, one.key) for one in _find_problems(paths, max_jobs)}
+        unread = {
+            at: one for at, one in unread.items() if not at[0].line or (one.place, one.key) in alone
+        }
     problems += unread.values()
     if not problems and not any(study.selected for study in studies):
         problems.append(FileProblem(selection, "", NONE_SELECTED))
@@ -135,9 +148,9 @@ class CaseFile:
     path: str
     problems: list[FileProblem]
     tree: Tree | None = None
-    changes: Tree = field(default_factory=lambda: Tree({}, {}))
+    changes: Tree = NO_CHANGES
     name: str = ""
-    name_place: Place = field(default_factory=lambda: Place(""))
+    name_place: Place = NOWHERE
     report: Report = field(default_factory=Report)
 
 
@@ -173,20 +186,16 @@ def _find_shared_names(files: Sequence[CaseFile]) -> list[FileProblem]:
 
 def _study(
     file: CaseFile, max_jobs: int, only: Test | None, progress: Progress
-) -> tuple[Study | None, list[Block], list[FileProblem]]:
-    """Return the study of a file with its blocks, or what is wrong with it."""
-    blocks, problems = _blocks(file, max_jobs)
-    if problems or not blocks:
-        return None, [], problems
+) -> tuple[Study, list[Block]]:
+    """Return the study of a file with its blocks. Raises CaseFileError."""
+    blocks = _blocks(file, max_jobs)
     is_grid = len(blocks) == 1 and blocks[0].is_grid
     cases = Cases(blocks)
     columns = [*blocks[0].columns] if is_grid else _columns(blocks)
-    keys, values, problems = _check_cases(file, cases, [] if is_grid else columns, progress)
+    keys, values = _check_cases(file, cases, [] if is_grid else columns, progress)
     is_drawn = any(sweep.is_drawn for block in blocks for sweep in block.sweeps.values())
-    if "sample" in blocks[0].tree.values and not (problems or file.changes.values or is_drawn):
-        problems = [blocks[0].tree.problem(("sample",), NO_DRAWS, True)]
-    if problems:
-        return None, [], problems
+    if "sample" in blocks[0].tree.values and not (file.changes.values or is_drawn):
+        raise CaseFileError([blocks[0].tree.problem(("sample",), NO_DRAWS, True)])
     cases.keys = keys
     spreads = {key: sweep.spread for block in blocks for key, sweep in block.sweeps.items()
                if sweep.is_drawn and sweep.has_ends}  # fmt: skip
@@ -199,17 +208,22 @@ def _study(
     fixed = tuple(expand_synonyms(block.fixed)[0] for block in blocks)
     told = {name: text or "" for name, text in vars(file.report).items()}
     study = Study(file.name, file.path, axes, cases, keys, is_grid, selected, fixed, **told)
-    return study, blocks, []
+    return study, blocks
 
 
-def _blocks(file: CaseFile, max_jobs: int) -> tuple[list[Block], list[FileProblem]]:
-    """Return the blocks of a file, or what is wrong with them, and with any single value."""
-    trees, problems = _block_trees(file, max_jobs) if file.tree else ([], [])
+def _blocks(file: CaseFile, max_jobs: int) -> list[Block]:
+    """Return the blocks of a file.
+
+    Raises CaseFileError with what is wrong with the file, its blocks and any single value.
+    """
+    if not file.tree:
+        raise CaseFileError(file.problems)
+    trees, problems = _block_trees(file.tree, file.changes, max_jobs)
     plans = [plan_block(tree, file.name) for tree in trees]
     blocks = [block for block, _ in plans]
     problems += [problem for _, wrong in plans for problem in wrong]
     if too_many := _find_too_many(blocks, max_jobs):
-        return [], [*problems, too_many]
+        raise CaseFileError([*problems, too_many])
     told = {one.key for one in file.problems}
     for block in blocks:
         repeated = [one for one in block.find_repeated() if one.key not in told]
@@ -217,7 +231,7 @@ def _blocks(file: CaseFile, max_jobs: int) -> tuple[list[Block], list[FileProble
         if math.prod(block.sizes().values()) and not (repeated or block.numbers):
             problems.append(block.tree.problem(("exclude",), "leaves no job"))
     if not problems and not file.problems:
-        return blocks, []
+        return blocks
     found: Located = {}  # what is wrong with single values is told in the same run
     for block in blocks:
         for rows in block.each_value():
@@ -227,13 +241,11 @@ def _blocks(file: CaseFile, max_jobs: int) -> tuple[list[Block], list[FileProble
                 found |= {} if error.is_misfit else block.locate(error, rows)
     told |= {one.key for one in problems}  # from which more may follow
     left = [one for one in found.values() if not any(covers(one.key, key) for key in told)]
-    return [], problems + left
+    raise CaseFileError(problems + left)
 
 
-def _block_trees(file: CaseFile, max_jobs: int) -> tuple[list[Tree], list[FileProblem]]:
+def _block_trees(tree: Tree, changes: Tree, max_jobs: int) -> tuple[list[Tree], list[FileProblem]]:
     """Return the values of each block over those of the file; the file's alone without blocks."""
-    tree, changes = file.tree, file.changes
-    assert tree
     if ("blocks",) in changes.values:
         tree = override(tree, Tree({("blocks",): changes.values["blocks",]}, changes.places))
         values = {path: value for path, value in changes.values.items() if path != ("blocks",)}
@@ -298,10 +310,9 @@ def _columns(blocks: Sequence[Block]) -> list[str]:
 
 def _check_cases(
     file: CaseFile, cases: Cases, columns: Sequence[str], progress: Progress
-) -> tuple[tuple[str, ...], dict[str, list[Any]], list[FileProblem]]:
-    """Return the key of each case, its value of each swept key, and what is wrong with values."""
-    found: Located = {}
-    misfits: Located = {}  # told once each value is good
+) -> tuple[tuple[str, ...], dict[str, list[Any]]]:
+    """Return the key of each case, and its value of each swept key. Raises CaseFileError."""
+    wrong: dict[bool, Located] = {False: {}, True: {}}  # misfits are told once each value is good
     keys: list[str] = []
     values: dict[str, list[Any]] = {key: [] for key in columns}
     total = len(cases)
@@ -313,72 +324,64 @@ def _check_cases(
             case = block.case(place)
         except CaseError as error:
             located = block.locate(error, block.rows_of(place))
-            if error.is_misfit:
-                misfits = located | misfits
-            else:
-                found = located | found
+            wrong[error.is_misfit] = located | wrong[error.is_misfit]
             continue
-        if not (found or misfits):
+        if not any(wrong.values()):
             keys.append(case.key)
             for key in columns:
                 values[key].append(value_of(case, key))
     progress(total, total, "")
-    found = found or misfits
+    found = wrong[False] or wrong[True]
     problems = [*itertools.islice(found.values(), MAX_CONFLICTS)]
     if len(found) > MAX_CONFLICTS:
         message = f"{len(found)} conflicts between swept values; the first {MAX_CONFLICTS} are"
         problems.append(FileProblem(Place(file.path), "", message))
-    return tuple(keys), values, problems
+    if problems:
+        raise CaseFileError(problems)
+    return tuple(keys), values
 
 
 Where = tuple[Place, str]  # a key of a file, which may be given for several blocks or files
 
 
-def _blocks_alone(files: Sequence[CaseFile], max_jobs: int) -> list[Block]:
-    """Return the blocks that files have without the command line; none of a file that is wrong."""
-    plain = [replace(file, changes=Tree({}, {}), problems=[]) for file in files]
-    found = [_study(file, max_jobs, None, no_progress)[1] for file in plain]
-    return [block for blocks in found for block in blocks]
+def _find_problems(paths: Sequence[str | os.PathLike[str]], max_jobs: int) -> list[FileProblem]:
+    """Return what is wrong with files without the command line."""
+    try:
+        load_studies(*paths, max_jobs=max_jobs)
+    except CaseFileError as error:
+        return error.problems
+    return []
 
 
 def _find_unread(blocks: Sequence[Block]) -> dict[Where, FileProblem]:
-    """Return the keys that no job reads of those that they are given for."""
+    """Return the keys that no job reads of those that they are given for.
+
+    Cases are built only until each key has a reader.
+    """
     read: set[Where] = set()
     unread: dict[Where, FileProblem] = {}
     for block in blocks:
-        some, none = _read_in(block, read)
-        read |= some
-        unread |= none
+        tree, wanted = block.tree, {}
+        for key, value in block.given.items():
+            path = path_of(key)
+            while path not in tree.places:  # of a part, the key that gives all of them
+                path = path[:-1]
+            where = tree.at(*path)[0], key_of(path)
+            if where not in read and (row_of(key) or key in WORDS) and not is_off(key, value):
+                is_swept = key in block.sweeps
+                wanted[where] = conditions(key) if is_swept else needs_of_given(key, block.given)
+        for number in block.numbers if wanted else ():
+            case = block.case(number)
+            for where, needs in [*wanted.items()]:
+                unmet = next((one for one in needs if not condition(one[1])(case)), None)
+                if unmet is None:
+                    read.add(where)
+                    del wanted[where]
+                elif where not in unread:
+                    problem = problem_of(*unmet)
+                    at = tree.at(*path_of(problem.key))[0]
+                    place = at if at.file == where[0].file else where[0]
+                    unread[where] = FileProblem(place, problem.key, problem.message)
+            if not wanted:
+                break
     return {where: problem for where, problem in unread.items() if where not in read}
-
-
-def _read_in(block: Block, known: set[Where]) -> tuple[set[Where], dict[Where, FileProblem]]:
-    """Return which keys of a block its jobs read, and a problem for each other one.
-
-    known: those of which it is known already. Cases are built only until each key has a reader.
-    """
-    tree, wanted = block.tree, {}
-    for key, value in block.given.items():
-        path = path_of(key)
-        while path not in tree.places:  # of a part, the key that gives all of them
-            path = path[:-1]
-        where = tree.at(*path)[0], key_of(path)
-        if where not in known and (row_of(key) or key in WORDS) and not is_off(key, value):
-            is_swept = key in block.sweeps
-            wanted[where] = conditions(key) if is_swept else needs_of_given(key, block.given)
-    read: set[Where] = set()
-    unread: dict[Where, FileProblem] = {}
-    for number in block.numbers if wanted else ():
-        case = block.case(number)
-        for where in [one for one in wanted if one not in read]:
-            unmet = [one for one in wanted[where] if not condition(one[1])(case)]
-            if not unmet:
-                read.add(where)
-            elif where not in unread:
-                problem = problem_of(*unmet[0])
-                at = tree.at(*path_of(problem.key))[0]
-                place = at if at.file == where[0].file else where[0]
-                unread[where] = FileProblem(place, problem.key, problem.message)
-        if len(read) == len(wanted):
-            break
-    return read, {where: problem for where, problem in unread.items() if where not in read}
