@@ -32,6 +32,10 @@ from compressor.cases.swept import FORMS, NoSweep, Sweep, design, design_size, s
 from compressor.cases.table import outside_identity
 from compressor.cases.yaml_reader import FileProblem, Place, Tree
 
+NO_ENDS = (
+    ": a normal distribution has no ends; give it a smaller sd, or draw from {triangular: [least, "
+    "likeliest, greatest]}"
+)
 RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
 
 Factors = list[tuple[str, ...]]  # keys that advance together
@@ -124,11 +128,6 @@ class Block:
         """Return the case of one combination. Raises CaseError where its values do not fit."""
         return Case.resolve({"name": self.name or "case", **self.values_of(number)})
 
-    def solver_of(self, number: int) -> tuple[int, ...]:
-        """Return the rows of the keys by which cases differ in `solve` or `output`."""
-        rows = self.rows_of(number).items()
-        return tuple(row for key, row in rows if key.startswith(("solve", "output")))
-
     def each_value(self) -> Iterator[dict[str, int]]:
         """Yield rows of the swept keys in which each value stands once at least."""
         for number in range(max(map(len, self.columns.values()), default=1)):
@@ -151,7 +150,7 @@ class Block:
                 sweep, row = self.sweeps[swept], rows[swept]
                 place = self.tree.at(*sweep.path, *[row] * (sweep.kind == "list"))[1]
                 if not error.is_misfit and not sweep.has_ends:
-                    message = tell_draw(row + 1, len(self.columns[swept]), message)
+                    message = f"draw {row + 1} of {len(self.columns[swept])}: {message}{NO_ENDS}"
             else:
                 is_value = tuple(parts) in self.tree.places and not is_of_key(message)
                 place = self.tree.at(*parts)[is_value]
@@ -179,14 +178,6 @@ class Block:
 def is_of_key(message: str) -> bool:
     """Return whether a problem is about a key, and not about its value."""
     return message.startswith("unknown key")
-
-
-def tell_draw(number: int, of: int, message: str) -> str:
-    """Return what is wrong with a value drawn from a distribution without ends."""
-    return (
-        f"draw {number} of {of}: {message}: a normal distribution has no ends; give it a smaller "
-        "sd, or draw from {triangular: [least, likeliest, greatest]}"
-    )
 
 
 def reader(values: Mapping[str, Any]) -> Callable[[str], Any]:

@@ -8,7 +8,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import field, replace
 from functools import cache, cached_property, lru_cache, partial
 from typing import Any
@@ -23,13 +23,12 @@ from compressor.cases.checks import (
     stands_for,
     values_given,
 )
-from compressor.cases.comparison import condition
 from compressor.cases.conflicts import (
     FACT_KEYS,
     LED,
-    conditions,
     conflicts,
     given_conflicts,
+    reads,
     unread_values,
     values_read,
 )
@@ -381,16 +380,11 @@ stroke, 240 mm
         return ""
 
     @property
-    def chooses_laws(self) -> bool:
-        """Return whether contact or friction has another law than the default one."""
-        return self.contact.law != CONTACT_LAWS[0] or bool(self.friction and self.friction.law)
-
-    @property
     def chooses_forces(self) -> bool:
         """Return whether it has laws, a film or a load that runs by default do not have."""
         measured = self.load == "gas" and self.gas.is_measured
-        at_joints = self.chooses_laws or self.lubricant is not None
-        return measured or (at_joints and self.joint != "none")
+        own_law = self.contact.law != CONTACT_LAWS[0] or (self.friction and self.friction.law)
+        return measured or (self.joint != "none" and bool(own_law or self.lubricant))
 
     @property
     def needs_mechanism(self) -> bool:
@@ -496,7 +490,11 @@ def identity_of(case: Case) -> dict[str, Any]:
         "model": MODEL_VERSION,
         "span": (duration, settle, round(case.steps)),
         "solver": (solve.rtol or targets or solve.accuracy, solve.method, solve.max_steps),
-        "facts": _facts_read(case),
+        "facts": {
+            key: value
+            for key in FACT_KEYS
+            if (value := getter(key)(case)) is not None and reads(case, key)
+        },
     }
     if case.joint != "none":
         found["clearance_mm"] = vars(case.clearance_mm)
@@ -520,28 +518,6 @@ def _identity_of_group(name: str, group: Any) -> dict[str, Any]:
     if cards := given.get("indicator"):  # the digest counts, wherever the file is
         given["indicator"] = {end: card and card.rpartition("@")[2] for end, card in cards.items()}
     return given
-
-
-def _facts_read(case: Case) -> dict[str, Any]:
-    """Return the facts that a case has and reads."""
-    holds = frozenset(needed for needed, test in _fact_conditions().items() if test(case))
-    return {key: value for key, get in _facts_where(holds) if (value := get(case)) is not None}
-
-
-@cache
-def _fact_conditions() -> dict[str, Callable[[Any], bool]]:
-    """Return the tests of what facts are read with, by their texts: many need the same."""
-    return {needed: condition(needed) for key in FACT_KEYS for _, needed in conditions(key)}
-
-
-@cache
-def _facts_where(holds: frozenset[str]) -> list[tuple[str, Callable[[Any], Any]]]:
-    """Return the facts that are read where some conditions hold, and how a case gives each."""
-    return [
-        (key, getter(key))
-        for key in FACT_KEYS
-        if all(needed in holds for _, needed in conditions(key))
-    ]
 
 
 def _plain_parts(value: Any) -> Any:

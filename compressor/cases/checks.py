@@ -27,6 +27,7 @@ from compressor.cases.parameter import (
     convert_other,
     quote_value,
     split_unit,
+    to_python,
 )
 from compressor.cases.table import GROUPS, TOP, WORDS, parts_by_key, table
 from compressor.cases.yaml_reader import Path, is_number
@@ -132,11 +133,6 @@ PERCENT = re.compile(r"(\w*_)?clearance(_\w*)?_(percent|pct)")
 TWICE = "stands in place of {}: give one of the two"
 
 
-def halve(value: Any) -> Any:
-    """Return half of a number, and any other value as it is."""
-    return value / 2 if is_number(value) else value
-
-
 def row_of_double(key: str) -> Parameter:
     """Return the row of a key of `DOUBLES`."""
     row = table()[DOUBLES[key]]
@@ -146,31 +142,20 @@ def row_of_double(key: str) -> Parameter:
     )  # fmt: skip
 
 
-def check_double(key: str, value: Any) -> str | None:
-    """Return what is wrong with a value of a key of `DOUBLES`, in its own numbers; None if nothing.
-
-    Of one value: what is swept is checked where its values are made.
-    """
-    if isinstance(value, Mapping | list | tuple) or hasattr(value, "ndim") or value is None:
-        return None
-    return row_of_double(key).check(value)
-
-
 def expand_synonyms(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
     """Return nested values with each synonym as its key; both at once are a problem."""
     whole, problems = dict(values), []
     for synonym, key in DOUBLES.items():
-        group, name, own = *synonym.split("."), key.rpartition(".")[2]
+        group, name, own = *synonym.split("."), _leaf(key)
         within = whole.get(group)
         if not isinstance(within, Mapping) or name not in within:
             continue
-        message = TWICE.format(key) if own in within else check_double(synonym, within[name])
-        if message:
+        whole[group] = {one: value for one, value in within.items() if one != name}
+        row, value = row_of_double(synonym), within[name]
+        if message := TWICE.format(key) if own in within else row.check(value):
             problems.append(Problem(synonym, message))
-            whole[group] = {one: value for one, value in within.items() if one != name}
         else:
-            renamed = {own if one == name else one: value for one, value in within.items()}
-            whole[group] = renamed | {own: halve(within[name])}
+            whole[group][own] = to_python(value) / 2
     return whole, problems
 
 
@@ -186,11 +171,11 @@ def of_other_quantity(name: str, group: str, value: Any) -> str:
     is_near = group in ("", "machine", "gas")
     if PERCENT.fullmatch(name) and is_near:
         return "; write gas.clearance_percent, a number or {head: 12, crank: 14}"
-    ours, factor = OTHER_UNITS.get(name.rpartition("_")[2], ("mm", 1.0))
-    known = is_number(value) and ours == "mm"
-    half, whole = (f"{value * factor / n:.12g}" if known else "..." for n in (2, 1))
     for words, form in DIAMETERS if DIAMETER.fullmatch(name) else ():
         if re.search(words, name) and (is_near or "pin_radius" in form):
+            ours, factor = OTHER_UNITS.get(name.rpartition("_")[2], ("mm", 1.0))
+            known = is_number(value) and ours == "mm"
+            half, whole = (f"{value * factor / n:.12g}" if known else "..." for n in (2, 1))
             return "; write " + form.format(half=half, whole=whole)
     return ""
 
@@ -212,6 +197,7 @@ def known_keys(group: str) -> list[str]:
 
 def describe_unknown(name: str, group: str, value: Any = None) -> str:
     """Return the error of a key that a group does not have; value: the key's."""
+    value = to_python(value)
     known, doubles = known_keys(group), [key for key in DOUBLES if key.startswith(f"{group}.")]
     hint = (
         in_our_unit(name, value, [*known, *map(_leaf, doubles)])

@@ -12,7 +12,7 @@ from typing import Any
 from compressor.cases.blocks import Sample
 from compressor.cases.checks import DOUBLES, keys_of, phrase_of, row_of, row_of_double
 from compressor.cases.load import WHOLE_FILE, Report
-from compressor.cases.parameter import NAME, Parameter, adapter_of, rows_of
+from compressor.cases.parameter import Parameter, adapter_of, rows_of
 from compressor.cases.swept import FORMS, SAMPLED
 from compressor.cases.table import GROUPS, WORDS, outside_identity, parts_by_key, table
 
@@ -105,8 +105,6 @@ def _value(row: Parameter) -> Schema:
 
 def _single_value(row: Parameter) -> Schema:
     """Return the schema of one value of a parameter."""
-    if row.kind == "text":
-        return {"type": "string", "pattern": rf"^(?!\.){NAME.pattern}$"}
     return adapter_of(replace(row, optional=False)).json_schema()
 
 

@@ -17,7 +17,6 @@ from compressor.cases.case import Case
 from compressor.cases.checks import (
     DOUBLES,
     expand_synonyms,
-    halve,
     key_of,
     row_of,
     stands_for,
@@ -202,7 +201,7 @@ def _study(
     values = dict(blocks[0].columns) if is_grid else values
     for key, sweep in blocks[0].sweeps.items() if is_grid else ():
         if key_of(sweep.path) in DOUBLES:
-            values[key] = [*map(halve, values[key])]
+            values[key] = [value / 2 for value in values[key]]
     axes = tuple(Axis(key, tuple(values[key]), spreads.get(key)) for key in columns)
     selected = range(len(cases)) if only is None else cases.where(only)
     fixed = tuple(expand_synonyms(block.fixed)[0] for block in blocks)

@@ -44,7 +44,7 @@ from compressor.metrics import METRICS
 from compressor.program import CompsimError, did_you_mean
 
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
-NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
+NAME = r"^[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}$"
 NO_VALUE = "has no value; leave the key out to get its default"
 # a number that is written as text, with a decimal comma or a unit
 AS_NUMBER = re.compile(
@@ -221,7 +221,7 @@ def convert_other(value: Any, unit: str) -> str:
 # kind -> what it may be beside the words of its row
 OTHERWISE = {
     "accuracy": "errors by metric such as {peak_acceleration: 0.01}",
-    "text": "text",
+    "text": "a name of up to 64 letters [A-Za-z0-9._-], without a leading dot",
     "card": "the path of a CSV file with columns crank_angle_deg and pressure_bar",
 }
 
@@ -375,14 +375,6 @@ def to_whole(value: Any) -> Any:
     return int(value) if type(value) is float and value.is_integer() else value
 
 
-def check_name(value: str) -> str:
-    """Return the name of a study. Raises ValueError for one that no file could have."""
-    if NAME.fullmatch(value) and not value.startswith("."):
-        return value
-    allowed = "[A-Za-z0-9._-], at most 64"
-    raise ValueError(f"{quote_value(value)} is no name: use {allowed}, no leading dot")
-
-
 def check_lines(value: str) -> str:
     """Return a text of lines without blanks around it. Raises ValueError for any other."""
     if value.strip() and all(line.isprintable() for line in value.strip().split("\n")):
@@ -415,7 +407,7 @@ def annotation_of(row: Parameter) -> Any:
         ],
         "integer": Annotated[int, Field(strict=True, **ends), BeforeValidator(to_whole)],
         "boolean": Annotated[bool, Field(strict=True), BeforeValidator(to_python)],
-        "text": Annotated[str, Field(strict=True), AfterValidator(check_name)],
+        "text": Annotated[str, Field(strict=True, pattern=NAME)],
         "card": Annotated[str, Field(strict=True, min_length=1)],
         "lines": Annotated[
             str, Field(strict=True, min_length=1, max_length=int(row.high)),

@@ -2,7 +2,7 @@
 
 import itertools
 from bisect import bisect_right
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, overload
 
@@ -57,12 +57,12 @@ class Study:
         block, place = self.cases.place_of(number)
         return {**expand_synonyms(block.values_of(place))[0], "name": block.name}
 
-    def solver_of(self, number: int) -> Hashable:
-        """Return what jobs share only if their cases have equal groups `solve` and `output`."""
-        if not isinstance(self.cases, Cases):
-            return number
-        block, place = self.cases.place_of(number)
-        return id(block), block.solver_of(place)
+    @property
+    def is_of_one_solver(self) -> bool:
+        """Return whether all jobs are known to have equal groups `solve` and `output`."""
+        of_blocks = {repr((one.get("solve"), one.get("output"))) for one in self.fixed}
+        is_swept = any(axis.key.startswith(("solve.", "output.")) for axis in self.axes)
+        return len(of_blocks) == 1 and not is_swept
 
     def shard(self, number: int, of: int) -> "Study":
         """Return the study with the jobs of one shard selected, 1 <= number <= of.

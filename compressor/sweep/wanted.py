@@ -71,13 +71,15 @@ class RequestedJobs:
         """
         found: dict[str, JobEnd] = {}
         verdicts: dict[Hashable, bool] = {}  # by what a verdict depends on
+        studies = {study.name: study for study, _ in self.places.values()}
+        shared = {name for name, study in studies.items() if study.is_of_one_solver}
         columns = (stored.columns[name].tolist() for name in ("status", "reason", "kept"))
         ends = [*zip(*columns, strict=True)]
         positions = stored.find([*self.places]).tolist()
-        for (key, (study, number)), position in zip(self.places.items(), positions, strict=True):
+        for (key, (study, _)), position in zip(self.places.items(), positions, strict=True):
             if position < 0:
                 continue
-            kind = key if key in self.own else (study.name, study.solver_of(number))
+            kind = study.name if study.name in shared and key not in self.own else key
             about = kind, ends[position]
             if about not in verdicts:
                 verdicts[about] = stored.status_at(position).satisfies(self[key])

@@ -32,6 +32,8 @@ def told(values) -> list[str]:
         ({"sample": {"n": 64}}, f"sample: unknown key; a case has {AT_TOP}"),
         ({1: 2}, f"1: unknown key; a case has {AT_TOP}"),
         ({"machine": {1: 2}}, f"machine.1: unknown key; machine has {IN_MACHINE}"),
+        ({"clearance_diametral_mm": 10**400},
+         "clearance_diametral_mm: unknown key; write clearance_mm: inf, which is radial"),
         ({"machine": None}, "machine: has no value; leave the key out to get its default"),
         ({"solve": {"accuracy": []}},
          "solve.accuracy: needs draft, standard, fine or reference, or errors by metric such as "

@@ -170,8 +170,8 @@ def test_a_sweep_full_of_conflicts_is_cut_short(write):
 def test_names_decide_where_a_study_is_stored(write):
     paths = [write("name: Same", "a.yaml"), write("{}", "same.yaml"), write("{}", "a b.yaml")]
     assert mistakes(*paths) == [
-        "a b.yaml:1:1: name: the file's name gives none: 'a b' is no name: "
-        "use [A-Za-z0-9._-], at most 64, no leading dot; set name",
+        "a b.yaml:1:1: name: the file's name gives none: needs a name of up to 64 letters "
+        "[A-Za-z0-9._-], without a leading dot, not 'a b'; set name",
         "same.yaml:1:1: name: a.yaml and same.yaml would be stored under one name, same",
     ]
 
@@ -246,7 +246,7 @@ def hostile(unit: str, before: str = "", after: str = "") -> str:
         (hostile("["), "is nested too deeply"),
         (hostile("- "), "is nested too deeply"),
         (hostile("9", "machine: {speed_rpm: ", "}"), "rpm, not inf"),
-        (hostile("x", "name: "), "no leading dot"),
+        (hostile("x", "name: "), "xxx'"),
         ("#" * (MAX_BYTES + 1), "is larger than 1 MiB: no case file"),
     ],
     ids=lambda value: value[:12],
