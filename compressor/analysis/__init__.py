@@ -7,7 +7,6 @@ from compressor.analysis.contacts import (
     OILED_MODES,
     UNKNOWN,
     angle_modes,
-    contact_modes,
     impacts,
     joints_with_clearance,
     measure_orbit,

@@ -56,7 +56,7 @@ def read_cycle(run: "xr.Dataset") -> Cycle:
     and the impacts of the same one. Raises NoSeriesError where no revolution is settled.
     """
     settled, count = whole_revolutions(run)
-    recorded = _read_sensor(run)
+    recorded = read_sensor(run)
     number = min(count, recorded[2]) if recorded else count
     turns = settled["crank_angle"].values / math.tau
     begin = turns[0] + number - 1
@@ -65,13 +65,15 @@ def read_cycle(run: "xr.Dataset") -> Cycle:
     degrees = 360.0 * (turns[inside] % 1.0)
     load = revolution["contact_force"].sel(joint="small_end", axis="x").values
     if recorded:
-        angle, vibration = _sort_by_angle(*_read_last_turn(recorded, begin))
+        passed, values, _ = recorded
+        its = (passed > begin - 1e-9) & (passed < begin + 1 - 1e-9)
+        angle, vibration = sort_by_angle(360.0 * ((passed[its] + 1e-12) % 1.0), values[its])
     else:
-        angle, vibration = _sort_by_angle(degrees, revolution["acceleration"].values)
-    load_angle, sorted_load = _sort_by_angle(degrees, load)
+        angle, vibration = sort_by_angle(degrees, revolution["acceleration"].values)
+    load_angle, sorted_load = sort_by_angle(degrees, load)
     return Cycle(
         angle, vibration, recorded is not None, load_angle, sorted_load,
-        _reversals(turns[inside], load), _events(run, begin), _struck(run, begin),
+        find_reversals(turns[inside], load), find_events(run, begin), find_impacts(run, begin),
     )  # fmt: skip
 
 
@@ -91,13 +93,13 @@ def read_loads(run: "xr.Dataset") -> tuple[np.ndarray, dict[str, np.ndarray]]:
     }
 
 
-def _sort_by_angle(degrees: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def sort_by_angle(degrees: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return values by rising angle."""
     order = np.argsort(degrees, kind="stable")
     return degrees[order], values[order]
 
 
-def _read_sensor(run: "xr.Dataset") -> tuple[np.ndarray, np.ndarray, int] | None:
+def read_sensor(run: "xr.Dataset") -> tuple[np.ndarray, np.ndarray, int] | None:
     """Return the crank's revolutions at the samples of a record, these, and how many are settled.
 
     Revolutions count from the run's begin. By the tacho, at a steady pace before the first pulse
@@ -120,16 +122,7 @@ def _read_sensor(run: "xr.Dataset") -> tuple[np.ndarray, np.ndarray, int] | None
     return passed + (first if steady else 0.0), run["sensor_acceleration"].values, whole
 
 
-def _read_last_turn(
-    recorded: tuple[np.ndarray, np.ndarray, int], begin: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return angles (degrees) and samples of a record in the revolution that begins there."""
-    turns, values, _ = recorded
-    inside = (turns > begin - 1e-9) & (turns < begin + 1 - 1e-9)
-    return 360.0 * ((turns[inside] + 1e-12) % 1.0), values[inside]
-
-
-def _reversals(turns: np.ndarray, load: np.ndarray) -> tuple[float, ...]:
+def find_reversals(turns: np.ndarray, load: np.ndarray) -> tuple[float, ...]:
     """Return the crank angles (degrees) at which a force changes its sign, straight between.
 
     Of a force that is zero for a while, as in flight, it is where it is zero for the last time.
@@ -143,7 +136,7 @@ def _reversals(turns: np.ndarray, load: np.ndarray) -> tuple[float, ...]:
     return tuple(sorted(float(one) for one in 360.0 * (at % 1.0)))
 
 
-def _events(run: "xr.Dataset", begin: float) -> tuple[tuple[float, str], ...]:
+def find_events(run: "xr.Dataset", begin: float) -> tuple[tuple[float, str], ...]:
     """Return the angles (degrees) and names of the load's corners in a revolution.
 
     They are the same in each: those of the next one are read, which has one before it.
@@ -169,7 +162,7 @@ def _events(run: "xr.Dataset", begin: float) -> tuple[tuple[float, str], ...]:
     return tuple(sorted(found))
 
 
-def _struck(run: "xr.Dataset", begin: float) -> dict[str, np.ndarray]:
+def find_impacts(run: "xr.Dataset", begin: float) -> dict[str, np.ndarray]:
     """Return the angles (degrees) of the impacts in a revolution by joint with clearance."""
     try:
         joints = joints_with_clearance(run)

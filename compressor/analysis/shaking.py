@@ -104,7 +104,6 @@ def healthy_body_velocity_rms(case: Case) -> np.ndarray:
 ORDER = 12  # of the crank speed: above it the ideal machine's force has next to nothing
 SAME_TURN_DEGREES = 20.0  # changes of sign nearer to each other are one turn
 BEFORE, AFTER = 10.0, 50.0  # degrees about a change of direction that count as belonging to it
-SILENT_SHARE = 1e-9  # of the greatest force: what lies below is rounding
 LEVELS = 5  # of the kurtogram that chooses a sensor's band, at most
 MIN_SHARE = 0.01  # of the record's energy that this band has
 MIN_LINES = 128  # samples that a level of it needs, twice over for each further one
@@ -135,8 +134,7 @@ class Shaking:
     `turns`: crank angles (degrees) at which a force along the cylinder at a joint with clearance
     changes its sign. `angle` (degrees) and `mean_square` (N^2), (a_turn,): of the part of X above
     `ORDER`, a mean over revolutions. The rms of this part has two shares, N, whose squares add up
-    to its own: `near_turns`, from `BEFORE` to `AFTER` a turn, and `elsewhere`. `ring`: the
-    strongest order of the latter, nan where the part above `ORDER` is rounding.
+    to its own: `near_turns`, from `BEFORE` to `AFTER` a turn, and `elsewhere`.
     """
 
     revolutions: int
@@ -146,7 +144,6 @@ class Shaking:
     mean_square: np.ndarray
     near_turns: float
     elsewhere: float
-    ring: float
 
 
 def shaking(run: "xr.Dataset") -> Shaking:
@@ -155,7 +152,7 @@ def shaking(run: "xr.Dataset") -> Shaking:
     Raises NoSeriesError where the series hold no whole settled revolution, RecordError where they
     are too coarse for `ORDER`.
     """
-    from compressor.vibration import high_pass_orders, line_amplitudes
+    from compressor.vibration import high_pass_orders
 
     settled, revolutions = whole_revolutions(run)
     crank = settled["crank_angle"].values
@@ -166,10 +163,6 @@ def shaking(run: "xr.Dataset") -> Shaking:
     mean_square = (high.reshape(-1, a_turn) ** 2).mean(axis=0)
     turns = directions_change(settled)
     is_near = near_a_turn(angle, turns)
-    rest = np.where(np.tile(is_near, high.size // a_turn), 0.0, high)
-    lines = line_amplitudes(rest, a_turn, True)
-    lines[: ORDER + 1] = 0.0
-    rings = lines.max() > SILENT_SHARE * np.abs(force).max()
     return Shaking(
         revolutions,
         order_lines(even, a_turn),
@@ -178,7 +171,6 @@ def shaking(run: "xr.Dataset") -> Shaking:
         mean_square,
         math.sqrt(float(mean_square[is_near].sum()) / a_turn),
         math.sqrt(float(mean_square[~is_near].sum()) / a_turn),
-        float(np.argmax(lines)) if rings else math.nan,
     )
 
 

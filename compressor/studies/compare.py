@@ -16,7 +16,7 @@ import numpy as np
 from compressor.analysis import ORDER, faulty_joints
 from compressor.cases import Case, points
 from compressor.digits import align_columns, plural
-from compressor.program import Progress, no_progress
+from compressor.program import Progress, no_progress, report_progress
 from compressor.report import BLACK, CYCLE, GREY, LineStyle, PlotlyFigure, fill, make_grid
 from compressor.store import (
     Folder,
@@ -289,8 +289,7 @@ def compare_record(
     stored = read_store(folder, warn=True)
     wanted = dict(wanted_jobs(words, folder, key))
     jobs = []
-    for number, (one, swept) in enumerate(wanted.items()):
-        progress(number, len(wanted), "")
+    for one, swept in report_progress([*wanted.items()], progress):
         other, case = job_record(stored, one), stored.case_at(int(stored.find([one])[0]))
         if other is None or case is None or not case.sensor:
             continue

@@ -8,7 +8,7 @@ import xarray as xr
 from conftest import listed
 
 from compressor.analysis.contacts import impacts
-from compressor.analysis.cycle import _reversals, read_cycle, read_loads
+from compressor.analysis.cycle import find_reversals, read_cycle, read_loads
 from compressor.analysis.runs import record_of
 from compressor.analysis.shaking import NoSeriesError, frame_forces, healthy_twin
 from compressor.cases.case import Case
@@ -88,7 +88,7 @@ def test_a_reversal_through_flight_is_one(flight):
     load = np.array([2.0, 2.0, *zeros, -2.0, -2.0, *zeros, -2.0])
     turns = 3.0 + np.arange(load.size) / 100
     at = 1 + flight if flight else 1.5
-    assert _reversals(turns, load) == pytest.approx((3.6 * at,))
+    assert find_reversals(turns, load) == pytest.approx((3.6 * at,))
 
 
 def test_valve_events_are_the_corners_of_the_gas_cycle(sensed):
