@@ -7,7 +7,6 @@ import pytest
 from scipy.stats import spearmanr
 
 from compressor.analysis.effects import correlate_ranks, grid_effects, sampled_effects
-from compressor.cases.swept import design
 
 
 def table(function, *axes):
@@ -56,17 +55,6 @@ def test_gaps_of_a_sum_are_filled_rightly():
 def test_what_never_changes_has_no_effects():
     assert np.isnan(grid_effects(np.full((3, 2), 5.0)).main).all()
     assert np.isnan(sampled_effects([np.arange(9.0)], np.full(9, 5.0)).main).all()
-
-
-def test_saltelli_s_designs_have_indices():
-    points = np.array(design("saltelli", 256, 2, 1))
-    values = points[:, 0] + 2 * points[:, 1]
-    values[5] = math.nan
-    found = sampled_effects([*points.T], values)
-    assert (found.kind, found.unknown) == ("saltelli", 1)
-    assert found.total == pytest.approx([0.2, 0.8], abs=0.03)
-    assert (found.main_ends[0] <= found.main).all()
-    assert (found.main_ends[1] >= found.main).all()
 
 
 def test_other_designs_have_correlations_of_ranks():

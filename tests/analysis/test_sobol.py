@@ -49,6 +49,8 @@ def test_failed_runs_do_not_bias_the_indices():
     found = sampled_effects([*points.T], np.where(lost, np.nan, values))
     assert (found.kind, found.unknown, found.base) == ("saltelli", lost.sum(), 256)
     assert found.total == pytest.approx([0.2, 0.8], abs=0.04)
+    assert (found.main_ends[0] <= found.main).all()
+    assert (found.main_ends[1] >= found.main).all()
     whole = sampled_effects([*points.T], values)
     assert (whole.unknown, whole.base) == (0, 0)
 

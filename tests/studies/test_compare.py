@@ -219,14 +219,6 @@ def test_a_shift_and_a_size_are_found_apart(degrees):
     assert found["rms_ratio"].value == pytest.approx(3.0, rel=1e-3)
 
 
-def test_a_record_is_like_itself():
-    one = record((5, 1.0, 0.0), (40, 1.0, 30.0), noise=0.3)
-    found = likeness(one, one)
-    assert found["correlation"].value == pytest.approx(1.0)
-    assert found["envelope"].value == pytest.approx(1.0)
-    assert found["rms_ratio"].value == 1.0
-
-
 def test_the_envelope_hears_bursts_whatever_rings_in_them():
     """Two bursts at the same angles, of other orders: their waves have nothing in common."""
     turns = (TIMES - FIRST) / TURN
