@@ -6,12 +6,14 @@ spaced; curves have as many points as a screen can show.
 """
 
 import json
+from base64 import b64encode
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 import xarray as xr
+from plotly.io.json import to_json_plotly
 
 from compressor.analysis import SPOKEN, NoSeriesError, last_revolution
 from compressor.metrics import JOINTS, SERIES
@@ -28,30 +30,40 @@ EVEN = 1e-3  # of a step: how far evenly spaced numbers may be off
 
 def script(name: str, figure: go.Figure) -> str:
     """Return the script of a figure."""
-    return f"compsimFigure({json.dumps(name)},{thin_figure(figure).to_json()});\n"
+    return f"compsimFigure({json.dumps(name)},{to_json_plotly(thin_figure(figure))});\n"
 
 
-def thin_figure(figure: go.Figure) -> go.Figure:
-    """Return a figure with the points that a screen can show."""
+def thin_figure(figure: go.Figure) -> dict[str, Any]:
+    """Return a figure in plotly's JSON, with the points that a screen can show.
+
+    Plotly checks again whatever it makes a figure of, so that this is none.
+    """
     data = [thin_trace(trace, figure.layout[f"xaxis{trace.xaxis[1:]}"]) for trace in figure.data]
-    return go.Figure(data, figure.layout)
+    return {"data": data, "layout": figure.layout.to_plotly_json()}
 
 
 def thin_trace(trace: Trace, axis: Any) -> dict[str, Any]:
     """Return a trace with fewer points and numbers of 32 bits; axis: of x."""
     found = trace.to_plotly_json()
     part = visible(trace, axis) if trace.type == "scatter" and not trace.fill else slice(None)
+    x = found["x"][part].astype(np.float32)
     for of in (found, found.get("error_y", {}), found.get("error_x", {})):
         for name in (name for name, one in of.items() if isinstance(one, np.ndarray)):
             values = of[name][part]
-            of[name] = values if values.dtype.kind in "OU" else values.astype(np.float32)
-    x = found["x"]
+            is_number = values.dtype.kind not in "OU" and values.size > 0
+            of[name] = encode(values) if is_number else values
     if trace.type == "scatter" and x.size > 8 and np.isfinite(x).all():
         step = float(x[-1] - x[0]) / (x.size - 1)
         if step and np.ptp(x - x[0] - step * np.arange(x.size)) <= EVEN * abs(step):
             del found["x"]
             found |= {"x0": float(x[0]), "dx": step}
     return found
+
+
+def encode(values: np.ndarray) -> dict[str, str]:
+    """Return numbers as plotly's JSON has them: of 32 bits, in base64."""
+    found = {"dtype": "f4", "bdata": b64encode(values.astype("<f4").tobytes()).decode()}
+    return found | ({"shape": ", ".join(map(str, values.shape))} if values.ndim > 1 else {})
 
 
 def visible(trace: go.Scatter, axis: Any) -> Any:

@@ -21,7 +21,6 @@ from compressor.report.interactive import (
     MAX_POINTS,
     extremes,
     script,
-    thin_figure,
 )
 
 X = np.linspace(0.0, 360.0, 721)
@@ -85,7 +84,8 @@ def test_panels_of_the_same_jobs_share_columns_and_name_their_axes():
 
 
 def test_the_page_gets_what_was_drawn(drawing):
-    found = json.loads(thin_figure(drawing.figure()).to_json())
+    text = script("one", drawing.figure())
+    found = json.loads(text.removeprefix('compsimFigure("one",').removesuffix(");\n"))
     figure = go.Figure(found)  # plotly itself takes it
     sine, cosine, part, _, cells, bars, jobs = found["data"]
     assert (sine["x0"], sine["dx"]) == (0.0, 0.5)

@@ -35,6 +35,7 @@ from compressor.report.figures.drawing import INCH, ROOM, WAYS, WIDTH, Panel, Tr
 from compressor.report.figures.style import PIXEL
 
 DPI = 150
+EDGE = 0.1  # inches, around what is drawn
 LEGEND_WIDTH = 130  # characters, in a row of a legend
 MARKERS = {
     "circle": "o", "square": "s", "diamond": "D", "triangle-up": "^", "triangle-down": "v",
@@ -69,9 +70,10 @@ STYLE: dict[str, Any] = {
 @style.context(STYLE, after_reset=True)
 def render(figure: go.Figure, kind: str = "png") -> bytes:
     """Return a figure as the bytes of a `png` or `svg` file, without a time stamp."""
-    stream = io.BytesIO()
-    paint(figure).savefig(stream, format=kind, bbox_inches="tight", pad_inches=0.1,
-                          metadata={"Date": None} if kind == "svg" else {})  # fmt: skip
+    stream, painted = io.BytesIO(), paint(figure)
+    box = painted.get_tightbbox().padded(EDGE)  # "tight" would draw all once more to find it
+    metadata = {"Date": None} if kind == "svg" else {}
+    painted.savefig(stream, format=kind, bbox_inches=box, metadata=metadata)
     return stream.getvalue()
 
 

@@ -73,14 +73,18 @@ class Measure:
 
         0 of a number that is rounding beside that of the other joint or axis.
         """
-        values = data[name]
         place = {"joint": self.joint} if self.joint else {"axis": self.axis} if self.axis else {}
+        found = data[name].sel(place, drop=True)
+        values = found.values  # by numpy: xarray's own `where` takes ten times as long
         if place:
             sizes = abs(data[self.variable])
-            values = values.where(~(sizes < ROUNDING * sizes.max([*place])), 0.0)
+            (way,) = map(sizes.get_axis_num, place)
+            greatest = np.fmax.reduce(sizes.values, way)
+            values = np.where(sizes.sel(place).values < ROUNDING * greatest, 0.0, values)
         if BARRED[self.variable].contact:
-            values = values.where(data["max_penetration"] != 0)
-        return values.sel(place, drop=True) * self.factor
+            depth = data["max_penetration"].sel(place).values
+            values = np.where(depth != 0, values, math.nan)
+        return found.copy(data=values * self.factor)
 
 
 def shown_variables(name: str) -> Iterator[Measure]:
