@@ -25,7 +25,7 @@ from compressor.analysis.machine_numbers import (
     describe_cases,
     describe_machine,
 )
-from compressor.analysis.margins import mean_peak
+from compressor.analysis.margins import Margin, mean_peak
 from compressor.analysis.runs import (
     CLEARANCES,
     FAULTS,

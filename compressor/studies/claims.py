@@ -12,7 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from compressor.analysis import LOADS, RULES, claim_margins, label, paper_cases, saltelli_design
+from compressor.analysis import (
+    LOADS,
+    RULES,
+    Margin,
+    claim_margins,
+    label,
+    paper_cases,
+    saltelli_design,
+)
 from compressor.cases import Case, points
 from compressor.digits import setting
 from compressor.program import Progress, no_progress, report_progress
@@ -41,7 +49,7 @@ from compressor.store import (
     read_store,
     swept_column,
 )
-from compressor.studies.frame import StudyError, rows_dataset
+from compressor.studies.frame import Row, StudyError, rows_dataset
 
 CLAIMS = tuple(range(1, len(RULES) + 1))
 SHORT = (
@@ -67,24 +75,11 @@ NUMBERS = {  # name -> dims, unit, long name
     "chaotic": ((), "1", "how many of the cases are chaotic"),
 }
 TEXTS = {"failed": "cases there are not, and why"}
+UNKNOWN = Margin(math.nan, math.nan)
+NO_MARGINS = [UNKNOWN] * len(CLAIMS), dict.fromkeys(SHARES, UNKNOWN)
 REMEDY = "compsim init claims writes a case file with all eleven cases of each machine"
 
 Key = tuple[tuple[str, Any], ...]  # swept values of a machine
-
-
-class Margins(NamedTuple):
-    """How far a machine is from each claim's threshold; nan where jobs are missing or failed.
-
-    `margin`, `error`: (8,), relative; `share_margin`, `share_error`: of claim 7 by each of `SHARES`
-    alone, (4,). `chaotic`: how many cases are. `failed`: which cases there are not, and why.
-    """
-
-    margin: list[float]
-    error: list[float]
-    share_margin: list[float]
-    share_error: list[float]
-    chaotic: int = 0
-    failed: str = ""
 
 
 def machines(source: StoredStudy) -> dict[Key, dict[str, str]]:
@@ -139,23 +134,25 @@ def judge_machines(
     return machines_dataset(rows, coords).assign_attrs(study=source.name)
 
 
-def measure(runs: Mapping[str, xr.Dataset], failed: str = "") -> Margins:
-    """Return the margins of one machine's runs by label; nan where some failed."""
-    chaotic = sum(run.attrs.get("regime") == "chaotic" for run in runs.values())
-    if failed:
-        no_claim, no_share = [math.nan] * len(CLAIMS), [math.nan] * len(SHARES)
-        return Margins(no_claim, no_claim, no_share, no_share, chaotic, failed)
-    each, alone = claim_margins(runs)
+def measure(runs: Mapping[str, xr.Dataset], failed: str = "") -> Row:
+    """Return the `NUMBERS` and `TEXTS` of one machine's runs by label.
+
+    failed: which cases there are not, and why; margins are nan then.
+    """
+    each, alone = NO_MARGINS if failed else claim_margins(runs)
     shares = [alone[name] for name in SHARES]
-    return Margins(
-        [one.value for one in each], [one.error for one in each],
-        [one.value for one in shares], [one.error for one in shares], chaotic,
-    )  # fmt: skip
+    return {
+        "margin": [one.value for one in each], "error": [one.error for one in each],
+        "share_margin": [one.value for one in shares],
+        "share_error": [one.error for one in shares],
+        "chaotic": sum(run.attrs.get("regime") == "chaotic" for run in runs.values()),
+        "failed": failed,
+    }  # fmt: skip
 
 
-def machines_dataset(rows: list[Margins], coords: Mapping[str, tuple]) -> xr.Dataset:
+def machines_dataset(rows: list[Row], coords: Mapping[str, tuple]) -> xr.Dataset:
     """Return margins with the dimension machine; coords: of the swept keys."""
-    found = rows_dataset([row._asdict() for row in rows], "machine", TEXTS, NUMBERS)
+    found = rows_dataset(rows, "machine", TEXTS, NUMBERS)
     own = {
         "claim": ("claim", np.array(CLAIMS), {"long_name": "claim of the paper"}),
         "share": ("share", np.array(SHARES, object), {"long_name": "measure of claim 7"}),

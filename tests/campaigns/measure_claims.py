@@ -85,7 +85,7 @@ def agreeing():
     """The margins of the machine in which all claims hold, in long runs."""
     (study,) = load_studies(example("agreeing"), overrides=[f"solve.duration_rev={LONG_REV:g}"])
     found = judged_alone(study.cases[0])
-    return {"margin": found.margin, "error": found.error, "revolutions": LONG_REV}
+    return {"margin": found["margin"], "error": found["error"], "revolutions": LONG_REV}
 
 
 def counted(found):
