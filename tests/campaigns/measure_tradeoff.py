@@ -19,11 +19,7 @@ from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.page import model_table
 from compressor.studies.tradeoff.variants import faulty, run_variants, scale_contact, variants
-from compressor.studies.tradeoff.work_precision import (
-    VARIABLES,
-    draw_work_precision,
-    tabulate,
-)
+from compressor.studies.tradeoff.work_precision import VARIABLES, draw_work_precision, tabulate
 
 ROUNDS = 3
 FAULTS = "joint: [big_end, small_end, both]\nclearance_mm: 0.2\n"

@@ -17,14 +17,7 @@ from itertools import groupby
 from pathlib import Path
 from statistics import median
 
-from page_tables import (
-    FINDINGS,
-    RESULTS,
-    kept,
-    markdown,
-    within_bars,
-    write_blocks,
-)
+from page_tables import FINDINGS, RESULTS, kept, markdown, within_bars, write_blocks
 
 
 def read_commit():
@@ -364,7 +357,7 @@ def alarms(found):
     return table(rows, columns)
 
 
-DRAWN = {"": "other cases", "laws": "other laws", "features": "features"}
+DRAWN = {"laws": "other laws", "features": "features"}
 
 
 def stress(found):
@@ -372,8 +365,7 @@ def stress(found):
             "whole range": Counter(found["ends"]["whole"])}  # fmt: skip
     for one in found["fresh"]:
         counts = ends.setdefault(f"fresh, {DRAWN[one['drawn']]}", Counter())
-        for name, count in one["ends"].items():  # of an earlier program by range
-            counts.update(count if isinstance(count, dict) else {name: count})
+        counts.update(one["ends"])
     names = sorted({"silent_wrong"}.union(*ends.values()), key=lambda n: (n != "ok", n))
     rows = [[f"`{name}`", *(str(of[name]) for of in ends.values())] for name in names]
     rows.append(["share of `ok`", *(f"{of['ok'] / of.total():.1%}" for of in ends.values())])

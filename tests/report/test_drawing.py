@@ -10,18 +10,9 @@ import pytest
 from conftest import decoded
 
 from compressor.report.figures.contours import contour_area, contour_lines
-from compressor.report.figures.drawing import (
-    as_csv,
-    describe_figure,
-    make_grid,
-    outline_cells,
-)
+from compressor.report.figures.drawing import as_csv, describe_figure, make_grid, outline_cells
 from compressor.report.figures.style import LineStyle, fill, mark, palette
-from compressor.report.interactive import (
-    MAX_POINTS,
-    extremes,
-    script,
-)
+from compressor.report.interactive import MAX_POINTS, extremes, script
 
 X = np.linspace(0.0, 360.0, 721)
 BLUE, RED = LineStyle("#1f4488", (4, 2), 1.5), LineStyle("#d0583b")

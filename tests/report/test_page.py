@@ -24,11 +24,7 @@ from compressor.report.page import (
     TableRow,
     document,
 )
-from compressor.report.paper_sections import (
-    DiagnosisContent,
-    MissingFigures,
-    PaperCasesContent,
-)
+from compressor.report.paper_sections import DiagnosisContent, MissingFigures, PaperCasesContent
 from compressor.report.side_by_side import HealthyAndWorn
 from compressor.report.study_section import JobsContent, StudyContent
 from compressor.store.studies import StoredStudy

@@ -13,11 +13,7 @@ from compressor.physics import exact_motion
 from compressor.report import plots, side_by_side
 from compressor.report.figures.job import NAMES
 from compressor.report.plots import page_figures
-from compressor.report.side_by_side import (
-    choose_jobs,
-    compare_healthy,
-    differing_in_clearance,
-)
+from compressor.report.side_by_side import compare_healthy, differing_in_clearance
 from compressor.store.reader import open_study, read_store
 from compressor.store.studies import read_studies
 
@@ -115,16 +111,6 @@ def test_a_peak_that_is_not_known_makes_no_job_the_worst(study):
     assert "contact force" not in found.words
     assert "sensor peak" in found.words
     assert len(shown(found)) == len(CLEARANCES)
-
-
-@pytest.mark.parametrize(
-    ("count", "needed", "chosen"),
-    [(1, [0], [0]), (3, [1], [0, 1, 2]), (9, [8], [0, 2, 4, 6, 8]), (9, [3, 7], [0, 3, 4, 7, 8]),
-     (20, [19], [0, 4, 10, 16, 19])],
-)  # fmt: skip
-def test_jobs_between_are_spread(count, needed, chosen, monkeypatch):
-    monkeypatch.setattr(side_by_side, "MAX_WORN", 5)
-    assert choose_jobs(range(count), needed) == chosen
 
 
 def test_jobs_of_a_list_differ_in_clearances_alone(study):

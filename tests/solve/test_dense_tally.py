@@ -7,10 +7,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.physics import COLUMNS, Column, new_tally
-from compressor.solve.dense_tally import (
-    find_tops,
-    tally_steps,
-)
+from compressor.solve.dense_tally import find_tops, tally_steps
 from compressor.solve.si_record import record
 
 

@@ -9,10 +9,7 @@ from compressor.metrics import METRICS, NUMBERS, SERIES
 from compressor.physics import COLUMNS, Column
 from compressor.solve import error_bars
 from compressor.solve import run as run_module
-from compressor.solve.error_bars import (
-    FLOOR,
-    bars,
-)
+from compressor.solve.error_bars import FLOOR, bars
 from compressor.solve.series import distances
 from compressor.solve.simulate import measure, simulate
 from compressor.solve.solution import solve

@@ -13,11 +13,7 @@ from compressor.physics.record import FREEDOMS
 from compressor.physics.systems import observe_all, start
 from compressor.solve.request import Request
 from compressor.solve.run import integrate
-from compressor.solve.search import (
-    PARTED_DISTANCE,
-    SHIFT,
-    predictability_horizon,
-)
+from compressor.solve.search import PARTED_DISTANCE, SHIFT, predictability_horizon
 from compressor.solve.si_record import offsets, record, scene
 from compressor.solve.simulate import measure
 

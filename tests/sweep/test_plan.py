@@ -3,10 +3,9 @@
 import json
 
 import pytest
-from compsim import cli
 
 from compressor.cases.load import load_studies
-from compressor.sweep import plan, warm_up
+from compressor.sweep import plan
 from compressor.sweep.plan import forecast
 from compressor.sweep.sweep import sweep
 
@@ -98,19 +97,6 @@ def test_a_job_that_is_timed_is_a_job_of_the_sweep(studies, monkeypatch):
     assert plan.time_job(case)[0] == 2.0
     clock = iter([0.0, 60.0])
     assert plan.time_job(case)[0] == 60.0  # a long one runs once
-
-
-def test_compiling_that_is_ahead_is_told(studies, monkeypatch, tmp_path, capsys):
-    """Before anything is timed, `plan` compiles what it times."""
-    timed_as(monkeypatch, lambda case: 0.01)
-    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path)
-    studies(one={**NINE, "joint": "both", "clearance_mm": 0.1})
-    assert cli.main(["plan", "one.yaml", "-j", "1"]) == 0
-    said = capsys.readouterr().out
-    assert "(by one timed job of each study), after about 26 s of compiling, and " in said
-    warm_up.marker("auto").touch()
-    assert cli.main(["plan", "one.yaml", "-j", "1"]) == 0
-    assert "compiling" not in capsys.readouterr().out
 
 
 def test_nothing_ahead_costs_nothing(studies):

@@ -6,15 +6,7 @@ and the acceleration recomputed from the states on the output grid.
 """
 
 import numpy as np
-from peers.mechanism import (
-    ACCELERATIONS,
-    DURATION,
-    START,
-    load_of,
-    output_grid,
-    pieces,
-    tolerances,
-)
+from peers.mechanism import ACCELERATIONS, DURATION, START, load_of, output_grid, pieces, tolerances
 from scipy.integrate import solve_ivp
 
 
