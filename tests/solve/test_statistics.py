@@ -9,10 +9,12 @@ from scipy import stats
 from compressor.metrics import METRICS, NUMBERS, QUANTILES
 from compressor.physics import merge_tallies, new_record, new_tally
 from compressor.solve.run_metrics import (
+    MAX_BATCHES,
     MIN_REVOLUTIONS,
     chaotic_bars,
     count_bar,
     metrics,
+    parts,
     statistics,
     summarize_peaks,
 )
@@ -129,3 +131,13 @@ def test_the_least_bar_of_a_count_is_that_of_a_poisson_one():
     for count in (0, 1, 5, 24, 1000):
         upper = poisson_upper(count)
         assert count_bar(np.array(count)) == pytest.approx(upper - count, rel=0.1, abs=0.2)
+
+
+@pytest.mark.parametrize("count", [1, 2, 29, 30, 31, 59, 60, 100, 1000])
+def test_batches_are_alike_and_few(count):
+    batches = parts(range(count), MAX_BATCHES, 1)
+    assert len({len(batch) for batch in batches}) == 1
+    assert len(batches) <= MAX_BATCHES
+    assert batches[-1][-1] == count - 1  # what is left out is the beginning
+    assert sum(map(len, batches)) > count / 2
+    assert all(len(s) >= min(count, 5) for s in parts(range(count), 30, 5))
