@@ -116,10 +116,10 @@ CYCLE = ("suction_MPa", "discharge_MPa", "exponent", "clearance_percent", "valve
 MEASURED = {key: value for key, value in DOUBLE.items() if key not in CYCLE}
 
 
-def pressures(degrees):
+def pressures(degrees, inlet=0.2 * 0.96, outlet=0.7 * 1.05):
     """Pressures (MPa) of `DOUBLE`'s ideal cycle in the head and the crank end, without phases."""
     x, *_ = exact_motion(np.radians(degrees), 0.09, 0.45, 1.0)
-    inlet, outlet, found = 0.2 * 0.96, 0.7 * 1.05, []
+    found = []
     for gap, share, down in ((0.54 - x, 0.12, True), (x - 0.36, 0.14, False)):
         space, clearance = gap + share * 0.18, share * 0.18
         expanded = np.maximum(inlet, outlet * (clearance / space) ** 1.3)

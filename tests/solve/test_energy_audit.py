@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from test_rod_load import FLIES
 
 from compressor.cases.case import Case
 from compressor.metrics import METRICS
@@ -17,11 +18,6 @@ from compressor.solve.simulate import measure, simulate
 
 SHORT = {"duration_rev": 0.5, "settle_rev": 0}
 BIG_END = {"joint": "big_end", "clearance_mm": 0.2}
-FLYING = {"stroke_mm": 180, "rod_length_mm": 450, "speed_rpm": 571, "reciprocating_mass_kg": 24,
-          "pin_radius_mm": 35}  # fmt: skip
-CRANK_END = {"action": "crank_end", "bore_mm": 220, "rod_diameter_mm": 60,
-             "clearance_percent": {"crank": 14}, "suction_MPa": 0.2, "discharge_MPa": 0.55,
-             "exponent": 1.3, "back_pressure_MPa": 0.1}  # fmt: skip
 
 
 def case(**solve):
@@ -62,8 +58,8 @@ def test_what_is_allowed_follows_the_tolerance():
 def test_a_heavily_damped_contact_balances_as_tightly_as_its_steps(damping):
     """Its force is held at 0 for long, while its spring gives its energy up: nothing is moved."""
     values = {
-        "joint": "small_end", "clearance_mm": 0.3, "load": "gas", "machine": FLYING,
-        "contact": {"damping_N_s_per_mm": damping}, "gas": CRANK_END,
+        "joint": "small_end", "clearance_mm": 0.3, "load": "gas", "machine": FLIES["machine"],
+        "contact": {"damping_N_s_per_mm": damping}, "gas": FLIES["gas"],
     }  # fmt: skip
     for rtol in (1e-8, 1e-10):
         solve = {**SHORT, "rtol": rtol, "error_bars": False}

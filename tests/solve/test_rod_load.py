@@ -9,6 +9,7 @@ import pytest
 from compsim import cli
 from compsim.job_text import reversal_verdict, values_of
 from conftest import store
+from test_cylinder_runs import DOUBLE, MACHINE, pressures
 
 from compressor.cases.case import Case
 from compressor.metrics import NUMBERS
@@ -99,25 +100,13 @@ def test_of_the_ideal_machine(load, degrees, share):
 
 def test_of_a_double_acting_cylinder():
     """Combined rod load of the ideal machine: gas on both faces, less the ideal m a."""
-    gas = {
-        "action": "double", "bore_mm": 220, "rod_diameter_mm": 60, "suction_MPa": 0.2,
-        "discharge_MPa": 0.7, "exponent": 1.3, "clearance_percent": {"head": 12, "crank": 14},
-        "back_pressure_MPa": 0,
-    }  # fmt: skip
-    machine = {"stroke_mm": 180, "rod_length_mm": 450, "speed_rpm": 740,
-               "reciprocating_mass_kg": 30}  # fmt: skip
-    values = {"load": "gas", "machine": machine, "gas": gas, "solve": TURN, **SIGNALLED}
+    gas = DOUBLE | {"valve_loss_percent": 0, "back_pressure_MPa": 0}
+    values = {"load": "gas", "machine": MACHINE, "gas": gas, "solve": TURN, **SIGNALLED}
     numbers = measure(Case.from_values(values)).numbers
-    theta = np.radians(np.arange(0, 360, 0.05) + 0.025)
-    x, _, a = exact_motion(theta, 0.09, 0.45, 740 * math.pi / 30)
-    faces, shares = (math.pi * 0.11**2, math.pi * (0.11**2 - 0.03**2)), (0.12, 0.14)
-    push = np.zeros_like(x)
-    for face, share, gap, sign in zip(faces, shares, (0.54 - x, x - 0.36), (1, -1), strict=True):
-        space, clearance = gap + share * 0.18, share * 0.18
-        grows = (theta < math.pi) == (sign == 1)
-        expanded = np.maximum(2e5, 7e5 * (clearance / space) ** 1.3)
-        compressed = np.minimum(7e5, 2e5 * ((clearance + 0.18) / space) ** 1.3)
-        push += sign * face * np.where(grows, expanded, compressed)
+    degrees = np.arange(0, 360, 0.05) + 0.025
+    head, crank = pressures(degrees, 0.2, 0.7)
+    push = 1e6 * math.pi * (0.11**2 * head - (0.11**2 - 0.03**2) * crank)
+    _, _, a = exact_motion(np.radians(degrees), 0.09, 0.45, 740 * math.pi / 30)
     load = -push - 30 * a  # positive in tension
     pull, push = load.max(), -load.min()
     tension = 360 * np.mean(load > 0)
