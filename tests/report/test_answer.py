@@ -5,11 +5,9 @@ import pytest
 import xarray as xr
 
 from compressor.report.answer import (
-    MetricChange,
     Points,
     finding,
     rank_findings,
-    round_robin,
     study_findings,
     worn_joints,
 )
@@ -116,18 +114,6 @@ def test_a_study_s_findings_name_its_points(study):
     assert len(Points(study)) == 6
     (alone,) = study_findings(study.isel(speed_rpm=[0], clearance_mm=[0]))
     assert (alone.low, alone.high) == ("", "100 ± 1 m/s²")
-
-
-def test_what_always_stands_there_does_not_count_among_the_three():
-    def one(title, rank, always=False):
-        return MetricChange(title, "", "", "", "", "", rank, always)
-
-    grows = [one("p", 4), one("q", 3), one("r", 2), one("s", 1)]
-    always = [one("x", 2.5, True), one("y", 0, True)]
-    ((_, found),) = round_robin([("a", grows + always)])
-    assert "".join(one.title for one in found) == "pqxry"
-    both = [*round_robin([("a", grows + always), ("b", grows + always)])]
-    assert ["".join(one.title for one in found) for _, found in both] == ["pqxy", "pxy"]
 
 
 def test_the_worn_joint_s_force_and_the_reversal_stand_there_though_they_do_not_change():

@@ -6,11 +6,10 @@ import sys
 import matplotlib
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
 
 from compressor.analysis.cam import Cam
 from compressor.analysis.runs import paper_cases
-from compressor.report.figures import FIGURES, pictures, style
+from compressor.report.figures import FIGURES, pictures
 from compressor.report.figures.drawing import panels_of
 from compressor.solve.si_record import record
 
@@ -191,26 +190,6 @@ def test_acceleration_is_enlarged_where_it_differs_most(drawn, number):
 
 
 # ---- how they look ----------------------------------------------------------------------------
-
-
-def lightness(color):
-    """CIE L* of a colour."""
-    rgb = np.array(to_rgb(color))
-    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    return 116 * np.cbrt(linear @ [0.2126, 0.7152, 0.0722]) - 16
-
-
-@pytest.mark.parametrize(
-    "group",
-    [[style.IDEAL, *style.BY_CLEARANCE.values()], [*style.BY_LOAD.values()], [*style.CYCLE]],
-)
-def test_curves_survive_greyscale(group):
-    shades = sorted(lightness(line.color) for line in group)
-    assert np.diff(shades).min() >= 3
-    assert shades[-1] <= 80
-    assert len({line.dash for line in group}) == len(group)
-    if len(group) < 5:
-        assert np.diff(shades).min() >= 18
 
 
 @pytest.mark.parametrize("number", FIGURE)

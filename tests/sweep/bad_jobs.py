@@ -76,12 +76,6 @@ def sleep(payload):
     return payload
 
 
-def pid_after(seconds):
-    """Sleep; return the worker's process."""
-    time.sleep(seconds)
-    return os.getpid()
-
-
 def look(name):
     """What a worker finds: an environment variable, or what its files are."""
     if name != "files":

@@ -17,7 +17,7 @@ from bad_jobs import LEAST, POISON, named, sleep, work
 
 from compressor.store import StoreError
 from compressor.sweep import pool
-from compressor.sweep.pool import Batches, WorkersFailed, run_batches
+from compressor.sweep.pool import WorkersFailed, run_batches
 from compressor.sweep.worker import MAX_TEXT, JobLost, JobResult, Workers
 
 RULES = {"memory": LEAST, "grace": 0.3}
@@ -79,33 +79,12 @@ def test_no_more_processes_start_than_there_are_jobs(monkeypatch):
     assert len(started) <= 2
 
 
-def test_batches_take_their_time_and_are_small_at_first_and_towards_the_end():
-    batches = Batches([(n, n, 9.0) for n in range(100)], 0.5, 2)
-    assert len(batches.next()) == 1  # nothing is known
-    batches.learn(0.05)
-    sizes = []
-    while batch := batches.next():
-        sizes.append(len(batch))
-    assert sizes[0] == 10
-    assert sizes[-1] <= 2
-    assert sizes == sorted(sizes, reverse=True)
-    assert sum(sizes) == 99
-
-
 def test_jobs_are_read_as_they_are_needed():
     issued = itertools.count()
     ends = run_batches(sleep, ((n, 0.01, 9.0) for n in issued), Workers(target_seconds=0.05))
     list(itertools.islice(ends, 20))
     assert next(issued) < 200
     ends.close()
-
-
-def test_a_long_batch_gives_its_rest_back():
-    """Twenty short jobs promise a long batch, which meets jobs that take forty times as long."""
-    seconds = [0.005] * 40 + [0.2] * 20
-    jobs = [(n, t, 9.0) for n, t in enumerate(seconds)]
-    ends = results(run_batches(bad_jobs.pid_after, jobs, Workers(target_seconds=0.05)))
-    assert len({ends[n] for n in range(40, 60)}) == 2
 
 
 def test_a_worker_has_none_of_our_files(tmp_path):

@@ -217,16 +217,6 @@ def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):
         sweep(studies(one={}), tmp_path / "out", 1, lambda *event: pytest.fail("began to run"))
 
 
-def test_progress_counts_every_job_once(studies, tmp_path, in_process):
-    made = studies(one={"load": ["none", "spring", "gas"]})
-    told = []
-    sweep(made, tmp_path / "out", 2, lambda *event: told.append(event))
-    counts = [event[0] for event in told if not event[2]]
-    assert counts == sorted(set(counts))
-    assert (counts[0], counts[-1]) == (0, 3)
-    assert {event[1] for event in told} == {3}
-
-
 def test_an_interrupted_sweep_keeps_its_jobs_and_goes_on(studies, tmp_path):
     def stop(done, total, remark):
         if done:
