@@ -346,9 +346,9 @@ def _numbers_of_gas(sound: Case) -> Named:
 
 
 def _both_sides(name: str, load: np.ndarray) -> Named:
-    """Yield the greatest tension and compression of a load (N)."""
-    yield f"{name}, tension", (1e-3 * max(float(load.max()), 0.0), "kN")
-    yield f"{name}, compression", (1e-3 * max(float(-load.min()), 0.0), "kN")
+    """Yield the greatest tension and compression of a load (N); 0 rather than -0."""
+    yield f"{name}, tension", (1e-3 * max(0.0, float(load.max())), "kN")
+    yield f"{name}, compression", (1e-3 * max(0.0, float(-load.min())), "kN")
 
 
 def _numbers_of_pins(case: Case, sound: dict[str, tuple[float, str]]) -> Named:

@@ -125,6 +125,13 @@ def test_a_nameplate_s_numbers_are_those_by_hand(read):
     assert lines["suction"] == "absolute 0.4113 MPa, a gauge reads 3.1 bar"
 
 
+def test_a_load_of_no_tension_is_zero():
+    """Where the suction pressure is on both faces it was -0 kN."""
+    given = {"suction_MPa": 0.13, "discharge_MPa": 0.9, "back_pressure_MPa": 0.13}
+    numbers = describe_cases([Case.from_values({"load": "gas", "gas": given})]).numbers
+    assert math.copysign(1.0, by_name(numbers)["gas load, tension"].low) == 1.0
+
+
 @pytest.mark.parametrize("name", MISTAKES)
 def test_a_mistake_is_remarked_on_with_its_key(name, read):
     before, after, key = MISTAKES[name]

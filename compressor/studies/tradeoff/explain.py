@@ -294,5 +294,6 @@ def advice_row(advice: dict[str, Any]) -> tuple[str, ...]:
     """Return how a feature moves peaks and time, and how to leave it out if it is not needed."""
     sizes = advice["changes"].values()
     changes = ("unknown" if math.isnan(size) else percent(size, "+") for size in sizes)
-    verdict = advice["note"] or ("needed" if advice["needed_for"] else advice["left_out"])
+    why_unknown = advice["note"] if any(map(math.isnan, sizes)) else ""
+    verdict = why_unknown or ("needed" if advice["needed_for"] else advice["left_out"])
     return advice["name"], *changes, f"× {advice['time_ratio']:.2g}", verdict

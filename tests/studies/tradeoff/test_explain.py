@@ -9,6 +9,7 @@ from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.explain import (
+    advice_row,
     explain,
     ideal_scales,
     terms,
@@ -66,6 +67,17 @@ def test_what_changes_less_than_the_promise_can_go(explained):
         assert one["needed_for"] == []
         assert all(abs(size) < told["promise"] for size in one["changes"].values())
     assert advice(told, "no friction")["left_out"] == "friction: false"
+
+
+@pytest.mark.parametrize(("size", "told"), [(-0.3, "needed"), (1e-5, "joint: small_end"),
+                                            (float("nan"), "failed: budget_steps")])  # fmt: skip
+def test_a_note_hides_no_known_verdict(size, told):
+    """Two worn joints of unlike clearance had `clearance_mm 0.3` in place of `needed`."""
+    needed = [] if abs(size) < 5e-3 else ["force"]
+    note = "failed: budget_steps" if size != size else "clearance_mm 0.3"
+    row = {"name": "ideal big end", "changes": {"force": size}, "time_ratio": 0.5, "note": note,
+           "needed_for": needed, "left_out": "joint: small_end"}  # fmt: skip
+    assert advice_row(row)[-1] == told
 
 
 def test_a_tighter_promise_keeps_what_a_looser_one_drops(explained):
