@@ -19,6 +19,7 @@ MAX_LIMITS = 3  # of a metric: zones A to D, as of ISO 20816-1
 ZONES = "ABCD"
 TEXT = re.compile(r"\s*(\w+)\s*=\s*([^=]*[^=\s])\s*")
 WITHOUT_UNIT = ("", "per rev")
+MORE_IS_BETTER = ("rod_load_reversal_angle",)  # A would be the worst zone
 
 
 class LimitError(CompsimError, ValueError):
@@ -95,6 +96,9 @@ def read_limits(texts: Iterable[str], units: Units = "usual") -> Limits:
             near = hint or f"there are {', '.join(known)}"
             raise LimitError(f"{text!r} is no limit: write METRIC=VALUE,... and the unit, such as "
                              f"'sensor_peak=20,50 m/s²'; {near}")  # fmt: skip
+        if parts[1] in MORE_IS_BETTER:
+            raise LimitError(f"{text!r}: more reversal is better, and zone A is below a limit; "
+                             "compsim show JOB --reversal judges it")  # fmt: skip
         if parts[1] in found:
             raise LimitError(f"{text!r}: {parts[1]} has limits already")
         found[parts[1]] = read_values(parts[2], shown_measure(parts[1], units), text)
