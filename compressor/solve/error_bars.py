@@ -142,16 +142,6 @@ def comparison_run(case: Case, solution: Solution, timeout: float) -> Solution:
     return run_at_tolerance(case, rtol, timeout, case.body is not None)
 
 
-def looser_comparison_run(
-    case: Case, solution: Solution, other: Solution, timeout: float
-) -> Solution | None:
-    """Return a looser run where the motion enlarges errors, or None; other: `comparison_run`."""
-    if other.reason or not is_amplified(solution.rtol, distances(solution.samples, other.samples)):
-        return None
-    looser = run_at_tolerance(case, LOOSER_FACTOR * solution.rtol, timeout, case.body is not None)
-    return None if looser.reason else looser
-
-
 def estimate_errors(solution: Solution, *others: Solution) -> None:
     """Write a run's error bars, the longest by any other run that reached its end; inf without."""
     for one in others:

@@ -8,11 +8,12 @@ from compressor.metrics import METRICS
 from compressor.outcome import Regime
 from compressor.reasons import Reason
 from compressor.solve.error_bars import (
+    LOOSER_FACTOR,
     ORDER,
     TIGHTER_FACTOR,
     comparison_run,
     estimate_errors,
-    looser_comparison_run,
+    is_amplified,
     ratio_of,
     relative_bar,
 )
@@ -26,6 +27,7 @@ from compressor.solve.run_metrics import (
     statistics,
 )
 from compressor.solve.search import Search, find_span, predictability_horizon, repeats
+from compressor.solve.series import distances
 
 # a tighter run may end so
 OUT_OF_BUDGET = Reason.BUDGET_STEPS, Reason.BUDGET_SECONDS, Reason.STEP_UNDERFLOW
@@ -100,7 +102,11 @@ def comparison_runs(
     tighter = comparison_run(case, now, search.left)
     search.count(tighter.trajectory)
     yield tighter
-    if before is None and (looser := looser_comparison_run(case, now, tighter, search.left)):
+    if before or tighter.reason:
+        return
+    if is_amplified(now.rtol, distances(now.samples, tighter.samples)):
+        rtol = LOOSER_FACTOR * now.rtol
+        looser = run_at_tolerance(case, rtol, search.left, case.body is not None)
         search.count(looser.trajectory)
         yield looser
 
