@@ -88,13 +88,13 @@ def changed_values(case: "Case") -> Iterator[str]:
     """Yield the values of a case other than the defaults, as --set takes them."""
     from functools import partial
 
-    from compressor.cases import Case, keys_of, row_of, value_in
+    from compressor.cases import Case, keys_of, row_of, value_of
 
     values, usual = case.values(), Case().values()
-    for key in keys_of(partial(value_in, values)):
-        value, row = value_in(values, key), row_of(key)
+    for key in keys_of(partial(value_of, values)):
+        value, row = value_of(values, key), row_of(key)
         default = row.default if row else None
-        if key != "name" and value not in (None, value_in(usual, key), default):
+        if key != "name" and value not in (None, value_of(usual, key), default):
             yield f"{key}={value}"
 
 

@@ -16,7 +16,6 @@ from compressor.cases.checks import (
     row_of,
     stands_for,
     suggestion,
-    value_in,
     value_of,
     values_given,
 )

@@ -22,7 +22,7 @@ from compressor.cases.checks import (
     row_of,
     stands_for,
     suggestion,
-    value_in,
+    value_of,
 )
 from compressor.cases.comparison import NoComparison, Test, comparison
 from compressor.cases.conflicts import IN_PLACE_OF
@@ -186,10 +186,10 @@ def reader(values: Mapping[str, Any]) -> Callable[[str], Any]:
     whole = expand_synonyms(values)[0]
 
     def value(key: str) -> Any:
-        found, row = value_in(whole, key), row_of(key)
+        found, row = value_of(whole, key), row_of(key)
         if found is not None or not row or stands_for(key):
             return found
-        has_rival = key in RIVALS and value_in(whole, RIVALS[key]) is not None
+        has_rival = key in RIVALS and value_of(whole, RIVALS[key]) is not None
         return None if has_rival else row.default
 
     return value

@@ -11,7 +11,7 @@ an unknown key names what was probably meant, or else what there is.
 import dataclasses
 import operator
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from functools import cache, lru_cache
 from typing import Any
@@ -19,6 +19,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from compressor.cases.parameter import (
+    BY_PART,
     OTHER_UNITS,
     PART_WORDS,
     Parameter,
@@ -53,11 +54,16 @@ def phrase_of(key: str) -> str:
     return row.label.removesuffix(PART_WORDS.get(first, "")).rstrip()
 
 
-def single(key: str, values: Iterable[Any]) -> Any:
-    """Return the one value that all parts of a key have, but for ideal joints; or None."""
+def single(key: str, value: Any) -> Any:
+    """Return the one value that all parts of a key have, but for ideal joints; or None.
+
+    What is no value by part is returned as it is; of a group None.
+    """
+    if not isinstance(value, Mapping):
+        return value
     may_be_0 = key != "clearance_mm"
-    found = {value for value in values if value is not None and (value or may_be_0)}
-    return found.pop() if len(found) == 1 else None
+    found = {one for one in value.values() if one is not None and (one or may_be_0)}
+    return found.pop() if key in parts_by_key() and len(found) == 1 else None
 
 
 def keys_of(value: Callable[[str], Any]) -> Iterator[str]:
@@ -73,13 +79,23 @@ def keys_of(value: Callable[[str], Any]) -> Iterator[str]:
             yield whole
 
 
-def value_of(case: Any, key: str) -> Any:
-    """Return a case's value of a dotted key; None where it has none, or no single one."""
-    if key in WORDS:
-        return getattr(case, key) is not None
-    if parts := stands_for(key):
-        return single(key, (value_of(case, part) for part in parts))
-    return getter(key)(case)
+def value_of(holder: Any, key: str) -> Any:
+    """Return the value of a dotted key of a case, or of nested values; None where it is not one.
+
+    Of an optional group it is whether a case has it.
+    """
+    value, above = holder, ""
+    if not isinstance(holder, Mapping):
+        value = getter(key)(holder)
+        value = vars(value) if isinstance(value, BY_PART) else value
+        return value is not None if key in WORDS else single(key, value)
+    for name in key.split("."):
+        if isinstance(value, Mapping):
+            value = value.get(name)
+        elif above not in parts_by_key():
+            return None
+        above = f"{above}.{name}".lstrip(".")
+    return single(key, value)
 
 
 @cache
@@ -94,21 +110,6 @@ def getter(key: str) -> Callable[[Any], Any]:
             return None
 
     return value
-
-
-def value_in(values: Mapping[str, Any], key: str) -> Any:
-    """Return the value of a dotted key in nested values; None where it is not one value."""
-    value: Any = values
-    *above, last = key.split(".")
-    for part in above:
-        value = value.get(part) if isinstance(value, Mapping) else None
-    if isinstance(value, Mapping):
-        value = value.get(last)
-    elif ".".join(above) not in parts_by_key():
-        return None
-    if not isinstance(value, Mapping):
-        return value
-    return single(key, value.values()) if key in parts_by_key() else None
 
 
 # key -> the key whose double it is; a file gives one of the two
@@ -300,11 +301,11 @@ def key_of(path: Path) -> str:
 def leaves(values: Mapping[Any, Any], above: Path = ()) -> Iterator[tuple[Path, Any]]:
     """Yield the path and the value, or the sweep, of each key; of a value by part each part's."""
     for name, value in values.items():
-        path, is_group = (*above, name), isinstance(value, Mapping) and not above and name in GROUPS
-        if is_group and not value:  # its defaults
+        path, inner = (*above, name), value if isinstance(value, Mapping) else None
+        if inner == {} and not above and name in GROUPS:  # its defaults
             yield path, WORDS.get(name) or value
-        elif is_group or is_by_part(key_of(path), value):
-            yield from leaves(value, path)
+        elif inner and ((not above and name in GROUPS) or is_by_part(key_of(path), inner)):
+            yield from leaves(inner, path)
         elif path[0] not in SWEEP:
             yield path, value
 

@@ -17,7 +17,7 @@ from functools import cache
 from typing import Any
 
 from compressor.cases.card import DRIVING, CardError, open_card, taken_work
-from compressor.cases.checks import TWICE, row_of, stands_for, value_in
+from compressor.cases.checks import TWICE, row_of, stands_for, value_of
 from compressor.cases.comparison import condition
 from compressor.cases.groups import CRANK_END, ENDS, PAPER_CYLINDER
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
@@ -168,17 +168,17 @@ def outside_judged(values: Mapping[str, Any]) -> dict[str, str]:
     found = {}
     ideal = values.get("joint") == "none"
     for key, row in table().items():
-        value, whole = value_in(values, key), key.rpartition(".")[0]
+        value, whole = value_of(values, key), key.rpartition(".")[0]
         if row.judged is None or not is_number(value) or (ideal and key.startswith(OF_CONTACT)):
             continue
         if not value and (key in ABSENT_AT_ZERO or whole == "clearance_mm"):
             continue
-        if key == "contact.stiffness_N_per_mm15" and value_in(values, "contact.exponent") != 1.5:
+        if key == "contact.stiffness_N_per_mm15" and value_of(values, "contact.exponent") != 1.5:
             continue  # the stiffness has another unit
         low, high = row.judged
         if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
             unit = f" {row.unit}".replace("^p", "^1.5").rstrip()
-            is_shared = whole == "clearance_mm" or (stands_for(whole) and value_in(values, whole))
+            is_shared = whole == "clearance_mm" or (stands_for(whole) and value_of(values, whole))
             found[whole if is_shared else key] = (
                 f"{value:g}{unit} is outside the range that the program was judged on, "
                 f"{low:g} to {high:g}{unit}"

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from compressor.analysis import describe_cases
-from compressor.cases import DOUBLES, keys_of, reads, row_of, stands_for, value_in
+from compressor.cases import DOUBLES, keys_of, reads, row_of, stands_for, value_of
 from compressor.digits import setting
 from compressor.report.figures.sweep_data import name_in_words
 from compressor.store import Stored, StoredStudy
@@ -47,8 +47,8 @@ def find_inputs(stored: Stored, study: StoredStudy) -> Inputs | None:
     swept = {part for axis in study.axes for part in (axis.key, *stands_for(axis.key))}
     fixed = {
         key: value
-        for key in keys_of(partial(value_in, study.fixed))
-        if key not in swept and (value := value_in(study.fixed, key)) is not None
+        for key in keys_of(partial(value_of, study.fixed))
+        if key not in swept and (value := value_of(study.fixed, key)) is not None
     }
     named = {part for key in study.given for part in (key, *stands_for(key))}
     named |= {key.rpartition(".")[0] for key in named}

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case, CaseError, Sensor, outside_judged, paper_notes, points, value_in
+from compressor.cases import Case, CaseError, Sensor, outside_judged, paper_notes, points, value_of
 from compressor.outcome import Regime
 from compressor.store.stored import Stored
 from compressor.store.studies import StoredStudy
@@ -56,7 +56,7 @@ def run_caveats(stored: Stored, study: StoredStudy) -> list[str]:
     if not positions.size:
         return []
     numbers = stored.numbers(positions, ("settled_rev", "clipped_fraction"))
-    fixed = value_in(study.fixed, "solve.settle_rev")
+    fixed = value_of(study.fixed, "solve.settle_rev")
     begins = [point.get("solve.settle_rev", fixed) for point in points(study)]
     begin = np.array([b if isinstance(b, int | float) else math.nan for b in begins], float)[there]
     regimes, shares = stored.words("regime")[positions], numbers["clipped_fraction"]

@@ -9,7 +9,7 @@ import xarray as xr
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from compressor.cases import points, table, value_in
+from compressor.cases import points, table, value_of
 from compressor.digits import is_known
 from compressor.metrics import BARRED, NUMBERS, SIZES
 from compressor.outcome import Variable, coordinates, word_variables
@@ -50,7 +50,7 @@ def lay_out_jobs(studies: Sequence[StoredStudy]) -> xr.Dataset:
             if any(axis.key == key for axis in study.axes):
                 column += [point.get(key) for point in points(study)]
             else:
-                column += [value_in(study.fixed, key)] * study.jobs
+                column += [value_of(study.fixed, key)] * study.jobs
         found[name] = ("job", *swept_column(key, column))
     keys = np.array([key for study in studies for key in study.keys])
     return xr.Dataset({"key": ("job", keys, KEY)}, found)
@@ -113,7 +113,7 @@ def machine_constants(studies: Sequence[StoredStudy], layout: xr.Dataset) -> dic
     ]  # fmt: skip
     found = {}
     for key, name in coordinate_names(keys).items():
-        values, attrs = swept_column(key, [value_in(study.fixed, key) for study in studies])
+        values, attrs = swept_column(key, [value_of(study.fixed, key) for study in studies])
         if name in layout or values.dtype.kind != "f":
             continue
         jobs = np.repeat(values, [study.jobs for study in studies])

@@ -29,7 +29,6 @@ from compressor.cases import (
     reads,
     row_of,
     stands_for,
-    value_in,
     value_of,
     values_given,
 )
@@ -374,7 +373,7 @@ def vary_numbers(study: Study, job: int) -> Iterator[Variant]:
         if doubt is None or key in SCALED or not reads(case, key) or names & swept:
             continue
         is_given = not names.isdisjoint(given)
-        value = value_in(nested, key) if is_given else value_of(case, key)
+        value = value_of(nested if is_given else case, key)
         span = doubt.given if is_given else doubt.left_out
         if span is None or value is None:
             continue
