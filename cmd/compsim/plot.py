@@ -70,7 +70,8 @@ def plot(words, folder, output, units, **chosen) -> int:
     acceleration, above the rod load, with reversals, valve events and impacts), its signals over
     crank angle, spectra, orbits, contact modes and impacts, beside the same machine without
     clearance, and cards of the gas in its cylinder. Of a study: vibration over crank angle, order
-    spectra and contact modes over a swept axis. Nothing but what is stored is needed.
+    spectra and contact modes over a swept axis. Nothing but what is stored is needed, and the files
+    of `gas.indicator` of a job that has any.
     """
     from compressor.report import PlotChoice, write_plots
     from compressor.store import writable_folder

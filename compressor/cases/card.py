@@ -80,9 +80,13 @@ def open_card(value: str, end: str) -> Card:
     """
     found = MARKED.fullmatch(value)
     path, digest = found.groups() if found else (value, "")
-    card = read_card(path, end)
+    remedy = "put the card of that time back, or run the case file again"
+    try:
+        card = read_card(path, end)
+    except CardError as error:
+        raise CardError(f"{error}; {remedy}") from error
     if digest != digest_of(card):
-        raise CardError(f"{path}: has changed since the case was made: read the case file again")
+        raise CardError(f"{path}: has changed since the case was made; {remedy}")
     return card
 
 

@@ -126,9 +126,10 @@ def test_a_file_that_has_changed_is_not_run(tmp_path, card):
     write(tmp_path / "head.csv", [(a, pressure(a) + 0.1) for a in ANGLES])
     found = measure(case)
     assert (found.status, found.reason) == ("failed", "invalid_input")
-    assert "head.csv: has changed since the case was made" in found.attributes["detail"]
+    remedy = "; put the card of that time back, or run the case file again"
+    assert f"head.csv: has changed since the case was made{remedy}" in found.attributes["detail"]
     os.remove(card)
-    assert "cannot be read" in measure(case).attributes["detail"]
+    assert f"No such file or directory{remedy}" in measure(case).attributes["detail"]
     with pytest.raises(CardError):
         open_card(case.gas.indicator.head, "head")
     assert measured(write(tmp_path / "head.csv", [(a, 0.2) for a in ANGLES])).key != case.key
