@@ -316,12 +316,9 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
 
 def draw_paper(runs: Mapping[str, xr.Dataset], units: Units, kind: Kind = "paper") -> list[Plate]:
     """Return every figure of the paper, or of the diagnosis, whose cases are there."""
-    plates = []
-    for one in FIGURES[kind].values():
-        if runs.keys() >= {*one.needs}:
-            shown = one.make(runs, units=units)
-            plates.append(Plate(one.name, one.title, shown.caption, shown.figure))
-    return plates
+    known = (one for one in FIGURES[kind].values() if runs.keys() >= {*one.needs})
+    drawn = [one.make(runs, units=units) for one in known]
+    return [Plate(one.name, one.title, one.caption, one.figure) for one in drawn]
 
 
 @dataclass(frozen=True)

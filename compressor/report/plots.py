@@ -28,6 +28,7 @@ from compressor.report.figures import FIGURES, SweptRow
 from compressor.report.figures.drawing import as_csv
 from compressor.report.figures.pictures import render
 from compressor.report.figures.sweep_data import name_in_words
+from compressor.report.figures.table import DrawnFigure
 from compressor.report.study_section import file_name
 from compressor.store import (
     DamagedFile,
@@ -86,12 +87,11 @@ def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tup
     return tuple(what) or tuple(known)
 
 
-def publish_figures(
-    drawn: Iterable[tuple[str, str, go.Figure]], output: Folder, stem: str
-) -> Iterator[Plotted]:
-    """Write figures with their names and captions as files; yields each. Raises StoreError."""
-    for name, caption, figure in drawn:
-        yield Plotted(write_figure(Path(output) / f"{file_name(stem, name)}.png", figure), caption)
+def publish_figures(drawn: Iterable[DrawnFigure], output: Folder, stem: str) -> Iterator[Plotted]:
+    """Write figures as files; yields each. Raises StoreError."""
+    for one in drawn:
+        path = Path(output) / f"{file_name(stem, one.name)}.png"
+        yield Plotted(write_figure(path, one.figure), one.caption)
 
 
 def write_figure(path: Path, figure: go.Figure) -> Path:
@@ -140,8 +140,8 @@ def write_plots(
 
 def job_figures(
     stored: Stored, studies: Sequence[StoredStudy], key: str, choice: PlotChoice
-) -> Iterator[tuple[str, str, go.Figure]]:
-    """Yield the names, captions and figures of a job that has time series."""
+) -> Iterator[DrawnFigure]:
+    """Yield the figures of a job that has time series."""
     figures = choose_figures(choice.what, [*JOB], f"job {key}")
     if choice.over or choice.at or choice.limit:
         raise PlotError(f"{key} is one job: --over, --at and --limit are for studies")
@@ -165,8 +165,8 @@ def job_figures(
         for name in figures:
             if all(has[need] for need in JOB[name].needs):
                 shown = JOB[name].make(run, twins[name], units=choice.units)
-                shown.figure.layout.title = job_title(studies, key, JOB[name].title)
-                yield name, shown.caption, shown.figure
+                shown.figure.layout.title = job_title(studies, key, shown.title)
+                yield shown
     except NoSeriesError as error:
         raise PlotError(f"job {key}: {error}") from error
 
@@ -185,10 +185,8 @@ def drawable(stored: Stored, studies: Sequence[StoredStudy], key: str) -> xr.Dat
     return stored.job(key)
 
 
-def study_figures(
-    stored: Stored, study: StoredStudy, choice: PlotChoice
-) -> Iterator[tuple[str, str, go.Figure]]:
-    """Yield the names, captions and figures of a study along one axis."""
+def study_figures(stored: Stored, study: StoredStudy, choice: PlotChoice) -> Iterator[DrawnFigure]:
+    """Yield the figures of a study along one axis."""
     if choice.what and {*choice.what} <= {*JOB}:
         first = study.keys[0][:KEY_DIGITS]
         raise PlotError(
@@ -221,8 +219,8 @@ def study_figures(
             continue
         kept = keep_sensed(rows) if name == "cycles" else rows
         shown = STUDY[name].make(kept, axis_words(over), units=choice.units)
-        shown.figure.layout.title = study_title(study, STUDY[name].title, where)
-        yield name, shown.caption + where, shown.figure
+        shown.figure.layout.title = study_title(study, shown.title, where)
+        yield shown._replace(note=where)
 
 
 def whole_twin(run: xr.Dataset, sensed: bool = False) -> xr.Dataset | None:
@@ -327,10 +325,8 @@ def with_segments(
 MAX_PAGE_ROWS = 12  # of a study's jobs whose series a page reads
 
 
-def page_figures(
-    stored: Stored, study: StoredStudy, units: Units
-) -> Iterator[tuple[str, str, str, go.Figure]]:
-    """Yield what a page draws of a study over the crank angle: name, title, caption, figure.
+def page_figures(stored: Stored, study: StoredStudy, units: Units) -> Iterator[DrawnFigure]:
+    """Yield what a page draws of a study over the crank angle.
 
     The vibration along an axis, and the revolution of the job where it is greatest. Nothing of a
     study that kept no series.
@@ -348,7 +344,7 @@ def page_figures(
     if len(known) > 1:
         title = f"vibration over crank angle and {axis_words(over)}"
         shown = STUDY["cycles"].make(rows, axis_words(over), units=units)
-        yield "cycles", title, shown.caption + drawn, shown.figure
+        yield shown._replace(title=title, note=drawn)
     loudest = max(known, key=lambda n: np.abs(known[n].vibration).max())
     run = stored.job(jobs[loudest][1])
     case = case_of(run)
@@ -356,12 +352,11 @@ def page_figures(
     twin = whole_twin(run, sensed="sensor_acceleration" in run) if is_worn else None
     value = f"{over} {rows[loudest].value}" if jobs[loudest][0] != "" else rows[loudest].value
     shown = JOB["analyst"].make(run, twin, units=units)
-    title = f"{JOB['analyst'].title}, {value}"
     note = " It is the job with the greatest vibration of these." if len(known) > 1 else ""
-    yield "analyst", title, shown.caption + note + drawn, shown.figure
+    yield shown._replace(title=f"{shown.title}, {value}", note=note + drawn)
     if case.load == "gas":
-        shown, title = JOB["cards"].make(run, twin, units=units), f"{JOB['cards'].title}, {value}"
-        yield "cards", title, shown.caption + where, shown.figure
+        shown = JOB["cards"].make(run, twin, units=units)
+        yield shown._replace(title=f"{shown.title}, {value}", note=where)
 
 
 def keep_sensed(rows: Sequence[SweptRow]) -> list[SweptRow]:

@@ -32,6 +32,7 @@ from compressor.report.answer import (
 from compressor.report.figures import FIGURES
 from compressor.report.figures.pictures import render_all
 from compressor.report.figures.sweep import draw_sweep
+from compressor.report.figures.table import DrawnFigure
 from compressor.report.interactive import (
     job_scripts,
     series_name,
@@ -244,17 +245,15 @@ def drawn_study(
     And revolutions over the crank angle. Neither is drawn where the paper's figures are.
     """
     with label_studies(stored, [study]) as data:
+        named: list[tuple[str, DrawnFigure]] = []
+        if not study.figures:
+            swept, turns = draw_sweep(data, limits, units), page_figures(stored, study, units)
+            named = [(file_name("sweep", study.name, one.name), one) for one in swept]
+            named += [(file_name(one.name, study.name), one) for one in turns]
         plates = [
-            Plate(file_name("sweep", study.name, one.name), f"{study.name}: {one.title}",
-                  one.caption, one.figure)
-            for one in ([] if study.figures else draw_sweep(data, limits, units))
-        ]  # fmt: skip
-        plates += [
-            Plate(file_name(name, study.name), f"{study.name}: {title}", words, figure)
-            for name, title, words, figure in (
-                [] if study.figures else page_figures(stored, study, units)
-            )
-        ]  # fmt: skip
+            Plate(name, f"{study.name}: {one.title}", one.caption, one.figure)
+            for name, one in named
+        ]
         figures, table = study_sections(stored, study, data, plates, notes, limits, units)
         keys = [*(key for plate in plates for key in plate.jobs), *study.keys[:MAX_ROWS]]
         counts = job_counts(data)

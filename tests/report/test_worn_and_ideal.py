@@ -140,15 +140,15 @@ def failing_twin(run, sensed=False):
 def test_a_twin_that_fails_stands_nowhere(swept, study, monkeypatch):
     """The job is drawn alone."""
     (stored, data), (own,) = study, read_studies(swept)
-    drawn = {name: figure for name, _, _, figure in page_figures(stored, own, "usual")}
+    drawn = {one.name: one.figure for one in page_figures(stored, own, "usual")}
     monkeypatch.setattr(side_by_side, "healthy_twin", failing_twin)
     monkeypatch.setattr(plots, "healthy_twin", failing_twin)
     assert compare_healthy(stored, data) is None
-    alone = {name: figure for name, _, _, figure in page_figures(stored, own, "usual")}
+    alone = {one.name: one.figure for one in page_figures(stored, own, "usual")}
     assert [*alone] == [*drawn]
     names = [{trace.name for trace in figures["analyst"].data} for figures in (drawn, alone)]
     assert names[0] - names[1] == {NAMES["twin"]}
     assert NAMES["this"] in names[1]
     choice = plots.PlotChoice(what=("analyst", "signals"))
     of_job = plots.job_figures(stored, [own], own.keys[0], choice)
-    assert [name for name, _, _ in of_job] == ["analyst", "signals"]
+    assert [one.name for one in of_job] == ["analyst", "signals"]

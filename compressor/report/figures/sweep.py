@@ -1,10 +1,8 @@
 """Chooses how a study's sweep is drawn, by its axes, and says what is seen."""
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
-import plotly.graph_objects as go
 import xarray as xr
 
 from compressor.report.figures.sweep_data import (
@@ -69,18 +67,9 @@ RANKS = (
 MAX_ROWS = 3  # measures that stand in a figure with rows of them
 
 
-class SweepFigure(NamedTuple):
-    """A drawing of a study's sweep. name: what its files are called after the study's name."""
-
-    name: str
-    title: str
-    caption: str
-    figure: go.Figure
-
-
 def draw_sweep(
     data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usual"
-) -> list[SweepFigure]:
+) -> list[DrawnFigure]:
     """Return the drawings of a study, as `open_study` gives it; curves show limits of metrics.
 
     None where nothing is swept or measured.
@@ -106,7 +95,7 @@ def draw_sweep(
             "enough to be seen.",
             describe_thinning(axis, MAX_JOBS), *marks, *zone_words(shown, limits),
         )  # fmt: skip
-        return [SweepFigure(axis.name, title, join_sentences(*words), figure)]
+        return [DrawnFigure(figure, join_sentences(*words), name=axis.name, title=title)]
     return [*draw_grid(sweep, shown, marks, limits)]
 
 
@@ -117,7 +106,7 @@ def zone_words(shown: Sequence[Measure], limits: Limits) -> list[str]:
 
 def draw_grid(
     sweep: PlottedSweep, shown: Sequence[Measure], marks: tuple[str, str], limits: Limits
-) -> Iterator[SweepFigure]:
+) -> Iterator[DrawnFigure]:
     """Yield the figures of a grid of two or more axes.
 
     A ranking, and an overview of all metrics. Two axes of numbers, or of words, are a map.
@@ -135,12 +124,13 @@ def draw_grid(
         )
         thinned = [describe_thinning(axis, MAX_CELLS) for axis in sweep.axes]
         words = f"A cell a job{lines}.", *thinned, *marks, *zone_words(shown, limits)
-        yield SweepFigure("map", title, join_sentences(*words), figure)
+        yield DrawnFigure(figure, join_sentences(*words), name="map", title=title)
         return
     role = roles_of(sweep, order)
     title = f"metrics over {sweep.axes[role.x].phrase} and {sweep.axes[role.color].phrase}"
     words = describe_overview(sweep, role), marks[0] if len(sweep.axes) == 2 else "", marks[1]
-    yield SweepFigure("overview", title, join_sentences(*words), draw_overview(sweep, role, shown))
+    figure = draw_overview(sweep, role, shown)
+    yield DrawnFigure(figure, join_sentences(*words), name="overview", title=title)
 
 
 def describe_overview(sweep: PlottedSweep, role: Roles) -> str:
@@ -164,7 +154,7 @@ def describe_overview(sweep: PlottedSweep, role: Roles) -> str:
 
 def draw_sampled(
     sweep: PlottedSweep, shown: Sequence[Measure], marks: tuple[str, str]
-) -> Iterator[SweepFigure]:
+) -> Iterator[DrawnFigure]:
     """Yield the figures of a list of jobs that are no grid.
 
     A ranking, each metric against its strongest key, and some metrics against all keys.
@@ -180,8 +170,8 @@ def draw_sampled(
     kind = axis_kind(sweep)
     which = f"the {kind} that matters most for each" if found else f"a {kind}"
     words = f"Every metric over {which}, a point a job.", *describe_colors(sweep), *marks
-    figure = draw_points(sweep, strongest, shown)
-    yield SweepFigure("points", f"metrics over {which}", join_sentences(*words), figure)
+    figure, title = draw_points(sweep, strongest, shown), f"metrics over {which}"
+    yield DrawnFigure(figure, join_sentences(*words), name="points", title=title)
     if len(numbers) < 2:
         return
     columns = numbers[:MAX_COLUMNS]
@@ -192,12 +182,12 @@ def draw_sampled(
     words = (f"The metrics that change most over {some}, a point a job.", *describe_colors(sweep),
              marks[0])  # fmt: skip
     title = f"{', '.join(one.title for one in group)} over each {kind}"
-    yield SweepFigure("scatter", title, join_sentences(*words), figure)
+    yield DrawnFigure(figure, join_sentences(*words), name="scatter", title=title)
 
 
 def draw_ranked(
     sweep: PlottedSweep, found: Ranking, shown: Sequence[Measure]
-) -> Iterator[SweepFigure]:
+) -> Iterator[DrawnFigure]:
     """Yield the ranking of the axes, if enough is known for one."""
     if not found or len(sweep.axes) < 2:
         return
@@ -215,9 +205,9 @@ def draw_ranked(
         f"{'; '.join(left)}." if left else "",
     )  # fmt: skip
     numbers = [(measure.title, spell_strongest(sweep, one)) for measure, one in found.items()]
-    drawn = DrawnFigure(draw_ranking(sweep, found), join_sentences(*words), numbers)
     title = "what explains the spread of each metric"
-    yield SweepFigure("ranking", title, drawn.caption, drawn.figure)
+    yield DrawnFigure(draw_ranking(sweep, found), join_sentences(*words), numbers, name="ranking",
+                      title=title)  # fmt: skip
 
 
 def join_sentences(*parts: str) -> str:

@@ -1,12 +1,11 @@
 """The table of figures: what each is called, what it needs, and the function that makes it.
 
 A figure is one function under one line: it returns what is drawn, a sentence on what is shown, and
-labelled numbers of it.
+labelled numbers of it. Those of a sweep, which its axes choose, are in `sweep`.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -19,17 +18,24 @@ Number = tuple[str, str]  # a label, and what is measured, with its unit
 
 
 class DrawnFigure(NamedTuple):
-    """A figure: what is drawn, a sentence on what is shown, and labelled numbers of it."""
+    """A figure: what is drawn, a sentence on what is shown, and labelled numbers of it.
+
+    note: sentences after the numbers, on the jobs that are drawn; name: of its files.
+    """
 
     figure: go.Figure
     sentence: str
     numbers: Sequence[Number] = ()
+    note: str = ""
+    name: str = ""
+    title: str = ""
 
     @property
     def caption(self) -> str:
-        """Return the sentence and the numbers."""
+        """Return the sentence, the numbers and the note."""
         text = "; ".join(f"{label}: {value}" for label, value in self.numbers)
-        return f"{self.sentence} {text[0].upper()}{text[1:]}." if text else self.sentence
+        numbers = f" {text[0].upper()}{text[1:]}." if text else ""
+        return self.sentence + numbers + self.note
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,10 @@ def figure(
     """Return a decorator that enters a function into the table; options: given to it."""
 
     def enter(make: Callable[..., DrawnFigure]) -> Callable[..., DrawnFigure]:
-        FIGURES[kind][name] = Figure(name, title, needs, partial(make, **options))
+        def named(*given: Any, **more: Any) -> DrawnFigure:
+            return make(*given, **options, **more)._replace(name=name, title=title)
+
+        FIGURES[kind][name] = Figure(name, title, needs, named)
         return make
 
     return enter
