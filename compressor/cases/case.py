@@ -8,7 +8,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Mapping, Set
 from dataclasses import field, replace
 from functools import cache, cached_property, lru_cache, partial
 from typing import Any
@@ -25,7 +25,6 @@ from compressor.cases.checks import (
 )
 from compressor.cases.conflicts import (
     FACT_KEYS,
-    LED,
     conflicts,
     given_conflicts,
     reads,
@@ -63,6 +62,7 @@ from compressor.cases.parameter import (
     Targets,
     first_tolerance,
     make_group,
+    name_as_written,
     problems_of,
     quote_value,
 )
@@ -456,19 +456,6 @@ def find_given(values: Mapping[str, Any]) -> frozenset[str]:
     return frozenset(keys | above | {part for key in keys for part in stands_for(key)})
 
 
-def name_as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> list[Problem]:
-    """Return the problems of parts that one value stands for as problems of that, each once."""
-    found: dict[Problem, None] = {}
-    for one in problems:
-        whole = one.key.rpartition(".")[0]
-        value = _value_at(whole, values) if whole in parts_by_key() else {}
-        by_part = isinstance(value, Mapping | BY_PART)
-        by_part |= value is None and whole == "clearance_mm"
-        by_part |= whole == LED and one.key != stands_for(whole)[0]
-        found[one if by_part else Problem(whole, one.message)] = None
-    return [*found]
-
-
 def has_own_cylinder(values: Mapping[str, Any], given: Set[str]) -> bool:
     """Return whether a cylinder is not the paper's; given: the dotted keys of nested values."""
     if not given.isdisjoint(OWN_GAS):
@@ -553,13 +540,6 @@ def _plain_value(group: Any) -> dict[str, Any] | bool:
 def digest(identity: Mapping[str, Any]) -> str:
     """Return the hash of an identity, as JSON: 20 hexadecimal digits."""
     return hashlib.sha256(KEY_TEXT.encode(identity).encode()).hexdigest()[:20]
-
-
-def _value_at(key: str, values: Mapping[str, Any]) -> Any:
-    """Return the value of a dotted key in nested values; None where there is none."""
-    group, _, name = key.rpartition(".")
-    within = values.get(group) if group else values
-    return within.get(name) if isinstance(within, Mapping) else None
 
 
 def with_ideal_joints(case: Case, features: bool = True) -> Case:

@@ -22,7 +22,7 @@ from compressor.cases.comparison import condition
 from compressor.cases.groups import CRANK_END, ENDS, PAPER_CYLINDER
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
-from compressor.cases.parameter import IMPLAUSIBLE, Problem
+from compressor.cases.parameter import IMPLAUSIBLE, LED, Problem
 from compressor.cases.table import GROUPS, READ, WORDS, table
 from compressor.cases.yaml_reader import is_number
 from compressor.metrics import AXES, JOINTS
@@ -53,7 +53,6 @@ def moving_mass(case: Case) -> float:
     return case.machine.rod_mass_kg + case.machine.reciprocating_mass_kg
 
 
-LED = "gas.indicator"  # key whose one value is that of its first part alone
 # what two materials make, and so facts, too
 OF_MATERIALS = ("contact.modulus_GPa", "contact.stiffness_N_per_mm15", "contact.geometry")
 # what is part of a job's key only where the job reads it: facts, and what follows from them

@@ -11,7 +11,7 @@ import dataclasses
 import math
 import re
 import reprlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from functools import lru_cache, partial
@@ -136,6 +136,7 @@ class PerMotion(Generic[Value]):
     reciprocating: Value
 
 
+LED = "gas.indicator"  # key whose one value is that of its first part alone
 BY_PART = PerJoint | PerEnd | PerValve | PerMotion
 PART_WORDS = {
     "big_end": "of the big end", "small_end": "of the small end", "head": "of the head end",
@@ -459,15 +460,13 @@ def problems_of(
             continue
         if not one["loc"]:
             raise cause  # an error of the program's own
-        key, named, value, rest = "", "", values, [*map(str, one["loc"])]
+        key, value, rest = "", values, [*map(str, one["loc"])]
         while rest and (inner := f"{key}.{rest[0]}".lstrip(".")) in known:
             if kind in NAMED_WRONGLY and not rest[1:]:
                 break
-            if isinstance(value, Mapping | BY_PART):  # no value that stands for all parts
-                named = inner
             key, value, rest = inner, _value_under(value, rest[0]), rest[1:]
         if key in rows:
-            found[rows[key].problem(named, value, rest, str(cause))] = None
+            found[rows[key].problem(key, value, rest, str(cause))] = None
         elif parts := {name: row for name in PART_WORDS if (row := rows.get(f"{key}.{name}"))}:
             found[_problem_of_parts(key, value, parts, str(cause))] = None
         elif kind in NAMED_WRONGLY:
@@ -475,7 +474,27 @@ def problems_of(
             found[Problem(f"{key}.{rest[0]}".lstrip("."), message)] = None
         else:
             found[Problem(key, NO_VALUE if value is None else describe(key, "", value))] = None
-    return [problem for problem in found if problem]
+    return name_as_written(values, filter(None, found))
+
+
+def name_as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> list[Problem]:
+    """Return the problems of parts that one value stands for as problems of that, each once."""
+    found: dict[Problem, None] = {}
+    for one in problems:
+        whole, _, part = one.key.rpartition(".")
+        value = _value_at(whole, values) if whole and part in PART_WORDS else {}
+        by_part = isinstance(value, Mapping | BY_PART)
+        by_part |= value is None and whole == "clearance_mm"
+        by_part |= whole == LED and part != "head"
+        found[one if by_part else Problem(whole, one.message)] = None
+    return [*found]
+
+
+def _value_at(key: str, values: Mapping[str, Any]) -> Any:
+    """Return the value of a dotted key in nested values; None where there is none."""
+    group, _, name = key.rpartition(".")
+    within = values.get(group) if group else values
+    return within.get(name) if isinstance(within, Mapping) else None
 
 
 @lru_cache

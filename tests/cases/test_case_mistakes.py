@@ -5,6 +5,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.cases.checks import known_keys
+from compressor.cases.groups import Machine
 from compressor.cases.parameter import CaseError
 from compressor.program import CompsimError
 
@@ -30,6 +31,7 @@ def told(values) -> list[str]:
         ({"machine": {"speed_rpm": {"range": [300, 500, 50]}}},
          "machine.speed_rpm: needs a number in (0, 100000] rpm, not {'range': [300, 500, 50]}"),
         ({"sample": {"n": 64}}, f"sample: unknown key; a case has {AT_TOP}"),
+        ({"rotating": 5}, "rotating: unknown key; did you mean machine.balance.rotating?"),
         ({1: 2}, f"1: unknown key; a case has {AT_TOP}"),
         ({"machine": {1: 2}}, f"machine.1: unknown key; machine has {IN_MACHINE}"),
         ({"clearance_diametral_mm": 10**400},
@@ -63,6 +65,17 @@ def test_the_error_is_one_of_the_program_and_of_a_value():
         Case.from_values({"joint": "top"})
     with pytest.raises(ValueError, match="needs none, big_end"):
         Case.from_values({"joint": "top"})
+
+
+@pytest.mark.parametrize(
+    ("value", "key"),
+    [(-1, "pin_radius_mm"), ({"big_end": -1, "small_end": 5}, "pin_radius_mm.big_end")],
+)
+def test_a_group_names_its_keys_as_they_are_given(value, key):
+    with pytest.raises(CaseError) as caught:
+        Machine(pin_radius_mm=value)
+    (problem,) = caught.value.problems
+    assert str(problem) == f"{key}: -1 is outside (0, 10000] mm"
 
 
 # Numbers of other libraries
