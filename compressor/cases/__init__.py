@@ -1,6 +1,6 @@
 """A YAML text -> checked cases and studies."""
 
-from compressor.cases.card import open_card
+from compressor.cases.card import CardError, open_card
 from compressor.cases.case import (
     FOLLOWING,
     MODEL_VERSION,

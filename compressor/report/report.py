@@ -6,6 +6,7 @@ report which is interrupted leaves the one before as it was.
 
 import contextlib
 import shlex
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import chain
@@ -16,7 +17,9 @@ import xarray as xr
 from plotly.offline import get_plotlyjs
 
 from compressor.analysis import Claim, claims
+from compressor.cases import CardError
 from compressor.outcome import Regime
+from compressor.program import CompsimWarning
 from compressor.report.answer import (
     FirstScreen,
     MetricChange,
@@ -168,15 +171,17 @@ def build_report(
     of_faults = draw_paper(paper.usable, units, "diagnosis")
     own = [study for study in studies if not repeats_paper(study, paper)]
     added = [one(results, studies) for one in add]
-    drawn = [
-        drawn_study(
-            stored, study,
-            [one.note for name, one in of_own.items() if name == study.name]
-            + [one.notes[study.name] for one in added if study.name in one.notes],
-            limits, units,
-        )
-        for study in own
-    ]  # fmt: skip
+    drawn: list[DrawnStudy] = []
+    left_out: dict[str, str] = {}  # study -> why
+    for study in own:
+        notes = [one.note for name, one in of_own.items() if name == study.name]
+        notes += [one.notes[study.name] for one in added if study.name in one.notes]
+        try:
+            drawn.append(drawn_study(stored, study, notes, limits, units))
+        except CardError as error:
+            left_out[study.name] = f"study {study.name} is left out: {error}"
+            warnings.warn(left_out[study.name], CompsimWarning, stacklevel=3)
+    own = [study for study in own if study.name not in left_out]
     chapters = [chapter for one in added for chapter in one.chapters]
     later = [
         *chain(*(one.plates for one in of_own.values()), of_faults, *(one.plates for one in drawn))
@@ -186,7 +191,7 @@ def build_report(
     judged = claims(paper.usable) if paper.stored else []
     figures, tables = paper_sections(paper, of_paper, judged, caveats, units)
     sections = [
-        answer_section(summarise(own, paper, judged, drawn, units)),
+        answer_section(summarise(own, paper, judged, drawn, [*left_out.values()], units)),
         *(one.figures for one in drawn),
         *figures,
         *chain(*(one.sections for one in of_own.values())),
@@ -283,9 +288,10 @@ def summarise(
     paper: PaperRuns,
     judged: Sequence[Claim],
     drawn: Sequence[DrawnStudy],
+    left_out: Sequence[str],
     units: Units = "usual",
 ) -> FirstScreen:
-    """Return the page's first screen; judged: the paper's claims."""
+    """Return the page's first screen; judged: the paper's claims; left_out: studies, and why."""
     lines = [one.line for one in drawn]
     told = [one for study, one in zip(own, drawn, strict=True) if not study.is_trial] or drawn
     each: list[tuple[str, Sequence[MetricChange]]] = [(one.line.name, one.findings) for one in told]
@@ -298,7 +304,8 @@ def summarise(
             (label_in_words(name), run) for name, run in paper.stored.items() if name != "typical"
         )
         each.append(("The paper's cases", findings(worn, units)))
-    cautions = [text for one in drawn for text in one.cautions]
+    cautions = [f"{text[0].upper()}{text[1:]}." for text in left_out]
+    cautions += [text for one in drawn for text in one.cautions]
     return FirstScreen(lines, [*round_robin(each)], judged, cautions)
 
 

@@ -20,6 +20,7 @@ from compressor.analysis.runs import paper_cases
 from compressor.analysis.shaking import last_revolution
 from compressor.cases.case import Case
 from compressor.cases.load import load_cases, load_studies
+from compressor.program import CompsimWarning
 from compressor.reasons import Reason
 from compressor.report.figures import FIGURES, pictures
 from compressor.report.figures.table import spell
@@ -545,6 +546,23 @@ def test_failed_jobs_are_highlighted_and_everything_is_escaped(own, tmp_path):
     kinds = {key: kind for key, (kind, _) in found.jobs.items()}
     assert [kinds[key] for key in study.keys] == [None, None, "failed", "missing"]
     assert all("<" not in p.name and "/" not in p.name for p in (tmp_path / "out").iterdir())
+
+
+def test_a_study_whose_card_is_gone_costs_the_page_itself_alone(own, tmp_path):
+    card = tmp_path / "head.csv"
+    rows = (f"{angle},{0.4 + 0.2 * np.cos(np.radians(angle))}" for angle in range(0, 360, 5))
+    card.write_text("\n".join(["crank_angle_deg,pressure_MPa", *rows]))
+    file = tmp_path / "measured.yaml"
+    file.write_text(
+        f"load: gas\ngas: {{indicator: {{head: {card}}}}}\nclearance_mm: 0.1\njoint: both\n"
+    )
+    store(own, file, overrides=[*SHORT, *DRAFT])
+    card.unlink()
+    with pytest.warns(CompsimWarning, match="study measured is left out: .*put the card of that"):
+        page = write_report(own, tmp_path / "report")
+    text = page.read_text()
+    assert "Study measured is left out" in text
+    assert "Study own" in text
 
 
 def test_long_tables_are_cut_and_say_so(own, tmp_path, monkeypatch):
