@@ -8,7 +8,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Mapping, Set
+from collections.abc import Callable, Mapping, Set
 from dataclasses import field, replace
 from functools import cache, cached_property, lru_cache, partial
 from typing import Any
@@ -23,11 +23,12 @@ from compressor.cases.checks import (
     stands_for,
     values_given,
 )
+from compressor.cases.comparison import condition
 from compressor.cases.conflicts import (
     FACT_KEYS,
+    conditions,
     conflicts,
     given_conflicts,
-    reads,
     unread_values,
     values_read,
 )
@@ -477,11 +478,7 @@ def identity_of(case: Case) -> dict[str, Any]:
         "model": MODEL_VERSION,
         "span": (duration, settle, round(case.steps)),
         "solver": (solve.rtol or targets or solve.accuracy, solve.method, solve.max_steps),
-        "facts": {
-            key: value
-            for key in FACT_KEYS
-            if (value := getter(key)(case)) is not None and reads(case, key)
-        },
+        "facts": _facts_read(case),
     }
     if case.joint != "none":
         found["clearance_mm"] = vars(case.clearance_mm)
@@ -505,6 +502,28 @@ def _identity_of_group(name: str, group: Any) -> dict[str, Any]:
     if cards := given.get("indicator"):  # the digest counts, wherever the file is
         given["indicator"] = {end: card and card.rpartition("@")[2] for end, card in cards.items()}
     return given
+
+
+def _facts_read(case: Case) -> dict[str, Any]:
+    """Return the facts that a case has and reads."""
+    holds = frozenset(needed for needed, test in _fact_conditions().items() if test(case))
+    return {key: value for key, get in _facts_where(holds) if (value := get(case)) is not None}
+
+
+@cache
+def _fact_conditions() -> dict[str, Callable[[Any], bool]]:
+    """Return the tests of what facts are read with, by their texts: many need the same."""
+    return {needed: condition(needed) for key in FACT_KEYS for _, needed in conditions(key)}
+
+
+@cache
+def _facts_where(holds: frozenset[str]) -> list[tuple[str, Callable[[Any], Any]]]:
+    """Return the facts that are read where some conditions hold, and how a case gives each."""
+    return [
+        (key, getter(key))
+        for key in FACT_KEYS
+        if all(needed in holds for _, needed in conditions(key))
+    ]
 
 
 def _plain_parts(value: Any) -> Any:
