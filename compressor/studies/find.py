@@ -198,6 +198,8 @@ class Question:
         Raises StudyError, and CaseFileError with what is wrong in the file.
         """
         key, value = self.span.key, self.span.value
+        if key in [one.partition("=")[0].strip() for one in self.overrides]:
+            raise StudyError(f"--set {key}: --over searches over it; leave one of the two out")
         ends = [self._load(f"{value(share)!r}") for share in (0.0, 1.0)]
         if ends[0].jobs > 1:
             axes = ", ".join(axis.key for axis in ends[0].axes)

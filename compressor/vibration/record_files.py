@@ -237,6 +237,11 @@ def read_record(path: str | Path, **known: Any) -> Record:
     if file.layout and not file.layout.startswith(PLAIN):
         named = ", ".join(f"{kind} {name}" for kind, name in names.items())
         remarks.append(f"{path}: {file.layout}; {named}")
+    for kind, option, units in SCALES:
+        written = file.channels[chosen[kind]].unit if kind in chosen else ""
+        if unit_name(written, units) and units[unit_name(written, units)] != scales[kind]:
+            taken = f"--{option.replace('_', '-')} {getattr(hints, option)}"
+            remarks.append(f"{names[kind]}: the file says {written}, taken as {taken} says")
     values = columns["acceleration"] * scales["acceleration"] * (hints.full_scale or 1.0)
     if "time" in chosen:
         start = columns["time"][0] * scales["time"]

@@ -117,6 +117,8 @@ MISTAKES += [
         ("--over clearence_mm=0.1:0.3 FIRST", "is no key of a number; did you mean clearance_mm?"),
         ("--over load=1:2 FIRST", "load is no continuous number: give a key"),
         ("--over solve.timeout_s=10:20 FIRST", "solve.timeout_s changes nothing"),
+        ("--over clearance_mm=0.1:0.2 --set clearance_mm=0.1 FIRST",
+         "--set clearance_mm: --over searches over it; leave one of the two out"),
         ("OVER FIRST --set 'load=[none, spring]'", "makes 2 jobs for one clearance_mm"),
         ("OVER FIRST --set joint=knee", "joint: needs none, big_end, small_end"),
     )

@@ -264,6 +264,9 @@ def test_a_record_as_analysers_write_it_is_read(encoding, tmp_path):
     assert "separator semicolon, decimal comma, header in line 4, 3 columns; time Time" in layout
     assert "Keyphasor [V]: its rise counts as top dead centre; --tacho-deg says its angle" in tacho
     assert len(read_record(path, tacho_deg=30.0).remarks) == 1
+    other = read_record(path, tacho_deg=30.0, unit="m/s2")
+    np.testing.assert_allclose(other.values, VALUES / 9.80665, atol=1e-7)
+    assert other.remarks[1].endswith("the file says g, taken as --unit m/s2 says")
 
 
 def uneven_times(share, drift):
