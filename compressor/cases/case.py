@@ -215,6 +215,7 @@ stroke, 240 mm
         Raises CaseError with everything that does not fit together.
         """
         values = vars(self)  # which alone can be written to: a case is frozen
+        values["load"] = table()["load"].choice_of(self.load)
         if self.guide:
             values["guide"] = fill_guide(self.guide, self.machine.reciprocating_mass_kg)
         if self.joint != "both":
@@ -461,8 +462,10 @@ def has_own_cylinder(values: Mapping[str, Any], given: Set[str]) -> bool:
     """Return whether a cylinder is not the paper's; given: the dotted keys of nested values."""
     if not given.isdisjoint(OWN_GAS):
         return True
-    lengths = {"machine.crank_radius_mm", "machine.rod_length_mm"}
-    return values.get("load") == "gas" and not given.isdisjoint(lengths)
+    has_gas = values.get("load") in ("gas", "typical")
+    return has_gas and any(
+        key in given for key in ("machine.crank_radius_mm", "machine.rod_length_mm")
+    )
 
 
 def identity_of(case: Case) -> dict[str, Any]:

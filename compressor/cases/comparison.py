@@ -111,6 +111,7 @@ def _compare_job(key: str, sign: Any, text: str) -> Test:
     is_number = row.kind in ("number", "integer")
     if not is_number and sign not in (operator.eq, operator.ne):
         raise NoComparison(f"{key} is a word: compare it by == or !=")
+    wanted = row.choice_of(wanted)
     if wanted not in row.choices and (
         type(wanted) not in (int, float) if is_number else row.check(wanted)
     ):

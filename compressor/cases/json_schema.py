@@ -105,7 +105,8 @@ def _value(row: Parameter) -> Schema:
 
 def _single_value(row: Parameter) -> Schema:
     """Return the schema of one value of a parameter."""
-    return adapter_of(replace(row, optional=False)).json_schema()
+    words = (*row.choices, *(alias for alias, _ in row.aliases))
+    return adapter_of(replace(row, optional=False, choices=words)).json_schema()
 
 
 def _forms() -> Schema:

@@ -243,6 +243,7 @@ class Parameter:
     choices: tuple[str, ...] = ()
     optional: bool = False
     identity: bool = True  # whether it is part of a job's identity
+    aliases: tuple[tuple[str, str], ...] = ()  # other words, each with the choice it stands for
     judged: tuple[float, float] | None = None  # range that extreme scenes are drawn from
     read: tuple[str, ...] = ()  # conditions that all hold where a case reads it
     # whether it is of the machine: a file may give it though no job reads it, so that one file
@@ -297,6 +298,10 @@ class Parameter:
         needed = [one for one in self.read if not any(o != one and o in one for o in self.read)]
         return "; ".join(dict.fromkeys(needed))
 
+    def choice_of(self, value: Any) -> Any:
+        """Return the choice that an alias stands for, and any other value as it is."""
+        return next((choice for alias, choice in self.aliases if alias == value), value)
+
     def check(self, value: Any) -> str | None:
         """Return what is wrong with a scalar value of this parameter, or None."""
         try:
@@ -341,7 +346,7 @@ class Parameter:
         """Return the error of a value of another kind; words: of these one may be misspelt."""
         message = f"needs {self.needed}, not {quote_value(value)}"
         word = words[0][:MAX_WORD] if words and isinstance(words[0], str) else ""
-        lower = {choice.lower(): choice for choice in self.words}
+        lower = dict(self.aliases) | {choice.lower(): choice for choice in self.words}
         near = get_close_matches(word.lower(), lower, n=1)
         number = AS_NUMBER.fullmatch(word) if self.is_number else None
         if near and lower[near[0]] in self.needed:
@@ -420,7 +425,9 @@ def annotation_of(row: Parameter) -> Any:
     found: Any = kinds.get(row.kind)
     if words is not None and row.kind != "materials":
         found = words if found is None else words | found
-    return found | None if row.optional else found
+    if row.optional:
+        found = found | None
+    return Annotated[found, BeforeValidator(row.choice_of)] if row.aliases else found
 
 
 BY_METRIC: Any = None

@@ -37,7 +37,8 @@ TOP: dict[str, Any] = {
         "case", (), "name of the study; default: the file's", kind="text", identity=False
     ),
     "load": choice(
-        "spring", ("spring", "gas", "none"), "load on the piston", "§2.2-2.4"
+        "spring", ("spring", "gas", "none"), "load on the piston", "§2.2-2.4",
+        aliases=(("design", "spring"), ("typical", "gas")),
     ),
     "joint": choice(
         "none", ("none", "big_end", "small_end", "both"), "joints with clearance", "§3.2"

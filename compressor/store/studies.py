@@ -327,6 +327,8 @@ def find_value(folder: Folder, study: StoredStudy, word: str) -> tuple[str, Any]
     if not equals or not text:
         raise WrongName(folder, f"{word!r} is no AXIS=VALUE of {study.name}", _name_axes(study))
     axis = find_axis(folder, study, name)
+    row = row_of(axis.key)
+    text = row.choice_of(text) if row else text
     meant = {in_words(value): value for value in axis.values}
     numbers = [value for value in axis.values if isinstance(value, int | float)]
     with contextlib.suppress(ValueError):

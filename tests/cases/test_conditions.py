@@ -36,7 +36,7 @@ SIGNS = ("==", "!=", "<", "<=", ">", ">=")
         ("not (load == none and joint == both)", True),
         ("  machine.speed_rpm  >  +4.0E2  ", True),
         ("machine.speed_rpm == 0x1F4", True), ("clearance_mm > -.5", True),
-        ("\n load\t==\n spring\x1f", True), ("(load) == (spring)", True),
+        ("\n load\t==\n design\x1f", True), ("(load) == (design)", True),
         ("clearance_mm>0.1or load==none", True), ("solve.error_bars != False", True),
     ],
 )  # fmt: skip
