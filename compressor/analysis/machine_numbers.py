@@ -10,7 +10,7 @@ import itertools
 import math
 import random
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +28,7 @@ from compressor.cases import (
 from compressor.metrics import JOINTS
 from compressor.physics import ideal_forces, segments
 from compressor.solve import record
+from compressor.units import Units, unit_in
 
 MAX_CASES = 50  # of a study that are looked at, beside the first and the last
 PIECES = 500  # samples of each phase of the load: peaks between its corners to a few 1e-6
@@ -86,6 +87,15 @@ USUAL = {
     "suction, absolute": Usual(
         0.07, math.inf, ("gas.suction_MPa",), below=("gas.suction_MPa", ABSOLUTE)
     ),
+    # 5 to 20 %; below 2 % no valve and no piston's end gap has room
+    "cylinder, clearance at the head": Usual(
+        1.0, math.inf, ("gas.clearance_percent",),
+        below=("gas.clearance_percent", "it is in per cent of the swept volume: 17, not 0.17"),
+    ),
+    "cylinder, clearance at the crank": Usual(
+        1.0, math.inf, ("gas.clearance_percent",),
+        below=("gas.clearance_percent", "it is in per cent of the swept volume: 17, not 0.17"),
+    ),
     # 0.3 to 3; plungers of the highest pressures have less
     "cylinder, bore over stroke": Usual(
         0.1, 3.0, ("gas.piston_radius_mm",), above=("gas.piston_radius_mm", BORE)
@@ -120,17 +130,10 @@ USUAL = {
                "ISO VG class: VG 150 has 48 mPa s at 60 °C"),
     ),
 }  # fmt: skip
-# of either end of the cylinder; 5 to 20 %: below 2 % no valve and no piston's end gap has room
-USUAL |= dict.fromkeys(
-    ("cylinder, clearance at the head", "cylinder, clearance at the crank"),
-    Usual(1.0, math.inf, ("gas.clearance_percent",),
-          below=("gas.clearance_percent", "it is in per cent of the swept volume: 17, not 0.17")),
-)  # fmt: skip
-PINS = tuple(joint.replace("_", " ") for joint in JOINTS)
 # of either pin
 USUAL |= {
-    f"{pin}, {name}": usual
-    for pin in PINS
+    f"{joint.replace('_', ' ')}, {name}": usual
+    for joint in JOINTS
     for name, usual in {
         # new bushes: 0.5 to 1.5; a bush is scrapped at two to three times that
         "clearance over pin": Usual(
@@ -148,26 +151,32 @@ USUAL |= {
         ),
     }.items()
 }  # fmt: skip
+BEARING = {f"{joint.replace('_', ' ')}, pressure" for joint in JOINTS}
 
 
-class MachineNumber(NamedTuple):
+@dataclass(frozen=True)
+class MachineNumber:
     """A number of a machine over the cases looked at: equal `low` and `high` where none differs.
 
-    `name`: thing and quantity, such as "rod load, tension". `remark`: why a number that lies beyond
-    what is usual in all cases may be a mistake, with the `key` that would explain it; "" without.
+    `name`: thing and quantity, such as "rod load, tension". `usual_low`, `usual_high`: what
+    machines have; nan where every value is usual. `remark`: why a number that lies beyond it in all
+    cases may be a mistake, with the `key` that would explain it; "" without.
     """
 
     name: str
     low: float
     high: float
     unit: str
+    usual_low: float = math.nan
+    usual_high: float = math.nan
     key: str = ""
     remark: str = ""
 
-    def value(self) -> str:
+    def value(self, units: Units = "usual") -> str:
         """Return the number with its unit as text: `62.2 kN`, or `40 to 62.2 kN`."""
-        both = dict.fromkeys(_format(one) for one in (self.low, self.high))
-        return f"{' to '.join(both)} {self.unit}".rstrip()
+        unit, factor = unit_in(self.unit, units)
+        both = dict.fromkeys(_format(factor * one) for one in (self.low, self.high))
+        return f"{' to '.join(both)} {unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -178,12 +187,12 @@ class MachineDescription:
     looked_at: int
     jobs: int
 
-    def lines(self) -> list[tuple[str, str]]:
+    def lines(self, units: Units = "usual") -> list[tuple[str, str]]:
         """Return a line for each thing: its name, and its numbers in words."""
         found: dict[str, list[str]] = {}
         for number in self.numbers:
             thing, _, quantity = number.name.partition(", ")
-            found.setdefault(thing, []).append(f"{quantity} {number.value()}")
+            found.setdefault(thing, []).append(f"{quantity} {number.value(units)}")
         return [(thing, ", ".join(words)) for thing, words in found.items()]
 
     def remarks(self, warned: Collection[str] = ()) -> dict[str, str]:
@@ -222,14 +231,17 @@ def describe_machine(study: Study) -> MachineDescription:
     if len(numbers) > MAX_CASES:
         drawn = random.Random(0).sample(numbers, MAX_CASES)
         numbers = sorted({numbers[0], *drawn, numbers[-1]})  # the ends of an axis
-    return describe_cases([study.cases[number] for number in numbers], len(study.selected))
+    cases = [study.cases[number] for number in numbers]
+    return MachineDescription(machine_numbers(cases), len(cases), len(study.selected))
 
 
-def describe_cases(cases: Sequence[Case], jobs: int | None = None) -> MachineDescription:
-    """Return what cases say of their machine: numbers in the order in which they are read.
+def describe_cases(cases: Sequence[Case]) -> MachineDescription:
+    """Return what cases say of their machine."""
+    return MachineDescription(machine_numbers(cases), len(cases), len(cases))
 
-    jobs: of which they are a part, if they are.
-    """
+
+def machine_numbers(cases: Sequence[Case]) -> tuple[MachineNumber, ...]:
+    """Return the numbers of the machine of cases, in the order in which they are read."""
     found: dict[str, list[float]] = {}
     units: dict[str, str] = {}
     known: dict[str, dict[str, tuple[float, str]]] = {}
@@ -241,20 +253,24 @@ def describe_cases(cases: Sequence[Case], jobs: int | None = None) -> MachineDes
         for name, (value, unit) in itertools.chain(known[sound.physics_key].items(), of_pins):
             found.setdefault(name, []).append(value)
             units[name] = unit
-    order = sorted(found, key=lambda name: name.startswith(PINS))
-    numbers = [_over_cases(name, found[name], units[name], cases) for name in order]
-    return MachineDescription(tuple(numbers), len(cases), jobs or len(cases))
+    order = sorted(found, key=_is_of_pin)
+    return tuple(_over_cases(name, found[name], units[name], cases) for name in order)
+
+
+def _is_of_pin(name: str) -> bool:
+    return name.startswith(tuple(joint.replace("_", " ") for joint in JOINTS))
 
 
 class RevolutionLoads(NamedTuple):
     """Loads of the sound machine over a revolution, (m,) each; N along x, positive in tension.
 
-    `angle`: rad. `gas`: of the load on the piston; `rod`: on the crosshead pin, with the inertia of
-    what reciprocates. `sizes`: forces at big and small end, (m, 2).
+    `angle`: rad. `gas`: of the load on the piston; `inertia`: of what reciprocates; `rod`: their
+    sum, on the crosshead pin. `sizes`: forces at big and small end, (m, 2).
     """
 
     angle: np.ndarray
     gas: np.ndarray
+    inertia: np.ndarray
     rod: np.ndarray
     sizes: np.ndarray
 
@@ -269,7 +285,7 @@ def revolution_loads(sound: Case) -> RevolutionLoads:
     times = np.concatenate([np.linspace(*ends, PIECES + 1) for ends in itertools.pairwise(edges)])
     load, *forces = ideal_forces(times, np.repeat(phases, PIECES + 1), p).T
     sizes = np.stack([np.hypot(*forces[:2]), np.hypot(*forces[2:])], axis=1)
-    return RevolutionLoads(times * sound.omega, -load, forces[2], sizes)
+    return RevolutionLoads(times * sound.omega, -load, forces[2] + load, forces[2], sizes)
 
 
 def tension_fraction(angle: np.ndarray, load: np.ndarray) -> float:
@@ -318,7 +334,8 @@ def _numbers_of_sound(sound: Case) -> Named:
         peak = float(np.abs(loads.rod).max())
         yield "piston rod, diameter over bore", (rod / (2.0 * sound.gas.piston_radius_mm), "")
         yield "piston rod, stress", (peak / (math.pi / 4.0 * rod**2), "MPa")
-    for joint, name, peak in zip(JOINTS, PINS, loads.sizes.max(axis=0), strict=True):
+    for joint, peak in zip(JOINTS, loads.sizes.max(axis=0), strict=True):
+        name = joint.replace("_", " ")
         yield f"{name}, pin diameter", (2.0 * machine.pin_radius_mm.at(joint), "mm")
         yield f"{name}, peak load", (1e-3 * float(peak), "kN")
 
@@ -355,8 +372,8 @@ def _numbers_of_pins(case: Case, sound: dict[str, tuple[float, str]]) -> Named:
     """Yield the numbers of the joints with clearance; sound: those of the machine without."""
     if case.lubricant and case.joint != "none":
         yield "oil, viscosity", (case.lubricant.viscosity_mPa_s, "mPa s")
-    for joint, name in zip(JOINTS, PINS, strict=True):
-        clearance = getattr(case.clearance_mm, joint)
+    for joint in JOINTS:
+        clearance, name = getattr(case.clearance_mm, joint), joint.replace("_", " ")
         if not clearance:
             continue
         pin = 2.0 * case.machine.pin_radius_mm.at(joint)
@@ -382,15 +399,15 @@ def _over_cases(
     """Return a number over cases, with a remark where all of them are beyond what is usual."""
     plain = MachineNumber(name, min(values), max(values), unit)
     usual = USUAL.get(name)
-    if usual is None or (plain.high >= usual.low and plain.low <= usual.high):
+    if usual is None:
         return plain
+    plain = replace(plain, usual_low=usual.low, usual_high=usual.high)
     key, hint = usual.below if plain.high < usual.low else usual.above
-    if not hint or not any(_is_own(case, usual.keys) for case in cases):
+    is_usual = plain.high >= usual.low and plain.low <= usual.high
+    if is_usual or not hint or not any(_is_own(case, usual.keys) for case in cases):
         return plain
     gas = cases[0].gas if cases[0].load == "gas" else None
-    if name.endswith(" end, pressure") and not (
-        gas and (gas.is_measured or _is_own(cases[0], GAS_KEYS))
-    ):
+    if name in BEARING and not (gas and (gas.is_measured or _is_own(cases[0], GAS_KEYS))):
         key = "lubricant.bearing_length_mm" if cases[0].lubricant else "contact.length_mm"
         hint = hint.rpartition("; or ")[2]
     if gas and gas.is_measured and key == "gas.discharge_MPa":
@@ -401,7 +418,7 @@ def _over_cases(
     range_ = f"at least {usual.low:g}" if plain.high < usual.low else f"at most {usual.high:g}"
     thing, _, quantity = name.partition(", ")
     remark = f"{thing}: {quantity} {plain.value()}, where {range_} is usual; {hint}"
-    return plain._replace(key=key, remark=remark)
+    return replace(plain, key=key, remark=remark)
 
 
 LONG_ROD = 0.05  # crank radius over length: below it the rod is more likely wrong than the stroke

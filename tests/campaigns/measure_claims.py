@@ -51,8 +51,8 @@ def main(target):
     print(f"map: {seconds} s", flush=True)
     default = judged_alone(Case.from_values({}))
     found["default"] = {
-        "margin": default.margin, "error": default.error,
-        "shares": dict(zip(SHARES, default.share_margin, strict=True)),
+        "margin": default["margin"], "error": default["error"],
+        "shares": dict(zip(SHARES, default["share_margin"], strict=True)),
     }  # fmt: skip
     drawn, _ = judged_study("assumptions")
     table = sensitivity(drawn)

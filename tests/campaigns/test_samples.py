@@ -40,8 +40,8 @@ def test_the_free_crank_keeps_its_energy():
 def test_the_default_machine_has_its_margins_of_claims():
     stored, found = kept("claims.json")["default"], judged_alone(Case.from_values({}))
     for claim in CLAIMS:
-        both = stored["error"][claim - 1] + found.error[claim - 1] + 1e-9
-        assert abs(stored["margin"][claim - 1] - found.margin[claim - 1]) <= both, claim
+        both = stored["error"][claim - 1] + found["error"][claim - 1] + 1e-9
+        assert abs(stored["margin"][claim - 1] - found["margin"][claim - 1]) <= both, claim
 
 
 def test_the_first_value_that_is_followed_has_its_exponent():
