@@ -24,6 +24,16 @@ EQUIVALENT = {
     "contact_laws.py, solve_rising: rising(middle) < value -> rising(middle) <= value": (
         "where a middle has the value itself, both ends close in on it"
     ),
+    "march.py, add_sides: 0.0 -> 1.0 (3)": (
+        "where the load is zero at an end, the search closes in on that end and adds nothing"
+    ),
+    "mechanism_rows.py, beyond_model: deepest > IMPLAUSIBLE * min(p.guide_length, p.guide_height)"
+    " -> deepest >= IMPLAUSIBLE * min(p.guide_length, p.guide_height)": (
+        "no number of a motion is the limit itself"
+    ),
+    "step_control.py, first_step: 1e-05 -> 1.0100000000000002e-05 (2)": (
+        "from which rate on the first step is guessed by it: every step's error is controlled"
+    ),
 }
 
 OPERATORS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,

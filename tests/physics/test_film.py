@@ -9,6 +9,7 @@ from published import BEARING
 from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case
+from compressor.physics import FILM_TERMS
 from compressor.physics.film import film, film_numbers_at, short_film
 from compressor.solve.bearing import film_constants, reynolds
 from compressor.solve.si_record import record
@@ -96,6 +97,20 @@ def test_polynomials_keep_reynolds_numbers():
             ours, beta = rotation(eps, constants)
             assert ours == pytest.approx(math.hypot(*found), rel=1e-3)
             assert beta == pytest.approx(math.atan2(found[1], found[0]), abs=1e-3)
+
+
+def test_a_film_is_reynolds_at_the_polynomials_own_places():
+    """Turned, pressed and pulled apart; near the centre the film is made to resist alike."""
+    share, ratio = 0.02, 0.5
+    constants, _ = film_constants(ratio, share)
+    nodes = np.cos(np.pi * (np.arange(FILM_TERMS) + 0.5) / FILM_TERMS)
+    least = math.sqrt(0.5 * share)
+    places = 1.0 - (least + 0.5 * (1.0 - least) * (nodes + 1.0)) ** 2
+    for eps in places[places > 0.2].tolist():
+        for wedge, closing in ((1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
+            exact = reynolds(eps, ratio, wedge, closing)
+            found = np.array(film_numbers_at(eps, wedge, closing, constants))
+            assert np.linalg.norm(found - exact) < 1e-12 * np.linalg.norm(exact)
 
 
 def test_at_the_centre_the_film_resists_alike_in_all_directions():

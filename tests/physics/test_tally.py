@@ -13,6 +13,7 @@ from compressor.physics.tally import (
     IN_STEPS,
     add_flows,
     cut_tally,
+    extreme_of,
     lobatto,
     merge_tallies,
     new_tally,
@@ -32,6 +33,11 @@ def test_lobatto_is_exact_for_polynomials(n):
     nodes, weights = lobatto(n)
     for degree in range(2 * n - 2):
         assert weights @ nodes**degree == pytest.approx(1 / (degree + 1), rel=1e-12)
+
+
+def test_a_straight_line_has_no_extreme():
+    assert np.isnan(extreme_of(-1.0, 1.0, 2.0, 3.0, 4.0)).all()
+    assert extreme_of(-1.0, 1.0, 2.0, 3.0, 2.0) == (0.0, 3.0)
 
 
 @pytest.mark.parametrize("middle", [0.1, 0.37, 0.5, 0.93])
