@@ -8,12 +8,15 @@ from scipy.integrate import solve_ivp
 
 from compressor.cases.case import Case
 from compressor.cases.table import table
+from compressor.metrics import JOINTS
 from compressor.physics.contact import (
+    ContactState,
     FrictionLaw,
     bristle_rate,
     friction_coefficient,
     steepest,
     stribeck,
+    write_carried_rates,
 )
 from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
@@ -112,6 +115,20 @@ def test_bristles_stick():
         (0.0, 0.5), [0.0], method="LSODA", rtol=1e-9, atol=1e-12,
     ).y[0, -1]  # fmt: skip
     assert creep > 1e-3
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_bristles_bend_at_the_worn_joint_alone(joint):
+    values = {"joint": JOINTS[joint], "clearance_mm": 0.2, "friction": {"law": "lugre"}}
+    p = record(Case.from_values(values))
+    place = 2 * p["freedoms"]
+    y, rates = np.full(place + 4, 1e-6), np.full(place + 4, math.nan)
+    sliding = ContactState(*np.zeros(len(ContactState._fields)))._replace(slip=0.02)
+    write_carried_rates(sliding, sliding, 0.5, y, p, rates)
+    expected = np.zeros(4)
+    expected[2 + joint] = 0.5 * bristle_rate(0.02, 1e-6, p)
+    np.testing.assert_array_equal(rates[place:], expected)
+    assert expected.any()
 
 
 @pytest.mark.slow
