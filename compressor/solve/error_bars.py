@@ -127,7 +127,7 @@ def overruns_friction(p: np.record, rtol: float) -> bool:
     return rubs and rtol * length_and_speed(p)[1] > MAX_SPEED_ERROR * p["stiction_velocity"]
 
 
-def comparison_run(case: Case, solution: Solution, timeout: float) -> Solution:
+def make_comparison_run(case: Case, solution: Solution, timeout: float) -> Solution:
     """Return another run of a case, by which a run's errors are estimated: a tighter one.
 
     A looser one where no room is left; one by the stiff method where friction may be overrun.

@@ -11,9 +11,9 @@ from compressor.solve.error_bars import (
     LOOSER_FACTOR,
     ORDER,
     TIGHTER_FACTOR,
-    comparison_run,
     estimate_errors,
     is_amplified,
+    make_comparison_run,
     ratio_of,
     relative_bar,
 )
@@ -69,7 +69,7 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
             return now
         others: list[Solution] = []
         excess = 0.0
-        for other in comparison_runs(case, now, before, search):
+        for other in make_comparison_runs(case, now, before, search):
             others.append(other)
             estimate_errors(now, *others)
             excess = excess_over_promise(case, now)
@@ -90,7 +90,7 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
         rtol = max(float(f"{rtol / tightening:.1e}"), LAST_RTOL)
 
 
-def comparison_runs(
+def make_comparison_runs(
     case: Case, now: Solution, before: Solution | None, search: Search
 ) -> Iterator[Solution]:
     """Yield the runs that tell of a run's errors: the one before it, and then a tighter one.
@@ -99,7 +99,7 @@ def comparison_runs(
     """
     if before:
         yield before
-    tighter = comparison_run(case, now, search.left)
+    tighter = make_comparison_run(case, now, search.left)
     search.count(tighter.trajectory)
     yield tighter
     if before or tighter.reason:

@@ -150,7 +150,7 @@ def test_the_run_that_errors_are_estimated_by(rtol, other):
     given = {"duration_rev": 0.25, "settle_rev": 0, "rtol": rtol}
     case = Case.from_values({**BOTH, "solve": given})
     found = run_module.run_at_tolerance(case, rtol, 60.0, False)
-    assert error_bars.comparison_run(case, found, 60.0).rtol == pytest.approx(other)
+    assert error_bars.make_comparison_run(case, found, 60.0).rtol == pytest.approx(other)
 
 
 LOOSE = {
