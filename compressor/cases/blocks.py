@@ -17,12 +17,12 @@ from compressor.cases.checks import (
     expand_synonyms,
     hold_value,
     key_of,
-    leaves,
     no_mapping,
     row_of,
     stands_for,
     suggestion,
     value_of,
+    walk_leaves,
 )
 from compressor.cases.comparison import NoComparison, Test, comparison
 from compressor.cases.conflicts import IN_PLACE_OF
@@ -204,7 +204,7 @@ def plan_block(tree: Tree, name: str) -> tuple[Block, list[FileProblem]]:
     fixed: dict[str, Any] = {}
     sweeps: dict[str, Sweep] = {}
     problems = []
-    for path, value in leaves(tree.values):
+    for path, value in walk_leaves(tree.values):
         key = DOUBLES.get(key_of(path), key_of(path))
         given[key] = value
         if not is_swept(key, value):

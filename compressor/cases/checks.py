@@ -290,7 +290,7 @@ def hold_value(key: str, value: Any) -> Any:
 
 def values_given(values: Mapping[Any, Any]) -> dict[str, Any]:
     """Return the values that are set in nested values, by dotted key, of a key by part by part."""
-    return {key_of(path): value for path, value in leaves(values) if value is not None}
+    return {key_of(path): value for path, value in walk_leaves(values) if value is not None}
 
 
 def key_of(path: Path) -> str:
@@ -298,14 +298,14 @@ def key_of(path: Path) -> str:
     return ".".join(map(str, path))
 
 
-def leaves(values: Mapping[Any, Any], above: Path = ()) -> Iterator[tuple[Path, Any]]:
+def walk_leaves(values: Mapping[Any, Any], above: Path = ()) -> Iterator[tuple[Path, Any]]:
     """Yield the path and the value, or the sweep, of each key; of a value by part each part's."""
     for name, value in values.items():
         path, inner = (*above, name), value if isinstance(value, Mapping) else None
         if inner == {} and not above and name in GROUPS:  # its defaults
             yield path, WORDS.get(name) or value
         elif inner and ((not above and name in GROUPS) or is_by_part(key_of(path), inner)):
-            yield from leaves(inner, path)
+            yield from walk_leaves(inner, path)
         elif path[0] not in SWEEP:
             yield path, value
 

@@ -4,7 +4,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from compressor.cases.checks import DOUBLES, SWEEP, is_by_part, key_of, leaves, stands_for
+from compressor.cases.checks import DOUBLES, SWEEP, is_by_part, key_of, stands_for, walk_leaves
 from compressor.cases.conflicts import IN_PLACE_OF
 from compressor.cases.table import parts_by_key
 from compressor.cases.yaml_reader import FileProblem, Path, Place, Tree, read_text, shorten
@@ -46,7 +46,7 @@ def drop(values: Mapping[str, Any], path: Path) -> dict[str, Any]:
 
 def merge_block(file: Tree, block: Tree) -> Tree:
     """Return a file's values with all those of one of its blocks."""
-    changes = dict(leaves(block.values))
+    changes = dict(walk_leaves(block.values))
     for key in SWEEP:
         value = block.values.get(key)
         if isinstance(value, dict):

@@ -129,7 +129,7 @@ def write_plots(
     named = {study.name: study for study in studies}
     of_job = bool(choice.what) and {*choice.what} <= {*JOB}
     if len(words) == 1 and words[0] in named and not (of_job and named[words[0]].jobs == 1):
-        drawn = study_figures(stored, named[words[0]], choice)
+        drawn = draw_study(stored, named[words[0]], choice)
         stem = words[0]
     else:
         key = find_job(results, words, studies, stored.keys())
@@ -185,7 +185,7 @@ def drawable(stored: Stored, studies: Sequence[StoredStudy], key: str) -> xr.Dat
     return stored.job(key)
 
 
-def study_figures(stored: Stored, study: StoredStudy, choice: PlotChoice) -> Iterator[DrawnFigure]:
+def draw_study(stored: Stored, study: StoredStudy, choice: PlotChoice) -> Iterator[DrawnFigure]:
     """Yield the figures of a study along one axis."""
     if choice.what and {*choice.what} <= {*JOB}:
         first = study.keys[0][:KEY_DIGITS]
@@ -325,7 +325,7 @@ def with_segments(
 MAX_PAGE_ROWS = 12  # of a study's jobs whose series a page reads
 
 
-def page_figures(stored: Stored, study: StoredStudy, units: Units) -> Iterator[DrawnFigure]:
+def draw_for_page(stored: Stored, study: StoredStudy, units: Units) -> Iterator[DrawnFigure]:
     """Yield what a page draws of a study over the crank angle.
 
     The vibration along an axis, and the revolution of the job where it is greatest. Nothing of a

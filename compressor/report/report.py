@@ -62,7 +62,7 @@ from compressor.report.paper_sections import (
     paper_sections,
     repeats_paper,
 )
-from compressor.report.plots import page_figures
+from compressor.report.plots import draw_for_page
 from compressor.report.study_section import (
     MAX_ROWS,
     file_name,
@@ -252,7 +252,7 @@ def drawn_study(
     with label_studies(stored, [study]) as data:
         named: list[tuple[str, DrawnFigure]] = []
         if not study.figures:
-            swept, turns = draw_sweep(data, limits, units), page_figures(stored, study, units)
+            swept, turns = draw_sweep(data, limits, units), draw_for_page(stored, study, units)
             named = [(file_name("sweep", study.name, one.name), one) for one in swept]
             named += [(file_name(one.name, study.name), one) for one in turns]
         plates = [

@@ -12,7 +12,7 @@ from compressor.cases.load import load_cases
 from compressor.physics import exact_motion
 from compressor.report import plots, side_by_side
 from compressor.report.figures.job import NAMES
-from compressor.report.plots import page_figures
+from compressor.report.plots import draw_for_page
 from compressor.report.side_by_side import compare_healthy, differing_in_clearance
 from compressor.store.reader import open_study, read_store
 from compressor.store.studies import read_studies
@@ -140,11 +140,11 @@ def failing_twin(run, sensed=False):
 def test_a_twin_that_fails_stands_nowhere(swept, study, monkeypatch):
     """The job is drawn alone."""
     (stored, data), (own,) = study, read_studies(swept)
-    drawn = {one.name: one.figure for one in page_figures(stored, own, "usual")}
+    drawn = {one.name: one.figure for one in draw_for_page(stored, own, "usual")}
     monkeypatch.setattr(side_by_side, "healthy_twin", failing_twin)
     monkeypatch.setattr(plots, "healthy_twin", failing_twin)
     assert compare_healthy(stored, data) is None
-    alone = {one.name: one.figure for one in page_figures(stored, own, "usual")}
+    alone = {one.name: one.figure for one in draw_for_page(stored, own, "usual")}
     assert [*alone] == [*drawn]
     names = [{trace.name for trace in figures["analyst"].data} for figures in (drawn, alone)]
     assert names[0] - names[1] == {NAMES["twin"]}
