@@ -62,10 +62,10 @@ def figure(
     """Return a decorator that enters a function into the table; options: given to it."""
 
     def enter(make: Callable[..., DrawnFigure]) -> Callable[..., DrawnFigure]:
-        def named(*given: Any, **more: Any) -> DrawnFigure:
+        def draw(*given: Any, **more: Any) -> DrawnFigure:
             return make(*given, **options, **more)._replace(name=name, title=title)
 
-        FIGURES[kind][name] = Figure(name, title, needs, named)
+        FIGURES[kind][name] = Figure(name, title, needs, draw)
         return make
 
     return enter
