@@ -222,7 +222,7 @@ def read_numbers(measure: Measure, data: xr.Dataset) -> tuple[np.ndarray, np.nda
     """
     if measure.variable not in data:
         return np.array(math.nan), np.array(math.nan)
-    values, bars = measure.of(data).values.copy(), measure.bar(data).values.copy()
+    values, bars = measure.of(data), measure.bar(data)
     if measure.variable == KNOCK and f"{KNOCK}_mean" in data:
         regime = data["regime"]
         for place in np.argwhere((regime.values == Regime.CHAOTIC) & ~np.isnan(values)):

@@ -78,7 +78,7 @@ def compare_healthy(
 def known_values(measure: Measure, data: xr.Dataset) -> np.ndarray:
     """Return a measure of a study's jobs in a row, nan where its error bar is as long as it."""
     values, bars = measure.of(data), measure.bar(data)
-    return values.where(bars.isnull() | (bars < values)).values.ravel()
+    return np.where(np.isnan(bars) | (bars < values), values, np.nan).ravel()
 
 
 def differing_in_clearance(data: xr.Dataset, place: int) -> list[int]:
@@ -128,7 +128,7 @@ def _compare(
         sound = float(measure.of(healthy))
         if np.isnan(sound) or BARRED[measure.variable].contact:
             continue
-        values, bars = measure.of(data).values.ravel(), measure.bar(data).values.ravel()
+        values, bars = measure.of(data).ravel(), measure.bar(data).ravel()
         cells = [Cell(column_title(measure)), Cell(number(sound), "number", sound)]
         cells += [_cell(measure, float(values[n]), float(bars[n]), sound) for n in places]
         rows.append(TableRow(cells))

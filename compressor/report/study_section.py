@@ -187,7 +187,7 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
 def jobs_table(data: xr.Dataset, limits: Limits = NO_LIMITS, units: Units = "usual") -> PageTable:
     """Return a row for every job of a study, as far as a page can hold them."""
     swept, shown = swept_values(data), measures(data, units)
-    metrics = [(m, m.of(data).values.ravel(), m.bar(data).values.ravel()) for m in shown]
+    metrics = [(m, m.of(data).ravel(), m.bar(data).ravel()) for m in shown]
     words = ("status", "reason", "regime", "key")
     ends = zip(*(data[name].values.flat for name in words), strict=True)
     rows = []

@@ -103,7 +103,7 @@ def model_table(data: xr.Dataset) -> ModelTable:
     first = data.isel(choice=0)
     shown = [m for m in measures(first) if BARRED[m.variable].kind != "count"]
     known = [m for m in shown if has_number(m, float(m.of(first)), float(m.bar(first)))]
-    columns = [(m, m.of(data).values, m.bar(data).values) for m in known]
+    columns = [(m, m.of(data), m.bar(data)) for m in known]
     rows = []
     for n in range(1, data.sizes["choice"]):
         one = data.isel(choice=n)
