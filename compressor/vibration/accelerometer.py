@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates
-from scipy.signal import butter, sosfilt
 
 from compressor.cases import Body, Sensor
 from compressor.vibration.body import (
@@ -131,6 +130,8 @@ def with_noise(
 def low_pass(sensor: Sensor, signal: np.ndarray, step: float) -> np.ndarray:
     """Return what a sensor's anti-aliasing filter leaves of a signal at steps (s), from rest on."""
     corner = sensor.low_pass_Hz or sensor.rate_Hz / USUAL
+    from scipy.signal import butter, sosfilt  # takes half a second
+
     return sosfilt(butter(POLES, corner, fs=1.0 / step, output="sos"), signal)
 
 

@@ -16,7 +16,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 from scipy.ndimage import spline_filter1d
-from scipy.signal import lfilter
 
 from compressor.cases import Body
 
@@ -46,6 +45,8 @@ def oscillate(
     One complex unknown, z = q' - conj(s) q with z' = s z + f and s = w (-zeta + i sqrt(1-zeta^2)),
     carries both q = Im z / Im s and q'. Over a step, z' = s z + cubic has a closed form.
     """
+    from scipy.signal import lfilter  # takes half a second, of machines with a body alone
+
     if not 0.0 < damping_ratio < 1.0:
         raise ValueError(f"a damping ratio lies between 0 and 1, not at {damping_ratio:g}")
     omega = 2.0 * np.pi * frequency

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import binned_statistic
 
 from compressor.cases import Body, Sensor
 from compressor.vibration.accelerometer import Record, listen
@@ -123,6 +122,8 @@ def segment_levels(
     revolution, (m,). Segment k goes from 360 k / count degrees, included, to the next, not
     included. The peak is the greatest magnitude; both are nan where a segment has no sample.
     """
+    from scipy.stats import binned_statistic  # takes half a second
+
     # an angle that rounding has put just before a segment's begin lies in it
     place = (angle_deg + 3.6e-7 / count) % 360.0
     peak, square = (

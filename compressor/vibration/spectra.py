@@ -13,10 +13,8 @@ take them as periodic. All raise RecordError for one that is not finite.
 import math
 
 import numpy as np
-from scipy import stats
 from scipy.fft import ifft, irfft, rfft
 from scipy.interpolate import CubicSpline
-from scipy.signal import hilbert
 
 from compressor.program import CompsimError
 
@@ -122,6 +120,8 @@ def envelope_spectrum(
         text = f"no line lies between {low} and {high}, which are {apart:g} apart"
         remedy = f"choose a wider band below {rate / 2:g}, half the rate, or pass a longer signal"
         raise RecordError(f"{text}: {remedy}")
+    from scipy.signal import hilbert  # takes half a second, of envelopes alone
+
     envelope = np.abs(hilbert(band_signal(values, rate, low, high)))
     amplitudes = line_amplitudes(envelope, envelope.size, rms=False)
     return np.arange(amplitudes.size) * (rate / envelope.size / speed), amplitudes
@@ -191,6 +191,8 @@ def shape(values: np.ndarray) -> tuple[float, float, float, float]:
     root = math.sqrt(float(np.mean(found**2)))
     if not root:
         return 0.0, math.nan, math.nan, math.nan
+    from scipy import stats  # takes half a second
+
     kurtosis = float(stats.kurtosis(found, fisher=False)) if np.ptp(found) else math.nan
     ordered = np.sort(np.abs(found))
     beyond = (np.arange(found.size)[::-1] + 0.5) / found.size
