@@ -19,8 +19,8 @@ from markupsafe import Markup, escape
 
 from compressor.digits import PAGE_DIGITS, by_bar, setting
 from compressor.outcome import Regime
+from compressor.report.figures import pictures
 from compressor.report.figures.drawing import INCH, as_csv, describe_figure
-from compressor.report.figures.pictures import DPI
 from compressor.report.figures.sweep_data import Measure
 from compressor.report.interactive import script
 from compressor.report.limits import NO_LIMITS, Limits
@@ -180,7 +180,7 @@ class Plate:
     def size(self) -> tuple[int, int]:
         """Return width and height of the PNG in pixels."""
         layout = self.figure.layout
-        return int(layout.width * DPI / INCH), int(layout.height * DPI / INCH)
+        return int(layout.width * pictures.DPI / INCH), int(layout.height * pictures.DPI / INCH)
 
     @property
     def alt(self) -> str:
@@ -198,12 +198,12 @@ class Plate:
         """Return whether its points are jobs, which a click opens."""
         return any(True for _ in self.jobs)
 
-    @property
-    def texts(self) -> dict[str, str]:
-        """Return the files beside the page that are no pictures, by their names."""
+    def make_files(self) -> dict[str, bytes]:
+        """Return its files beside the page by name: picture, table and script."""
         return {
-            f"{self.name}.csv": as_csv(self.figure),
-            f"{self.name}.js": script(self.name, self.figure),
+            f"{self.name}.png": pictures.render(self.figure),
+            f"{self.name}.csv": as_csv(self.figure).encode(),
+            f"{self.name}.js": script(self.name, self.figure).encode(),
         }
 
 

@@ -28,7 +28,7 @@ from compressor.cases import Case
 from compressor.report.answer import last_case
 from compressor.report.figures import FIGURES, Shakings, measure_shaking
 from compressor.report.figures.sweep_data import MEASURES, measures
-from compressor.report.figures.table import Kind
+from compressor.report.figures.table import DrawnFigure
 from compressor.report.page import (
     Cell,
     PageTable,
@@ -314,11 +314,15 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
     yield Section("missing", "Figures that could not be drawn", "missing.html", content)
 
 
-def draw_paper(runs: Mapping[str, xr.Dataset], units: Units, kind: Kind = "paper") -> list[Plate]:
-    """Return every figure of the paper, or of the diagnosis, whose cases are there."""
-    known = (one for one in FIGURES[kind].values() if runs.keys() >= {*one.needs})
-    drawn = [one.make(runs, units=units) for one in known]
-    return [Plate(one.name, one.title, one.caption, one.figure) for one in drawn]
+def draw_paper(runs: Mapping[str, xr.Dataset], units: Units) -> list[Plate]:
+    """Return every figure of the paper whose cases are there."""
+    known = (one for one in PAPER.values() if runs.keys() >= {*one.needs})
+    return [plate_of(one.make(runs, units=units)) for one in known]
+
+
+def plate_of(drawn: DrawnFigure) -> Plate:
+    """Return a figure as the page has it, under its own name and title."""
+    return Plate(drawn.name, drawn.title, drawn.caption, drawn.figure)
 
 
 @dataclass(frozen=True)
@@ -330,11 +334,17 @@ class DiagnosisContent:
     plates: list[Plate]
 
 
-def diagnosis_sections(runs: Mapping[str, xr.Dataset], plates: list[Plate]) -> Iterator[Section]:
-    """Yield the section of the figures that were drawn, and a table of the force above `ORDER`."""
-    if plates:
-        content = DiagnosisContent(ORDER, force_table(measure_shaking(runs)), plates)
-        yield Section("diagnosis", "Diagnosis", "diagnosis.html", content)
+def draw_diagnosis(runs: Mapping[str, xr.Dataset], units: Units) -> list[DiagnosisContent]:
+    """Return the figures of the faults side by side, and a table of the force above `ORDER`.
+
+    Nothing where a case is missing.
+    """
+    figures = FIGURES["diagnosis"].values()
+    if not all(runs.keys() >= {*one.needs} for one in figures):
+        return []
+    found = measure_shaking(runs)
+    drawn = [plate_of(one.make(runs, found, units=units)) for one in figures]
+    return [DiagnosisContent(ORDER, force_table(found), drawn)]
 
 
 def force_table(found: Shakings) -> PageTable:

@@ -33,7 +33,7 @@ from compressor.report.answer import (
     worn_joints,
 )
 from compressor.report.figures import FIGURES
-from compressor.report.figures.pictures import render_all
+from compressor.report.figures.pictures import draw_all
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.interactive import (
@@ -43,6 +43,7 @@ from compressor.report.interactive import (
 from compressor.report.limits import Limits, read_limits
 from compressor.report.page import (
     Add,
+    Chapter,
     JobFacts,
     JobsToOpen,
     Plate,
@@ -51,8 +52,10 @@ from compressor.report.page import (
     document,
 )
 from compressor.report.paper_sections import (
+    DiagnosisContent,
+    OwnFigures,
     PaperRuns,
-    diagnosis_sections,
+    draw_diagnosis,
     draw_paper,
     find_paper_runs,
     is_of_paper,
@@ -111,12 +114,9 @@ def write_report(
     """
     folder, zones = Path(report), read_limits(limits, units)
     contents = build_report(results, command, add, zones, units, studies)
-    plates = contents.plates
-    pictures = render_all([(plate.heading, plate.figure) for plate in plates])
-    files = {f"{one.name}.png": png for one, png in zip(plates, pictures, strict=True)}
-    for plate in plates:
-        files |= {name: text.encode() for name, text in plate.texts.items()}
-    files |= {f"{series_name(key)}.js": text.encode() for key, text in contents.series.items()}
+    files = {f"{series_name(key)}.js": text.encode() for key, text in contents.series.items()}
+    for made in draw_all([(one.heading, one.make_files) for one in contents.plates]):
+        files |= made
     library = {LIBRARY: get_plotlyjs().encode()}
     if single:
         page = contents.page(library | files)
@@ -168,7 +168,7 @@ def build_report(
         paper = PaperRuns({}, {}, {})  # a few like runs in a sweep of one's own are no reproduction
     of_paper = draw_paper(paper.usable, units)
     of_own = {one.name: own_figures(stored, one, units) for one in studies if one.figures}
-    of_faults = draw_paper(paper.usable, units, "diagnosis")
+    faults = draw_diagnosis(paper.usable, units)
     own = [study for study in studies if not repeats_paper(study, paper)]
     added = [one(results, studies) for one in add]
     drawn: list[DrawnStudy] = []
@@ -183,10 +183,9 @@ def build_report(
             warnings.warn(left_out[study.name], CompsimWarning, stacklevel=3)
     own = [study for study in own if study.name not in left_out]
     chapters = [chapter for one in added for chapter in one.chapters]
-    later = [
-        *chain(*(one.plates for one in of_own.values()), of_faults, *(one.plates for one in drawn))
-    ]
-    later += [plate for chapter in chapters for plate in chapter.plates]
+    several: list[OwnFigures | DiagnosisContent | DrawnStudy | Chapter]
+    several = [*of_own.values(), *faults, *drawn, *chapters]
+    later = [plate for one in several for plate in one.plates]
     caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored, one)]
     judged = claims(paper.usable) if paper.stored else []
     figures, tables = paper_sections(paper, of_paper, judged, caveats, units)
@@ -195,7 +194,7 @@ def build_report(
         *(one.figures for one in drawn),
         *figures,
         *chain(*(one.sections for one in of_own.values())),
-        *diagnosis_sections(paper.usable, of_faults),
+        *(Section("diagnosis", "Diagnosis", "diagnosis.html", one) for one in faults),
         *(chapter.section for chapter in chapters),
         *(one.table for one in drawn),
         *tables,

@@ -10,7 +10,7 @@ from compressor.analysis.shaking import frame_forces
 from compressor.report.figures import FIGURES
 from compressor.report.figures.diagnosis import BIN, NEEDS, measure_shaking
 from compressor.report.figures.drawing import panels_of
-from compressor.report.paper_sections import diagnosis_sections, draw_paper, force_table
+from compressor.report.paper_sections import draw_diagnosis, force_table
 
 KEPT = slice(1200, 4800)  # three settled revolutions
 
@@ -21,8 +21,8 @@ def found(paper_runs):
 
 
 @pytest.fixture(scope="module")
-def drawn(paper_runs):
-    return {name: one.make(paper_runs) for name, one in FIGURES["diagnosis"].items()}
+def drawn(paper_runs, found):
+    return {name: one.make(paper_runs, found) for name, one in FIGURES["diagnosis"].items()}
 
 
 def high(run):
@@ -96,5 +96,4 @@ def test_the_table_has_every_case(found, paper_runs):
 
 def test_nothing_is_drawn_where_a_case_is_missing(paper_runs):
     some = {name: run for name, run in paper_runs.items() if name != "both 0.2"}
-    assert draw_paper(some, "usual", "diagnosis") == []
-    assert not [*diagnosis_sections(some, [])]
+    assert draw_diagnosis(some, "usual") == []

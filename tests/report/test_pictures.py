@@ -11,10 +11,14 @@ from matplotlib.image import imread
 
 from compressor.report.figures import pictures as module
 from compressor.report.figures.drawing import make_grid
-from compressor.report.figures.pictures import render, render_all
+from compressor.report.figures.pictures import draw_all, render
 from compressor.report.figures.style import LineStyle, fill
 
 NAMES = ["one", "two", "three", "four", "five"]
+
+
+def draw_pictures(figures):
+    return draw_all([(name, lambda one=one: module.render(one)) for name, one in figures.items()])
 
 
 @pytest.fixture
@@ -53,27 +57,27 @@ def elsewhere(monkeypatch, act):
 
 def test_two_processes_draw_what_one_does(figures, alone, two, monkeypatch, tmp_path, capfd):
     elsewhere(monkeypatch, lambda: (tmp_path / str(os.getpid())).touch())
-    assert render_all([*figures.items()]) == alone
+    assert draw_pictures(figures) == alone
     assert sorted(capfd.readouterr().err.splitlines()) == sorted(f"drawing {n}" for n in NAMES)
     assert 1 <= len([*tmp_path.iterdir()]) <= 2
 
 
 def test_a_process_that_dies_costs_nothing(figures, alone, two, monkeypatch):
     elsewhere(monkeypatch, lambda: os._exit(9))
-    assert render_all([*figures.items()]) == alone
+    assert draw_pictures(figures) == alone
 
 
 def test_an_error_of_another_process_is_raised(figures, two, monkeypatch):
     elsewhere(monkeypatch, lambda: 1 // 0)
     with pytest.raises(ZeroDivisionError):
-        render_all([*figures.items()])
+        draw_pictures(figures)
 
 
 def test_beside_threads_no_process_is_copied(figures, alone, monkeypatch):
     monkeypatch.setattr(module, "ProcessPoolExecutor", pytest.fail)
     monkeypatch.setattr(threading, "active_count", lambda: 2)
-    assert render_all([*figures.items()]) == alone
-    assert render_all([]) == []
+    assert draw_pictures(figures) == alone
+    assert draw_all([]) == []
 
 
 def test_a_picture_shows_what_the_figure_has():

@@ -54,12 +54,11 @@ def measure_shaking(runs: Runs) -> Shakings:
 
 
 @figure("diagnosis", "diagnosis-spectra", "Diagnosis 1: orders of the force on the frame", *NEEDS)
-def draw_spectra(runs: Runs, units: Units = "usual") -> DrawnFigure:
+def draw_spectra(runs: Runs, found: Shakings, units: Units = "usual") -> DrawnFigure:
     """Return X over orders: healthy, and each joint at the greatest clearance.
 
     Rms over clearance.
     """
-    found = measure_shaking(runs)
     drawing, panels = make_grid(1, 2, 4.6, widths=(2.3, 1), units=units)
     lines, trend = panels.flat
     lines.label("y", "amplitude of X ({})", "N")
@@ -102,7 +101,7 @@ def draw_spectra(runs: Runs, units: Units = "usual") -> DrawnFigure:
 
 
 @figure("diagnosis", "diagnosis-orbits", "Diagnosis 2: orbits of the journals", *NEEDS)
-def draw_orbits(runs: Runs, units: Units = "usual") -> DrawnFigure:
+def draw_orbits(runs: Runs, found: Shakings, units: Units = "usual") -> DrawnFigure:
     """Return the journals' orbits of each joint at three clearances, all to one scale."""
     drawing, panels = make_grid(
         len(SINGLE_FAULTS), len(CLEARANCES), 7.2, units=units, share_x="all", share_y="all"
@@ -130,9 +129,8 @@ def draw_orbits(runs: Runs, units: Units = "usual") -> DrawnFigure:
 
 @figure("diagnosis", "diagnosis-angles",
         "Diagnosis 3: when the frame shakes, and the contact modes", *NEEDS)  # fmt: skip
-def draw_angles(runs: Runs, units: Units = "usual") -> DrawnFigure:
+def draw_angles(runs: Runs, found: Shakings, units: Units = "usual") -> DrawnFigure:
     """Return X's high orders and the joints' contact modes over the crank angle."""
-    found = measure_shaking(runs)
     drawing, panels = make_grid(
         2 * len(SINGLE_FAULTS), 1, 8.4, heights=(2.6, 1) * 2, units=units, share_x="all"
     )

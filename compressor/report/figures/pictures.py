@@ -13,10 +13,10 @@ import re
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import plotly.graph_objects as go
@@ -77,46 +77,48 @@ def render(figure: go.Figure, kind: str = "png") -> bytes:
     return stream.getvalue()
 
 
-TO_DRAW: list[tuple[str, go.Figure]] = []  # of a copy of this process, with what each is called
+Made = TypeVar("Made")
+Work = Sequence[tuple[str, Callable[[], Made]]]  # what is drawn, in words, and what draws it
+TO_DRAW: list[tuple[str, Callable[[], Any]]] = []  # of a copy of this process
 
 
-def start_copy(figures: Sequence[tuple[str, go.Figure]]) -> None:
+def start_copy(work: Work[Any]) -> None:
     """Prepare a copy: pickled to it, a figure would lose its arrays. Ctrl-C ends it silently."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    TO_DRAW[:] = figures
+    TO_DRAW[:] = work
 
 
-def render_numbered(number: int) -> bytes:
-    """Return the PNG of a figure that the copy has."""
-    return render_reported(*TO_DRAW[number])
+def draw_numbered(number: int) -> Any:
+    """Return what is drawn of the work that the copy has."""
+    return draw_reported(*TO_DRAW[number])
 
 
-def render_reported(heading: str, figure: go.Figure) -> bytes:
-    """Return the PNG of a figure; say what is drawn in one write, since two share stderr."""
+def draw_reported(heading: str, draw: Callable[[], Made]) -> Made:
+    """Return what is drawn; say what that is in one write, since two share stderr."""
     with contextlib.suppress(OSError):
         sys.stderr.write(f"drawing {heading}\n")
         sys.stderr.flush()
-    return render(figure)
+    return draw()
 
 
-def render_all(figures: Sequence[tuple[str, go.Figure]]) -> list[bytes]:
-    """Return the PNG of figures, each with what it is called on stderr.
+def draw_all(work: Work[Made]) -> list[Made]:
+    """Return what is drawn, each with what it is called on stderr.
 
-    They are drawn two at a time, by copies of this process; one after the other where the system
-    makes no copies, or threads run, whose locks a copy would take along.
+    Two at a time draw, copies of this process; one after the other where the system makes no
+    copies, or threads run, whose locks a copy would take along.
     """
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     can_fork = cores > 1 and "fork" in multiprocessing.get_all_start_methods()
-    if can_fork and threading.active_count() == 1 and len(figures) > 1:
+    if can_fork and threading.active_count() == 1 and len(work) > 1:
         with (  # if a copy dies, such as for want of memory, all is drawn here
             contextlib.suppress(BrokenProcessPool),
             ProcessPoolExecutor(
-                2, multiprocessing.get_context("fork"), start_copy, (figures,)
+                2, multiprocessing.get_context("fork"), start_copy, (work,)
             ) as pool,
         ):
-            return [*pool.map(render_numbered, range(len(figures)))]
-    return [render_reported(*one) for one in figures]
+            return [*pool.map(draw_numbered, range(len(work)))]
+    return [draw_reported(*one) for one in work]
 
 
 def paint(figure: go.Figure) -> Figure:
