@@ -33,13 +33,15 @@ from compressor.cases import (
 )
 from compressor.metrics import JOINTS
 from compressor.physics import elastic_form, greatest_load
-from compressor.solve.measured_gas import card_noise, fit_polytrope
+from compressor.solve.measured_gas import card_noise, fit_polytrope, gas_nodes
 from compressor.solve.si_record import record
 
 EXPONENTS = (1.0, 1.5)  # that gas is compressed with
 MAX_MISFIT = 0.05  # of a card's lines, rms of the pressure's logarithm
 MAX_UNLIKE = 0.25  # by which a card's clearance may differ from what is given
 MAX_NOISE = 5e-4  # of a card's range of pressure
+MAX_FLATTENED = 5e-3  # of it, by which smoothing lowers the peak, beside
+PEAKS = 3.0  # times the noise, by which that alone raises a peak
 
 
 @dataclass(frozen=True)
@@ -301,7 +303,7 @@ def check_cards(case: Case) -> Remarks:
 
 
 def _tell_samples(case: Case, end: str) -> Iterator[str]:
-    """Yield how many revolutions a card is of, where its pressures begin, and its noise."""
+    """Yield a card's revolutions, where its pressures begin, its noise, what smoothing takes."""
     card, noise = open_card(case.gas.cards[end], end), card_noise(case, end)
     span = max(card.pressures) - min(card.pressures)
     if card.revolutions > 1:
@@ -317,6 +319,14 @@ def _tell_samples(case: Case, end: str) -> Iterator[str]:
         yield (
             f"noise or rounding of its samples is about {noise:.2g} MPa (rms), {force:.3g} N on "
             f"the piston; smoothed over {case.gas.smooth_deg or 0.0:g} degrees: gas.smooth_deg"
+        )
+    top = max(card.pressures) + card.is_gauge * case.gas.ambient
+    taken = top - float(gas_nodes(case, end)[:, 0].max()) / to_si(1.0, "MPa")
+    if case.gas.smooth_deg and taken - PEAKS * noise > MAX_FLATTENED * span:
+        yield (
+            f"smoothing over {case.gas.smooth_deg:g} degrees lowers its peak by {taken:.3g} MPa, "
+            f"{100 * taken / span:.2g} % of its range, and so the loads: set a smaller "
+            "gas.smooth_deg"
         )
 
 

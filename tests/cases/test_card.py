@@ -284,3 +284,15 @@ def test_noise_of_a_card_is_told_and_smoothed(tmp_path):
     left = [gas_nodes(one, "head")[:, 0] - gas_nodes(quiet, "head")[:, 0]
             for one in (rough, smooth)]  # fmt: skip
     assert left[1].std() < 0.5 * left[0].std()
+
+
+@pytest.mark.parametrize("width", [2.0, 40.0])
+def test_what_smoothing_takes_off_a_peak_is_told(tmp_path, width):
+    """A peak as a valve makes it, narrower than the window or wider: by numpy's least squares."""
+    rows = [(a, cycle(a) + 0.1 * np.exp(-(((a - 320) / width) ** 2))) for a in FINE]
+    path = write(tmp_path / "peak.csv", rows)
+    assert "smoothing" not in told_of(measured(path))
+    within = np.arange(-6.0, 6.01, 0.25)  # degrees: a node each
+    left = np.polyfit(within, 0.1 * np.exp(-((within / width) ** 2)), 3)[-1]
+    told = f"lowers its peak by {0.1 - left:.3g} MPa, {(0.1 - left) / 0.006:.2g} % of its range"
+    assert (told in told_of(measured(path, smooth_deg=12))) == (width < 6.0)
