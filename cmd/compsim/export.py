@@ -39,4 +39,6 @@ def export(names, folder, output, force, units) -> int:
     rows, what = write(folder, names, output, force, units or "si")
     size = screen.size(os.path.getsize(output))
     screen.print_text(f"{output}  {plural(rows, what)}, {size}")
+    if str(output).endswith(".wav"):
+        screen.say("a .wav names no channels: read it by --channel 1 --unit m/s2 --tacho 2")
     return screen.DONE

@@ -103,7 +103,7 @@ def test_an_exported_record_is_its_job(folder, capsys):
 )
 def test_a_unit_that_was_perhaps_mistaken_is_named(unit, told, folder, capsys):
     path = exported(folder, ".wav")
-    capsys.readouterr()
+    assert "--channel 1 --unit m/s2 --tacho 2" in capsys.readouterr().err
     words = ["--channel", "1", "--tacho", "2", "--tacho-deg", "20", "--unit"]
     assert told in run(folder, capsys, path, folder[1], *words, unit)
     assert "perhaps" not in run(folder, capsys, path, folder[1], *words, "in/s2")
