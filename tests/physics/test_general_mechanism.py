@@ -263,6 +263,24 @@ def test_energy_changes_by_the_powers(joint, features, unbalance):
         assert row[Column.FRICTION_POWER] >= 0.0
 
 
+def test_ideal_joints_rub_by_their_forces():
+    """The loss: mu r |F| at each pin, times how fast it turns in its bore, by closed formulas."""
+    values = {
+        "load": "gas",
+        "machine": {"pin_radius_mm": 20},
+        "friction": {"dynamic": 0.1, "ideal_joints": True},
+    }
+    p = featured("none", (), values, rubbing=1, guide_friction=0.0)
+    for angle in (-0.4, 0.1, 0.3):  # both pins slide faster than friction depends on their speed
+        row = np.empty(COLUMNS)
+        observe_at(angle / p["omega"], np.zeros(4), 1, p, row)
+        forces = np.hypot(*row[Column.FORCE : Column.FORCE + 4].reshape(2, 2).T)
+        tilt = math.asin(p["crank_ratio"] * math.sin(angle))
+        rod = p["omega"] * p["crank_ratio"] * math.cos(angle) / math.cos(tilt)
+        lost = 0.1 * 0.02 * forces @ [p["omega"] + rod, rod]
+        assert row[Column.FRICTION_POWER] == pytest.approx(lost, rel=1e-12)
+
+
 @pytest.mark.parametrize(("joint", "features"), COMBINATIONS)
 def test_an_evaluation_leaves_no_trace_in_the_next(joint, features):
     """To the bit, of a record that has served another instant before."""
