@@ -191,8 +191,7 @@ def caution(
 
     In at most `most` warnings a file.
     """
-    from compressor.analysis import describe_machine
-    from compressor.solve import cautions
+    from compressor.analysis import cautions, describe_machine
 
     machines = {study.name: describe_machine(study) for study in studies}
     for study in studies:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from compressor.analysis.runs import case_of, record_of
-from compressor.cases import Case, to_si
+from compressor.cases import Case, open_card, to_si
 from compressor.physics import exact_motion, sample_segments, segments
 from compressor.solve import gas_nodes
 
@@ -176,3 +176,57 @@ def cylinder_words(case: Case) -> str:
         f"{power / 1e3:.4g} kW indicated ({each}); {3600 * flow:.4g} m³/h at suction conditions, "
         "by the ideal cycle"
     )
+
+
+DIGITS = 12  # of a pressure in MPa: what differs beyond them is rounding of binary numbers
+OFF_STEP = 0.05  # of a step, by which a multiple of it may be off
+POLYTROPIC = (0.2, 0.8)  # shares of the pressure's logarithmic range between which lines are fitted
+MIN_FITTED = 5  # samples on each of the two lines
+CLEARANCES = np.geomspace(0.005, 3.0, 400)  # of the swept volume, that are tried
+
+
+def card_noise(case: Case, end: str) -> float:
+    """Return the standard deviation (MPa) of what differs from sample to sample in a card.
+
+    By the median of fourth differences; at least that of rounding to multiples of a step.
+    """
+    card = open_card(case.gas.cards[end], end)
+    values = np.array(card.pressures)
+    bends = np.diff(np.concatenate([values[-2:], values, values[:2]]), 4)
+    noise = float(np.median(np.abs(bends)) / (0.6745 * math.sqrt(70.0)))
+    step = np.diff(np.unique(values.round(DIGITS))).min(initial=math.inf)
+    multiples = values / step
+    if math.isinf(step) or np.abs(multiples - np.round(multiples)).max() > OFF_STEP:
+        return noise
+    return max(noise, float(step) / math.sqrt(12.0))
+
+
+def fit_polytrope(case: Case, end: str) -> tuple[float, float, float] | None:
+    """Return misfit, clearance and exponent that fit both lines of a card; None without lines.
+
+    Misfit: rms of the pressure's logarithm; clearance: of the swept volume; p (c + s)^n is
+    constant.
+    """
+    machine, pressure = case.machine, gas_nodes(case, end)[:, 0]
+    angles = np.arange(pressure.size) * 2.0 * math.pi / pressure.size
+    x, *_ = exact_motion(angles, machine.crank_radius_mm, machine.rod_length_mm, 1.0)
+    swept = (x.max() - x) / (2.0 * machine.crank_radius_mm)
+    grows = angles < math.pi
+    if end == "crank":
+        swept, grows = 1.0 - swept, ~grows
+    level = np.log(pressure)
+    low, high = level.min() + np.array(POLYTROPIC) * (level.max() - level.min())
+    between = (level > low) & (level < high)
+    lines = [between & side for side in (grows, ~grows)]
+    if high <= low or min(line.sum() for line in lines) < MIN_FITTED:
+        return None
+    found = []
+    for clearance in CLEARANCES:
+        volume = np.log(clearance + swept)
+        apart = [(volume[line] - volume[line].mean(), level[line] - level[line].mean())
+                 for line in lines]  # fmt: skip
+        v, p = (np.concatenate(each) for each in zip(*apart, strict=True))
+        exponent = -float(v @ p) / float(v @ v)
+        misfit = float(np.sqrt(np.mean((p + exponent * v) ** 2)))
+        found.append((misfit, float(clearance), exponent))
+    return min(found)

@@ -56,7 +56,7 @@ PIN = "pin_radius_mm is half of the pin's diameter"
 # Wider than usual practice, so that no real machine is remarked on; what is narrower in books
 # stands beside each. No limit of power and flow: every size is built.
 USUAL = {
-    # 0.15 to 0.3; above 0.35 `compressor.solve.cautions` has a remark
+    # 0.15 to 0.3; above 0.35 `cautions` has a remark
     "rod, crank ratio": Usual(
         0.12, 1.0, ("machine.crank_radius_mm", "machine.rod_length_mm"),
         below=("machine.stroke_mm", f"{STROKE}; or rod_length_mm is too long"),

@@ -1,7 +1,5 @@
 """A case -> its outcome: motion, metrics, error bars, reasons."""
 
-from compressor.solve.cautions import JointScales, cautions, joint_scales
-from compressor.solve.measured_gas import gas_nodes
 from compressor.solve.request import Metrics, Request, Trajectory, revolutions
 from compressor.solve.run import integrate, run_at_tolerance
 from compressor.solve.run_metrics import (
@@ -23,5 +21,5 @@ from compressor.solve.search import (
     with_settle_rev,
 )
 from compressor.solve.series import SIGNALS, signals_of_scene
-from compressor.solve.si_record import is_ideal, natural_sizes, record, stiffness_of
+from compressor.solve.si_record import gas_nodes, is_ideal, natural_sizes, record, stiffness_of
 from compressor.solve.simulate import measure, observe, simulate

@@ -5,13 +5,15 @@ as long. What reads many fields may be given `physics.read_fields` in its place.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case, joint_stiffness, to_si
+from compressor.cases import Case, joint_stiffness, open_card, to_si
 from compressor.metrics import JOINTS
 from compressor.physics import (
+    CARD_NODES,
     FLOWS,
     Coordinate,
     Fields,
@@ -29,9 +31,9 @@ from compressor.physics import (
     state_names,
     static_load,
 )
-from compressor.solve.measured_gas import gas_nodes
 
 NO_APPROACH = 1000.0  # mm/s: of laws that damp by none, and divide nothing by it
+SMOOTHING_ORDER = 3  # of the polynomials in a window that smooths a card
 
 
 def scene(case: Case) -> Scene:
@@ -141,6 +143,44 @@ def _gas(case: Case, p: dict[str, Any]) -> None:
             p[f"{prefix}discharge_force"] = open_at[1] * areas[end]
         p["crank_clearance"] = to_si(gas.clearance("crank", stroke), "mm")
         p["back_force"] = back * (areas["head"] - areas["crank"])
+
+
+def gas_nodes(case: Case, end: str) -> np.ndarray:
+    """Return pressure (Pa, absolute) and its slope a node of an end's card, (CARD_NODES, 2)."""
+    gas = case.gas
+    card = open_card(gas.cards[end], end)
+    nodes = to_si(1.0, "MPa") * card_nodes(card.angles, card.pressures)
+    if card.is_gauge:
+        nodes[:, 0] += to_si(gas.ambient, "MPa")
+    return smooth_nodes(nodes, gas.smooth_deg or 0.0)
+
+
+def card_nodes(angles: Sequence[float], values: Sequence[float]) -> np.ndarray:
+    """Return values, and slopes a node, of a card's curve at angles (degrees): (CARD_NODES, 2)."""
+    from scipy.interpolate import Akima1DInterpolator  # of cases with a card alone
+
+    around = np.add.outer([-360.0, 0.0, 360.0], angles).ravel()
+    curve = Akima1DInterpolator(around, np.tile(values, 3))
+    width = 360.0 / CARD_NODES
+    at = np.arange(CARD_NODES) * width
+    return np.stack([curve(at), width * curve(at, 1)], axis=1)
+
+
+def smooth_nodes(nodes: np.ndarray, degrees: float) -> np.ndarray:
+    """Return values and slopes a node, (m, 2), smoothed in a window; 0 degrees: as they are.
+
+    By Savitzky and Golay's cubic least squares (SciPy's); the window goes round the revolution.
+    """
+    width = 2 * round(degrees * len(nodes) / 720.0) + 1
+    if width <= SMOOTHING_ORDER + 1:
+        return nodes
+    from scipy.signal import savgol_filter
+
+    both = [
+        savgol_filter(nodes[:, 0], width, SMOOTHING_ORDER, deriv=derivative, mode="wrap")
+        for derivative in (0, 1)
+    ]
+    return np.stack(both, axis=1)
 
 
 def _film(case: Case, p: dict[str, Any]) -> None:

@@ -11,6 +11,7 @@ import pytest
 from compsim import screen
 from test_layers import ROOT
 
+from compressor.analysis.cautions import cautions
 from compressor.analysis.machine_numbers import (
     USUAL,
     describe_machine,
@@ -20,7 +21,6 @@ from compressor.analysis.machine_numbers import (
 from compressor.cases.case import Case, with_ideal_joints
 from compressor.cases.load import load_studies
 from compressor.physics import COLUMNS, Column, exact_motion, observe_all, segments
-from compressor.solve.cautions import cautions
 from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
 
@@ -268,8 +268,8 @@ def test_a_case_file_is_looked_at_without_machine_code_or_xarray(tmp_path):
     path = tmp_path / "machine.yaml"
     path.write_text(NAMEPLATE, encoding="utf-8")
     code = (
-        "import sys; from compressor.analysis import describe_machine\n"
-        "from compressor.cases import load_studies; from compressor.solve import cautions\n"
+        "import sys; from compressor.analysis import cautions, describe_machine\n"
+        "from compressor.cases import load_studies\n"
         f"study = load_studies({str(path)!r})[0]; cautions(study); describe_machine(study)\n"
         "print([name for name in ('numba', 'scipy', 'xarray') if name in sys.modules])"
     )

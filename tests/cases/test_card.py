@@ -7,11 +7,12 @@ import os
 import numpy as np
 import pytest
 
+from compressor.analysis.cautions import remarks
+from compressor.analysis.cylinder import card_noise, fit_polytrope
 from compressor.cases.card import CardError, mark_card, open_card, read_card
 from compressor.cases.case import Case, CaseError
 from compressor.cases.load import CaseFileError, load_studies
-from compressor.solve.cautions import remarks
-from compressor.solve.measured_gas import card_noise, fit_polytrope, gas_nodes
+from compressor.solve.si_record import gas_nodes
 from compressor.solve.simulate import measure
 
 ANGLES = list(range(0, 360, 5))

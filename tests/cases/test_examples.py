@@ -4,9 +4,9 @@ import re
 
 import pytest
 
+from compressor.analysis.cautions import cautions
 from compressor.cases.examples import FOLDER, STARTS, example, templates
 from compressor.cases.load import load_studies
-from compressor.solve.cautions import cautions
 from compressor.solve.simulate import simulate
 
 NAMES = sorted(path.stem for path in FOLDER.glob("*.yaml"))

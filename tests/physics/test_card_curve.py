@@ -7,7 +7,7 @@ import pytest
 
 from compressor.physics.loads import card_force
 from compressor.physics.record import CARD_NODES, new_record
-from compressor.solve.measured_gas import card_nodes
+from compressor.solve.si_record import card_nodes
 
 AT = np.arange(CARD_NODES) * 360 / CARD_NODES
 

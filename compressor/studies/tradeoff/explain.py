@@ -12,7 +12,12 @@ from typing import Any
 
 import xarray as xr
 
-from compressor.analysis import describe_machine, healthy_body_velocity_rms
+from compressor.analysis import (
+    JointScales,
+    describe_machine,
+    healthy_body_velocity_rms,
+    joint_scales,
+)
 from compressor.cases import (
     ACCURACY,
     Case,
@@ -25,12 +30,7 @@ from compressor.digits import align_columns, plural
 from compressor.metrics import JOINTS
 from compressor.physics import state_names
 from compressor.program import Progress, duration, no_progress
-from compressor.solve import (
-    JointScales,
-    joint_scales,
-    record,
-    simulate,
-)
+from compressor.solve import record, simulate
 from compressor.studies.tradeoff.page import ModelTable, model_table, percent
 from compressor.studies.tradeoff.variants import (
     FEATURES,

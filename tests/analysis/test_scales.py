@@ -5,10 +5,10 @@ import pytest
 from random_cases import random_cases
 from scipy.integrate import solve_ivp
 
+from compressor.analysis.cautions import across, contact_scales, greatest_force
 from compressor.cases.case import Case
 from compressor.metrics import JOINTS
 from compressor.physics.contact_laws import Power
-from compressor.solve.cautions import across, contact_scales, greatest_force
 from compressor.solve.request import Stop, check_depth
 from compressor.solve.run import run_at_tolerance
 from compressor.solve.si_record import record

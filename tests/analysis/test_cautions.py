@@ -6,10 +6,10 @@ import page_tables
 import pytest
 from test_layers import ROOT
 
+from compressor.analysis.cautions import USUAL, Caution, cautions, is_usual, remarks, slips
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.cases.table import table
-from compressor.solve.cautions import USUAL, Caution, cautions, is_usual, remarks, slips
 
 STUDIES = load_studies(*sorted((ROOT / "configs").glob("*.yaml")))
 BIG_END = {"joint": "big_end", "clearance_mm": 0.2}

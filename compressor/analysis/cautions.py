@@ -2,7 +2,7 @@
 
 Natural scales are closed formulas of a case's parameters alone. Forces are bounds; the deepest
 contact of random cases is 0.6 to 1.6 times as deep as they say in nine of ten
-(tests/solve/test_scales.py).
+(tests/analysis/test_scales.py).
 
 A key looks as if it were given in another unit where every value that it has in a study lies
 outside its usual range, and that unit would bring all of them inside. An oddity is reported once a
@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from compressor.analysis.cylinder import card_noise, fit_polytrope
 from compressor.cases import (
     Body,
     Case,
@@ -33,8 +34,7 @@ from compressor.cases import (
 )
 from compressor.metrics import JOINTS
 from compressor.physics import elastic_form, greatest_load
-from compressor.solve.measured_gas import card_noise, fit_polytrope, gas_nodes
-from compressor.solve.si_record import record
+from compressor.solve import gas_nodes, record
 
 EXPONENTS = (1.0, 1.5)  # that gas is compressed with
 MAX_MISFIT = 0.05  # of a card's lines, rms of the pressure's logarithm
