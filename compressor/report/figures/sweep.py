@@ -18,7 +18,6 @@ from compressor.report.figures.sweep_maps import (
     Ranking,
     draw_maps,
     draw_ranking,
-    leading,
     order_by_mean_strength,
     order_of,
     ranking,
@@ -26,7 +25,6 @@ from compressor.report.figures.sweep_maps import (
 )
 from compressor.report.figures.sweep_panels import (
     CHAOTIC,
-    MAX_COLUMNS,
     MAX_JOBS,
     MAX_LINES,
     MAX_PLACES,
@@ -35,7 +33,6 @@ from compressor.report.figures.sweep_panels import (
     draw_curves,
     draw_overview,
     draw_points,
-    draw_scatter,
     grouping,
     roles_of,
 )
@@ -64,7 +61,6 @@ RANKS = (
     "ratio of ranks, of numbers with 95 % intervals. An effect that rises and falls again is not "
     "seen in it."
 )
-MAX_ROWS = 3  # measures that stand in a figure with rows of them
 
 
 def draw_sweep(
@@ -157,7 +153,7 @@ def draw_sampled(
 ) -> Iterator[DrawnFigure]:
     """Yield the figures of a list of jobs that are no grid.
 
-    A ranking, each metric against its strongest key, and some metrics against all keys.
+    A ranking, and each metric against its strongest key.
     """
     found = ranking(sweep, shown)
     yield from draw_ranked(sweep, found, shown)
@@ -172,17 +168,6 @@ def draw_sampled(
     words = f"Every metric over {which}, a point a job.", *describe_colors(sweep), *marks
     figure, title = draw_points(sweep, strongest, shown), f"metrics over {which}"
     yield DrawnFigure(figure, join_sentences(*words), name="points", title=title)
-    if len(numbers) < 2:
-        return
-    columns = numbers[:MAX_COLUMNS]
-    group = leading(sweep, shown, MAX_ROWS)
-    figure = draw_scatter(sweep, columns, group)
-    most = f"the {len(columns)} strongest" if found else f"{len(columns)}"
-    some = f"{most} of {len(numbers)} {kind}s" if len(numbers) > len(columns) else f"each {kind}"
-    words = (f"The metrics that change most over {some}, a point a job.", *describe_colors(sweep),
-             marks[0])  # fmt: skip
-    title = f"{', '.join(one.title for one in group)} over each {kind}"
-    yield DrawnFigure(figure, join_sentences(*words), name="scatter", title=title)
 
 
 def draw_ranked(

@@ -10,7 +10,6 @@ import plotly.graph_objects as go
 from matplotlib.ticker import LogLocator, MaxNLocator
 
 from compressor.analysis import Effects, grid_effects, sampled_effects
-from compressor.metrics import BARRED
 from compressor.report.figures.contours import contour_lines
 from compressor.report.figures.drawing import (
     Panel,
@@ -159,7 +158,6 @@ def scale_map(panel: Panel, way: Way, axis: PlottedAxis, words: Sequence[str]) -
 COLUMNS = 4
 MAIN, TOTAL = "by itself (main effect)", "with its interactions (total effect)"
 RANK = "correlation of ranks"
-FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning
 Ranking = dict[Measure, Effects]
 
 
@@ -183,24 +181,6 @@ def ranking(sweep: PlottedSweep, measures: Sequence[Measure]) -> Ranking:
 def order_of(effects: Effects) -> list[int]:
     """Return the numbers of the axes, the strongest first; what is unknown is last."""
     return np.argsort(-np.nan_to_num(effects.strength), kind="stable").tolist()
-
-
-def leading(sweep: PlottedSweep, measures: Sequence[Measure], most: int) -> list[Measure]:
-    """Return the measures that change most over a sweep, as the greatest over the least value.
-
-    One a metric; none that is a count, or is 0 without clearance by its meaning.
-    """
-    ratios: dict[Measure, float] = {}
-    for measure in measures:
-        values = sweep.known(measure)
-        values = values[np.isfinite(values) & (values >= 0.0)]
-        row = BARRED[measure.variable]
-        if values.size and not row.counted and measure.variable not in FROM_IDEAL:
-            ratios[measure] = values.max() / values.min() if values.min() > 0.0 else 1.0
-    chosen: dict[str, Measure] = {}
-    for measure in sorted(ratios, key=lambda one: -ratios[one]):
-        chosen.setdefault(measure.variable, measure)
-    return [*chosen.values()][:most] or list(measures[:1])
 
 
 def order_by_mean_strength(found: Ranking) -> list[int]:

@@ -176,7 +176,6 @@ def draw_curves(
     return drawing.figure()
 
 
-MAX_COLUMNS = 4
 MAX_PLACES = 200  # in x
 
 
@@ -303,21 +302,6 @@ def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Mea
     for panel, axis, measure in zip(drawing.panels, axes, measures, strict=True):
         plot_points(panel, sweep, axis, measure)
         panel.x.title = sweep.axes[axis].title
-    return drawing.figure()
-
-
-def draw_scatter(
-    sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Measure]
-) -> go.Figure:
-    """Return the measures in rows over axes in columns."""
-    drawing, grid = make_grid(len(measures), len(axes), 2.3 * len(measures) + 0.9,
-                              share_x="columns", share_y="rows")  # fmt: skip
-    for row, measure in zip(grid, measures, strict=True):
-        for panel, axis in zip(row, axes, strict=True):
-            panel.label("x", sweep.axes[axis].title)
-            panel.label("y", "{}", measure.unit)
-            plot_points(panel, sweep, axis, measure)
-        row[0].title = measure.title
     return drawing.figure()
 
 
