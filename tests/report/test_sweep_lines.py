@@ -40,7 +40,7 @@ def test_failed_missing_and_chaotic_jobs_are_marked():
     ring = marks["chaotic: a greatest value holds for this run only"]
     assert (*ring.x, *ring.y, *ring.customdata) == (0.4, 400, "k3")
     assert panel.y.range[0] < marks["a job failed here"].y < 100
-    assert "A cross: a job failed here" in drawn.caption
+    assert ("failed", "1") in drawn.numbers
     assert {*listed(drawn.figure)} == {*marks} - {"peak acceleration"}
 
 
@@ -56,7 +56,7 @@ def test_what_is_the_same_at_every_job_is_said():
     data["rms_acceleration"] = 0 * data["rms_acceleration"] + 7.5
     (drawn,) = draw_sweep(data)
     assert [panel.title for panel in panels_of(drawn.figure)] == ["peak acceleration"]
-    assert "not drawn: rms acceleration (7.5 m/s²)." in drawn.caption
+    assert ("rms acceleration, at every job", "7.5 m/s²") in drawn.numbers
 
 
 def test_where_nothing_ran_nothing_is_drawn():
@@ -70,4 +70,4 @@ def test_of_very_many_values_some_are_drawn():
     (curve,) = panels_of(drawn.figure)[0].traces
     assert curve.x.size == 1000
     assert (curve.x[0], curve.x[-1]) == (0.1, 1.0)
-    assert "Of 100000 values of clearance 1000 are shown." in drawn.caption
+    assert ("values of clearance drawn", "1,000 of 100,000") in drawn.numbers

@@ -34,7 +34,8 @@ def test_the_overview_shows_means_of_what_is_known():
     expected[1] = peak(0.2, 400, 0)
     assert fast.y == pytest.approx(expected)
     assert slow.customdata is None
-    assert "Each point is the mean over joint. Up to 2 of 12 jobs lack" in drawn.caption
+    assert drawn.sentence.endswith("a point is the mean over joint.")
+    assert drawn.numbers[:3] == [("jobs", "12"), ("failed", "1"), ("chaotic", "1")]
 
 
 def test_two_axes_with_words_are_lines_of_jobs():

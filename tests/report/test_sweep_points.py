@@ -33,7 +33,7 @@ def test_points_are_jobs_over_what_matters_most():
     assert [*one["a job"].customdata] == [f"k{n}" for n in range(60)]
     assert (
         found["points"].caption
-        == "Every metric over the key that matters most for each, a point a job."
+        == "Every metric over the key that matters most for each, a point a job. Jobs: 60."
     )
 
 
@@ -70,4 +70,4 @@ def test_many_jobs_are_thinned_with_a_word():
     assert time.process_time() - start < 5.0
     for panel in panels_of(found["points"].figure):
         assert traces(panel)["a job"].x.size == 2000
-    assert "2,000 of 100,000 jobs are drawn" in found["points"].caption
+    assert ("jobs drawn", "2,000 of 100,000") in found["points"].numbers

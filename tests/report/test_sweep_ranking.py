@@ -58,10 +58,8 @@ def test_jobs_without_a_value_are_told():
     status[1, 1, 0] = "failed"
     drawn = plan(grid(AXES, lambda c, n, load: 10 + c + 2 * n + 0 * load, status=status))
     assert bars(drawn["ranking"])["load"]["total effect"] == pytest.approx([0, 0], abs=1e-6)
-    assert (
-        "up to 1 of a metric, count with the sum of their axes' main effects"
-        in drawn["ranking"].caption
-    )
+    (label,) = (label for label, value in drawn["ranking"].numbers if value == "up to 1")
+    assert label.endswith("count with the sum of their axes' main effects")
 
 
 def test_correlations_are_told_with_their_intervals():
@@ -99,12 +97,12 @@ def test_blocks_of_a_design_with_a_failed_job_are_left_out():
     status = np.full(256, "ok", dtype="U7")
     status[[3, 9, 64 + 20, 128 + 30, 192 + 30, 192 + 40, 192 + 50]] = "failed"  # 30 twice
     data = listed(columns, 1 + points[:, 0] + 3 * points[:, 1], status=status)
-    caption = plan(data)["ranking"].caption
+    numbers = plan(data)["ranking"].numbers
     (peak, _) = ranking(sweep_of(data), measures(data)).values()
     assert (peak.unknown, peak.base) == (7, 32)
     assert peak.total_ends[0, 1] < 0.9 < peak.total_ends[1, 1]
-    assert "They are of the first 32 whole blocks of the design." in caption
-    assert "up to 7 of a metric, are left out" in caption
+    assert ("first whole blocks of the design", "32") in numbers
+    assert [value for label, value in numbers if label.endswith("are left out")] == ["up to 7"]
 
 
 def test_of_a_grid_with_large_gaps_nothing_is_ranked():

@@ -24,28 +24,20 @@ from compressor.report.figures.sweep_maps import (
     spell_strongest,
 )
 from compressor.report.figures.sweep_panels import (
-    CHAOTIC,
     MAX_JOBS,
     MAX_LINES,
     MAX_PLACES,
     MAX_POINTS,
-    Roles,
     draw_curves,
     draw_overview,
     draw_points,
     grouping,
     roles_of,
 )
-from compressor.report.figures.table import DrawnFigure
+from compressor.report.figures.table import DrawnFigure, Number
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.units import Units
 
-MARKS = {
-    "failed": "a cross: a job failed here",
-    "missing": "a grey circle: a job was not run",
-    CHAOTIC: "a pink ring: a chaotic job, whose averages hold within their bars, but whose "
-    "greatest values hold for that run only",
-}
 VARIANCE = (
     "Spread is the variance over the grid. Bars: the share that an axis explains by itself (main "
     "effect) and together with its interactions with others (total effect, as in the "
@@ -68,9 +60,8 @@ def draw_sweep(
 ) -> list[DrawnFigure]:
     """Return the drawings of a study, as `open_study` gives it; curves show limits of metrics.
 
-    None where nothing is swept or measured.
-
-    What is the same at every job is said in a caption, and not drawn.
+    None where nothing is swept or measured. What is the same at every job is a number of a caption,
+    and not drawn.
     """
     known = measures(data, units)
     sweep = sweep_of(data)
@@ -79,29 +70,29 @@ def draw_sweep(
     shown, same = split_measures(sweep, known)
     if not shown:
         shown, same = known, []
-    marks = describe_marks(sweep), describe_unchanged(sweep, same)
+    about = [*count_jobs(sweep), *(number_of_all(sweep, one) for one in same)]
     if not sweep.is_grid:
-        return [*draw_sampled(sweep, shown, marks)]
+        return [*draw_sampled(sweep, shown, about)]
     if len(sweep.axes) == 1:
         (axis,) = sweep.axes
-        title = f"metrics against {axis.phrase}"
-        figure = draw_curves(sweep, shown, limits)
-        words = (
+        sentence = (
             f"Every metric against {axis.phrase}, a point a job, with error bars where one is long "
-            "enough to be seen.",
-            describe_thinning(axis, MAX_JOBS), *marks, *zone_words(shown, limits),
-        )  # fmt: skip
-        return [DrawnFigure(figure, join_sentences(*words), name=axis.name, title=title)]
-    return [*draw_grid(sweep, shown, marks, limits)]
+            "enough to be seen."
+        )
+        return [DrawnFigure(
+            draw_curves(sweep, shown, limits), sentence, [*thinned(axis, MAX_JOBS), *about],
+            zone_words(shown, limits), axis.name, f"metrics against {axis.phrase}",
+        )]  # fmt: skip
+    return [*draw_grid(sweep, shown, about, limits)]
 
 
-def zone_words(shown: Sequence[Measure], limits: Limits) -> list[str]:
+def zone_words(shown: Sequence[Measure], limits: Limits) -> str:
     """Return the sentences on zones, if any of the measures has limits; lines are dashed red."""
-    return limits.words if any(limits.of(one) for one in shown) else []
+    return "".join(f" {text}" for text in limits.words) if any(map(limits.of, shown)) else ""
 
 
 def draw_grid(
-    sweep: PlottedSweep, shown: Sequence[Measure], marks: tuple[str, str], limits: Limits
+    sweep: PlottedSweep, shown: Sequence[Measure], about: Sequence[Number], limits: Limits
 ) -> Iterator[DrawnFigure]:
     """Yield the figures of a grid of two or more axes.
 
@@ -118,38 +109,28 @@ def draw_grid(
         lines = (
             "; white: lines of equal value, which stand in the scale of colours, too" * has_lines
         )
-        thinned = [describe_thinning(axis, MAX_CELLS) for axis in sweep.axes]
-        words = f"A cell a job{lines}.", *thinned, *marks, *zone_words(shown, limits)
-        yield DrawnFigure(figure, join_sentences(*words), name="map", title=title)
+        cut = [number for axis in sweep.axes for number in thinned(axis, MAX_CELLS)]
+        yield DrawnFigure(figure, f"A cell a job{lines}.", [*cut, *about],
+                          zone_words(shown, limits), "map", title)  # fmt: skip
         return
     role = roles_of(sweep, order)
-    title = f"metrics over {sweep.axes[role.x].phrase} and {sweep.axes[role.color].phrase}"
-    words = describe_overview(sweep, role), marks[0] if len(sweep.axes) == 2 else "", marks[1]
-    figure = draw_overview(sweep, role, shown)
-    yield DrawnFigure(figure, join_sentences(*words), name="overview", title=title)
-
-
-def describe_overview(sweep: PlottedSweep, role: Roles) -> str:
-    """Describe every metric over two of the axes: what a point and a colour are."""
     x, color = (sweep.axes[n] for n in role)
     others = [axis.phrase for n, axis in enumerate(sweep.axes) if n not in role]
-    whole = (sweep.status == "ok") & ~sweep.chaotic
-    point, left = "A point a job.", ""
-    if others:
-        point = f"Each point is the mean over {' and '.join(others)}."
-    if others and not whole.all():
-        left = (
-            f"Up to {int((~whole).sum())} of {whole.size} jobs lack a value that is known within "
-            "its error bar, and are no part of a mean."
-        )
-    return join_sentences(
-        f"Every metric over {x.phrase}, a colour for each value of {color.phrase}.",
-        point, left, describe_thinning(x, MAX_PLACES), describe_thinning(color, MAX_LINES),
+    point = f"the mean over {' and '.join(others)}" if others else "a job"
+    sentence = (
+        f"Every metric over {x.phrase}, a colour for each value of {color.phrase}; a point is "
+        f"{point}."
+    )
+    cut = [*thinned(x, MAX_PLACES), *thinned(color, MAX_LINES)]
+    yield DrawnFigure(
+        draw_overview(sweep, role, shown), sentence, [*cut, *about],
+        " What is not known within its error bar is no part of a mean." * bool(others),
+        "overview", f"metrics over {x.phrase} and {color.phrase}",
     )  # fmt: skip
 
 
 def draw_sampled(
-    sweep: PlottedSweep, shown: Sequence[Measure], marks: tuple[str, str]
+    sweep: PlottedSweep, shown: Sequence[Measure], about: Sequence[Number]
 ) -> Iterator[DrawnFigure]:
     """Yield the figures of a list of jobs that are no grid.
 
@@ -163,11 +144,18 @@ def draw_sampled(
     for measure in shown:
         own = order_of(found[measure]) if measure in found else order
         strongest.append(next(n for n in own if n in numbers))
-    kind = axis_kind(sweep)
+    # where some keys are words, each metric is drawn over a number
+    kind = "number" if {axis.is_words for axis in sweep.axes} == {True, False} else "key"
     which = f"the {kind} that matters most for each" if found else f"a {kind}"
-    words = f"Every metric over {which}, a point a job.", *describe_colors(sweep), *marks
-    figure, title = draw_points(sweep, strongest, shown), f"metrics over {which}"
-    yield DrawnFigure(figure, join_sentences(*words), name="points", title=title)
+    phrase, _, _ = grouping(sweep)
+    colors = f", a colour for each {phrase}" * bool(phrase)
+    count = sweep.place.size
+    drawn = [("jobs drawn", f"{MAX_POINTS:,} of {count:,}")] * (count > MAX_POINTS)
+    yield DrawnFigure(
+        draw_points(sweep, strongest, shown),
+        f"Every metric over {which}, a point a job{colors}.", [*drawn, *about], "", "points",
+        f"metrics over {which}",
+    )  # fmt: skip
 
 
 def draw_ranked(
@@ -181,23 +169,15 @@ def draw_ranked(
     bases = {effects.base for effects in found.values() if effects.base}
     left = [measure.title for measure in shown if measure not in found]
     how = "count with the sum of their axes' main effects" if kind == "grid" else "are left out"
-    words = (
-        {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS}[kind],
-        f"They are of the first {min(bases):,} whole blocks of the design." if bases else "",
-        f"Points without a value that is known within its error bar, up to {most} of a metric, "
-        f"{how}." if most else "",
-        "Not ranked, since too few values are known or all known ones are the same: "
-        f"{'; '.join(left)}." if left else "",
-    )  # fmt: skip
     numbers = [(measure.title, spell_strongest(sweep, one)) for measure, one in found.items()]
+    numbers += [("first whole blocks of the design", f"{min(bases):,}")] if bases else []
+    numbers += [(f"points of a metric that are not known within their error bars, and {how}",
+                 f"up to {most}")] * bool(most)  # fmt: skip
+    numbers += [("not ranked, as too few values are known or all are the same", ", ".join(left))
+                ] * bool(left)  # fmt: skip
+    sentence = {"grid": VARIANCE, "saltelli": INDICES, "rank": RANKS}[kind]
     title = "what explains the spread of each metric"
-    yield DrawnFigure(draw_ranking(sweep, found), join_sentences(*words), numbers, name="ranking",
-                      title=title)  # fmt: skip
-
-
-def join_sentences(*parts: str) -> str:
-    """Return the sentences one after the other."""
-    return " ".join(part for part in parts if part)
+    yield DrawnFigure(draw_ranking(sweep, found), sentence, numbers, "", "ranking", title)
 
 
 def split_measures(
@@ -210,40 +190,22 @@ def split_measures(
     return [m for m, varies in both if varies], [m for m, varies in both if not varies]
 
 
-def describe_marks(sweep: PlottedSweep) -> str:
-    """Describe the marks that are drawn, if any."""
-    there = {*sweep.status.ravel().tolist()} | ({CHAOTIC} if sweep.chaotic.any() else set())
-    text = "; ".join(words for mark, words in MARKS.items() if mark in there)
-    return f"{text[0].upper()}{text[1:]}." if text else ""
+def count_jobs(sweep: PlottedSweep) -> Iterator[Number]:
+    """Yield how many jobs there are, and how many of these failed, were not run, are chaotic."""
+    yield "jobs", f"{sweep.place.size:,}"
+    failed, missing = (sweep.status == word for word in ("failed", "missing"))
+    for name, here in (("failed", failed), ("not run", missing), ("chaotic", sweep.chaotic)):
+        if here.any():
+            yield name, f"{here.sum():,}"
 
 
-def describe_unchanged(sweep: PlottedSweep, same: Sequence[Measure]) -> str:
-    """Describe the measures that are the same at every job, with their values."""
-    if not same:
-        return ""
-    parts = [
-        f"{m.title} ({shown_value(np.nanmax(sweep.values(m)))} {m.unit}".rstrip() + ")"
-        for m in same
-    ]
-    return f"The same at every job, and not drawn: {'; '.join(parts)}."
+def number_of_all(sweep: PlottedSweep, measure: Measure) -> Number:
+    """Return the number of a measure that is the same at every job."""
+    value = f"{shown_value(np.nanmax(sweep.values(measure)))} {measure.unit}".rstrip()
+    return f"{measure.title}, at every job", value
 
 
-def describe_thinning(axis: PlottedAxis, most: int) -> str:
-    """Describe how many of an axis' values are shown, if not all are."""
+def thinned(axis: PlottedAxis, most: int) -> list[Number]:
+    """Return how many of an axis' values are drawn; nothing where all are."""
     count = axis.values.size
-    return "" if count <= most else f"Of {count} values of {axis.phrase} {most} are shown."
-
-
-def axis_kind(sweep: PlottedSweep) -> str:
-    """Return what a list of jobs is drawn over: a key, or a number where some keys are words."""
-    return "number" if {axis.is_words for axis in sweep.axes} == {True, False} else "key"
-
-
-def describe_colors(sweep: PlottedSweep) -> Iterator[str]:
-    """Yield the sentences on colours, and on how many points are drawn."""
-    phrase, _, _ = grouping(sweep)
-    if phrase:
-        yield f"A colour for each {phrase}."
-    count = sweep.place.size
-    if count > MAX_POINTS:
-        yield f"{MAX_POINTS:,} of {count:,} jobs are drawn; the ranking is that of all."
+    return [(f"values of {axis.phrase} drawn", f"{most:,} of {count:,}")] * (count > most)
