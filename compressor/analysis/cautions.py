@@ -115,7 +115,7 @@ PRESSURES = {"bar": 0.1, "kPa": 1e-3, "Pa": 1e-6}
 # key -> what is usual for it, lowest and highest, and the units it may be mistaken for, as factors.
 # Reciprocating compressors from model engines to large process machines, with a margin; a contact
 # is from plastic bushings to steel in a conforming bore (Hertz, K = 4/3 sqrt(R) E').
-USUAL = {
+USUAL_KEYS = {
     "clearance_mm": (1e-3, 2.0, METRES | MICROMETRES),
     "machine.crank_radius_mm": (5.0, 1e3, METRES),
     "machine.rod_length_mm": (20.0, 1e4, METRES),
@@ -153,14 +153,14 @@ class Caution(NamedTuple):
 
 def is_usual(key: str, value: float) -> bool:
     """Return whether a value is usual for a key; limits may come from a conversion, and count."""
-    low, high, _ = USUAL[key]
+    low, high, _ = USUAL_KEYS[key]
     return low * (1 - 1e-9) <= value <= high * (1 + 1e-9)
 
 
 def slips(cases: Sequence[Case]) -> list[Caution]:
     """Return the keys of a study's cases whose values all look like another unit's."""
     found = []
-    for key, (usual_low, usual_high, units) in USUAL.items():
+    for key, (usual_low, usual_high, units) in USUAL_KEYS.items():
         read = [values for case in cases if (values := values_of(case, key))]
         values = sorted({value for several in read for value in several})
         if not (other := other_unit(key, values)):
@@ -188,7 +188,7 @@ def other_unit(key: str, values: Sequence[float]) -> str:
     """Return the unit in which unusual values would all be usual, "" where there is none."""
     if not values or any(value <= 0 or is_usual(key, value) for value in values):
         return ""
-    low, high, units = USUAL[key]
+    low, high, units = USUAL_KEYS[key]
     row, middle = row_of(key), sum(map(math.log, values)) / len(values)
     default = float(row.default) if row and row.default else math.sqrt(low * high)
     return min(

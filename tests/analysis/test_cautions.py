@@ -6,7 +6,7 @@ import page_tables
 import pytest
 from test_layers import ROOT
 
-from compressor.analysis.cautions import USUAL, Caution, cautions, is_usual, remarks, slips
+from compressor.analysis.cautions import USUAL_KEYS, Caution, cautions, is_usual, remarks, slips
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.cases.table import table
@@ -204,7 +204,7 @@ def test_what_is_usual_or_reaches_into_it_is_not(key, given, others, tmp_path):
 
 
 def test_defaults_are_usual():
-    for key in USUAL:
+    for key in USUAL_KEYS:
         default = table()[key].default if key in table() else None
         assert not default or is_usual(key, default), key
 
