@@ -10,7 +10,7 @@ from compressor.analysis import healthy_twin
 from compressor.cases import Case, stands_for
 from compressor.digits import is_known
 from compressor.metrics import BARRED, JOINTS
-from compressor.report.answer import FORCE, Points
+from compressor.report.answer import FORCE, KNOCK, Points
 from compressor.report.figures.sweep_data import MEASURES, Measure, measures, swept_values
 from compressor.report.page import (
     Cell,
@@ -28,6 +28,7 @@ MAX_WORN = 10  # jobs that stand beside the machine without clearance
 CLEARANCES = {"clearance_mm", *stands_for("clearance_mm")}
 MAX_TRIED = 50  # jobs among which the worst with clearance is looked for
 SENSOR = "sensor_peak"
+HEARD = 2.0  # times the sensor peak without clearance: what a plant would look into
 FROM_IDEAL = ("rms_acceleration_deviation",)  # 0 without clearance, by its meaning
 
 
@@ -148,8 +149,24 @@ def _compare(
         "The machine without clearance, by the same model: its joints are ideal, also without oil "
         "film. A sound bearing has some clearance; jobs that count as healthy are marked so. "
         f"Beside it {beside}. In parentheses: how many times as much as without clearance."
+        + describe_noise(data, healthy, places)
     )
     return HealthyAndWorn(words, PageTable(["metric", "without clearance", *heads], rows, 2))
+
+
+def describe_noise(data: xr.Dataset, healthy: xr.Dataset, places: Sequence[int]) -> str:
+    """Return that a sensor hears worn jobs of which none knocks, else ""."""
+    if not {SENSOR, KNOCK} <= {*data} or SENSOR not in healthy:
+        return ""
+    (peak,) = (measure for measure in MEASURES if measure.variable == SENSOR)
+    knocks = [known_values(m, data)[places] for m in MEASURES if m.variable == KNOCK]
+    times = np.fmax.reduce(known_values(peak, data)[places]) / float(peak.of(healthy))
+    if not times >= HEARD or np.fmax.reduce(np.ravel(knocks)) > BARRED[KNOCK].limit:
+        return ""
+    return (
+        f" No joint knocks, but the sensor's peak is up to {times:.2g} times as high: blows that "
+        "are small beside the force in a joint may still be heard."
+    )
 
 
 def _cell(measure: Measure, value: float, bar: float, sound: float) -> Cell:

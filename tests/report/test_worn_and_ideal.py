@@ -102,6 +102,19 @@ def test_the_worst_jobs_stand_there_in_the_order_of_clearance(study, worst, monk
     assert healthy == [size <= 0.1 for size in columns]
 
 
+@pytest.mark.parametrize(("knock", "times", "is_told"), [(0.2, 3, True), (0.3, 3, False),
+                                                         (0.2, 1.5, False)])  # fmt: skip
+def test_what_a_sensor_hears_though_nothing_knocks_is_told(study, knock, times, is_told):
+    """The page said that it does not knock, and of its sensor nothing."""
+    stored, data = study
+    sound = compare_healthy(stored, data).table.rows
+    (sound,) = (row.cells[1].value for row in sound if row.cells[0].text.startswith("sensor peak"))
+    data["sensor_peak"] = data["sensor_peak"] * 0 + times * sound
+    data["knock"] = data["knock"] * 0 + knock
+    found = compare_healthy(stored, data).words
+    assert (f"the sensor's peak is up to {times} times as high" in found) == is_told
+
+
 def test_a_peak_that_is_not_known_makes_no_job_the_worst(study):
     stored, data = study
     for name in ("peak_contact_force", "sensor_peak"):
