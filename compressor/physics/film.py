@@ -41,17 +41,18 @@ def short_film(eps, wedge, closing):
     speed = square_root(closing * closing + 0.25 * wedge * wedge)
     if not speed > 0.0:
         return 0.0, 0.0
-    sin_begin, cos_begin = closing / speed, 0.5 * wedge / speed
+    per_speed = 1.0 / speed
+    sin_begin, cos_begin = closing * per_speed, 0.5 * wedge * per_speed
     x = eps * cos_begin
     room, ends = 1.0 - eps * eps, 1.0 - x * x
-    root = square_root(room)
+    root, per_room, per_ends = square_root(room), 1.0 / room, 1.0 / ends
     angle = math.pi + math.atan2(2.0 * eps * root * sin_begin, 1.0 - 2.0 * eps * eps + x * x)
-    first = angle / root  # integral of 1 / h
-    second = (first + 2.0 * eps * sin_begin / ends) / room  # of 1 / h^2
-    third = 3.0 * second - first + 2.0 * eps * sin_begin * (1.0 + x * x) / (ends * ends)
-    third *= 0.5 / room  # of 1 / h^3
-    sines = 0.5 * second - 2.0 * eps * cos_begin * cos_begin * sin_begin / (ends * ends)
-    mixed = -2.0 * eps * cos_begin**3 / (ends * ends)
+    first = angle * root * per_room  # integral of 1 / h
+    part = 2.0 * eps * sin_begin * per_ends
+    second = (first + part) * per_room  # of 1 / h^2
+    third = 0.5 * (3.0 * second - first + part * (1.0 + x * x) * per_ends) * per_room  # of 1 / h^3
+    wide = 2.0 * eps * cos_begin * cos_begin * per_ends * per_ends
+    sines, mixed = 0.5 * second - wide * sin_begin, -wide * cos_begin
     cosines = third - sines
     return 2.0 * closing * cosines - wedge * mixed, wedge * sines - 2.0 * closing * mixed
 
@@ -63,13 +64,13 @@ def short_bearing_shares(eps, constants):
     Of that, tan(beta / 2) over that of Ocvirk's angle. constants: of
     `solve.bearing.film_constants`.
     """
-    u = square_root(1.0 - eps)
+    left, u = 1.0 - eps, square_root(1.0 - eps)
     pressed, pulled, turned, further = 0.0, 0.0, 0.0, 0.0
-    for i in range(FILM_TERMS - 1, -1, -1):
-        pressed = pressed * u + constants[i, 0]
-        pulled = pulled * u + constants[i, 1]
-        turned = turned * u + constants[i, 2]
-        further = further * u + constants[i, 3]
+    for i in range(FILM_TERMS - 2, -1, -2):  # in pairs: half as many steps wait for each other
+        pressed = pressed * left + (constants[i, 0] + u * constants[i + 1, 0])
+        pulled = pulled * left + (constants[i, 1] + u * constants[i + 1, 1])
+        turned = turned * left + (constants[i, 2] + u * constants[i + 1, 2])
+        further = further * left + (constants[i, 3] + u * constants[i + 1, 3])
     pressed, pulled, turned = (1.0 - eps) / pressed, (1.0 + eps) / pulled, (1.0 - eps) / turned
     if eps < CENTRE_ECCENTRICITY:
         centre = 0.0
@@ -96,15 +97,15 @@ def film_numbers_at(eps, wedge, closing, constants):
     size = square_root(normal * normal + across * across)
     if not size > 0.0:
         return 0.0, 0.0
-    cosine, sine = normal / size, across / size
+    per_size = 1.0 / size
+    cosine, sine = normal * per_size, across * per_size
     pressed, pulled, turned, further = short_bearing_shares(eps, constants)
     middle, slope = 0.5 * (pressed + pulled), 0.5 * (pressed - pulled)
     # the direction of a short bearing that turns: Ocvirk's attitude
     wide, far = math.pi * square_root(1.0 - eps * eps), 4.0 * eps
     ocvirk = far / square_root(wide * wide + far * far)
-    from_pressed = (1.0 - cosine) / (1.0 - ocvirk)
-    near = 2.0 * from_pressed / (1.0 + from_pressed * from_pressed)
-    near *= (1.0 + cosine) / (1.0 + ocvirk)
+    one, other = 1.0 - cosine, 1.0 - ocvirk
+    near = 2.0 * one * other * (1.0 + cosine) / ((one * one + other * other) * (1.0 + ocvirk))
     size *= middle + slope * cosine + (turned - middle - slope * ocvirk) * near
     towards, away = 1.0 + cosine, further * further * (1.0 - cosine)
     size /= towards + away
@@ -121,20 +122,19 @@ def film(joint, eccentricity, spins, p):
     ex, ey, ex_rate, ey_rate = eccentricity
     pin, clearance, constants = p.pin_radius[joint], p.clearance[joint], p.film_constants[joint]
     distance = square_root(ex * ex + ey * ey)
-    nx, ny = (ex / distance, ey / distance) if distance > 0.0 else (1.0, 0.0)
+    per_clearance, per_distance = 1.0 / clearance, 1.0 / distance if distance > 0.0 else 0.0
+    nx, ny = (ex * per_distance, ey * per_distance) if distance > 0.0 else (1.0, 0.0)
     radial, across = ex_rate * nx + ey_rate * ny, ey_rate * nx - ex_rate * ny
-    eps = bounded_eccentricity(distance / clearance, p.film_share)
-    length = p.film_length[joint]
-    relative = clearance / pin
-    size = 2.0 * length * pin * p.viscosity / (relative * relative)
+    eps, length = bounded_eccentricity(distance * per_clearance, p.film_share), p.film_length[joint]
+    size = 2.0 * length * pin**3 * p.viscosity * per_clearance * per_clearance
     journal_spin, bore_spin = spins
-    per_distance = eps / distance if distance > 0.0 else 1.0 / clearance
-    wedge = eps * (journal_spin + bore_spin) - 2.0 * across * per_distance  # eps w
-    away, along = film_numbers_at(eps, wedge, radial / clearance, constants)
+    near = eps * per_distance if distance > 0.0 else per_clearance
+    wedge = eps * (journal_spin + bore_spin) - 2.0 * across * near  # eps w
+    away, along = film_numbers_at(eps, wedge, radial * per_clearance, constants)
     normal, side = -size * away, size * along
     fx, fy = normal * nx - side * ny, normal * ny + side * nx
     shear = 2.0 * math.pi * p.viscosity * length * pin**3
-    shear *= (journal_spin - bore_spin) / (clearance * square_root(1.0 - eps * eps))
+    shear *= (journal_spin - bore_spin) * per_clearance / square_root(1.0 - eps * eps)
     half = 0.5 * distance * side
     lost = shear * (journal_spin - bore_spin) + half * (journal_spin + bore_spin)
     lost -= normal * radial + side * across
