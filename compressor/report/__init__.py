@@ -28,6 +28,7 @@ from compressor.report.figures.sweep_data import (
     measures,
     positions,
 )
+from compressor.report.figures.table import DrawnFigure
 from compressor.report.page import (
     Add,
     AddedContent,
@@ -35,7 +36,6 @@ from compressor.report.page import (
     Cell,
     Chapter,
     PageTable,
-    Plate,
     Section,
     StudyNote,
     TableRow,

@@ -8,21 +8,18 @@ import base64
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from compressor.digits import PAGE_DIGITS, by_bar, setting
 from compressor.outcome import Regime
-from compressor.report.figures import pictures
-from compressor.report.figures.drawing import INCH, as_csv, describe_figure
 from compressor.report.figures.sweep_data import Measure
-from compressor.report.interactive import script
+from compressor.report.figures.table import DrawnFigure
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.store import Folder, StoredStudy
 
@@ -167,46 +164,6 @@ class Section:
     content: object = None
 
 
-@dataclass(frozen=True)
-class Plate:
-    """A figure of the page, under the name of its files."""
-
-    name: str
-    heading: str
-    caption: str
-    figure: go.Figure
-
-    @property
-    def size(self) -> tuple[int, int]:
-        """Return width and height of the PNG in pixels."""
-        layout = self.figure.layout
-        return int(layout.width * pictures.DPI / INCH), int(layout.height * pictures.DPI / INCH)
-
-    @property
-    def alt(self) -> str:
-        """Return the figure in words."""
-        return describe_figure(self.figure)
-
-    @property
-    def jobs(self) -> Iterator[str]:
-        """Return the keys of the jobs that its points are."""
-        for trace in self.figure.data:
-            yield from [] if trace.customdata is None else np.ravel(trace.customdata).tolist()
-
-    @property
-    def opens_jobs(self) -> bool:
-        """Return whether its points are jobs, which a click opens."""
-        return any(True for _ in self.jobs)
-
-    def make_files(self) -> dict[str, bytes]:
-        """Return its files beside the page by name: picture, table and script."""
-        return {
-            f"{self.name}.png": pictures.render(self.figure),
-            f"{self.name}.csv": as_csv(self.figure).encode(),
-            f"{self.name}.js": script(self.name, self.figure).encode(),
-        }
-
-
 class JobFacts(NamedTuple):
     """What a click on a point shows of a study's jobs: by key, in the order of the names."""
 
@@ -284,7 +241,7 @@ class Chapter(NamedTuple):
     """A section with the figures that it shows."""
 
     section: Section
-    plates: Sequence[Plate] = ()
+    figures: Sequence[DrawnFigure] = ()
 
 
 class AddedContent(NamedTuple):
@@ -293,7 +250,7 @@ class AddedContent(NamedTuple):
     table: PageTable
     paragraphs: Sequence[str] = ()
     lines: Sequence[str] = ()
-    plates: Sequence[Plate] = ()
+    figures: Sequence[DrawnFigure] = ()
     title: str = ""
     notes: str = ""
 

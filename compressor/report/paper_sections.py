@@ -4,7 +4,7 @@ import math
 import shlex
 import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
@@ -32,7 +32,6 @@ from compressor.report.figures.table import DrawnFigure
 from compressor.report.page import (
     Cell,
     PageTable,
-    Plate,
     Section,
     StudyNote,
     TableRow,
@@ -155,7 +154,7 @@ class OwnFigures:
     """
 
     note: StudyNote
-    plates: Sequence[Plate]
+    figures: Sequence[DrawnFigure]
     sections: Sequence[Section]
 
 
@@ -168,26 +167,25 @@ def own_figures(stored: Stored, study: StoredStudy, units: Units) -> OwnFigures:
     runs = find_runs(stored, [study], cases_of(case)).usable if case else {}
     alike = comparable(runs.values())
     lacking = [one for one in PAPER.values() if not runs.keys() >= {*one.needs}]
-    plates = [
-        replace(plate, name=file_name(study.name, plate.name),
-                heading=f"{study.name}: {plate.heading}")
-        for plate in (draw_paper(runs, units) if alike else ())
+    figures = [
+        one._replace(name=file_name(study.name, one.name), title=f"{study.name}: {one.title}")
+        for one in (draw_paper(runs, units) if alike else ())
     ]  # fmt: skip
     numbers = ", ".join(one.title.partition(":")[0].removeprefix("Figure ") for one in lacking)
     why = f", but not Figures {numbers}, whose cases are not among its jobs" * bool(lacking)
     text = f"The paper's figures and claims are drawn of this machine{why}"
-    if not plates:
+    if not figures:
         text = (
             f"The paper's figures of this machine are not drawn{why if alike else f', {UNEQUAL}'}"
         )
         return OwnFigures(StudyNote(text, table_anchor(study.name), "Its jobs"), [], [])
     anchor = file_name("figures", study.name)
     sections = [
-        Section(anchor, f"{study.name}: the paper's figures", "figures.html", plates),
+        Section(anchor, f"{study.name}: the paper's figures", "figures.html", figures),
         Section(file_name("claims", study.name), f"{study.name}: the paper's claims", "claims.html",
                 claims(runs)),
     ]  # fmt: skip
-    return OwnFigures(StudyNote(text, anchor, "Figures and claims"), plates, sections)
+    return OwnFigures(StudyNote(text, anchor, "Figures and claims"), figures, sections)
 
 
 def comparable(runs: Collection[xr.Dataset]) -> bool:
@@ -227,7 +225,7 @@ class PaperCasesContent:
 
 def paper_sections(
     paper: PaperRuns,
-    plates: Sequence[Plate],
+    drawn: Sequence[DrawnFigure],
     judged: Sequence[Claim],
     caveats: list[str],
     units: Units = "usual",
@@ -236,7 +234,7 @@ def paper_sections(
 
     judged: the paper's claims.
     """
-    figures = [Section("figures", "The paper's figures", "figures.html", plates)] if plates else []
+    figures = [Section("figures", "The paper's figures", "figures.html", drawn)] if drawn else []
     if not paper.stored:
         return figures, []
     title = "Spring and cam: what is printed, what follows"
@@ -314,15 +312,10 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
     yield Section("missing", "Figures that could not be drawn", "missing.html", content)
 
 
-def draw_paper(runs: Mapping[str, xr.Dataset], units: Units) -> list[Plate]:
+def draw_paper(runs: Mapping[str, xr.Dataset], units: Units) -> list[DrawnFigure]:
     """Return every figure of the paper whose cases are there."""
     known = (one for one in PAPER.values() if runs.keys() >= {*one.needs})
-    return [plate_of(one.make(runs, units=units)) for one in known]
-
-
-def plate_of(drawn: DrawnFigure) -> Plate:
-    """Return a figure as the page has it, under its own name and title."""
-    return Plate(drawn.name, drawn.title, drawn.caption, drawn.figure)
+    return [one.make(runs, units=units) for one in known]
 
 
 @dataclass(frozen=True)
@@ -331,7 +324,7 @@ class DiagnosisContent:
 
     order: int
     table: PageTable
-    plates: list[Plate]
+    figures: list[DrawnFigure]
 
 
 def draw_diagnosis(runs: Mapping[str, xr.Dataset], units: Units) -> list[DiagnosisContent]:
@@ -343,7 +336,7 @@ def draw_diagnosis(runs: Mapping[str, xr.Dataset], units: Units) -> list[Diagnos
     if not all(runs.keys() >= {*one.needs} for one in figures):
         return []
     found = measure_shaking(runs)
-    drawn = [plate_of(one.make(runs, found, units=units)) for one in figures]
+    drawn = [one.make(runs, found, units=units) for one in figures]
     return [DiagnosisContent(ORDER, force_table(found), drawn)]
 
 

@@ -32,12 +32,14 @@ from compressor.report.answer import (
     study_findings,
     worn_joints,
 )
-from compressor.report.figures import FIGURES
+from compressor.report.figures import FIGURES, pictures
+from compressor.report.figures.drawing import as_csv
 from compressor.report.figures.pictures import draw_all
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.interactive import (
     job_scripts,
+    script,
     series_name,
 )
 from compressor.report.limits import Limits, read_limits
@@ -46,7 +48,6 @@ from compressor.report.page import (
     Chapter,
     JobFacts,
     JobsToOpen,
-    Plate,
     Section,
     StudyNote,
     document,
@@ -115,7 +116,7 @@ def write_report(
     folder, zones = Path(report), read_limits(limits, units)
     contents = build_report(results, command, add, zones, units, studies)
     files = {f"{series_name(key)}.js": text.encode() for key, text in contents.series.items()}
-    for made in draw_all([(one.heading, one.make_files) for one in contents.plates]):
+    for made in draw_all([(one.title, partial(make_files, one)) for one in contents.figures]):
         files |= made
     library = {LIBRARY: get_plotlyjs().encode()}
     if single:
@@ -127,6 +128,15 @@ def write_report(
     publish(folder / "index.html", contents.page({}).encode(errors="backslashreplace"))
     remove_stale(folder, contents)
     return folder / "index.html"
+
+
+def make_files(drawn: DrawnFigure) -> dict[str, bytes]:
+    """Return a figure's files beside the page by name: picture, table and script."""
+    return {
+        f"{drawn.name}.png": pictures.render(drawn.figure),
+        f"{drawn.name}.csv": as_csv(drawn.figure).encode(),
+        f"{drawn.name}.js": script(drawn.name, drawn.figure).encode(),
+    }
 
 
 def publish_changed(path: Path, content: bytes) -> None:
@@ -143,7 +153,7 @@ class ReportContent(NamedTuple):
     `page`: returns its text, which holds the files that it is given.
     """
 
-    plates: list[Plate]
+    figures: list[DrawnFigure]
     studies: list[str]
     series: dict[str, str]
     page: Callable[[Mapping[str, bytes]], str]
@@ -185,13 +195,13 @@ def build_report(
     chapters = [chapter for one in added for chapter in one.chapters]
     several: list[OwnFigures | DiagnosisContent | DrawnStudy | Chapter]
     several = [*of_own.values(), *faults, *drawn, *chapters]
-    later = [plate for one in several for plate in one.plates]
+    later = [figure for one in several for figure in one.figures]
     caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored, one)]
     judged = claims(paper.usable) if paper.stored else []
     figures, tables = paper_sections(paper, of_paper, judged, caveats, units)
     sections = [
         answer_section(summarise(own, paper, judged, drawn, [*left_out.values()], units)),
-        *(one.figures for one in drawn),
+        *(one.section for one in drawn),
         *figures,
         *chain(*(one.sections for one in of_own.values())),
         *(Section("diagnosis", "Diagnosis", "diagnosis.html", one) for one in faults),
@@ -228,9 +238,9 @@ class DrawnStudy(NamedTuple):
     jobs: what a click on a job's point shows; cautions: what to know beside what changes most.
     """
 
-    figures: Section
+    section: Section
     table: Section
-    plates: list[Plate]
+    figures: list[DrawnFigure]
     findings: list[MetricChange]
     line: StudyLine
     jobs: JobFacts
@@ -254,17 +264,15 @@ def drawn_study(
             swept, turns = draw_sweep(data, limits, units), draw_for_page(stored, study, units)
             named = [(file_name("sweep", study.name, one.name), one) for one in swept]
             named += [(file_name(one.name, study.name), one) for one in turns]
-        plates = [
-            Plate(name, f"{study.name}: {one.title}", one.caption, one.figure)
-            for name, one in named
-        ]
-        figures, table = study_sections(stored, study, data, plates, notes, limits, units)
-        keys = [*(key for plate in plates for key in plate.jobs), *study.keys[:MAX_ROWS]]
+        figures = [one._replace(name=name, title=f"{study.name}: {one.title}")
+                   for name, one in named]  # fmt: skip
+        section, table = study_sections(stored, study, data, figures, notes, limits, units)
+        keys = [*(key for one in figures for key in one.jobs), *study.keys[:MAX_ROWS]]
         counts = job_counts(data)
         return DrawnStudy(
-            figures, table, plates, study_findings(data, units),
+            section, table, figures, study_findings(data, units),
             StudyLine(
-                f"Study {study.name}", figures.anchor, counts.text, bool(counts.failed),
+                f"Study {study.name}", section.anchor, counts.text, bool(counts.failed),
                 bool(counts.ok),
             ),
             job_facts(data, keys), motion_cautions(stored, study, data),
@@ -310,9 +318,9 @@ def summarise(
 
 def remove_stale(report: Path, contents: ReportContent) -> None:
     """Remove what an earlier report drew and this one did not: the paper's figures, and series."""
-    plates = {plate.name for plate in contents.plates}
+    drawn = {one.name for one in contents.figures}
     own = (file_name(study, name) for study in contents.studies for name in FIGURES["paper"])
-    names = {*FIGURES["paper"], *FIGURES["diagnosis"], *own} - plates
+    names = {*FIGURES["paper"], *FIGURES["diagnosis"], *own} - drawn
     stale = [report / f"{name}.{kind}" for name in names for kind in KINDS]
     scripts = {f"{series_name(key)}.js" for key in contents.series}
     stale += [path for path in report.glob(f"{series_name('*')}.js") if path.name not in scripts]

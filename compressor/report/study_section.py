@@ -11,13 +11,13 @@ import xarray as xr
 from compressor.outcome import Regime, regime_words
 from compressor.reasons import remedy
 from compressor.report.figures.sweep_data import measures, swept_values
+from compressor.report.figures.table import DrawnFigure
 from compressor.report.inputs import Inputs, find_inputs
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.report.page import (
     Cell,
     JobFacts,
     PageTable,
-    Plate,
     Section,
     StudyNote,
     column_title,
@@ -68,7 +68,7 @@ class StudyContent:
     caveats: Sequence[str]
     failures: Sequence[str]
     remedies: Sequence[str]
-    plates: Sequence[Plate]
+    figures: Sequence[DrawnFigure]
     jobs: str
     notes: Sequence[StudyNote] = ()
     title: str = ""
@@ -96,7 +96,7 @@ def study_sections(
     stored: Stored,
     study: StoredStudy,
     data: xr.Dataset,
-    plates: Sequence[Plate],
+    figures: Sequence[DrawnFigure],
     notes: Sequence[StudyNote] = (),
     limits: Limits = NO_LIMITS,
     units: Units = "usual",
@@ -114,7 +114,7 @@ def study_sections(
         caveats=study_caveats(stored, study),
         failures=failed_jobs(stored, data),
         remedies=[f"{reason}: {remedy(reason)}" for reason in reasons],
-        plates=plates,
+        figures=figures,
         jobs=anchor,
         notes=notes,
         title=study.title,

@@ -82,18 +82,18 @@ def test_runs_on_other_grids_cannot_be_drawn_together(heavy_store):
 def test_figures_and_captions_are_the_machine_s(heavy_store):
     stored, study = read_store(heavy_store), read_studies(heavy_store)[0]
     runs = find_runs(stored, [study], paper_cases(**HEAVY)).usable
-    found = {plate.name: plate for plate in own(heavy_store).plates}
+    found = {one.name: one for one in own(heavy_store).figures}
     assert {*found} == FILES
-    plate = found["heavy-figure-15"]
-    assert plate.heading.startswith("heavy: Figure 15: Contact force at the big end")
+    drawn = found["heavy-figure-15"]
+    assert drawn.title.startswith("heavy: Figure 15: Contact force at the big end")
     of = [runs[label("both", c)] for c in CLEARANCES]
     assert {case_of(run).machine.reciprocating_mass_kg for run in of} == {20}
     peaks = [float(run["peak_contact_force_axis"].sel(joint="big_end", axis="x")) for run in of]
     assert (
         f"Greatest along the cylinder at 0.1, 0.2, 0.3 mm: {spell(np.array(peaks) / 1e3)} kN"
-        in (plate.caption)
+        in (drawn.caption)
     )
-    rows = [panel for panel in panels_of(plate.figure) if panel.x.domain[0] == 0][:3]
+    rows = [panel for panel in panels_of(drawn.figure) if panel.x.domain[0] == 0][:3]
     drawn = [np.abs(one.y).max() for panel in rows for one in panel.traces if one.name]
     series = [run["contact_force"].sel(joint="big_end", axis="x").values[-1201:] for run in of]
     assert drawn == pytest.approx([np.abs(one).max() / 1e3 for one in series])

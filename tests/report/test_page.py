@@ -4,13 +4,13 @@ import html
 import html.parser
 import json
 import re
-from dataclasses import replace
 
 from jinja2 import PackageLoader
 
 from compressor.analysis.claims import Claim
 from compressor.report.answer import Assumptions, FirstScreen, MetricChange, Provenance, StudyLine
 from compressor.report.figures.drawing import make_grid
+from compressor.report.figures.table import DrawnFigure
 from compressor.report.inputs import Inputs
 from compressor.report.page import (
     AddedContent,
@@ -18,7 +18,6 @@ from compressor.report.page import (
     JobFacts,
     JobsToOpen,
     PageTable,
-    Plate,
     Section,
     StudyNote,
     TableRow,
@@ -44,11 +43,11 @@ class Hostile:
         return text
 
 
-def plate(evil):
+def drawn(evil):
     drawing, grid = make_grid(1, 1, 1.0)
     grid[0, 0].title = evil()
     figure = drawing.figure()
-    return Plate("drawn", evil(), evil(), figure)
+    return DrawnFigure(figure, evil(), name="drawn", title=evil())
 
 
 def table(evil):
@@ -71,19 +70,19 @@ def contents(evil):
     study = StoredStudy(evil(), evil(), (), (evil(), evil()), {}, evil(), {evil(): evil()}, evil())
     return {
         "addition.html": AddedContent(
-            table(evil), [evil()], [evil()], [plate(evil)], evil(), evil()
+            table(evil), [evil()], [evil()], [drawn(evil)], evil(), evil()
         ),
         "answer.html": answer,
         "assumptions.html": Assumptions([evil()], True, True, True, [evil()]),
         "cases.html": PaperCasesContent([evil()], table(evil)),
         "claims.html": claims,
-        "diagnosis.html": DiagnosisContent(12, table(evil), [plate(evil)]),
-        "figures.html": [plate(evil), plate(evil)],
+        "diagnosis.html": DiagnosisContent(12, table(evil), [drawn(evil)]),
+        "figures.html": [drawn(evil), drawn(evil)],
         "jobs.html": JobsContent(evil(), 9, table(evil), [evil()]),
         "missing.html": MissingFigures([evil()], [evil()], evil()),
         "printed.html": table(evil),
         "provenance.html": Provenance(*(evil() for _ in range(6)), [study]),
-        "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [plate(evil)],
+        "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [drawn(evil)],
                                    evil(), [StudyNote(evil(), evil(), evil())],
                                    evil(), evil(), [evil()], HealthyAndWorn(evil(), table(evil)),
                                    Inputs(*([(evil(), evil())] for _ in range(5)))),
@@ -132,7 +131,7 @@ class Attributes(html.parser.HTMLParser):
 
 def test_an_attribute_ends_where_its_text_ends():
     evil = "a b=c d=\"e\" f='g' \"h='"
-    named = replace(plate(lambda: evil), name=evil)
+    named = drawn(lambda: evil)._replace(name=evil)
     content = {**contents(lambda: evil), "figures.html": [named]}
     text = document([Section(evil, evil, name, given) for name, given in content.items()])
     assert Attributes(text).names == {

@@ -4,13 +4,16 @@ A figure is one function under one line: it returns what is drawn, a sentence on
 labelled numbers of it. Those of a sweep, which its axes choose, are in `sweep`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
+
+from compressor.report.figures.drawing import INCH, describe_figure
+from compressor.report.figures.pictures import DPI
 
 Kind = Literal["paper", "diagnosis", "job", "study"]
 NOTHING = 1e-6  # in any unit of a figure: below it a number is rounding
@@ -36,6 +39,23 @@ class DrawnFigure(NamedTuple):
         text = "; ".join(f"{label}: {value}" for label, value in self.numbers)
         numbers = f" {text[0].upper()}{text[1:]}." if text else ""
         return self.sentence + numbers + self.note
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Return width and height of the PNG in pixels."""
+        layout = self.figure.layout
+        return int(layout.width * DPI / INCH), int(layout.height * DPI / INCH)
+
+    @property
+    def alt(self) -> str:
+        """Return what is drawn in words."""
+        return describe_figure(self.figure)
+
+    @property
+    def jobs(self) -> Iterator[str]:
+        """Return the keys of the jobs that its points are, which a click opens."""
+        for trace in self.figure.data:
+            yield from [] if trace.customdata is None else np.ravel(trace.customdata).tolist()
 
 
 @dataclass(frozen=True)

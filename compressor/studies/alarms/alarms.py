@@ -35,9 +35,9 @@ from compressor.report import (
     Additions,
     Cell,
     Chapter,
+    DrawnFigure,
     LineStyle,
     PageTable,
-    Plate,
     PlotlyFigure,
     Section,
     StudyNote,
@@ -521,13 +521,14 @@ def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Addit
     study = next((study for study in studies if study.name == name), None)
     if study is None:
         return Additions({}, [])
-    plates = [Plate(file_name("alarms", name), "Alarms by clearance", CAPTION, draw_alarms(found))]
+    drawn = DrawnFigure(draw_alarms(found), CAPTION, name=file_name("alarms", name),
+                        title="Alarms by clearance")  # fmt: skip
     head, *rows = list_rows(found)
     table = PageTable(head, [TableRow([Cell(text) for text in row]) for row in rows], lead=3)
     lines = [*list_numbers(found), *list_warnings(found)]
-    content = AddedContent(table, (), lines, plates, study.title, study.notes)
+    content = AddedContent(table, (), lines, [drawn], study.title, study.notes)
     anchor, title = file_name("alarms-of", name), f"Which alarm sees wear first in study {name}"
     section = Section(anchor, title, "addition.html", content)
     line = f"{found.sizes['alarm']} alarms were judged by its records."
     note = StudyNote(line, anchor, "Which alarm sees wear first")
-    return Additions({name: note}, [Chapter(section, plates)])
+    return Additions({name: note}, [Chapter(section, [drawn])])

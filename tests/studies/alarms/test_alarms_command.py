@@ -102,7 +102,7 @@ def test_the_report_has_a_section_of_its_study(written, worn_store):
         assert all(html.escape(text) in page for text in row)
     assert "sound machines: 60 jobs of 60 draws" in page
     assert html.escape(CAPTION) in page
-    assert [plate.name for plate in chapter.plates] == ["alarms-worn"]
+    assert [one.name for one in chapter.figures] == ["alarms-worn"]
     assert made.notes["worn"].anchor == chapter.section.anchor
     assert add(worn_store, [], written[0]).chapters == []  # of a study that is not stored
     assert add(worn_store, studies, "").chapters == []
