@@ -133,10 +133,19 @@ return [...document.querySelectorAll(".plot")].flatMap(plot => {
   }).map(text => plot.closest("figure").id + ": " + text.textContent);
 });
 """
+COVERED = """
+return [...document.querySelectorAll(".plot")].flatMap(plot => {
+  const bar = plot.querySelector(".modebar").getBoundingClientRect();
+  return [...plot.querySelectorAll(".legendtext")].filter(text => {
+    const one = text.getBoundingClientRect();
+    return one.right > bar.left && one.left < bar.right && one.top < bar.bottom;
+  }).map(text => plot.closest("figure").id + ": " + text.textContent);
+});
+"""
 
 
 @pytest.mark.parametrize("width", [1400, 800, 360])
-def test_no_word_in_a_figure_is_cut(page, own, tmp_path, width):
+def test_no_word_in_a_figure_is_cut_or_covered(page, own, tmp_path, width):
     with browser(tmp_path, width, 900) as driven:
         for folder in (own, page):
             opened(driven, folder)
@@ -145,6 +154,7 @@ def test_no_word_in_a_figure_is_cut(page, own, tmp_path, width):
                 live(driven, name)
             assert driven.execute_script("return document.querySelectorAll('.ytick').length") > 10
             assert not (cut := driven.execute_script(CUT)), "\n".join(cut)
+            assert not (covered := driven.execute_script(COVERED)), "\n".join(covered)
 
 
 @pytest.mark.parametrize("dark", [False, True])

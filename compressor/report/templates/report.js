@@ -164,6 +164,7 @@ const ON_DARK = {
 };
 const tone = (color) => (isDark() && ON_DARK[color]) || color;
 const SCALE = 74; // px that a scale of colours takes
+const TOOLBAR = 90; // px in the upper right corner of a figure
 
 class Figure {
   constructor(frame) {
@@ -257,7 +258,9 @@ class Figure {
     const listed = data.filter((trace) => trace.showlegend);
     const showlegend = listed.length > 1 || listed.some((one) => !/lines/.test(one.mode));
     const letters = listed.reduce((sum, one) => sum + 7 * one.name.length + 56, 0);
-    const legend = showlegend ? 6 + 23 * Math.ceil(1.1 * letters / width) : 0;
+    // a legend that would reach the toolbar in the corner stands below it
+    const bar = showlegend && margin.l + 1.1 * letters > width - TOOLBAR ? 24 : 0;
+    const legend = showlegend ? bar + 6 + 23 * Math.ceil(1.1 * letters / width) : 0;
     layout.height += legend;
     layout.margin = { ...margin, t: margin.t + legend };
     const axis = { gridcolor: faint, zeroline: false, linecolor: faint, showline: true,
@@ -282,7 +285,8 @@ class Figure {
       data.filter((one) => one.fill).forEach((one) => { one.opacity = 0.35 * (one.opacity ?? 1); });
     }
     return { data, layout: { ...layout, width, title: undefined, showlegend, dragmode: "zoom",
-      legend: { orientation: "h", yref: "container", y: 1, yanchor: "top", x: 0 },
+      legend: { orientation: "h", yref: "container", y: 1 - bar / layout.height,
+        yanchor: "top", x: 0 },
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { family: "system-ui, sans-serif", size: 12, color: ink },
       modebar: { bgcolor: "rgba(0,0,0,0)", color: faint, activecolor: ink },
