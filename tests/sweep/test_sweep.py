@@ -4,6 +4,7 @@ import json
 import os
 import re
 import sys
+from functools import partial
 
 import bad_jobs
 import numpy as np
@@ -208,6 +209,24 @@ def test_a_job_that_cannot_be_stored_ends_the_sweep(studies, tmp_path, in_proces
     (tmp_path / "out/batches").symlink_to("nowhere")
     with pytest.raises(StoreError, match=r"out/batches: is a link that leads nowhere"):
         sweep(studies(one={"load": ["none", "spring"]}), tmp_path / "out", 2)
+
+
+def test_what_a_killed_worker_stored_and_did_not_tell_of_stays(studies, tmp_path, monkeypatch):
+    """Its jobs run again, to the same numbers, and are one job each."""
+    (study,) = studies(few={**BOTH, "clearance_mm": [0.1, 0.2, 0.3]})
+    out, store_and_die = tmp_path / "out", partial(bad_jobs.store_and_die, tmp_path)
+    monkeypatch.setattr(SWEEP, "store_outcomes", store_and_die)
+    assert sweep([study], out, 1).run_now == 3
+    batches = [int(size) for size in (tmp_path / "stored").read_text().split()]
+    assert sum(batches) == 3 + batches[0]
+    found = store.read_store(out)
+    assert len(found) == 3
+    for case in study.cases:
+        wanted = SWEEP.run_job(case).series["acceleration"].values
+        assert (
+            found.values(case.key, ["acceleration"])["acceleration"].tobytes() == wanted.tobytes()
+        )
+    assert not list(verify(out))
 
 
 def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):
