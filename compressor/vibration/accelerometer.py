@@ -129,9 +129,9 @@ def with_noise(
 
 def low_pass(sensor: Sensor, signal: np.ndarray, step: float) -> np.ndarray:
     """Return what a sensor's anti-aliasing filter leaves of a signal at steps (s), from rest on."""
-    corner = sensor.low_pass_Hz or sensor.rate_Hz / USUAL
     from scipy.signal import butter, sosfilt  # takes half a second
 
+    corner = sensor.low_pass_Hz or sensor.rate_Hz / USUAL
     return sosfilt(butter(POLES, corner, fs=1.0 / step, output="sos"), signal)
 
 

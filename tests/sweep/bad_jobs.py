@@ -8,7 +8,6 @@ import time
 from pathlib import Path
 
 from compressor.store import StoreError
-from compressor.sweep.sweep import store_outcomes
 
 LEAST = 400_000_000  # bytes that a job may add
 SECONDS = {"hang": 1.0, "stop": 1.0}  # that a job may take; others end by themselves
@@ -144,6 +143,8 @@ def store(folder, results):
 
 def store_and_die(place, folder, outcomes):
     """Store a batch of outcomes; the first worker dies before it has told of them."""
+    from compressor.sweep.sweep import store_outcomes  # workers of other tests need not load it
+
     ends = store_outcomes(folder, outcomes)
     if note(place, "stored", f"{len(outcomes)} ") == f"{len(outcomes)} ":
         os.kill(os.getpid(), signal.SIGKILL)

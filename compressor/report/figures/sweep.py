@@ -80,7 +80,7 @@ def draw_sweep(
             "enough to be seen."
         )
         return [DrawnFigure(
-            draw_curves(sweep, shown, limits), sentence, [*thinned(axis, MAX_JOBS), *about],
+            draw_curves(sweep, shown, limits), sentence, [*count_drawn(axis, MAX_JOBS), *about],
             zone_words(shown, limits), axis.name, f"metrics against {axis.phrase}",
         )]  # fmt: skip
     return [*draw_grid(sweep, shown, about, limits)]
@@ -109,7 +109,7 @@ def draw_grid(
         lines = (
             "; white: lines of equal value, which stand in the scale of colours, too" * has_lines
         )
-        cut = [number for axis in sweep.axes for number in thinned(axis, MAX_CELLS)]
+        cut = [number for axis in sweep.axes for number in count_drawn(axis, MAX_CELLS)]
         yield DrawnFigure(figure, f"A cell a job{lines}.", [*cut, *about],
                           zone_words(shown, limits), "map", title)  # fmt: skip
         return
@@ -121,7 +121,7 @@ def draw_grid(
         f"Every metric over {x.phrase}, a colour for each value of {color.phrase}; a point is "
         f"{point}."
     )
-    cut = [*thinned(x, MAX_PLACES), *thinned(color, MAX_LINES)]
+    cut = [*count_drawn(x, MAX_PLACES), *count_drawn(color, MAX_LINES)]
     yield DrawnFigure(
         draw_overview(sweep, role, shown), sentence, [*cut, *about],
         " What is not known within its error bar is no part of a mean." * bool(others),
@@ -205,7 +205,7 @@ def number_of_all(sweep: PlottedSweep, measure: Measure) -> Number:
     return f"{measure.title}, at every job", value
 
 
-def thinned(axis: PlottedAxis, most: int) -> list[Number]:
+def count_drawn(axis: PlottedAxis, most: int) -> list[Number]:
     """Return how many of an axis' values are drawn; nothing where all are."""
     count = axis.values.size
     return [(f"values of {axis.phrase} drawn", f"{most:,} of {count:,}")] * (count > most)
