@@ -20,6 +20,7 @@ from compressor.physics.march import (
     march,
     new_stepper,
     new_work,
+    rehearse,
 )
 from compressor.physics.mechanism_rows import STALLED
 from compressor.physics.observe import (
@@ -55,6 +56,7 @@ from compressor.physics.systems import (
 from compressor.physics.tally import (
     GREATEST,
     MEANS,
+    ROD_LOAD,
     SQUARES,
     add_flows,
     cut_tally,

@@ -586,3 +586,19 @@ def march(w, p, z, work, atol, size, edges, phases, times, states, tally, limit)
         if met:  # what is seen at t is not what the step saw at its end
             w.observed = 0
         stop_beyond(w, z, tally, p)
+
+
+@jit
+def rehearse(w, h, z, work, size, phase, p, tally, times):
+    """Do, so many times, a part of what a march does with a step, without going on.
+
+    A copy of a process compiles it for no times, while that one compiles the march, which loads
+    these parts. In this order the two seldom compile one at once.
+    """
+    for _ in range(times):
+        choose_method(w, h, z, work, size)
+        tally_step(
+            h, NODES, WEIGHTS, work.rows, times, work.gap_fraction, work.sides, times > 0, tally, p
+        )
+        onset_ahead(w, h, work, phase, p)
+        accumulate_metrics(w, crank_direction(w.t, p), h, times, z, work, size, phase, p, tally)

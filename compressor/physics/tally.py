@@ -27,7 +27,9 @@ from compressor.physics.record import zero
 
 # of a peak: nodes between which a step resolved to its tolerance may rise above it
 PEAK_NEARNESS = 0.98
-ROD_LOAD = FORCE + 2  # force on the small end along x, positive in tension
+# column of the force on the small end along x, positive in tension; no `int`, for each value of
+# which numba would compile what it is given to anew
+ROD_LOAD = np.int64(FORCE + 2)
 
 
 def lobatto(n):
@@ -307,7 +309,7 @@ def tally_step(span, nodes, weights, rows, every, gap_fraction, sides, measured,
 
 
 @jit
-def tally_each(spans, nodes, weights, rows, gaps, sides, measured, tally, p):
+def tally_each(spans, nodes, weights, rows, every, gaps, sides, measured, tally, p):
     """Add steps one after the other as `tally_step` adds one; arrays have a row for each step."""
     for n in range(spans.size):
-        tally_step(spans[n], nodes, weights, rows[n], 1, gaps[n], sides[n], measured, tally, p)
+        tally_step(spans[n], nodes, weights, rows[n], every, gaps[n], sides[n], measured, tally, p)

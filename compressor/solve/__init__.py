@@ -1,7 +1,7 @@
 """A case -> its outcome: motion, metrics, error bars, reasons."""
 
 from compressor.solve.request import Metrics, Request, Trajectory, revolutions
-from compressor.solve.run import integrate, run_at_tolerance
+from compressor.solve.run import compile_parts, integrate, run_at_tolerance
 from compressor.solve.run_metrics import (
     allowed_residual,
     average_bar,

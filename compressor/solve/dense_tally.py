@@ -14,6 +14,7 @@ import numpy as np
 
 from compressor.physics import (
     FLOWS,
+    ROD_LOAD,
     Column,
     Load,
     add_flows,
@@ -34,7 +35,6 @@ Observer = Callable[..., np.ndarray]
 Look = Callable[[np.ndarray], np.ndarray]  # returns the values of a function at times (s)
 
 NODES, WEIGHTS = lobatto(9)  # steps may be long
-ROD_LOAD = int(Column.FORCE) + 2  # at the small end, along x
 PEAKED = slice(Column.ACCELERATION, Column.DEVIATION)  # columns whose greatest size is tallied
 POINTS = 17
 FOR_CHANGES, FOR_TOPS = 8, 4  # rounds: windows shrink 16-fold in each, or 8-fold
@@ -106,7 +106,9 @@ def tally_steps(
     times = np.append((steps[:-1, None] + spans[:, None] * NODES[:-1]).ravel(), steps[-1])
     rows, gaps, sides = observe(times), np.zeros((spans.size, 2)), np.zeros((spans.size, 4))
 
-    def above(column: int, sign: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def above(
+        column: int | np.int64, sign: float = 1.0
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the share of each step in which a column is positive, its changes and rates."""
         values = sign * rows[:, column]
         found = find_changes(lambda at: sign * observe(at)[:, column], times, values)
@@ -127,7 +129,7 @@ def tally_steps(
         sides[:, 2:] = tops(lambda rows: rows[:, [ROD_LOAD]] * (1.0, -1.0), tally["side_peak"])
     last = NODES.size - 1
     of_steps = rows[last * np.arange(spans.size)[:, None] + np.arange(NODES.size)]
-    tally_each(spans, NODES, WEIGHTS, of_steps, gaps, sides, measured, tally, p)
+    tally_each(spans, NODES, WEIGHTS, of_steps, 1, gaps, sides, measured, tally, p)
     return of_steps
 
 

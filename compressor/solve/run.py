@@ -26,6 +26,8 @@ from compressor.physics import (
     new_stepper,
     new_tally,
     new_work,
+    read_fields,
+    rehearse,
     sample_segments,
     segments,
     tally_energy,
@@ -84,6 +86,15 @@ def integrate(request: Request) -> Trajectory:
         result.phases = result.edge_phases[sample_segments(times, edges)]
     result.seconds = time.perf_counter() - began
     return result
+
+
+def compile_parts(case: Case) -> None:
+    """Have parts of the march compiled that it then loads, a third of all that it is."""
+    p = record(case)
+    start, size = initial_state(case, p), natural_sizes(read_fields(p))
+    _, phases = segments(read_fields(p), case.turn)
+    z, work = np.append(start, np.zeros(FLOWS)), new_work(size.size)
+    rehearse(new_stepper(Mode.AUTO), 1.0, z, work, size, phases[0], p, new_tally(True), 0)
 
 
 def march_through(

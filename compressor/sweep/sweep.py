@@ -16,7 +16,7 @@ from compressor.outcome import Outcome, without_run
 from compressor.program import Progress, ignore_warnings, no_progress
 from compressor.reasons import Reason
 from compressor.store import Folder, merge_batches, read_store, write_batch, write_study
-from compressor.sweep.pool import Input, Workers, require_posix, run_batches
+from compressor.sweep.pool import Input, Workers, cores, require_posix, run_batches
 from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Needs, compile_once, load
 from compressor.sweep.worker import End, JobLost, Store, attempt, describe_error, store_results
@@ -200,7 +200,7 @@ def in_this_process(
     Starting workers takes longer than they do. A job that ends its process ends the sweep; one that
     raises an exception is lost, as in a worker.
     """
-    compile_once(Needs.of(jobs.cases()), remark)
+    compile_once(Needs.of(jobs.cases()), remark, cores())
     ran = [attempt(run_job, case) for case in jobs.cases()]
     ends = store_results(partial(store_outcomes, folder), ran)
     yield from (replace(end, id=key) for key, end in zip(jobs.places, ends, strict=True))
@@ -221,7 +221,7 @@ def run_here(
     """
     require_posix()
     if jobs:
-        compile_once(needs, remark)
+        compile_once(needs, remark, workers)
     return run_batches(work, jobs, Workers(workers, partial(load, needs), grace=GRACE), store)
 
 

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import subprocess
 import sys
 from functools import partial
 
@@ -185,23 +186,49 @@ def test_jobs_that_do_harm_are_failed_jobs(studies, tmp_path, monkeypatch):
     assert np.isnan(found.peak_acceleration).values.ravel().tolist() == [True] * 3 + [False]
 
 
-@pytest.fixture
-def uncompiled(tmp_path, monkeypatch):
-    """A machine that has compiled nothing: the needs that were loaded since."""
-    loaded = []
-    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path / "code")
-    monkeypatch.setattr(warm_up, "load", loaded.append)
-    return loaded
-
-
-def test_only_what_cases_need_is_compiled(uncompiled):
+def test_only_what_cases_need_is_compiled(tmp_path, monkeypatch):
     """A machine with oil in its joints needs no equations of dry ones."""
+    monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path / "code")
     oiled = {"joint": "both", "clearance_mm": 0.1, "lubricant": True}
     for values, parts in (
         ({"joint": "both", "clearance_mm": 0.1}, {"auto"}), (oiled, {"laws"}),
         (oiled | {"guide": True}, {"features"}),
     ):  # fmt: skip
         assert {*warm_up.Needs.of([Case.from_values(values)]).uncompiled} == parts
+
+
+PARTS = """
+import sys
+import numba
+from compressor.cases.case import Case
+from compressor.solve import run
+from compressor.solve.simulate import measure
+from compressor.sweep.warm_up import KINDS
+march, found = sys.modules["compressor.physics.march"], set()
+def record(name, part):
+    def recorded(*given):
+        found.add((name, *map(numba.typeof, given)))
+        return part(*given)
+    return recorded
+for name in ("choose_method", "tally_step", "onset_ahead", "accumulate_metrics"):
+    setattr(march, name, record(name, getattr(march, name)))
+run.rehearse = lambda *given: march.rehearse(*given[:-1], 1)
+for kind in KINDS.values():
+    span = {"duration_rev": 0.002, "settle_rev": 0, "output_step_deg": 0.36, "error_bars": False}
+    case = Case.from_values({"joint": "both", "clearance_mm": 0.1, "solve": span} | kind)
+    measure(case)
+    marched = {*found}
+    found.clear()
+    run.compile_parts(case)
+    assert len(marched) == 4 and marched == found
+    found.clear()
+"""
+
+
+def test_what_a_copy_compiles_is_what_a_march_calls():
+    """Of other types it would serve nobody, and nobody would see that."""
+    values = {"COMPSIM_JIT": "0", "PYTHONPATH": os.pathsep.join(sys.path)}
+    subprocess.run([sys.executable, "-c", PARTS], env=os.environ | values, check=True)
 
 
 def test_a_job_that_cannot_be_stored_ends_the_sweep(studies, tmp_path, in_process):
