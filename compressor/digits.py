@@ -24,11 +24,7 @@ def is_known(value: float, bar: float, relative: bool = True) -> bool:
 
 
 def by_bar(
-    value: float,
-    bar: float,
-    relative: bool = True,
-    bare: bool = False,
-    digits: int = MAX_DIGITS,
+    value: float, bar: float, relative: bool = True, bare: bool = False, digits: int = MAX_DIGITS
 ) -> str:
     """Return a number with its error bar, such as 647.1 ± 0.3, to the digits that the bar allows.
 

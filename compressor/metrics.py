@@ -271,11 +271,7 @@ SERIES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "acceleration": ((), "m/s2", "crosshead acceleration"),
     "rod_angle": ((), "rad", "rod angle phi"),
     "piston_force": ((), "N", "piston force, positive towards the crank"),
-    "contact_force": (
-        ("joint", "axis"),
-        "N",
-        "joint force on the rod, with that of an oil film",
-    ),
+    "contact_force": (("joint", "axis"), "N", "joint force on the rod, with that of an oil film"),
     "eccentricity": (("joint", "axis"), "m", "journal centre less bearing centre"),
     "penetration": (("joint",), "m", "contact penetration, negative where there is a gap"),
 }

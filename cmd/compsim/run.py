@@ -33,10 +33,7 @@ def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple
 @options.max_jobs
 @click.option("--rerun", type=click.Choice(["failed"]), help="Run stored jobs that failed again.")
 @click.option(
-    "--shard",
-    metavar="I/N",
-    callback=read_shard,
-    help="Run part I of N; others run the rest.",
+    "--shard", metavar="I/N", callback=read_shard, help="Run part I of N; others run the rest."
 )
 @click.option(
     "--scheduler", metavar="ADDRESS", help="Run on this dask cluster, such as tcp://host:8786."

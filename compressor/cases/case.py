@@ -32,16 +32,7 @@ from compressor.cases.conflicts import (
     unread_values,
     values_read,
 )
-from compressor.cases.groups import (
-    Contact,
-    Friction,
-    Gas,
-    Machine,
-    Offset,
-    Output,
-    Solve,
-    Spring,
-)
+from compressor.cases.groups import Contact, Friction, Gas, Machine, Offset, Output, Solve, Spring
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
 from compressor.cases.optional_groups import (
     Body,
@@ -67,14 +58,7 @@ from compressor.cases.parameter import (
     problems_of,
     quote_value,
 )
-from compressor.cases.table import (
-    GROUPS,
-    TOP,
-    WORDS,
-    outside_identity,
-    parts_by_key,
-    table,
-)
+from compressor.cases.table import GROUPS, TOP, WORDS, outside_identity, parts_by_key, table
 from compressor.cases.yaml_reader import resolve_scalar
 from compressor.metrics import JOINTS
 
@@ -430,9 +414,7 @@ def adapter_of_case() -> TypeAdapter[Case]:
     return TypeAdapter(Case)
 
 
-def plain_values(
-    values: Mapping[str, Any],
-) -> tuple[dict[str, Any], list[Problem], frozenset[str]]:
+def plain_values(values: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem], frozenset[str]]:
     """Return nested values without synonyms, and with what follows from others; problems; keys.
 
     The keys are those given (`find_given`). What follows is the geometry of materials, and the

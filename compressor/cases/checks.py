@@ -113,10 +113,7 @@ def getter(key: str) -> Callable[[Any], Any]:
 
 
 # key -> the key whose double it is; a file gives one of the two
-DOUBLES = {
-    "machine.stroke_mm": "machine.crank_radius_mm",
-    "gas.bore_mm": "gas.piston_radius_mm",
-}
+DOUBLES = {"machine.stroke_mm": "machine.crank_radius_mm", "gas.bore_mm": "gas.piston_radius_mm"}
 # words in the name of a diameter -> what to write of its value, half or whole
 DIAMETERS = (
     (r"clearance", "clearance_mm: {half}, which is radial"),

@@ -14,14 +14,7 @@ from typing import Any
 
 from compressor.cases.blocks import Block, Located, plan_block, read_own
 from compressor.cases.case import Case
-from compressor.cases.checks import (
-    DOUBLES,
-    expand_synonyms,
-    key_of,
-    row_of,
-    stands_for,
-    value_of,
-)
+from compressor.cases.checks import DOUBLES, expand_synonyms, key_of, row_of, stands_for, value_of
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
 from compressor.cases.conflicts import conditions, is_off, needs_of_given, problem_of
 from compressor.cases.keys import (
@@ -35,14 +28,7 @@ from compressor.cases.keys import (
 from compressor.cases.parameter import CaseError, choice, make_group
 from compressor.cases.study import Axis, Cases, Study
 from compressor.cases.table import WORDS, outside_identity, table
-from compressor.cases.yaml_reader import (
-    CaseFileError,
-    FileProblem,
-    Place,
-    Tree,
-    read_file,
-    shorten,
-)
+from compressor.cases.yaml_reader import CaseFileError, FileProblem, Place, Tree, read_file, shorten
 from compressor.program import Progress, no_progress
 
 MAX_JOBS = 10_000

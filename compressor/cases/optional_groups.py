@@ -5,15 +5,7 @@ from functools import partial
 from typing import ClassVar
 
 from compressor.cases.groups import AT_JOINTS
-from compressor.cases.parameter import (
-    PerJoint,
-    by_part,
-    choice,
-    flag,
-    integer,
-    make_group,
-    number,
-)
+from compressor.cases.parameter import PerJoint, by_part, choice, flag, integer, make_group, number
 
 # conditions under which a case reads a key; others stand beside their only key
 PLAY = "guide.clearance_mm > 0"

@@ -17,15 +17,7 @@ from difflib import get_close_matches
 from functools import lru_cache, partial
 from inspect import cleandoc
 from types import NoneType
-from typing import (
-    Annotated,
-    Any,
-    Generic,
-    Literal,
-    TypeVar,
-    dataclass_transform,
-    get_args,
-)
+from typing import Annotated, Any, Generic, Literal, TypeVar, dataclass_transform, get_args
 
 import pydantic
 from pydantic import (
@@ -577,11 +569,7 @@ def annotation_of_field(name: str, item: Any, own: Any) -> Any:
 
 
 def by_part(
-    of: type,
-    row: Any,
-    read: Mapping[str, Any] | None = None,
-    fill: Any = ...,
-    first: bool = False,
+    of: type, row: Any, read: Mapping[str, Any] | None = None, fill: Any = ..., first: bool = False
 ) -> Any:
     """Return the field of a key that has a value for each part of a thing, or one for all.
 

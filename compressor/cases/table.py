@@ -8,16 +8,7 @@ import dataclasses
 from functools import cache
 from typing import Any
 
-from compressor.cases.groups import (
-    Contact,
-    Friction,
-    Gas,
-    Machine,
-    Offset,
-    Output,
-    Solve,
-    Spring,
-)
+from compressor.cases.groups import Contact, Friction, Gas, Machine, Offset, Output, Solve, Spring
 from compressor.cases.laws import CLEARANCE
 from compressor.cases.optional_groups import Body, Drive, Guide, Lubricant, Rod, Sensor, Wear
 from compressor.cases.parameter import (

@@ -23,12 +23,7 @@ from compressor.physics.march import (
     rehearse,
 )
 from compressor.physics.mechanism_rows import STALLED
-from compressor.physics.observe import (
-    COLUMNS,
-    WIDE,
-    Column,
-    frame_of_series,
-)
+from compressor.physics.observe import COLUMNS, WIDE, Column, frame_of_series
 from compressor.physics.onset import approach_at
 from compressor.physics.record import (
     CARD_NODES,

@@ -22,11 +22,7 @@ from compressor.physics._jit import (
 )
 from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.kinematics import crank_direction, ideal, ideal_after
-from compressor.physics.observe import (
-    ACCELERATION,
-    COLUMNS,
-    NEARNESS,
-)
+from compressor.physics.observe import ACCELERATION, COLUMNS, NEARNESS
 from compressor.physics.onset import (
     LANDING_FRACTION,
     first_onset,

@@ -21,12 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.physics._jit import inline_llvm, inner, jit, square_root
-from compressor.physics.contact import (
-    NO_CONTACT,
-    ContactState,
-    friction_coefficient,
-    joint_contact,
-)
+from compressor.physics.contact import NO_CONTACT, ContactState, friction_coefficient, joint_contact
 from compressor.physics.contact_laws import power, rise
 from compressor.physics.kinematics import IdealMotion
 from compressor.physics.loads import piston_force

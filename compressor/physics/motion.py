@@ -8,12 +8,7 @@ follows from the loop over both joints, so that a clearance of a nanometre keeps
 from typing import NamedTuple
 
 from compressor.physics._jit import inline_llvm, inner, square_root
-from compressor.physics.contact import (
-    NO_CONTACT,
-    ContactState,
-    joint_contact,
-    write_carried_rates,
-)
+from compressor.physics.contact import NO_CONTACT, ContactState, joint_contact, write_carried_rates
 from compressor.physics.contact_laws import has_chosen_laws
 from compressor.physics.kinematics import IdealMotion, ideal
 from compressor.physics.loads import piston_force

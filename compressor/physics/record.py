@@ -152,7 +152,7 @@ FILM: list[tuple] = [
 CARD_NODES = 1440  # a revolution
 # of gas that was measured
 CARD: list[tuple] = [
-    ("card", "f8", (CARD_NODES, 2)),  # force (N) over the crank's angle, and its slope a node
+    ("card", "f8", (CARD_NODES, 2))  # force (N) over the crank's angle, and its slope a node
 ]
 # of a mechanism with more freedom than ideal guides, a steady crank and a rigid rod leave it
 FEATURES: list[tuple] = [

@@ -21,13 +21,7 @@ from compressor.report.figures.style import (
     mark,
     palette,
 )
-from compressor.report.figures.sweep_data import (
-    FOOT,
-    MARKS,
-    Measure,
-    measures,
-    positions,
-)
+from compressor.report.figures.sweep_data import FOOT, MARKS, Measure, measures, positions
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.page import (
     Add,
@@ -41,11 +35,6 @@ from compressor.report.page import (
     TableRow,
     format_measure,
 )
-from compressor.report.plots import (
-    PlotChoice,
-    title_figure,
-    write_figure,
-    write_plots,
-)
+from compressor.report.plots import PlotChoice, title_figure, write_figure, write_plots
 from compressor.report.report import write_report
 from compressor.report.study_section import file_name

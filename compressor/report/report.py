@@ -37,21 +37,9 @@ from compressor.report.figures.drawing import as_csv
 from compressor.report.figures.pictures import draw_all
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.table import DrawnFigure
-from compressor.report.interactive import (
-    job_scripts,
-    script,
-    series_name,
-)
+from compressor.report.interactive import job_scripts, script, series_name
 from compressor.report.limits import Limits, read_limits
-from compressor.report.page import (
-    Add,
-    Chapter,
-    JobFacts,
-    JobsToOpen,
-    Section,
-    StudyNote,
-    document,
-)
+from compressor.report.page import Add, Chapter, JobFacts, JobsToOpen, Section, StudyNote, document
 from compressor.report.paper_sections import (
     DiagnosisContent,
     OwnFigures,
@@ -248,11 +236,7 @@ class DrawnStudy(NamedTuple):
 
 
 def drawn_study(
-    stored: Stored,
-    study: StoredStudy,
-    notes: Sequence[StudyNote],
-    limits: Limits,
-    units: Units,
+    stored: Stored, study: StoredStudy, notes: Sequence[StudyNote], limits: Limits, units: Units
 ) -> DrawnStudy:
     """Return a user's own study: its sections, and its sweep, drawn; `notes`: lines on it.
 

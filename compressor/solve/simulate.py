@@ -14,15 +14,7 @@ from compressor.reasons import Reason
 from compressor.solve.request import Trajectory, passed_time
 from compressor.solve.run import Solution
 from compressor.solve.run_metrics import ledger
-from compressor.solve.series import (
-    SIGNALS,
-    Variables,
-    block,
-    features,
-    finer,
-    rows_of,
-    variable,
-)
+from compressor.solve.series import SIGNALS, Variables, block, features, finer, rows_of, variable
 from compressor.solve.solution import solve
 
 if TYPE_CHECKING:

@@ -40,11 +40,7 @@ class ExportError(CompsimError):
 
 
 def export(
-    folder: Folder,
-    names: Sequence[str],
-    output: Folder,
-    force: bool = False,
-    units: Units = "si",
+    folder: Folder, names: Sequence[str], output: Folder, force: bool = False, units: Units = "si"
 ) -> tuple[int, str]:
     """Write a file of studies, a row a job, or of one job, a row a sample; return its rows.
 

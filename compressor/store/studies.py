@@ -19,15 +19,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from compressor.cases import (
-    MODEL_VERSION,
-    PerJoint,
-    Study,
-    phrase_of,
-    points,
-    row_of,
-    values_given,
-)
+from compressor.cases import MODEL_VERSION, PerJoint, Study, phrase_of, points, row_of, values_given
 from compressor.digits import setting
 from compressor.program import VERSION, did_you_mean, library_versions
 from compressor.store.files import (

@@ -281,10 +281,7 @@ def numbers(found: xr.Dataset) -> list[tuple[str, str]]:
 
 REACH = 0.5  # of the threshold: margins beyond it have the same colour
 OF_MASSES = (3, 4, 5, 6, 7, 8)  # claims that masses can decide
-EFFECTS = (
-    ("first_order", GREY, 0.19, "main effect"),
-    ("total_order", BLUE, -0.19, "total"),
-)
+EFFECTS = (("first_order", GREY, 0.19, "main effect"), ("total_order", BLUE, -0.19, "total"))
 MAP = "blue: the claim holds, red: it does not, by its margin; ring: the default masses"
 BARS = "shares of the variance of a claim's margin by an assumption, with 95 % intervals"
 

@@ -1,10 +1,6 @@
 """What a frame does with the forces on it, and how its signals are read."""
 
-from compressor.vibration.accelerometer import (
-    Record,
-    analogue_rate,
-    noisy,
-)
+from compressor.vibration.accelerometer import Record, analogue_rate, noisy
 from compressor.vibration.body import Forces
 from compressor.vibration.monitor import Monitored, measure_record, segment_levels, shake_body
 from compressor.vibration.record_files import encode_record, read_record, record_columns

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from compressor.analysis.shaking import (
-    NoSeriesError,
-    frame_forces,
-    healthy_twin,
-    whole_revolutions,
-)
+from compressor.analysis.shaking import NoSeriesError, frame_forces, healthy_twin, whole_revolutions
 from compressor.cases.case import Case
 from compressor.solve.series import SIGNALS
 from compressor.solve.simulate import simulate

@@ -82,8 +82,7 @@ def test_a_group_names_its_keys_as_they_are_given(value, key):
 
 
 @pytest.mark.parametrize(
-    "number",
-    [np.float64(0.25), np.float32(0.25), np.array(0.25), np.arange(0, 1, 0.25)[1]],
+    "number", [np.float64(0.25), np.float32(0.25), np.array(0.25), np.arange(0, 1, 0.25)[1]]
 )
 def test_numbers_of_numpy_are_numbers(number):
     values = {"joint": "big_end", "clearance_mm": number}

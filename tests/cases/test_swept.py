@@ -254,7 +254,7 @@ def test_only_some_jobs_are_selected_and_all_are_in_the_study(read):
         "compsim plan without it lists those that there are"
     ]
     assert refused(read, "laod: none", only="clearance > 1") == [
-        "--only clearance > 1: unknown key 'clearance'; did you mean clearance_mm?",
+        "--only clearance > 1: unknown key 'clearance'; did you mean clearance_mm?"
     ]
 
 

@@ -134,8 +134,7 @@ def test_bristles_bend_at_the_worn_joint_alone(joint):
 @pytest.mark.slow
 @pytest.mark.compiled
 @pytest.mark.parametrize(
-    ("law", "joint"),
-    [("lugre", "both"), ("coulomb_tanh", "small_end"), ("ambrosio", "big_end")],
+    ("law", "joint"), [("lugre", "both"), ("coulomb_tanh", "small_end"), ("ambrosio", "big_end")]
 )
 def test_runs_keep_their_energy_and_agree_with_other_methods(law, joint):
     """Of the explicit pair, the stiff partner and SciPy's DOP853."""

@@ -42,13 +42,7 @@ from compressor.physics.systems import (
 from compressor.physics.tally import new_tally
 from compressor.solve.run import COMPILED as METHODS
 from compressor.solve.run import CONTACT_STEP
-from compressor.solve.si_record import (
-    initial_state,
-    length_and_speed,
-    natural_sizes,
-    record,
-    scene,
-)
+from compressor.solve.si_record import initial_state, length_and_speed, natural_sizes, record, scene
 
 H = 1e-3  # s, of the hand-made steps
 CLEARANCE = 2e-4  # m
@@ -349,8 +343,7 @@ def missed(pulses, rtol, method=METHODS["TSIT5"]):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("method", "rtol"),
-    [*(("TSIT5", rtol) for rtol in TOLERANCES), ("RODAS", 1e-5)],
+    ("method", "rtol"), [*(("TSIT5", rtol) for rtol in TOLERANCES), ("RODAS", 1e-5)]
 )
 def test_no_constructed_pulse_is_stepped_over(pulses, method, rtol):
     """An onset is landed on, unless a graze shallower than the tolerance is not there at all."""

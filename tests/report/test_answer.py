@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from compressor.report.answer import (
-    Points,
-    finding,
-    rank_findings,
-    study_findings,
-    worn_joints,
-)
+from compressor.report.answer import Points, finding, rank_findings, study_findings, worn_joints
 from compressor.report.figures.sweep_data import MEASURES
 from compressor.report.page import format_measure
 

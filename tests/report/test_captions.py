@@ -124,8 +124,7 @@ def test_the_cam_and_the_gas_are_told_by_their_numbers(paper_runs):
 
 
 @pytest.mark.parametrize(
-    ("values", "text"),
-    [(1234.56, "1235 N"), ([0.0123456, -7.0], "0.01235, -7 N"), (1.4e-9, "0 N")],
+    ("values", "text"), [(1234.56, "1235 N"), ([0.0123456, -7.0], "0.01235, -7 N"), (1.4e-9, "0 N")]
 )
 def test_numbers_have_four_digits(values, text):
     assert spell(values, "N") == text

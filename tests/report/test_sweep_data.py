@@ -34,8 +34,7 @@ def test_what_is_rounding_beside_the_other_axis_is_0():
     """It was told as 9.764e-14 mm/s, and a worn machine's as 1.6e+11 times that."""
     values = xr.DataArray([[9.79e-3, 9.764e-17], [9.79e-3, 1.6e-5]], dims=("job", "axis"))
     data = xr.Dataset(
-        {"body_velocity_rms": values, "body_velocity_rms_error": 0.8 * values},
-        {"axis": ["x", "y"]},
+        {"body_velocity_rms": values, "body_velocity_rms_error": 0.8 * values}, {"axis": ["x", "y"]}
     )
     x, y = (m for m in MEASURES if m.variable == "body_velocity_rms")
     assert y.of(data) == pytest.approx([0.0, 0.016])

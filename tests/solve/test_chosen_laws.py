@@ -43,10 +43,7 @@ def test_the_dry_joint_keeps_its_energy_and_says_what_is_known_of_it():
 
 @pytest.mark.parametrize(
     ("method", "law", "joint"),
-    [
-        ("DOP853", "lankarani_nikravesh", "both"),
-        ("Radau", "flores", "small_end"),
-    ],
+    [("DOP853", "lankarani_nikravesh", "both"), ("Radau", "flores", "small_end")],
 )
 def test_scipy_s_methods_meet_with_the_same_speeds(law, joint, method):
     """They share the equations with the march, and neither its steps nor its search for onsets."""

@@ -138,8 +138,7 @@ def cards(folder, step):
 
 
 @pytest.mark.parametrize(
-    ("step", "force", "work"),
-    [(0.25, 6e-5, 1e-4), (1, 3e-4, 2e-4), (5, 5e-3, 2e-3)],
+    ("step", "force", "work"), [(0.25, 6e-5, 1e-4), (1, 3e-4, 2e-4), (5, 5e-3, 2e-3)]
 )
 def test_a_card_of_the_ideal_cycle_gives_the_ideal_run_back(tmp_path, step, force, work):
     """Within the error of its samples, which falls with their step (relative L2, and work)."""

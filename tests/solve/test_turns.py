@@ -25,8 +25,7 @@ def ends(of):
 
 
 @pytest.mark.parametrize(
-    ("joint", "method"),
-    [("big_end", "DOP853"), ("both", "auto"), ("both", "RODAS")],
+    ("joint", "method"), [("big_end", "DOP853"), ("both", "auto"), ("both", "RODAS")]
 )
 def test_revolutions_add_up_to_the_whole_run(joint, method):
     of = case(joint, method)

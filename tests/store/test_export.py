@@ -21,11 +21,7 @@ from compressor.store.studies import write_study
 from compressor.vibration.record_files import read_record
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
-GRID = {
-    "joint": "both",
-    "clearance_mm": [0.1, 0.2],
-    "solve": SHORT | {"max_steps": [5, 10**6]},
-}
+GRID = {"joint": "both", "clearance_mm": [0.1, 0.2], "solve": SHORT | {"max_steps": [5, 10**6]}}
 LIST = {
     "joint": "big_end",
     "clearance_mm": 0.1,
@@ -150,8 +146,7 @@ def stored(results, key):
 
 
 @pytest.mark.parametrize(
-    ("suffix", "hints"),
-    [(".wav", {"channel": "1", "tacho": "2", "unit": "m/s2"}), (".mat", {})],
+    ("suffix", "hints"), [(".wav", {"channel": "1", "tacho": "2", "unit": "m/s2"}), (".mat", {})]
 )
 def test_a_record_alone_is_what_analysts_open(suffix, hints, worn, tmp_path, capsys):
     """Values to the digits of the type, whatever the job's own samples are."""

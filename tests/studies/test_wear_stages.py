@@ -8,11 +8,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.solve import simulate
-from compressor.studies.wear import (
-    Worn,
-    follow_stage,
-    life,
-)
+from compressor.studies.wear import Worn, follow_stage, life
 
 VALUES = {"joint": "big_end", "clearance_mm": 0.2, "solve": {"accuracy": "draft"}}
 

@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from compressor.vibration.spectra import (
-    RecordError,
-    line_amplitudes,
-    resample_angle,
-)
+from compressor.vibration.spectra import RecordError, line_amplitudes, resample_angle
 
 TURN = 2 * np.pi
 M = 360

@@ -22,13 +22,7 @@ from compressor.analysis import (
 )
 from compressor.report.figures.curves import Runs
 from compressor.report.figures.drawing import ROOM, WAYS, Panel, make_grid
-from compressor.report.figures.job import (
-    ORDERS_AXIS,
-    list_modes,
-    plot_lines,
-    plot_orbit,
-    show_turn,
-)
+from compressor.report.figures.job import ORDERS_AXIS, list_modes, plot_lines, plot_orbit, show_turn
 from compressor.report.figures.paper import AT, sizes
 from compressor.report.figures.rows import SweptRow, plot_modes, rows_modes
 from compressor.report.figures.style import BLUE, BY_CLEARANCE, GOLD, IDEAL, RED, LineStyle, fill

@@ -40,16 +40,7 @@ from compressor.report.figures.drawing import (
     join_with_gaps,
     make_grid,
 )
-from compressor.report.figures.style import (
-    BLACK,
-    BLUE,
-    GOLD,
-    GREY,
-    RED,
-    LineStyle,
-    fill,
-    mark,
-)
+from compressor.report.figures.style import BLACK, BLUE, GOLD, GREY, RED, LineStyle, fill, mark
 from compressor.report.figures.table import DrawnFigure, Number, figure, spell, spell_span
 from compressor.units import Units, unit_in
 

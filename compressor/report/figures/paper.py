@@ -34,13 +34,7 @@ from compressor.report.figures.curves import (
     plot_enlarged,
     plot_rows,
 )
-from compressor.report.figures.drawing import (
-    WAYS,
-    Drawing,
-    Panel,
-    circle,
-    make_grid,
-)
+from compressor.report.figures.drawing import WAYS, Drawing, Panel, circle, make_grid
 from compressor.report.figures.style import (
     BLACK,
     BLUE,

@@ -8,12 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import plotly.graph_objects as go
 
-from compressor.report.figures.drawing import (
-    Drawing,
-    Panel,
-    make_grid,
-    thin_places,
-)
+from compressor.report.figures.drawing import Drawing, Panel, make_grid, thin_places
 from compressor.report.figures.style import BLUE, CYCLE, RED, LineStyle, mark, palette
 from compressor.report.figures.sweep_data import (
     MARKS,

@@ -19,24 +19,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from compressor.cases import (
-    MODEL_VERSION,
-    Case,
-    CaseFileError,
-    Output,
-    Study,
-    load_studies,
-    points,
-)
+from compressor.cases import MODEL_VERSION, Case, CaseFileError, Output, Study, load_studies, points
 from compressor.metrics import JOINTS
 from compressor.program import PROGRAM, Progress, no_progress
-from compressor.store import (
-    Folder,
-    coordinate_names,
-    swept_column,
-    writable_folder,
-    write_dataset,
-)
+from compressor.store import Folder, coordinate_names, swept_column, writable_folder, write_dataset
 from compressor.studies.follow.motion import (
     COORDINATES,
     NUMBERS,
@@ -275,10 +261,7 @@ def differing(machine: FollowedMachine, up: Sequence[Row], down: Sequence[Row]) 
 
 
 def followed_dataset(
-    study: Study,
-    along: KeyRange,
-    every: Sequence[FollowedMachine],
-    rows: Sequence[list[list[Row]]],
+    study: Study, along: KeyRange, every: Sequence[FollowedMachine], rows: Sequence[list[list[Row]]]
 ) -> xr.Dataset:
     """Return the rows of all chains as one Dataset.
 

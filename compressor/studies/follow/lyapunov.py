@@ -16,15 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.cases import Case
-from compressor.solve import (
-    Request,
-    integrate,
-    natural_sizes,
-    parts,
-    record,
-    standard_error,
-    sure,
-)
+from compressor.solve import Request, integrate, natural_sizes, parts, record, standard_error, sure
 
 RTOL = 1e-12  # of both runs, whatever the case has
 SHIFT = 1e-6  # natural sizes: how far from the motion the other one starts

@@ -18,14 +18,7 @@ from compressor.analysis import (
     healthy_body_velocity_rms,
     joint_scales,
 )
-from compressor.cases import (
-    ACCURACY,
-    Case,
-    Study,
-    points,
-    to_si,
-    with_ideal_joints,
-)
+from compressor.cases import ACCURACY, Case, Study, points, to_si, with_ideal_joints
 from compressor.digits import align_columns, plural
 from compressor.metrics import JOINTS
 from compressor.physics import state_names

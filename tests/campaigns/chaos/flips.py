@@ -9,16 +9,7 @@ import random
 import shutil
 from functools import cache, partial
 
-from chaos.common import (
-    Tally,
-    command,
-    complete_store,
-    differing,
-    forked,
-    fresh,
-    run_here,
-    whole,
-)
+from chaos.common import Tally, command, complete_store, differing, forked, fresh, run_here, whole
 from compressor.store.files import StoreError
 from compressor.store.stored import read_store
 

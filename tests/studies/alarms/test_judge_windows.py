@@ -13,12 +13,7 @@ from compressor.studies.alarms.alarms import (
     list_rows,
     rank_alarms,
 )
-from compressor.studies.alarms.readings import (
-    LADDER,
-    RECORD,
-    band_velocity,
-    read_windows,
-)
+from compressor.studies.alarms.readings import LADDER, RECORD, band_velocity, read_windows
 from compressor.vibration import Record
 
 LEVELS = {0.2: 1.5, 0.3: 2.5, 0.4: 6.0}  # clearance, mm -> rms over the sound one

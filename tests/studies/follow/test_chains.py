@@ -6,11 +6,7 @@ from conftest import assert_same_bits
 from compressor.store import read_dataset, write_dataset
 from compressor.store.files import StoreError
 from compressor.studies.follow import motion
-from compressor.studies.follow.follow import (
-    load_values,
-    machines,
-    read_over,
-)
+from compressor.studies.follow.follow import load_values, machines, read_over
 from compressor.studies.follow.motion import ValuePlan
 from compressor.studies.frame import make_rows, stored_rows
 

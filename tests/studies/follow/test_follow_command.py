@@ -7,12 +7,7 @@ from compsim import cli
 from conftest import jobs_here
 
 from compressor.cases import CaseFileError
-from compressor.studies.follow.follow import (
-    StudyError,
-    load_values,
-    machines,
-    read_over,
-)
+from compressor.studies.follow.follow import StudyError, load_values, machines, read_over
 from compressor.studies.follow.motion import NUMBERS, TEXTS
 
 TEXT = """

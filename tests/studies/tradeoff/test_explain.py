@@ -8,12 +8,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
 from compressor.solve.simulate import simulate
-from compressor.studies.tradeoff.explain import (
-    advice_row,
-    explain,
-    ideal_scales,
-    terms,
-)
+from compressor.studies.tradeoff.explain import advice_row, explain, ideal_scales, terms
 from compressor.studies.tradeoff.variants import choose_job
 
 SOLVE = {"duration_rev": 0.25, "settle_rev": 0}
