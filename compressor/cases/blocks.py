@@ -203,9 +203,14 @@ def plan_block(tree: Tree, name: str) -> tuple[Block, list[FileProblem]]:
     given: dict[str, Any] = {}
     fixed: dict[str, Any] = {}
     sweeps: dict[str, Sweep] = {}
+    names: dict[str, str] = {}  # as the file gives keys, of which one may be double another
     problems = []
     for path, value in walk_leaves(tree.values):
         key = DOUBLES.get(key_of(path), key_of(path))
+        other = names.setdefault(key, key_of(path))
+        if other != key_of(path) and (key in sweeps or is_swept(key, value)):
+            told = f"{other} is given, too: give one of the two"
+            problems.append(FileProblem(tree.at(*path)[0], key_of(path), told))
         given[key] = value
         if not is_swept(key, value):
             own = hold_value(key, value) if key == key_of(path) else value

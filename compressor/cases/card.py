@@ -163,6 +163,8 @@ def _check_pressures(path: str, rows: Sequence[Row], name: str, is_gauge: bool) 
             raise CardError(f"{path}:{line}: {pressure:g} MPa is below a vacuum; {unit}")
         if pressure > high:
             raise CardError(f"{path}:{line}: {pressure:g} MPa is above {high:g}; {unit}")
+    if not rows:
+        raise CardError(f"{path}: has no row with an angle and a pressure; {NEEDED}")
     if all(pressure < low for _, _, pressure in rows):
         raise CardError(f"{path}:{rows[0][0]}: all pressures are below {low:g} MPa; {unit}")
 

@@ -249,7 +249,8 @@ stroke, 240 mm
         found: dict[str, Any] = {}
         for name in (*TOP, *GROUPS):
             value = getattr(self, name)
-            is_default = (value is None and WORDS[name]) or value == SOUND
+            is_sound = name == "healthy_clearance_mm" and value == SOUND
+            is_default = is_sound or (value is None and WORDS[name])
             if is_default or (self.joint == "none" and name == "clearance_mm"):
                 continue
             if name in GROUPS:

@@ -91,7 +91,7 @@ def read_overrides(texts: Sequence[str]) -> tuple[Tree, list[FileProblem]]:
             message = "needs the form key=value, such as joint=both"
             problems.append(FileProblem(place, "", message))
             continue
-        if path in values:
+        if any(path[: len(one)] == one[: len(path)] for one in values):
             problems.append(FileProblem(place, key, "is set twice"))
         tree, wrong = read_text(value, place)
         problems += wrong

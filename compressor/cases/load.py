@@ -178,22 +178,27 @@ def _study(
     cases = Cases(blocks)
     columns = [*blocks[0].columns] if is_grid else _columns(blocks)
     keys, values = _check_cases(file, cases, [] if is_grid else columns, progress)
-    is_drawn = any(sweep.is_drawn for block in blocks for sweep in block.sweeps.values())
-    if "sample" in blocks[0].tree.values and not (file.changes.values or is_drawn):
-        raise CaseFileError([blocks[0].tree.problem(("sample",), NO_DRAWS, True)])
+    sampled = next((block.tree for block in blocks if "sample" in block.tree.values), None)
+    if sampled and file.tree and not any(map(draws, blocks)):
+        alone = _block_trees(file.tree, NO_CHANGES, max_jobs)[0]  # of which --set may leave nothing
+        if not any(draws(plan_block(tree, file.name)[0]) for tree in alone):
+            raise CaseFileError([sampled.problem(("sample",), NO_DRAWS, True)])
     cases.keys = keys
-    spreads = {key: sweep.spread for block in blocks for key, sweep in block.sweeps.items()
-               if sweep.is_drawn and sweep.has_ends}  # fmt: skip
     values = dict(blocks[0].columns) if is_grid else values
     for key, sweep in blocks[0].sweeps.items() if is_grid else ():
         if key_of(sweep.path) in DOUBLES:
             values[key] = [value / 2 for value in values[key]]
-    axes = tuple(Axis(key, tuple(values[key]), spreads.get(key)) for key in columns)
+    axes = tuple(Axis(key, tuple(values[key])) for key in columns)
     selected = range(len(cases)) if only is None else cases.where(only)
     fixed = tuple(expand_synonyms(block.fixed)[0] for block in blocks)
     told = {name: text or "" for name, text in vars(file.report).items()}
     study = Study(file.name, file.path, axes, cases, keys, is_grid, selected, fixed, **told)
     return study, blocks
+
+
+def draws(block: Block) -> bool:
+    """Return whether a block draws values of any key."""
+    return any(sweep.is_drawn for sweep in block.sweeps.values())
 
 
 def _blocks(file: CaseFile, max_jobs: int) -> list[Block]:

@@ -2,8 +2,8 @@
 
 import itertools
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, overload
 
 from compressor.cases.blocks import Block, reader
@@ -14,15 +14,10 @@ from compressor.cases.comparison import Test
 
 @dataclass(frozen=True)
 class Axis:
-    """One swept key of a study, such as `machine.rod_mass_kg`, and its values.
-
-    `spread`: where a design drew it from a range, the function that takes shares of that, 0 to 1,
-    to values; a normal distribution has no range.
-    """
+    """One swept key of a study, such as `machine.rod_mass_kg`, and its values."""
 
     key: str
     values: tuple[Any, ...]
-    spread: Callable[[float], float] | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)

@@ -93,6 +93,8 @@ def test_revolutions_are_averaged_on_the_first_one_s_angles(tmp_path, card):
          "before its revolution does"),
         ([(angle, 400) for angle in range(0, 360, 10)], None, ":2: 400 MPa is above 100; is "
          "pressure_MPa the column's unit?"),
+        ([("", "", 1), ("", "", 2)], "crank_angle_deg,pressure_bar,time", ": has no row with an "
+         "angle and a pressure"),
         ([(angle, 4e-7) for angle in range(0, 360, 10)], None, "all pressures are below 0.001"),
         ([(angle, -0.01) for angle in range(0, 360, 10)], None, ":2: -0.01 MPa is below a vacuum"),
         ([(angle, -1.2) for angle in range(0, 360, 10)], "crank_angle_deg,pressure_barg",

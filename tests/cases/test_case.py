@@ -238,3 +238,11 @@ def test_any_number_is_either_refused_or_reads_back(joint, numbers):
 def test_values_of_another_kind_are_told(call, value):
     with pytest.raises(CompsimError, match="needs "):
         call(value)
+
+
+def test_a_clearance_of_0_reads_back():
+    """Such a job was stored and run, and could not be shown."""
+    for values in ({"joint": "big_end", "clearance_mm": 0}, {"joint": "both", "clearance_mm": 0}):
+        case = Case.from_values(values)
+        assert Case.from_attribute(case.attributes()["case"]) == case
+        assert Case.from_values(case.values()).key == case.key

@@ -288,3 +288,13 @@ def test_any_sweep_is_planned_or_refused(read, text):
         message = ""
         assert len(rows(study)) == len(study.cases) == len([*study.cases]) > 0
     assert all(line.startswith("case.yaml") for line in message.splitlines())
+
+
+def test_a_sample_that_samples_nothing_is_refused_whatever_else_is_set(read):
+    one = "joint: both\nclearance_mm: {CLEARANCE}\nsample: {n: 4}"
+    plain, drawn = one.replace("{CLEARANCE}", "0.1"), one.replace("CLEARANCE", "random: [0.1, 0.2]")
+    block = "blocks: [{load: none}, {joint: both, clearance_mm: 0.1, sample: {n: 4}}]"
+    for text, overrides in ((plain, ()), (plain, ("machine.speed_rpm=300",)), (block, ())):
+        with pytest.raises(CaseFileError, match="samples nothing"):
+            read(text, *overrides)
+    assert read(drawn, "clearance_mm=0.1").jobs == 1

@@ -4,6 +4,7 @@ import pytest
 
 from compressor.cases.case import Case
 from compressor.cases.checks import DOUBLES
+from compressor.cases.load import CaseFileError
 from compressor.cases.study import Axis
 
 
@@ -48,3 +49,9 @@ def test_a_block_and_the_command_line_replace_either_word(read):
     assert study.cases[0].machine.crank_radius_mm == 100
     study = read("load: none\nmachine: {stroke_mm: 200}", "machine.crank_radius_mm=80")
     assert study.cases[0].machine.crank_radius_mm == 80
+
+
+def test_two_sweeps_of_one_quantity_are_refused(read):
+    """The first of them vanished."""
+    with pytest.raises(CaseFileError, match="stroke_mm is given, too: give one of the two"):
+        read("load: none\nmachine: {stroke_mm: [200, 240, 300], crank_radius_mm: [100, 110]}")
