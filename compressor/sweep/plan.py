@@ -76,7 +76,7 @@ class Ahead:
             return self.counts
         looked_at = {study: self.draw_cases(keys) for study, keys in self.missing.items()}
         needs = Needs.of(case for cases in looked_at.values() for case in cases)
-        compiling = compile_seconds(needs)
+        compiling = compile_seconds(needs, min(workers, cores()))
         compile_once(needs, remark, workers)
         parts = [
             self.estimate(part, looked_at[part.study]) if part.missing else part

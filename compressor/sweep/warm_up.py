@@ -10,8 +10,6 @@ import contextlib
 import hashlib
 import multiprocessing
 import os
-import signal
-import threading
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +17,8 @@ from typing import Any, NamedTuple
 from compressor.cases import Case
 from compressor.program import COMPILED, library_versions, machine_code_folder
 from compressor.store import StoreError
+from compressor.sweep.pool import cores
+from compressor.sweep.worker import settle
 
 COMPILING = (
     "compiling the equations, for about {seconds} s, or longer on a slow or busy machine; once for "
@@ -81,33 +81,34 @@ def load(needs: Needs, beside: bool = False) -> None:
 def parts_beside(case: Case) -> Iterator[None]:
     """Have a copy of this process compile parts of the march of a case meanwhile.
 
-    Not where the system makes no copies, or threads run, whose locks a copy would take along.
+    Not where the system makes no copies. One that waits for a lock of a thread that is not in it
+    does no harm: all that it has not finished is compiled here, and then it is killed.
     """
-    if "fork" not in multiprocessing.get_all_start_methods() or threading.active_count() > 1:
-        yield
-        return
-    copy = multiprocessing.get_context("fork").Process(target=compile_quietly, args=(case,))
-    copy.start()
+    copy = None
+    with contextlib.suppress(OSError, ValueError):  # too many processes; there are no copies
+        copy = multiprocessing.get_context("fork").Process(target=compile_quietly, args=(case,))
+        copy.start()
     try:
         yield
-    finally:  # what it has not finished has been compiled here
-        copy.terminate()
-        copy.join()
+    finally:
+        if copy and copy.pid:
+            copy.kill()
+            copy.join()
 
 
 def compile_quietly(case: Case) -> None:
     """Compile parts of the march of a case; what goes wrong the other process meets and tells."""
     from compressor.solve import compile_parts
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_DFL)
+    settle()
     with contextlib.suppress(Exception):
         compile_parts(case)
 
 
-def compile_seconds(needs: Needs) -> int:
+def compile_seconds(needs: Needs, processes: int) -> int:
     """Return seconds of compiling that are ahead of a run with these needs, about."""
-    return sum(SECONDS.get(part, 1) for part in needs.uncompiled)
+    seconds = sum(SECONDS.get(part, 1) for part in needs.uncompiled)
+    return seconds if processes > 1 else round(1.5 * seconds)
 
 
 def marker(part: str) -> Path:
@@ -126,8 +127,12 @@ def compile_once(needs: Needs, remark: Callable[[str], None], processes: int = 1
     """
     if os.environ.get("NUMBA_DISABLE_JIT", "0").strip() not in ("", "0"):
         remark("NUMBA_DISABLE_JIT is set: nothing is compiled, and runs take tens of times as long")
-    if ahead := needs.uncompiled:
-        remark(COMPILING.format(seconds=compile_seconds(needs)))
+        return
+    if os.environ.get("COMPSIM_JIT") == "0":
+        return
+    ahead, processes = needs.uncompiled, min(processes, cores())
+    if ahead:
+        remark(COMPILING.format(seconds=compile_seconds(needs, processes)))
     try:
         for part, alone in ahead.items():
             load(alone, processes > 1)

@@ -144,7 +144,7 @@ def attempt(work: Callable[[Any], Any], payload: Any) -> End:
         raise
     except MemoryError:
         return JobLost(None, Reason.OUT_OF_MEMORY, "needs more memory than its worker may add")
-    except BaseException as error:  # work may even call sys.exit
+    except (Exception, SystemExit) as error:  # work may even call sys.exit
         return JobLost(None, Reason.INTERNAL_ERROR, *describe_error(error))
 
 

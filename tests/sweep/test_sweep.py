@@ -21,6 +21,7 @@ from compressor.store.status import verify
 from compressor.sweep import warm_up
 from compressor.sweep.sweep import JobFailure, Options, sweep
 from compressor.sweep.wanted import RequestedJobs
+from compressor.sweep.worker import attempt
 
 SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 
@@ -195,6 +196,20 @@ def test_only_what_cases_need_is_compiled(tmp_path, monkeypatch):
         (oiled | {"guide": True}, {"features"}),
     ):  # fmt: skip
         assert {*warm_up.Needs.of([Case.from_values(values)]).uncompiled} == parts
+
+
+def test_what_asks_the_program_to_end_is_no_failure_of_a_job():
+    """Ctrl-C in a job of this process was stored as a bug of it."""
+
+    class Interrupted(BaseException):
+        """As the command line raises it."""
+
+    def work(error):
+        raise error
+
+    with pytest.raises(Interrupted):
+        attempt(work, Interrupted())
+    assert attempt(work, SystemExit(3)).reason == "internal_error"
 
 
 PARTS = """
