@@ -29,7 +29,11 @@ def read_bands(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) ->
 @options.results
 @options.output("Also write all rates as netCDF, and a figure, here.")
 @click.option(
-    "--wear", "run", metavar="RUN", help="Print hours from each alarm to the limit of a wear run."
+    "--wear",
+    "run",
+    type=options.TEXT,
+    metavar="RUN",
+    help="Print hours from each alarm to the limit of a wear run.",
 )
 @click.option(
     "--false-alarms", type=RATE, default=0.01, help="Set limits for this rate of false alarms."

@@ -39,6 +39,8 @@ def explain(configs, jobs, models, every, folder, as_json, **how) -> int:
     """
     if every and not models:
         raise click.UsageError("--all says what --models varies: add --models")
+    if jobs and models:
+        raise click.UsageError("-j is of the sweep's cost, which --models does not estimate")
     from compressor.cases import points
     from compressor.store import writable_folder, write_dataset
     from compressor.studies.tradeoff.explain import explain as explain_job

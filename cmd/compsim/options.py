@@ -24,6 +24,17 @@ class GivenPath(click.Path):
         return super().convert(value, param, ctx)
 
 
+class GivenText(click.ParamType):
+    """A text; an empty one, as of a shell variable that is not set, is none."""
+
+    name = "text"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> str:
+        """Return the text. Raises BadParameter."""
+        return str(value) if value else self.fail("an empty word: is it not set?", param, ctx)
+
+
+TEXT = GivenText()
 COUNT, NUMBER = click.IntRange(min=1), click.IntRange(min=0)
 FILE, FOLDER = GivenPath(readable=False), GivenPath(file_okay=False, readable=False)
 # as help and messages call them
@@ -38,7 +49,10 @@ set_keys = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Set a key in all case files."
 )
 only = click.option(
-    "--only", metavar="COMPARISON", help="Take only jobs with this, as 'clearance_mm < 0.2'."
+    "--only",
+    type=TEXT,
+    metavar="COMPARISON",
+    help="Take only jobs with this, as 'clearance_mm < 0.2'.",
 )
 max_jobs = click.option(
     "--max-jobs", type=COUNT, default=MAX_JOBS, help="Refuse a case file with more jobs than this."

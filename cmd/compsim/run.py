@@ -4,6 +4,7 @@ import os
 import shlex
 from contextlib import nullcontext
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,10 +19,12 @@ if TYPE_CHECKING:
 
 def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
     """Return (I, N) of I/N with 1 <= I <= N. Raises BadParameter for other text."""
-    number, of = (text or "1/1").partition("/")[::2]
+    if text is None:
+        return None
+    number, of = text.partition("/")[::2]
     if not (number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):
         raise click.BadParameter(f"{text!r} is no I/N with 1 <= I <= N, such as 2/8")
-    return (int(number), int(of)) if text else None
+    return int(number), int(of)
 
 
 @click.command()
@@ -36,7 +39,10 @@ def read_shard(_: click.Context, __: click.Parameter, text: str | None) -> tuple
     "--shard", metavar="I/N", callback=read_shard, help="Run part I of N; others run the rest."
 )
 @click.option(
-    "--scheduler", metavar="ADDRESS", help="Run on this dask cluster, such as tcp://host:8786."
+    "--scheduler",
+    type=options.TEXT,
+    metavar="ADDRESS",
+    help="Run on this dask cluster, such as tcp://host:8786.",
 )
 @options.quiet
 @click.pass_obj
@@ -90,10 +96,11 @@ def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
         screen.say("--rerun failed runs failed jobs again; a changed case file makes new jobs.")
     if quiet:
         return
-    from compressor.store import read_store, read_studies, run_caveats
+    from compressor.store import read_store, read_study, run_caveats
 
-    ran, stored = {one.study for one in summary.counts}, read_store(folder)
-    for study in read_studies(folder):  # what only runs show: `caution` has said the rest
-        for text in run_caveats(stored, study) if study.name in ran else ():
+    stored = read_store(folder)
+    for *_, where in lines:  # what only runs show: `caution` has said the rest
+        study = read_study(Path(where))
+        for text in run_caveats(stored, study):
             screen.say_wrapped(f"{study.name}: {text}")
     screen.say(f"next: compsim report -r {shlex.quote(folder)}")

@@ -54,6 +54,8 @@ def show(words, folder, case, reversal, units, as_json) -> int:
     618 requires, by 15 degrees and 3 percent, or as a maker does. --json has all numbers in SI.
     """
     options.check_json_units(as_json, units)
+    if case and as_json:
+        raise click.UsageError("--case prints a case file: leave out --json, which has all keys")
     from compressor.reasons import remedy
     from compressor.store import report_job
     from compsim.job_text import sections

@@ -28,6 +28,7 @@ from compressor.store.studies import (
     find_value,
     healthy_clearance,
     read_studies,
+    read_study,
     swept_column,
     write_study,
 )

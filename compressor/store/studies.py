@@ -182,7 +182,8 @@ def encode(study: StoredStudy) -> bytes:
 def study_paths(folder: Folder) -> list[Path]:
     """Return the files of all studies of a store. Raises StoreError."""
     with refusals(Path(folder)):
-        return sorted(Path(folder).glob("studies/*.json"))
+        found = Path(folder).glob("studies/*.json")
+        return sorted(path for path in found if path.name[0] != ".")  # as some disks add
 
 
 def read_studies(folder: Folder) -> list[StoredStudy]:
@@ -260,7 +261,10 @@ def find_job(
     if not values and all(study.name != first for study in studies):
         return whole_key(folder, first, studies, stored)
     study = find_study(folder, first, studies)
-    wanted = dict(find_value(folder, study, word) for word in values)
+    found = [find_value(folder, study, word) for word in values]
+    wanted = dict(found)
+    if len(wanted) < len(found):
+        raise WrongName(folder, f"{' '.join(values)}: an axis is given twice", "give one value")
     jobs = {
         key: point
         for key, point in zip(study.keys, points(study), strict=True)

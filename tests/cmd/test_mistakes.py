@@ -59,6 +59,9 @@ MISTAKES = [
     # folders of results
     ("status -r resluts", "resluts: there is no such folder of results; did you mean results?"),
     ("plan wear.yaml --set joint=both --set joint=none", "--set joint=none: joint: is set twice"),
+    ("plan wear.yaml --set machine.speed_rpm=9 --set 'machine={rod_mass_kg: 3}'", "is set twice"),
+    ("run good.yaml --only ''", "an empty word"), ("run good.yaml --scheduler ''", "an empty word"),
+    ("run good.yaml --shard ''", "'' is no I/N"),
     ("verify -r again", "again: holds no study; choose another folder"),
     ("report -o READONLY", "nothing may be written to READONLY", "another folder"),
     ("export -o READONLY/all.csv", "nothing may be written to READONLY", "another folder"),
@@ -72,6 +75,8 @@ MISTAKES = [
     ("show wear 0.1", "'0.1' is no AXIS=VALUE of wear; its axes are clearance_mm"),
     ("show wear load=none", "wear has no axis 'load'; its axes are clearance_mm, machine.rod_"),
     ("show ffffffff", "no job's key begins with 'ffffffff'"),
+    ("show wear clearance_mm=0.1 clearance_mm=0.2", "an axis is given twice"),
+    ("show wear --case --json", "--case prints a case file: leave out --json"),
     ("show wear --json --units plant", "--json has all numbers in SI", "leave out --units plant"),
     *((f"show ab --reversal {text}", "give degrees and percent, such as 30,25")
       for text in ("15", "a,b", "200,3", "15,-1")),
@@ -84,6 +89,7 @@ MISTAKES = [
     ("identify good.csv --study wear", "good.csv: cannot be read", "time_s,acceleration_m_per_s2"),
     # questions
     ("explain good.yaml --all", "--all says what --models varies: add --models"),
+    ("explain good.yaml --models -j 2", "-j is of the sweep's cost"),
     ("tradeoff again/wear.yaml", "again/wear.yaml: a job of wear has no joint with clearance"),
     ("tradeoff good.yaml --set solve.methd=auto", "did you mean solve.method?"),
     ("follow good.yaml", "Missing option '--over'"),
