@@ -60,11 +60,10 @@ class Limits:
         low, high = (sum(end >= one for one in limits) for end in (value - bar, value + bar))
         return Zone(ZONES[low] + (f"/{ZONES[high]}" if high > low else ""), high)
 
-    @property
-    def words(self) -> list[str]:
-        """Return a sentence on each metric's zones."""
-        sentences = []
-        for name in self.by_metric:
+    def words(self, shown: Iterable[Measure]) -> list[str]:
+        """Return a sentence on the zones of each metric that is shown."""
+        sentences, variables = [], {measure.variable for measure in shown}
+        for name in filter(variables.__contains__, self.by_metric):
             one = shown_measure(name, self.units)
             title, unit = one.title.partition(",")[0], f" {one.unit}" if one.unit else ""
             texts = [f"{limit:g}{unit}" for limit in self.of(one)]

@@ -172,12 +172,11 @@ def own_figures(stored: Stored, study: StoredStudy, units: Units) -> OwnFigures:
         for one in (draw_paper(runs, units) if alike else ())
     ]  # fmt: skip
     numbers = ", ".join(one.title.partition(":")[0].removeprefix("Figure ") for one in lacking)
-    why = f", but not Figures {numbers}, whose cases are not among its jobs" * bool(lacking)
+    why = f", but not Figures {numbers}, whose cases are not all there with series" * bool(lacking)
     text = f"The paper's figures and claims are drawn of this machine{why}"
     if not figures:
-        text = (
-            f"The paper's figures of this machine are not drawn{why if alike else f', {UNEQUAL}'}"
-        )
+        reason = "of whose cases none is there with series" if alike else UNEQUAL
+        text = f"The paper's figures are not drawn of this machine, {reason}"
         return OwnFigures(StudyNote(text, table_anchor(study.name), "Its jobs"), [], [])
     anchor = file_name("figures", study.name)
     sections = [

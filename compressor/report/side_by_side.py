@@ -10,7 +10,7 @@ from compressor.analysis import healthy_twin
 from compressor.cases import Case, stands_for
 from compressor.digits import is_known
 from compressor.metrics import BARRED, JOINTS
-from compressor.report.answer import FORCE, KNOCK, Points
+from compressor.report.answer import FORCE, KNOCK, Points, read_numbers
 from compressor.report.figures.sweep_data import MEASURES, Measure, measures, swept_values
 from compressor.report.page import (
     Cell,
@@ -142,8 +142,9 @@ def _compare(
             f"all jobs that differ in clearances alone, from the least on{peaks}"
             if are_all
             else f"{len(places)} jobs that differ in clearances alone, from the least on: those of "
-            f"the least and the greatest clearance and of the greatest {' and '.join(greatest)}, "
-            f"and others between{peaks}; the table of all jobs has the rest"
+            "the least and the greatest clearance"
+            + f" and of the greatest {' and '.join(greatest)}" * bool(greatest)
+            + f", and others between{peaks}; the table of all jobs has the rest"
         )
     words = (
         "The machine without clearance, by the same model: its joints are ideal, also without oil "
@@ -159,9 +160,9 @@ def describe_noise(data: xr.Dataset, healthy: xr.Dataset, places: Sequence[int])
     if not {SENSOR, KNOCK} <= {*data} or SENSOR not in healthy:
         return ""
     (peak,) = (measure for measure in MEASURES if measure.variable == SENSOR)
-    knocks = [known_values(m, data)[places] for m in MEASURES if m.variable == KNOCK]
+    knocks = [read_numbers(m, data)[0].ravel()[places] for m in MEASURES if m.variable == KNOCK]
     times = np.fmax.reduce(known_values(peak, data)[places]) / float(peak.of(healthy))
-    if not times >= HEARD or np.fmax.reduce(np.ravel(knocks)) > BARRED[KNOCK].limit:
+    if not times >= HEARD or not (np.fmax.reduce(knocks) <= BARRED[KNOCK].limit).all():
         return ""
     return (
         f" No joint knocks, but the sensor's peak is up to {times:.2g} times as high: blows that "

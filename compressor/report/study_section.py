@@ -129,7 +129,7 @@ def study_sections(
         data["status"].size,
         jobs_table(data, limits, units),
         [*map(regime_words, regimes)],
-        limits.words,
+        limits.words(measures(data, units)),
     )
     return (
         Section(file_name("study", study.name), f"Study {study.name}", "study.html", content),

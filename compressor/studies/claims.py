@@ -208,17 +208,22 @@ class Consistent(NamedTuple):
     claims: tuple[int, ...]
 
 
-def most_consistent(plane: xr.Dataset) -> Consistent:
+def most_consistent(plane: xr.Dataset) -> Consistent | None:
     """Return the machine around which the least margin, at its neighbours too, is greatest.
 
     Claims 1 and 2, which do not depend on masses, are left aside, and so are claims that hold at no
-    machine. Machines at the plane's edge are not chosen.
+    machine. Machines at the plane's edge are not chosen, nor any that has no verdict or a neighbour
+    without: None where that leaves none.
     """
     held = (plane["margin"] >= 0.0).any([ROD, RECIPROCATING])
     claims = tuple(claim for claim in CLAIMS[2:] if held.sel(claim=claim))
-    margin = plane["margin"].sel(claim=[*claims]).min("claim").fillna(-np.inf)
+    if not claims:
+        return None
+    margin = plane["margin"].sel(claim=[*claims]).min("claim", skipna=False).fillna(-np.inf)
     around = margin.rolling({ROD: 3, RECIPROCATING: 3}, center=True).min().fillna(-np.inf)
     best = around.isel(around.argmax(...))
+    if not np.isfinite(best):
+        return None
     return Consistent(float(best[ROD]), float(best[RECIPROCATING]), float(best), claims)
 
 
@@ -271,8 +276,8 @@ def numbers(found: xr.Dataset) -> list[tuple[str, str]]:
         ("all but claim 7 hold in", f"{held[:, others].all(axis=1).sum()}"),
     ]
     plane = mass_plane(found)
-    if plane is not None:
-        best = most_consistent(plane)
+    best = None if plane is None else most_consistent(plane)
+    if best:
         masses = f"{setting(best.rod_mass)} and {setting(best.reciprocating_mass)} kg"
         names = ", ".join(map(str, best.claims))
         rows.append(("most consistent", f"{masses}: claims {names} by {100 * best.least:.2g} %"))
@@ -287,20 +292,26 @@ BARS = "shares of the variance of a claim's margin by an assumption, with 95 % i
 
 
 def draw(found: xr.Dataset, effects: xr.Dataset | None) -> tuple[PlotlyFigure, str] | None:
-    """Return the figure of machines and a sentence on it; None where they are neither kind.
+    """Return the figure of machines and a sentence on it.
+
+    None where they are neither kind, or nothing is known of them.
 
     A map over both masses, or what decides each claim.
     """
     plane = mass_plane(found)
+    if found["margin"].isnull().all():
+        return None
     if plane is not None:
         return draw_map(plane), MAP
-    return (draw_sensitivity(effects), BARS) if effects is not None else None
+    if effects is None or effects["total_order"].isnull().all():
+        return None
+    return draw_sensitivity(effects), BARS
 
 
 def draw_map(plane: xr.Dataset) -> PlotlyFigure:
     """Return each claim's margin over rod and reciprocating mass, and how many claims hold."""
     drawing, panels = make_grid(2, 4, 5.6, share_x="all", share_y="all")
-    x, y = (midway(plane[name].values) for name in (ROD, RECIPROCATING))
+    x, y = masses = plane[ROD].values, plane[RECIPROCATING].values
     *shown, number, best = drawing.panels
     for claim, panel in zip(OF_MASSES, shown, strict=True):
         margin = plane["margin"].sel(claim=claim).transpose(RECIPROCATING, ROD).values
@@ -312,8 +323,7 @@ def draw_map(plane: xr.Dataset) -> PlotlyFigure:
     number.map(x, y, count.astype(float), palette("cividis", 7), (1.5, 8.5))
     number.title = "how many of eight hold"
     most = int(count.max())
-    best.fill(*rectangle(x, y), fill("#f4f4f4"))
-    masses = plane[ROD].values, plane[RECIPROCATING].values
+    best.fill(*rectangle(midway(x), midway(y)), fill("#f4f4f4"))
     around = contour_area(*masses, (count == most).astype(float), 0.5, 1.5)
     best.fill(*around, fill(BLUE, 0.35, 1.5))
     border(best, plane, count == most, BLUE)

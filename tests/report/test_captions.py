@@ -1,5 +1,7 @@
 """Captions: a fixed sentence, and labelled numbers that are those of the drawn runs."""
 
+import csv
+import io
 import re
 
 import numpy as np
@@ -11,6 +13,7 @@ from compressor.analysis.cycle import Cycle
 from compressor.analysis.runs import CLEARANCES, FAULTS, label
 from compressor.cases.case import Case
 from compressor.report.figures import FIGURES
+from compressor.report.figures.drawing import as_csv
 from compressor.report.figures.job import FILM, draw_analyst, draw_orbits
 from compressor.report.figures.rows import SweptRow, draw_cycles, draw_map
 from compressor.report.figures.table import spell
@@ -153,8 +156,13 @@ def test_captions_of_oiled_joints_speak_of_dry_contact():
     found = draw_map([SweptRow("0.05", modes=angle_modes(full), lubricated=True)], "clearance")
     assert FILM in found.caption
     assert numbers(found)["film alone at the big end"] == [100.0]
+    of_csv = csv.DictReader(io.StringIO(as_csv(found.figure)))
+    assert next(of_csv)["big end: clearance"] == "0.05"  # no number of a row
     for one in (told["modes"], found):
         assert listed(one.figure) == [*OILED_MODES]
+    quarter = angle_modes(full.isel(time=slice(None, None, 4)))  # no sample is no other mode
+    rows = [SweptRow("0.1", modes=quarter, lubricated=True), SweptRow("0.2", problem="failed")]
+    assert numbers(draw_map(rows, "clearance"))["film alone at the big end"] == [100.0]
 
 
 def test_a_chaotic_motion_is_told(paper_runs):

@@ -30,8 +30,8 @@ def drawing():
         panel.rule(RED, y=0.0)
         panel.title = title
         panel.span("x", *ends)
-    edges, z = (np.array([1.0, 2, 4]), np.array([0.0, 1, 2])), np.array([[1, 10], [100, np.nan]])
-    low.map(*edges, z, palette("cividis"), (1.0, 100.0), "peak ({})", "kN", is_log=True,
+    middles, z = (np.array([1.0, 4.0]), np.array([0.0, 1.0])), np.array([[1, 10], [100, np.nan]])
+    low.map(*middles, z, palette("cividis"), (1.0, 100.0), "peak ({})", "kN", is_log=True,
             jobs=("a", "b", "c", "d"))  # fmt: skip
     ends = np.array([[0.1, 0.2], [0.1, 0.1]])
     bars.bars([0.25, 0.75], [0, 1], fill("#000000"), "main effect", errors=ends, thick=0.5)
@@ -106,7 +106,7 @@ def test_axes_read_in_the_unit_that_is_wanted():
     panel.span("y", -29.41995, 29.41995)
     panel.rule(RED, y=9.80665)
     panel.write("inside", 45.0, 0.5, inside="y")
-    image.map(np.arange(3.0), np.arange(2.0), np.array([[1.0, 4.0]]), palette("cividis"),
+    image.map(np.arange(2.0), np.arange(1.0), np.array([[1.0, 4.0]]), palette("cividis"),
               (1.0, 4.0), "force ({})", "N")  # fmt: skip
     figure = drawing.figure()
     curve, cells = figure.data

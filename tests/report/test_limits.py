@@ -54,7 +54,7 @@ def test_limits_in_g_are_limits_in_m_per_s2():
         limits = read_limits(["sensor_peak=0.5,2g"], units)
         assert limits.of(PEAK) == pytest.approx((4.903325, 19.6133))
         assert limits.of(PEAK.read_in("plant")) == pytest.approx((0.5, 2.0))
-        assert words in limits.words[0]
+        assert words in limits.words([PEAK])[0]
 
 
 @pytest.mark.parametrize("units", ["usual", "plant", "si"])

@@ -103,7 +103,8 @@ def test_the_worst_jobs_stand_there_in_the_order_of_clearance(study, worst, monk
 
 
 @pytest.mark.parametrize(("knock", "times", "is_told"), [(0.2, 3, True), (0.3, 3, False),
-                                                         (0.2, 1.5, False)])  # fmt: skip
+                                                         (0.2, 1.5, False),
+                                                         (np.nan, 3, False)])  # fmt: skip
 def test_what_a_sensor_hears_though_nothing_knocks_is_told(study, knock, times, is_told):
     """The page said that it does not knock, and of its sensor nothing."""
     stored, data = study

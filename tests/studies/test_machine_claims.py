@@ -207,3 +207,15 @@ def test_the_most_consistent_machine_has_consistent_neighbours(plane):
     assert (best.rod_mass, best.reciprocating_mass) == (6.0, 11.0)
     assert best.claims == (3, 4, 5, 6, 8)
     assert best.least == pytest.approx(0.1)
+
+
+def test_a_plane_without_verdicts_has_no_most_consistent_machine(plane):
+    """A run that was stopped early ended in an internal error, at its edge in -inf %."""
+    one = plane.copy(deep=True)
+    rods, masses = (plane[name].values for name in (ROD, RECIPROCATING))
+    one["margin"].values[np.isin(rods, (3.0, 6.0)) & (masses == 11.0)] = np.nan  # beside all inner
+    assert most_consistent(mass_plane(one)) is None
+    plane["margin"].values[:] = np.nan
+    assert most_consistent(mass_plane(plane)) is None
+    assert "most consistent" not in dict(numbers(plane))
+    assert draw(plane, None) is None

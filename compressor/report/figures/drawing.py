@@ -9,6 +9,7 @@ import csv
 import io
 import itertools
 import math
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any, Literal, TypeAlias
 
@@ -172,7 +173,7 @@ class Panel:
         ends: tuple[float, float], title: str = "", unit: str = "", is_log: bool = False,
         name: str = "", jobs: Sequence[str] = (), has_scale: bool = True,
     ) -> None:  # fmt: skip
-        """Draw a map of z, shape (rows, columns), over the edges of columns and rows.
+        """Draw a map of z, shape (rows, columns), over the middles of columns and rows.
 
         colors: from the first to the second of `ends`, with steps if there are a few; title, with
         `{}` for the unit: of their scale. On a log scale z becomes its logarithm.
@@ -513,9 +514,9 @@ def as_csv(figure: go.Figure) -> str:
                 continue  # an enlarged view of the same curve
             seen.add(same)
             if (x_title, x.tobytes()) != last:
-                columns.append((f"{where}: {x_title}", texts(x)))
+                columns.append((f"{where}: {x_title}", name_places(x, panel.x)))
                 last = x_title, x.tobytes()
-            columns.append((f"{where}: {y_title}", texts(y)))
+            columns.append((f"{where}: {y_title}", name_places(y, panel.y, figure.layout.meta)))
             columns += [(f"{where}: {name}", texts(values)) for name, values in more]
             if jobs and jobs != last_jobs:
                 columns.append((f"{where}: job", jobs))
@@ -531,7 +532,6 @@ def points(trace: Trace) -> tuple[np.ndarray, np.ndarray, *tuple[tuple[str, np.n
     """Return x and y of a trace's points, and what else is known of them by its name."""
     x, y = np.asarray(trace.x, float), np.asarray(trace.y, float)
     if isinstance(trace, go.Heatmap):
-        x, y = (0.5 * (edges[1:] + edges[:-1]) for edges in (x, y))
         values = trace.z.ravel() if trace.text is None else 10.0 ** trace.z.ravel()
         title = one_line(trace.colorbar.title.text or "") or "value"
         return np.tile(x, y.size), np.repeat(y, x.size), (title, values)
@@ -542,6 +542,20 @@ def points(trace: Trace) -> tuple[np.ndarray, np.ndarray, *tuple[tuple[str, np.n
     if error.array is None:
         return x, y
     return x, y, ("below", error.arrayminus), ("above", error.array)
+
+
+NUMERAL = re.compile(r"[-+−.\deE]+")
+
+
+def name_places(values: np.ndarray, axis: Axis, rows: Sequence[str] | None = None) -> list[str]:
+    """Return places along an axis as text: the names of its rows, or words at its ticks."""
+    named = dict(enumerate(rows or ())) or {
+        place: one_line(word)
+        for place, word in (zip(axis.tickvals, axis.ticktext, strict=True) if axis.ticktext else ())
+        if not NUMERAL.fullmatch(word)
+    }
+    both = zip(values.tolist(), texts(values), strict=True)
+    return [named.get(value, text) for value, text in both]
 
 
 def texts(values: np.ndarray) -> list[str]:

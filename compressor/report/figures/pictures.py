@@ -31,7 +31,17 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import MultipleLocator
 
-from compressor.report.figures.drawing import INCH, ROOM, WAYS, WIDTH, Panel, Trace, Way, panels_of
+from compressor.report.figures.drawing import (
+    INCH,
+    ROOM,
+    WAYS,
+    WIDTH,
+    Panel,
+    Trace,
+    Way,
+    midway,
+    panels_of,
+)
 from compressor.report.figures.style import PIXEL
 
 DPI = 150
@@ -316,7 +326,9 @@ def paint_map(axes: Axes, trace: go.Heatmap) -> None:
     norm = Normalize(trace.zmin, trace.zmax)
     stops = [(float(at), color) for at, color in trace.colorscale]
     colors = LinearSegmentedColormap.from_list("", stops)
-    axes.pcolormesh(trace.x, trace.y, np.ma.masked_invalid(trace.z), norm=norm, cmap=colors,
+    x, y = (midway(np.asarray(at), scale == "log") for at, scale
+            in ((trace.x, axes.get_xscale()), (trace.y, axes.get_yscale())))  # fmt: skip
+    axes.pcolormesh(x, y, np.ma.masked_invalid(trace.z), norm=norm, cmap=colors,
                     rasterized=True, zorder=1.5)  # fmt: skip
     if trace.showscale is not False:
         scale = trace.colorbar

@@ -130,15 +130,14 @@ def start_map(
 ) -> tuple[Drawing, Panel]:  # fmt: skip
     """Return a drawing with a table in colour, a row a value, and the panel of that.
 
-    title: of the rows; x: edges of the table's columns; ends: of the colours, which `name` titles,
+    title: of the rows; x: of the table's columns; ends: of the colours, which `name` titles,
     with `{}` for the unit.
     """
     drawing, panels = make_grid(
         1, 2, height(len(rows)) + 0.9, widths=(3, 1), units=units, share_y="all"
     )
-    image, edges = panels[0, 0], np.arange(len(rows) + 1) - 0.5
-    shown = np.clip(table, *ends)  # nan stays
-    image.map(x, edges, shown, palette("cividis"), ends, name, unit, is_log=True)
+    image, shown = panels[0, 0], np.clip(table, *ends)  # nan stays
+    image.map(x, np.arange(len(rows)), shown, palette("cividis"), ends, name, unit, is_log=True)
     label_rows(image, rows, title)
     return drawing, image
 
@@ -165,8 +164,9 @@ def draw_cycles(rows: Sequence[SweptRow], title: str, units: Units = "usual") ->
     table = np.array([one.degree_peaks if one else np.full(360, np.nan) for one in found])
     top = np.nanmax(table)
     ends = top * 10.0**-CYCLE_DECADES, top
-    drawing, image = start_map(rows, title, np.arange(361.0), table, ends, "|a| ({})", "m/s²",
-                               units)  # fmt: skip
+    drawing, image = start_map(
+        rows, title, np.arange(360) + 0.5, table, ends, "|a| ({})", "m/s²", units
+    )
     corners = [[at for at, _ in one.events] if one else [] for one in found]
     reversals = [one.reversals if one else () for one in found]
     has_cam = any(event.startswith("cam") for one in found if one for _, event in one.events)
@@ -212,7 +212,7 @@ def draw_segments(rows: Sequence[SweptRow], title: str, units: Units = "usual") 
     found = [row.segments for row in rows]
     table = np.array([one.ratio if one else np.full(36, np.nan) for one in found])
     top = max(float(np.nanmax(table)), 1.1)
-    drawing, image = start_map(rows, title, 10.0 * np.arange(37), table, (1.0, top),
+    drawing, image = start_map(rows, title, 10.0 * np.arange(36) + 5.0, table, (1.0, top),
                                "rms over that without clearance", "", units)  # fmt: skip
     for name, shape, color, over in (
         ("over its limit", "square", RED, [o.over_limit if o else None for o in found]),
@@ -281,7 +281,7 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str, units: Units = "usual")
     if top < 1e-9 * np.nanmax(table):  # ideal joints: rounding
         top = np.nanmax(table)
     ends = top * 10.0**-MAP_DECADES, top
-    drawing, image = start_map(rows, title, np.arange(size + 1) + 0.5, table, ends,
+    drawing, image = start_map(rows, title, np.arange(1, size + 1), table, ends,
                                "amplitude of X ({})", "N", units)  # fmt: skip
     image.rule(LineStyle(RED, (4, 1.5)), x=ORDER + 0.5)
     image.x.title = ORDERS_AXIS + f"; dashed: order {ORDER}"
@@ -308,7 +308,8 @@ def draw_map(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> Dr
         drawing.list_area("no series, or no clearance", UNSEEN)
     away, numbers = row_modes_words(rows)[0], []
     for joint, table in modes.items():
-        share = 100.0 * (table == MODES.index("flight")).mean(axis=1)
+        known, away_in = ((table >= 0).sum(axis=1), (table == MODES.index("flight")).sum(axis=1))
+        share = 100.0 * np.divide(away_in, known, out=np.full(len(rows), np.nan), where=known > 0)
         numbers += spell_ends(f"{away} at the {SPOKEN[joint]}", share, rows, "% of the revolution")
     sentence = (
         f"The most frequent contact mode in each degree, {describe_rows(rows, title)}."
@@ -348,7 +349,8 @@ def plot_modes(panel: Panel, table: np.ndarray) -> None:
     known, ends = np.where(table < 0, np.nan, table), (-0.5, len(MODES) - 0.5)
     panel.x.showgrid = panel.y.showgrid = False
     panel.fill(*outline_cells(*edges, table < 0), UNSEEN)
-    panel.map(*edges, known, [*MODE_COLORS.values()], ends, has_scale=False)
+    x, y = (0.5 * (some[1:] + some[:-1]) for some in edges)
+    panel.map(x, y, known, [*MODE_COLORS.values()], ends, has_scale=False)
     if len(table) < 40:
         between = [np.array([[0.0, edge], [360.0, edge]]) for edge in edges[1][1:-1]]
         panel.plot(*join_with_gaps(between), LineStyle("#ffffff", linewidth=0.8))
@@ -359,6 +361,7 @@ def label_rows(panel: Panel, rows: Sequence[SweptRow], title: str) -> None:
     each = -(-len(rows) // MAX_TICKS)
     words = [f"{row.value} ({row.problem})" if row.problem else row.value for row in rows]
     panel.name_ticks("y", words[::each], range(0, len(rows), each))
+    panel.figure.layout.meta = words  # of all rows, for the table
     panel.span("y", -0.5, len(rows) - 0.5)
     panel.y.title, panel.x.showgrid, panel.y.showgrid = title, False, False
 

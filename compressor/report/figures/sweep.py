@@ -88,7 +88,7 @@ def draw_sweep(
 
 def zone_words(shown: Sequence[Measure], limits: Limits) -> str:
     """Return the sentences on zones, if any of the measures has limits; lines are dashed red."""
-    return "".join(f" {text}" for text in limits.words) if any(map(limits.of, shown)) else ""
+    return "".join(f" {text}" for text in limits.words(shown))
 
 
 def draw_grid(

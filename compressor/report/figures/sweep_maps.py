@@ -110,8 +110,8 @@ def plot_map(panel: Panel, cells: Cells, table: np.ndarray, measure: Measure) ->
     x, y = (midway(c, axis.is_log) for c, axis in zip(cells.centres, cells.axes, strict=True))
     panel.fill(*outline_cells(x, y, np.isnan(table)), NOTHING)
     panel.map(
-        x, y, table, palette(COLORS), (low, top), "{}", measure.unit, is_log, measure.title,
-        job_keys(cells.keys),
+        *cells.centres, table, palette(COLORS), (low, top), "{}", measure.unit, is_log,
+        measure.title, job_keys(cells.keys),
     )  # fmt: skip
     if levels:
         lines = contour_lines(*cells.centres, table, levels)

@@ -28,7 +28,9 @@ const collator = new Intl.Collator(undefined, { numeric: true });
 
 function value(row, column) {
   const cell = row.cells[column];
-  return cell === undefined ? "" : cell.dataset.value ?? cell.textContent.trim();
+  if (cell === undefined) return "";
+  const isBare = cell.classList.contains("number") && !("value" in cell.dataset);
+  return isBare ? "" : cell.dataset.value ?? cell.textContent.trim();
 }
 
 function compare(a, b) {
