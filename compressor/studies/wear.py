@@ -382,7 +382,8 @@ def draw_wear(machines: Iterable[WornMachine], title: str = "") -> PlotlyFigure:
     """
     drawing, grid = make_grid(1, 2, 3.6)
     opening, force = grid.flat
-    drawn = [one for one in machines if one.life][:MAX_DRAWN]
+    alive = [one for one in machines if one.life]
+    drawn = alive[:MAX_DRAWN]
     last = 1e-9
     for one, line in zip(drawn, CYCLE, strict=False):
         assert one.stages is not None
@@ -406,5 +407,6 @@ def draw_wear(machines: Iterable[WornMachine], title: str = "") -> PlotlyFigure:
     for panel, letter in zip(grid.flat, "ab", strict=True):
         panel.title = f"({letter})"
         panel.rule(LineStyle(GREY, linewidth=0.5, zorder=0), y=0.0)
-    drawing.title = title
+    some = f"the first {len(drawn)} of {len(alive)} machines" * (len(drawn) < len(alive))
+    drawing.title = ": ".join(filter(None, (title, some)))
     return drawing.figure()

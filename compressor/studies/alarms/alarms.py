@@ -405,7 +405,7 @@ def list_rows(found: xr.Dataset) -> list[tuple[str, ...]]:
         )
     ]
     for joint in found["joint"].values.tolist():
-        greatest = found["clearance"].values[found["worn_joint"].values == joint].max()
+        greatest = found["clearance_high"].values[found["worn_joint"].values == joint].max()
         for level, noise in enumerate(found["noise"].values.tolist()):
             for place in rank_alarms(found, joint, level):
                 one = found.isel(alarm=place, noise=level).sel(joint=joint)
@@ -469,8 +469,8 @@ FILE, FIGURE = "alarms.nc", "alarms.png"
 REMEDY = "compsim alarms STUDY -o the folder writes it again"
 MAX_KINDS = 6  # kinds of alarm that have a line: the first to see wear
 CAPTION = (
-    "Share of windows in which an alarm trips, by clearance, each kind with its best filter; "
-    "dashed: the share from which on it detects."
+    "Share of windows in which an alarm trips, by clearance, at the first level of noise, each "
+    "kind with its best filter; dashed: the share from which on it detects."
 )
 
 

@@ -189,9 +189,13 @@ def split_into_folds(
 
     Where a label has too few machines, whatever is alike, each job stands for itself.
     """
-    few = min(len({*machines[labels == label].tolist()}) for label in np.unique(labels)) < FOLDS
-    groups = np.arange(len(labels)) if few else machines
+    groups = np.arange(len(labels)) if has_few_machines(labels, machines) else machines
     return [*StratifiedGroupKFold(FOLDS).split(labels, labels, groups)]
+
+
+def has_few_machines(labels: np.ndarray, machines: np.ndarray) -> bool:
+    """Return whether any label has fewer machines than there are folds."""
+    return min(len({*machines[labels == one].tolist()}) for one in np.unique(labels)) < FOLDS
 
 
 @dataclass(frozen=True)
@@ -238,7 +242,7 @@ class Identifier:
     """A study made ready to explain records.
 
     joints: those that it knows; right: the share of the study's jobs whose joint is told by those
-    of other machines.
+    of others that stand `apart`: machines, or jobs.
     """
 
     library: Library
@@ -250,6 +254,7 @@ class Identifier:
     clearances: dict[str, Clearance]
     strangeness: Strangeness
     right: float
+    apart: str
 
     @classmethod
     def fit(cls, library: Library) -> "Identifier":
@@ -267,6 +272,7 @@ class Identifier:
         scale = np.maximum(filled.std(axis=0), MIN_SPREAD)
         points = np.clip((filled - middle) / scale, -FARTHEST, FARTHEST)
         folds = split_into_folds(library.joints, library.machines)
+        are_few = has_few_machines(library.joints, library.machines)
         one_hot = (library.joints[:, None] == joints).astype(float)
         scorer, chooser, right = KernelRidge(kernel="rbf", gamma=GAMMA, alpha=ALPHA), None, 1.0
         if len(joints) > 1:
@@ -282,7 +288,7 @@ class Identifier:
                 clearances[joint] = Clearance.fit(points[mine], logs, library.machines[mine])
         return cls(
             library, joints, middle, scale, scorer, chooser, clearances,
-            Strangeness.fit(points, folds), right,
+            Strangeness.fit(points, folds), right, "jobs" if are_few else "machines",
         )  # fmt: skip
 
     def identify(self, row: np.ndarray) -> Identification:
@@ -338,7 +344,7 @@ def list_joints(fitted: Identifier, answer: Identification) -> Iterator[str]:
     left = [joint for joint in ENDS if joint not in fitted.joints]
     facts = {
         "jobs of the study": f"{len(library.keys)} of {library.jobs}",
-        "of these, joint right by those of other machines": f"{fitted.right:.1%}",
+        f"of these, joint right by those of other {fitted.apart}": f"{fitted.right:.1%}",
         "of these, as strange as the record": f"{answer.p_value:.1%}",
         "nearest job": answer.nearest,
         "joints with too few jobs": ", ".join(left) or "none",

@@ -113,7 +113,7 @@ def advise(paid: Sequence[Variant], table: ModelTable, case: Case) -> Iterator[d
             "left_out": left_out[row.name],
             "changes": changes,
             "time_ratio": row.time_ratio,
-            "needed_for": [w for w, size in changes.items() if not abs(size) < promise(case)],
+            "needed_for": [w for w, size in changes.items() if abs(size) >= promise(case)],
             "note": row.note,
         }
 
@@ -275,7 +275,7 @@ def cost_lines(facts: dict[str, Any]) -> Iterator[str]:
     yield f"{solved} of it for the solution (`seconds` in show){rest}"
     if facts["jobs"] > 1:
         by = f"{plural(facts['jobs'])} with {plural(facts['workers'], 'worker')}"
-        yield f"{facts['sweep_seconds']:.2g} s for {by}, if all cost the same"
+        yield f"{short_time(facts['sweep_seconds'])} for {by}, if all cost the same"
 
 
 def short_time(seconds: float) -> str:
@@ -287,6 +287,7 @@ def advice_row(advice: dict[str, Any]) -> tuple[str, ...]:
     """Return how a feature moves peaks and time, and how to leave it out if it is not needed."""
     sizes = advice["changes"].values()
     changes = ("unknown" if math.isnan(size) else percent(size, "+") for size in sizes)
-    why_unknown = advice["note"] if any(map(math.isnan, sizes)) else ""
-    verdict = why_unknown or ("needed" if advice["needed_for"] else advice["left_out"])
+    is_open = any(map(math.isnan, sizes))
+    why = advice["note"] or "not known, as of a chaotic motion"
+    verdict = "needed" if advice["needed_for"] else why if is_open else advice["left_out"]
     return advice["name"], *changes, f"× {advice['time_ratio']:.2g}", verdict

@@ -59,7 +59,7 @@ def test_the_table_has_the_first_alarm_of_each_joint_first(written):
             best["first_clearance"].values[:2], rel=5e-3
         )
         assert np.isinf(best["first_clearance"].values[2])  # of 10 draws a clearance
-        most = best["clearance"].values[found["worn_joint"].values == joint].max()
+        most = best["clearance_high"].values[found["worn_joint"].values == joint].max()
         assert float(last) == pytest.approx(most, rel=5e-3)
 
 

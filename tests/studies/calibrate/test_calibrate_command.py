@@ -103,6 +103,8 @@ def test_a_case_without_a_sensor_and_the_speed_are_refused(fitted, monkeypatch, 
     monkeypatch.chdir(place)
     assert cli.main([*words, "--fit", "machine.speed_rpm=400:500"]) == 2
     assert "machine.speed_rpm is the record's own" in capsys.readouterr().err
+    assert cli.main([*words, "--set", "sensor.low_pass_Hz=1"]) == 2
+    assert "its sensor's band holds no order of" in capsys.readouterr().err
     Path("bare.yaml").write_text('{"load": "gas", "gas": {"switching": "exact"}}')
     again = ["bare.yaml" if word == "machine.yaml" else word for word in words]
     assert cli.main(again[:5] + again[7:]) == 2

@@ -68,7 +68,7 @@ def test_what_changes_less_than_the_promise_can_go(explained):
                                             (float("nan"), "failed: budget_steps")])  # fmt: skip
 def test_a_note_hides_no_known_verdict(size, told):
     """Two worn joints of unlike clearance had `clearance_mm 0.3` in place of `needed`."""
-    needed = [] if abs(size) < 5e-3 else ["force"]
+    needed = ["force"] if abs(size) >= 5e-3 else []
     note = "failed: budget_steps" if size != size else "clearance_mm 0.3"
     row = {"name": "ideal big end", "changes": {"force": size}, "time_ratio": 0.5, "note": note,
            "needed_for": needed, "left_out": "joint: small_end"}  # fmt: skip
