@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from browsing import axe_script, browser, lacking, live, wait_for
+from browsing import axe_script, browser, lacking, live, show, wait_for
 from conftest import store
 
 from compressor.report.report import write_report
@@ -41,9 +41,16 @@ def own(once):
 
 
 @pytest.fixture(scope="module")
-def driver(tmp_path_factory):
-    with browser(tmp_path_factory.mktemp("profile")) as driven:
-        yield driven
+def started(tmp_path_factory):
+    with browser(tmp_path_factory.mktemp("profile")) as driver:
+        yield driver
+
+
+@pytest.fixture
+def driver(started):
+    """A browser that shows a wide, light page."""
+    show(started)
+    return started
 
 
 def opened(driver, folder):
@@ -113,13 +120,13 @@ def test_a_click_on_a_job_tells_of_it(driver, own):
 
 @pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("width", [1400, 800, 360])
-def test_no_width_needs_to_scroll_sideways(page, tmp_path, width, dark):
-    with browser(tmp_path, width, 900, dark) as driven:
-        opened(driven, page)
-        live(driven, "figure-08")
-        assert driven.execute_script("return document.documentElement.scrollWidth") <= width
-        ground = driven.execute_script("return getComputedStyle(document.body).backgroundColor")
-        assert (sum(map(int, re.findall(r"\d+", ground)[:3])) < 200) == dark
+def test_no_width_needs_to_scroll_sideways(driver, page, width, dark):
+    show(driver, width, 900, dark)
+    opened(driver, page)
+    live(driver, "figure-08")
+    assert driver.execute_script("return document.documentElement.scrollWidth") <= width
+    ground = driver.execute_script("return getComputedStyle(document.body).backgroundColor")
+    assert (sum(map(int, re.findall(r"\d+", ground)[:3])) < 200) == dark
 
 
 CUT = """
@@ -145,37 +152,37 @@ return [...document.querySelectorAll(".plot")].flatMap(plot => {
 
 
 @pytest.mark.parametrize("width", [1400, 800, 360])
-def test_no_word_in_a_figure_is_cut_or_covered(page, own, tmp_path, width):
-    with browser(tmp_path, width, 900) as driven:
-        for folder in (own, page):
-            opened(driven, folder)
-            names = "return [...document.querySelectorAll('figure')].map(f => f.id)"
-            for name in driven.execute_script(names):
-                live(driven, name)
-            assert driven.execute_script("return document.querySelectorAll('.ytick').length") > 10
-            assert not (cut := driven.execute_script(CUT)), "\n".join(cut)
-            assert not (covered := driven.execute_script(COVERED)), "\n".join(covered)
+def test_no_word_in_a_figure_is_cut_or_covered(driver, page, own, width):
+    show(driver, width, 900)
+    for folder in (own, page):
+        opened(driver, folder)
+        names = "return [...document.querySelectorAll('figure')].map(f => f.id)"
+        for name in driver.execute_script(names):
+            live(driver, name)
+        assert driver.execute_script("return document.querySelectorAll('.ytick').length") > 10
+        assert not (cut := driver.execute_script(CUT)), "\n".join(cut)
+        assert not (covered := driver.execute_script(COVERED)), "\n".join(covered)
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_axe_finds_no_serious_violation(page, own, tmp_path, dark):
+def test_axe_finds_no_serious_violation(driver, page, own, dark):
     axe = axe_script()
     if not axe:
         pytest.skip("axe-core is not installed (PyPI: axe-playwright-python)")
-    with browser(tmp_path, dark=dark) as driven:
-        for folder in (page, own):
-            opened(driven, folder)
-            live(driven, driven.execute_script("return document.querySelector('figure').id"))
-            driven.execute_script(axe)
-            found = driven.execute_async_script(
-                "const done = arguments[0]; axe.run().then(r => done(r.violations))"
-            )
-            serious = {
-                one["id"]: [node["html"][:120] for node in one["nodes"][:3]]
-                for one in found
-                if one["impact"] in ("serious", "critical")
-            }
-            assert serious == {}
+    show(driver, dark=dark)
+    for folder in (page, own):
+        opened(driver, folder)
+        live(driver, driver.execute_script("return document.querySelector('figure').id"))
+        driver.execute_script(axe)
+        found = driver.execute_async_script(
+            "const done = arguments[0]; axe.run().then(r => done(r.violations))"
+        )
+        serious = {
+            one["id"]: [node["html"][:120] for node in one["nodes"][:3]]
+            for one in found
+            if one["impact"] in ("serious", "critical")
+        }
+        assert serious == {}
 
 
 def test_what_is_printed_are_the_pictures(driver, page):
@@ -187,16 +194,15 @@ def test_what_is_printed_are_the_pictures(driver, page):
     )
     assert driver.execute_script(shown)[0] == "none"
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    assert driver.execute_script(shown) == ["block", "none"]
+
+
+def test_without_scripts_there_are_pictures(driver, page):
+    driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
     try:
-        assert driver.execute_script(shown) == ["block", "none"]
+        driver.get(f"file://{page}/index.html")
+        sizes = [image.size["width"] for image in driver.find_elements("css selector", "img")]
     finally:
-        driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
-
-
-def test_without_scripts_there_are_pictures(page, tmp_path):
-    with browser(tmp_path) as driven:
-        driven.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
-        driven.get(f"file://{page}/index.html")
-        sizes = [image.size["width"] for image in driven.find_elements("css selector", "img")]
-        assert len(sizes) >= 13
-        assert min(sizes) > 500
+        driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+    assert len(sizes) >= 13
+    assert min(sizes) > 500
