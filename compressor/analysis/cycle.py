@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 # what begins at a corner of the load, by the phase that it leads to
 VALVES = ("discharge closes", "suction opens", "suction closes", "discharge opens")
-CAM = ("cam: dwell ends", "cam: dwell begins", "cam: dwell ends", "cam: dwell begins")
+CAM = ("cam: dwell begins", "cam: dwell ends", "cam: dwell begins", "cam: dwell ends")
 
 
 @dataclass(frozen=True)

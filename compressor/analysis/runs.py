@@ -96,11 +96,16 @@ def force_relation(run: "xr.Dataset", joint: str) -> Relation:
 def ideal_motion(run: "xr.Dataset") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return displacement, velocity and acceleration (SI) of the ideal machine.
 
-    (m,) each, at the run's own crank angles.
+    (m,) each, at the run's own crank angles, and at its own crank speed where that varies.
     """
     case = case_of(run)
     lengths = case.machine.crank_radius_mm / 1000, case.machine.rod_length_mm / 1000
-    return exact_motion(run["crank_angle"].values, *lengths, case.omega)
+    x, v, a = exact_motion(run["crank_angle"].values, *lengths, case.omega)
+    if "crank_speed" not in run:
+        return x, v, a
+    speed = run["crank_speed"].values
+    share, gain = speed / case.omega, np.gradient(speed, run["time"].values)
+    return x, v * share, a * share**2 + v / case.omega * gain
 
 
 def case_of(run: "xr.Dataset") -> Case:

@@ -43,14 +43,17 @@ def frame_forces(run: "xr.Dataset") -> dict[str, np.ndarray]:
     case = case_of(run)
     if not (case.needs_mechanism or case.lubricant):
         return signals_of_scene(record_of(run), run)
-    values = case.values()
-    solve = {name: value for name, value in values["solve"].items() if name != "accuracy"}
-    values["solve"] = solve | {"rtol": float(run.attrs["rtol"]), "error_bars": False}
+    values, degrees = case.values(), np.degrees(run["crank_angle"].values)
+    each = round((degrees[-1] - degrees[0]) / (degrees.size - 1), 9)
+    samples = np.rint(degrees / each).astype(int)
+    values["solve"] = {  # of the case as it was run, without what was yet to be found
+        "method": case.solve.method, "rtol": float(run.attrs["rtol"]), "error_bars": False,
+        "max_steps": case.solve.max_steps, "timeout_s": case.solve.timeout_s,
+        "settle_rev": round(float(run.attrs["settle"]) / case.turn, 9),
+        "duration_rev": int(samples[-1]) * each / 360.0, "output_step_deg": each,
+    }  # fmt: skip
     values["output"] = {"keep": "series", "signals": True}
-    again = simulate(Case.from_values(values))
-    return frame_forces(
-        again.isel(time=np.isin(again["crank_angle"].values, run["crank_angle"].values))
-    )
+    return frame_forces(simulate(Case.resolve(values)).isel(time=samples))
 
 
 def whole_revolutions(run: "xr.Dataset") -> "tuple[xr.Dataset, int]":
@@ -82,7 +85,7 @@ def last_revolution(run: "xr.Dataset") -> "tuple[np.ndarray, xr.Dataset]":
 
 
 def healthy_twin(run: "xr.Dataset", sensed: bool = False) -> "xr.Dataset":
-    """Return the run of the same machine with ideal joints, on the run's output grid.
+    """Return the run of the same machine with ideal joints, on the output grid of its own case.
 
     From closed forms, or simulated where a feature leaves none: it may then fail. Without error
     bars; with body and sensor where it is to be `sensed`. Only the run's case is read.
@@ -183,6 +186,8 @@ def evenly(settled: "xr.Dataset", revolutions: int, values: np.ndarray) -> tuple
 
     crank = settled["crank_angle"].values
     a_turn = (crank.size - 1) // revolutions // 2 * 2
+    if not a_turn:
+        raise NoSeriesError("the run has no two samples a revolution (solve.output_step_deg)")
     return resample_angle(crank, values, a_turn)[: revolutions * a_turn], a_turn
 
 
@@ -229,6 +234,7 @@ def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
     angle: of the samples, (m,) degrees; changes of several revolutions, and of a force that
     trembles about zero, are put together where they are nearer than `SAME_TURN_DEGREES`.
     """
+    angle, force = angle[force != 0.0], force[force != 0.0]  # to be free is no change of sign
     at = np.sort(angle[1:][np.diff(np.sign(force)) != 0] % 360.0)
     if not at.size:
         return ()

@@ -30,6 +30,19 @@ def test_forces_are_the_signals_of_the_run(joint, weight, more):
         np.testing.assert_allclose(values, run[name].values, rtol=0, atol=1e-9 * size)
 
 
+@pytest.mark.parametrize("load", ["spring", "gas"])
+def test_an_oiled_machine_is_simulated_again_as_it_was(load):
+    """With `auto` another span was found anew; what a sweep leaves unread was refused."""
+    solve = {"accuracy": "fine", "settle_rev": "auto", "duration_rev": "auto"}
+    values = {"joint": "big_end", "clearance_mm": 0.1, "lubricant": True, "load": load,
+              "spring": {"stiffness_N_per_mm": 30}, "solve": solve}  # fmt: skip
+    run = simulate(Case.resolve({**values, "output": {"signals": True}}))
+    found = frame_forces(run.drop_vars([*SIGNALS]))
+    for name, values in found.items():
+        size = np.abs(run[name].values).max()
+        np.testing.assert_allclose(values, run[name].values, rtol=0, atol=1e-4 * size)
+
+
 def test_whole_revolutions_leave_the_rest():
     run = simulate(Case.from_values({"solve": {**DRAFT, "duration_rev": 3.7}}))
     kept, count = whole_revolutions(run)

@@ -98,6 +98,15 @@ def test_a_force_that_trembles_about_zero_turns_once():
     assert turning_points(angle, trembling) == pytest.approx((0.0, 180.0), abs=2.0)
 
 
+def test_a_journal_that_is_free_for_a_while_turns_once_or_not():
+    """Each end of a flight counted as a change of sign."""
+    angle = np.arange(0.0, 720.0, 0.1)
+    force = np.where((angle % 360.0 > 100.0) & (angle % 360.0 < 140.0), 0.0, 1.0)
+    assert turning_points(angle, force) == ()
+    push = np.where((angle % 360.0 >= 140.0) & (angle % 360.0 < 300.0), -1.0, 1.0)
+    assert turning_points(angle, force * push) == pytest.approx((140.0, 300.0), abs=0.2)
+
+
 def test_turns_about_top_dead_centre_are_one():
     angle = np.arange(0, 1080.0, 0.3)
     at = turning_points(angle, np.sin(np.radians(angle + 0.5 * np.cos(np.radians(angle / 3)))))
