@@ -197,6 +197,7 @@ IN_PLACE_OF = (
     ("gas.clearance_percent.head", "gas.head_clearance_mm"),
     ("machine.balance", "machine.counterweight_kg_mm"),
 )
+MIN_SAMPLES = 4  # of a sensor, in a revolution
 MAX_MOVING_SHARE = 0.1  # the moving parts' share of a body's mass
 MAX_BACK_ACTION = 0.3  # of a force that a body's motion may change at the speed's first two orders
 MAX_REVOLUTIONS_TOLD = 1e9  # revolutions, more than any run has
@@ -437,6 +438,9 @@ def body_rules(case: Case) -> Rules:
         )
     if sensor and sensor.low_pass_Hz is not None and sensor.low_pass_Hz >= sensor.rate_Hz / 2:
         yield "sensor.low_pass_Hz", "must be less than half of rate_Hz"
+    if sensor and (count := sensor.rate_Hz * case.turn) < MIN_SAMPLES:
+        text = f"{sensor.rate_Hz:g} Hz are {count:.3g} samples a revolution, too few: is it in kHz?"
+        yield "sensor.rate_Hz", text
 
 
 def contact_rules(case: Case) -> Rules:
