@@ -1,6 +1,6 @@
 """The mechanics: numbers in, numbers out; only numpy and the one door to numba."""
 
-from compressor.physics.contact import choose_laws, steepest
+from compressor.physics.contact import choose_laws
 from compressor.physics.contact_laws import elastic_form
 from compressor.physics.film import short_film
 from compressor.physics.kinematics import exact_motion

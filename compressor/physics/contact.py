@@ -99,20 +99,6 @@ def friction_coefficient(slip, bristle, p):
     return adams(slip, p)
 
 
-def steepest(p) -> float:
-    """Return the greatest slope of a record's friction coefficient over the slip (s/m)."""
-    law, rise_over = p["friction"], p["stiction_velocity"].item()
-    if law == FrictionLaw.ADAMS:
-        return 1.5 * p["static"].item() / rise_over
-    if law == FrictionLaw.THRELFALL:
-        return 3.0 / SATURATED * p["dynamic"].item() / rise_over
-    if law == FrictionLaw.AMBROSIO:
-        return p["dynamic"].item() * p["per_transition"].item()
-    if law == FrictionLaw.LUGRE:
-        return (p["bristle_damping"] + p["viscous"]).item()
-    return p["dynamic"].item() / rise_over
-
-
 def choose_laws(p, contact: str, restitution: float, friction: str) -> None:
     """Set the laws of a record, or of a dict for one, by their names in small letters; chi by e."""
     law = Law[contact.upper()]

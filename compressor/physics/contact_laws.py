@@ -167,7 +167,7 @@ class Law(IntEnum):
     FLORES = 4
     GONTHIER = 5
     HU_GUO = 6
-    JOHNSON = 7  # of a pin in its bore; these two: cylinder_laws
+    JOHNSON = 7  # of a pin in its bore, as the next
     LIU = 8
 
 

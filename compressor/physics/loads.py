@@ -99,7 +99,7 @@ def begin_stroke(t, deviation, i, phases, p):
 def spring_force(phase, x, v, deviation, deviation_rate, p):
     """Return the spring force (N) between piston and cam follower: Eq. 8-10, the cam closed."""
     late = phase >= COMPRESSION  # compared by size: LLVM makes no vector code of a `switch`
-    if phase & 1:  # the follower dwells
+    if phase & 1:  # the follower moves with the ideal piston; else it dwells
         shortening = deviation + (p.spring_stroke if late else 0.0)
         rate = deviation_rate
     else:

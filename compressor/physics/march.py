@@ -144,7 +144,7 @@ STEPPER = np.dtype(
         ("rtol", "f8"),
         ("settle", "f8"),
         ("contact_step", "f8"),  # s: a step that resolves the contact's own frequency
-        ("deepest", "f8"),  # m: penetration beyond which the run stops
+        ("deepest", "f8", (2,)),  # m: penetration of each joint beyond which the run stops
     ],
     align=True,
 )
@@ -507,7 +507,7 @@ def accept_step(w, z, work, reached, fresh, at_edge, segments):
 @inline_once
 def stop_beyond(w, z, tally, p):
     """Stop a stepper whose motion has left what the model describes."""
-    if tally.deepest > w.deepest:
+    if tally.deepest[0] > w.deepest[0] or tally.deepest[1] > w.deepest[1]:
         w.status = PENETRATION_IMPLAUSIBLE
     elif not is_finite(z):
         w.status = NON_FINITE

@@ -1,8 +1,9 @@
 """Equations of motion of the four scenes, in the joints' eccentricities.
 
-physics/README.md, Scenes and Contact. State y: the eccentricities of the joints with clearance,
-then their rates, then what contacts carry where laws were chosen. Where rod and crosshead are
-follows from the loop over both joints, so that a clearance of a nanometre keeps its digits.
+physics/README.md, Clearance configurations, Contact. State y: the eccentricities of the joints with
+clearance, then their rates, then what contacts carry where laws were chosen. Where rod and
+crosshead are follows from the loop over both joints, so that a clearance of a nanometre keeps its
+digits.
 """
 
 from typing import NamedTuple

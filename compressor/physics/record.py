@@ -15,7 +15,7 @@ SMALL_END = 1
 
 
 class Scene(IntEnum):
-    """Which joints have clearance, hence what is integrated (physics/README.md, Scenes)."""
+    """Which joints have clearance: physics/README.md, Clearance configurations."""
 
     IDEAL = 0
     BIG_END = 1

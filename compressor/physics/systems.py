@@ -60,7 +60,7 @@ def enter_segment(t, y, i, phases, p):
 
 @jit
 def derivative(t, y, phase, p, out):
-    """Write dy/dt into `out`, (n,); phase: of the load, 0 to 3."""
+    """Write dy/dt into `out`, (n,); phase: of the load."""
     write_rates(evaluate(ideal(t, p), y, phase, p), y, p, out)
 
 

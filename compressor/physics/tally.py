@@ -87,7 +87,7 @@ FIELDS = (
     Field("releases", SUM, (2,), "i8"),
     Field("touching", KEPT, (2,), "i8", 1),  # until it is seen apart
     Field("flown", KEPT, (2,), "i8"),  # whether the journal was off its bore since the last contact
-    Field("deepest", KEPT, begin=-math.inf),  # penetration over the whole run
+    Field("deepest", KEPT, (2,), begin=-math.inf),  # penetration over the whole run
     Field("energy", KEPT),  # at the start
     Field("crank_work", KEPT),
     Field("load_work", KEPT),
@@ -263,7 +263,7 @@ def tally_contact(joint, span, nodes, rows, every, gap_fraction, measured, tally
         touching = touches
         if touches:
             flown = 0
-        tally.deepest = max(tally.deepest, depth)
+        tally.deepest[joint] = max(tally.deepest[joint], depth)
     tally.touching[joint], tally.flown[joint] = touching, flown
     if measured:
         known = tally.max_penetration[joint]

@@ -158,32 +158,33 @@ def check_state(p: np.record, state: np.ndarray) -> None:
         raise Stop(Reason.ROD_IMPLAUSIBLE, detail)
 
 
-def greatest_depth(p: Fields) -> tuple[float, str]:
-    """Return the penetration (m) beyond which a run stops, and what that is in words."""
-    names = ("stiffness", "clearance", "pin_radius")
-    each = zip(*(p[name].tolist() for name in names), strict=True)
-    joints = [joint for joint in each if joint[1] > 0.0]
-    tenth = IMPLAUSIBLE * min((pin for *_, pin in joints), default=math.inf)
-    most = min((elastic_form(k, c, p).deepest for k, c, _ in joints), default=math.inf)
-    if most < tenth:
-        return most, "half the clearance, up to which contact.law: johnson holds"
-    return tenth, "a tenth of the pin radius"
+def greatest_depths(p: Fields) -> np.ndarray:
+    """Return each joint's penetration (m, (2,)) beyond which a run stops; inf of an ideal one."""
+    names, found = ("stiffness", "clearance", "pin_radius"), []
+    for k, c, pin in zip(*(p[name].tolist() for name in names), strict=True):
+        most = min(IMPLAUSIBLE * pin, elastic_form(k, c, p).deepest) if c > 0.0 else math.inf
+        found.append(most)
+    return np.array(found)
 
 
 MAX_ENERGY = 100.0  # times the machine's: no motion brings a contact so far, a step too long does
 
 
-def check_depth(depth: float, p: np.record) -> None:
-    """Raise Stop for a penetration (m) beyond `greatest_depth`, by what let it come so far."""
-    most, words = greatest_depth(p)
+def check_depth(depths: np.ndarray, p: np.record) -> None:
+    """Raise Stop for penetrations (m, (2,)) beyond `greatest_depths`, by what let one come so."""
+    limits = greatest_depths(p)
+    joint = int(np.argmax(depths - limits))
+    depth, most = float(depths[joint]), float(limits[joint])
     if depth <= most:
         return
     speed = p["crank_radius"] * p["omega"]
     kinetic = 0.5 * (p["rod_mass"] + p["reciprocating_mass"]) * speed**2
     present = kinetic + 2.0 * p["crank_radius"] * greatest_load(p)
-    joints = zip(p["stiffness"].tolist(), p["clearance"].tolist(), strict=True)
-    needed = min(elastic_form(k, c, p).energy(most) for k, c in joints if c > 0.0)
-    if needed > MAX_ENERGY * present:
+    stiffness, clearance = (float(p[name][joint]) for name in ("stiffness", "clearance"))
+    if elastic_form(stiffness, clearance, p).energy(most) > MAX_ENERGY * present:
         text = "a step went into a contact that is too stiff for it at this tolerance"
         raise Stop(Reason.CONTACT_UNDERRESOLVED, f"{depth * 1e3:.3g} mm: {text}")
+    words = "a tenth of the pin radius"
+    if most < IMPLAUSIBLE * p["pin_radius"][joint]:
+        words = "half the clearance, up to which contact.law: johnson holds"
     raise Stop(Reason.PENETRATION_IMPLAUSIBLE, f"{depth * 1e3:.3g} mm, more than {words}")

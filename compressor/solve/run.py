@@ -41,7 +41,7 @@ from compressor.solve.request import (
     Trajectory,
     check_depth,
     check_state,
-    greatest_depth,
+    greatest_depths,
     overdue,
     revolutions,
     split_segments,
@@ -109,7 +109,7 @@ def march_through(
     length, speed = contact_sizes(request.fields)
     stepper["rtol"], stepper["settle"] = request.rtol, settle
     stepper["contact_step"] = CONTACT_STEP * length / speed
-    stepper["deepest"] = greatest_depth(request.fields)[0]
+    stepper["deepest"] = greatest_depths(request.fields)
     while stepper.status == Status.RUNNING:
         left = request.max_steps - result.steps - result.rejected
         count = ends[0] if ends else result.edge_phases.size
@@ -129,7 +129,7 @@ def march_through(
         if stepper.status == Status.DONE:
             return
         try:
-            check_march(request, stepper, z, float(result.tally.deepest), deadline)
+            check_march(request, stepper, z, result.tally.deepest, deadline)
         except Stop:
             result.stop_time, result.stop_state = float(stepper.t), z[:-FLOWS].copy()
             result.last_steps = read_last_steps(stepper, work)
@@ -154,7 +154,7 @@ def read_last_steps(stepper: np.record, work: WorkArrays) -> list[tuple[float, f
 
 
 def check_march(
-    request: Request, stepper: np.record, z: np.ndarray, deepest: float, deadline: float
+    request: Request, stepper: np.record, z: np.ndarray, deepest: np.ndarray, deadline: float
 ) -> None:
     """Raise Stop where a march has stopped at z, or may go no further."""
     status = Status(int(stepper.status))
@@ -220,14 +220,12 @@ def run_at_tolerance(
 
     `sampled`: on the output grid; steps do not land on it. `state`: the motion at the start in
     place of the case's own. `cuts`, `enough`: as of a `Request`. `sampled_until`: the time (s)
-    behind which there are no samples but the end. A run that stops raises nothing: its `reason`
-    says why.
+    behind which there are no samples of the grid but the end. A run that stops raises nothing: its
+    `reason` says why.
     """
     p, end = record(case), case.duration
-    output, compared = (
-        times[(times <= sampled_until) | (times == end)]
-        for times in (output_times(case, sampled), compared_times(case))
-    )
+    output, compared = output_times(case, sampled), compared_times(case)
+    output = output[(output <= sampled_until) | (output == end)]
     times, has_rod_load = np.union1d(output, compared), case.output.signals
     if is_ideal(case):
         pieces = round(PIECES * (case.rtol / rtol) ** FINER_POWER)

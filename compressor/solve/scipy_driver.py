@@ -86,7 +86,7 @@ class ScipyRun:
         result.stop_time, result.stop_state, result.steps = t, z[:-FLOWS].copy(), result.steps + 1
         row = self.observe(np.array([t]), z[:, None])[0]
         tally_energy(row, np.array(z[-FLOWS:]), result.tally)
-        check_depth(float(row[Column.PENETRATION : Column.NORMAL].max()), self.p)
+        check_depth(row[Column.PENETRATION : Column.NORMAL], self.p)
         check_state(self.p, z)
         most = self.request.max_steps
         if result.steps + result.rejected >= most and t < self.request.times[-1]:
@@ -150,7 +150,7 @@ class ScipyRun:
         for first in range(0, steps.size - 1, STEPS_AT_ONCE):
             part, measured = steps[first : first + STEPS_AT_ONCE + 1], bool(steps[0] >= self.settle)
             rows = tally_steps(self.p, result.tally, part, observe, measured)
-            check_depth(float(result.tally["deepest"]), self.p)
+            check_depth(result.tally["deepest"], self.p)
             if missed := find_missed_contact(self.p, request.rtol, part, rows):
                 result.stop_time, text = missed
                 result.stop_state = dense(result.stop_time)[:-FLOWS]

@@ -41,11 +41,11 @@ def predictability_horizon(
     """Return the time (s) until a motion shifted by 1e-9 of the clearance is 1 % of it away.
 
     At the worse joint, or of the crosshead in a guide with play, at every half degree. inf where
-    the two are close at the end, or joints are ideal; where a run stops before, the time up to
-    there. The case's own method and tolerance do not count: the horizon belongs to the motion.
+    the two are close at the end, or joints are ideal; nan where a run stops before they part. The
+    case's own method and tolerance do not count: the horizon belongs to the motion.
     """
     found = compare_shifted(case, case.duration, rtol, shift, timeout)
-    return math.inf if found.whole else found.time
+    return math.inf if found.whole else found.time if found.parted else math.nan
 
 
 class Parting(NamedTuple):
@@ -321,9 +321,9 @@ def with_settle_rev(case: Case, settle: float, period: int, duration: float | No
     settings = replace(case.solve, settle_rev=settle)
     if duration is not None:
         steps = case.steps * duration * case.turn / case.duration
-        settings = replace(settings, duration_rev=duration, duration_s=None)
-        if settings.output_step_s is None:
-            settings = replace(settings, output_step_deg=360.0 * duration / round(steps))
+        step = 360.0 * duration / round(steps)
+        settings = replace(settings, duration_rev=duration, duration_s=None, output_step_s=None,
+                           output_step_deg=step)  # fmt: skip
     return replace(case, solve=settings)
 
 

@@ -56,13 +56,13 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
             words = search.limit_of(now.trajectory) or now.detail
             return fail(case, best, f"the next run: {words}", now)
         search.count(now.trajectory)
-        best = now
+        best = now if energy_balances(case, now) else before or now
         if not energy_balances(case, now):
             # error bars compare runs: where both lack the same energy they would agree
             unsound += 1
             tighter = next_audit_rtol(rtol, unsound)
             if tighter is None:
-                return fail(case, now, f"at rtol {rtol:.2g}")
+                return fail(case, best, f"at rtol {rtol:.2g}")
             rtol = tighter
             continue
         if not case.wants_bars:

@@ -14,7 +14,6 @@ from compressor.physics.contact import (
     FrictionLaw,
     bristle_rate,
     friction_coefficient,
-    steepest,
     stribeck,
     write_carried_rates,
 )
@@ -52,6 +51,20 @@ def test_the_coefficient_is_odd_and_bounded(law):
         assert settled(-slip, p) == pytest.approx(-mu, rel=1e-12)
         assert 0.0 <= mu <= 0.23 + 1e-12
     assert settled(10.0, p) == pytest.approx(0.15, rel=1e-9)
+
+
+def steepest(p):
+    """The greatest slope of a record's friction coefficient over the slip (s/m), by its formula."""
+    law, rise_over = p["friction"], p["stiction_velocity"].item()
+    if law == FrictionLaw.ADAMS:
+        return 1.5 * p["static"].item() / rise_over
+    if law == FrictionLaw.THRELFALL:
+        return 3.0 / (1.0 - math.exp(-3.0)) * p["dynamic"].item() / rise_over
+    if law == FrictionLaw.AMBROSIO:
+        return p["dynamic"].item() * p["per_transition"].item()
+    if law == FrictionLaw.LUGRE:
+        return (p["bristle_damping"] + p["viscous"]).item()
+    return p["dynamic"].item() / rise_over
 
 
 @laws

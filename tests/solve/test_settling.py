@@ -48,6 +48,31 @@ def test_a_case_settles_where_its_revolutions_agree():
     assert found.key != same.key
 
 
+def test_a_motion_that_settles_late_has_the_numbers_of_its_series():
+    """Without series it ended as an internal error."""
+    late = SLOW | {"machine": {"speed_rpm": 230}}
+    found, with_series = (
+        measure(Case.from_values({**late, "solve": AUTO, "output": {"keep": keep}}))
+        for keep in ("metrics", "series")
+    )
+    assert found.numbers["settled_rev"] == with_series.numbers["settled_rev"] >= 4
+    for name in ("peak_acceleration", "rms_acceleration"):
+        bars = sum(float(one.numbers[f"{name}_error"]) for one in (found, with_series))
+        assert abs(found.numbers[name] - with_series.numbers[name]) <= bars
+
+
+@pytest.mark.parametrize(("solve", "reason"), [
+    ({"duration_s": 0.48, "output_step_s": 1e-4, "settle_rev": "auto"}, "not_settled"),
+    ({"settle_rev": 0.5, "duration_rev": "auto", "output_step_s": 0.004}, ""),
+])  # fmt: skip
+def test_steps_in_seconds_need_not_fit_the_span_that_is_found(solve, reason):
+    """The solver made a case that the rules refuse."""
+    machine = {"speed_rpm": 490 if reason else 600}
+    values = {**(SLOW if reason else PAPER), "machine": machine, "solve": solve}
+    found = measure(Case.from_values(values))
+    assert found.reason == reason, found.attributes
+
+
 @pytest.mark.parametrize("keep", ["metrics", "series"])
 def test_no_run_is_made_twice(keep, monkeypatch):
     """The run that shows where a case settles is its first one; beside it is that of its bars."""
