@@ -40,7 +40,8 @@ def explain(configs, jobs, models, every, folder, as_json, **how) -> int:
     if every and not models:
         raise click.UsageError("--all says what --models varies: add --models")
     if jobs and models:
-        raise click.UsageError("-j is of the sweep's cost, which --models does not estimate")
+        text = "-j is for the estimate of a sweep, which --models does not make: leave out -j"
+        raise click.UsageError(text)
     from compressor.cases import points
     from compressor.store import writable_folder, write_dataset
     from compressor.studies.tradeoff.explain import explain as explain_job

@@ -79,8 +79,9 @@ def follow(config, over, both, log, points, no_exponent, rerun, folder, jobs, qu
             title = title_figure(study.title or study.name, "motion", where)
             screen.print_text(str(write_figure(path, draw_followed(machine, title))))
             drawn += 1
-    if drawn == MAX_DRAWN < data.sizes["job"] and not quiet:
-        screen.say(f"figures are of the first {MAX_DRAWN} of {data.sizes['job']} machines")
+    able = sum((data.isel(job=n)["status"] == "ok").any().item() for n in range(data.sizes["job"]))
+    if drawn < able and not quiet:
+        screen.say(f"figures are of the first {drawn} of {able} machines")
     screen.print_text(str(found.path))
     if not quiet:
         new, seconds = found.total - found.done_before, time.monotonic() - began

@@ -171,9 +171,11 @@ def notes(found: "JobReport") -> Iterator[str]:
         yield "an impact that the film cushions is no dry contact: see knock"
     regime = found.attributes.get("regime")
     if regime == "undecided":
+        is_asked = found.case.solve.horizon is True
+        remedy = "raise solve.max_steps or timeout_s" if is_asked else "ask by solve.horizon: true"
         yield (
             "errors are as large as numbers, and chaos could not be ruled out in the time that was "
-            "spent: ask by solve.horizon: true"
+            f"spent: {remedy}"
         )
     if regime == "chaotic":
         yield "the motion is chaotic: averages may be trusted, single peaks may not"

@@ -175,7 +175,7 @@ def own_figures(stored: Stored, study: StoredStudy, units: Units) -> OwnFigures:
     why = f", but not Figures {numbers}, whose cases are not all there with series" * bool(lacking)
     text = f"The paper's figures and claims are drawn of this machine{why}"
     if not figures:
-        reason = "of whose cases none is there with series" if alike else UNEQUAL
+        reason = "since no figure has all its cases there with series" if alike else UNEQUAL
         text = f"The paper's figures are not drawn of this machine, {reason}"
         return OwnFigures(StudyNote(text, table_anchor(study.name), "Its jobs"), [], [])
     anchor = file_name("figures", study.name)

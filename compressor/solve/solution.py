@@ -62,7 +62,8 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
             unsound += 1
             tighter = next_audit_rtol(rtol, unsound)
             if tighter is None:
-                return fail(case, best, f"at rtol {rtol:.2g}")
+                told = f"the next run's energy does not balance, at rtol {rtol:.2g}"
+                return fail(case, best, told if before else f"at rtol {rtol:.2g}")
             rtol = tighter
             continue
         if not case.wants_bars:

@@ -348,8 +348,8 @@ def calibrate(
     # the highest order that both hold; a job's own count may be one less by rounding
     jobs.highest = min(len(measured.amplitudes), int(corner / measured.speed * (1.0 - 1e-9)))
     if not jobs.highest:
-        rpm = f"{60 * measured.speed:.6g} rpm"
-        raise StudyError(f"{path}: its sensor's band holds no order of {rpm}: raise low_pass_Hz")
+        what = f"its sensor's band holds no order of {60 * measured.speed:.6g} rpm"
+        raise StudyError(f"{path}: {what}: raise sensor.low_pass_Hz")
     starts = np.array(design("lhs", POINTS_A_KEY * len(unknowns), len(unknowns), SEED))
     amplitudes, errors = measured.amplitudes[: jobs.highest], measured.errors[: jobs.highest]
     fit = fit_orders(jobs, amplitudes, errors, starts)

@@ -10,6 +10,7 @@ import contextlib
 import hashlib
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,6 +27,7 @@ COMPILING = (
 )
 # of compiling by two processes, on an idle cloud machine of 2026; by one half as much again
 SECONDS = {"auto": 17, "laws": 20, "features": 34}
+NO_JIT = os.environ.get("NUMBA_DISABLE_JIT", "0").strip() not in ("", "0")
 LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 # what a case has that needs a part: the default forces alone; others; a mechanism with any feature
 KINDS: dict[str, dict[str, Any]] = {
@@ -50,7 +52,12 @@ class Needs(NamedTuple):
 
     @property
     def uncompiled(self) -> "dict[str, Needs]":
-        """Return the needed parts that this machine has not compiled before, as needs of theirs."""
+        """Return the needed parts that this machine has not compiled before, as needs of theirs.
+
+        None where compiling is switched off.
+        """
+        if NO_JIT or os.environ.get("COMPSIM_JIT") == "0":
+            return {}
         found = {m: Needs((m,), ("plain",)) for m in self.methods if "plain" in self.kinds}
         found |= {kind: Needs(self.methods, (kind,)) for kind in self.kinds if kind != "plain"}
         return {part: alone for part, alone in found.items() if not marker(part).exists()}
@@ -101,6 +108,7 @@ def compile_quietly(case: Case) -> None:
     from compressor.solve import compile_parts
 
     settle()
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     with contextlib.suppress(Exception):
         compile_parts(case)
 
@@ -125,11 +133,8 @@ def compile_once(needs: Needs, remark: Callable[[str], None], processes: int = 1
     Part by part: those that are finished when the program is stopped are not compiled again.
     processes: how many may compile. Raises StoreError where machine code cannot be written.
     """
-    if os.environ.get("NUMBA_DISABLE_JIT", "0").strip() not in ("", "0"):
+    if NO_JIT:
         remark("NUMBA_DISABLE_JIT is set: nothing is compiled, and runs take tens of times as long")
-        return
-    if os.environ.get("COMPSIM_JIT") == "0":
-        return
     ahead, processes = needs.uncompiled, min(processes, cores())
     if ahead:
         remark(COMPILING.format(seconds=compile_seconds(needs, processes)))

@@ -89,7 +89,7 @@ MISTAKES = [
     ("identify good.csv --study wear", "good.csv: cannot be read", "time_s,acceleration_m_per_s2"),
     # questions
     ("explain good.yaml --all", "--all says what --models varies: add --models"),
-    ("explain good.yaml --models -j 2", "-j is of the sweep's cost"),
+    ("explain good.yaml --models -j 2", "-j is for the estimate of a sweep"),
     ("tradeoff again/wear.yaml", "again/wear.yaml: a job of wear has no joint with clearance"),
     ("tradeoff good.yaml --set solve.methd=auto", "did you mean solve.method?"),
     ("follow good.yaml", "Missing option '--over'"),

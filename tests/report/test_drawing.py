@@ -163,3 +163,16 @@ def test_lines_of_equal_value_lie_where_a_plane_has_them():
     assert {*x[np.isfinite(x)]} == {0.5, 1.5}
     x, y = contour_area(np.arange(3), np.arange(2), plane, 0.5, 1.5)
     assert (x.min(), x.max(), y.min(), y.max()) == (0.5, 1.5, 0, 1)
+
+
+def test_a_word_that_is_a_number_stands_in_the_table():
+    """Of `solve.settle_rev: [auto, 3]` the second was 1, its place on the axis."""
+    drawing, grid = make_grid(1, 1, 3.0)
+    panel = grid[0, 0]
+    panel.plot([0.0, 1.0], [5.0, 6.0], RED, "a job")
+    panel.name_ticks("x", ["auto", "3"])
+    _, *rows = csv.reader(io.StringIO(as_csv(drawing.figure())))
+    assert [row[0] for row in rows] == ["auto", "3"]
+    panel.name_ticks("x", ["0", "1"], [0.0, 1.0])
+    _, *rows = csv.reader(io.StringIO(as_csv(drawing.figure())))
+    assert [row[0] for row in rows] == ["0", "1"]

@@ -544,7 +544,7 @@ def points(trace: Trace) -> tuple[np.ndarray, np.ndarray, *tuple[tuple[str, np.n
     return x, y, ("below", error.arrayminus), ("above", error.array)
 
 
-NUMERAL = re.compile(r"[-+−.\deE]+")
+NUMERAL = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
 
 def name_places(values: np.ndarray, axis: Axis, rows: Sequence[str] | None = None) -> list[str]:
@@ -552,7 +552,7 @@ def name_places(values: np.ndarray, axis: Axis, rows: Sequence[str] | None = Non
     named = dict(enumerate(rows or ())) or {
         place: one_line(word)
         for place, word in (zip(axis.tickvals, axis.ticktext, strict=True) if axis.ticktext else ())
-        if not NUMERAL.fullmatch(word)
+        if not (NUMERAL.fullmatch(word) and math.isclose(float(word), place, rel_tol=1e-3))
     }
     both = zip(values.tolist(), texts(values), strict=True)
     return [named.get(value, text) for value, text in both]
