@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from compressor.units import Units
 
 MAX_JOBS = 10_000
+EMPTY = "an empty word: is a shell variable not set?"
 
 
 class GivenPath(click.Path):
@@ -20,7 +21,7 @@ class GivenPath(click.Path):
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
         """Return the path. Raises BadParameter."""
         if not os.fspath(value):
-            self.fail("an empty word: is a shell variable not set?", param, ctx)
+            self.fail(EMPTY, param, ctx)
         return super().convert(value, param, ctx)
 
 
@@ -31,7 +32,7 @@ class GivenText(click.ParamType):
 
     def convert(self, value: Any, param: Any, ctx: Any) -> str:
         """Return the text. Raises BadParameter."""
-        return str(value) if value else self.fail("an empty word: is it not set?", param, ctx)
+        return str(value) if value else self.fail(EMPTY, param, ctx)
 
 
 TEXT = GivenText()

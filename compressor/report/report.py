@@ -36,6 +36,7 @@ from compressor.report.figures import FIGURES, pictures
 from compressor.report.figures.drawing import as_csv
 from compressor.report.figures.pictures import draw_all
 from compressor.report.figures.sweep import draw_sweep
+from compressor.report.figures.sweep_data import measures
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.interactive import job_scripts, script, series_name
 from compressor.report.limits import Limits, read_limits
@@ -180,6 +181,9 @@ def build_report(
             left_out[study.name] = f"study {study.name} is left out: {error}"
             warnings.warn(left_out[study.name], CompsimWarning, stacklevel=3)
     own = [study for study in own if study.name not in left_out]
+    for name in limits.by_metric.keys() - {name for one in drawn for name in one.shown}:
+        text = f"no study of this report has {name}: its limits are shown nowhere"
+        warnings.warn(text, CompsimWarning, stacklevel=3)
     chapters = [chapter for one in added for chapter in one.chapters]
     several: list[OwnFigures | DiagnosisContent | DrawnStudy | Chapter]
     several = [*of_own.values(), *faults, *drawn, *chapters]
@@ -223,7 +227,8 @@ def choose_studies(results: Folder, names: Sequence[str]) -> list[StoredStudy]:
 class DrawnStudy(NamedTuple):
     """What the page has of a user's own study.
 
-    jobs: what a click on a job's point shows; cautions: what to know beside what changes most.
+    jobs: what a click on a job's point shows; cautions: what to know beside what changes most;
+    shown: the metrics that its table has.
     """
 
     section: Section
@@ -233,6 +238,7 @@ class DrawnStudy(NamedTuple):
     line: StudyLine
     jobs: JobFacts
     cautions: list[str]
+    shown: set[str]
 
 
 def drawn_study(
@@ -260,6 +266,7 @@ def drawn_study(
                 bool(counts.ok),
             ),
             job_facts(data, keys), motion_cautions(stored, study, data),
+            {one.variable for one in measures(data)},
         )  # fmt: skip
 
 

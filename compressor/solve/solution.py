@@ -56,8 +56,9 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
             words = search.limit_of(now.trajectory) or now.detail
             return fail(case, best, f"the next run: {words}", now)
         search.count(now.trajectory)
-        best = now if energy_balances(case, now) else before or now
-        if not energy_balances(case, now):
+        is_sound = energy_balances(case, now)
+        best = now if is_sound else before or now
+        if not is_sound:
             # error bars compare runs: where both lack the same energy they would agree
             unsound += 1
             tighter = next_audit_rtol(rtol, unsound)

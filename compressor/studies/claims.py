@@ -292,11 +292,9 @@ BARS = "shares of the variance of a claim's margin by an assumption, with 95 % i
 
 
 def draw(found: xr.Dataset, effects: xr.Dataset | None) -> tuple[PlotlyFigure, str] | None:
-    """Return the figure of machines and a sentence on it.
+    """Return the figure of machines and a sentence on it: a map over both masses, or what decides.
 
     None where they are neither kind, or nothing is known of them.
-
-    A map over both masses, or what decides each claim.
     """
     plane = mass_plane(found)
     if found["margin"].isnull().all():

@@ -147,6 +147,7 @@ def test_shards(case_file, capsys):
         ran += int(out.split()[1])
         assert err == ""  # as all is well
     assert ran == 3
+    Path("results/studies/other.json").write_text("{}")  # damage of another study is no matter
     assert cli.main(["run", "two.yaml", "-j", "1"]) == 0
     assert "nothing to do: all 3 jobs" in capsys.readouterr().err
 

@@ -12,7 +12,7 @@ from conftest import store, without_pictures
 
 from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.sweep import draw_sweep
-from compressor.report.figures.sweep_data import MEASURES
+from compressor.report.figures.sweep_data import MEASURES, measures
 from compressor.report.figures.sweep_maps import LIMIT
 from compressor.report.limits import MORE_IS_BETTER, LimitError, read_limits
 from compressor.report.page import measured_cell
@@ -117,6 +117,12 @@ def test_the_page_and_the_curves_show_the_zones(tmp_path, capsys):
     assert lines["sensor peak"] == [float(middle)]
     assert not lines["sensor rms"]
     capsys.readouterr()
+    has = {one.variable for one in measures(study)} | {*MORE_IS_BETTER}
+    lacking = next(one for one in MEASURES if one.variable not in has)
+    with without_pictures():
+        assert cli.main([*report, "--limit", f"{lacking.variable}=3 {lacking.unit}"]) == 0
+    told = f"no study of this report has {lacking.variable}: its limits are shown nowhere"
+    assert told in " ".join(capsys.readouterr().err.split())
     assert cli.main([*report, "--limit", "sensor_peak=3"]) == 2
     assert "write 'sensor_peak=3 m/s²'" in capsys.readouterr().err
     with without_pictures():

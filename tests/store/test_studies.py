@@ -16,6 +16,7 @@ from compressor.store.studies import (
     find_study,
     find_value,
     read_studies,
+    study_paths,
     write_study,
 )
 
@@ -153,3 +154,9 @@ def test_studies_by_name():
 def test_a_value_is_the_nearest_before_a_rounded_one(word, expected):
     near = named("near", {"machine.speed_rpm": (500, 500.001, 500.0015, 500.002, 712.3000001)}, "")
     assert find_value("place", near, f"speed_rpm={word}") == ("machine.speed_rpm", expected)
+
+
+def test_hidden_files_of_other_systems_are_no_studies(tmp_path):
+    (tmp_path / "studies").mkdir()
+    (tmp_path / "studies/._wear.json").write_bytes(b"\0\5\26\7")  # as macOS adds on foreign disks
+    assert study_paths(tmp_path) == []

@@ -359,6 +359,6 @@ def jsonable_answer(record: str, fitted: Identifier, answer: Identification) -> 
     return {
         "record": record, "study": fitted.library.study, "jobs": len(fitted.library.keys),
         "jobs_of_study": fitted.library.jobs, **asdict(answer),
-        "study_joint_right": fitted.right,
+        "study_joint_right": fitted.right, "by_other": fitted.apart,
         "joints": fitted.joints,
     }  # fmt: skip
