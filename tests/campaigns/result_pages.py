@@ -232,7 +232,13 @@ def peers(found):
             ("its wall time / our solver's", "kernel_wall_ratio", 2),
         )
     }  # fmt: skip
-    return table(tools.values(), columns)
+    timed = found["evaluations"]
+    return table(tools.values(), columns) + "\n" + table(
+        [*timed["scenes"], {"scene": "both, oil / dry", **timed["oil"]}],
+        {"one evaluation": lambda row: row["scene"].replace("_", " "),
+         "ours, ns": lambda row: number(1e9 * row["seconds"]),
+         "the other, ns": lambda row: number(1e9 * row["other_seconds"]), "ratio": "ratio"},
+    )  # fmt: skip
 
 
 def tradeoff(found):
