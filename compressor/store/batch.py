@@ -227,8 +227,9 @@ def read_tables(path: Path) -> tuple[np.ndarray, np.ndarray]:
         values, errors = (file[name][()] for name in TABLES)
         labels = read_bytes(file["metric"]).astype(str).tolist()
     count, columns = len(labels), np.full(len(ALL) + 1, -1)
+    # the last place is of labels without a bar, and of those of another version of the program
     columns[[ERRORS.get(label, -1) for label in labels]] = range(count, 2 * count)
-    columns[[VALUES[label] for label in labels]] = range(count)
+    columns[[VALUES.get(label, -1) for label in labels]] = range(count)
     return np.column_stack([values, errors, np.full(len(values), np.nan)]), columns
 
 

@@ -8,7 +8,7 @@ import xarray as xr
 from conftest import flip
 from made_jobs import batches, forget, held, key, made, peaks, plan
 
-from compressor.store import merge, reader
+from compressor.store import batch, merge, reader
 from compressor.store.batch import read_batch, read_outcomes, write_batch
 from compressor.store.files import StoreError
 from compressor.store.merge import merge_batches
@@ -71,6 +71,23 @@ def test_a_more_complete_row_counts_whoever_writes_last(better, worse, merged, t
         merge_all(tmp_path / "both")
         assert len(batches(tmp_path / "both")) == 1
     assert held(read_store(tmp_path / "both")) == held(read_store(tmp_path / "alone"))
+
+
+def test_a_number_of_another_version_is_left_aside(tmp_path, monkeypatch):
+    """It has a metric that this one does not know."""
+    write_batch(tmp_path, [made(1), made(2)])
+    labels = batch.VALUES
+    with monkeypatch.context() as patch:
+        rename = {"peak_contact_force_axis.big_end.x": "peak_velocity"}
+        patch.setattr(batch, "VALUES", {rename.get(n, n): at for n, at in labels.items()})
+        patch.setitem(batch.NUMBERS, "peak_velocity", batch.NUMBERS["peak_acceleration"])
+        write_batch(tmp_path, [made(3)])
+    merge_all(tmp_path)
+    assert peaks(tmp_path) == {1: 1, 2: 2, 3: 3}
+    one, other = read_store(tmp_path).numbers(np.array([1, 2]))["peak_contact_force_axis"]
+    assert one.tolist() == [[2, 2], [3, 4]]
+    assert np.isnan(other[0, 0])
+    assert other.ravel().tolist()[1:] == [2, 3, 4]
 
 
 # ---- merges -------------------------------------------------------------------------------------
