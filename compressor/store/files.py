@@ -15,6 +15,7 @@ from compressor.program import CompsimError, CompsimWarning, did_you_mean
 
 Folder = str | os.PathLike[str]
 
+LEFTOVERS = f"**/.*.{32 * '[0-9a-f]'}.tmp"  # what `publish` calls its files, and nobody else
 LEFTOVER_AGE = 3600.0  # s; a temporary file this old belongs to a writer that died
 
 FREE_SPACE_REMEDY = "free some space there, then run the same command again"
@@ -156,14 +157,13 @@ def sync_folder(folder: Path) -> None:
 
 
 def discard_leftovers(folder: Path) -> None:
-    """Remove the temporary files of writers that died long ago, from the folders in a folder.
+    """Remove the temporary files of writers that died long ago, from all folders in a folder.
 
     Not where a link leads: others may write there. Raises OSError.
     """
-    for path in folder.glob("*/.*.tmp"):
+    for path in folder.glob(LEFTOVERS):  # which follows no link
         with contextlib.suppress(OSError):
-            is_old = time.time() - path.stat().st_mtime > LEFTOVER_AGE
-            if is_old and not path.parent.is_symlink():
+            if time.time() - path.stat().st_mtime > LEFTOVER_AGE:
                 path.unlink()
 
 

@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import random
+import uuid
 
 import pytest
 import xarray as xr
@@ -79,12 +80,17 @@ def test_files_and_folders_are_synced(tmp_path, monkeypatch):
 
 def test_old_leftovers_are_removed_and_young_ones_kept(tmp_path):
     write_batch(tmp_path, [made(1)])
-    old, young = (tmp_path / f"batches/.{name}.h5.1.tmp" for name in ("old", "young"))
-    for path in (old, young):
+    ending = f"{uuid.uuid4().hex}.tmp"
+    names = ("batches/.old.h5", "follow/chains/.old.nc", "batches/.young.h5")
+    old, chain, young = (tmp_path / f"{name}.{ending}" for name in names)
+    other = tmp_path / "batches/.other.1.tmp"  # of another program
+    chain.parent.mkdir(parents=True)
+    for path in (old, chain, young, other):
         path.touch()
-    os.utime(old, (0, 0))
+        if path != young:
+            os.utime(path, (0, 0))
     (tmp_path / "elsewhere").mkdir()
-    beyond = tmp_path / "elsewhere" / ".old.tmp"
+    beyond = tmp_path / "elsewhere" / old.name
     beyond.touch()
     os.utime(beyond, (0, 0))
     (tmp_path / "store").mkdir()
@@ -92,7 +98,8 @@ def test_old_leftovers_are_removed_and_young_ones_kept(tmp_path):
     discard_leftovers(tmp_path / "store")
     assert beyond.exists()
     discard_leftovers(tmp_path)
-    assert [path.exists() for path in (old, young, beyond)] == [False, True, False]
+    there = [path.exists() for path in (old, chain, beyond, young, other)]
+    assert there == [False, False, False, True, True]
     assert read_store(tmp_path).keys() == {key(1)}
 
 

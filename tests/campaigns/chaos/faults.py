@@ -64,7 +64,7 @@ class Campaign:
         if how == "damaged":
             first.write_bytes(first.read_bytes()[:-1])
         elif how == "grown":  # and with many small batches, to be merged
-            first.rename(leftover := first.with_name(f".{first.name}.tmp"))
+            first.rename(leftover := first.with_name(f".{first.name}.{32 * '0'}.tmp"))
             os.utime(leftover, (0, 0))
             for path in others:
                 for outcome in read_outcomes(path):
