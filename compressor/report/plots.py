@@ -173,13 +173,14 @@ def job_figures(
 
 def drawable(stored: Stored, studies: Sequence[StoredStudy], key: str) -> xr.Dataset:
     """Return the job's Dataset with time series; PlotError says what to do where there are none."""
-    status = stored.status(key)
-    if status is None:
+    position = stored.position(key)
+    if position is None:
         files = " ".join(study.case_file for study in studies if key in study.keys)
         raise PlotError(f"job {key} was not run yet: compsim run {files} -r {stored.folder}")
+    status = stored.status_at(position)
     if status.status != "ok":
         cure = remedy(status.reason)
-        raise PlotError(f"job {key} failed: {status.reason}: {status.detail}; {cure}")
+        raise PlotError(f"job {key} failed: {status.reason}: {stored.detail(position)}; {cure}")
     if not status.samples:
         raise PlotError(f"job {key} kept no time series: {KEEP}")
     return stored.job(key)

@@ -176,9 +176,12 @@ def failed_jobs(stored: Stored, data: xr.Dataset) -> list[str]:
     swept = swept_values(data)
     rows = []
     for place in failed[:MAX_DETAILS]:
-        job = stored.status(str(data["key"].values.flat[place]))
+        position = stored.position(str(data["key"].values.flat[place]))
+        text = "gone"
+        if position is not None:
+            text = status_text(stored.status_at(position).reason, stored.detail(position))
         point = [f"{name} {value_cell(values[place]).text}" for name, values in swept.items()]
-        rows.append(f"{', '.join(point)}: {status_text(job.reason, job.detail) if job else 'gone'}")
+        rows.append(f"{', '.join(point)}: {text}")
     if len(failed) > MAX_DETAILS:
         rows.append(f"and {len(failed) - MAX_DETAILS} more")
     return rows

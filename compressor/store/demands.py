@@ -69,10 +69,8 @@ def serving_both(first: Case, second: Case) -> Case:
 class JobStatus:
     """How a stored job ended, and what is kept of it."""
 
-    key: str
     status: str  # ok | failed
     reason: str  # a stable name; empty when ok
-    detail: str
     samples: int  # of the time series; 0 where only metrics are kept
     kept: frozenset[str]
 

@@ -213,7 +213,7 @@ def report_job(folder: Folder, *words: str) -> JobReport:
         again,
         end.status,
         end.reason,
-        end.detail,
+        str(attributes.get("detail", "")),
         os.fspath(stored.batch_of(position)[0]),
         end.samples,
         numbers,

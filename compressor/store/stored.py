@@ -135,13 +135,17 @@ class Stored:
         return None if position is None else self.status_at(position)
 
     def status_at(self, position: int) -> JobStatus:
-        """Return how the job at a position ended."""
-        key, status, reason, kept = (
-            self.columns[name][position].decode() for name in ("job", "status", "reason", "kept")
+        """Return how the job at a position ended; nothing is read of its batch."""
+        status, reason, kept = (
+            self.columns[name][position].decode() for name in ("status", "reason", "kept")
         )
-        detail = "" if status == "ok" else str(self.attributes(position).get("detail", ""))
-        samples = int(self.columns["samples"][position])
-        return JobStatus(key, status, reason, detail, samples, frozenset(kept.split()))
+        return JobStatus(
+            status, reason, int(self.columns["samples"][position]), frozenset(kept.split())
+        )
+
+    def detail(self, position: int) -> str:
+        """Return what is known of a failure beyond its reason."""
+        return str(self.attributes(position).get("detail", ""))
 
     def find_ok(self, key: str, healthy: PerJoint) -> tuple[Case, Outcome] | str:
         """Return the case and outcome of a job that is ok, else why there are none, in a word.

@@ -426,7 +426,8 @@ def find(
                 regime = store.columns["regime"][position].decode()
                 reading = question.goal.read(store.numbers([position])[0], regime)
             else:
-                reading = JobReading(reason=f"the job failed, {end.reason}: {end.detail}")
+                text = f"the job failed, {end.reason}: {store.detail(position)}"
+                reading = JobReading(reason=text)
             found.append(Point(share, value, reading, key, end.status != "ok"))
         return found
 

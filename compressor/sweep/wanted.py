@@ -88,6 +88,6 @@ class RequestedJobs:
             elif ends[position][0] == b"ok":
                 found[key] = JobEnd("ok")
             else:
-                end = stored.status_at(position)
-                found[key] = JobEnd(end.status, end.reason, end.detail)
+                status, reason, _ = ends[position]
+                found[key] = JobEnd(status.decode(), reason.decode(), stored.detail(position))
         return found

@@ -8,6 +8,7 @@ import sys
 from functools import partial
 
 import bad_jobs
+import h5py
 import numpy as np
 import pytest
 from conftest import flip
@@ -157,6 +158,21 @@ def test_damaged_numbers_are_mended_with_series_as_exact_as_they_were(
         again = store.read_job(tmp_path / "out", made[0].cases[0].key)
         assert again.acceleration.identical(job.acceleration)
         assert verify(tmp_path / "out") == []
+
+
+def test_a_damaged_failed_job_is_mended(studies, tmp_path, in_process, monkeypatch):
+    """It was an error, since why the job failed is read from what is damaged."""
+    monkeypatch.setattr(netcdf, "MAX_COMPACT", 0)
+    made, out = studies(stuck={**BOTH, "solve": {"max_steps": 5}}), tmp_path / "out"
+    first = sweep(made, out, 1)
+    (path,) = out.glob("batches/*.h5")
+    with h5py.File(path) as file:
+        attributes = file["attributes"][()]
+    flip(path, attributes)
+    again = sweep(made, out, 1)
+    assert (again.run_now, again.failed) == (1, first.failed)
+    assert verify(out) == []
+    assert sweep(made, out, 1).run_now == 0
 
 
 HARM = {  # by load and rod mass: the reason, the detail

@@ -84,7 +84,8 @@ def trial(folder, expected, draw, counts):
     ]
     stored = read_store(folder / "out")
     for key, kind in bad.items():
-        (_, reason, detail), end = KINDS[kind], stored.status(key)
+        (_, reason, detail), position = KINDS[kind], stored.position(key)
+        end = None if position is None else stored.outcome(position)
         if not end or (end.status, end.reason) != ("failed", reason) or detail not in end.detail:
             problems.append(f"{kind}, job {key}: {end}")
         if not re.search(rf": {reason}: .*; job {key}\n", run.text()):
