@@ -150,7 +150,7 @@ def _first_readable(stored: Stored, positions: np.ndarray) -> dict[str, Variable
     """Return the series of the first of some jobs that is not damaged; {} without one, and warn."""
     for position in positions.tolist():
         try:
-            return stored.series(position)
+            return stored.series([position])[0]
         except DamagedFile as error:
             damage = error
     warnings.warn(f"{damage}: no time series can be read", StoreWarning, stacklevel=2)
@@ -175,8 +175,9 @@ class StudySeries(BackendArray):
         positions = np.asarray(self.positions[jobs])
         shape = np.empty(self.longest)[samples].shape
         found = np.full((positions.size, *shape), np.nan)
-        for place, values in self.stored.series_of_jobs(self.name, positions.ravel()):
-            block = np.full(self.longest, np.nan)
-            block[: len(values)] = values
-            found[place] = block[samples]
+        for place, one in enumerate(self.stored.series(positions.ravel(), [self.name])):
+            if self.name in one:
+                values, block = one[self.name].values, np.full(self.longest, np.nan)
+                block[: len(values)] = values
+                found[place] = block[samples]
         return found.reshape((*positions.shape, *shape))

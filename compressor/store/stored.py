@@ -240,35 +240,25 @@ class Stored:
         status, reason = (self.columns[name][position].decode() for name in ("status", "reason"))
         return Outcome(status, reason, self.numbers([position])[0], self.attributes(position))
 
-    def series(self, position: int, names: Sequence[str] | None = None) -> dict[str, Variable]:
-        """Return time series of a job by name, of `names` those that it has."""
-        if not self.columns["samples"][position]:
-            return {}
-
-        def read() -> dict[str, Variable]:
-            path, row = self.batch_of(position)
-            return read_series(path, [row], names)[0]
-
-        return self._read(read)
-
-    def series_of_jobs(self, name: str, positions: np.ndarray) -> list[tuple[int, np.ndarray]]:
-        """Return a time series of each of some jobs that has it, by its place among positions."""
+    def series(
+        self, positions: Any, names: Sequence[str] | None = None
+    ) -> list[dict[str, Variable]]:
+        """Return time series of jobs by name, of `names` those that each has; {} at -1."""
         whole = np.where(self.columns["samples"][positions] > 0, positions, -1)
+        found: list[dict[str, Variable]] = [{} for _ in whole]
 
-        def read() -> list[tuple[int, np.ndarray]]:
-            return [
-                (place, one[name].values)
-                for path, places, rows in self._by_batch(whole)
-                for place, one in zip(places, read_series(path, rows, [name]), strict=True)
-                if name in one
-            ]
+        def fill() -> None:
+            for path, places, rows in self._by_batch(whole):
+                for place, one in zip(places, read_series(path, rows, names), strict=True):
+                    found[place] = one
 
-        return self._read(read)
+        self._read(fill)
+        return found
 
     def values(self, key: str, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return some variables of a stored job's time series."""
         position = self.position(key)
-        found = {} if position is None else self.series(position, names)
+        found = {} if position is None else self.series([position], names)[0]
         return {name: one.values for name, one in found.items()}
 
     def job(self, key: str) -> "xr.Dataset":
@@ -279,7 +269,7 @@ class Stored:
         if position is None:
             raise StoreError(self.folder, f"job {key} is not stored", "run its study first")
         outcome = self.outcome(position)
-        return xr.Dataset(outcome.table(self.series(position)), attrs=outcome.attributes)
+        return xr.Dataset(outcome.table(self.series([position])[0]), attrs=outcome.attributes)
 
 
 def _warn_of(damaged: Sequence[DamagedFile]) -> None:

@@ -80,7 +80,7 @@ def held(stored):
         one = stored.outcome(position)
         series = {
             n: (item.dims, item.values.dtype, item.values.tobytes(), item.attrs)
-            for n, item in stored.series(position).items()
+            for n, item in stored.series([position])[0].items()
         }
         numbers, attributes = one.numbers.tobytes(), repr(one.attributes)
         found[name.decode()] = stored.status_at(position), numbers, attributes, series

@@ -117,7 +117,7 @@ def contents(folder, foreign=()):
         parts = [one.status, one.reason]
         parts += [one.numbers[name].tobytes() for name in one.numbers.dtype.names if name != TIMED]
         parts += [(name, one.attributes[name]) for name in one.attributes if name not in foreign]
-        for name, (dims, values, attrs) in stored.series(position).items():
+        for name, (dims, values, attrs) in stored.series([position])[0].items():
             parts += [name, dims, values.dtype.char, values.tobytes(), attrs]
         found[key.decode()] = hashlib.sha256(repr(parts).encode()).hexdigest()
     return found
