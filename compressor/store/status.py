@@ -7,7 +7,7 @@ aside, so that a run computes them again. There is no index: jobs whose batch is
 
 import os
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -60,16 +60,6 @@ class Damage:
     studies: dict[str, Owners]
     again: tuple[Again, ...]
 
-    @classmethod
-    def of(
-        cls, error: StoreError, keys: Iterable[str], remedy: str, studies: Sequence[StoredStudy]
-    ) -> "Damage":
-        """Return the damage that an error tells of; remedy: where no job is lost."""
-        belong = find_owners(studies, keys)
-        names = {name for owners in belong.values() for name in owners}
-        again = tuple(study.again for study in studies if study.name in names)
-        return cls(Path(error.path), error.problem, "" if belong else remedy, belong, again)
-
 
 def verify(folder: Folder) -> list[Damage]:
     """Return all damage to a store: to batches, studies and the files of studies.
@@ -79,18 +69,26 @@ def verify(folder: Folder) -> list[Damage]:
     place = Path(os.path.abspath(folder))  # as batches have it
     studies: list[StoredStudy] = []
     found: list[Damage] = []
+
+    def note(error: StoreError, keys: Iterable[str], remedy: str) -> None:
+        """Note damage that costs some jobs; remedy: where it costs none."""
+        path, belong = Path(error.path), find_owners(studies, keys)
+        names = {name for owners in belong.values() for name in owners}
+        again = tuple(study.again for study in studies if study.name in names)
+        found.append(Damage(path, error.problem, "" if belong else remedy, belong, again))
+        if path.parent.name == BATCHES:
+            set_aside(path)
+
     for path in study_paths(place):
         try:
             studies.append(read_study(path))
         except StoreError as error:
-            found.append(Damage.of(error, (), "run its case file again", ()))
+            note(error, (), "run its case file again")
     stored = read_store(place)
     paths, source, _ = stored.places
     absent = {key for study in studies for key in study.keys} - stored.keys()
-    found += [  # even their keys cannot be read
-        Damage.of(error, sorted(absent), "delete it: no job needs it", studies)
-        for error in stored.damaged
-    ]
+    for damage in stored.damaged:  # even their keys cannot be read
+        note(damage, sorted(absent), "delete it: no job needs it")
     with refusals(place):
         others = sorted(place.glob("**/*.nc"))
     if not (studies or found or paths or others):
@@ -102,11 +100,7 @@ def verify(folder: Folder) -> list[Damage]:
             pass  # merged with others meanwhile
         except DamagedFile as error:
             keys = [key.decode() for key in stored.columns["job"][source == number]]
-            remedy = "delete it: the command that made it makes it again"
-            found.append(Damage.of(error, keys, remedy, studies))
-    for damage in found:
-        if damage.path.parent.name == BATCHES:
-            set_aside(damage.path)
+            note(error, keys, "delete it: the command that made it makes it again")
     return found
 
 
