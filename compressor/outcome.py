@@ -105,15 +105,19 @@ class Outcome:
             for name, (dims, values, attrs) in variables.items()
         }
 
+    def words(self) -> dict[str, str]:
+        """Return what is said of the job in a word each, by `JOB_WORDS`."""
+        ends = {"status": self.status, "reason": self.reason}
+        return ends | {name: str(self.attributes.get(name, "")) for name in ("promise", "regime")}
+
     def variables(self) -> dict[str, tuple]:
-        """Return the status, reason and numbers as xarray variables: (dims, values, attributes).
+        """Return words and numbers as xarray variables: (dims, values, attributes).
 
         What only some jobs have is absent where it is nan, as statistics of a motion that is not
         chaotic.
         """
         named: dict[str, tuple] = {
-            "status": ((), self.status, {"long_name": "ok or failed"}),
-            "reason": ((), self.reason, {"long_name": "why a run failed, by a stable name"}),
+            name: ((), text, {"long_name": JOB_WORDS[name]}) for name, text in self.words().items()
         }
         for (name, metric), value in zip(NUMBERS.items(), self.numbers.item(), strict=True):
             if metric.is_given(np.asarray(value)):
@@ -121,22 +125,13 @@ class Outcome:
         return named
 
 
-# words on a job, as attributes of its Dataset and as variables, with what they mean
-WORDS = {
+# words on a job, as variables of its Dataset, with what they mean
+JOB_WORDS = {
+    "status": "ok, failed or missing",
+    "reason": "why a run failed",
     "promise": "kept: the accuracy target was reached; none: there is no target",
     "regime": "; ".join(map(regime_words, Regime)),
 }
-
-
-def word_variables(attributes: Mapping[str, Any]) -> dict[str, "Variable"]:
-    """Return the promise and the regime in a job's attributes as variables, as a study has them.
-
-    Files of time series hold them as attributes alone.
-    """
-    return {
-        name: Variable((), np.asarray(str(attributes.get(name, ""))), {"long_name": phrase})
-        for name, phrase in WORDS.items()
-    }
 
 
 def _rebuild_outcome(status: str, reason: str, numbers: bytes, *rest: Any) -> Outcome:

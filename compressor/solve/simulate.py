@@ -7,7 +7,7 @@ import numpy as np
 
 from compressor.cases import MODEL_VERSION, Case, require_case
 from compressor.metrics import SERIES
-from compressor.outcome import Outcome, row, without_run, word_variables
+from compressor.outcome import Outcome, row, without_run
 from compressor.physics import is_featured, state_names
 from compressor.program import PROGRAM, library_versions
 from compressor.reasons import Reason
@@ -56,10 +56,9 @@ def simulate(case: Case) -> "xr.Dataset":
     (('time', 'joint', 'axis'), 'N')
     """
     found, series = observe(require_case(case))
-    variables = found.table(series) | word_variables(found.attributes)
     import xarray as xr  # takes half a second to load, which storing a job spares
 
-    return xr.Dataset(variables, attrs=found.attributes)
+    return xr.Dataset(found.table(series), attrs=found.attributes)
 
 
 def observe(case: Case) -> tuple[Outcome, Variables]:

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from compressor.metrics import AXES, HORIZON, JOINTS, NUMBERS, QUANTILES, SEGMENTS, THRESHOLDS
-from compressor.outcome import ABSCISSAE, ROW, Outcome, Variable, coordinates
+from compressor.outcome import ABSCISSAE, JOB_WORDS, ROW, Outcome, Variable, coordinates
 from compressor.store.files import Folder, publish
 from compressor.store.netcdf import (
     dimensions_of,
@@ -45,10 +45,7 @@ from compressor.store.netcdf import (
 FOLDER, SUFFIX = "batches", ".h5"
 WORDS = {
     "physics_key": "hash of what a job simulates, not how",
-    "status": "ok or failed",
-    "reason": "why a run failed, by a stable name",
-    "promise": "kept: the accuracy target was reached",
-    "regime": "how far the motion is predictable",
+    **JOB_WORDS,
     "kept": "what is kept: bars, horizon, signals, series, these in double precision, compressed",
 }
 LABELS = {
@@ -147,14 +144,8 @@ def _words(outcome: Outcome) -> dict[str, str]:
         "double": series and series.values.dtype.char == "d",
         "compressed": series and outcome.compress,
     }
-    return {
-        "physics_key": str(attributes.get("physics_key", "")),
-        "status": outcome.status,
-        "reason": outcome.reason,
-        "promise": str(attributes.get("promise", "")),
-        "regime": str(attributes.get("regime", "")),
-        "kept": " ".join(name for name, is_kept in kept.items() if is_kept),
-    }
+    text = " ".join(name for name, is_kept in kept.items() if is_kept)
+    return outcome.words() | {"physics_key": str(attributes.get("physics_key", "")), "kept": text}
 
 
 def _join_series(outcomes: Sequence[Outcome]) -> dict[str, Variable]:

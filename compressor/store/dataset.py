@@ -12,7 +12,7 @@ from xarray.core import indexing
 from compressor.cases import points, table, value_of
 from compressor.digits import is_known
 from compressor.metrics import BARRED, NUMBERS, SIZES
-from compressor.outcome import Variable, coordinates, word_variables
+from compressor.outcome import JOB_WORDS, Variable, coordinates
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
 from compressor.store.netcdf import DamagedFile
@@ -20,10 +20,6 @@ from compressor.store.stored import Stored
 from compressor.store.studies import StoredStudy, coordinate_names, swept_column
 
 KEY = {"long_name": "a job's identity"}
-JOB_WORDS = {  # what a missing job has of each, and what it is
-    "status": ("missing", "ok, failed or missing"),
-    "reason": ("", "why a run failed"),
-} | {name: ("", one.attrs["long_name"]) for name, one in word_variables({}).items()}
 
 
 def lay_out(studies: Sequence[StoredStudy]) -> xr.Dataset:
@@ -60,14 +56,10 @@ def label_jobs(layout: xr.Dataset, stored: Stored, with_series: bool = False) ->
     """Return the Dataset of laid out jobs of a store, with their time series if wanted."""
     dims, positions = layout["key"].dims, stored.find(layout["key"].values)
     found = positions[positions >= 0]
-    variables: dict[Any, xr.Variable] = {"key": layout["key"].variable} | {
-        name: xr.Variable(
-            dims,
-            np.append(stored.words(name), otherwise)[positions],  # the last one at -1
-            {"long_name": phrase},
-        )
-        for name, (otherwise, phrase) in JOB_WORDS.items()
-    }
+    variables: dict[Any, xr.Variable] = {"key": layout["key"].variable}
+    for name, phrase in JOB_WORDS.items():
+        words = np.append(stored.words(name), "missing" if name == "status" else "")  # last: at -1
+        variables[name] = xr.Variable(dims, words[positions], {"long_name": phrase})
     if (stored.columns["reason"][found] != Reason.INTERNAL_ERROR.encode()).any():
         given = [name for name in NUMBERS if name in stored.given]
         numbers = stored.numbers(positions, given)

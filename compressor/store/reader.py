@@ -5,7 +5,6 @@ import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from compressor.outcome import word_variables
 from compressor.store.files import Folder, StoreWarning
 from compressor.store.stored import Stored, read_store
 from compressor.store.studies import StoredStudy, find_study, read_studies
@@ -33,8 +32,7 @@ def read_job(folder: Folder, key: str) -> "xr.Dataset":
     >>> run.acceleration.dims, compressor.Case.from_attribute(run.attrs["case"]).joint
     (('time',), 'big_end')
     """
-    run = read_store(folder).job(key)
-    return run.assign(word_variables(run.attrs))
+    return read_store(folder).job(key)
 
 
 def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -> "xr.Dataset":
