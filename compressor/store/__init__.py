@@ -26,7 +26,6 @@ from compressor.store.studies import (
     find_job,
     find_study,
     find_value,
-    healthy_clearance,
     read_studies,
     read_study,
     swept_column,

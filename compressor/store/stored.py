@@ -42,6 +42,8 @@ from compressor.store.netcdf import DamagedFile, check_file
 if TYPE_CHECKING:
     import xarray as xr
 
+    from compressor.store.studies import StoredStudy
+
 ATTEMPTS = 100  # at reading batches that a run merges meanwhile
 Found = TypeVar("Found")
 
@@ -147,10 +149,10 @@ class Stored:
         """Return what is known of a failure beyond its reason."""
         return str(self.attributes(position).get("detail", ""))
 
-    def find_ok(self, key: str, healthy: PerJoint) -> tuple[Case, Outcome] | str:
-        """Return the case and outcome of a job that is ok, else why there are none, in a word.
+    def find_ok(self, key: str, study: "StoredStudy") -> tuple[Case, Outcome] | str:
+        """Return the case and outcome of a study's job that is ok, else in a word why not.
 
-        healthy: the clearance up to which a joint of the case counts as sound.
+        A joint of the case counts as sound by the study: another may have stored the job.
         """
         position = self.position(key)
         if position is None:
@@ -159,7 +161,10 @@ class Stored:
         if outcome.status != "ok":
             return outcome.reason
         case = self.case_at(position)
-        return (replace(case, healthy_clearance_mm=healthy), outcome) if case else "damaged"
+        if case is None:
+            return "damaged"
+        healthy = study.fixed.get("healthy_clearance_mm", {"big_end": 0.0, "small_end": 0.0})
+        return replace(case, healthy_clearance_mm=PerJoint(**healthy)), outcome
 
     # ---- what is read of their batches ----------------------------------------------------------
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from compressor.cases import MODEL_VERSION, PerJoint, Study, phrase_of, points, row_of, values_given
+from compressor.cases import MODEL_VERSION, Axis, Study, phrase_of, points, row_of, values_given
 from compressor.digits import setting
 from compressor.program import VERSION, did_you_mean, library_versions
 from compressor.store.files import (
@@ -36,17 +36,9 @@ from compressor.store.files import (
 if TYPE_CHECKING:
     import numpy as np
 
+DIGEST = b',\n "digest": '  # the last entry of a study, after all that it is made of
 RENAMED = {"joint": "fault"}  # `joint` is a dimension of every dataset
 UNIT_IN_GROUP = ("clearance_mm", "initial_offset_mm")
-
-
-@dataclass(frozen=True)
-class StoredAxis:
-    """One swept key of a stored study, its values in the case file's unit."""
-
-    key: str
-    values: tuple[Any, ...]
-    units: str  # "" for words
 
 
 @dataclass(frozen=True)
@@ -58,7 +50,7 @@ class StoredStudy:
 
     name: str
     case_file: str
-    axes: tuple[StoredAxis, ...]
+    axes: tuple[Axis, ...]  # values in the case file's unit
     keys: tuple[str, ...]
     fixed: dict[str, Any]  # values of the first case, as in a case file
     command: str
@@ -101,8 +93,9 @@ def swept_column(key: str, values: Sequence[Any]) -> tuple["np.ndarray", dict[st
     """
     import numpy as np  # status does without
 
-    attrs = {"long_name": phrase_of(key), "case_key": key}
-    if (unit := _unit(key)) and not any(isinstance(value, str) for value in values):
+    attrs, row = {"long_name": phrase_of(key), "case_key": key}, row_of(key)
+    unit = (row.unit or "1") if row and row.kind in ("number", "integer") else ""
+    if unit and not any(isinstance(value, str) for value in values):
         return np.array([math.nan if v is None else v for v in values]), attrs | {"units": unit}
     return np.array([in_words(value) for value in values], "U"), attrs
 
@@ -125,16 +118,6 @@ def coordinate_names(keys: Sequence[str]) -> dict[str, str]:
     }
 
 
-def healthy_clearance(study: StoredStudy) -> PerJoint:
-    """Return the clearance up to which a joint counts as sound, by the study.
-
-    Its jobs have no say: a job may have been stored by another study, which holds another
-    clearance to be healthy.
-    """
-    given = study.fixed.get("healthy_clearance_mm")
-    return PerJoint(**given) if given else PerJoint(0.0, 0.0)
-
-
 def write_study(
     folder: Folder, study: "Study", command: str = "", overrides: Sequence[str] = ()
 ) -> None:
@@ -145,7 +128,7 @@ def write_study(
     new = StoredStudy(
         study.name,
         os.path.abspath(study.path),
-        tuple(StoredAxis(axis.key, tuple(axis.values), _unit(axis.key)) for axis in study.axes),
+        study.axes,
         study.keys,
         study.cases[0].values(),
         command,
@@ -171,12 +154,15 @@ def write_study(
 
 
 def encode(study: StoredStudy) -> bytes:
-    """Return the text of a study's file; its last entry is the digest of what stands before it."""
+    """Return the text of a study's file."""
     plain = vars(study) | {"axes": [vars(axis) for axis in study.axes]}
-    text = json.dumps(plain, indent=1)
-    head = text.removesuffix("\n}").encode()
+    return seal(json.dumps(plain, indent=1).removesuffix("\n}").encode())
+
+
+def seal(head: bytes) -> bytes:
+    """Return a study's file, whose last entry is the digest of what stands before it."""
     digest = hashlib.blake2b(head, digest_size=10).hexdigest()
-    return head + f',\n "digest": "{digest}"\n}}\n'.encode()
+    return head + DIGEST + f'"{digest}"\n}}\n'.encode()
 
 
 def study_paths(folder: Folder) -> list[Path]:
@@ -200,12 +186,11 @@ def read_study(path: Path) -> StoredStudy:
         data = path.read_bytes()
         plain = json.loads(data)
         del plain["digest"]
-        axes = (StoredAxis(a["key"], _frozen(a["values"]), a["units"]) for a in plain["axes"])
+        axes = (Axis(a["key"], _frozen(a["values"])) for a in plain["axes"])
         more = {"axes": tuple(axes), "keys": tuple(plain["keys"])}
         more |= {name: tuple(plain[name]) for name in ("given", "overrides")}
         study = StoredStudy(**plain | more)
-        # a sound file is what would be written of it again, its digest included
-        if encode(study) != data or study.name != path.stem:
+        if seal(data.partition(DIGEST)[0]) != data or study.name != path.stem:
             raise ValueError
     except FileNotFoundError:
         raise
@@ -220,12 +205,6 @@ def read_study(path: Path) -> StoredStudy:
 def _frozen(values: Sequence[Any]) -> tuple[Any, ...]:
     """Return the values as a case holds them; JSON makes lists of tuples."""
     return tuple(_frozen(value) if isinstance(value, list) else value for value in values)
-
-
-def _unit(key: str) -> str:
-    """Return the unit of a swept key, "" for words."""
-    row = row_of(key)
-    return (row.unit or "1") if row and row.kind in ("number", "integer") else ""
 
 
 AS_PRINTED = 1e-5  # relative; values are shown to six digits
@@ -302,7 +281,7 @@ def whole_key(
     raise WrongName(folder, problem, hint or remedy)
 
 
-def find_axis(folder: Folder, study: StoredStudy, name: str) -> StoredAxis:
+def find_axis(folder: Folder, study: StoredStudy, name: str) -> Axis:
     """Return the axis of a study by its key, or the end of it. Raises WrongName."""
     short = coordinate_names([axis.key for axis in study.axes])
     found = [

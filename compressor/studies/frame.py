@@ -30,7 +30,6 @@ from compressor.store import (
     Folder,
     StoredStudy,
     StoreError,
-    healthy_clearance,
     job_record,
     read_dataset,
     read_store,
@@ -228,11 +227,11 @@ def records(
 
     left: counts the others by reason. A joint counts as sound by the study's healthy clearance.
     """
-    stored, healthy = read_store(folder, warn=True), healthy_clearance(source)
+    stored = read_store(folder, warn=True)
     own = dict(zip(source.keys, points(source), strict=True))
     for key, point in report_progress([*own.items()], progress):
         try:
-            found = stored.find_ok(key, healthy)
+            found = stored.find_ok(key, source)
             record = None if isinstance(found, str) else job_record(stored, key)
         except DamagedFile:
             left["damaged"] += 1

@@ -18,11 +18,12 @@ import numpy as np
 from result_pages import keep, provenance, run_campaign
 
 from compressor.cases.case import Case
+from compressor.cases.study import Axis
 from compressor.store.batch import batch_paths, encode_batch, write_batch
 from compressor.store.merge import merge_batches
 from compressor.store.reader import open_study, read_store
 from compressor.store.status import verify
-from compressor.store.studies import StoredAxis, StoredStudy, encode
+from compressor.store.studies import StoredStudy, encode
 from compressor.sweep.sweep import run_job
 
 WORN = {"joint": "big_end", "clearance_mm": 0.2}
@@ -62,8 +63,8 @@ def plan(folder, jobs):
     """Store the study of the rows: a grid of two axes."""
     many = 100 if jobs % 100 == 0 else 1
     axes = (
-        StoredAxis("machine.speed_rpm", tuple(range(jobs // many)), "rpm"),
-        StoredAxis("machine.rod_mass_kg", tuple(range(many)), "kg"),
+        Axis("machine.speed_rpm", tuple(range(jobs // many))),
+        Axis("machine.rod_mass_kg", tuple(range(many))),
     )
     keys = tuple(map(key, range(jobs)))
     study = StoredStudy("many", "many.yaml", axes, keys, {}, "", {}, "")

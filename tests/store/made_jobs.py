@@ -8,11 +8,12 @@ import numpy as np
 from conftest import keep
 
 from compressor.cases.load import load_studies
+from compressor.cases.study import Axis
 from compressor.outcome import ROW, Outcome
 from compressor.solve.simulate import simulate
 from compressor.store.batch import read_lines, read_tables
 from compressor.store.reader import read_store
-from compressor.store.studies import StoredAxis, StoredStudy, encode, write_study
+from compressor.store.studies import StoredStudy, encode, write_study
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 
@@ -59,7 +60,7 @@ def made(number, value=None, reason="", samples=0, precision="double", **attribu
 
 def plan(folder, count):
     """Store a study `made` of as many made-up jobs, over speeds."""
-    axis = StoredAxis("machine.speed_rpm", tuple(range(300, 300 + count)), "rpm")
+    axis = Axis("machine.speed_rpm", tuple(range(300, 300 + count)))
     keys = tuple(map(key, range(count)))
     one = StoredStudy("made", "made.yaml", (axis,), keys, {}, "", {}, "")
     (folder / "studies").mkdir(parents=True, exist_ok=True)

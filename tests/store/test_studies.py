@@ -6,16 +6,16 @@ import os
 import pytest
 from made_jobs import study
 
-from compressor.cases.study import points
+from compressor.cases.study import Axis, points
 from compressor.store.files import StoreError, WrongName
 from compressor.store.reader import open_study
 from compressor.store.studies import (
-    StoredAxis,
     StoredStudy,
     find_job,
     find_study,
     find_value,
     read_studies,
+    seal,
     study_paths,
     write_study,
 )
@@ -30,11 +30,18 @@ def test_a_study_is_stored_and_found(tmp_path):
     assert (found.name, found.command) == ("speeds", "compsim run speeds.yaml")
     assert found.keys == tuple(case.key for case in one.cases)
     assert (found.again.overrides, found.again.jobs) == (("joint=none",), 4)
-    assert [(axis.key, axis.values, axis.units) for axis in found.axes] == [
-        ("machine.speed_rpm", (300, 500), "rpm"),
-        ("load", ("spring", "none"), ""),
-    ]
+    assert found.axes == (Axis("machine.speed_rpm", (300, 500)), Axis("load", ("spring", "none")))
     assert list(points(found))[1] == {"machine.speed_rpm": 300, "load": "none"}
+
+
+def test_a_study_is_read_whose_axes_have_their_units(tmp_path):
+    """As they had until they were those of a case file."""
+    write_study(tmp_path, study("speeds", machine={"speed_rpm": [300, 500]}))
+    (found,) = read_studies(tmp_path)
+    plain = vars(found) | {"axes": [vars(axis) | {"units": "rpm"} for axis in found.axes]}
+    head = json.dumps(plain, indent=1).removesuffix("\n}").encode()
+    (tmp_path / "studies/speeds.json").write_bytes(seal(head))
+    assert read_studies(tmp_path) == [found]
 
 
 def test_storing_a_study_again_leaves_its_file_alone_and_a_changed_one_takes_its_place(tmp_path):
@@ -83,7 +90,7 @@ def test_a_file_is_no_folder_of_results(name, told, tmp_path):
 
 
 def named(name, axes, keys, is_grid=True):
-    made = tuple(StoredAxis(key, tuple(values), "") for key, values in axes.items())
+    made = tuple(Axis(key, tuple(values)) for key, values in axes.items())
     return StoredStudy(name, f"{name}.yaml", made, tuple(keys), {}, "", {}, "", is_grid)
 
 

@@ -18,7 +18,7 @@ import xarray as xr
 
 from compressor.cases import Case, Sensor
 from compressor.program import PROGRAM, Progress, no_progress
-from compressor.store import Folder, find_study, publish, write_dataset
+from compressor.store import Folder, find_study, publish, swept_column, write_dataset
 from compressor.studies.diagnosis.features import FEATURES, features
 from compressor.studies.frame import RecordedJob, StudyError, cut_windows, no_records, records
 from compressor.vibration import RecordError, noisy
@@ -124,7 +124,11 @@ def make_data_set(
         title=f"compsim: labelled windows of {source.name}", program=PROGRAM, study=source.name,
         case_file=source.case_file, fixed=json.dumps(source.fixed),
         versions=json.dumps(source.versions),
-        axes=json.dumps([[axis.key, axis.units, list_values(axis.values)] for axis in source.axes]),
+        axes=json.dumps([
+            [axis.key, swept_column(axis.key, axis.values)[1].get("units", ""),
+             list_values(axis.values)]
+            for axis in source.axes
+        ]),
         jobs=len({*source.keys}), left_out=json.dumps(+left), revolutions=revolutions,
         hop=hop or revolutions, test_share=test_share, seed=seed,
         clipped_records=sum(share >= Sensor.REPORTED for share in clipped),

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from compressor.cases.study import Axis
 from compressor.metrics import JOINTS, METRICS
 from compressor.report.page import document
 from compressor.store.files import StoreWarning
 from compressor.store.netcdf import write_dataset
-from compressor.store.studies import StoredAxis, StoredStudy
+from compressor.store.studies import StoredStudy
 from compressor.studies.tradeoff.page import (
     add,
     headline,
@@ -23,7 +24,7 @@ from compressor.studies.tradeoff.page import (
     read_models,
 )
 
-AXIS = StoredAxis("clearance_mm", (0.1, 0.2, 0.3), "mm")
+AXIS = Axis("clearance_mm", (0.1, 0.2, 0.3))
 STUDY = StoredStudy("worn", "worn.yaml", (AXIS,), ("0" * 20, "1" * 20, "2" * 20), {}, "", {}, "")
 NAMES = ["the case itself", "softer", "oil", "other law", "broken", "impossible"]
 PEAK = [100.0, 193.0, 34.0, 500.0, math.nan, math.nan]  # m/s2
