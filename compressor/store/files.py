@@ -11,7 +11,7 @@ import uuid
 from collections.abc import Iterator
 from pathlib import Path
 
-from compressor.program import CompsimError, CompsimWarning, did_you_mean
+from compressor.program import CompsimError, CompsimWarning
 
 Folder = str | os.PathLike[str]
 
@@ -165,27 +165,3 @@ def discard_leftovers(folder: Path) -> None:
         with contextlib.suppress(OSError):
             if time.time() - path.stat().st_mtime > LEFTOVER_AGE:
                 path.unlink()
-
-
-def no_results(folder: Folder) -> WrongName:
-    """Return the error about a folder that holds no study of jobs, with what was probably meant."""
-    place = Path(folder)
-    if place.suffix in (".yaml", ".yml") and place.is_file():
-        remedy = f"compsim run {folder} makes one, in results"
-        return WrongName(folder, "is a case file, where a folder of results is needed", remedy)
-    problem = (
-        "is a file, where a folder of results is needed" if place.is_file()
-        else "holds no study" if place.exists()
-        else "there is no such folder of results"
-    )  # fmt: skip
-    near: dict[str, Path] = {}
-    with contextlib.suppress(OSError):
-        beside = (found.parent.name for found in place.absolute().parent.glob("*/studies"))
-        near = {name: place.parent / name for name in beside if name != place.name}
-    other = "choose another folder, or make one: compsim run CONFIG..."
-    return WrongName(folder, problem, did_you_mean(place.name, near, near) or other)
-
-
-def list_few(names: list[str], most: int = 5) -> str:
-    """Return a few names, and whether there are more."""
-    return ", ".join(names[:most]) + (", …" if len(names) > most else "")

@@ -19,7 +19,7 @@ from compressor.cases import Case, points
 from compressor.metrics import NUMBERS
 from compressor.store.batch import FOLDER as BATCHES
 from compressor.store.caveats import job_caveats, study_caveats
-from compressor.store.files import Folder, StoreError, no_results, refusals
+from compressor.store.files import Folder, StoreError, refusals
 from compressor.store.merge import set_aside
 from compressor.store.netcdf import DamagedFile, check_file
 from compressor.store.stored import read_store
@@ -27,6 +27,7 @@ from compressor.store.studies import (
     Again,
     StoredStudy,
     find_job,
+    no_results,
     read_studies,
     read_study,
     study_paths,

@@ -22,16 +22,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from compressor.cases import MODEL_VERSION, Axis, Study, phrase_of, points, row_of, values_given
 from compressor.digits import setting
 from compressor.program import VERSION, did_you_mean, library_versions
-from compressor.store.files import (
-    Folder,
-    StoreError,
-    WrongName,
-    list_few,
-    no_results,
-    publish,
-    refusals,
-    system_error,
-)
+from compressor.store.files import Folder, StoreError, WrongName, publish, refusals, system_error
 
 if TYPE_CHECKING:
     import numpy as np
@@ -170,6 +161,25 @@ def study_paths(folder: Folder) -> list[Path]:
     with refusals(Path(folder)):
         found = Path(folder).glob("studies/*.json")
         return sorted(path for path in found if path.name[0] != ".")  # as some disks add
+
+
+def no_results(folder: Folder) -> WrongName:
+    """Return the error about a folder that holds no study of jobs, with what was probably meant."""
+    place = Path(folder)
+    if place.suffix in (".yaml", ".yml") and place.is_file():
+        remedy = f"compsim run {folder} makes one, in results"
+        return WrongName(folder, "is a case file, where a folder of results is needed", remedy)
+    problem = (
+        "is a file, where a folder of results is needed" if place.is_file()
+        else "holds no study" if place.exists()
+        else "there is no such folder of results"
+    )  # fmt: skip
+    near: dict[str, Path] = {}
+    with contextlib.suppress(OSError):
+        beside = (found.parent.name for found in place.absolute().parent.glob("*/studies"))
+        near = {name: place.parent / name for name in beside if name != place.name}
+    other = "choose another folder, or make one: compsim run CONFIG..."
+    return WrongName(folder, problem, did_you_mean(place.name, near, near) or other)
 
 
 def read_studies(folder: Folder) -> list[StoredStudy]:
@@ -328,3 +338,8 @@ def _name_values(values: Iterable[Any]) -> str:
     """Return a few values of an axis."""
     found = [value for value in dict.fromkeys(values) if value is not None]
     return list_few([setting(one) if isinstance(one, float) else in_words(one) for one in found])
+
+
+def list_few(names: list[str]) -> str:
+    """Return the first five names, and whether there are more."""
+    return ", ".join(names[:5]) + (", …" if len(names) > 5 else "")
