@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.program import PROGRAM, CompsimError
+from compressor.program import PROGRAM
 from compressor.store.files import Folder, WrongName, publish
 from compressor.store.netcdf import encode_dataset
 from compressor.store.sensor_records import NEEDS_SENSOR
@@ -33,12 +33,6 @@ TABLES, RECORDS = (".nc", ".csv"), (".wav", ".mat")  # of all that is known; of 
 HEXADECIMAL = re.compile("[0-9a-f]{1,20}")
 
 
-class ExportError(CompsimError):
-    """A target that an export cannot be written to."""
-
-    exit_code = 2
-
-
 def export(
     folder: Folder, names: Sequence[str], output: Folder, force: bool = False, units: Units = "si"
 ) -> tuple[int, str]:
@@ -46,19 +40,20 @@ def export(
 
     With what a row is. names: of studies, all without; or the beginning of the job's key. output:
     .nc or .csv; or .wav or .mat, for the sensor's record of a job. force: replace what is there;
-    units: of CSV, other files are in SI. Raises ExportError for a file that does not fit, and
+    units: of CSV, other files are in SI. Raises WrongName for a file that does not fit, and
     StoreError where the store or the disk gives way.
     """
     path, stored, known = Path(output), read_store(folder, warn=True), read_studies(folder)
     _check_target(path, force, units)
     keys = {name for name in names if HEXADECIMAL.fullmatch(name)} - {one.name for one in known}
     if keys and len(names) > 1:
-        raise ExportError(f"{path} has studies, or one job: export each job to a file of its own")
+        problem = "has studies, or one job"
+        raise WrongName(path, problem, "export each job to a file of its own")
     if keys:
         key = whole_key(folder, names[0], known, stored.keys())
         rows, what, data = _encode_job(stored, key, path.suffix, units)
     elif path.suffix in RECORDS:
-        raise ExportError(f"{path} is for the sensor's record of one job: name it by its key")
+        raise WrongName(path, "is for the sensor's record of one job", "name it by its key")
     else:
         studies = [find_study(folder, name, known) for name in dict.fromkeys(names)] or known
         rows, what = sum(study.jobs for study in studies), "job"
@@ -68,17 +63,15 @@ def export(
 
 
 def _check_target(path: Path, force: bool, units: Units) -> None:
-    """Raise ExportError where a file may not be written, or not in these units."""
+    """Raise WrongName where a file may not be written, or not in these units."""
     if path.suffix not in (*TABLES, *RECORDS):
         problem = f"no files of the type {path.suffix}" if path.suffix else "no folders"
-        raise ExportError(
-            f"{path}: {problem} are written: end the name in {' or '.join(TABLES)}, or for a job's "
-            f"record in {' or '.join(RECORDS)}"
-        )
+        ends = f"{' or '.join(TABLES)}, or for a job's record in {' or '.join(RECORDS)}"
+        raise WrongName(path, f"{problem} are written", f"end the name in {ends}")
     if units == "plant" and path.suffix != ".csv":
-        raise ExportError(f"{path}: plant units are of CSV alone: leave out --units")
+        raise WrongName(path, "plant units are of CSV alone", "leave out --units")
     if os.path.lexists(path) and not force:
-        raise ExportError(f"{path} exists: --force replaces it")
+        raise WrongName(path, "exists", "--force replaces it")
 
 
 def _encode_studies(

@@ -14,8 +14,8 @@ from conftest import flip, keep
 from compressor.cases.load import load_studies
 from compressor.metrics import METRICS, SIZES
 from compressor.solve.simulate import simulate
-from compressor.store.export import ExportError, export
-from compressor.store.files import StoreError
+from compressor.store.export import export
+from compressor.store.files import StoreError, WrongName
 from compressor.store.reader import open_study, read_job, read_store
 from compressor.store.studies import write_study
 from compressor.vibration.record_files import read_record
@@ -165,19 +165,19 @@ def test_a_record_alone_is_what_analysts_open(suffix, hints, worn, tmp_path, cap
 @pytest.mark.parametrize(
     ("names", "file", "more", "message"),
     [
-        (["grid", "KEY"], "x.nc", {}, "x.nc has studies, or one job: export each job to a file"),
-        (["grid"], "x.wav", {}, "x.wav is for the sensor's record of one job: name it by its key"),
+        (["grid", "KEY"], "x.nc", {}, "x.nc: has studies, or one job; export each job to a file"),
+        (["grid"], "x.wav", {}, "x.wav: is for the sensor's record of one job; name it by its key"),
         (["grid"], "x.nc", {"units": "plant"}, "plant units are of CSV alone"),
-        (["grid"], "x.xls", {}, r"no files of the type .xls are written: end the name in .nc or"),
-        (["grid"], "x", {}, "no folders are written: end the name in .nc or .csv, or for a job's"),
-        (["grid"], "grid.csv", {}, "grid.csv exists: --force replaces it"),
+        (["grid"], "x.xls", {}, r"no files of the type .xls are written; end the name in .nc or"),
+        (["grid"], "x", {}, "no folders are written; end the name in .nc or .csv, or for a job's"),
+        (["grid"], "grid.csv", {}, "grid.csv: exists; --force replaces it"),
     ],
 )
 def test_what_does_not_fit_is_refused(results, names, file, more, message, tmp_path):
     key = open_study(results, "list").key.values[0]
     names = [key if name == "KEY" else name for name in names]
     (tmp_path / "grid.csv").touch()
-    with pytest.raises(ExportError, match=message):
+    with pytest.raises(WrongName, match=message):
         export(results, names, tmp_path / file, **more)
     assert [path.name for path in tmp_path.iterdir()] == ["grid.csv"]
     export(results, ["grid"], tmp_path / "grid.csv", force=True)
