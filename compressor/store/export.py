@@ -21,7 +21,7 @@ import numpy as np
 from compressor.program import PROGRAM
 from compressor.store.files import Folder, WrongName, publish
 from compressor.store.netcdf import encode_dataset
-from compressor.store.sensor_records import NEEDS_SENSOR
+from compressor.store.sensor_records import NEEDS_SENSOR, job_record
 from compressor.store.stored import Stored, read_store
 from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
 from compressor.units import Units, unit_in
@@ -105,17 +105,18 @@ def _encode_job(stored: Stored, key: str, suffix: str, units: Units) -> tuple[in
     if not (samples := int(stored.columns["samples"][position])):
         remedy = "run its case file with --set output.keep=series, or export its study"
         raise WrongName(stored.folder, f"job {key} has no time series", remedy)
-    run = stored.job(key)
-    record = _record(run)
-    if suffix == ".csv":
-        return samples, "sample", encode_csv(columns(run, "time", units) | record)
     if suffix == ".nc":
-        return samples, "sample", encode_dataset(run)
-    from compressor.vibration import encode_record  # loads parts of SciPy
+        return samples, "sample", encode_dataset(stored.job(key))
+    found, record = job_record(stored, key), {}
+    if found:
+        from compressor.vibration import encode_record, record_columns  # loads parts of SciPy
 
-    if not record:
+        record = record_columns(found.times, found.values, found.tacho)
+    if suffix == ".csv":
+        return samples, "sample", encode_csv(columns(stored.job(key), "time", units) | record)
+    if not found:
         raise WrongName(stored.folder, f"job {key} has no sensor's record", NEEDS_SENSOR)
-    return len(next(iter(record.values()))), "sample", encode_record(record, suffix)
+    return len(found.times), "sample", encode_record(record, suffix)
 
 
 def columns(table: "xr.Dataset", dim: str, units: Units = "si") -> dict[str, np.ndarray]:
@@ -140,16 +141,6 @@ def columns(table: "xr.Dataset", dim: str, units: Units = "si") -> dict[str, np.
         for number, labels in enumerate(itertools.product(*inner)):
             found["_".join(map(str, (name, *labels))) + ending] = values[:, number]
     return found
-
-
-def _record(run: "xr.Dataset") -> dict[str, np.ndarray]:
-    """Return the columns of a job's record, as `compsim identify` reads them; nothing without."""
-    if "sensor_time" not in run:
-        return {}
-    from compressor.vibration import record_columns  # loads parts of SciPy
-
-    names = ("sensor_time", "sensor_acceleration", "tacho_time")
-    return record_columns(*(run[name].values for name in names))
 
 
 def encode_csv(table: dict[str, np.ndarray]) -> bytes:

@@ -21,11 +21,11 @@ SERIES = ("sensor_time", "sensor_acceleration", "tacho_time")
 
 def job_record(stored: Stored, key: str) -> "Record | None":
     """Return the sensor's record of a stored job; None where it has none."""
-    from compressor.vibration import Record  # loads parts of SciPy
-
     found = stored.values(key, SERIES)
     if set(found) != set(SERIES):
         return None
+    from compressor.vibration import Record  # loads parts of SciPy
+
     times, values, tacho = (np.asarray(found[name], float) for name in SERIES)
     return Record(times, values, tacho, math.nan)
 
