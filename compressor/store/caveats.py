@@ -5,12 +5,12 @@ records, cases outside the range that the program was judged on, and where jobs 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
-from compressor.cases import Case, CaseError, Sensor, outside_judged, paper_notes, points, value_of
+from compressor.cases import Case, Sensor, outside_judged, paper_notes, points, value_of
 from compressor.outcome import Regime
 from compressor.store.stored import Stored
 from compressor.store.studies import StoredStudy
@@ -37,30 +37,36 @@ def study_caveats(stored: Stored, study: StoredStudy) -> list[str]:
     positions = stored.find(study.keys)
     positions = positions[positions >= 0]
     some = np.linspace(0, positions.size - 1, min(MAX_LOOKED_AT, positions.size)).astype(int)
-    notes: dict[str, str] = {}
-    outside: dict[str, str] = {}
-    for position in positions[some].tolist():
-        if case := stored.case_at(position):
-            notes |= paper_notes(case)
-            outside |= outside_judged(case.values())
-    of_cases = [f"{key}: {text}" for key, text in (*notes.items(), *outside.items())]
-    return [*run_caveats(stored, study), *of_cases, *_of_failures(stored, study)]
+    cases = [case for at in positions[some].tolist() if (case := stored.case_at(at))]
+    return [*run_caveats(stored, study), *_of_cases(cases), *_of_failures(stored, study)]
 
 
 def run_caveats(stored: Stored, study: StoredStudy) -> list[str]:
     """Return the caveats of runs alone: of repetition, and of clipped sensor records."""
-    positions = stored.find(study.keys)
+    fixed = value_of(study.fixed, "solve.settle_rev")
+    begins = [point.get("solve.settle_rev", fixed) for point in points(study)]
+    return _of_runs(stored, stored.find(study.keys), begins)
+
+
+def job_caveats(stored: Stored, position: int) -> list[str]:
+    """Return what to know of a job that is ok beside its numbers, a sentence each."""
+    case = stored.case_at(position)
+    if case is None:
+        return []  # of another version of the program
+    return [*_of_runs(stored, np.array([position]), [case.solve.settle_rev]), *_of_cases([case])]
+
+
+def _of_runs(stored: Stored, positions: np.ndarray, begins: Sequence[Any]) -> list[str]:
+    """Return the caveats of those of some jobs that are ok; begins: solve.settle_rev of each."""
     there = positions >= 0
     there[there] = stored.columns["status"][positions[there]] == b"ok"
     positions = positions[there]
     if not positions.size:
         return []
     numbers = stored.numbers(positions, ("settled_rev", "clipped_fraction"))
-    fixed = value_of(study.fixed, "solve.settle_rev")
-    begins = [point.get("solve.settle_rev", fixed) for point in points(study)]
     begin = np.array([b if isinstance(b, int | float) else math.nan for b in begins], float)[there]
-    regimes, shares = stored.words("regime")[positions], numbers["clipped_fraction"]
-    return describe_runs(regimes, numbers["settled_rev"], begin, shares)
+    regimes = stored.columns["regime"][positions].astype(str)
+    return describe_runs(regimes, numbers["settled_rev"], begin, numbers["clipped_fraction"])
 
 
 def describe_runs(
@@ -86,24 +92,14 @@ def describe_runs(
     ]
 
 
-def job_caveats(numbers: Mapping[str, Any], attributes: Mapping[str, Any]) -> list[str]:
-    """Return what to know of a job that is ok beside its numbers, a sentence each.
-
-    numbers, attributes: as a row of a store has them.
-    """
-    try:
-        case = Case.from_attribute(attributes["case"])
-    except (KeyError, CaseError):
-        return []  # of another version of the program
-    begin = math.nan if case.solve.settle_rev == "auto" else case.solve.settle_rev
-    values = (
-        attributes.get("regime", ""),
-        numbers["settled_rev"],
-        begin,
-        numbers["clipped_fraction"],
-    )
-    of_case = (*paper_notes(case).items(), *outside_judged(case.values()).items())
-    return [*describe_runs(*map(np.atleast_1d, values)), *(f"{k}: {text}" for k, text in of_case)]
+def _of_cases(cases: Iterable[Case]) -> list[str]:
+    """Return what the paper and the judged ranges say of cases, each key once."""
+    notes: dict[str, str] = {}
+    outside: dict[str, str] = {}
+    for case in cases:
+        notes |= paper_notes(case)
+        outside |= outside_judged(case.values())
+    return [f"{key}: {text}" for key, text in (*notes.items(), *outside.items())]
 
 
 def _of_failures(stored: Stored, study: StoredStudy) -> list[str]:

@@ -213,5 +213,5 @@ def report_job(folder: Folder, *words: str) -> JobReport:
         end.samples,
         numbers,
         attributes,
-        job_caveats(numbers, attributes) if end.status == "ok" else [],
+        job_caveats(stored, position) if end.status == "ok" else [],
     )
