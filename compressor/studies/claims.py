@@ -16,6 +16,7 @@ from compressor.analysis import (
     LOADS,
     RULES,
     Margin,
+    NoSeriesError,
     claim_margins,
     label,
     paper_cases,
@@ -50,6 +51,7 @@ from compressor.store import (
     swept_column,
 )
 from compressor.studies.frame import Row, StudyError, rows_dataset
+from compressor.vibration import RecordError
 
 CLAIMS = tuple(range(1, len(RULES) + 1))
 SHORT = (
@@ -137,9 +139,14 @@ def judge_machines(
 def measure(runs: Mapping[str, xr.Dataset], failed: str = "") -> Row:
     """Return the `NUMBERS` and `TEXTS` of one machine's runs by label.
 
-    failed: which cases there are not, and why; margins are nan then.
+    failed: which cases there are not, and why; margins are nan then, and of runs that are too
+    short or too coarse.
     """
-    each, alone = NO_MARGINS if failed else claim_margins(runs)
+    try:
+        each, alone = NO_MARGINS if failed else claim_margins(runs)
+    except (NoSeriesError, RecordError) as error:
+        each, alone = NO_MARGINS
+        failed = str(error)
     shares = [alone[name] for name in SHARES]
     return {
         "margin": [one.value for one in each], "error": [one.error for one in each],

@@ -60,6 +60,9 @@ def stored(once):
         fail = text.replace("output_step_deg: 1", "output_step_deg: 1, max_steps: 50")
         run(folder / "some.yaml", folder, text)
         run(folder / "failing.yaml", folder, fail.replace("[3, 4.7]", "3"))
+        run(folder / "short.yaml", folder, text.replace("duration_rev: 2", "duration_rev: 1.5"))
+        coarse = "output_step_deg: [1, 15]"
+        run(folder / "coarse.yaml", folder, (QUICK + BLOCKS).replace("output_step_deg: 1", coarse))
 
     return once("claims", fill)
 
@@ -85,6 +88,18 @@ def test_a_machine_with_a_failed_case_has_no_margins(stored):
     assert found["failed"].item().startswith("big_end 0.1: budget_steps; big_end 0.2: budget_steps")
     assert np.isnan(found["margin"]).all()
     assert ("without a verdict", "1") in numbers(found)
+
+
+@pytest.mark.compiled
+def test_a_machine_with_too_short_or_too_coarse_series_has_no_margins(stored):
+    short = judge_machines(stored, find_study(stored, "short"))
+    text = "the run has no whole settled revolution (solve.duration_rev)"
+    assert short["failed"].values.tolist() == [text, text]
+    fine, coarse = judge_machines(stored, find_study(stored, "coarse")).transpose("machine", ...)
+    assert fine["failed"] == ""
+    assert "sample more finely" in coarse["failed"].item()
+    assert np.isnan(coarse["margin"]).all()
+    assert not np.isnan(fine["margin"]).any()
 
 
 @pytest.mark.compiled
