@@ -11,7 +11,6 @@ CLEARANCE = 3e-4  # m
 SPEED, CONTACT, FLIGHT = 0.3, 1.037e-3, 3.011e-3  # m/s, s, s: of each bounce
 PEAK, DAMPED = 4000.0, 700.0  # N: of the normal force's first and second sine
 DEPTH = SPEED * CONTACT / np.pi  # m
-LOST = 4.0 / 3.0 * DAMPED * DEPTH  # the first one loses nothing
 TURN = 40.0  # rad/s, of the contact's direction
 
 

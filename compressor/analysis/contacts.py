@@ -135,14 +135,12 @@ def measure_orbit(run: "xr.Dataset", joint: str) -> Orbit:
 
 
 STENCIL = 4  # samples that the journal's path before first touch is a polynomial through
-WORK_SAMPLES = 16  # points a sample step in which force times rate is summed
 COLUMNS: dict[str, type | str] = {  # over impact, SI but for the angle: types
     "joint": f"U{max(map(len, JOINTS))}",
     "time": float,  # of first touch
     "crank_angle": float,  # of first touch, degrees from top dead centre, 0 to 360
     "revolution": int,  # of first touch, the run's first being 1
     "approach_speed": float,  # relative normal speed at first touch
-    "lost_energy": float,  # integral of normal force times penetration rate, less what is stored
 }
 
 
@@ -158,7 +156,6 @@ class Impact:
     crank_angle: float
     revolution: int
     approach_speed: float
-    lost_energy: float
     span: ContactSpan
     follows: int
 
@@ -167,11 +164,8 @@ def impacts(run: "xr.Dataset") -> "xr.Dataset":
     """Return the impacts after settling, by time: `COLUMNS` over the dim `impact`.
 
     An impact is a contact (F_N > 0) that begins after the journal was off its bore, as in
-    `impact_count`; one that lies between two samples is not seen. `lost_energy` is what the contact
-    damping took, the clamp of the force at zero included, since the elastic energy is zero at both
-    ends (physics/README.md, Energy); what a contact still stores where the run's end cuts it off is
-    taken from it. The integral runs over the whole contact, which may go on as following contact.
-    Raises ValueError for a run without time series or clearance.
+    `impact_count`; one that lies between two samples is not seen. Raises ValueError for a run
+    without time series or clearance.
     """
     import xarray as xr
 
@@ -196,14 +190,11 @@ def impacts_of(run: "xr.Dataset", series: ContactSeries) -> list[Impact]:
             continue
         begin, speed = touch(series, span)
         longest = contact.impact_time(contact.impact_depth(mass, speed), speed)
-        lost = contact_work(series, span, begin, release(series, span))
-        if span.last + 1 == series.time.size:  # what is stored elastically is not lost
-            lost -= contact.energy(float(series.depth[-1]))
         turns = np.interp(begin, series.time, series.angle) / (2 * np.pi)
         found.append(
             Impact(
-                series.joint, begin, float(360.0 * (turns % 1.0)), int(turns) + 1, speed, lost,
-                span, following_from(series, span, begin + longest),
+                series.joint, begin, float(360.0 * (turns % 1.0)), int(turns) + 1, speed, span,
+                following_from(series, span, begin + longest),
             )
         )  # fmt: skip
     return found
@@ -236,23 +227,6 @@ def touch(series: ContactSeries, span: ContactSpan) -> tuple[float, float]:
     return float(series.time[first] + at * step), max(0.0, speed)
 
 
-def release(series: ContactSeries, span: ContactSpan) -> float:
-    """Return the time (s) at which the normal force of a contact vanishes: by its last slope.
-
-    Known to a part of a sample step. Of a contact of one sample it is half a step later; of one
-    that the run's end cuts off, the run's end.
-    """
-    last, time, normal = span.last, series.time, series.normal
-    if last + 1 == time.size:
-        return float(time[last])
-    step = time[last + 1] - time[last]
-    fall = normal[last - 1] - normal[last]
-    if last == span.first:
-        return float(time[last] + 0.5 * step)
-    share = normal[last] / fall if fall > 0 else 1.0
-    return float(time[last] + step * min(1.0, share))
-
-
 def following_from(series: ContactSeries, span: ContactSpan, until: float) -> int:
     """Return the first sample of a contact that is no longer impact.
 
@@ -268,33 +242,6 @@ def following_from(series: ContactSeries, span: ContactSpan, until: float) -> in
         if rising.size:
             beyond = span.first + int(falling[0] + rising[0])
     return max(span.first + 1, min(beyond, late))
-
-
-def contact_work(series: ContactSeries, span: ContactSpan, begin: float, end: float) -> float:
-    """Return normal force times penetration rate of a contact, summed from `begin` to `end` (s), J.
-
-    The force is a monotone cubic (Fritsch and Carlson) through the samples in contact and zero at
-    both ends; the journal's path is a cubic spline through them and two samples on either side.
-    """
-    from scipy.interpolate import CubicSpline, PchipInterpolator
-
-    inside = slice(span.first, span.last + 1)
-    time, normal = series.time[inside], series.normal[inside]
-    # an end nearer to a sample would have a slope of rounding alone
-    least = 1e-3 * (series.time[1] - series.time[0])
-    if time[0] - begin > least:
-        time, normal = np.append(begin, time), np.append(0.0, normal)
-    if end - time[-1] > least:
-        time, normal = np.append(time, end), np.append(normal, 0.0)
-    if time.size < 2:
-        return 0.0
-    force = PchipInterpolator(time, normal)
-    around = slice(max(0, span.first - 2), span.last + 3)
-    path = CubicSpline(series.time[around], series.place[around])
-    fine = np.linspace(time[0], time[-1], WORK_SAMPLES * (time.size - 1) + 1)
-    place = path(fine)
-    rate = (place * path(fine, 1)).sum(axis=1) / np.linalg.norm(place, axis=1)
-    return float(np.trapezoid(force(fine) * rate, fine))
 
 
 MODES = ("flight", "impact", "following")

@@ -563,8 +563,7 @@ def draw_impacts(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
         if angle.size:
             fastest = int(np.argmax(speed))
             text = f"{spell(speed[fastest], 'm/s')} at {angle[fastest]:.0f}°"
-            lost = float(mine["lost_energy"].sum())
-            numbers += [("the fastest", text), ("together they lost", spell(lost, "J"))]
+            numbers.append(("the fastest", text))
     if not found.sizes["impact"]:
         panel.write(none, 180, 0.5, inside="y", side="center")
         panel.span("y", 0, 1)
