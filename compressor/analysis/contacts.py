@@ -135,48 +135,34 @@ def measure_orbit(run: "xr.Dataset", joint: str) -> Orbit:
 
 
 STENCIL = 4  # samples that the journal's path before first touch is a polynomial through
-COLUMNS: dict[str, type | str] = {  # over impact, SI but for the angle: types
-    "joint": f"U{max(map(len, JOINTS))}",
-    "time": float,  # of first touch
-    "crank_angle": float,  # of first touch, degrees from top dead centre, 0 to 360
-    "revolution": int,  # of first touch, the run's first being 1
-    "approach_speed": float,  # relative normal speed at first touch
-}
 
 
 @dataclass(frozen=True)
 class Impact:
-    """One impact by the names of `COLUMNS`, with its contact.
+    """One impact with its contact; SI but for the angle.
 
     `follows`: the first sample that is following contact; after `span.last` where there is none.
     """
 
     joint: str
-    time: float
-    crank_angle: float
-    revolution: int
-    approach_speed: float
+    time: float  # of first touch
+    crank_angle: float  # of first touch, degrees from top dead centre, 0 to 360
+    revolution: int  # of first touch, the run's first being 1
+    approach_speed: float  # relative normal speed at first touch
     span: ContactSpan
     follows: int
 
 
-def impacts(run: "xr.Dataset") -> "xr.Dataset":
-    """Return the impacts after settling, by time: `COLUMNS` over the dim `impact`.
+def impacts(run: "xr.Dataset") -> list[Impact]:
+    """Return the impacts after settling, by time.
 
     An impact is a contact (F_N > 0) that begins after the journal was off its bore, as in
     `impact_count`; one that lies between two samples is not seen. Raises ValueError for a run
     without time series or clearance.
     """
-    import xarray as xr
-
-    joints = joints_with_clearance(run)
+    joints, begin = joints_with_clearance(run), run.attrs["settle"] * (1 - 1e-12)
     found = [one for joint in joints for one in impacts_of(run, contact_series(run, joint))]
-    found = [one for one in found if one.time >= run.attrs["settle"] * (1 - 1e-12)]
-    found.sort(key=lambda one: one.time)
-    return xr.Dataset({
-        name: ("impact", np.array([getattr(one, name) for one in found], dtype=kind))
-        for name, kind in COLUMNS.items()
-    })  # fmt: skip
+    return sorted((one for one in found if one.time >= begin), key=lambda one: one.time)
 
 
 def impacts_of(run: "xr.Dataset", series: ContactSeries) -> list[Impact]:

@@ -168,8 +168,11 @@ def find_impacts(run: "xr.Dataset", begin: float) -> dict[str, np.ndarray]:
         joints = joints_with_clearance(run)
     except ValueError:
         return {}
-    found = impacts(run)
-    angle, joint = found["crank_angle"].values, found["joint"].values
-    turn = found["revolution"].values - 1 + angle / 360.0
-    inside = (turn > begin - 1e-9) & (turn < begin + 1)
-    return {one: angle[inside & (joint == one)] for one in joints}
+    found = [
+        one for one in impacts(run)
+        if begin - 1e-9 < one.revolution - 1 + one.crank_angle / 360.0 < begin + 1
+    ]  # fmt: skip
+    return {
+        joint: np.array([one.crank_angle for one in found if one.joint == joint])
+        for joint in joints
+    }

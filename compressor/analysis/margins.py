@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from compressor.analysis.contacts import FOLLOWING, contact_modes, impacts
+from compressor.analysis.contacts import FOLLOWING, Impact, contact_modes, impacts
 from compressor.analysis.runs import settled_part
 from compressor.analysis.shaking import ORDER, evenly, whole_revolutions
 from compressor.solve import average_bar, mean_bar
@@ -188,9 +188,10 @@ class Shares(NamedTuple):
 class Evidence(NamedTuple):
     """What is looked at: whole revolutions of a run, a joint's impacts, its force above `ORDER`."""
 
+    joint: str
     settled: "xr.Dataset"
     revolutions: int
-    table: "xr.Dataset"
+    hits: list[Impact]
     high: np.ndarray  # (m,), N, along the cylinder
 
 
@@ -200,9 +201,9 @@ def evidence(run: "xr.Dataset", joint: str) -> Evidence:
 
     settled, count = whole_revolutions(run)
     force = settled["contact_force"].sel(joint=joint, axis="x").values
-    return Evidence(
-        settled, count, impacts(settled), high_pass_orders(*evenly(settled, count, force), ORDER)
-    )
+    high = high_pass_orders(*evenly(settled, count, force), ORDER)
+    hits = [one for one in impacts(settled) if one.joint == joint]
+    return Evidence(joint, settled, count, hits, high)
 
 
 def continuity(run: "xr.Dataset", joint: str, start_up: bool = False) -> Continuity:
@@ -211,17 +212,17 @@ def continuity(run: "xr.Dataset", joint: str, start_up: bool = False) -> Continu
     `start_up`: over whole revolutions from the run's begin. Raises NoSeriesError where there is
     none, ValueError where the joint has no clearance.
     """
-    return continuity_of(evidence(run.assign_attrs(settle=0.0) if start_up else run, joint), joint)
+    return continuity_of(evidence(run.assign_attrs(settle=0.0) if start_up else run, joint))
 
 
-def continuity_of(found: Evidence, joint: str) -> Continuity:
+def continuity_of(found: Evidence) -> Continuity:
     """Return the `Continuity` of a joint from its evidence."""
     from compressor.vibration import energy_angle, shape
 
-    modes = contact_modes(found.settled)["mode"].sel(joint=joint).values[:-1]
+    modes = contact_modes(found.settled)["mode"].sel(joint=found.joint).values[:-1]
     return Continuity(
         float((modes != FOLLOWING).mean()),
-        hit_share(found.table, joint, found.revolutions),
+        hit_share(found.hits, found.revolutions),
         energy_angle(found.high, ENERGY),
         shape(found.high)[3],
     )
@@ -237,7 +238,7 @@ def measured_shares(run: "xr.Dataset", joint: str) -> Shares:
     chaotic run all come from the scatter of its revolutions. Raises as `continuity`.
     """
     by = evidence(run, joint)
-    found = continuity_of(by, joint)
+    found = continuity_of(by)
     if is_chaotic(run):
 
         def share(name: str) -> "Callable[[xr.Dataset], float]":
@@ -245,22 +246,21 @@ def measured_shares(run: "xr.Dataset", joint: str) -> Shares:
 
         errors = [by_revolution(by.settled, share(name)) for name in Shares._fields]
     else:
-        errors = [apart_error(by, joint), hit_error(by, joint), angle_error(by, joint)]
+        errors = [apart_error(by), hit_error(by), angle_error(by)]
     values = (getattr(found, name) for name in Shares._fields)
     return Shares(*(BarredNumber(*pair) for pair in zip(values, errors, strict=True)))
 
 
-def apart_error(by: Evidence, joint: str) -> float:
+def apart_error(by: Evidence) -> float:
     """Return the error of the share of crank angle in flight or impact."""
-    count = int((by.table["joint"].values == joint).sum())
-    stored_error = float(by.settled["contact_loss_fraction_error"].sel(joint=joint))
-    return stored_error + 2.0 * count / (by.settled.sizes["time"] - 1)
+    stored_error = float(by.settled["contact_loss_fraction_error"].sel(joint=by.joint))
+    return stored_error + 2.0 * len(by.hits) / (by.settled.sizes["time"] - 1)
 
 
-def hit_error(by: Evidence, joint: str) -> float:
+def hit_error(by: Evidence) -> float:
     """Return the error of the share of windows that are hit."""
-    mine = by.table["joint"].values == joint
-    speed, angle = (by.table[name].values[mine] for name in ("approach_speed", "crank_angle"))
+    speed = np.array([one.approach_speed for one in by.hits])
+    angle = np.array([one.crank_angle for one in by.hits])
     doubt = series_error(by.settled, "velocity", by.settled["velocity"].values)
     if math.isnan(doubt):
         return math.nan
@@ -270,12 +270,12 @@ def hit_error(by: Evidence, joint: str) -> float:
     return float(unsure.sum()) * WINDOW / (360.0 * by.revolutions)
 
 
-def angle_error(by: Evidence, joint: str) -> float:
+def angle_error(by: Evidence) -> float:
     """Return the error of the share of crank angle that holds `ENERGY` of the energy."""
     from compressor.vibration import energy_angle
 
-    force = by.settled["contact_force"].sel(joint=joint).values
-    error = series_error(by.settled, "contact_force", force, joint=joint)
+    force = by.settled["contact_force"].sel(joint=by.joint).values
+    error = series_error(by.settled, "contact_force", force, joint=by.joint)
     size = math.sqrt(float(np.mean(by.high**2)))
     if math.isnan(error) or not size:
         return error
@@ -295,8 +295,8 @@ def compare_continuity(big: Continuity, small: Continuity) -> str:
     )
 
 
-def hit_share(table: "xr.Dataset", joint: str, revolutions: int) -> float:
-    """Return the share of crank-angle windows (`WINDOW` degrees) in which a joint hits."""
-    counts = (table["joint"].values == joint) & (table["approach_speed"].values > SLOWEST)
-    angle = 360.0 * table["revolution"].values[counts] + table["crank_angle"].values[counts]
-    return np.unique(angle // WINDOW).size * WINDOW / (360.0 * revolutions)
+def hit_share(hits: Sequence[Impact], revolutions: int) -> float:
+    """Return the share of crank-angle windows (`WINDOW` degrees) that impacts fall into."""
+    angles = (360.0 * one.revolution + one.crank_angle for one in hits
+              if one.approach_speed > SLOWEST)  # fmt: skip
+    return len({angle // WINDOW for angle in angles}) * WINDOW / (360.0 * revolutions)

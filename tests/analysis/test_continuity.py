@@ -1,8 +1,9 @@
 """How continuously joints hit: on series that are known, and on the paper's cases."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
-import xarray as xr
 
 from compressor.analysis.margins import (
     SLOWEST,
@@ -17,20 +18,18 @@ from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 
 
-def table(*rows):
-    """A table of impacts: joint, revolution, crank angle, approach speed."""
-    names = ("joint", "revolution", "crank_angle", "approach_speed")
-    columns = zip(names, zip(*rows, strict=True), strict=True)
-    return xr.Dataset({name: ("impact", list(column)) for name, column in columns})
+class Hit(NamedTuple):
+    """What is read of an `Impact`."""
+
+    revolution: int
+    crank_angle: float
+    approach_speed: float
 
 
 def test_windows_that_are_hit_are_counted_once():
-    found = table(
-        ("big_end", 1, 41.0, 0.3), ("big_end", 1, 49.9, 0.2), ("big_end", 1, 50.1, 0.2),
-        ("big_end", 2, 41.0, 0.3), ("big_end", 2, 200.0, 0.009), ("small_end", 1, 7.0, 0.5),
-    )  # fmt: skip
-    assert hit_share(found, "big_end", 2) == pytest.approx(3 / 72)
-    assert hit_share(found, "small_end", 2) == pytest.approx(1 / 72)
+    hits = [Hit(1, 41.0, 0.3), Hit(1, 49.9, 0.2), Hit(1, 50.1, 0.2), Hit(2, 41.0, 0.3),
+            Hit(2, 200.0, 0.009)]  # fmt: skip
+    assert hit_share(hits, 2) == pytest.approx(3 / 72)
 
 
 @pytest.mark.parametrize("share", [0.25, 0.5])
@@ -90,11 +89,8 @@ def test_measured_shares_are_those_of_continuity_with_errors(paper_runs):
 def test_an_impact_at_a_window_s_edge_or_of_the_slowest_speed_is_in_doubt(paper_runs):
     """Of four impacts, one lies at an edge and one is as slow as counts."""
     found = evidence(paper_runs["big_end 0.2"], "big_end")
-    hits = table(
-        ("big_end", 2, 45.0, 0.3), ("big_end", 2, 49.9, 0.2), ("big_end", 3, 55.0, SLOWEST),
-        ("big_end", 3, 155.0, 0.5), ("small_end", 3, 60.0, 0.5),
-    )  # fmt: skip
-    assert hit_error(found._replace(table=hits), "big_end") == pytest.approx(2 / 36 / 3)
+    hits = [Hit(2, 45.0, 0.3), Hit(2, 49.9, 0.2), Hit(3, 55.0, SLOWEST), Hit(3, 155.0, 0.5)]
+    assert hit_error(found._replace(hits=hits)) == pytest.approx(2 / 36 / 3)
 
 
 def test_a_chaotic_run_s_shares_are_unknown_of_three_revolutions(paper_runs):

@@ -554,8 +554,9 @@ def draw_impacts(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     turns, numbers = settled_revolutions(run), []
     for joint in joints_with_clearance(run):
         color, shape = BY_JOINT[joint]
-        mine = found.isel(impact=found["joint"].values == joint)
-        angle, speed = mine["crank_angle"].values, mine["approach_speed"].values
+        mine = [one for one in found if one.joint == joint]
+        angle = np.array([one.crank_angle for one in mine])
+        speed = np.array([one.approach_speed for one in mine])
         name = f"{SPOKEN[joint]}: {angle.size / turns:.3g} {kind} a revolution"
         panel.strokes(angle, 0.0, speed, LineStyle(color, linewidth=0.8))
         panel.plot(angle, speed, mark(color, shape, 5), name)
@@ -564,7 +565,7 @@ def draw_impacts(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
             fastest = int(np.argmax(speed))
             text = f"{spell(speed[fastest], 'm/s')} at {angle[fastest]:.0f}°"
             numbers.append(("the fastest", text))
-    if not found.sizes["impact"]:
+    if not found:
         panel.write(none, 180, 0.5, inside="y", side="center")
         panel.span("y", 0, 1)
         panel.y.tickvals = ()
