@@ -7,7 +7,6 @@ own unit.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -160,25 +159,14 @@ SLOWEST = 0.01  # m/s: approach speed from which on a contact after flight count
 ENERGY = 0.9  # share of the energy whose angle is reported
 
 
-@dataclass(frozen=True)
-class Continuity:
-    """How a joint's contact is spread over whole revolutions; all are shares, 0 to 1.
+class Shares(NamedTuple):
+    """How a joint's contact is spread over whole revolutions: shares, 0 to 1, with their errors.
 
     `apart`: of crank angle in flight or impact (`contact_modes`). `hit`: of windows of `WINDOW`
     degrees that an impact faster than `SLOWEST` falls into. `energy_angle`: of crank angle that
     holds `ENERGY` of the energy of the horizontal joint force above `ORDER`, large where it rings
-    all around. `gini`: index of that force's magnitudes, large where it is concentrated (Hurley and
-    Rickard 2009).
+    all around.
     """
-
-    apart: float
-    hit: float
-    energy_angle: float
-    gini: float
-
-
-class Shares(NamedTuple):
-    """The shares of crank angle of a `Continuity`, each with its error."""
 
     apart: BarredNumber
     hit: BarredNumber
@@ -196,7 +184,10 @@ class Evidence(NamedTuple):
 
 
 def evidence(run: "xr.Dataset", joint: str) -> Evidence:
-    """Return the `Evidence` of a joint. Raises as `continuity`."""
+    """Return the `Evidence` of a joint with clearance over settled whole revolutions of a run.
+
+    Raises NoSeriesError where there is none, ValueError where no joint has clearance.
+    """
     from compressor.vibration import high_pass_orders
 
     settled, count = whole_revolutions(run)
@@ -206,49 +197,33 @@ def evidence(run: "xr.Dataset", joint: str) -> Evidence:
     return Evidence(joint, settled, count, hits, high)
 
 
-def continuity(run: "xr.Dataset", joint: str, start_up: bool = False) -> Continuity:
-    """Return the `Continuity` of a joint with clearance, over settled whole revolutions of a run.
+def find_shares(by: Evidence) -> dict[str, float]:
+    """Return the values of `Shares` by their names."""
+    from compressor.vibration import energy_angle
 
-    `start_up`: over whole revolutions from the run's begin. Raises NoSeriesError where there is
-    none, ValueError where the joint has no clearance.
-    """
-    return continuity_of(evidence(run.assign_attrs(settle=0.0) if start_up else run, joint))
-
-
-def continuity_of(found: Evidence) -> Continuity:
-    """Return the `Continuity` of a joint from its evidence."""
-    from compressor.vibration import energy_angle, shape
-
-    modes = contact_modes(found.settled)["mode"].sel(joint=found.joint).values[:-1]
-    return Continuity(
-        float((modes != FOLLOWING).mean()),
-        hit_share(found.hits, found.revolutions),
-        energy_angle(found.high, ENERGY),
-        shape(found.high)[3],
-    )
+    modes = contact_modes(by.settled)["mode"].sel(joint=by.joint).values[:-1]
+    return {
+        "apart": float((modes != FOLLOWING).mean()),
+        "hit": hit_share(by.hits, by.revolutions),
+        "energy_angle": energy_angle(by.high, ENERGY),
+    }
 
 
-def measured_shares(run: "xr.Dataset", joint: str) -> Shares:
+def measure_shares(run: "xr.Dataset", joint: str) -> Shares:
     """Return the settled shares of a joint with clearance.
 
     The errors follow from the run's error bars. That of `apart` is the bar of the share of time
     without contact, and two samples for each impact. That of `hit` is a window for each impact that
     is within the velocity's error of `SLOWEST`, or within a sample of a window's edge. That of
     `energy_angle` is its change where the energy changes as much as the force's error allows. In a
-    chaotic run all come from the scatter of its revolutions. Raises as `continuity`.
+    chaotic run all come from the scatter of its revolutions. Raises as `evidence`.
     """
     by = evidence(run, joint)
-    found = continuity_of(by)
+    found, errors = find_shares(by), [apart_error(by), hit_error(by), angle_error(by)]
     if is_chaotic(run):
-
-        def share(name: str) -> "Callable[[xr.Dataset], float]":
-            return lambda turn: getattr(continuity(turn, joint), name)
-
-        errors = [by_revolution(by.settled, share(name)) for name in Shares._fields]
-    else:
-        errors = [apart_error(by), hit_error(by), angle_error(by)]
-    values = (getattr(found, name) for name in Shares._fields)
-    return Shares(*(BarredNumber(*pair) for pair in zip(values, errors, strict=True)))
+        turns = [find_shares(evidence(turn, joint)) for turn in revolutions(by.settled)]
+        errors = [mean_bar(np.array([turn[name] for turn in turns])) for name in found]
+    return Shares(*map(BarredNumber, found.values(), errors))
 
 
 def apart_error(by: Evidence) -> float:
@@ -285,13 +260,15 @@ def angle_error(by: Evidence) -> float:
     return max(high - found, found - low)
 
 
-def compare_continuity(big: Continuity, small: Continuity) -> str:
-    """Return the measures of a big end beside those of a small end, in words."""
+def compare_shares(big: Shares, small: Shares) -> str:
+    """Return the shares of a big end beside those of a small end, in words."""
+    (apart, hit, angle), (small_apart, small_hit, small_angle) = (
+        [one.value for one in shares] for shares in (big, small)
+    )
     return (
-        f"flight and impact {big.apart:.1%} and {small.apart:.1%} of the angle; "
-        f"{WINDOW:g}° windows hit {big.hit:.1%} and {small.hit:.1%}; {ENERGY:.0%} of the energy of "
-        f"F_x above order {ORDER} in {big.energy_angle:.0%} and {small.energy_angle:.0%} of the "
-        f"angle; Gini index {big.gini:.2f} and {small.gini:.2f}"
+        f"flight and impact {apart:.1%} and {small_apart:.1%} of the angle; "
+        f"{WINDOW:g}° windows hit {hit:.1%} and {small_hit:.1%}; {ENERGY:.0%} of the energy of "
+        f"F_x above order {ORDER} in {angle:.0%} and {small_angle:.0%} of the angle"
     )
 
 

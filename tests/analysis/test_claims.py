@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from compressor.analysis.claims import RULES, claim_margins, claims, more_continuous
-from compressor.analysis.margins import BarredNumber, Shares
+from compressor.analysis.claims import RULES, claim_margins, claims
+from compressor.analysis.margins import Shares
 from compressor.analysis.runs import (
     CLEARANCES,
     FAULT_LABELS,
@@ -138,15 +138,6 @@ def test_two_clearances_must_exceed_both_single_ones(paper_runs):
     assert judged(runs, 8).held
     even = altered(runs, "both 0.2", "peak_acceleration", lambda v: 0 * v + 2)
     assert not judged(even, 8).held
-
-
-def test_a_big_end_is_to_exceed_by_every_share():
-    """By 5 % of the revolution; errors of both shares add."""
-    small = Shares(BarredNumber(0.1, 0.01), BarredNumber(0.2), BarredNumber(0.3))
-    big = Shares(BarredNumber(0.2, 0.02), BarredNumber(0.25), BarredNumber(0.31))
-    margins = more_continuous(big, small)
-    assert [one.value for one in margins] == pytest.approx([0.05, 0.0, -0.04])
-    assert margins[0].error == pytest.approx(0.03)
 
 
 def test_continuous_ringing_at_the_big_end_alone_is_seen(paper_runs):

@@ -7,13 +7,12 @@ import pytest
 
 from compressor.analysis.margins import (
     SLOWEST,
-    continuity,
     evidence,
+    find_shares,
     hit_error,
     hit_share,
-    measured_shares,
+    measure_shares,
 )
-from compressor.analysis.shaking import whole_revolutions
 from compressor.cases.case import Case
 from compressor.solve.simulate import simulate
 
@@ -39,22 +38,9 @@ def test_the_energy_s_angle_is_that_of_a_ringing(paper_runs, share):
     angle = np.degrees(run["crank_angle"].values) % 360
     ringing = 100 * np.cos(np.radians(60 * angle)) * (angle < 360 * share)
     run["contact_force"].loc[{"joint": "big_end", "axis": "x"}] = ringing
-    found = continuity(run, "big_end")
-    assert found.energy_angle == pytest.approx(share * 1.8734 / np.pi, rel=0.03)
-    quiet = continuity(paper_runs["big_end 0.2"], "big_end")
-    assert (quiet.apart, quiet.hit) == (0.0, 0.0)
-
-
-def test_a_short_ringing_is_less_continuous_than_a_long_one(paper_runs):
-    found = []
-    for share in (0.1, 0.3, 0.9):
-        run = paper_runs["big_end 0.2"].copy(deep=True)
-        angle = np.degrees(run["crank_angle"].values) % 360
-        ringing = np.cos(np.radians(60 * angle)) * (angle < 360 * share)
-        run["contact_force"].loc[{"joint": "big_end", "axis": "x"}] = ringing
-        found.append(continuity(run, "big_end"))
-    assert [one.gini for one in found] == sorted((one.gini for one in found), reverse=True)
-    assert [one.energy_angle for one in found] == sorted(one.energy_angle for one in found)
+    found = measure_shares(run, "big_end")
+    assert found.energy_angle.value == pytest.approx(share * 1.8734 / np.pi, rel=0.03)
+    assert (found.apart.value, found.hit.value) == (0.0, 0.0)  # by the eccentricity, as before
 
 
 def test_flight_and_impacts_of_a_machine_that_rattles():
@@ -62,27 +48,25 @@ def test_flight_and_impacts_of_a_machine_that_rattles():
     loose |= {"contact": {"damping_N_s_per_mm": 1}}
     solve = {"accuracy": "draft", "error_bars": False}
     run = simulate(Case.from_values({**loose, "solve": solve}))
-    found, whole = continuity(run, "big_end"), continuity(run, "big_end", start_up=True)
+    by = evidence(run, "big_end")
+    found = find_shares(by)
     lost = float(run["contact_loss_fraction"].sel(joint="big_end"))
-    assert lost < found.apart < 0.5
-    revolutions = whole_revolutions(run)[1]
-    most = float(run["impact_count"].sel(joint="big_end")) / (36 * revolutions)
-    assert 0.5 * most < found.hit <= most * (1 + 1e-12)
-    assert whole.apart > found.apart
+    assert lost < found["apart"] < 0.5
+    most = float(run["impact_count"].sel(joint="big_end")) / (36 * by.revolutions)
+    assert 0.5 * most < found["hit"] <= most * (1 + 1e-12)
 
 
-def test_measured_shares_are_those_of_continuity_with_errors(paper_runs):
+def test_shares_have_errors_by_the_run_s_bars(paper_runs):
     """What is not there has no error but that of the contact's bar."""
     run = paper_runs["small_end 0.2"].copy(deep=True)
-    found = continuity(run, "small_end")
     run["contact_loss_fraction_error"].loc[{"joint": "small_end"}] = 0.01
     run["contact_force_error"].loc[{"joint": "small_end"}] = 1e-4
-    short = measured_shares(run, "small_end")
-    assert [one.value for one in short] == [found.apart, found.hit, found.energy_angle]
+    short = measure_shares(run, "small_end")
+    assert [one.value for one in short] == [*find_shares(evidence(run, "small_end")).values()]
     assert short.apart.error == 0.01
     assert short.hit.error == 0.0
     run["contact_force_error"].loc[{"joint": "small_end"}] *= 100.0
-    long = measured_shares(run, "small_end")
+    long = measure_shares(run, "small_end")
     assert 0.0 < short.energy_angle.error < long.energy_angle.error < 1.0
 
 
@@ -100,7 +84,7 @@ def test_a_chaotic_run_s_shares_are_unknown_of_three_revolutions(paper_runs):
     ringing = np.cos(60 * angle) * ((np.degrees(angle) % 360) < 90.0 * turn)
     run["contact_force"].loc[{"joint": "big_end", "axis": "x"}] = 100.0 * ringing
     run.attrs["regime"] = "chaotic"
-    found = measured_shares(run, "big_end").energy_angle
+    found = measure_shares(run, "big_end").energy_angle
     assert 0.3 < found.value < 0.6  # shares of about 1, 2 and 3 quarters of 0.6
     assert found.error == np.inf
 
@@ -108,7 +92,7 @@ def test_a_chaotic_run_s_shares_are_unknown_of_three_revolutions(paper_runs):
 def test_the_paper_s_default_machine_is_not_more_continuous_at_the_big_end(paper_runs):
     """Nothing flies, and the small end rings over more of the angle at 0.1 mm."""
     big, small = (
-        measured_shares(paper_runs[f"{joint} 0.1"], joint) for joint in ("big_end", "small_end")
+        measure_shares(paper_runs[f"{joint} 0.1"], joint) for joint in ("big_end", "small_end")
     )
     assert big.apart.value == small.apart.value == 0.0
     assert big.energy_angle.value < small.energy_angle.value

@@ -13,6 +13,7 @@ from compressor.analysis.margins import (
     above,
     at_least,
     at_most,
+    exceeds,
     least,
     measure,
     peak,
@@ -25,6 +26,12 @@ def test_margins_by_hand():
     assert at_least(BarredNumber(2.4, 0.3), 3.0) == pytest.approx((-0.2, 0.1))
     assert at_most(BarredNumber(0.02, 0.01), 0.05) == pytest.approx((0.6, 0.2))
     assert above(BarredNumber(2.0), 2.0).value < 0.0 == at_least(BarredNumber(2.0), 2.0).value
+
+
+def test_a_measure_exceeds_another_by_a_part_and_errors_add():
+    big, small = BarredNumber(0.2, 0.02), BarredNumber(0.1, 0.01)
+    assert exceeds(big, small, 0.05) == pytest.approx((0.05, 0.03))
+    assert exceeds(small, big, 0.05) == pytest.approx((-0.15, 0.03))
 
 
 def test_a_ratio_s_relative_errors_add():
