@@ -7,8 +7,8 @@ machines: the masses are our assumption, so a claim that fails is a result.
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,9 +51,9 @@ if TYPE_CHECKING:
 
 Runs = Mapping[str, "xr.Dataset"]
 MOTION = ("displacement", "velocity", "acceleration")  # in the order of `ideal_motion`
-# how far each measure is from its threshold, and what is shown, made when it is looked at: a claim
-# holds where no margin is negative
-Verdict = tuple[list[Margin], Iterable[tuple[str, str]]]
+# how far each measure is from its threshold, and what is shown: a claim holds where no margin is
+# negative
+Verdict = tuple[list[Margin], list[tuple[str, str]]]
 EXCESS = 0.05  # of all crank angles, by which a big end's share is to exceed a small end's
 
 
@@ -321,33 +321,36 @@ RULES = (
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim of the paper, measured: `held` is None when its cases are not there."""
+    """One claim of the paper, measured: without `margins` where its cases are not there."""
 
     number: int
     statement: str
     threshold: str
-    held: bool | None
-    measured: list[tuple[str, str]] = field(default_factory=list)
-    note: str = ""
-    margin: Margin | None = None
+    measured: list[tuple[str, str]]
+    note: str
+    margins: list[Margin]
+
+    @property
+    def margin(self) -> Margin | None:
+        """Return the smallest margin, that of the claim."""
+        return least(self.margins) if self.margins else None
+
+    @property
+    def held(self) -> bool | None:
+        """Return whether the claim holds; None where its cases are not there."""
+        return self.margin.value >= 0.0 if self.margin else None
 
 
 def claims(runs: Runs) -> list[Claim]:
-    """Return every claim with its margin, measured on the runs at hand.
+    """Return every claim with its margins, measured on the runs at hand.
 
-    runs: by label (see `paper_cases`), complete ones. A claim whose runs are not there has `held`
-    None.
+    runs: by label (see `paper_cases`), complete ones.
     """
     found = []
     for number, rule in enumerate(RULES, 1):
         missing = [name for name in rule.needs if name not in runs]
-        heading = (number, rule.statement, rule.threshold)
-        if missing:
-            found.append(Claim(*heading, None, [("missing", ", ".join(missing))], rule.note))
-            continue
-        margins, rows = rule.judge(runs)
-        margin = least(margins)
-        found.append(Claim(*heading, margin.value >= 0.0, [*rows], rule.note, margin))
+        margins, rows = ([], [("missing", ", ".join(missing))]) if missing else rule.judge(runs)
+        found.append(Claim(number, rule.statement, rule.threshold, rows, rule.note, margins))
     return found
 
 
@@ -359,7 +362,7 @@ def claim_margins(runs: Runs) -> tuple[list[Margin], dict[str, Margin]]:
     (`active_share`), without an error.
     """
     settled = {name: settled_part(run) for name, run in runs.items()}
-    each = [rule.judge(settled)[0] for rule in RULES]
+    each = [claim.margins for claim in claims(settled)]
     shares = Shares._fields
     alone = {name: least(each[6][n :: len(shares)]) for n, name in enumerate(shares)}
     return [least(margins) for margins in each], alone | {"active": vibrating(settled)}

@@ -8,6 +8,7 @@ import re
 from jinja2 import PackageLoader
 
 from compressor.analysis.claims import Claim
+from compressor.analysis.margins import Margin
 from compressor.report.answer import Assumptions, FirstScreen, MetricChange, Provenance, StudyLine
 from compressor.report.figures.drawing import make_grid
 from compressor.report.figures.table import DrawnFigure
@@ -58,8 +59,9 @@ def table(evil):
 
 def contents(evil):
     """What every template is given, each text of it hostile; by the template's name."""
-    claims = [Claim(n, evil(), evil(), held, [(evil(), evil())], evil())
-              for n, held in enumerate((True, False, None))]  # fmt: skip
+    margins = ([Margin(0.1, 0.0)], [Margin(-0.1, 0.0)], [])
+    claims = [Claim(n, evil(), evil(), [(evil(), evil())], evil(), found)
+              for n, found in enumerate(margins)]  # fmt: skip
     found = MetricChange(*(evil() for _ in range(6)), 1.0)
     answer = FirstScreen(
         [StudyLine(evil(), evil(), evil(), bad) for bad in (True, False)],
