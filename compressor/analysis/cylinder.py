@@ -156,28 +156,6 @@ def _cycle_pressures(
     return np.choose(phase, [expanded, inlet, compressed, outlet])
 
 
-def cylinder_words(case: Case) -> str:
-    """Return indicated power, flow and volumetric efficiency of a case's cylinder in words."""
-    if case.gas.is_measured:
-        powers = {end: work / case.turn / 1e3 for end, work in card_works(case).items()}
-        each = ", ".join(f"{end} end {power:.4g} kW" for end, power in powers.items())
-        return f"{sum(powers.values()):.4g} kW indicated ({each}), by the cards"
-    cycles, rate = ideal_cycles(case), 1.0 / case.turn
-    if not cycles:
-        return "no gas is compressed"
-    power = sum(cycle.indicated_work for cycle in cycles.values()) * rate
-    flow = sum(cycle.capacity for cycle in cycles.values()) * rate
-    each = ", ".join(
-        f"{end} end {cycle.indicated_work * rate / 1e3:.4g} kW at a volumetric efficiency of "
-        f"{cycle.volumetric_efficiency:.3g}"
-        for end, cycle in cycles.items()
-    )
-    return (
-        f"{power / 1e3:.4g} kW indicated ({each}); {3600 * flow:.4g} m³/h at suction conditions, "
-        "by the ideal cycle"
-    )
-
-
 DIGITS = 12  # of a pressure in MPa: what differs beyond them is rounding of binary numbers
 OFF_STEP = 0.05  # of a step, by which a multiple of it may be off
 POLYTROPIC = (0.2, 0.8)  # shares of the pressure's logarithmic range between which lines are fitted

@@ -341,7 +341,7 @@ def _numbers_of_sound(sound: Case) -> Named:
 
 
 def _numbers_of_gas(sound: Case) -> Named:
-    """Yield power, flow, pressures and clearance volumes."""
+    """Yield power, flow, volumetric efficiencies, pressures and clearance volumes."""
     gas, rate = sound.gas, 1.0 / sound.turn
     if gas.is_measured:
         yield "cylinder, indicated power", (1e-3 * rate * sum(card_works(sound).values()), "kW")
@@ -352,6 +352,8 @@ def _numbers_of_gas(sound: Case) -> Named:
         flow = sum(cycle.capacity for cycle in cycles.values())
         yield "cylinder, indicated power", (1e-3 * rate * work, "kW")
         yield "cylinder, flow at suction", (3600.0 * rate * flow, "m³/h")
+    for end, cycle in cycles.items():
+        yield f"cylinder, volumetric efficiency at the {end}", (cycle.volumetric_efficiency, "")
     yield "cylinder, pressure ratio", (gas.discharge_MPa / gas.suction_MPa, "")
     for end, cycle in cycles.items():
         percent = 100.0 * cycle.clearance_volume / cycle.swept_volume

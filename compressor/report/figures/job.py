@@ -15,7 +15,7 @@ from compressor.analysis import (
     Cycle,
     angle_modes,
     case_of,
-    cylinder_words,
+    describe_cases,
     deviation_spectrum,
     end_states,
     frame_forces,
@@ -339,7 +339,8 @@ def draw_cards(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
         (f"indicated power, {end} end", spell(1e-3 * gas.work / seconds, "kW"))
         for end, gas in end_states(revolution).items()
     ]
-    numbers.append(("the cylinder without clearance", cylinder_words(case_of(run))))
+    machine = dict(describe_cases([case_of(run)]).lines())
+    numbers.append(("the cylinder without clearance", machine["cylinder"]))
     sentence = (
         "Pressure of the gas over its volume and over crank angle, in the last settled revolution, "
         "as it presses on the piston."
