@@ -29,9 +29,9 @@ from compressor.analysis.runs import (
     force_relation,
     ideal_motion,
     label,
-    load_corners,
     load_phases,
     paper_cases,
+    record_of,
     settled_part,
     settled_revolutions,
 )

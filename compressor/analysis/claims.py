@@ -40,7 +40,7 @@ from compressor.analysis.runs import (
     force_relation,
     ideal_motion,
     label,
-    load_corners,
+    record_of,
     settled_part,
     settled_revolutions,
 )
@@ -82,7 +82,7 @@ def same_motion(runs: Runs) -> Verdict:
 def design_force(runs: Runs) -> Verdict:
     """Return the verdict on claim 2: the spring load peaks higher, with other corners."""
     peaks = {load: float(runs[load]["piston_force"].max()) for load in ("design", "typical")}
-    corners = {load: np.degrees(load_corners(runs[load])) for load in peaks}
+    corners = {load: np.degrees(record_of(runs[load]).corners) for load in peaks}
     shifts = np.abs(corners["design"] - corners["typical"])[[0, 2]]
     rows = [(f"peak, {load}", f"{peak:.1f} N") for load, peak in peaks.items()]
     rows += [

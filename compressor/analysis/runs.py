@@ -118,11 +118,6 @@ def record_of(run: "xr.Dataset") -> np.record:
     return _record(run.attrs["case"])
 
 
-def load_corners(run: "xr.Dataset") -> np.ndarray:
-    """Return crank angles (rad) at which the phases of a run's load change, three a revolution."""
-    return np.array(record_of(run).corners)
-
-
 def load_phases(run: "xr.Dataset") -> np.ndarray:
     """Return the phase of the load at each sample as an integer.
 

@@ -12,7 +12,6 @@ from compressor.analysis.runs import (
     case_of,
     force_relation,
     ideal_motion,
-    load_corners,
     load_phases,
     paper_cases,
     record_of,
@@ -180,9 +179,8 @@ def test_the_case_of_a_run_is_recovered(paper_runs):
 def test_the_load_of_a_run_changes_phase_at_its_corners(paper_runs, label):
     run = paper_runs[label]
     degrees = np.degrees(run["crank_angle"].values)[:-1] % 360  # the last sample ends a phase
-    corners = np.degrees(load_corners(run))
+    corners = np.degrees(record_of(run).corners)
     far = (np.abs(degrees[:, None] - np.array([*corners, 360.0])) > 1e-6).all(axis=1)
     expected = np.searchsorted(corners, degrees, side="right")
     assert (load_phases(run)[:-1][far] == expected[far]).all()
     assert load_phases(run)[-1] == 3
-    assert tuple(record_of(run).corners) == tuple(load_corners(run))

@@ -17,8 +17,8 @@ from compressor.analysis import (
     force_relation,
     ideal_motion,
     label,
-    load_corners,
     load_phases,
+    record_of,
     settled_part,
 )
 from compressor.report.figures.curves import (
@@ -188,7 +188,7 @@ def draw_piston_force(runs: Runs, units: Units = "usual") -> DrawnFigure:
     for load, name in (("design", "spring"), ("typical", "gas")):
         peak = float(runs[load]["piston_force"].max()) * KILONEWTON
         numbers.append((f"greatest force of the {name}", spell(peak, "kN")))
-        numbers.append((f"corners of the {name}", spell_angles(load_corners(runs[load]))))
+        numbers.append((f"corners of the {name}", spell_angles(record_of(runs[load]).corners)))
     return DrawnFigure(finish_figure(drawing, panels[0]), sentence, numbers)
 
 
@@ -324,7 +324,7 @@ def draw_pressure_volume(runs: Runs, units: Units = "usual") -> DrawnFigure:
         "Cylinder pressure over gas volume in the typical model, from the stored piston force and "
         "displacement; arrows point in the direction of time."
     )
-    used, exact = load_corners(runs["typical"]), Cam.of(runs["typical"]).gas_corners
+    used, exact = record_of(runs["typical"]).corners, Cam.of(runs["typical"]).gas_corners
     numbers = [
         ("the phases change at", spell_angles(used)),
         ("off the ideal gas's corners by up to", spell_angles(np.abs(used - exact).max())),
