@@ -11,7 +11,6 @@ study. What cannot be simulated at all is refused by `compressor.cases.conflicts
 
 import itertools
 import math
-import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -19,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from compressor.analysis.cylinder import card_noise, fit_polytrope
+from compressor.analysis.machine_numbers import sample_cases
 from compressor.cases import (
     Body,
     Case,
@@ -204,7 +204,7 @@ UNEVEN_ROD = 0.02  # of the rod's length: its centre is so far from the middle
 # which is 0.43 to 0.89 of m a b, that of two masses at the bores
 HEAVY_ENDS = 2.0
 LONGEST_CRANK = 0.35  # of the rod's length; 0.15 to 0.3 is usual
-MAX_JOBS = 500  # of a study that are looked at
+MAX_JOBS = 500  # of a study that are looked at, beside the first and the last
 NEAR_BUCKLING = 0.5  # of Euler's load; beyond it a rod bends by more than its inertia requires
 NEAR_RESONANCE = 0.1  # of an order's frequency: nearer, the body's motion is a resonance's
 
@@ -379,16 +379,12 @@ def remarks(case: Case) -> Iterator[tuple[Check, str, str]]:
             yield check, key, message
 
 
-def cautions(study: Study, most: int = MAX_JOBS) -> list[Caution]:
+def cautions(study: Study) -> list[Caution]:
     """Return what is odd about the selected jobs of a study, a `Caution` for each oddity.
 
-    Of more than `most` jobs as many are looked at, drawn evenly and always the same. A key whose
-    values look like another unit's has that remark alone, and no forces are told then.
+    A key whose values look like another unit's has that remark alone, and no forces are told then.
     """
-    numbers: Sequence[int] = study.selected
-    if len(numbers) > most:
-        numbers = sorted(random.Random(0).sample(numbers, most))
-    cases = [study.cases[number] for number in numbers]
+    cases = sample_cases(study, MAX_JOBS)
     units = {one.key: one for one in slips(cases)}
     found: dict[tuple[Check, str], Caution] = {}
     for case in cases:

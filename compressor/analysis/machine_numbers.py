@@ -222,16 +222,24 @@ EXPLAINED = {
 }  # fmt: skip
 
 
+def sample_cases(study: Study, most: int) -> list[Case]:
+    """Return the selected cases of a study; of more than `most` a fair draw, and both ends.
+
+    It is always the same.
+    """
+    numbers: Sequence[int] = study.selected
+    if len(numbers) > most:
+        drawn = random.Random(0).sample(numbers, most)
+        numbers = sorted({numbers[0], *drawn, numbers[-1]})  # the ends of an axis
+    return [study.cases[number] for number in numbers]
+
+
 def describe_machine(study: Study) -> MachineDescription:
     """Return what the selected jobs of a study say of their machine, of many of them a fair draw.
 
     Takes some milliseconds a machine; a sweep of clearances has one.
     """
-    numbers: Sequence[int] = study.selected
-    if len(numbers) > MAX_CASES:
-        drawn = random.Random(0).sample(numbers, MAX_CASES)
-        numbers = sorted({numbers[0], *drawn, numbers[-1]})  # the ends of an axis
-    cases = [study.cases[number] for number in numbers]
+    cases = sample_cases(study, MAX_CASES)
     return MachineDescription(machine_numbers(cases), len(cases), len(study.selected))
 
 

@@ -129,7 +129,7 @@ def test_a_large_sweep_is_sampled_evenly_and_always_the_same(tmp_path):
     )
     (deep, *_) = found = cautions(many)
     assert found == cautions(many)
-    assert deep.of == 500
+    assert 500 <= deep.of <= 502
     assert 0.4 < deep.jobs / deep.of < 0.6
 
 
