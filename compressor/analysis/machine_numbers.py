@@ -28,7 +28,6 @@ from compressor.cases import (
 from compressor.metrics import JOINTS
 from compressor.physics import ideal_forces, segments
 from compressor.solve import record
-from compressor.units import Units, unit_in
 
 MAX_CASES = 50  # of a study that are looked at, beside the first and the last
 PIECES = 500  # samples of each phase of the load: peaks between its corners to a few 1e-6
@@ -172,11 +171,10 @@ class MachineNumber:
     key: str = ""
     remark: str = ""
 
-    def value(self, units: Units = "usual") -> str:
+    def value(self) -> str:
         """Return the number with its unit as text: `62.2 kN`, or `40 to 62.2 kN`."""
-        unit, factor = unit_in(self.unit, units)
-        both = dict.fromkeys(_format(factor * one) for one in (self.low, self.high))
-        return f"{' to '.join(both)} {unit}".rstrip()
+        both = dict.fromkeys(map(_format, (self.low, self.high)))
+        return f"{' to '.join(both)} {self.unit}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -187,12 +185,12 @@ class MachineDescription:
     looked_at: int
     jobs: int
 
-    def lines(self, units: Units = "usual") -> list[tuple[str, str]]:
+    def lines(self) -> list[tuple[str, str]]:
         """Return a line for each thing: its name, and its numbers in words."""
         found: dict[str, list[str]] = {}
         for number in self.numbers:
             thing, _, quantity = number.name.partition(", ")
-            found.setdefault(thing, []).append(f"{quantity} {number.value(units)}")
+            found.setdefault(thing, []).append(f"{quantity} {number.value()}")
         return [(thing, ", ".join(words)) for thing, words in found.items()]
 
     def remarks(self, warned: Collection[str] = ()) -> dict[str, str]:
