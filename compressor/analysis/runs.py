@@ -60,6 +60,7 @@ FAULT_LABELS = tuple(label(fault, c) for fault in FAULTS for c in CLEARANCES)
 
 
 ACTIVE = 0.1  # of the ideal peak acceleration: where a machine is said to vibrate
+ACTIVE_DEG = 6.0  # of crank angle, over which its rms is taken
 
 
 def settled_part(run: "xr.Dataset") -> "xr.Dataset":
@@ -138,16 +139,16 @@ def _record(text: str) -> np.record:
     return record(_case(text))
 
 
-def active_share(run: "xr.Dataset", window_deg: float = 6.0, level: float = ACTIVE) -> float:
+def active_share(run: "xr.Dataset") -> float:
     """Return the share of the settled time in which the machine vibrates.
 
-    It vibrates where the rms over `window_deg` of crank angle of the acceleration's deviation
-    from the ideal motion exceeds `level` times the ideal peak acceleration.
+    It vibrates where the rms over `ACTIVE_DEG` of the acceleration's deviation from the ideal
+    motion exceeds `ACTIVE` times the ideal peak acceleration.
     """
     settled = settled_part(run)
     _, _, ideal = ideal_motion(settled)
     angle = settled["crank_angle"].values
-    width = max(1, round(np.radians(window_deg) / (angle[1] - angle[0])))
+    width = max(1, round(math.radians(ACTIVE_DEG) / (angle[1] - angle[0])))
     square = (settled["acceleration"].values - ideal) ** 2
     rms = np.sqrt(np.convolve(square, np.ones(width) / width, mode="valid"))
-    return float((rms > level * np.abs(ideal).max()).mean())
+    return float((rms > ACTIVE * np.abs(ideal).max()).mean())
