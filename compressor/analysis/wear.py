@@ -22,11 +22,12 @@ def rubbing_work(run: "xr.Dataset") -> np.ndarray:
     """
     p, found = record_of(run), np.zeros(len(JOINTS))
     settled = slice(-settled_part(run).sizes["time"], None)
+    tilt = run["guide_tilt"].values if "guide_tilt" in run else np.zeros(run.sizes["time"])
     for joint, clearance in joints_with_clearance(run).items():
         number, series = JOINTS.index(joint), contact_series(run, joint)
         x, y = series.place.T
         turned = np.hypot(x, y) * np.gradient(np.unwrap(np.arctan2(y, x)), series.time)
-        journal = series.angle if joint == "big_end" else tilt_of(run)
+        journal = series.angle if joint == "big_end" else tilt
         radius = p["pin_radius"][number]
         sliding = turned + (radius - series.depth) * np.gradient(journal, series.time)
         # against the bore, which turns with the rod, whose angle is clockwise
@@ -35,11 +36,6 @@ def rubbing_work(run: "xr.Dataset") -> np.ndarray:
         work = np.trapezoid(power[settled], series.time[settled])
         found[number] = work / settled_revolutions(run)
     return found
-
-
-def tilt_of(run: "xr.Dataset") -> np.ndarray:
-    """Return the crosshead's tilt (rad, counter-clockwise) at a run's samples; 0 without play."""
-    return run["guide_tilt"].values if "guide_tilt" in run else np.zeros(run.sizes["time"])
 
 
 def interpolate_hours(hours: np.ndarray, opened: np.ndarray, clearance: float) -> float:
