@@ -47,6 +47,7 @@ class Usual(NamedTuple):
 
 
 STROKE = "stroke_mm is the whole stroke, crank_radius_mm half of it"
+MEAN_SPEED = ("machine.stroke_mm", f"{STROKE}, in mm; speed_rpm is in rpm")
 BORE = "bore_mm is the whole bore, piston_radius_mm half of it"
 IN_MPA = "pressures are in MPa: 1 bar is 0.1 MPa"
 OF_CARD = "its pressures are in the unit that the column's title says, gauge or absolute"
@@ -72,9 +73,7 @@ USUAL = {
     ),
     # 3 to 5 m/s of process compressors, from 1 to 6 of others (Bloch and Hoefner, 1996)
     "piston, mean speed": Usual(
-        0.5, 7.0, ("machine.crank_radius_mm",),
-        below=("machine.stroke_mm", f"{STROKE}, in mm; speed_rpm is in rpm"),
-        above=("machine.stroke_mm", f"{STROKE}, in mm; speed_rpm is in rpm"),
+        0.5, 7.0, ("machine.crank_radius_mm",), below=MEAN_SPEED, above=MEAN_SPEED
     ),
     # 1.1 to 5 a stage, by the temperature that API 618 allows; workshop compressors reach 10
     "cylinder, pressure ratio": Usual(
@@ -87,13 +86,12 @@ USUAL = {
         0.07, math.inf, ("gas.suction_MPa",), below=("gas.suction_MPa", ABSOLUTE)
     ),
     # 5 to 20 %; below 2 % no valve and no piston's end gap has room
-    "cylinder, clearance at the head": Usual(
-        1.0, math.inf, ("gas.clearance_percent",),
-        below=("gas.clearance_percent", "it is in per cent of the swept volume: 17, not 0.17"),
-    ),
-    "cylinder, clearance at the crank": Usual(
-        1.0, math.inf, ("gas.clearance_percent",),
-        below=("gas.clearance_percent", "it is in per cent of the swept volume: 17, not 0.17"),
+    **dict.fromkeys(
+        ("cylinder, clearance at the head", "cylinder, clearance at the crank"),
+        Usual(
+            1.0, math.inf, ("gas.clearance_percent",),
+            below=("gas.clearance_percent", "it is in per cent of the swept volume: 17, not 0.17"),
+        ),
     ),
     # 0.3 to 3; plungers of the highest pressures have less
     "cylinder, bore over stroke": Usual(
