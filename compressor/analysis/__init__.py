@@ -1,6 +1,6 @@
 """What runs mean, and what the paper says of them."""
 
-from compressor.analysis.cam import Cam, comparisons
+from compressor.analysis.cam import Cam
 from compressor.analysis.cautions import JointScales, cautions, joint_scales
 from compressor.analysis.claims import RULES, Claim, claim_margins, claims
 from compressor.analysis.contacts import (

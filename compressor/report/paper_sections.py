@@ -19,7 +19,6 @@ from compressor.analysis import (
     Shaking,
     cases_of,
     claims,
-    comparisons,
     label,
     paper_cases,
     settled_part,
@@ -229,19 +228,17 @@ def paper_sections(
     caveats: list[str],
     units: Units = "usual",
 ) -> tuple[list[Section], list[Section]]:
-    """Return the paper's sections: figures; and claims, cases, and the load's printed numbers.
+    """Return the paper's sections: figures; and claims and cases.
 
     judged: the paper's claims.
     """
     figures = [Section("figures", "The paper's figures", "figures.html", drawn)] if drawn else []
     if not paper.stored:
         return figures, []
-    title = "Spring and cam: what is printed, what follows"
     cases = PaperCasesContent(caveats, cases_table(paper, units))
     return figures, [
         Section("claims", "The paper's claims", "claims.html", judged),
         Section("cases", "The paper's cases", "cases.html", cases),
-        Section("printed", title, "printed.html", printed_table()),
     ]
 
 
@@ -275,20 +272,6 @@ def label_in_words(name: str) -> str:
     """Return a label of `paper_cases` in words."""
     fault, _, clearance = name.partition(" ")
     return f"{SPOKEN[fault]}, {clearance} mm" if clearance else f"{fault} model, no clearance"
-
-
-def printed_table() -> PageTable:
-    """Return the paper's numbers of the spring load beside those that follow from its equations."""
-    rows = [
-        TableRow([
-            Cell(c.quantity),
-            number_cell(math.nan if c.printed is None else c.printed, c.unit),
-            number_cell(c.follows, c.unit),
-            Cell(c.source),
-        ])
-        for c in comparisons()
-    ]  # fmt: skip
-    return PageTable(["quantity", "printed", "follows", "from"], rows)
 
 
 def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:

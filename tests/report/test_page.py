@@ -82,7 +82,6 @@ def contents(evil):
         "figures.html": [drawn(evil), drawn(evil)],
         "jobs.html": JobsContent(evil(), 9, table(evil), [evil()]),
         "missing.html": MissingFigures([evil()], [evil()], evil()),
-        "printed.html": table(evil),
         "provenance.html": Provenance(*(evil() for _ in range(6)), [study]),
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [drawn(evil)],
                                    evil(), [StudyNote(evil(), evil(), evil())],
