@@ -81,10 +81,7 @@ def seed_global_draws() -> Iterator[None]:
 
 
 def saltelli_design(columns: np.ndarray) -> SaltelliDesign | None:
-    """Return the parts of a `saltelli` design.
-
-    None where the columns, (points, k), are no such design.
-    """
+    """Return the parts of a `saltelli` design; None where the columns, (points, k), are none."""
     count, keys = columns.shape
     n, rest = divmod(count, keys + 2)
     if rest or n < 2 or n & (n - 1) or columns.dtype == object:

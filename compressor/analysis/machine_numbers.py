@@ -219,10 +219,7 @@ EXPLAINED = {
 
 
 def sample_cases(study: Study, most: int) -> list[Case]:
-    """Return the selected cases of a study; of more than `most` a fair draw, and both ends.
-
-    It is always the same.
-    """
+    """Return the selected cases of a study; of more than `most` both ends and a fixed draw."""
     numbers: Sequence[int] = study.selected
     if len(numbers) > most:
         drawn = random.Random(0).sample(numbers, most)
@@ -280,10 +277,7 @@ class RevolutionLoads(NamedTuple):
 
 
 def revolution_loads(sound: Case) -> RevolutionLoads:
-    """Return the `RevolutionLoads` of a sound machine, at both sides of each corner of its load.
-
-    By the equations that its run has.
-    """
+    """Return a sound machine's loads by its run's equations, at both sides of each corner."""
     p = record(sound)
     edges, phases = segments(p, sound.turn)
     times = np.concatenate([np.linspace(*ends, PIECES + 1) for ends in itertools.pairwise(edges)])

@@ -102,10 +102,7 @@ def revolutions(run: "xr.Dataset") -> "Iterator[xr.Dataset]":
 
 
 def by_revolution(run: "xr.Dataset", value: "Callable[[xr.Dataset], float]") -> float:
-    """Return half of the 95 % interval of a value's mean over revolutions, by their scatter.
-
-    inf of too few revolutions.
-    """
+    """Return half of the 95 % interval of a value's mean over revolutions; inf of too few."""
     return mean_bar(np.array([value(turn) for turn in revolutions(run)]))
 
 
@@ -126,10 +123,7 @@ def peak(run: "xr.Dataset", name: str, **where: str) -> BarredNumber:
 
 
 def mean_peak(run: "xr.Dataset", name: str, **where: str) -> BarredNumber:
-    """Return the mean over a chaotic run's revolutions of each one's greatest value, with its bar.
-
-    where: its joint.
-    """
+    """Return a chaotic run's mean over revolutions of each one's peak; where: its joint."""
     value, error = (
         float(run[n].sel(where)) for n in (f"{name}_mean", f"{name}_mean_standard_error")
     )

@@ -120,10 +120,7 @@ def record_of(run: "xr.Dataset") -> np.record:
 
 
 def load_phases(run: "xr.Dataset") -> np.ndarray:
-    """Return the phase of the load at each sample as an integer.
-
-    In order: expansion, suction, compression, discharge.
-    """
+    """Return the phase at each sample: 0 expansion, 1 suction, 2 compression, 3 discharge."""
     times = run["time"].values
     edges, phases = segments(record_of(run), times[-1])
     return phases[sample_segments(times, edges)]

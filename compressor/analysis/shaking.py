@@ -274,10 +274,7 @@ class SensorEnvelope:
 
 
 def sensor_envelope(run: "xr.Dataset") -> SensorEnvelope | None:
-    """Return the envelope spectrum of a run's sensor.
-
-    None where it has none, or too short a record.
-    """
+    """Return the envelope spectrum of a run's sensor; None without, or of too short a record."""
     from compressor.vibration import envelope_spectrum, kurtogram, line_amplitudes
 
     if "sensor_acceleration" not in run:
