@@ -25,12 +25,11 @@ from compressor.report.figures.sweep_data import FOOT, MARKS, Measure, measures,
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.page import (
     Add,
-    AddedContent,
     Additions,
     Cell,
-    Chapter,
     PageTable,
     Section,
+    SectionContent,
     StudyNote,
     TableRow,
     format_measure,

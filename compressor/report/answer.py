@@ -65,7 +65,7 @@ def assumptions_section(stored: Stored, studies: Sequence[StoredStudy], claims: 
         claims,
         [*dict.fromkeys(start_up(case) for _, case in cases)],
     )
-    return Section("assumptions", "What to keep in mind", "assumptions.html", content)
+    return Section("assumptions", "What to keep in mind", content, "assumptions.html")
 
 
 def start_up(case: Case) -> str:
@@ -113,7 +113,7 @@ def provenance_section(studies: Sequence[StoredStudy], results: Folder, command:
         written=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         studies=studies,
     )
-    return Section("provenance", "Where this comes from", "provenance.html", content)
+    return Section("provenance", "Where this comes from", content, "provenance.html")
 
 
 MAX_FINDINGS = 3  # besides those that always stand there
@@ -193,7 +193,7 @@ class FirstScreen:
 
 def answer_section(answer: FirstScreen) -> Section:
     """Return the section that the page begins with."""
-    return Section("answer", "The answer", "answer.html", answer)
+    return Section("answer", "The answer", answer, "answer.html")
 
 
 def findings(jobs: Iterable[tuple[str, xr.Dataset]], units: Units = "usual") -> list[MetricChange]:

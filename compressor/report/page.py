@@ -154,14 +154,26 @@ def column_title(measure: Measure) -> str:
     return measure.title + (f" ({measure.unit})" if measure.unit else "")
 
 
+class SectionContent(NamedTuple):
+    """What `section.html` prints; title, notes: of the machine; code: files and commands."""
+
+    table: PageTable | None = None
+    paragraphs: Sequence[str] = ()
+    lines: Sequence[str] = ()
+    figures: Sequence[DrawnFigure] = ()
+    title: str = ""
+    notes: str = ""
+    code: Sequence[str] = ()
+
+
 @dataclass(frozen=True)
 class Section:
     """A part of the page: `template` prints its `content`, `anchor` is its id."""
 
     anchor: str
     title: str
-    template: str
-    content: object = None
+    content: Any = SectionContent()
+    template: str = "section.html"
 
 
 class JobFacts(NamedTuple):
@@ -237,29 +249,11 @@ class StudyNote(NamedTuple):
     link: str
 
 
-class Chapter(NamedTuple):
-    """A section with the figures that it shows."""
-
-    section: Section
-    figures: Sequence[DrawnFigure] = ()
-
-
-class AddedContent(NamedTuple):
-    """What the section of a study prints, by `addition.html`; title, notes: of the machine."""
-
-    table: PageTable
-    paragraphs: Sequence[str] = ()
-    lines: Sequence[str] = ()
-    figures: Sequence[DrawnFigure] = ()
-    title: str = ""
-    notes: str = ""
-
-
 class Additions(NamedTuple):
-    """Notes by the name of the study that they are on, and chapters."""
+    """Notes by the name of the study that they are on, and sections."""
 
     notes: Mapping[str, StudyNote]
-    chapters: Sequence[Chapter]
+    sections: Sequence[Section]
 
 
 Add = Callable[[Folder, Sequence[StoredStudy]], Additions]  # of the folder of results

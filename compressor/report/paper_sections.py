@@ -32,6 +32,7 @@ from compressor.report.page import (
     Cell,
     PageTable,
     Section,
+    SectionContent,
     StudyNote,
     TableRow,
     column_title,
@@ -145,22 +146,13 @@ REVOLUTION_ROUNDING = 1e-6  # revolutions: rounding of a whole one
 UNEQUAL = "whose runs do not settle at one crank angle, with fine samples of a whole revolution"
 
 
-@dataclass(frozen=True)
-class OwnFigures:
-    """The paper's figures of the machine of a study whose case file asks for them.
-
-    note: on its section; sections: of figures and claims, none where nothing can be drawn.
-    """
-
-    note: StudyNote
-    figures: Sequence[DrawnFigure]
-    sections: Sequence[Section]
-
-
-def own_figures(stored: Stored, study: StoredStudy, units: Units) -> OwnFigures:
+def own_figures(
+    stored: Stored, study: StoredStudy, units: Units
+) -> tuple[StudyNote, list[Section]]:
     """Return the paper's figures and claims of the machine of a study's last job.
 
-    A figure needs those of the paper's cases that it shows among the study's jobs.
+    A figure needs those of the paper's cases that it shows among the study's jobs. The note is on
+    the study's section; there are no sections where nothing can be drawn.
     """
     case = last_case(stored, study)
     runs = find_runs(stored, [study], cases_of(case)).usable if case else {}
@@ -170,20 +162,19 @@ def own_figures(stored: Stored, study: StoredStudy, units: Units) -> OwnFigures:
         one._replace(name=file_name(study.name, one.name), title=f"{study.name}: {one.title}")
         for one in (draw_paper(runs, units) if alike else ())
     ]  # fmt: skip
-    numbers = ", ".join(one.title.partition(":")[0].removeprefix("Figure ") for one in lacking)
-    why = f", but not Figures {numbers}, whose cases are not all there with series" * bool(lacking)
-    text = f"The paper's figures and claims are drawn of this machine{why}"
     if not figures:
         reason = "since no figure has all its cases there with series" if alike else UNEQUAL
         text = f"The paper's figures are not drawn of this machine, {reason}"
-        return OwnFigures(StudyNote(text, table_anchor(study.name), "Its jobs"), [], [])
+        return StudyNote(text, table_anchor(study.name), "Its jobs"), []
+    numbers = ", ".join(one.title.partition(":")[0].removeprefix("Figure ") for one in lacking)
+    why = f", but not Figures {numbers}, whose cases are not all there with series" * bool(lacking)
+    text = f"The paper's figures and claims are drawn of this machine{why}"
     anchor = file_name("figures", study.name)
-    sections = [
-        Section(anchor, f"{study.name}: the paper's figures", "figures.html", figures),
-        Section(file_name("claims", study.name), f"{study.name}: the paper's claims", "claims.html",
-                claims(runs)),
+    return StudyNote(text, anchor, "Figures and claims"), [
+        Section(anchor, f"{study.name}: the paper's figures", SectionContent(figures=figures)),
+        Section(file_name("claims", study.name), f"{study.name}: the paper's claims", claims(runs),
+                "claims.html"),
     ]  # fmt: skip
-    return OwnFigures(StudyNote(text, anchor, "Figures and claims"), figures, sections)
 
 
 def comparable(runs: Collection[xr.Dataset]) -> bool:
@@ -204,21 +195,15 @@ def comparable(runs: Collection[xr.Dataset]) -> bool:
     )
 
 
-@dataclass(frozen=True)
-class MissingFigures:
-    """What each figure lacks, and the case files and the command that give it."""
-
-    figures: Sequence[str]
-    case_files: Sequence[str]
-    command: str
-
-
-@dataclass(frozen=True)
-class PaperCasesContent:
-    """What a page says of the paper's cases: what to know beside their numbers, and a table."""
-
-    caveats: list[str]
-    table: PageTable
+CASES = (
+    "Metrics are taken over the dense solution after the start-up. Energy residual: the worst "
+    "imbalance of energy, relative to what the contacts lose. A dash: nothing to tell, such as "
+    "contact in an ideal joint."
+)
+TO_GET = (
+    "The case files and the command give what is missing. A case that failed is run again with "
+    "--rerun failed, or as a new job once its settings change."
+)
 
 
 def paper_sections(
@@ -232,13 +217,14 @@ def paper_sections(
 
     judged: the paper's claims.
     """
-    figures = [Section("figures", "The paper's figures", "figures.html", drawn)] if drawn else []
+    content = SectionContent(figures=drawn)
+    figures = [Section("figures", "The paper's figures", content)] if drawn else []
     if not paper.stored:
         return figures, []
-    cases = PaperCasesContent(caveats, cases_table(paper, units))
+    cases = SectionContent(cases_table(paper, units), [CASES], caveats)
     return figures, [
-        Section("claims", "The paper's claims", "claims.html", judged),
-        Section("cases", "The paper's cases", "cases.html", cases),
+        Section("claims", "The paper's claims", judged, "claims.html"),
+        Section("cases", "The paper's cases", cases),
     ]
 
 
@@ -290,8 +276,8 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
     files = case_files(paper.absent)
     texts = [f"# {name}\n{text}" for name, text in files.items()]
     command = f"compsim run {' '.join(files)} -r {shlex.quote(str(results))}"
-    content = MissingFigures(figures, texts, command)
-    yield Section("missing", "Figures that could not be drawn", "missing.html", content)
+    content = SectionContent(None, [TO_GET], figures, code=[*texts, command])
+    yield Section("missing", "Figures that could not be drawn", content)
 
 
 def draw_paper(runs: Mapping[str, xr.Dataset], units: Units) -> list[DrawnFigure]:

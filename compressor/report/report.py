@@ -40,10 +40,8 @@ from compressor.report.figures.sweep_data import measures
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.interactive import job_scripts, script, series_name
 from compressor.report.limits import Limits, read_limits
-from compressor.report.page import Add, Chapter, JobFacts, JobsToOpen, Section, StudyNote, document
+from compressor.report.page import Add, JobFacts, JobsToOpen, Section, StudyNote, document
 from compressor.report.paper_sections import (
-    DiagnosisContent,
-    OwnFigures,
     PaperRuns,
     draw_diagnosis,
     draw_paper,
@@ -167,14 +165,15 @@ def build_report(
         paper = PaperRuns({}, {}, {})  # a few like runs in a sweep of one's own are no reproduction
     of_paper = draw_paper(paper.usable, units)
     of_own = {one.name: own_figures(stored, one, units) for one in studies if one.figures}
+    own_notes = {name: note for name, (note, _) in of_own.items()}
     faults = draw_diagnosis(paper.usable, units)
     own = [study for study in studies if not repeats_paper(study, paper)]
     added = [one(results, studies) for one in add]
     drawn: list[DrawnStudy] = []
     left_out: dict[str, str] = {}  # study -> why
     for study in own:
-        notes = [one.note for name, one in of_own.items() if name == study.name]
-        notes += [one.notes[study.name] for one in added if study.name in one.notes]
+        given = [own_notes, *(one.notes for one in added)]
+        notes = [of[study.name] for of in given if study.name in of]
         try:
             drawn.append(drawn_study(stored, study, notes, limits, units))
         except CardError as error:
@@ -184,10 +183,6 @@ def build_report(
     for name in limits.by_metric.keys() - {name for one in drawn for name in one.shown}:
         text = f"no study of this report has {name}: its limits are shown nowhere"
         warnings.warn(text, CompsimWarning, stacklevel=3)
-    chapters = [chapter for one in added for chapter in one.chapters]
-    several: list[OwnFigures | DiagnosisContent | DrawnStudy | Chapter]
-    several = [*of_own.values(), *faults, *drawn, *chapters]
-    later = [figure for one in several for figure in one.figures]
     caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored, one)]
     judged = claims(paper.usable) if paper.stored else []
     figures, tables = paper_sections(paper, of_paper, judged, caveats, units)
@@ -195,9 +190,9 @@ def build_report(
         answer_section(summarise(own, paper, judged, drawn, [*left_out.values()], units)),
         *(one.section for one in drawn),
         *figures,
-        *chain(*(one.sections for one in of_own.values())),
-        *(Section("diagnosis", "Diagnosis", "diagnosis.html", one) for one in faults),
-        *(chapter.section for chapter in chapters),
+        *chain(*(sections for _, sections in of_own.values())),
+        *(Section("diagnosis", "Diagnosis", one, "diagnosis.html") for one in faults),
+        *chain(*(one.sections for one in added)),
         *(one.table for one in drawn),
         *tables,
         assumptions_section(stored, studies, bool(paper.stored)),
@@ -209,8 +204,9 @@ def build_report(
     titled = [study for study in studies if study.title]
     titles = {study.title for study in titled if not study.is_trial or titled[0].is_trial}
     title = titles.pop() if len(titles) == 1 else ""  # several machines have it in their sections
+    figures = [one for section in sections for one in getattr(section.content, "figures", ())]
     page = partial(document, sections, jobs, title)
-    return ReportContent([*of_paper, *later], [study.name for study in studies], series, page)
+    return ReportContent(figures, [study.name for study in studies], series, page)
 
 
 def choose_studies(results: Folder, names: Sequence[str]) -> list[StoredStudy]:
@@ -233,7 +229,6 @@ class DrawnStudy(NamedTuple):
 
     section: Section
     table: Section
-    figures: list[DrawnFigure]
     findings: list[MetricChange]
     line: StudyLine
     jobs: JobFacts
@@ -260,7 +255,7 @@ def drawn_study(
         keys = [*(key for one in figures for key in one.jobs), *study.keys[:MAX_ROWS]]
         counts = job_counts(data)
         return DrawnStudy(
-            section, table, figures, study_findings(data, units),
+            section, table, study_findings(data, units),
             StudyLine(
                 f"Study {study.name}", section.anchor, counts.text, bool(counts.failed),
                 bool(counts.ok),

@@ -19,6 +19,7 @@ from compressor.report.page import (
     JobFacts,
     PageTable,
     Section,
+    SectionContent,
     StudyNote,
     column_title,
     job_row,
@@ -78,20 +79,6 @@ class StudyContent:
     inputs: Inputs | None = None
 
 
-@dataclass(frozen=True)
-class JobsContent:
-    """The table of a study's jobs, as far as a page can hold them.
-
-    `regimes`: what they mean; `zones`: what those of metrics with limits mean.
-    """
-
-    study: str
-    jobs: int
-    table: PageTable
-    regimes: Sequence[str]
-    zones: Sequence[str] = ()
-
-
 def study_sections(
     stored: Stored,
     study: StoredStudy,
@@ -123,17 +110,20 @@ def study_sections(
         beside=compare_healthy(stored, data, units),
         inputs=find_inputs(stored, study),
     )
-    regimes = [name for name in Regime if (data["regime"].values == name).any()]
-    table = JobsContent(
-        study.name,
-        data["status"].size,
-        jobs_table(data, limits, units),
-        [*map(regime_words, regimes)],
-        limits.words(measures(data, units)),
-    )
+    table = jobs_table(data, limits, units)
+    shown, count = len(table.rows), data["status"].size
+    regimes = [regime_words(name) for name in Regime if (data["regime"].values == name).any()]
+    paragraphs = [
+        *[f"The first {shown} of {count} jobs; compsim export {study.name} gives all."]
+        * (shown < count),
+        *[f"{'; '.join(regimes)}."] * bool(regimes),
+        *limits.words(measures(data, units)),
+        "A click on a job's key, in the last column, opens its place in the sweep and, where time "
+        "series are stored, its acceleration and its contact forces.",
+    ]
     return (
-        Section(file_name("study", study.name), f"Study {study.name}", "study.html", content),
-        Section(anchor, f"Jobs of study {study.name}", "jobs.html", table),
+        Section(file_name("study", study.name), f"Study {study.name}", content, "study.html"),
+        Section(anchor, f"Jobs of study {study.name}", SectionContent(table, paragraphs)),
     )
 
 

@@ -82,7 +82,8 @@ def test_runs_on_other_grids_cannot_be_drawn_together(heavy_store):
 def test_figures_and_captions_are_the_machine_s(heavy_store):
     stored, study = read_store(heavy_store), read_studies(heavy_store)[0]
     runs = find_runs(stored, [study], paper_cases(**HEAVY)).usable
-    found = {one.name: one for one in own(heavy_store).figures}
+    _, (section, _) = own(heavy_store)
+    found = {one.name: one for one in section.content.figures}
     assert {*found} == FILES
     drawn = found["heavy-figure-15"]
     assert drawn.title.startswith("heavy: Figure 15: Contact force at the big end")
@@ -107,6 +108,7 @@ def test_they_have_their_sections(heavy_store, tmp_path, undrawn):
     order = [i for i in found.ids if i in ("figures-heavy", "heavy-figure-08", "study-heavy")]
     assert order == ["study-heavy", "figures-heavy", "heavy-figure-08"]
     assert "are drawn of this machine, but not Figures 3, 6, 7, whose" in found.text
+    assert "Figure 4 · Figure 8 · Figure 9" in found.text  # each link had the study's name
     assert "rod mass 3 kg" in found.text
     rows = [cells for _, cells in found.rows if cells[0].startswith("(")]
     verdicts = [cells[1].partition("margin")[0] for cells in rows]

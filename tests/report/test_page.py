@@ -14,19 +14,19 @@ from compressor.report.figures.drawing import make_grid
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.inputs import Inputs
 from compressor.report.page import (
-    AddedContent,
     Cell,
     JobFacts,
     JobsToOpen,
     PageTable,
     Section,
+    SectionContent,
     StudyNote,
     TableRow,
     document,
 )
-from compressor.report.paper_sections import DiagnosisContent, MissingFigures, PaperCasesContent
+from compressor.report.paper_sections import DiagnosisContent
 from compressor.report.side_by_side import HealthyAndWorn
-from compressor.report.study_section import JobsContent, StudyContent
+from compressor.report.study_section import StudyContent
 from compressor.store.studies import StoredStudy
 
 KINDS = ("word", "number", "code")
@@ -71,18 +71,13 @@ def contents(evil):
     )
     study = StoredStudy(evil(), evil(), (), (evil(), evil()), {}, evil(), {evil(): evil()}, evil())
     return {
-        "addition.html": AddedContent(
-            table(evil), [evil()], [evil()], [drawn(evil)], evil(), evil()
-        ),
         "answer.html": answer,
         "assumptions.html": Assumptions([evil()], True, True, True, [evil()]),
-        "cases.html": PaperCasesContent([evil()], table(evil)),
         "claims.html": claims,
         "diagnosis.html": DiagnosisContent(12, table(evil), [drawn(evil)]),
-        "figures.html": [drawn(evil), drawn(evil)],
-        "jobs.html": JobsContent(evil(), 9, table(evil), [evil()]),
-        "missing.html": MissingFigures([evil()], [evil()], evil()),
         "provenance.html": Provenance(*(evil() for _ in range(6)), [study]),
+        "section.html": SectionContent(table(evil), [evil()], [evil()],
+                                       [drawn(evil) for _ in range(4)], evil(), evil(), [evil()]),
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [drawn(evil)],
                                    evil(), [StudyNote(evil(), evil(), evil())],
                                    evil(), evil(), [evil()], HealthyAndWorn(evil(), table(evil)),
@@ -95,7 +90,7 @@ def test_every_template_escapes_every_text():
     given = contents(evil)
     words = "</script><script>alert(1)</script>"
     jobs = JobsToOpen(words, [JobFacts([words], {"key": [words]})], ["key"])
-    sections = [Section(evil(), evil(), name, content) for name, content in given.items()]
+    sections = [Section(evil(), evil(), content, name) for name, content in given.items()]
     text = document(sections, jobs, title=evil())
     own = {"page.html", "pieces.html", "style.css", "report.js"}
     assert {*PackageLoader("compressor.report").list_templates()} - {*given} == own
@@ -133,8 +128,8 @@ class Attributes(html.parser.HTMLParser):
 def test_an_attribute_ends_where_its_text_ends():
     evil = "a b=c d=\"e\" f='g' \"h='"
     named = drawn(lambda: evil)._replace(name=evil)
-    content = {**contents(lambda: evil), "figures.html": [named]}
-    text = document([Section(evil, evil, name, given) for name, given in content.items()])
+    content = {**contents(lambda: evil), "section.html": SectionContent(figures=[named])}
+    text = document([Section(evil, evil, given, name) for name, given in content.items()])
     assert Attributes(text).names == {
         "alt", "aria-label", "charset", "class", "content", "href", "id", "lang", "name", "role",
         "scope", "src", "tabindex", "data-copy", "data-job", "data-title",

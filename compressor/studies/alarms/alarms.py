@@ -31,15 +31,14 @@ from compressor.program import PROGRAM, Progress, no_progress
 from compressor.report import (
     CYCLE,
     GREY,
-    AddedContent,
     Additions,
     Cell,
-    Chapter,
     DrawnFigure,
     LineStyle,
     PageTable,
     PlotlyFigure,
     Section,
+    SectionContent,
     StudyNote,
     TableRow,
     file_name,
@@ -526,9 +525,8 @@ def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Addit
     head, *rows = list_rows(found)
     table = PageTable(head, [TableRow([Cell(text) for text in row]) for row in rows], lead=3)
     lines = [*list_numbers(found), *list_warnings(found)]
-    content = AddedContent(table, (), lines, [drawn], study.title, study.notes)
+    content = SectionContent(table, (), lines, [drawn], study.title, study.notes)
     anchor, title = file_name("alarms-of", name), f"Which alarm sees wear first in study {name}"
-    section = Section(anchor, title, "addition.html", content)
     line = f"{found.sizes['alarm']} alarms were judged by its records."
     note = StudyNote(line, anchor, "Which alarm sees wear first")
-    return Additions({name: note}, [Chapter(section, [drawn])])
+    return Additions({name: note}, [Section(anchor, title, content)])

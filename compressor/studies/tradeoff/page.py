@@ -19,13 +19,12 @@ from compressor.digits import PAGE_DIGITS, align_columns, by_bar, is_known
 from compressor.metrics import BARRED
 from compressor.outcome import Regime
 from compressor.report import (
-    AddedContent,
     Additions,
     Cell,
-    Chapter,
     Measure,
     PageTable,
     Section,
+    SectionContent,
     StudyNote,
     TableRow,
     file_name,
@@ -284,14 +283,14 @@ def read_models(folder: Folder, study: StoredStudy) -> list[xr.Dataset]:
 def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:
     """Return a line on each study of which something was varied, and a section on each job."""
     notes: dict[str, StudyNote] = {}
-    chapters = []
+    sections = []
     for study in studies:
         for number, data in enumerate(read_models(results, study)):
             anchor = file_name("models", study.name) + (f"-{number + 1}" if number else "")
             text = f"What moves its numbers: {headline(model_table(data))}"
             notes.setdefault(study.name, StudyNote(text, anchor, "Table of what was varied"))
-            chapters.append(Chapter(models_section(anchor, study, data)))
-    return Additions(notes, chapters)
+            sections.append(models_section(anchor, study, data))
+    return Additions(notes, sections)
 
 
 def models_section(anchor: str, study: StoredStudy, data: xr.Dataset) -> Section:
@@ -301,7 +300,7 @@ def models_section(anchor: str, study: StoredStudy, data: xr.Dataset) -> Section
     texts = [f"{headline(table)}.", LEGEND.format(place)]
     texts += [UNKNOWN.format(", ".join(table.unknown))] if table.unknown else []
     title = f"What moves the numbers of study {place.rpartition(', ')[0]}"
-    return Section(anchor, title, "addition.html", AddedContent(page_table(table), texts))
+    return Section(anchor, title, SectionContent(page_table(table), texts))
 
 
 def page_table(table: ModelTable) -> PageTable:

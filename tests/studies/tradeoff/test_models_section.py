@@ -111,8 +111,8 @@ def test_choices_are_read_where_they_are_of_a_job_of_the_study(tmp_path):
     write_dataset(tmp_path / "models" / "worn-out.nc", second)  # of another study
     found = [one.attrs["key"] for one in read_models(tmp_path, study)]
     assert sorted(found) == [study.keys[0], study.keys[2]]
-    chapters = add(tmp_path, [study], "").chapters
-    assert [chapter.section.title for chapter in chapters] == [
+    sections = add(tmp_path, [study], "").sections
+    assert [section.title for section in sections] == [
         f"What moves the numbers of study worn at clearance_mm = {value}" for value in (0.1, 0.3)
     ]
     with pytest.warns(StoreWarning, match=r"worn-2{8}\.nc: is not shown, as worn has no"):
