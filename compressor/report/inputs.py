@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -21,28 +20,16 @@ HALVES = {half: whole for whole, half in DOUBLES.items()}  # stroke and bore are
 Lines = Sequence[tuple[str, str]]
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """The inputs of a study, a line a thing or a group of keys: its name, and values with units.
+def find_inputs(stored: Stored, study: StoredStudy) -> list[tuple[str, Lines]]:
+    """Return the inputs of a study under titles, a line a thing or a group of keys.
 
-    `machine`: its numbers without clearance; `remarks`: on those that are implausible, by key;
-    `assumed`: values of the program, which the file does not give.
+    Nothing where this version knows no case of it.
     """
-
-    machine: Lines
-    remarks: Lines
-    given: Lines
-    swept: Lines
-    assumed: Lines
-
-
-def find_inputs(stored: Stored, study: StoredStudy) -> Inputs | None:
-    """Return the inputs of a study; None where this version knows no case of it."""
     places = [place for place in stored.find([*study.keys]).tolist() if place >= 0]
     places = places[:: -(-len(places) // MAX_CASES) or 1]
     cases = [case for place in places if (case := stored.case_at(place))]
     if not cases:
-        return None
+        return []
     machine = describe_cases(cases)
     swept = {part for axis in study.axes for part in (axis.key, *stands_for(axis.key))}
     fixed = {
@@ -58,13 +45,14 @@ def find_inputs(stored: Stored, study: StoredStudy) -> Inputs | None:
         for key, value in fixed.items()
         if key not in given and key.partition(".")[0] not in NOT_ASSUMED and reads(cases[0], key)
     }
-    return Inputs(
-        machine.lines(),
-        [*machine.remarks().items()],
-        by_group(given),
-        by_group({axis.key: [*dict.fromkeys(axis.values)] for axis in study.axes}),
-        by_group(assumed),
-    )
+    axes = {axis.key: [*dict.fromkeys(axis.values)] for axis in study.axes}
+    return [
+        ("The machine without clearance, by what was given", machine.lines()),
+        ("Implausible", [*machine.remarks().items()]),
+        ("Given", by_group(given)),
+        ("Swept", by_group(axes)),
+        ("Not given: values of the program", by_group(assumed)),
+    ]
 
 
 def by_group(values: Mapping[str, Any]) -> list[tuple[str, str]]:

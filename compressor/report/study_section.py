@@ -12,7 +12,7 @@ from compressor.outcome import Regime, regime_words
 from compressor.reasons import remedy
 from compressor.report.figures.sweep_data import measures, swept_values
 from compressor.report.figures.table import DrawnFigure
-from compressor.report.inputs import Inputs, find_inputs
+from compressor.report.inputs import Lines, find_inputs
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.report.page import (
     Cell,
@@ -76,7 +76,7 @@ class StudyContent:
     about: str = ""
     settings: Sequence[str] = ()
     beside: HealthyAndWorn | None = None
-    inputs: Inputs | None = None
+    inputs: Sequence[tuple[str, Lines]] = ()
 
 
 def study_sections(

@@ -12,7 +12,6 @@ from compressor.analysis.margins import Margin
 from compressor.report.answer import Assumptions, FirstScreen, MetricChange, Provenance, StudyLine
 from compressor.report.figures.drawing import make_grid
 from compressor.report.figures.table import DrawnFigure
-from compressor.report.inputs import Inputs
 from compressor.report.page import (
     Cell,
     JobFacts,
@@ -81,7 +80,7 @@ def contents(evil):
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [drawn(evil)],
                                    evil(), [StudyNote(evil(), evil(), evil())],
                                    evil(), evil(), [evil()], HealthyAndWorn(evil(), table(evil)),
-                                   Inputs(*([(evil(), evil())] for _ in range(5)))),
+                                   [(evil(), [(evil(), evil())])]),
     }  # fmt: skip
 
 
