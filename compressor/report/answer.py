@@ -88,31 +88,18 @@ def last_case(stored: Stored, study: StoredStudy) -> Case | None:
 LIBRARIES = ("numpy", "scipy", "numba", "xarray", "h5py", "matplotlib")
 
 
-@dataclass(frozen=True)
-class Provenance:
-    """What made a page, and the studies it is about; `written` is in UTC."""
-
-    program: str
-    libraries: str
-    platform: str
-    results: Path
-    command: str
-    written: str
-    studies: Sequence[StoredStudy]
-
-
 def provenance_section(studies: Sequence[StoredStudy], results: Folder, command: str) -> Section:
     """Return the section on program and command that made a page, and its studies."""
     versions = library_versions(*LIBRARIES)
-    content = Provenance(
-        program=f"{PROGRAM}, model {MODEL_VERSION}",
-        libraries=", ".join(f"{name} {version}" for name, version in versions.items()),
-        platform=f"Python {platform.python_version()}, {platform.platform()}",
-        results=Path(results).absolute(),
-        command=command,
-        written=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-        studies=studies,
-    )
+    content = {
+        "program": f"{PROGRAM}, model {MODEL_VERSION}",
+        "libraries": ", ".join(f"{name} {version}" for name, version in versions.items()),
+        "platform": f"Python {platform.python_version()}, {platform.platform()}",
+        "results": Path(results).absolute(),
+        "command": command,
+        "written": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "studies": studies,
+    }
     return Section("provenance", "Where this comes from", content, "provenance.html")
 
 

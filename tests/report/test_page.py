@@ -9,7 +9,7 @@ from jinja2 import PackageLoader
 
 from compressor.analysis.claims import Claim
 from compressor.analysis.margins import Margin
-from compressor.report.answer import Assumptions, FirstScreen, MetricChange, Provenance, StudyLine
+from compressor.report.answer import Assumptions, FirstScreen, MetricChange, StudyLine
 from compressor.report.figures.drawing import make_grid
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.page import (
@@ -29,6 +29,7 @@ from compressor.report.study_section import StudyContent
 from compressor.store.studies import StoredStudy
 
 KINDS = ("word", "number", "code")
+PROVENANCE = ("program", "libraries", "platform", "results", "command", "written")
 
 
 class Hostile:
@@ -74,7 +75,7 @@ def contents(evil):
         "assumptions.html": Assumptions([evil()], True, True, True, [evil()]),
         "claims.html": claims,
         "diagnosis.html": DiagnosisContent(12, table(evil), [drawn(evil)]),
-        "provenance.html": Provenance(*(evil() for _ in range(6)), [study]),
+        "provenance.html": {**{name: evil() for name in PROVENANCE}, "studies": [study]},
         "section.html": SectionContent(table(evil), [evil()], [evil()],
                                        [drawn(evil) for _ in range(4)], evil(), evil(), [evil()]),
         "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [drawn(evil)],
