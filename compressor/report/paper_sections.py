@@ -42,7 +42,7 @@ from compressor.report.page import (
     status_text,
     value_cell,
 )
-from compressor.report.study_section import KEY_DIGITS, file_name, table_anchor
+from compressor.report.study_section import KEY_DIGITS, file_name
 from compressor.store import DamagedFile, Folder, Stored, StoredStudy, StoreWarning
 from compressor.units import Units
 
@@ -165,7 +165,7 @@ def own_figures(
     if not figures:
         reason = "since no figure has all its cases there with series" if alike else UNEQUAL
         text = f"The paper's figures are not drawn of this machine, {reason}"
-        return StudyNote(text, table_anchor(study.name), "Its jobs"), []
+        return StudyNote(text, file_name("jobs", study.name), "Its jobs"), []
     numbers = ", ".join(one.title.partition(":")[0].removeprefix("Figure ") for one in lacking)
     why = f", but not Figures {numbers}, whose cases are not all there with series" * bool(lacking)
     text = f"The paper's figures and claims are drawn of this machine{why}"

@@ -56,25 +56,20 @@ class Counts(NamedTuple):
 
 @dataclass(frozen=True)
 class StudyContent:
-    """What a page says of a study; `chaotic` counts jobs whose statistics alone hold.
+    """What a page says of a study; jobs: the id of the section with its table.
 
-    `notes`: lines that others add; `caveats`: what to know beside the numbers, a sentence each;
-    `title`, `about`: what its case file says of the machine; `settings`: what `--set` changed;
-    `beside`: the machine without clearance; `inputs`: what was given, swept and assumed.
+    caveats: what to know beside the numbers, a sentence each; notes: lines that others add;
+    beside: the machine without clearance; inputs: what was given, swept and assumed.
     """
 
-    case_file: str
+    study: StoredStudy
     counts: str
-    chaotic: int
     caveats: Sequence[str]
     failures: Sequence[str]
     remedies: Sequence[str]
     figures: Sequence[DrawnFigure]
     jobs: str
     notes: Sequence[StudyNote] = ()
-    title: str = ""
-    about: str = ""
-    settings: Sequence[str] = ()
     beside: HealthyAndWorn | None = None
     inputs: Sequence[tuple[str, Lines]] = ()
 
@@ -93,20 +88,16 @@ def study_sections(
     notes: lines that others add to the first; limits: of metrics, whose zones the table shows.
     """
     reasons = dict.fromkeys(data["reason"].values[data["status"].values == "failed"])
-    anchor = table_anchor(study.name)
+    anchor = file_name("jobs", study.name)
     content = StudyContent(
-        case_file=study.case_file,
+        study=study,
         counts=job_counts(data).text,
-        chaotic=int((data["regime"].values == Regime.CHAOTIC).sum()),
         caveats=study_caveats(stored, study),
         failures=failed_jobs(stored, data),
         remedies=[f"{reason}: {remedy(reason)}" for reason in reasons],
         figures=figures,
         jobs=anchor,
         notes=notes,
-        title=study.title,
-        about=study.notes,
-        settings=study.again.overrides,
         beside=compare_healthy(stored, data, units),
         inputs=find_inputs(stored, study),
     )
@@ -125,11 +116,6 @@ def study_sections(
         Section(file_name("study", study.name), f"Study {study.name}", content, "study.html"),
         Section(anchor, f"Jobs of study {study.name}", SectionContent(table, paragraphs)),
     )
-
-
-def table_anchor(study: str) -> str:
-    """Return the id of the section with a study's table."""
-    return file_name("jobs", study)
 
 
 def file_name(*words: str) -> str:

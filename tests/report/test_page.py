@@ -69,7 +69,8 @@ def contents(evil):
         claims,
         [evil()],
     )
-    study = StoredStudy(evil(), evil(), (), (evil(), evil()), {}, evil(), {evil(): evil()}, evil())
+    study = StoredStudy(evil(), evil(), (), (evil(), evil()), {}, evil(), {evil(): evil()}, evil(),
+                        title=evil(), notes=evil(), overrides=(evil(),))  # fmt: skip
     return {
         "answer.html": answer,
         "assumptions.html": Assumptions([evil()], True, True, True, [evil()]),
@@ -78,9 +79,9 @@ def contents(evil):
         "provenance.html": {**{name: evil() for name in PROVENANCE}, "studies": [study]},
         "section.html": SectionContent(table(evil), [evil()], [evil()],
                                        [drawn(evil) for _ in range(4)], evil(), evil(), [evil()]),
-        "study.html": StudyContent(evil(), evil(), 3, [evil()], [evil()], [evil()], [drawn(evil)],
+        "study.html": StudyContent(study, evil(), [evil()], [evil()], [evil()], [drawn(evil)],
                                    evil(), [StudyNote(evil(), evil(), evil())],
-                                   evil(), evil(), [evil()], HealthyAndWorn(evil(), table(evil)),
+                                   HealthyAndWorn(evil(), table(evil)),
                                    [(evil(), [(evil(), evil())])]),
     }  # fmt: skip
 
