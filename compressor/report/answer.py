@@ -158,19 +158,6 @@ class FirstScreen:
     cautions: Sequence[str] = ()
 
     @property
-    def lists(self) -> list[tuple[str, Sequence[tuple[str, Sequence[MetricChange]]]]]:
-        """Return the findings under what they are called: of single jobs nothing changes."""
-        changes, others = (
-            [(name, some) for name, found in self.findings
-             if (some := [one for one in found if bool(one.low) == is_change])]
-            for is_change in (True, False)
-        )  # fmt: skip
-        if not changes:
-            return [("What was found" if others else "What changes most", others)]
-        more = [("What else was found", others)] if others else []
-        return [("What changes most", changes), *more]
-
-    @property
     def no_finding(self) -> str:
         """Return the sentence that stands in place of findings."""
         if not any(line.has_result for line in self.lines):
