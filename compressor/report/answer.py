@@ -9,7 +9,7 @@ reversal of the rod load.
 import datetime
 import math
 import platform
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -368,24 +368,3 @@ def finding(
     change = f"{ratio:.3g} times" if ratio < 1e3 else "from nearly nothing"
     change = change if least >= 0.0 else ""
     return MetricChange(title, text(low), names[low], text(high), names[high], change, rank, always)
-
-
-def round_robin(
-    each: Sequence[tuple[str, Sequence[MetricChange]]],
-) -> Iterator[tuple[str, Sequence[MetricChange]]]:
-    """Yield each name with its first findings, at most MAX_FINDINGS in all.
-
-    One finding of each is chosen in turn, so that no name crowds out another. What always stands
-    there does not count.
-    """
-    room = MAX_FINDINGS
-    counts = [0] * len(each)
-    sizes = [sum(not one.always for one in found) for _, found in each]
-    while room and any(n < size for n, size in zip(counts, sizes, strict=True)):
-        for place, size in enumerate(sizes):
-            if room and counts[place] < size:
-                counts[place] += 1
-                room -= 1
-    for count, (name, found) in zip(counts, each, strict=True):
-        if chosen := choose_findings(found, count):
-            yield name, chosen

@@ -21,14 +21,15 @@ from compressor.cases import CardError
 from compressor.outcome import Regime
 from compressor.program import CompsimWarning
 from compressor.report.answer import (
+    MAX_FINDINGS,
     FirstScreen,
     MetricChange,
     StudyLine,
     answer_section,
     assumptions_section,
+    choose_findings,
     findings,
     provenance_section,
-    round_robin,
     study_findings,
     worn_joints,
 )
@@ -297,9 +298,11 @@ def summarise(
             (label_in_words(name), run) for name, run in paper.stored.items() if name != "typical"
         )
         each.append(("The paper's cases", findings(worn, units)))
+    count = MAX_FINDINGS if len(each) == 1 else 1
+    shown = [(name, chosen) for name, found in each if (chosen := choose_findings(found, count))]
     cautions = [f"{text[0].upper()}{text[1:]}." for text in left_out]
     cautions += [text for one in drawn for text in one.cautions]
-    return FirstScreen(lines, [*round_robin(each)], judged, cautions)
+    return FirstScreen(lines, shown, judged, cautions)
 
 
 def remove_stale(report: Path, contents: ReportContent) -> None:
