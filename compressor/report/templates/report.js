@@ -11,17 +11,17 @@ const remembered = {
   set: (key, value) => { try { localStorage.setItem(key, value); } catch { /* not kept */ } },
 };
 const prefersDark = matchMedia("(prefers-color-scheme: dark)");
-const isDark = () =>
-  (root.dataset.theme || (prefersDark.matches ? "dark" : "light")) === "dark";
-
-const nameTheme = (button) => { button.textContent = isDark() ? "light" : "dark"; };
+const isDark = () => root.dataset.theme === "dark";
 
 function setTheme(theme) {
   root.dataset.theme = theme;
-  remembered.set("compsim-theme", theme);
-  each(".theme", nameTheme);
+  each(".theme", (button) => { button.textContent = isDark() ? "light" : "dark"; });
   drawn.forEach((figure) => figure.redraw());
 }
+
+// the reader's, else the system's
+const useTheme = () =>
+  setTheme(remembered.get("compsim-theme") ?? (prefersDark.matches ? "dark" : "light"));
 
 // ---- tables ---------------------------------------------------------------------------------
 const collator = new Intl.Collator(undefined, { numeric: true });
@@ -366,21 +366,20 @@ function showJob(key) {
 let told = { results: "results", studies: [], series: [] };
 
 // ---- start ----------------------------------------------------------------------------------
-const kept = remembered.get("compsim-theme");
-if (kept) root.dataset.theme = kept;
+useTheme(); // before anything is shown
 
 document.addEventListener("DOMContentLoaded", () => {
   const facts = document.getElementById("jobs");
   if (facts) told = JSON.parse(facts.textContent);
   each(".theme", (button) => {
     button.hidden = false;
-    nameTheme(button);
-    button.addEventListener("click", () => setTheme(isDark() ? "light" : "dark"));
+    button.addEventListener("click", () => {
+      remembered.set("compsim-theme", isDark() ? "light" : "dark");
+      setTheme(isDark() ? "light" : "dark");
+    });
   });
-  prefersDark.addEventListener("change", () => {
-    each(".theme", nameTheme);
-    drawn.forEach((figure) => figure.redraw());
-  });
+  useTheme();
+  prefersDark.addEventListener("change", useTheme);
   each(".blocks, .scroll:not(.blocks *)", openTable);
   each("dialog button", (button) => button.addEventListener("click", () => {
     if (button.dataset.copy !== undefined) {
