@@ -28,9 +28,7 @@ const collator = new Intl.Collator(undefined, { numeric: true });
 
 function value(row, column) {
   const cell = row.cells[column];
-  if (cell === undefined) return "";
-  const isBare = cell.classList.contains("number") && !("value" in cell.dataset);
-  return isBare ? "" : cell.dataset.value ?? cell.textContent.trim();
+  return cell?.dataset.value ?? cell?.textContent.trim() ?? "";
 }
 
 function compare(a, b) {
