@@ -16,7 +16,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from compressor.digits import PAGE_DIGITS, by_bar, setting
+from compressor.digits import MAX_DECIMAL, PAGE_DIGITS, by_bar, setting
 from compressor.outcome import Regime
 from compressor.report.figures.sweep_data import Measure
 from compressor.report.figures.table import DrawnFigure
@@ -43,7 +43,7 @@ class TableRow:
     """A row's cells; `mark`: the job failed, is missing, or is chaotic; `key`: of the job."""
 
     cells: Sequence[Cell]
-    mark: Literal["", "failed", "missing", "chaotic"] = ""
+    mark: str = ""
     key: str = ""
 
 
@@ -87,12 +87,8 @@ def number(value: float) -> str:
         return "–"
     if not float(value).is_integer():
         value = float(f"{value:.{PAGE_DIGITS}g}")
-    size = abs(value)
-    if size < 1e7 and size == int(size):
-        return f"{value:.0f}"
-    if not 1e-3 <= size < 1e7:
-        return f"{value:.{PAGE_DIGITS - 1}e}"
-    return f"{value:.{max(0, 3 - math.floor(math.log10(size)))}f}"
+    is_whole = abs(value) < MAX_DECIMAL and value == int(value)
+    return f"{value:.0f}" if is_whole else f"{value:#.{PAGE_DIGITS}g}"
 
 
 def number_cell(value: float, unit: str = "") -> Cell:
@@ -136,11 +132,8 @@ def value_cell(value: Any) -> Cell:
 
 def job_row(cells: Sequence[Cell], status: str, regime: str = "", key: str = "") -> TableRow:
     """Return a job's row, marked where the job failed, is missing, or is chaotic."""
-    if status == "failed":
-        return TableRow(cells, "failed", key)
-    if status == "missing":
-        return TableRow(cells, "missing", key)
-    return TableRow(cells, "chaotic" if regime == Regime.CHAOTIC else "", key)
+    chaotic = regime if regime == Regime.CHAOTIC else ""
+    return TableRow(cells, chaotic if status == "ok" else status, key)
 
 
 def status_text(status: object, reason: object, regime: object = "") -> str:
