@@ -56,11 +56,6 @@ class PaperRuns:
     absent: dict[str, str]  # label -> why it is not usable
 
 
-def find_paper_runs(stored: Stored, studies: Sequence[StoredStudy]) -> PaperRuns:
-    """Return the runs with the physics of the paper's cases."""
-    return find_runs(stored, studies, paper_cases())
-
-
 def is_of_paper(stored: Stored, study: StoredStudy) -> bool:
     """Return whether all stored jobs of a study, and at least one, are cases of the paper."""
     count = sum(at >= 0 for at in stored.find([*study.keys]))

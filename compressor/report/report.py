@@ -16,7 +16,7 @@ from typing import NamedTuple
 import xarray as xr
 from plotly.offline import get_plotlyjs
 
-from compressor.analysis import Claim, claims
+from compressor.analysis import Claim, claims, paper_cases
 from compressor.cases import CardError
 from compressor.outcome import Regime
 from compressor.program import CompsimWarning
@@ -46,7 +46,7 @@ from compressor.report.paper_sections import (
     PaperRuns,
     draw_diagnosis,
     draw_paper,
-    find_paper_runs,
+    find_runs,
     is_of_paper,
     label_in_words,
     missing_sections,
@@ -160,10 +160,9 @@ def build_report(
     limits, units, names: of studies, see `write_report`.
     """
     studies, stored = choose_studies(results, names), read_store(results, warn=True)
-    paper = find_paper_runs(stored, studies)
+    # a few like runs in a sweep of one's own are no reproduction
     papers = [study for study in studies if is_of_paper(stored, study)]
-    if not papers:
-        paper = PaperRuns({}, {}, {})  # a few like runs in a sweep of one's own are no reproduction
+    paper = find_runs(stored, papers, paper_cases())
     of_paper = draw_paper(paper.usable, units)
     of_own = {one.name: own_figures(stored, one, units) for one in studies if one.figures}
     own_notes = {name: note for name, (note, _) in of_own.items()}
@@ -197,7 +196,7 @@ def build_report(
         *(one.table for one in drawn),
         *tables,
         assumptions_section(stored, studies, bool(paper.stored)),
-        *missing_sections(paper, results),
+        *(missing_sections(paper, results) if papers else ()),
         provenance_section(studies, results, command),
     ]
     series = {key: text for one in drawn for key, text in job_scripts(stored, one.jobs.jobs, units)}

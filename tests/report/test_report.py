@@ -24,7 +24,7 @@ from compressor.program import CompsimWarning
 from compressor.reasons import Reason
 from compressor.report.figures import FIGURES, pictures
 from compressor.report.figures.table import spell
-from compressor.report.paper_sections import find_paper_runs
+from compressor.report.paper_sections import find_runs
 from compressor.report.report import KINDS, write_report
 from compressor.store.caveats import study_caveats
 from compressor.store.files import StoreError, StoreWarning
@@ -306,7 +306,7 @@ def test_a_failed_case_is_told_with_its_reason(paper_store, tmp_path):
     part = part_of(paper_store, tmp_path / "part", "design", "typical")
     key = next(s for s in read_studies(part) if s.name == "design").keys[0]
     fail(part, key, "non_finite", EVIL)
-    paper = find_paper_runs(read_store(part), read_studies(part))
+    paper = find_runs(read_store(part), read_studies(part), paper_cases())
     assert paper.absent["design"] == "failed: non_finite"
     assert "design" not in paper.usable
     write_report(part, tmp_path / "out")
@@ -321,7 +321,7 @@ def test_a_damaged_case_is_told(paper_store, tmp_path):
     part = part_of(paper_store, tmp_path / "part", "typical")
     path = damage_series(part, read_studies(part)[0].keys[0])
     with pytest.warns(StoreWarning, match=f"{path.name}: is damaged"):
-        paper = find_paper_runs(read_store(part), read_studies(part))
+        paper = find_runs(read_store(part), read_studies(part), paper_cases())
     assert paper.absent["typical"] == "its file is damaged"
     assert not paper.stored
 
@@ -352,7 +352,7 @@ def test_the_most_exact_run_is_shown(paper_store, tmp_path):
     (tmp_path / "exact.yaml").write_text("load: gas\nsolve: {rtol: [1e-3, 1e-7]}\n")
     store(part, tmp_path / "exact.yaml")
     assert (
-        find_paper_runs(read_store(part), read_studies(part)).usable["typical"].attrs["rtol"]
+        find_runs(read_store(part), read_studies(part), paper_cases()).usable["typical"].attrs["rtol"]
         == 1e-7
     )
 
