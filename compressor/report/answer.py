@@ -170,16 +170,6 @@ def answer_section(answer: FirstScreen) -> Section:
     return Section("answer", "The answer", answer, "answer.html")
 
 
-def findings(jobs: Iterable[tuple[str, xr.Dataset]], units: Units = "usual") -> list[MetricChange]:
-    """Return the metrics that change most over jobs, each job named."""
-    named = [(name, job) for name, job in jobs if str(job["status"].item()) == "ok"]
-    known = list(dict.fromkeys(m for _, job in named for m in measures(job, units)))
-    names = [name for name, _ in named]
-    columns = ((m, np.array([read_numbers(m, job) for _, job in named]).T) for m in known)
-    rows = [(m, values, bars) for m, (values, bars) in columns]
-    return rank_findings(rows, names, {joint for _, job in named for joint in worn_joints(job)})
-
-
 def study_findings(data: xr.Dataset, units: Units = "usual") -> list[MetricChange]:
     """Return the metrics that change most over a study's jobs, as `open_study` gives it."""
     points = Points(data)
@@ -189,13 +179,11 @@ def study_findings(data: xr.Dataset, units: Units = "usual") -> list[MetricChang
 
 
 def read_numbers(measure: Measure, data: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Return a measure and its error bars, of a job or in the shape of a study's.
+    """Return a measure of a study's jobs and its error bars, in their shape.
 
     A single blow of a chaotic motion has no meaning: of its knock the mean over revolutions of the
     hardest one in each counts, with its 95 % interval, as in `compsim find`.
     """
-    if measure.variable not in data:
-        return np.array(math.nan), np.array(math.nan)
     values, bars = measure.of(data), measure.bar(data)
     if measure.variable == KNOCK and f"{KNOCK}_mean" in data:
         regime = data["regime"]

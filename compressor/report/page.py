@@ -165,7 +165,7 @@ class Section:
 
     anchor: str
     title: str
-    content: Any = SectionContent()
+    content: Any
     template: str = "section.html"
 
 

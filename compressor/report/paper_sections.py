@@ -23,11 +23,12 @@ from compressor.analysis import (
     paper_cases,
     settled_part,
 )
-from compressor.cases import Case
+from compressor.cases import Axis, Case
 from compressor.report.answer import last_case
 from compressor.report.figures import FIGURES, Shakings, measure_shaking
-from compressor.report.figures.sweep_data import MEASURES, measures
+from compressor.report.figures.sweep_data import measures
 from compressor.report.figures.table import DrawnFigure
+from compressor.report.limits import NO_LIMITS, Limits
 from compressor.report.page import (
     Cell,
     PageTable,
@@ -35,15 +36,10 @@ from compressor.report.page import (
     SectionContent,
     StudyNote,
     TableRow,
-    column_title,
-    job_row,
-    measured_cell,
     number_cell,
-    status_text,
-    value_cell,
 )
-from compressor.report.study_section import KEY_DIGITS, file_name
-from compressor.store import DamagedFile, Folder, Stored, StoredStudy, StoreWarning
+from compressor.report.study_section import file_name, jobs_table
+from compressor.store import DamagedFile, Folder, Stored, StoredStudy, StoreWarning, label_studies
 from compressor.units import Units
 
 
@@ -191,9 +187,8 @@ def comparable(runs: Collection[xr.Dataset]) -> bool:
 
 
 CASES = (
-    "Metrics are taken over the dense solution after the start-up. Energy residual: the worst "
-    "imbalance of energy, relative to what the contacts lose. A dash: nothing to tell, such as "
-    "contact in an ideal joint."
+    "Metrics are taken over the dense solution after the start-up. A dash: nothing to tell, such "
+    "as contact in an ideal joint."
 )
 TO_GET = (
     "The case files and the command give what is missing. A case that failed is run again with "
@@ -202,51 +197,32 @@ TO_GET = (
 
 
 def paper_sections(
-    paper: PaperRuns,
-    drawn: Sequence[DrawnFigure],
+    cases: xr.Dataset,
     judged: Sequence[Claim],
-    caveats: list[str],
+    caveats: Sequence[str],
+    limits: Limits = NO_LIMITS,
     units: Units = "usual",
-) -> tuple[list[Section], list[Section]]:
-    """Return the paper's sections: figures; and claims and cases.
+) -> list[Section]:
+    """Return the paper's sections after its figures: claims and cases.
 
-    judged: the paper's claims.
+    cases: of `paper_data`; judged: the paper's claims; limits: of metrics, whose zones are shown.
     """
-    content = SectionContent(figures=drawn)
-    figures = [Section("figures", "The paper's figures", content)] if drawn else []
-    if not paper.stored:
-        return figures, []
-    cases = SectionContent(cases_table(paper, units), [CASES], caveats)
-    return figures, [
+    words = [CASES, *limits.words(measures(cases, units))]
+    table = SectionContent(jobs_table(cases, limits, units), words, caveats)
+    return [
         Section("claims", "The paper's claims", judged, "claims.html"),
-        Section("cases", "The paper's cases", cases),
+        Section("cases", "The paper's cases", table),
     ]
 
 
-def cases_table(paper: PaperRuns, units: Units) -> PageTable:
-    """Return a row for each of the paper's cases, stored or not."""
-    known = [measures(run) for run in paper.stored.values()]
-    shown = [m.read_in(units) for m in MEASURES if any(m in some for some in known)]
-    head = ["case", "status", *map(column_title, shown), "energy residual", "rtol", "job"]
-    rows = []
-    for name in paper_cases():
-        run = paper.stored.get(name)
-        if run is None:
-            cells = [Cell(label_in_words(name)), Cell("not stored"), *[Cell("")] * (len(head) - 2)]
-            rows.append(TableRow(cells, "missing"))
-            continue
-        status, key = str(run["status"].item()), run.attrs["key"]
-        regime = run.attrs.get("regime", "")
-        start = [
-            Cell(label_in_words(name)),
-            Cell(status_text(status, run["reason"].item(), regime)),
-        ]
-        metrics = [measured_cell(m, *m.read(run)) for m in shown]
-        residual = number_cell(float(run.get("energy_residual", math.nan)))
-        tolerance = value_cell(run.attrs.get("rtol", ""))
-        trust = [residual, tolerance, Cell(key[:KEY_DIGITS], "code")]
-        rows.append(job_row([*start, *metrics, *trust], status, regime, key))
-    return PageTable(head, rows)
+def paper_data(stored: Stored, paper: PaperRuns) -> xr.Dataset:
+    """Return the paper's cases as one study of eleven jobs, as `open_study` does."""
+    names = [*paper_cases()]
+    keys = [paper.stored[name].attrs["key"] if name in paper.stored else "" for name in names]
+    axis = Axis("case", tuple(map(label_in_words, names)))
+    fixed = Case.from_values({}).values()
+    study = StoredStudy("paper", "", (axis,), tuple(keys), fixed, "", {}, "")
+    return label_studies(stored, [study])
 
 
 def label_in_words(name: str) -> str:

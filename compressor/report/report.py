@@ -28,7 +28,6 @@ from compressor.report.answer import (
     answer_section,
     assumptions_section,
     choose_findings,
-    findings,
     provenance_section,
     study_findings,
     worn_joints,
@@ -41,16 +40,23 @@ from compressor.report.figures.sweep_data import measures
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.interactive import job_scripts, script, series_name
 from compressor.report.limits import Limits, read_limits
-from compressor.report.page import Add, JobFacts, JobsToOpen, Section, StudyNote, document
+from compressor.report.page import (
+    Add,
+    JobFacts,
+    JobsToOpen,
+    Section,
+    SectionContent,
+    StudyNote,
+    document,
+)
 from compressor.report.paper_sections import (
-    PaperRuns,
     draw_diagnosis,
     draw_paper,
     find_runs,
     is_of_paper,
-    label_in_words,
     missing_sections,
     own_figures,
+    paper_data,
     paper_sections,
     repeats_paper,
 )
@@ -163,7 +169,7 @@ def build_report(
     # a few like runs in a sweep of one's own are no reproduction
     papers = [study for study in studies if is_of_paper(stored, study)]
     paper = find_runs(stored, papers, paper_cases())
-    of_paper = draw_paper(paper.usable, units)
+    paper_figures = draw_paper(paper.usable, units)
     of_own = {one.name: own_figures(stored, one, units) for one in studies if one.figures}
     own_notes = {name: note for name, (note, _) in of_own.items()}
     faults = draw_diagnosis(paper.usable, units)
@@ -180,16 +186,21 @@ def build_report(
             left_out[study.name] = f"study {study.name} is left out: {error}"
             warnings.warn(left_out[study.name], CompsimWarning, stacklevel=3)
     own = [study for study in own if study.name not in left_out]
-    for name in limits.by_metric.keys() - {name for one in drawn for name in one.shown}:
+    shown = {name for one in drawn for name in one.shown}
+    cases, judged, tables = None, list[Claim](), list[Section]()
+    if paper.stored:
+        cases, judged = paper_data(stored, paper), claims(paper.usable)
+        shown |= {one.variable for one in measures(cases)}
+        caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored, one)]
+        tables = paper_sections(cases, judged, caveats, limits, units)
+    for name in limits.by_metric.keys() - shown:
         text = f"no study of this report has {name}: its limits are shown nowhere"
         warnings.warn(text, CompsimWarning, stacklevel=3)
-    caveats = [f"{one.name}: {t}" for one in papers for t in study_caveats(stored, one)]
-    judged = claims(paper.usable) if paper.stored else []
-    figures, tables = paper_sections(paper, of_paper, judged, caveats, units)
+    of_paper = Section("figures", "The paper's figures", SectionContent(figures=paper_figures))
     sections = [
-        answer_section(summarise(own, paper, judged, drawn, [*left_out.values()], units)),
+        answer_section(summarise(own, cases, judged, drawn, [*left_out.values()], units)),
         *(one.section for one in drawn),
-        *figures,
+        *[of_paper] * bool(paper_figures),
         *chain(*(sections for _, sections in of_own.values())),
         *(Section("diagnosis", "Diagnosis", one, "diagnosis.html") for one in faults),
         *chain(*(one.sections for one in added)),
@@ -253,16 +264,17 @@ def drawn_study(
                    for name, one in named]  # fmt: skip
         section, table = study_sections(stored, study, data, figures, notes, limits, units)
         keys = [*(key for one in figures for key in one.jobs), *study.keys[:MAX_ROWS]]
-        counts = job_counts(data)
+        line = describe_run(f"Study {study.name}", section.anchor, data)
         return DrawnStudy(
-            section, table, study_findings(data, units),
-            StudyLine(
-                f"Study {study.name}", section.anchor, counts.text, bool(counts.failed),
-                bool(counts.ok),
-            ),
-            job_facts(data, keys), motion_cautions(stored, study, data),
-            {one.variable for one in measures(data)},
+            section, table, study_findings(data, units), line, job_facts(data, keys),
+            motion_cautions(stored, study, data), {one.variable for one in measures(data)},
         )  # fmt: skip
+
+
+def describe_run(name: str, anchor: str, data: xr.Dataset) -> StudyLine:
+    """Return what was run, and how it ended; anchor: of its section."""
+    counts = job_counts(data)
+    return StudyLine(name, anchor, counts.text, bool(counts.failed), bool(counts.ok))
 
 
 def motion_cautions(stored: Stored, study: StoredStudy, data: xr.Dataset) -> list[str]:
@@ -278,25 +290,23 @@ def motion_cautions(stored: Stored, study: StoredStudy, data: xr.Dataset) -> lis
 
 def summarise(
     own: Sequence[StoredStudy],
-    paper: PaperRuns,
+    cases: xr.Dataset | None,
     judged: Sequence[Claim],
     drawn: Sequence[DrawnStudy],
     left_out: Sequence[str],
     units: Units = "usual",
 ) -> FirstScreen:
-    """Return the page's first screen; judged: the paper's claims; left_out: studies, and why."""
+    """Return the page's first screen.
+
+    cases: of the paper, as of `paper_data`; judged: its claims; left_out: studies, and why.
+    """
     lines = [one.line for one in drawn]
     told = [one for study, one in zip(own, drawn, strict=True) if not study.is_trial] or drawn
     each: list[tuple[str, Sequence[MetricChange]]] = [(one.line.name, one.findings) for one in told]
-    if paper.stored:
-        failed = [n for n, run in paper.stored.items() if str(run["status"].item()) != "ok"]
-        counts = f"{len(paper.stored)} of 11 stored" + (f", {len(failed)} failed" if failed else "")
-        has_result = len(failed) < len(paper.stored)
-        lines.append(StudyLine("The paper's cases", "cases", counts, bool(failed), has_result))
-        worn = (
-            (label_in_words(name), run) for name, run in paper.stored.items() if name != "typical"
-        )
-        each.append(("The paper's cases", findings(worn, units)))
+    if cases is not None:
+        lines.append(describe_run("The paper's cases", "cases", cases))
+        worn = cases.isel(case=slice(1, None))  # and the design model; the first is the typical one
+        each.append(("The paper's cases", study_findings(worn, units)))
     count = MAX_FINDINGS if len(each) == 1 else 1
     shown = [(name, chosen) for name, found in each if (chosen := choose_findings(found, count))]
     cautions = [f"{text[0].upper()}{text[1:]}." for text in left_out]

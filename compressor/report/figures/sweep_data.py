@@ -59,12 +59,6 @@ class Measure:
         name = f"{self.variable}_error"
         return self.in_unit(data, name) if name in data else self.of(data) * math.nan
 
-    def read(self, job: xr.Dataset) -> tuple[float, float]:
-        """Return the metric of a job and its error bar; nan where it has none."""
-        if self.variable not in job:
-            return math.nan, math.nan
-        return float(self.of(job)), float(self.bar(job))
-
     def in_unit(self, data: xr.Dataset, name: str) -> np.ndarray:
         """Return a variable of the metric in the measure's unit.
 
