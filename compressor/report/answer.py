@@ -28,59 +28,15 @@ from compressor.report.page import Section, format_measure, number
 from compressor.store import Folder, Stored, StoredStudy
 from compressor.units import Units
 
-MASSES = {
-    "rod_mass_kg": "rod {:g} kg (a steel bar of 600 × 40 × 25 mm)",
-    "reciprocating_mass_kg": "crosshead with piston rod and piston {:g} kg",
-}
 
-
-@dataclass(frozen=True)
-class Assumptions:
-    """Which of the assumptions enter what the page shows."""
-
-    masses: Sequence[str]  # that a study leaves to the defaults, in words
-    worn: bool
-    spring: bool
-    claims: bool
-    start_up: Sequence[str]  # how long it is left out, in words
-
-
-def assumptions_section(stored: Stored, studies: Sequence[StoredStudy], claims: bool) -> Section:
-    """Return the section of the assumptions behind a store's studies and the claims."""
-    default = Case.from_values({}).machine
-    cases = [(study, case) for study in studies if (case := last_case(stored, study))]
-    ours = [
-        words.format(getattr(default, mass))
-        for mass, words in MASSES.items()
-        if any(
-            getattr(case.machine, mass) == getattr(default, mass)
-            and f"machine.{mass}" not in {axis.key for axis in study.axes}
-            for study, case in cases
-        )
-    ]
-    content = Assumptions(
-        ours,
-        any(case.joint != "none" for _, case in cases),
-        any(case.load == "spring" for _, case in cases),
-        claims,
-        [*dict.fromkeys(start_up(case) for _, case in cases)],
-    )
+def assumptions_section(has_claims: bool) -> Section:
+    """Return the section of the assumptions behind all studies, and behind the paper's claims."""
+    content = {"claims": has_claims, "machine": Case.from_values({}).machine}
     return Section("assumptions", "What to keep in mind", content, "assumptions.html")
 
 
-def start_up(case: Case) -> str:
-    """Return in words how long a case's metrics leave out the start-up."""
-    settle = case.solve.settle_rev
-    if isinstance(settle, str):
-        return "until revolutions agree"
-    return f"for {settle:g} revolution" + "s" * (settle != 1)
-
-
 def last_case(stored: Stored, study: StoredStudy) -> Case | None:
-    """Return the case of a study's last stored job.
-
-    None where there is none that this version knows.
-    """
+    """Return the case of a study's last stored job; None where this version knows none."""
     places = [place for place in stored.find([*study.keys]).tolist() if place >= 0]
     return stored.case_at(places[-1]) if places else None
 

@@ -206,7 +206,7 @@ def build_report(
         *chain(*(one.sections for one in added)),
         *(one.table for one in drawn),
         *tables,
-        assumptions_section(stored, studies, bool(paper.stored)),
+        assumptions_section(bool(paper.stored)),
         *(missing_sections(paper, results) if papers else ()),
         provenance_section(studies, results, command),
     ]

@@ -9,7 +9,8 @@ from jinja2 import PackageLoader
 
 from compressor.analysis.claims import Claim
 from compressor.analysis.margins import Margin
-from compressor.report.answer import Assumptions, FirstScreen, MetricChange, StudyLine
+from compressor.cases.case import Case
+from compressor.report.answer import FirstScreen, MetricChange, StudyLine
 from compressor.report.figures.drawing import make_grid
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.page import (
@@ -73,7 +74,7 @@ def contents(evil):
                         title=evil(), notes=evil(), overrides=(evil(),))  # fmt: skip
     return {
         "answer.html": answer,
-        "assumptions.html": Assumptions([evil()], True, True, True, [evil()]),
+        "assumptions.html": {"claims": True, "machine": Case().machine},
         "claims.html": claims,
         "diagnosis.html": DiagnosisContent(12, table(evil), [drawn(evil)]),
         "provenance.html": {**{name: evil() for name in PROVENANCE}, "studies": [study]},
