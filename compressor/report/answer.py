@@ -103,10 +103,7 @@ class StudyLine:
 
 @dataclass(frozen=True)
 class FirstScreen:
-    """The first screen.
-
-    `cautions`: of jobs that are chaotic or have not settled, a sentence each.
-    """
+    """The first screen; cautions: of jobs that are chaotic or not settled, a sentence each."""
 
     lines: Sequence[StudyLine]
     findings: Sequence[tuple[str, Sequence[MetricChange]]]

@@ -96,7 +96,6 @@ def extremes(y: np.ndarray, count: int) -> np.ndarray:
 
 
 MAX_SERIES = 60  # jobs of a study whose time series lie beside the page
-ACCELERATION, FORCE = ("acceleration", "m/s²"), ("contact force", "kN")
 SHOWN = ("time", "crank_angle", "acceleration", "contact_force")  # of a job's series
 
 
@@ -148,7 +147,8 @@ def draw_job(run: xr.Dataset, units: Units = "usual") -> go.Figure:
     angle, turn = last_revolution(run)
     drawing, grid = make_grid(2, 1, 4.0, units=units, share_x="all")
     sizes = 1e-3 * np.linalg.norm(turn["contact_force"].transpose("joint", "time", "axis"), axis=2)
-    for panel, (title, unit) in zip(grid[:, 0], (ACCELERATION, FORCE), strict=True):
+    shown = ("acceleration", "m/s²"), ("contact force", "kN")
+    for panel, (title, unit) in zip(grid[:, 0], shown, strict=True):
         panel.title = title
         panel.label("x", ANGLE_AXIS, "°")
         panel.label("y", f"{title} ({{}})", unit)

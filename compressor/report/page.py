@@ -192,10 +192,7 @@ SUBJECT = "Reciprocating compressor with joint clearance"
 
 
 def templates(files: Mapping[str, bytes] | None = None) -> Environment:
-    """Return the page's templates: they escape what they print, and what they lack is an error.
-
-    files: of a page that holds them, by name.
-    """
+    """Return the page's templates, which escape what they print; files: as of `document`."""
 
     def address(name: str) -> Markup:
         """Return where a file is: beside the page, or in it."""

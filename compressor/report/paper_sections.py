@@ -71,10 +71,7 @@ def repeats_paper(study: StoredStudy, paper: PaperRuns) -> bool:
 def find_runs(
     stored: Stored, studies: Sequence[StoredStudy], cases: Mapping[str, Case]
 ) -> PaperRuns:
-    """Return the studies' runs with the physics of some cases by label.
-
-    Of several, the most exact.
-    """
+    """Return the most exact run of the studies with each case's physics, by label."""
     labels = {case.physics_key: name for name, case in cases.items()}
     found: dict[str, xr.Dataset] = {}
     damaged = set()

@@ -161,10 +161,7 @@ def build_report(
     units: Units = "usual",
     names: Sequence[str] = (),
 ) -> ReportContent:
-    """Return the figures, series and page of a report, in memory.
-
-    limits, units, names: of studies, see `write_report`.
-    """
+    """Return the figures, series and page of a report, in memory; arguments as `write_report`."""
     studies, stored = choose_studies(results, names), read_store(results, warn=True)
     # a few like runs in a sweep of one's own are no reproduction
     papers = [study for study in studies if is_of_paper(stored, study)]
@@ -221,10 +218,7 @@ def build_report(
 
 
 def choose_studies(results: Folder, names: Sequence[str]) -> list[StoredStudy]:
-    """Return the studies of some names, by default all, those of searches last.
-
-    Raises WrongName with the nearest names.
-    """
+    """Return the studies of some names, or all, those of searches last. Raises WrongName."""
     if not names:
         return sorted(read_studies(results), key=lambda study: study.is_trial)
     known = read_studies(results)
@@ -250,10 +244,7 @@ class DrawnStudy(NamedTuple):
 def drawn_study(
     stored: Stored, study: StoredStudy, notes: Sequence[StudyNote], limits: Limits, units: Units
 ) -> DrawnStudy:
-    """Return a user's own study: its sections, and its sweep, drawn; `notes`: lines on it.
-
-    And revolutions over the crank angle. Neither is drawn where the paper's figures are.
-    """
+    """Return a study, with figures of it unless the paper's are drawn; notes: lines on it."""
     with label_studies(stored, [study]) as data:
         named: list[tuple[str, DrawnFigure]] = []
         if not study.figures:

@@ -54,10 +54,9 @@ def compare_healthy(
     is_worn = abs(data["max_penetration"]) > 0.0  # exactly 0 in an ideal joint
     has_clearance = (is_worn.any("joint") & (data["status"] == "ok")).values.ravel()
     force = np.full(has_clearance.size, np.nan)
-    for measure in MEASURES:
-        if measure.variable == FORCE and FORCE in data:
-            worn = is_worn.sel(joint=measure.joint).values.ravel()
-            force = np.fmax(force, np.where(worn, known_values(measure, data), np.nan))
+    for measure in measures_of(FORCE, data):
+        worn = is_worn.sel(joint=measure.joint).values.ravel()
+        force = np.fmax(force, np.where(worn, known_values(measure, data), np.nan))
     jobs = np.flatnonzero(has_clearance)
     ranked = jobs[np.argsort(-force[jobs], kind="stable")]  # what is not known comes last
     rows = stored.find([*map(str, data["key"].values.ravel())]).tolist()
@@ -65,15 +64,19 @@ def compare_healthy(
         if case := stored.case_at(rows[place]):
             alike = [n for n in differing_in_clearance(data, place) if has_clearance[n]]
             greatest = {"contact force in a worn joint": place} if force[place] > 0.0 else {}
-            for measure in MEASURES:
-                if measure.variable == SENSOR and SENSOR in data:
-                    peaks = known_values(measure, data)[alike]
-                    if np.isfinite(peaks).any():
-                        greatest["sensor peak"] = alike[int(np.nanargmax(peaks))]
+            for measure in measures_of(SENSOR, data):
+                peaks = known_values(measure, data)[alike]
+                if np.isfinite(peaks).any():
+                    greatest["sensor peak"] = alike[int(np.nanargmax(peaks))]
             places = choose_jobs(alike, [place, *greatest.values()])
             are_all = len(places) == len(alike)
             return _compare(stored, data, case, places, greatest, are_all, units)
     return None
+
+
+def measures_of(name: str, data: xr.Dataset) -> list[Measure]:
+    """Return the measures of a metric, of each joint or axis; none where the data have it not."""
+    return [one for one in MEASURES if one.variable == name and name in data]
 
 
 def known_values(measure: Measure, data: xr.Dataset) -> np.ndarray:
@@ -159,8 +162,8 @@ def describe_noise(data: xr.Dataset, healthy: xr.Dataset, places: Sequence[int])
     """Return that a sensor hears worn jobs of which none knocks, else ""."""
     if not {SENSOR, KNOCK} <= {*data} or SENSOR not in healthy:
         return ""
-    (peak,) = (measure for measure in MEASURES if measure.variable == SENSOR)
-    knocks = [read_numbers(m, data)[0].ravel()[places] for m in MEASURES if m.variable == KNOCK]
+    (peak,) = measures_of(SENSOR, data)
+    knocks = [read_numbers(m, data)[0].ravel()[places] for m in measures_of(KNOCK, data)]
     times = np.fmax.reduce(known_values(peak, data)[places]) / float(peak.of(healthy))
     if not times >= HEARD or not (np.fmax.reduce(knocks) <= BARRED[KNOCK].limit).all():
         return ""

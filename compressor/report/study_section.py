@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from compressor.digits import plural
 from compressor.outcome import Regime, regime_words
 from compressor.reasons import remedy
 from compressor.report.figures.sweep_data import measures, swept_values
@@ -47,8 +48,7 @@ class Counts(NamedTuple):
     @property
     def text(self) -> str:
         """Return the counts in words."""
-        jobs = sum(self)
-        parts = [f"{jobs} job{'s' * (jobs != 1)}: {self.ok} ok"]
+        parts = [f"{plural(sum(self))}: {self.ok} ok"]
         parts += [f"{self.failed} failed"] if self.failed else []
         parts += [f"{self.missing} not run"] if self.missing else []
         return ", ".join(parts)
