@@ -18,8 +18,11 @@ from markupsafe import Markup, escape
 
 from compressor.digits import MAX_DECIMAL, PAGE_DIGITS, by_bar, setting
 from compressor.outcome import Regime
+from compressor.report.figures import pictures
+from compressor.report.figures.drawing import as_csv
 from compressor.report.figures.sweep_data import Measure
 from compressor.report.figures.table import DrawnFigure
+from compressor.report.interactive import script
 from compressor.report.limits import NO_LIMITS, Limits
 from compressor.store import Folder, StoredStudy
 
@@ -147,13 +150,37 @@ def column_title(measure: Measure) -> str:
     return measure.title + (f" ({measure.unit})" if measure.unit else "")
 
 
+class ShownFigure(NamedTuple):
+    """What the page says of a figure, and the files beside it by name; jobs: keys of its points."""
+
+    name: str
+    title: str
+    caption: str
+    alt: str
+    size: tuple[int, int]
+    jobs: Sequence[str]
+    files: Mapping[str, bytes]
+
+
+def show_figure(drawn: DrawnFigure) -> ShownFigure:
+    """Return a figure as the page has it: with its picture, table and script."""
+    files = {
+        f"{drawn.name}.png": pictures.render(drawn.figure),
+        f"{drawn.name}.csv": as_csv(drawn.figure).encode(),
+        f"{drawn.name}.js": script(drawn.name, drawn.figure).encode(),
+    }
+    return ShownFigure(
+        drawn.name, drawn.title, drawn.caption, drawn.alt, drawn.size, [*drawn.jobs], files
+    )
+
+
 class SectionContent(NamedTuple):
     """What `section.html` prints; title, notes: of the machine; code: files and commands."""
 
     table: PageTable | None = None
     paragraphs: Sequence[str] = ()
     lines: Sequence[str] = ()
-    figures: Sequence[DrawnFigure] = ()
+    figures: Sequence[DrawnFigure | ShownFigure] = ()
     title: str = ""
     notes: str = ""
     code: Sequence[str] = ()

@@ -5,6 +5,7 @@ import shlex
 import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -25,7 +26,8 @@ from compressor.analysis import (
 )
 from compressor.cases import Axis, Case
 from compressor.report.answer import last_case
-from compressor.report.figures import FIGURES, Shakings, measure_shaking
+from compressor.report.figures import FIGURES, Figure, Shakings, measure_shaking
+from compressor.report.figures.pictures import draw_all
 from compressor.report.figures.sweep_data import measures
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.limits import NO_LIMITS, Limits
@@ -34,9 +36,11 @@ from compressor.report.page import (
     PageTable,
     Section,
     SectionContent,
+    ShownFigure,
     StudyNote,
     TableRow,
     number_cell,
+    show_figure,
 )
 from compressor.report.study_section import file_name, jobs_table
 from compressor.store import DamagedFile, Folder, Stored, StoredStudy, StoreWarning, label_studies
@@ -146,10 +150,7 @@ def own_figures(
     runs = find_runs(stored, [study], cases_of(case)).usable if case else {}
     alike = comparable(runs.values())
     lacking = [one for one in PAPER.values() if not runs.keys() >= {*one.needs}]
-    figures = [
-        one._replace(name=file_name(study.name, one.name), title=f"{study.name}: {one.title}")
-        for one in (draw_paper(runs, units) if alike else ())
-    ]  # fmt: skip
+    figures = draw_paper(runs, units, study.name) if alike else []
     if not figures:
         reason = "since no figure has all its cases there with series" if alike else UNEQUAL
         text = f"The paper's figures are not drawn of this machine, {reason}"
@@ -248,10 +249,20 @@ def missing_sections(paper: PaperRuns, results: Folder) -> Iterator[Section]:
     yield Section("missing", "Figures that could not be drawn", content)
 
 
-def draw_paper(runs: Mapping[str, xr.Dataset], units: Units) -> list[DrawnFigure]:
-    """Return every figure of the paper whose cases are there."""
-    known = (one for one in PAPER.values() if runs.keys() >= {*one.needs})
-    return [one.make(runs, units=units) for one in known]
+def draw_paper(runs: Mapping[str, xr.Dataset], units: Units, study: str = "") -> list[ShownFigure]:
+    """Return every figure of the paper whose cases are there; study: whose machine it is, if any.
+
+    Copies of this process make all of them, since their numbers take as long as their pictures.
+    """
+
+    def show(one: Figure) -> ShownFigure:
+        drawn = one.make(runs, units=units)
+        if study:
+            drawn = drawn._replace(name=file_name(study, one.name), title=f"{study}: {one.title}")
+        return show_figure(drawn)
+
+    known = [one for one in PAPER.values() if runs.keys() >= {*one.needs}]
+    return draw_all([(one.title, partial(show, one)) for one in known])
 
 
 @dataclass(frozen=True)

@@ -32,13 +32,12 @@ from compressor.report.answer import (
     study_findings,
     worn_joints,
 )
-from compressor.report.figures import FIGURES, pictures
-from compressor.report.figures.drawing import as_csv
+from compressor.report.figures import FIGURES
 from compressor.report.figures.pictures import draw_all
 from compressor.report.figures.sweep import draw_sweep
 from compressor.report.figures.sweep_data import measures
 from compressor.report.figures.table import DrawnFigure
-from compressor.report.interactive import job_scripts, script, series_name
+from compressor.report.interactive import job_scripts, series_name
 from compressor.report.limits import Limits, read_limits
 from compressor.report.page import (
     Add,
@@ -46,8 +45,10 @@ from compressor.report.page import (
     JobsToOpen,
     Section,
     SectionContent,
+    ShownFigure,
     StudyNote,
     document,
+    show_figure,
 )
 from compressor.report.paper_sections import (
     draw_diagnosis,
@@ -110,8 +111,10 @@ def write_report(
     folder, zones = Path(report), read_limits(limits, units)
     contents = build_report(results, command, add, zones, units, studies)
     files = {f"{series_name(key)}.js": text.encode() for key, text in contents.series.items()}
-    for made in draw_all([(one.title, partial(make_files, one)) for one in contents.figures]):
-        files |= made
+    drawn = [one for one in contents.figures if isinstance(one, DrawnFigure)]
+    shown = [one for one in contents.figures if isinstance(one, ShownFigure)]
+    for made in [*shown, *draw_all([(one.title, partial(show_figure, one)) for one in drawn])]:
+        files |= made.files
     library = {LIBRARY: get_plotlyjs().encode()}
     if single:
         page = contents.page(library | files)
@@ -122,15 +125,6 @@ def write_report(
     publish(folder / "index.html", contents.page({}).encode(errors="backslashreplace"))
     remove_stale(folder, contents)
     return folder / "index.html"
-
-
-def make_files(drawn: DrawnFigure) -> dict[str, bytes]:
-    """Return a figure's files beside the page by name: picture, table and script."""
-    return {
-        f"{drawn.name}.png": pictures.render(drawn.figure),
-        f"{drawn.name}.csv": as_csv(drawn.figure).encode(),
-        f"{drawn.name}.js": script(drawn.name, drawn.figure).encode(),
-    }
 
 
 def publish_changed(path: Path, content: bytes) -> None:
@@ -144,10 +138,11 @@ def publish_changed(path: Path, content: bytes) -> None:
 class ReportContent(NamedTuple):
     """A report that is drawn: its figures, the names of its studies, series by job, its page.
 
-    `page`: returns its text, which holds the files that it is given.
+    figures: those of the paper with their files; page: returns its text, which holds the files that
+    it is given.
     """
 
-    figures: list[DrawnFigure]
+    figures: list[DrawnFigure | ShownFigure]
     studies: list[str]
     series: dict[str, str]
     page: Callable[[Mapping[str, bytes]], str]
