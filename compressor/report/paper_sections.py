@@ -262,7 +262,7 @@ def draw_paper(runs: Mapping[str, xr.Dataset], units: Units, study: str = "") ->
         return show_figure(drawn)
 
     known = [one for one in PAPER.values() if runs.keys() >= {*one.needs}]
-    return draw_all([(one.title, partial(show, one)) for one in known])
+    return draw_all([partial(show, one) for one in known])
 
 
 @dataclass(frozen=True)

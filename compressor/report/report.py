@@ -113,7 +113,7 @@ def write_report(
     files = {f"{series_name(key)}.js": text.encode() for key, text in contents.series.items()}
     drawn = [one for one in contents.figures if isinstance(one, DrawnFigure)]
     shown = [one for one in contents.figures if isinstance(one, ShownFigure)]
-    for made in [*shown, *draw_all([(one.title, partial(show_figure, one)) for one in drawn])]:
+    for made in [*shown, *draw_all([partial(show_figure, one) for one in drawn])]:
         files |= made.files
     library = {LIBRARY: get_plotlyjs().encode()}
     if single:

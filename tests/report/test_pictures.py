@@ -18,7 +18,7 @@ NAMES = ["one", "two", "three", "four", "five"]
 
 
 def draw_pictures(figures):
-    return draw_all([(name, lambda one=one: module.render(one)) for name, one in figures.items()])
+    return draw_all([lambda one=one: module.render(one) for one in figures.values()])
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def elsewhere(monkeypatch, act):
 def test_two_processes_draw_what_one_does(figures, alone, two, monkeypatch, tmp_path, capfd):
     elsewhere(monkeypatch, lambda: (tmp_path / str(os.getpid())).touch())
     assert draw_pictures(figures) == alone
-    assert sorted(capfd.readouterr().err.splitlines()) == sorted(f"drawing {n}" for n in NAMES)
+    assert capfd.readouterr().err == "drawing 5 figures\n"
     assert 1 <= len([*tmp_path.iterdir()]) <= 2
 
 

@@ -31,6 +31,7 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import MultipleLocator
 
+from compressor.digits import plural
 from compressor.report.figures.drawing import (
     INCH,
     ROOM,
@@ -88,8 +89,8 @@ def render(figure: go.Figure, kind: str = "png") -> bytes:
 
 
 Made = TypeVar("Made")
-Work = Sequence[tuple[str, Callable[[], Made]]]  # what is drawn, in words, and what draws it
-TO_DRAW: list[tuple[str, Callable[[], Any]]] = []  # of a copy of this process
+Work = Sequence[Callable[[], Made]]  # what draws a figure each
+TO_DRAW: list[Callable[[], Any]] = []  # of a copy of this process
 
 
 def start_copy(work: Work[Any]) -> None:
@@ -100,23 +101,18 @@ def start_copy(work: Work[Any]) -> None:
 
 def draw_numbered(number: int) -> Any:
     """Return what is drawn of the work that the copy has."""
-    return draw_reported(*TO_DRAW[number])
-
-
-def draw_reported(heading: str, draw: Callable[[], Made]) -> Made:
-    """Return what is drawn; say what that is in one write, since two share stderr."""
-    with contextlib.suppress(OSError):
-        sys.stderr.write(f"drawing {heading}\n")
-        sys.stderr.flush()
-    return draw()
+    return TO_DRAW[number]()
 
 
 def draw_all(work: Work[Made]) -> list[Made]:
-    """Return what is drawn, each with what it is called on stderr.
+    """Return what is drawn; say on stderr how much that is.
 
     Two at a time draw, copies of this process; one after the other where the system makes no
     copies, or threads run, whose locks a copy would take along.
     """
+    with contextlib.suppress(OSError):
+        sys.stderr.write(f"drawing {plural(len(work), 'figure')}\n" * bool(work))
+        sys.stderr.flush()
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     can_fork = cores > 1 and "fork" in multiprocessing.get_all_start_methods()
@@ -128,7 +124,7 @@ def draw_all(work: Work[Made]) -> list[Made]:
             ) as pool,
         ):
             return [*pool.map(draw_numbered, range(len(work)))]
-    return [draw_reported(*one) for one in work]
+    return [draw() for draw in work]
 
 
 def paint(figure: go.Figure) -> Figure:
