@@ -128,11 +128,14 @@ def write_report(
 
 
 def publish_changed(path: Path, content: bytes) -> None:
-    """Write a file unless it has this content already. Raises StoreError."""
+    """Write a file unless it has this content already. Raises StoreError.
+
+    A power cut may cost it: the same command makes it again.
+    """
     with contextlib.suppress(OSError):
         if path.stat().st_size == len(content) and path.read_bytes() == content:
             return
-    publish(path, content)
+    publish(path, content, durable=False)
 
 
 class ReportContent(NamedTuple):

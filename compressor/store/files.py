@@ -92,10 +92,11 @@ def refusals(path: Path, named: bool = True) -> Iterator[None]:
         raise system_error(other, error) from error
 
 
-def publish(path: Path, data: bytes) -> None:
-    """Write a whole file under its name, durably, or leave what was there.
+def publish(path: Path, data: bytes, durable: bool = True) -> None:
+    """Write a whole file under its name, or leave what was there.
 
-    Raises StoreError where the disk refuses.
+    durable: a power cut leaves it there, too, which takes the disk a while. Raises StoreError where
+    the disk refuses.
     """
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
     make_folder(path.parent)
@@ -103,14 +104,16 @@ def publish(path: Path, data: bytes) -> None:
         try:
             with open(temporary, "wb") as file:
                 file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
+                if durable:
+                    file.flush()
+                    os.fsync(file.fileno())
             os.replace(temporary, path)
         except BaseException:
             with contextlib.suppress(OSError):
                 temporary.unlink()
             raise
-        sync_folder(path.parent)
+        if durable:
+            sync_folder(path.parent)
 
 
 def make_folder(folder: Path) -> None:
