@@ -1,6 +1,6 @@
 """Pictures of figures by matplotlib, by two processes where there are cores for them.
 
-Figures are made on the Agg canvas without pyplot, and inside a style context, so that neither a
+Figures are made on the Agg canvas without pyplot, and with all settings given, so that neither a
 user's matplotlibrc nor a user's own figures are touched.
 """
 
@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import plotly.graph_objects as go
-from matplotlib import style
+from matplotlib import rc_context, rcParamsDefault
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -53,7 +53,8 @@ MARKERS = {
     "triangle-left": "<", "triangle-right": ">", "pentagon": "p", "x-thin": "x",
 }  # fmt: skip
 
-STYLE: dict[str, Any] = {
+STYLE: Any = {
+    **{name: one for name, one in rcParamsDefault.items() if name != "backend"},  # not given back
     "font.size": 9.5,
     "axes.titlelocation": "left",
     "axes.titley": 1.0,  # found again for each drawing it takes a tenth of the time
@@ -78,7 +79,7 @@ STYLE: dict[str, Any] = {
 }
 
 
-@style.context(STYLE, after_reset=True)
+@rc_context(STYLE)  # matplotlib.style would first parse its library
 def render(figure: go.Figure, kind: str = "png") -> bytes:
     """Return a figure as the bytes of a `png` or `svg` file, without a time stamp."""
     stream, painted = io.BytesIO(), paint(figure)
