@@ -1,7 +1,9 @@
 """The figures: every line is the stored series, and every panel can be read."""
 
+import math
 import subprocess
 import sys
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -9,9 +11,12 @@ import pytest
 
 from compressor.analysis.cam import Cam
 from compressor.analysis.runs import paper_cases
+from compressor.cases.case import Case
 from compressor.report.figures import FIGURES, pictures
 from compressor.report.figures.drawing import panels_of
+from compressor.report.figures.paper import PHASES
 from compressor.solve.si_record import record
+from compressor.solve.simulate import simulate
 
 FIGURE = {int(name[-2:]): figure for name, figure in FIGURES["paper"].items()}
 SETTLED = slice(1200, None)  # 0.3 degrees a sample: the first revolution is start-up
@@ -137,7 +142,34 @@ def test_pressure_volume(drawn, paper_runs):
     volume = area * (0.740 - run["displacement"].values[SETTLED]) * 1000
     check_lines(panel, [(volume, run["piston_force"].values[SETTLED] / area / 1e6)])
     names = {note.text for note in panel.notes if not note.showarrow}
-    assert names == {"expansion", "suction", "compression", "discharge"}
+    assert names == {*PHASES}
+
+
+CYLINDER = {"action": "double", "bore_mm": 220, "rod_diameter_mm": 60, "suction_MPa": 0.2,
+            "discharge_MPa": 0.7, "clearance_percent": {"head": 12, "crank": 14}}  # fmt: skip
+CARD = {"bore_mm": 220, "indicator": "card.csv"}
+
+
+@pytest.mark.parametrize(
+    ("gas", "pressures", "named"),
+    [
+        (CYLINDER, (0.2, 0.7), {*PHASES}),
+        (CYLINDER | {"back_pressure_MPa": 0.1}, (0.2, 0.7), {*PHASES}),
+        (CYLINDER | {"action": "crank_end", "clearance_percent": 14}, (0.2, 0.7), {*PHASES}),
+        (CYLINDER | {"unloaded": "head"}, (0.2, 0.7), {*PHASES}),
+        (CARD, (0.3, 0.7), set()),
+    ],
+)
+def test_pressure_volume_of_a_cylinder(tmp_path, monkeypatch, gas, pressures, named):
+    """It was the force of both ends over the head's face; one without phases ended the report."""
+    monkeypatch.chdir(tmp_path)
+    rows = (f"{a},{0.5 - 0.2 * math.sin(math.radians(a))}\n" for a in range(0, 360, 5))
+    Path("card.csv").write_text("crank_angle_deg,pressure_MPa\n" + "".join(rows))
+    case = Case.from_values({"load": "gas", "gas": gas})
+    (panel,) = panels_of(FIGURE[3].make({"typical": simulate(case)}).figure)
+    ((_, found),) = lines(panel)
+    assert (found.min(), found.max()) == pytest.approx(pressures, rel=1e-3)
+    assert {note.text for note in panel.notes if not note.showarrow} == named
 
 
 def test_cam(drawn):

@@ -13,6 +13,7 @@ from compressor.analysis import (
     SPOKEN,
     Cam,
     case_of,
+    end_states,
     faulty_joints,
     force_relation,
     ideal_motion,
@@ -310,45 +311,40 @@ BASE = LineStyle("#707070", (1, 1.2), 1.2, 2.1)
 @paper_figure(3, "The ideal p–V diagram", "typical")
 def draw_pressure_volume(runs: Runs, units: Units = "usual") -> DrawnFigure:
     """Return figure 3: cylinder pressure over volume, with phases and direction."""
-    run = settled_part(runs["typical"])
-    volume, pressure = gas_state(run)
+    run, gas = settled_part(runs["typical"]), case_of(runs["typical"]).gas
+    states = end_states(run)
+    end = (gas.compressing_ends or [*states])[0]
+    volume, pressure = states[end]
     drawing, panels = make_grid(1, 1, 5.2, units=units)
     (panel,) = panels.flat
-    panel.label("x", "gas volume V ({})", "litres")
+    panel.label("x", f"{'displaced' if gas.is_measured else 'gas'} volume V ({{}})", "litres")
     panel.label("y", "pressure p ({}, absolute)", "MPa")
     panel.plot(volume, pressure, CLOSED, "gas in the cylinder")
-    name_phases(panel, run, volume, pressure)
+    phases = load_phases(run)  # of both ends, those of the head end count one, of the other four
+    name_phases(panel, phases % 4 if end == "head" else phases // 4, volume, pressure)
     panel.span("x", 0, 1.05 * volume.max())
     panel.span("y", 0, 1.15 * pressure.max())
     sentence = (
-        "Cylinder pressure over gas volume in the typical model, from the stored piston force and "
-        "displacement; arrows point in the direction of time."
+        f"Pressure over gas volume in the {end} end of the typical model's cylinder; arrows point "
+        "in the direction of time."
     )
-    used, exact = record_of(runs["typical"]).corners, Cam.of(runs["typical"]).gas_corners
-    numbers = [
-        ("the phases change at", spell_angles(used)),
-        ("off the ideal gas's corners by up to", spell_angles(np.abs(used - exact).max())),
-    ]
+    numbers, used = [], record_of(run).corners
+    if used.any():
+        off = np.abs(used - Cam.of(run).gas_corners).max()
+        numbers = [
+            ("the phases change at", spell_angles(used)),
+            ("off the ideal gas's corners by up to", spell_angles(off)),
+        ]
     return DrawnFigure(drawing.figure(), sentence, numbers)
 
 
-def gas_state(run: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Return the volume (litres) and absolute pressure (MPa) of a run of the gas load."""
-    case = case_of(run)
-    machine, gas = case.machine, case.gas
-    area = math.pi * gas.piston_radius_mm**2  # mm^2
-    clearance = gas.clearance("head", 2 * machine.crank_radius_mm)
-    head = machine.rod_length_mm + machine.crank_radius_mm + clearance
-    volume = area * (head - run["displacement"].values * 1e3) * 1e-6
-    return volume, run["piston_force"].values / area + (gas.back_pressure_MPa or 0.0)
-
-
-def name_phases(panel: Panel, run: xr.Dataset, volume: np.ndarray, pressure: np.ndarray) -> None:
+def name_phases(panel: Panel, phase: np.ndarray, volume: np.ndarray, pressure: np.ndarray) -> None:
     """Write each phase's name beside it, with an arrow along its direction."""
-    phase = load_phases(run) % len(PHASES)  # with exact switching they are numbered from 4 on
     offsets = {"expansion": (14, 8), "suction": (0, -16), "compression": (10, 8)}
     for number, name in enumerate(PHASES):
         here = np.flatnonzero(phase == number)
+        if here.size in (0, phase.size):  # the only one, of a measured card or an unloaded end
+            continue
         here = here[: np.argmax(np.diff(here, append=np.inf) > 1) + 1]  # its first revolution
         middle = here[np.argmin(np.abs(volume[here] - volume[here].mean()))]
         places = [middle + here.size // 14, middle - here.size // 14, middle]
