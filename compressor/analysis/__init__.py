@@ -36,17 +36,14 @@ from compressor.analysis.runs import (
     settled_revolutions,
 )
 from compressor.analysis.shaking import (
-    AFTER,
-    BEFORE,
     ORDER,
     NoSeriesError,
-    Shaking,
+    Spectrum,
     deviation_spectrum,
     frame_forces,
     healthy_body_velocity_rms,
     healthy_twin,
     last_revolution,
-    near_a_turn,
     sensor_envelope,
     shaking,
 )

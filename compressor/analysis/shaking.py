@@ -1,19 +1,15 @@
-"""How joints with clearance shake the frame: orders of the force along the cylinder, and when.
+"""How joints with clearance shake the frame: orders of the force along the cylinder.
 
 A worn joint puts its force on the frame in high orders of the crank speed, where the ideal machine
-has next to none. The part above `ORDER` is split by crank angle. One share lies about the changes
-of direction of a joint's force, where the journal crosses its bore and swings on the other side;
-the other lies elsewhere.
+has next to none.
 """
 
-import itertools
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.analysis.contacts import joints_with_clearance
 from compressor.analysis.runs import case_of, ideal_motion, record_of, settled_part
 from compressor.cases import Case, with_ideal_joints
 from compressor.solve import SIGNALS, signals_of_scene, simulate
@@ -105,8 +101,6 @@ def healthy_body_velocity_rms(case: Case) -> np.ndarray:
 
 
 ORDER = 12  # of the crank speed: above it the ideal machine's force has next to nothing
-SAME_TURN_DEGREES = 20.0  # changes of sign nearer to each other are one turn
-BEFORE, AFTER = 10.0, 50.0  # degrees about a change of direction that count as belonging to it
 LEVELS = 5  # of the kurtogram that chooses a sensor's band, at most
 MIN_SHARE = 0.01  # of the record's energy that this band has
 MIN_LINES = 128  # samples that a level of it needs, twice over for each further one
@@ -130,51 +124,21 @@ class Spectrum:
         return self.orders, self.amplitudes
 
 
-@dataclass(frozen=True)
-class Shaking:
-    """The force X on the frame along the cylinder, over `revolutions` settled ones.
+def shaking(run: "xr.Dataset") -> Spectrum:
+    """Return the order spectrum of X, the force on the frame along the cylinder, N, of a run.
 
-    `turns`: crank angles (degrees) at which a force along the cylinder at a joint with clearance
-    changes its sign. `angle` (degrees) and `mean_square` (N^2), (a_turn,): of the part of X above
-    `ORDER`, a mean over revolutions. The rms of this part has two shares, N, whose squares add up
-    to its own: `near_turns`, from `BEFORE` to `AFTER` a turn, and `elsewhere`.
-    """
-
-    revolutions: int
-    spectrum: Spectrum
-    turns: tuple[float, ...]
-    angle: np.ndarray
-    mean_square: np.ndarray
-    near_turns: float
-    elsewhere: float
-
-
-def shaking(run: "xr.Dataset") -> Shaking:
-    """Return the `Shaking` of a run with time series; of ideal joints there are no turns.
-
-    Raises NoSeriesError where the series hold no whole settled revolution, RecordError where they
+    Raises NoSeriesError where its series hold no whole settled revolution, RecordError where they
     are too coarse for `ORDER`.
     """
-    from compressor.vibration import high_pass_orders
+    from compressor.vibration import RecordError
 
     settled, revolutions = whole_revolutions(run)
-    crank = settled["crank_angle"].values
     force = frame_forces(settled)["shaking_force"][:, 0]
     even, a_turn = evenly(settled, revolutions, force)
-    high = high_pass_orders(even, a_turn, ORDER)
-    angle = (np.degrees(crank[0]) + 360.0 * np.arange(a_turn) / a_turn) % 360.0
-    mean_square = (high.reshape(-1, a_turn) ** 2).mean(axis=0)
-    turns = directions_change(settled)
-    is_near = near_a_turn(angle, turns)
-    return Shaking(
-        revolutions,
-        order_lines(even, a_turn),
-        turns,
-        angle,
-        mean_square,
-        math.sqrt(float(mean_square[is_near].sum()) / a_turn),
-        math.sqrt(float(mean_square[~is_near].sum()) / a_turn),
-    )
+    if a_turn <= 2 * ORDER:
+        text = f"order {ORDER} is not below {a_turn / 2:g}, half the samples a turn"
+        raise RecordError(f"{text}: run it with a finer solve.output_step_deg")
+    return order_lines(even, a_turn)
 
 
 def evenly(settled: "xr.Dataset", revolutions: int, values: np.ndarray) -> tuple[np.ndarray, int]:
@@ -212,51 +176,6 @@ def deviation_spectrum(run: "xr.Dataset") -> Spectrum:
     settled, revolutions = whole_revolutions(run)
     deviation = settled["acceleration"].values - ideal_motion(settled)[2]
     return order_lines(*evenly(settled, revolutions, deviation))
-
-
-def directions_change(settled: "xr.Dataset") -> tuple[float, ...]:
-    """Return the crank angles (degrees) at which forces along the cylinder change sign.
-
-    Of all joints with clearance, in rising order.
-    """
-    try:
-        joints = joints_with_clearance(settled)
-    except ValueError:
-        return ()
-    crank = np.degrees(settled["crank_angle"].values)
-    forces = (settled["contact_force"].sel(joint=joint, axis="x").values for joint in joints)
-    return tuple(sorted(turn for force in forces for turn in turning_points(crank, force)))
-
-
-def turning_points(angle: np.ndarray, force: np.ndarray) -> tuple[float, ...]:
-    """Return the crank angles (degrees, 0 to 360) at which a force changes its sign.
-
-    angle: of the samples, (m,) degrees; changes of several revolutions, and of a force that
-    trembles about zero, are put together where they are nearer than `SAME_TURN_DEGREES`.
-    """
-    angle, force = angle[force != 0.0], force[force != 0.0]  # to be free is no change of sign
-    at = np.sort(angle[1:][np.diff(np.sign(force)) != 0] % 360.0)
-    if not at.size:
-        return ()
-    groups: list[list[float]] = [[at[0]]]
-    for one, other in itertools.pairwise(at):
-        if other - one > SAME_TURN_DEGREES:
-            groups.append([])
-        groups[-1].append(float(other))
-    if len(groups) > 1 and groups[0][0] + 360.0 - groups[-1][-1] <= SAME_TURN_DEGREES:
-        groups[0] = [one - 360.0 for one in groups.pop()] + groups[0]
-    return tuple(sorted(float(np.mean(group)) % 360.0 for group in groups))
-
-
-def near_a_turn(angle: np.ndarray, turns: tuple[float, ...]) -> np.ndarray:
-    """Return whether crank angles (degrees, (m,)) lie from `BEFORE` to `AFTER` a turn.
-
-    turns: the crank angles of all changes of direction, degrees.
-    """
-    is_near = np.zeros(angle.size, bool)
-    for turn in turns:
-        is_near |= (angle - turn + BEFORE) % 360.0 < BEFORE + AFTER
-    return is_near
 
 
 @dataclass(frozen=True)

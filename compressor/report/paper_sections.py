@@ -1,4 +1,4 @@
-"""The sections of a report about the paper: figures, cases, claims, own machines, diagnosis."""
+"""The sections of a report about the paper: figures, cases, claims, own machines."""
 
 import math
 import shlex
@@ -17,7 +17,6 @@ from compressor.analysis import (
     ORDER,
     SPOKEN,
     Claim,
-    Shaking,
     cases_of,
     claims,
     label,
@@ -26,22 +25,11 @@ from compressor.analysis import (
 )
 from compressor.cases import Axis, Case
 from compressor.report.answer import last_case
-from compressor.report.figures import FIGURES, Figure, Shakings, measure_shaking
+from compressor.report.figures import FIGURES, Figure
 from compressor.report.figures.pictures import draw_all
 from compressor.report.figures.sweep_data import measures
-from compressor.report.figures.table import DrawnFigure
 from compressor.report.limits import NO_LIMITS, Limits
-from compressor.report.page import (
-    Cell,
-    PageTable,
-    Section,
-    SectionContent,
-    ShownFigure,
-    StudyNote,
-    TableRow,
-    number_cell,
-    show_figure,
-)
+from compressor.report.page import Section, SectionContent, ShownFigure, StudyNote, show_figure
 from compressor.report.study_section import file_name, jobs_table
 from compressor.store import DamagedFile, Folder, Stored, StoredStudy, StoreWarning, label_studies
 from compressor.units import Units
@@ -263,44 +251,3 @@ def draw_paper(runs: Mapping[str, xr.Dataset], units: Units, study: str = "") ->
 
     known = [one for one in PAPER.values() if runs.keys() >= {*one.needs}]
     return draw_all([partial(show, one) for one in known])
-
-
-@dataclass(frozen=True)
-class DiagnosisContent:
-    """What a page says of the faults side by side."""
-
-    order: int
-    table: PageTable
-    figures: list[DrawnFigure]
-
-
-def draw_diagnosis(runs: Mapping[str, xr.Dataset], units: Units) -> list[DiagnosisContent]:
-    """Return the figures of the faults side by side, and a table of the force above `ORDER`.
-
-    Nothing where a case is missing.
-    """
-    figures = FIGURES["diagnosis"].values()
-    if not all(runs.keys() >= {*one.needs} for one in figures):
-        return []
-    found = measure_shaking(runs)
-    drawn = [one.make(runs, found, units=units) for one in figures]
-    return [DiagnosisContent(ORDER, force_table(found), drawn)]
-
-
-def force_table(found: Shakings) -> PageTable:
-    """Return the rms of X above `ORDER` and its two shares, N, by fault and clearance."""
-    head = ["clearance at", "clearance", "rms", "near changes of direction", "elsewhere"]
-    healthy = found["design"]
-    rows = [TableRow([Cell("none"), number_cell(0.0, "mm"), *forces(healthy)])]
-    for fault in FAULTS:
-        for clearance in CLEARANCES:
-            one = found[label(fault, clearance)]
-            size = Cell(f"{clearance:g} mm", "number", clearance)
-            rows.append(TableRow([Cell(SPOKEN[fault]), size, *forces(one)]))
-    return PageTable(head, rows)
-
-
-def forces(one: Shaking) -> list[Cell]:
-    """Return the whole and its shares, to 0.1 N."""
-    values = one.spectrum.above, one.near_turns, one.elsewhere
-    return [Cell(f"{value:.1f} N", "number", value) for value in values]

@@ -51,7 +51,6 @@ from compressor.report.page import (
     show_figure,
 )
 from compressor.report.paper_sections import (
-    draw_diagnosis,
     draw_paper,
     find_runs,
     is_of_paper,
@@ -167,7 +166,6 @@ def build_report(
     paper_figures = draw_paper(paper.usable, units)
     of_own = {one.name: own_figures(stored, one, units) for one in studies if one.figures}
     own_notes = {name: note for name, (note, _) in of_own.items()}
-    faults = draw_diagnosis(paper.usable, units)
     own = [study for study in studies if not repeats_paper(study, paper)]
     added = [one(results, studies) for one in add]
     drawn: list[DrawnStudy] = []
@@ -197,7 +195,6 @@ def build_report(
         *(one.section for one in drawn),
         *[of_paper] * bool(paper_figures),
         *chain(*(sections for _, sections in of_own.values())),
-        *(Section("diagnosis", "Diagnosis", one, "diagnosis.html") for one in faults),
         *chain(*(one.sections for one in added)),
         *(one.table for one in drawn),
         *tables,
@@ -307,7 +304,7 @@ def remove_stale(report: Path, contents: ReportContent) -> None:
     """Remove what an earlier report drew and this one did not: the paper's figures, and series."""
     drawn = {one.name for one in contents.figures}
     own = (file_name(study, name) for study in contents.studies for name in FIGURES["paper"])
-    names = {*FIGURES["paper"], *FIGURES["diagnosis"], *own} - drawn
+    names = {*FIGURES["paper"], *own} - drawn
     stale = [report / f"{name}.{kind}" for name in names for kind in KINDS]
     scripts = {f"{series_name(key)}.js" for key in contents.series}
     stale += [path for path in report.glob(f"{series_name('*')}.js") if path.name not in scripts]

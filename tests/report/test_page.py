@@ -24,7 +24,6 @@ from compressor.report.page import (
     TableRow,
     document,
 )
-from compressor.report.paper_sections import DiagnosisContent
 from compressor.report.side_by_side import HealthyAndWorn
 from compressor.report.study_section import StudyContent
 from compressor.store.studies import StoredStudy
@@ -76,7 +75,6 @@ def contents(evil):
         "answer.html": answer,
         "assumptions.html": {"claims": True, "machine": Case().machine},
         "claims.html": claims,
-        "diagnosis.html": DiagnosisContent(12, table(evil), [drawn(evil)]),
         "provenance.html": {**{name: evil() for name in PROVENANCE}, "studies": [study]},
         "section.html": SectionContent(table(evil), [evil()], [evil()],
                                        [drawn(evil) for _ in range(4)], evil(), evil(), [evil()]),

@@ -1,6 +1,6 @@
 """The table of figures, which the modules beside it fill."""
 
-from compressor.report.figures.diagnosis import Shakings, measure_shaking
+from compressor.report.figures.paper import paper_figure
 from compressor.report.figures.rows import SweptRow
 from compressor.report.figures.table import FIGURES, DrawnFigure, Figure
 

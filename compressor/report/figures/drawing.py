@@ -234,25 +234,14 @@ class Panel:
 
     def rule(self, style: LineStyle, x: float = math.nan, y: float = math.nan) -> None:
         """Draw a straight line across the panel, at x or at y."""
-        way: Way = "x" if math.isnan(y) else "y"
-        at = x if way == "x" else y
-        line = {**style.line, "width": max(1.0, style.line["width"])}
-        self.shape(way, at, at, type="line", line=line,
-                   layer="below" if style.zorder < 1.0 else "above")  # fmt: skip
-
-    def draw_band(self, way: Way, low: float, high: float, style: LineStyle) -> None:
-        """Draw an area across the panel, from a lower to a higher x or y."""
-        self.shape(way, low, high, type="rect", layer="below", fillcolor=style.color,
-                   line={"width": 0})  # fmt: skip
-
-    def shape(self, way: Way, low: float, high: float, **look: Any) -> None:
-        """Draw what lies between two values along an axis, and across all of the panel."""
-        other = WAYS[way == "x"]
-        first, last = self.at(way, [low, high]).tolist()
+        way, other = WAYS if math.isnan(y) else WAYS[::-1]
+        at = float(self.at(way, x if way == "x" else y)[0])
         self.figure.add_shape({
-            f"{way}0": first, f"{way}1": last, f"{way}ref": f"{way}{self.suffix}",
+            f"{way}0": at, f"{way}1": at, f"{way}ref": f"{way}{self.suffix}",
             f"{other}0": 0.0, f"{other}1": 1.0, f"{other}ref": f"{other}{self.suffix} domain",
-        } | look)  # fmt: skip
+            "type": "line", "line": {**style.line, "width": max(1.0, style.line["width"])},
+            "layer": "below" if style.zorder < 1.0 else "above",
+        })  # fmt: skip
 
     def span(self, way: Way, low: float = math.nan, high: float = math.nan) -> None:
         """Show what lies between two values; one that is not given follows from what is drawn."""

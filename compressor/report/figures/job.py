@@ -360,9 +360,9 @@ def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     force, deviation = panels[:2, 0]
     force.label("y", "amplitude of X ({})", "N")
     deviation.label("y", "amplitude ({})", "m/s²")
-    plot_lines(force, shaking(run).spectrum.lines, THIS, NAMES["this"])
+    plot_lines(force, shaking(run).lines, THIS, NAMES["this"])
     if twin is not None:
-        plot_lines(force, shaking(twin).spectrum.lines, TWIN, NAMES["twin"])
+        plot_lines(force, shaking(twin).lines, TWIN, NAMES["twin"])
     plot_deviation(deviation, deviation_spectrum(run).lines)
     force.title = "force on the frame along the cylinder"
     deviation.title = "acceleration of the crosshead less that of ideal joints"
@@ -370,9 +370,9 @@ def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
         plot_envelope(panels[2, 0], (envelope.orders, envelope.amplitudes), envelope.band)
     for panel in panels.flat:
         panel.x.title = ORDERS_AXIS
-    above = [(f"rms of X above order {ORDER}", spell(shaking(run).spectrum.above, "N"))]
+    above = [(f"rms of X above order {ORDER}", spell(shaking(run).above, "N"))]
     if twin is not None:
-        above.append(("without clearance", spell(shaking(twin).spectrum.above, "N")))
+        above.append(("without clearance", spell(shaking(twin).above, "N")))
     above.append(("rms of the deviation above it", spell(deviation_spectrum(run).above, "m/s²")))
     if envelope is not None:
         low, high = (f"{edge:.0f}" for edge in envelope.band)

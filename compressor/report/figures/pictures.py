@@ -184,13 +184,9 @@ def paint_panel(axes: Axes, panel: Panel) -> None:
         paint_trace(axes, trace, 2.0 + 0.01 * height)
     for rule in panel.rules:
         way = "x" if "domain" in rule.yref else "y"
-        look = {"zorder": 1.9 if rule.layer == "below" else 2.9}
-        if rule.type == "rect":
-            area = axes.axvspan if way == "x" else axes.axhspan
-            area(rule[f"{way}0"], rule[f"{way}1"], color=rule.fillcolor, linewidth=0.0, **look)
-        else:
-            line = axes.axvline if way == "x" else axes.axhline
-            line(rule[f"{way}0"], **look, **line_look(rule.line))
+        line = axes.axvline if way == "x" else axes.axhline
+        look = {"zorder": 1.9 if rule.layer == "below" else 2.9} | line_look(rule.line)
+        line(rule[f"{way}0"], **look)
     for note in panel.notes:
         is_inside = ["domain" in ref for ref in (note.xref, note.yref)]
         at = [10.0**end if scale.type == "log" and not inside else end for end, scale, inside
@@ -250,10 +246,7 @@ def curve_look(trace: go.Scatter) -> dict[str, Any]:
     """Return the keywords of a curve of matplotlib: its line, its marks or both."""
     marks, symbol = trace.marker, trace.marker.symbol or ""
     look = line_look(trace.line) if "lines" in trace.mode else {"linestyle": "none"}
-    look |= {
-        "alpha": trace.opacity,
-        "drawstyle": "steps-post" if trace.line.shape == "hv" else None,
-    }
+    look["alpha"] = trace.opacity
     if "markers" in trace.mode:
         is_open = symbol.endswith("-open")
         look |= {

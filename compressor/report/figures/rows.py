@@ -7,7 +7,7 @@ import numpy as np
 import plotly.graph_objects as go
 import xarray as xr
 
-from compressor.analysis import MODES, OILED_MODES, ORDER, SPOKEN, UNKNOWN, Cycle, Shaking
+from compressor.analysis import MODES, OILED_MODES, ORDER, SPOKEN, UNKNOWN, Cycle, Spectrum
 from compressor.metrics import JOINTS
 from compressor.report.figures.drawing import (
     Drawing,
@@ -71,7 +71,7 @@ class SweptRow:
     """
 
     value: str
-    shaking: Shaking | None = None
+    shaking: Spectrum | None = None
     modes: xr.Dataset | None = None
     cycle: Cycle | None = None
     segments: Segments | None = None
@@ -272,11 +272,11 @@ def segment_words(place: int) -> str:
 def draw_waterfall(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> DrawnFigure:
     """Return order spectra of X, a row a value, in colour; beside them the rms above `ORDER`."""
     found = [row.shaking for row in rows]
-    size = min(MAX_MAP_ORDERS, *(one.spectrum.orders.size - 1 for one in found if one))
+    size = min(MAX_MAP_ORDERS, *(one.orders.size - 1 for one in found if one))
     table = np.full((len(rows), size), np.nan)
     for number, one in enumerate(found):
         if one:
-            table[number] = one.spectrum.amplitudes[1 : size + 1]
+            table[number] = one.amplitudes[1 : size + 1]
     top = np.nanmax(table[:, ORDER:])  # the first orders are beyond the scale
     if top < 1e-9 * np.nanmax(table):  # ideal joints: rounding
         top = np.nanmax(table)
@@ -285,7 +285,7 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str, units: Units = "usual")
                                "amplitude of X ({})", "N", units)  # fmt: skip
     image.rule(LineStyle(RED, (4, 1.5)), x=ORDER + 0.5)
     image.x.title = ORDERS_AXIS + f"; dashed: order {ORDER}"
-    above = np.array([one.spectrum.above if one else np.nan for one in found])
+    above = np.array([one.above if one else np.nan for one in found])
     words = f"rms of X above<br>order {ORDER} ({{}})"
     figure = finish_map(drawing, above, words, "N", max(1.0, 1.08 * np.nanmax(above)))
     numbers = spell_ends(f"rms of X above order {ORDER}", above, rows, "N")

@@ -17,7 +17,7 @@ class LineStyle:
     dash: lengths of strokes and gaps in widths of the line, () of a solid one; linewidth and
     markersize: in points, of a line that is not drawn 0; marker: plotly's name of it, "" without;
     edge: colour of the marks' outline, "" as the rest; is_hollow: marks are outlines alone;
-    is_hatched: the area is, in colour `edge`; is_step: a value holds up to the next x.
+    is_hatched: the area is, in colour `edge`.
     """
 
     color: str
@@ -30,7 +30,6 @@ class LineStyle:
     edge_width: float = 1.0
     is_hollow: bool = False
     is_hatched: bool = False
-    is_step: bool = False
     alpha: float = 1.0
 
     @property
@@ -38,8 +37,7 @@ class LineStyle:
         """Return plotly's description of the line."""
         strokes = [round(PIXEL * part * self.linewidth, 2) for part in self.dash]
         dash = ",".join(f"{part}px" for part in strokes) or "solid"
-        found = {"color": self.color, "width": round(PIXEL * self.linewidth, 2), "dash": dash}
-        return found | ({"shape": "hv"} if self.is_step else {})
+        return {"color": self.color, "width": round(PIXEL * self.linewidth, 2), "dash": dash}
 
     @property
     def marks(self) -> dict[str, Any]:

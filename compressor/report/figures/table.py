@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from compressor.report.figures.drawing import INCH, describe_figure
 from compressor.report.figures.pictures import DPI
 
-Kind = Literal["paper", "diagnosis", "job", "study"]
+Kind = Literal["paper", "job", "study"]
 NOTHING = 1e-6  # in any unit of a figure: below it a number is rounding
 Number = tuple[str, str]  # a label, and what is measured, with its unit
 
@@ -73,7 +73,7 @@ class Figure:
     make: Callable[..., DrawnFigure]
 
 
-FIGURES: dict[Kind, dict[str, Figure]] = {"paper": {}, "diagnosis": {}, "job": {}, "study": {}}
+FIGURES: dict[Kind, dict[str, Figure]] = {"paper": {}, "job": {}, "study": {}}
 
 
 def figure(
