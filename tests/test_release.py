@@ -5,6 +5,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import oldest
 import release
 
 from compressor.cases import MODEL_VERSION
@@ -26,6 +27,12 @@ def test_the_lock_has_what_is_installed_for_tests_and_site():
     more = PROJECT["project"]["optional-dependencies"]
     asked = PROJECT["project"]["dependencies"] + more["dev"] + more["docs"]
     assert {re.match(r"[\w.-]+", one)[0].lower() for one in asked} <= locked
+
+
+def test_the_oldest_libraries_come_with_what_tests_of_extras_need():
+    more = PROJECT["project"]["optional-dependencies"]
+    extras = [one for name in ("dataset", "learn", "dask") for one in more[name]]
+    assert {one.partition(">=")[0] for one in extras} <= {*oldest.TOOLS}
 
 
 def test_data_files_that_a_wheel_must_hold():
