@@ -65,9 +65,10 @@ def branches(block):
 
 
 def copy_of_the_program(place, *more):
+    """Byte code too, whose temporary files may vanish meanwhile: to compile it takes seconds."""
     for folder in ("compressor", "cmd", *more):
         shutil.copytree(ROOT / folder, place / folder,
-                        ignore=shutil.ignore_patterns("__pycache__", "results"))  # fmt: skip
+                        ignore=shutil.ignore_patterns("results", "*.pyc.*"))  # fmt: skip
     shutil.copyfile(ROOT / "pyproject.toml", place / "pyproject.toml")
 
 
@@ -126,12 +127,23 @@ sys.exit(cli.main(["report", "-o", "out"]))
 """  # the other pictures are as ever
 
 
-def test_the_page_on_figures_is_right(tmp_path, paper_store):
+def add_verb(place, name, module, line):
+    """Add a verb to a copy of the program, by its module and its line in the table of verbs."""
+    (place / f"cmd/compsim/{name}.py").write_text(module, encoding="utf-8")
+    place_of_it = '"Read what is stored": ('
+    changed(place, "cmd/compsim/cli.py", (line.strip() + " ", place_of_it, True))
+
+
+def test_the_pages_on_figures_verbs_and_studies_are_right(tmp_path, paper_store):
+    """In one copy: each costs seconds."""
     copy_of_the_program(tmp_path)
     (function,) = blocks("## How to add a figure", "## How to add a verb")
-    paper = tmp_path / "compressor/report/figures/paper.py"
-    text = paper.read_text(encoding="utf-8")
-    paper.write_text(f"{text}\n\n{function}", encoding="utf-8")
+    with open(tmp_path / "compressor/report/figures/paper.py", "a", encoding="utf-8") as paper:
+        paper.write(f"\n\n{function}")
+    add_verb(tmp_path, "size", *blocks("## How to add a verb", "## How to add a study"))
+    module, verb = blocks("## How to add a study", "## How to add a public name")
+    (tmp_path / "compressor/studies/count.py").write_text(module, encoding="utf-8")
+    add_verb(tmp_path, "count", verb, '"count",\n')
     part_of(paper_store, tmp_path / "results", "design", "big-end")  # which the figure needs
     run_in(tmp_path, "-c", REPORT, cwd=tmp_path)
     page = (tmp_path / "out/index.html").read_text(encoding="utf-8")
@@ -140,34 +152,13 @@ def test_the_page_on_figures_is_right(tmp_path, paper_store):
     rows = (tmp_path / "out/figure-17.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) > 1000
     assert (tmp_path / "out/figure-17.png").stat().st_size > 10_000
-
-
-def add_verb(place, name, module, line):
-    """Add a verb to a copy of the program, by its module and its line in the table of verbs."""
-    (place / f"cmd/compsim/{name}.py").write_text(module, encoding="utf-8")
-    place_of_it = '"Read what is stored": ('
-    changed(place, "cmd/compsim/cli.py", (line.strip() + " ", place_of_it, True))
-
-
-def test_the_page_on_verbs_is_right(tmp_path):
-    copy_of_the_program(tmp_path)
-    add_verb(tmp_path, "size", *blocks("## How to add a verb", "## How to add a study"))
     (tmp_path / "some").mkdir()
     (tmp_path / "some/file").write_text("four", encoding="utf-8")
     assert run_in(tmp_path, "-m", "compsim", "size", "-r", "some", cwd=tmp_path) == "4\n"
-    assert "Print how many bytes" in run_in(tmp_path, "-m", "compsim", "--help", cwd=tmp_path)
-
-
-def test_the_page_on_studies_is_right(tmp_path, paper_store):
-    copy_of_the_program(tmp_path)
-    module, verb = blocks("## How to add a study", "## How to add a public name")
-    (tmp_path / "compressor/studies/count.py").write_text(module, encoding="utf-8")
-    add_verb(tmp_path, "count", verb, '"count",\n')
-    (tmp_path / "results").symlink_to(paper_store)
     assert run_in(tmp_path, "-m", "compsim", "count", "big-end", cwd=tmp_path) == "periodic 3\n"
-    assert "Print how many jobs of a study" in run_in(
-        tmp_path, "-m", "compsim", "--help", cwd=tmp_path
-    )
+    help_text = run_in(tmp_path, "-m", "compsim", "--help", cwd=tmp_path)
+    assert "Print how many bytes" in help_text
+    assert "Print how many jobs of a study" in help_text
 
 
 def test_the_page_on_contact_laws_is_right(tmp_path):
