@@ -97,7 +97,7 @@ def count_averages(found):
 def judge_faults(found):
     rows = [row for row in found["campaigns"].values() if "skipped" not in row]
     failed, trials = (sum(row[name] for row in rows) for name in ("failed", "trials"))
-    return f"{failed} of {trials:,} trials", "none", not failed
+    return f"{failed} of {trials:,} trials", "none", trials > 0 and not failed
 
 
 def judge_mutants(found):
