@@ -153,9 +153,10 @@ def check_forces(scene, t, y, phase, p, absolute_state, params):
 
 @pytest.mark.parametrize("load", LOADS)
 def test_ideal_joint_forces_agree_with_newton_and_euler(load):
-    case = Case.from_values({"load": load, "machine": {"gravity_m_per_s2": 9.81}})
-    p = record(case)
-    params = reference.paper_params(load, "none", 0.0, gravity=9.81)
+    machine = {"gravity_m_per_s2": 9.81, "rod_centre_mm": 220}
+    p = record(Case.from_values({"load": load, "machine": machine}))
+    params = reference.paper_params(load, "none", 0.0, gravity=9.81, rod_centre=0.22,
+                                    rod_inertia=float(p.rod_inertia))  # fmt: skip
     row = np.empty(COLUMNS)
     for k, t in enumerate(np.linspace(0.001, 0.119, 24)):
         observe_at(t, np.zeros(4), k % 4, p, row)

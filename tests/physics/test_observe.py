@@ -65,25 +65,6 @@ def test_joint_forces_move_crosshead_and_rod(joint):
         assert push == pytest.approx(p.reciprocating_mass * row[Column.ACCELERATION], abs=1e-7)
 
 
-def test_ideal_joint_forces_give_the_rod_its_spin():
-    """Euler's equation of the rod about its centre with the forces found, and Newton along y."""
-    p = record(case("none", machine={"gravity_m_per_s2": 9.81, "rod_centre_mm": 220}))
-    h = 1e-5
-    for t in np.linspace(0.001, 0.11, 12):
-        early, row, late = (row_at(p, t + s, np.zeros(4)) for s in (-h, 0, h))
-        phi = [r[Column.ROD_ANGLE] for r in (early, row, late)]
-        spin_up = (phi[0] - 2 * phi[1] + phi[2]) / h**2
-        direction = np.array([math.cos(phi[1]), -math.sin(phi[1])])
-        big, small = row[Column.FORCE : Column.FORCE + 2], row[Column.FORCE + 2 : Column.FORCE + 4]
-        moment = [u * f[1] - w * f[0] for f in (big, small) for u, w in [direction]]
-        a, b = p.rod_centre, p.rod_length - p.rod_centre
-        assert b * moment[1] - a * moment[0] == pytest.approx(-p.rod_inertia * spin_up, abs=2e-2)
-        height = [p.crank_radius * math.sin(p.omega * (t + s)) - a * math.sin(f)
-                  for s, f in zip((-h, 0, h), phi, strict=True)]  # fmt: skip
-        lift = (height[0] - 2 * height[1] + height[2]) / h**2
-        assert big[1] + small[1] == pytest.approx(p.rod_mass * (lift + 9.81), abs=5e-2)
-
-
 @pytest.mark.parametrize("joint", JOINTS)
 def test_eccentricity_matches_the_positions(joint):
     """The difference identities against plain trigonometry of the positions."""
