@@ -107,6 +107,8 @@ MISTAKES = [
     ("dataset wear -o faults --revolutions 1", "--revolutions", "1 is not in the range x>=2"),
     ("find typo.yaml --over clearance_mm=0.01:0.3 --first 'peak_acceleration > 1'",
      "typo.yaml:1:11: machine.sped_rpm: unknown key; did you mean machine.speed_rpm?"),
+    ("calibrate good.csv good.yaml --fit machine.rod_mass=3:8",
+     "--fit machine.rod_mass=3:8: machine.rod_mass is no key of a number"),
     ("find good.yaml --over clearance_mm=0.1:0.3 --json --units plant", "--json has all numbers"),
 ]  # fmt: skip
 OVER, FIRST = "--over clearance_mm=0.01:0.3", "--first 'peak_acceleration > 1'"
@@ -119,6 +121,7 @@ MISTAKES += [
         ("OVER", "give one of --first, --greatest and --least"),
         ("--over clearance_mm=0.3:0.1 FIRST", "write the lower end first"),
         ("--over clearance_mm FIRST", "write KEY=LOW:HIGH"),
+        ("--over clearance_mm=0.1:inf FIRST", "write KEY=LOW:HIGH"),
         ("--over clearance_mm=0:0.3 --log FIRST", "needs ends above 0"),
         ("--over clearence_mm=0.1:0.3 FIRST", "is no key of a number; did you mean clearance_mm?"),
         ("--over load=1:2 FIRST", "load is no continuous number: give a key"),

@@ -13,7 +13,6 @@ from conftest import jobs_here
 from compressor.cases.load import load_cases
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
-from compressor.studies.frame import StudyError, read_range
 
 CASE = {
     "load": "gas",
@@ -81,21 +80,6 @@ def test_what_is_printed_is_a_case_file(fitted, monkeypatch):
     assert case.sensor.noise_m_per_s2 == 0.001
     comments = [line for line in text.splitlines() if line.startswith("#")]
     assert any("95 % interval" in line and "body.mass_kg" in line for line in comments)
-
-
-@pytest.mark.parametrize(
-    ("text", "what"),
-    [
-        ("machine.rod_mass_kg", "write KEY=LOW:HIGH"),
-        ("machine.rod_mass_kg=8:3", "write the lower end first"),
-        ("machine.rod_mass=3:8", "is no key"),
-        ("solve.method=1:2", "is no continuous number"),
-        ("machine.rod_mass_kg=3:inf", "write KEY=LOW:HIGH"),
-    ],
-)
-def test_what_is_no_range_is_refused(text, what):
-    with pytest.raises(StudyError, match=what):
-        read_range("--fit", text)
 
 
 def test_a_case_without_a_sensor_and_the_speed_are_refused(fitted, monkeypatch, capsys):

@@ -4,7 +4,6 @@ import pytest
 from conftest import assert_same_bits
 
 from compressor.store import read_dataset, write_dataset
-from compressor.store.files import StoreError
 from compressor.studies.follow import motion
 from compressor.studies.follow.follow import load_values, machines, read_over
 from compressor.studies.follow.motion import ValuePlan
@@ -55,12 +54,3 @@ def test_a_chain_goes_on_from_its_last_value_and_ends_in_the_same_bits(whole, tm
     write_dataset(chain.path(tmp_path), chain.to_dataset(stored_rows(chain, folder)[:4]))
     make_rows(chain, tmp_path)
     assert_same_bits(read_dataset(chain.path(tmp_path)), read_dataset(chain.path(folder)))
-
-
-def test_another_file_of_its_name_is_refused(whole, tmp_path):
-    chain, folder = whole
-    wrong = chain.path(tmp_path)
-    wrong.parent.mkdir(parents=True)
-    wrong.write_bytes(chain.path(folder).read_bytes()[:-9])
-    with pytest.raises(StoreError, match="delete it"):
-        make_rows(chain, tmp_path)

@@ -91,18 +91,6 @@ def test_a_job_that_fails_has_no_error(tmp_path):
     assert {*found["reason"].values.ravel()} == {"", "budget_steps"}
 
 
-def test_each_case_of_a_file_is_a_scene(tmp_path):
-    found = made(
-        tmp_path,
-        *SOME[:1],
-        "solve.rtol=[1.0e-3, 1.0e-5]",
-        "solve.timeout_s=600",
-        joint=["big_end", "both"],
-    )[0]
-    assert found["scene"].values.tolist() == ["big_end", "both"]
-    assert found["error_acceleration"].notnull().sum() >= 10
-
-
 def test_a_run_that_finds_its_own_length_gives_it_to_all(tmp_path, in_process):
     """A draft of this one settles after one revolution."""
     path = tmp_path / "auto.yaml"
