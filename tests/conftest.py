@@ -18,6 +18,7 @@ import h5py
 import hypothesis
 import numpy as np
 import pytest
+from compsim import cli
 
 from compressor.analysis.runs import paper_cases
 from compressor.cases.case import Case
@@ -112,6 +113,18 @@ def read(tmp_path, monkeypatch):
         return study
 
     return read
+
+
+@pytest.fixture
+def compsim(capsys):
+    """Run a command, which ends with `code`, and return what it printed: `out` and `err`."""
+
+    def run(*words, code=0):
+        capsys.readouterr()
+        assert cli.main([*map(str, words)]) == code
+        return capsys.readouterr()
+
+    return run
 
 
 def refused(read, text, *overrides, **more):

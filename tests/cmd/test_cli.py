@@ -12,8 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
-from compsim import cli, screen
-from conftest import jobs_here
+from compsim import screen
 
 from compressor.analysis.runs import paper_cases
 from compressor.cases import load
@@ -47,11 +46,10 @@ def test_help_needs_nothing_heavy():
     assert found.stdout == "[]\n"
 
 
-def test_a_run_says_what_it_did_and_what_comes_next(case_file, capsys):
+def test_a_run_says_what_it_did_and_what_comes_next(case_file, compsim):
     case_file("two.yaml", load=["none", "spring"])
     case_file("one.yaml", load="gas")
-    assert cli.main(["run", "two.yaml", "one.yaml", "-j", "1", "-r", "out dir"]) == 0
-    out, err = capsys.readouterr()
+    out, err = compsim("run", "two.yaml", "one.yaml", "-j", "1", "-r", "out dir")
     assert [line.split() for line in out.splitlines()] == [
         ["two", "2", "jobs", "2", "ok", "0", "failed", "out", "dir/studies/two.json"],
         ["one", "1", "job", "1", "ok", "0", "failed", "out", "dir/studies/one.json"],
@@ -61,8 +59,7 @@ def test_a_run_says_what_it_did_and_what_comes_next(case_file, capsys):
     assert "\r" not in err
     manifest = read_studies("out dir")[0]
     assert manifest.command == "compsim run two.yaml one.yaml -j 1 -r 'out dir'"
-    assert cli.main(["run", "two.yaml", "one.yaml", "-r", "out dir"]) == 0
-    again = capsys.readouterr()
+    again = compsim("run", "two.yaml", "one.yaml", "-r", "out dir")
     assert again.out == out
     assert again.err.startswith("nothing to do: all 3 jobs are stored in out dir\n")
 
@@ -74,43 +71,37 @@ def test_configs_are_the_paper_s_cases_and_nothing_else():
 
 
 @pytest.mark.parametrize("quiet", [[], ["--quiet"]])
-def test_failed_jobs_are_listed_with_what_to_do(quiet, case_file, capsys):
+def test_failed_jobs_are_listed_with_what_to_do(quiet, case_file, compsim):
     case_file("mix.yaml", joint="both", clearance_mm=0.1, solve={"max_steps": [5, 10**6]})
     for _ in range(2):
-        assert cli.main(["run", "mix.yaml", "-j", "1", *quiet]) == 3
-        out, err = capsys.readouterr()
+        out, err = compsim("run", "mix.yaml", "-j", "1", *quiet, code=3)
         assert out == "mix  2 jobs  1 ok  1 failed  results/studies/mix.json\n"
         assert "1 job failed:\n  mix solve.max_steps=5: budget_steps: more than 5 steps; job" in err
         assert "budget_steps (1): raise solve.max_steps" in err
         (key,) = re.findall(r"; job ([0-9a-f]{20})$", err, re.MULTILINE)
         assert store.read_store("results").status(key).reason == "budget_steps"
         assert "--rerun failed runs failed jobs again" in err
-    assert cli.main(["run", "mix.yaml", "-j", "1", "--rerun", "failed"]) == 3
-    assert "1 job run in" in capsys.readouterr().err
+    assert "1 job run in" in compsim("run", "mix.yaml", "-j", "1", "--rerun", "failed", code=3).err
 
 
-def test_only_selected_jobs_run_and_the_study_stays_whole(case_file, capsys):
+def test_only_selected_jobs_run_and_the_study_stays_whole(case_file, compsim):
     case_file("two.yaml", load=["none", "spring"])
     case_file("one.yaml", load="gas")
-    some = ["run", "two.yaml", "one.yaml", "-j", "1", "--only", "load == none"]
-    assert cli.main(some) == 0
-    out, err = capsys.readouterr()
+    out, err = compsim("run", "two.yaml", "one.yaml", "-j", "1", "--only", "load == none")
     assert [line.split()[1:6:2] for line in out.splitlines()] == [["1", "1", "0"], ["0", "0", "0"]]
     assert err.startswith("--only selects 1 of 3 jobs\n")
     found = store.open_study("results", "two")
     assert found.status.values.tolist() == ["ok", "missing"]
-    assert cli.main(["run", "two.yaml", "one.yaml", "-j", "1"]) == 0
-    assert "2 jobs run in" in capsys.readouterr().err
+    assert "2 jobs run in" in compsim("run", "two.yaml", "one.yaml", "-j", "1").err
     assert store.open_study("results").status.values.tolist() == ["ok"] * 3
 
 
-def test_plan_tells_what_a_run_will_do_and_stores_nothing(case_file, capsys):
+def test_plan_tells_what_a_run_will_do_and_stores_nothing(case_file, compsim):
     case_file("two.yaml", load=["none", "spring"])
     case_file("many.yaml", joint="big_end", clearance_mm={"linspace": [0.1, 0.4, 4]},
               blocks=[{}, {"joint": "none", "output": {"keep": "metrics"}}])  # fmt: skip
     both = ["two.yaml", "many.yaml", "-j", "1"]
-    assert cli.main(["plan", *both, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(compsim("plan", *both, "--json").out)
     assert not Path("results").exists()
     # the ideal machine with the spring load is a job of both studies
     assert [(s["study"], s["jobs"], s["missing"]) for s in found["studies"]] == [
@@ -121,71 +112,60 @@ def test_plan_tells_what_a_run_will_do_and_stores_nothing(case_file, capsys):
     assert found["first"][0]["coordinates"] == {"load": "none"}
     assert found["seconds"] > 0
 
-    assert cli.main(["run", *both]) == 0
+    compsim("run", *both)
     size = sum(path.stat().st_size for path in Path("results/batches").iterdir())
     assert 1 < found["bytes"] / size < 1.02  # rows, too
-    capsys.readouterr()
-    assert cli.main(["plan", "many.yaml", "--set", "load=[spring, none]", "-j", "1"]) == 0
-    out = capsys.readouterr().out.splitlines()
+    out = compsim("plan", "many.yaml", "--set", "load=[spring, none]", "-j", "1").out.splitlines()
     assert out[0].split() == ["many", "10", "jobs", "6", "done", "4", "missing"]
     assert out[1].startswith("about ")
     assert out[2] == "missing: many clearance_mm=0.1 load=none joint=big_end"
     ideal = ["--only", "joint == none", "--set", "machine.rod_mass_kg=3"]
-    assert cli.main(["plan", "many.yaml", *ideal]) == 0
-    out = capsys.readouterr().out.splitlines()
+    out = compsim("plan", "many.yaml", *ideal).out.splitlines()
     assert [out[0].split()[1], *out[2:]] == ["1", "missing: many joint=none"]
-    assert cli.main(["plan", "two.yaml"]) == 0
-    assert capsys.readouterr().out.split() == ["two", "2", "jobs", "2", "done", "0", "missing"]
+    out = compsim("plan", "two.yaml").out
+    assert out.split() == ["two", "2", "jobs", "2", "done", "0", "missing"]
 
 
-def test_shards(case_file, capsys):
+def test_shards(case_file, compsim):
     case_file("two.yaml", load=["none", "spring", "gas"])
     ran = 0
     for part in ("1/2", "2/2"):
-        assert cli.main(["run", "two.yaml", "-j", "1", "--shard", part, "--quiet"]) == 0
-        out, err = capsys.readouterr()
+        out, err = compsim("run", "two.yaml", "-j", "1", "--shard", part, "--quiet")
         ran += int(out.split()[1])
         assert err == ""  # as all is well
     assert ran == 3
     Path("results/studies/other.json").write_text("{}")  # damage of another study is no matter
-    assert cli.main(["run", "two.yaml", "-j", "1"]) == 0
-    assert "nothing to do: all 3 jobs" in capsys.readouterr().err
+    assert "nothing to do: all 3 jobs" in compsim("run", "two.yaml", "-j", "1").err
 
 
-def test_verify_finds_damage_that_a_run_mends(case_file, capsys):
+def test_verify_finds_damage_that_a_run_mends(case_file, compsim):
     case_file("two.yaml", load=["none", "spring"])
-    assert cli.main(["run", "two.yaml", "-j", "1", "--quiet"]) == 0
-    capsys.readouterr()
-    assert cli.main(["verify"]) == 0
-    assert capsys.readouterr() == ("", "no damage\n")
+    compsim("run", "two.yaml", "-j", "1", "--quiet")
+    assert compsim("verify") == ("", "no damage\n")
     file = min(Path("results/batches").iterdir()).absolute()
     data = bytearray(file.read_bytes())
     series = store.read_store("results").values(key := load_cases("two.yaml")[0].key, ["time"])
     data[data.index(series["time"].tobytes())] ^= 4
     file.write_bytes(data)
-    assert cli.main(["verify"]) == 5
-    out, err = capsys.readouterr()
+    out, err = compsim("verify", code=5)
     problem = "is damaged, or no file of compsim's"
     assert out == f"{file}: {problem}\n  job {key}\n    in two load=none\n"
     repair = f"compsim run {os.path.abspath('two.yaml')} -r results"
     assert err == f"1 damaged file, 1 job lost\nto repair: {repair}\n"
     file.with_name(f"{file.name}.damaged").rename(file)  # which verify has set aside
-    assert cli.main(["verify", "--json"]) == 5
-    out, _ = capsys.readouterr()
-    (found,) = json.loads(out)
+    (found,) = json.loads(compsim("verify", "--json", code=5).out)
     assert (found["path"], found["problem"]) == (str(file), problem)
     assert found["studies"] == {key: {"two": {"load": "none"}}}
-    assert cli.main([*shlex.split(repair)[1:], "-j", "1", "--quiet"]) == 0
-    assert cli.main(["verify"]) == 0
+    compsim(*shlex.split(repair)[1:], "-j", "1", "--quiet")
+    compsim("verify")
 
 
-def test_the_unforeseen_is_told_with_its_traceback(case_file, capsys, monkeypatch):
+def test_the_unforeseen_is_told_with_its_traceback(case_file, compsim, monkeypatch):
     def broken(*arguments, **options):
         raise ZeroDivisionError("no reason")
 
     monkeypatch.setattr("compressor.cases.load_studies", broken)
-    assert cli.main(["run", case_file("one.yaml")]) == 1
-    err = capsys.readouterr().err
+    err = compsim("run", case_file("one.yaml"), code=1).err
     assert "in broken" in err
     assert err.endswith("compsim: internal error: please report it, with the lines above\n")
 
@@ -207,12 +187,11 @@ def test_durations_points_and_sizes(say, thing, text):
 # ---- explain and tradeoff -----------------------------------------------------------------------
 
 
-def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, capsys):
+def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, compsim):
     case_file(
         "two.yaml", joint="big_end", clearance_mm=[0.1, 0.2], machine={"gravity_m_per_s2": 1e-4}
     )
-    assert cli.main(["explain", "two.yaml", "-j", "1"]) == 0
-    out, err = capsys.readouterr()
+    out, err = compsim("explain", "two.yaml", "-j", "1")
     assert out.startswith("two: 2 jobs; explained: clearance_mm = 0.2\n  machine    piston  ")
     assert "\n  motion     clearance at " in out
     for word in ("active", "absent", "scales", "tolerance", "cost"):
@@ -232,15 +211,13 @@ def test_explain_tells_terms_scales_and_what_is_paid_for(case_file, capsys):
     )
 
 
-def test_tradeoff_stores_draws_and_lists(case_file, capsys):
+def test_tradeoff_stores_draws_and_lists(case_file, compsim):
     import xarray as xr
 
     case_file("a.yaml", joint=["big_end", "both"], clearance_mm=0.2, solve={"duration_rev": 0.1})
     sets = ["solve.method=[auto, RODAS]", "solve.rtol=[1e-3, 1e-5]", "solve.timeout_s=600"]
     words = ["tradeoff", "a.yaml", "-r", "kept", *(w for text in sets for w in ("--set", text))]
-    with jobs_here():
-        assert cli.main(words) == 0
-    out = capsys.readouterr().out
+    out = compsim(*words).out
     with xr.open_dataset("kept/tradeoff/a-tradeoff.nc", engine="h5netcdf") as study:
         assert study["scene"].values.tolist() == ["big_end", "both"]
         assert (study["status"] == "ok").all()
@@ -251,18 +228,14 @@ def test_tradeoff_stores_draws_and_lists(case_file, capsys):
     for kind in ("png", "svg", "nc"):
         assert f"kept/tradeoff/a-tradeoff.{kind}\n" in out
         assert Path(f"kept/tradeoff/a-tradeoff.{kind}").exists()
-    with jobs_here():
-        assert cli.main(words) == 0
-    assert capsys.readouterr().out == out  # all of it was stored
+    assert compsim(*words).out == out  # all of it was stored
 
 
-def test_explain_models_prints_and_stores(case_file, capsys, monkeypatch):
+def test_explain_models_prints_and_stores(case_file, compsim, monkeypatch):
     """Without laws and mechanisms, which take a minute to compile: test_variants has them."""
     monkeypatch.setattr("compressor.studies.tradeoff.variants.other_models", lambda *of: [])
     case_file("worn.yaml", joint="big_end", clearance_mm=[0.2, 0.3], solve={"duration_rev": 0.1})
-    words = ["explain", "--models", "worn.yaml", "-r", "kept"]
-    assert cli.main(words) == 0
-    out, err = capsys.readouterr()
+    out, err = compsim("explain", "--models", "worn.yaml", "-r", "kept")
     assert re.search(r"kept/models/worn-[0-9a-f]{8}\.nc\n$", err)
     assert re.match(
         r"worn at clearance_mm = 0.3, one of 2 jobs: peak .*?: [\d.]+ (?:kN|m/s²); numerical "
@@ -305,21 +278,19 @@ def signalled(monkeypatch):
 
 
 @pytest.mark.parametrize(("number", "code"), [("INT", 130), ("TERM", 143), ("HUP", 129)])
-def test_exit_codes_of_signals(number, code, case_file, capsys, answering, signalled):
+def test_exit_codes_of_signals(number, code, case_file, compsim, answering, signalled):
     number = signal.Signals[f"SIG{number}"]
     answering(number, signal.SIG_DFL)
     signalled(number)
-    assert cli.main(["run", case_file("one.yaml")]) == code
-    assert capsys.readouterr().err == f"interrupted by {number.name}\n"
+    assert compsim("run", case_file("one.yaml"), code=code).err == f"interrupted by {number.name}\n"
     assert signal.getsignal(number) == signal.SIG_DFL
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_that_was_ignored_stays_ignored(number, case_file, capsys, answering, signalled):
+def test_a_signal_that_was_ignored_stays_ignored(number, case_file, compsim, answering, signalled):
     answering(number, signal.SIG_IGN)  # as nohup does, and a shell for what runs behind it
     signalled(number)
-    assert cli.main(["plan", case_file("one.yaml")]) == 0
-    assert "interrupted" not in capsys.readouterr().err
+    assert "interrupted" not in compsim("plan", case_file("one.yaml")).err
     assert signal.getsignal(number) == signal.SIG_IGN
 
 
@@ -379,20 +350,18 @@ def test_a_run_that_is_told_to_end(started, tmp_path):
     assert re.fullmatch(rf"{machine}{slow}\d+ {goes_on}\ninterrupted by SIGINT\n", err)
 
 
-def test_a_run_says_what_the_file_means_and_what_is_odd_about_it(case_file, capsys):
+def test_a_run_says_what_the_file_means_and_what_is_odd_about_it(case_file, compsim):
     """In plan and explain, too; --quiet leaves out the numbers, and no warning."""
     halved = {"stroke_mm": 120, "rod_length_mm": 600}  # R / L = 0.1
     case_file("m.yaml", load="gas", machine=halved, gas={"switching": "exact"})
     warning = "m.yaml: warning: machine.stroke_mm: rod: crank ratio 0.1, where at least 0.12 is"
     for words in (["plan"], ["run", "-r", "a"], ["run", "-r", "b", "--quiet"], ["explain"]):
-        assert cli.main([words[0], "m.yaml", *words[1:]]) == 0
-        out, err = capsys.readouterr()
+        out, err = compsim(words[0], "m.yaml", *words[1:])
         assert err.startswith(warning), words
         printed = out if words[0] == "explain" else err
         assert ("piston     mean speed 2 m/s" in printed) == ("--quiet" not in words)
-    assert cli.main(["run", "m.yaml", "-r", "a"]) == 0  # nothing to do
-    assert "mean speed" not in capsys.readouterr().err
-    assert cli.main(["plan", "m.yaml", "-r", "a", "--json"]) == 0
-    numbers = json.loads(capsys.readouterr().out)["machines"]["m"]["numbers"]
+    assert "mean speed" not in compsim("run", "m.yaml", "-r", "a").err  # nothing to do
+    found = json.loads(compsim("plan", "m.yaml", "-r", "a", "--json").out)
+    numbers = found["machines"]["m"]["numbers"]
     (speed,) = (one for one in numbers if one["name"] == "piston, mean speed")
     assert (speed["low"], speed["unit"], speed["usual_low"]) == (2.0, "m/s", 0.5)

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import pytest
-from compsim import cli
 
 from compressor.cases.examples import STARTS, templates
 from compressor.cases.load import load_studies
@@ -15,9 +14,8 @@ def place(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_the_list_has_questions_jobs_and_times(capsys):
-    assert cli.main(["init"]) == 0
-    out, err = capsys.readouterr()
+def test_the_list_has_questions_jobs_and_times(compsim):
+    out, err = compsim("init")
     lines = out.splitlines()
     assert [line.split()[0] for line in lines if line[0] != " "] == [*templates()]
     assert max(map(len, lines)) <= 80
@@ -28,30 +26,27 @@ def test_the_list_has_questions_jobs_and_times(capsys):
 
 
 @pytest.mark.parametrize("name", STARTS)
-def test_a_file_is_written_and_the_next_command_named(name, capsys):
-    assert cli.main(["init", name]) == 0
-    assert capsys.readouterr() == (f"{name}.yaml\n", f"next: compsim run {name}.yaml\n")
+def test_a_file_is_written_and_the_next_command_named(name, compsim):
+    assert compsim("init", name) == (f"{name}.yaml\n", f"next: compsim run {name}.yaml\n")
     assert Path(f"{name}.yaml").read_text() == templates()[name].path.read_text()
     (study,) = load_studies(f"{name}.yaml")
     assert study.name == name
 
 
-def test_files_and_folders_may_be_chosen(capsys):
-    assert cli.main(["init", "wear", "-o", "deep/er/mine.yaml"]) == 0
-    assert capsys.readouterr().err == "next: compsim run deep/er/mine.yaml\n"
-    assert cli.main(["init", "paper", "-o", "deep"]) == 0
-    assert capsys.readouterr().out == "deep/paper.yaml\n"
+def test_files_and_folders_may_be_chosen(compsim):
+    err = compsim("init", "wear", "-o", "deep/er/mine.yaml").err
+    assert err == "next: compsim run deep/er/mine.yaml\n"
+    assert compsim("init", "paper", "-o", "deep").out == "deep/paper.yaml\n"
     assert Path("deep/er/mine.yaml").read_text().splitlines()[2].startswith(
         "# next: compsim run deep/er/mine.yaml;"
     )  # fmt: skip
 
 
-def test_nothing_is_overwritten(capsys):
+def test_nothing_is_overwritten(compsim):
     Path("wear.yaml").write_text("mine")
     Path("link.yaml").symlink_to("absent")
     for words in (["wear"], ["wear", "-o", "wear.yaml"], ["paper", "-o", "link.yaml"]):
-        assert cli.main(["init", *words]) == 2
-        err = capsys.readouterr().err
+        err = compsim("init", *words, code=2).err
         assert "exists, and is not overwritten: compsim init " in err
         assert "-o OTHER.yaml" in err
     assert Path("wear.yaml").read_text() == "mine"

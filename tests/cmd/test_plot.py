@@ -127,10 +127,9 @@ def peak(run, last):
     return np.abs(run["acceleration"].values[last]).max()
 
 
-def test_a_job_is_named_as_in_show(plot, folder, capsys, unpainted):
+def test_a_job_is_named_as_in_show(plot, folder, compsim, unpainted):
     words = ["worn", "clearance_mm=0.3", "machine.speed_rpm=500"]
-    assert cli.main(["show", *words, "-r", str(folder), "--json"]) == 0
-    shown = json.loads(capsys.readouterr().out)["key"]
+    shown = json.loads(compsim("show", *words, "-r", str(folder), "--json").out)["key"]
     code, found, err = plot(*words, "--what", "orbits")
     assert (code, [*found], err) == (0, [f"plots/{shown[:10]}-orbits.png"], "")
     assert shown == key(folder, "worn", 3)
@@ -210,7 +209,7 @@ def test_what_cannot_be_drawn_is_told(plot, folder, words, told):
     assert told in " ".join(err.split())
 
 
-def test_segments_of_a_study_are_drawn_beside_the_healthy_machine(tmp_path, capsys, unpainted):
+def test_segments_of_a_study_are_drawn_beside_the_healthy_machine(tmp_path, compsim, unpainted):
     """The limit is times the rms of the same machine without clearance; other studies have none."""
     values = {
         "joint": "big_end", "clearance_mm": [0.05, 0.2], "sensor": True,
@@ -220,9 +219,8 @@ def test_segments_of_a_study_are_drawn_beside_the_healthy_machine(tmp_path, caps
     home = tmp_path / "results"
     (study,) = store(home, tmp_path / "heard.yaml")
     sound = simulate(Case.from_values({**values, "joint": "none", "clearance_mm": 0}))
-    words = ["plot", "heard", "--what", "segments", "-r", str(home), "-o", str(tmp_path / "out")]
-    assert cli.main([*words, "--limit", "5x"]) == 0
-    told = capsys.readouterr().out
+    words = ["plot", "heard", "--what", "segments", "-r", home, "-o", tmp_path / "out"]
+    told = compsim(*words, "--limit", "5x").out
     healthy = sound["sensor_segment_rms"].values
     runs = [read_store(home).job(case.key)["sensor_segment_rms"].values for case in study.cases]
     over = [(rms > 5 * healthy).sum() for rms in runs]
@@ -230,13 +228,12 @@ def test_segments_of_a_study_are_drawn_beside_the_healthy_machine(tmp_path, caps
     place = int(np.argmax(runs[0] / healthy))
     assert f"{10 * place} to {10 * place + 10}° at 0.05, {spell(runs[0][place])} m/s² over" in told
     level = healthy.max() / 9.80665
-    assert cli.main([*words, "--limit", f"{level}g"]) == 0
+    told = compsim(*words, "--limit", f"{level}g").out
     over = [(rms > healthy.max()).sum() for rms in runs]
-    told = capsys.readouterr().out
     assert re.search(rf"over their limit: {over[0]}\b.* at 0\.05, {over[1]}\b.* at 0\.2;", told)
     for wrong in ("5", "5 mm/s", "-1x"):
-        assert cli.main([*words, "--limit", wrong]) == 2
-        assert "give a number and its unit, such as '20 m/s²'" in capsys.readouterr().err
+        err = compsim(*words, "--limit", wrong, code=2).err
+        assert "give a number and its unit, such as '20 m/s²'" in err
     other = [word if word != "segments" else "map" for word in words]
-    assert cli.main([*other, "--limit", "5x"]) == 2
-    assert "--limit 5x is of segments: add --what segments" in capsys.readouterr().err
+    err = compsim(*other, "--limit", "5x", code=2).err
+    assert "--limit 5x is of segments: add --what segments" in err

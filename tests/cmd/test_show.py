@@ -7,7 +7,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from compsim import cli
 from compsim.job_text import knock_verdict, notes
 from conftest import CHAOTIC, store
 
@@ -20,13 +19,12 @@ HERE = ["big-end", "clearance_mm=0.2"]
 
 
 @pytest.fixture
-def show(capsys):
+def show(compsim):
     """Runs `compsim show` and returns what it prints."""
 
     def run(*words):
         place = ["-r"] if isinstance(words[0], Path) else []
-        assert cli.main(["show", *place, *map(str, words)]) == 0
-        return capsys.readouterr().out
+        return compsim("show", *place, *words).out
 
     return run
 

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from compsim import cli
 from compsim.job_text import reversal_verdict, values_of
 from conftest import store
 from test_cylinder_runs import DOUBLE, MACHINE, pressures
@@ -193,16 +192,14 @@ def test_a_load_without_reversal_is_told_by_its_bounds():
     ]
 
 
-def test_show_judges_the_reversal(tmp_path, capsys, monkeypatch):
+def test_show_judges_the_reversal(tmp_path, compsim, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.yaml").write_text(json.dumps({"solve": TURN, **SIGNALLED}))
     (study,) = store(tmp_path / "results", tmp_path / "s.yaml")
     key = study.cases[0].key
 
     def told(*words):
-        capsys.readouterr()
-        assert cli.main(["show", key, *words]) == 0
-        return " ".join(capsys.readouterr().out.split())
+        return " ".join(compsim("show", key, *words).out.split())
 
     assert "%: passes API 618's 15 degrees and 3 %" in told()
     assert "%: passes the maker's 30 degrees and 25 %" in told("--reversal", "30,25")

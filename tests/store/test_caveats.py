@@ -36,18 +36,9 @@ def folder(tmp_path_factory):
     return place / "k1"
 
 
-def said(capsys, *words):
-    """What a command says, its lines joined."""
-    assert cli.main([*map(str, words)]) == 0
-    found = capsys.readouterr()
-    return found._replace(
-        **{name: " ".join(text.split()) for name, text in found._asdict().items()}
-    )
-
-
-def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder, capsys):
-    err = said(capsys, "run", folder.parent / "k1.yaml", "-j", "1", "-r", folder).err
-    out = said(capsys, "status", "-r", folder).out
+def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder, compsim):
+    err = compsim("run", folder.parent / "k1.yaml", "-j", "1", "-r", folder).err
+    out, err = (" ".join(text.split()) for text in (compsim("status", "-r", folder).out, err))
     numbers = [report_job(folder, key).numbers for key in open_study(folder).key.values]
     late = sum(numbers_["settled_rev"] > 0 for numbers_ in numbers)
     unrepeated = sum(math.isnan(numbers_["settled_rev"]) for numbers_ in numbers)

@@ -166,7 +166,7 @@ def test_every_flipped_bit_of_a_study_is_found(tmp_path):
         assert damage.remedy == "run its case file again"
 
 
-def test_damage_to_a_machine_that_was_followed_is_told(tmp_path, capsys):
+def test_damage_to_a_machine_that_was_followed_is_told(tmp_path, compsim):
     kept = xr.Dataset(
         {
             "hours": ("stage", [0.0, 1.5, 3.0], {"units": "h"}),
@@ -193,11 +193,10 @@ def test_damage_to_a_machine_that_was_followed_is_told(tmp_path, capsys):
             (damage,) = verify(tmp_path)
             assert damage.path == path
             assert "delete it" in damage.remedy
-    assert cli.main(["verify", "-r", str(tmp_path)]) == 5
-    assert "delete it" in capsys.readouterr().out
+    assert "delete it" in compsim("verify", "-r", tmp_path, code=5).out
 
 
-def test_jobs_in_a_damaged_batch_count_as_missing_with_a_warning(tmp_path, capsys):
+def test_jobs_in_a_damaged_batch_count_as_missing_with_a_warning(tmp_path, compsim):
     """Where it cannot be opened, and where only its numbers are damaged."""
     parts = [[0], [1], [*range(2, 400)]]  # the values of the last have a checksum of their own
     paths = [write_batch(tmp_path, [made(n) for n in part]) for part in parts]
@@ -210,8 +209,8 @@ def test_jobs_in_a_damaged_batch_count_as_missing_with_a_warning(tmp_path, capsy
     assert found.status.values[:3].tolist() == ["missing", "ok", "missing"]
     stored = read_store(tmp_path)
     assert [stored.intact(stored.position(key(n))) for n in (1, 2, 3)] == [True, False, False]
-    assert cli.main(["verify", "-r", str(tmp_path), "--json"]) == 5
-    lost = {one["path"]: [*one["studies"]] for one in json.loads(capsys.readouterr().out)}
+    told = json.loads(compsim("verify", "-r", tmp_path, "--json", code=5).out)
+    lost = {one["path"]: [*one["studies"]] for one in told}
     assert lost == {str(paths[0]): [key(0)], str(paths[2]): [*map(key, range(2, 400))]}
     assert [path.exists() for path in paths] == [False, True, False]  # a run sees what is missing
-    assert cli.main(["verify", "-r", str(tmp_path)]) == 0
+    compsim("verify", "-r", tmp_path)

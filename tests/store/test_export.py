@@ -8,7 +8,6 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from compsim import cli
 from conftest import flip, keep
 
 from compressor.cases.load import load_studies
@@ -148,14 +147,14 @@ def stored(results, key):
 @pytest.mark.parametrize(
     ("suffix", "hints"), [(".wav", {"channel": "1", "tacho": "2", "unit": "m/s2"}), (".mat", {})]
 )
-def test_a_record_alone_is_what_analysts_open(suffix, hints, worn, tmp_path, capsys):
+def test_a_record_alone_is_what_analysts_open(suffix, hints, worn, tmp_path, compsim):
     """Values to the digits of the type, whatever the job's own samples are."""
     stored = read_store(worn)
     recorded = (key for key in sorted(stored.keys()) if "sensor_time" in stored.job(key))
     one = next(recorded)
     job, path = stored.job(one), tmp_path / f"job{suffix}"
-    assert cli.main(["export", one, "-r", str(worn), "-o", str(path)]) == 0
-    assert f"{job.sizes['sensor_time']} samples" in capsys.readouterr().out
+    out = compsim("export", one, "-r", worn, "-o", path).out
+    assert f"{job.sizes['sensor_time']} samples" in out
     found = read_record(path, **hints)
     np.testing.assert_allclose(found.times, job.sensor_time, atol=1e-5)
     np.testing.assert_allclose(found.values, job.sensor_acceleration, rtol=6e-8, atol=1e-12)
@@ -184,7 +183,7 @@ def test_what_does_not_fit_is_refused(results, names, file, more, message, tmp_p
     assert len(table(tmp_path / "grid.csv")) == 4
 
 
-def test_damaged_jobs_are_told(results, tmp_path, capsys):
+def test_damaged_jobs_are_told(results, tmp_path, compsim):
     """Damaged series are an error; damaged numbers leave their jobs out of a study's table."""
     copy = tmp_path / "results"
     shutil.copytree(results, copy)
@@ -192,10 +191,10 @@ def test_damaged_jobs_are_told(results, tmp_path, capsys):
     hurt = min(stored.keys())
     path, _ = stored.batch_of(stored.position(hurt))
     whole = flip(path, stored.values(hurt, ["acceleration"])["acceleration"])
-    assert cli.main(["export", hurt, "-r", str(copy), "-o", str(tmp_path / "x.csv")]) == 5
-    assert f"{path}: is damaged" in capsys.readouterr().err
+    err = compsim("export", hurt, "-r", copy, "-o", tmp_path / "x.csv", code=5).err
+    assert f"{path}: is damaged" in err
     path.write_bytes(whole[:-1])
-    assert cli.main(["export", "-r", str(copy), "-o", str(tmp_path / "x.csv")]) == 0
-    assert f"{path}: is damaged" in " ".join(capsys.readouterr().err.split())
+    err = compsim("export", "-r", copy, "-o", tmp_path / "x.csv").err
+    assert f"{path}: is damaged" in " ".join(err.split())
     found = {row["key"]: row["status"] for row in table(tmp_path / "x.csv")}
     assert found[hurt] == "missing"

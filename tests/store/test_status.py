@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from compsim import cli
 from conftest import store
 
 from compressor.cases.load import load_studies
@@ -33,61 +32,53 @@ def mix(tmp_path, monkeypatch, in_process):
     return study
 
 
-def test_status_counts_jobs_and_reasons(mix, capsys):
+def test_status_counts_jobs_and_reasons(mix, compsim):
     (found,) = standings("results")
     assert (found.jobs, found.ok, found.failed, found.missing) == (4, 1, 2, 1)
     assert found.reasons == {"budget_steps": 2}
-    assert cli.main(["status"]) == 0
-    out, err = capsys.readouterr()
+    out, err = compsim("status")
     assert " ".join(out.split("\n")[0].split()) == "mix 4 jobs 1 ok 2 failed 1 missing"
     assert "2 budget_steps: raise solve.max_steps" in out
     assert f"next: compsim run {mix.path} -r results\n" == err
-    assert cli.main(["status", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)[0]["reasons"] == {"budget_steps": 2}
+    assert json.loads(compsim("status", "--json").out)[0]["reasons"] == {"budget_steps": 2}
 
 
-def test_show_tells_how_a_job_ended(mix, capsys):
+def test_show_tells_how_a_job_ended(mix, compsim):
     by_end = {report_job("results", key).status: key for key in mix.keys}
     assert by_end.keys() == {"ok", "failed", "missing"}
-    assert cli.main(["show", by_end["ok"][:12]]) == 0
-    out = capsys.readouterr().out
+    out = compsim("show", by_end["ok"][:12]).out
     assert f"job {by_end['ok']}: ok" in out
     assert "in mix clearance_mm=0.1 solve.max_steps=1000000" in out
-    assert cli.main(["show", by_end["failed"]]) == 0
-    out = capsys.readouterr().out
+    out = compsim("show", by_end["failed"]).out
     assert "failed: budget_steps: more than 5 steps" in out
     assert "what to do: raise solve.max_steps" in out
     lines = [line.split() for line in out.split("\n")]
     (stopped,) = (words for words in lines if words[:1] == ["stopped"])
     assert 0 < float(stopped[2]) < 0.03
     assert float(stopped[4]) == pytest.approx(float(stopped[2]) * 3000, rel=1e-3)
-    assert cli.main(["show", by_end["missing"]]) == 0
-    out, err = capsys.readouterr()
+    out, err = compsim("show", by_end["missing"])
     assert "not run yet" in out
     assert err.startswith("next: compsim run ")
 
 
-def test_the_next_run_has_the_same_jobs(tmp_path, monkeypatch, capsys, in_process):
+def test_the_next_run_has_the_same_jobs(tmp_path, monkeypatch, compsim, in_process):
     """What was set on the command line is part of them."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "one case.yaml").write_text(json.dumps({"name": "one", "solve": SHORT}))
     setting = ["--set", "joint=big_end", "--set=clearance_mm=[0.1, 0.2]"]
     command = ["run", "one case.yaml", "-j", "1", "--quiet", *setting]
-    assert cli.main([*command, "--only", "clearance_mm < 0.15"]) == 0
-    capsys.readouterr()
-    assert cli.main(["status"]) == 0
-    next_run = capsys.readouterr().err.removeprefix("next: ").strip()
-    assert cli.main([*shlex.split(next_run)[1:], "--quiet", "-j", "1"]) == 0
+    compsim(*command, "--only", "clearance_mm < 0.15")
+    next_run = compsim("status").err.removeprefix("next: ").strip()
+    compsim(*shlex.split(next_run)[1:], "--quiet", "-j", "1")
     assert standings("results")[0].missing == 0
 
 
-def test_damage_is_told_where_its_jobs_count_as_missing(mix, capsys):
+def test_damage_is_told_where_its_jobs_count_as_missing(mix, compsim):
     paths = [*Path("results/batches").iterdir()]
     for path in paths:
         path.write_bytes(path.read_bytes()[:-1])
-    for command in (["status"], ["show", mix.keys[0]], ["status", "--json"]):
-        assert cli.main(command) == 0
-        out, err = capsys.readouterr()
+    for words in (["status"], ["show", mix.keys[0]], ["status", "--json"]):
+        out, err = compsim(*words)
         assert "missing" in out or "not run yet" in out
         said = " ".join(err.split())
         assert all(said.count(f"{path.name}: is damaged") == 1 for path in paths)
@@ -106,18 +97,16 @@ def budget(folder):
     return str(folder / "results")
 
 
-def test_status_shows_where_jobs_fail_by_a_tree_of_scikit_learn_s(tmp_path, monkeypatch, capsys):
+def test_status_shows_where_jobs_fail_by_a_tree_of_scikit_learn_s(tmp_path, monkeypatch, compsim):
     """Where that is installed."""
     folder = budget(tmp_path)
-    assert cli.main(["status", "-r", folder]) == 0
-    lines = capsys.readouterr().out.splitlines()
+    lines = compsim("status", "-r", folder).out.splitlines()
     first = lines.index("    where jobs fail (jobs of each class in weights):")
     assert lines[first + 1 : first + 3] == [
         "      |--- solve.max_steps <= 2500002.5000",
         "      |   |--- weights: [6.0000, 0.0000] class: failed",
     ]
     monkeypatch.setitem(sys.modules, "sklearn.tree", None)
-    assert cli.main(["status", "-r", folder]) == 0
-    out = capsys.readouterr().out
+    out = compsim("status", "-r", folder).out
     assert "6 failed" in out
     assert "where jobs fail" not in out

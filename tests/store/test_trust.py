@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from compsim import cli
 from conftest import keep
 
 from compressor.cases.case import Case
@@ -105,12 +104,11 @@ def test_numbers_that_few_jobs_have_can_be_masked():
         assert found[name].notnull().values.tolist() == known, name
 
 
-def test_status_counts_by_promise_and_by_regime(ring, capsys):
+def test_status_counts_by_promise_and_by_regime(ring, compsim):
     (one,) = standings(ring)
     assert one.promises == {"none": 1, "kept": 1}
     assert one.regimes == {"chaotic": 1, "periodic": 1}
-    assert cli.main(["status", "-r", str(ring)]) == 0
-    out = capsys.readouterr().out
+    out = compsim("status", "-r", ring).out
     assert max(map(len, out.splitlines())) <= 80
     out = " ".join(out.split())
     assert (

@@ -7,7 +7,6 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from compsim import cli
 from conftest import store
 
 from compressor.studies.compare import CAPTION, curves, measure_likeness
@@ -51,22 +50,30 @@ def folder(tmp_path_factory):
     return place, keys[0][0], dict(zip(OTHERS, keys[1], strict=True)), keys[2][0]
 
 
-def run(folder, capsys, *words, code=0):
-    assert cli.main(["compare", *words, "-r", str(folder[0] / "results")]) == code
-    found = capsys.readouterr()
-    return found.err if code else found.out
+@pytest.fixture
+def compare(folder, compsim):
+    def run(*words, code=0):
+        found = compsim("compare", *words, "-r", folder[0] / "results", code=code)
+        return found.err if code else found.out
+
+    return run
 
 
-def exported(folder, suffix=".csv"):
-    path = folder[0] / f"record{suffix}"
-    out = ["-r", str(folder[0] / "results"), "-o", str(path), "--force"]
-    assert cli.main(["export", folder[1], *out]) == 0
-    return str(path)
+@pytest.fixture
+def export(folder, compsim):
+    """Export the job's record; the file and what is said of it."""
+
+    def run(suffix):
+        path = folder[0] / f"record{suffix}"
+        words = ["export", folder[1], "-r", folder[0] / "results", "-o", path, "--force"]
+        return path, compsim(*words).err
+
+    return run
 
 
 @pytest.mark.compiled
-def test_numbers_say_how_far_a_record_is_off(folder, capsys):
-    found = json.loads(run(folder, capsys, folder[1], "others", "--json"))
+def test_numbers_say_how_far_a_record_is_off(folder, compare):
+    found = json.loads(compare(folder[1], "others", "--json"))
     jobs = {job["key"]: job for job in found["jobs"]}
     for name, key in folder[2].items():
         for (number, tolerance), value in zip(TOLERANCE.items(), LIKENESS[name], strict=True):
@@ -78,10 +85,8 @@ def test_numbers_say_how_far_a_record_is_off(folder, capsys):
 
 
 @pytest.mark.compiled
-def test_an_exported_record_is_its_job(folder, capsys):
-    path = exported(folder)
-    capsys.readouterr()
-    out = run(folder, capsys, path, folder[1])
+def test_an_exported_record_is_its_job(folder, compare, export):
+    out = compare(export(".csv")[0], folder[1])
     record, head, job = out.splitlines()
     assert record.endswith("record.csv: 9 revolutions at 500 rpm, 25600 Hz, 5.153 m/s2 rms up to "
                            "order 1200")  # fmt: skip
@@ -101,23 +106,23 @@ def test_an_exported_record_is_its_job(folder, capsys):
         ("mm/s2", "read: the rms is 0.001 times the job's: m/s2 were perhaps read as mm/s2; check"),
     ],
 )
-def test_a_unit_that_was_perhaps_mistaken_is_named(unit, told, folder, capsys):
-    path = exported(folder, ".wav")
-    assert "--channel 1 --unit m/s2 --tacho 2" in capsys.readouterr().err
+def test_a_unit_that_was_perhaps_mistaken_is_named(unit, told, folder, compare, export):
+    path, err = export(".wav")
+    assert "--channel 1 --unit m/s2 --tacho 2" in err
     words = ["--channel", "1", "--tacho", "2", "--tacho-deg", "20", "--unit"]
-    assert told in run(folder, capsys, path, folder[1], *words, unit)
-    assert "perhaps" not in run(folder, capsys, path, folder[1], *words, "in/s2")
-    (job,) = json.loads(run(folder, capsys, path, folder[1], *words, "m/s2", "--json"))["jobs"]
+    assert told in compare(path, folder[1], *words, unit)
+    assert "perhaps" not in compare(path, folder[1], *words, "in/s2")
+    (job,) = json.loads(compare(path, folder[1], *words, "m/s2", "--json"))["jobs"]
     assert job["rms_ratio"]["value"] == pytest.approx(1.0, rel=0.01)
 
 
 @pytest.mark.compiled
-def test_the_figure_has_the_curves_of_both(folder, capsys, tmp_path):
+def test_the_figure_has_the_curves_of_both(folder, compare, tmp_path):
     picture, table = tmp_path / "x.svg", tmp_path / "x.csv"
-    out = run(folder, capsys, folder[1], "others", "-o", str(picture))
+    out = compare(folder[1], "others", "-o", picture)
     assert ET.parse(picture).getroot().tag.endswith("svg")
     assert out.splitlines()[-1].strip() == CAPTION
-    found = json.loads(run(folder, capsys, folder[1], "others", "-o", str(table), "--json"))
+    found = json.loads(compare(folder[1], "others", "-o", table, "--json"))
     assert f"inside the range of the 6 jobs at {found['envelope_inside']:.0%} of crank" in out
     with open(table, newline="", encoding="utf-8") as file:
         head, *_ = csv.reader(file)
@@ -125,7 +130,7 @@ def test_the_figure_has_the_curves_of_both(folder, capsys, tmp_path):
 
 
 @pytest.mark.compiled
-def test_mistakes_are_named(folder, capsys, tmp_path):
+def test_mistakes_are_named(folder, compare, tmp_path):
     for words, told in (
         (["absent.csv", "others"], "absent.csv: cannot be read"),
         ([folder[1]], "Missing argument 'JOB|STUDY...'"),
@@ -137,25 +142,25 @@ def test_mistakes_are_named(folder, capsys, tmp_path):
         ([folder[1], "others", "-o", "x.pdf"], "-o x.pdf: end the name in .png, .svg, .csv"),
         ([folder[1], "others", "--unit", "g"], "says all of its record; leave --unit out"),
     ):
-        assert told in run(folder, capsys, *words, code=2)
-    assert "has no sensor's record" in run(folder, capsys, folder[3], "others", code=5)
+        assert told in compare(*words, code=2)
+    assert "has no sensor's record" in compare(folder[3], "others", code=5)
     slow = tmp_path / "slow.csv"
     times = np.arange(200) / 200.0
     wave = np.sin(2 * np.pi * (times - 0.01) / 0.12)
     np.savetxt(slow, np.column_stack([times, wave, wave]), "%.9g", ",", comments="",
                header="time_s,acceleration_m_per_s2,tacho")  # fmt: skip
-    out = run(folder, capsys, str(slow), "others", code=2)
+    out = compare(slow, "others", code=2)
     assert "slow.csv: the sampling rate holds the orders up to 9 alone" in out
 
 
 @pytest.mark.compiled
-def test_a_job_is_compared_with_the_others_of_its_study(folder, capsys):
+def test_a_job_is_compared_with_the_others_of_its_study(folder, compare):
     """Not with itself, unless it is named; a job without a record is counted."""
     mine = folder[2]["a clearance of 0.1 mm"]
-    found = json.loads(run(folder, capsys, mine, "others", "deaf", "--json"))
+    found = json.loads(compare(mine, "others", "deaf", "--json"))
     assert {job["key"] for job in found["jobs"]} == {*folder[2].values()} - {mine}
     assert found["left_out"] == 1
-    alone = json.loads(run(folder, capsys, mine, mine, "--json"))
+    alone = json.loads(compare(mine, mine, "--json"))
     assert [job["key"] for job in alone["jobs"]] == [mine]
     assert alone["jobs"][0]["correlation"]["value"] == pytest.approx(1.0)
 

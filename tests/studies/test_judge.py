@@ -54,7 +54,7 @@ def folder(once):
 
 
 @pytest.mark.compiled
-def test_good_numbers_are_confirmed_and_nothing_runs_twice(folder, capsys, in_process):
+def test_good_numbers_are_confirmed_and_nothing_runs_twice(folder, compsim, in_process):
     """A short run of a law that remembers a meeting is judged by SciPy's DOP853."""
     with jobs_here():
         found = judge(folder, "laws", 1)
@@ -67,10 +67,8 @@ def test_good_numbers_are_confirmed_and_nothing_runs_twice(folder, capsys, in_pr
     again = judge(folder, "laws", 1, lambda *event: told.append(event))
     assert [job.votes for job in again] == [job.votes for job in found]
     assert told == []
-    assert cli.main(["judge", "laws", "-r", str(folder), "--quiet"]) == 0
-    assert capsys.readouterr().out.startswith("2 jobs: ok 2\n")
-    assert cli.main(["judge", "laws", "-r", str(folder), "--quiet", "--json"]) == 0
-    rows = json.loads(capsys.readouterr().out)
+    assert compsim("judge", "laws", "-r", str(folder), "--quiet").out.startswith("2 jobs: ok 2\n")
+    rows = json.loads(compsim("judge", "laws", "-r", str(folder), "--quiet", "--json").out)
     assert [row["contact.law"] for row in rows] == ["impact", "flores"]
     assert [row["verdict"] for row in rows] == ["ok", "ok"]
 

@@ -103,10 +103,9 @@ def test_a_machine_with_too_short_or_too_coarse_series_has_no_margins(stored):
 
 
 @pytest.mark.compiled
-def test_the_command_prints_and_writes(stored, tmp_path, monkeypatch, capsys):
+def test_the_command_prints_and_writes(stored, tmp_path, monkeypatch, compsim):
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["claims", "some", "-r", str(stored), "--quiet"]) == 0
-    out = capsys.readouterr().out
+    out = compsim("claims", "some", "-r", str(stored), "--quiet").out
     assert "two clearances are worse" in out
     assert "machines judged           2" in out
     assert Path(stored, "claims", "some.nc").exists()

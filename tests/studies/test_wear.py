@@ -44,15 +44,13 @@ def told(place):
     return load_cases(here), out
 
 
-def test_a_line_for_each_machine_says_when_it_is_worn_out(told, place, capsys):
+def test_a_line_for_each_machine_says_when_it_is_worn_out(told, place, compsim):
     cases, out = told
-    assert main(["wear", str(place / "bearing.yaml"), "-r", str(out)]) == 0
-    said = capsys.readouterr()
+    said = compsim("wear", place / "bearing.yaml", "-r", out)
     head, *lines = said.out.splitlines()
     assert "worn out after, h" in head
     assert "all 2 machines are stored" in said.err
-    assert main(["wear", str(place / "bearing.yaml"), "-r", str(out), "--json"]) == 0
-    numbers = json.loads(capsys.readouterr().out)
+    numbers = json.loads(compsim("wear", place / "bearing.yaml", "-r", out, "--json").out)
     for line, one, case in zip(lines, numbers, cases, strict=True):
         assert f"machine.speed_rpm={case.machine.speed_rpm}" in line
         assert f"{one['hours']:.4g}" in line
@@ -106,7 +104,7 @@ def test_a_killed_machine_goes_on_and_ends_in_the_same_bits(told, tmp_path):
 
 
 def test_a_failed_machine_is_told_and_goes_on_when_asked(
-    place, tmp_path, capsys, monkeypatch, in_process
+    place, tmp_path, compsim, monkeypatch, in_process
 ):
     file = place / "failing.yaml"
     file.write_text(TEXT.replace("[400, 500]", "400"), encoding="utf-8")
@@ -125,8 +123,7 @@ def test_a_failed_machine_is_told_and_goes_on_when_asked(
     assert (kept[-1]["reason"], kept[-1]["detail"]) == ("budget_seconds", "slow")
     make_rows(worn, tmp_path)
     assert len(stored_rows(worn, tmp_path)) == len(kept)
-    assert main(["wear", str(file), "-r", str(tmp_path)]) == 3
-    said = capsys.readouterr()
+    said = compsim("wear", file, "-r", tmp_path, code=3)
     assert "failing: budget_seconds: slow" in said.err
     assert "--rerun" in said.err
     assert "failed: budget_seconds" in said.out
@@ -159,11 +156,10 @@ def whole(worn, folder):
         ("joint: none\nwear: true\n", "wear: nothing reads this group: it needs clearance_mm"),
     ],
 )
-def test_what_cannot_wear_is_refused(text, message, tmp_path, capsys):
+def test_what_cannot_wear_is_refused(text, message, tmp_path, compsim):
     file = tmp_path / "odd.yaml"
     file.write_text(text, encoding="utf-8")
-    assert main(["wear", str(file), "-r", str(tmp_path / "none")]) == 2
-    assert message in capsys.readouterr().err
+    assert message in compsim("wear", file, "-r", tmp_path / "none", code=2).err
     assert not (tmp_path / "none").exists()
 
 

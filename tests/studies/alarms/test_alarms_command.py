@@ -19,12 +19,6 @@ from compressor.studies.alarms.readings import ALARMS
 KINDS = len(ALARMS) - 1  # without the body's velocity, which no job here has
 
 
-def run(folder, capsys, *words, code=0):
-    assert cli.main(["alarms", *words, "-r", str(folder), "--quiet"]) == code
-    found = capsys.readouterr()
-    return found.err if code else found.out
-
-
 @pytest.fixture(scope="module")
 def written(worn_store, tmp_path_factory):
     """The folder of files, and stdout."""
@@ -118,7 +112,7 @@ def test_hours_stand_beside_the_clearances(written):
     assert "hours before the limit" in out
 
 
-def test_mistakes_are_named(worn_store, worn, capsys, tmp_path):
+def test_mistakes_are_named(worn_store, worn, compsim, tmp_path):
     for folder, words, told in (
         (worn, ["deaf"], "study deaf has no sensor's record: write `body: true` and `sensor: "
          "{length_rev: 11}` into"),
@@ -136,4 +130,4 @@ def test_mistakes_are_named(worn_store, worn, capsys, tmp_path):
         (worn_store, [], "Missing argument 'STUDY'"),
         (worn_store, ["wrn"], "did you mean worn?"),
     ):  # fmt: skip
-        assert told in run(folder, capsys, *words, code=2)
+        assert told in compsim("alarms", *words, "-r", folder, "--quiet", code=2).err

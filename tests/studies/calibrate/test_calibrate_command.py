@@ -50,13 +50,12 @@ def fitted(tmp_path_factory):
         yield place, words, out.getvalue()
 
 
-def test_the_machine_of_a_record_comes_back(fitted, monkeypatch, capsys):
+def test_the_machine_of_a_record_comes_back(fitted, monkeypatch, compsim):
     """Values in their intervals, these narrow; asked again nothing runs."""
     place, words, _ = fitted
     monkeypatch.chdir(place)
     stored = len(read_store("results").keys())
-    assert cli.main([*words, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(compsim(*words, "--json").out)
     for key, value in TRUTH.items():
         one = found["keys"][key]
         assert one["low"] < value < one["high"]
@@ -82,14 +81,13 @@ def test_what_is_printed_is_a_case_file(fitted, monkeypatch):
     assert any("95 % interval" in line and "body.mass_kg" in line for line in comments)
 
 
-def test_a_case_without_a_sensor_and_the_speed_are_refused(fitted, monkeypatch, capsys):
+def test_a_case_without_a_sensor_and_the_speed_are_refused(fitted, monkeypatch, compsim):
     place, words, _ = fitted
     monkeypatch.chdir(place)
-    assert cli.main([*words, "--fit", "machine.speed_rpm=400:500"]) == 2
-    assert "machine.speed_rpm is the record's own" in capsys.readouterr().err
-    assert cli.main([*words, "--set", "sensor.low_pass_Hz=1"]) == 2
-    assert "its sensor's band holds no order of" in capsys.readouterr().err
+    err = compsim(*words, "--fit", "machine.speed_rpm=400:500", code=2).err
+    assert "machine.speed_rpm is the record's own" in err
+    err = compsim(*words, "--set", "sensor.low_pass_Hz=1", code=2).err
+    assert "its sensor's band holds no order of" in err
     Path("bare.yaml").write_text('{"load": "gas", "gas": {"switching": "exact"}}')
     again = ["bare.yaml" if word == "machine.yaml" else word for word in words]
-    assert cli.main(again[:5] + again[7:]) == 2
-    assert "body and sensor" in capsys.readouterr().err
+    assert "body and sensor" in compsim(*again[:5], *again[7:], code=2).err

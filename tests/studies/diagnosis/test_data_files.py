@@ -7,7 +7,6 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from compsim import cli
 
 from compressor.studies.diagnosis.dataset import (
     LABELS,
@@ -94,11 +93,10 @@ def test_without_pyarrow_the_rest_is_written(made, tmp_path, without_pyarrow):
     assert written == {"windows.nc", "README.md"} == {path.name for path in tmp_path.iterdir()}
 
 
-def test_the_command(worn, tmp_path, capsys):
+def test_the_command(worn, tmp_path, compsim):
     place = tmp_path / "inner" / "faults"
     words = ["-r", str(worn), "-o", str(place), "--noise", "0,0.5", "--no-signals"]
-    assert cli.main(["dataset", "worn", *words]) == 0
-    out, err = capsys.readouterr()
+    out, err = compsim("dataset", "worn", *words)
     assert "big_end  train         2        8\n" in out
     assert "warning: too few machines to test on: both, none\n" in err
     assert "left out: 2 budget_steps\n" in out

@@ -4,12 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from compsim import cli
 from conftest import struck
 from scipy.io import wavfile
 
 from compressor.store.reader import read_store
 from compressor.studies.diagnosis import identify
+
+STUDY = ("--study", "worn", "--quiet")
 
 
 @pytest.fixture(scope="module")
@@ -53,9 +54,9 @@ def record(tmp_path):
     return written(tmp_path / "record.csv", times + 0.01, values, tacho + 0.01)
 
 
-def test_a_record_is_explained(record, folder, capsys):
-    assert cli.main(["identify", record, "--study", "worn", "-r", folder, "--quiet"]) == 0
-    first, head, best, *_, last, _ = capsys.readouterr().out.splitlines()
+def test_a_record_is_explained(record, folder, compsim):
+    out = compsim("identify", record, *STUDY, "-r", folder).out
+    first, head, best, *_, last, _ = out.splitlines()
     assert first.startswith(f"{record}: ")
     assert "revolutions at 500 rpm, 8000 Hz" in first
     assert head.split()[:3] == ["rank", "joint", "probability"]
@@ -67,28 +68,25 @@ def test_a_record_is_explained(record, folder, capsys):
     assert last.split() == ["varied:", "machine.rod_mass_kg", "2.0202", "to", "7.9455"]
 
 
-def test_an_exported_job_is_explained_as_the_job_itself(tmp_path, folder, capsys):
+def test_an_exported_job_is_explained_as_the_job_itself(tmp_path, folder, compsim):
     key, path = sorted(read_store(folder).keys())[5], str(tmp_path / "job.csv")
-    assert cli.main(["export", key, "-r", folder, "-o", path]) == 0
-    capsys.readouterr()
+    compsim("export", key, "-r", folder, "-o", path)
     answers = []
     for record in (key, path):
-        words = ["identify", record, "--study", "worn", "-r", folder, "--quiet", "--json"]
-        assert cli.main(words) == 0
-        found = json.loads(capsys.readouterr().out)
+        found = json.loads(compsim("identify", record, *STUDY, "-r", folder, "--json").out)
         answers.append({one["joint"]: one["probability"] for one in found["candidates"]})
     assert answers[1] == pytest.approx(answers[0], abs=0.05)  # by itself it is left out
     assert max(answers[1], key=answers[1].get) == max(answers[0], key=answers[0].get)
 
 
-def test_a_steady_speed_stands_in_for_a_tacho(tmp_path, folder, capsys):
+def test_a_steady_speed_stands_in_for_a_tacho(tmp_path, folder, compsim):
     path = written(tmp_path / "bare.csv", *struck("big_end", [0.3], 5002), wave=False)
     steady = ["--rpm", "500", "--tdc", "0.24"]
-    assert cli.main(["identify", path, "--study", "worn", "-r", folder, *steady]) == 0
-    assert capsys.readouterr().out.splitlines()[2].split()[1] == "big_end"
+    out = compsim("identify", path, *STUDY, "-r", folder, *steady).out
+    assert out.splitlines()[2].split()[1] == "big_end"
 
 
-def test_what_a_file_does_not_say_options_do(tmp_path, folder, capsys):
+def test_what_a_file_does_not_say_options_do(tmp_path, folder, compsim):
     """The same record as whole numbers of WAV, in g, its tacho a quarter of a turn late."""
     times, values, tacho = struck("big_end", [0.3], 5002)
     as_csv = written(tmp_path / "bare.csv", times, values, tacho, wave=False)
@@ -100,47 +98,42 @@ def test_what_a_file_does_not_say_options_do(tmp_path, folder, capsys):
              "--tacho-deg", "90"]  # fmt: skip
     chances, steady = [], ["--rpm", "500", "--tdc", "0"]
     for words in ([as_csv, *steady], [str(tmp_path / "record.wav"), *hints]):
-        assert cli.main(["identify", *words, "--study", "worn", "-r", folder, "--json"]) == 0
-        best = json.loads(capsys.readouterr().out)["candidates"][0]
+        found = json.loads(compsim("identify", *words, *STUDY, "-r", folder, "--json").out)
+        best = found["candidates"][0]
         chances.append(best["probability"])
         assert best["joint"] == "big_end"
     assert chances[1] == pytest.approx(chances[0], abs=0.01)
 
 
-def test_what_does_not_fit_is_said_first(tmp_path, folder, capsys):
+def test_what_does_not_fit_is_said_first(tmp_path, folder, compsim):
     times, values, tacho = struck("none", [], 5003)
     values += 30 * np.sin(2 * np.pi * 300 * times)
     path = written(tmp_path / "hum.csv", times, values, tacho)
-    assert cli.main(["identify", path, "--study", "worn", "-r", folder]) == 0
-    lines = capsys.readouterr().out.splitlines()
+    lines = compsim("identify", path, *STUDY, "-r", folder).out.splitlines()
     assert lines[1].startswith("NOTHING IN THIS STUDY FITS: ")
     assert lines[2].startswith("compare noise (sensor.noise_m_per_s2), unit (g read as m/s2 is")
 
 
-def test_without_scikit_learn_it_says_how_to_get_it(record, folder, capsys, monkeypatch):
+def test_without_scikit_learn_it_says_how_to_get_it(record, folder, compsim, monkeypatch):
     monkeypatch.setattr("compsim.identify.find_spec", lambda name: None)
-    assert cli.main(["identify", record, "--study", "worn", "-r", folder]) == 2
-    assert "needs scikit-learn: pip install 'compsim[learn]'" in capsys.readouterr().err
+    err = compsim("identify", record, *STUDY, "-r", folder, code=2).err
+    assert "needs scikit-learn: pip install 'compsim[learn]'" in err
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "told"),
+    ("words", "told"),
     [
-        (["absent.csv", "--study", "worn"], 2, "absent.csv: cannot be read: No such file"),
-        (["RECORD"], 2, "Missing option '--study'"),
-        (["RECORD", "--study", "torn"], 2, "holds no study 'torn'"),
-        (["RECORD", "--study", "worn", "--rpm", "500"], 2, "--rpm and --tdc belong together"),
-        (["RECORD", "--study", "worn", "--rpm", "500", "--tdc", "0"], 2, "has a tacho column"),
-        (["abcdef", "--study", "worn"], 2, "no job's key begins with 'abcdef'"),
-        (
-            ["abcdef", "--study", "worn", "--rpm", "1", "--tdc", "0"],
-            2,
-            "a stored job such as abcdef says all of its record; leave --rpm --tdc out",
-        ),
-        (["RECORD", "--study", "worn", "--channel", "room"], 2, "--channel room: no channel of"),
+        ("absent.csv --study worn", "absent.csv: cannot be read: No such file"),
+        ("RECORD", "Missing option '--study'"),
+        ("RECORD --study torn", "holds no study 'torn'"),
+        ("RECORD --study worn --rpm 500", "--rpm and --tdc belong together"),
+        ("RECORD --study worn --rpm 500 --tdc 0", "has a tacho column"),
+        ("abcdef --study worn", "no job's key begins with 'abcdef'"),
+        ("abcdef --study worn --rpm 1 --tdc 0",
+         "a stored job such as abcdef says all of its record; leave --rpm --tdc out"),
+        ("RECORD --study worn --channel room", "--channel room: no channel of"),
     ],
-)
-def test_mistakes_are_named(arguments, code, told, record, folder, capsys):
-    arguments = [record if word == "RECORD" else word for word in arguments]
-    assert cli.main(["identify", *arguments, "-r", folder]) == code
-    assert told in capsys.readouterr().err
+)  # fmt: skip
+def test_mistakes_are_named(words, told, record, folder, compsim):
+    words = [record if word == "RECORD" else word for word in words.split()]
+    assert told in compsim("identify", *words, "-r", folder, code=2).err

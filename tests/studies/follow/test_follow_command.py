@@ -37,10 +37,10 @@ def place(tmp_path_factory):
     return place
 
 
-def run(place, capsys, *more):
-    words = ["--over", OVER, "--both", "--no-exponent", "--points", "8", *more]
-    code = cli.main(["follow", str(place / "worn.yaml"), "-r", str(place / "r"), *words])
-    return code, *capsys.readouterr()
+@pytest.fixture
+def follow_again(place, compsim):
+    words = ["--over", OVER, "--both", "--no-exponent", "--points", "8"]
+    return lambda: compsim("follow", place / "worn.yaml", "-r", place / "r", *words)
 
 
 def test_the_dataset_has_machines_both_ways_and_values(place):
@@ -64,9 +64,8 @@ def test_the_dataset_has_machines_both_ways_and_values(place):
     assert {*NUMBERS, *TEXTS} - {*found.data_vars} == {"end_state"}
 
 
-def test_a_second_run_has_nothing_to_do_and_prints_the_same(place, capsys):
-    code, out, said = run(place, capsys)
-    assert code == 0
+def test_a_second_run_has_nothing_to_do_and_prints_the_same(place, follow_again):
+    out, said = follow_again()
     assert out.splitlines()[:4] == [
         "rod_mass_kg 3.0",
         "direction  radial clearance (mm)  values  motion    exponent (1/rev)",
@@ -80,13 +79,12 @@ def test_a_second_run_has_nothing_to_do_and_prints_the_same(place, capsys):
     assert "nothing to do: all 12 values are stored" in said
 
 
-def test_a_chain_that_is_missing_is_run_alone_and_is_the_same(place, capsys, in_process):
+def test_a_chain_that_is_missing_is_run_alone_and_is_the_same(place, follow_again, in_process):
     before = xr.load_dataset(place / FILE)
     gone, *others = sorted((place / "r/follow/chains").glob("*.nc"))
     stamps = [path.stat().st_mtime_ns for path in others]
     gone.unlink()
-    code, _, said = run(place, capsys)
-    assert code == 0
+    said = follow_again().err
     assert "3 values run in" in said
     assert "9 were stored before" in said
     assert len(others) == 3
@@ -114,11 +112,10 @@ def test_values_that_a_machine_does_not_have_are_missing(in_process, tmp_path):
     assert "differs" not in found
 
 
-def test_failed_values_end_with_3_and_say_why(in_process, capsys, tmp_path):
+def test_failed_values_end_with_3_and_say_why(in_process, compsim, tmp_path):
     path = write(tmp_path / "short.yaml", WORN + "solve: {accuracy: draft, max_steps: 60}\n")
-    code = cli.main(["follow", path, "--over", OVER, "--both", "-r", str(tmp_path), "-j", "1"])
-    out, said = capsys.readouterr()
-    assert code == 3
+    words = ["follow", path, "--over", OVER, "--both", "-r", tmp_path, "-j", "1"]
+    out, said = compsim(*words, code=3)
     assert "up         0.1 to 0.3             3       failed budget_steps" in out
     assert "job 1 down at 0.3: budget_steps: more than 60 steps" in said
     assert "budget_steps (6): raise solve.max_steps" in said

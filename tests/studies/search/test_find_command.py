@@ -68,11 +68,10 @@ def test_direct_runs_on_both_sides_confirm_the_interval(accuracy, found, folder)
         assert difference <= end["reading"]["bar"] * (3 if accuracy == "standard" else 1e-6)
 
 
-def test_a_limit_beside_the_first_point_is_said_in_plant_units(found, folder, capsys):
+def test_a_limit_beside_the_first_point_is_said_in_plant_units(found, folder, compsim):
     """By points that are stored, and a few more; the first one is the base."""
     asked = [*ASKED[:-4], "--first", "peak_contact_force.small_end > 1.02 * base", "-j", "2"]
-    assert cli.main([*asked, "--quiet", "--units", "plant"]) == 0
-    out = capsys.readouterr().out
+    out = compsim(*asked, "--quiet", "--units", "plant").out
     low = direct(0.002, "draft", "peak_contact_force") / 1e3
     base, times = re.search(r"^base +(\S+) ± \S+ kN, times (\S+)$", out, re.MULTILINE).groups()
     assert float(base) == pytest.approx(low, rel=1e-2)
@@ -81,11 +80,10 @@ def test_a_limit_beside_the_first_point_is_said_in_plant_units(found, folder, ca
     assert times == "1.02"
 
 
-def test_a_second_search_computes_nothing(found, folder, capsys):
+def test_a_second_search_computes_nothing(found, folder, compsim):
     keys = read_store("results").keys()
     assert found[1]["run_now"] == len(found[1]["points"]) == len(keys)
-    assert cli.main([*ASKED, "--quiet"]) == 0
-    out, err = capsys.readouterr()
+    out, err = compsim(*ASKED, "--quiet")
     low, high = (f"{found[1][end]['argument']:.9g}" for end in ("low", "high"))
     assert max(map(len, out.splitlines())) <= 80
     head, rows = out.splitlines()[:4], [line.split() for line in out.splitlines()[4:]]
@@ -105,24 +103,22 @@ def test_a_second_search_computes_nothing(found, folder, capsys):
     assert err == ""
 
 
-def test_the_store_is_one_study_that_status_and_run_understand(found, folder, capsys):
+def test_the_store_is_one_study_that_status_and_run_understand(found, folder, compsim):
     (study,) = read_studies("results")
     points = found[1]["points"]
     assert study.axes[0].values == tuple(point["argument"] for point in points)
     assert study.keys == tuple(point["key"] for point in points)
     assert study.is_trial  # a report puts it behind studies of a run
-    assert cli.main(["status"]) == 0
-    assert f"{len(points)} ok" in capsys.readouterr().out
-    assert cli.main(["verify"]) == 0
+    assert f"{len(points)} ok" in compsim("status").out
+    compsim("verify")
     again = study.again
     (same,) = load_studies(again.case_file, overrides=again.overrides)
     assert same.keys == study.keys
 
 
-def test_failed_jobs_are_no_answer(folder, capsys):
+def test_failed_jobs_are_no_answer(folder, compsim):
     ask = ["find", "worn.yaml", "--over", "clearance_mm=0.01:0.02", "--scan", "3", "--quiet",
            "--first", "peak_acceleration > 1", "--set", "solve.max_steps=5"]  # fmt: skip
-    assert cli.main(ask) == 3
-    out = capsys.readouterr().out
+    out = compsim(*ask, code=3).out
     assert re.match(r"peak_acceleration > 1 m/s2: unclear\n", out)
     assert out.count("the job failed, budget_steps: more than 5 steps  failed  ") == 3
