@@ -182,21 +182,6 @@ def bar_row(word, name, measured):
     }
 
 
-def broken(word, cases, measured):
-    """The runs that say `kept` and are not, with what they say."""
-    return [
-        {
-            **values["machine"],
-            **{key: values[key] for key in ("load", "joint", "clearance_mm")},
-            "error": case["words"][word]["error"],
-            "told": case["words"][word]["told"],
-        }
-        for values, case in zip(cases, measured, strict=True)
-        if case["words"][word]["promise"] == "kept"
-        and case["words"][word]["error"] > ACCURACY[word].promise
-    ]
-
-
 def main(target, jobs=2, count=334, seeds=SEEDS):
     cases = [values for seed in seeds for values in strangers(seed, count)]
     with Parallel(n_jobs=jobs) as parallel:
@@ -212,7 +197,6 @@ def main(target, jobs=2, count=334, seeds=SEEDS):
         "truth": {"rtol": TRUTH, "DOP853": CONFIRMED_RTOL, "apart": distance},
         "words": words,
         "bars": bars,
-        "broken": {word: broken(word, cases, measured) for word in ACCURACY},
     }
     keep(target, result, 4)
 

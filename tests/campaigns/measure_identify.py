@@ -86,7 +86,6 @@ def judged(identifier, records):
     intervals of the joint that is worn, whatever is ranked first; `factor`: upper over lower end.
     """
     right, said, false, missed, told, always, factors = [], [], [], [], [], [], []
-    confused = {joint: dict.fromkeys(JOINTS, 0) for joint in JOINTS}
     for joint, opened, row in zip(
         records.joints, records.clearances, records.features, strict=True
     ):
@@ -94,7 +93,6 @@ def judged(identifier, records):
         first = answer.candidates[0].joint
         right.append(first == joint)
         said.append(not answer.fits)
-        confused[joint][first] += 1
         (false if joint == "none" else missed).append((first != "none") == (joint == "none"))
         own = next(one for one in answer.candidates if one.joint == joint)
         for side, interval in own.clearances.items():
@@ -115,7 +113,6 @@ def judged(identifier, records):
         "nothing_fits_where_worn": share(np.sum(np.array(said)[worn]), worn.sum()),
         "false_alarms": share(sum(false), len(false)),
         "missed": share(sum(missed), len(missed)),
-        "confused": confused,
     }
 
 

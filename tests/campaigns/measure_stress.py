@@ -5,20 +5,16 @@ for the pages.
 """
 
 from collections import Counter
-from pathlib import Path
 
-import numpy as np
 from compsim import cli
 from compsim.screen import DONE, SOME_FAILED
 from result_pages import keep, provenance, run_campaign
 
 from compressor.cases.examples import example
 from compressor.cases.load import load_studies
-from compressor.store.reader import read_store
-from compressor.studies.judge import FOLDER, count_ends, judge, rank
+from compressor.studies.judge import count_ends, judge
 
 STUDY = "extremes"
-WORST = 10
 # what each block of the file draws: numbers in the supported ranges or in wider ones; more besides
 BLOCKS = ("supported", "whole", "supported", "laws", "supported", *["features"] * 6)
 
@@ -47,13 +43,6 @@ def group(jobs):
     return {"scenes": len(jobs), "ends": count_ends(jobs), "silent_wrong": wrong}
 
 
-def seconds(folder):
-    """The wall time of all jobs of a folder of results, and of the longest one."""
-    stored = read_store(folder)
-    taken = stored.numbers(np.arange(len(stored)), ["seconds"])["seconds"]
-    return float(taken.sum()), float(taken.max())
-
-
 def main(target, folder="stress", workers=2, overrides=()):
     settings = [word for text in overrides for word in ("--set", text)]
     code = cli.main(["run", str(example(STUDY)), "-r", folder, "-j", str(workers), *settings])
@@ -62,16 +51,10 @@ def main(target, folder="stress", workers=2, overrides=()):
     jobs, of = judge(folder, STUDY, workers), kinds(overrides)
     by_kind = {name: [job for job in jobs if of[job.key] == name] for name in dict.fromkeys(BLOCKS)}
     drawn = [*by_kind["supported"], *by_kind["whole"]]
-    ok = [job for job in drawn if job.verdict == "ok"]
-    (own, slowest), (judging, _) = seconds(folder), seconds(Path(folder, FOLDER))
     found = {
-        **provenance("make stress"), "workers": workers, "work_s": own + judging,
-        "scenes": len(drawn), "silent_wrong": Counter(j.verdict for j in drawn)["silent_wrong"],
-        "at_most": 3.0 / len(drawn),  # 95 % bound where none was found
+        **provenance("make stress"), "scenes": len(drawn),
+        "silent_wrong": Counter(job.verdict for job in drawn)["silent_wrong"],
         "ends": {name: count_ends(by_kind[name]) for name in ("supported", "whole")},
-        "unforeseeable": sum(job.is_chaotic for job in ok),
-        "worst": [shown(job) for job in rank(drawn)[:WORST]],
-        "slowest_s": slowest,
         "fresh": [{"drawn": name, **group(by_kind[name])} for name in ("laws", "features")],
     }  # fmt: skip
     keep(target, found, 3)
