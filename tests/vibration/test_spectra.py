@@ -1,11 +1,30 @@
-"""Single-sided amplitudes: against closed forms."""
+"""Orders, amplitudes, indicators and envelopes: against closed forms and signals that are known."""
+
+import math
 
 import numpy as np
 import pytest
 
-from compressor.vibration.spectra import line_amplitudes
+from compressor.vibration.spectra import (
+    RecordError,
+    energy_angle,
+    envelope_spectrum,
+    high_pass_orders,
+    kurtogram,
+    line_amplitudes,
+    resample_angle,
+    shape,
+)
 
 BLOCK = 240
+M = 720  # samples a revolution
+
+
+def noise(size: int, seed: int = 5) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal(size)
+
+
+# ---- amplitudes of lines
 
 
 @pytest.mark.parametrize("block", [BLOCK, BLOCK + 1])
@@ -37,3 +56,274 @@ def test_blocks_are_averaged_by_mean_square():
     values = np.concatenate([loud, 0.0 * loud, 3.0 * loud[:17]])  # the rest is no whole block
     found = line_amplitudes(values, BLOCK, rms=False)
     assert found[7] == pytest.approx(np.sqrt(0.5), abs=1e-12)
+
+
+# ---- orders of the crank speed
+
+
+def even(turns: float, a_turn: int = M, begin: float = 0.0) -> np.ndarray:
+    return begin + 2 * np.pi * np.arange(round(turns * a_turn)) / a_turn
+
+
+def at_varying_speed(turns: int, samples: int) -> np.ndarray:
+    """Crank angles at equal times; the speed swings by 20 % twice a revolution, and runs up."""
+    time = np.linspace(0.0, 1.0, samples)
+    angle = 2 * np.pi * turns * (0.8 * time + 0.2 * time**2)
+    return angle + 0.1 * np.sin(2 * angle)
+
+
+@pytest.mark.parametrize(("extra", "turns"), [(-1, 2), (0, 3), (1, 3), (M - 1, 3), (M, 4)])
+def test_only_whole_revolutions_are_kept(extra, turns):
+    angle = 2 * np.pi * np.arange(3 * M + extra) / M
+    assert resample_angle(angle, np.cos(angle), M).shape == (turns * M,)
+
+
+def test_a_sine_is_restored_from_unequal_angles():
+    """The spline errs by the fourth power of the interval."""
+    errors = []
+    for samples in (4001, 8001):
+        angle = at_varying_speed(10, samples)
+        found = resample_angle(angle, np.sin(5 * angle), 600)
+        error = np.abs(found - np.sin(5 * even(found.size / 600, 600)))
+        errors.append(np.max(error[600:-600]))  # the ends are worse
+    assert errors[0] < 1e-4
+    assert errors[0] / errors[1] == pytest.approx(16, rel=0.25)
+
+
+def test_resampling_gathers_a_line_that_varying_speed_smears():
+    angle = at_varying_speed(20, 40_001)
+    values = 1.5 * np.sin(24 * angle)
+    even_values = resample_angle(angle, values, 2000)
+    found = line_amplitudes(even_values, 2000, rms=False)
+    assert found[24] == pytest.approx(1.5, abs=1e-4)
+    assert np.max(np.delete(found, 24)) < 1e-4
+    smeared = line_amplitudes(values[:-1], values.size // 20, rms=False)
+    assert smeared[24] < 0.5
+
+
+def test_squares_of_the_spectrum_add_up_to_the_mean_square():
+    values = 5.0 + noise(8 * M)
+    for turns in (8, 1, 4):
+        found = line_amplitudes(values, turns * M, rms=True)
+        assert np.sum(found**2) == pytest.approx(np.mean(values**2), rel=1e-12)
+
+
+# ---- indicators
+
+
+def rms(values):
+    return shape(values)[0]
+
+
+def crest_factor(values):
+    return shape(values)[1]
+
+
+def kurtosis(values):
+    return shape(values)[2]
+
+
+def gini(values):
+    return shape(values)[3]
+
+
+ANGLE = 2 * np.pi * np.arange(4 * M) / M  # four revolutions
+SINE = 2.5 * np.sin(3 * ANGLE)
+SQUARE = np.where(ANGLE % 2.0 < 1.0, 0.7, -0.7)
+BALANCED = np.tile([0.7, -0.7], 100)
+NOISE = np.random.default_rng(11).standard_normal(200_000)
+SILENCE = np.zeros(100)
+
+
+def test_rms():
+    assert rms(SINE) == pytest.approx(2.5 / math.sqrt(2), rel=1e-12)
+    assert rms(SINE + 4.0) == pytest.approx(math.hypot(4.0, 2.5 / math.sqrt(2)), rel=1e-12)
+    assert rms(SILENCE) == 0.0
+
+
+def test_crest_factor():
+    assert crest_factor(SINE) == pytest.approx(math.sqrt(2), rel=1e-12)
+    assert crest_factor(SQUARE) == pytest.approx(1.0, rel=1e-12)
+    assert crest_factor(np.eye(1, 400)[0]) == pytest.approx(20.0, rel=1e-12)
+
+
+def test_kurtosis():
+    assert kurtosis(SINE) == pytest.approx(1.5, rel=1e-12)
+    assert kurtosis(SINE + 9.0) == pytest.approx(1.5, rel=1e-9)
+    assert kurtosis(BALANCED) == pytest.approx(1.0, rel=1e-12)
+    assert kurtosis(NOISE) == pytest.approx(3.0, abs=0.06)  # sqrt(24 / m) = 0.011
+    # a share p of ones has 1 / (p (1 - p)) - 3
+    assert kurtosis(np.eye(1, 50)[0]) == pytest.approx(1 / (0.02 * 0.98) - 3, rel=1e-12)
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 1000])
+def test_gini(size):
+    assert gini(np.full(size, 0.3)) == pytest.approx(0.0, abs=1e-12)
+    assert gini(np.eye(1, size)[0]) == pytest.approx(1 - 1 / size, abs=1e-12)
+    ramp = np.arange(1.0, size + 1)
+    assert gini(ramp) == pytest.approx((size - 1) / (3 * size), abs=1e-12)
+    assert gini(-5e3 * ramp[::-1]) == pytest.approx((size - 1) / (3 * size), abs=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.001, 0.5, 0.9, 1.0])
+def test_energy_angle_of_a_burst(share):
+    burst = np.zeros(4 * M)
+    burst[100:190] = 3.0 * (-1.0) ** np.arange(90)
+    burst[M + 20 : M + 50] = -3.0
+    assert energy_angle(burst, share) == pytest.approx(share * 120 / (4 * M), rel=1e-9)
+    assert energy_angle(SQUARE, share) == pytest.approx(share, rel=1e-9)
+
+
+def test_energy_angle_of_a_sine():
+    """The loudest parts, |x| <= u about the peaks, hold (2u + sin 2u) / pi in an angle 2u / pi."""
+    half = 0.7
+    share = (2 * half + math.sin(2 * half)) / math.pi
+    assert energy_angle(SINE, share) == pytest.approx(2 * half / math.pi, abs=2e-3)
+
+
+@pytest.mark.parametrize("find", [crest_factor, kurtosis, gini, energy_angle])
+def test_silence_has_no_shape(find):
+    assert math.isnan(find(SILENCE))
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+@pytest.mark.parametrize("find", [crest_factor, kurtosis, gini, energy_angle])
+def test_shape_knows_no_unit(find, scale):
+    values = NOISE[:500]
+    assert find(scale * values) == pytest.approx(find(values), rel=1e-12)
+    assert rms(scale * values) == pytest.approx(scale * rms(values), rel=1e-12)
+
+
+def test_high_pass_removes_orders_up_to_and_with_one():
+    low = 4.0 + np.cos(ANGLE) + 3.0 * np.sin(11.75 * ANGLE) + 2.0 * np.sin(12 * ANGLE + 1.0)
+    high = 0.2 * np.sin(12.25 * ANGLE + 0.4) + 0.1 * np.cos(300 * ANGLE)
+    assert high_pass_orders(low + high, M, 12) == pytest.approx(high, abs=1e-12)
+    kept = high + 2.0 * np.sin(12 * ANGLE + 1.0)
+    assert high_pass_orders(low + high, M, 11.9) == pytest.approx(kept, abs=1e-12)
+    assert high_pass_orders(kept + 1.0, M, 0) == pytest.approx(kept, abs=1e-12)
+
+
+def test_high_pass_counts_lines_exactly():
+    """1/49 times 49 is a little less than 1."""
+    angle = 2 * np.pi * np.arange(49 * 16) / 16
+    for one in range(1, 300):
+        line = np.cos(one / 49 * angle)
+        assert np.max(np.abs(high_pass_orders(line, 16, one / 49))) < 1e-12
+        assert np.max(np.abs(high_pass_orders(line, 16, (one - 1) / 49) - line)) < 1e-12
+
+
+# ---- envelopes and the kurtogram
+
+
+RATE, SIZE = 10_000.0, 30_000  # samples a second; 3 s
+TIME = np.arange(SIZE) / RATE
+BAND = (1500.0, 2500.0)
+
+
+def modulated(amplitude: float = 1.6, depth: float = 0.5) -> np.ndarray:
+    swell = 1.0 + depth * np.cos(2 * np.pi * 10 * TIME + 0.2)
+    return amplitude * swell * np.sin(2 * np.pi * 2000 * TIME)
+
+
+def rings(rate: float, size: int, carrier: float, every: float) -> np.ndarray:
+    """Decaying sines of 1 at the begin, 2 ms long, `every` so many seconds."""
+    since = (np.arange(size) / rate + 0.3 * every) % every
+    return np.exp(-since / 2e-3) * np.sin(2 * np.pi * carrier * since)
+
+
+def test_lines_of_the_envelope():
+    slow = 40.0 * np.cos(2 * np.pi * 5 * TIME) + 7.0  # outside of the band
+    frequency, found = envelope_spectrum(modulated() + slow, RATE, BAND)
+    for at, amplitude in {0: 1.6, 10: 0.8, 20: 0.0}.items():
+        one = found[np.argmin(np.abs(frequency - at))]
+        assert one == pytest.approx(amplitude, abs=1e-9)
+    assert frequency[-1] == RATE / 2
+    assert np.sum(found > 1e-9) == 2
+
+
+def test_bands_divide_the_range():
+    frequency, bandwidth, kurtosis = kurtogram(noise(2**12), 2000.0, 3)
+    parts = [1, 2, 3, 4, 6, 8]
+    assert frequency.size == kurtosis.size == sum(parts)
+    for parts_here in parts:
+        here = np.isclose(bandwidth, 1000.0 / parts_here)
+        assert np.sum(here) == parts_here
+        lower = frequency[here] - bandwidth[here] / 2
+        assert lower == pytest.approx(np.arange(parts_here) * 1000.0 / parts_here)
+
+
+def test_stationary_noise_has_none():
+    """Scattered by 1.7 over the root of the lines in a band."""
+    found = np.array([kurtogram(noise(2**12, seed), 1.0, 4)[2] for seed in range(100)])
+    scatter = 1.7 / np.sqrt(2**12 * kurtogram(noise(2**12), 1.0, 4)[1])
+    assert np.mean(found / scatter) == pytest.approx(0.0, abs=0.1)
+    assert np.std(found / scatter) == pytest.approx(1.0, abs=0.1)
+
+
+def test_neighbours_share_the_power_of_a_line_between_them():
+    """Two lines a and b in a band have 2 a^2 b^2 / (a^2 + b^2)^2 - 1."""
+    size = 2**14
+    count = 2 * np.pi * np.arange(size)
+    values = np.sin(0.1875 * count) + np.sqrt(2) * np.sin(0.25 * count)
+    frequency, _, kurtosis = kurtogram(values, 1.0, 2)
+    assert frequency[-4:] == pytest.approx([0.0625, 0.1875, 0.3125, 0.4375])
+    assert kurtosis[-3] == pytest.approx(-0.5, abs=0.01)
+    assert kurtosis[-2] == pytest.approx(-1.0, abs=1e-9)
+
+
+def test_a_sine_has_minus_one_in_its_bands_and_the_rest_is_silent():
+    frequency, bandwidth, kurtosis = kurtogram(np.sin(2 * np.pi * 0.3 * np.arange(10_000)), 1.0, 5)
+    own = np.abs(frequency - 0.3) < bandwidth / 2
+    assert kurtosis[own] == pytest.approx(-1.0, abs=1e-9)
+    far = np.abs(frequency - 0.3) > bandwidth
+    assert np.isnan(kurtosis[far]).all()
+
+
+@pytest.mark.parametrize("carrier", [2300.0, 4700.0, 8100.0])
+def test_the_best_band_holds_the_carrier_of_impulses_in_noise(carrier):
+    rate, size = 20_480.0, 2**16
+    values = 2.0 * rings(rate, size, carrier, 0.1) + 0.3 * noise(size)
+    frequency, bandwidth, kurtosis = kurtogram(values, rate, 6)
+    one = np.nanargmax(kurtosis)
+    half = bandwidth[one] / 2
+    low, high = frequency[one] - half, frequency[one] + half
+    assert low - 200.0 < carrier < high + 200.0
+    assert high - low < 4000.0
+    assert kurtosis[one] > 20 / np.sqrt(2 * half / rate * size)
+    frequency, spectrum = envelope_spectrum(values, rate, (low, high))
+    near = (frequency > 2.0) & (frequency < 50.0)
+    assert frequency[near][np.argmax(spectrum[near])] % 10.0 == pytest.approx(0.0, abs=0.4)
+
+
+def test_a_jump_from_end_to_begin_is_no_impulse():
+    size = 2**14
+    slow = 100.0 * np.sin(2 * np.pi * 3.25 * np.arange(size) / size)
+    frequency, bandwidth, kurtosis = kurtogram(slow + noise(size), 1.0, 5)
+    high = frequency - bandwidth / 2 > 0.05
+    assert np.max(np.abs(kurtosis[high]) * np.sqrt(bandwidth[high] * size)) < 10.0
+
+
+# ---- what is refused
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: resample_angle(even(0.9), even(0.9), M), "pass at least one revolution"),
+        (lambda: resample_angle(even(2), np.full(2 * M, np.nan), M), "index 0: cut these off"),
+        (lambda: resample_angle(even(2), np.ones((2 * M, 2)), M), "pass one real component"),
+        (lambda: resample_angle(even(2), 1j * even(2), M), "complex128"),
+        (lambda: rms(np.array([])), "at least one sample"),
+        (lambda: gini(np.array([1.0, np.inf])), "first at index 1"),
+        (lambda: high_pass_orders(SINE, M, M / 2), "choose a lower order"),
+        (lambda: high_pass_orders(SINE, M, -1), "choose a lower order"),
+        (lambda: high_pass_orders(SINE, M, math.nan), "choose a lower order"),
+        (lambda: envelope_spectrum(TIME, RATE, (20.1, 20.2)), "choose a wider band"),
+        (lambda: envelope_spectrum(TIME, RATE, (6000.0, 7000.0)), "band below 5000, half the rate"),
+        (lambda: kurtogram(TIME, RATE, 8), "32768 samples, and there are 30000: choose fewer"),
+        (lambda: kurtogram(np.full(SIZE, 0.1), RATE, 3), "constant"),
+    ],
+)
+def test_bad_input_is_told_with_a_remedy(call, told):
+    with pytest.raises(RecordError, match=told):
+        call()
