@@ -94,13 +94,6 @@ def number(value: float) -> str:
     return f"{value:.0f}" if is_whole else f"{value:#.{PAGE_DIGITS}g}"
 
 
-def number_cell(value: float, unit: str = "") -> Cell:
-    """Return one measured number, with its unit where the column has several."""
-    if math.isnan(value):
-        return Cell(number(value), "number")
-    return Cell(f"{number(value)} {unit}".rstrip(), "number", value)
-
-
 SHORT_BAR = 5e-4  # of a number: its error bar is below its fourth digit
 
 
