@@ -195,7 +195,7 @@ def settle_motion(
     each: list[Metrics] = []
 
     def enough(turns: list[np.record], points: np.ndarray) -> bool:
-        each.append(metrics(p, turns[-1]))
+        each[len(turns) - 1 :] = [metrics(p, turns[-1])]  # a run made again begins anew
         return steady(each, within) is not None
 
     found = follow_revolutions(case, state, SETTLE_REV, deadline, enough)
