@@ -1,5 +1,6 @@
 """`compsim claims`: in which machines the paper's claims hold, and what decides them."""
 
+import shlex
 from pathlib import Path
 
 import click
@@ -30,7 +31,14 @@ def claims(study, folder, quiet) -> int:
     """
     from compressor.report import write_figure
     from compressor.store import find_study, write_dataset
-    from compressor.studies.claims import draw, judge_machines, numbers, sensitivity, table
+    from compressor.studies.claims import (
+        draw,
+        judge_machines,
+        list_failed,
+        numbers,
+        sensitivity,
+        table,
+    )
 
     with ProgressReporter(quiet, "machines") as progress:
         found = judge_machines(folder, find_study(folder, study), progress)
@@ -45,4 +53,16 @@ def claims(study, folder, quiet) -> int:
         for kind in (".png", ".svg"):
             write_figure(path.with_suffix(kind), figure)
         screen.print_text(f"{path.with_suffix('.png')}: {sentence}")
-    return screen.SOME_FAILED if (found["failed"] != "").any() else screen.DONE
+    failed = [*list_failed(found)]
+    if not failed:
+        return screen.DONE
+    screen.say("without a verdict:")
+    for text in failed[: screen.MAX_FAILURES]:  # a line each, for who searches a log
+        screen.say(f"  {text}")
+    if len(failed) > screen.MAX_FAILURES:
+        screen.say(f"  and {len(failed) - screen.MAX_FAILURES} more")
+    screen.say_wrapped(
+        f"compsim status -r {shlex.quote(folder)} says why jobs failed, and what to do; run the "
+        "study again for what is missing or damaged, with output.keep: series for time series"
+    )
+    return screen.SOME_FAILED

@@ -119,8 +119,11 @@ def judge_machines(
         runs, problems = {}, [f"{name}: missing" for name in LABELS if name not in jobs]
         for name, key in jobs.items():
             status = stored.status(key)
-            if status is None or status.reason or not status.samples:
-                problems.append(f"{name}: {status.reason if status else 'missing'}")
+            why = status.reason if status else "missing"
+            if status and not status.samples:
+                why = why or "without time series"
+            if why:
+                problems.append(f"{name}: {why}")
                 continue
             try:
                 runs[name] = stored.job(key)
@@ -171,6 +174,14 @@ def machines_dataset(rows: list[Row], coords: Mapping[str, tuple]) -> xr.Dataset
 def assumptions(found: xr.Dataset) -> list[str]:
     """Return the names of the swept keys of machines."""
     return [str(name) for name, one in found.coords.items() if "case_key" in one.attrs]
+
+
+def list_failed(found: xr.Dataset) -> Iterator[str]:
+    """Yield what each machine without a verdict lacks, behind its swept values."""
+    for number in np.flatnonzero(found["failed"].values != ""):
+        one = found.isel(machine=number)
+        machine = ", ".join(f"{name} {one[name].item()}" for name in assumptions(found))
+        yield f"{machine}: {one['failed'].item()}".removeprefix(": ")
 
 
 def sensitivity(found: xr.Dataset) -> xr.Dataset | None:

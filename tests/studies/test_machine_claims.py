@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from compsim import cli
 
 from compressor.analysis.claims import claims
 from compressor.analysis.runs import cases_of
@@ -109,7 +108,16 @@ def test_the_command_prints_and_writes(stored, tmp_path, monkeypatch, compsim):
     assert "two clearances are worse" in out
     assert "machines judged           2" in out
     assert Path(stored, "claims", "some.nc").exists()
-    assert cli.main(["claims", "failing", "-r", str(stored), "--quiet"]) == 3
+    err = compsim("claims", "failing", "-r", str(stored), "--quiet", code=3).err
+    assert "without a verdict:\n  big_end 0.1: budget_steps; big_end 0.2: budget_steps" in err
+    assert "compsim status" in err
+
+
+@pytest.mark.compiled
+def test_a_case_without_time_series_is_told(tmp_path):
+    text = QUICK + BLOCKS + "output: {keep: metrics}\n"
+    found = judge_machines(tmp_path, run(tmp_path / "bare.yaml", tmp_path, text))
+    assert "; big_end 0.1: without time series; big_end 0.2: without" in found["failed"].item()
 
 
 @pytest.mark.parametrize("name", ["claims", "assumptions"])
