@@ -16,8 +16,10 @@ import numpy as np
 import xarray as xr
 
 from compressor.cases import (
+    CONTACT_LAWS,
     CYLINDRICAL,
     FOLLOWING,
+    FRICTION_LAWS,
     Case,
     CaseError,
     Output,
@@ -45,20 +47,6 @@ REPEATS = 3  # of shorter ones; the fastest counts
 RESTITUTION = 0.9  # of a law that damps by it, where the case has none
 STEEL = ("steel", "steel")  # where a law needs materials, and the case has none
 UNDAMPED = ("impact", "hertz")  # laws that no restitution damps
-# words of a case file -> the laws' names
-CONTACT_LAWS = {
-    "hertz": "Hertz",
-    "lankarani_nikravesh": "Lankarani-Nikravesh",
-    "flores": "Flores",
-    "johnson": "Johnson",
-    "liu": "Liu",
-}
-FRICTION_LAWS = {
-    "coulomb_tanh": "Coulomb (tanh)",
-    "threlfall": "Threlfall",
-    "ambrosio": "Ambrósio",
-    "lugre": "LuGre",
-}
 SCALES = {"÷ 2": 0.5, "× 2": 2.0}  # of the contact's stiffness and damping
 SCALED = ("contact.stiffness_N_per_mm15", "contact.damping_N_s_per_mm")
 SAME_STIFFNESS = 1.01  # stiffnesses of two joints
@@ -215,12 +203,12 @@ FEATURES = (
             {"friction.ideal_joints": False}),
     Feature("friction of the guide", "guide", {"guide": True}, {"guide": None}, "ideal guide"),
     Feature("speed that gives way", "drive", {"drive": True}, {"drive": None}, "steady speed"),
-    *(Feature(f"contact law: {name}", "contact.law", partial(contact_values, law),
-              partial(contact_values, "impact"), "contact law: IMPACT (ADAMS)", True, law)
-      for law, name in CONTACT_LAWS.items()),
-    *(Feature(f"friction law: {name}", "friction.law", partial(friction_values, law),
-              {"friction.law": "adams"}, "friction law: ADAMS", True, law)
-      for law, name in FRICTION_LAWS.items()),
+    *(Feature(f"contact law: {law}", "contact.law", partial(contact_values, law),
+              partial(contact_values, "impact"), "contact law: impact", True, law)
+      for law in CONTACT_LAWS if law != "impact"),
+    *(Feature(f"friction law: {law}", "friction.law", partial(friction_values, law),
+              {"friction.law": "adams"}, "friction law: adams", True, law)
+      for law in FRICTION_LAWS if law != "adams"),
     Feature("play of the guide", "guide.clearance_mm", {"guide.clearance_mm": 0.05},
             {"guide.clearance_mm": 0}, "guide without play", True),
     Feature("oil film", "lubricant", oil_values, {"lubricant": None}, "dry joints", True),
