@@ -11,7 +11,6 @@ from compressor.report.figures.drawing import panels_of
 from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.work_precision import (
-    ERRORS,
     StudyError,
     draw_work_precision,
     fastest,
@@ -57,8 +56,7 @@ def test_the_study_is_named_after_the_file_and_its_lists_are_what_set_says(whole
 
 def test_errors_fall_with_the_tolerance(study):
     assert study["rtol"].values.tolist() == [1e-3, 1e-5, 1e-7, 1e-12]
-    for name in ERRORS:
-        assert (study[f"error_{name}"].sel(rtol=1e-7) < 1e-5).all(), name
+    assert (study["error_acceleration"].sel(rtol=1e-7) < 1e-5).all()
     compared = study["error_acceleration"].sel(rtol=[1e-3, 1e-5, 1e-7])
     assert (compared.diff("rtol") < 0).all()
 
@@ -70,8 +68,6 @@ def test_errors_are_those_of_runs_made_by_hand(whole):
     a, b = (one["acceleration"].values for one in (run, truth))
     one = found.sel({"method": "auto", "rtol": 1e-5}).squeeze()
     assert one["error_acceleration"] == np.linalg.norm(a - b) / np.linalg.norm(b)
-    forces = [float(each["peak_contact_force"].sel(joint="big_end")) for each in (run, truth)]
-    assert one["error_peak_contact_force"] == pytest.approx(abs(forces[0] / forces[1] - 1))
 
 
 def test_no_job_is_judged_by_itself(study):
