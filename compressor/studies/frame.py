@@ -274,17 +274,13 @@ def rows_dataset(
 class GrowingRows(Protocol):
     """Rows that are made one after the other, each from those before, and their file.
 
-    key: hash of what decides them, an attribute of the file; texts, numbers: names of columns, with
-    `reason` among the texts, "" of a row that is good; cases: that are run; seconds: that they may
-    take; size: of the whole, of which `count_done` is a part.
+    key: hash of what decides them, an attribute of the file; each has a `reason`, "" of a row that
+    is good; cases: that are run; seconds: that they may take; size: of the whole, of which
+    `count_done` is a part.
     """
 
     @property
     def key(self) -> str: ...
-    @property
-    def texts(self) -> Mapping[str, str]: ...
-    @property
-    def numbers(self) -> Numbers: ...
     @property
     def cases(self) -> Sequence[Case]: ...
     @property
@@ -305,14 +301,12 @@ def stored_rows(growing: GrowingRows, folder: Folder, rerun: bool = False) -> li
     path = growing.path(folder)
     if not path.exists():
         return []
-    found, names = read_dataset(path, REMADE), (*growing.texts, *growing.numbers)
-    if found.attrs.get("key") != growing.key or not {*names} <= {*found.variables}:
+    found = read_dataset(path, REMADE)
+    if found.attrs.get("key") != growing.key:
         raise StoreError(path, "does not hold what its name says", REMADE)
-    columns = {name: found[name].values for name in names}
-    rows = [
-        {name: str(one[n]) if name in growing.texts else one[n] for name, one in columns.items()}
-        for n in range(len(columns[names[0]]))
-    ]
+    (dim,) = found["reason"].dims
+    columns = {str(k): one.values for k, one in found.variables.items() if one.dims[:1] == (dim,)}
+    rows = [{name: one[n] for name, one in columns.items()} for n in range(found.sizes[dim])]
     return [*itertools.takewhile(lambda row: not row["reason"], rows)] if rerun else rows
 
 

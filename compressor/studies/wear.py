@@ -72,7 +72,6 @@ class Worn:
     """One machine whose bores wear, stage by stage (`frame.GrowingRows`)."""
 
     case: Case
-    texts, numbers = TEXTS, NUMBERS
     size = 1
 
     @property

@@ -117,7 +117,6 @@ class Chain:
     cases: tuple[Case, ...]
     values: tuple[float, ...]
     plan: ValuePlan
-    texts, numbers = TEXTS, NUMBERS
 
     @cached_property
     def key(self) -> str:
