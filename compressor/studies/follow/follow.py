@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from compressor.cases import MODEL_VERSION, Case, CaseFileError, Output, Study, load_studies, points
+from compressor.cases import Case, CaseFileError, Output, Study, load_studies, points
 from compressor.metrics import JOINTS
 from compressor.program import PROGRAM, Progress, no_progress
 from compressor.store import Folder, coordinate_names, swept_column, writable_folder, write_dataset
@@ -301,6 +301,6 @@ def followed_dataset(
     )
     data.attrs = {
         "study": study.name, "title": study.title, "over": over, "log": int(along.log),
-        "program": PROGRAM, "model_version": MODEL_VERSION,
+        "program": PROGRAM,
     }  # fmt: skip
     return data
