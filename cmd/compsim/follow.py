@@ -1,6 +1,5 @@
 """`compsim follow`: the motion of machines along a key, value after value."""
 
-import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -65,7 +64,6 @@ def follow(config, over, both, log, points, no_exponent, rerun, folder, jobs, qu
         study = load_values(config, along, progress=progress, **how)
     if not quiet:
         screen.caution([study])
-    began = time.monotonic()
     with ProgressReporter(quiet, "values", folder=folder) as progress:
         found = run_chains(study, along, folder, jobs or cores(), progress, rerun)
     data, drawn = found.data, 0
@@ -84,8 +82,8 @@ def follow(config, over, both, log, points, no_exponent, rerun, folder, jobs, qu
         screen.say(f"figures are of the first {drawn} of {able} machines")
     screen.print_text(str(found.path))
     if not quiet:
-        new, seconds = found.total - found.done_before, time.monotonic() - began
-        screen.say_done(new, found.done_before, seconds, folder, "value")
+        new = found.total - found.done_before
+        screen.say_done(new, found.done_before, progress.seconds, folder, "value")
     failures = [*list_failures(data)]
     if failures:
         screen.say_failures(failures)

@@ -54,6 +54,11 @@ class ProgressReporter:
         )
         self.task = self.line.add_task("", total=None)
 
+    @property
+    def seconds(self) -> float:
+        """Return the wall time since this began."""
+        return time.monotonic() - self.began
+
     def __enter__(self) -> "ProgressReporter":
         return self
 

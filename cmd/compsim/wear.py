@@ -36,16 +36,15 @@ def wear(configs, folder, jobs, rerun, as_json, quiet, **how) -> int:
     studies = read_cases(configs, quiet, **how)
     check_wear(studies)
     with ProgressReporter(quiet, "machines", folder=folder) as progress:
-        summary = run_wear(studies, folder, jobs or cores(), progress, rerun)
+        machines, before = run_wear(studies, folder, jobs or cores(), progress, rerun)
     if as_json:
-        screen.print_json([to_row(one, folder) for one in summary.machines])
+        screen.print_json([to_row(one, folder) for one in machines])
     else:
-        screen.print_text(*align_columns(table(summary.machines), "<>><"))
+        screen.print_text(*align_columns(table(machines), "<>><"))
     if not quiet:
-        new = len(summary.machines) - summary.done_before
-        screen.say_done(new, summary.done_before, summary.seconds, folder, "machine")
+        screen.say_done(len(machines) - before, before, progress.seconds, folder, "machine")
     for study in studies:
-        mine = [one for one in summary.machines if one.study == study.name]
+        mine = [one for one in machines if one.study == study.name]
         if any(one.life for one in mine):
             title = title_figure(study.title or study.name, "wear of the bores")
             path = write_figure(Path(folder, "wear", f"{study.name}.png"), draw_wear(mine, title))
@@ -53,7 +52,7 @@ def wear(configs, folder, jobs, rerun, as_json, quiet, **how) -> int:
                 screen.say(str(path))
     failed = [
         (one.study + screen.point_text(one.point), one.reason, one.detail)
-        for one in summary.machines
+        for one in machines
         if one.reason
     ]
     if failed:

@@ -6,7 +6,6 @@ after each of them; the same command goes on from it.
 """
 
 import math
-import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,15 +22,8 @@ from compressor.program import PROGRAM, Progress
 from compressor.reasons import Reason
 from compressor.report import BLACK, CYCLE, GREY, LineStyle, PlotlyFigure, fill, make_grid
 from compressor.solve import simulate
-from compressor.store import Folder, StoreError, read_dataset, writable_folder
-from compressor.studies.frame import (
-    REMADE,
-    StudyError,
-    hash_key,
-    rows_dataset,
-    run_rows,
-    stored_rows,
-)
+from compressor.store import Folder, StoreError, writable_folder
+from compressor.studies.frame import StudyError, hash_key, rows_dataset, run_rows, stored_rows
 from compressor.sweep import JobLost
 
 FOLDER = "wear"
@@ -196,21 +188,17 @@ def next_stage(machine: Worn, stage: Stage) -> Stage:
     return follow_stage(machine, hours, opened)
 
 
-def wear_file(folder: Folder, case: Case) -> Path:
-    """Return the path at which the stages of a case with wear are stored."""
-    return Worn(case).path(folder)
-
-
 def open_wear(folder: Folder, case: Case) -> xr.Dataset:
     """Return the wear of a case's bores from a folder of results, as far as it was run.
 
     Dims: `stage`, `joint`; `hours` and `clearance` (m) by stage, with the metrics of the motion at
     such clearances. Raises StoreError where there is nothing of it.
     """
-    path = wear_file(folder, case)
-    if not path.exists():
-        raise StoreError(path, "is not there", "compsim wear the case file")
-    return read_dataset(path, REMADE)
+    worn = Worn(case)
+    rows = stored_rows(worn, folder)
+    if not rows:
+        raise StoreError(worn.path(folder), "is not there", "compsim wear the case file")
+    return worn.to_dataset(rows)
 
 
 class Life(NamedTuple):
@@ -261,14 +249,6 @@ class WornMachine:
     detail: str = ""
 
 
-class WearSummary(NamedTuple):
-    """What a run did: machines, how many of them were complete before, and seconds."""
-
-    machines: list[WornMachine]
-    done_before: int
-    seconds: float
-
-
 def check_wear(studies: Sequence[Study]) -> None:
     """Raise StudyError unless each case wears, and is measured over whole revolutions."""
     for study, case in ((one, case) for one in studies for case in one.cases):
@@ -289,14 +269,13 @@ def check_wear(studies: Sequence[Study]) -> None:
 
 def run_wear(
     studies: Sequence[Study], folder: Folder, workers: int, progress: Progress, rerun: bool = False
-) -> WearSummary:
+) -> tuple[list[WornMachine], int]:
     """Follow and store the wear of all cases of studies, as far as it is missing.
 
-    rerun: machines that failed go on from their last good stage. Progress counts machines. Raises
-    StoreError and WorkersFailed; whatever ends it early, what was stored stays, and the same call
-    goes on.
+    Return the machines, and how many of them were complete before. rerun: machines that failed go
+    on from their last good stage. Progress counts machines. Raises StoreError and WorkersFailed;
+    whatever ends it early, what was stored stays, and the same call goes on.
     """
-    began = time.monotonic()
     writable_folder(folder)
     listed = [
         (study.name, point, Worn(case))
@@ -304,8 +283,7 @@ def run_wear(
         for point, case in zip(points(study), study.cases, strict=True)
     ]
     done, lost = run_rows([worn for _, _, worn in listed], folder, workers, progress, rerun)
-    found = [worn_machine(*one, folder, lost.get(one[2].key)) for one in listed]
-    return WearSummary(found, done, time.monotonic() - began)
+    return [worn_machine(*one, folder, lost.get(one[2].key)) for one in listed], done
 
 
 def worn_machine(

@@ -16,7 +16,7 @@ from compressor.cases.load import load_cases
 from compressor.store.files import StoreError
 from compressor.studies import wear
 from compressor.studies.frame import make_rows, stored_rows
-from compressor.studies.wear import Worn, hours, open_wear, wear_file
+from compressor.studies.wear import Worn, hours, open_wear
 
 TEXT = """
 joint: both
@@ -57,7 +57,7 @@ def test_a_line_for_each_machine_says_when_it_is_worn_out(told, place, compsim):
         assert f"{one['low']:.4g} to {one['high']:.4g}" in line
         assert one["low"] < one["hours"] < one["high"]
         found = open_wear(out, case)
-        assert one["file"] == str(wear_file(out, case))
+        assert one["file"] == str(Worn(case).path(out))
         worst = float(found["clearance"].sel(joint=one["joint"]).values[-1])
         assert worst == found["clearance"].values.max() == one["clearance"] >= 0.23e-3
         assert f"{1e3 * worst:.3f} mm at {one['joint']}" in line
@@ -167,7 +167,7 @@ def test_a_file_of_something_else_is_told(told, tmp_path):
     cases, out = told
     place = Worn(cases[1]).path(tmp_path)
     place.parent.mkdir(parents=True)
-    place.write_bytes(wear_file(out, cases[0]).read_bytes())
+    place.write_bytes(Worn(cases[0]).path(out).read_bytes())
     with pytest.raises(StoreError, match="does not hold what its name says"):
         stored_rows(Worn(cases[1]), tmp_path)
     with pytest.raises(StoreError, match="compsim wear the case file"):
