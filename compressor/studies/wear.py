@@ -23,7 +23,7 @@ from compressor.reasons import Reason
 from compressor.report import BLACK, CYCLE, GREY, LineStyle, PlotlyFigure, fill, make_grid
 from compressor.solve import simulate
 from compressor.store import Folder, StoreError, writable_folder
-from compressor.studies.frame import StudyError, hash_key, rows_dataset, run_rows, stored_rows
+from compressor.studies.frame import Row, StudyError, hash_key, rows_dataset, run_rows, stored_rows
 from compressor.sweep import JobLost
 
 FOLDER = "wear"
@@ -46,7 +46,6 @@ AT_MOST = 100_000  # motions, whose wall time a machine may take
 MAX_DRAWN = len(CYCLE)  # machines in a figure
 
 TEXTS = {"reason": "why it ended early", "detail": "what is known of that"}
-Stage = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ class Worn:
         """Return the path of its file."""
         return Path(folder) / FOLDER / f"{self.key}.nc"
 
-    def over(self, stage: Stage) -> bool:
+    def over(self, stage: Row) -> bool:
         """Return whether a stage is the last one: worn out, at the end of its hours, or failed."""
         late = bool(stage["hours"] >= self.most_hours)
         return bool(stage["reason"]) or late or bool((stage["clearance"] >= self.limit).any())
@@ -131,15 +130,15 @@ class Worn:
         """Return the wall time that it may take."""
         return AT_MOST * self.case.solve.timeout_s
 
-    def count_done(self, rows: Sequence[Stage]) -> int:
+    def count_done(self, rows: Sequence[Row]) -> int:
         """Return 1 if all its stages are there, else 0."""
         return int(bool(rows) and self.over(rows[-1]))
 
-    def make_row(self, rows: Sequence[Stage]) -> Stage:
+    def make_row(self, rows: Sequence[Row]) -> Row:
         """Run the next stage, or that of unworn bores."""
         return next_stage(self, rows[-1]) if rows else follow_stage(self, 0.0, self.clearances)
 
-    def to_dataset(self, rows: Sequence[Stage]) -> xr.Dataset:
+    def to_dataset(self, rows: Sequence[Row]) -> xr.Dataset:
         """Return its stages, with the dimension `stage`."""
         found = rows_dataset(rows, "stage", TEXTS, NUMBERS)
         worn = found["clearance"].values - self.clearances
@@ -150,28 +149,25 @@ class Worn:
         return found.assign_coords(where).assign_attrs(attrs)
 
 
-def follow_stage(machine: Worn, hours: float, clearances: np.ndarray) -> Stage:
+def follow_stage(machine: Worn, hours: float, clearances: np.ndarray) -> Row:
     """Return the stage at clearances (m) that were worn in some hours: a run, and what it rubs."""
-    run: Any = {}
+    row: Row = {"hours": hours, "clearance": clearances, "turn": math.nan,
+                "rubbing_work": np.full(len(JOINTS), math.nan)}  # fmt: skip
     try:
         run = simulate(machine.case_at(clearances))
-        reason, detail = str(run["reason"].values), str(run.attrs.get("detail", ""))
     except CaseError as error:  # such as clearances that exceed the pins
-        reason, detail = Reason.INVALID_INPUT, str(error)
-    shapes = {name: [len(JOINTS)] * len(METRICS[name].dims) for name in SHOWN}
-    found = {name: run[name].values if name in run else math.nan for name in SHOWN}
-    work, turn = np.full(len(JOINTS), math.nan), math.nan
-    if not reason:
+        nothing = {n: np.full([len(JOINTS)] * len(METRICS[n].dims), math.nan) for n in SHOWN}
+        return row | nothing | {"reason": Reason.INVALID_INPUT, "detail": str(error)}
+    row |= {name: run[name].values for name in SHOWN}
+    row |= {"reason": str(run["reason"].values), "detail": str(run.attrs.get("detail", ""))}
+    if not row["reason"]:
         time = settled_part(run)["time"].values
-        work, turn = rubbing_work(run), float(np.ptp(time)) / settled_revolutions(run)
-    return {
-        "hours": hours, "clearance": clearances, "rubbing_work": work, "turn": turn,
-        "reason": reason, "detail": detail,
-        **{name: np.broadcast_to(value, shapes[name]) for name, value in found.items()},
-    }  # fmt: skip
+        row["turn"] = float(np.ptp(time)) / settled_revolutions(run)
+        row["rubbing_work"] = rubbing_work(run)
+    return row
 
 
-def next_stage(machine: Worn, stage: Stage) -> Stage:
+def next_stage(machine: Worn, stage: Row) -> Row:
     """Return the stage after one that is not the last; by the midpoint rule."""
     opened, rate = stage["clearance"], machine.depth_per_work * stage["rubbing_work"]
     left = (machine.most_hours - stage["hours"]) * 3600.0 / stage["turn"]
