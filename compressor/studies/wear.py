@@ -63,7 +63,6 @@ class Worn:
 
     @cached_property
     def key(self) -> str:
-        """Return the hash of what decides the numbers."""
         return hash_key([self.case.key, self.case.values()["wear"], SCHEMA])
 
     @property
@@ -112,7 +111,6 @@ class Worn:
         )  # fmt: skip
 
     def path(self, folder: Folder) -> Path:
-        """Return the path of its file."""
         return Path(folder) / FOLDER / f"{self.key}.nc"
 
     def over(self, stage: Row) -> bool:
@@ -122,12 +120,10 @@ class Worn:
 
     @property
     def cases(self) -> tuple[Case]:
-        """Return the case that is run."""
         return (self.case,)
 
     @property
     def seconds(self) -> float:
-        """Return the wall time that it may take."""
         return AT_MOST * self.case.solve.timeout_s
 
     def count_done(self, rows: Sequence[Row]) -> int:

@@ -120,25 +120,20 @@ class Chain:
 
     @cached_property
     def key(self) -> str:
-        """Return the hash of what decides the numbers."""
         return hash_key([[case.key for case in self.cases], astuple(self.plan), SCHEMA])
 
     def path(self, folder: Folder) -> Path:
-        """Return the path of its file."""
         return Path(folder) / FOLDER / "chains" / f"{self.key}.nc"
 
     @property
     def size(self) -> int:
-        """Return the number of its values."""
         return len(self.cases)
 
     @property
     def seconds(self) -> float:
-        """Return the wall time that it may take."""
         return RUNS * sum(case.solve.timeout_s for case in self.cases)
 
     def count_done(self, rows: Sequence[Row]) -> int:
-        """Return the number of its values that are run."""
         return len(rows)
 
     def make_row(self, rows: Sequence[Row]) -> Row:
