@@ -99,12 +99,15 @@ def read_study(
     clipped = 0
     for job in records(folder, source, left, progress):
         case, record = job.case, job.record
-        bands = bands or default_bands(record.rate, highest_passed(case.sensor))
-        check_bands(bands, job.key, record.rate, highest_passed(case.sensor))
+        assert case.body  # which made the record
+        assert case.sensor
+        passes = min(case.sensor.low_pass_Hz or math.inf, case.sensor.mounting_Hz)
+        bands = bands or default_bands(record.rate, passes)
+        check_bands(bands, job.key, record.rate, passes)
         if len(record.tacho) - 1 < revolutions or not np.ptp(record.values):
             left["too_short" if np.ptp(record.values) else "silent_record"] += 1
             continue
-        low, high = case.body.band_Hz if case.body else (0.0, math.inf)
+        low, high = case.body.band_Hz
         in_band = low, min(high, record.rate / 2.0)
         own: dict[tuple[int, str], Readings] = {}
         try:
@@ -137,16 +140,8 @@ def read_study(
     return Windows(joints, clearances, draws, keys, stacked, clipped)
 
 
-def highest_passed(sensor: Sensor | None) -> float:
-    """Return the frequency (Hz) above which a sensor's low pass or mounting lets nothing through.
-
-    Without a low pass of its own a sensor has one by its sampling rate, which bands mind anyway.
-    """
-    return min(sensor.low_pass_Hz or math.inf, sensor.mounting_Hz) if sensor else math.inf
-
-
 def check_bands(bands: Sequence[Band], key: str, rate: float, passes: float) -> None:
-    """Raise StudyError unless a job's record holds the bands."""
+    """Raise StudyError unless a job's record holds the bands; passes: as `default_bands` has it."""
     top = min(rate / 2.0, passes)
     for low, high in bands:
         if high > top * (1.0 + 1e-9):

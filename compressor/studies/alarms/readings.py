@@ -83,7 +83,7 @@ ALARMS = (
 )
 
 
-def default_bands(rate: float, passes: float = math.inf) -> tuple[Band, ...]:
+def default_bands(rate: float, passes: float) -> tuple[Band, ...]:
     """Return the bands of a sampling rate, Hz: a frame's, and two above it where there is room.
 
     passes: the highest frequency that the sensor's chain lets through, Hz. The two share what a
