@@ -53,7 +53,6 @@ STIFF = 8.0  # evaluations a step: more are the stiff partner's
 SHORT = 2000  # steps
 # steps, so that a verdict does not depend on how fast a machine is; and seconds beyond all of them
 COMPILED_STEPS, SCIPY_STEPS, SECONDS = 2_500_000, 20_000, 300.0
-VERDICTS = ("ok", "failed", "silent_wrong", "unjudged", "missing")
 
 
 class Vote(NamedTuple):
@@ -89,7 +88,7 @@ class JudgedJob:
 
     @property
     def verdict(self) -> str:
-        """Return one of `VERDICTS`."""
+        """Return ok, failed, silent_wrong, unjudged or missing."""
         if self.status != "ok":
             return self.status
         agreed, dissent = self.counts()
@@ -157,10 +156,9 @@ def read_jobs(folder: Folder, source: StoredStudy) -> list[JudgedJob]:
         is_ok = said["status"] == "ok"
         case = stored.case_at(where) if is_ok else None
         rtol = float(stored.attributes(where)["rtol"]) if is_ok else math.nan
-        own_numbers = {name: numbers[name][number] for name in names}
         status = said["status"] or "missing"
         job = JudgedJob(key, point, status, said["reason"], said["regime"], case, rtol,
-                        own_numbers, [])  # fmt: skip
+                        numbers[number], [])  # fmt: skip
         found.append(job)
     return found
 
@@ -212,8 +210,7 @@ def hear_votes(place: Folder, jobs: Sequence[JudgedJob], cases: Sequence[Case]) 
     for number, (job, case) in enumerate(zip(jobs, cases, strict=True)):
         vote = Vote(case.solve.method)
         if at[number] >= 0 and status[at[number]] == "ok":
-            theirs = {name: numbers[name][number] for name in JUDGED}
-            vote = compare(case.solve.method, job, theirs)
+            vote = compare(case.solve.method, job, numbers[number])
         job.votes.append(vote)
 
 
