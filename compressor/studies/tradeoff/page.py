@@ -181,30 +181,24 @@ def span_text(measure: Measure, low: float, high: float) -> str:
     return f"{' to '.join(texts)} {unit}".rstrip()
 
 
-def main_numbers(table: ModelTable) -> dict[str, str]:
+def headline(table: ModelTable) -> str:
     """Return the peak that moves most, its numerical error, how far it moves, and by what most.
 
-    And the number of runs, and of those without a number of it; {} of a case that knows no metric.
+    And the number of runs, and of those without a number of it, in one line.
     """
     n = table.main
     if n is None:
-        return {}
+        return "metrics that are known: 0"
     measure, value, bar = table.measures[n], table.values[n], table.bars[n]
     text = by_bar(value, bar, measure.is_relative, bare=True, digits=PAGE_DIGITS)
-    blank = sum(math.isnan(row.changes[n]) for row in table.rows)
-    return {
+    found = {
         measure.title: f"{text} {measure.unit}".rstrip(),
         "numerical error": percent(bar / value),
         "moved by": table.span_texts[n],
         "most by": next((row.name for row in table.most(n)), NO_VALUE),
-        "runs": f"{len(table.rows)}",
-        "without a number": f"{blank}",
+        "runs": len(table.rows),
+        "without a number": sum(math.isnan(row.changes[n]) for row in table.rows),
     }
-
-
-def headline(table: ModelTable) -> str:
-    """Return the main numbers in one line."""
-    found = main_numbers(table) or {"metrics that are known": "0"}
     return "; ".join(f"{name}: {text}" for name, text in found.items())
 
 
@@ -267,15 +261,13 @@ def read_models(folder: Folder, study: StoredStudy) -> list[xr.Dataset]:
             continue
         try:
             data = read_dataset(path, again)
-            if data.attrs["key"] in study.keys:
+            if data.attrs.get("key") in study.keys:
                 found.append(data)
                 continue
             problem = f"{path}: is not shown, as {study.name} has no such job: run the case file "
             problem += "with the same --set, or delete it"
         except StoreError as error:
             problem = str(error)
-        except KeyError:
-            problem = f"{path}: holds no choices of the model: {again}"
         warnings.warn(problem, StoreWarning, stacklevel=2)
     return found
 

@@ -121,5 +121,5 @@ def test_choices_are_read_where_they_are_of_a_job_of_the_study(tmp_path):
     with pytest.warns(StoreWarning, match=r"worn-0{8}\.nc.*compsim explain --models"):
         assert len(read_models(tmp_path, study)) == 1
     write_dataset(path, xr.Dataset({"a": 1.0}))
-    with pytest.warns(StoreWarning, match="holds no choices of the model"):
+    with pytest.warns(StoreWarning, match="is not shown, as worn has no such job"):
         assert len(read_models(tmp_path, study)) == 1
