@@ -18,7 +18,7 @@ from compressor.cases.load import load_studies
 from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
 from compressor.studies.tradeoff.page import model_table
-from compressor.studies.tradeoff.variants import faulty, run_variants, scale_contact, variants
+from compressor.studies.tradeoff.variants import faulty, make_variants, run_variants, scale_contact
 from compressor.studies.tradeoff.work_precision import VARIABLES, draw_work_precision, tabulate
 
 ROUNDS = 3
@@ -40,7 +40,7 @@ def points(study):
 
 def changes(scene, case):
     """What each variant of the model does; peaks as the output grid has them."""
-    table = model_table(run_variants(case, [*variants(case), *scale_contact(case)]))
+    table = model_table(run_variants(case, [*make_variants(case), *scale_contact(case)]))
     for row in table.rows:
         moved = {(m.variable, m.joint): change
                  for m, change in zip(table.measures, row.changes, strict=True)}  # fmt: skip

@@ -6,42 +6,21 @@ promises: model only what a scene requires.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import islice
 from typing import Any
 
 import xarray as xr
 
-from compressor.analysis import (
-    JointScales,
-    describe_machine,
-    healthy_body_velocity_rms,
-    joint_scales,
-)
+from compressor.analysis import JointScales, describe_cases, healthy_body_velocity_rms, joint_scales
 from compressor.cases import ACCURACY, Case, Study, points, to_si, with_ideal_joints
 from compressor.digits import align_columns, plural
 from compressor.metrics import JOINTS
 from compressor.physics import state_names
 from compressor.program import Progress, duration, no_progress
 from compressor.solve import record, simulate
+from compressor.studies.tradeoff import variants
 from compressor.studies.tradeoff.page import ModelTable, model_table, percent
-from compressor.studies.tradeoff.variants import (
-    FEATURES,
-    Feature,
-    Variant,
-    faulty,
-    format_value,
-    run_fastest,
-    run_variants,
-    variants,
-)
 
-SCENES = {  # by the joints with clearance
-    (): "ideal joints",
-    ("big_end",): "clearance at the big end",
-    ("small_end",): "clearance at the small end",
-    ("big_end", "small_end"): "clearance at both joints",
-}
 PEAKS = {"peak_acceleration": "acceleration", "peak_contact_force": "force"}
 
 
@@ -54,22 +33,23 @@ def explain(
     pays for. progress: called with how many features have been tried, of how many.
     """
     case = study.cases[job]
-    run, seconds = run_fastest(case, 2)  # the first one may load compiled code
+    run, seconds = variants.run_fastest(case, 2)  # the first one may load compiled code
     good = run["status"] == "ok"
     active, absent = terms(case)
+    worn = " and ".join(joint.replace("_", " ") for joint in variants.faulty(case))
     if case.body and good:
         active["body"] = body_words(case, run)
     advice: Sequence[dict[str, Any]] = ()
     if good and run["steps"] > 0:
-        paid = [one for one in variants(case) if one.left_out]
-        table = model_table(run_variants(case, paid, progress))
+        paid = [one for one in variants.make_variants(case) if one.left_out]
+        table = model_table(variants.run_variants(case, paid, progress))
         advice = [*advise(paid, table, case)]
     return {
         "study": study.name,
         "jobs": study.jobs,
         "point": next(islice(points(study), job, None)),
-        "machine": describe_machine(replace(study, selected=[job])).lines(),
-        "scene": SCENES[tuple(faulty(case))],
+        "machine": describe_cases([case]).lines(),
+        "scene": f"clearance at the {worn}" if worn else "ideal joints",
         "unknowns": unknown_names(case),
         "active": active,
         "absent": absent,
@@ -91,7 +71,9 @@ def explain(
     }
 
 
-def advise(paid: Sequence[Variant], table: ModelTable, case: Case) -> Iterator[dict[str, Any]]:
+def advise(
+    paid: Sequence[variants.Variant], table: ModelTable, case: Case
+) -> Iterator[dict[str, Any]]:
     """Yield how leaving each feature out changes peaks and time, and what it is needed for.
 
     Of the joints with clearance the greatest change counts; nan where one is not known.
@@ -103,7 +85,7 @@ def advise(paid: Sequence[Variant], table: ModelTable, case: Case) -> Iterator[d
             every = [
                 size
                 for m, size in zip(table.measures, row.changes, strict=True)
-                if m.variable == name and m.joint in ("", *faulty(case))
+                if m.variable == name and m.joint in ("", *variants.faulty(case))
             ]
             changes[words] = max(
                 every, key=lambda size: (size != size, abs(size)), default=math.nan
@@ -124,10 +106,10 @@ def unknown_names(case: Case) -> tuple[str, ...]:
     They are freedoms, bristles where friction has them, and the crank's own.
     """
     p = record(case)
-    names, n = state_names(p), int(p["freedoms"])
+    names, n, worn = state_names(p), int(p["freedoms"]), variants.faulty(case)
     bristles = names[2 * n + 2 : 2 * n + 4] if p["bristle_stiffness"] > 0.0 else ()
     found = names[:n] + tuple(
-        name for name, joint in zip(bristles, JOINTS, strict=False) if joint in faulty(case)
+        name for name, joint in zip(bristles, JOINTS, strict=False) if joint in worn
     )
     return found + tuple(name for name in names[2 * n :] if name.startswith("crank's lag"))
 
@@ -168,7 +150,7 @@ def ideal_scales(case: Case) -> Iterator[JointScales]:
     The ideal machine has none of a case's features: its guide, drive and rod are ideal, too.
     """
     p, ideal = record(case), simulate(with_ideal_joints(case, features=False))
-    for joint in faulty(case):
+    for joint in variants.faulty(case):
         yield joint_scales(p, joint, float(ideal["peak_contact_force"].sel(joint=joint)))
 
 
@@ -177,9 +159,9 @@ def ideal_scales(case: Case) -> Iterator[JointScales]:
 
 def terms(case: Case) -> tuple[dict[str, str], list[str]]:
     """Return the terms that a case computes, in words, and those that it leaves out at no cost."""
-    ideal = not faulty(case)
+    ideal = not variants.faulty(case)
     own_keys = ("clearance_mm", "contact.law", "friction.law")  # with contact and friction
-    shown = [row for row in FEATURES if not (row.word or row.key.startswith(own_keys))]
+    shown = [row for row in variants.FEATURES if not (row.word or row.key.startswith(own_keys))]
     active = {row.name: paid_value(case, row) for row in shown if row.is_in(case)}
     absent = [row.name for row in shown if row.name not in active]
     if case.counterweight:
@@ -188,7 +170,7 @@ def terms(case: Case) -> tuple[dict[str, str], list[str]]:
     if ideal:
         return active, [*absent, "clearance", "contact"]
     widths = [f"{getattr(case.clearance_mm, joint):g} mm at the {joint.replace('_', ' ')}"
-              for joint in faulty(case)]  # fmt: skip
+              for joint in variants.faulty(case)]  # fmt: skip
     active["clearance"] = ", ".join(widths)
     if case.worn_joint != case.joint:
         active["clearance"] += f"; worn: {case.worn_joint.replace('_', ' ')}"
@@ -196,7 +178,7 @@ def terms(case: Case) -> tuple[dict[str, str], list[str]]:
     return active, absent
 
 
-def paid_value(case: Case, feature: Feature) -> str:
+def paid_value(case: Case, feature: variants.Feature) -> str:
     """Return the value by which a case pays for a feature."""
     group, dot, name = feature.key.partition(".")
     if feature.key == "friction" and case.friction:
@@ -211,7 +193,7 @@ def paid_value(case: Case, feature: Feature) -> str:
 def list_fields(group: Any) -> str:
     """Return the keys of a group of a case that have a value, as text."""
     fields = {key: one for key, one in vars(group).items() if one is not None}
-    return ", ".join(f"{key} {format_value(one)}" for key, one in fields.items())
+    return ", ".join(f"{key} {variants.format_value(one)}" for key, one in fields.items())
 
 
 def body_words(case: Case, run: xr.Dataset) -> str:

@@ -1,6 +1,6 @@
 """A case with one thing otherwise: another model of its machine, or another value of a number.
 
-`FEATURES` has a row for each feature of the model, `variants` makes cases of the rows, and
+`FEATURES` has a row for each feature of the model, `make_variants` makes cases of the rows, and
 `vary_numbers` of the numbers in doubt: those that the file does not give, or that a plant can only
 guess (`Plausible` of `cases`), at both ends of their range. `run_variants` runs them.
 """
@@ -231,7 +231,7 @@ class Variant(NamedTuple):
     left_out: str = ""
 
 
-def variants(case: Case) -> Iterator[Variant]:
+def make_variants(case: Case) -> Iterator[Variant]:
     """Yield a case without each feature that it has, and with each that it may have."""
     for row in FEATURES:
         is_in = row.is_in(case)
@@ -256,7 +256,7 @@ def other_models(case: Case) -> Iterator[Variant]:
     choices = {row.name for row in FEATURES if row.is_choice}
     choices |= {row.off for row in FEATURES if row.is_choice}
     choices |= set() if case.friction else {"friction"}
-    yield from (one for one in variants(case) if one.name in choices)
+    yield from (one for one in make_variants(case) if one.name in choices)
     yield from scale_contact(case)
 
 
@@ -420,7 +420,7 @@ def explain_models(
     attributes `study` and `key` (of the job).
     """
     case = replace(study.cases[job], wear=None)  # which is of no single run
-    models = [*variants(case), *scale_contact(case)] if every else [*other_models(case)]
+    models = [*make_variants(case), *scale_contact(case)] if every else [*other_models(case)]
     data = run_variants(case, [*vary_numbers(study, job), *models], progress)
     return data.assign_attrs({"study": study.name, "key": study.keys[job]})
 
