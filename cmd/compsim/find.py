@@ -62,12 +62,15 @@ def find(config, over, folder, jobs, units, as_json, quiet, **asked) -> int:
     given = [(kind, text) for kind in KINDS if (text := asked.pop(kind)) is not None]
     if len(given) != 1:
         raise click.UsageError("give one of --first, --greatest and --least")
+    from compressor.studies.find import Question, comparison, goal_of, jsonable_answer, list_answer
     from compressor.studies.find import find as search
-    from compressor.studies.find import jsonable_answer, list_answer, read_question
+    from compressor.studies.frame import read_range
     from compressor.sweep import cores
 
     ((kind, goal),) = given
-    question = read_question(config, over, goal, kind, **asked)
+    sought = comparison(goal) if kind == "first" else goal_of(goal, kind)
+    span = read_range("--over", over, log=asked.pop("log"))
+    question = Question(config, span, sought, **asked)
     study = question.load_first()
     if not quiet:
         screen.caution([study])

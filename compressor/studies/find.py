@@ -23,7 +23,7 @@ from compressor.metrics import AXES, BARRED, JOINTS, NUMBERS, SEGMENTS, THRESHOL
 from compressor.program import Progress, did_you_mean, no_progress
 from compressor.solve import average_bar
 from compressor.store import Folder, StoreError, read_store
-from compressor.studies.frame import GrowingStudy, KeySpan, StudyError, read_range
+from compressor.studies.frame import GrowingStudy, KeySpan, StudyError
 from compressor.units import READABLE, Units, read_quantity, split_number, unit_in
 
 # ---- the question
@@ -31,6 +31,11 @@ from compressor.units import READABLE, Units, read_quantity, split_number, unit_
 SIGNS = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
 COMPARISON = re.compile(r"\s*([\w.]+)\s*(>=|<=|>|<)\s*([^<>=]*[^<>=\s])\s*")
 BESIDE = re.compile(r"(?:(\S+?)\s*\*\s*)?base")  # a limit beside the value at the range's lower end
+NO_COMPARISON = (
+    f"is no comparison: write METRIC[.JOINT], one of {' '.join(SIGNS)}, and a number in SI, such "
+    "as 'contact_loss_fraction.small_end > 0.001', a number and its unit, such as 166 kN, or a "
+    "factor, such as 1.5 * base"
+)
 WORDS = {
     "joint": JOINTS, "axis": AXES, "threshold": THRESHOLDS,
     "segment": tuple(f"{degrees:g}" for degrees in SEGMENTS),
@@ -139,23 +144,19 @@ class Goal:
 def comparison(text: str) -> Goal:
     """Return the goal of a comparison such as `peak_acceleration > 600`. Raises StudyError."""
     parts = COMPARISON.fullmatch(text)
-    beside = BESIDE.fullmatch(parts[3]) if parts else None
-    times = _number(beside[1] or "1") if beside else math.nan
-    number = split_number(parts[3])[0] if parts and not beside else None
-    if parts is None or (number is None and math.isnan(times)):
-        raise StudyError(f"{text!r} is no comparison: write METRIC[.JOINT], one of "
-                            f"{' '.join(SIGNS)}, and a number in SI, such as "
-                            "'contact_loss_fraction.small_end > 0.001', a number and its unit, "
-                            "such as 166 kN, or a factor, such as 1.5 * base")  # fmt: skip
-    goal = goal_of(parts[1], parts[2])
-    if beside:
-        return replace(goal, times=times)
+    if parts is None:
+        raise StudyError(f"{text!r} {NO_COMPARISON}")
+    goal, beside = goal_of(parts[1], parts[2]), BESIDE.fullmatch(parts[3])
+    number, unit = (beside[1] or "1", "1") if beside else (parts[3], BARRED[goal.metric].unit)
     try:
-        limit = read_quantity(parts[3], goal.unit or BARRED[goal.metric].unit)
+        value = read_quantity(number, unit)
     except ValueError as error:
         raise StudyError(f"{text!r}: {error}") from error
-    unit = split_number(parts[3])[1]
-    return replace(goal, limit=math.nan if limit is None else limit, limit_unit=unit)
+    if value is None:
+        raise StudyError(f"{text!r} {NO_COMPARISON}")
+    if beside:
+        return replace(goal, times=value)
+    return replace(goal, limit=value, limit_unit=split_number(parts[3])[1])
 
 
 def goal_of(text: str, sign: str) -> Goal:
@@ -214,27 +215,6 @@ class Question:
         texts = [*self.overrides, f"{self.span.key}={value}"]
         (study,) = load_studies(self.path, overrides=texts)
         return study
-
-
-def read_question(
-    path: str, over: str, goal: str, which: str = "first", log: bool = False, **more: Any
-) -> Question:
-    """Return the question that texts ask.
-
-    over: KEY=LOW:HIGH; goal: a comparison, or with `which` greatest or least a metric; more: other
-    fields. Raises StudyError.
-    """
-    sought = comparison(goal) if which == "first" else goal_of(goal, which)
-    return Question(path, read_range("--over", over, log=log), sought, **more)
-
-
-def _number(text: str) -> float:
-    """Return a finite number, or nan."""
-    try:
-        value = float(text)
-    except ValueError:
-        return math.nan
-    return value if math.isfinite(value) else math.nan
 
 
 # ---- the search
