@@ -18,15 +18,7 @@ from compressor.cases import Case, points
 from compressor.digits import align_columns, plural
 from compressor.program import Progress, no_progress, report_progress
 from compressor.report import BLACK, CYCLE, GREY, LineStyle, PlotlyFigure, fill, make_grid
-from compressor.store import (
-    Folder,
-    find_record,
-    find_study,
-    job_record,
-    read_store,
-    read_studies,
-    report_job,
-)
+from compressor.store import Folder, find_record, job_record, read_store, read_studies, report_job
 from compressor.studies.frame import Revolutions, StudyError, by_revolutions
 from compressor.vibration import RecordError, segment_levels
 
@@ -337,10 +329,9 @@ def wanted_jobs(
     words: Sequence[str], folder: Folder, own: str
 ) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield keys and swept values of the jobs that words name, of studies without the own one."""
-    names = {study.name for study in read_studies(folder)}
+    studies = {study.name: study for study in read_studies(folder)}
     for word in words:
-        if word in names:
-            study = find_study(folder, word)
+        if study := studies.get(word):
             pairs = zip(study.keys, points(study), strict=True)
             yield from ((key, swept) for key, swept in pairs if key != own)
         else:

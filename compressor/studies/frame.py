@@ -30,10 +30,10 @@ from compressor.store import (
     Folder,
     StoredStudy,
     StoreError,
+    find_study,
     job_record,
     read_dataset,
     read_store,
-    read_studies,
     write_dataset,
 )
 from compressor.sweep import JobLost, Needs, Options, in_this_process, run_here, sweep
@@ -162,15 +162,12 @@ class GrowingStudy:
         point: one that makes a case.
         """
         self.find_name(point)
-        with contextlib.suppress(StoreError):  # no study yet
-            for study in read_studies(self.folder):
-                axes = {axis.key: axis.values for axis in study.axes}
-                if study.name == self.name and [*axes] == [*self.keys]:
-                    given = [*zip(*axes.values(), strict=True)]
-                    stored = read_store(self.folder).keys()
-                    with contextlib.suppress(ValueError):  # the file no longer takes them
-                        pairs = zip(given, self.load(given).keys, strict=True)
-                        self.jobs |= {point: key for point, key in pairs if key in stored}
+        with contextlib.suppress(StoreError, ValueError):  # no study yet, or no longer its points
+            axes = {axis.key: axis.values for axis in find_study(self.folder, self.name).axes}
+            if [*axes] == [*self.keys]:
+                given, stored = [*zip(*axes.values(), strict=True)], read_store(self.folder).keys()
+                pairs = zip(given, self.load(given).keys, strict=True)
+                self.jobs |= {point: key for point, key in pairs if key in stored}
 
     def run(self, given: Sequence[Point]) -> list[str]:
         """Return the keys of the jobs of points, run where they are missing; "" of refused ones.
