@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from compressor.cases import Case, Sensor
+from compressor.cases import Case, Sensor, values_given
 from compressor.program import PROGRAM, Progress, no_progress
 from compressor.store import Folder, find_study, publish, swept_column, write_dataset
 from compressor.studies.diagnosis.features import FEATURES, features
@@ -289,12 +289,7 @@ Swept keys have other values in other jobs, and blocks of a case file may have o
 def write_card(dataset: xr.Dataset) -> str:
     """Return the card of a data set as Markdown: facts in tables, and warnings."""
     attrs = dataset.attrs
-    fixed, left = json.loads(attrs["fixed"]), json.loads(attrs["left_out"])
-    case = [
-        (f"{group}.{name}" if name else group, value)
-        for group, inner in fixed.items()
-        for name, value in (inner.items() if isinstance(inner, dict) else [("", inner)])
-    ]
+    left = json.loads(attrs["left_out"])
     facts = {
         "simulated jobs": attrs["jobs"],
         "jobs that gave windows": len({*dataset["key"].values.tolist()}),
@@ -319,7 +314,7 @@ def write_card(dataset: xr.Dataset) -> str:
                          for name, one in LABELS.items()]),
         features=tabulate(("feature", "what it is"), described),
         swept=tabulate(("key", "unit", "values"), json.loads(attrs["axes"])),
-        case=tabulate(("key", "value"), case),
+        case=tabulate(("key", "value"), values_given(json.loads(attrs["fixed"])).items()),
     )  # fmt: skip
 
 
