@@ -10,6 +10,7 @@ import io
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -102,7 +103,7 @@ def make_data_set(
         try:
             for first, window in cut_windows(job.record, revolutions, hop):
                 found = [
-                    [*features(window.times, values, window.tacho).values()]
+                    [*features(replace(window, values=values)).values()]
                     for level, rms in enumerate(noise)
                     for values in [
                         noisy(window.values, rms, [seed, int(job.key, 16), first, level])

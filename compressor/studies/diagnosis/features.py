@@ -47,15 +47,13 @@ FEATURES = {  # name -> phrase
 }  # fmt: skip
 
 
-def features(times: np.ndarray, values: np.ndarray, tacho: np.ndarray) -> dict[str, float]:
+def features(record: Record) -> dict[str, float]:
     """Return the `FEATURES` of a record by name.
 
-    times: s, (m,), equally spaced; values: m/s2, (m,); tacho: times (s) of top dead centre, (k,)
-    with k - 1 whole revolutions. A crank angle is known to a sample. Raises RecordError for fewer
-    than two revolutions, pulses that do not increase or lie beyond the samples, and values that are
-    not all numbers, or all zero.
+    A crank angle is known to a sample. Raises RecordError for fewer than two revolutions, pulses
+    that do not increase or lie beyond the samples, and values that are not all numbers, or all
+    zero.
     """
-    record = Record(times, values, tacho, math.nan)
     turned = by_revolutions(record, SECTORS)
     even, a_turn, speed = turned.values.ravel(), turned.values.shape[1], turned.speed
     ((_, whole),) = cut_windows(record, len(turned.values))

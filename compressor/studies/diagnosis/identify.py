@@ -81,7 +81,7 @@ def read_library(folder: Folder, study: str, progress: Progress = no_progress) -
     rows: list[tuple[Any, ...]] = []
     for job in records(folder, source, left, progress):
         try:
-            found = describe_record(job.record)
+            found = np.array([*features(job.record).values()])
         except RecordError:
             left["silent_record"] += 1
             continue
@@ -96,11 +96,6 @@ def read_library(folder: Folder, study: str, progress: Progress = no_progress) -
     }
     keys, joints, opened, found, machines = map(np.array, zip(*rows, strict=True))
     return Library(study, keys, joints, opened, found, machines, source.jobs, swept)
-
-
-def describe_record(record: Record) -> np.ndarray:
-    """Return the features of a record, (FEATURES,). Raises RecordError."""
-    return np.array([*features(record.times, record.values, record.tacho).values()])
 
 
 @dataclass(frozen=True)
@@ -318,7 +313,7 @@ def explain_record(
     key: a job left out, since it must not explain itself. Raises RecordError, StoreError, and
     StudyError where the study has too little.
     """
-    row = describe_record(record)
+    row = np.array([*features(record).values()])
     library = read_library(folder, study, progress)
     fitted = Identifier.fit(library.only(library.keys != key))
     return fitted, fitted.identify(row)

@@ -79,7 +79,8 @@ def test_features_are_those_of_the_stored_samples(made):
         assert np.isnan(row["signal"].values[count:]).all()
         for level, rms in enumerate(NOISE):
             seed = [SEED, int(row["key"].item(), 16), row["first_pulse"].item(), level]
-            found = features(times, noisy(values, rms, seed), row["tacho"].values)
+            record = Record(times, noisy(values, rms, seed), row["tacho"].values, 0.0)
+            found = features(record)
             assert [*found] == made["feature"].values.tolist()
             assert row["features"].values[level] == pytest.approx([*found.values()], abs=1e-4)
     assert made["signal"].dtype == np.float32

@@ -9,6 +9,7 @@ from compressor.store.reader import read_store
 from compressor.store.sensor_records import find_record
 from compressor.studies.diagnosis.features import features
 from compressor.studies.diagnosis.identify import StudyError, read_library
+from compressor.vibration import Record
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +27,7 @@ def test_a_library_holds_joints_clearances_and_what_else_is_swept(library):
 
 def test_features_are_those_of_the_records(library):
     ends = [c for c in library.clearances[7].tolist() if c]
-    expected = features(*struck(library.joints[7], ends, 7))
+    expected = features(Record(*struck(library.joints[7], ends, 7), 0.0))
     np.testing.assert_allclose(library.features[7], list(expected.values()), rtol=1e-9)
 
 

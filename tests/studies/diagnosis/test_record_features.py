@@ -13,7 +13,7 @@ from compressor.studies.diagnosis.features import (
     SMALLEST,
     features,
 )
-from compressor.vibration import RecordError
+from compressor.vibration import Record, RecordError
 
 RATE, SPEED, WHOLE = 25600.0, 8.0, 10  # Hz, rev/s, revolutions
 FIRST = 0.0123  # s, of the first pulse: between two samples
@@ -22,6 +22,10 @@ TACHO = FIRST + np.arange(WHOLE + 1) / SPEED
 TURNS = (TIMES - FIRST) * SPEED
 NOISE = np.random.default_rng(3).standard_normal(TIMES.size)
 SILENT = math.log10(SMALLEST)
+
+
+def describe(times, values, tacho):
+    return features(Record(times, values, tacho, math.nan))
 
 
 def sine(order, amplitude=1.0):
@@ -35,7 +39,7 @@ def mean_turn(turns, orders=range(20, 500, 7)):
 
 
 def test_a_sine():
-    found = features(TIMES, sine(100, 3.0), TACHO)  # 800 Hz
+    found = describe(TIMES, sine(100, 3.0), TACHO)  # 800 Hz
     assert [*found] == [*FEATURES]
     assert found["level"] == pytest.approx(math.log10(3.0 / math.sqrt(2)), abs=1e-6)
     assert found["speed"] == pytest.approx(math.log10(SPEED), abs=1e-12)
@@ -50,7 +54,7 @@ def test_a_sine():
 
 
 def test_only_the_level_knows_the_size():
-    small, large = (features(TIMES, size * NOISE, TACHO) for size in (1e-3, 1e3))
+    small, large = (describe(TIMES, size * NOISE, TACHO) for size in (1e-3, 1e3))
     assert large["level"] - small["level"] == pytest.approx(6.0, abs=1e-12)
     for name in {*FEATURES} - {"level"}:
         assert large[name] == pytest.approx(small[name], rel=1e-9, abs=1e-9)
@@ -58,7 +62,7 @@ def test_only_the_level_knows_the_size():
 
 @pytest.mark.parametrize("order", [1, 5, 12])
 def test_the_swing_of_a_machine_without_clearance_is_no_sound(order):
-    found = features(TIMES, sine(order) + sine(200, 0.1), TACHO)
+    found = describe(TIMES, sine(order) + sine(200, 0.1), TACHO)
     assert found["above_swing"] == pytest.approx(math.log10(0.01 / 1.01), abs=1e-3)
     assert found["synchronous"] == pytest.approx(1.0, abs=1e-3)
     assert found["band_0"] == pytest.approx(math.log10(1 / 1.01), abs=1e-3)
@@ -69,7 +73,7 @@ def test_the_swing_of_a_machine_without_clearance_is_no_sound(order):
 def test_a_burst_stands_in_its_sector(sector):
     place = (TURNS % 1.0) * SECTORS - sector
     burst = np.where((place > 0) & (place < 1), np.sin(np.pi * place) ** 2, 0.0) * sine(400)
-    found = features(TIMES, burst, TACHO)
+    found = describe(TIMES, burst, TACHO)
     for k in range(SECTORS):
         assert found[f"sector_{15 * k}"] == pytest.approx(0.0 if k == sector else SILENT, abs=1e-3)
     # of the burst's energy, sin^4, 90 % stand in a share of the sector; the carrier's zeros can go
@@ -81,7 +85,7 @@ def test_a_burst_stands_in_its_sector(sector):
 
 
 def test_bands_of_white_noise_are_as_wide_as_they_are():
-    found = features(TIMES, NOISE, TACHO)
+    found = describe(TIMES, NOISE, TACHO)
     for low, high in zip(BANDS, (*BANDS[1:], RATE / 2), strict=True):
         lines = (high - low) * WHOLE / SPEED  # independent lines of a chi-square law
         share = math.log10((high - low) / (RATE / 2))
@@ -93,18 +97,18 @@ def test_bands_of_white_noise_are_as_wide_as_they_are():
 
 @pytest.mark.parametrize("whole", [2, 5, 10])
 def test_noise_is_not_synchronous(whole):
-    found = features(TIMES, NOISE, TACHO[: whole + 1])
+    found = describe(TIMES, NOISE, TACHO[: whole + 1])
     scatter = math.sqrt(2 / (RATE / SPEED))
     assert found["synchronous"] == pytest.approx(1 / whole, rel=4 * scatter)
 
 
 def test_a_turn_that_repeats_itself_is_synchronous():
-    found = features(TIMES, mean_turn(TURNS), TACHO)
+    found = describe(TIMES, mean_turn(TURNS), TACHO)
     assert found["synchronous"] == pytest.approx(1.0, abs=1e-6)
     lines = np.fft.rfft(NOISE)
     lines[lines.size // 4 :] = 0.0  # the spline that resamples takes from the highest frequencies
     low = np.fft.irfft(lines, NOISE.size)
-    noisy = features(TIMES, mean_turn(TURNS) / np.std(mean_turn(TURNS)) + low / np.std(low), TACHO)
+    noisy = describe(TIMES, mean_turn(TURNS) / np.std(mean_turn(TURNS)) + low / np.std(low), TACHO)
     assert noisy["synchronous"] == pytest.approx((1 + 1 / WHOLE) / 2, abs=0.02)
 
 
@@ -119,15 +123,15 @@ def test_turns_at_their_own_pace_are_still_synchronous():
     fine = np.linspace(0, TIMES[-1], 2_000_001)
     tacho = np.interp(np.arange(WHOLE + 1), angle(fine), fine)
     values = mean_turn(angle(TIMES), range(20, 60, 7))
-    assert features(TIMES, values, tacho)["synchronous"] > 0.99
-    assert features(TIMES, values, TACHO)["synchronous"] < 0.98
+    assert describe(TIMES, values, tacho)["synchronous"] > 0.99
+    assert describe(TIMES, values, TACHO)["synchronous"] < 0.98
 
 
 @pytest.mark.parametrize("beat", BEATS)
 def test_a_modulated_carrier_has_its_order_in_the_envelope(beat):
     carrier = sine(250)  # 2000 Hz
     values = (1.0 + 0.4 * np.cos(2 * np.pi * beat * TURNS)) * carrier
-    found = features(TIMES, values, TACHO)
+    found = describe(TIMES, values, TACHO)
     for one in BEATS:
         assert found[f"envelope_{one}"] == pytest.approx(0.4 if one == beat else 0.0, abs=1e-3)
 
@@ -140,7 +144,7 @@ def test_every_revolution_between_pulses_counts(speed, share):
     times = np.arange(math.ceil(tacho[-1] * RATE - 1e-9) + 1) / RATE
     turn = np.floor((times - tacho[0]) * speed)
     values = np.where(turn == 2, 1.0, 0.0) * np.sin(2 * np.pi * 500 * times)  # the last alone
-    found = features(times, values, tacho)
+    found = describe(times, values, tacho)
     assert found["level"] == pytest.approx(math.log10(math.sqrt(1 / 6)), abs=2e-3)
 
 
@@ -160,4 +164,4 @@ def test_every_revolution_between_pulses_counts(speed, share):
 )
 def test_a_record_that_tells_nothing_is_refused(values, tacho, told):
     with pytest.raises(RecordError, match=told):
-        features(TIMES, values, tacho)
+        describe(TIMES, values, tacho)
