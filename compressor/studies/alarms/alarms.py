@@ -392,11 +392,9 @@ def list_rows(found: xr.Dataset) -> list[tuple[str, ...]]:
 
     Each alarm has its best filter; an end beyond the study's greatest clearance has a >.
     """
+    hours = ["hours before the limit"] * ("hours" in found)
     rows: list[tuple[str, ...]] = [
-        (
-            *("joint", "noise, m/s2", "alarm", "limit", "false alarms, %", "detects from, mm"),
-            *(("hours before the limit",) if "hours" in found else ()),
-        )
+        ("joint", "noise, m/s2", "alarm", "limit", "false alarms, %", "detects from, mm", *hours)
     ]
     for joint in found["joint"].values.tolist():
         greatest = found["clearance_high"].values[found["worn_joint"].values == joint].max()
@@ -405,13 +403,14 @@ def list_rows(found: xr.Dataset) -> list[tuple[str, ...]]:
                 one = found.isel(alarm=place, noise=level).sel(joint=joint)
                 if noise and one["kind"].item() == BODY_VELOCITY:
                     continue
-                row = (
+                row: tuple[str, ...] = (
                     joint, f"{noise:g}", one["alarm"].item(), f"{one['limit'].item():.3g}",
                     show_interval(100.0 * one["false_alarms"].values, "{:.2g}"),
                     show_interval(one["first_clearance"].values, "{:.3g}", greatest),
                 )  # fmt: skip
-                more = (show_interval(one["hours"].values, "{:.4g}"),) if "hours" in found else ()
-                rows.append((*row, *more))
+                if hours:
+                    row += (show_interval(one["hours"].values, "{:.4g}"),)
+                rows.append(row)
     return rows
 
 

@@ -1,7 +1,7 @@
 """What alarms read of a sensor's record: levels, counts and velocity of windows, by filter."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -119,7 +119,7 @@ def read_windows(
             read_window(one.values, turns_at(one.times, one.tacho), revolutions)
             for _, one in windows
         ]:
-            found[name] = stack_readings(rows)
+            found[name] = {key: np.array([row[key] for row in rows]) for key in rows[0]}
     if found:
         speed = band_velocity(values, rate, *velocity_band)
         windows = cut_windows(replace(record, values=speed), revolutions)
@@ -137,12 +137,6 @@ def read_window(values: np.ndarray, turns: np.ndarray, revolutions: int) -> Read
     counts = np.zeros(LADDER.size)
     counts[:below] = found.get("sensor_counts_per_rev", np.empty(0))
     return found | {"sensor_counts_per_rev": counts}
-
-
-def stack_readings(rows: Iterable[Readings]) -> Readings:
-    """Return readings of several windows as (windows, numbers)."""
-    listed = list(rows)
-    return {name: np.array([row[name] for row in listed]) for name in listed[0]}
 
 
 def band_velocity(values: np.ndarray, rate: float, low: float, high: float) -> np.ndarray:
