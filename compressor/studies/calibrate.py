@@ -107,13 +107,6 @@ class Fit:
     noise: float
 
 
-def weigh(amplitudes: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Return the standard deviation that each order's real and imaginary part is fitted within."""
-    sizes = np.abs(amplitudes)
-    least = FLOOR * sizes.max()
-    return np.sqrt(errors**2 / 2.0 + (MODEL_ERROR * sizes) ** 2 + least**2)
-
-
 def drifts(count: int) -> np.ndarray:
     """Return the ways in which all orders err together, (ways, count): gain and phase, and tilts.
 
@@ -133,7 +126,9 @@ class Misfit:
 
     def __init__(self, model: Model, amplitudes: np.ndarray, errors: np.ndarray, unknowns: int):
         self.model, self.amplitudes, self.unknowns = model, amplitudes, unknowns
-        self.sizes = weigh(amplitudes, errors)
+        sizes = np.abs(amplitudes)
+        variances = errors**2 / 2.0 + (MODEL_ERROR * sizes) ** 2 + (FLOOR * sizes.max()) ** 2
+        self.sizes = np.sqrt(variances)  # within which real and imaginary parts are fitted
         self.drifts = drifts(len(amplitudes))
         self.known = np.append(np.full(unknowns, 1.0 / UNIFORM), np.ones(len(self.drifts)))
         self.middle = np.append(np.full(unknowns, 0.5), np.zeros(len(self.drifts)))
