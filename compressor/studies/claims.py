@@ -15,7 +15,6 @@ import xarray as xr
 from compressor.analysis import (
     LOADS,
     RULES,
-    Margin,
     NoSeriesError,
     claim_margins,
     label,
@@ -77,8 +76,6 @@ NUMBERS = {  # name -> dims, unit, long name
     "chaotic": ((), "1", "how many of the cases are chaotic"),
 }
 TEXTS = {"failed": "cases there are not, and why"}
-UNKNOWN = Margin(math.nan, math.nan)
-NO_MARGINS = [UNKNOWN] * len(CLAIMS), dict.fromkeys(SHARES, UNKNOWN)
 REMEDY = "compsim init claims writes a case file with all eleven cases of each machine"
 
 Key = tuple[tuple[str, Any], ...]  # swept values of a machine
@@ -136,7 +133,11 @@ def judge_machines(
         name: ("machine", *swept_column(key, column))
         for (key, name), column in zip(names.items(), columns, strict=True)
     }
-    return machines_dataset(rows, coords).assign_attrs(study=source.name)
+    coords["claim"] = "claim", np.array(CLAIMS), {"long_name": "claim of the paper"}
+    coords["share"] = "share", np.array(SHARES, object), {"long_name": "measure of claim 7"}
+    thresholds = "; ".join(f"{n}. {rule.threshold}" for n, rule in zip(CLAIMS, RULES, strict=True))
+    judged = rows_dataset(rows, "machine", TEXTS, NUMBERS).assign_coords(coords)
+    return judged.assign_attrs(thresholds=thresholds, study=source.name)
 
 
 def measure(runs: Mapping[str, xr.Dataset], failed: str = "") -> Row:
@@ -145,30 +146,19 @@ def measure(runs: Mapping[str, xr.Dataset], failed: str = "") -> Row:
     failed: which cases there are not, and why; margins are nan then, and of runs that are too
     short or too coarse.
     """
+    each, shares = (np.full((len(names), 2), math.nan) for names in (CLAIMS, SHARES))
     try:
-        each, alone = NO_MARGINS if failed else claim_margins(runs)
+        if not failed:
+            each[:], alone = claim_margins(runs)
+            shares[:] = [alone[name] for name in SHARES]
     except (NoSeriesError, RecordError) as error:
-        each, alone = NO_MARGINS
         failed = str(error)
-    shares = [alone[name] for name in SHARES]
     return {
-        "margin": [one.value for one in each], "error": [one.error for one in each],
-        "share_margin": [one.value for one in shares],
-        "share_error": [one.error for one in shares],
+        "margin": each[:, 0].tolist(), "error": each[:, 1].tolist(),
+        "share_margin": shares[:, 0].tolist(), "share_error": shares[:, 1].tolist(),
         "chaotic": sum(run.attrs.get("regime") == "chaotic" for run in runs.values()),
         "failed": failed,
     }  # fmt: skip
-
-
-def machines_dataset(rows: list[Row], coords: Mapping[str, tuple]) -> xr.Dataset:
-    """Return margins with the dimension machine; coords: of the swept keys."""
-    found = rows_dataset(rows, "machine", TEXTS, NUMBERS)
-    own = {
-        "claim": ("claim", np.array(CLAIMS), {"long_name": "claim of the paper"}),
-        "share": ("share", np.array(SHARES, object), {"long_name": "measure of claim 7"}),
-    }
-    thresholds = "; ".join(f"{n}. {rule.threshold}" for n, rule in zip(CLAIMS, RULES, strict=True))
-    return found.assign_coords({**coords, **own}).assign_attrs(thresholds=thresholds)
 
 
 def assumptions(found: xr.Dataset) -> list[str]:
