@@ -1,6 +1,7 @@
 """A store -> figures and a page; the tools by which studies draw and add to the page."""
 
-from compressor.report.figures.contours import contour_area, contour_lines
+from compressor.report.figures import style
+from compressor.report.figures.contours import contour_lines
 from compressor.report.figures.drawing import (
     Panel,
     PlotlyFigure,

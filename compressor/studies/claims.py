@@ -24,23 +24,7 @@ from compressor.analysis import (
 from compressor.cases import Case, points
 from compressor.digits import setting
 from compressor.program import Progress, no_progress, report_progress
-from compressor.report import (
-    BLACK,
-    BLUE,
-    GREY,
-    RED,
-    LineStyle,
-    Panel,
-    PlotlyFigure,
-    contour_area,
-    contour_lines,
-    fill,
-    make_grid,
-    mark,
-    midway,
-    palette,
-    rectangle,
-)
+from compressor.report import Panel, PlotlyFigure, contour_lines, make_grid, style
 from compressor.store import (
     DamagedFile,
     Folder,
@@ -294,7 +278,9 @@ def numbers(found: xr.Dataset) -> list[tuple[str, str]]:
 
 REACH = 0.5  # of the threshold: margins beyond it have the same colour
 OF_MASSES = (3, 4, 5, 6, 7, 8)  # claims that masses can decide
-EFFECTS = (("first_order", GREY, 0.19, "main effect"), ("total_order", BLUE, -0.19, "total"))
+EFFECTS = (("first_order", style.GREY, 0.19, "main effect"),
+           ("total_order", style.BLUE, -0.19, "total"))  # fmt: skip
+FEW_OR_MOST = ("#f4f4f4", "#a9b6ce")  # colours of machines: a pale blue where most claims hold
 MAP = "blue: the claim holds, red: it does not, by its margin; ring: the default masses"
 BARS = "shares of the variance of a claim's margin by an assumption, with 95 % intervals"
 
@@ -317,26 +303,24 @@ def draw(found: xr.Dataset, effects: xr.Dataset | None) -> tuple[PlotlyFigure, s
 def draw_map(plane: xr.Dataset) -> PlotlyFigure:
     """Return each claim's margin over rod and reciprocating mass, and how many claims hold."""
     drawing, panels = make_grid(2, 4, 5.6, share_x="all", share_y="all")
-    x, y = masses = plane[ROD].values, plane[RECIPROCATING].values
+    x, y = plane[ROD].values, plane[RECIPROCATING].values
     *shown, number, best = drawing.panels
     for claim, panel in zip(OF_MASSES, shown, strict=True):
         margin = plane["margin"].sel(claim=claim).transpose(RECIPROCATING, ROD).values
-        panel.map(x, y, margin, palette("RdBu"), (-REACH, REACH), "margin",
+        panel.map(x, y, margin, style.palette("RdBu"), (-REACH, REACH), "margin",
                   has_scale=panel is panels[0, 3])  # fmt: skip
-        border(panel, plane, margin >= 0.0, BLACK)
+        border(panel, plane, margin >= 0.0, style.BLACK)
         panel.title = f"claim {claim}"
     count = (plane["margin"] >= 0.0).transpose("claim", RECIPROCATING, ROD).sum("claim").values
-    number.map(x, y, count.astype(float), palette("cividis", 7), (1.5, 8.5))
+    number.map(x, y, count.astype(float), style.palette("cividis", 7), (1.5, 8.5))
     number.title = "how many of eight hold"
     most = int(count.max())
-    best.fill(*rectangle(midway(x), midway(y)), fill("#f4f4f4"))
-    around = contour_area(*masses, (count == most).astype(float), 0.5, 1.5)
-    best.fill(*around, fill(BLUE, 0.35, 1.5))
-    border(best, plane, count == most, BLUE)
+    best.map(x, y, (count == most).astype(float), FEW_OR_MOST, (0.0, 1.0), has_scale=False)
+    border(best, plane, count == most, style.BLUE)
     best.title = f"most of them: {most} hold"
     default = Case.from_values({}).machine
     for panel in drawing.panels:
-        ring = mark(RED, "circle", 6, is_hollow=True, edge_width=1.8)
+        ring = style.mark(style.RED, "circle", 6, is_hollow=True, edge_width=1.8)
         panel.plot(default.rod_mass_kg, default.reciprocating_mass_kg, ring)
         panel.x.showgrid = panel.y.showgrid = False
         panel.x.title, panel.y.title = "rod mass (kg)", "reciprocating mass (kg)"
@@ -348,7 +332,7 @@ def border(panel: Panel, plane: xr.Dataset, inside: np.ndarray, color: str) -> N
     if inside.any() and not inside.all():
         masses = plane[ROD].values, plane[RECIPROCATING].values
         line = contour_lines(*masses, inside.astype(float), [0.5])
-        panel.plot(*line, LineStyle(color, linewidth=1.0))
+        panel.plot(*line, style.LineStyle(color, linewidth=1.0))
 
 
 def draw_sensitivity(effects: xr.Dataset) -> PlotlyFigure:
@@ -365,7 +349,7 @@ def draw_sensitivity(effects: xr.Dataset) -> PlotlyFigure:
             value, at = one[variable].values, place - shift
             low, high = (one[f"{variable}_{end}"].values for end in ("low", "high"))
             ends = np.nan_to_num([value - low, high - value]).clip(min=0.0)
-            panel.bars(np.maximum(value, 0.0), at, fill(color), name, 0.36, errors=ends)
+            panel.bars(np.maximum(value, 0.0), at, style.fill(color), name, 0.36, errors=ends)
         panel.title = f"claim {claim}"
         panel.x.title = "share of the variance"
         panel.span("x", 0.0, 1.25)

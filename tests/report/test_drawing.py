@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 import pytest
 from conftest import decoded
 
-from compressor.report.figures.contours import contour_area, contour_lines
+from compressor.report.figures.contours import contour_lines
 from compressor.report.figures.drawing import as_csv, describe_figure, make_grid, outline_cells
 from compressor.report.figures.style import LineStyle, fill, mark, palette
 from compressor.report.interactive import MAX_POINTS, extremes, script
@@ -161,8 +161,6 @@ def test_lines_of_equal_value_lie_where_a_plane_has_them():
     plane = np.array([[0.0, 1, 2], [0, 1, 2]])
     x, _ = contour_lines(np.arange(3), np.arange(2), plane, [0.5, 1.5])
     assert {*x[np.isfinite(x)]} == {0.5, 1.5}
-    x, y = contour_area(np.arange(3), np.arange(2), plane, 0.5, 1.5)
-    assert (x.min(), x.max(), y.min(), y.max()) == (0.5, 1.5, 0, 1)
 
 
 def test_a_word_that_is_a_number_stands_in_the_table():
