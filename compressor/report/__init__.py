@@ -10,18 +10,6 @@ from compressor.report.figures.drawing import (
     midway,
     rectangle,
 )
-from compressor.report.figures.style import (
-    BLACK,
-    BLUE,
-    CYCLE,
-    GOLD,
-    GREY,
-    RED,
-    LineStyle,
-    fill,
-    mark,
-    palette,
-)
 from compressor.report.figures.sweep_data import FOOT, MARKS, Measure, measures, positions
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.page import (

@@ -17,7 +17,7 @@ from compressor.analysis import ORDER, faulty_joints
 from compressor.cases import Case, points
 from compressor.digits import align_columns, plural
 from compressor.program import Progress, no_progress, report_progress
-from compressor.report import BLACK, CYCLE, GREY, LineStyle, PlotlyFigure, fill, make_grid
+from compressor.report import PlotlyFigure, make_grid, style
 from compressor.store import Folder, find_record, job_record, read_store, read_studies, report_job
 from compressor.studies.frame import Revolutions, StudyError, by_revolutions
 from compressor.vibration import RecordError, segment_levels
@@ -379,7 +379,7 @@ def jsonable_comparison(found: Comparison) -> dict[str, Any]:
 
 # ---- the figure ---------------------------------------------------------------------------------
 
-RECORD = LineStyle(BLACK, linewidth=1.3, zorder=3.0)
+RECORD = style.LineStyle(style.BLACK, linewidth=1.3, zorder=3.0)
 CAPTION = (
     "The record (black) beside the jobs most alike: (a) mean revolution; (b) peak and, paler, rms "
     "of each 10 degrees, on average over revolutions; (c) rms of the orders; (d) envelope above "
@@ -392,14 +392,14 @@ def draw_comparison(found: Comparison) -> PlotlyFigure:
     drawing, grid = make_grid(2, 2, 7.4)
     shown = [(found.name, found.curves, RECORD), *(
         (f"{job.key[:KEY_DIGITS]}: {job.what}", job.curves, line)
-        for job, line in zip(found.jobs[:MAX_DRAWN], CYCLE, strict=False)
+        for job, line in zip(found.jobs[:MAX_DRAWN], style.CYCLE, strict=False)
     )]  # fmt: skip
     (mean, segments), (orders, envelope) = grid
     degrees = np.arange(360) + 0.5
     if (count := len(found.jobs)) > 1:
         low, high = found.around
         edge = np.concatenate([degrees, degrees[::-1]]), np.concatenate([low, high[::-1]])
-        envelope.fill(*edge, fill(GREY, 0.5), f"range of {count} jobs", listed=False)
+        envelope.fill(*edge, style.fill(style.GREY, 0.5), f"range of {count} jobs", listed=False)
     steps = np.repeat(np.arange(SEGMENTS + 1) * (360.0 / SEGMENTS), 2)[1:-1]
     for name, one, line in shown:
         mean.plot(one.angle, one.mean, line, name)

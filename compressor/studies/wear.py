@@ -20,7 +20,7 @@ from compressor.cases import Case, CaseError, Output, PerJoint, Study, Wear, poi
 from compressor.metrics import JOINTS, METRICS
 from compressor.program import PROGRAM, Progress
 from compressor.reasons import Reason
-from compressor.report import BLACK, CYCLE, GREY, LineStyle, PlotlyFigure, fill, make_grid
+from compressor.report import PlotlyFigure, make_grid, style
 from compressor.solve import simulate
 from compressor.store import Folder, StoreError, writable_folder
 from compressor.studies.frame import Row, StudyError, hash_key, rows_dataset, run_rows, stored_rows
@@ -43,7 +43,7 @@ NUMBERS: dict[str, tuple[tuple[str, ...], str, str]] = {
 }
 
 AT_MOST = 100_000  # motions, whose wall time a machine may take
-MAX_DRAWN = len(CYCLE)  # machines in a figure
+MAX_DRAWN = len(style.CYCLE)  # machines in a figure
 
 TEXTS = {"reason": "why it ended early", "detail": "what is known of that"}
 
@@ -343,19 +343,19 @@ def draw_wear(machines: Iterable[WornMachine], title: str = "") -> PlotlyFigure:
     alive = [one for one in machines if one.life]
     drawn = alive[:MAX_DRAWN]
     last = 1e-9
-    for one, line in zip(drawn, CYCLE, strict=False):
+    for one, line in zip(drawn, style.CYCLE, strict=False):
         assert one.stages is not None
         assert one.life
         stages, factor = one.stages.sel(joint=one.life.joint), one.worn.wear.coefficient_factor
         at, opened = stages["hours"].values, 1e3 * stages["clearance"].values
         opening.plot(at, opened, line)
         around = np.concatenate([at / factor, at[::-1] * factor])
-        opening.fill(around, np.concatenate([opened, opened[::-1]]), fill(line.color, 0.15))
+        opening.fill(around, np.concatenate([opened, opened[::-1]]), style.fill(line.color, 0.15))
         peaks = 1e-3 * stages["peak_contact_force"].values
         force.plot(at, peaks, line, f"{name_of(one)}, {one.life.joint.replace('_', ' ')}")
         last = max(last, float(at[-1]))
     for limit in {1e3 * one.worn.limit for one in drawn if math.isfinite(one.worn.limit)}:
-        opening.rule(LineStyle(BLACK, linewidth=0.8), y=limit)
+        opening.rule(style.LineStyle(style.BLACK, linewidth=0.8), y=limit)
         opening.write("limit", 0.02 * last, limit, shift=(0, 2), size=8.5)
     opening.x.title = force.x.title = "operating hours"
     opening.span("x", 0.0, last)
@@ -364,7 +364,7 @@ def draw_wear(machines: Iterable[WornMachine], title: str = "") -> PlotlyFigure:
     force.span("y", low=0.0)
     for panel, letter in zip(grid.flat, "ab", strict=True):
         panel.title = f"({letter})"
-        panel.rule(LineStyle(GREY, linewidth=0.5, zorder=0), y=0.0)
+        panel.rule(style.LineStyle(style.GREY, linewidth=0.5, zorder=0), y=0.0)
     some = f"the first {len(drawn)} of {len(alive)} machines" * (len(drawn) < len(alive))
     drawing.title = ": ".join(filter(None, (title, some)))
     return drawing.figure()

@@ -29,12 +29,9 @@ from compressor.cases import Case, Sensor, Wear
 from compressor.metrics import JOINTS
 from compressor.program import PROGRAM, Progress, no_progress
 from compressor.report import (
-    CYCLE,
-    GREY,
     Additions,
     Cell,
     DrawnFigure,
-    LineStyle,
     PageTable,
     PlotlyFigure,
     Section,
@@ -43,6 +40,7 @@ from compressor.report import (
     TableRow,
     file_name,
     make_grid,
+    style,
     title_figure,
     write_figure,
 )
@@ -481,11 +479,11 @@ def draw_alarms(found: xr.Dataset, title: str = "") -> PlotlyFigure:
     )
     for panel, joint in zip(grid.flat, joints, strict=True):
         mine = found.isel(noise=0, state=np.flatnonzero(found["worn_joint"].values == joint))
-        for kind, line in zip(first[:MAX_KINDS], CYCLE, strict=False):
+        for kind, line in zip(first[:MAX_KINDS], style.CYCLE, strict=False):
             shares = mine["detection"].isel(alarm=best[joint][kind]).sel(end="value").values
-            style = replace(line, marker="circle", markersize=3.5)
-            panel.plot(mine["clearance"].values, shares, style, kind)
-        panel.rule(LineStyle(GREY, (3.7, 1.6), 0.8), y=found.attrs["detected"])
+            look = replace(line, marker="circle", markersize=3.5)
+            panel.plot(mine["clearance"].values, shares, look, kind)
+        panel.rule(style.LineStyle(style.GREY, (3.7, 1.6), 0.8), y=found.attrs["detected"])
         panel.title = f"({'abc'[joints.index(joint)]}) {joint.replace('_', ' ')}"
         panel.x.title = "clearance (mm)"
         panel.span("y", -0.02, 1.04)

@@ -15,27 +15,14 @@ import xarray as xr
 
 from compressor.analysis import SPOKEN
 from compressor.digits import align_columns
-from compressor.report import (
-    BLACK,
-    BLUE,
-    FOOT,
-    MARKS,
-    RED,
-    LineStyle,
-    Panel,
-    PlotlyFigure,
-    make_grid,
-    mark,
-    midway,
-    positions,
-)
+from compressor.report import FOOT, MARKS, Panel, PlotlyFigure, make_grid, midway, positions, style
 
 # the second is smaller and lies on the first, so that both are seen where they agree
-BY_DIRECTION = {"up": (BLUE, 4.0, 2.2), "down": (RED, 2.1, 2.4)}
+BY_DIRECTION = {"up": (style.BLUE, 4.0, 2.2), "down": (style.RED, 2.1, 2.4)}
 # rows of the panel of periods: 1 to 4 one by one, up to 16 by octaves, and where there is none
 PERIODS = {1: 0.0, 2: 1.0, 3: 2.0, 4: 3.0, 8: 4.0, 16: 5.0}
 ROWS_OF = {"chaotic": 6.2, "undecided": 7.2}
-FAILED = replace(MARKS["failed"], color=BLACK, markersize=5, edge_width=1.3)
+FAILED = replace(MARKS["failed"], color=style.BLACK, markersize=5, edge_width=1.3)
 FAILED_NAME = "a run failed here"
 MILLI = 1e3
 NO_BARS: Mapping[str, np.ndarray] = {}
@@ -149,7 +136,7 @@ def plot(
     """
     for name, numbers in of.items():
         color, size, zorder = BY_DIRECTION[name]
-        look = mark(color, "circle", times * size, zorder, edge_width=0.0)
+        look = style.mark(color, "circle", times * size, zorder, edge_width=0.0)
         at = np.repeat(x, numbers[0].size)
         panel.plot(at, numbers.ravel(), look, name, bars.get(name))
 
@@ -182,7 +169,7 @@ def plot_exponents(panel: Panel, x: np.ndarray, chains: dict[str, xr.Dataset]) -
     plot(
         panel, x, {name: one["lyapunov_exponent"].values for name, one in chains.items()}, bars=bars
     )
-    panel.rule(LineStyle(BLACK, linewidth=0.8), y=0.0)
+    panel.rule(style.LineStyle(style.BLACK, linewidth=0.8), y=0.0)
     panel.title = "largest Lyapunov exponent, with its 95 % bar; above 0 close motions part"
     panel.y.title = "per revolution"
     leave_room(panel)

@@ -15,18 +15,7 @@ import xarray as xr
 from compressor.cases import ACCURACY, METHODS, Study, load_studies, points
 from compressor.digits import align_columns
 from compressor.program import PROGRAM, Progress, no_progress
-from compressor.report import (
-    BLACK,
-    BLUE,
-    GOLD,
-    LineStyle,
-    Panel,
-    PlotlyFigure,
-    fill,
-    make_grid,
-    mark,
-    rectangle,
-)
+from compressor.report import Panel, PlotlyFigure, make_grid, rectangle, style
 from compressor.store import Folder, read_job, read_store
 from compressor.studies.frame import MAX_NAME, StudyError, replace_settings, without_keys
 from compressor.sweep import Options, sweep
@@ -176,19 +165,19 @@ def list_fastest(study: xr.Dataset) -> list[str]:
 COLUMNS = 3
 WORDS_ROOM = 4.0  # times left of the fastest point, for the words
 MID, LIGHT = "#7d7d7d", "#ababab"
-# compiled methods are solid and coloured, SciPy's grey and dashed
-LOOKS = {
-    "auto": (LineStyle(BLUE, (), 1.7, 3.2, "circle", 3.8), "auto (TSIT5)"),
-    "RODAS": (LineStyle(GOLD, (), 1.6, 3.0, "diamond", 3.8), "RODAS"),
-    "DOP853": (LineStyle(BLACK, (1, 1.2), 1.2, 2.5, "triangle-up", 3.8), "SciPy DOP853"),
-    "RK45": (LineStyle(MID, (4, 1.5), 1.1, 2.4, "triangle-down", 3.8), "SciPy RK45"),
-    "LSODA": (LineStyle(BLACK, (6, 1.5), 1.0, 2.3, "triangle-left", 3.8), "SciPy LSODA"),
-    "Radau": (LineStyle(LIGHT, (6, 1.2, 1.2, 1.2), 1.3, 2.2, "triangle-right", 3.8), "SciPy Radau"),
-    "BDF": (LineStyle(MID, (1, 1.2), 1.2, 2.1, "pentagon", 3.8), "SciPy BDF"),
+# of a `LineStyle`, and a label: compiled methods are solid and coloured, SciPy's grey and dashed
+LOOKS: dict[str, tuple[Any, ...]] = {
+    "auto": (style.BLUE, (), 1.7, 3.2, "circle", "auto (TSIT5)"),
+    "RODAS": (style.GOLD, (), 1.6, 3.0, "diamond", "RODAS"),
+    "DOP853": (style.BLACK, (1, 1.2), 1.2, 2.5, "triangle-up", "SciPy DOP853"),
+    "RK45": (MID, (4, 1.5), 1.1, 2.4, "triangle-down", "SciPy RK45"),
+    "LSODA": (style.BLACK, (6, 1.5), 1.0, 2.3, "triangle-left", "SciPy LSODA"),
+    "Radau": (LIGHT, (6, 1.2, 1.2, 1.2), 1.3, 2.2, "triangle-right", "SciPy Radau"),
+    "BDF": (MID, (1, 1.2), 1.2, 2.1, "pentagon", "SciPy BDF"),
 }
-OTHER = (LineStyle(MID, (), 1.0, 2.0, "circle", 3.8), "")
-TIER = mark(BLUE, "circle", 9.5, 4, is_hollow=True)
-DISAGREE = fill("#f0f0f0", zorder=0, edge="#c9c9c9", is_hatched=True)
+OTHER = (MID, (), 1.0, 2.0, "circle", "")
+TIER = style.mark(style.BLUE, "circle", 9.5, 4, is_hollow=True)
+DISAGREE = style.fill("#f0f0f0", zorder=0, edge="#c9c9c9", is_hatched=True)
 
 
 def draw_work_precision(study: xr.Dataset) -> PlotlyFigure:
@@ -224,7 +213,8 @@ def draw_work_precision(study: xr.Dataset) -> PlotlyFigure:
 def draw_scene(panel: Panel, one: xr.Dataset) -> None:
     """Draw a line a method, and a ring and the word where a tolerance of `auto` has one."""
     for name in one["method"].values:
-        line, label = LOOKS.get(str(name), OTHER)
+        color, dash, width, zorder, marker, label = LOOKS.get(str(name), OTHER)
+        line = style.LineStyle(color, dash, width, zorder, marker, 3.8)
         row = one.sel({"method": name})
         seconds = row["seconds"].where(row["error_acceleration"].notnull()).values
         panel.plot(seconds, row["error_acceleration"].values, line, label or str(name))
@@ -233,7 +223,9 @@ def draw_scene(panel: Panel, one: xr.Dataset) -> None:
             point = one.sel({"method": "auto", "rtol": tier.rtol})
             x, y = point["seconds"].item(), point["error_acceleration"].item()
             panel.plot(x, y, TIER)
-            panel.write(word, x, y, BLUE, shift=(-11, -2), side="right", level="top", size=8.5)
+            panel.write(
+                word, x, y, style.BLUE, shift=(-11, -2), side="right", level="top", size=8.5
+            )
 
 
 def limits(study: xr.Dataset) -> tuple[float, float]:
