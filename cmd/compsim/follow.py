@@ -56,10 +56,9 @@ def follow(config, over, both, log, points, no_exponent, rerun, folder, jobs, qu
     from compressor.studies.follow.figure import draw_followed, table
     from compressor.studies.follow.follow import follow as run_chains
     from compressor.studies.follow.follow import load_values, read_over
-    from compressor.studies.follow.motion import ValuePlan
     from compressor.sweep import cores
 
-    along = read_over(over, log=log, both=both, plan=ValuePlan(points, not no_exponent))
+    along = read_over(over, log=log, both=both, points=points, exponent=not no_exponent)
     with ProgressReporter(quiet, "cases read") as progress:
         study = load_values(config, along, progress=progress, **how)
     if not quiet:

@@ -46,7 +46,7 @@ def test_the_default_machine_has_its_margins_of_claims():
 
 def test_the_first_value_that_is_followed_has_its_exponent():
     (machine,) = machines(load_values(example("regimes"), ALONG), ALONG)
-    found = run_value(machine.chains[0].cases[0], None, ALONG.plan)
+    found = run_value(machine.chains[0].cases[0], None, ALONG.points, ALONG.exponent)
     row = kept("regimes.json")["rows"][0]
     assert found["regime"] == row["regime"] == "periodic"
     assert float(found["period"]) == row["period"]

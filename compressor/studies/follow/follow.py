@@ -10,7 +10,7 @@ the same numbers to the bit.
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import itemgetter
 from pathlib import Path
@@ -21,20 +21,12 @@ import xarray as xr
 
 from compressor.cases import Case, CaseFileError, Output, Study, load_studies, points
 from compressor.metrics import JOINTS
-from compressor.program import PROGRAM, Progress, no_progress
+from compressor.program import PROGRAM, Progress
 from compressor.store import Folder, coordinate_names, swept_column, writable_folder, write_dataset
-from compressor.studies.follow.motion import (
-    COORDINATES,
-    NUMBERS,
-    TEXTS,
-    Row,
-    ValuePlan,
-    differ,
-    empty_row,
-    run_value,
-)
+from compressor.studies.follow import motion
 from compressor.studies.frame import (
     KeySpan,
+    Row,
     StudyError,
     hash_key,
     read_range,
@@ -55,11 +47,13 @@ NOT_FOLLOWED = ("solve", "output", "body", "sensor", "initial_offset_mm")
 class KeyRange(KeySpan):
     """The values of a key, and how they are followed.
 
-    `both`: up and then down, each from its own start.
+    `both`: up and then down, each from its own start; `points`: Poincaré points of a motion that
+    does not repeat itself; `exponent`: whether the largest Lyapunov exponent is looked for.
     """
 
     both: bool = False
-    plan: ValuePlan = field(default_factory=ValuePlan)
+    points: int = 64
+    exponent: bool = True
 
     @property
     def ways(self) -> tuple[str, ...]:
@@ -78,24 +72,15 @@ def read_over(text: str, log: bool = False, **more: Any) -> KeyRange:
     return KeyRange(**vars(span), **more)
 
 
-def load_values(
-    path: Folder,
-    along: KeyRange,
-    overrides: Sequence[str] = (),
-    max_jobs: int = 10_000,
-    only: str = "",
-    progress: Progress = no_progress,
-) -> Study:
+def load_values(path: Folder, along: KeyRange, overrides: Sequence[str] = (), **how: Any) -> Study:
     """Return the study of a case file with a job for each machine and value of the key.
 
-    Raises CaseFileError, in which the values stand under --over.
+    how: of `load_studies`. Raises CaseFileError, in which the values stand under --over.
     """
     form = "logspace" if along.log else "linspace"
     values = f"{along.key}={{{form}: [{along.low!r}, {along.high!r}, {along.count}]}}"
     try:
-        (study,) = load_studies(
-            path, overrides=[*overrides, values], max_jobs=max_jobs, only=only, progress=progress
-        )
+        (study,) = load_studies(path, overrides=[*overrides, values], **how)
     except CaseFileError as error:
         asked = f"--over {along.key}={along.low:g}:{along.high:g}:{along.count}"
         ours = f"--set {along.key}={{{form}"
@@ -111,16 +96,17 @@ def load_values(
 class Chain:
     """Cases that are run one after the other, each from the last one's end (`frame.GrowingRows`).
 
-    `values`: of the key that is followed.
+    `values`: of the key that is followed; `points`, `exponent`: see `KeyRange`.
     """
 
     cases: tuple[Case, ...]
     values: tuple[float, ...]
-    plan: ValuePlan
+    points: int
+    exponent: bool
 
     @cached_property
     def key(self) -> str:
-        return hash_key([[case.key for case in self.cases], astuple(self.plan), SCHEMA])
+        return hash_key([[case.key for case in self.cases], [self.points, self.exponent], SCHEMA])
 
     def path(self, folder: Folder) -> Path:
         return Path(folder) / FOLDER / "chains" / f"{self.key}.nc"
@@ -140,12 +126,12 @@ class Chain:
         """Run the next value, from the last one's end, or from its own start without one."""
         state = rows[-1]["end_state"] if rows else None
         begin = None if state is None or np.isnan(state).any() else state
-        return run_value(self.cases[len(rows)], begin, self.plan)
+        return motion.run_value(self.cases[len(rows)], begin, self.points, self.exponent)
 
     def to_dataset(self, rows: Sequence[Row]) -> xr.Dataset:
         """Return its rows, with the dimension `value` in the order of running."""
         attrs = {"key": self.key, "case": self.cases[0].attributes()["case"], "program": PROGRAM}
-        found = rows_dataset(rows, "value", TEXTS, NUMBERS)
+        found = rows_dataset(rows, "value", motion.TEXTS, motion.NUMBERS)
         return found.assign_coords(value=[*self.values[: len(rows)]]).assign_attrs(attrs)
 
 
@@ -163,7 +149,8 @@ def machines(study: Study, along: KeyRange) -> list[FollowedMachine]:
     for number, point in enumerate(points(study)):
         if number in selected:
             value = point.pop(along.key, math.nan)  # an ideal machine has no clearance
-            case = bare_machine(study.cases[number])
+            # what does not change how the machine moves makes no other chain
+            case = replace(study.cases[number], output=Output(), wear=None, body=None, sensor=None)
             found.setdefault(repr(point), (point, []))[1].append((value, case))
     for point, jobs in found.values():
         if problem := objection(along, [case for _, case in jobs]):
@@ -171,14 +158,9 @@ def machines(study: Study, along: KeyRange) -> list[FollowedMachine]:
             raise StudyError(f"{study.path}: {problem}{f' ({where})' if where else ''}")
         jobs.sort(key=itemgetter(0))
         ways = ((*zip(*one, strict=True),) for one in (jobs, jobs[::-1])[: len(along.ways)])
-        chains = (Chain(cases, values, along.plan) for values, cases in ways)
+        chains = (Chain(cases, values, along.points, along.exponent) for values, cases in ways)
         listed.append(FollowedMachine(point, (*chains,)))
     return listed
-
-
-def bare_machine(case: Case) -> Case:
-    """Return a case without what does not change how its machine moves."""
-    return replace(case, output=Output(), wear=None, body=None, sensor=None)
 
 
 def objection(along: KeyRange, cases: Sequence[Case]) -> str:
@@ -236,7 +218,7 @@ def follow(
 def rows_to_show(chain: Chain, folder: Folder, end: JobLost | None) -> list[Row]:
     """Return the rows of a chain, at least one; end: how it was lost, at the value after them."""
     rows = stored_rows(chain, folder)
-    blank = empty_row(chain.cases[0], chain.plan.points) | {"status": "missing"}
+    blank = motion.empty_row(chain.cases[0], chain.points) | {"status": "missing"}
     if end and len(rows) < len(chain.cases):
         failed = {"status": "failed", "reason": str(end.reason), "detail": end.detail}
         return [*rows, blank | failed]
@@ -250,7 +232,7 @@ def differing(machine: FollowedMachine, up: Sequence[Row], down: Sequence[Row]) 
     return {
         value
         for case, value, row in zip(first.cases, first.values, up, strict=False)
-        if value in other and differ(case, row, other[value])
+        if value in other and motion.differ(case, row, other[value])
     }
 
 
@@ -271,7 +253,7 @@ def followed_dataset(
         ]
         for machine, ways in zip(every, rows, strict=True)
     ]
-    missing = dict.fromkeys(TEXTS, "") | {"status": "missing"}
+    missing = dict.fromkeys(motion.TEXTS, "") | {"status": "missing"}
     data = xr.combine_nested(
         parts, ["job", "direction"], join="outer", fill_value=missing, combine_attrs="override"
     )
@@ -292,7 +274,7 @@ def followed_dataset(
     data = data.assign_coords(
         direction=("direction", [*along.ways], {"long_name": "which way it is followed"}),
         joint=("joint", [*JOINTS], {"long_name": "joint of the rod"}),
-        coordinate=("coordinate", [*COORDINATES], {"long_name": "coordinate of a point"}),
+        coordinate=("coordinate", [*motion.COORDINATES], {"long_name": "coordinate of a point"}),
     )
     data.attrs = {
         "study": study.name, "title": study.title, "over": over, "log": int(along.log),

@@ -10,7 +10,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from compressor.solve import (
     with_settle_rev,
 )
 from compressor.studies.follow.lyapunov import largest_exponent
+from compressor.studies.frame import Row
 
 SETTLE_REV = 50  # most revolutions dropped at each value
 EXPONENT_REV = 16  # of a motion that repeats itself, for its exponent
@@ -52,7 +52,6 @@ MEASURED = (
     "peak_acceleration", "rms_acceleration", "peak_contact_force", "contact_loss_fraction",
 )  # fmt: skip
 
-Row = dict[str, Any]
 # of the tallies of revolutions so far, and their Poincaré points
 Enough = Callable[[list[np.record], np.ndarray], bool]
 TEXTS = {
@@ -78,18 +77,6 @@ NUMBERS: dict[str, tuple[tuple[str, ...], str, str]] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class ValuePlan:
-    """How a value is run.
-
-    `points`: Poincaré points of a motion that does not repeat itself; `exponent`: whether the
-    largest Lyapunov exponent is looked for.
-    """
-
-    points: int = 64
-    exponent: bool = True
-
-
 @dataclass
 class RevolutionRun:
     """Some revolutions of a case.
@@ -107,14 +94,16 @@ class RevolutionRun:
     detail: str
 
 
-def run_value(case: Case, state: np.ndarray | None, plan: ValuePlan) -> Row:
+def run_value(case: Case, state: np.ndarray | None, most: int, wants_exponent: bool) -> Row:
     """Follow a case from a state on, or from its own start, until it settles, and measure it.
 
-    The row has the names of `TEXTS` and `NUMBERS`. A run that stops is a row too, with its
-    reason and the state that it began from, so that the next value can go on from there. The wall
-    time is the case's own. Nothing in a row depends on how long it took.
+    most: Poincaré points of a motion that does not repeat itself; wants_exponent: whether the
+    largest Lyapunov exponent is looked for. The row has the names of `TEXTS` and `NUMBERS`. A run
+    that stops is a row too, with its reason and the state that it began from, so that the next
+    value can go on from there. The wall time is the case's own. Nothing in a row depends on how
+    long it took.
     """
-    row, deadline = empty_row(case, plan.points), time.monotonic() + case.solve.timeout_s
+    row, deadline = empty_row(case, most), time.monotonic() + case.solve.timeout_s
     if state is not None:
         row["end_state"] = state
     run, since = settle_motion(case, state, deadline)
@@ -126,15 +115,15 @@ def run_value(case: Case, state: np.ndarray | None, plan: ValuePlan) -> Row:
         return period_of(places(points, clearance), within)
 
     run = follow_revolutions(
-        case, run.state, plan.points, deadline, lambda *so_far: period_in(*so_far) is not None
+        case, run.state, most, deadline, lambda *so_far: period_in(*so_far) is not None
     )
     if run.reason:
         return failed_row(row, run)
     period = period_in(run.turns, run.points)
     exponent = error = math.nan
-    if plan.exponent:
+    if wants_exponent:
         left = max(deadline - time.monotonic(), 0.0)
-        count = min(plan.points, EXPONENT_REV) if period else plan.points
+        count = min(most, EXPONENT_REV) if period else most
         found = largest_exponent(case, run.state, count, left)
         # a motion that contracts so fast has an exponent that is at most this, of unknown error
         exponent, error = found.value, math.nan if found.at_most else found.error

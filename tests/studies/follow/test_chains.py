@@ -6,7 +6,6 @@ from conftest import assert_same_bits
 from compressor.store import read_dataset, write_dataset
 from compressor.studies.follow import motion
 from compressor.studies.follow.follow import load_values, machines, read_over
-from compressor.studies.follow.motion import ValuePlan
 from compressor.studies.frame import make_rows, stored_rows
 
 TEXT = """
@@ -14,7 +13,7 @@ joint: big_end
 contact: {damping_N_s_per_mm: 0.336}
 solve: {accuracy: draft, output_step_deg: 2}
 """
-ALONG = read_over("clearance_mm=0.02:0.2:6", both=True, plan=ValuePlan(6, exponent=False))
+ALONG = read_over("clearance_mm=0.02:0.2:6", both=True, points=6, exponent=False)
 
 
 @pytest.fixture(autouse=True)

@@ -16,7 +16,6 @@ from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
 from compressor.studies.follow import motion
 from compressor.studies.follow.motion import (
-    ValuePlan,
     bare_case,
     follow_revolutions,
     poincare_points,
@@ -24,7 +23,7 @@ from compressor.studies.follow.motion import (
     settle_motion,
 )
 
-PLAN = ValuePlan(points=12, exponent=False)
+HOW = {"most": 12, "wants_exponent": False}
 DRAFT = {"accuracy": "draft"}
 
 
@@ -46,7 +45,7 @@ def settle_soon(monkeypatch):
 
 @pytest.fixture(scope="module")
 def row():
-    return run_value(BIG_END, None, PLAN)
+    return run_value(BIG_END, None, **HOW)
 
 
 # Revolutions
@@ -113,7 +112,7 @@ def test_a_value_begins_at_the_state_that_it_is_given(row):
     Measured are six revolutions of a period of one, from where the metrics agree.
     """
     after, state = case(0.25), row["end_state"]
-    found = run_value(after, state, PLAN)
+    found = run_value(after, state, **HOW)
     settled, since = settle_motion(after, state, soon())
     first = follow_revolutions(after, state, 1, soon())
     run = run_at_tolerance(bare_case(after, 1), after.rtol, 60.0, False, state)
@@ -141,7 +140,7 @@ def test_a_motion_that_takes_two_revolutions_has_two_points(monkeypatch):
     """With a seventieth of the paper's damping and 0.0776 mm (standard accuracy)."""
     monkeypatch.setattr(motion, "SETTLE_REV", 40)
     values = {"joint": "big_end", "clearance_mm": 0.0776, "contact": {"damping_N_s_per_mm": 5}}
-    row = run_value(Case.from_values(values), None, PLAN)
+    row = run_value(Case.from_values(values), None, **HOW)
     assert (row["regime"], row["period"], row["revolutions"]) == ("periodic", 2, 8)
     points = row["section"][:3, 0, :2]
     assert np.linalg.norm(points[1] - points[0]) > 0.01 * 0.0776e-3
@@ -150,8 +149,8 @@ def test_a_motion_that_takes_two_revolutions_has_two_points(monkeypatch):
 
 def test_a_run_that_stops_is_a_row_with_the_state_that_it_began_from(row):
     short = case(solve=DRAFT | {"max_steps": 50})
-    found = run_value(short, row["end_state"], PLAN)
+    found = run_value(short, row["end_state"], **HOW)
     assert (found["status"], found["reason"]) == ("failed", "budget_steps")
     np.testing.assert_array_equal(found["end_state"], row["end_state"])
-    assert np.isnan(run_value(short, None, PLAN)["end_state"]).all()
+    assert np.isnan(run_value(short, None, **HOW)["end_state"]).all()
     assert math.isnan(found["peak_acceleration"])
