@@ -5,10 +5,8 @@ coordinate `attrs["over"]` names, and those of the variables.
 """
 
 import itertools
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -25,32 +23,6 @@ ROWS_OF = {"chaotic": 6.2, "undecided": 7.2}
 FAILED = replace(MARKS["failed"], color=style.BLACK, markersize=5, edge_width=1.3)
 FAILED_NAME = "a run failed here"
 MILLI = 1e3
-NO_BARS: Mapping[str, np.ndarray] = {}
-
-
-class Stretch(NamedTuple):
-    """Neighbouring values of one direction with the same motion, and the ends of its exponents."""
-
-    direction: str
-    first: float
-    last: float
-    values: int
-    motion: str
-    exponents: tuple[float, float]
-
-
-def find_spans(machine: xr.Dataset) -> Iterator[Stretch]:
-    """Yield the spans of each direction of a machine, by rising values."""
-    over = machine.attrs["over"]
-    for direction in machine["direction"].values.tolist():
-        chain = machine.sel(direction=direction)
-        values, exponents = chain[over].values, chain["lyapunov_exponent"].values
-        motions = [name_motion(chain.isel({over: n})) for n in range(values.size)]
-        for motion, group in itertools.groupby(range(values.size), motions.__getitem__):
-            at = [*group]
-            known = exponents[at][np.isfinite(exponents[at])]
-            ends = (known.min(), known.max()) if known.size else (math.nan, math.nan)
-            yield Stretch(direction, values[at[0]], values[at[-1]], len(at), motion, ends)
 
 
 def name_motion(one: xr.Dataset) -> str:
@@ -62,14 +34,23 @@ def name_motion(one: xr.Dataset) -> str:
 
 
 def table(machine: xr.Dataset) -> list[str]:
-    """Return the spans of a machine as lines of a table, and where up and down differ."""
+    """Return lines of a table of neighbouring values with the same motion, by direction.
+
+    And where up and down differ.
+    """
     over = machine[machine.attrs["over"]]
     cells = [["direction", title_key(over), "values", "motion", "exponent (1/rev)"]]
-    for one in find_spans(machine):
-        ends = dict.fromkeys(f"{end:.4g}" for end in (one.first, one.last))
-        rates = dict.fromkeys(f"{end:.2f}" for end in one.exponents if math.isfinite(end))
-        where, rate = " to ".join(ends), " to ".join(rates)
-        cells.append([one.direction, where, str(one.values), one.motion, rate])
+    for direction in machine["direction"].values.tolist():
+        chain = machine.sel(direction=direction)
+        exponents = chain["lyapunov_exponent"].values
+        motions = [name_motion(chain.isel({over.name: n})) for n in range(over.size)]
+        for motion, group in itertools.groupby(range(over.size), motions.__getitem__):
+            at = [*group]
+            known = sorted(exponents[at][np.isfinite(exponents[at])])
+            ends = dict.fromkeys(f"{over.values[n]:.4g}" for n in (at[0], at[-1]))
+            rates = dict.fromkeys(f"{rate:.2f}" for rate in (*known[:1], *known[-1:]))
+            row = [direction, " to ".join(ends), str(len(at)), motion, " to ".join(rates)]
+            cells.append(row)
     lines = align_columns(cells)
     if "differs" in machine and (marked := machine["differs"].values == 1).any():
         listed = ", ".join(f"{value:.4g}" for value in over.values[marked])
@@ -124,12 +105,9 @@ def draw_followed(machine: xr.Dataset, title: str = "") -> PlotlyFigure:
 
 
 def plot(
-    panel: Panel,
-    x: np.ndarray,
-    of: dict[str, np.ndarray],
-    times: float = 1.0,
-    bars: Mapping[str, np.ndarray] = NO_BARS,
-) -> None:
+    panel: Panel, x: np.ndarray, of: dict[str, np.ndarray], times: float = 1.0,
+    bars: Mapping[str, np.ndarray] | None = None,
+) -> None:  # fmt: skip
     """Draw numbers at each value, (values,) or (values, n), by direction, in marks of its own.
 
     times: size of the marks.
@@ -138,7 +116,7 @@ def plot(
         color, size, zorder = BY_DIRECTION[name]
         look = style.mark(color, "circle", times * size, zorder, edge_width=0.0)
         at = np.repeat(x, numbers[0].size)
-        panel.plot(at, numbers.ravel(), look, name, bars.get(name))
+        panel.plot(at, numbers.ravel(), look, name, (bars or {}).get(name))
 
 
 def plot_periods(panel: Panel, x: np.ndarray, chains: dict[str, xr.Dataset]) -> None:
