@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from pathlib import Path
 
 import click
 
@@ -74,16 +75,17 @@ def alarms(study, folder, output, run, quiet, **how) -> int:
     clearance. RUN is a file of compsim wear, or its folder of results.
     """
     from compressor.digits import align_columns
-    from compressor.store import read_studies, writable_folder
+    from compressor.report import title_figure, write_figure
+    from compressor.store import read_studies, writable_folder, write_dataset
     from compressor.studies.alarms.alarms import (
-        CAPTION,
+        FILE,
         add_hours,
+        draw_alarms,
         judge_alarms,
         list_numbers,
         list_rows,
         list_warnings,
         read_wear,
-        write_alarms,
     )
 
     wear = read_wear(run) if run else None
@@ -97,8 +99,10 @@ def alarms(study, folder, output, run, quiet, **how) -> int:
         screen.say_wrapped(f"warning: {text}")
     if output:
         titles = [one.title for one in read_studies(folder) if one.name == study]
-        paths = write_alarms(found, output, "".join(titles) or study)
-        screen.print_text(*map(str, paths), CAPTION)
+        drawn = draw_alarms(found, title_figure("".join(titles) or study, "alarms by clearance"))
+        path = write_dataset(Path(output, FILE), found)
+        picture = write_figure(Path(output, "alarms.png"), drawn.figure)
+        screen.print_text(str(path), str(picture), drawn.caption)
         if not quiet:
             beside = "" if output == "alarms" else f" --alarms {shlex.quote(output)}"
             screen.say(f"next: compsim report -r {shlex.quote(folder)}{beside}")

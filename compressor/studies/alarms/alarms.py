@@ -33,7 +33,6 @@ from compressor.report import (
     Cell,
     DrawnFigure,
     PageTable,
-    PlotlyFigure,
     Section,
     SectionContent,
     StudyNote,
@@ -41,10 +40,8 @@ from compressor.report import (
     file_name,
     make_grid,
     style,
-    title_figure,
-    write_figure,
 )
-from compressor.store import Folder, StoredStudy, find_study, read_dataset, write_dataset
+from compressor.store import Folder, StoredStudy, find_study, read_dataset
 from compressor.studies.alarms.readings import (
     ALARMS,
     BODY_VELOCITY,
@@ -456,7 +453,7 @@ def list_warnings(found: xr.Dataset) -> Iterator[str]:
 
 # ---- the figure, the files, and the section of a report ----------------------------------------
 
-FILE, FIGURE = "alarms.nc", "alarms.png"
+FILE = "alarms.nc"
 REMEDY = "compsim alarms STUDY -o the folder writes it again"
 MAX_KINDS = 6  # kinds of alarm that have a line: the first to see wear
 CAPTION = (
@@ -465,7 +462,7 @@ CAPTION = (
 )
 
 
-def draw_alarms(found: xr.Dataset, title: str = "") -> PlotlyFigure:
+def draw_alarms(found: xr.Dataset, title: str = "") -> DrawnFigure:
     """Return a panel a joint: the share of windows in which alarms trip, by clearance.
 
     Of the first level of noise, and of the kinds that see wear first over all joints.
@@ -488,14 +485,8 @@ def draw_alarms(found: xr.Dataset, title: str = "") -> PlotlyFigure:
         panel.x.title = "clearance (mm)"
         panel.span("y", -0.02, 1.04)
     grid.flat[0].y.title, drawing.title = "windows in which it trips", title
-    return drawing.figure()
-
-
-def write_alarms(found: xr.Dataset, output: Folder, title: str) -> list[Path]:
-    """Write a result as netCDF and as a figure; return their paths. title: of the machine."""
-    figure = draw_alarms(found, title_figure(title, "alarms by clearance"))
-    path = write_figure(Path(output, FIGURE), figure)
-    return [write_dataset(Path(output, FILE), found), path]
+    name = f"alarms-{found.attrs['study']}"
+    return DrawnFigure(drawing.figure(), CAPTION, name=name, title="Alarms by clearance")
 
 
 def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:
@@ -512,12 +503,10 @@ def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Addit
     study = next((study for study in studies if study.name == name), None)
     if study is None:
         return Additions({}, [])
-    drawn = DrawnFigure(draw_alarms(found), CAPTION, name=file_name("alarms", name),
-                        title="Alarms by clearance")  # fmt: skip
     head, *rows = list_rows(found)
     table = PageTable(head, [TableRow([Cell(text) for text in row]) for row in rows], lead=3)
     lines = [*list_numbers(found), *list_warnings(found)]
-    content = SectionContent(table, (), lines, [drawn], study.title, study.notes)
+    content = SectionContent(table, (), lines, [draw_alarms(found)], study.title, study.notes)
     anchor, title = file_name("alarms-of", name), f"Which alarm sees wear first in study {name}"
     line = f"{found.sizes['alarm']} alarms were judged by its records."
     note = StudyNote(line, anchor, "Which alarm sees wear first")

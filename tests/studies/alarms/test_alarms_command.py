@@ -70,7 +70,7 @@ def test_the_figure_has_the_shares_of_each_joint(written):
     folder, _ = written
     found = read_dataset(folder / "alarms.nc")
     assert (folder / "alarms.png").read_bytes()[:4] == b"\x89PNG"
-    panels = panels_of(draw_alarms(found))
+    panels = panels_of(draw_alarms(found).figure)
     for panel, joint in zip(panels, found["joint"].values, strict=True):
         mine = found["worn_joint"].values == joint
         for trace in panel.traces:
