@@ -94,7 +94,8 @@ def test_a_machine_with_too_short_or_too_coarse_series_has_no_margins(stored):
     short = judge_machines(stored, find_study(stored, "short"))
     text = "the run has no whole settled revolution (solve.duration_rev)"
     assert short["failed"].values.tolist() == [text, text]
-    fine, coarse = judge_machines(stored, find_study(stored, "coarse")).transpose("machine", ...)
+    found = judge_machines(stored, find_study(stored, "coarse"))
+    fine, coarse = (found.isel(machine=number) for number in range(2))
     assert fine["failed"] == ""
     assert "sample more finely" in coarse["failed"].item()
     assert np.isnan(coarse["margin"]).all()
