@@ -21,8 +21,6 @@ are first used.
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-# its table says which files of a store are results
-import compressor.studies  # noqa: F401
 from compressor.program import VERSION as __version__
 from compressor.program import CompsimError, CompsimWarning
 

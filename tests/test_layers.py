@@ -35,8 +35,7 @@ ROOT_MODULES = ("program", "metrics", "digits", "units", "reasons", "outcome")
 EVERY = {*PACKAGES, *ROOT_MODULES}
 # package or root module -> what it may import of ours, beside the root module `program`
 MAY_IMPORT = dict.fromkeys(ROOT_MODULES, ()) | PACKAGES | {
-    # the public calls, found when they are first used, and the table of studies
-    "": {"cases", "solve", "store", "studies"},
+    "": {"cases", "solve", "store"},  # the public calls, found when they are first used
     "outcome": {"metrics", "reasons"}, "studies": EVERY, "compsim": EVERY,
 }  # fmt: skip
 LIBRARIES = {  # library -> the modules that may import it
@@ -73,7 +72,7 @@ def room(module):
 
 
 def study(module):
-    """The study that a module is part of; "" of the table, the frame, and elsewhere."""
+    """The study that a module is part of; "" of the frame, and elsewhere."""
     _, _, name = module.partition("compressor.studies.")
     return name.partition(".")[0].replace("frame", "")
 

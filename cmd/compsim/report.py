@@ -1,10 +1,10 @@
 """`compsim report`: the page, figures and tables of a folder of results."""
 
 import os
+from functools import partial
 
 import click
 
-from compressor.studies import page_additions
 from compsim import options, screen
 
 
@@ -24,7 +24,7 @@ from compsim import options, screen
 @options.units("kN, mm, µm, m/s²")
 @options.addition("alarms")
 @click.pass_obj
-def report(command, names, folder, output, single, limits, units, **places) -> int:
+def report(command, names, folder, output, single, limits, units, alarms) -> int:
     """Draw stored studies as a page of figures and tables.
 
     \b
@@ -43,8 +43,10 @@ def report(command, names, folder, output, single, limits, units, **places) -> i
         output += ".html"
     writable_folder((os.path.dirname(output) or ".") if single else output, make=False)
     from compressor.report import write_report
+    from compressor.studies.alarms.alarms import add as add_alarms
+    from compressor.studies.tradeoff.page import add as add_models
 
-    add = page_additions(places)
+    add = (add_models, partial(add_alarms, place=alarms))  # of each study that adds to a page
     path = write_report(folder, output, command, add, limits, units or "usual", names, single)
     screen.print_text(str(path))
     if single:

@@ -12,17 +12,6 @@ from compressor.report.figures.drawing import (
 )
 from compressor.report.figures.sweep_data import FOOT, MARKS, Measure, measures, positions
 from compressor.report.figures.table import DrawnFigure
-from compressor.report.page import (
-    Add,
-    Additions,
-    Cell,
-    PageTable,
-    Section,
-    SectionContent,
-    StudyNote,
-    TableRow,
-    format_measure,
-)
+from compressor.report.page import Add, Addition, Cell, PageTable, TableRow, format_measure
 from compressor.report.plots import PlotChoice, title_figure, write_figure, write_plots
 from compressor.report.report import write_report
-from compressor.report.study_section import file_name

@@ -8,7 +8,7 @@ import base64
 import itertools
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
@@ -259,11 +259,29 @@ class StudyNote(NamedTuple):
     link: str
 
 
-class Additions(NamedTuple):
-    """Notes by the name of the study that they are on, and sections."""
+class Addition(NamedTuple):
+    """What a study adds to a page: a section, and a line on a stored study with a link to it.
 
-    notes: Mapping[str, StudyNote]
-    sections: Sequence[Section]
+    line, link: in that study's section, and the words of the link; "" of a further section.
+    machine: its title and notes.
+    """
+
+    study: str
+    line: str
+    link: str
+    anchor: str
+    title: str
+    table: PageTable
+    paragraphs: Sequence[str] = ()
+    lines: Sequence[str] = ()
+    figures: Sequence[DrawnFigure] = ()
+    machine: tuple[str, str] = ("", "")
+
+    @property
+    def section(self) -> Section:
+        """Return the section."""
+        shown = self.table, self.paragraphs, self.lines, self.figures
+        return Section(self.anchor, self.title, SectionContent(*shown, *self.machine))
 
 
-Add = Callable[[Folder, Sequence[StoredStudy]], Additions]  # of the folder of results
+Add = Callable[[Folder, Sequence[StoredStudy]], Iterable[Addition]]  # of the folder of results

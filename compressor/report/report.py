@@ -98,11 +98,10 @@ def write_report(
 ) -> Path:
     """Write figures and `index.html` about a folder of results; returns the page's path.
 
-    add: what makes more of the page, such as `compressor.studies.page_additions` gives. limits: of
-    metrics, whose zones tables and curves show, such as `sensor_peak=20,50 m/s²`. units: of
-    figures and tables, of `compressor.units`. studies:
-    names of those to tell of, in this order, by default all, those of searches last. single: report
-    is a file, the page with all that it needs in it.
+    add: what makes more of the page. limits: of metrics, whose zones tables and curves show, such
+    as `sensor_peak=20,50 m/s²`. units: of figures and tables, of `compressor.units`. studies: names
+    of those to tell of, in this order, by default all, those of searches last. single: report is a
+    file, the page with all that it needs in it.
 
     Raises LimitError where these cannot be used, StoreError where there are no results, or the
     report's folder cannot be written.
@@ -167,12 +166,13 @@ def build_report(
     of_own = {one.name: own_figures(stored, one, units) for one in studies if one.figures}
     own_notes = {name: note for name, (note, _) in of_own.items()}
     own = [study for study in studies if not repeats_paper(study, paper)]
-    added = [one(results, studies) for one in add]
+    added = [more for one in add for more in one(results, studies)]
     drawn: list[DrawnStudy] = []
     left_out: dict[str, str] = {}  # study -> why
     for study in own:
-        given = [own_notes, *(one.notes for one in added)]
-        notes = [of[study.name] for of in given if study.name in of]
+        notes = [note for name, note in own_notes.items() if name == study.name]
+        notes += [StudyNote(one.line, one.anchor, one.link)
+                  for one in added if one.study == study.name and one.line]  # fmt: skip
         try:
             drawn.append(drawn_study(stored, study, notes, limits, units))
         except CardError as error:
@@ -195,7 +195,7 @@ def build_report(
         *(one.section for one in drawn),
         *[of_paper] * bool(paper_figures),
         *chain(*(sections for _, sections in of_own.values())),
-        *chain(*(one.sections for one in added)),
+        *(one.section for one in added),
         *(one.table for one in drawn),
         *tables,
         assumptions_section(bool(paper.stored)),

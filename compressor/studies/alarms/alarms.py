@@ -28,19 +28,7 @@ from compressor.analysis import faulty_joints, interpolate_hours
 from compressor.cases import Case, Sensor, Wear
 from compressor.metrics import JOINTS
 from compressor.program import PROGRAM, Progress, no_progress
-from compressor.report import (
-    Additions,
-    Cell,
-    DrawnFigure,
-    PageTable,
-    Section,
-    SectionContent,
-    StudyNote,
-    TableRow,
-    file_name,
-    make_grid,
-    style,
-)
+from compressor.report import Addition, Cell, DrawnFigure, PageTable, TableRow, make_grid, style
 from compressor.store import Folder, StoredStudy, find_study, read_dataset
 from compressor.studies.alarms.readings import (
     ALARMS,
@@ -489,25 +477,21 @@ def draw_alarms(found: xr.Dataset, title: str = "") -> DrawnFigure:
     return DrawnFigure(drawing.figure(), CAPTION, name=name, title="Alarms by clearance")
 
 
-def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:
-    """Return the section of the alarms that are in a folder, and a line on their study.
+def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Iterator[Addition]:
+    """Yield the section of the alarms that are in a folder, if there are any.
 
-    Nothing where there are none, or of a study that is not stored. Raises StoreError for a file
-    that is something else.
+    None of a study that is not stored. Raises StoreError for a file that is something else.
     """
     path = Path(place or "", FILE)
-    if not place or not path.exists():
-        return Additions({}, [])
-    found = read_dataset(path, REMEDY)
-    name = str(found.attrs.get("study"))
-    study = next((study for study in studies if study.name == name), None)
-    if study is None:
-        return Additions({}, [])
-    head, *rows = list_rows(found)
-    table = PageTable(head, [TableRow([Cell(text) for text in row]) for row in rows], lead=3)
-    lines = [*list_numbers(found), *list_warnings(found)]
-    content = SectionContent(table, (), lines, [draw_alarms(found)], study.title, study.notes)
-    anchor, title = file_name("alarms-of", name), f"Which alarm sees wear first in study {name}"
-    line = f"{found.sizes['alarm']} alarms were judged by its records."
-    note = StudyNote(line, anchor, "Which alarm sees wear first")
-    return Additions({name: note}, [Section(anchor, title, content)])
+    found = read_dataset(path, REMEDY) if place and path.exists() else xr.Dataset()
+    for study in studies:
+        if study.name == found.attrs.get("study"):
+            head, *texts = list_rows(found)
+            rows = [TableRow([Cell(text) for text in row]) for row in texts]
+            yield Addition(
+                study.name, f"{found.sizes['alarm']} alarms were judged by its records.",
+                "Which alarm sees wear first", f"alarms-of-{study.name}",
+                f"Which alarm sees wear first in study {study.name}", PageTable(head, rows, 3), (),
+                [*list_numbers(found), *list_warnings(found)], [draw_alarms(found)],
+                (study.title, study.notes),
+            )  # fmt: skip

@@ -18,19 +18,7 @@ from compressor.cases import Study, points
 from compressor.digits import PAGE_DIGITS, align_columns, by_bar, is_known
 from compressor.metrics import BARRED
 from compressor.outcome import Regime
-from compressor.report import (
-    Additions,
-    Cell,
-    Measure,
-    PageTable,
-    Section,
-    SectionContent,
-    StudyNote,
-    TableRow,
-    file_name,
-    format_measure,
-    measures,
-)
+from compressor.report import Addition, Cell, Measure, PageTable, TableRow, format_measure, measures
 from compressor.store import Folder, StoredStudy, StoreError, StoreWarning, read_dataset
 
 NONE_SEEN = "none seen"  # less than both error bars
@@ -272,27 +260,18 @@ def read_models(folder: Folder, study: StoredStudy) -> list[xr.Dataset]:
     return found
 
 
-def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Additions:
-    """Return a line on each study of which something was varied, and a section on each job."""
-    notes: dict[str, StudyNote] = {}
-    sections = []
+def add(results: Folder, studies: Sequence[StoredStudy]) -> Iterator[Addition]:
+    """Yield a section on each job of which something was varied, with one line on its study."""
     for study in studies:
         for number, data in enumerate(read_models(results, study)):
-            anchor = file_name("models", study.name) + (f"-{number + 1}" if number else "")
-            text = f"What moves its numbers: {headline(model_table(data))}"
-            notes.setdefault(study.name, StudyNote(text, anchor, "Table of what was varied"))
-            sections.append(models_section(anchor, study, data))
-    return Additions(notes, sections)
-
-
-def models_section(anchor: str, study: StoredStudy, data: xr.Dataset) -> Section:
-    """Return the section on what was varied of a study's job."""
-    table = model_table(data)
-    place = place_text(study, data.attrs["key"])
-    texts = [f"{headline(table)}.", LEGEND.format(place)]
-    texts += [UNKNOWN.format(", ".join(table.unknown))] if table.unknown else []
-    title = f"What moves the numbers of study {place.rpartition(', ')[0]}"
-    return Section(anchor, title, SectionContent(page_table(table), texts))
+            table, place = model_table(data), place_text(study, data.attrs["key"])
+            texts = [f"{headline(table)}.", LEGEND.format(place)]
+            texts += [UNKNOWN.format(", ".join(table.unknown))] if table.unknown else []
+            line = "" if number else f"What moves its numbers: {headline(table)}"
+            anchor = f"models-{study.name}" + (f"-{number + 1}" if number else "")
+            title = f"What moves the numbers of study {place.rpartition(', ')[0]}"
+            link, shown = "Table of what was varied", page_table(table)
+            yield Addition(study.name, line, link, anchor, title, shown, texts)
 
 
 def page_table(table: ModelTable) -> PageTable:

@@ -85,9 +85,8 @@ def test_the_report_has_a_section_of_its_study(written, worn_store):
     studies = [
         dataclasses.replace(one, title="Unit 3", notes="A.") for one in read_studies(worn_store)
     ]
-    made = add(worn_store, studies, written[0])
-    (section,) = made.sections
-    page = document([section])
+    (made,) = add(worn_store, studies, written[0])
+    page = document([made.section])
     assert "Which alarm sees wear first in study worn" in page
     assert page.count("<tr") == 1 + 3 * KINDS
     assert "<strong>Unit 3</strong>" in page
@@ -96,10 +95,10 @@ def test_the_report_has_a_section_of_its_study(written, worn_store):
         assert all(html.escape(text) in page for text in row)
     assert "sound machines: 60 jobs of 60 draws" in page
     assert html.escape(CAPTION) in page
-    assert [one.name for one in section.content.figures] == ["alarms-worn"]
-    assert made.notes["worn"].anchor == section.anchor
-    assert add(worn_store, [], written[0]).sections == []  # of a study that is not stored
-    assert add(worn_store, studies, "").sections == []
+    assert [one.name for one in made.figures] == ["alarms-worn"]
+    assert (made.study, made.anchor) == ("worn", "alarms-of-worn")
+    assert [*add(worn_store, [], written[0])] == []  # of a study that is not stored
+    assert [*add(worn_store, studies, "")] == []
 
 
 def test_hours_stand_beside_the_clearances(written):

@@ -18,7 +18,6 @@ from compressor.studies.tradeoff.page import (
     headline,
     model_table,
     models_file,
-    models_section,
     page_table,
     place_text,
     read_models,
@@ -89,9 +88,12 @@ def test_a_change_is_what_lies_beyond_both_bars():
     assert table.rows[1].time_ratio == 3.0
 
 
-def test_the_page_shows_line_table_and_what_is_assumed():
+def test_the_page_shows_line_table_and_what_is_assumed(tmp_path):
     data = made()
-    text = document([models_section("models-worn", STUDY, data)] * 2)
+    write_dataset(models_file(tmp_path, "worn", STUDY.keys[2]), data)
+    (one,) = add(tmp_path, [STUDY])
+    text = document([one.section] * 2)
+    assert one.line == f"What moves its numbers: {headline(model_table(data))}"
     assert text.count(f"<p>{headline(model_table(data))}.</p>") == 2
     assert "The table is of worn at clearance_mm = 0.3, one of 3 jobs: its" in text
     alone = replace(STUDY, axes=(), keys=("a",))
@@ -111,8 +113,9 @@ def test_choices_are_read_where_they_are_of_a_job_of_the_study(tmp_path):
     write_dataset(tmp_path / "models" / "worn-out.nc", second)  # of another study
     found = [one.attrs["key"] for one in read_models(tmp_path, study)]
     assert sorted(found) == [study.keys[0], study.keys[2]]
-    sections = add(tmp_path, [study], "").sections
-    assert [section.title for section in sections] == [
+    first, second = add(tmp_path, [study])
+    assert (bool(second.line), second.anchor) == (False, "models-worn-2")
+    assert [first.title, second.title] == [
         f"What moves the numbers of study worn at clearance_mm = {value}" for value in (0.1, 0.3)
     ]
     with pytest.warns(StoreWarning, match=r"worn-2{8}\.nc: is not shown, as worn has no"):
