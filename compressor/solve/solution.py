@@ -40,9 +40,9 @@ MIN_TIGHTENING, MAX_TIGHTENING = 10.0, 1000.0  # times tighter that the next run
 def refine_until_accurate(case: Case, search: Search, first: Solution | None = None) -> Solution:
     """Return the first run that keeps its promise, or the last whole one as a failed job.
 
-    Each run is compared with the run before it, and with one a little tighter if that says that the
-    promise is kept; the next one is as much tighter as the errors need. Where a first one's are as
-    large as the numbers, chaos is looked for.
+    A first run is compared with one a little tighter, and both with the next, which is as much
+    tighter as the errors need; later ones, with the run before and a tighter one. Where a first
+    one's errors are as large as the numbers, chaos is looked for.
     """
     rtol, unsound = case.rtol, 0  # runs whose energy does not balance
     best: Solution | None = None  # the last whole run
@@ -89,18 +89,34 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
         share = ERROR_AIM / excess * (1.0 if before else 1.0 - TIGHTER_FACTOR**-ORDER)
         before = now
         tightening = min(max(ratio_of(share), MIN_TIGHTENING), MAX_TIGHTENING)
+        if tighter_companion(now):  # the next run needs none, and takes the place of its own
+            tightening *= TIGHTER_FACTOR
         rtol = max(float(f"{rtol / tightening:.1e}"), LAST_RTOL)
+
+
+def tighter_companion(before: Solution) -> Solution | None:
+    """Return the tighter run that has judged a run, if both may judge the next one.
+
+    Not where its error is a tenth of the numbers or more: of the next one it would say too little.
+    """
+    if before.series_errors["acceleration"] >= DOUBTFUL:
+        return None
+    return next((one for one in before.companions if one.rtol < before.rtol), None)
 
 
 def make_comparison_runs(
     case: Case, now: Solution, before: Solution | None, search: Search
 ) -> Iterator[Solution]:
-    """Yield the runs that tell of a run's errors: the one before it, and then a tighter one.
+    """Yield the runs that tell of a run's errors: the one before it, and one beside either.
 
     For a first run a looser one where the motion enlarges errors: two may agree by chance.
     """
     if before:
+        beside = tighter_companion(before)  # read first: a run that judges another has none
         yield before
+        if beside:
+            yield beside
+            return
     tighter = make_comparison_run(case, now, search.left)
     search.count(tighter.trajectory)
     yield tighter

@@ -67,9 +67,13 @@ def test_an_ill_conditioned_case_is_run_tighter_until_it_keeps_its_word(word, as
     found = simulate(of(ILL, accuracy=word))
     assert (found["status"].item(), found.attrs["promise"]) == ("ok", "kept")
     tier = ACCURACY[word]
-    *_, now, beside = asked
+    if word == "draft":  # its first run is as wrong as its numbers are large: it judges no other
+        *_, now, beside = asked
+        assert beside == pytest.approx(now / error_bars.TIGHTER_FACTOR)
+    else:  # the first two runs judge the third
+        first, beside, now = asked
+        assert [first, beside] == pytest.approx([tier.rtol, tier.rtol / error_bars.TIGHTER_FACTOR])
     assert found.attrs["rtol"] == now < 0.11 * tier.rtol
-    assert beside == pytest.approx(now / error_bars.TIGHTER_FACTOR)
     exact = settled(simulate(of(ILL, rtol=1e-11, error_bars=False)))
     first = settled(simulate(of(ILL, rtol=tier.rtol, error_bars=False)))
     first_error, error = (
