@@ -17,15 +17,18 @@ from compressor.studies.follow.motion import run_value
 
 @pytest.mark.compiled
 def test_published_numbers_come_out_again():
-    """What is kept was found by this code, to the digits that are shown."""
+    """What is kept was found by this code, to the digits that are shown.
+
+    Bearings and wear by physics/test_film.py and analysis/test_wear_hours.py, on the same numbers.
+    """
     found = {(one["what"], one["source"]): one["found"] for one in kept("validation.json")["rows"]}
-    subjects = ("play", "dry_joint", "frame", "elastic_rod", "bearing", "wear")
+    subjects = ("play", "dry_joint", "frame", "elastic_rod")
     again = [one for name in subjects for one in getattr(measure_validation, name)()]
     for one in again:
         same = found[one["what"], one["source"]]
         assert one["found"] == pytest.approx(same, rel=1e-6, abs=one["within"])
         assert abs(one["found"] - one["expected"]) <= one["within"]
-    assert len(again) >= 41
+    assert len(again) >= 27
 
 
 def test_the_free_crank_keeps_its_energy():
@@ -66,7 +69,7 @@ def test_a_chaotic_case_says_so_and_knows_its_rms():
 def test_a_machine_that_wears_has_its_hours():
     rows = kept("wear.json")["machines"]
     row = min(rows, key=lambda row: row["values"]["clearance_mm"])  # fewest steps
-    again = measure_wear.judged(row["values"])
+    hours, _, reason = measure_wear.followed(row["values"], measure_wear.DEFAULT)
+    assert reason == row["reason"] == ""
     # last bits of a run move the hours by 1e-4
-    assert again["hours"] == pytest.approx(row["hours"], rel=1e-3)
-    assert again["error"] == pytest.approx(row["error"], abs=1e-3)
+    assert abs(hours / row["hours"] - 1.0) == pytest.approx(row["error"], abs=1e-3)
