@@ -196,6 +196,20 @@ def store(folder, *paths, overrides=()):
     return studies
 
 
+def write_cases(folder, **studies):
+    """Write case files of values by the names of studies (JSON is YAML); returns their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / f"{name}.yaml" for name in studies]
+    for path, values in zip(paths, studies.values(), strict=True):
+        path.write_text(json.dumps(values), encoding="utf-8")
+    return paths
+
+
+def store_cases(folder, **studies):
+    """Simulate studies of values by name into `results` of a folder; returns the studies."""
+    return store(folder / "results", *write_cases(folder, **studies))
+
+
 def part_of(whole, folder, *names):
     """Make a store with some of a store's studies, by name; returns its folder."""
     stored = read_store(whole)
@@ -243,16 +257,7 @@ DEAF = {"name": "deaf", "joint": "big_end", "clearance_mm": 0.1, "solve": WORN["
 @pytest.fixture(scope="session")
 def worn(once):
     """A folder with the studies `worn`, of seven cases at two speeds each, and `deaf`."""
-
-    def fill(folder):
-        folder.mkdir(parents=True)
-        paths = []
-        for case in (WORN, DEAF):
-            paths.append(folder / f"{case['name']}.yaml")
-            paths[-1].write_text(json.dumps(case), encoding="utf-8")
-        store(folder / "results", *paths)
-
-    return once("worn", fill) / "results"
+    return once("worn", lambda folder: store_cases(folder, worn=WORN, deaf=DEAF)) / "results"
 
 
 STRUCK = {"none": (), "big_end": (90,), "small_end": (330,), "both": (90, 330)}  # degrees
@@ -276,7 +281,6 @@ def struck(joint, clearances, seed):
 
 def store_worn(folder):
     """A study `worn` of made-up records, without simulating more than one of its cases."""
-    folder.mkdir()
     rng = np.random.default_rng(9)
     joints = [list(STRUCK)[number % len(STRUCK)] for number in range(WORN_JOBS)]
     drawn = (0.05 * 10 ** rng.random((WORN_JOBS, 2))).round(5).tolist()
@@ -288,13 +292,12 @@ def store_worn(folder):
     }
     rods = rng.uniform(2, 8, WORN_JOBS).round(4).tolist()
     together = ["joint", *(f"clearance_mm.{side}" for side in ends), "machine.rod_mass_kg"]
-    path = folder / "worn.yaml"
-    path.write_text(json.dumps({
+    values = {
         "joint": joints, "clearance_mm": ends, "machine": {"rod_mass_kg": rods},
         "zip": [together], "body": True, "sensor": True,
         "solve": {"duration_rev": 1, "settle_rev": 0, "accuracy": "draft", "error_bars": False},
-    }))  # fmt: skip
-    (study,) = load_studies(path)
+    }  # fmt: skip
+    (study,) = load_studies(*write_cases(folder, worn=values))
     write_study(folder, study, "compsim run")
     case = study.cases[0]
     plain = replace(case, body=None, sensor=None)

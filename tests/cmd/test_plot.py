@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from compsim import cli
-from conftest import store
+from conftest import store_cases
 
 from compressor.analysis.shaking import frame_forces
 from compressor.cases.case import Case
@@ -40,12 +40,8 @@ CASES = {
 def folder(tmp_path_factory):
     """A store of short studies, one of them failed, one without series, one not run."""
     home = tmp_path_factory.mktemp("plots")
-    files = []
-    for name, values in CASES.items():
-        values = {**values, "solve": SOLVE | values.get("solve", {})}
-        files.append(home / f"{name}.yaml")
-        files[-1].write_text(json.dumps(values))
-    store(home / "results", *files)
+    store_cases(home, **{name: {**values, "solve": SOLVE | values.get("solve", {})}
+                         for name, values in CASES.items()})  # fmt: skip
     return home / "results"
 
 
@@ -215,9 +211,8 @@ def test_segments_of_a_study_are_drawn_beside_the_healthy_machine(tmp_path, comp
         "joint": "big_end", "clearance_mm": [0.05, 0.2], "sensor": True,
         "body": {"frequency_x_Hz": 4.0, "frequency_y_Hz": 30.0}, "solve": SOLVE,
     }  # fmt: skip
-    (tmp_path / "heard.yaml").write_text(json.dumps(values))
     home = tmp_path / "results"
-    (study,) = store(home, tmp_path / "heard.yaml")
+    (study,) = store_cases(tmp_path, heard=values)
     sound = simulate(Case.from_values({**values, "joint": "none", "clearance_mm": 0}))
     words = ["plot", "heard", "--what", "segments", "-r", home, "-o", tmp_path / "out"]
     told = compsim(*words, "--limit", "5x").out

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 from compsim.job_text import knock_verdict, notes
-from conftest import CHAOTIC, store
+from conftest import CHAOTIC, store_cases
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_cases, load_studies
@@ -106,10 +106,8 @@ def test_json_is_in_si_and_whole(paper_store, show):
 
 
 def test_of_a_chaotic_job_averages_are_told_and_peaks_are_not(show, tmp_path):
-    path = tmp_path / "wild.yaml"
     solve = {"accuracy": "draft", "duration_rev": 11}  # averages over ten settled revolutions
-    path.write_text(json.dumps(CHAOTIC | {"solve": solve}))
-    store(tmp_path / "results", path)
+    store_cases(tmp_path, wild=CHAOTIC | {"solve": solve})
     out = show(tmp_path / "results", "wild")
     told = values(out)
     assert told["peak acceleration"] == "unknown"

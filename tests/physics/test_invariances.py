@@ -6,12 +6,11 @@ but a number (gravity, back pressure, the spring's damping) is off at its neutra
 """
 
 import itertools
-import json
 import math
 
 import numpy as np
 import pytest
-from conftest import jobs_here
+from conftest import jobs_here, write_cases
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -235,10 +234,8 @@ SWEPT = {
 
 def swept(folder, workers, backwards=False, interrupted=False):
     """Every number and series of a sweep by job, timings apart; stopped once and gone on with."""
-    folder.mkdir()
     values = {key: v[::-1] if backwards and isinstance(v, list) else v for key, v in SWEPT.items()}
-    (folder / "one.yaml").write_text(json.dumps(values))
-    studies = load_studies(folder / "one.yaml")
+    studies = load_studies(*write_cases(folder, one=values))
 
     def stop(done, total, remark):
         if done == 1:

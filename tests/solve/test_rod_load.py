@@ -1,13 +1,12 @@
 """Rod-load reversal: closed forms, flight, both peaks, error bars, and the verdict."""
 
-import json
 import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from compsim.job_text import reversal_verdict, values_of
-from conftest import store
+from conftest import store_cases
 from test_cylinder_runs import DOUBLE, MACHINE, pressures
 
 from compressor.cases.case import Case
@@ -194,8 +193,7 @@ def test_a_load_without_reversal_is_told_by_its_bounds():
 
 def test_show_judges_the_reversal(tmp_path, compsim, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "s.yaml").write_text(json.dumps({"solve": TURN, **SIGNALLED}))
-    (study,) = store(tmp_path / "results", tmp_path / "s.yaml")
+    (study,) = store_cases(tmp_path, s={"solve": TURN, **SIGNALLED})
     key = study.cases[0].key
 
     def told(*words):

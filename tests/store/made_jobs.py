@@ -1,11 +1,10 @@
 """Stores of short runs, and of outcomes that nobody ran."""
 
-import json
 import tempfile
 from pathlib import Path
 
 import numpy as np
-from conftest import keep
+from conftest import keep, write_cases
 
 from compressor.cases.load import load_studies
 from compressor.cases.study import Axis
@@ -21,9 +20,7 @@ SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_ste
 def study(name, solve=SHORT, **values):
     """A study of given values, lists being swept, by way of a case file (JSON is YAML)."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, f"{name}.yaml")
-        path.write_text(json.dumps({"solve": solve, **values}))
-        return load_studies(path)[0]
+        return load_studies(*write_cases(Path(folder), **{name: {"solve": solve, **values}}))[0]
 
 
 def fill(folder, *studies, skip=()):

@@ -1,12 +1,10 @@
 """What to know beside stored numbers: said where it is so, and nowhere else."""
 
-import json
 import math
 
 import numpy as np
 import pytest
-from compsim import cli
-from conftest import jobs_here
+from conftest import store_cases
 
 from compressor.store.caveats import describe_runs
 from compressor.store.reader import open_study
@@ -30,10 +28,8 @@ OUTSIDE = (
 def folder(tmp_path_factory):
     """A study of two jobs from the start on, with a sensor that is far too sensitive."""
     place = tmp_path_factory.mktemp("caveats")
-    (place / "k1.yaml").write_text(json.dumps(STUDY), encoding="utf-8")
-    with jobs_here():
-        assert cli.main(["run", str(place / "k1.yaml"), "-j", "1", "-r", str(place / "k1")]) == 0
-    return place / "k1"
+    store_cases(place, k1=STUDY)
+    return place / "results"
 
 
 def test_a_run_and_its_status_count_what_started_late_and_what_is_clipped(folder, compsim):

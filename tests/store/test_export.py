@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import flip, keep
+from conftest import flip, keep, write_cases
 
 from compressor.cases.load import load_studies
 from compressor.metrics import METRICS, SIZES
@@ -35,10 +35,8 @@ LIST = {
 def results(tmp_path_factory):
     """A grid of four jobs, of which two failed, one is ok and one is missing; two sampled jobs."""
     place = tmp_path_factory.mktemp("export")
-    for name, values in (("grid", GRID), ("list", LIST)):
-        (place / f"{name}.yaml").write_text(json.dumps(values))
     folder = place / "results"
-    for study in load_studies(place / "grid.yaml", place / "list.yaml"):
+    for study in load_studies(*write_cases(place, grid=GRID, list=LIST)):
         write_study(folder, study, "compsim run")
         keep(folder, *(simulate(case) for n, case in enumerate(study.cases) if n != 3))
     return folder

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import store
+from conftest import store_cases, write_cases
 
 from compressor.cases.load import load_studies
 from compressor.store.status import report_job, standings
@@ -25,9 +25,8 @@ MIX = {
 def mix(tmp_path, monkeypatch, in_process):
     """A study of four jobs of which two failed, one is ok and one is missing."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "mix.yaml").write_text(json.dumps(MIX))
     only = "clearance_mm < 0.15 or solve.max_steps < 10"
-    (study,) = load_studies(tmp_path / "mix.yaml", only=only)
+    (study,) = load_studies(*write_cases(tmp_path, mix=MIX), only=only)
     sweep([study], tmp_path / "results", 1)
     return study
 
@@ -64,7 +63,7 @@ def test_show_tells_how_a_job_ended(mix, compsim):
 def test_the_next_run_has_the_same_jobs(tmp_path, monkeypatch, compsim, in_process):
     """What was set on the command line is part of them."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "one case.yaml").write_text(json.dumps({"name": "one", "solve": SHORT}))
+    write_cases(tmp_path, **{"one case": {"name": "one", "solve": SHORT}})
     setting = ["--set", "joint=big_end", "--set=clearance_mm=[0.1, 0.2]"]
     command = ["run", "one case.yaml", "-j", "1", "--quiet", *setting]
     compsim(*command, "--only", "clearance_mm < 0.15")
@@ -88,12 +87,11 @@ def test_damage_is_told_where_its_jobs_count_as_missing(mix, compsim):
 def budget(folder):
     """A study of which the half with the smaller budget fails, in a store."""
     case = {
-        "name": "budget", "clearance_mm": [0.1, 0.12, 0.14, 0.16, 0.18, 0.2], "joint": "big_end",
+        "clearance_mm": [0.1, 0.12, 0.14, 0.16, 0.18, 0.2], "joint": "big_end",
         "solve": {"max_steps": [5, 5000000], "duration_rev": 2, "accuracy": "draft",
                   "error_bars": False, "horizon": False},
     }  # fmt: skip
-    (folder / "budget.yaml").write_text(json.dumps(case))
-    store(folder / "results", folder / "budget.yaml")
+    store_cases(folder, budget=case)
     return str(folder / "results")
 
 

@@ -1,23 +1,20 @@
 """How far results are to be trusted, as the store keeps and tells it: promises and regimes."""
 
-import json
 import math
 
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import keep
+from conftest import store_cases
 
 from compressor.cases.case import Case
-from compressor.cases.load import load_studies
 from compressor.metrics import METRICS, NUMBERS, QUANTILES
 from compressor.outcome import REGIME_WORDS, Regime
-from compressor.solve.simulate import measure, simulate
+from compressor.solve.simulate import measure
 from compressor.store.batch import write_batch
 from compressor.store.dataset import mask_untrusted
 from compressor.store.reader import open_study, read_store
 from compressor.store.status import standings
-from compressor.store.studies import write_study
 
 BRIEF = {"duration_rev": 1.2, "settle_rev": 0.2, "output_step_deg": 0.9}
 RING = {
@@ -34,10 +31,7 @@ RING = {
 def ring(tmp_path_factory):
     """A folder with a study of four jobs: one is chaotic, one is kept, two failed."""
     folder = tmp_path_factory.mktemp("ring")
-    (folder / "ring.yaml").write_text(json.dumps(RING))
-    (study,) = load_studies(folder / "ring.yaml")
-    write_study(folder / "results", study, "by hand")
-    keep(folder / "results", *map(simulate, study.cases))
+    store_cases(folder, ring=RING)
     return folder / "results"
 
 

@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from conftest import store
+from conftest import store_cases
 
 from compressor.studies.compare import CAPTION, curves, measure_likeness
 from compressor.studies.frame import by_revolutions
@@ -42,10 +42,8 @@ TOLERANCE = {"correlation": 0.1, "envelope": 0.05, "rms_ratio": 0.05}
 def folder(tmp_path_factory):
     """A job `base`, and `others` that differ from it."""
     place = tmp_path_factory.mktemp("compare")
-    (place / "base.yaml").write_text(json.dumps(CASE))
-    (place / "others.yaml").write_text(json.dumps(CASE | {"blocks": [*OTHERS.values()]}))
-    (place / "deaf.yaml").write_text(json.dumps({"solve": CASE["solve"]}))
-    studies = store(place / "results", *(place / f"{n}.yaml" for n in ("base", "others", "deaf")))
+    others, deaf = CASE | {"blocks": [*OTHERS.values()]}, {"solve": CASE["solve"]}
+    studies = store_cases(place, base=CASE, others=others, deaf=deaf)
     keys = [[case.key for case in study.cases] for study in studies]
     return place, keys[0][0], dict(zip(OTHERS, keys[1], strict=True)), keys[2][0]
 

@@ -1,7 +1,6 @@
 """A dask cluster does as one machine does, whatever becomes of its workers."""
 
 import contextlib
-import json
 import os
 import signal
 import subprocess
@@ -14,6 +13,7 @@ import distributed
 import numpy as np
 import pytest
 from compsim.cli import main
+from conftest import write_cases
 
 from compressor.cases.load import load_studies
 from compressor.store import reader as store
@@ -65,13 +65,10 @@ def studies(tmp_path_factory):
     """One study of many jobs without time series, one of few with."""
     folder = tmp_path_factory.mktemp("studies")
     solve = {"duration_rev": 2, "accuracy": "draft", "error_bars": False, "output_step_deg": 0.9}
-    many = {"joint": "big_end", "output": {"keep": "metrics"}}
-    for name, values in {
-        "many": many | {"clearance_mm": {"linspace": [0.1, 0.3, 60]}},
-        "few": {"joint": "small_end", "clearance_mm": {"linspace": [0.1, 0.3, 10]}},
-    }.items():
-        (folder / f"{name}.yaml").write_text(json.dumps(values | {"solve": solve}))
-    return load_studies(folder / "many.yaml", folder / "few.yaml")
+    many = {"joint": "big_end", "output": {"keep": "metrics"}, "solve": solve,
+            "clearance_mm": {"linspace": [0.1, 0.3, 60]}}  # fmt: skip
+    few = {"joint": "small_end", "clearance_mm": {"linspace": [0.1, 0.3, 10]}, "solve": solve}
+    return load_studies(*write_cases(folder, many=many, few=few))
 
 
 @pytest.fixture(scope="module")
@@ -190,10 +187,9 @@ def test_no_scheduler_is_a_mistake(studies, tmp_path, capsys, impatient):
 
 
 def test_sigterm_keeps_what_is_finished_and_cancels_the_rest(dask, tmp_path):
-    config = tmp_path / "long.yaml"
-    sizes = {"linspace": [0.1, 0.3, 5000]}
-    config.write_text(json.dumps({"joint": "big_end", "clearance_mm": sizes} | {
-        "output": {"keep": "metrics"}}))  # fmt: skip
+    values = {"joint": "big_end", "clearance_mm": {"linspace": [0.1, 0.3, 5000]},
+              "output": {"keep": "metrics"}}  # fmt: skip
+    (config,) = write_cases(tmp_path, long=values)
     out = tmp_path / "out"
     call = [sys.executable, "-m", "compsim", "run", str(config), "-r", str(out)]
     call += ["--scheduler", dask.scheduler_address]

@@ -1,8 +1,9 @@
 """What is ahead of a sweep: counts at once, and costs from some of its jobs."""
 
-import json
+from pathlib import Path
 
 import pytest
+from conftest import write_cases
 
 from compressor.cases.load import load_studies
 from compressor.sweep import plan
@@ -19,11 +20,10 @@ def studies(tmp_path, monkeypatch, in_process):
     monkeypatch.chdir(tmp_path)
 
     def make(only="", **values):
-        for name, content in values.items():
-            whole = {"output": {"keep": "metrics"}, **content}
-            text = json.dumps(whole | {"solve": SHORT | content.get("solve", {})})
-            (tmp_path / f"{name}.yaml").write_text(text)
-        return load_studies(*(f"{name}.yaml" for name in values), only=only)
+        whole = {name: {"output": {"keep": "metrics"}, **content,
+                        "solve": SHORT | content.get("solve", {})}
+                 for name, content in values.items()}  # fmt: skip
+        return load_studies(*write_cases(Path(), **whole), only=only)
 
     return make
 

@@ -1,6 +1,5 @@
 """Sweeps: only what is missing runs, and no failure of a job, or of us, costs another job."""
 
-import json
 import os
 import re
 import subprocess
@@ -11,7 +10,7 @@ import bad_jobs
 import h5py
 import numpy as np
 import pytest
-from conftest import flip
+from conftest import flip, write_cases
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
@@ -36,10 +35,9 @@ def studies(tmp_path):
     """Makes the studies of some values by name, lists being swept (JSON is YAML)."""
 
     def make(**values):
-        for name, content in values.items():
-            content = {**content, "solve": SHORT | content.get("solve", {})}
-            (tmp_path / f"{name}.yaml").write_text(json.dumps(content))
-        return load_studies(*(tmp_path / f"{name}.yaml" for name in values))
+        short = {name: {**content, "solve": SHORT | content.get("solve", {})}
+                 for name, content in values.items()}  # fmt: skip
+        return load_studies(*write_cases(tmp_path, **short))
 
     return make
 

@@ -1,9 +1,7 @@
 """What a case models, and which of its features have no effect."""
 
-import json
-from pathlib import Path
-
 import pytest
+from conftest import write_cases
 
 from compressor.cases.case import Case
 from compressor.cases.load import load_studies
@@ -20,9 +18,8 @@ def explained(tmp_path):
 
     def made(**values):
         values["solve"] = SOLVE | values.get("solve", {})
-        path = tmp_path / "made.yaml"
-        Path(path).write_text(json.dumps({"joint": "big_end", "clearance_mm": 0.2} | values))
-        study = load_studies(path)[0]
+        values = {"joint": "big_end", "clearance_mm": 0.2} | values
+        (study,) = load_studies(*write_cases(tmp_path, made=values))
         return explain(study, choose_job(study, tmp_path)[0], workers=2)
 
     return made

@@ -1,11 +1,11 @@
 """Variants: which a case has, what they assume, and that they move metrics so far."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import write_cases
 
 from compressor.cases.case import Case
 from compressor.cases.laws import CONTACT_LAWS
@@ -232,16 +232,10 @@ def test_rod_load_body_and_sensor_are_compared(few, tmp_path):
 
 def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
     few()
-    path = Path(tmp_path / "worn.yaml")
-    values = {
-        "joint": "big_end",
-        "clearance_mm": [0.1, 0.2],
-        "solve": SHORT,
-        "body": {"start": "rest"},
-    }
-    path.write_text(json.dumps(values))
+    values = {"joint": "big_end", "clearance_mm": [0.1, 0.2], "solve": SHORT,
+              "body": {"start": "rest"}}  # fmt: skip
+    (study,) = load_studies(*write_cases(tmp_path, worn=values))
     seen = []
-    study = load_studies(path)[0]
     data = explain_models(study, 0, progress=lambda done, total, _: seen.append((done, total)))
     assert {*data["choice"].values} == {ITSELF, *THREE}
     assert [*dict.fromkeys(seen)] == [(n, 4) for n in (0, 1, 2, 3, 4)]

@@ -1,10 +1,8 @@
 """Work and precision: errors that fall, failures that stay, references that know their limits."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
+from conftest import write_cases
 
 from compressor.program import no_progress
 from compressor.report.figures.drawing import panels_of
@@ -27,8 +25,8 @@ SOME = ["solve.method=[auto, RODAS, LSODA]", "solve.rtol=[1.0e-3, 1.0e-7, 1.0e-5
 
 def made(place, *overrides, **values):
     """The numbers of a case file's study, the study, and the folder of results."""
-    path = Path(place, "worn.yaml")
-    path.write_text(json.dumps({"joint": "big_end", "clearance_mm": 0.2, "solve": SHORT} | values))
+    values = {"joint": "big_end", "clearance_mm": 0.2, "solve": SHORT} | values
+    (path,) = write_cases(place, worn=values)
     study, texts = load_methods(str(path), overrides, place / "kept")
     sweep([study], place / "kept", 1, no_progress, Options("", texts, backend=in_this_process))
     return work_precision(place / "kept", study), study, place / "kept"
@@ -89,9 +87,8 @@ def test_a_job_that_fails_has_no_error(tmp_path):
 
 def test_a_run_that_finds_its_own_length_gives_it_to_all(tmp_path, in_process):
     """A draft of this one settles after one revolution."""
-    path = tmp_path / "auto.yaml"
     solve = {"duration_rev": "auto", "settle_rev": "auto", "accuracy": "draft"}
-    path.write_text(json.dumps({"joint": "big_end", "clearance_mm": 0.2, "solve": solve}))
+    (path,) = write_cases(tmp_path, auto={"joint": "big_end", "clearance_mm": 0.2, "solve": solve})
     study, texts = load_methods(str(path), SOME, tmp_path)
     assert {(one.solve.duration_rev, one.solve.settle_rev) for one in study.cases} == {(4.0, 1.0)}
     assert "solve.settle_rev=1.0" in texts
