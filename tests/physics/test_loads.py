@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from cylinder_made import DOUBLE, MACHINE, pressures
 
 from compressor.cases.case import Case
 from compressor.physics.kinematics import exact_motion, ideal
@@ -16,12 +17,6 @@ from compressor.physics.loads import (
 )
 from compressor.solve.si_record import record
 
-MACHINE = {"stroke_mm": 180, "rod_length_mm": 450, "speed_rpm": 740}
-DOUBLE = {
-    "action": "double", "bore_mm": 220, "rod_diameter_mm": 60, "suction_MPa": 0.2,
-    "discharge_MPa": 0.7, "exponent": 1.3, "clearance_percent": {"head": 12, "crank": 14},
-    "valve_loss_percent": {"suction": 4, "discharge": 5}, "back_pressure_MPa": 0.1,
-}  # fmt: skip
 EXACT = {"load": "gas", "gas": {"switching": "exact"}}
 GAS, SPRING = {"load": "gas"}, {"load": "spring"}
 
@@ -150,26 +145,6 @@ HEAD_ALONE = {"action": "single", "rod_diameter_mm": None, "clearance_percent": 
 CRANK_ALONE = {"action": "crank_end", "clearance_percent": 14}
 
 
-def pressures(degrees):
-    """Pressures (Pa) in the head and the crank end of `DOUBLE`, from the greater of two curves.
-
-    No phases: while the space grows the gas expands down to the suction pressure, and while it
-    shrinks it is compressed up to the discharge pressure, each behind its valve.
-    """
-    x, *_ = exact_motion(math.radians(degrees), 0.09, 0.45, 1.0)
-    inlet, outlet = 0.2e6 * 0.96, 0.7e6 * 1.05
-    found = []
-    for space, clearance, grows in (
-        (0.54 + 0.12 * 0.18 - x, 0.12 * 0.18, degrees < 180),
-        (x - 0.36 + 0.14 * 0.18, 0.14 * 0.18, degrees >= 180),
-    ):
-        if grows:
-            found.append(max(inlet, outlet * (clearance / space) ** 1.3))
-        else:
-            found.append(min(outlet, inlet * ((clearance + 0.18) / space) ** 1.3))
-    return found
-
-
 def in_segments(p, degrees):
     """The force of the ideal machine in the phase of the segment that a crank angle lies in."""
     edges, phases = segments(p, 2 * math.pi / p.omega)
@@ -186,7 +161,7 @@ def in_segments(p, degrees):
 def test_forces_of_both_faces(gas, head, crank, degrees):
     """1: an end's cycle, 0: the back pressure, else its constant pressure."""
     faces, cycle = [math.pi * 0.11**2, math.pi * (0.11**2 - 0.03**2)], pressures(degrees)
-    inside = [{0: 0.1e6, 1: cycle[i]}.get(kind, kind) for i, kind in enumerate((head, crank))]
+    inside = [{0: 0.1e6, 1: 1e6 * cycle[i]}.get(kind, kind) for i, kind in enumerate((head, crank))]
     rod = 0.1e6 * (faces[0] - faces[1])
     expected = faces[0] * inside[0] - faces[1] * inside[1] - rod
     assert in_segments(cylinder(**gas), degrees) == pytest.approx(expected, rel=1e-12, abs=1e-8)

@@ -2,19 +2,14 @@
 
 import numpy as np
 import pytest
+from cylinder_made import DOUBLE, MACHINE, pressures
 from test_feature_runs import apart
 
 from compressor.analysis.cylinder import end_states
 from compressor.cases.case import Case
-from compressor.physics import exact_motion
 from compressor.solve.simulate import simulate
 
-MACHINE = {"stroke_mm": 180, "rod_length_mm": 450, "speed_rpm": 740, "reciprocating_mass_kg": 30}
-DOUBLE = {
-    "action": "double", "bore_mm": 220, "rod_diameter_mm": 60, "suction_MPa": 0.2,
-    "discharge_MPa": 0.7, "exponent": 1.3, "clearance_percent": {"head": 12, "crank": 14},
-    "valve_loss_percent": {"suction": 4, "discharge": 5}, "back_pressure_MPa": 0.1,
-}  # fmt: skip
+HEAVY = MACHINE | {"reciprocating_mass_kg": 30}
 WORN = {"joint": "small_end", "clearance_mm": 0.2}
 FEATURES = {
     "guide": {"guide": {"clearance_mm": 0.1}},
@@ -26,7 +21,7 @@ FEATURES = {
 
 def run(more, **solve):
     how = {"duration_rev": 1, "settle_rev": 0, "error_bars": False, **solve}
-    values = {"load": "gas", "machine": MACHINE, "gas": DOUBLE, **WORN, **more, "solve": how}
+    values = {"load": "gas", "machine": HEAVY, "gas": DOUBLE, **WORN, **more, "solve": how}
     found = simulate(Case.from_values(values))
     assert found.status == "ok", found.attrs.get("detail")
     return found
@@ -114,18 +109,6 @@ def test_single_acting_with_exact_corners_is_the_plain_load():
 
 CYCLE = ("suction_MPa", "discharge_MPa", "exponent", "clearance_percent", "valve_loss_percent")
 MEASURED = {key: value for key, value in DOUBLE.items() if key not in CYCLE}
-
-
-def pressures(degrees, inlet=0.2 * 0.96, outlet=0.7 * 1.05):
-    """Pressures (MPa) of `DOUBLE`'s ideal cycle in the head and the crank end, without phases."""
-    x, *_ = exact_motion(np.radians(degrees), 0.09, 0.45, 1.0)
-    found = []
-    for gap, share, down in ((0.54 - x, 0.12, True), (x - 0.36, 0.14, False)):
-        space, clearance = gap + share * 0.18, share * 0.18
-        expanded = np.maximum(inlet, outlet * (clearance / space) ** 1.3)
-        compressed = np.minimum(outlet, inlet * ((clearance + 0.18) / space) ** 1.3)
-        found.append(np.where((degrees < 180) == down, expanded, compressed))
-    return found
 
 
 def cards(folder, step):
