@@ -22,8 +22,6 @@ COMBINATIONS = {
         **BOTH, "drive": {"flywheel_kg_m2": 1}, **GUIDE,
         "rod": {"damping_ratio": 0.05}, "machine": {"gravity_m_per_s2": 9.81},
     },
-    "flores": {**BOTH, "contact": {"law": "flores", "restitution": 0.6}},
-    "hu_guo": {**SMALL_END, "contact": {"law": "hu_guo", "restitution": 0.6}},
     "johnson": {**BOTH, "contact": {"law": "johnson", **PIN}},
     "liu": {**BOTH, "contact": {"law": "liu", **PIN}},
 }  # fmt: skip

@@ -151,10 +151,10 @@ def store_and_die(place, folder, outcomes):
     return ends
 
 
-def announced(payload):
-    """Say which process this is, then do what the payload's name says."""
+def announced(payload, do=work):
+    """Say which process this is, then do something with the payload."""
     os.write(2, f"{os.getpid()}\n".encode())
-    return work(payload)
+    return do(payload)
 
 
 def harmful(case):

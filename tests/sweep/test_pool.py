@@ -151,18 +151,20 @@ def test_a_job_may_succeed_when_it_is_tried_again(tmp_path):
 def test_a_worker_s_time_stands_still_with_ours():
     """All are stopped, as by Ctrl-Z, for longer than the job may take."""
     code = (
-        "import bad_jobs; from compressor.sweep.pool import run_batches, Workers\n"
+        "import bad_jobs, functools; from compressor.sweep.pool import run_batches, Workers\n"
+        "sleep = functools.partial(bad_jobs.announced, do=bad_jobs.sleep)\n"
         "jobs = [(n, 1.0, 1.5) for n in range(2)]\n"
-        "for end in run_batches(bad_jobs.sleep, jobs, Workers(2, grace=0.5)): print(end)"
+        "for end in run_batches(sleep, jobs, Workers(2, grace=0.5)): print(end)"
     )
     folder = Path(__file__).parent
     running = subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, start_new_session=True,
-        env=os.environ | {"PYTHONPATH": f"{folder}"},
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True, env=os.environ | {"PYTHONPATH": f"{folder}"},
     )  # fmt: skip
-    time.sleep(2.5)
+    for _ in range(2):
+        running.stderr.readline()  # a job has begun
     os.killpg(running.pid, signal.SIGSTOP)
-    time.sleep(4.0)
+    time.sleep(2.5)
     os.killpg(running.pid, signal.SIGCONT)
     said, _ = running.communicate(timeout=60)
     assert said.count("JobResult") == 2
