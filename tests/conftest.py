@@ -51,6 +51,7 @@ CHAOTIC = {  # light, fast and without damping: it can be foretold for half a re
 CONFIGS = sorted((Path(__file__).parent.parent / "configs").glob("*.yaml"))
 
 
+LONG = ("test_newcomer", "test_pages", "test_cluster", "test_pool", "test_systems", "test_tutorial")
 PARTS = ("plain", "laws", "features")  # of the equations: the first two take as long as the last
 
 
@@ -58,6 +59,11 @@ def pytest_configure(config):
     """All tests of a module run in one process, since they share what they make."""
     if getattr(config.option, "dist", "no") == "load":  # which -n alone asks for
         config.option.dist, config.option.loadscopereorder = "loadfile", False
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the longest modules: at the end one process would wait for the other."""
+    items.sort(key=lambda item: item.path.stem not in LONG)
 
 
 @pytest.fixture(scope="session")
