@@ -16,6 +16,7 @@ from compressor.sweep.pool import cores
 from compressor.sweep.sweep import run_job
 from compressor.sweep.wanted import RequestedJobs
 from compressor.sweep.warm_up import Needs, compile_once, compile_seconds
+from compressor.sweep.worker import JobResult, attempt
 
 ROW_BYTES = 700  # of one job in a merged batch without time series
 MAX_CASES = 1_000  # of the missing jobs of a study that are looked at, drawn evenly
@@ -141,8 +142,8 @@ def time_job(case: Case) -> tuple[float, int]:
     """
     for _ in range(2):
         began = time.process_time()
-        outcome = run_job(case)
+        end = attempt(run_job, case)  # a job may fail by an exception, too
         seconds = time.process_time() - began
         if seconds > LONG_JOB:
             break
-    return seconds, len(encode_batch([outcome]))
+    return seconds, len(encode_batch([end.result])) if isinstance(end, JobResult) else 0

@@ -14,12 +14,11 @@ from typing import Any
 from compressor.cases import Case, Study, points
 from compressor.outcome import Outcome, without_run
 from compressor.program import Progress, ignore_warnings, no_progress
-from compressor.reasons import Reason
 from compressor.store import Folder, merge_batches, read_store, write_batch, write_study
 from compressor.sweep.pool import Input, Workers, cores, require_posix, run_batches
 from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Needs, compile_once, load
-from compressor.sweep.worker import End, JobLost, Store, attempt, describe_error, store_results
+from compressor.sweep.worker import End, JobLost, Store, attempt, store_results
 
 GRACE = 5.0  # s beyond its time in which a job may end by itself, before its worker is killed
 REPORT_SECONDS = 0.1  # s between two reports of progress, or more
@@ -160,22 +159,13 @@ def store_lost(folder: Path, case: Case, end: JobLost) -> JobEnd:
 
 
 def run_job(case: Case) -> Outcome:
-    """Simulate a case, in a worker; an exception is a failure of the job."""
+    """Simulate a case, in a worker."""
     from compressor.solve import observe  # needs numba: only to simulate
 
-    try:
-        with ignore_warnings():  # a solver's remarks; what matters is in the result
-            outcome, variables = observe(case)
-        output = case.output
-        if output.keep == "series" and outcome.reason != Reason.INVALID_INPUT:
-            outcome = outcome.with_series(variables, output.precision, output.compress)
-        return outcome
-    except MemoryError:
-        raise
-    except Exception as error:
-        detail, traceback = describe_error(error)
-        attributes = case.attributes()
-        return without_run(attributes, Reason.INTERNAL_ERROR, detail, traceback=traceback)
+    with ignore_warnings():  # a solver's remarks; what matters is in the result
+        outcome, series = observe(case)
+    output = case.output
+    return outcome.with_series(series, output.precision, output.compress) if series else outcome
 
 
 def store_outcomes(folder: Path, outcomes: Sequence[Outcome]) -> list[JobEnd]:
