@@ -31,7 +31,7 @@ from compressor.store.batch import write_batch
 from compressor.store.stored import read_store
 from compressor.store.studies import read_studies, write_study
 from compressor.sweep.warm_up import Needs, compile_once
-from compressor.sweep.worker import JobResult
+from compressor.sweep.worker import End
 
 # nohup ignores SIGHUP, and a shell SIGINT of what it runs behind: tests that send them, and the
 # commands that they start, are to get them
@@ -339,7 +339,7 @@ def jobs_here():
     def run_batches(work, jobs, workers, store=None):
         for name, payload, _ in jobs:
             result = work(payload)
-            yield JobResult(name, store([result])[0] if store else result, 0.01)
+            yield End(name, store([result])[0] if store else result, 0.01)
 
     with pytest.MonkeyPatch.context() as patch:
         module = sys.modules["compressor.sweep.sweep"]

@@ -36,7 +36,7 @@ from compressor.store import (
     read_store,
     write_dataset,
 )
-from compressor.sweep import JobLost, Needs, Options, in_this_process, run_here, sweep
+from compressor.sweep import End, Needs, Options, in_this_process, run_here, sweep
 from compressor.vibration import Record, check_record, resample_angle, turns_at
 
 RANGE = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*(?::\s*(\d+)\s*)?")
@@ -321,7 +321,7 @@ def run_rows(
     workers: int,
     progress: Progress,
     rerun: bool = False,
-) -> tuple[int, dict[str, JobLost]]:
+) -> tuple[int, dict[str, End]]:
     """Make what is missing of files, side by side; return what was done before, and what was lost.
 
     Those that were lost by their keys. Progress counts as `count_done`. Whatever ends it early,
@@ -346,7 +346,7 @@ def run_rows(
     needs = Needs.of(case for one in missing for case in one.cases)
     running = run_here(partial(make_rows, folder=place, rerun=rerun), jobs, needs, workers, look)
     with contextlib.closing(running), calling_often(look):
-        lost = {end.id: end for end in running if isinstance(end, JobLost)}
+        lost = {end.id: end for end in running if end.reason}
     look()
     return before, lost
 

@@ -24,7 +24,7 @@ from compressor.report import PlotlyFigure, make_grid, style
 from compressor.solve import simulate
 from compressor.store import Folder, StoreError, writable_folder
 from compressor.studies.frame import Row, StudyError, hash_key, rows_dataset, run_rows, stored_rows
-from compressor.sweep import JobLost
+from compressor.sweep import End
 
 FOLDER = "wear"
 SCHEMA = 2  # of a stage's numbers: a change of what they mean makes them again
@@ -279,7 +279,7 @@ def run_wear(
 
 
 def worn_machine(
-    study: str, point: dict[str, Any], worn: Worn, folder: Folder, end: JobLost | None
+    study: str, point: dict[str, Any], worn: Worn, folder: Folder, end: End | None
 ) -> WornMachine:
     """Return a machine of a study by its stored stages; end: how its worker was lost, if it was."""
     kept = stored_rows(worn, folder)

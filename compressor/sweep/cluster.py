@@ -11,7 +11,6 @@ import os
 import pickle
 import platform
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from compressor.sweep.pool import Batches, Job
 from compressor.sweep.sweep import Backend, run_job
 from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Needs, load
-from compressor.sweep.worker import End, JobLost, JobResult, attempt, store_results
+from compressor.sweep.worker import End, attempt, store_results
 
 CONNECT_SECONDS = 8.0  # s until a scheduler that does not answer counts as not there
 TARGET_SECONDS = 0.5  # of a batch
@@ -138,7 +137,7 @@ def run_on_cluster(
                 continue
             if isinstance(error, KilledWorker):
                 how = f"{error.allowed_failures + 1} workers of the cluster that had it alone"
-                yield JobLost(batch[0].id, Reason.WORKER_DIED, f"it felled {how}")
+                yield End(batch[0].id, reason=Reason.WORKER_DIED, detail=f"it felled {how}")
                 continue
             if future.cancelled() or client.status != "running":
                 raise lost_scheduler from error
@@ -149,8 +148,8 @@ def run_on_cluster(
             for data in written:
                 publish_batch(folder, data)
             for job, end in zip(batch, ends, strict=True):
-                if isinstance(end, JobResult):
+                if not end.reason:
                     batches.learn(end.seconds)
-                yield replace(end, id=job.id)
+                yield end._replace(id=job.id)
     finally:
         client.cancel([*out])

@@ -16,7 +16,7 @@ from compressor.sweep.pool import cores
 from compressor.sweep.sweep import run_job
 from compressor.sweep.wanted import RequestedJobs
 from compressor.sweep.warm_up import Needs, compile_once, compile_seconds
-from compressor.sweep.worker import JobResult, attempt
+from compressor.sweep.worker import attempt
 
 ROW_BYTES = 700  # of one job in a merged batch without time series
 MAX_CASES = 1_000  # of the missing jobs of a study that are looked at, drawn evenly
@@ -146,4 +146,4 @@ def time_job(case: Case) -> tuple[float, int]:
         seconds = time.process_time() - began
         if seconds > LONG_JOB:
             break
-    return seconds, len(encode_batch([end.result])) if isinstance(end, JobResult) else 0
+    return seconds, 0 if end.reason else len(encode_batch([end.result]))

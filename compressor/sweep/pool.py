@@ -27,7 +27,7 @@ from joblib import Parallel, cpu_count, delayed
 from compressor.program import THREAD_VARIABLES, CompsimError
 from compressor.reasons import Reason
 from compressor.store import StoreError
-from compressor.sweep.worker import ENDING, End, JobLost, JobResult, Store, Workers
+from compressor.sweep.worker import ENDING, End, Store, Workers
 
 Input = tuple[Hashable, Any, float]  # id, payload, wall time that the job may take (s)
 
@@ -81,8 +81,8 @@ def run_batches(
 
     jobs: read as workers need them; where they have a length, batches shrink towards the end.
     store: called with the results of a batch in the worker; returns what is sent home for each.
-    Both functions must be found by name in another process. What `work` raises makes its job a
-    JobLost, but a StoreError ends the call. Closing the iterator kills the workers. Raises
+    Both functions must be found by name in another process. What `work` raises is why its job has
+    no result, but a StoreError ends the call. Closing the iterator kills the workers. Raises
     StoreError, WorkersFailed, and what `jobs` raises.
     """
     pool = Pool(work, jobs, workers, store)
@@ -197,12 +197,12 @@ class Pool:
 
     def settle(self, job: Job, end: End) -> End:
         """Return the end of a job with its id."""
-        if isinstance(end, JobResult):
+        if not end.reason:
             self.batches.learn(end.seconds)
         elif end.reason == Reason.OUT_OF_MEMORY:
             most = f"{self.rules.memory / 1e9:.3g} GB that a worker may add"
-            end = replace(end, detail=f"needs more than the {most}")
-        return replace(end, id=job.id)
+            end = end._replace(detail=f"needs more than the {most}")
+        return end._replace(id=job.id)
 
     def lose(self, batch: list[Job], died: "Death") -> list[End]:
         """Return the job that is lost with its worker, if any; the others wait to run again.
@@ -225,10 +225,10 @@ class Pool:
             waiting.appendleft(batch)
         if died.late:
             text = f"more than {job.timeout:g} s of wall time; its worker was killed"
-            return [JobLost(job.id, Reason.BUDGET_SECONDS, text)]
+            return [End(job.id, reason=Reason.BUDGET_SECONDS, detail=text)]
         if job.again:
             text = f"its worker ended by {died.how}, also when it ran again alone"
-            return [JobLost(job.id, Reason.WORKER_DIED, text)]
+            return [End(job.id, reason=Reason.WORKER_DIED, detail=text)]
         waiting.append([job._replace(again=True)])
         return []
 

@@ -6,7 +6,7 @@ ended. A run that fails, breaks, or takes its worker with it, is a result with a
 
 import time
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from compressor.store import Folder, merge_batches, read_store, write_batch, wri
 from compressor.sweep.pool import Input, Workers, cores, require_posix, run_batches
 from compressor.sweep.wanted import JobEnd, RequestedJobs
 from compressor.sweep.warm_up import Needs, compile_once, load
-from compressor.sweep.worker import End, JobLost, Store, attempt, store_results
+from compressor.sweep.worker import End, Store, attempt, store_results
 
 GRACE = 5.0  # s beyond its time in which a job may end by itself, before its worker is killed
 REPORT_SECONDS = 0.1  # s between two reports of progress, or more
@@ -139,7 +139,7 @@ def run_missing(
     running = (options.backend or partial(run_locally, workers))(folder, jobs, tell)
     try:
         for end in running:
-            if isinstance(end, JobLost):
+            if end.reason:
                 ends[end.id] = store_lost(folder, jobs[end.id], end)
             else:
                 ends[end.id] = end.result
@@ -150,7 +150,7 @@ def run_missing(
         running.close()
 
 
-def store_lost(folder: Path, case: Case, end: JobLost) -> JobEnd:
+def store_lost(folder: Path, case: Case, end: End) -> JobEnd:
     """Store that a job has no result; return how it ended."""
     more = {"traceback": end.traceback} if end.traceback else {}
     outcome = without_run(case.attributes(), end.reason, end.detail, **more)
@@ -193,7 +193,7 @@ def in_this_process(
     compile_once(Needs.of(jobs.cases()), remark, cores())
     ran = [attempt(run_job, case) for case in jobs.cases()]
     ends = store_results(partial(store_outcomes, folder), ran)
-    yield from (replace(end, id=key) for key, end in zip(jobs.places, ends, strict=True))
+    yield from (end._replace(id=key) for key, end in zip(jobs.places, ends, strict=True))
 
 
 def run_here(

@@ -9,9 +9,9 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, NamedTuple
 
 from compressor.reasons import Reason
 from compressor.store import StoreError
@@ -26,30 +26,19 @@ PR_SET_PDEATHSIG = 1  # linux/prctl.h
 Store = Callable[[list[Any]], list[Any]]  # of results; returns what is sent home for each
 
 
-@dataclass(frozen=True)
-class JobResult:
-    """A job that ended, its result, and the seconds that it took."""
+class End(NamedTuple):
+    """How a job ended: its result and the seconds that it took, or why it has none.
 
-    id: Any
-    result: Any
-    seconds: float
-
-
-@dataclass(frozen=True)
-class JobLost:
-    """A job that has no result.
-
-    `reason`: WORKER_DIED, OUT_OF_MEMORY, BUDGET_SECONDS, or INTERNAL_ERROR, with a traceback,
-    where the work raised an exception.
+    `reason`: "", or WORKER_DIED, OUT_OF_MEMORY, BUDGET_SECONDS, or INTERNAL_ERROR, with a
+    traceback, where the work raised an exception.
     """
 
-    id: Any
-    reason: str
-    detail: str
+    id: Any = None
+    result: Any = None
+    seconds: float = 0.0
+    reason: str = ""
+    detail: str = ""
     traceback: str = ""
-
-
-End = JobResult | JobLost
 
 
 @dataclass(frozen=True)
@@ -139,13 +128,15 @@ def attempt(work: Callable[[Any], Any], payload: Any) -> End:
     """Return what some work gives, or why it gives nothing. Raises StoreError."""
     start = time.monotonic()
     try:
-        return JobResult(None, work(payload), time.monotonic() - start)
+        return End(result=work(payload), seconds=time.monotonic() - start)
     except StoreError:
         raise
     except MemoryError:
-        return JobLost(None, Reason.OUT_OF_MEMORY, "needs more memory than its worker may add")
+        text = "needs more memory than its worker may add"
+        return End(reason=Reason.OUT_OF_MEMORY, detail=text)
     except (Exception, SystemExit) as error:  # work may even call sys.exit
-        return JobLost(None, Reason.INTERNAL_ERROR, *describe_error(error))
+        text, traceback = describe_error(error)
+        return End(reason=Reason.INTERNAL_ERROR, detail=text, traceback=traceback)
 
 
 def store_results(store: Store, ends: list[End]) -> list[End]:
@@ -153,13 +144,13 @@ def store_results(store: Store, ends: list[End]) -> list[End]:
 
     What `store` gives takes the place of each result. Raises StoreError.
     """
-    results = [end.result for end in ends if isinstance(end, JobResult)]
+    results = [end.result for end in ends if not end.reason]
     if not results:
         return ends
     stored = attempt(store, results)
-    if isinstance(stored, JobResult):
+    if not stored.reason:
         sent = iter(stored.result)
-        return [replace(e, result=next(sent)) if isinstance(e, JobResult) else e for e in ends]
+        return [end if end.reason else end._replace(result=next(sent)) for end in ends]
     if len(ends) == 1:
         return [stored]
     return [end for one in ends for end in store_results(store, [one])]

@@ -18,17 +18,17 @@ from bad_jobs import LEAST, POISON, named, sleep, work
 from compressor.store import StoreError
 from compressor.sweep import pool
 from compressor.sweep.pool import WorkersFailed, run_batches
-from compressor.sweep.worker import MAX_TEXT, JobLost, JobResult, Workers
+from compressor.sweep.worker import MAX_TEXT, Workers
 
 RULES = {"memory": LEAST, "grace": 0.3}
 
 
 def results(ends):
-    return {end.id: end.result for end in ends if isinstance(end, JobResult)}
+    return {end.id: end.result for end in ends if not end.reason}
 
 
 def lost(ends):
-    return {end.id: end for end in ends if isinstance(end, JobLost)}
+    return {end.id: end for end in ends if end.reason}
 
 
 def is_running(pid):
@@ -167,7 +167,7 @@ def test_a_worker_s_time_stands_still_with_ours():
     time.sleep(2.5)
     os.killpg(running.pid, signal.SIGCONT)
     said, _ = running.communicate(timeout=60)
-    assert said.count("JobResult") == 2
+    assert said.count("End(") == 2
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ from compressor.studies.frame import (
     run_rows,
     stored_rows,
 )
-from compressor.sweep import JobLost
+from compressor.sweep import End
 
 FOLDER = "follow"
 SCHEMA = 3  # of a row's numbers: a change of what they mean makes chains again
@@ -215,7 +215,7 @@ def follow(
     return Followed(sum(chain.size for chain in chains), before, data, path)
 
 
-def rows_to_show(chain: Chain, folder: Folder, end: JobLost | None) -> list[Row]:
+def rows_to_show(chain: Chain, folder: Folder, end: End | None) -> list[Row]:
     """Return the rows of a chain, at least one; end: how it was lost, at the value after them."""
     rows = stored_rows(chain, folder)
     blank = motion.empty_row(chain.cases[0], chain.points) | {"status": "missing"}

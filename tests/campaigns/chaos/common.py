@@ -26,7 +26,7 @@ from compressor.store.files import StoreError
 from compressor.store.status import verify
 from compressor.store.stored import read_store
 from compressor.store.studies import read_studies
-from compressor.sweep.worker import JobResult
+from compressor.sweep.worker import End
 
 SWEEP = sys.modules["compressor.sweep.sweep"]  # the function of its name hides it
 FORK = multiprocessing.get_context("fork")
@@ -230,6 +230,6 @@ def run_here(size=2, stored=len):
         while batch := [*itertools.islice(left, size)]:
             ends = store([work(job[1]) for job in batch])
             stored([job[0] for job in batch])
-            yield from (JobResult(job[0], end, 0.01) for job, end in zip(batch, ends, strict=True))
+            yield from (End(job[0], end, 0.01) for job, end in zip(batch, ends, strict=True))
 
     SWEEP.run_batches = run_batches
