@@ -36,7 +36,7 @@ from compressor.store import (
     read_store,
     write_dataset,
 )
-from compressor.sweep import End, Needs, Options, in_this_process, run_here, sweep
+from compressor.sweep import End, Options, in_this_process, needed_parts, run_here, sweep
 from compressor.vibration import Record, check_record, resample_angle, turns_at
 
 RANGE = re.compile(r"\s*([\w.]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*(?::\s*(\d+)\s*)?")
@@ -343,8 +343,8 @@ def run_rows(
 
     look()
     jobs = [(one.key, one, one.seconds) for one in missing]
-    needs = Needs.of(case for one in missing for case in one.cases)
-    running = run_here(partial(make_rows, folder=place, rerun=rerun), jobs, needs, workers, look)
+    parts = needed_parts(case for one in missing for case in one.cases)
+    running = run_here(partial(make_rows, folder=place, rerun=rerun), jobs, parts, workers, look)
     with contextlib.closing(running), calling_often(look):
         lost = {end.id: end for end in running if end.reason}
     look()

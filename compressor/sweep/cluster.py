@@ -22,7 +22,7 @@ from compressor.store import encode_batch, publish_batch
 from compressor.sweep.pool import Batches, Job
 from compressor.sweep.sweep import Backend, run_job
 from compressor.sweep.wanted import JobEnd, RequestedJobs
-from compressor.sweep.warm_up import Needs, load
+from compressor.sweep.warm_up import Part, load, needed_parts
 from compressor.sweep.worker import End, attempt, store_results
 
 CONNECT_SECONDS = 8.0  # s until a scheduler that does not answer counts as not there
@@ -53,7 +53,7 @@ load_once = functools.cache(load)  # in each process of the cluster, so that no 
 
 
 def run_cases(
-    ours: dict[str, str], needs: Needs, cases: bytes
+    ours: dict[str, str], parts: tuple[Part, ...], cases: bytes
 ) -> tuple[str, list[End], list[bytes]]:
     """Return how pickled cases ended, and their batches, on a worker of the cluster.
 
@@ -68,7 +68,7 @@ def run_cases(
         batches.append(encode_batch(outcomes))
         return [JobEnd.of(outcome) for outcome in outcomes]
 
-    load_once(needs)
+    load_once(parts)
     return "", store_results(keep, [attempt(run_job, one) for one in pickle.loads(cases)]), batches
 
 
@@ -110,7 +110,7 @@ def run_on_cluster(
     lost_scheduler = ClusterError(
         f"{address}: the scheduler was lost; the same command goes on with another"
     )
-    needs, batches = Needs.of(jobs.cases()), Batches(jobs, TARGET_SECONDS, 1)
+    parts, batches = needed_parts(jobs.cases()), Batches(jobs, TARGET_SECONDS, 1)
     out: dict[Any, list[Job]] = {}  # batches on their way, by dask's future
     suspects: list[Job] = []  # of batches that have felled their workers
     ready = as_completed(loop=client.loop)
@@ -125,7 +125,7 @@ def run_on_cluster(
                 if not batch:
                     break
                 cases = pickle.dumps([job.payload for job in batch])
-                future = client.submit(run_cases, versions(), needs, cases, pure=False)
+                future = client.submit(run_cases, versions(), parts, cases, pure=False)
                 out[future] = batch
                 ready.add(future)
             if not out:

@@ -15,7 +15,7 @@ from compressor.store import Folder, encode_batch, read_store
 from compressor.sweep.pool import cores
 from compressor.sweep.sweep import run_job
 from compressor.sweep.wanted import RequestedJobs
-from compressor.sweep.warm_up import Needs, compile_once, compile_seconds
+from compressor.sweep.warm_up import compile_once, compile_seconds, needed_parts
 from compressor.sweep.worker import attempt
 
 ROW_BYTES = 700  # of one job in a merged batch without time series
@@ -76,21 +76,21 @@ class Ahead:
         if not self.counts.missing:
             return self.counts
         looked_at = {study: self.draw_cases(keys) for study, keys in self.missing.items()}
-        needs = Needs.of(case for cases in looked_at.values() for case in cases)
-        compiling = compile_seconds(needs, min(workers, cores()))
-        compile_once(needs, remark, workers)
-        parts = [
-            self.estimate(part, looked_at[part.study]) if part.missing else part
-            for part in self.counts.studies
+        parts = needed_parts(case for cases in looked_at.values() for case in cases)
+        compiling = compile_seconds(parts, min(workers, cores()))
+        compile_once(parts, remark, workers)
+        shares = [
+            self.estimate(one, looked_at[one.study]) if one.missing else one
+            for one in self.counts.studies
         ]
         working = min(workers, self.counts.missing)
         return replace(
             self.counts,
-            studies=tuple(parts),
+            studies=tuple(shares),
             workers=working,
-            seconds=sum(part.seconds for part in parts) / min(working, cores()),
+            seconds=sum(one.seconds for one in shares) / min(working, cores()),
             compiling=compiling,
-            bytes=sum(part.bytes for part in parts),
+            bytes=sum(one.bytes for one in shares),
         )
 
     def draw_cases(self, keys: Sequence[str]) -> list[Case]:

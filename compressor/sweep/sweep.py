@@ -17,7 +17,7 @@ from compressor.program import Progress, ignore_warnings, no_progress
 from compressor.store import Folder, merge_batches, read_store, write_batch, write_study
 from compressor.sweep.pool import Input, Workers, cores, require_posix, run_batches
 from compressor.sweep.wanted import JobEnd, RequestedJobs
-from compressor.sweep.warm_up import Needs, compile_once, load
+from compressor.sweep.warm_up import Part, compile_once, load, needed_parts
 from compressor.sweep.worker import End, Store, attempt, store_results
 
 GRACE = 5.0  # s beyond its time in which a job may end by itself, before its worker is killed
@@ -179,7 +179,7 @@ def run_locally(
 ) -> Generator[End, None, None]:
     """Run jobs in the worker processes of this machine: a Backend, but for its first argument."""
     store = partial(store_outcomes, folder)
-    return run_here(run_job, jobs, Needs.of(jobs.cases()), workers, remark, store)
+    return run_here(run_job, jobs, needed_parts(jobs.cases()), workers, remark, store)
 
 
 def in_this_process(
@@ -190,7 +190,7 @@ def in_this_process(
     Starting workers takes longer than they do. A job that ends its process ends the sweep; one that
     raises an exception is lost, as in a worker.
     """
-    compile_once(Needs.of(jobs.cases()), remark, cores())
+    compile_once(needed_parts(jobs.cases()), remark, cores())
     ran = [attempt(run_job, case) for case in jobs.cases()]
     ends = store_results(partial(store_outcomes, folder), ran)
     yield from (end._replace(id=key) for key, end in zip(jobs.places, ends, strict=True))
@@ -199,7 +199,7 @@ def in_this_process(
 def run_here(
     work: Callable[[Any], Any],
     jobs: RequestedJobs | Sequence[Input],
-    needs: Needs,
+    parts: tuple[Part, ...],
     workers: int,
     remark: Callable[[str], None],
     store: Store | None = None,
@@ -211,8 +211,8 @@ def run_here(
     """
     require_posix()
     if jobs:
-        compile_once(needs, remark, workers)
-    return run_batches(work, jobs, Workers(workers, partial(load, needs), grace=GRACE), store)
+        compile_once(parts, remark, workers)
+    return run_batches(work, jobs, Workers(workers, partial(load, parts), grace=GRACE), store)
 
 
 def count_ends(

@@ -13,7 +13,7 @@ import os
 import signal
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from compressor.cases import Case
 from compressor.program import COMPILED, library_versions, machine_code_folder
@@ -26,7 +26,7 @@ COMPILING = (
     "each version of the program, and a stop loses nothing"
 )
 # of compiling by two processes, on an idle cloud machine of 2026; by one half as much again
-SECONDS = {"auto": 17, "laws": 20, "features": 34}
+SECONDS = {"plain": 17, "laws": 20, "features": 34}
 NO_JIT = os.environ.get("NUMBA_DISABLE_JIT", "0").strip() not in ("", "0")
 LIBRARIES = ("numba", "llvmlite", "numpy")  # machine code is theirs
 # what a case has that needs a part: the default forces alone; others; a mechanism with any feature
@@ -35,35 +35,29 @@ KINDS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
-class Needs(NamedTuple):
-    """The parts of the equations that some cases need: methods of integration, and `KINDS`."""
-
-    methods: tuple[str, ...] = ()
-    kinds: tuple[str, ...] = ()
-
-    @classmethod
-    def of(cls, cases: Iterable[Case]) -> "Needs":
-        methods, kinds = {"auto"}, set()
-        for case in cases:  # which may be made one by one
-            methods.add(case.solve.method)
-            others = "laws" if case.chooses_forces else "plain"
-            kinds.add("features" if case.needs_mechanism else others)
-        return cls(tuple(sorted(methods)), tuple(sorted(kinds)))
-
-    @property
-    def uncompiled(self) -> "dict[str, Needs]":
-        """Return the needed parts that this machine has not compiled before, as needs of theirs.
-
-        None where compiling is switched off.
-        """
-        if NO_JIT or os.environ.get("COMPSIM_JIT") == "0":
-            return {}
-        found = {m: Needs((m,), ("plain",)) for m in self.methods if "plain" in self.kinds}
-        found |= {kind: Needs(self.methods, (kind,)) for kind in self.kinds if kind != "plain"}
-        return {part: alone for part, alone in found.items() if not marker(part).exists()}
+Part = tuple[str, str]  # of the equations: one of `KINDS`, and a method of integration
 
 
-def load(needs: Needs, beside: bool = False) -> None:
+def needed_parts(cases: Iterable[Case]) -> tuple[Part, ...]:
+    """Return the parts of the equations that some cases need."""
+    found: set[Part] = set()
+    for case in cases:  # which may be made one by one
+        others = "laws" if case.chooses_forces else "plain"
+        kind = "features" if case.needs_mechanism else others
+        found |= {(kind, "auto"), (kind, case.solve.method)}
+    return tuple(sorted(found))
+
+
+def uncompiled(parts: Iterable[Part]) -> list[Part]:
+    """Return those of some parts that this machine has not compiled before.
+
+    None where compiling is switched off.
+    """
+    is_off = NO_JIT or os.environ.get("COMPSIM_JIT") == "0"
+    return [part for part in parts if not (is_off or marker(part).exists())]
+
+
+def load(parts: Iterable[Part], beside: bool = False) -> None:
     """Load the equations, or compile them, by runs that are as short as can be.
 
     beside: a copy of this process compiles a part of them meanwhile.
@@ -76,8 +70,7 @@ def load(needs: Needs, beside: bool = False) -> None:
             {"joint": "both", "clearance_mm": 0.1, "solve": {**solve, "method": method}}
             | KINDS[kind]
         )
-        for kind in needs.kinds
-        for method in needs.methods
+        for kind, method in parts
     ]
     with parts_beside(cases[-1]) if beside else contextlib.nullcontext():
         for case in cases:
@@ -113,21 +106,21 @@ def compile_quietly(case: Case) -> None:
         compile_parts(case)
 
 
-def compile_seconds(needs: Needs, processes: int) -> int:
-    """Return seconds of compiling that are ahead of a run with these needs, about."""
-    seconds = sum(SECONDS.get(part, 1) for part in needs.uncompiled)
+def compile_seconds(parts: Iterable[Part], processes: int) -> int:
+    """Return seconds of compiling that are ahead of a run that needs these parts, about."""
+    seconds = sum(SECONDS[kind] if method == "auto" else 1 for kind, method in uncompiled(parts))
     return seconds if processes > 1 else round(1.5 * seconds)
 
 
-def marker(part: str) -> Path:
+def marker(part: Part) -> Path:
     """Return the file that says that a part of the equations has been compiled on this machine."""
     # numba keeps machine code by the path of its sources: a copied folder brings none of use
     what = f"{library_versions(*LIBRARIES)} {COMPILED}"
     known = hashlib.sha256(what.encode()).hexdigest()[:8]
-    return machine_code_folder() / f"compiled-{known}-{part}"
+    return machine_code_folder() / f"compiled-{known}-{'-'.join(part)}"
 
 
-def compile_once(needs: Needs, remark: Callable[[str], None], processes: int = 1) -> None:
+def compile_once(parts: Iterable[Part], remark: Callable[[str], None], processes: int = 1) -> None:
     """Compile here what this machine has not compiled before, so that workers need but load it.
 
     Part by part: those that are finished when the program is stopped are not compiled again.
@@ -135,12 +128,12 @@ def compile_once(needs: Needs, remark: Callable[[str], None], processes: int = 1
     """
     if NO_JIT:
         remark("NUMBA_DISABLE_JIT is set: nothing is compiled, and runs take tens of times as long")
-    ahead, processes = needs.uncompiled, min(processes, cores())
+    ahead, processes = uncompiled(parts), min(processes, cores())
     if ahead:
-        remark(COMPILING.format(seconds=compile_seconds(needs, processes)))
+        remark(COMPILING.format(seconds=compile_seconds(ahead, processes)))
     try:
-        for part, alone in ahead.items():
-            load(alone, processes > 1)
+        for part in ahead:
+            load((part,), processes > 1)
             marker(part).parent.mkdir(parents=True, exist_ok=True)
             marker(part).touch()
     except OSError as error:

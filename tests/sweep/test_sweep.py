@@ -205,11 +205,12 @@ def test_only_what_cases_need_is_compiled(tmp_path, monkeypatch):
     """A machine with oil in its joints needs no equations of dry ones."""
     monkeypatch.setattr(warm_up, "machine_code_folder", lambda: tmp_path / "code")
     oiled = {"joint": "both", "clearance_mm": 0.1, "lubricant": True}
-    for values, parts in (
-        ({"joint": "both", "clearance_mm": 0.1}, {"auto"}), (oiled, {"laws"}),
-        (oiled | {"guide": True}, {"features"}),
+    for values, kind in (
+        ({"joint": "both", "clearance_mm": 0.1}, "plain"), (oiled, "laws"),
+        (oiled | {"guide": True}, "features"),
     ):  # fmt: skip
-        assert {*warm_up.Needs.of([Case.from_values(values)]).uncompiled} == parts
+        parts = warm_up.needed_parts([Case.from_values(values)])
+        assert warm_up.uncompiled(parts) == [(kind, "auto")]
 
 
 def test_what_asks_the_program_to_end_is_no_failure_of_a_job():

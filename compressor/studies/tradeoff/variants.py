@@ -38,7 +38,7 @@ from compressor.metrics import BARRED, JOINTS, METRICS
 from compressor.program import PROGRAM, Progress, no_progress, report_progress
 from compressor.solve import simulate, stiffness_of
 from compressor.store import Folder, read_store
-from compressor.sweep import Needs, compile_once
+from compressor.sweep import compile_once, needed_parts
 
 ITSELF = "the case itself"
 MAX_SECONDS = 30.0  # of a variant
@@ -436,8 +436,8 @@ def run_variants(
     """
     every = [Variant(ITSELF, case), *others]
     # each variant has little time, which compiling its equations would use up
-    needs = Needs.of([one.case for one in every if one.case])
-    compile_once(needs, lambda remark: progress(0, len(every), remark))
+    parts = needed_parts([one.case for one in every if one.case])
+    compile_once(parts, lambda remark: progress(0, len(every), remark))
     runs: list[xr.Dataset] = []
     names = [name + end for name in COMPARED for end in ("", "_error")]
     for one in report_progress(every, progress):
