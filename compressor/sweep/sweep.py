@@ -136,7 +136,11 @@ def run_missing(
         progress(len(ends), total, text)
 
     tell()
-    running = (options.backend or partial(run_locally, workers))(folder, jobs, tell)
+    if options.backend:
+        running = options.backend(folder, jobs, tell)
+    else:
+        parts, store = needed_parts(jobs.cases()), partial(store_outcomes, folder)
+        running = run_here(run_job, jobs, parts, workers, tell, store)
     try:
         for end in running:
             if end.reason:
@@ -154,8 +158,7 @@ def store_lost(folder: Path, case: Case, end: End) -> JobEnd:
     """Store that a job has no result; return how it ended."""
     more = {"traceback": end.traceback} if end.traceback else {}
     outcome = without_run(case.attributes(), end.reason, end.detail, **more)
-    write_batch(folder, [outcome])
-    return JobEnd.of(outcome)
+    return store_outcomes(folder, [outcome])[0]
 
 
 def run_job(case: Case) -> Outcome:
@@ -172,14 +175,6 @@ def store_outcomes(folder: Path, outcomes: Sequence[Outcome]) -> list[JobEnd]:
     """Store the outcomes of a batch of jobs; return how each ended. Raises StoreError."""
     write_batch(folder, outcomes)
     return [JobEnd.of(outcome) for outcome in outcomes]
-
-
-def run_locally(
-    workers: int, folder: Path, jobs: RequestedJobs, remark: Callable[[str], None]
-) -> Generator[End, None, None]:
-    """Run jobs in the worker processes of this machine: a Backend, but for its first argument."""
-    store = partial(store_outcomes, folder)
-    return run_here(run_job, jobs, needed_parts(jobs.cases()), workers, remark, store)
 
 
 def in_this_process(
