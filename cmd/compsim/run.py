@@ -2,6 +2,7 @@
 
 import os
 import shlex
+from collections import Counter
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
@@ -79,10 +80,11 @@ def run(command, configs, folder, jobs, rerun, shard, scheduler, quiet, **how) -
 def report_run(summary: "Summary", folder: str, quiet: bool) -> None:
     """Report what a run did, what failed and what to do next."""
     lines, failures = [], []
-    for one in summary.counts:
-        ends = f"{one.jobs - one.failed} ok", f"{one.failed} failed"
-        where = os.path.join(folder, "studies", f"{one.study}.json")
-        lines.append((one.study, plural(one.jobs), *ends, where))
+    failed = Counter(lost.study for lost in summary.failed)
+    for name, jobs in summary.counts.items():
+        ends = f"{jobs - failed[name]} ok", f"{failed[name]} failed"
+        where = os.path.join(folder, "studies", f"{name}.json")
+        lines.append((name, plural(jobs), *ends, where))
     for lost in summary.failed:
         place = lost.study + screen.point_text(lost.coordinates)
         failures.append((place, lost.reason, f"{lost.detail}; job {lost.key}"))

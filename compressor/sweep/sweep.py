@@ -59,22 +59,12 @@ class JobFailure:
 
 
 @dataclass(frozen=True)
-class JobCount:
-    """How many of a study's selected jobs ended well."""
-
-    study: str
-    jobs: int
-    failed: int
-
-
-@dataclass(frozen=True)
 class Summary:
-    """What a sweep did; `total`, `done_before` and `run_now` count a shared job once."""
+    """What a sweep did; `done_before` and `run_now` count a shared job once."""
 
-    total: int
     done_before: int
     run_now: int
-    counts: tuple[JobCount, ...]
+    counts: dict[str, int]  # selected jobs by study
     failed: tuple[JobFailure, ...]
     seconds: float
 
@@ -110,10 +100,9 @@ def sweep(
         run_missing(folder, missing, ends, workers, progress, options)
     if missing or stored.damaged:
         merge_batches(folder)
-    counts, failed = count_ends(studies, ends)
-    seconds = time.monotonic() - began
-    before = len(wanted) - len(missing)
-    return Summary(len(wanted), before, len(missing), counts, failed, seconds)
+    counts = {study.name: len(study.selected) for study in studies}
+    failures, seconds = list_failures(studies, ends), time.monotonic() - began
+    return Summary(len(wanted) - len(missing), len(missing), counts, failures, seconds)
 
 
 def run_missing(
@@ -210,18 +199,14 @@ def run_here(
     return run_batches(work, jobs, Workers(workers, partial(load, parts), grace=GRACE), store)
 
 
-def count_ends(
-    studies: Sequence[Study], ends: dict[str, JobEnd]
-) -> tuple[tuple[JobCount, ...], tuple[JobFailure, ...]]:
-    """Return how the selected jobs of each study ended, and every one that failed."""
-    counts, failures = [], []
+def list_failures(studies: Sequence[Study], ends: dict[str, JobEnd]) -> tuple[JobFailure, ...]:
+    """Return every selected job of studies that failed."""
+    failures: list[JobFailure] = []
     for study in studies:
         selected = {*study.selected}
-        failed = [
+        failures += [
             JobFailure(study.name, point, key, ends[key].reason, ends[key].detail)
-            for number, point in enumerate(points(study))
-            if number in selected and ends[key := study.keys[number]].status != "ok"
+            for number, (key, point) in enumerate(zip(study.keys, points(study), strict=True))
+            if number in selected and ends[key].status != "ok"
         ]
-        counts.append(JobCount(study.name, len(selected), len(failed)))
-        failures += failed
-    return tuple(counts), tuple(failures)
+    return tuple(failures)
