@@ -26,8 +26,7 @@ from joblib import Parallel, cpu_count, delayed
 
 from compressor.program import THREAD_VARIABLES, CompsimError
 from compressor.reasons import Reason
-from compressor.store import StoreError
-from compressor.sweep.worker import ENDING, End, Store, Workers
+from compressor.sweep.worker import ENDING, End, Store, Workers, WorkersFailed
 
 Input = tuple[Hashable, Any, float]  # id, payload, wall time that the job may take (s)
 
@@ -43,10 +42,6 @@ START = (  # a worker's program, which has our path and not our main module
     "pipe = Connection(int(sys.argv[1])); sys.path[:] = pipe.recv(); "
     "from compressor.sweep.worker import serve; serve(pipe)"
 )
-
-
-class WorkersFailed(CompsimError):
-    """Worker processes cannot be started, or die before they begin a job."""
 
 
 class UnsupportedSystem(CompsimError):
@@ -168,10 +163,8 @@ class Pool:
         if isinstance(answer, Death):
             self.workers.discard(worker)
             return [] if self.stopped else self.lose(batch, answer)
-        if isinstance(answer, StoreError):
+        if isinstance(answer, CompsimError):
             raise answer
-        if isinstance(answer, str):
-            raise WorkersFailed(f"jobs could not even begin: {answer}")
         self.idle.append(worker)
         self.fruitless = 0
         if rest := batch[len(answer) :]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
+from compressor.program import CompsimError
 from compressor.reasons import Reason
 from compressor.store import StoreError
 
@@ -24,6 +25,10 @@ if hasattr(signal, "SIGHUP"):  # not on Windows
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 Store = Callable[[list[Any]], list[Any]]  # of results; returns what is sent home for each
+
+
+class WorkersFailed(CompsimError):
+    """Worker processes cannot be started, or die before they begin a job."""
 
 
 class End(NamedTuple):
@@ -61,8 +66,8 @@ def serve(pipe: Connection) -> None:
     """Run the batches that come through a pipe, until it is closed.
 
     The place of each job goes home before it runs, and the number of all when they have run. An
-    answer is a list of ends, without the rest that is given back; StoreError; or a text of what
-    keeps this process from any job.
+    answer is a list of ends, without the rest that is given back; StoreError; or WorkersFailed,
+    with what keeps this process from any job.
     """
     settle()
     try:
@@ -75,7 +80,7 @@ def serve(pipe: Connection) -> None:
         gc.enable()
         limit(rules.memory)
     except BaseException as error:
-        pipe.send(describe_error(error)[0])
+        pipe.send(WorkersFailed(f"jobs could not even begin: {describe_error(error)[0]}"))
         return
     with contextlib.suppress(EOFError):
         while True:
