@@ -32,26 +32,26 @@ def plan(configs, folder, jobs, as_json, **how) -> int:
     compsim plan wear.yaml --only 'clearance_mm < 0.2'
 
     Jobs that are stored already are not run again. Times one job of each study, and takes the
-    others to cost as much for every revolution; stores nothing.
+    others to cost as much; stores nothing.
     """
-    from compressor.sweep import cores, forecast
+    from compressor.sweep import add_times, cores, forecast
 
     studies = read_cases(configs, **how)
     machines = screen.caution(studies, None)
     screen.say_machines(machines)
-    found, workers = forecast(studies, folder, FIRST), jobs or cores()
+    (found, missing), workers = forecast(studies, folder, FIRST), jobs or cores()
     if as_json:
         plain = {study: dataclasses.asdict(machine) for study, machine in machines.items()}
-        times = dataclasses.asdict(found.with_times(workers, screen.say))
+        times = dataclasses.asdict(add_times(found, missing, workers, screen.say))
         screen.print_json(times | {"machines": plain})
         return screen.DONE
     rows = []
-    for one in found.counts.studies:
+    for one in found.studies:
         rows.append((one.study, plural(one.jobs), f"{one.done} done", f"{one.missing} missing"))
     screen.print_text(*align_columns(rows, "<>>>"))
-    if found.counts.missing:
-        screen.print_text(cost(found.with_times(workers, screen.say)))
-    for job in found.counts.first:
+    if missing:
+        screen.print_text(cost(add_times(found, missing, workers, screen.say)))
+    for job in found.first:
         screen.print_text(f"missing: {job.study}{screen.point_text(job.coordinates)}")
     return screen.DONE
 

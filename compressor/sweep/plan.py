@@ -1,7 +1,7 @@
 """What a sweep will do, before it does it: its jobs, those done, and what the others will cost.
 
 Counts come first, at once. Then one missing job of each study is run and timed; the others are
-taken to cost as much for every revolution, which is no more than a guess where jobs differ.
+taken to cost as much, which is no more than a guess where jobs differ.
 """
 
 import random
@@ -19,7 +19,7 @@ from compressor.sweep.warm_up import compile_once, compile_seconds, needed_parts
 from compressor.sweep.worker import attempt
 
 ROW_BYTES = 700  # of one job in a merged batch without time series
-MAX_CASES = 1_000  # of the missing jobs of a study that are looked at, drawn evenly
+MAX_CASES = 1_000  # missing jobs that are looked at for what is to be compiled, drawn evenly
 LONG_JOB = 10.0  # s of a job that is not run twice for what loading was in it
 
 
@@ -63,76 +63,66 @@ class Forecast:
     bytes: int = 0
 
 
-@dataclass(frozen=True)
-class Ahead:
-    """What is ahead of some studies: `counts` is a Forecast without times and bytes."""
+def forecast(
+    studies: Sequence[Study], folder: Folder, first: int
+) -> tuple[Forecast, RequestedJobs]:
+    """Return what `sweep` would do with the selected jobs of some studies, and what is missing.
 
-    counts: Forecast
-    missing: dict[str, list[str]]  # keys, by study
-    cases: RequestedJobs
-
-    def with_times(self, workers: int, remark: Callable[[str], None]) -> Forecast:
-        """Return the whole forecast, for so many processes; `remark` is called about compiling."""
-        if not self.counts.missing:
-            return self.counts
-        looked_at = {study: self.draw_cases(keys) for study, keys in self.missing.items()}
-        parts = needed_parts(case for cases in looked_at.values() for case in cases)
-        compiling = compile_seconds(parts, min(workers, cores()))
-        compile_once(parts, remark, workers)
-        shares = [
-            self.estimate(one, looked_at[one.study]) if one.missing else one
-            for one in self.counts.studies
-        ]
-        working = min(workers, self.counts.missing)
-        return replace(
-            self.counts,
-            studies=tuple(shares),
-            workers=working,
-            seconds=sum(one.seconds for one in shares) / min(working, cores()),
-            compiling=compiling,
-            bytes=sum(one.bytes for one in shares),
-        )
-
-    def draw_cases(self, keys: Sequence[str]) -> list[Case]:
-        """Return the cases of missing jobs, of some drawn at random where they are many."""
-        few = keys if len(keys) <= MAX_CASES else random.Random(0).sample(keys, MAX_CASES)
-        return [self.cases[key] for key in few]
-
-    def estimate(self, part: StudyShare, cases: Sequence[Case]) -> StudyShare:
-        """Return a study's part with what its missing jobs will take, by one of them."""
-        seconds, size = time_job(timed := cases[len(cases) // 2])
-        share = part.missing / len(cases)
-        turns = share * sum(map(revolutions, cases))
-        samples = share * sum(case.steps + 1 for case in cases if case.output.keep == "series")
-        series = max(0, size - ROW_BYTES) * samples / (timed.steps + 1)
-        taken = round(ROW_BYTES * part.missing + series)
-        return replace(part, seconds=turns * seconds / revolutions(timed), bytes=taken)
-
-
-def forecast(studies: Sequence[Study], folder: Folder, first: int) -> Ahead:
-    """Return what `sweep` would do with the selected jobs of some studies, `first` of them by name.
-
-    Nothing is stored. Raises StoreError where the folder cannot be read.
+    The forecast has no times and bytes (`add_times`), and `first` missing jobs by name. Nothing is
+    stored. Raises StoreError where the folder cannot be read.
     """
     stored, wanted = read_store(folder), RequestedJobs(studies)
     done = wanted.among(stored.keys()).stored_ends(stored).keys()
-    missing: dict[str, list[str]] = {}
+    missing = wanted.among(wanted.places.keys() - done)
     ahead: list[Next] = []
-    parts: list[StudyShare] = []
+    shares: list[StudyShare] = []
     for study in studies:
-        mine = [key for key, (owner, _) in wanted.places.items() if owner is study]
-        new = missing[study.name] = [key for key in mine if key not in done]
-        parts.append(StudyShare(study.name, len(mine), len(mine) - len(new), len(new)))
+        jobs = len(jobs_of(study.name, wanted))
+        new = jobs_of(study.name, missing)
+        shares.append(StudyShare(study.name, jobs, jobs - len(new), len(new)))
         if named := {*new[: first - len(ahead)]}:
             found = zip(study.keys, points(study), strict=True)
             ahead += [Next(study.name, point, key) for key, point in found if key in named]
-    counts = len(wanted), len(done), len(wanted) - len(done)
-    return Ahead(Forecast(*counts, tuple(parts), tuple(ahead)), missing, wanted)
+    counts = len(wanted), len(done), len(missing)
+    return Forecast(*counts, tuple(shares), tuple(ahead)), missing
 
 
-def revolutions(case: Case) -> float:
-    """Return how many revolutions a run of a case is, at most."""
-    return case.duration / case.turn
+def jobs_of(name: str, jobs: RequestedJobs) -> list[str]:
+    """Return the keys of jobs that count for the study of a name."""
+    return [key for key, (study, _) in jobs.places.items() if study.name == name]
+
+
+def add_times(
+    counts: Forecast, missing: RequestedJobs, workers: int, remark: Callable[[str], None]
+) -> Forecast:
+    """Return a forecast with the time and bytes of missing jobs, run by so many processes.
+
+    Each is taken to cost as much as the middle one of its study. remark: called about compiling.
+    """
+    if not missing:
+        return counts
+    keys = {share.study: jobs_of(share.study, missing) for share in counts.studies}
+    timed = {study: missing[mine[len(mine) // 2]] for study, mine in keys.items() if mine}
+    some = random.Random(0).sample([*missing.places], min(MAX_CASES, len(missing)))
+    parts = needed_parts([*timed.values(), *(missing[key] for key in some)])
+    compiling = compile_seconds(parts, min(workers, cores()))
+    compile_once(parts, remark, workers)
+    shares = []
+    for share in counts.studies:
+        if case := timed.get(share.study):
+            seconds, size = time_job(case)
+            size = size if case.output.keep == "series" else ROW_BYTES
+            share = replace(share, seconds=share.missing * seconds, bytes=share.missing * size)
+        shares.append(share)
+    working = min(workers, counts.missing)
+    return replace(
+        counts,
+        studies=tuple(shares),
+        workers=working,
+        seconds=sum(share.seconds for share in shares) / min(working, cores()),
+        compiling=compiling,
+        bytes=sum(share.bytes for share in shares),
+    )
 
 
 def time_job(case: Case) -> tuple[float, int]:

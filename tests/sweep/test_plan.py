@@ -7,7 +7,7 @@ from conftest import write_cases
 
 from compressor.cases.load import load_studies
 from compressor.sweep import plan
-from compressor.sweep.plan import forecast
+from compressor.sweep.plan import add_times, forecast
 from compressor.sweep.sweep import sweep
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
@@ -29,26 +29,24 @@ def studies(tmp_path, monkeypatch, in_process):
 
 
 def counts(found):
-    return [(part.study, part.jobs, part.done, part.missing) for part in found.counts.studies]
+    return [(part.study, part.jobs, part.done, part.missing) for part in found[0].studies]
 
 
 def test_counts_follow_from_the_store_and_shared_jobs_count_once(studies):
     both = studies(one=NINE, two={"machine": {"rod_mass_kg": [3, 4, 7]}})
     assert counts(forecast(both, "results", 0)) == [("one", 9, 0, 9), ("two", 1, 0, 1)]
     sweep(studies("machine.rod_mass_kg < 3.6", one=NINE), "results", 1)
-    found = forecast(both, "results", 3)
-    assert counts(found) == [("one", 9, 3, 6), ("two", 1, 0, 1)]
-    assert (found.counts.jobs, found.counts.done, found.counts.missing) == (10, 3, 7)
-    assert [one.coordinates["machine.rod_mass_kg"] for one in found.counts.first] == [
-        3.75, 4.0, 4.25
-    ]  # fmt: skip
-    assert len(forecast(both, "results", 50).counts.first) == 7
+    found, missing = forecast(both, "results", 3)
+    assert counts((found, missing)) == [("one", 9, 3, 6), ("two", 1, 0, 1)]
+    assert (found.jobs, found.done, found.missing, len(missing)) == (10, 3, 7, 7)
+    assert [one.coordinates["machine.rod_mass_kg"] for one in found.first] == [3.75, 4.0, 4.25]
+    assert len(forecast(both, "results", 50)[0].first) == 7
 
     series = studies(one={**NINE, "output": {"keep": "series"}})  # which stored jobs do not serve
     assert counts(forecast(series, "results", 0)) == [("one", 9, 0, 9)]
     selected = forecast(studies("machine.rod_mass_kg > 4", one=NINE), "results", 1)
     assert counts(selected) == [("one", 4, 0, 4)]
-    assert selected.counts.first[0].coordinates == {"machine.rod_mass_kg": 4.25}
+    assert selected[0].first[0].coordinates == {"machine.rod_mass_kg": 4.25}
 
 
 def timed_as(monkeypatch, seconds, size=0):
@@ -65,27 +63,30 @@ def timed_as(monkeypatch, seconds, size=0):
     return made
 
 
+def timed(studies, workers, remark=str):
+    """What is ahead of studies in an empty folder, with its time."""
+    return add_times(*forecast(studies, "results", 0), workers, remark)
+
+
 def test_one_job_of_each_study_tells_the_time_of_all(studies, monkeypatch):
-    made = timed_as(monkeypatch, lambda case: case.machine.rod_mass_kg)
-    slow = {**NINE, "solve": {"duration_rev": 0.5}}
-    found = forecast(studies(one=NINE, two=slow), "results", 0).with_times(2, str)
+    made = timed_as(monkeypatch, lambda case: case.machine.rod_mass_kg, 1000)
+    series = {**NINE, "output": {"keep": "series"}, "solve": {"duration_rev": 0.5}}
+    found = timed(studies(one=NINE, two=series), 2)
     assert [case.machine.rod_mass_kg for case in made] == [4, 4]  # the middle one
     assert [part.seconds for part in found.studies] == pytest.approx([9 * 4, 9 * 4])
     assert found.seconds == pytest.approx(18 * 4 / 2)
-    assert found.bytes == 18 * plan.ROW_BYTES
-    assert forecast(studies(one=NINE), "results", 0).with_times(300, str).seconds == 9.0  # 4 cores
-    monkeypatch.setattr(plan, "MAX_CASES", 3)  # of the missing jobs that are looked at
-    some = forecast(studies(one=NINE), "results", 0).with_times(1, str)
-    assert some.missing == 9
-    assert some.seconds == pytest.approx(9 * made[-1].machine.rod_mass_kg)
+    assert [part.bytes for part in found.studies] == [9 * plan.ROW_BYTES, 9 * 1000]
+    assert timed(studies(one=NINE), 300).seconds == 9.0  # 4 cores
 
 
-def test_time_follows_revolutions_and_bytes_samples(studies, monkeypatch):
-    timed_as(monkeypatch, lambda case: 3.0 * plan.revolutions(case), plan.ROW_BYTES + 1000)
-    axes = {"solve": {"duration_rev": [0.25, 0.5, 1.0]}, "output": {"keep": "series"}}
-    found = forecast(studies(one=axes), "results", 0).with_times(1, str)
-    assert found.seconds == pytest.approx(3.0 * 1.75)
-    assert found.bytes == pytest.approx(3 * plan.ROW_BYTES + 1000 * 3.5, rel=0.01)
+def test_all_is_compiled_that_a_timed_job_needs(studies, monkeypatch):
+    """Else its time would be that of compiling; of many jobs only some are looked at."""
+    timed_as(monkeypatch, lambda case: 1.0)
+    monkeypatch.setattr(plan, "MAX_CASES", 1)
+    compiled = []
+    monkeypatch.setattr(plan, "compile_once", lambda parts, *_: compiled.append(parts))
+    timed(studies(one=NINE, two={"joint": "both", "clearance_mm": 0.1, "lubricant": True}), 1)
+    assert compiled == [(("laws", "auto"), ("plain", "auto"))]
 
 
 def test_a_job_that_is_timed_is_a_job_of_the_sweep(studies, monkeypatch):
@@ -102,5 +103,5 @@ def test_a_job_that_is_timed_is_a_job_of_the_sweep(studies, monkeypatch):
 def test_nothing_ahead_costs_nothing(studies):
     made = studies(one=NINE)
     sweep(made, "results", 1)
-    found = forecast(made, "results", 5).with_times(2, pytest.fail)
+    found = add_times(*forecast(made, "results", 5), 2, pytest.fail)
     assert (found.missing, found.seconds, found.bytes, found.first) == (0, 0, 0, ())
