@@ -15,7 +15,7 @@ import numpy as np
 from compressor.metrics import AXES, JOINTS, NUMBERS, QUANTILES, SEGMENTS, SIZES, THRESHOLDS
 from compressor.program import PROGRAM
 
-# a job's numbers as one structured scalar: what workers send home and segments hold
+# a job's numbers as one structured scalar
 ROW = np.dtype(
     [(name, "f8", tuple(SIZES[dim] for dim in row.dims)) for name, row in NUMBERS.items()]
 )
@@ -23,12 +23,12 @@ ABSCISSAE = ("time", "crank_angle")  # stay double: their steps are what matters
 NOTHING = np.full(1, math.nan, ROW).tobytes()
 
 
-def row(data: bytes = NOTHING) -> np.void:
-    """Return a job's numbers, to be written: from their bytes, or nan.
+def row() -> np.void:
+    """Return a job's numbers, nan, to be written.
 
     To copy so many named numbers takes twenty times as long.
     """
-    return np.frombuffer(bytearray(data), ROW)[0]
+    return np.frombuffer(bytearray(NOTHING), ROW)[0]
 
 
 class Regime(StrEnum):
@@ -70,11 +70,6 @@ class Outcome:
     attributes: dict[str, Any]
     series: "dict[str, Variable]" = field(default_factory=dict)
     compress: bool = False
-
-    def __reduce__(self) -> Any:
-        """Return the pickled form without the names of all numbers, whose sending costs most."""
-        rest = self.attributes, self.series, self.compress
-        return _rebuild_outcome, (self.status, self.reason, self.numbers.tobytes(), *rest)
 
     @property
     def key(self) -> str:
@@ -132,10 +127,6 @@ JOB_WORDS = {
     "promise": "kept: the accuracy target was reached; none: there is no target",
     "regime": "; ".join(map(regime_words, Regime)),
 }
-
-
-def _rebuild_outcome(status: str, reason: str, numbers: bytes, *rest: Any) -> Outcome:
-    return Outcome(status, reason, row(numbers), *rest)
 
 
 def without_run(attributes: Mapping[str, Any], reason: str, detail: str, **more: Any) -> Outcome:
