@@ -211,9 +211,7 @@ def find_repetition(
     return None
 
 
-def repeats(
-    case: Case, samples: np.ndarray, errors: Metrics
-) -> tuple[int, float] | tuple[None, float]:
+def repeats(case: Case, samples: np.ndarray, errors: Metrics) -> tuple[int | None, float]:
     """Return the period of a motion (rev), and the revolution from which on it repeats itself.
 
     Revolutions are the same if no series is farther apart than both its errors. None and nan

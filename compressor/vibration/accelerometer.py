@@ -85,7 +85,8 @@ def listen(
         force = getattr(forces, sensor.place)[:, AXES.index(sensor.direction)]
         casing = casing_motion(body, force, step, steady)
         foot = acceleration + casing.acceleration
-    mounted = oscillate(foot, step, *mode_of(sensor), steady)
+    mode = sensor.mounting_Hz, sensor.mounting_damping_ratio
+    mounted = oscillate(foot, step, *mode, steady)
     times = pace = np.array([0.0, length])
     jitters = bool(steady and sensor.speed_jitter)
     if jitters:
@@ -96,7 +97,7 @@ def listen(
             start = state_at(casing, step, pace[0])
             force = interpolate_periodic(force, step, pace)
             foot += casing_motion(body, force, step, start=start).acceleration
-        mounted = oscillate(foot, step, *mode_of(sensor), start=state_at(mounted, step, pace[0]))
+        mounted = oscillate(foot, step, *mode, start=state_at(mounted, step, pace[0]))
     signal = mounted.displacement * (2.0 * np.pi * sensor.mounting_Hz) ** 2
     taken = np.arange(int(length * sensor.rate_Hz * (1 + 1e-12))) / sensor.rate_Hz
     if steady and not jitters:
@@ -157,11 +158,6 @@ def paces(sensor: Sensor, rng: np.random.Generator, times: np.ndarray, turn: flo
     deviations = rng.normal(0.0, sensor.speed_jitter, knots.size)
     course = CubicSpline(knots * turn, deviations).antiderivative()
     return times + course(times) - course(0.0)
-
-
-def mode_of(sensor: Sensor) -> tuple[float, float]:
-    """Return frequency (Hz) and damping ratio of a sensor on its mounting."""
-    return sensor.mounting_Hz, sensor.mounting_damping_ratio
 
 
 def noisy(values: np.ndarray, rms: float, seed: Sequence[int]) -> np.ndarray:
