@@ -114,11 +114,7 @@ def encode_batch(outcomes: Sequence[Outcome]) -> bytes:
         "samples": (("job",), [len(one) for one in times], {}),
         "end_time": (("job",), [one[-1] if len(one) else 0.0 for one in times], {"units": "s"}),
         "metric": (("metric",), np.array(labels, "U"), {}),
-        "unit": (
-            ("metric",),
-            np.array([NUMBERS[name_of(label)].unit for label in labels], "U"),
-            {},
-        ),
+        "unit": (("metric",), np.array([NUMBERS[name_of(one)].unit for one in labels], "U"), {}),
         "value": (("job", "metric"), numbers[:, [VALUES[label] for label in labels]], {}),
         "error": (
             ("job", "metric"),

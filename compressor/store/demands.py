@@ -10,13 +10,8 @@ from dataclasses import dataclass, replace
 from compressor.cases import Case
 from compressor.reasons import Reason
 
-WORTH = {
-    "bars": 1,
-    "horizon": 1,
-    "signals": 1,
-    "series": 4,
-    "double": 4,
-}  # of several rows of a job
+# of what is kept, where there are several rows of a job
+WORTH = {"bars": 1, "horizon": 1, "signals": 1, "series": 4, "double": 4}
 OF_THE_END = {"bars", "horizon"}  # what a failed job cannot have
 FINAL = {  # reasons of jobs that would fail again
     Reason.INTERNAL_ERROR,

@@ -1,11 +1,8 @@
 """The store: a folder of finished jobs and of the studies they belong to.
 
-    <folder>/batches/<name>.h5      some jobs each, with their time series where kept: `batch`
-    <folder>/studies/<name>.json    one study: axes, keys of its jobs in C order: `studies`
-
-Every file appears under its name only when all of it is on disk. There is no index: what is stored
-is read from the batches. A run may merge batches with others at any time: then jobs are looked for
-again.
+README.md lists its files. Each appears under its name only when all of it is on disk. There is no
+index: what is stored is read from the batches. A run may merge batches with others at any time:
+then jobs are looked for again.
 """
 
 import contextlib

@@ -136,10 +136,8 @@ def write_study(
     path = Path(folder) / "studies" / f"{study.name}.json"
     with contextlib.suppress(StoreError, FileNotFoundError):  # one that is damaged is replaced
         old = read_study(path)
-        made = {
-            name: getattr(old, name) for name in ("command", "overrides", "versions", "written")
-        }
-        if replace(new, **made) == old:
+        when = ("command", "overrides", "versions", "written")
+        if replace(new, **{name: getattr(old, name) for name in when}) == old:
             return
     publish(path, encode(new))
 
