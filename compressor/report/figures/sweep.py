@@ -149,7 +149,7 @@ def draw_sampled(
     which = f"the {kind} that matters most for each" if found else f"a {kind}"
     phrase, _, _ = grouping(sweep)
     colors = f", a colour for each {phrase}" * bool(phrase)
-    count = sweep.place.size
+    count = sweep.status.size
     drawn = [("jobs drawn", f"{MAX_POINTS:,} of {count:,}")] * (count > MAX_POINTS)
     yield DrawnFigure(
         draw_points(sweep, strongest, shown),
@@ -184,7 +184,7 @@ def split_measures(
     sweep: PlottedSweep, known: Sequence[Measure]
 ) -> tuple[list[Measure], list[Measure]]:
     """Return the measures that differ between jobs, or that some lack, and the others."""
-    values, is_ok = [sweep.values(measure) for measure in known], sweep.status == "ok"
+    values, is_ok = [measure.of(sweep.data) for measure in known], sweep.status == "ok"
     varied = [bool(np.isnan(v[is_ok]).any() or np.ptp(v[np.isfinite(v)])) for v in values]
     both = [*zip(known, varied, strict=True)]
     return [m for m, varies in both if varies], [m for m, varies in both if not varies]
@@ -192,7 +192,7 @@ def split_measures(
 
 def count_jobs(sweep: PlottedSweep) -> Iterator[Number]:
     """Yield how many jobs there are, and how many of these failed, were not run, are chaotic."""
-    yield "jobs", f"{sweep.place.size:,}"
+    yield "jobs", f"{sweep.status.size:,}"
     failed, missing = (sweep.status == word for word in ("failed", "missing"))
     for name, here in (("failed", failed), ("not run", missing), ("chaotic", sweep.chaotic)):
         if here.any():
@@ -201,7 +201,7 @@ def count_jobs(sweep: PlottedSweep) -> Iterator[Number]:
 
 def number_of_all(sweep: PlottedSweep, measure: Measure) -> Number:
     """Return the number of a measure that is the same at every job."""
-    value = f"{shown_value(np.nanmax(sweep.values(measure)))} {measure.unit}".rstrip()
+    value = f"{shown_value(np.nanmax(measure.of(sweep.data)))} {measure.unit}".rstrip()
     return f"{measure.title}, at every job", value
 
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import xarray as xr
 from compressor.analysis import SPOKEN
 from compressor.digits import ROUNDING
 from compressor.metrics import AXES, BARRED, JOINTS
+from compressor.report.figures.drawing import thin_places
 from compressor.report.figures.style import RED, mark
 from compressor.units import Units, unit_in
 
@@ -189,93 +189,71 @@ class PlottedAxis:
 
 @dataclass(frozen=True)
 class PlottedSweep:
-    """The jobs of a study over its axes.
-
-    place: the number of each point's job in the order of the study's `status`; of the axes'
-    lengths in a grid, else (jobs,).
-    """
+    """The jobs of a study over its axes; data: with the dimensions of a grid's axes, else `job`."""
 
     data: xr.Dataset
     axes: tuple[PlottedAxis, ...]
-    place: np.ndarray
-    is_grid: bool
 
-    def at_points(self, values: np.ndarray) -> np.ndarray:
-        """Return values of the study's jobs at the points."""
-        return values.ravel()[self.place]
+    @property
+    def is_grid(self) -> bool:
+        """Return whether its jobs fill a grid."""
+        return self.data["status"].dims != ("job",)
 
-    def values(self, measure: Measure) -> np.ndarray:
-        """Return a measure at the points, in its unit."""
-        return self.at_points(measure.of(self.data))
+    @property
+    def status(self) -> np.ndarray:
+        """Return the status of each job."""
+        return self.data["status"].values
 
-    def bars(self, measure: Measure) -> np.ndarray:
-        """Return the error bars of a measure at the points; nan where there is none."""
-        return self.at_points(measure.bar(self.data))
+    @property
+    def keys(self) -> np.ndarray:
+        """Return the key of each job."""
+        return self.data["key"].values
+
+    @property
+    def chaotic(self) -> np.ndarray:
+        """Return whether each job is chaotic."""
+        return self.data["regime"].values == "chaotic"
 
     def known(self, measure: Measure) -> np.ndarray:
-        """Return a measure at the points, nan where it is not known within its error bar.
+        """Return a measure of the jobs, nan where it is not known within its error bar.
 
         A chaotic motion's greatest value is not.
         """
-        values, bars = self.values(measure), self.bars(measure)
+        values, bars = measure.of(self.data), measure.bar(self.data)
         good = np.isnan(bars) | np.isfinite(bars)
-        if BARRED[measure.variable].bar.relative:
+        if measure.is_relative:
             good &= ~(bars >= abs(values)) | (bars == 0.0)
         return np.where(good, values, math.nan)
 
-    @cached_property
-    def status(self) -> np.ndarray:
-        """Return the status of each point's job."""
-        return self.at_points(self.data["status"].values)
-
-    @cached_property
-    def chaotic(self) -> np.ndarray:
-        """Return whether each point's job is chaotic."""
-        if "regime" not in self.data:
-            return np.zeros(self.place.shape, bool)
-        return self.at_points(self.data["regime"].values) == "chaotic"
-
-    @cached_property
-    def keys(self) -> np.ndarray:
-        """Return the key of each point's job."""
-        return self.at_points(self.data["key"].values)
+    def at(self, axis: int, number: int) -> "PlottedSweep":
+        """Return the part of a grid at one value of an axis."""
+        rest = self.axes[:axis] + self.axes[axis + 1 :]
+        return PlottedSweep(self.data.isel({self.axes[axis].name: number}), rest)
 
 
 def sweep_of(data: xr.Dataset) -> PlottedSweep:
     """Return the sweep of a study, as `open_study` gives it; numbers of a grid are sorted."""
-    status = data["status"]
-    names = swept_axes(data)
-    if status.dims == ("job",):
-        axes = [axis_of(data, name, data[name].values) for name in names]
-        return PlottedSweep(data, tuple(axes), np.arange(status.size), False)
-    place = np.arange(status.size).reshape(status.shape)
-    found = []
-    for name in names:
-        values = data[name].values
-        order = np.arange(values.size) if values.dtype.kind not in "fiu" else np.argsort(values)
-        place = np.take(place, order, axis=status.dims.index(name))
-        found.append(axis_of(data, name, values[order]))
-    return PlottedSweep(
-        data, tuple(found), place.reshape([axis.values.size for axis in found]), True
-    )
+    names, dims = swept_axes(data), data["status"].dims
+    if dims != ("job",):
+        data = data.isel({dim: 0 for dim in dims if dim not in names})
+        data = data.sortby([name for name in names if data[name].dtype.kind in "fiu"])
+    return PlottedSweep(data, tuple(axis_of(data, name) for name in names))
 
 
 def coarse(sweep: PlottedSweep, axis: int, most: int) -> PlottedSweep:
     """Return a grid with at most so many values of an axis, evenly chosen, the ends among them."""
-    size = sweep.axes[axis].values.size
-    if size <= most:
+    one = sweep.axes[axis]
+    chosen = thin_places(one.values.size, most)
+    if chosen.size == one.values.size:
         return sweep
-    chosen = np.unique(np.linspace(0, size - 1, most).astype(int))
-    axes = [
-        replace(one, values=one.values[chosen]) if n == axis else one
-        for n, one in enumerate(sweep.axes)
-    ]
-    return PlottedSweep(sweep.data, tuple(axes), np.take(sweep.place, chosen, axis), True)
+    thin = replace(one, values=one.values[chosen])
+    axes = (*sweep.axes[:axis], thin, *sweep.axes[axis + 1 :])
+    return PlottedSweep(sweep.data.isel({one.name: chosen}), axes)
 
 
-def axis_of(data: xr.Dataset, name: str, values: np.ndarray) -> PlottedAxis:
+def axis_of(data: xr.Dataset, name: str) -> PlottedAxis:
     """Return an axis of a study with its phrase and unit."""
-    attrs = data[name].attrs
+    values, attrs = data[name].values, data[name].attrs
     unit, key = str(attrs.get("units", "")), str(attrs.get("case_key", name))
     phrase = str(attrs.get("long_name", key))
     if phrase in (key, name) or len(phrase) > LONG_PHRASE or values.dtype.kind not in "fiu":

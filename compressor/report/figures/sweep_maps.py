@@ -11,14 +11,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 
 from compressor.analysis import Effects, grid_effects, sampled_effects
 from compressor.report.figures.contours import contour_lines
-from compressor.report.figures.drawing import (
-    Panel,
-    Way,
-    make_grid,
-    midway,
-    outline_cells,
-    thin_places,
-)
+from compressor.report.figures.drawing import Panel, Way, make_grid, midway, outline_cells
 from compressor.report.figures.style import BLUE, GOLD, GREY, LineStyle, fill, palette
 from compressor.report.figures.sweep_data import (
     MARKS,
@@ -26,6 +19,7 @@ from compressor.report.figures.sweep_data import (
     Measure,
     PlottedAxis,
     PlottedSweep,
+    coarse,
     spans_decades,
 )
 from compressor.report.figures.sweep_panels import (
@@ -58,11 +52,16 @@ def orient_axes(sweep: PlottedSweep) -> tuple[int, int]:
 
 
 class Cells(NamedTuple):
-    """The jobs of a map: its axes in x and y, the places of the cells' middles, and their keys."""
+    """The jobs of a map: its axes in x and y, and the cells' keys."""
 
     axes: tuple[PlottedAxis, PlottedAxis]
-    centres: tuple[np.ndarray, np.ndarray]
     keys: np.ndarray
+
+    @property
+    def centres(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the places of the cells' middles along x and y."""
+        x, y = self.axes
+        return x.places, y.places
 
 
 def draw_maps(
@@ -73,16 +72,16 @@ def draw_maps(
     At most MAX_CELLS along an axis. Over two axes of numbers, limits of a measure are lines.
     """
     in_x, in_y = orient_axes(sweep)
+    sweep = coarse(coarse(sweep, 0, MAX_CELLS), 1, MAX_CELLS)
     x, y = sweep.axes[in_x], sweep.axes[in_y]
-    chosen = [thin_places(axis.values.size, MAX_CELLS) for axis in (y, x)]
 
     def table(values: np.ndarray) -> np.ndarray:
-        return values.transpose(in_y, in_x)[np.ix_(*chosen)]
+        return values.transpose(in_y, in_x)
 
     status, chaotic = table(sweep.status), table(sweep.chaotic)
-    cells = Cells((x, y), (x.places[chosen[1]], y.places[chosen[0]]), table(sweep.keys))
+    cells = Cells((x, y), table(sweep.keys))
     drawing = metric_panels(measures, 2.6, "all", "all")
-    tables = [table(sweep.values(measure)) for measure in measures]
+    tables = [table(measure.of(sweep.data)) for measure in measures]
     for panel, measure, values in zip(drawing.panels, measures, tables, strict=True):
         panel.label("y", "")  # the colours have the unit
         plot_map(panel, cells, values, measure)

@@ -1,16 +1,18 @@
 """Sweeps drawn as lines or points: a panel a metric."""
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
+import xarray as xr
 
 from compressor.report.figures.drawing import Drawing, Panel, make_grid, thin_places
 from compressor.report.figures.style import BLUE, CYCLE, RED, LineStyle, mark, palette
 from compressor.report.figures.sweep_data import (
+    FOOT,
     MARKS,
     NAMES,
     Measure,
@@ -28,7 +30,6 @@ MAX_KEYS = 2000  # jobs of a study that clicks show
 PANEL_MARGIN = 0.18  # of a panel's height, below and above its values
 VISIBLE = 0.004  # of a panel's height: an error bar that is seen
 MARKERS = ("circle", "square", "diamond", "triangle-up", "triangle-down")
-FEET = {"failed": 0.03, "missing": 0.08}  # of a panel's height
 CHAOTIC = "chaotic: a greatest value holds for this run only"
 LIMIT = LineStyle(RED, (4, 1.5), 1.4, 2.4)  # of a metric
 RING = mark("#d633a8", "circle", 4.5, 5, is_hollow=True, edge_width=0.8)
@@ -59,18 +60,19 @@ def job_keys(keys: np.ndarray) -> tuple[str, ...]:
 
 
 def plot_jobs(
-    panel: Panel, points: tuple[np.ndarray, np.ndarray, np.ndarray], keys: np.ndarray, name: str,
-    line: LineStyle, span: float, listed: bool = True,
+    panel: Panel, sweep: PlottedSweep, measure: Measure, name: str, line: LineStyle, span: float,
+    listed: bool = True,
 ) -> None:  # fmt: skip
-    """Draw a line through jobs (x, y, bars), with error bars where any is seen beside the span.
+    """Draw a line through the jobs of one axis, and rings around those that are chaotic.
 
-    listed: in the legend.
+    span: of the panel, beside which error bars are drawn that are seen; listed: in the legend.
     """
-    x, y, bars = points
-    finite = np.where(np.isfinite(bars), bars, 0.0)
-    ends = np.where(np.isfinite(y), finite, np.nan)
-    errors = np.stack([ends, ends]) if (finite > VISIBLE * span).any() else None
+    x, y, keys, wild = sweep.axes[0].places, measure.of(sweep.data), sweep.keys, sweep.chaotic
+    bars = np.nan_to_num(measure.bar(sweep.data), posinf=0.0)
+    ends = np.where(np.isfinite(y), bars, np.nan)
+    errors = np.stack([ends, ends]) if (bars > VISIBLE * span).any() else None
     panel.plot(x, y, line, name, errors, job_keys(keys), listed)
+    mark_points(panel, x[wild], y[wild], keys[wild], ring_around(line.markersize), CHAOTIC)
 
 
 def mark_points(
@@ -86,14 +88,15 @@ def mark_feet(panel: Panel, x: np.ndarray, status: np.ndarray, keys: np.ndarray)
     low, high = panel.y.range
     for word, look in MARKS.items():
         here = status == word
-        foot = low + FEET[word] * (high - low)
+        foot = low + FOOT[word] * (high - low)
         foot = (10.0**foot if panel.y.type == "log" else foot) / panel.factors["y"]
         feet = np.full(here.sum(), foot)
         mark_points(panel, x[here], feet, keys[here], look, NAMES[word])
 
 
 def scale_x(panel: Panel, axis: PlottedAxis) -> None:
-    """Set words at ticks, and a log scale where numbers span decades."""
+    """Name an axis; set words at its ticks, and a log scale where numbers span decades."""
+    panel.x.title = axis.title
     if axis.is_words:
         panel.name_ticks("x", in_lines(axis.words))
         panel.span("x", -0.3, len(axis.words) - 0.7)
@@ -128,17 +131,22 @@ def scale_y(panel: Panel, values: np.ndarray) -> float:
     return float(high - low + 2.0 * room)
 
 
-def lines_for(axis: PlottedAxis, chosen: Iterable[int]) -> list[LineStyle]:
-    """Return a line for each of an axis' values, from dark to light where they are numbers.
+def lines_for(axis: PlottedAxis, is_points: bool) -> dict[int, LineStyle]:
+    """Return lines by the numbers of an axis' values, from dark to light where these are numbers.
 
-    chosen: the numbers of the values. Colours are those of viridis, which the colour-blind tell
-    apart by lightness.
+    At most MAX_LINES; is_points: marks alone. Colours are those of viridis, which the colour-blind
+    tell apart by lightness.
     """
-    numbers = list(chosen)
-    if len(numbers) <= len(CYCLE) and (axis.is_words or len(numbers) == 1):
-        return list(CYCLE[: len(numbers)])
-    shares = np.linspace(0.0, 0.88, len(numbers))
-    return [LineStyle(palette("viridis", 256)[int(256 * share)], (), 1.5) for share in shares]
+    chosen = thin_places(axis.values.size, MAX_LINES).tolist()
+    lines = list(CYCLE[: len(chosen)])
+    if len(chosen) > len(CYCLE) or (not axis.is_words and len(chosen) > 1):
+        shares = np.linspace(0.0, 0.88, len(chosen))
+        lines = [LineStyle(palette("viridis", 256)[int(256 * share)], (), 1.5) for share in shares]
+    return {
+        n: replace(line, marker=MARKERS[n % len(MARKERS)] if axis.is_words else "circle",
+                   markersize=3.4, linewidth=0.0 if is_points else line.linewidth)
+        for n, line in zip(chosen, lines, strict=True)
+    }  # fmt: skip
 
 
 PLAIN_LINE = LineStyle(BLUE, (), 1.4, marker="circle", markersize=3.8)
@@ -154,18 +162,13 @@ def draw_curves(
     """
     sweep = coarse(sweep, 0, MAX_JOBS)
     (axis,) = sweep.axes
-    x, status, chaotic, keys = axis.places, sweep.status, sweep.chaotic, sweep.keys
     drawing = metric_panels(measures, 2.35, "all")
     line = replace(PLAIN_LINE, linewidth=0.0) if axis.is_words else PLAIN_LINE
     for panel, measure in zip(drawing.panels, measures, strict=True):
-        values, bars = sweep.values(measure), sweep.bars(measure)
-        panel.x.title = axis.title
         scale_x(panel, axis)
-        span = scale_y(panel, values)
-        plot_jobs(panel, (x, values, bars), keys, measure.title, line, span, listed=False)
-        ring = ring_around(line.markersize)
-        mark_points(panel, x[chaotic], values[chaotic], keys[chaotic], ring, CHAOTIC)
-        mark_feet(panel, x, status, keys)
+        span = scale_y(panel, measure.of(sweep.data))
+        plot_jobs(panel, sweep, measure, measure.title, line, span, listed=False)
+        mark_feet(panel, axis.places, sweep.status, sweep.keys)
         for limit in limits.of(measure):
             panel.rule(LIMIT, y=limit)
     return drawing.figure()
@@ -179,22 +182,6 @@ class Roles(NamedTuple):
 
     x: int
     color: int
-
-
-@dataclass(frozen=True)
-class MeasuredPoints:
-    """A measure at points: of a sweep or, of a line, over x and what is averaged, (x, others)."""
-
-    values: np.ndarray
-    bars: np.ndarray
-    status: np.ndarray
-    chaotic: np.ndarray
-    keys: np.ndarray
-
-    @property
-    def is_jobs(self) -> bool:
-        """Return whether each point is one job."""
-        return self.values.shape[1] == 1
 
 
 def roles_of(sweep: PlottedSweep, order: Sequence[int]) -> Roles:
@@ -214,74 +201,27 @@ def draw_overview(sweep: PlottedSweep, role: Roles, measures: Sequence[Measure])
     What is not known within its error bar is no part of a mean.
     """
     sweep = coarse(sweep, role.x, MAX_PLACES)
+    axis, color = (sweep.axes[n] for n in role)
+    lines = lines_for(color, axis.is_words)
     drawing = metric_panels(measures, 2.35, "all")
+    parts = {n: sweep.at(role.color, n) for n in lines} if len(sweep.axes) == 2 else {}
     for panel, measure in zip(drawing.panels, measures, strict=True):
-        panel.x.title = sweep.axes[role.x].title
-        plot_parts(panel, sweep, role, whole_part(sweep, measure))
+        scale_x(panel, axis)
+        if not parts:
+            known = xr.DataArray(sweep.known(measure), dims=[one.name for one in sweep.axes])
+            others = [dim for dim in known.dims if dim not in (axis.name, color.name)]
+            means = known.isel({color.name: [*lines]}).mean(others)  # nan where nothing is known
+            scale_y(panel, means.values)
+            for row, (n, line) in enumerate(lines.items()):
+                values = means.isel({color.name: row}).values
+                panel.plot(axis.places, values, line, color.value_text(n))
+            continue
+        span = scale_y(panel, measure.of(sweep.data))
+        for n, part in parts.items():
+            plot_jobs(panel, part, measure, color.value_text(n), lines[n], span)
+        for part in parts.values():
+            mark_feet(panel, axis.places, part.status, part.keys)
     return drawing.figure()
-
-
-def whole_part(sweep: PlottedSweep, measure: Measure) -> MeasuredPoints:
-    """Return a measure over a sweep.
-
-    Where lines are means, what is known of it within its error bar.
-    """
-    values = sweep.known(measure) if len(sweep.axes) > 2 else sweep.values(measure)
-    return MeasuredPoints(values, sweep.bars(measure), sweep.status, sweep.chaotic, sweep.keys)
-
-
-def line_part(whole: MeasuredPoints, role: Roles, color: int) -> MeasuredPoints:
-    """Return what a line shows: the points over x at a colour's value, by its number."""
-
-    def part(values: np.ndarray) -> np.ndarray:
-        first = np.moveaxis(values, (role.x, role.color), (0, 1))
-        return first[:, color].reshape(values.shape[role.x], -1)
-
-    return MeasuredPoints(
-        part(whole.values), part(whole.bars), part(whole.status), part(whole.chaotic),
-        part(whole.keys),
-    )  # fmt: skip
-
-
-def plot_parts(panel: Panel, sweep: PlottedSweep, role: Roles, whole: MeasuredPoints) -> None:
-    """Draw a panel's lines and marks."""
-    axis, color = sweep.axes[role.x], sweep.axes[role.color]
-    x, chosen = axis.places, thin_places(color.values.size, MAX_LINES)
-    parts = [line_part(whole, role, int(n)) for n in chosen]
-    scale_x(panel, axis)
-    values = whole.values if parts[0].is_jobs else np.stack([mean_of(p.values) for p in parts])
-    span = scale_y(panel, values)
-    for n, part, line in zip(chosen, parts, lines_for(color, chosen), strict=True):
-        marker = MARKERS[int(n) % len(MARKERS)] if color.is_words else "circle"
-        style = replace(line, marker=marker, markersize=3.4)
-        style = replace(style, linewidth=0.0) if axis.is_words else style
-        plot_part(panel, x, part, color.value_text(int(n)), style, span)
-    if not parts[0].is_jobs:
-        return
-    places = np.repeat(x, len(parts))
-    status = np.concatenate([part.status for part in parts], axis=1).ravel()
-    keys = np.concatenate([part.keys for part in parts], axis=1).ravel()
-    mark_feet(panel, places, status, keys)
-
-
-def plot_part(
-    panel: Panel, x: np.ndarray, part: MeasuredPoints, name: str, style: LineStyle, span: float
-) -> None:  # fmt: skip
-    """Draw a line through jobs with their bars, or through means."""
-    if part.is_jobs:
-        values, ring, keys = part.values[:, 0], part.chaotic[:, 0], part.keys[:, 0]
-        plot_jobs(panel, (x, values, part.bars[:, 0]), keys, name, style, span)
-        look = ring_around(style.markersize)
-        mark_points(panel, x[ring], values[ring], keys[ring], look, CHAOTIC)
-        return
-    panel.plot(x, mean_of(part.values), style, name)
-
-
-def mean_of(values: np.ndarray) -> np.ndarray:
-    """Return the means over the last axis of what is known; nan where nothing is."""
-    known = np.isfinite(values)
-    count = known.sum(axis=-1)
-    return np.where(count, np.where(known, values, 0.0).sum(axis=-1) / np.maximum(count, 1), np.nan)
 
 
 MAX_POINTS = 2000  # in a panel
@@ -296,7 +236,6 @@ def draw_points(sweep: PlottedSweep, axes: Sequence[int], measures: Sequence[Mea
     drawing = metric_panels(measures, 2.35)
     for panel, axis, measure in zip(drawing.panels, axes, measures, strict=True):
         plot_points(panel, sweep, axis, measure)
-        panel.x.title = sweep.axes[axis].title
     return drawing.figure()
 
 
@@ -308,13 +247,13 @@ def grouping(sweep: PlottedSweep) -> tuple[str, list[Any], np.ndarray]:
     for axis in sweep.axes:
         if axis.is_words and len(axis.words) <= len(CYCLE):
             return axis.phrase, axis.words, axis.places.astype(int)
-    return "", [""], np.zeros(sweep.place.shape, int)
+    return "", [""], np.zeros(sweep.status.shape, int)
 
 
 def plot_points(panel: Panel, sweep: PlottedSweep, axis: int, measure: Measure) -> None:
     """Draw the jobs over one axis, in the colours of their groups."""
     one = sweep.axes[axis]
-    x, y, keys = one.places, sweep.values(measure), sweep.keys
+    x, y, keys = one.places, measure.of(sweep.data), sweep.keys
     scale_x(panel, one)
     scale_y(panel, y)
     phrase, words, group = grouping(sweep)
