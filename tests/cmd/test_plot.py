@@ -97,7 +97,7 @@ def test_a_job_is_drawn_with_its_numbers(plot, folder, unpainted):
     assert [*found] == names
     run = job(folder, "worn", 3)
     analyst, loads, signals, spectra, orbits, modes, impacts = found.values()
-    assert "gas without clearance: " in loads
+    assert "both combined, without clearance: " in loads
     force = frame_forces(run)
     last = slice(2 * 720, None)
     x = force["shaking_force"][last, 0] / 1e3
@@ -105,6 +105,7 @@ def test_a_job_is_drawn_with_its_numbers(plot, folder, unpainted):
     assert f"Greatest acceleration: {spell(peak(run, last))} m/s²" in analyst
     torque = force["crank_torque"][last]
     assert f"drives the crank: {spell(torque.min())} to {spell(torque.max())} N m" in signals
+    assert "drives the crank, without clearance: " in signals
     lines = np.fft.rfft(force["shaking_force"][720:2160, 0]) / 1440
     above = np.sqrt(2 * (np.abs(lines[25:]) ** 2).sum())
     told = float(re.search(r"above order 12: ([\d.]+) N; without clearance: 0 N", spectra)[1])

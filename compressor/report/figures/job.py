@@ -1,8 +1,7 @@
 """Figures of one job: signals, cards, spectra, orbits, modes, impacts."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -77,8 +76,6 @@ def film(run: xr.Dataset) -> str:
     return FILM if case_of(run).lubricant else ""
 
 
-Forces = dict[str, np.ndarray]
-
 THIS = LineStyle(BLUE, (), 1.1, 2.3)
 TWIN = LineStyle(GOLD, (), 2.2, 2.1)  # broader and lighter, below
 MARK = LineStyle(RED, (4, 1.5), 1.0, 2.2)
@@ -91,30 +88,6 @@ MAX_ENVELOPE = 60  # of an envelope
 ROUNDING = 1e-6  # m/s2, of an acceleration
 DECADES = 4  # below the greatest line
 ORDERS_AXIS = "order (cycles per revolution)"
-
-
-@dataclass(frozen=True)
-class Signal:
-    """A panel of the page of signals."""
-
-    title: str
-    axis: str  # its title, without the unit
-    unit: str
-    values: Callable[[xr.Dataset, Forces], np.ndarray]
-
-
-SIGNALS = (
-    Signal("acceleration of the crosshead", "a", "m/s²", lambda run, _: run["acceleration"].values),
-    Signal("force on the frame along the cylinder", "X", "kN",
-           lambda _, force: force["shaking_force"][:, 0] * KILONEWTON),
-    Signal("force on the frame across the cylinder", "Y", "kN",
-           lambda _, force: force["shaking_force"][:, 1] * KILONEWTON),
-    Signal("force of the crosshead on its guide, upwards", "F<sub>g</sub>", "kN",
-           lambda _, force: force["guide_force"] * KILONEWTON),
-    Signal("torque that drives the crank", "T", "N m", lambda _, force: force["crank_torque"]),
-    Signal("rod load at the crosshead pin, tension positive", "F<sub>r</sub>", "kN",
-           lambda _, force: force["rod_load"] * KILONEWTON),
-)  # fmt: skip
 
 
 @figure("job", "analyst", "a revolution as an analyst reads it")
@@ -193,77 +166,70 @@ def loudest(found: Cycle) -> tuple[float, float]:
     return float(np.abs(found.vibration[place])), float(found.angle[place])
 
 
-def plot_beside_twin(
-    panels: Sequence[Panel], run: xr.Dataset, twin: Twin,
-    read: Callable[[xr.Dataset], tuple[np.ndarray, Sequence[np.ndarray]]],
-) -> None:  # fmt: skip
-    """Draw curves of a run and of its twin over a revolution, one a panel.
+class Signal(NamedTuple):
+    """A panel over the crank angle: its title, its axis without the unit, the unit, the series."""
 
-    read: the angles of a run (degrees), and its curves.
-    """
-    for one, line, name in ((run, THIS, NAMES["this"]), (twin, TWIN, NAMES["twin"])):
-        if one is None:
-            continue
-        degrees, curves = read(one)
-        for panel, values in zip(panels, curves, strict=True):
-            panel.label("x", ANGLE_AXIS, "°")
-            panel.plot(degrees, values, line, name)
-        panels[0].span("x", degrees[0], degrees[-1])
-    panels[0].x.dtick = 90.0
+    title: str
+    axis: str
+    unit: str
+    name: str
 
 
+SIGNALS = (
+    Signal("acceleration of the crosshead", "a", "m/s²", "acceleration"),
+    Signal("force on the frame along the cylinder", "X", "kN", "along"),
+    Signal("force on the frame across the cylinder", "Y", "kN", "across"),
+    Signal("force of the crosshead on its guide, upwards", "F<sub>g</sub>", "kN", "guide_force"),
+    Signal("torque that drives the crank", "T", "N m", "crank_torque"),
+    Signal("rod load at the crosshead pin, tension positive", "F<sub>r</sub>", "kN", "rod_load"),
+)
 LOADS = (
-    ("load of gas or spring on the piston, tension positive", "F<sub>g</sub> ({})", "gas"),
-    ("inertia of what reciprocates", "F<sub>i</sub> ({})", "inertia"),
-    ("rod load at the crosshead pin: both combined", "F<sub>r</sub> ({})", "rod"),
+    Signal("load of gas or spring on the piston, tension positive", "F<sub>g</sub>", "kN", "gas"),
+    Signal("inertia of what reciprocates", "F<sub>i</sub>", "kN", "inertia"),
+    Signal("rod load at the crosshead pin: both combined", "F<sub>r</sub>", "kN", "rod"),
 )
 
 
-@figure("job", "loads", "gas load, inertia and rod load over crank angle")
-def draw_loads(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
-    """Return the gas load, inertia and rod load over a revolution, with the ideal machine's."""
-    drawing, panels = make_grid(3, 1, 7.2, units=units, share_x="all")
-    for panel, (title, axis, _) in zip(panels[:, 0], LOADS, strict=True):
-        panel.title = title
-        panel.label("y", axis, "kN")
-    for panel in panels[:, 0]:
-        panel.rule(ZERO, y=0.0)
-
-    def read(one: xr.Dataset) -> tuple[np.ndarray, list[np.ndarray]]:
-        degrees, loads = read_loads(one)
-        return degrees, [loads[key] * KILONEWTON for _, _, key in LOADS]
-
-    plot_beside_twin(drawing.panels, run, twin, read)
-    numbers = [
-        (f"{key}{where}", spell_span(load * KILONEWTON, "kN"))
-        for one, where in ((run, ""), (twin, " without clearance")) if one is not None
-        for key, load in read_loads(one)[1].items()
-    ]  # fmt: skip
-    sentence = "Loads of the last settled revolution over crank angle; tension is positive."
-    return DrawnFigure(drawing.figure(), sentence + caution(run), numbers)
+def read_signals(run: xr.Dataset) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return crank angles (degrees) of the last revolution, its acceleration and its forces, SI."""
+    degrees, revolution = last_revolution(run)
+    forces = frame_forces(revolution)
+    along, across = forces["shaking_force"].T
+    own = {"acceleration": revolution["acceleration"].values, "along": along, "across": across}
+    return degrees, forces | own
 
 
-@figure("job", "signals", "acceleration, forces and torque over crank angle")
-def draw_signals(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
-    """Return six panels of a run's last settled revolution, with the ideal machine's."""
-    drawing, panels = make_grid(3, 2, 8.6, units=units, share_x="all")
-    for panel, signal in zip(panels.flat, SIGNALS, strict=True):
+@figure("job", "signals", "acceleration, forces and torque over crank angle",
+        signals=SIGNALS, read=read_signals, height=8.6)  # fmt: skip
+@figure("job", "loads", "gas load, inertia and rod load over crank angle",
+        signals=LOADS, read=read_loads, height=7.2)  # fmt: skip
+def draw_signals(
+    run: xr.Dataset, twin: Twin, signals: Sequence[Signal],
+    read: Callable[[xr.Dataset], tuple[np.ndarray, Mapping[str, np.ndarray]]], height: float,
+    units: Units = "usual",
+) -> DrawnFigure:  # fmt: skip
+    """Return panels of a run's last settled revolution, with the ideal machine's.
+
+    read: returns the crank angles (degrees) of a run, and its series in SI by the signals' names.
+    """
+    drawing, panels = make_grid(3, len(signals) // 3, height, units=units, share_x="all")
+    for panel, signal in zip(panels.flat, signals, strict=True):
         panel.title = signal.title
+        panel.label("x", ANGLE_AXIS, "°")
         panel.label("y", f"{signal.axis} ({{}})", signal.unit)
-
-    def read(one: xr.Dataset) -> tuple[np.ndarray, list[np.ndarray]]:
-        degrees, revolution = last_revolution(one)
-        forces = frame_forces(revolution)
-        return degrees, [signal.values(revolution, forces) for signal in SIGNALS]
-
-    plot_beside_twin(drawing.panels, run, twin, read)
-    numbers = [
-        (signal.title, spell_span(values, signal.unit))
-        for signal, values in zip(SIGNALS, read(run)[1], strict=True)
-    ]
-    if twin is not None:
-        ideal = last_revolution(twin)[1]["acceleration"].values
-        numbers.insert(1, ("without clearance", spell_span(ideal, "m/s²")))
+        panel.rule(ZERO, y=0.0)
+    numbers = []
+    both = (run, THIS, "this", ""), (twin, TWIN, "twin", ", without clearance")
+    for one, line, name, where in both:
+        if one is None:
+            continue
+        degrees, series = read(one)
+        for panel, signal in zip(panels.flat, signals, strict=True):
+            values = series[signal.name] * (KILONEWTON if signal.unit == "kN" else 1.0)
+            panel.plot(degrees, values, line, NAMES[name])
+            numbers.append((f"{signal.title}{where}", spell_span(values, signal.unit)))
+        panels[0, 0].span("x", degrees[0], degrees[-1])
+    panels[0, 0].x.dtick = 90.0
     sentence = "The last settled revolution over crank angle, at stored samples."
     return DrawnFigure(drawing.figure(), sentence + caution(run), numbers)
 
@@ -510,25 +476,15 @@ def show_turn(panel: Panel, step: float = 45.0) -> None:
 
 def plot_strip(panel: Panel, shares: xr.Dataset, joint: str, words: Sequence[str]) -> None:
     """Draw the share of revolutions in each mode, stacked, over bins of the crank angle."""
-    share = shares["share"].sel(joint=joint)
-    heights = [share.sel(mode=mode).fillna(0.0).values for mode in MODE_COLORS]
-    stack_modes(panel, shares["angle"].values, 360.0 / shares.sizes["angle"], heights, words)
+    share, width = shares["share"].sel(joint=joint), 360.0 / shares.sizes["angle"]
+    foot = np.zeros(shares.sizes["angle"])
+    for word, (mode, color) in zip(words, MODE_COLORS.items(), strict=True):
+        height = share.sel(mode=mode).fillna(0.0).values
+        panel.bars(shares["angle"].values, foot + height, fill(color), word, width, foot,
+                   is_upright=True)  # fmt: skip
+        foot = foot + height
     panel.title = f"share of revolutions in each contact mode, {SPOKEN[joint]}"
-
-
-def stack_modes(
-    panel: Panel,
-    x: np.ndarray,
-    width: float | np.ndarray,
-    heights: Sequence[np.ndarray],
-    words: Sequence[str] = MODES,
-) -> None:
-    """Draw the shares of the contact modes one above the other, over the middles of bins."""
     panel.y.title, panel.y.tickvals = "share", (0, 1)
-    foot = np.zeros(x.size)
-    for word, color, height in zip(words, MODE_COLORS.values(), heights, strict=True):
-        panel.bars(x, foot + height, fill(color), word, width, foot, is_upright=True)
-        foot = foot + np.nan_to_num(height)
     panel.x.showgrid = panel.y.showgrid = False
     panel.span("y", 0, 1)
 
