@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.lib.stride_tricks import sliding_window_view
 
-from compressor.analysis import CLEARANCES, NoSeriesError, label, last_revolution, settled_part
+from compressor.analysis import CLEARANCES, label, last_revolution
 from compressor.report.figures.drawing import ROOM, Panel, rectangle
 from compressor.report.figures.style import BLACK, BY_CLEARANCE, BY_LOAD, IDEAL, LineStyle
 
@@ -51,39 +51,27 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Curve:
-    """One run in a figure: its name in the legend, its last revolution, and its line."""
+    """A run in a figure: its name in the legend, its last revolution, by degrees, and its line."""
 
     name: str
+    degrees: np.ndarray
     run: xr.Dataset
     line: LineStyle
 
 
-def degrees(run: xr.Dataset) -> np.ndarray:
-    """Return the crank angle (°) of a run's samples from the top dead centre before them."""
-    angle = np.degrees(run["crank_angle"].values)
-    return angle - 360.0 * np.floor(angle[0] / 360.0 + 1e-9)
-
-
 def fault_curves(runs: Runs, fault: str, ideal: bool) -> list[Curve]:
     """Return the curves of 0.1, 0.2 and 0.3 mm, and that of no clearance before them."""
-    curves = [Curve(f"{c:g} mm", turn(runs[label(fault, c)]), BY_CLEARANCE[c]) for c in CLEARANCES]
-    return [Curve("no clearance", turn(runs["design"]), IDEAL), *curves] if ideal else curves
+    curves = [Curve(f"{c:g} mm", *last_revolution(runs[label(fault, c)]), BY_CLEARANCE[c])
+              for c in CLEARANCES]  # fmt: skip
+    healthy = [Curve("no clearance", *last_revolution(runs["design"]), IDEAL)] if ideal else []
+    return healthy + curves
 
 
 def load_curves(runs: Runs) -> list[Curve]:
     """Return the curves of the typical and the design model, without clearance."""
-    return [Curve(name, turn(runs[load]), BY_LOAD[load]) for load, name in LOADS.items()]
-
-
-def turn(run: xr.Dataset) -> xr.Dataset:
-    """Return the last revolution of a run.
-
-    Of one that has none after settling, all that has settled.
-    """
-    try:
-        return last_revolution(run)[1]
-    except NoSeriesError:
-        return settled_part(run)
+    return [
+        Curve(name, *last_revolution(runs[load]), BY_LOAD[load]) for load, name in LOADS.items()
+    ]
 
 
 def plot(panel: Panel, curves: Sequence[Curve], quantity: Quantity, listed: bool = True) -> None:
@@ -91,10 +79,9 @@ def plot(panel: Panel, curves: Sequence[Curve], quantity: Quantity, listed: bool
     panel.label("x", "", "°")
     panel.label("y", f"{quantity.axis} ({{}})", quantity.unit)
     for curve in curves:
-        x, y = degrees(curve.run), quantity.values(curve.run)
-        panel.plot(x, y, curve.line, curve.name, listed=listed)
-    angle = degrees(curves[0].run)
-    panel.span("x", angle[0], angle[-1])
+        values = quantity.values(curve.run)
+        panel.plot(curve.degrees, values, curve.line, curve.name, listed=listed)
+    panel.span("x", curves[0].degrees[0], curves[0].degrees[-1])
     panel.x.dtick = TICK
     panel.title = quantity.title
 
@@ -129,7 +116,7 @@ def plot_enlarged(
     """Draw the same curves over a part of the span, which is marked in the full panels."""
     plot(enlarged, curves, quantity)
     enlarged.x.dtick = 10 if quantity.window > 30 else 5
-    angle = degrees(curves[0].run)[part]
+    angle = curves[0].degrees[part]
     values = np.array([quantity.values(curve.run)[part] for curve in curves])
     margin = 0.06 * np.ptp(values)
     low, high = values.min() - margin, values.max() + margin
@@ -149,7 +136,7 @@ def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, 
     quantity it is the one with the greatest mean distance over the height that it needs. Where all
     curves are one, it lies around the greatest value.
     """
-    angle = degrees(curves[0].run)
+    angle = curves[0].degrees
     values = np.array([quantity.values(curve.run) for curve in curves])
     low, high = values.min(axis=0), values.max(axis=0)
     count = min(angle.size, round(quantity.window / (angle[1] - angle[0])) + 1)

@@ -25,6 +25,7 @@ from compressor.analysis import (
 from compressor.report.figures.curves import (
     ANGLE_AXIS,
     KILONEWTON,
+    SAME_CURVE,
     Curve,
     Quantity,
     Runs,
@@ -53,7 +54,6 @@ from compressor.units import Units
 SERIES = ("displacement", "velocity", "acceleration")
 WORDS = "displacement, velocity and acceleration"
 AT = f"{', '.join(f'{c:g}' for c in CLEARANCES)} mm"
-SAME_CURVE = 1e-9  # of a curve's range: what cannot be seen, and is rounding
 
 
 def paper_figure(
@@ -214,7 +214,8 @@ def draw_contact_force(runs: Runs, fault: str, joint: str, units: Units = "usual
         6, 2, 11.5, widths=(2, 1), units=units, share_x="columns", tall=both
     )
     curves = fault_curves(runs, fault, ideal=False)
-    part, _ = differing_part(curves, contact_force(first_joint(fault), "x"))
+    chosen_by = faulty_joints(fault)[0]
+    part, _ = differing_part(curves, contact_force(chosen_by, "x"))
     for rows, axis, letter in zip(both, "xy", "ab", strict=True):
         quantity = contact_force(joint, axis)
         enlarged = panels[rows.start, 1]
@@ -227,8 +228,7 @@ def draw_contact_force(runs: Runs, fault: str, joint: str, units: Units = "usual
     sentence = (
         "Force on the rod: (a) along the cylinder, positive away from the crank, and (b) vertical, "
         "on a scale of its own. Left, the last revolution, a row a clearance; right, the part in "
-        f"the black rectangles, where the horizontal forces at the {SPOKEN[first_joint(fault)]} "
-        "differ most."
+        f"the black rectangles, where the horizontal forces at the {SPOKEN[chosen_by]} differ most."
     )
     numbers = []
     for axis, words in (("x", "along the cylinder"), ("y", "across it")):
@@ -237,11 +237,6 @@ def draw_contact_force(runs: Runs, fault: str, joint: str, units: Units = "usual
         values = spell(np.array(peaks) * KILONEWTON, "kN")
         numbers.append((f"greatest {words} at {AT}", values))
     return DrawnFigure(finish_figure(drawing, [panels[-1, 0], enlarged]), sentence, numbers)
-
-
-def first_joint(fault: str) -> str:
-    """Return the joint whose forces choose the enlarged view."""
-    return "small_end" if fault == "small_end" else "big_end"
 
 
 def contact_force(joint: str, axis: str) -> Quantity:
@@ -427,19 +422,11 @@ def draw_follower(panel: Panel, cam: Cam, angles: np.ndarray) -> None:
     where = math.degrees(fall)
     dots = LineStyle(RED, (1, 1.65), 1.5)
     panel.strokes(np.array([where]), left, np.array([height]), dots)
-    write_at(panel, f"printed: rises by {height:.1f} mm", (150, height), (0, 5), "left")
-    write_at(
-        panel, f"and falls by {left:.1f} mm:\nit does not close", (where, 165), (-6, 0), "right"
-    )
+    panel.write(f"printed: rises by {height:.1f} mm", 150, height, shift=(0, 5), size=9)
+    text = f"and falls by {left:.1f} mm:\nit does not close"
+    panel.write(text, where, 165, shift=(-6, 0), side="right", size=9)
     stroke = float(cam.follower(math.pi)) * 1e3
-    write_at(panel, f"{stroke:.0f} mm each way", (183, stroke), (0, 5), "left")
+    panel.write(f"{stroke:.0f} mm each way", 183, stroke, shift=(0, 5), size=9)
     panel.title, panel.x.dtick = "(b) follower displacement", 60.0
     panel.span("x", 0, 360)
     panel.span("y", -6, 1.12 * height)
-
-
-def write_at(
-    panel: Panel, text: str, point: tuple[float, float], shift: tuple[float, float], side: str
-) -> None:
-    """Draw a remark beside a point of a panel, shifted in points (1/72 inch)."""
-    panel.write(text, *point, shift=shift, side=side, size=9)
