@@ -95,6 +95,7 @@ def test_the_page_gets_what_was_drawn(drawing):
     assert figure.layout.hovermode == "closest"  # a map is no curve
     assert figure.layout.xaxis.unifiedhovertitle.text == "%{x:.6~g} °"
     assert "kN" in sine["hovertemplate"]
+    assert "layout" not in found["layout"]["template"]  # plotly's own has 7 kB
 
 
 def test_axes_read_in_the_unit_that_is_wanted():

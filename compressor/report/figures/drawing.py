@@ -44,21 +44,12 @@ class Panel:
 
     def __init__(self, figure: go.Figure, suffix: str, units: Units = "usual"):
         self.figure, self.suffix, self.units = figure, suffix, units
+        self.x, self.y = (figure.layout[f"{way}axis{suffix}"] for way in WAYS)
         self.factors, self.unit = dict.fromkeys(WAYS, 1.0), dict.fromkeys(WAYS, "")
 
     def axis(self, way: Way) -> Axis:
         """Return the axis `x` or `y`, of plotly."""
-        return self.figure.layout[f"{way}axis{self.suffix}"]
-
-    @property
-    def x(self) -> Axis:
-        """Return plotly's x axis."""
-        return self.axis("x")
-
-    @property
-    def y(self) -> Axis:
-        """Return plotly's y axis."""
-        return self.axis("y")
+        return self.x if way == "x" else self.y
 
     @property
     def traces(self) -> list[Trace]:
@@ -369,9 +360,10 @@ def make_grid(
         rows, columns, specs=specs, row_heights=[*heights] or None, column_widths=[*widths] or None,
         horizontal_spacing=min(0.6 / columns, (BARE if share_y else BETWEEN)["x"] / across),
         vertical_spacing=min(0.6 / rows, (BARE if share_x else BETWEEN)["y"] / down),
+        figure=go.Figure(layout={"template": {}}),  # else its own one, in every script
     )  # fmt: skip
     figure.update_layout(
-        width=WIDTH, height=INCH * height, margin=MARGIN, template={}, barmode="overlay", bargap=0
+        width=WIDTH, height=INCH * height, margin=MARGIN, barmode="overlay", bargap=0
     )
     grid = np.empty((rows, columns), object)
     for row, column in itertools.product(range(rows), range(columns)):
