@@ -11,7 +11,7 @@ from matplotlib.image import imread
 
 from compressor.report.figures import pictures as module
 from compressor.report.figures.drawing import make_grid
-from compressor.report.figures.pictures import draw_all, render
+from compressor.report.figures.pictures import draw_all, paint, render
 from compressor.report.figures.style import LineStyle, fill
 
 NAMES = ["one", "two", "three", "four", "five"]
@@ -53,6 +53,17 @@ def elsewhere(monkeypatch, act):
         return draw(figure)
 
     monkeypatch.setattr(module, "render", first)
+
+
+def test_panels_that_share_decades_draw_them_alike():
+    """All but the first had the ticks of a log scale on a linear one."""
+    drawing, grid = make_grid(1, 2, 2.0, share_x="all")
+    for panel in grid.flat:
+        panel.plot([1, 10, 100], [1, 2, 3], LineStyle("#000000"))
+    grid[0, 0].x.type = "log"
+    for axes in paint(drawing.figure()).axes:
+        x, _ = axes.transData.transform([(1, 2), (10, 2), (100, 2)]).T
+        assert x[1] - x[0] == pytest.approx(x[2] - x[1])
 
 
 def test_two_processes_draw_what_one_does(figures, alone, two, monkeypatch, tmp_path, capfd):

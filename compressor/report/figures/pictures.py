@@ -139,7 +139,8 @@ def paint(figure: go.Figure) -> Figure:
             one.sharex(axes[panel.x.matches[1:]])
         if panel.y.matches:
             one.sharey(axes[panel.y.matches[1:]])
-        paint_panel(one, panel)
+    for panel in panels:  # after all are there: a log scale is for those that share it by then
+        paint_panel(axes[panel.suffix], panel)
     for panel, way in itertools.product(panels, WAYS):
         limit_axis(axes[panel.suffix], way, panel.axis(way))
     if layout.title.text:
