@@ -5,12 +5,14 @@ sampling design. How many there are is known before any value is made; values ar
 are first asked for, and so is each job's case.
 """
 
+import contextlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
+from compressor.cases.card import CardError, mark_card
 from compressor.cases.case import Case
 from compressor.cases.checks import (
     DOUBLES,
@@ -94,6 +96,20 @@ class Block:
         return found
 
     @cached_property
+    def card_keys(self) -> list[str]:
+        """Return the keys of cards that are given."""
+        return [key for key in self.given if (row := row_of(key)) and row.kind == "card"]
+
+    @cached_property
+    def mark(self) -> Callable[[str, str], str]:
+        """Return the function that marks a key's card, each as it was at first.
+
+        A job's key has the digest of when it was planned. Were a card read again where its case is
+        made for a run, a file that has changed would be computed under the key of the old one.
+        """
+        return cache(mark_path)
+
+    @cached_property
     def numbers(self) -> Sequence[int]:
         """Return the numbers of the combinations that are not excluded, in C order."""
         every = range(math.prod(len(self.columns[keys[0]]) for keys in self.factors))
@@ -126,7 +142,11 @@ class Block:
 
     def case(self, number: int) -> Case:
         """Return the case of one combination. Raises CaseError where its values do not fit."""
-        return Case.resolve({"name": self.name or "case", **self.values_of(number)})
+        values = {"name": self.name or "case", **self.values_of(number)}
+        for key in self.card_keys:
+            if isinstance(card := value_of(values, key), str):
+                values = put(values, path_of(key), self.mark(key, card))
+        return Case.resolve(values)
 
     def each_value(self) -> Iterator[dict[str, int]]:
         """Yield rows of the swept keys in which each value stands once at least."""
@@ -178,6 +198,13 @@ class Block:
 def is_of_key(message: str) -> bool:
     """Return whether a problem is about a key, and not about its value."""
     return message.startswith("unknown key")
+
+
+def mark_path(key: str, path: str) -> str:
+    """Return the path of a card with the digest of its numbers; as it is where it is no card."""
+    with contextlib.suppress(CardError, ValueError):  # which the case's check reports
+        return mark_card(path, "crank" if key.endswith(".crank") else "head")
+    return path
 
 
 def reader(values: Mapping[str, Any]) -> Callable[[str], Any]:

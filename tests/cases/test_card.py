@@ -164,6 +164,28 @@ def test_what_does_not_fit_is_told(card, gas, words):
     assert words in str(caught.value)
 
 
+@pytest.mark.parametrize("indicator", ["head.csv", ["head.csv", "other.csv"]])
+@pytest.mark.parametrize("text", ["", "crank_angle_deg,pressure_MPa\n"])
+def test_a_card_that_is_replaced_after_planning_fails_its_jobs(tmp_path, card, indicator, text):
+    """By another card, and by a file that is none: no job runs under the key of the old one."""
+    write(tmp_path / "other.csv", [(angle, 2 * pressure(angle)) for angle in ANGLES])
+    gas = {"indicator": indicator, "piston_radius_mm": [50, 51]}
+    (tmp_path / "case.yaml").write_text(json.dumps({"load": "gas", "gas": gas, **SHORT}))
+    (study,) = load_studies("case.yaml")
+    if text:
+        (tmp_path / "head.csv").write_text(text)
+    else:
+        write(tmp_path / "head.csv", [(angle, pressure(angle) + 0.1) for angle in ANGLES])
+    case = study.cases[1]
+    assert (case.key, case.gas.piston_radius_mm) == (study.keys[1], 51)
+    found = measure(case)
+    assert (found.status, found.reason) == ("failed", "invalid_input")
+    assert "put the card of that time back" in found.detail
+    assert "has changed since the case was made" in found.detail or text
+    axes = {axis.key: axis.values for axis in study.axes}
+    assert axes.get("gas.indicator", ("head.csv", "other.csv")) == ("head.csv", "other.csv")
+
+
 def test_paths_are_seen_from_the_case_file(tmp_path, card, monkeypatch):
     os.mkdir("deeper")
     write(tmp_path / "deeper" / "crank.csv", [(a, pressure(a)) for a in ANGLES])
