@@ -8,7 +8,7 @@ whole, for its key and for what is wrong with its values, and again when it is u
 import itertools
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,6 +39,11 @@ IN_BLOCK = "cannot stand in a block: it belongs to the whole file"
 WHOLE_FILE = ("name", "blocks", "report")
 AT_TOP = "needs keys at the top, such as `joint: big_end`, with a space after the colon"
 NO_BLOCKS = "needs a list of mappings, such as [{load: none}, {joint: both}]"
+# values with which a case is as without the key, and so has None
+AS_WITHOUT = {
+    "clearance_mm": 0.0, "machine.counterweight_kg_mm": 0.0, "contact.geometry": "external",
+    "friction.law": "adams", "friction.ideal_joints": False,
+}  # fmt: skip
 NO_CHANGES, NOWHERE = Tree({}, {}), Place("")
 NO_DRAWS = "samples nothing: give a key {random: [least, greatest]}, lhs, sobol or saltelli"
 
@@ -318,8 +323,9 @@ def _check_cases(
             continue
         if not any(wrong.values()):
             keys.append(case.key)
+            given = expand_synonyms(block.values_of(place))[0] if columns else {}
             for key in columns:
-                values[key].append(value_of(case, key))
+                values[key].append(axis_value(case, given, key))
     progress(total, total, "")
     found = wrong[False] or wrong[True]
     problems = [*itertools.islice(found.values(), MAX_CONFLICTS)]
@@ -329,6 +335,17 @@ def _check_cases(
     if problems:
         raise CaseFileError(problems)
     return tuple(keys), values
+
+
+def axis_value(case: Case, given: Mapping[str, Any], key: str) -> Any:
+    """Return a job's value on an axis, as its case has it; None where it has none.
+
+    given: nested values of the file, which alone have what a case writes as without the key.
+    """
+    own, told = value_of(case, key), value_of(given, key)
+    if own is None and told == AS_WITHOUT.get(key):
+        return told
+    return own
 
 
 Where = tuple[Place, str]  # a key of a file, which may be given for several blocks or files

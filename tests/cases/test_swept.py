@@ -233,6 +233,53 @@ blocks:
     assert [case.friction is None for case in study.cases] == [False, False, True, False, False]
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "clearance_mm: [0.1, 0.2]\nmachine: {counterweight_kg_mm: [0, 500]}\n"
+        "exclude: clearance_mm == 0.2 and machine.counterweight_kg_mm == 500\n",
+        "machine: {counterweight_kg_mm: [0, 500, 0]}\nclearance_mm: [0.1, 0.1, 0.2]\n"
+        "zip: [[clearance_mm, machine.counterweight_kg_mm]]\n",
+        "blocks: [{machine: {counterweight_kg_mm: [0, 500]}, clearance_mm: 0.1}, "
+        "{machine: {counterweight_kg_mm: 0}, clearance_mm: 0.2}]\n",
+    ],
+)
+def test_an_axis_of_no_grid_has_the_values_that_the_file_gives(read, text):
+    """Also of 0, which a case writes as no counterweight."""
+    axes = {axis.key: axis.values for axis in read(ONE + text).axes}
+    assert axes["machine.counterweight_kg_mm"] == (0, 500, 0)
+    assert axes["clearance_mm"] == (0.1, 0.1, 0.2)
+
+
+def test_words_that_a_case_writes_as_none_stay_on_their_axis(read):
+    study = read("""\
+joint: [none, big_end]
+clearance_mm: [0, 0.2]
+friction: {law: [adams, lugre], ideal_joints: [false, true]}
+exclude: friction.law == lugre and friction.ideal_joints == true
+""")
+    axes = {axis.key: axis.values for axis in study.axes}
+    assert axes["friction.law"] == ("adams", "adams", "lugre") * 4
+    assert axes["friction.ideal_joints"] == (False, True, False) * 4
+    assert axes["clearance_mm"] == (None,) * 6 + (0,) * 3 + (0.2,) * 3
+
+
+def test_an_axis_of_no_grid_has_no_value_that_a_job_has_not(read):
+    """The law of a job reads no coefficient of restitution, another one does."""
+    study = read(
+        ONE
+        + """\
+clearance_mm: 0.2
+contact: {law: [hertz, flores], restitution: [0.5, 0.9], materials: [steel, steel],
+  geometry: [external, internal]}
+exclude: contact.law == hertz and contact.restitution == 0.9
+"""
+    )
+    axes = {axis.key: axis.values for axis in study.axes}
+    assert axes["contact.restitution"] == (None, None, 0.5, 0.5, 0.9, 0.9)
+    assert axes["contact.geometry"] == ("external", "internal") * 3
+
+
 def test_a_block_takes_the_place_of_the_files_keys_and_an_override_of_both(read):
     text = ONE + "clearance_mm: [0.1, 0.2]\nblocks: [{clearance_mm: 0.3}, {load: none}]\n"
     assert rows(read(text)) == [(0.3, "spring"), (0.1, "none"), (0.2, "none")]
