@@ -9,7 +9,7 @@ import contextlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Any
 
 from compressor.cases.card import CardError, mark_card
@@ -115,7 +115,7 @@ class Block:
         every = range(math.prod(len(self.columns[keys[0]]) for keys in self.factors))
         if not self.exclusions:
             return every
-        jobs = ((number, reader(self.values_of(number))) for number in every)
+        jobs = ((n, reader(self.given_of(n), partial(self._case_if_any, n))) for n in every)
         return [number for number, job in jobs if not any(test(job) for test in self.exclusions)]
 
     def rows_of(self, number: int) -> dict[str, int]:
@@ -140,6 +140,10 @@ class Block:
             return drop(values, ("clearance_mm",))
         return values
 
+    def given_of(self, number: int) -> dict[str, Any]:
+        """Return the values of one combination without synonyms."""
+        return expand_synonyms(self.values_of(number))[0]
+
     def case(self, number: int) -> Case:
         """Return the case of one combination. Raises CaseError where its values do not fit."""
         values = {"name": self.name or "case", **self.values_of(number)}
@@ -147,6 +151,12 @@ class Block:
             if isinstance(card := value_of(values, key), str):
                 values = put(values, path_of(key), self.mark(key, card))
         return Case.resolve(values)
+
+    def _case_if_any(self, number: int) -> Case | None:
+        """Return the case of one combination, None where its values do not fit."""
+        with contextlib.suppress(CaseError):
+            return self.case(number)
+        return None
 
     def each_value(self) -> Iterator[dict[str, int]]:
         """Yield rows of the swept keys in which each value stands once at least."""
@@ -207,16 +217,20 @@ def mark_path(key: str, path: str) -> str:
     return path
 
 
-def reader(values: Mapping[str, Any]) -> Callable[[str], Any]:
-    """Return the function that gives the value of a key in nested ones, or its default, or None."""
+def reader(given: Mapping[str, Any], case: Callable[[], Case | None]) -> Callable[[str], Any]:
+    """Return the function that gives a job's value of a key: as given, the default, or the case's.
 
-    whole = expand_synonyms(values)[0]
+    given: nested values without synonyms. case: makes the job's case, and is called only for what
+    a case fills in by other keys, such as the inertia of a uniform rod.
+    """
 
     def value(key: str) -> Any:
-        found, row = value_of(whole, key), row_of(key)
-        if found is not None or not row or stands_for(key):
+        found, row = value_of(given, key), row_of(key)
+        if found is not None or not row:
             return found
-        has_rival = key in RIVALS and value_of(whole, RIVALS[key]) is not None
+        if row.default is None or stands_for(key):
+            return value_of(case(), key)
+        has_rival = key in RIVALS and value_of(given, RIVALS[key]) is not None
         return None if has_rival else row.default
 
     return value

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from compressor.cases.blocks import Block, Located, plan_block, read_own
+from compressor.cases.blocks import Block, Located, plan_block, read_own, reader
 from compressor.cases.case import Case
 from compressor.cases.checks import DOUBLES, expand_synonyms, key_of, row_of, stands_for, value_of
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
@@ -182,7 +182,8 @@ def _study(
     is_grid = len(blocks) == 1 and blocks[0].is_grid
     cases = Cases(blocks)
     columns = [*blocks[0].columns] if is_grid else _columns(blocks)
-    keys, values = _check_cases(file, cases, [] if is_grid else columns, progress)
+    swept = [] if is_grid else columns
+    keys, values, selected = _check_cases(file, cases, swept, only, progress)
     sampled = next((block.tree for block in blocks if "sample" in block.tree.values), None)
     if sampled and file.tree and not any(map(draws, blocks)):
         alone = _block_trees(file.tree, NO_CHANGES, max_jobs)[0]  # of which --set may leave nothing
@@ -194,7 +195,6 @@ def _study(
         if key_of(sweep.path) in DOUBLES:
             values[key] = [value / 2 for value in values[key]]
     axes = tuple(Axis(key, tuple(values[key])) for key in columns)
-    selected = range(len(cases)) if only is None else cases.where(only)
     fixed = tuple(expand_synonyms(block.fixed)[0] for block in blocks)
     told = {name: text or "" for name, text in vars(file.report).items()}
     study = Study(file.name, file.path, axes, cases, keys, is_grid, selected, fixed, **told)
@@ -304,11 +304,15 @@ def _columns(blocks: Sequence[Block]) -> list[str]:
 
 
 def _check_cases(
-    file: CaseFile, cases: Cases, columns: Sequence[str], progress: Progress
-) -> tuple[tuple[str, ...], dict[str, list[Any]]]:
-    """Return the key of each case, and its value of each swept key. Raises CaseFileError."""
+    file: CaseFile, cases: Cases, columns: Sequence[str], only: Test | None, progress: Progress
+) -> tuple[tuple[str, ...], dict[str, list[Any]], list[int]]:
+    """Return the key of each case, its value of each swept key, and the numbers of those selected.
+
+    Raises CaseFileError.
+    """
     wrong: dict[bool, Located] = {False: {}, True: {}}  # misfits are told once each value is good
     keys: list[str] = []
+    selected: list[int] = []
     values: dict[str, list[Any]] = {key: [] for key in columns}
     total = len(cases)
     progress = progress if total >= MANY_CASES else no_progress
@@ -323,9 +327,11 @@ def _check_cases(
             continue
         if not any(wrong.values()):
             keys.append(case.key)
-            given = expand_synonyms(block.values_of(place))[0] if columns else {}
+            given = block.given_of(place) if columns or only else {}
             for key in columns:
                 values[key].append(axis_value(case, given, key))
+            if only is None or is_selected(only, given, case):
+                selected.append(number)
     progress(total, total, "")
     found = wrong[False] or wrong[True]
     problems = [*itertools.islice(found.values(), MAX_CONFLICTS)]
@@ -334,7 +340,12 @@ def _check_cases(
         problems.append(FileProblem(Place(file.path), "", message))
     if problems:
         raise CaseFileError(problems)
-    return tuple(keys), values
+    return tuple(keys), values, selected
+
+
+def is_selected(only: Test, given: Mapping[str, Any], case: Case) -> bool:
+    """Return whether a comparison holds for a job; given: nested values of the file."""
+    return only(reader(given, lambda: case))
 
 
 def axis_value(case: Case, given: Mapping[str, Any], key: str) -> Any:

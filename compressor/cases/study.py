@@ -6,10 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, overload
 
-from compressor.cases.blocks import Block, reader
+from compressor.cases.blocks import Block
 from compressor.cases.case import Case
-from compressor.cases.checks import expand_synonyms
-from compressor.cases.comparison import Test
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class Study:
         """Return what the file gives of a job, nested as a case file has it."""
         assert isinstance(self.cases, Cases)
         block, place = self.cases.place_of(number)
-        return {**expand_synonyms(block.values_of(place))[0], "name": block.name}
+        return {**block.given_of(place), "name": block.name}
 
     @property
     def is_of_one_solver(self) -> bool:
@@ -105,11 +103,6 @@ class Cases(Sequence[Case]):
         if self.keys:
             vars(case)["key"] = self.keys[numbers]
         return case
-
-    def where(self, test: Test) -> list[int]:
-        """Return the numbers of the cases for which a comparison holds."""
-        jobs = (reader(block.values_of(place)) for block, place in self.places())
-        return [number for number, job in enumerate(jobs) if test(job)]
 
 
 def points(study: Any) -> Iterator[dict[str, Any]]:

@@ -211,6 +211,52 @@ def test_a_comparison_knows_what_is_not_swept(read):
         assert len(read(text + f"exclude: {exclude}\n").cases) == left, exclude
 
 
+OWN = "load: gas\nmachine: {rod_mass_kg: [4, 6]}\ngas: {discharge_MPa: [0.393, 0.5]}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "condition", "jobs"),
+    [
+        (OWN, "machine.rod_inertia_kg_m2 > 0.15", [2, 3]),
+        (OWN, "machine.rod_centre_mm == 300 and machine.rod_mass_kg < 5", [0, 1]),
+        (OWN, "machine.rod_inertia_kg_m2 == 0.12 and gas.switching == exact", [0, 1]),
+        (OWN, "gas.switching == exact", [0, 1, 2, 3]),
+        (ONE + "clearance_mm: [0.1, 0.2]\nwear: true\n", "wear.limit_mm < 0.3", [0]),
+        (ONE + "clearance_mm: [0.1, 0.2]\n", "machine.pin_radius_mm == 10", [0, 1]),
+        (ONE + "clearance_mm: [0.1, 0.2]\n", "wear.limit_mm < 0.3 or solve.rtol > 0", []),
+    ],
+)  # fmt: skip
+def test_a_comparison_sees_what_a_case_fills_in(read, text, condition, jobs):
+    """Selected are the very jobs that are left out by the same text."""
+    every = read(text)
+    keys = [every.keys[number] for number in range(every.jobs) if number not in jobs]
+    if jobs:
+        assert [*read(text, only=condition).selected] == jobs
+    else:
+        assert "selects no job" in refused(read, text, only=condition)[0]
+    without = f"{text}exclude: {condition}\n"
+    if keys:
+        assert [*read(without).keys] == keys
+    else:
+        assert "leaves no job" in refused(read, without)[0]
+
+
+def test_a_block_without_a_cylinder_of_its_own_has_the_corners_of_the_paper(read):
+    text = "load: gas\nblocks: [{}, {gas: {unloaded: head}}]\n"
+    for condition, job in [
+        ("gas.switching == paper", 0),
+        ("gas.switching == exact", 1),
+        ("gas.valve_loss_percent == 0 and gas.action == single", 1),
+    ]:
+        assert [*read(text, only=condition).selected] == [job], condition
+
+
+def test_what_has_no_case_is_not_left_out_by_what_a_case_would_fill_in(read):
+    text = "machine: {crank_radius_mm: [100, 700]}\nload: none\n"
+    (message,) = refused(read, text + "exclude: machine.rod_inertia_kg_m2 > 1\n")
+    assert "must be shorter than the rod" in message
+
+
 def test_blocks_stand_one_after_the_other(read):
     study = read("""\
 load: none
