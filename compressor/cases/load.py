@@ -28,7 +28,15 @@ from compressor.cases.keys import (
 from compressor.cases.parameter import CaseError, choice, make_group
 from compressor.cases.study import Axis, Cases, Study
 from compressor.cases.table import WORDS, outside_identity, table
-from compressor.cases.yaml_reader import CaseFileError, FileProblem, Place, Tree, read_file, shorten
+from compressor.cases.yaml_reader import (
+    START,
+    CaseFileError,
+    FileProblem,
+    Place,
+    Tree,
+    read_file,
+    shorten,
+)
 from compressor.program import Progress, no_progress
 
 MAX_JOBS = 10_000
@@ -91,6 +99,8 @@ def load_studies(
             test = comparison(only)
         except NoComparison as error:
             problems.append(FileProblem(selection, "", str(error)))
+    if not paths:
+        problems.append(FileProblem(NOWHERE, "", f"needs the path of a case file; {START}"))
     mistaken = bool(problems)
     files = [_read(os.fsdecode(path), NO_CHANGES if mistaken else changes) for path in paths]
     problems += [problem for file in files for problem in file.problems]

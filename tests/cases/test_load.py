@@ -160,6 +160,11 @@ def test_mistakes_of_all_files_are_told_at_once(write):
     ]
 
 
+def test_without_a_file_the_path_of_one_is_asked_for():
+    remedy = "compsim init writes a case file to start from"
+    assert mistakes() == [f"needs the path of a case file; {remedy}"]
+
+
 def test_a_sweep_full_of_conflicts_is_cut_short(write):
     text = "machine: {rod_length_mm: %s, crank_radius_mm: %s}\nload: none\n"
     found = mistakes(write(text % (numbers(30), numbers(30))))
