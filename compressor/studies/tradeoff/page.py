@@ -224,11 +224,11 @@ def list_changes(place: str, table: ModelTable) -> Iterator[str]:
 LEGEND = """\
 The table is of {}: its metrics, with error bars where four digits show them, and below how much \
 each changes where one thing is otherwise: a number that the case file does not give, or that a \
-plant can only guess, at an end of its plausible range (the table of keys has them all), or \
-another model. What moves the first line’s number most comes first. “None seen”: no more than \
-both error bars. “Points”: percentage points of a share. “No contact”: the journal touches no \
-bore. “Chaotic”: such a motion has no peak to compare. The last column says why a number is in \
-doubt, and what another model assumes that the file does not give."""
+plant can only guess, at an end of its plausible range, or another model. What moves the first \
+line’s number most comes first. “None seen”: no more than both error bars. “Points”: percentage \
+points of a share. “No contact”: the journal touches no bore. “Chaotic”: such a motion has no \
+peak to compare. The last column says why a number is in doubt, and what another model assumes \
+that the file does not give."""
 UNKNOWN = "No change is given of what is not known, or not above 0, of the case itself: {}."
 
 
