@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from compressor.cases.card import ATMOSPHERE_MPA, CardError, open_card
+from compressor.cases.card import ATMOSPHERE_MPA
 from compressor.cases.checks import (
     describe_wrong,
     expand_synonyms,
@@ -356,15 +356,6 @@ stroke, 240 mm
     def wants_bars(self) -> bool:
         """Return whether metrics are to have error bars; accuracy by number needs them."""
         return self.solve.error_bars or bool(self.targets)
-
-    def find_changed_card(self) -> str:
-        """Return what is wrong with the file of an indicator card now; "" for nothing."""
-        try:
-            for end, card in self.gas.cards.items() if self.load == "gas" else ():
-                open_card(card, end)
-        except CardError as error:
-            return str(error)
-        return ""
 
     @property
     def chooses_forces(self) -> bool:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.cases import MODEL_VERSION, Case, require_case
+from compressor.cases import MODEL_VERSION, CardError, Case, require_case
 from compressor.metrics import SERIES
 from compressor.outcome import Outcome, row, without_run
 from compressor.physics import is_featured, state_names
@@ -63,10 +63,10 @@ def simulate(case: Case) -> "xr.Dataset":
 
 def observe(case: Case) -> tuple[Outcome, Variables]:
     """Simulate one case; return its `Outcome` and its time series (see `simulate`)."""
-    detail = case.find_changed_card()
-    if detail:
-        return without_run(case.attributes(), Reason.INVALID_INPUT, detail), {}
-    return with_series(case, solve(case))
+    try:
+        return with_series(case, solve(case))
+    except CardError as error:  # of a file that has changed, or is gone
+        return without_run(case.attributes(), Reason.INVALID_INPUT, str(error)), {}
 
 
 def with_series(case: Case, solution: Solution) -> tuple[Outcome, Variables]:
