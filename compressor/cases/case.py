@@ -7,12 +7,12 @@ error bars, and a change that moves numbers further is a new version, and so mak
 import hashlib
 import json
 import math
-import re
 from collections.abc import Callable, Mapping, Set
 from dataclasses import field, replace
 from functools import cache, cached_property, lru_cache, partial
 from typing import Any
 
+import yaml
 from pydantic import TypeAdapter, ValidationError
 
 from compressor.cases.card import ATMOSPHERE_MPA
@@ -29,8 +29,8 @@ from compressor.cases.conflicts import (
     conditions,
     conflicts,
     given_conflicts,
+    reads,
     unread_values,
-    values_read,
 )
 from compressor.cases.groups import Contact, Friction, Gas, Machine, Offset, Output, Solve, Spring
 from compressor.cases.laws import CONTACT_LAWS, CYLINDRICAL
@@ -59,7 +59,6 @@ from compressor.cases.parameter import (
     quote_value,
 )
 from compressor.cases.table import GROUPS, TOP, WORDS, outside_identity, parts_by_key, table
-from compressor.cases.yaml_reader import resolve_scalar
 from compressor.metrics import JOINTS
 
 MODEL_VERSION = "3"  # of equations and of the meaning of what is stored; part of a key
@@ -550,28 +549,17 @@ def with_ideal_joints(case: Case, features: bool = True) -> Case:
     return replace(ideal, friction=None, guide=None, drive=None, rod=None, body=None, sensor=None)
 
 
-WORD = re.compile(r"[A-Za-z][A-Za-z0-9._-]*")
-
-
 def to_yaml(case: Case) -> str:
     """Return a resolved case as the text of a case file, which reads back to an equal case.
 
     Values that the case does not read are left out. A job of a sweep over loads or laws may have
     some that are not the defaults: its text reads back to a case of the same physics and another
-    key.
+    key. A name that YAML 1.2 alone reads as a number, such as `1e5`, does not read back.
     """
-    lines = []
-    for key, value in values_read(case).items():
+    found: dict[str, Any] = {}
+    for key, value in case.values().items():
         if isinstance(value, Mapping):
-            lines.append(f"{key}:")
-            lines += [f"  {name}: {_scalar(item)}" for name, item in value.items()]
-        else:
-            lines.append(f"{key}: {_scalar(value)}")
-    return "\n".join(lines) + "\n"
-
-
-def _scalar(value: Any) -> str:
-    """Return a value in YAML: as JSON, but plain where a word reads back as text."""
-    if isinstance(value, str) and WORD.fullmatch(value) and resolve_scalar(value) == value:
-        return value
-    return json.dumps(value)
+            value = {name: one for name, one in value.items() if reads(case, f"{key}.{name}")}
+        if value != {}:
+            found[key] = value
+    return yaml.safe_dump(found, sort_keys=False, allow_unicode=True, width=math.inf)

@@ -131,17 +131,6 @@ def unread_values(
             break
 
 
-def values_read(case: Any) -> dict[str, Any]:
-    """Return the values of a case, nested, without those that it does not read."""
-    found: dict[str, Any] = {}
-    for key, value in case.values().items():
-        if not isinstance(value, Mapping):
-            found[key] = value
-        elif inner := {name: v for name, v in value.items() if reads(case, f"{key}.{name}")}:
-            found[key] = inner
-    return found
-
-
 def default_in(case: Case, key: str) -> Any:
     """Return the value that a case would have of a key if it were not given."""
     row = row_of(key)
