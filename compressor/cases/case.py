@@ -26,8 +26,8 @@ from compressor.cases.checks import (
 from compressor.cases.comparison import condition
 from compressor.cases.conflicts import (
     FACT_KEYS,
+    RULES,
     conditions,
-    conflicts,
     given_conflicts,
     reads,
     unread_values,
@@ -211,7 +211,7 @@ stroke, 240 mm
             values["lubricant"] = values["wear"] = None
         if self.wear:
             values["wear"] = fill_wear(self.wear, self.clearance_mm)
-        if problems := [*conflicts(self)]:
+        if problems := [Problem(*one) for rule in RULES for one in rule(self)]:
             raise CaseError(problems)
 
     @classmethod

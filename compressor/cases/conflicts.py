@@ -193,13 +193,6 @@ MAX_REVOLUTIONS_TOLD = 1e9  # revolutions, more than any run has
 SETTLING_REV = 3.0  # that `settle_rev: auto` compares at least
 
 
-def conflicts(case: Case) -> Iterator[Problem]:
-    """Yield everything in a case that does not fit together."""
-    for rule in RULES:
-        for key, message in rule(case):
-            yield Problem(key, message)
-
-
 @cache
 def given_conflicts(joint: str, given: frozenset[str]) -> Sequence[Problem]:
     """Return what is missing beside a joint, and keys of which a case gives one; given: dotted."""
