@@ -19,7 +19,7 @@ from typing import Any
 from compressor.cases.card import DRIVING, CardError, open_card, taken_work
 from compressor.cases.checks import TWICE, row_of, stands_for, value_of
 from compressor.cases.comparison import condition
-from compressor.cases.groups import CRANK_END, ENDS, PAPER_CYLINDER
+from compressor.cases.groups import CRANK_END, ENDS
 from compressor.cases.laws import CYLINDRICAL, READ_BY, RESTITUTING, law_of
 from compressor.cases.optional_groups import MAX_RATIO, MIN_RATIO
 from compressor.cases.parameter import IMPLAUSIBLE, LED, Problem
@@ -186,6 +186,11 @@ IN_PLACE_OF = (
     ("gas.clearance_percent.head", "gas.head_clearance_mm"),
     ("machine.balance", "machine.counterweight_kg_mm"),
 )
+# keys that decide where the corners of the gas cycle lie
+OF_CORNERS = (
+    "machine.crank_radius_mm", "machine.rod_length_mm", "gas.head_clearance_mm", "gas.suction_MPa",
+    "gas.discharge_MPa", "gas.exponent",
+)  # fmt: skip
 MIN_SAMPLES = 4  # of a sensor, in a revolution
 MAX_MOVING_SHARE = 0.1  # the moving parts' share of a body's mass
 MAX_BACK_ACTION = 0.3  # of a force that a body's motion may change at the speed's first two orders
@@ -300,23 +305,12 @@ def cycle_rules(case: Case) -> Rules:
                     f"the gas left at the {end} never expands to the suction pressure; "
                     "lower it, or the pressure ratio",
                 )
-    elif gas.is_cylinder or _corners(case) != PAPER_CORNERS:
+    elif gas.is_cylinder or any(value_of(case, key) != table()[key].default for key in OF_CORNERS):
         yield (
             "gas.switching",
             "the printed corners hold for the paper's geometry and pressures only; "
             "set switching: exact",
         )
-
-
-CORNER_KEYS = ("head_clearance_mm", "suction_MPa", "discharge_MPa", "exponent")
-PAPER_CORNERS = (120.0, 600.0, *(PAPER_CYLINDER[key] for key in CORNER_KEYS))
-
-
-def _corners(case: Case) -> tuple[float | None, ...]:
-    """Return what decides where the gas cycle's corners lie."""
-    machine = case.machine
-    of_gas = (getattr(case.gas, key) for key in CORNER_KEYS)
-    return (machine.crank_radius_mm, machine.rod_length_mm, *of_gas)
 
 
 def card_rules(case: Case) -> Rules:

@@ -134,11 +134,8 @@ CYLINDER_KEYS = (
     "indicator", "ambient_MPa", "smooth_deg",
 )  # fmt: skip
 NO_LOSS = PerValve(0.0, 0.0)
-# what the paper prints of its cylinder: another value makes one of one's own, too
-PAPER_CYLINDER = {
-    "piston_radius_mm": 50.0, "head_clearance_mm": 20.0, "suction_MPa": 0.105,
-    "discharge_MPa": 0.393, "exponent": 1.4,
-}  # fmt: skip
+# what the paper prints of its cylinder, the defaults: another value makes one of one's own, too
+PRINTED = ("piston_radius_mm", "head_clearance_mm", "suction_MPa", "discharge_MPa", "exponent")
 OWN_CYLINDER = (
     "a cylinder of one's own: any key of `gas` but this one and {other}, the stroke or the rod's "
     "length is given"
@@ -241,13 +238,11 @@ class Gas:
 
     def __post_init__(self) -> None:
         """Fill in what a cylinder's keys leave open; what is as without a key goes without it."""
-        values = vars(self)
+        values, usual = vars(self), type(self).__dataclass_fields__
         if self.is_cylinder:
             filled = {"action": "single", "unloaded": "none", "valve_loss_percent": NO_LOSS}
             values.update({key: value for key, value in filled.items() if values[key] is None})
-        is_own = self.is_cylinder or any(
-            values[key] != printed for key, printed in PAPER_CYLINDER.items()
-        )
+        is_own = self.is_cylinder or any(values[key] != usual[key].default for key in PRINTED)
         if self.switching is None:
             values["switching"] = "exact" if is_own else "paper"
         if self.back_pressure_MPa is None:
