@@ -50,7 +50,6 @@ class TextTable:
     """
 
     path: str
-    encoding: str
     separator: str
     decimal: str
     names: tuple[str, ...]
@@ -64,10 +63,6 @@ class TextTable:
         header = f"header in line {self.header_line}" if self.header_line else "no header"
         signs = f"separator {SEPARATORS[self.separator]}, decimal {DECIMALS[self.decimal]}"
         return f"{signs}, {header}, {len(self.names)} columns"
-
-    def place(self, line: int, column: int) -> str:
-        """Return where a cell is, for an error; column from 0."""
-        return f"{self.path}:{line}:{column + 1}: {self.names[column]}"
 
     def read_columns(self, numbers: Sequence[int]) -> tuple[list[int], list[list[float]]]:
         """Return the lines of the rows, and columns by their numbers from 0.
@@ -98,7 +93,8 @@ class TextTable:
         """Return a cell as a finite number. Raises TextTableError."""
         if (value := parse_number(text, self.decimal)) is not None and math.isfinite(value):
             return value
-        where, shown = self.place(line, column), repr(printable(text[:40]))
+        where = f"{self.path}:{line}:{column + 1}: {self.names[column]}"
+        shown = repr(printable(text[:40]))
         if value is not None or NOT_FINITE.fullmatch(text):
             remedy = "cut the table, or fill the gap"
             raise TextTableError(f"{where}: {shown} is not finite; {remedy}")
@@ -125,7 +121,7 @@ def open_text_table(
     separator: one of `SEPARATORS`, found where it is ""; decimal: one of `DECIMALS`, likewise;
     skip_lines: the number of lines above the header, found where it is None.
     """
-    text, encoding = decode_text(path, Path(path).read_bytes())
+    text = decode_text(path, Path(path).read_bytes())
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     marks, signs = [separator] if separator else SEPARATORS, [decimal] if decimal else DECIMALS
     blocks: list[_Block] = []
@@ -157,23 +153,21 @@ def open_text_table(
         while len(names) > block.width and not names[-1]:
             names = names[:-1]
     numeric = (*block.numeric, *[False] * (len(names) - block.width))
-    return TextTable(
-        str(path), encoding, block.separator, block.decimal, names, header_line, numeric, rows
-    )
+    return TextTable(str(path), block.separator, block.decimal, names, header_line, numeric, rows)
 
 
-def decode_text(path: str | Path, data: bytes) -> tuple[str, str]:
-    """Return a text and its encoding: UTF-8, UTF-16, or else Latin 1. Raises TextTableError."""
-    encoding = next((name for mark, name in MARKS if data.startswith(mark)), "")
+def decode_text(path: str | Path, data: bytes) -> str:
+    """Return the text of bytes in UTF-8, UTF-16, or else Latin 1. Raises TextTableError."""
+    encoding = next((name for mark, name in MARKS if data.startswith(mark)), "utf-8")
     try:
-        text, encoding = data.decode(encoding or "utf-8"), encoding or "utf-8"
+        text = data.decode(encoding)
     except UnicodeDecodeError as error:
-        if encoding:
+        if encoding != "utf-8":
             raise TextTableError(f"{path}: is no text in {encoding.upper()}: {error}") from error
-        text, encoding = data.decode("latin-1"), "latin-1"
+        text = data.decode("latin-1")
     if re.search("[\x00-\x08\x0e-\x1f]", text[:10000]):
         raise TextTableError(f"{path}: is no text file: it has bytes that no text has")
-    return text, encoding
+    return text
 
 
 def _split(lines: Sequence[str], separator: str) -> Iterator[Row]:
