@@ -267,21 +267,6 @@ class Sensor:
         read="sensor.threshold_m_per_s2 > 0",
     )  # fmt: skip
 
-    @property
-    def thresholds(self) -> tuple[float | None, float | None]:
-        """Return both thresholds, None where there is none."""
-        return self.threshold_m_per_s2, self.second_threshold_m_per_s2
-
-    def report_clipping(self, fraction: float) -> str:
-        """Return a sentence about a record with a fraction clipped; "" below a thousandth."""
-        if not fraction >= self.REPORTED:
-            return ""
-        return (
-            f"{100 * fraction:.3g} % of the sensor's samples are clipped at its range, "
-            f"{self.range_m_per_s2:g} m/s²: levels and spectra are those of the clipped record; "
-            "raise sensor.range_m_per_s2"
-        )
-
 
 value = partial(number, identity=False)  # of no single run
 

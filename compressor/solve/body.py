@@ -94,7 +94,8 @@ def measure_body(case: Case, solution: Solution, ours: Monitored) -> Metrics:
     """
     if not solution.metrics:
         return {}
-    counted = case.sensor.thresholds if case.sensor else ()
+    sensor = case.sensor
+    counted = (sensor.threshold_m_per_s2, sensor.second_threshold_m_per_s2) if sensor else ()
     metrics: Metrics = {**ours.measure(counted)}
     if not case.wants_bars:
         return metrics

@@ -26,10 +26,7 @@ LATE = (
     "the motion settled after solve.settle_rev, with start-up in the metrics; "
     "solve.settle_rev: auto leaves it out"
 )
-CLIPPED = (
-    "the sensor's record is clipped, at worst {worst:.3g} % of its samples: raise "
-    "sensor.range_m_per_s2"
-)
+CLIPPED = "the sensor's record is clipped, {share} % of its samples: raise sensor.range_m_per_s2"
 
 
 def study_caveats(stored: Stored, study: StoredStudy) -> list[str]:
@@ -82,7 +79,7 @@ def describe_runs(
     texts = (
         ((regimes == Regime.PREDICTABLE) & np.isnan(settled), UNREPEATED),
         ((regimes == Regime.PERIODIC) & (settled > begin), LATE),
-        (clipped, CLIPPED.format(worst=worst)),
+        (clipped, CLIPPED.format(share=f"at worst {worst:.3g}")),
     )
     jobs = len(regimes)
     return [

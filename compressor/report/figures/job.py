@@ -29,6 +29,7 @@ from compressor.analysis import (
     settled_revolutions,
     shaking,
 )
+from compressor.cases import Sensor
 from compressor.metrics import JOINTS
 from compressor.report.figures.curves import ANGLE_AXIS, KILONEWTON
 from compressor.report.figures.drawing import (
@@ -41,6 +42,7 @@ from compressor.report.figures.drawing import (
 )
 from compressor.report.figures.style import BLACK, BLUE, GOLD, GREY, RED, LineStyle, fill, mark
 from compressor.report.figures.table import DrawnFigure, Number, figure, spell, spell_span
+from compressor.store import CLIPPED
 from compressor.units import Units, unit_in
 
 # flight, impact, following: lightness 30, 54, 90
@@ -344,9 +346,9 @@ def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
         low, high = (f"{edge:.0f}" for edge in envelope.band)
         label = f"spectral kurtosis of the band from {low} to {high} Hz"
         above.append((label, spell(envelope.kurtosis)))
-    sensor, clipped = case_of(run).sensor, float(run.get("clipped_fraction", 0.0))
-    if sensor and (text := sensor.report_clipping(clipped)):
-        above.append(("record", text))
+    clipped = float(run.get("clipped_fraction", 0.0))
+    if clipped >= Sensor.REPORTED:
+        above.append(("record", CLIPPED.format(share=f"{100.0 * clipped:.3g}")))
     sentence = "Peak amplitudes over the settled revolutions."
     return DrawnFigure(drawing.figure(), sentence + caution(run), above)
 
