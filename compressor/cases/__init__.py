@@ -39,6 +39,7 @@ from compressor.cases.load import load_cases, load_studies
 from compressor.cases.materials import joint_stiffness, paper_notes
 from compressor.cases.optional_groups import Body, Drive, Guide, Lubricant, Rod, Sensor, Wear
 from compressor.cases.parameter import ACCURACY, IMPLAUSIBLE, TIGHTEST, CaseError, PerJoint, to_si
+from compressor.cases.plausible import PLAUSIBLE
 from compressor.cases.study import Axis, Study, points
 from compressor.cases.swept import design
 from compressor.cases.table import table

@@ -30,7 +30,6 @@ from pydantic import (
 )
 
 from compressor.cases.card import ATMOSPHERE_MPA, IN_MPA, CardError, mark_card
-from compressor.cases.plausible import PLAUSIBLE, Plausible
 from compressor.cases.yaml_reader import is_number
 from compressor.metrics import METRICS
 from compressor.program import CompsimError, did_you_mean
@@ -241,7 +240,6 @@ class Parameter:
     # whether it is of the machine: a file may give it though no job reads it, so that one file
     # serves the machine with clearance and without; of the gas, of a cylinder that is there
     fact: bool = False
-    plausible: Plausible | None = None  # where there is a doubt about it
 
     @property
     def label(self) -> str:
@@ -599,7 +597,6 @@ def rows_of(
     optional = NoneType in get_args(annotation or item.type)
     units = [unit for name in key.split(".") if (unit := split_unit(name)[1])]
     shared = {"optional": optional and bool(whole), "unit": units[-1] if units else ""}
-    shared["plausible"] = PLAUSIBLE.get(key)
     for part, row in item.metadata.get("parts", whole).items():
         default = getattr(item.default, part, None) if part else item.default
         name = f"{key}.{part}" if part else key

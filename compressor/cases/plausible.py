@@ -16,9 +16,6 @@ class Span(NamedTuple):
         each = [self.low * value, self.high * value] if self.are_factors else [self.low, self.high]
         return [end for end in each if abs(end - value) > 1e-9 * abs(value)]
 
-    def __str__(self) -> str:
-        return f"{self.low:g} to {self.high:g}" + " times" * self.are_factors
-
 
 times = Span  # a span of factors
 from_to = partial(Span, are_factors=False)  # a span of values in the case file's unit
@@ -34,10 +31,6 @@ class Plausible(NamedTuple):
     why: str
     left_out: Span
     given: Span | None = None
-
-    def __str__(self) -> str:
-        also = f"; given, {self.given}" if self.given else ""
-        return f"{self.left_out}{', given or not' if self.given == self.left_out else also}"
 
 
 def always(why: str, span: Span) -> Plausible:

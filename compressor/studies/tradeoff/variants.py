@@ -20,6 +20,7 @@ from compressor.cases import (
     CYLINDRICAL,
     FOLLOWING,
     FRICTION_LAWS,
+    PLAUSIBLE,
     Case,
     CaseError,
     Output,
@@ -29,7 +30,6 @@ from compressor.cases import (
     path_of,
     put,
     reads,
-    row_of,
     stands_for,
     value_of,
     values_given,
@@ -355,9 +355,9 @@ def vary_numbers(study: Study, job: int) -> Iterator[Variant]:
     case, nested = study.cases[job], study.given(job)
     given, swept = values_given(nested), {axis.key for axis in study.axes}
     for key in keys_of(partial(value_of, case)):
-        row, whole = row_of(key), key.rpartition(".")[0]
+        whole = key.rpartition(".")[0]
         names = {key, *stands_for(key)} | ({whole} if stands_for(whole) else set())
-        doubt = row.plausible if row else None
+        doubt = PLAUSIBLE.get(key) or PLAUSIBLE.get(whole)
         if doubt is None or key in SCALED or not reads(case, key) or names & swept:
             continue
         is_given = not names.isdisjoint(given)
