@@ -92,32 +92,28 @@ class Outcome:
         return replace(self, series=series, compress=compress)
 
     def table(self, more: Mapping[str, tuple]) -> "dict[str, Variable]":
-        """Return the variables of the job's Dataset: its own, and more of them."""
-        variables = {**self.variables(), **more}
-        variables |= coordinates(dim for dims, _, _ in variables.values() for dim in dims)
+        """Return the variables of the job's Dataset: words, numbers, and more of them.
+
+        What only some jobs have is absent where it is nan, as statistics of a motion that is not
+        chaotic.
+        """
+        found: dict[str, tuple] = {
+            name: ((), text, {"long_name": JOB_WORDS[name]}) for name, text in self.words().items()
+        }
+        for (name, metric), value in zip(NUMBERS.items(), self.numbers.item(), strict=True):
+            if metric.is_given(np.asarray(value)):
+                found[name] = (metric.dims, value, metric.attributes)
+        found |= more
+        found |= coordinates(dim for dims, _, _ in found.values() for dim in dims)
         return {
             name: Variable(dims, np.asarray(values), attrs)
-            for name, (dims, values, attrs) in variables.items()
+            for name, (dims, values, attrs) in found.items()
         }
 
     def words(self) -> dict[str, str]:
         """Return what is said of the job in a word each, by `JOB_WORDS`."""
         ends = {"status": self.status, "reason": self.reason}
         return ends | {name: str(self.attributes.get(name, "")) for name in ("promise", "regime")}
-
-    def variables(self) -> dict[str, tuple]:
-        """Return words and numbers as xarray variables: (dims, values, attributes).
-
-        What only some jobs have is absent where it is nan, as statistics of a motion that is not
-        chaotic.
-        """
-        named: dict[str, tuple] = {
-            name: ((), text, {"long_name": JOB_WORDS[name]}) for name, text in self.words().items()
-        }
-        for (name, metric), value in zip(NUMBERS.items(), self.numbers.item(), strict=True):
-            if metric.is_given(np.asarray(value)):
-                named[name] = (metric.dims, value, metric.attributes)
-        return named
 
 
 # words on a job, as variables of its Dataset, with what they mean
