@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import yaml
+from yaml.constructor import ConstructorError
 
 from compressor.program import CompsimError, printable
 
@@ -139,17 +140,11 @@ class _Loader(yaml.SafeLoader):
         event = self.peek_event()
         if isinstance(event, yaml.AliasEvent):
             told = "aliases (*) are not allowed; write the value out"
-            raise _Refused(told, event.start_mark)
-        if getattr(event, "tag", None) is not None:
-            raise _Refused("tags (!) are not allowed", event.start_mark)
-        return super().compose_node(parent, index)
-
-
-class _Refused(yaml.MarkedYAMLError):
-    """What is YAML, but no case file's."""
-
-    def __init__(self, problem: str, mark: Any):
-        super().__init__(problem=problem, problem_mark=mark)
+        elif getattr(event, "tag", None) is not None:
+            told = "tags (!) are not allowed"
+        else:
+            return super().compose_node(parent, index)
+        raise ConstructorError(problem=told, problem_mark=event.start_mark)
 
 
 class _Reader:
@@ -216,7 +211,7 @@ def _tell_syntax(text: str, error: yaml.MarkedYAMLError, start: Place) -> FilePr
     mark, told = error.problem_mark or error.context_mark, str(error.problem)
     line, column = (mark.line, mark.column) if mark else (0, 0)
     place = Place(start.file, line + 1, column + 1) if start.line and mark else start
-    if isinstance(error, _Refused):
+    if isinstance(error, ConstructorError):  # YAML, but no case file's
         return FileProblem(place, "", told)
     if told == "but found another document":
         return FileProblem(place, "", "a second document begins here; a case file holds one")
