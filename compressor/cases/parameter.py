@@ -13,8 +13,7 @@ import re
 import reprlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from difflib import get_close_matches
-from functools import lru_cache, partial
+from functools import lru_cache, partial, reduce
 from inspect import cleandoc
 from types import NoneType
 from typing import Annotated, Any, Generic, Literal, TypeVar, dataclass_transform, get_args
@@ -32,7 +31,7 @@ from pydantic import (
 from compressor.cases.card import ATMOSPHERE_MPA, IN_MPA, CardError, mark_card
 from compressor.cases.yaml_reader import is_number
 from compressor.metrics import METRICS
-from compressor.program import CompsimError, did_you_mean
+from compressor.program import MAX_WORD_LENGTH, CompsimError, did_you_mean
 
 IMPLAUSIBLE = 0.1  # of the journal radius: a penetration the contact law was never meant for
 NAME = r"^[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}$"
@@ -175,7 +174,6 @@ class CaseError(CompsimError, ValueError):
         return "\n".join(map(str, self.problems))
 
 
-MAX_WORD = 100  # characters that are looked at to find what was meant
 SHORT_REPR = reprlib.Repr()
 SHORT_REPR.maxstring = SHORT_REPR.maxother = SHORT_REPR.maxlong = 60
 
@@ -335,12 +333,11 @@ class Parameter:
     def _refuse(self, value: Any, *words: Any) -> str:
         """Return the error of a value of another kind; words: of these one may be misspelt."""
         message = f"needs {self.needed}, not {quote_value(value)}"
-        word = words[0][:MAX_WORD] if words and isinstance(words[0], str) else ""
-        lower = dict(self.aliases) | {choice.lower(): choice for choice in self.words}
-        near = get_close_matches(word.lower(), lower, n=1)
+        word = words[0][:MAX_WORD_LENGTH] if words and isinstance(words[0], str) else ""
+        aliases = dict(self.aliases)
+        if hint := did_you_mean(word, [*aliases, *self.words], aliases):
+            return f"{message}; {hint}"
         number = AS_NUMBER.fullmatch(word) if self.is_number else None
-        if near and lower[near[0]] in self.needed:
-            return f"{message}; did you mean {lower[near[0]]}?"
         if not number:
             return message
         plain = number[1].replace(",", ".")
@@ -448,7 +445,6 @@ def problems_of(
     rows: by dotted key. describe: a function of a group, a name and its value, which returns the
     error of a key that the group has not, or of a value that is no group (name "").
     """
-    known = _keys_and_above(tuple(rows))
     found: dict[Problem | None, None] = {}
     for one in error.errors(include_url=False):
         cause, kind = one.get("ctx", {}).get("error", ""), one["type"]
@@ -458,8 +454,10 @@ def problems_of(
         if not one["loc"]:
             raise cause  # an error of the program's own
         key, value, rest = "", values, [*map(str, one["loc"])]
-        while rest and (inner := f"{key}.{rest[0]}".lstrip(".")) in known:
-            if kind in NAMED_WRONGLY and not rest[1:]:
+        while rest:
+            inner = f"{key}.{rest[0]}".lstrip(".")
+            is_named = kind in NAMED_WRONGLY and not rest[1:]
+            if is_named or not any(f"{row}.".startswith(f"{inner}.") for row in rows):
                 break
             key, value, rest = inner, _value_under(value, rest[0]), rest[1:]
         if key in rows:
@@ -479,26 +477,13 @@ def name_as_written(values: Mapping[str, Any], problems: Iterable[Problem]) -> l
     found: dict[Problem, None] = {}
     for one in problems:
         whole, _, part = one.key.rpartition(".")
-        value = _value_at(whole, values) if whole and part in PART_WORDS else {}
+        is_part = whole and part in PART_WORDS
+        value = reduce(_value_under, whole.split("."), values) if is_part else {}
         by_part = isinstance(value, Mapping | BY_PART)
         by_part |= value is None and whole == "clearance_mm"
         by_part |= whole == LED and part != "head"
         found[one if by_part else Problem(whole, one.message)] = None
     return [*found]
-
-
-def _value_at(key: str, values: Mapping[str, Any]) -> Any:
-    """Return the value of a dotted key in nested values; None where there is none."""
-    group, _, name = key.rpartition(".")
-    within = values.get(group) if group else values
-    return within.get(name) if isinstance(within, Mapping) else None
-
-
-@lru_cache
-def _keys_and_above(keys: tuple[str, ...]) -> frozenset[str]:
-    """Return dotted keys, and those of what holds them."""
-    ends = ((key, end) for key in keys for end, sign in enumerate(f"{key}.") if sign == ".")
-    return frozenset(key[:end] for key, end in ends)
 
 
 NAMED_WRONGLY = ("unexpected_keyword_argument", "invalid_key", "missing")  # kinds of pydantic's
