@@ -193,8 +193,10 @@ def known_keys(group: str) -> list[str]:
     return [item.name for item in dataclasses.fields(GROUPS[group])]
 
 
-def describe_unknown(name: str, group: str, value: Any = None) -> str:
-    """Return the error of a key that a group does not have; value: the key's."""
+def describe_wrong(group: str, name: str, value: Any) -> str:
+    """Return the error of an unknown key of a case's group; without a name of what is no group."""
+    if not name:
+        return no_mapping(group, value)
     value = to_python(value)
     known, doubles = known_keys(group), [key for key in DOUBLES if key.startswith(f"{group}.")]
     hint = (
@@ -204,11 +206,6 @@ def describe_unknown(name: str, group: str, value: Any = None) -> str:
         or f"; {group or 'a case'} has {', '.join(known)}"
     )
     return f"unknown key{hint}"
-
-
-def describe_wrong(group: str, name: str, value: Any) -> str:
-    """Return the error of an unknown key of a case's group, or without a name of what is none."""
-    return describe_unknown(name, group, value) if name else no_mapping(group, value)
 
 
 def no_mapping(key: str, value: Any) -> str:
