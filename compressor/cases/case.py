@@ -198,15 +198,11 @@ stroke, 240 mm
         Raises CaseError with everything that does not fit together.
         """
         values = vars(self)  # which alone can be written to: a case is frozen
-        values["load"] = table()["load"].choice_of(self.load)
         if self.guide:
             values["guide"] = fill_guide(self.guide, self.machine.reciprocating_mass_kg)
-        if self.joint != "both":
-            gaps = self.clearance_mm
-            unused = {
-                joint: 0.0 for joint in JOINTS if joint != self.joint and getattr(gaps, joint)
-            }
-            values["clearance_mm"] = replace(gaps, **unused) if unused else gaps
+        is_worn = {one: self.joint in (one, "both") for one in JOINTS}
+        gaps = {one: self.clearance_mm.at(one) if is_worn[one] else 0.0 for one in JOINTS}
+        values["clearance_mm"] = PerJoint(**gaps)
         if self.joint == "none":  # which has no bore that oil fills, or that wears
             values["lubricant"] = values["wear"] = None
         if self.wear:
