@@ -162,19 +162,17 @@ def _distribution(word: str, body: dict[str, Any], log: bool | None) -> Spread:
     (name,), inside = names, body[names[0]]
     if log is not None:
         raise NoSweep(f"log is for {FORMS[word]}, not for {name}", "log")
-    whole = isinstance(inside, dict) and {*inside} == {"mean", "sd"}
     if name == "normal":
-        numbers = [inside["mean"], inside["sd"]] if whole else []
-        good = all(map(is_finite, numbers)) and bool(numbers) and numbers[1] > 0
+        is_whole = isinstance(inside, dict) and {*inside} == {"mean", "sd"}
+        if is_whole and all(map(is_finite, inside.values())) and inside["sd"] > 0:
+            return _normal(inside["mean"], inside["sd"])
         needs = "sd above 0"
     else:
-        numbers = inside if isinstance(inside, list) and len(inside) == 3 else []
-        good = all(map(is_finite, numbers)) and numbers == sorted(numbers)
-        good = good and bool(numbers) and numbers[0] < numbers[2]
+        is_whole = isinstance(inside, list) and len(inside) == 3 and all(map(is_finite, inside))
+        if is_whole and inside == sorted(inside) and inside[0] < inside[2]:
+            return _triangular(*inside)
         needs = "in rising order, the ends different"
-    if not good:
-        raise NoSweep(f"{name} needs {DISTRIBUTIONS[name]}, finite numbers, {needs}", word, name)
-    return _normal(*numbers) if name == "normal" else _triangular(*numbers)
+    raise NoSweep(f"{name} needs {DISTRIBUTIONS[name]}, finite numbers, {needs}", word, name)
 
 
 def _normal(mean: float, sd: float) -> Spread:
