@@ -94,11 +94,8 @@ def _parts(node: Any) -> tuple[str, Any, str]:
     if one and isinstance(node.left, ast.Name | ast.Attribute):
         sign, value = SIGNS[type(node.ops[0])], ast.unparse(node.comparators[0])
         return ast.unparse(node.left), sign, value
-    raise NoComparison(f"needs a key, a sign and a value in place of {_quote(node)}: {SUCH_AS}")
-
-
-def _quote(node: ast.expr) -> str:
-    return quote_value(ast.unparse(node))
+    what = quote_value(ast.unparse(node))
+    raise NoComparison(f"needs a key, a sign and a value in place of {what}: {SUCH_AS}")
 
 
 def _compare_job(key: str, sign: Any, text: str) -> Test:
@@ -108,14 +105,13 @@ def _compare_job(key: str, sign: Any, text: str) -> Test:
         raise NoComparison(f"unknown key {quote_value(key)}{suggestion(key, '')}")
     if row.kind in ("materials", "text", "card"):
         raise NoComparison(f"{key} cannot be compared")
-    is_number = row.kind in ("number", "integer")
-    if not is_number and sign not in (operator.eq, operator.ne):
+    if not row.is_number and sign not in (operator.eq, operator.ne):
         raise NoComparison(f"{key} is a word: compare it by == or !=")
     wanted = row.choice_of(wanted)
     if wanted not in row.choices and (
-        type(wanted) not in (int, float) if is_number else row.check(wanted)
+        type(wanted) not in (int, float) if row.is_number else row.check(wanted)
     ):
-        raise NoComparison(f"{key} needs {'a number' if is_number else row.needed}, not {text}")
+        raise NoComparison(f"{key} needs {'a number' if row.is_number else row.needed}, not {text}")
     if isinstance(wanted, str) and sign not in (operator.eq, operator.ne):
         raise NoComparison(f"{wanted} is a word: compare it by == or !=")
     return _compare(lambda value: value(key), sign, wanted)

@@ -85,7 +85,7 @@ def swept_column(key: str, values: Sequence[Any]) -> tuple["np.ndarray", dict[st
     import numpy as np  # status does without
 
     attrs, row = {"long_name": phrase_of(key), "case_key": key}, row_of(key)
-    unit = (row.unit or "1") if row and row.kind in ("number", "integer") else ""
+    unit = (row.unit or "1") if row and row.is_number else ""
     if unit and not any(isinstance(value, str) for value in values):
         return np.array([math.nan if v is None else v for v in values]), attrs | {"units": unit}
     return np.array([in_words(value) for value in values], "U"), attrs

@@ -6,14 +6,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 FOLDER = Path(__file__).parent
-STARTS = (
-    "paper",
-    "machine",
-    "wear",
-    "speed-sweep",
-    "sampling",
-    "diagnosis",
-)  # those to begin with, in order
+# those to begin with, in order
+STARTS = ("paper", "machine", "wear", "speed-sweep", "sampling", "diagnosis")
 NEXT = "next: "
 
 
