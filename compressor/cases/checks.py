@@ -3,9 +3,6 @@
 A key may have a value for each part of a thing, such as `pin_radius_mm: {big_end: 60, small_end:
 35}`, or one for all; then its name is an axis of a sweep like any key. Words of the trade: keys
 that are twice one of ours, and other units that are answered.
-
-Keys that are not there, and groups that are none: their errors, in files and values alike. That of
-an unknown key names what was probably meant, or else what there is.
 """
 
 import dataclasses

@@ -3,9 +3,6 @@
 Keys that a case does not read: the one rule, which `keys_read` applies to jobs of files. Who reads
 a key stands in the table of parameters (`read`). Where a file gives a key and none of the jobs it
 is given for reads it, the file's author believes in what does not count.
-
-Where a case leaves the range that the program was judged on, from which the example `extremes`
-draws; it stands in the table of parameters as `judged`.
 """
 
 import contextlib
@@ -42,7 +39,6 @@ def back_action(case: Case, axis: str, frequency: Any) -> Any:
     or y.
     """
     body = case.body
-    assert body is not None
     natural = getattr(body, f"frequency_{axis}_Hz")
     stiffness = natural**2 - frequency**2 + 2j * body.damping_ratio * frequency * natural
     return moving_mass(case) / body.mass_kg * frequency**2 / stiffness

@@ -37,10 +37,10 @@ CRANK_END = "gas.action == double or gas.action == crank_end"
 CYCLE = "not gas.is_measured"  # by an indicator card of an end that presses
 HEAD_CLEARANCE = "gas.action != crank_end or not gas.clearance_percent.crank"
 
-COMPILED = ("auto", "TSIT5", "RODAS")  # by `compressor.solve`; the others are SciPy's
 JUDGED_STIFFNESS = (1e8 / 1000**1.5, 1e12 / 1000**1.5)  # N/mm^1.5: judged on, 1e8 to 1e12 N/m^1.5
 PAPER_STIFFNESS = 3.36e5  # N/mm^1.5
-METHODS = (*COMPILED, "LSODA", "Radau", "BDF", "DOP853", "RK45")
+# the first three are compiled, by `compressor.solve`; the others are SciPy's
+METHODS = ("auto", "TSIT5", "RODAS", "LSODA", "Radau", "BDF", "DOP853", "RK45")
 
 
 shift = partial(number, 0.0, "[-1000, 1000]", unit="mm")

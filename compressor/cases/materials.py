@@ -1,7 +1,4 @@
-"""Materials of the paper, the contact stiffness that follows from them, and its pin's numbers.
-
-Needs no compiler.
-"""
+"""Materials of the paper, the contact stiffness that follows from them, and its pin's numbers."""
 
 import math
 from collections.abc import Mapping

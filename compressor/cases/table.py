@@ -1,8 +1,4 @@
-"""The table of parameters: what a case has, and the rows of all its keys.
-
-The reader, the compiled record, the dataset's attributes and the README's table are all made from
-the fields of the groups.
-"""
+"""The table of parameters: what a case has, and the rows of all its keys."""
 
 import dataclasses
 from functools import cache
