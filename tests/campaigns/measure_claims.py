@@ -13,7 +13,7 @@ from result_pages import keep, provenance, run_campaign
 
 from compressor.analysis import RULES, cases_of
 from compressor.cases.case import Case
-from compressor.cases.examples import example
+from compressor.cases.examples import templates
 from compressor.cases.load import load_studies
 from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
@@ -63,7 +63,7 @@ def main(target):
 
 def judged_study(name, overrides=()):
     """The margins of an example's machines, and the seconds of its runs; 0 if some were stored."""
-    (study,) = load_studies(example(name), overrides=overrides, max_jobs=20_000)
+    (study,) = load_studies(templates()[name].path, overrides=overrides, max_jobs=20_000)
     began = time.perf_counter()
     done = sweep([study], FOLDER, 2)
     found = judge_machines(FOLDER, find_study(FOLDER, name))
@@ -79,7 +79,9 @@ def judged_alone(machine):
 
 def agreeing():
     """The margins of the machine in which all claims hold, in long runs."""
-    (study,) = load_studies(example("agreeing"), overrides=[f"solve.duration_rev={LONG_REV:g}"])
+    (study,) = load_studies(
+        templates()["agreeing"].path, overrides=[f"solve.duration_rev={LONG_REV:g}"]
+    )
     found = judged_alone(study.cases[0])
     return {"margin": found["margin"], "error": found["error"], "revolutions": LONG_REV}
 

@@ -17,7 +17,7 @@ from compsim import cli
 from result_pages import keep, provenance, run_campaign
 
 import compressor
-from compressor.cases.examples import example
+from compressor.cases.examples import templates
 from compressor.cases.load import load_studies
 from compressor.studies.tradeoff.variants import Variant, vary_numbers
 
@@ -58,7 +58,7 @@ def rows(study):
 
 def oils():
     """The peak force on the small end at 0.2 mm: as in the file, and dry."""
-    (study,) = load_studies(example("machine"))
+    (study,) = load_studies(templates()["machine"].path)
     case = next(one for one in study.cases if one.clearance_mm.small_end == CLEARANCE)
     films = {"file": case.lubricant, "dry": None}
     return {name: peak(replace(case, lubricant=film)) for name, film in films.items()}
@@ -75,7 +75,7 @@ def peak(case):
 
 def decided():
     """What each number in doubt makes of two jobs: rows of the number, its value and metrics."""
-    (study,) = load_studies(example("machine"))
+    (study,) = load_studies(templates()["machine"].path)
     sizes = [round(case.clearance_mm.small_end, 9) for case in study.cases]
     every = {size: [*machines(study, sizes.index(size))] for size in (BEFORE, WORN)}
     rows = []
@@ -111,7 +111,10 @@ def main(target):
         for share in (None, *LAST_SHARES):
             words = [] if share is None else ["--set", f"lubricant.last_share={share}"]
             folder = str(Path(place, f"{share}"))
-            assert cli.main(["run", str(example("machine")), "-r", folder, "--quiet", *words]) == 0
+            assert (
+                cli.main(["run", str(templates()["machine"].path), "-r", folder, "--quiet", *words])
+                == 0
+            )
             with compressor.open_study(folder, "machine") as study:
                 found[share] = rows(study)
         films = [{"last_share": share, "rows": found[share]} for share in LAST_SHARES]

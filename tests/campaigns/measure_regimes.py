@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from result_pages import keep, provenance, run_campaign
 
-from compressor.cases.examples import example
+from compressor.cases.examples import templates
 from compressor.report.figures.pictures import render
 from compressor.studies.follow.figure import draw_followed, table
 from compressor.studies.follow.follow import follow, load_values, read_over
@@ -20,7 +20,7 @@ ALONG = read_over("clearance_mm=0.01:1:80", log=True, both=True)
 
 
 def main(target):
-    study = load_values(example("regimes"), ALONG)
+    study = load_values(templates()["regimes"].path, ALONG)
     data = follow(study, ALONG, FOLDER, 2, lambda *told: None).data.isel(job=0)
     over = data.attrs["over"]
     rows = []

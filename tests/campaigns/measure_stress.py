@@ -10,7 +10,7 @@ from compsim import cli
 from compsim.screen import DONE, SOME_FAILED
 from result_pages import keep, provenance, run_campaign
 
-from compressor.cases.examples import example
+from compressor.cases.examples import templates
 from compressor.cases.load import load_studies
 from compressor.studies.judge import count_ends, judge
 
@@ -21,7 +21,7 @@ BLOCKS = ("supported", "whole", "supported", "laws", "supported", *["features"] 
 
 def kinds(overrides):
     """The kind of each job, by key."""
-    (study,) = load_studies(example(STUDY), overrides=overrides)
+    (study,) = load_studies(templates()[STUDY].path, overrides=overrides)
     sizes = [len(block.numbers) for block in study.cases.blocks]
     each = [kind for kind, size in zip(BLOCKS, sizes, strict=True) for _ in range(size)]
     return dict(zip(study.keys, each, strict=True))
@@ -45,7 +45,9 @@ def group(jobs):
 
 def main(target, folder="stress", workers=2, overrides=()):
     settings = [word for text in overrides for word in ("--set", text)]
-    code = cli.main(["run", str(example(STUDY)), "-r", folder, "-j", str(workers), *settings])
+    code = cli.main(
+        ["run", str(templates()[STUDY].path), "-r", folder, "-j", str(workers), *settings]
+    )
     if code not in (DONE, SOME_FAILED):
         raise SystemExit(code)
     jobs, of = judge(folder, STUDY, workers), kinds(overrides)

@@ -12,7 +12,7 @@ from page_tables import FINDINGS, kept
 from peers import mechanism
 
 from compressor.cases import Wear
-from compressor.cases.examples import example
+from compressor.cases.examples import templates
 from compressor.cases.load import load_studies
 from compressor.cases.parameter import ACCURACY
 from compressor.metrics import METRICS
@@ -89,7 +89,7 @@ def test_a_hundred_chaotic_cases_know_their_rms():
 
 
 def test_the_examples_are_the_machines_of_the_map_of_claims():
-    found, (study,) = kept("claims.json"), load_studies(example("consistent"))
+    found, (study,) = kept("claims.json"), load_studies(templates()["consistent"].path)
     machine, best = study.cases[0].machine, found["consistent"]
     masses = machine.rod_mass_kg, machine.reciprocating_mass_kg
     assert masses == pytest.approx((best["rod_mass"], best["reciprocating_mass"]))
@@ -143,7 +143,7 @@ def test_alarms_were_measured_on_the_cases_and_the_model_of_today(tmp_path):
 
 
 def test_the_nameplate_s_machine_was_run_as_it_is():
-    (study,) = load_studies(example("machine"))
+    (study,) = load_studies(templates()["machine"].path)
     keys = [row["key"] for row in kept("nameplate.json")["rows"]]
     assert keys == [case.key for case in study.cases], "make nameplate"
 

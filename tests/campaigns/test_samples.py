@@ -10,7 +10,7 @@ from page_tables import kept
 from published import guided
 
 from compressor.cases.case import Case
-from compressor.cases.examples import example
+from compressor.cases.examples import templates
 from compressor.studies.follow.follow import load_values, machines
 from compressor.studies.follow.motion import run_value
 
@@ -48,7 +48,7 @@ def test_the_default_machine_has_its_margins_of_claims():
 
 
 def test_the_first_value_that_is_followed_has_its_exponent():
-    (machine,) = machines(load_values(example("regimes"), ALONG), ALONG)
+    (machine,) = machines(load_values(templates()["regimes"].path, ALONG), ALONG)
     found = run_value(machine.chains[0].cases[0], None, ALONG.points, ALONG.exponent)
     row = kept("regimes.json")["rows"][0]
     assert found["regime"] == row["regime"] == "periodic"

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from compressor.analysis.cautions import cautions
-from compressor.cases.examples import FOLDER, STARTS, example, templates
+from compressor.cases.examples import FOLDER, STARTS, templates
 from compressor.cases.load import load_studies
 from compressor.solve.simulate import simulate
 
@@ -15,7 +15,7 @@ NAMES = sorted(path.stem for path in FOLDER.glob("*.yaml"))
 @pytest.mark.parametrize("name", STARTS)
 def test_templates_run_without_a_warning(name):
     """Two jobs of each, short ones: the axes' ends."""
-    (study,) = load_studies(example(name), overrides=["solve.accuracy=draft"])
+    (study,) = load_studies(templates()[name].path, overrides=["solve.accuracy=draft"])
     assert cautions(study) == []
     for case in (study.cases[0], study.cases[-1]):
         run = simulate(case)

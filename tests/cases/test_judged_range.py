@@ -7,7 +7,7 @@ import pytest
 from compressor.cases.case import Case
 from compressor.cases.checks import row_of
 from compressor.cases.conflicts import outside_judged
-from compressor.cases.examples import example
+from compressor.cases.examples import templates
 from compressor.cases.load import load_studies
 from compressor.cases.table import parts_by_key, table
 
@@ -45,8 +45,8 @@ def test_what_is_not_read_is_not_outside():
 
 def test_the_example_draws_extremes_from_the_judged_ranges():
     """Each key that has a range is drawn from it, in numbers of four digits."""
-    (study,) = load_studies(example("extremes"), overrides=["sample.n=1"])
-    text = example("extremes").read_text(encoding="utf-8")
+    (study,) = load_studies(templates()["extremes"].path, overrides=["sample.n=1"])
+    text = templates()["extremes"].path.read_text(encoding="utf-8")
     drawn = {axis.key for axis in study.axes}
     for key, row in table().items():
         if row.judged:

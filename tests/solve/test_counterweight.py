@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compressor.cases.case import Case, with_ideal_joints
-from compressor.cases.examples import example
+from compressor.cases.examples import templates
 from compressor.cases.load import load_studies
 from compressor.solve.si_record import record
 from compressor.solve.simulate import simulate
@@ -101,7 +101,7 @@ def test_orders_of_the_nameplate_machine_by_hand():
     Order 1 of Y is exact. Order 2 of X has the first two terms of the series of the crosshead's
     acceleration by R / L; the third is a fortieth of the second.
     """
-    (study,) = load_studies(example("machine"))
+    (study,) = load_studies(templates()["machine"].path)
     values = with_ideal_joints(study.cases[0]).values()
     for group in ("body", "sensor"):
         values.pop(group, None)

@@ -9,7 +9,7 @@ import xarray as xr
 from compressor.analysis.claims import claims
 from compressor.analysis.runs import cases_of
 from compressor.cases.case import Case
-from compressor.cases.examples import example
+from compressor.cases.examples import templates
 from compressor.cases.load import load_studies
 from compressor.cases.swept import design
 from compressor.report.figures.drawing import panels_of
@@ -123,7 +123,9 @@ def test_a_case_without_time_series_is_told(tmp_path):
 
 @pytest.mark.parametrize("name", ["claims", "assumptions"])
 def test_every_machine_of_the_examples_has_all_cases(name):
-    (study,) = load_studies(example(name), overrides=["sample.n=2"] if name != "claims" else [])
+    (study,) = load_studies(
+        templates()[name].path, overrides=["sample.n=2"] if name != "claims" else []
+    )
     found = machines(study)
     assert {len(jobs) for jobs in found.values()} == {11}
     assert len(found) * 11 == study.jobs

@@ -48,14 +48,3 @@ def _header(path: Path) -> tuple[str, str, str]:
     lines = path.read_text(encoding="utf-8").splitlines()
     words = [line.removeprefix("#").strip() for line in lines[:3]]
     return words[0], words[1], words[2].removeprefix(NEXT)
-
-
-def example(name: str) -> Path:
-    """Return the path of an example case file, such as `consistent`.
-
-    Raises ValueError, which names all examples, where there is none of this name.
-    """
-    known = templates()
-    if name not in known:
-        raise ValueError(f"no example {name!r}; there are: {', '.join(known)}")
-    return known[name].path

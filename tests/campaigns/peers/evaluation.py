@@ -27,7 +27,7 @@ from peers.mechanism import (
 )
 
 from compressor.cases.case import Case
-from compressor.cases.examples import example
+from compressor.cases.examples import templates
 from compressor.physics._jit import jit
 from compressor.physics.kinematics import ideal
 from compressor.physics.loads import piston_place
@@ -140,7 +140,7 @@ def beside_transcription(scene):
 
 def oiled_beside_dry():
     """An evaluation of the machine of `compsim init machine` with oil at both pins, and without."""
-    values = yaml.safe_load(example("machine").read_text())
+    values = yaml.safe_load(templates()["machine"].path.read_text())
     wanted = {name: values[name] for name in ("joint", "machine", "load", "gas", "contact")}
     wanted["clearance_mm"] = OILED_CLEARANCES
     wanted["solve"] = {"duration_rev": 4, "settle_rev": 1, "error_bars": False}
