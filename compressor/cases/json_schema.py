@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
 
-from compressor.cases.blocks import Sample
 from compressor.cases.checks import DOUBLES, keys_of, phrase_of, row_of, row_of_double
 from compressor.cases.load import WHOLE_FILE, Report
 from compressor.cases.parameter import Parameter, adapter_of, rows_of
+from compressor.cases.study import Sample
 from compressor.cases.swept import FORMS, SAMPLED
 from compressor.cases.table import GROUPS, WORDS, outside_identity, parts_by_key, table
 

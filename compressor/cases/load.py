@@ -1,7 +1,7 @@
 """Case files to studies: what is swept multiplies, and all errors are reported at once.
 
 A file becomes nested values with their places (`yaml_reader`), blocks and overrides stand over them
-(`keys`), and the jobs are counted (`blocks`) before any is made. Each job's case is then built
+(`keys`), and the jobs are counted (`study`) before any is made. Each job's case is then built
 whole, for its key and for what is wrong with its values, and again when it is used.
 """
 
@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from compressor.cases.blocks import Block, Located, plan_block, read_own, reader
 from compressor.cases.case import Case
 from compressor.cases.checks import DOUBLES, expand_synonyms, key_of, row_of, stands_for, value_of
 from compressor.cases.comparison import NoComparison, Test, comparison, condition
@@ -26,7 +25,7 @@ from compressor.cases.keys import (
     read_overrides,
 )
 from compressor.cases.parameter import CaseError, choice, make_group
-from compressor.cases.study import Axis, Cases, Study
+from compressor.cases.study import Axis, Block, Cases, Located, Study, plan_block, read_own, reader
 from compressor.cases.table import WORDS, outside_identity, table
 from compressor.cases.yaml_reader import (
     START,

@@ -1,13 +1,392 @@
-"""A study: the jobs of one case file, each built when it is used."""
+"""A study: the jobs of one case file, by blocks of fixed values and of swept ones that multiply.
 
+A factor is one key, or several whose values advance together: a `zip` group, or the keys of a
+sampling design. How many there are is known before any value is made; values are made when they
+are first asked for, and so is each job's case.
+"""
+
+import contextlib
 import itertools
+import math
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, overload
+from functools import cache, cached_property, partial
+from typing import Any
 
-from compressor.cases.blocks import Block
+from compressor.cases.card import CardError, mark_card
 from compressor.cases.case import Case
+from compressor.cases.checks import (
+    DOUBLES,
+    expand_synonyms,
+    hold_value,
+    key_of,
+    no_mapping,
+    row_of,
+    stands_for,
+    suggestion,
+    value_of,
+    walk_leaves,
+)
+from compressor.cases.comparison import NoComparison, Test, comparison
+from compressor.cases.conflicts import IN_PLACE_OF
+from compressor.cases.keys import drop, path_of, put
+from compressor.cases.parameter import CaseError, integer, make_group, quote_value
+from compressor.cases.swept import FORMS, NoSweep, Sweep, design, design_size, sweep_of
+from compressor.cases.table import outside_identity
+from compressor.cases.yaml_reader import FileProblem, Place, Tree
+
+NO_ENDS = (
+    ": a normal distribution has no ends; give it a smaller sd, or draw from {triangular: [least, "
+    "likeliest, greatest]}"
+)
+RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
+
+Factors = list[tuple[str, ...]]  # keys that advance together
+Located = dict[tuple[Place, str], FileProblem]  # by the place and the key that a problem is about
+
+
+@dataclass(frozen=True)
+class Block:
+    """The jobs of a block: every combination of its factors' values, but for those left out.
+
+    name: of the study. `given` has what is given by dotted key, `fixed` what is not swept of it,
+    nested, and `sweeps` how the rest is, with the `sample` of a design.
+    """
+
+    name: str
+    tree: Tree
+    given: dict[str, Any]
+    fixed: dict[str, Any]
+    sweeps: dict[str, Sweep]
+    factors: Factors
+    sample: "Sample"
+    exclusions: list[Test]
+
+    @property
+    def is_grid(self) -> bool:
+        """Return whether every key is an axis of its own, and no combination is left out."""
+        drawn = any(sweep.is_drawn for sweep in self.sweeps.values())
+        return not (self.exclusions or drawn or any(len(keys) > 1 for keys in self.factors))
+
+    def size(self, keys: tuple[str, ...]) -> int:
+        """Return how many values keys that advance together have."""
+        sweep = self.sweeps[keys[0]]
+        return sweep.count or design_size(sweep.kind, self.sample.n or 0, len(keys))
+
+    def sizes(self) -> dict[str, int]:
+        """Return how many values each factor has, by its keys."""
+        return {" with ".join(keys): self.size(keys) for keys in self.factors}
+
+    @cached_property
+    def columns(self) -> dict[str, list[Any]]:
+        """Return the values of each swept key."""
+        found: dict[str, list[Any]] = {}
+        for keys in self.factors:
+            made = [self.sweeps[key].make() for key in keys]
+            sweep, count = self.sweeps[keys[0]], self.sample.n
+            if sweep.is_drawn and count:
+                points = design(sweep.kind, count, len(keys), self.sample.seed)
+                shares = zip(*points, strict=True)
+                made = [
+                    [*map(self.sweeps[key].spread, own)]
+                    for key, own in zip(keys, shares, strict=True)
+                ]
+            for key, column in zip(keys, made, strict=True):
+                is_own = self.sweeps[key].path == path_of(key)
+                found[key] = [hold_value(key, value) if is_own else value for value in column]
+        return found
+
+    @cached_property
+    def card_keys(self) -> list[str]:
+        """Return the keys of cards that are given."""
+        return [key for key in self.given if (row := row_of(key)) and row.kind == "card"]
+
+    @cached_property
+    def mark(self) -> Callable[[str, str], str]:
+        """Return the function that marks a key's card, each as it was at first.
+
+        A job's key has the digest of when it was planned. Were a card read again where its case is
+        made for a run, a file that has changed would be computed under the key of the old one.
+        """
+        return cache(mark_path)
+
+    @cached_property
+    def numbers(self) -> Sequence[int]:
+        """Return the numbers of the combinations that are not excluded, in C order."""
+        every = range(math.prod(len(self.columns[keys[0]]) for keys in self.factors))
+        if not self.exclusions:
+            return every
+        jobs = ((n, reader(self.given_of(n), partial(self._case_if_any, n))) for n in every)
+        return [number for number, job in jobs if not any(test(job) for test in self.exclusions)]
+
+    def rows_of(self, number: int) -> dict[str, int]:
+        """Return which of its values each swept key has in one combination."""
+        found: dict[str, int] = {}
+        for keys in reversed(self.factors):
+            number, row = divmod(number, len(self.columns[keys[0]]))
+            found |= dict.fromkeys(keys, row)
+        return found
+
+    def values_at(self, rows: Mapping[str, int]) -> dict[str, Any]:
+        """Return nested values, as a case file has them, with these of the swept keys."""
+        values = self.fixed
+        for key, row in rows.items():
+            values = put(values, self.sweeps[key].path, self.columns[key][row])
+        return values
+
+    def values_of(self, number: int) -> dict[str, Any]:
+        """Return the values of one combination, nested as a case file has them."""
+        values = self.values_at(self.rows_of(number))
+        if "joint" in self.sweeps and values["joint"] == "none":
+            return drop(values, ("clearance_mm",))
+        return values
+
+    def given_of(self, number: int) -> dict[str, Any]:
+        """Return the values of one combination without synonyms."""
+        return expand_synonyms(self.values_of(number))[0]
+
+    def case(self, number: int) -> Case:
+        """Return the case of one combination. Raises CaseError where its values do not fit."""
+        values = {"name": self.name or "case", **self.values_of(number)}
+        for key in self.card_keys:
+            if isinstance(card := value_of(values, key), str):
+                values = put(values, path_of(key), self.mark(key, card))
+        return Case.resolve(values)
+
+    def _case_if_any(self, number: int) -> Case | None:
+        """Return the case of one combination, None where its values do not fit."""
+        with contextlib.suppress(CaseError):
+            return self.case(number)
+        return None
+
+    def each_value(self) -> Iterator[dict[str, int]]:
+        """Yield rows of the swept keys in which each value stands once at least."""
+        for number in range(max(map(len, self.columns.values()), default=1)):
+            yield {key: number % len(column) for key, column in self.columns.items() if column}
+
+    def locate(self, error: CaseError, rows: Mapping[str, int]) -> Located:
+        """Return a case's problems at the values that they are about, one of each value.
+
+        rows: of the case's swept keys.
+        """
+        found: Located = {}
+        for problem in error.problems:
+            doubles = (double for double, half in DOUBLES.items() if half == problem.key)
+            key = next((one for one in doubles if path_of(one) in self.tree.places), problem.key)
+            message = problem.message
+            parts = [key] if (key,) in self.tree.places else key.split(".")
+            above = (".".join(parts[:n]) for n in range(len(parts), 0, -1))
+            swept = next((own for one in above if (own := DOUBLES.get(one, one)) in rows), "")
+            if swept:
+                sweep, row = self.sweeps[swept], rows[swept]
+                place = self.tree.at(*sweep.path, *[row] * (sweep.kind == "list"))[1]
+                if not error.is_misfit and not sweep.has_ends:
+                    message = f"draw {row + 1} of {len(self.columns[swept])}: {message}{NO_ENDS}"
+            else:
+                is_value = tuple(parts) in self.tree.places and not is_of_key(message)
+                place = self.tree.at(*parts)[is_value]
+            found.setdefault((place, key), FileProblem(place, key, message))
+        return found
+
+    def find_repeated(self) -> Iterator[FileProblem]:
+        """Yield the values that keys have twice; of values that were made the first one."""
+        for keys in self.factors:
+            sweep = self.sweeps[keys[0]]
+            seen: set[str] = set()
+            is_list = sweep.kind == "list"
+            where = "in the list" if is_list else "among its values"
+            columns = (self.columns[key] for key in keys)
+            for number, values in enumerate(zip(*columns, strict=True)):
+                if (text := repr(values)) in seen:
+                    place = self.tree.at(*sweep.path, *[number] * is_list)[1]
+                    message = f"{', '.join(map(quote_value, values))} is {where} twice"
+                    yield FileProblem(place, " with ".join(keys), message)
+                    if not is_list:
+                        break
+                seen.add(text)
+
+
+def is_of_key(message: str) -> bool:
+    """Return whether a problem is about a key, and not about its value."""
+    return message.startswith("unknown key")
+
+
+def mark_path(key: str, path: str) -> str:
+    """Return the path of a card with the digest of its numbers; as it is where it is no card."""
+    with contextlib.suppress(CardError, ValueError):  # which the case's check reports
+        return mark_card(path, "crank" if key.endswith(".crank") else "head")
+    return path
+
+
+def reader(given: Mapping[str, Any], case: Callable[[], Case | None]) -> Callable[[str], Any]:
+    """Return the function that gives a job's value of a key: as given, the default, or the case's.
+
+    given: nested values without synonyms. case: makes the job's case, and is called only for what
+    a case fills in by other keys, such as the inertia of a uniform rod.
+    """
+
+    def value(key: str) -> Any:
+        found, row = value_of(given, key), row_of(key)
+        if found is not None or not row:
+            return found
+        if row.default is None or stands_for(key):
+            return value_of(case(), key)
+        has_rival = key in RIVALS and value_of(given, RIVALS[key]) is not None
+        return None if has_rival else row.default
+
+    return value
+
+
+def plan_block(tree: Tree, name: str) -> tuple[Block, list[FileProblem]]:
+    """Return a block whose values are yet to be made, and what is wrong with how they are swept.
+
+    name: of the study.
+    """
+    given: dict[str, Any] = {}
+    fixed: dict[str, Any] = {}
+    sweeps: dict[str, Sweep] = {}
+    names: dict[str, str] = {}  # as the file gives keys, of which one may be double another
+    problems = []
+    for path, value in walk_leaves(tree.values):
+        key = DOUBLES.get(key_of(path), key_of(path))
+        other = names.setdefault(key, key_of(path))
+        if other != key_of(path) and (key in sweeps or is_swept(key, value)):
+            told = f"{other} is given, too: give one of the two"
+            problems.append(FileProblem(tree.at(*path)[0], key_of(path), told))
+        given[key] = value
+        if not is_swept(key, value):
+            own = hold_value(key, value) if key == key_of(path) else value
+            fixed = put(fixed, path, own)
+            continue
+        try:
+            sweeps[key] = _sweep(path, key, value)
+        except NoSweep as error:
+            problems.append(FileProblem(tree.at(*path, *error.path)[1], key, str(error)))
+    sample, wrong_design = _design_of(tree, sweeps)
+    groups, wrong_zip = _zip_groups(tree, sweeps, {problem.key for problem in problems})
+    exclusions, wrong_tests = _exclusions(tree)
+    drawn = tuple(key for key, sweep in sweeps.items() if sweep.is_drawn)
+    together = {key: group for group in [drawn, *groups] for key in group}
+    factors = [*dict.fromkeys(together.get(key, (key,)) for key in sweeps)]
+    block = Block(name, tree, given, fixed, sweeps, factors, sample, exclusions)
+    return block, [*problems, *wrong_design, *wrong_zip, *wrong_tests]
+
+
+def is_swept(key: str, value: Any) -> bool:
+    """Return whether a value stands for many, unlike a pair of materials or an accuracy."""
+    row = row_of(key)
+    if row is None:
+        return False
+    if isinstance(value, dict):
+        return key != "solve.accuracy"
+    is_pair = row.kind == "materials"
+    return isinstance(value, list) and (not is_pair or any(isinstance(n, list) for n in value))
+
+
+def _sweep(path: tuple[Any, ...], key: str, value: Any) -> Sweep:
+    """Return how a value sweeps a key. Raises NoSweep where it cannot."""
+    row, parts = row_of(key), stands_for(key)
+    if key in outside_identity():
+        raise NoSweep("cannot be swept: it does not change what a job computes")
+    if isinstance(value, dict) and FORMS.keys() & value and not (row and row.is_number):
+        raise NoSweep(f"is no number, so that {next(iter(value))} cannot sweep it: give a list")
+    if parts and isinstance(value, list) and any(isinstance(one, dict) for one in value):
+        first, *_, last = (part.rpartition(".")[2] for part in parts)
+        form = f"{{{first}: [...], {last}: ...}}"
+        raise NoSweep(f"a list has values of all parts alike: sweep each part, {form}")
+    return sweep_of(path, value, row is not None and row.kind == "integer")
+
+
+@make_group
+class Sample:
+    """How many samples a file's designs draw, and from which seed; `sample`."""
+
+    n: int | None = integer(None, "[1, 1e15]", "samples of a design")
+    seed: int = integer(0, "[0, 1e18]", "seed of a design")
+
+
+def _design_of(tree: Tree, sweeps: dict[str, Sweep]) -> tuple[Sample, list[FileProblem]]:
+    """Return how many samples from which seed a block draws, and what is wrong with that."""
+    drawn = [sweep for sweep in sweeps.values() if sweep.is_drawn]
+    sample, problems = read_own(Sample, "sample", tree)
+    for sweep in drawn:
+        if sweep.kind != drawn[0].kind:
+            kinds = f"{drawn[0].kind} or {sweep.kind}"
+            text = f"one design draws all sampled keys: {kinds}, not both"
+            problems.append(tree.problem(sweep.path, text))
+    if len(drawn) == 1 and drawn[0].kind == "saltelli":
+        text = "saltelli exchanges keys one by one: draw two or more, or draw this one by sobol"
+        problems.append(tree.problem(drawn[0].path, text))
+    if drawn and sample.n is None and not problems:
+        text = "needs a number of samples: add `sample: {n: 64, seed: 1}` to the file"
+        problems.append(tree.problem(drawn[0].path, text))
+    return Sample() if problems else sample, problems
+
+
+def read_own(of: type[Any], name: str, tree: Tree) -> tuple[Any, list[FileProblem]]:
+    """Return a group of a file that is no part of a case, and what is wrong with it."""
+    values = tree.values.get(name, {})
+    if not isinstance(values, dict):
+        return of(), [tree.problem((name,), no_mapping(name, values))]
+    try:
+        return of(**values), []
+    except CaseError as error:
+        return of(), [
+            tree.problem((name, *path_of(one.key)), one.message, is_of_key(one.message))
+            for one in error.problems
+        ]
+
+
+def _zip_groups(
+    tree: Tree, sweeps: dict[str, Sweep], wrong: set[str]
+) -> tuple[Factors, list[FileProblem]]:
+    """Return the groups of `zip`, swept keys with equally many values, and what is wrong with them.
+
+    wrong: keys whose sweep is wrong, which is reported already.
+    """
+    value = tree.values.get("zip", [])
+    found: Factors = []
+    problems = []
+    for number, keys in enumerate(value if isinstance(value, list) else [value]):
+        message = _tell_zip(sweeps, keys, [key for group in found for key in group])
+        if not message:
+            found.append(tuple(sorted(keys, key=[*sweeps].index)))
+        elif not (isinstance(keys, list) and wrong.intersection(map(str, keys))):
+            problems.append(FileProblem(tree.at("zip", number)[1], "zip", message))
+    return found, problems
+
+
+def _tell_zip(sweeps: dict[str, Sweep], keys: Any, taken: Sequence[str]) -> str:
+    """Return what is wrong with a group of keys that advance together; taken: by other groups."""
+    if not isinstance(keys, list) or len(keys) < 2 or not all(isinstance(k, str) for k in keys):
+        return "needs a list of groups of keys, such as [[machine.speed_rpm, clearance_mm]]"
+    swept = {key: sweeps[key] for key in keys if key in sweeps}
+    if any(sweep.is_drawn for sweep in swept.values()):
+        return "sampled keys go together by their design already"
+    for key in keys:
+        if key not in swept:
+            hint = "" if row_of(key) else suggestion(key, "")
+            return f"{quote_value(key)} is not swept here{hint}"
+        if key in taken or keys.count(key) > 1:
+            return f"{key} is named twice"
+    if len({sweep.count for sweep in swept.values()}) > 1:
+        listed = ", ".join(f"{key} has {sweep.count}" for key, sweep in swept.items())
+        return f"needs equally many values of each key: {listed}"
+    return ""
+
+
+def _exclusions(tree: Tree) -> tuple[list[Test], list[FileProblem]]:
+    """Return the comparisons of `exclude`; where one holds, a combination is left out."""
+    value = tree.values.get("exclude", [])
+    texts = value if isinstance(value, list) else [value]
+    tests, problems = [], []
+    for number, text in enumerate(texts):
+        try:
+            tests.append(comparison(text))
+        except NoComparison as error:
+            problems.append(FileProblem(tree.at("exclude", number)[1], "exclude", str(error)))
+    return tests, problems
 
 
 @dataclass(frozen=True)
@@ -90,18 +469,12 @@ class Cases(Sequence[Case]):
         """Yield the block and the number in it of each case."""
         return ((block, number) for block in self.blocks for number in block.numbers)
 
-    @overload
-    def __getitem__(self, index: int) -> Case: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Case, ...]: ...
-    def __getitem__(self, index: int | slice) -> Case | tuple[Case, ...]:
-        numbers = range(len(self))[index]
-        if isinstance(numbers, range):
-            return tuple(self[number] for number in numbers)
-        block, place = self.place_of(numbers)
+    def __getitem__(self, index: Any) -> Any:
+        number = range(len(self))[index]
+        block, place = self.place_of(number)
         case = block.case(place)
         if self.keys:
-            vars(case)["key"] = self.keys[numbers]
+            vars(case)["key"] = self.keys[number]
         return case
 
 
