@@ -256,7 +256,7 @@ def stored(text: str) -> dict[str, str]:
     if case.output.keep == "metrics":
         return {name: text for name, text in found.items() if name != "time"}
     # of its time series: the text of the case is longer by the key
-    found["file"] = str(len(encode_batch([outcome_of(run)])) // 10_000)
+    found["file"] = str(round(len(encode_batch([outcome_of(run)])) / 10_000))
     if case.wear:
         worn = Worn(case)
         begun = worn.make_row([])
