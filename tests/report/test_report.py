@@ -339,12 +339,13 @@ def test_metrics_without_series_have_tables_but_no_figures(paper_store, tmp_path
     part = part_of(paper_store, tmp_path / "part", "typical")
     (key,) = read_store(part).keys()
     replace_jobs(part, read_job(part, key).drop_dims("time"))
-    write_report(part, tmp_path / "out")
+    write_report(part, tmp_path / "out", limits=["peak_acceleration=300,400 m/s2"])
     found = read(tmp_path / "out")
     assert "stored without its time series" in found.text
     assert not found.sources
     (row,) = [cells for _, cells in found.rows if cells[0] == "typical model, no clearance"]
-    assert row[2] == "394.8"
+    assert row[2] == "394.8 B"
+    assert "Zones of peak acceleration, by limits that were given: A below 300" in found.text
 
 
 def test_the_most_exact_run_is_shown(paper_store, tmp_path):
