@@ -108,20 +108,14 @@ MIN_LINES = 128  # samples that a level of it needs, twice over for each further
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Lines over orders of the crank speed, (k,) each: peak amplitudes in the signal's unit.
+    """Peak amplitudes of the orders 0, 1, ... of the crank speed, (k,), in the signal's unit.
 
     Blocks are revolutions, whose mean squares are averaged. `above`: rms of what lies above
     `ORDER` over all of them, in the signal's unit.
     """
 
-    orders: np.ndarray
     amplitudes: np.ndarray
     above: float
-
-    @property
-    def lines(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return orders and amplitudes."""
-        return self.orders, self.amplitudes
 
 
 def shaking(run: "xr.Dataset") -> Spectrum:
@@ -165,7 +159,7 @@ def order_lines(even: np.ndarray, a_turn: int) -> Spectrum:
     amplitudes = line_amplitudes(even, a_turn, False)
     fine = line_amplitudes(even, even.size, True)[ORDER * even.size // a_turn + 1 :]
     above = math.sqrt(float(np.sum(fine**2)))  # Parseval
-    return Spectrum(np.arange(amplitudes.size), amplitudes, above)
+    return Spectrum(amplitudes, above)
 
 
 def deviation_spectrum(run: "xr.Dataset") -> Spectrum:

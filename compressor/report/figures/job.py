@@ -328,10 +328,10 @@ def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     force, deviation = panels[:2, 0]
     force.label("y", "amplitude of X ({})", "N")
     deviation.label("y", "amplitude ({})", "m/s²")
-    plot_lines(force, shaking(run).lines, THIS, NAMES["this"])
+    plot_lines(force, shaking(run).amplitudes, THIS, NAMES["this"])
     if twin is not None:
-        plot_lines(force, shaking(twin).lines, TWIN, NAMES["twin"])
-    plot_deviation(deviation, deviation_spectrum(run).lines)
+        plot_lines(force, shaking(twin).amplitudes, TWIN, NAMES["twin"])
+    plot_deviation(deviation, deviation_spectrum(run).amplitudes)
     force.title = "force on the frame along the cylinder"
     deviation.title = "acceleration of the crosshead less that of ideal joints"
     if envelope is not None:
@@ -353,12 +353,10 @@ def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFi
     return DrawnFigure(drawing.figure(), sentence + caution(run), above)
 
 
-def plot_lines(
-    panel: Panel, lines: tuple[np.ndarray, np.ndarray], line: LineStyle, name: str
-) -> None:
-    """Draw orders and amplitudes, (k,) each, on a log scale from order 1 on; mark `ORDER`."""
-    shown = (lines[0] >= 1) & (lines[0] <= MAX_ORDERS)
-    orders, amplitudes = (values[shown] for values in lines)
+def plot_lines(panel: Panel, amplitudes: np.ndarray, line: LineStyle, name: str) -> None:
+    """Draw amplitudes of the orders 0, 1, ..., (k,), on a log scale from 1 on; mark `ORDER`."""
+    amplitudes = amplitudes[1 : MAX_ORDERS + 1]
+    orders = np.arange(1, amplitudes.size + 1)
     panel.plot(orders, amplitudes, line, name)
     panel.y.type, before = "log", panel.y.range
     others = 10.0 ** before[1] / panel.factors["y"] / 3.0 if before else 0.0
@@ -371,10 +369,10 @@ def plot_lines(
         panel.write(f"order {ORDER}", ORDER, 1, RED, "y", (4, -4), level="top", size=8.5)
 
 
-def plot_deviation(panel: Panel, lines: tuple[np.ndarray, np.ndarray]) -> None:
+def plot_deviation(panel: Panel, amplitudes: np.ndarray) -> None:
     """Draw the spectrum of a deviation, m/s2; in words where it is rounding, as of ideal joints."""
-    if lines[1].max() > ROUNDING:
-        plot_lines(panel, lines, THIS, NAMES["this"])
+    if amplitudes.max() > ROUNDING:
+        plot_lines(panel, amplitudes, THIS, NAMES["this"])
         return
     text = "none: the motion is that of ideal joints"
     panel.write(text, 0.5, 0.5, inside="xy", side="center")

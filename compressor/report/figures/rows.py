@@ -272,7 +272,7 @@ def segment_words(place: int) -> str:
 def draw_waterfall(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> DrawnFigure:
     """Return order spectra of X, a row a value, in colour; beside them the rms above `ORDER`."""
     found = [row.shaking for row in rows]
-    size = min(MAX_MAP_ORDERS, *(one.orders.size - 1 for one in found if one))
+    size = min(MAX_MAP_ORDERS, *(one.amplitudes.size - 1 for one in found if one))
     table = np.full((len(rows), size), np.nan)
     for number, one in enumerate(found):
         if one:
