@@ -24,7 +24,7 @@ from compressor.store import Folder, StoredStudy, StoreError, StoreWarning, read
 NONE_SEEN = "none seen"  # less than both error bars
 NO_VALUE = "–"
 MIN_SHOWN_CHANGE = 1e-5  # relative: a smaller change is not written out
-MOST_SHOWN = 5  # of what moves a metric, on the screen
+MOST_SHOWN = 8  # of what moves a metric, on the screen
 KEY_DIGITS = 8  # of a job's key in a file's name
 KEY_IN_NAME = re.compile(rf"(-[0-9a-f]{{{KEY_DIGITS}}})")
 
