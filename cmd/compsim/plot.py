@@ -78,6 +78,6 @@ def plot(words, folder, output, units, **chosen) -> int:
 
     writable_folder(output, make=False)
     choice = PlotChoice(units=units or "usual", **chosen)
-    for drawn in write_plots(folder, output, words, choice):
-        screen.print_text(str(drawn.path), f"  {drawn.caption}")
+    for path, caption in write_plots(folder, output, words, choice):
+        screen.print_text(str(path), f"  {caption}")
     return screen.DONE

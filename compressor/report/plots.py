@@ -1,6 +1,6 @@
 """`compsim plot`: figures of one job, or of a study along one of its axes, as files."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import wrap
@@ -25,9 +25,9 @@ from compressor.metrics import JOINTS
 from compressor.program import CompsimError
 from compressor.reasons import remedy
 from compressor.report.figures import FIGURES, SweptRow
-from compressor.report.figures.drawing import as_csv
+from compressor.report.figures.drawing import as_csv, thin_places
 from compressor.report.figures.pictures import render
-from compressor.report.figures.sweep_data import name_in_words
+from compressor.report.figures.sweep_data import name_in_words, shown_value
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.study_section import file_name
 from compressor.store import (
@@ -68,14 +68,6 @@ class PlotChoice:
     units: Units = "usual"
 
 
-@dataclass(frozen=True)
-class Plotted:
-    """A figure that was written."""
-
-    path: Path
-    caption: str
-
-
 def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tuple[str, ...]:
     """Return the figures to draw: those requested, by default all.
 
@@ -85,13 +77,6 @@ def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tup
     if wrong:
         raise PlotError(f"{thing} has no figure {wrong[0]!r}: it has {', '.join(known)}")
     return tuple(what) or tuple(known)
-
-
-def publish_figures(drawn: Iterable[DrawnFigure], output: Folder, stem: str) -> Iterator[Plotted]:
-    """Write figures as files; yields each. Raises StoreError."""
-    for one in drawn:
-        path = Path(output) / f"{file_name(stem, one.name)}.png"
-        yield Plotted(write_figure(path, one.figure), one.caption)
 
 
 def write_figure(path: Path, figure: go.Figure) -> Path:
@@ -117,8 +102,8 @@ KEEP = "run it again with --set output.keep=series"
 
 def write_plots(
     results: Folder, output: Folder, words: Sequence[str], choice: PlotChoice
-) -> Iterator[Plotted]:
-    """Draw a study by its name, or a job by the words that `show` takes; yields what was written.
+) -> Iterator[tuple[Path, str]]:
+    """Draw a study by its name, or a job by the words that `show` takes; yield files and captions.
 
     A study of one job has a job's figures, too. words: the beginning of a job's key, or a study,
     and `axis=value` until one job is left. Raises WrongName where they name none or several,
@@ -135,7 +120,9 @@ def write_plots(
         key = find_job(results, words, studies, stored.keys())
         drawn = job_figures(stored, studies, key, choice)
         stem = key[:KEY_DIGITS]
-    yield from publish_figures(drawn, output, stem)
+    for one in drawn:
+        path = Path(output) / f"{file_name(stem, one.name)}.png"
+        yield write_figure(path, one.figure), one.caption
 
 
 def job_figures(
@@ -195,10 +182,7 @@ def draw_study(stored: Stored, study: StoredStudy, choice: PlotChoice) -> Iterat
         )
     figures = choose_figures(choice.what, [*STUDY], f"study {study.name}")
     over = choose_axis(stored.folder, study, choice.over)
-    jobs, where = select_jobs(stored.folder, study, over, choice.at)
-    if len(jobs) > MAX_ROWS:
-        where += f" {MAX_ROWS} of {len(jobs)} jobs, evenly chosen."
-        jobs = [jobs[n * len(jobs) // MAX_ROWS] for n in range(MAX_ROWS)]
+    jobs, where = select_jobs(stored.folder, study, over, choice.at, MAX_ROWS)
     rows = [swept_row(stored, value, key) for value, key in jobs]
     if not any(row.shaking for row in rows):
         raise PlotError(nothing_to_draw(stored, study, rows))
@@ -208,20 +192,16 @@ def draw_study(stored: Stored, study: StoredStudy, choice: PlotChoice) -> Iterat
     if "segments" in figures:
         rows = with_segments(stored, jobs, rows, limit)
     for name in figures:
-        if name == "segments" and not any(row.segments for row in rows):
-            if choice.what:
-                raise PlotError(
-                    f"no job of {study.name} has a sensor's record in segments: {SENSE}"
-                )
-            continue
-        if name == "map" and not any(row.modes is not None for row in rows):
-            if choice.what:
-                raise PlotError(f"no joint of {study.name} has clearance: there is no mode map")
+        needs = STUDY[name].needs
+        lack = [need for need in needs if all(getattr(row, need) is None for row in rows)]
+        if lack and choice.what:
+            raise PlotError(LACK[lack[0]].format(study.name))
+        if lack:
             continue
         kept = keep_sensed(rows) if name == "cycles" else rows
         shown = STUDY[name].make(kept, axis_words(over), units=choice.units)
         shown.figure.layout.title = study_title(study, shown.title, where)
-        yield shown._replace(note=where)
+        yield shown._replace(note=spell_where(where))
 
 
 def whole_twin(run: xr.Dataset, sensed: bool = False) -> xr.Dataset | None:
@@ -235,12 +215,14 @@ def job_title(studies: Sequence[StoredStudy], key: str, what: str) -> str:
     for study in studies:
         if key in study.keys:
             point = [*points(study)][study.keys.index(key)]
-            values = [f"{axis} {format_swept_value(value)}" for axis, value in point.items()]
-            return title_figure(study.title or study.name, what, [*values, f"job {key[:10]}"])
-    return in_lines(what, [f"job {key[:10]}"])
+            values = [f"{axis} {shown_value(value)}" for axis, value in point.items()]
+            return title_figure(
+                study.title or study.name, what, [*values, f"job {key[:KEY_DIGITS]}"]
+            )
+    return title_figure(f"job {key[:KEY_DIGITS]}", what)
 
 
-def study_title(study: StoredStudy, what: str, where: str) -> str:
+def study_title(study: StoredStudy, what: str, where: Sequence[str]) -> str:
     """Return the title of a study's figure: what is drawn, which joints are worn, the speed."""
     swept = {axis.key for axis in study.axes}
     parts = []
@@ -248,21 +230,13 @@ def study_title(study: StoredStudy, what: str, where: str) -> str:
         parts.append(JOINT_WORDS[study.fixed["joint"]])
     if "machine.speed_rpm" not in swept:
         parts.append(f"{study.fixed['machine']['speed_rpm']:g} rpm")
-    said = where.strip().removesuffix(".").split(". ")
-    parts += [part.removeprefix("Here ") for part in said if part]
-    return title_figure(study.title or study.name, what, parts)
+    return title_figure(study.title or study.name, what, [*parts, *where])
 
 
 def title_figure(machine: str, what: str, parts: Sequence[str] = ()) -> str:
     """Return a figure's title: the machine by its title or study, what is drawn, and where."""
-    return in_lines(f"{machine}: {what}", parts)
-
-
-def in_lines(first: str, parts: Sequence[str]) -> str:
-    """Return a title: a line that says what is drawn, and below it what of."""
-    return "<br>".join(
-        line for text in (first, "; ".join(parts)) for line in wrap(text, TITLE_WIDTH)
-    )
+    texts = f"{machine}: {what}", "; ".join(parts)
+    return "<br>".join(line for text in texts for line in wrap(text, TITLE_WIDTH))
 
 
 def axis_words(key: str) -> str:
@@ -273,7 +247,11 @@ def axis_words(key: str) -> str:
     return f"{name} ({unit})" if unit else name
 
 
-SENSE = "run it with body: true and sensor: true"
+LACK = {  # why a study has no figure that needs what no row has
+    "segments": "no job of {} has a sensor's record in segments: run it with body: true and "
+    "sensor: true",
+    "modes": "no joint of {} has clearance: there is no mode map",
+}
 
 
 def read_limit(text: str) -> tuple[float, bool] | None:
@@ -333,12 +311,9 @@ def draw_for_page(stored: Stored, study: StoredStudy, units: Units) -> Iterator[
     study that kept no series.
     """
     over = choose_axis(stored.folder, study, "")
-    jobs, where = select_jobs(stored.folder, study, over, ())
-    number, count, drawn = len(jobs), min(len(jobs), MAX_PAGE_ROWS), where
-    if count < number:
-        drawn += f" {count} of {number} jobs, evenly chosen."
-        jobs = [jobs[round(n * (number - 1) / (count - 1))] for n in range(count)]
-    rows = keep_sensed([swept_row(stored, value, key, brief=True) for value, key in jobs])
+    jobs, where = select_jobs(stored.folder, study, over, (), MAX_PAGE_ROWS)
+    drawn = spell_where(where)
+    rows = keep_sensed([swept_row(stored, value, key, ["cycle"]) for value, key in jobs])
     known = {n: row.cycle for n, row in enumerate(rows) if row.cycle}
     if not known:
         return
@@ -357,7 +332,7 @@ def draw_for_page(stored: Stored, study: StoredStudy, units: Units) -> Iterator[
     yield shown._replace(title=f"{shown.title}, {value}", note=note + drawn)
     if case.load == "gas":
         shown = JOB["cards"].make(run, twin, units=units)
-        yield shown._replace(title=f"{shown.title}, {value}", note=where)
+        yield shown._replace(title=f"{shown.title}, {value}", note=drawn)
 
 
 def keep_sensed(rows: Sequence[SweptRow]) -> list[SweptRow]:
@@ -381,6 +356,7 @@ def nothing_to_draw(stored: Stored, study: StoredStudy, rows: Sequence[SweptRow]
         "failed": f"compsim status -r {stored.folder} shows why",
         "not run": f"compsim run {study.case_file} -r {stored.folder}",
         "no series": KEEP,
+        "damaged": f"compsim verify -r {stored.folder} names the file",
         "too short": "run it with a longer solve.duration_rev",
     }
     text = "; ".join(f"{problem}: {cures[problem]}" for problem in sorted(problems))
@@ -397,11 +373,11 @@ def choose_axis(folder: Folder, study: StoredStudy, name: str) -> str:
 
 
 def select_jobs(
-    folder: Folder, study: StoredStudy, over: str, at: Sequence[str]
-) -> tuple[list[tuple[Any, str]], str]:
-    """Return (value, key) of the jobs along an axis, and a sentence on the other axes.
+    folder: Folder, study: StoredStudy, over: str, at: Sequence[str], most: int
+) -> tuple[list[tuple[Any, str]], list[str]]:
+    """Return (value, key) of the jobs along an axis in its order, and the other axes in words.
 
-    In the order of the axis. Raises PlotError where `at` names no job, or the axis itself.
+    At most `most`. Raises PlotError where `at` names no job, or the axis itself.
     """
     fixed = {}
     for text in at:
@@ -421,46 +397,43 @@ def select_jobs(
         raise PlotError(f"no job of {study.name} has {', '.join(at)}")
     numbers = all(isinstance(value, int | float) for value, _ in jobs)
     jobs.sort(key=lambda job: job[0] if numbers else 0)
-    values = ", ".join(f"{name} {format_swept_value(value)}" for name, value in fixed.items())
-    where = f" Here {values}." if values else ""
-    varied = [axis.key for axis in study.axes if axis.key not in (over, *fixed)]
-    return jobs, where + (f" Along with it vary {', '.join(varied)}." if varied else "")
+    values = ", ".join(f"{name} {shown_value(value)}" for name, value in fixed.items())
+    varied = ", ".join(axis.key for axis in study.axes if axis.key not in (over, *fixed))
+    where = [values] * bool(values) + [f"along with it vary {varied}"] * bool(varied)
+    if len(jobs) > most:
+        where.append(f"{most} of {len(jobs)} jobs, evenly chosen")
+    return [jobs[n] for n in thin_places(len(jobs), most)], where
 
 
-def swept_row(stored: Stored, value: Any, key: str, brief: bool = False) -> SweptRow:
-    """Return one job as a row of a figure over an axis, or with the reason why it has none.
+def spell_where(where: Sequence[str]) -> str:
+    """Return the sentence on which jobs of a study are drawn, if not all."""
+    return f" Here {'; '.join(where)}." if where else ""
 
-    brief: its last revolution alone, and no error for a damaged job.
-    """
-    name, status = (
-        format_swept_value(value) if value != "" else key[:KEY_DIGITS],
-        stored.status(key),
-    )
+
+def read_modes(run: xr.Dataset) -> xr.Dataset | None:
+    """Return the `angle_modes` of a run, None of ideal joints."""
+    try:
+        return angle_modes(run)
+    except ValueError:
+        return None
+
+
+READ = {"cycle": read_cycle, "shaking": shaking, "modes": read_modes}  # parts of a `SweptRow`
+
+
+def swept_row(stored: Stored, value: Any, key: str, parts: Collection[str] = (*READ,)) -> SweptRow:
+    """Return one job as a row of a figure over an axis, with some parts, or why it has none."""
+    name = shown_value(value) if value != "" else key[:KEY_DIGITS]
+    status = stored.status(key)
     if status is None or status.status != "ok" or not status.samples:
         problem = "not run" if status is None else "failed" if status.reason else "no series"
         return SweptRow(name, problem=problem)
     try:
         run = stored.job(key)
+        found: dict[str, Any] = {part: READ[part](run) for part in parts}
     except DamagedFile:
-        if brief:
-            return SweptRow(name, problem="damaged")
-        raise
-    chaotic = run.attrs.get("regime") == "chaotic"
-    try:
-        cycle = read_cycle(run)
-        if brief:
-            return SweptRow(name, cycle=cycle, chaotic=chaotic)
-        found = shaking(run)
+        return SweptRow(name, problem="damaged")
     except NoSeriesError:
         return SweptRow(name, problem="too short")
-    try:
-        oil = bool(case_of(run).lubricant)
-        return SweptRow(name, found, angle_modes(run), cycle, chaotic=chaotic, lubricated=oil)
-    except ValueError:  # ideal joints
-        return SweptRow(name, found, cycle=cycle, chaotic=chaotic)
-
-
-def format_swept_value(value: Any) -> str:
-    """Return a swept value in few characters."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return f"{value:g}" if number else str(value)
+    chaotic, oil = run.attrs.get("regime") == "chaotic", bool(case_of(run).lubricant)
+    return SweptRow(name, **found, chaotic=chaotic, lubricated=oil)

@@ -2,12 +2,13 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from compsim import cli
-from conftest import store_cases
+from conftest import damage_series, store_cases
 
 from compressor.analysis.shaking import frame_forces
 from compressor.cases.case import Case
@@ -158,6 +159,17 @@ def test_a_study_is_drawn_along_an_axis(plot, folder, unpainted):
     _, default, _ = plot("worn")[1].values()
     assert "each value of clearance (mm)" in default
     assert "Here machine.speed_rpm 400." in default
+
+
+def test_a_damaged_job_is_a_row_without_series(folder, tmp_path, compsim, unpainted):
+    """It ended the plot of its study."""
+    home = shutil.copytree(folder, tmp_path / "results")
+    damage_series(home, key(home, "worn", 0))
+    words = ["plot", "worn", "--what", "waterfall", "-r", home, "-o", tmp_path / "out"]
+    assert "Not drawn: 1 of 2 jobs (damaged)." in compsim(*words).out
+    damage_series(home, key(home, "worn", 2))
+    told = " ".join(compsim(*words, code=2).err.split())
+    assert f"can be drawn: damaged: compsim verify -r {home} names the file" in told
 
 
 def test_rounding_is_not_drawn_as_a_spectrum(folder):

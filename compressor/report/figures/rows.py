@@ -203,7 +203,7 @@ def draw_cycles(rows: Sequence[SweptRow], title: str, units: Units = "usual") ->
     )
 
 
-@figure("study", "segments", "vibration in segments of 10°")
+@figure("study", "segments", "vibration in segments of 10°", "segments")
 def draw_segments(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> DrawnFigure:
     """Return the rms in segments of 10 degrees over the healthy machine's, a row a value.
 
@@ -293,7 +293,7 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str, units: Units = "usual")
     return DrawnFigure(figure, sentence, numbers)
 
 
-@figure("study", "map", "most frequent contact mode over crank angle")
+@figure("study", "map", "most frequent contact mode over crank angle", "modes")
 def draw_map(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> DrawnFigure:
     """Return the most frequent contact mode over the crank angle, a row a value, for each joint."""
     modes = rows_modes(rows)

@@ -130,7 +130,8 @@ def positions(data: xr.Dataset, axis: str) -> np.ndarray:
 
 def shown_value(value: Any) -> str:
     """Return a swept value in few characters."""
-    return f"{value:g}" if isinstance(value, float | int | np.number) else str(value)
+    is_number = isinstance(value, float | int | np.number) and not isinstance(value, bool)
+    return f"{value:g}" if is_number else str(value)
 
 
 LOG_RATIO = 100.0  # numbers that span more are drawn on a log scale
