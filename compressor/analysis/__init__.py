@@ -41,7 +41,6 @@ from compressor.analysis.shaking import (
     Spectrum,
     deviation_spectrum,
     frame_forces,
-    healthy_body_velocity_rms,
     healthy_twin,
     last_revolution,
     sensor_envelope,

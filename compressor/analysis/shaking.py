@@ -5,7 +5,7 @@ has next to none.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -80,24 +80,18 @@ def last_revolution(run: "xr.Dataset") -> "tuple[np.ndarray, xr.Dataset]":
     return angle - 360.0 * np.floor(angle[0] / 360.0 + 1e-9), settled.isel(time=slice(first, None))
 
 
-def healthy_twin(run: "xr.Dataset", sensed: bool = False) -> "xr.Dataset":
+def healthy_twin(run: "xr.Dataset") -> "xr.Dataset | None":
     """Return the run of the same machine with ideal joints, on the output grid of its own case.
 
-    From closed forms, or simulated where a feature leaves none: it may then fail. Without error
-    bars; with body and sensor where it is to be `sensed`. Only the run's case is read.
+    From closed forms, or simulated where a feature leaves none; None where it then fails. Without
+    error bars, with body and sensor. Only the run's case is read.
     """
     ideal = with_ideal_joints(case_of(run))
-    values = (ideal if sensed else replace(ideal, body=None, sensor=None)).values()
+    values = ideal.values()
     values["solve"]["error_bars"] = False
     values["output"] = {"keep": "series", "signals": ideal.output.signals}
-    return simulate(Case.resolve(values))
-
-
-def healthy_body_velocity_rms(case: Case) -> np.ndarray:
-    """Return the metric `body_velocity_rms` of a case's machine with ideal joints, m/s, (2,)."""
-    values = replace(with_ideal_joints(case), sensor=None).values()
-    values["solve"]["error_bars"] = False
-    return simulate(Case.resolve(values))["body_velocity_rms"].values
+    twin = simulate(Case.resolve(values))
+    return twin if twin["status"].item() == "ok" else None
 
 
 ORDER = 12  # of the crank speed: above it the ideal machine's force has next to nothing

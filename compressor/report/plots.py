@@ -145,13 +145,11 @@ def job_figures(
     for name in choice.what:
         for lack in (need for need in JOB[name].needs if not has[need]):
             raise PlotError(f"job {key} {why[lack]}, so that there is no figure {name!r} of it")
-    twins: dict[str, xr.Dataset | None] = dict.fromkeys(figures, whole_twin(run) if worn else None)
-    if worn and "analyst" in figures and "sensor_acceleration" in run:
-        twins["analyst"] = whole_twin(run, sensed=True)
+    twin = healthy_twin(run) if worn else None
     try:
         for name in figures:
             if all(has[need] for need in JOB[name].needs):
-                shown = JOB[name].make(run, twins[name], units=choice.units)
+                shown = JOB[name].make(run, twin, units=choice.units)
                 shown.figure.layout.title = job_title(studies, key, shown.title)
                 yield shown
     except NoSeriesError as error:
@@ -202,12 +200,6 @@ def draw_study(stored: Stored, study: StoredStudy, choice: PlotChoice) -> Iterat
         shown = STUDY[name].make(kept, axis_words(over), units=choice.units)
         shown.figure.layout.title = study_title(study, shown.title, where)
         yield shown._replace(note=spell_where(where))
-
-
-def whole_twin(run: xr.Dataset, sensed: bool = False) -> xr.Dataset | None:
-    """Return the machine of a run with ideal joints; None where its own run fails."""
-    twin = healthy_twin(run, sensed=sensed)
-    return twin if twin["status"].item() == "ok" else None
 
 
 def job_title(studies: Sequence[StoredStudy], key: str, what: str) -> str:
@@ -292,7 +284,7 @@ def with_segments(
         case = case_of(run)
         one = with_ideal_joints(case).key
         if one not in healthy:
-            twin = whole_twin(run, sensed=True)
+            twin = healthy_twin(run)
             if twin is None:
                 raise PlotError("the same machine without clearance, whose levels limits are times "
                                 "of, does not run to its end")  # fmt: skip
@@ -324,8 +316,7 @@ def draw_for_page(stored: Stored, study: StoredStudy, units: Units) -> Iterator[
     loudest = max(known, key=lambda n: np.abs(known[n].vibration).max())
     run = stored.job(jobs[loudest][1])
     case = case_of(run)
-    is_worn = case.joint != "none"
-    twin = whole_twin(run, sensed="sensor_acceleration" in run) if is_worn else None
+    twin = healthy_twin(run) if case.joint != "none" else None
     value = f"{over} {rows[loudest].value}" if jobs[loudest][0] != "" else rows[loudest].value
     shown = JOB["analyst"].make(run, twin, units=units)
     note = " It is the job with the greatest vibration of these." if len(known) > 1 else ""

@@ -11,7 +11,7 @@ from typing import Any
 
 import xarray as xr
 
-from compressor.analysis import JointScales, describe_cases, healthy_body_velocity_rms, joint_scales
+from compressor.analysis import JointScales, describe_cases, healthy_twin, joint_scales
 from compressor.cases import ACCURACY, Case, Study, points, to_si, with_ideal_joints
 from compressor.digits import align_columns, plural
 from compressor.metrics import JOINTS
@@ -200,9 +200,13 @@ def body_words(case: Case, run: xr.Dataset) -> str:
     """Return how fast a case's body moves in words, and that of the healthy machine."""
     if "body_velocity_rms" not in run:
         return "no whole settled revolution, by which its velocity would be known"
-    both = run["body_velocity_rms"].values, healthy_body_velocity_rms(case)
-    own, healthy = (" and ".join(f"{1e3 * one:.3g}" for one in rms) for rms in both)
-    return f"{own} mm/s rms along x and y, with ideal joints {healthy}"
+    twin = healthy_twin(xr.Dataset(attrs=case.attributes()))
+    own, *healthy = (
+        " and ".join(f"{1e3 * rms:.3g}" for rms in one["body_velocity_rms"].values)
+        for one in (run, twin) if one is not None
+    )  # fmt: skip
+    beside = f", with ideal joints {healthy[0]}" if healthy else ""
+    return f"{own} mm/s rms along x and y{beside}"
 
 
 # ---- as text ------------------------------------------------------------------------------------
