@@ -2,14 +2,7 @@
 
 from compressor.report.figures import style
 from compressor.report.figures.contours import contour_lines
-from compressor.report.figures.drawing import (
-    Panel,
-    PlotlyFigure,
-    join_with_gaps,
-    make_grid,
-    midway,
-    rectangle,
-)
+from compressor.report.figures.drawing import Panel, PlotlyFigure, make_grid, midway, rectangle
 from compressor.report.figures.sweep_data import FOOT, MARKS, Measure, measures, positions
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.page import Add, Addition, Cell, PageTable, TableRow, format_measure

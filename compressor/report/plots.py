@@ -80,10 +80,7 @@ def choose_figures(what: Sequence[str], known: Sequence[str], thing: str) -> tup
 
 
 def write_figure(path: Path, figure: go.Figure) -> Path:
-    """Write a figure as the end of its path says, .png, .svg or .csv; return the path.
-
-    Raises StoreError.
-    """
+    """Write a figure as its path ends, .png, .svg or .csv; return the path. Raises StoreError."""
     kind = path.suffix[1:]
     publish(path, as_csv(figure).encode() if kind == "csv" else render(figure, kind))
     return path

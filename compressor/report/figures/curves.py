@@ -157,9 +157,6 @@ def differing_part(curves: Sequence[Curve], quantity: Quantity) -> tuple[slice, 
 
 
 def first_peak(score: np.ndarray, nearly: float, reach: int) -> int:
-    """Return the place of the first maximum that is nearly the greatest.
-
-    Revolutions that are nearly equal then give the same place.
-    """
+    """Return the place of the first maximum that is nearly the greatest."""
     first = int(np.argmax(score >= nearly * score.max()))
     return first + int(np.argmax(score[first : first + reach + 1]))

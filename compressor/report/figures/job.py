@@ -318,10 +318,7 @@ def draw_cards(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
 
 @figure("job", "spectra", "order spectra")
 def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
-    """Return the order spectra of X and of the crosshead's deviation.
-
-    With a sensor, of its envelope.
-    """
+    """Return the order spectra of X, of the deviation, and of a sensor's envelope."""
     envelope = sensor_envelope(run)
     rows = 2 if envelope is None else 3
     drawing, panels = make_grid(rows, 1, 2.7 * rows + 0.5, units=units)

@@ -108,10 +108,7 @@ def draw_load_response(runs: Runs, units: Units = "usual") -> DrawnFigure:
               fault="small_end")  # fmt: skip
 @paper_figure(14, "Response with clearance at both joints", *sizes("both", "design"), fault="both")
 def draw_fault_response(runs: Runs, fault: str, units: Units = "usual") -> DrawnFigure:
-    """Return figure 8, 11 or 14: no clearance, and three clearances of one fault.
-
-    Acceleration oscillates fast: it has a row a clearance.
-    """
+    """Return figure 8, 11 or 14: no clearance, and three clearances of one fault."""
     curves = fault_curves(runs, fault, ideal=True)
     drawing, panels = make_grid(
         5, 2, 11.5, heights=(3, 3, 2, 2, 2), units=units, tall=[slice(2, 5)]
@@ -202,12 +199,9 @@ def draw_piston_force(runs: Runs, units: Units = "usual") -> DrawnFigure:
 @paper_figure(16, "Contact force at the small end, clearance at both joints", *sizes("both"),
               fault="both", joint="small_end")  # fmt: skip
 def draw_contact_force(runs: Runs, fault: str, joint: str, units: Units = "usual") -> DrawnFigure:
-    """Return figure 9, 12, 15 or 16: contact force at one joint, a row a clearance.
+    """Return figure 9, 12, 15 or 16: contact force at one joint both ways, a row a clearance.
 
-    Both ways in each row: along the cylinder and across it.
-
-    All enlarged views show the window in which the horizontal forces at the fault's first joint
-    differ most, so that those of both joints show the same angles.
+    All enlarged views show one window, chosen at the fault's first joint.
     """
     both = slice(0, 3), slice(3, 6)
     drawing, panels = make_grid(
@@ -353,10 +347,7 @@ def name_phases(panel: Panel, phase: np.ndarray, volume: np.ndarray, pressure: n
 
 @paper_figure(4, "The cam of the spring load", "design")
 def draw_cam(runs: Runs, units: Units = "usual") -> DrawnFigure:
-    """Return figure 4: the cam's contour, and its follower's displacement.
-
-    Beside the displacement stands the one that Eq. 10 gives as printed.
-    """
+    """Return figure 4: the cam's contour, and its follower's displacement, also as printed."""
     cam = Cam.of(runs["design"])
     angles = np.radians(np.linspace(0, 360, 1441))
     drawing, panels = make_grid(1, 2, 4.9, widths=(1, 1.25), units=units)

@@ -94,10 +94,7 @@ def zone_words(shown: Sequence[Measure], limits: Limits) -> str:
 def draw_grid(
     sweep: PlottedSweep, shown: Sequence[Measure], about: Sequence[Number], limits: Limits
 ) -> Iterator[DrawnFigure]:
-    """Yield the figures of a grid of two or more axes.
-
-    A ranking, and an overview of all metrics. Two axes of numbers, or of words, are a map.
-    """
+    """Yield a grid's figures: a ranking, and all metrics as maps or lines."""
     found = ranking(sweep, shown)
     yield from draw_ranked(sweep, found, shown)
     order = order_by_mean_strength(found) if found else [*range(len(sweep.axes))]
@@ -132,10 +129,7 @@ def draw_grid(
 def draw_sampled(
     sweep: PlottedSweep, shown: Sequence[Measure], about: Sequence[Number]
 ) -> Iterator[DrawnFigure]:
-    """Yield the figures of a list of jobs that are no grid.
-
-    A ranking, and each metric against its strongest key.
-    """
+    """Yield a list's figures: a ranking, and each metric over its strongest key."""
     found = ranking(sweep, shown)
     yield from draw_ranked(sweep, found, shown)
     order = order_by_mean_strength(found) if found else [*range(len(sweep.axes))]

@@ -41,10 +41,7 @@ class Measure:
 
     @property
     def is_relative(self) -> bool:
-        """Return whether its error bar is a part of its value.
-
-        The bar of a share or a count is in its own unit.
-        """
+        """Return whether its error bar is a part of its value, not in its own unit."""
         return BARRED[self.variable].bar.relative
 
     def of(self, data: xr.Dataset) -> np.ndarray:
@@ -60,10 +57,7 @@ class Measure:
         return self.in_unit(data, name) if name in data else self.of(data) * math.nan
 
     def in_unit(self, data: xr.Dataset, name: str) -> np.ndarray:
-        """Return a variable of the metric in the measure's unit.
-
-        0 of a number that is rounding beside that of the other joint or axis.
-        """
+        """Return a variable of the metric in the unit; 0 of rounding beside the other joint."""
         found = data.variables[name]  # by numpy: xarray's own steps take ten times as long
         values = found.values
         if self.joint or self.axis:
@@ -103,10 +97,7 @@ def measures(data: xr.Dataset, units: Units = "usual") -> list[Measure]:
 
 
 def swept_axes(study: xr.Dataset) -> list[str]:
-    """Return the axes of a study that have more than one value.
-
-    Of a list of jobs, the coordinates.
-    """
+    """Return the axes, of a list of jobs the coordinates, that have more than one value."""
     if study["status"].dims != ("job",):
         return [str(dim) for dim in study["status"].dims if study.sizes[dim] > 1]
     columns = (str(n) for n, c in study.coords.items() if c.dims == ("job",) and n != "key")

@@ -42,10 +42,7 @@ NOTHING = fill("#f2f2f2", edge=GREY, is_hatched=True)
 
 
 def orient_axes(sweep: PlottedSweep) -> tuple[int, int]:
-    """Return which of two axes lies along x and which along y.
-
-    Words lie along y, else the axis with fewer values.
-    """
+    """Return which of two axes lies along x, and which, of words or few values, along y."""
     first, second = sweep.axes
     rank = [(not axis.is_words, axis.values.size) for axis in (first, second)]
     return (0, 1) if rank[0] >= rank[1] else (1, 0)
@@ -125,10 +122,7 @@ def plot_limits(panel: Panel, cells: Cells, table: np.ndarray, limits: Sequence[
 
 
 def has_lines(table: np.ndarray, axes: tuple[PlottedAxis, PlottedAxis]) -> bool:
-    """Return whether lines of equal value are worth drawing.
-
-    They are over numbers, unless they would go round a few cells.
-    """
+    """Return whether lines of equal value are worth it: over numbers, round many cells."""
     rising = np.nansum(table > np.nanmin(table)) >= MIN_RISEN * table.size
     return min(table.shape) >= 3 and not any(axis.is_words for axis in axes) and bool(rising)
 
@@ -161,10 +155,7 @@ Ranking = dict[Measure, Effects]
 
 
 def ranking(sweep: PlottedSweep, measures: Sequence[Measure]) -> Ranking:
-    """Return the effects of a sweep's axes on each measure that is known well enough.
-
-    All of one kind.
-    """
+    """Return the effects of a sweep's axes, of one kind, on each measure known well enough."""
     columns = [axis.values for axis in sweep.axes]
     found = {}
     for measure in measures:
@@ -189,10 +180,7 @@ def order_by_mean_strength(found: Ranking) -> list[int]:
 
 
 def draw_ranking(sweep: PlottedSweep, found: Ranking) -> go.Figure:
-    """Return a panel an axis, the strongest first, with a row a measure.
-
-    Bars with 95 % intervals.
-    """
+    """Return a panel an axis, the strongest first, with a bar and its interval a measure."""
     order = order_by_mean_strength(found)
     rows, columns = math.ceil(len(order) / COLUMNS), min(COLUMNS, len(order))
     each = 0.26 * len(found) + 0.75
