@@ -34,7 +34,7 @@ OUT_OF_BUDGET = Reason.BUDGET_STEPS, Reason.BUDGET_SECONDS, Reason.STEP_UNDERFLO
 LAST_RTOL = TIGHTER_FACTOR * TIGHTEST  # with a tighter run to compare it with
 DOUBTFUL = 0.1  # of a number: an error from which on chaos is looked for
 ERROR_AIM = 0.7  # of what is allowed: where the next run's error is aimed at
-MIN_TIGHTENING, MAX_TIGHTENING = 10.0, 1000.0  # times tighter that the next run may be
+MIN_TIGHTENING, MAX_TIGHTENING = 10.0, 1000.0  # times tighter than a judge that a run may be
 
 
 def refine_until_accurate(case: Case, search: Search, first: Solution | None = None) -> Solution:
@@ -89,17 +89,19 @@ def refine_until_accurate(case: Case, search: Search, first: Solution | None = N
         share = ERROR_AIM / excess * (1.0 if before else 1.0 - TIGHTER_FACTOR**-ORDER)
         before = now
         tightening = min(max(ratio_of(share), MIN_TIGHTENING), MAX_TIGHTENING)
-        if tighter_companion(now):  # the next run needs none, and takes the place of its own
+        if tighter_companion(case, now):  # the next run needs none, and takes the place of its own
             tightening *= TIGHTER_FACTOR
         rtol = max(float(f"{rtol / tightening:.1e}"), LAST_RTOL)
 
 
-def tighter_companion(before: Solution) -> Solution | None:
+def tighter_companion(case: Case, before: Solution) -> Solution | None:
     """Return the tighter run that has judged a run, if both may judge the next one.
 
     Not where its error is a tenth of the numbers or more: of the next one it would say too little.
     """
-    if before.series_errors["acceleration"] >= DOUBTFUL:
+    errors = [before.series_errors["acceleration"]]
+    errors += [relative_bar(before.metrics[name], before.bars[name]) for name, _ in case.targets]
+    if max(errors) >= DOUBTFUL:
         return None
     return next((one for one in before.companions if one.rtol < before.rtol), None)
 
@@ -111,12 +113,13 @@ def make_comparison_runs(
 
     For a first run a looser one where the motion enlarges errors: two may agree by chance.
     """
+    beside = tighter_companion(case, before) if before else None  # read before it judges another
     if before:
-        beside = tighter_companion(before)  # read first: a run that judges another has none
         yield before
-        if beside:
-            yield beside
-            return
+    # not for the last tolerance, nor across a run whose energy does not balance
+    if beside and 0.99 * now.rtol > LAST_RTOL and beside.rtol < 1.1 * MAX_TIGHTENING * now.rtol:
+        yield beside
+        return
     tighter = make_comparison_run(case, now, search.left)
     search.count(tighter.trajectory)
     yield tighter

@@ -13,7 +13,7 @@ from compressor.solve import run as run_module
 from compressor.solve.error_bars import is_amplified
 from compressor.solve.series import distances
 from compressor.solve.simulate import measure, simulate
-from compressor.solve.solution import excess_over_promise, solve
+from compressor.solve.solution import excess_over_promise, solve, tighter_companion
 
 SHORT = {"duration_rev": 1, "settle_rev": 0.5}
 BOTH = {"joint": "both", "clearance_mm": 0.2}
@@ -116,6 +116,15 @@ def test_where_errors_are_enlarged_a_looser_run_is_asked_as_well(asked):
         by_each.append(again.bars | again.series_errors)
     for name, bar in (found.bars | found.series_errors).items():
         np.testing.assert_array_equal(bar, np.maximum(*(one[name] for one in by_each)))
+
+
+def test_a_run_that_is_far_off_judges_no_other():
+    case = of(ILL, accuracy={"peak_acceleration": 1e-3})
+    first, beside = (run_module.run_at_tolerance(case, rtol, 60.0, False) for rtol in (1e-7, 4e-8))
+    error_bars.estimate_errors(first, beside)
+    assert tighter_companion(case, first) is beside
+    first.bars["peak_acceleration"] = 0.2 * first.metrics["peak_acceleration"]
+    assert tighter_companion(case, first) is None
 
 
 # their first runs keep no promise, and two later ones agree by chance: errors of 60 % and 3 % at
