@@ -220,6 +220,12 @@ def read_tables(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return np.column_stack([values, errors, np.full(len(values), np.nan)]), columns
 
 
+def has_foreign_numbers(path: Path) -> bool:
+    """Return whether a batch has numbers of another version, which only that one can read."""
+    with open_netcdf(path) as file:
+        return not {*read_bytes(file["metric"]).astype(str).tolist()} <= VALUES.keys()
+
+
 def read_numbers(path: Path, rows: Sequence[int], places: np.ndarray) -> np.ndarray:
     """Return numbers of some jobs at some places in a row of all, nan where there are none."""
     table, columns = read_tables(path)

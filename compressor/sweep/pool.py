@@ -190,7 +190,7 @@ class Pool:
 
     def settle(self, job: Job, end: End) -> End:
         """Return the end of a job with its id."""
-        if not end.reason:
+        if end.reason in ("", Reason.INTERNAL_ERROR):
             self.batches.learn(end.seconds)
         elif end.reason == Reason.OUT_OF_MEMORY:
             most = f"{self.rules.memory / 1e9:.3g} GB that a worker may add"

@@ -140,8 +140,8 @@ def attempt(work: Callable[[Any], Any], payload: Any) -> End:
         text = "needs more memory than its worker may add"
         return End(reason=Reason.OUT_OF_MEMORY, detail=text)
     except (Exception, SystemExit) as error:  # work may even call sys.exit
-        text, traceback = describe_error(error)
-        return End(reason=Reason.INTERNAL_ERROR, detail=text, traceback=traceback)
+        seconds, (text, traceback) = time.monotonic() - start, describe_error(error)
+        return End(None, None, seconds, Reason.INTERNAL_ERROR, text, traceback)
 
 
 def store_results(store: Store, ends: list[End]) -> list[End]:

@@ -82,7 +82,8 @@ def test_a_number_of_another_version_is_left_aside(tmp_path, monkeypatch):
         patch.setattr(batch, "VALUES", {rename.get(n, n): at for n, at in labels.items()})
         patch.setitem(batch.NUMBERS, "peak_velocity", batch.NUMBERS["peak_acceleration"])
         write_batch(tmp_path, [made(3)])
-    merge_all(tmp_path)
+    merge_all(tmp_path)  # into none that lacks the number
+    assert len(batches(tmp_path)) == 2
     assert peaks(tmp_path) == {1: 1, 2: 2, 3: 3}
     one, other = read_store(tmp_path).numbers(np.array([1, 2]))["peak_contact_force_axis"]
     assert one.tolist() == [[2, 2], [3, 4]]

@@ -37,7 +37,7 @@ from compressor.studies.frame import (
 from compressor.sweep import End
 
 FOLDER = "follow"
-SCHEMA = 3  # of a row's numbers: a change of what they mean makes chains again
+SCHEMA = 4  # of a row's numbers: a change of what they mean makes chains again
 RUNS = 4  # of a value, each with the case's own wall time at most, and some more
 # groups whose keys are not followed: of the run and its start, or of what the machine shakes
 NOT_FOLLOWED = ("solve", "output", "body", "sensor", "initial_offset_mm")
