@@ -2,17 +2,20 @@
 
 Cases of seeds that judge nothing are run at a ladder of tolerances, each with companions tighter
 and looser, and at 1e-12. Kept are percentiles of true error over distance by the ratio of the two
-tolerances, for acceleration. From these the shares of `compressor.solve.error_bars` were chosen;
-`make accuracy` judges them, and the bars of all metrics, on other seeds.
+tolerances, for acceleration, and by ratio and metric how many true errors the bars would hold and
+how long they would be. From these the shares of `compressor.metrics` and
+`compressor.solve.error_bars` were chosen; `make accuracy` judges them on other seeds.
 """
 
+import numpy as np
 from joblib import Parallel, delayed
-from measure_accuracy import percentiles
+from measure_accuracy import CONTACT, EXACT, percentiles
 from random_cases import strangers
 from result_pages import keep, provenance, run_campaign
 
 from compressor.cases.case import Case
-from compressor.solve.error_bars import TIGHTER_DISTANCE_FACTOR, closeness
+from compressor.metrics import METRICS
+from compressor.solve.error_bars import TIGHTER_DISTANCE_FACTOR, bars, closeness
 from compressor.solve.run import run_at_tolerance
 from compressor.solve.series import distances
 
@@ -26,7 +29,7 @@ LIMITS = (50, 90, 95, 99, 99.5)
 
 
 def one_case(values):
-    """By tolerance and ratio: error and distance of acceleration."""
+    """By tolerance and ratio: error and distance of acceleration; each metric's error and bar."""
     case = Case.from_values({**values, "solve": {"rtol": TRUTH}})
     runs = {}
 
@@ -41,14 +44,28 @@ def one_case(values):
             other_rtol = float(f"{ratio * rtol:.3g}")
             if other_rtol > LOOSEST or run(rtol).reason or run(other_rtol).reason:
                 continue
-            here, other = run(rtol).samples, run(other_rtol).samples
+            here, other = run(rtol), run(other_rtol)
+            apart = distances(here.samples, other.samples)
+            found = bars(here.metrics, other.metrics, ratio, apart, 0.0)
             rows.append({
                 "rtol": rtol,
                 "ratio": ratio,
-                "error": float(distances(truth.samples, here)["acceleration"]),
-                "distance": float(distances(here, other)["acceleration"]),
+                "error": float(distances(truth.samples, here.samples)["acceleration"]),
+                "distance": float(apart["acceleration"]),
+                "metrics": {
+                    name: relative(name, here.metrics, truth.metrics, found[name])
+                    for name in METRICS
+                },
             })  # fmt: skip
     return rows
+
+
+def relative(name, metrics, truth, bar):
+    """Errors and bars of a metric, of joints with contact where it is one of contact."""
+    there = np.ravel(truth["max_penetration"]) != 0 if name in CONTACT else slice(None)
+    value, sure, length = (np.ravel(x)[there] for x in (metrics[name], truth[name], bar))
+    error = np.abs(value - sure)
+    return np.where(error > EXACT * np.abs(sure), error, 0.0), length
 
 
 def series_row(rows, ratio):
@@ -66,6 +83,18 @@ def series_row(rows, ratio):
     }
 
 
+def metric_row(rows, name, ratio):
+    """Share of errors within their bars, and bar over error in the median, at a ratio."""
+    pairs = [row["metrics"][name] for row in rows if row["ratio"] == ratio]
+    error, bar = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    wrong = error > 0
+    return {
+        "ratio": ratio,
+        "within": np.mean(error <= bar),
+        "tightness": np.median(bar[wrong] / error[wrong]),
+    }
+
+
 def main(target, jobs=2, cases=350):
     drawn = [values for seed in SEEDS for values in strangers(seed, cases)]
     found = Parallel(n_jobs=jobs)(delayed(one_case)(values) for values in drawn)
@@ -74,6 +103,9 @@ def main(target, jobs=2, cases=350):
         **provenance("make calibration"),
         "cases": {"seeds": SEEDS, "of_each": cases, "percentiles": LIMITS},
         "series": [series_row(rows, ratio) for ratio in RATIOS],
+        "metrics": {
+            name: [metric_row(rows, name, ratio) for ratio in RATIOS] for name in METRICS
+        },
     }  # fmt: skip
     keep(target, result, 4)
 

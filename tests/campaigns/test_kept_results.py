@@ -1,12 +1,14 @@
 """What campaigns have measured is of today's cases, and reaches what is required of it."""
 
 import math
+from collections import Counter
 
 import measure_accuracy
 import measure_alarms
 import measure_identify
 import measure_peers
 import measure_wear
+import mutation
 import pytest
 from page_tables import FINDINGS, kept
 from peers import mechanism
@@ -166,3 +168,12 @@ def test_intervals_of_calibrate_hold_where_the_model_is_right(other, most):
     inside = sum(one["inside"] for one in row["keys"].values())
     assert inside >= 0.9 * row["machines"] * len(row["keys"])
     assert row["said_not_to_fit"] <= most * row["machines"]
+
+
+def test_mutants_are_caught():
+    rows = kept("mutants.json")["mutants"]
+    kinds = Counter(row["kind"] for row in rows)
+    assert kinds == {"planted": 30} | dict.fromkeys(mutation.KINDS, 10)
+    assert not any("cannot_be_loaded" in row for row in rows)
+    assert not any(row["caught_by"] for row in rows if "equivalent" in row)
+    assert all("::" in row["caught_by"] for row in rows if row["caught_by"])

@@ -3,6 +3,7 @@
 import ast
 
 import planted_bugs
+from mutation import EQUIVALENT, drawn
 
 
 def test_thirty_bugs_can_be_planted():
@@ -11,3 +12,8 @@ def test_thirty_bugs_can_be_planted():
     assert len({bug.identity for bug in bugs}) == 30
     for bug in bugs:
         ast.parse(bug.source())
+
+
+def test_equivalent_mutants_are_drawn_ones():
+    """An entry that is not drawn any more is to be removed."""
+    assert set(EQUIVALENT) <= {mutant.identity for mutant in drawn(60)}

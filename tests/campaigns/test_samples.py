@@ -19,7 +19,8 @@ from compressor.studies.follow.motion import run_value
 def test_published_numbers_come_out_again():
     """What is kept was found by this code, to the digits that are shown.
 
-    Bearings and wear by physics/test_film.py and analysis/test_wear_hours.py, on the same numbers.
+    Bearings and wear are held to the published numbers by physics/test_film.py and
+    analysis/test_wear_hours.py.
     """
     found = {(one["what"], one["source"]): one["found"] for one in kept("validation.json")["rows"]}
     subjects = ("play", "dry_joint", "frame", "elastic_rod")
