@@ -17,7 +17,7 @@ from compressor.analysis.cycle import Cycle, read_cycle, read_loads
 from compressor.analysis.cylinder import end_states
 from compressor.analysis.effects import Effects, grid_effects, saltelli_design, sampled_effects
 from compressor.analysis.machine_numbers import MachineDescription, describe_cases, describe_machine
-from compressor.analysis.margins import Margin, mean_peak
+from compressor.analysis.margins import mean_peak
 from compressor.analysis.runs import (
     CLEARANCES,
     FAULTS,

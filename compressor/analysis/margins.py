@@ -213,10 +213,12 @@ def measure_shares(run: "xr.Dataset", joint: str) -> Shares:
     chaotic run all come from the scatter of its revolutions. Raises as `evidence`.
     """
     by = evidence(run, joint)
-    found, errors = find_shares(by), [apart_error(by), hit_error(by), angle_error(by)]
+    found = find_shares(by)
     if is_chaotic(run):
         turns = [find_shares(evidence(turn, joint)) for turn in revolutions(by.settled)]
         errors = [mean_bar(np.array([turn[name] for turn in turns])) for name in found]
+    else:
+        errors = [apart_error(by), hit_error(by), angle_error(by)]
     return Shares(*map(BarredNumber, found.values(), errors))
 
 

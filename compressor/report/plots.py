@@ -320,7 +320,7 @@ def draw_for_page(stored: Stored, study: StoredStudy, units: Units) -> Iterator[
     yield shown._replace(title=f"{shown.title}, {value}", note=note + drawn)
     if case.load == "gas":
         shown = JOB["cards"].make(run, twin, units=units)
-        yield shown._replace(title=f"{shown.title}, {value}", note=drawn)
+        yield shown._replace(title=f"{shown.title}, {value}")
 
 
 def keep_sensed(rows: Sequence[SweptRow]) -> list[SweptRow]:
@@ -387,7 +387,7 @@ def select_jobs(
     jobs.sort(key=lambda job: job[0] if numbers else 0)
     values = ", ".join(f"{name} {shown_value(value)}" for name, value in fixed.items())
     varied = ", ".join(axis.key for axis in study.axes if axis.key not in (over, *fixed))
-    where = [values] * bool(values) + [f"along with it vary {varied}"] * bool(varied)
+    where = [values] * bool(values) + [f"{varied} vary along with it"] * bool(varied)
     if len(jobs) > most:
         where.append(f"{most} of {len(jobs)} jobs, evenly chosen")
     return [jobs[n] for n in thin_places(len(jobs), most)], where

@@ -223,7 +223,7 @@ def choose_studies(results: Folder, names: Sequence[str]) -> list[StoredStudy]:
 class DrawnStudy(NamedTuple):
     """What the page has of a user's own study.
 
-    jobs: what a click on a job's point shows; cautions: what to know beside what changes most;
+    jobs: what a click on a job's point shows; cautions: what to know beside the findings;
     shown: the metrics that its table has.
     """
 

@@ -60,6 +60,14 @@ def test_a_csv_has_every_number_once(drawing):
     ]  # fmt: skip
 
 
+def test_jobs_at_one_place_all_stand_in_the_csv():
+    drawing, grid = make_grid(1, 1, 4.0)
+    for key in "ab":
+        grid[0, 0].plot([1.0, 2.0], [0.0, 0.0], RED, "failed", jobs=(key, f"{key}2"))
+    (_, *rows) = csv.reader(io.StringIO(as_csv(drawing.figure())))
+    assert {"a", "b"} < {*rows[0]}
+
+
 def test_panels_of_the_same_jobs_share_columns_and_name_their_axes():
     drawing, grid = make_grid(2, 2, 4.0, share_x="all", share_y="all")
     for (row, column), panel in np.ndenumerate(grid):

@@ -490,7 +490,8 @@ def as_csv(figure: go.Figure) -> str:
                 continue
             where = f"{one_line(panel.title) or number}: {trace.name or ''}"
             where = where.removesuffix(": ")
-            same = x.tobytes(), y.tobytes(), trace.name, *(values.tobytes() for _, values in more)
+            same = (x.tobytes(), y.tobytes(), trace.name, jobs,
+                    *(values.tobytes() for _, values in more))  # fmt: skip
             if same in seen:
                 continue  # an enlarged view of the same curve
             seen.add(same)

@@ -228,7 +228,8 @@ def sweep_of(data: xr.Dataset) -> PlottedSweep:
     names, dims = swept_axes(data), data["status"].dims
     if dims != ("job",):
         data = data.isel({dim: 0 for dim in dims if dim not in names})
-        data = data.sortby([name for name in names if data[name].dtype.kind in "fiu"])
+        falling = [n for n in names if data[n].dtype.kind in "fiu" and (np.diff(data[n]) < 0).any()]
+        data = data.isel({name: np.argsort(data[name].values) for name in falling})
     return PlottedSweep(data, tuple(axis_of(data, name) for name in names))
 
 
