@@ -51,7 +51,7 @@ CHAOTIC = {  # light, fast and without damping: it can be foretold for half a re
 CONFIGS = sorted((Path(__file__).parent.parent / "configs").glob("*.yaml"))
 
 
-LONG = ("test_newcomer", "test_pages", "test_cluster", "test_pool", "test_systems", "test_tutorial")
+LONG = ("test_newcomer", "test_pages", "test_cluster", "test_pool", "test_tutorial")
 PARTS = ("plain", "laws", "features")  # of the equations: the first two take as long as the last
 
 

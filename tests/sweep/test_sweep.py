@@ -282,6 +282,15 @@ def test_what_a_killed_worker_stored_and_did_not_tell_of_stays(studies, tmp_path
     assert not list(verify(out))
 
 
+def test_a_run_on_windows_ends_with_one_clear_line(studies, tmp_path, monkeypatch, compsim):
+    made = studies(one=BOTH)
+    monkeypatch.setitem(sys.modules, "resource", None)
+    for words in (["run"], ["follow", "--over", "machine.speed_rpm=300:500:2"]):
+        err = compsim(*words, made[0].path, "-r", tmp_path / "out", code=2).err
+        assert err.count("has no resource, which a run needs: run it under Linux, macOS or WSL") == 1
+        assert "Traceback" not in err
+
+
 def test_a_store_that_cannot_be_read_runs_nothing(studies, tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/batches").write_text("in the way")
