@@ -6,40 +6,11 @@ fitted; the machines and equations are those of tests/published.py.
 
 import math
 import sys
-from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-
-sys.path.insert(0, str(Path(__file__).parent.parent))
-
-from published import (
-    ACCELERATION,
-    ASKED,
-    BEARING,
-    COEFFICIENT,
-    DRY,
-    END,
-    END_TIME,
-    GIVEN,
-    MACHINE,
-    POSITION,
-    PUBLIC,
-    RATE,
-    SLIDERS,
-    SLIDERS_WITHIN,
-    STIFFNESS,
-    drop,
-    exudyn_sliders,
-    frame_orders,
-    given_back,
-    guided,
-    integrate_simeon,
-    rod_apart,
-    rubbing,
-    simeon,
-)
+import published
 from result_pages import keep, provenance, run_campaign
+from scipy.interpolate import CubicSpline
 
 from compressor.analysis import rubbing_work
 from compressor.cases.case import Case
@@ -64,18 +35,19 @@ def row(subject, what, unit, expected, found, within, source):
 
 def restitution():
     """Drops through the whole solver."""
-    for law, given in GIVEN.items():
-        for asked, expected in zip(ASKED, given, strict=True):
-            _, rows = drop("small_end", 0.3, law=law, restitution=asked)
+    for law, given in published.GIVEN.items():
+        for asked, expected in zip(published.ASKED, given, strict=True):
+            _, rows = published.drop("small_end", 0.3, law=law, restitution=asked)
             what = f"{law}, e = {asked:g}"
-            yield row("Restitution", what, "", expected, given_back(rows), 1e-3, "closed form")
+            found = published.given_back(rows)
+            yield row("Restitution", what, "", expected, found, 1e-3, "closed form")
 
 
 def dry_joint():
     """The ideal machine of the dry joint, and its stiffness."""
     source = "Flores and Koshy"
     solve = {"duration_rev": 1, "settle_rev": 0, "output_step_deg": 0.25}
-    ideal = {key: value for key, value in MACHINE.items() if key != "pin_radius_mm"}
+    ideal = {key: value for key, value in published.MACHINE.items() if key != "pin_radius_mm"}
     values = {"load": "none", "friction": False, "machine": ideal, "solve": solve}
     run = simulate(Case.from_values({**values, "output": {"signals": True}}))
     a, torque = run["acceleration"].values, run["crank_torque"].values
@@ -86,22 +58,23 @@ def dry_joint():
     ):
         yield row("Dry joint", what, unit, expected, found, within, source)
     contact = {
-        "law": "hertz", "stiffness_N_per_mm15": DRY["contact"]["stiffness_N_per_mm15"]
+        "law": "hertz", "stiffness_N_per_mm15": published.DRY["contact"]["stiffness_N_per_mm15"]
     }  # fmt: skip
-    case = Case.from_values({**DRY, "contact": contact, "solve": {"duration_rev": 3}})
+    case = Case.from_values({**published.DRY, "contact": contact, "solve": {"duration_rev": 3}})
     parted = predictability_horizon(case) / case.turn
     yield row(
         "Dry joint", "undamped: close motions separate after", "rev", 1.6, parted, 0.1, source
     )
     ours = contact_stiffness("steel", "steel", 0.0095, 0.0100, True)
     ours *= (1 - 0.29**2) / (1 - 0.3**2)  # of their Poisson's ratio
-    yield row("Dry joint", "stiffness", "N/m^1.5", STIFFNESS, ours, 1e-3 * STIFFNESS, source)
+    asked = published.STIFFNESS
+    yield row("Dry joint", "stiffness", "N/m^1.5", asked, ours, 1e-3 * asked, source)
 
 
 def play():
     """The slider with play in its guide, before its first contact."""
     subject, source = "Guide with play", "Flores, Leine and Glocker 2010"
-    run = guided(rtol=1e-11)
+    run = published.guided(rtol=1e-11)
     speed = CubicSpline(run.time, run.crank_speed)(TIMES)
     height = CubicSpline(run.time, run.guide_height / 1e-3)(TIMES)
     for i, (one, other) in enumerate([(139.11588, 0.077487), (120.46388, 0.494396)]):
@@ -122,15 +95,16 @@ def play():
 def elastic_rod():
     """The published start of an elastic rod, by the equations that the program is held against."""
     source = "IVP test set, crank (Simeon)"
-    found = simeon(0.0, POSITION, RATE, PUBLIC)
+    found = published.simeon(0.0, published.POSITION, published.RATE, published.PUBLIC)
     subject = "Elastic rod"
-    x = 0.45 + POSITION[5]
+    x = 0.45 + published.POSITION[5]
     yield row(subject, "x₃ at the start", "m", 0.450016933, x, 1e-9, source)
-    spin = -0.15 * 150.0 / (0.30 + POSITION[5])
+    spin = -0.15 * 150.0 / (0.30 + published.POSITION[5])
     yield row(subject, "φ₂' at the start", "rad/s", -74.995767, spin, 1e-6, source)
-    yield row(subject, "x₃'' at the start", "m/s²", ACCELERATION[1], found[1], 1e-5, source)
+    asked = published.ACCELERATION[1]
+    yield row(subject, "x₃'' at the start", "m/s²", asked, found[1], 1e-5, source)
     source = "the same equations, by SciPy's DOP853"
-    for name, apart in rod_apart(0.008).items():
+    for name, apart in published.rod_apart(0.008).items():
         yield row(subject, f"{name}, relative difference over 8 ms", "", 0, apart, 1e-6, source)
 
 
@@ -140,14 +114,14 @@ def elastic_rod_at_the_end():
     The publication's start has nine digits, and the end follows from it within 2e-7.
     """
     subject, source = "Elastic rod", "IVP test set, crank (Simeon)"
-    end = integrate_simeon([END_TIME], PUBLIC, 1e-9)[:, -1]
-    for name, (place, expected) in END.items():
+    end = published.integrate_simeon([published.END_TIME], published.PUBLIC, 1e-9)[:, -1]
+    for name, (place, expected) in published.END.items():
         unit = "rad" if name == "φ₂" else "m"
         yield row(
             subject, f"{name} at 0.1 s", unit, expected, end[place], 1e-6 * abs(expected), source
         )
     source = "the same equations, by SciPy's DOP853"
-    for name, apart in rod_apart(END_TIME).items():
+    for name, apart in published.rod_apart(published.END_TIME).items():
         yield row(subject, f"{name}, relative difference over 0.1 s", "", 0, apart, 1e-6, source)
 
 
@@ -155,9 +129,10 @@ def frame():
     """A frame that moves both ways, by Exudyn's number; and ours, driven one way, by that frame."""
     subject, source = "Frame", "Exudyn, TestModels/sliderCrankFloatingTest.py"
     what = "slider's x at 0.3 s, frame held plus frame free"
-    yield row(subject, what, "m", SLIDERS, exudyn_sliders(), SLIDERS_WITHIN, source)
+    found = published.exudyn_sliders()
+    yield row(subject, what, "m", published.SLIDERS, found, published.SLIDERS_WITHIN, source)
     source = "the same equations, by SciPy's DOP853"
-    ours, both_ways = np.abs(frame_orders())
+    ours, both_ways = np.abs(published.frame_orders())
     for i, order in enumerate((1, 2)):
         for j, axis in enumerate("xy"):
             if both_ways[i, j] > 1e-6:
@@ -170,15 +145,18 @@ def wear():
     """What rubs in a run, by its time series, against the energy that friction takes."""
     source = "Archard's law; friction's energy over a constant coefficient"
     for joint in ("big_end", "small_end"):
-        run = simulate(rubbing(joint))
-        asked, found = float(run["friction_loss"]) / COEFFICIENT, float(rubbing_work(run).sum())
+        run = simulate(published.rubbing(joint))
+        asked, found = (
+            float(run["friction_loss"] / published.COEFFICIENT),
+            float(rubbing_work(run).sum()),
+        )
         yield row("Wear", f"∫ F ds, {joint}", "J", asked, found, 3e-3 * asked, source)
 
 
 def bearing():
     """Sommerfeld numbers and attitudes of the film, from Reynolds' equation."""
     source = "Butenschön 1976, DIN 31652"
-    for ratio, eps, number, angle in BEARING:
+    for ratio, eps, number, angle in published.BEARING:
         at, normal, across = f"B/D {ratio:g}, ε {eps:g}", *reynolds(eps, ratio)
         size = eps * math.hypot(normal, across)
         yield row("Journal bearing", f"So at {at}", "", number, size, 4e-3 * number, source)
@@ -189,15 +167,8 @@ def bearing():
 
 def main(target):
     every = (
-        restitution,
-        dry_joint,
-        play,
-        bearing,
-        elastic_rod,
-        elastic_rod_at_the_end,
-        frame,
-        wear,
-    )
+        restitution, dry_joint, play, bearing, elastic_rod, elastic_rod_at_the_end, frame, wear,
+    )  # fmt: skip
     rows = [one for made in every for one in made()]
     kept = provenance("make validation") | {"rows": rows}
     keep(target, kept)
