@@ -116,11 +116,10 @@ mutants: install  ## plant bugs and see whether the fast tests catch them (half 
 
 measurements: test-oldest calibration accuracy validation wear claims page tradeoff chaotic regimes identify nameplate store-bench sweep-bench peers pages  ## all of these (about three hours)
 
-pages: install  ## write the pages' generated tables, compressor/API.md, the tutorial's notebook
+pages: install  ## write the pages' generated tables, compressor/API.md
 	$(BIN)/python tests/page_tables.py
 	$(CAMPAIGN)/result_pages.py
 	$(BIN)/python tests/api_page.py
-	$(BIN)/python tests/tutorial.py
 
 docs: install  ## build the pages as a site with search: site/index.html
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'compsim[docs]'

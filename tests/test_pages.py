@@ -9,9 +9,9 @@ import json
 import re
 import shlex
 
+import page_commands
 import page_tables
 import pytest
-import tutorial
 from compsim.cli import VERBS, cli
 
 from compressor.cases.checks import DOUBLES, stands_for
@@ -161,7 +161,9 @@ def run_command(place, command, whole):
     if verb in READ or UNRUN.intersection(words):
         assert cli.commands[verb].make_context(verb, words)
         return ""
-    return tutorial.run_command(place, command, *(QUICK if verb == "run" and not whole else ()))
+    return page_commands.run_command(
+        place, command, *(QUICK if verb == "run" and not whole else ())
+    )
 
 
 @pytest.fixture(scope="module")
@@ -175,7 +177,7 @@ def folder(tmp_path_factory):
     (place / "configs").symlink_to(page_tables.ROOT / "configs")
     for commands, expected in blocks_and_outputs("console"):
         printed = [run_command(place, line, bool(expected)) for line in commands.splitlines()]
-        assert not expected or tutorial.missing(expected, "".join(printed)) == "", commands
+        assert not expected or page_commands.missing(expected, "".join(printed)) == "", commands
     return place
 
 
@@ -197,7 +199,7 @@ def test_python_example_works(folder, monkeypatch, capsys):
     for text, expected in blocks_and_outputs("python"):
         exec(text, names)
         out = capsys.readouterr().out
-        assert not expected or tutorial.missing(expected, out) == "", text
+        assert not expected or page_commands.missing(expected, out) == "", text
         printed += out
     assert names["a"].attrs["units"] == "m/s2"
     assert names["run"].attrs["complete"] == 1

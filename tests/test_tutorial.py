@@ -1,33 +1,28 @@
-"""The tutorial: each command is run, and each output compared.
-
-Its notebook is that page, cell by cell.
-"""
+"""The tutorial: each command is run, and each output compared."""
 
 import contextlib
 import io
+import re
 
 import pytest
-import tutorial
+from page_commands import missing, run_command
+from page_tables import ROOT
 
-TEXT = tutorial.PAGE.read_text(encoding="utf-8")
-CELLS = [one for one in tutorial.pieces(TEXT) if one.kind != "markdown"]
+TEXT = (ROOT / "compressor/cases/examples/TUTORIAL.md").read_text(encoding="utf-8")
+BLOCK = re.compile(r"^```(console|py)\n(.*?)^```\n(?:\n```text\n(.*?)^```\n)?", re.M | re.S)
 
 
 @pytest.mark.slow
 def test_each_command_prints_what_the_page_says(tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "agg")
     names = {}
-    for one in CELLS:
-        if one.kind == "console":
-            lines = one.source.splitlines()
-            printed = "".join(tutorial.run_command(tmp_path, line) for line in lines)
+    for kind, source, expected in BLOCK.findall(TEXT):
+        if kind == "console":  # commands after a prompt, and what they print
+            commands = re.findall(r"^\$ (.*)\n", source, re.M)
+            expected = re.sub(r"^\$ .*\n", "", source, flags=re.M)
+            printed = "".join(run_command(tmp_path, command) for command in commands)
         else:
             with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.chdir(tmp_path):
-                exec(one.source, names)
+                exec(source, names)
             printed = out.getvalue()
-        assert tutorial.missing(one.output, printed) == "", (one.source, printed)
-
-
-def test_the_notebook_is_made_from_the_page():
-    written = tutorial.NOTEBOOK.read_text(encoding="utf-8")
-    assert written == tutorial.notebook(TEXT), "stale: run make pages"
+        assert missing(tuple(expected.splitlines()), printed) == "", (source, printed)

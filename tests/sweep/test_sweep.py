@@ -287,7 +287,9 @@ def test_a_run_on_windows_ends_with_one_clear_line(studies, tmp_path, monkeypatc
     monkeypatch.setitem(sys.modules, "resource", None)
     for words in (["run"], ["follow", "--over", "machine.speed_rpm=300:500:2"]):
         err = compsim(*words, made[0].path, "-r", tmp_path / "out", code=2).err
-        assert err.count("has no resource, which a run needs: run it under Linux, macOS or WSL") == 1
+        assert (
+            err.count("has no resource, which a run needs: run it under Linux, macOS or WSL") == 1
+        )
         assert "Traceback" not in err
 
 

@@ -1,69 +1,17 @@
-"""The tutorial as pieces: prose, commands, Python and what they print; and as a notebook.
-
-`make pages` writes the notebook from the page; tests/test_tutorial.py runs it.
-"""
+"""Run the commands of pages in this process, and compare what they print with what pages say."""
 
 import contextlib
-import json
 import math
 import re
 import shlex
-from typing import NamedTuple
 
-import page_tables
 from click.testing import CliRunner
 from compsim import cli
 from conftest import jobs_here, without_pictures
 
-FOLDER = page_tables.ROOT / "compressor" / "cases" / "examples"
-PAGE, NOTEBOOK = FOLDER / "TUTORIAL.md", FOLDER / "TUTORIAL.ipynb"
-BLOCK = re.compile(
-    r"^```(console|py)\n(.*?)^```\n(?:\n```text\n(.*?)^```\n)?", re.MULTILINE | re.DOTALL
-)
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:e[-+]?\d+)?(?![\w.]*\w)")
 ANY = "…"  # in a line of output anything, alone any lines
 CLOSE = 2e-3  # relative: the last digits of a number differ between machines
-
-
-class Piece(NamedTuple):
-    """A part of the page: prose (`markdown`), or a cell (`console`, `py`) and what it prints."""
-
-    kind: str
-    source: str
-    output: tuple[str, ...] = ()
-
-
-def pieces(text: str) -> list[Piece]:
-    """The parts of a page in their order."""
-    found, place = [], 0
-    for block in BLOCK.finditer(text):
-        found.append(Piece("markdown", text[place : block.start()].strip()))
-        kind, inside, printed = block.groups()
-        lines = inside.splitlines()
-        if kind == "console":
-            commands = [line.removeprefix("$ ") for line in lines if line.startswith("$ ")]
-            output = tuple(line for line in lines if not line.startswith("$ "))
-            found.append(Piece(kind, "\n".join(commands), output))
-        else:
-            found.append(Piece(kind, inside.strip(), tuple((printed or "").splitlines())))
-        place = block.end()
-    return [*(one for one in found if one.source), Piece("markdown", text[place:].strip())]
-
-
-def notebook(text: str) -> str:
-    """The page as a notebook without outputs: commands are cells of the shell sh."""
-    cells = []
-    for number, one in enumerate(pieces(text)):
-        cell = {"cell_type": "markdown" if one.kind == "markdown" else "code",
-                "id": f"piece-{number}", "metadata": {}}  # fmt: skip
-        source = one.source.replace(" The same text is a [notebook](TUTORIAL.ipynb).", "")
-        if one.kind != "markdown":
-            cell |= {"execution_count": None, "outputs": []}
-            source = f"%%sh\n{source}" if one.kind == "console" else source
-        cells.append(cell | {"source": source.splitlines(keepends=True)})
-    kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
-    made = {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}
-    return json.dumps(made, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
 
 
 def missing(expected: tuple[str, ...], printed: str) -> str:
@@ -126,11 +74,3 @@ def run_command(place, command: str, *more: str) -> str:
 def expanded(place, word):
     """What a shell makes of a word."""
     return sorted(map(str, place.glob(word))) if "*" in word else [word]
-
-
-def main() -> None:
-    NOTEBOOK.write_text(notebook(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
