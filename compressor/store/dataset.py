@@ -10,8 +10,7 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from compressor.cases import points, table, value_of
-from compressor.digits import is_known
-from compressor.metrics import BARRED, NUMBERS, SIZES
+from compressor.metrics import NUMBERS, SIZES
 from compressor.outcome import JOB_WORDS, Variable, coordinates
 from compressor.reasons import Reason
 from compressor.store.files import StoreWarning
@@ -74,23 +73,6 @@ def label_jobs(layout: xr.Dataset, stored: Stored, with_series: bool = False) ->
     names = ["study", *SIZES, "time", *layout.variables]
     dataset = xr.Dataset(variables | {**layout.variables})
     return dataset.set_coords([name for name in names if name in dataset])
-
-
-def mask_untrusted(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a Dataset of jobs with nan for each metric that its error bar does not vouch for.
-
-    So are metrics of jobs that are not ok, and of runs without error bars.
-    """
-    known = np.vectorize(is_known, otypes=[bool])
-    is_ok = dataset["status"] == "ok"
-    masked = {}
-    for name, row in BARRED.items():
-        if name in dataset:
-            bar = dataset.get(f"{name}_error", np.nan * dataset[name])
-            vouched = xr.apply_ufunc(known, dataset[name], bar, row.bar.relative)
-            masked[name] = dataset[name].where(vouched & is_ok)
-            masked[f"{name}_error"] = bar.where(vouched & is_ok)
-    return dataset.assign(masked)
 
 
 def machine_constants(studies: Sequence[StoredStudy], layout: xr.Dataset) -> dict[str, xr.Variable]:

@@ -35,7 +35,7 @@ def read_job(folder: Folder, key: str) -> "xr.Dataset":
     return read_store(folder).job(key)
 
 
-def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -> "xr.Dataset":
+def open_study(folder: Folder, name: str | None = None) -> "xr.Dataset":
     """Return a study as one Dataset, labelled by its axes; series are read when they are used.
 
     folder: of results; name: of the study, all studies without. Variables and SI units are those
@@ -52,9 +52,6 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
 
     Series have the dimension `time`. If the jobs have different output grids (a swept speed),
     they have `sample` instead, nan beyond a job's end, with `time` a coordinate of every job.
-
-    With `trusted`, metrics are nan where they are not known: where the error bar is as long as the
-    number or inf, as of single peaks of a chaotic motion, or was not made; and where a job failed.
 
     Raises StoreError for a folder without results and for a study that it does not hold: a
     WrongName, which says what was probably meant. Of damaged files a StoreWarning is given, and
@@ -78,22 +75,18 @@ def open_study(folder: Folder, name: str | None = None, trusted: bool = False) -
     if name is not None:
         studies = [find_study(folder, name, studies)]
     stored = read_store(folder, warn=True)
-    dataset = stored.use(lambda sound: label_studies(sound, studies, trusted))
+    dataset = stored.use(lambda sound: label_studies(sound, studies))
     if "fault" in dataset.dims and "joint" in dataset.dims:
         warnings.warn(BOTH_JOINTS, StoreWarning, stacklevel=2)
     return dataset
 
 
-def label_studies(
-    stored: Stored, studies: Sequence[StoredStudy], trusted: bool = False
-) -> "xr.Dataset":
+def label_studies(stored: Stored, studies: Sequence[StoredStudy]) -> "xr.Dataset":
     """Return studies of a store as one Dataset, as `open_study` does."""
     from compressor.store import dataset as datasets  # loads xarray: half a second
 
     layout = datasets.lay_out(studies)
     found = datasets.label_jobs(layout, stored, with_series=True)
-    if trusted:
-        found = datasets.mask_untrusted(found)
     found = found.assign(datasets.machine_constants(studies, layout))
     names = [study.name for study in studies]
     return found.assign_attrs(folder=os.path.abspath(stored.folder), studies=names)
