@@ -42,8 +42,7 @@ def status(folder, as_json) -> int:
         remarks += [f"{n} {reason}: {remedy(reason)}" for reason, n in one.reasons.items()]
         screen.print_text(line)
         for text in remarks:
-            first, *tree = text.splitlines()
-            screen.print_text(*screen.wrap_line(first, 4), *(" " * 6 + line for line in tree))
+            screen.print_text(*screen.wrap_line(text, 4))
     wanting = [one.again for one in found if one.missing]
     for command in screen.run_commands(wanting, folder):
         screen.say(f"next: {command}")

@@ -1,7 +1,7 @@
 """What stored numbers cannot say of themselves, a sentence each, from stored values alone.
 
 Motions that were not seen to repeat, or settled after metrics began to count, clipped sensor
-records, cases outside the range that the program was judged on, and where jobs fail.
+records, and cases outside the range that the program was judged on.
 """
 
 import math
@@ -15,8 +15,6 @@ from compressor.outcome import Regime
 from compressor.store.stored import Stored
 from compressor.store.studies import StoredStudy
 
-MIN_FAILED = 3  # failed jobs, and good ones, for a tree of where jobs fail
-MIN_GAIN = 0.02  # of impurity that a split must bring
 MAX_LOOKED_AT = 16  # stored jobs of a study, for what only their cases show: a millisecond each
 UNREPEATED = (
     "the motion was not seen to repeat; a longer run may give other numbers, or be chaotic; "
@@ -35,7 +33,7 @@ def study_caveats(stored: Stored, study: StoredStudy) -> list[str]:
     positions = positions[positions >= 0]
     some = np.linspace(0, positions.size - 1, min(MAX_LOOKED_AT, positions.size)).astype(int)
     cases = [case for at in positions[some].tolist() if (case := stored.case_at(at))]
-    return [*run_caveats(stored, study), *_of_cases(cases), *_of_failures(stored, study)]
+    return [*run_caveats(stored, study), *_of_cases(cases)]
 
 
 def run_caveats(stored: Stored, study: StoredStudy) -> list[str]:
@@ -97,26 +95,3 @@ def _of_cases(cases: Iterable[Case]) -> list[str]:
         notes |= paper_notes(case)
         outside |= outside_judged(case.values())
     return [f"{key}: {text}" for key, text in (*notes.items(), *outside.items())]
-
-
-def _of_failures(stored: Stored, study: StoredStudy) -> list[str]:
-    """Return where in a study jobs fail: a decision tree, where scikit-learn is installed."""
-    positions = stored.find(study.keys)
-    there = positions >= 0
-    failed = stored.columns["status"][positions[there]] == b"failed"
-    if min(failed.sum(), (~failed).sum()) < MIN_FAILED or not study.axes:
-        return []
-    try:
-        from sklearn.tree import DecisionTreeClassifier, export_text
-    except ImportError:
-        return []
-    import pandas as pd
-
-    table = pd.get_dummies(pd.DataFrame(points(study))[there], prefix_sep=" is ")
-    tree = DecisionTreeClassifier(
-        max_depth=2, min_samples_leaf=MIN_FAILED, min_impurity_decrease=MIN_GAIN, random_state=0
-    ).fit(table.to_numpy(float), np.where(failed, "failed", "ok"))
-    if tree.get_depth() == 0:
-        return []
-    text = export_text(tree, feature_names=[*table], decimals=4, show_weights=True)
-    return [f"where jobs fail (jobs of each class in weights):\n{text.rstrip()}"]

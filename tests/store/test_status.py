@@ -2,11 +2,10 @@
 
 import json
 import shlex
-import sys
 from pathlib import Path
 
 import pytest
-from conftest import store_cases, write_cases
+from conftest import write_cases
 
 from compressor.cases.load import load_studies
 from compressor.store.status import report_job, standings
@@ -82,29 +81,3 @@ def test_damage_is_told_where_its_jobs_count_as_missing(mix, compsim):
         said = " ".join(err.split())
         assert all(said.count(f"{path.name}: is damaged") == 1 for path in paths)
         assert "Warning" not in err  # said as other messages are, without a place in the source
-
-
-def budget(folder):
-    """A study of which the half with the smaller budget fails, in a store."""
-    case = {
-        "clearance_mm": [0.1, 0.12, 0.14, 0.16, 0.18, 0.2], "joint": "big_end",
-        "solve": {"max_steps": [5, 5000000], "duration_rev": 2, "accuracy": "draft",
-                  "error_bars": False, "horizon": False},
-    }  # fmt: skip
-    store_cases(folder, budget=case)
-    return str(folder / "results")
-
-
-def test_status_shows_where_jobs_fail_by_a_tree_of_scikit_learn_s(tmp_path, monkeypatch, compsim):
-    """Where that is installed."""
-    folder = budget(tmp_path)
-    lines = compsim("status", "-r", folder).out.splitlines()
-    first = lines.index("    where jobs fail (jobs of each class in weights):")
-    assert lines[first + 1 : first + 3] == [
-        "      |--- solve.max_steps <= 2500002.5000",
-        "      |   |--- weights: [6.0000, 0.0000] class: failed",
-    ]
-    monkeypatch.setitem(sys.modules, "sklearn.tree", None)
-    out = compsim("status", "-r", folder).out
-    assert "6 failed" in out
-    assert "where jobs fail" not in out
