@@ -1,7 +1,5 @@
 """Results for other programs: a table of studies' jobs or the time series of one, in one file.
 
-A sensor's record, as programs that analyse vibration open it, is a WAV or MAT file, too.
-
 A CSV file has one header line, units in brackets where a name does not end in its unit, and
 numbers that read back to the bit; an empty cell is a number that there is not. A sensor's record
 has times of its own: its columns are those that `compsim identify` reads, and the shorter columns
@@ -21,7 +19,7 @@ import numpy as np
 from compressor.program import PROGRAM
 from compressor.store.files import Folder, WrongName, publish
 from compressor.store.netcdf import encode_dataset
-from compressor.store.sensor_records import NEEDS_SENSOR, job_record
+from compressor.store.sensor_records import job_record
 from compressor.store.stored import Stored, read_store
 from compressor.store.studies import StoredStudy, find_study, read_studies, whole_key
 from compressor.units import Units, unit_in
@@ -29,7 +27,7 @@ from compressor.units import Units, unit_in
 if TYPE_CHECKING:
     import xarray as xr
 
-TABLES, RECORDS = (".nc", ".csv"), (".wav", ".mat")  # of all that is known; of a record alone
+SUFFIXES = (".nc", ".csv")
 HEXADECIMAL = re.compile("[0-9a-f]{1,20}")
 
 
@@ -39,9 +37,8 @@ def export(
     """Write a file of studies, a row a job, or of one job, a row a sample; return its rows.
 
     With what a row is. names: of studies, all without; or the beginning of the job's key. output:
-    .nc or .csv; or .wav or .mat, for the sensor's record of a job. force: replace what is there;
-    units: of CSV, other files are in SI. Raises WrongName for a file that does not fit, and
-    StoreError where the store or the disk gives way.
+    .nc or .csv. force: replace what is there; units: of CSV, netCDF is in SI. Raises WrongName for
+    a file that does not fit, and StoreError where the store or the disk gives way.
     """
     path, stored, known = Path(output), read_store(folder, warn=True), read_studies(folder)
     _check_target(path, force, units)
@@ -51,9 +48,7 @@ def export(
         raise WrongName(path, problem, "export each job to a file of its own")
     if keys:
         key = whole_key(folder, names[0], known, stored.keys())
-        rows, what, data = _encode_job(stored, key, path.suffix, units)
-    elif path.suffix in RECORDS:
-        raise WrongName(path, "is for the sensor's record of one job", "name it by its key")
+        what, (rows, data) = "sample", _encode_job(stored, key, path.suffix, units)
     else:
         studies = [find_study(folder, name, known) for name in dict.fromkeys(names)] or known
         rows, what = sum(study.jobs for study in studies), "job"
@@ -64,10 +59,9 @@ def export(
 
 def _check_target(path: Path, force: bool, units: Units) -> None:
     """Raise WrongName where a file may not be written, or not in these units."""
-    if path.suffix not in (*TABLES, *RECORDS):
+    if path.suffix not in SUFFIXES:
         problem = f"no files of the type {path.suffix}" if path.suffix else "no folders"
-        ends = f"{' or '.join(TABLES)}, or for a job's record in {' or '.join(RECORDS)}"
-        raise WrongName(path, f"{problem} are written", f"end the name in {ends}")
+        raise WrongName(path, f"{problem} are written", f"end the name in {' or '.join(SUFFIXES)}")
     if units == "plant" and path.suffix != ".csv":
         raise WrongName(path, "plant units are of CSV alone", "leave out --units")
     if os.path.lexists(path) and not force:
@@ -97,8 +91,8 @@ def _encode_studies(
     return encode_dataset(table)
 
 
-def _encode_job(stored: Stored, key: str, suffix: str, units: Units) -> tuple[int, str, bytes]:
-    """Return how many rows a job's file has, what they are, and its bytes."""
+def _encode_job(stored: Stored, key: str, suffix: str, units: Units) -> tuple[int, bytes]:
+    """Return how many rows a job's file has, and its bytes."""
     position = stored.position(key)
     if position is None:
         raise WrongName(stored.folder, f"job {key} is not stored", "run its case file first")
@@ -106,17 +100,13 @@ def _encode_job(stored: Stored, key: str, suffix: str, units: Units) -> tuple[in
         remedy = "run its case file with --set output.keep=series, or export its study"
         raise WrongName(stored.folder, f"job {key} has no time series", remedy)
     if suffix == ".nc":
-        return samples, "sample", encode_dataset(stored.job(key))
-    found, record = job_record(stored, key), {}
-    if found:
-        from compressor.vibration import encode_record, record_columns  # loads parts of SciPy
+        return samples, encode_dataset(stored.job(key))
+    table = columns(stored.job(key), "time", units)
+    if found := job_record(stored, key):
+        from compressor.vibration import record_columns  # loads parts of SciPy
 
-        record = record_columns(found.times, found.values, found.tacho)
-    if suffix == ".csv":
-        return samples, "sample", encode_csv(columns(stored.job(key), "time", units) | record)
-    if not found:
-        raise WrongName(stored.folder, f"job {key} has no sensor's record", NEEDS_SENSOR)
-    return len(found.times), "sample", encode_record(record, suffix)
+        table |= record_columns(found.times, found.values, found.tacho)
+    return samples, encode_csv(table)
 
 
 def columns(table: "xr.Dataset", dim: str, units: Units = "si") -> dict[str, np.ndarray]:

@@ -3,7 +3,7 @@
 from compressor.vibration.accelerometer import Record, analogue_rate, noisy
 from compressor.vibration.body import Forces
 from compressor.vibration.monitor import Monitored, measure_record, segment_levels, shake_body
-from compressor.vibration.record_files import encode_record, read_record, record_columns
+from compressor.vibration.record_files import read_record, record_columns
 from compressor.vibration.spectra import (
     RecordError,
     band_signal,

@@ -1,10 +1,9 @@
 """Files of an accelerometer's record: CSV, WAV and MATLAB's MAT.
 
-A file's ending names its format: `READERS` and `ENCODERS` are the tables. What a file says of its
+A file's ending names its format: `READERS` is the table. What a file says of its
 channels is read; what it does not say, such as the unit of a WAV file, is never guessed.
 """
 
-import io
 import math
 import re
 import warnings
@@ -17,7 +16,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from compressor.cases import open_text_table
-from compressor.program import PROGRAM, CompsimError, did_you_mean
+from compressor.program import CompsimError, did_you_mean
 from compressor.vibration.accelerometer import Record
 from compressor.vibration.spectra import RecordError
 from compressor.vibration.tacho import (
@@ -379,37 +378,3 @@ def record_columns(times: np.ndarray, values: np.ndarray, pulses: np.ndarray) ->
         turns = np.interp(times, known, [-0.25, *range(len(pulses)), len(pulses) - 0.75])
         found.append(np.sin(2.0 * np.pi * turns))
     return dict(zip(RECORD_HEADER, found, strict=False))
-
-
-def encode_record(columns: Columns, suffix: str) -> bytes:
-    """Return a record as a file of a type of `ENCODERS`. Raises RecordError for a WAV's rate."""
-    times = columns[TIME]
-    return ENCODERS[suffix](columns, (len(times) - 1) / float(times[-1] - times[0]))
-
-
-def _encode_wav(columns: Columns, rate: float) -> bytes:
-    """Return 32-bit floats, 1.0 being 1 m/s2, so that no full scale has to be known."""
-    from scipy.io import wavfile
-
-    if abs(rate - round(rate)) > 1e-6 * rate:
-        text = f"a WAV file has a whole number of samples a second, and the record {rate:.9g}"
-        raise RecordError(f"{text}: choose .mat or .csv")
-    signals = [values for name, values in columns.items() if name != TIME]
-    file = io.BytesIO()
-    wavfile.write(file, round(rate), np.stack(signals, axis=1).astype(np.float32))
-    return file.getvalue()
-
-
-def _encode_mat(columns: Columns, rate: float) -> bytes:
-    """Return the columns as double variables of a MAT file of version 5, with the rate."""
-    from scipy.io import savemat
-
-    file = io.BytesIO()
-    savemat(file, {**columns, RATE: rate}, oned_as="column")
-    head = f"MATLAB 5.0 MAT-file, written by {PROGRAM}".encode().ljust(116)  # no date: same bytes
-    return head[:116] + file.getvalue()[116:]
-
-
-ENCODERS: dict[str, Callable[[Columns, float], bytes]] = {
-    ".wav": _encode_wav, ".mat": _encode_mat,
-}  # fmt: skip

@@ -17,7 +17,6 @@ from compressor.store.export import export
 from compressor.store.files import StoreError, WrongName
 from compressor.store.reader import open_study, read_job, read_store
 from compressor.store.studies import write_study
-from compressor.vibration.record_files import read_record
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 GRID = {"joint": "both", "clearance_mm": [0.1, 0.2], "solve": SHORT | {"max_steps": [5, 10**6]}}
@@ -143,30 +142,12 @@ def stored(results, key):
 
 
 @pytest.mark.parametrize(
-    ("suffix", "hints"), [(".wav", {"channel": "1", "tacho": "2", "unit": "m/s2"}), (".mat", {})]
-)
-def test_a_record_alone_is_what_analysts_open(suffix, hints, worn, tmp_path, compsim):
-    """Values to the digits of the type, whatever the job's own samples are."""
-    stored = read_store(worn)
-    recorded = (key for key in sorted(stored.keys()) if "sensor_time" in stored.job(key))
-    one = next(recorded)
-    job, path = stored.job(one), tmp_path / f"job{suffix}"
-    out = compsim("export", one, "-r", worn, "-o", path).out
-    assert f"{job.sizes['sensor_time']} samples" in out
-    found = read_record(path, **hints)
-    np.testing.assert_allclose(found.times, job.sensor_time, atol=1e-5)
-    np.testing.assert_allclose(found.values, job.sensor_acceleration, rtol=6e-8, atol=1e-12)
-    np.testing.assert_allclose(found.tacho, job.tacho_time, atol=1e-5)
-
-
-@pytest.mark.parametrize(
     ("names", "file", "more", "message"),
     [
         (["grid", "KEY"], "x.nc", {}, "x.nc: has studies, or one job; export each job to a file"),
-        (["grid"], "x.wav", {}, "x.wav: is for the sensor's record of one job; name it by its key"),
         (["grid"], "x.nc", {"units": "plant"}, "plant units are of CSV alone"),
         (["grid"], "x.xls", {}, r"no files of the type .xls are written; end the name in .nc or"),
-        (["grid"], "x", {}, "no folders are written; end the name in .nc or .csv, or for a job's"),
+        (["grid"], "x", {}, "no folders are written; end the name in .nc or .csv"),
         (["grid"], "grid.csv", {}, "grid.csv: exists; --force replaces it"),
     ],
 )

@@ -4,14 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from scipy.io import loadmat, savemat, wavfile
+from scipy.io import savemat, wavfile
 
-from compressor.vibration.record_files import (
-    RecordError,
-    encode_record,
-    read_record,
-    record_columns,
-)
+from compressor.vibration.record_files import RecordError, read_record, record_columns
 
 RATE, TURN = 1000.0, 0.1
 TIMES = np.arange(450) / RATE
@@ -108,7 +103,11 @@ def test_what_is_no_record_is_refused(columns, header, hints, told, written):
 def encoded(folder, suffix):
     """Writes the record to a file of a type."""
     path = folder / f"record{suffix}"
-    path.write_bytes(encode_record(COLUMNS, suffix))
+    if suffix == ".mat":
+        savemat(path, COLUMNS, oned_as="column")
+    else:
+        signals = [COLUMNS["acceleration_m_per_s2"], COLUMNS["tacho"]]
+        wavfile.write(path, int(RATE), np.stack(signals, axis=1).astype(np.float32))
     return path
 
 
@@ -119,24 +118,12 @@ def encoded(folder, suffix):
         (".mat", {}, 0.0),
     ],
 )
-def test_every_type_that_is_written_is_read(suffix, hints, error, tmp_path):
+def test_records_of_every_type_are_read(suffix, hints, error, tmp_path):
     path = encoded(tmp_path, suffix)
     found = read_record(path, **hints)
     np.testing.assert_allclose(found.times, TIMES, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.values, VALUES, rtol=error, atol=0)
     np.testing.assert_allclose(found.tacho, PULSES, atol=1e-5)
-    assert encode_record(COLUMNS, suffix) == path.read_bytes()  # no date in it
-
-
-def test_other_programs_find_what_the_page_says(tmp_path):
-    """SciPy's readers as the other program: values in m/s2 as they are, names, and the rate."""
-    rate, samples = wavfile.read(encoded(tmp_path, ".wav"))
-    assert (rate, samples.dtype, samples.shape) == (RATE, np.float32, (TIMES.size, 2))
-    np.testing.assert_array_equal(samples[:, 0], VALUES.astype(np.float32))
-    found = loadmat(encoded(tmp_path, ".mat"))
-    assert {*found} >= {"time_s", "acceleration_m_per_s2", "tacho", "rate_Hz"}
-    assert found["rate_Hz"].item() == pytest.approx(RATE, rel=1e-12)
-    assert found["acceleration_m_per_s2"].shape == (TIMES.size, 1)
 
 
 @pytest.mark.parametrize(
@@ -168,8 +155,6 @@ def test_wav_says_neither_unit_nor_which_channel(tmp_path):
         read_record(path, channel="1", unit="g", tacho="3")
     with pytest.raises(RecordError, match="says its times: leave --rate out"):
         read_record(path, channel="1", unit="g", rate=1000, **STEADY)
-    with pytest.raises(RecordError, match=r"whole number of samples a second, and the record 1500"):
-        encode_record(record_columns(TIMES * 1000 / 1500.5, VALUES, PULSES), ".wav")
 
 
 def test_a_matlab_file_may_hold_a_matrix_and_a_rate(tmp_path):
