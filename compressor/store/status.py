@@ -115,7 +115,6 @@ class StudyProgress:
     """
 
     study: str
-    case_file: str
     jobs: int
     ok: int
     failed: int
@@ -125,7 +124,6 @@ class StudyProgress:
     regimes: dict[str, int]
     caveats: list[str]
     again: Again
-    written: str = ""  # when it was first run (UTC)
 
 
 @dataclass(frozen=True)
@@ -166,7 +164,6 @@ def standings(folder: Folder) -> list[StudyProgress]:
         found.append(
             StudyProgress(
                 study.name,
-                study.case_file,
                 study.jobs,
                 ok.size,
                 failed.size,
@@ -176,7 +173,6 @@ def standings(folder: Folder) -> list[StudyProgress]:
                 counts("regime", ok),
                 study_caveats(stored, study),
                 study.again,
-                study.written,
             )
         )
     return found

@@ -162,22 +162,14 @@ def study_paths(folder: Folder) -> list[Path]:
 
 
 def no_results(folder: Folder) -> WrongName:
-    """Return the error about a folder that holds no study of jobs, with what was probably meant."""
+    """Return the error about a folder that holds no study of jobs."""
     place = Path(folder)
-    if place.suffix in (".yaml", ".yml") and place.is_file():
-        remedy = f"compsim run {folder} makes one, in results"
-        return WrongName(folder, "is a case file, where a folder of results is needed", remedy)
     problem = (
         "is a file, where a folder of results is needed" if place.is_file()
         else "holds no study" if place.exists()
         else "there is no such folder of results"
     )  # fmt: skip
-    near: dict[str, Path] = {}
-    with contextlib.suppress(OSError):
-        beside = (found.parent.name for found in place.absolute().parent.glob("*/studies"))
-        near = {name: place.parent / name for name in beside if name != place.name}
-    other = "choose another folder, or make one: compsim run CONFIG..."
-    return WrongName(folder, problem, did_you_mean(place.name, near, near) or other)
+    return WrongName(folder, problem, "choose another folder, or make one: compsim run CONFIG...")
 
 
 def read_studies(folder: Folder) -> list[StoredStudy]:

@@ -57,7 +57,7 @@ MISTAKES = [
     ("init wear -o good.yaml/wear.yaml", "good.yaml: is a file, where a folder is needed"),
     ("init wear", "wear.yaml exists, and is not overwritten: compsim init wear -o OTHER.yaml"),
     # folders of results
-    ("status -r resluts", "resluts: there is no such folder of results; did you mean results?"),
+    ("status -r resluts", "resluts: there is no such folder of results; choose another"),
     ("plan wear.yaml --set joint=both --set joint=none", "--set joint=none: joint: is set twice"),
     ("plan wear.yaml --set machine.speed_rpm=9 --set 'machine={rod_mass_kg: 3}'", "is set twice"),
     ("run good.yaml --only ''", "an empty word"), ("run good.yaml --scheduler ''", "an empty word"),
