@@ -36,7 +36,6 @@ from compressor.store.netcdf import (
     dimensions_of,
     encode_netcdf,
     is_text,
-    names_of,
     open_netcdf,
     read_attributes,
     read_bytes,
@@ -220,12 +219,6 @@ def read_tables(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return np.column_stack([values, errors, np.full(len(values), np.nan)]), columns
 
 
-def has_foreign_numbers(path: Path) -> bool:
-    """Return whether a batch has numbers of another version, which only that one can read."""
-    with open_netcdf(path) as file:
-        return not {*read_bytes(file["metric"]).astype(str).tolist()} <= VALUES.keys()
-
-
 def read_numbers(path: Path, rows: Sequence[int], places: np.ndarray) -> np.ndarray:
     """Return numbers of some jobs at some places in a row of all, nan where there are none."""
     table, columns = read_tables(path)
@@ -253,45 +246,55 @@ def read_series(
     if not found:
         return []
     with open_netcdf(path) as file:
-        for name in names_of(file) if names is None else names:
-            if name not in file:
+        every, counts = [*file], {}
+        is_single = np.char.find(read_bytes(file["kept"]), b"double") < 0
+        for name in every if names is None else names:
+            if name not in file or name in TABLES:
                 continue
             data = file[name]  # not `get`, to which what is damaged is absent
-            dims = dimensions_of(data)[1:]
-            if not dims or name in TABLES or is_text(data):
+            dims = dimensions_of(data, every)[1:]
+            if not dims or is_text(data):
                 continue
-            counts = [file[f"{dim}s"][()] for dim in dims if dim not in LABELS]
+            for dim in dims:
+                if dim not in counts and dim not in LABELS:
+                    counts[dim] = file[f"{dim}s"][()]
             attrs = read_attributes(data)
             absent = {*np.ravel(attrs.pop("absent", ())).tolist()}
-            singles = np.zeros(len(data), bool)
-            if "sample" in dims and name not in ABSCISSAE:  # stored as doubles beside others
-                singles = np.char.find(read_bytes(file["kept"]), b"double") < 0
+            # stored as doubles beside others
+            singles = is_single & ("sample" in dims and name not in ABSCISSAE)
+            lengths = [counts[dim] for dim in dims if dim not in LABELS]
             dims = [DIMENSIONS.get(dim, dim) for dim in dims]
             source = data[()] if len(rows) == len(data) else data  # one read for all jobs
             for one, row in zip(found, rows, strict=True):
                 if row not in absent:
-                    values = source[(row, *(slice(int(count[row])) for count in counts))]
+                    values = source[(row, *(slice(int(length[row])) for length in lengths))]
                     kind = np.dtype("f4") if singles[row] else data.dtype
                     one[name] = Variable(tuple(dims), values.astype(kind, copy=False), attrs)
     return found
 
 
 def read_outcomes(path: Path) -> list[Outcome]:
-    """Return all that a batch holds, to be merged with others."""
-    columns, _ = read_batch(path)
-    numbers = read_numbers(path, range(len(columns["job"])), ALL)
-    series = iter(read_series(path, np.flatnonzero(columns["samples"]).tolist()))
-    return [
-        Outcome(
-            columns["status"][row].decode(),
-            columns["reason"][row].decode(),
-            values.view(ROW)[0],
-            read_attributes_of(path, row),
-            next(series) if columns["samples"][row] else {},
-            b"compressed" in columns["kept"][row],
-        )
-        for row, values in enumerate(numbers)
-    ]
+    """Return all that a batch holds, to be merged with others.
+
+    Raises DamagedFile also for numbers of another version, which only that one can read.
+    """
+    with open_netcdf(path):  # so that it is opened in a moment below
+        columns, labels = read_batch(path)
+        if not {*labels} <= VALUES.keys():
+            raise ValueError
+        numbers = read_numbers(path, range(len(columns["job"])), ALL)
+        series = iter(read_series(path, np.flatnonzero(columns["samples"]).tolist()))
+        return [
+            Outcome(
+                columns["status"][row].decode(),
+                columns["reason"][row].decode(),
+                values.view(ROW)[0],
+                read_attributes_of(path, row),
+                next(series) if columns["samples"][row] else {},
+                b"compressed" in columns["kept"][row],
+            )
+            for row, values in enumerate(numbers)
+        ]
 
 
 def batch_paths(folder: Folder) -> list[Path]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from compressor.store.batch import encode_batch, has_foreign_numbers, publish_batch, read_outcomes
+from compressor.store.batch import encode_batch, publish_batch, read_outcomes
 from compressor.store.files import Folder, discard_leftovers, refusals
 from compressor.store.netcdf import DamagedFile
 from compressor.store.stored import read_store
@@ -78,8 +78,6 @@ def _merge_group(folder: Path, group: list[Counting]) -> None:
     """Write one batch in place of several, unless one is damaged, gone or of another version."""
     outcomes = []
     with contextlib.suppress(DamagedFile, FileNotFoundError):
-        if any(has_foreign_numbers(path) for path, _ in group):
-            return
         for path, rows in group:
             found = read_outcomes(path)
             outcomes += [found[row] for row in rows]

@@ -150,18 +150,13 @@ def read_attributes(place: Any) -> dict[str, Any]:
     return {n: v.decode() if isinstance(v, bytes) else v for n, v in found.items()}
 
 
-def dimensions_of(data: Any) -> list[str]:
+def dimensions_of(data: Any, names: Sequence[str]) -> list[str]:
     """Return the names of the dimensions of a variable.
 
-    Its DIMENSION_LIST has them, too, but no checksum: HDF5 may take for ever over a damaged one.
+    names: all of its file, of which dimensions are the first, in the order of their numbers. Its
+    DIMENSION_LIST has them, too, but no checksum: HDF5 may take for ever over a damaged one.
     """
-    names = [*data.file]  # dimensions first, in the order of their numbers
     return [names[at] for at in data.attrs.get("_Netcdf4Coordinates", ())]
-
-
-def names_of(file: Any) -> list[str]:
-    """Return the names of the variables of a file, in the order of writing."""
-    return [name for name in file if not file[name].attrs.get("NAME", b"").startswith(BARE)]
 
 
 def write_dataset(path: Path, dataset: "xr.Dataset") -> Path:
@@ -188,8 +183,11 @@ def read_dataset(path: Path, remedy: str = REMEDY) -> "xr.Dataset":
 
     found = {}
     with open_netcdf(path, remedy) as file:
-        for name in names_of(file):
-            data, dims = file[name], dimensions_of(file[name])
+        names = [*file]
+        for name in names:
+            data, dims = file[name], dimensions_of(file[name], names)
+            if data.attrs.get("NAME", b"").startswith(BARE):
+                continue
             if is_text(data):
                 values = np.char.decode(read_bytes(data), "utf-8")
                 dims = dims[:-1]
