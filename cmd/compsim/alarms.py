@@ -1,7 +1,6 @@
 """`compsim alarms`: which alarm sees wear first, joint by joint."""
 
 import re
-import shlex
 from pathlib import Path
 
 import click
@@ -78,6 +77,7 @@ def alarms(study, folder, output, run, quiet, **how) -> int:
     from compressor.report import title_figure, write_figure
     from compressor.store import read_studies, writable_folder, write_dataset
     from compressor.studies.alarms.alarms import (
+        CAPTION,
         FILE,
         add_hours,
         draw_alarms,
@@ -99,11 +99,8 @@ def alarms(study, folder, output, run, quiet, **how) -> int:
         screen.say_wrapped(f"warning: {text}")
     if output:
         titles = [one.title for one in read_studies(folder) if one.name == study]
-        drawn = draw_alarms(found, title_figure("".join(titles) or study, "alarms by clearance"))
+        figure = draw_alarms(found, title_figure("".join(titles) or study, "alarms by clearance"))
         path = write_dataset(Path(output, FILE), found)
-        picture = write_figure(Path(output, "alarms.png"), drawn.figure)
-        screen.print_text(str(path), str(picture), drawn.caption)
-        if not quiet:
-            beside = "" if output == "alarms" else f" --alarms {shlex.quote(output)}"
-            screen.say(f"next: compsim report -r {shlex.quote(folder)}{beside}")
+        picture = write_figure(Path(output, "alarms.png"), figure)
+        screen.print_text(str(path), str(picture), CAPTION)
     return screen.DONE

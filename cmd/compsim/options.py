@@ -67,12 +67,6 @@ def output(text: str, **how: Any) -> Callable[..., Any]:
     return click.option("-o", "--output", help=text, **{"type": FOLDER, **how})
 
 
-def addition(verb: str) -> Callable[..., Any]:
-    """Return the option by which a report has what another command wrote."""
-    text = f"Add what `compsim {verb}` wrote into this folder, if it is there."
-    return click.option(f"--{verb}", default=verb, type=FOLDER, help=text)
-
-
 def jobs(text: str = "Run in this many worker processes.") -> Callable[..., Any]:
     """Return the option -j, by default as many processes as this one may use cores."""
     return click.option("-j", "--jobs", type=COUNT, show_default="cores available", help=text)

@@ -1,7 +1,6 @@
 """`compsim report`: the page, figures and tables of a folder of results."""
 
 import os
-from functools import partial
 
 import click
 
@@ -22,9 +21,8 @@ from compsim import options, screen
     "unit, such as 'sensor_peak=0.5,2 g'.",
 )
 @options.units("kN, mm, µm, m/s²")
-@options.addition("alarms")
 @click.pass_obj
-def report(command, names, folder, output, single, limits, units, alarms) -> int:
+def report(command, names, folder, output, single, limits, units) -> int:
     """Draw stored studies as a page of figures and tables.
 
     \b
@@ -43,11 +41,8 @@ def report(command, names, folder, output, single, limits, units, alarms) -> int
         output += ".html"
     writable_folder((os.path.dirname(output) or ".") if single else output, make=False)
     from compressor.report import write_report
-    from compressor.studies.alarms.alarms import add as add_alarms
-    from compressor.studies.tradeoff.page import add as add_models
 
-    add = (add_models, partial(add_alarms, place=alarms))  # of each study that adds to a page
-    path = write_report(folder, output, command, add, limits, units or "usual", names, single)
+    path = write_report(folder, output, command, limits, units or "usual", names, single)
     screen.print_text(str(path))
     if single:
         screen.say(f"{screen.size(path.stat().st_size)}, all in one file")

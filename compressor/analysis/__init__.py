@@ -1,7 +1,7 @@
 """What runs mean, and what the paper says of them."""
 
 from compressor.analysis.cam import Cam
-from compressor.analysis.cautions import JointScales, cautions, joint_scales
+from compressor.analysis.cautions import cautions
 from compressor.analysis.claims import RULES, Claim, claim_margins, claims
 from compressor.analysis.contacts import (
     MODES,

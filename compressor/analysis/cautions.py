@@ -12,7 +12,7 @@ study. What cannot be simulated at all is refused by `compressor.cases.conflicts
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -44,18 +44,6 @@ MAX_FLATTENED = 5e-3  # of it, by which smoothing lowers the peak, beside
 PEAKS = 3.0  # times the noise, by which that alone raises a peak
 
 
-@dataclass(frozen=True)
-class JointScales:
-    """Natural scales of a joint's contact under a force (SI)."""
-
-    joint: str
-    clearance: float  # m
-    force: float  # N
-    penetration: float  # m, at rest under the force
-    damping_ratio: float  # of the lighter body on the contact at rest; above 1 it does not ring
-    swing_frequency: float  # Hz, of the journal swinging about the line of the force in its bore
-
-
 def greatest_force(p: np.record, joint: str) -> float:
     """Return a bound of the force at a joint of the ideal machine (N): inertia and load.
 
@@ -70,42 +58,18 @@ def greatest_force(p: np.record, joint: str) -> float:
     return float(inertia + p["rod_mass"] * p["gravity"] + greatest_load(p))
 
 
-def joint_scales(p: np.record, joint: str, force: float) -> JointScales:
-    """Return the scales of a joint with clearance under a force (N).
-
-    A journal held against its bore can roll to and fro on the wall: it swings like a pendulum, at
-    sqrt(F / (m e)); m is what the rod's end weighs `across` the rod.
-    """
-    number = JOINTS.index(joint)
-    clearance, stiffness = p["clearance"][number].item(), p["stiffness"][number].item()
-    contact = elastic_form(stiffness, clearance, p)
-    mass = min(p["rod_mass"], p["reciprocating_mass"]).item()
-    depth = float(contact.static_depth(force))
-    natural, damping = math.sqrt(contact.tangent(depth) / mass), contact.damping(depth)
-    swing = math.sqrt(force / (across(p, joint) * (clearance + depth)))
-    return JointScales(
-        joint, clearance, force, depth, damping / (2.0 * mass * natural), swing / (2.0 * math.pi)
-    )
-
-
-def across(p: np.record, joint: str) -> float:
-    """Return the mass (kg) that moves across the rod at an end, the other end being held."""
-    centre, length = p["rod_centre"].item(), p["rod_length"].item()
-    lever = length - centre if joint == "big_end" else centre
-    return (p["rod_inertia"].item() + p["rod_mass"].item() * lever**2) / length**2
-
-
 def dry_record(case: Case) -> np.record:
     """Return the record of a case without its oil: Reynolds' equation would take half a second."""
     return record(replace(case, lubricant=None))
 
 
-def contact_scales(case: Case) -> Iterator[JointScales]:
-    """Yield the scales of each joint with clearance under its greatest force."""
-    worn = [joint for joint in JOINTS if getattr(case.clearance_mm, joint) > 0]
-    if worn:
-        p = dry_record(case)
-        yield from (joint_scales(p, joint, greatest_force(p, joint)) for joint in worn)
+def contact_depths(case: Case) -> Iterator[tuple[float, float]]:
+    """Yield each joint's clearance and its penetration at rest under its greatest force (m)."""
+    p = dry_record(case)
+    for number, joint in enumerate(JOINTS):
+        if clearance := p["clearance"][number].item():
+            contact = elastic_form(p["stiffness"][number].item(), clearance, p)
+            yield clearance, float(contact.static_depth(greatest_force(p, joint)))
 
 
 METRES, MICROMETRES = {"m": 1e3}, {"µm": 1e-3}
@@ -271,8 +235,8 @@ def check_body(case: Case) -> Remarks:
 
 def check_depth(case: Case) -> Remarks:
     """Yield penetrations beside which a clearance is small."""
-    for joint in contact_scales(case):
-        depth, clearance = 1000 * joint.penetration, 1000 * joint.clearance
+    for lengths in contact_depths(case):
+        clearance, depth = (1000 * length for length in lengths)
         if depth > SHALLOW_CLEARANCES * clearance:
             yield "clearance_mm", (
                 f"{clearance:g} mm is less than the contact gives way, about {depth:.2g} mm: the "

@@ -1,10 +1,9 @@
-"""A store -> figures and a page; the tools by which studies draw and add to the page."""
+"""A store -> figures and a page; the tools by which studies draw."""
 
 from compressor.report.figures import style
 from compressor.report.figures.contours import contour_lines
 from compressor.report.figures.drawing import Panel, PlotlyFigure, make_grid, midway, rectangle
 from compressor.report.figures.sweep_data import FOOT, MARKS, Measure, measures, positions
 from compressor.report.figures.table import DrawnFigure
-from compressor.report.page import Add, Addition, Cell, PageTable, TableRow, format_measure
 from compressor.report.plots import PlotChoice, title_figure, write_figure, write_plots
 from compressor.report.report import write_report

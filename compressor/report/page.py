@@ -1,4 +1,4 @@
-"""The report as an HTML page with its figures, tables and what studies add to it.
+"""The report as an HTML page with its figures and tables.
 
 Python gives sections of plain data; the files in `templates` make markup of them, and escape every
 text that they print.
@@ -8,7 +8,7 @@ import base64
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
@@ -24,7 +24,6 @@ from compressor.report.figures.sweep_data import Measure
 from compressor.report.figures.table import DrawnFigure
 from compressor.report.interactive import script
 from compressor.report.limits import NO_LIMITS, Limits
-from compressor.store import Folder, StoredStudy
 
 
 @dataclass(frozen=True)
@@ -168,14 +167,12 @@ def show_figure(drawn: DrawnFigure) -> ShownFigure:
 
 
 class SectionContent(NamedTuple):
-    """What `section.html` prints; title, notes: of the machine; code: files and commands."""
+    """What `section.html` prints; code: files and commands."""
 
     table: PageTable | None = None
     paragraphs: Sequence[str] = ()
     lines: Sequence[str] = ()
     figures: Sequence[DrawnFigure | ShownFigure] = ()
-    title: str = ""
-    notes: str = ""
     code: Sequence[str] = ()
 
 
@@ -257,31 +254,3 @@ class StudyNote(NamedTuple):
     text: str
     anchor: str
     link: str
-
-
-class Addition(NamedTuple):
-    """What a study adds to a page: a section, and a line on a stored study with a link to it.
-
-    line, link: in that study's section, and the words of the link; "" of a further section.
-    machine: its title and notes.
-    """
-
-    study: str
-    line: str
-    link: str
-    anchor: str
-    title: str
-    table: PageTable
-    paragraphs: Sequence[str] = ()
-    lines: Sequence[str] = ()
-    figures: Sequence[DrawnFigure] = ()
-    machine: tuple[str, str] = ("", "")
-
-    @property
-    def section(self) -> Section:
-        """Return the section."""
-        shown = self.table, self.paragraphs, self.lines, self.figures
-        return Section(self.anchor, self.title, SectionContent(*shown, *self.machine))
-
-
-Add = Callable[[Folder, Sequence[StoredStudy]], Iterable[Addition]]  # of the folder of results

@@ -40,7 +40,6 @@ from compressor.report.figures.table import DrawnFigure
 from compressor.report.interactive import job_scripts, series_name
 from compressor.report.limits import Limits, read_limits
 from compressor.report.page import (
-    Add,
     JobFacts,
     JobsToOpen,
     Section,
@@ -90,7 +89,6 @@ def write_report(
     results: Folder,
     report: Folder,
     command: str = "",
-    add: Sequence[Add] = (),
     limits: Sequence[str] = (),
     units: Units = "usual",
     studies: Sequence[str] = (),
@@ -98,16 +96,16 @@ def write_report(
 ) -> Path:
     """Write figures and `index.html` about a folder of results; returns the page's path.
 
-    add: what makes more of the page. limits: of metrics, whose zones tables and curves show, such
-    as `sensor_peak=20,50 m/s²`. units: of figures and tables, of `compressor.units`. studies: names
-    of those to tell of, in this order, by default all, those of searches last. single: report is a
-    file, the page with all that it needs in it.
+    limits: of metrics, whose zones tables and curves show, such as `sensor_peak=20,50 m/s²`. units:
+    of figures and tables, of `compressor.units`. studies: names of those to tell of, in this order,
+    by default all, those of searches last. single: report is a file, the page with all that it
+    needs in it.
 
     Raises LimitError where these cannot be used, StoreError where there are no results, or the
     report's folder cannot be written.
     """
     folder, zones = Path(report), read_limits(limits, units)
-    contents = build_report(results, command, add, zones, units, studies)
+    contents = build_report(results, command, zones, units, studies)
     files = {f"{series_name(key)}.js": text.encode() for key, text in contents.series.items()}
     drawn = [one for one in contents.figures if isinstance(one, DrawnFigure)]
     shown = [one for one in contents.figures if isinstance(one, ShownFigure)]
@@ -150,12 +148,7 @@ class ReportContent(NamedTuple):
 
 
 def build_report(
-    results: Folder,
-    command: str,
-    add: Sequence[Add],
-    limits: Limits,
-    units: Units = "usual",
-    names: Sequence[str] = (),
+    results: Folder, command: str, limits: Limits, units: Units = "usual", names: Sequence[str] = ()
 ) -> ReportContent:
     """Return the figures, series and page of a report, in memory; arguments as `write_report`."""
     studies, stored = choose_studies(results, names), read_store(results, warn=True)
@@ -166,13 +159,10 @@ def build_report(
     of_own = {one.name: own_figures(stored, one, units) for one in studies if one.figures}
     own_notes = {name: note for name, (note, _) in of_own.items()}
     own = [study for study in studies if not repeats_paper(study, paper)]
-    added = [more for one in add for more in one(results, studies)]
     drawn: list[DrawnStudy] = []
     left_out: dict[str, str] = {}  # study -> why
     for study in own:
         notes = [note for name, note in own_notes.items() if name == study.name]
-        notes += [StudyNote(one.line, one.anchor, one.link)
-                  for one in added if one.study == study.name and one.line]  # fmt: skip
         try:
             drawn.append(drawn_study(stored, study, notes, limits, units))
         except CardError as error:
@@ -195,7 +185,6 @@ def build_report(
         *(one.section for one in drawn),
         *[of_paper] * bool(paper_figures),
         *chain(*(sections for _, sections in of_own.values())),
-        *(one.section for one in added),
         *(one.table for one in drawn),
         *tables,
         assumptions_section(bool(paper.stored)),

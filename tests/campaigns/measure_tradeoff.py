@@ -17,7 +17,7 @@ from compressor.analysis.runs import settled_part
 from compressor.cases.load import load_studies
 from compressor.report.figures.pictures import render
 from compressor.solve.simulate import simulate
-from compressor.studies.tradeoff.page import model_table
+from compressor.studies.tradeoff.changes import model_table
 from compressor.studies.tradeoff.variants import faulty, make_variants, run_variants, scale_contact
 from compressor.studies.tradeoff.work_precision import VARIABLES, draw_work_precision, tabulate
 

@@ -77,7 +77,7 @@ def contents(evil):
         "claims.html": claims,
         "provenance.html": {**{name: evil() for name in PROVENANCE}, "studies": [study]},
         "section.html": SectionContent(table(evil), [evil()], [evil()],
-                                       [drawn(evil) for _ in range(4)], evil(), evil(), [evil()]),
+                                       [drawn(evil) for _ in range(4)], [evil()]),
         "study.html": StudyContent(study, evil(), [evil()], [evil()], [evil()], [drawn(evil)],
                                    evil(), [StudyNote(evil(), evil(), evil())],
                                    HealthyAndWorn(evil(), table(evil)),

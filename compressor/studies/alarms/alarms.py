@@ -28,7 +28,7 @@ from compressor.analysis import faulty_joints, interpolate_hours
 from compressor.cases import Case, Sensor, Wear
 from compressor.metrics import JOINTS
 from compressor.program import PROGRAM, Progress, no_progress
-from compressor.report import Addition, Cell, DrawnFigure, PageTable, TableRow, make_grid, style
+from compressor.report import PlotlyFigure, make_grid, style
 from compressor.store import Folder, StoredStudy, find_study, read_dataset
 from compressor.studies.alarms.readings import (
     ALARMS,
@@ -439,10 +439,9 @@ def list_warnings(found: xr.Dataset) -> Iterator[str]:
         yield f"a clearance has {few} draws: to be sure that it is detected takes {needed}"
 
 
-# ---- the figure, the files, and the section of a report ----------------------------------------
+# ---- the figure and the file --------------------------------------------------------------------
 
 FILE = "alarms.nc"
-REMEDY = "compsim alarms STUDY -o the folder writes it again"
 MAX_KINDS = 6  # kinds of alarm that have a line: the first to see wear
 CAPTION = (
     "Share of windows in which an alarm trips, by clearance, at the first level of noise, each "
@@ -450,7 +449,7 @@ CAPTION = (
 )
 
 
-def draw_alarms(found: xr.Dataset, title: str = "") -> DrawnFigure:
+def draw_alarms(found: xr.Dataset, title: str = "") -> PlotlyFigure:
     """Return a panel a joint: the share of windows in which alarms trip, by clearance.
 
     Of the first level of noise, and of the kinds that see wear first over all joints.
@@ -473,25 +472,4 @@ def draw_alarms(found: xr.Dataset, title: str = "") -> DrawnFigure:
         panel.x.title = "clearance (mm)"
         panel.span("y", -0.02, 1.04)
     grid.flat[0].y.title, drawing.title = "windows in which it trips", title
-    name = f"alarms-{found.attrs['study']}"
-    return DrawnFigure(drawing.figure(), CAPTION, name=name, title="Alarms by clearance")
-
-
-def add(results: Folder, studies: Sequence[StoredStudy], place: Folder) -> Iterator[Addition]:
-    """Yield the section of the alarms that are in a folder, if there are any.
-
-    None of a study that is not stored. Raises StoreError for a file that is something else.
-    """
-    path = Path(place or "", FILE)
-    found = read_dataset(path, REMEDY) if place and path.exists() else xr.Dataset()
-    for study in studies:
-        if study.name == found.attrs.get("study"):
-            head, *texts = list_rows(found)
-            rows = [TableRow([Cell(text) for text in row]) for row in texts]
-            yield Addition(
-                study.name, f"{found.sizes['alarm']} alarms were judged by its records.",
-                "Which alarm sees wear first", f"alarms-of-{study.name}",
-                f"Which alarm sees wear first in study {study.name}", PageTable(head, rows, 3), (),
-                [*list_numbers(found), *list_warnings(found)], [draw_alarms(found)],
-                (study.title, study.notes),
-            )  # fmt: skip
+    return drawing.figure()

@@ -35,7 +35,7 @@ from compressor.cases import (
     values_given,
 )
 from compressor.metrics import BARRED, JOINTS, METRICS
-from compressor.program import PROGRAM, Progress, no_progress, report_progress
+from compressor.program import Progress, no_progress, report_progress
 from compressor.solve import simulate, stiffness_of
 from compressor.store import Folder, read_store
 from compressor.sweep import compile_once, needed_parts
@@ -411,18 +411,13 @@ def choose_job(study: Study, folder: Folder) -> tuple[int, str]:
     return int(np.argmax(gaps)), f"{why}is stored"
 
 
-def explain_models(
-    study: Study, job: int, every: bool = False, progress: Progress = no_progress
-) -> xr.Dataset:
+def explain_models(study: Study, job: int, progress: Progress = no_progress) -> xr.Dataset:
     """Run a job of a study, with every number in doubt, and by every other model of its machine.
 
-    every: with all other features toggled, too. Returns the Dataset of `run_variants` with the
-    attributes `study` and `key` (of the job).
+    Returns the Dataset of `run_variants`.
     """
     case = replace(study.cases[job], wear=None)  # which is of no single run
-    models = [*make_variants(case), *scale_contact(case)] if every else [*other_models(case)]
-    data = run_variants(case, [*vary_numbers(study, job), *models], progress)
-    return data.assign_attrs({"study": study.name, "key": study.keys[job]})
+    return run_variants(case, [*vary_numbers(study, job), *other_models(case)], progress)
 
 
 def run_variants(
@@ -458,14 +453,10 @@ def run_variants(
     table = xr.concat([run[[*lacking]].drop_attrs() for run in whole], "choice")
     for name in lacking:
         table[name].attrs = runs[0][name].attrs
-    columns = {"choice": "choice of the model", "note": "assumed values, or why it cannot be",
-               "varied": "the number that is another one"}  # fmt: skip
-    for name, phrase in columns.items():
-        field = "name" if name == "choice" else name
-        values = np.array([getattr(one, field) for one in every[: len(runs)]], object)
-        table[name] = "choice", values, {"long_name": phrase}
-    attrs = {"title": "metrics by choices of the model", "program": PROGRAM}
-    return table.assign_attrs(attrs | {"detail": runs[0].attrs.get("detail", "")})
+    for column, field in (("choice", "name"), ("note", "note"), ("varied", "varied")):
+        values = [getattr(one, field) for one in every[: len(runs)]]
+        table[column] = "choice", np.array(values, object)
+    return table.assign_attrs(detail=runs[0].attrs.get("detail", ""))
 
 
 def run_fastest(case: Case, least: int) -> tuple[xr.Dataset, float]:

@@ -1,8 +1,6 @@
 """`compsim alarms` on made-up records that strike: its table, files, figure, and mistakes."""
 
 import contextlib
-import dataclasses
-import html
 import re
 
 import numpy as np
@@ -11,9 +9,8 @@ from compsim import cli
 from test_lead import CASE, write_run
 
 from compressor.report.figures.drawing import panels_of
-from compressor.report.page import document
-from compressor.store import read_dataset, read_studies
-from compressor.studies.alarms.alarms import CAPTION, add, draw_alarms, list_rows, rank_alarms
+from compressor.store import read_dataset
+from compressor.studies.alarms.alarms import CAPTION, draw_alarms, rank_alarms
 from compressor.studies.alarms.readings import ALARMS
 
 KINDS = len(ALARMS) - 1  # without the body's velocity, which no job here has
@@ -70,7 +67,7 @@ def test_the_figure_has_the_shares_of_each_joint(written):
     folder, _ = written
     found = read_dataset(folder / "alarms.nc")
     assert (folder / "alarms.png").read_bytes()[:4] == b"\x89PNG"
-    panels = panels_of(draw_alarms(found).figure)
+    panels = panels_of(draw_alarms(found))
     for panel, joint in zip(panels, found["joint"].values, strict=True):
         mine = found["worn_joint"].values == joint
         for trace in panel.traces:
@@ -79,26 +76,6 @@ def test_the_figure_has_the_shares_of_each_joint(written):
             )
             np.testing.assert_array_equal(trace.y, found["detection"].values[best, 0, mine, 0])
         assert [rule.y0 for rule in panel.rules] == [0.9]
-
-
-def test_the_report_has_a_section_of_its_study(written, worn_store):
-    studies = [
-        dataclasses.replace(one, title="Unit 3", notes="A.") for one in read_studies(worn_store)
-    ]
-    (made,) = add(worn_store, studies, written[0])
-    page = document([made.section])
-    assert "Which alarm sees wear first in study worn" in page
-    assert page.count("<tr") == 1 + 3 * KINDS
-    assert "<strong>Unit 3</strong>" in page
-    assert '<p class="notes">A.</p>' in page
-    for row in list_rows(read_dataset(written[0] / "alarms.nc"))[1::KINDS]:
-        assert all(html.escape(text) in page for text in row)
-    assert "sound machines: 60 jobs of 60 draws" in page
-    assert html.escape(CAPTION) in page
-    assert [one.name for one in made.figures] == ["alarms-worn"]
-    assert (made.study, made.anchor) == ("worn", "alarms-of-worn")
-    assert [*add(worn_store, [], written[0])] == []  # of a study that is not stored
-    assert [*add(worn_store, studies, "")] == []
 
 
 def test_hours_stand_beside_the_clearances(written):

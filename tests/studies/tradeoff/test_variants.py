@@ -240,7 +240,6 @@ def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
     data = explain_models(study, 0, progress=lambda done, total, _: seen.append((done, total)))
     assert {*data["choice"].values} == {ITSELF, *THREE}
     assert [*dict.fromkeys(seen)] == [(n, 4) for n in (0, 1, 2, 3, 4)]
-    assert data.attrs["study"] == "worn"
     by_hand = {
         ITSELF: {},
         "contact stiffness × 2": {"contact": {"stiffness_N_per_mm15": 6.72e5}},
@@ -254,4 +253,3 @@ def test_the_table_is_that_of_runs_made_by_hand(few, tmp_path):
             np.testing.assert_array_equal(row[metric], run[metric])
             np.testing.assert_array_equal(row[f"{metric}_error"], run[f"{metric}_error"])
         assert row["regime"] == run.attrs["regime"]
-    assert data.attrs["key"] == study.keys[0]

@@ -1,30 +1,13 @@
 """Changes by choices of the model: what is beyond the error bars, and the words beside it."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
-import pytest
 import xarray as xr
 
-from compressor.cases.study import Axis
 from compressor.metrics import JOINTS, METRICS
-from compressor.report.page import document
-from compressor.store.files import StoreWarning
-from compressor.store.netcdf import write_dataset
-from compressor.store.studies import StoredStudy
-from compressor.studies.tradeoff.page import (
-    add,
-    headline,
-    model_table,
-    models_file,
-    page_table,
-    place_text,
-    read_models,
-)
+from compressor.studies.tradeoff.changes import list_changes, model_table
 
-AXIS = Axis("clearance_mm", (0.1, 0.2, 0.3))
-STUDY = StoredStudy("worn", "worn.yaml", (AXIS,), ("0" * 20, "1" * 20, "2" * 20), {}, "", {}, "")
 NAMES = ["the case itself", "softer", "oil", "other law", "broken", "impossible"]
 PEAK = [100.0, 193.0, 34.0, 500.0, math.nan, math.nan]  # m/s2
 PEAK_BAR = [0.01, 1.0, 1.0, math.inf, math.nan, math.nan]
@@ -61,8 +44,7 @@ def made(**more):
     variables |= {name: ("choice", np.array(values, object)) for name, values in words.items()}
     variables["seconds"] = "choice", np.array([1, 2, 3, 4, 5, math.nan], float)
     coordinates = {"choice": np.array(NAMES, object), "joint": list(JOINTS)}
-    attrs = {"study": "worn", "key": STUDY.keys[2]}
-    return xr.Dataset(variables, coordinates, attrs)
+    return xr.Dataset(variables, coordinates)
 
 
 def cells(table):
@@ -83,46 +65,14 @@ def test_a_change_is_what_lies_beyond_both_bars():
                                   loss: "+1 points"}  # fmt: skip
     assert {*found["broken"].values()} == {"failed"}
     assert {*found["impossible"].values()} == {"–"}
-    assert table.span_texts == ("-66 to +93 %", "0 to +50 %", "0 to +350 %", "0 to +99 points")
     assert [row.note for row in table.rows] == ["K 1", "", "", "failed: budget_steps", "needs more"]
     assert table.rows[1].time_ratio == 3.0
 
 
-def test_the_page_shows_line_table_and_what_is_assumed(tmp_path):
-    data = made()
-    write_dataset(models_file(tmp_path, "worn", STUDY.keys[2]), data)
-    (one,) = add(tmp_path, [STUDY])
-    text = document([one.section] * 2)
-    assert one.line == f"What moves its numbers: {headline(model_table(data))}"
-    assert text.count(f"<p>{headline(model_table(data))}.</p>") == 2
-    assert "The table is of worn at clearance_mm = 0.3, one of 3 jobs: its" in text
-    alone = replace(STUDY, axes=(), keys=("a",))
-    assert place_text(alone, "a") == "worn, the only job"
-    table = page_table(model_table(data))
-    assert [row.cells[0].text for row in table.rows] == [*NAMES, "all of them"]
-    assert [cell.text for cell in table.rows[1].cells][-1] == "K 1"
-    assert {len(row.cells) for row in table.rows} == {len(table.head)}
-
-
-def test_choices_are_read_where_they_are_of_a_job_of_the_study(tmp_path):
-    study = STUDY
-    assert read_models(tmp_path, study) == []
-    first, second = made().assign_attrs(key=study.keys[0]), made()
-    path = write_dataset(models_file(tmp_path, "worn", study.keys[0]), first)
-    write_dataset(models_file(tmp_path, "worn", study.keys[2]), second)
-    write_dataset(tmp_path / "models" / "worn-out.nc", second)  # of another study
-    found = [one.attrs["key"] for one in read_models(tmp_path, study)]
-    assert sorted(found) == [study.keys[0], study.keys[2]]
-    first, second = add(tmp_path, [study])
-    assert (bool(second.line), second.anchor) == (False, "models-worn-2")
-    assert [first.title, second.title] == [
-        f"What moves the numbers of study worn at clearance_mm = {value}" for value in (0.1, 0.3)
-    ]
-    with pytest.warns(StoreWarning, match=r"worn-2{8}\.nc: is not shown, as worn has no"):
-        assert len(read_models(tmp_path, replace(study, keys=study.keys[:2]))) == 1
-    path.write_bytes(path.read_bytes()[:-9])
-    with pytest.warns(StoreWarning, match=r"worn-0{8}\.nc.*compsim explain --models"):
-        assert len(read_models(tmp_path, study)) == 1
-    write_dataset(path, xr.Dataset({"a": 1.0}))
-    with pytest.warns(StoreWarning, match="is not shown, as worn has no such job"):
-        assert len(read_models(tmp_path, study)) == 1
+def test_what_moves_a_metric_most_is_listed_first():
+    lines = [*list_changes(model_table(made()))]
+    first = next(n for n, line in enumerate(lines) if line.startswith("peak acceleration "))
+    assert [line.split() for line in lines[first + 1 : first + 3]] == [
+        ["softer", "+93", "%"], ["oil", "-66", "%"]
+    ]  # fmt: skip
+    assert lines[-1].split(maxsplit=1) == ["impossible", "needs more"]
