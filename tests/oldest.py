@@ -19,8 +19,7 @@ NEEDED = ("pyproject.toml", "README.md", "cmd", "compressor")
 BOUND = re.compile(r"([A-Za-z0-9_-]+)>=([0-9.]+)(,<.*)?")
 SAMPLE = ("cases", "cmd", "report", "store", "sweep/test_sweep.py", "physics/test_march.py")
 TOOLS = (
-    "pytest", "pytest-xdist", "hypothesis", "jsonschema", "sympy", "distributed", "pyarrow",
-    "scikit-learn",
+    "pytest", "pytest-xdist", "hypothesis", "jsonschema", "sympy", "distributed", "scikit-learn",
 )  # fmt: skip
 CASE = "{joint: big_end, clearance_mm: 0.2, solve: {duration_rev: 2, accuracy: draft}}"
 

@@ -31,7 +31,7 @@ def test_the_lock_has_what_is_installed_for_tests_and_site():
 
 def test_the_oldest_libraries_come_with_what_tests_of_extras_need():
     more = PROJECT["project"]["optional-dependencies"]
-    extras = [one for name in ("dataset", "learn", "dask") for one in more[name]]
+    extras = [one for name in ("learn", "dask") for one in more[name]]
     assert {one.partition(">=")[0] for one in extras} <= {*oldest.TOOLS}
 
 

@@ -384,13 +384,13 @@ def no_records(source: StoredStudy, left: Mapping[str, int], revolutions: int) -
     return StudyError(f"{text}; {remedy}")
 
 
-def cut_windows(record: Record, revolutions: int, hop: int = 0) -> Iterator[tuple[int, Record]]:
+def cut_windows(record: Record, revolutions: int) -> Iterator[tuple[int, Record]]:
     """Yield the windows of a record, each behind the number of the pulse that it begins with.
 
     A window reaches from the last sample that is not after a pulse to the first that is not before
-    the pulse `revolutions` later. hop: revolutions to the next one, 0: none of it twice.
+    the pulse `revolutions` later, with which the next one begins.
     """
-    for first in range(0, len(record.tacho) - revolutions, hop or revolutions):
+    for first in range(0, len(record.tacho) - revolutions, revolutions):
         pulses = record.tacho[first : first + revolutions + 1]
         begin = max(int(np.searchsorted(record.times, pulses[0], side="right")) - 1, 0)
         inside = slice(begin, int(np.searchsorted(record.times, pulses[-1])) + 1)

@@ -26,7 +26,7 @@ from compressor.digits import align_columns
 from compressor.metrics import JOINTS
 from compressor.program import Progress, no_progress
 from compressor.store import Folder, find_study
-from compressor.studies.diagnosis.dataset import list_values, name_machine
+from compressor.studies.diagnosis.dataset import name_machine
 from compressor.studies.diagnosis.features import features
 from compressor.studies.frame import StudyError, no_records, records
 from compressor.vibration import MIN_REVOLUTIONS, Record, RecordError
@@ -57,7 +57,7 @@ class Library:
 
     joints: worn ones, (n,) none, big_end, small_end or both; clearances: mm, (n, 2) of big and
     small end, 0 where there is none; features: (n, FEATURES), nan where a record does not have one;
-    machines: (n,), their names; jobs: of the study; swept: reach of its other keys, in words.
+    machines: (n,), their names; jobs: of the study; swept: its other keys.
     """
 
     study: str
@@ -67,7 +67,7 @@ class Library:
     features: np.ndarray
     machines: np.ndarray
     jobs: int
-    swept: dict[str, str]
+    swept: list[str]
 
     def only(self, mask: np.ndarray) -> "Library":
         """Return the jobs that a mask (n,) keeps."""
@@ -89,11 +89,8 @@ def read_library(folder: Folder, study: str, progress: Progress = no_progress) -
         rows.append((job.key, job.case.worn_joint, ends, found, name_machine(job.case)))
     if not rows:
         raise no_records(source, left, MIN_REVOLUTIONS)
-    swept = {
-        axis.key: list_values(axis.values)
-        for axis in source.axes
-        if axis.key.partition(".")[0] not in IDENTIFIED
-    }
+    keys_of = (axis.key for axis in source.axes)
+    swept = [key for key in keys_of if key.partition(".")[0] not in IDENTIFIED]
     keys, joints, opened, found, machines = map(np.array, zip(*rows, strict=True))
     return Library(study, keys, joints, opened, found, machines, source.jobs, swept)
 
@@ -343,7 +340,7 @@ def list_joints(fitted: Identifier, answer: Identification) -> Iterator[str]:
         "of these, as strange as the record": f"{answer.p_value:.1%}",
         "nearest job": answer.nearest,
         "joints with too few jobs": ", ".join(left) or "none",
-        **{f"varied: {key}": reach for key, reach in library.swept.items()},
+        "varied": ", ".join(library.swept) or "none",
     }
     yield from align_columns(facts.items())
     yield "all else, such as the laws of contact and friction, is as in the study's case file"

@@ -65,7 +65,7 @@ def test_a_record_is_explained(record, folder, compsim):
     assert float(chance) > 0.8
     assert float(low.strip(",")) < float(median) < float(high.strip("]"))
     assert abs(float(median) - 0.2) < 0.06
-    assert last.split() == ["varied:", "machine.rod_mass_kg", "2.0202", "to", "7.9455"]
+    assert last.split() == ["varied", "machine.rod_mass_kg"]
 
 
 def test_an_exported_job_is_explained_as_the_job_itself(tmp_path, folder, compsim):
