@@ -16,7 +16,6 @@ import numpy as np
 from compressor.analysis.margins import (
     BarredNumber,
     Margin,
-    Shares,
     above,
     at_least,
     at_most,
@@ -237,12 +236,6 @@ def per_revolution(run: "xr.Dataset", count: str, joint: str) -> float:
     return float(run[count].sel(joint=joint)) / settled_revolutions(run)
 
 
-def vibrating(runs: Runs) -> Margin:
-    """Return the margin of claim 7 by the share of time in which the machine vibrates."""
-    pairs = ([active_share(runs[label(joint, c)]) for joint in JOINTS] for c in CLEARANCES)
-    return least([exceeds(BarredNumber(big), BarredNumber(small), EXCESS) for big, small in pairs])
-
-
 def two_are_worse(runs: Runs) -> Verdict:
     """Return the verdict on claim 8: two clearances are worse than one of the same size."""
     rows, margins = [], []
@@ -354,15 +347,7 @@ def claims(runs: Runs) -> list[Claim]:
     return found
 
 
-def claim_margins(runs: Runs) -> tuple[list[Margin], dict[str, Margin]]:
-    """Return how far each claim is from its threshold, and claim 7 by each share alone.
-
-    As `claims` judges them; all worn runs and ideal runs must be there. The second value has claim
-    7 by each of its shares, and as `active` by the share of time in which the machine vibrates
-    (`active_share`), without an error.
-    """
+def claim_margins(runs: Runs) -> list[Margin]:
+    """Return how far each claim is from its threshold; all worn and ideal runs must be there."""
     settled = {name: settled_part(run) for name, run in runs.items()}
-    each = [claim.margins for claim in claims(settled)]
-    shares = Shares._fields
-    alone = {name: least(each[6][n :: len(shares)]) for n, name in enumerate(shares)}
-    return [least(margins) for margins in each], alone | {"active": vibrating(settled)}
+    return [least(claim.margins) for claim in claims(settled)]

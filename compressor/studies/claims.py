@@ -7,7 +7,7 @@ Margins are taken from the stored jobs by the rules of the report, 0 at a claim'
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -22,9 +22,8 @@ from compressor.analysis import (
     saltelli_design,
 )
 from compressor.cases import Case, points
-from compressor.digits import setting
 from compressor.program import Progress, no_progress, report_progress
-from compressor.report import Panel, PlotlyFigure, contour_lines, make_grid, style
+from compressor.report import PlotlyFigure, contour_lines, make_grid, style
 from compressor.store import (
     DamagedFile,
     Folder,
@@ -42,10 +41,6 @@ SHORT = (
     "peaks grow with clearance", "horizontal force dominates", "acceleration follows force",
     "big end hits steadily", "two clearances are worse",
 )  # fmt: skip
-SHARES = ("apart", "hit", "energy_angle", "active")  # by which claim 7 is measured
-SHORT_SHARES = (
-    "flight and impact alone", "10° windows hit alone", "angle of energy alone", "vibration alone",
-)  # fmt: skip
 ROLES = ("load", "joint", "clearance_mm")  # keys that make the paper's cases of a machine
 LABELS = tuple(paper_cases())
 ROD, RECIPROCATING = "rod_mass_kg", "reciprocating_mass_kg"
@@ -55,8 +50,6 @@ INTERVALS = tuple(f"{order}{end}" for order in ORDERS for end in ("", "_low", "_
 NUMBERS = {  # name -> dims, unit, long name
     "margin": (("claim",), "1", "how far a claim is from its threshold, relative to it"),
     "error": (("claim",), "1", "how far the margin may be off"),
-    "share_margin": (("share",), "1", "margin of claim 7 by one share of the revolution alone"),
-    "share_error": (("share",), "1", "how far that margin may be off"),
     "chaotic": ((), "1", "how many of the cases are chaotic"),
 }
 TEXTS = {"failed": "cases there are not, and why"}
@@ -90,8 +83,8 @@ def judge_machines(
 ) -> xr.Dataset:
     """Return the margins of each machine of a stored study, with the dimension machine.
 
-    `margin`, `error` over claim; `share_margin`, `share_error` over share; swept keys are
-    coordinates, in the case file's unit. Raises StudyError and StoreError.
+    `margin`, `error` over claim; swept keys are coordinates, in the case file's unit. Raises
+    StudyError and StoreError.
     """
     found = machines(source)
     stored = read_store(folder, warn=True)
@@ -118,7 +111,6 @@ def judge_machines(
         for (key, name), column in zip(names.items(), columns, strict=True)
     }
     coords["claim"] = "claim", np.array(CLAIMS), {"long_name": "claim of the paper"}
-    coords["share"] = "share", np.array(SHARES, object), {"long_name": "measure of claim 7"}
     thresholds = "; ".join(f"{n}. {rule.threshold}" for n, rule in zip(CLAIMS, RULES, strict=True))
     judged = rows_dataset(rows, "machine", TEXTS, NUMBERS).assign_coords(coords)
     return judged.assign_attrs(thresholds=thresholds, study=source.name)
@@ -130,16 +122,13 @@ def measure(runs: Mapping[str, xr.Dataset], failed: str = "") -> Row:
     failed: which cases there are not, and why; margins are nan then, and of runs that are too
     short or too coarse.
     """
-    each, shares = (np.full((len(names), 2), math.nan) for names in (CLAIMS, SHARES))
+    margins = np.full((len(CLAIMS), 2), math.nan)
     try:
-        if not failed:
-            each[:], alone = claim_margins(runs)
-            shares[:] = [alone[name] for name in SHARES]
+        margins[:] = margins if failed else claim_margins(runs)
     except (NoSeriesError, RecordError) as error:
         failed = str(error)
     return {
-        "margin": each[:, 0].tolist(), "error": each[:, 1].tolist(),
-        "share_margin": shares[:, 0].tolist(), "share_error": shares[:, 1].tolist(),
+        "margin": margins[:, 0].tolist(), "error": margins[:, 1].tolist(),
         "chaotic": sum(run.attrs.get("regime") == "chaotic" for run in runs.values()),
         "failed": failed,
     }  # fmt: skip
@@ -191,49 +180,18 @@ def mass_plane(found: xr.Dataset) -> xr.Dataset | None:
     return found.set_index(machine=[RECIPROCATING, ROD]).unstack("machine")
 
 
-class Consistent(NamedTuple):
-    """A machine of a mass plane (kg), and the least margin of some claims there and around it."""
-
-    rod_mass: float
-    reciprocating_mass: float
-    least: float
-    claims: tuple[int, ...]
-
-
-def most_consistent(plane: xr.Dataset) -> Consistent | None:
-    """Return the machine around which the least margin, at its neighbours too, is greatest.
-
-    Claims 1 and 2, which do not depend on masses, are left aside, and so are claims that hold at no
-    machine. Machines at the plane's edge are not chosen, nor any that has no verdict or a neighbour
-    without: None where that leaves none.
-    """
-    held = (plane["margin"] >= 0.0).any([ROD, RECIPROCATING])
-    claims = tuple(claim for claim in CLAIMS[2:] if held.sel(claim=claim))
-    if not claims:
-        return None
-    margin = plane["margin"].sel(claim=[*claims]).min("claim", skipna=False).fillna(-np.inf)
-    around = margin.rolling({ROD: 3, RECIPROCATING: 3}, center=True).min().fillna(-np.inf)
-    best = around.isel(around.argmax(...))
-    if not np.isfinite(best):
-        return None
-    return Consistent(float(best[ROD]), float(best[RECIPROCATING]), float(best), claims)
-
-
 HEAD = ("claim", "", "holds in", "least", "median", "greatest", "most by, total effect")
 
 
 def table(found: xr.Dataset, effects: xr.Dataset | None) -> Iterator[tuple[str, ...]]:
     """Yield a row for each claim below a head: machines where it holds, its margins in percent.
 
-    Claim 7 stands by each of its shares alone, too. effects: of `sensitivity`.
+    effects: of `sensitivity`.
     """
     yield HEAD
     for claim, short in zip(CLAIMS, SHORT, strict=True):
         by = most_by(effects.sel(claim=claim)) if effects is not None else ""
         yield f"{claim}", short, *cells(found["margin"].sel(claim=claim)), by
-        for share, name in zip(SHARES, SHORT_SHARES, strict=True):
-            if claim == 7:
-                yield "", name, *cells(found["share_margin"].sel(share=share)), ""
 
 
 def cells(margin: xr.DataArray) -> list[str]:
@@ -256,31 +214,23 @@ def most_by(one: xr.Dataset) -> str:
 
 
 def numbers(found: xr.Dataset) -> list[tuple[str, str]]:
-    """Return up to six labelled numbers of machines."""
+    """Return labelled numbers of machines."""
     known = found["failed"].values == ""
     held = found["margin"].values >= 0.0
     others = [claim != 7 for claim in CLAIMS]
-    rows = [
+    return [
         ("machines judged", f"{known.sum()}"),
         ("without a verdict", f"{(~known).sum()}"),
         ("with chaotic cases", f"{(found['chaotic'].values > 0).sum()}"),
         ("all eight claims hold in", f"{held.all(axis=1).sum()}"),
         ("all but claim 7 hold in", f"{held[:, others].all(axis=1).sum()}"),
     ]
-    plane = mass_plane(found)
-    best = None if plane is None else most_consistent(plane)
-    if best:
-        masses = f"{setting(best.rod_mass)} and {setting(best.reciprocating_mass)} kg"
-        names = ", ".join(map(str, best.claims))
-        rows.append(("most consistent", f"{masses}: claims {names} by {100 * best.least:.2g} %"))
-    return rows
 
 
 REACH = 0.5  # of the threshold: margins beyond it have the same colour
 OF_MASSES = (3, 4, 5, 6, 7, 8)  # claims that masses can decide
 EFFECTS = (("first_order", style.GREY, 0.19, "main effect"),
            ("total_order", style.BLUE, -0.19, "total"))  # fmt: skip
-FEW_OR_MOST = ("#f4f4f4", "#a9b6ce")  # colours of machines: a pale blue where most claims hold
 MAP = "blue: the claim holds, red: it does not, by its margin; ring: the default masses"
 BARS = "shares of the variance of a claim's margin by an assumption, with 95 % intervals"
 
@@ -302,22 +252,20 @@ def draw(found: xr.Dataset, effects: xr.Dataset | None) -> tuple[PlotlyFigure, s
 
 def draw_map(plane: xr.Dataset) -> PlotlyFigure:
     """Return each claim's margin over rod and reciprocating mass, and how many claims hold."""
-    drawing, panels = make_grid(2, 4, 5.6, share_x="all", share_y="all")
+    drawing, panels = make_grid(2, 4, 5.6, len(OF_MASSES) + 1, share_x="all", share_y="all")
     x, y = plane[ROD].values, plane[RECIPROCATING].values
-    *shown, number, best = drawing.panels
+    *shown, number = drawing.panels
     for claim, panel in zip(OF_MASSES, shown, strict=True):
         margin = plane["margin"].sel(claim=claim).transpose(RECIPROCATING, ROD).values
         panel.map(x, y, margin, style.palette("RdBu"), (-REACH, REACH), "margin",
                   has_scale=panel is panels[0, 3])  # fmt: skip
-        border(panel, plane, margin >= 0.0, style.BLACK)
+        if (margin >= 0.0).any() and (margin < 0.0).any():
+            line = contour_lines(x, y, (margin >= 0.0).astype(float), [0.5])
+            panel.plot(*line, style.LineStyle(style.BLACK, linewidth=1.0))
         panel.title = f"claim {claim}"
     count = (plane["margin"] >= 0.0).transpose("claim", RECIPROCATING, ROD).sum("claim").values
     number.map(x, y, count.astype(float), style.palette("cividis", 7), (1.5, 8.5))
     number.title = "how many of eight hold"
-    most = int(count.max())
-    best.map(x, y, (count == most).astype(float), FEW_OR_MOST, (0.0, 1.0), has_scale=False)
-    border(best, plane, count == most, style.BLUE)
-    best.title = f"most of them: {most} hold"
     default = Case.from_values({}).machine
     for panel in drawing.panels:
         ring = style.mark(style.RED, "circle", 6, is_hollow=True, edge_width=1.8)
@@ -325,14 +273,6 @@ def draw_map(plane: xr.Dataset) -> PlotlyFigure:
         panel.x.showgrid = panel.y.showgrid = False
         panel.x.title, panel.y.title = "rod mass (kg)", "reciprocating mass (kg)"
     return drawing.figure()
-
-
-def border(panel: Panel, plane: xr.Dataset, inside: np.ndarray, color: str) -> None:
-    """Draw the line around the machines for which something is true."""
-    if inside.any() and not inside.all():
-        masses = plane[ROD].values, plane[RECIPROCATING].values
-        line = contour_lines(*masses, inside.astype(float), [0.5])
-        panel.plot(*line, style.LineStyle(color, linewidth=1.0))
 
 
 def draw_sensitivity(effects: xr.Dataset) -> PlotlyFigure:

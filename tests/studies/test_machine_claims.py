@@ -20,13 +20,10 @@ from compressor.studies.claims import (
     CLAIMS,
     RECIPROCATING,
     ROD,
-    SHARES,
     StudyError,
     draw,
     judge_machines,
     machines,
-    mass_plane,
-    most_consistent,
     numbers,
     sensitivity,
     table,
@@ -166,11 +163,10 @@ def machines_of(margin, coords):
     return xr.Dataset(
         {
             "margin": (("machine", "claim"), margin),
-            "share_margin": (("machine", "share"), np.full((count, 4), -0.1)),
             "chaotic": ("machine", np.zeros(count, int)),
             "failed": ("machine", np.full(count, "", object)),
         },
-        coords | {"claim": [*CLAIMS], "share": [*SHARES]},
+        coords | {"claim": [*CLAIMS]},
     )
 
 
@@ -216,31 +212,12 @@ def test_machines_are_counted(plane):
     assert dict(numbers(plane)) == {
         "machines judged": "24", "without a verdict": "0", "with chaotic cases": "0",
         "all eight claims hold in": "0", "all but claim 7 hold in": "16",
-        "most consistent": "6 and 11 kg: claims 3, 4, 5, 6, 8 by 10 %",
     }  # fmt: skip
     figure, sentence = draw(plane, None)
-    assert len(panels_of(figure)) == 8
-    assert panels_of(figure)[-1].title == "most of them: 7 hold"
+    assert panels_of(figure)[-1].title == "how many of eight hold"
     assert sentence.startswith("blue: the claim holds")
 
 
-def test_the_most_consistent_machine_has_consistent_neighbours(plane):
-    """Claim 8 grows with the rod's mass; a single machine with a greater margin is not taken."""
-    at = (plane[ROD].values == 3.0) & (plane[RECIPROCATING].values == 11.0)
-    plane["margin"].values[at, 7] = 9.0
-    best = most_consistent(mass_plane(plane))
-    assert (best.rod_mass, best.reciprocating_mass) == (6.0, 11.0)
-    assert best.claims == (3, 4, 5, 6, 8)
-    assert best.least == pytest.approx(0.1)
-
-
-def test_a_plane_without_verdicts_has_no_most_consistent_machine(plane):
-    """A run that was stopped early ended in an internal error, at its edge in -inf %."""
-    one = plane.copy(deep=True)
-    rods, masses = (plane[name].values for name in (ROD, RECIPROCATING))
-    one["margin"].values[np.isin(rods, (3.0, 6.0)) & (masses == 11.0)] = np.nan  # beside all inner
-    assert most_consistent(mass_plane(one)) is None
+def test_a_plane_without_verdicts_has_no_figure(plane):
     plane["margin"].values[:] = np.nan
-    assert most_consistent(mass_plane(plane)) is None
-    assert "most consistent" not in dict(numbers(plane))
     assert draw(plane, None) is None
