@@ -5,8 +5,8 @@ import click
 from compressor.program import did_you_mean
 from compsim import options, screen
 
-OF_JOB = ["analyst", "loads", "signals", "cards", "spectra", "orbits", "modes", "impacts"]
-OF_STUDY = ["cycles", "segments", "waterfall", "map"]
+OF_JOB = ["analyst", "loads", "signals", "cards", "spectra", "orbits", "impacts"]
+OF_STUDY = ["cycles", "segments", "waterfall"]
 LISTED = f"of a job {', '.join(OF_JOB)}; of a study {', '.join(OF_STUDY)}"
 
 
@@ -68,9 +68,9 @@ def plot(words, folder, output, units, **chosen) -> int:
 
     Of a job: a revolution as an analyst reads it (the sensor's record, or the crosshead's
     acceleration, above the rod load, with reversals, valve events and impacts), its signals over
-    crank angle, spectra, orbits, contact modes and impacts, beside the same machine without
-    clearance, and cards of the gas in its cylinder. Of a study: vibration over crank angle, order
-    spectra and contact modes over a swept axis. Nothing but what is stored is needed, and the files
+    crank angle, spectra, orbits and impacts, beside the same machine without clearance, and cards
+    of the gas in its cylinder. Of a study: vibration over crank angle and order spectra over a
+    swept axis. Nothing but what is stored is needed, and the files
     of `gas.indicator` of a job that has any.
     """
     from compressor.report import PlotChoice, write_plots

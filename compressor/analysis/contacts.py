@@ -4,11 +4,10 @@ In contact means F_N > 0, as everywhere in the program (physics/README.md, Conta
 the rod is F_N n - F_t t with n along the eccentricity, so that F_N is its part along n. Contact is
 dry contact: the force of a film across a gap is none.
 
-The contact modes of the joints over the crank angle: flight, impact, following. The three modes are
-those of Miedema and Mansour, Mechanical joints with clearance: a three-mode model, Journal of
-Engineering for Industry 98 (1976) 1319-1323; Flores and Lankarani, Contact force models for
-multibody dynamics (2016), use them as well. Two joints have nine combinations. Ours is how the
-modes are told apart in samples:
+The three contact modes, flight, impact and following, are those of Miedema and Mansour, Mechanical
+joints with clearance: a three-mode model, Journal of Engineering for Industry 98 (1976) 1319-1323;
+Flores and Lankarani, Contact force models for multibody dynamics (2016), use them as well. Ours is
+how they are told apart in samples:
 
 - flight: no contact (F_N = 0) from one contact to the next, with the journal off its bore in
   between;
@@ -19,13 +18,14 @@ modes are told apart in samples:
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from compressor.analysis.runs import record_of, settled_part
+from compressor.analysis.runs import record_of
 from compressor.metrics import JOINTS
 from compressor.physics import elastic_form
 
@@ -112,26 +112,6 @@ def contact_spans(series: ContactSeries) -> list[ContactSpan]:
         found.append(ContactSpan(first, beyond - 1, first - before, flown))
         before = beyond
     return found
-
-
-class Orbit(NamedTuple):
-    """How a journal goes round its bore.
-
-    `laps`: turns of the eccentricity in a revolution of the crank, counter-clockwise; to a whole
-    one where the journal passes near the centre between two samples. `off_wall`: share of samples
-    with the journal off its bore.
-    """
-
-    laps: float
-    off_wall: float
-
-
-def measure_orbit(run: "xr.Dataset", joint: str) -> Orbit:
-    """Return the `Orbit` of a joint with clearance after settling."""
-    series = contact_series(settled_part(run), joint)
-    turned = np.unwrap(np.arctan2(series.place[:, 1], series.place[:, 0]))
-    laps = (turned[-1] - turned[0]) / (series.angle[-1] - series.angle[0])
-    return Orbit(float(laps), float((series.depth < 0).mean()))
 
 
 STENCIL = 4  # samples that the journal's path before first touch is a polynomial through
@@ -230,35 +210,11 @@ def following_from(series: ContactSeries, span: ContactSpan, until: float) -> in
     return max(span.first + 1, min(beyond, late))
 
 
-MODES = ("flight", "impact", "following")
-# what a reader is shown of a joint with oil: its film takes the blow, and metal touches later
-OILED_MODES = ("film alone", "dry contact begins", "dry contact")
-FLIGHT, IMPACT, FOLLOWING = range(len(MODES))
-UNKNOWN = -1  # of a bin without samples
-BINS = 360  # of the crank angle, a degree each
+FLIGHT, IMPACT, FOLLOWING = range(3)  # contact modes
 
 
-def contact_modes(run: "xr.Dataset") -> "xr.Dataset":
-    """Return the mode of each joint with clearance after settling: `mode` over (time, joint).
-
-    It is the number of one of `MODES`; `time` has `crank_angle` (rad) as a coordinate. Raises
-    ValueError for a run without time series or clearance.
-    """
-    import xarray as xr
-
-    each = [contact_series(run, joint) for joint in joints_with_clearance(run)]
-    modes = np.stack([modes_of(run, series) for series in each], axis=1)
-    where = {
-        "time": each[0].time,
-        "crank_angle": ("time", each[0].angle),
-        "joint": [series.joint for series in each],
-    }
-    settle = {"settle": run.attrs["settle"]}
-    return settled_part(xr.Dataset({"mode": (("time", "joint"), modes)}, where, settle))
-
-
-def modes_of(run: "xr.Dataset", series: ContactSeries) -> np.ndarray:
-    """Return the mode of a joint at each sample of the whole run, (m,) integers.
+def modes_of(series: ContactSeries, struck: Sequence[Impact]) -> np.ndarray:
+    """Return the mode of a joint at each sample, (m,) numbers; struck: its impacts.
 
     A flight has no contact and is off the bore at some time. A contact that is lost and found again
     within the penetration leaves no flight.
@@ -268,50 +224,6 @@ def modes_of(run: "xr.Dataset", series: ContactSeries) -> np.ndarray:
     for begin, beyond in edges.tolist():
         if (series.depth[begin:beyond] < 0).any():
             modes[begin:beyond] = FLIGHT
-    for one in impacts_of(run, series):
+    for one in struck:
         modes[one.span.first : one.follows] = IMPACT
     return modes
-
-
-def mode_shares(run: "xr.Dataset") -> "xr.DataArray":
-    """Return the shares of settled time in each contact mode, over (joint, mode).
-
-    Samples stand for the step that they begin. Raises ValueError as `contact_modes`.
-    """
-    import xarray as xr
-
-    modes = contact_modes(run)["mode"]
-    each = modes.values[:-1, :, None] == np.arange(len(MODES))
-    where = {"joint": modes["joint"].values, "mode": list(MODES)}
-    return xr.DataArray(each.mean(axis=0), where, ("joint", "mode"))
-
-
-def angle_modes(run: "xr.Dataset") -> "xr.Dataset":
-    """Return `mode_map` of a run's `contact_modes`. Raises ValueError as they do."""
-    return mode_map(contact_modes(run))
-
-
-def mode_map(modes: "xr.Dataset") -> "xr.Dataset":
-    """Return the shares of each contact mode over the crank angle, all revolutions together.
-
-    modes: of `contact_modes`. Over bins of a degree, with `angle` (deg, 0 to 360) the middle of
-    each: `share` over (angle, joint, mode), and `majority` over (angle, joint), the mode with the
-    greatest share, the first of equals. A bin without samples has shares of nan and the majority
-    `UNKNOWN`.
-    """
-    import xarray as xr
-
-    samples = modes.isel(time=slice(None, -1))
-    # a sample on an edge belongs to the bin that begins there, whatever its rounding
-    place = np.floor(np.degrees(samples["crank_angle"].values) + 1e-6).astype(int) % BINS
-    counts = np.bincount(place, minlength=BINS)
-    mode = samples["mode"].values
-    shares = np.full((BINS, mode.shape[1], len(MODES)), np.nan)
-    for joint, number in np.ndindex(shares.shape[1:]):
-        found = np.bincount(place, mode[:, joint] == number, minlength=BINS)
-        np.divide(found, counts, out=shares[:, joint, number], where=counts > 0)
-    majority = np.where(np.isnan(shares[:, :, 0]), UNKNOWN, np.argmax(shares, axis=2))
-    return xr.Dataset(
-        {"share": (("angle", "joint", "mode"), shares), "majority": (("angle", "joint"), majority)},
-        {"angle": np.arange(BINS) + 0.5, "joint": modes["joint"].values, "mode": list(MODES)},
-    )

@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from compressor.analysis.contacts import FOLLOWING, Impact, contact_modes, impacts
+from compressor.analysis.contacts import (
+    FOLLOWING,
+    ContactSeries,
+    Impact,
+    contact_series,
+    impacts_of,
+    modes_of,
+)
 from compressor.analysis.runs import settled_part
 from compressor.analysis.shaking import ORDER, evenly, whole_revolutions
 from compressor.solve import average_bar, mean_bar
@@ -156,7 +163,7 @@ ENERGY = 0.9  # share of the energy whose angle is reported
 class Shares(NamedTuple):
     """How a joint's contact is spread over whole revolutions: shares, 0 to 1, with their errors.
 
-    `apart`: of crank angle in flight or impact (`contact_modes`). `hit`: of windows of `WINDOW`
+    `apart`: of crank angle in flight or impact (`modes_of`). `hit`: of windows of `WINDOW`
     degrees that an impact faster than `SLOWEST` falls into. `energy_angle`: of crank angle that
     holds `ENERGY` of the energy of the horizontal joint force above `ORDER`, large where it rings
     all around.
@@ -168,36 +175,36 @@ class Shares(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """What is looked at: whole revolutions of a run, a joint's impacts, its force above `ORDER`."""
+    """What is looked at: a joint in whole revolutions of a run, its impacts and high force."""
 
-    joint: str
+    series: ContactSeries
     settled: "xr.Dataset"
     revolutions: int
     hits: list[Impact]
-    high: np.ndarray  # (m,), N, along the cylinder
+    high: np.ndarray  # (m,), N, along the cylinder, above `ORDER`
 
 
 def evidence(run: "xr.Dataset", joint: str) -> Evidence:
     """Return the `Evidence` of a joint with clearance over settled whole revolutions of a run.
 
-    Raises NoSeriesError where there is none, ValueError where no joint has clearance.
+    Raises NoSeriesError where there is none.
     """
     from compressor.vibration import high_pass_orders
 
     settled, count = whole_revolutions(run)
     force = settled["contact_force"].sel(joint=joint, axis="x").values
     high = high_pass_orders(*evenly(settled, count, force), ORDER)
-    hits = [one for one in impacts(settled) if one.joint == joint]
-    return Evidence(joint, settled, count, hits, high)
+    series = contact_series(settled, joint)
+    return Evidence(series, settled, count, impacts_of(settled, series), high)
 
 
 def find_shares(by: Evidence) -> dict[str, float]:
     """Return the values of `Shares` by their names."""
     from compressor.vibration import energy_angle
 
-    modes = contact_modes(by.settled)["mode"].sel(joint=by.joint).values[:-1]
+    modes = modes_of(by.series, by.hits)
     return {
-        "apart": float((modes != FOLLOWING).mean()),
+        "apart": float((modes[:-1] != FOLLOWING).mean()),
         "hit": hit_share(by.hits, by.revolutions),
         "energy_angle": energy_angle(by.high, ENERGY),
     }
@@ -224,7 +231,7 @@ def measure_shares(run: "xr.Dataset", joint: str) -> Shares:
 
 def apart_error(by: Evidence) -> float:
     """Return the error of the share of crank angle in flight or impact."""
-    stored_error = float(by.settled["contact_loss_fraction_error"].sel(joint=by.joint))
+    stored_error = float(by.settled["contact_loss_fraction_error"].sel(joint=by.series.joint))
     return stored_error + 2.0 * len(by.hits) / (by.settled.sizes["time"] - 1)
 
 
@@ -245,8 +252,8 @@ def angle_error(by: Evidence) -> float:
     """Return the error of the share of crank angle that holds `ENERGY` of the energy."""
     from compressor.vibration import energy_angle
 
-    force = by.settled["contact_force"].sel(joint=by.joint).values
-    error = series_error(by.settled, "contact_force", force, joint=by.joint)
+    force = by.settled["contact_force"].sel(joint=by.series.joint).values
+    error = series_error(by.settled, "contact_force", force, joint=by.series.joint)
     size = math.sqrt(float(np.mean(by.high**2)))
     if math.isnan(error) or not size:
         return error

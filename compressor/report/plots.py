@@ -13,7 +13,6 @@ import xarray as xr
 from compressor.analysis import (
     SPOKEN,
     NoSeriesError,
-    angle_modes,
     case_of,
     healthy_twin,
     joints_with_clearance,
@@ -238,8 +237,7 @@ def axis_words(key: str) -> str:
 
 LACK = {  # why a study has no figure that needs what no row has
     "segments": "no job of {} has a sensor's record in segments: run it with body: true and "
-    "sensor: true",
-    "modes": "no joint of {} has clearance: there is no mode map",
+    "sensor: true"
 }
 
 
@@ -398,15 +396,7 @@ def spell_where(where: Sequence[str]) -> str:
     return f" Here {'; '.join(where)}." if where else ""
 
 
-def read_modes(run: xr.Dataset) -> xr.Dataset | None:
-    """Return the `angle_modes` of a run, None of ideal joints."""
-    try:
-        return angle_modes(run)
-    except ValueError:
-        return None
-
-
-READ = {"cycle": read_cycle, "shaking": shaking, "modes": read_modes}  # parts of a `SweptRow`
+READ = {"cycle": read_cycle, "shaking": shaking}  # parts of a `SweptRow`
 
 
 def swept_row(stored: Stored, value: Any, key: str, parts: Collection[str] = (*READ,)) -> SweptRow:
@@ -423,5 +413,4 @@ def swept_row(stored: Stored, value: Any, key: str, parts: Collection[str] = (*R
         return SweptRow(name, problem="damaged")
     except NoSeriesError:
         return SweptRow(name, problem="too short")
-    chaotic, oil = run.attrs.get("regime") == "chaotic", bool(case_of(run).lubricant)
-    return SweptRow(name, **found, chaotic=chaotic, lubricated=oil)
+    return SweptRow(name, **found, chaotic=run.attrs.get("regime") == "chaotic")

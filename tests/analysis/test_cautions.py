@@ -1,6 +1,5 @@
 """Warnings before a run: what is odd, told once, and nothing about what is not."""
 
-
 import page_tables
 import pytest
 from test_layers import ROOT

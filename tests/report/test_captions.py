@@ -1,21 +1,16 @@
 """Captions: a fixed sentence, and labelled numbers that are those of the drawn runs."""
 
-import csv
-import io
 import re
 
 import numpy as np
 import pytest
-from conftest import listed
 
-from compressor.analysis.contacts import OILED_MODES, angle_modes
 from compressor.analysis.cycle import Cycle
 from compressor.analysis.runs import CLEARANCES, FAULTS, label
 from compressor.cases.case import Case
 from compressor.report.figures import FIGURES
-from compressor.report.figures.drawing import as_csv
 from compressor.report.figures.job import FILM, draw_analyst, draw_orbits
-from compressor.report.figures.rows import SweptRow, draw_cycles, draw_map
+from compressor.report.figures.rows import SweptRow, draw_cycles
 from compressor.report.figures.table import spell
 from compressor.report.plots import keep_sensed
 from compressor.solve.simulate import simulate
@@ -140,12 +135,11 @@ def test_captions_of_oiled_joints_speak_of_dry_contact():
     dry = simulate(Case.from_values(values))
     full = simulate(Case.from_values({**values, "lubricant": {"viscosity_mPa_s": 3000}}))
     told = {}
-    for name in ("orbits", "modes", "impacts"):
+    for name in ("orbits", "impacts"):
         make = FIGURES["job"][name].make
         told[name] = make(full, None)
         assert FILM in told[name].caption
         assert "film" not in make(dry, None).caption
-    assert numbers(told["modes"])["film alone, big end"] == [100.0]
     assert numbers(told["impacts"])["dry contacts a revolution at the big end"] == [0.0]
     analyst = draw_analyst(full, None)
     assert dict(analyst.numbers)["dry contact at the big end"] == "none"
@@ -153,16 +147,6 @@ def test_captions_of_oiled_joints_speak_of_dry_contact():
     nearest = 1e6 * float(full["penetration"].sel(joint="big_end").values[2 * 720 :].max())
     assert numbers(told["orbits"])["big end, off its wall"] == [100.0]
     assert numbers(told["orbits"])["deepest, below 0 a gap"][0] == pytest.approx(nearest, rel=1e-3)
-    found = draw_map([SweptRow("0.05", modes=angle_modes(full), lubricated=True)], "clearance")
-    assert FILM in found.caption
-    assert numbers(found)["film alone at the big end"] == [100.0]
-    of_csv = csv.DictReader(io.StringIO(as_csv(found.figure)))
-    assert next(of_csv)["big end: clearance"] == "0.05"  # no number of a row
-    for one in (told["modes"], found):
-        assert listed(one.figure) == [*OILED_MODES]
-    quarter = angle_modes(full.isel(time=slice(None, None, 4)))  # no sample is no other mode
-    rows = [SweptRow("0.1", modes=quarter, lubricated=True), SweptRow("0.2", problem="failed")]
-    assert numbers(draw_map(rows, "clearance"))["film alone at the big end"] == [100.0]
 
 
 def test_a_chaotic_motion_is_told(paper_runs):

@@ -1,4 +1,4 @@
-"""Figures of one job: signals, cards, spectra, orbits, modes, impacts."""
+"""Figures of one job: signals, cards, spectra, orbits, impacts."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, TypeAlias
@@ -7,12 +7,9 @@ import numpy as np
 import xarray as xr
 
 from compressor.analysis import (
-    MODES,
-    OILED_MODES,
     ORDER,
     SPOKEN,
     Cycle,
-    angle_modes,
     case_of,
     describe_cases,
     deviation_spectrum,
@@ -21,8 +18,6 @@ from compressor.analysis import (
     impacts,
     joints_with_clearance,
     last_revolution,
-    measure_orbit,
-    mode_shares,
     read_cycle,
     read_loads,
     sensor_envelope,
@@ -32,22 +27,12 @@ from compressor.analysis import (
 from compressor.cases import Sensor
 from compressor.metrics import JOINTS
 from compressor.report.figures.curves import ANGLE_AXIS, KILONEWTON
-from compressor.report.figures.drawing import (
-    WAYS,
-    Drawing,
-    Panel,
-    circle,
-    join_with_gaps,
-    make_grid,
-)
-from compressor.report.figures.style import BLACK, BLUE, GOLD, GREY, RED, LineStyle, fill, mark
+from compressor.report.figures.drawing import WAYS, Panel, circle, join_with_gaps, make_grid
+from compressor.report.figures.style import BLACK, BLUE, GOLD, GREY, RED, LineStyle, mark
 from compressor.report.figures.table import DrawnFigure, Number, figure, spell, spell_span
 from compressor.store import CLIPPED
 from compressor.units import Units, unit_in
 
-# flight, impact, following: lightness 30, 54, 90
-MODE_COLORS = dict(zip(MODES, (BLUE, RED, "#dde3ee"), strict=True))
-UNSEEN = fill("#ffffff", edge=GREY, is_hatched=True)
 PATH = LineStyle(BLUE, (), 0.9, 2.3)
 ZERO = LineStyle(BLACK, linewidth=0.8)
 BY_JOINT = dict(zip(JOINTS, ((BLUE, "circle"), (RED, "diamond")), strict=True))
@@ -400,13 +385,11 @@ def draw_orbits(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFig
     _, revolution = last_revolution(run)
     numbers = []
     for joint in joints:
-        one = measure_orbit(run, joint)
-        deepest = float(revolution["penetration"].sel(joint=joint).max())
-        off = spell(100.0 * one.off_wall, "% of the time")
+        depth = revolution["penetration"].sel(joint=joint).values
+        off = spell(100.0 * (depth < 0).mean(), "% of the time")
         numbers += [
             (f"{SPOKEN[joint]}, off its wall", off),
-            ("deepest, below 0 a gap", spell(MICROMETRE * deepest, "µm")),
-            ("turns a revolution, counter-clockwise positive", spell(one.laps)),
+            ("deepest, below 0 a gap", spell(MICROMETRE * depth.max(), "µm")),
         ]
     sentence = "Journal centres in their bores to scale, in the last settled revolution."
     return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)
@@ -435,61 +418,11 @@ def plot_orbit(panel: Panel, run: xr.Dataset, joint: str) -> None:
         panel.axis(way).nticks = 5
 
 
-@figure("job", "modes", "contact modes over crank angle", "clearance")
-def draw_modes(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
-    """Return contact modes over the crank angle, as shares of the revolutions, and penetration."""
-    joints = joints_with_clearance(run)
-    shares, words = angle_modes(run), OILED_MODES if case_of(run).lubricant else MODES
-    rows = 2 * len(joints)
-    drawing, panels = make_grid(
-        rows, 1, 1.45 * rows + 0.9, heights=(1.0, 2.2) * len(joints), units=units, share_x="all"
-    )
-    for joint, strip, depth in zip(joints, panels[::2, 0], panels[1::2, 0], strict=True):
-        plot_strip(strip, shares, joint, words)
-        depth.label("y", "δ ({})", "µm")
-        degrees, revolution = last_revolution(run)
-        values = revolution["penetration"].sel(joint=joint).values * MICROMETRE
-        order = np.argsort(degrees % 360.0, kind="stable")
-        depth.plot((degrees % 360.0)[order], values[order], PATH)
-        depth.rule(ZERO, y=0.0)
-        depth.title = f"penetration, {SPOKEN[joint]}, last revolution; below 0 a gap"
-    for panel in drawing.panels:
-        show_turn(panel)
-    of_time = 100.0 * mode_shares(run)
-    numbers = [
-        (f"{word}, {SPOKEN[joint]}", spell(of_time.sel(joint=joint, mode=mode), "%"))
-        for joint in joints for mode, word in zip(MODES, words, strict=True)
-    ]  # fmt: skip
-    sentence = "Contact modes over crank angle; numbers are shares of the settled time."
-    return DrawnFigure(drawing.figure(), sentence + film(run) + caution(run), numbers)
-
-
 def show_turn(panel: Panel, step: float = 45.0) -> None:
     """Show one turn of the crank, with ticks so many degrees apart."""
     panel.label("x", ANGLE_AXIS, "°")
     panel.span("x", 0.0, 360.0)
     panel.x.dtick = step
-
-
-def plot_strip(panel: Panel, shares: xr.Dataset, joint: str, words: Sequence[str]) -> None:
-    """Draw the share of revolutions in each mode, stacked, over bins of the crank angle."""
-    share, width = shares["share"].sel(joint=joint), 360.0 / shares.sizes["angle"]
-    foot = np.zeros(shares.sizes["angle"])
-    for word, (mode, color) in zip(words, MODE_COLORS.items(), strict=True):
-        height = share.sel(mode=mode).fillna(0.0).values
-        panel.bars(shares["angle"].values, foot + height, fill(color), word, width, foot,
-                   is_upright=True)  # fmt: skip
-        foot = foot + height
-    panel.title = f"share of revolutions in each contact mode, {SPOKEN[joint]}"
-    panel.y.title, panel.y.tickvals = "share", (0, 1)
-    panel.x.showgrid = panel.y.showgrid = False
-    panel.span("y", 0, 1)
-
-
-def list_modes(drawing: Drawing, words: Sequence[str] = MODES) -> None:
-    """Name the modes by their colours in the legend."""
-    for word, color in zip(words, MODE_COLORS.values(), strict=True):
-        drawing.list_area(word, fill(color))
 
 
 @figure("job", "impacts", "contacts that begin, over crank angle", "clearance")

@@ -7,25 +7,9 @@ import numpy as np
 import plotly.graph_objects as go
 import xarray as xr
 
-from compressor.analysis import MODES, OILED_MODES, ORDER, SPOKEN, UNKNOWN, Cycle, Spectrum
-from compressor.metrics import JOINTS
-from compressor.report.figures.drawing import (
-    Drawing,
-    Panel,
-    join_with_gaps,
-    make_grid,
-    outline_cells,
-)
-from compressor.report.figures.job import (
-    FILM,
-    MODE_COLORS,
-    ORDERS_AXIS,
-    UNSEEN,
-    G,
-    list_modes,
-    loudest,
-    show_turn,
-)
+from compressor.analysis import ORDER, Cycle, Spectrum
+from compressor.report.figures.drawing import Drawing, Panel, make_grid
+from compressor.report.figures.job import ORDERS_AXIS, G, loudest, show_turn
 from compressor.report.figures.style import BLACK, BLUE, GOLD, RED, LineStyle, mark, palette
 from compressor.report.figures.table import DrawnFigure, Number, figure, spell
 from compressor.units import Units
@@ -64,20 +48,17 @@ class Segments:
 class SweptRow:
     """One job: its value on the axis in words, and what its series show.
 
-    `shaking` is None, and `problem` says why, where the job has none. `modes`: as `angle_modes`
-    gives them, None of ideal joints. `cycle`: its last revolution; `segments`: of its sensor's
-    record. `chaotic`: single lines hold for this course of the motion only. `lubricated`: its
-    joints have oil.
+    `shaking` is None, and `problem` says why, where the job has none. `cycle`: its last revolution;
+    `segments`: of its sensor's record. `chaotic`: single lines hold for this course of the motion
+    only.
     """
 
     value: str
     shaking: Spectrum | None = None
-    modes: xr.Dataset | None = None
     cycle: Cycle | None = None
     segments: Segments | None = None
     problem: str = ""
     chaotic: bool = False
-    lubricated: bool = False
 
     def with_segments(
         self, run: xr.Dataset, healthy: np.ndarray, limit: tuple[float, bool] | None
@@ -94,27 +75,6 @@ class SweptRow:
             limits = limit[0] * (healthy if limit[1] else np.ones(rms.size))
         found = Segments(rms, np.zeros(rms.size) if bar is None else bar, healthy, limits)
         return replace(self, segments=found)
-
-
-def row_modes_words(rows: Sequence[SweptRow]) -> tuple[str, ...]:
-    """Return what the contact modes of rows are called: of oiled joints where all have oil."""
-    return OILED_MODES if all(row.lubricated for row in rows if row.modes) else MODES
-
-
-def rows_modes(rows: Sequence[SweptRow]) -> dict[str, np.ndarray]:
-    """Return the most frequent mode over rows and crank angle, by joint: (rows, bins).
-
-    Integers, -1 where nothing is known; {} where no joint has clearance.
-    """
-    known = [row.modes for row in rows if row.modes is not None]
-    found = {}
-    for joint in (one for one in JOINTS if any(one in modes["joint"] for modes in known)):
-        table = np.full((len(rows), known[0].sizes["angle"]), UNKNOWN)
-        for number, row in enumerate(rows):
-            if row.modes is not None and joint in row.modes["joint"]:
-                table[number] = row.modes["majority"].sel(joint=joint).values
-        found[joint] = table
-    return found
 
 
 MAX_TICKS = 12
@@ -293,31 +253,6 @@ def draw_waterfall(rows: Sequence[SweptRow], title: str, units: Units = "usual")
     return DrawnFigure(figure, sentence, numbers)
 
 
-@figure("study", "map", "most frequent contact mode over crank angle", "modes")
-def draw_map(rows: Sequence[SweptRow], title: str, units: Units = "usual") -> DrawnFigure:
-    """Return the most frequent contact mode over the crank angle, a row a value, for each joint."""
-    modes = rows_modes(rows)
-    drawing, panels = make_grid(1, len(modes), height(len(rows)) + 0.9, units=units, share_y="all")
-    for panel, (joint, table) in zip(panels.flat, modes.items(), strict=True):
-        plot_modes(panel, table)
-        panel.title = SPOKEN[joint]
-        show_turn(panel, 90.0)
-    label_rows(panels[0, 0], rows, title)
-    list_modes(drawing, row_modes_words(rows))
-    if any((table < 0).any() for table in modes.values()):
-        drawing.list_area("no series, or no clearance", UNSEEN)
-    away, numbers = row_modes_words(rows)[0], []
-    for joint, table in modes.items():
-        known, away_in = ((table >= 0).sum(axis=1), (table == MODES.index("flight")).sum(axis=1))
-        share = 100.0 * np.divide(away_in, known, out=np.full(len(rows), np.nan), where=known > 0)
-        numbers += spell_ends(f"{away} at the {SPOKEN[joint]}", share, rows, "% of the revolution")
-    sentence = (
-        f"The most frequent contact mode in each degree, {describe_rows(rows, title)}."
-        f"{FILM if any(row.lubricated for row in rows) else ''}{left_out(rows)}"
-    )
-    return DrawnFigure(drawing.figure(), sentence, numbers)
-
-
 def describe_rows(rows: Sequence[SweptRow], title: str) -> str:
     """Describe what a row of a map is: a value of the axis, or a job where values repeat."""
     values = [row.value for row in rows]
@@ -341,19 +276,6 @@ def left_out(rows: Sequence[SweptRow]) -> str:
     wild = sum(row.chaotic for row in rows)
     text = f" Not drawn: {len(problems)} of {len(rows)} jobs ({', '.join(sorted({*problems}))})."
     return text * bool(problems) + f" Chaotic, so that lines change: {wild} jobs." * bool(wild)
-
-
-def plot_modes(panel: Panel, table: np.ndarray) -> None:
-    """Draw modes, (rows, bins) of integers as in `mode_map`, in their colours; below 0 hatched."""
-    edges = np.linspace(0, 360, table.shape[1] + 1), np.arange(len(table) + 1) - 0.5
-    known, ends = np.where(table < 0, np.nan, table), (-0.5, len(MODES) - 0.5)
-    panel.x.showgrid = panel.y.showgrid = False
-    panel.fill(*outline_cells(*edges, table < 0), UNSEEN)
-    x, y = (0.5 * (some[1:] + some[:-1]) for some in edges)
-    panel.map(x, y, known, [*MODE_COLORS.values()], ends, has_scale=False)
-    if len(table) < 40:
-        between = [np.array([[0.0, edge], [360.0, edge]]) for edge in edges[1][1:-1]]
-        panel.plot(*join_with_gaps(between), LineStyle("#ffffff", linewidth=0.8))
 
 
 def label_rows(panel: Panel, rows: Sequence[SweptRow], title: str) -> None:
