@@ -30,7 +30,6 @@ from compressor.analysis.shaking import (
     ORDER,
     NoSeriesError,
     Spectrum,
-    deviation_spectrum,
     frame_forces,
     healthy_twin,
     last_revolution,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from compressor.analysis.runs import case_of, ideal_motion, record_of, settled_part
+from compressor.analysis.runs import case_of, record_of, settled_part
 from compressor.cases import Case, with_ideal_joints
 from compressor.solve import SIGNALS, signals_of_scene, simulate
 
@@ -118,7 +118,7 @@ def shaking(run: "xr.Dataset") -> Spectrum:
     Raises NoSeriesError where its series hold no whole settled revolution, RecordError where they
     are too coarse for `ORDER`.
     """
-    from compressor.vibration import RecordError
+    from compressor.vibration import RecordError, line_amplitudes
 
     settled, revolutions = whole_revolutions(run)
     force = frame_forces(settled)["shaking_force"][:, 0]
@@ -126,7 +126,9 @@ def shaking(run: "xr.Dataset") -> Spectrum:
     if a_turn <= 2 * ORDER:
         text = f"order {ORDER} is not below {a_turn / 2:g}, half the samples a turn"
         raise RecordError(f"{text}: run it with a finer solve.output_step_deg")
-    return order_lines(even, a_turn)
+    amplitudes = line_amplitudes(even, a_turn, False)
+    fine = line_amplitudes(even, even.size, True)[ORDER * even.size // a_turn + 1 :]
+    return Spectrum(amplitudes, math.sqrt(float(np.sum(fine**2))))  # Parseval
 
 
 def evenly(settled: "xr.Dataset", revolutions: int, values: np.ndarray) -> tuple[np.ndarray, int]:
@@ -141,29 +143,6 @@ def evenly(settled: "xr.Dataset", revolutions: int, values: np.ndarray) -> tuple
     if not a_turn:
         raise NoSeriesError("the run has no two samples a revolution (solve.output_step_deg)")
     return resample_angle(crank, values, a_turn)[: revolutions * a_turn], a_turn
-
-
-def order_lines(even: np.ndarray, a_turn: int) -> Spectrum:
-    """Return the order spectrum of a signal at equal crank angles.
-
-    even: whole revolutions of `a_turn` samples each.
-    """
-    from compressor.vibration import line_amplitudes
-
-    amplitudes = line_amplitudes(even, a_turn, False)
-    fine = line_amplitudes(even, even.size, True)[ORDER * even.size // a_turn + 1 :]
-    above = math.sqrt(float(np.sum(fine**2)))  # Parseval
-    return Spectrum(amplitudes, above)
-
-
-def deviation_spectrum(run: "xr.Dataset") -> Spectrum:
-    """Return the order spectrum of the acceleration less the ideal machine's, m/s2.
-
-    Of the crosshead, over whole settled revolutions. Raises NoSeriesError where there is none.
-    """
-    settled, revolutions = whole_revolutions(run)
-    deviation = settled["acceleration"].values - ideal_motion(settled)[2]
-    return order_lines(*evenly(settled, revolutions, deviation))
 
 
 @dataclass(frozen=True)

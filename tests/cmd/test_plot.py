@@ -13,8 +13,6 @@ from conftest import damage_series, store_cases
 from compressor.analysis.shaking import frame_forces
 from compressor.cases.case import Case
 from compressor.report.figures import FIGURES
-from compressor.report.figures.drawing import panels_of
-from compressor.report.figures.job import draw_spectra
 from compressor.report.figures.table import spell
 from compressor.solve.simulate import simulate
 from compressor.store.reader import read_store
@@ -167,15 +165,6 @@ def test_a_damaged_job_is_a_row_without_series(folder, tmp_path, compsim, unpain
     damage_series(home, key(home, "worn", 2))
     told = " ".join(compsim(*words, code=2).err.split())
     assert f"can be drawn: damaged: compsim verify -r {home} names the file" in told
-
-
-def test_rounding_is_not_drawn_as_a_spectrum(folder):
-    ideal, worn = (
-        panels_of(draw_spectra(job(folder, name), None).figure)[1] for name in ("ideal", "worn")
-    )
-    assert not ideal.traces
-    assert "ideal joints" in ideal.notes[0].text
-    assert worn.traces[0].y.max() > 0.1
 
 
 def test_ideal_joints_have_no_contacts_to_draw(plot, folder, unpainted):

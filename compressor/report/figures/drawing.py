@@ -142,21 +142,16 @@ class Panel:
         self.plot(*join_with_gaps(lines), style)
 
     def bars(
-        self, x: ArrayLike, y: ArrayLike, style: LineStyle, name: str = "", thick: ArrayLike = 1.0,
-        foot: ArrayLike = 0.0, is_upright: bool = False, errors: np.ndarray | None = None,
+        self, x: ArrayLike, y: ArrayLike, style: LineStyle, name: str = "", thick: float = 1.0,
+        errors: np.ndarray | None = None,
     ) -> None:  # fmt: skip
-        """Draw bars from `foot` to x, at y, or upright ones to y; errors: below and above."""
-        along: Way = "y" if is_upright else "x"
-        ends = {"x": self.at("x", x), "y": self.at("y", y)}
-        thick = self.at("x" if is_upright else "y", thick)
-        _, base, width = np.broadcast_arrays(ends[along], self.at(along, foot), thick)
-        ends[along] = ends[along] - base
+        """Draw lying bars from 0 to x, at y; errors: below and above, shape (2, n)."""
         made = go.Bar(
-            **ends, name=name, orientation="v" if is_upright else "h", base=base.tolist(),
-            width=width.copy(), marker={"color": style.color},
+            x=self.at("x", x), y=self.at("y", y), name=name, orientation="h", width=thick,
+            marker={"color": style.color},
         )  # fmt: skip
         if errors is not None:
-            made[f"error_{along}"] = error_bars(self.factors[along] * errors)
+            made.error_x = error_bars(self.factors["x"] * errors)
         self.add(made, style.zorder, (), name)
 
     def map(
@@ -517,10 +512,7 @@ def points(trace: Trace) -> tuple[np.ndarray, np.ndarray, *tuple[tuple[str, np.n
         values = trace.z.ravel() if trace.text is None else 10.0 ** trace.z.ravel()
         title = one_line(trace.colorbar.title.text or "") or "value"
         return np.tile(x, y.size), np.repeat(y, x.size), (title, values)
-    along = "x" if isinstance(trace, go.Bar) and trace.orientation == "h" else "y"
-    if isinstance(trace, go.Bar):
-        x, y = (np.add(x, trace.base), y) if along == "x" else (x, np.add(y, trace.base))
-    error = trace[f"error_{along}"]
+    error = trace.error_x if isinstance(trace, go.Bar) else trace.error_y
     if error.array is None:
         return x, y
     return x, y, ("below", error.arrayminus), ("above", error.array)

@@ -12,7 +12,6 @@ from compressor.analysis import (
     Cycle,
     case_of,
     describe_cases,
-    deviation_spectrum,
     end_states,
     frame_forces,
     impacts,
@@ -72,7 +71,6 @@ BEGINS = ("opens", "begins")  # words of events; the others end what has begun
 NAMES = {"this": "this job", "twin": "the same machine without clearance"}
 MAX_ORDERS = 200  # that are drawn
 MAX_ENVELOPE = 60  # of an envelope
-ROUNDING = 1e-6  # m/s2, of an acceleration
 DECADES = 4  # below the greatest line
 ORDERS_AXIS = "order (cycles per revolution)"
 
@@ -303,27 +301,23 @@ def draw_cards(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigu
 
 @figure("job", "spectra", "order spectra")
 def draw_spectra(run: xr.Dataset, twin: Twin, units: Units = "usual") -> DrawnFigure:
-    """Return the order spectra of X, of the deviation, and of a sensor's envelope."""
+    """Return the order spectra of X and of a sensor's envelope."""
     envelope = sensor_envelope(run)
-    rows = 2 if envelope is None else 3
+    rows = 1 if envelope is None else 2
     drawing, panels = make_grid(rows, 1, 2.7 * rows + 0.5, units=units)
-    force, deviation = panels[:2, 0]
+    force = panels[0, 0]
     force.label("y", "amplitude of X ({})", "N")
-    deviation.label("y", "amplitude ({})", "m/s²")
     plot_lines(force, shaking(run).amplitudes, THIS, NAMES["this"])
     if twin is not None:
         plot_lines(force, shaking(twin).amplitudes, TWIN, NAMES["twin"])
-    plot_deviation(deviation, deviation_spectrum(run).amplitudes)
     force.title = "force on the frame along the cylinder"
-    deviation.title = "acceleration of the crosshead less that of ideal joints"
     if envelope is not None:
-        plot_envelope(panels[2, 0], (envelope.orders, envelope.amplitudes), envelope.band)
+        plot_envelope(panels[1, 0], (envelope.orders, envelope.amplitudes), envelope.band)
     for panel in panels.flat:
         panel.x.title = ORDERS_AXIS
     above = [(f"rms of X above order {ORDER}", spell(shaking(run).above, "N"))]
     if twin is not None:
         above.append(("without clearance", spell(shaking(twin).above, "N")))
-    above.append(("rms of the deviation above it", spell(deviation_spectrum(run).above, "m/s²")))
     if envelope is not None:
         low, high = (f"{edge:.0f}" for edge in envelope.band)
         label = f"spectral kurtosis of the band from {low} to {high} Hz"
@@ -349,17 +343,6 @@ def plot_lines(panel: Panel, amplitudes: np.ndarray, line: LineStyle, name: str)
     if not panel.rules:
         panel.rule(MARK, x=ORDER)
         panel.write(f"order {ORDER}", ORDER, 1, RED, "y", (4, -4), level="top", size=8.5)
-
-
-def plot_deviation(panel: Panel, amplitudes: np.ndarray) -> None:
-    """Draw the spectrum of a deviation, m/s2; in words where it is rounding, as of ideal joints."""
-    if amplitudes.max() > ROUNDING:
-        plot_lines(panel, amplitudes, THIS, NAMES["this"])
-        return
-    text = "none: the motion is that of ideal joints"
-    panel.write(text, 0.5, 0.5, inside="xy", side="center")
-    panel.span("x", 0, MAX_ORDERS)
-    panel.y.tickvals = ()
 
 
 def plot_envelope(

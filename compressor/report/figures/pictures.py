@@ -282,16 +282,11 @@ def paint_trace(axes: Axes, trace: Trace, height: float) -> None:
     if isinstance(trace, go.Heatmap):
         paint_map(axes, trace)
     elif isinstance(trace, go.Bar):
-        is_lying = trace.orientation == "h"
-        error = trace.error_x if is_lying else trace.error_y
         look = area_look(trace) | {"zorder": height}
-        if error.array is not None:
-            look |= {"xerr" if is_lying else "yerr": [error.arrayminus, error.array],
-                     "capsize": 2.0, "ecolor": "#303030"}  # fmt: skip
-        if is_lying:
-            axes.barh(trace.y, trace.x, trace.width, trace.base, **look)
-        else:
-            axes.bar(trace.x, trace.y, trace.width, trace.base, **look)
+        if trace.error_x.array is not None:
+            ends = [trace.error_x.arrayminus, trace.error_x.array]
+            look |= {"xerr": ends, "capsize": 2.0, "ecolor": "#303030"}
+        axes.barh(trace.y, trace.x, trace.width, **look)
     elif trace.fill:
         path = outline(trace.x, trace.y)
         if path:
