@@ -101,13 +101,8 @@ def draw_grid(
     first, second = (sweep.axes[n] for n in order[:2])
     if len(sweep.axes) == 2 and first.is_words == second.is_words:
         title = f"metrics over {first.phrase} and {second.phrase}"
-        figure = draw_maps(sweep, shown, limits)
-        has_lines = any(one.type == "scatter" and not (one.name or one.fill) for one in figure.data)
-        lines = (
-            "; white: lines of equal value, which stand in the scale of colours, too" * has_lines
-        )
         cut = [number for axis in sweep.axes for number in count_drawn(axis, MAX_CELLS)]
-        yield DrawnFigure(figure, f"A cell a job{lines}.", [*cut, *about],
+        yield DrawnFigure(draw_maps(sweep, shown, limits), "A cell a job.", [*cut, *about],
                           zone_words(shown, limits), "map", title)  # fmt: skip
         return
     role = roles_of(sweep, order)

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
-from matplotlib.ticker import LogLocator, MaxNLocator
 
 from compressor.analysis import Effects, grid_effects, sampled_effects
 from compressor.report.figures.contours import contour_lines
@@ -35,9 +34,7 @@ from compressor.report.limits import NO_LIMITS, Limits
 
 COLORS = "cividis"
 MAX_CELLS = 64  # along an axis
-MAX_CONTOURS = 5
 MAX_NAMED_VALUES, MIN_NAMED_GAP = 6, 0.15  # of an axis; share of what it spans
-MIN_RISEN = 0.2  # of the cells, above the least value
 NOTHING = fill("#f2f2f2", edge=GREY, is_hatched=True)
 
 
@@ -93,25 +90,16 @@ def draw_maps(
 
 
 def plot_map(panel: Panel, cells: Cells, table: np.ndarray, measure: Measure) -> None:
-    """Draw a measure's cells with their colour scale and, over numbers, lines of equal value."""
+    """Draw a measure's cells with their colour scale."""
     panel.x.showgrid = panel.y.showgrid = False
     low, high = float(np.nanmin(table)), float(np.nanmax(table))
-    is_log = spans_decades(table)
-    locator = LogLocator(subs=(1.0, 3.0)) if is_log else MaxNLocator(MAX_CONTOURS + 1)
-    steps = np.asarray(locator.tick_values(low, high))
-    inside = steps[(steps > low) & (steps < high)]
-    inside = inside[:: -(-inside.size // MAX_CONTOURS)] if inside.size else inside
-    levels = (*inside.tolist(),) if has_lines(table, cells.axes) else ()
     top = high if high > low else low + (abs(low) or 1.0)
     x, y = (midway(c, axis.is_log) for c, axis in zip(cells.centres, cells.axes, strict=True))
     panel.fill(*outline_cells(x, y, np.isnan(table)), NOTHING)
     panel.map(
-        *cells.centres, table, palette(COLORS), (low, top), "{}", measure.unit, is_log,
-        measure.title, job_keys(cells.keys),
+        *cells.centres, table, palette(COLORS), (low, top), "{}", measure.unit,
+        spans_decades(table), measure.title, job_keys(cells.keys),
     )  # fmt: skip
-    if levels:
-        lines = contour_lines(*cells.centres, table, levels)
-        panel.plot(*lines, LineStyle("#ffffff", linewidth=0.9))
 
 
 def plot_limits(panel: Panel, cells: Cells, table: np.ndarray, limits: Sequence[float]) -> None:
@@ -119,12 +107,6 @@ def plot_limits(panel: Panel, cells: Cells, table: np.ndarray, limits: Sequence[
     inside = tuple(one for one in limits if np.nanmin(table) < one < np.nanmax(table))
     if inside and min(table.shape) > 1 and not any(axis.is_words for axis in cells.axes):
         panel.plot(*contour_lines(*cells.centres, table, inside), LIMIT)
-
-
-def has_lines(table: np.ndarray, axes: tuple[PlottedAxis, PlottedAxis]) -> bool:
-    """Return whether lines of equal value are worth it: over numbers, round many cells."""
-    rising = np.nansum(table > np.nanmin(table)) >= MIN_RISEN * table.size
-    return min(table.shape) >= 3 and not any(axis.is_words for axis in axes) and bool(rising)
 
 
 def mark_cells(panel: Panel, cells: Cells, status: np.ndarray, chaotic: np.ndarray) -> None:
