@@ -6,7 +6,7 @@ STAMP := .venv/installed
 PURE := $(addprefix tests/physics/test_,kinematics.py loads.py contact.py motion.py observe.py tally.py \
   runge_kutta.py rosenbrock.py) tests/analysis/test_cam.py
 .DEFAULT_GOAL := help
-.PHONY: help install run figures test test-bare test-oldest test-pure check format calibration accuracy validation wear claims page store-bench sweep-bench peers tradeoff chaotic regimes identify calibrate nameplate stress chaos mutants measurements pages docs release lock alarms clean
+.PHONY: help install run figures test test-bare test-oldest test-pure check format calibration accuracy validation wear claims page sweep-bench peers tradeoff chaotic regimes identify calibrate nameplate stress chaos mutants measurements pages docs release lock alarms clean
 
 help:  ## show this help
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -59,14 +59,10 @@ accuracy: install  ## judge promises and error bars on 1,000 other random cases 
 claims: install  ## measure the paper's claims over machines, and what decides them (an hour, 5 GB)
 	$(CAMPAIGN)/measure_claims.py tests/results/claims.json
 
-page: install  ## test the report's page in a browser, measure how it is written and opens (ten minutes)
+page: install  ## test the report's page in a browser
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check selenium
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps axe-playwright-python
 	$(BIN)/python -m pytest tests/report/test_browser.py
-	$(CAMPAIGN)/measure_page.py tests/results/page.json
-
-store-bench: install  ## measure writing and opening 100,000 stored jobs (under a minute)
-	$(CAMPAIGN)/measure_store.py tests/results/store.json
 
 sweep-bench: install  ## measure start-up and 100,000 short jobs, killed three times and resumed (ten minutes or more)
 	$(CAMPAIGN)/measure_sweep.py tests/results/sweep.json
@@ -114,7 +110,7 @@ nameplate: install  ## run the case file of compsim init machine, for its page (
 mutants: install  ## plant bugs and see whether the fast tests catch them (half an hour)
 	$(CAMPAIGN)/measure_mutants.py tests/results/mutants.json
 
-measurements: test-oldest calibration accuracy validation wear claims page tradeoff chaotic regimes identify nameplate store-bench sweep-bench peers pages  ## all of these (about three hours)
+measurements: test-oldest calibration accuracy validation wear claims page tradeoff chaotic regimes identify nameplate sweep-bench peers pages  ## all of these (about three hours)
 
 pages: install  ## write the pages' generated tables, compressor/API.md
 	$(BIN)/python tests/page_tables.py

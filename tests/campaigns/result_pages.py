@@ -183,15 +183,6 @@ def deciding(drawn, place):
     return "–" if total[best] < 0.0 else f"{drawn['names'][best]}, {total[best]:.2f}"
 
 
-def store(found):
-    series = found["selection"]
-    job, *_, smallest = found["series"]
-    return listed(found["rows"] | {
-        f"{name}, with series": value for name, value in series.items()
-    } | {f"kB of a job with series, {words}": one["bytes"] / 1000
-         for words, one in (("double", job), ("single and compressed", smallest))})  # fmt: skip
-
-
 def validation(found):
     subjects = [[*group] for _, group in groupby(found["rows"], lambda row: row["subject"])]
     return table(subjects, {
@@ -259,20 +250,6 @@ def tradeoff(found):
              for change in dict.fromkeys(row["change"] for row in rows)]  # fmt: skip
     heads = [f"{scene.replace('_', ' ')} mm" for scene in scenes]
     return markdown(["change of the model", *heads], lines)
-
-
-def page(found):
-    rows = [{"name": f"{name}, {one['figures']} figures", **one}
-            for name, one in found["stores"].items()]  # fmt: skip
-
-    def size(row):
-        return f"{sum(value for key, value in row.items() if key.endswith('_bytes')) / 1e6:.1f}"
-
-    return table(rows, {
-        "report of": "name", "written in, s": "write_seconds:.1f",
-        "written again, s": "rewrite_seconds:.1f", "all files, MB": size,
-        "opens in, s": "open_seconds:.2f", "first figure live after, s": "first_figure_seconds:.2f",
-    })  # fmt: skip
 
 
 def sweep(found):
@@ -445,8 +422,6 @@ CAMPAIGNS = {
     "chaos": ("Do results survive kills, power cuts and damage?", chaos),
     "mutants": ("Would the tests notice a bug?", mutants),
     "sweep": ("How many jobs a second, and does an interrupted sweep lose one?", sweep),
-    "store": ("How large and fast is the store?", store),
-    "page": ("How fast is the report?", page),
     "nameplate": ("What does the case file of `compsim init machine` give?", nameplate),
 }  # fmt: skip
 
