@@ -204,6 +204,3 @@ def test_bars_of_the_ideal_machine_cover_its_quadrature(load):
         slack = rounding if name.startswith("mean_") else 0.0
         assert (error <= found.numbers[f"{name}_error"] + slack).all(), name
     assert found.numbers["peak_acceleration_error"] < 1e-5 * found.numbers["peak_acceleration"]
-
-
-# Accuracy as it is asked for
