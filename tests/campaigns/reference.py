@@ -18,8 +18,6 @@ from functools import lru_cache
 import mpmath
 import numpy as np
 import sympy
-from numba import njit
-from numba.extending import register_jitable
 from scipy.integrate import solve_ivp
 
 DIGITS = 40
@@ -86,19 +84,16 @@ def corners(params) -> tuple:
 
 
 def _record(params, backend):
-    """The values of `params` by attribute: mpf, floats, or a NumPy record (for numba)."""
+    """The values of `params` by attribute: mpf or floats."""
     values = [params[name] for name in SCALARS] + [LOADS.index(params["load"])]
     values += [params[k][j] for k in ("clearance", "contact_stiffness") for j in JOINTS]
-    if backend == "numba":
-        return np.rec.array([tuple(values)], dtype=[(name, float) for name in Record._fields])[0]
     return Record(*map(mpmath.mpf if backend == "mpmath" else float, values))
 
 
 # ---------------------------------------------------------------- contact and loads
-# Operators only, so that floats, mpf numbers and numba are served by the same text.
+# Operators only, so that floats and mpf numbers are served by the same text.
 
 
-@register_jitable
 def step(u, u0, h0, u1, h1):
     """The cubic from h0 at u0 to h1 at u1, constant outside."""
     if u <= u0:
@@ -109,14 +104,12 @@ def step(u, u0, h0, u1, h1):
     return h0 + (h1 - h0) * s * s * (3 - 2 * s)
 
 
-@register_jitable
 def friction_coefficient(slip, p):
     """ADAMS's odd, smoothed coefficient of friction at the slip velocity [m/s]."""
     size = step(abs(slip), p.stiction_velocity, p.mu_static, p.friction_velocity, p.mu_dynamic)
     return step(slip, -p.stiction_velocity, -1.0, p.stiction_velocity, 1.0) * size
 
 
-@register_jitable
 def contact_action(ex, ey, ux, uy, clearance, stiffness, spin_journal, spin_rod, p):
     """Force [N] and moment [N m] on the rod at the centre of its bore: (fx, fy, moment).
 
@@ -137,7 +130,6 @@ def contact_action(ex, ey, ux, uy, clearance, stiffness, spin_journal, spin_rod,
     return normal * nx + friction * ny, normal * ny - friction * nx, -bore_radius * friction
 
 
-@register_jitable
 def piston_force(x, v, x_ideal, v_ideal, phase, p):
     """Force [N] on the crosshead towards the crank; the cam follows the ideal motion."""
     if p.load == 1:
@@ -147,7 +139,6 @@ def piston_force(x, v, x_ideal, v_ideal, phase, p):
     return 0.0
 
 
-@register_jitable
 def gas_force(x, phase, p):
     """Expansion, suction, compression, discharge; less the pressure on the other face."""
     z = p.rod_length + p.crank_radius + p.head_clearance - x
@@ -162,7 +153,6 @@ def gas_force(x, phase, p):
     return (pressure - p.back_pressure) * p.piston_area
 
 
-@register_jitable
 def spring_force(x, v, x_ideal, v_ideal, phase, p):
     """Preloaded spring and damper between the piston and the cam's follower (at s, moving at w)."""
     top, dwell_end = p.rod_length + p.crank_radius, p.rod_length + p.crank_radius - p.stroke
@@ -276,9 +266,7 @@ def _functions(scene, backend):
         ((*state, *ACTIONS), _lagrange(scene)),
         ((W, *state, *ACTIONS), _rod_forces(scene)),
     )
-    modules = "mpmath" if backend == "mpmath" else "math"
-    compiled = (sympy.lambdify(names, found, modules, cse=True) for names, found in pairs)
-    return tuple(map(njit, compiled) if backend == "numba" else compiled)
+    return tuple(sympy.lambdify(names, found, backend, cse=True) for names, found in pairs)
 
 
 @lru_cache
@@ -292,7 +280,6 @@ def _ideal_functions(backend):
     )
 
 
-@register_jitable
 def _machine(p):
     """The values of CONSTANTS."""
     return (
@@ -318,7 +305,7 @@ def _actions(scene, backend):
         )
         return piston_force(y[0], y[n], x_ideal, v_ideal, phase, p), *big, *small
 
-    return njit(actions) if backend == "numba" else actions
+    return actions
 
 
 # ---------------------------------------------------------------- what tests call
@@ -328,20 +315,18 @@ def _numbers(values, backend):
     return [mpmath.mpf(v) if backend == "mpmath" else float(v) for v in values]
 
 
-def ideal_motion(t, params, backend="mpmath"):
+def _ideal_motion(t, params):
     """(x, x', x'', phi, phi', phi'') of the mechanism without clearance at the time t [s]."""
-    with mpmath.workdps(DIGITS):
-        (t,) = _numbers([t], backend)
-        return _ideal_functions(backend)[0](t, *_machine(_record(params, backend)))
+    return _ideal_functions("math")[0](t, *_machine(_record(params, "math")))
 
 
-def ideal_joint_forces(t, phase, params, backend="mpmath"):
-    """{joint: (fx, fy)} [N] on the rod in the mechanism without clearance."""
+def ideal_joint_forces(t, phase, params):
+    """{joint: (fx, fy)} [N] on the rod in the mechanism without clearance; mpf of 40 digits."""
     with mpmath.workdps(DIGITS):
-        p, (t,) = _record(params, backend), _numbers([t], backend)
-        x, v, *_ = _ideal_functions(backend)[0](t, *_machine(p))
-        load = piston_force(x, v, x, v, phase, p)
-        forces = _ideal_functions(backend)[1](t, *_machine(p), load)
+        p, t = _record(params, "mpmath"), mpmath.mpf(t)
+        motion, joint_forces = _ideal_functions("mpmath")
+        x, v, *_ = motion(t, *_machine(p))
+        forces = joint_forces(t, *_machine(p), piston_force(x, v, x, v, phase, p))
         return {"big_end": tuple(forces[:2]), "small_end": tuple(forces[2:])}
 
 
@@ -355,16 +340,16 @@ def _evaluate(scene, q, qd, t, phase, params, backend):
     return found, acts, rod_forces(found, y, t, *_machine(p), *acts)
 
 
-def accelerations(scene, q, qd, t, phase, params, backend="mpmath"):
-    """q'' for the scene's absolute COORDINATES; mpf of 40 digits ('mpmath') or floats ('math')."""
+def accelerations(scene, q, qd, t, phase, params):
+    """q'' for the scene's absolute COORDINATES; mpf of 40 digits."""
     with mpmath.workdps(DIGITS):
-        return list(_evaluate(scene, q, qd, t, phase, params, backend)[0])
+        return list(_evaluate(scene, q, qd, t, phase, params, "mpmath")[0])
 
 
-def joint_forces(scene, q, qd, t, phase, params, backend="mpmath"):
+def joint_forces(scene, q, qd, t, phase, params):
     """{joint: (fx, fy)} [N] on the rod: contact, or the constraint of an ideal joint."""
     with mpmath.workdps(DIGITS):
-        forces = _evaluate(scene, q, qd, t, phase, params, backend)[2]
+        forces = _evaluate(scene, q, qd, t, phase, params, "mpmath")[2]
         return {"big_end": tuple(forces[:2]), "small_end": tuple(forces[2:])}
 
 
@@ -380,25 +365,20 @@ def segments(params, end):
     return [(a, b, phase) for (a, phase), b in zip(cuts, stops, strict=False)]
 
 
-@lru_cache
 def _right_hand_side(scene):
-    """The compiled (t, y, phase, p) -> y'."""
-    accelerate, actions = _functions(scene, "numba")[1], _actions(scene, "numba")
+    """A function (t, y, phase, p) -> y'."""
+    accelerate, actions = _functions(scene, "math")[1], _actions(scene, "math")
 
-    @njit
     def rates(t, y, phase, p):
-        n = len(y) // 2
-        out = np.empty(2 * n)
-        out[:n] = y[n:]
-        out[n:] = accelerate(y, t, *_machine(p), *actions(y, t, phase, p))
-        return out
+        y = y.tolist()
+        return [*y[len(y) // 2 :], *accelerate(y, t, *_machine(p), *actions(y, t, phase, p))]
 
     return rates
 
 
 def _start(scene, params):
     """Ideal position and rates at top dead centre: (q, q') as one array."""
-    x, v, _, phi, phi_rate, _ = ideal_motion(0.0, params, "math")
+    x, v, _, phi, phi_rate, _ = _ideal_motion(0.0, params)
     if scene != "both":
         return np.array([x, phi, v, phi_rate])
     R, L, a, omega = (params[k] for k in ("crank_radius", "rod_length", "rod_centre", "omega"))
@@ -420,8 +400,8 @@ def _integrate(params, scene, t_grid, rtol, method):
     pieces = segments(params, t_grid[-1])
     for start, stop, phase in pieces:
         if phase in (0, 2):  # which begin at a dead centre
-            params = params | {"beyond": y[0] - float(ideal_motion(start, params, "math")[0])}
-        p = _record(params, "numba")
+            params = params | {"beyond": y[0] - _ideal_motion(start, params)[0]}
+        p = _record(params, "math")
         last = stop == t_grid[-1]
         inside = (t_grid >= start - 1e-12) & ((t_grid < stop - 1e-12) | last)
         times = np.append(np.clip(t_grid[inside], start, stop), stop)
