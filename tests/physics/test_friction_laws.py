@@ -70,7 +70,7 @@ def steepest(p):
 @laws
 def test_the_coefficient_is_continuous_and_no_steeper_than_told(law):
     p = friction(law)
-    slips = np.linspace(-0.2, 0.2, 40_001)
+    slips = np.linspace(-0.2, 0.2, 16_001)
     values = np.array([friction_coefficient(slip, 0.0, p) for slip in slips])
     slope = np.abs(np.diff(values) / np.diff(slips)).max()
     told = steepest(p)
