@@ -30,7 +30,7 @@ from compressor.solve.simulate import simulate
 from compressor.store.batch import write_batch
 from compressor.store.stored import read_store
 from compressor.store.studies import read_studies, write_study
-from compressor.sweep.warm_up import compile_once
+from compressor.sweep.warm_up import Part, compile_once
 from compressor.sweep.worker import End
 
 # nohup ignores SIGHUP, and a shell SIGINT of what it runs behind: tests that send them, and the
@@ -91,7 +91,7 @@ def equations(base):
         number = int(os.environ["PYTEST_XDIST_WORKER"].removeprefix("gw"))
         for part in PARTS if number % 2 == 0 else PARTS[::-1]:
             with locked(base / f"{part}.lock"):
-                compile_once([(part, "auto")], lambda remark: None)
+                compile_once([Part(part)], lambda remark: None)
 
 
 @pytest.fixture(scope="session")

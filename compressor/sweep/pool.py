@@ -1,7 +1,8 @@
 """Run jobs in worker processes: one that crashes, hangs or eats memory costs itself only.
 
 joblib gives threads, their queue and their results. Each thread has a process of its own, with a
-pipe that breaks if that dies: so a death names its own job, and costs no other process.
+pipe that breaks if that dies: so a death names its own job, and costs no other process. All are
+copies of one process that has loaded the equations, which takes two seconds, and runs no job.
 """
 
 import contextlib
@@ -12,6 +13,7 @@ import os
 import pickle
 import platform
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -19,6 +21,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Hashable, Iterable, Iterator
 from dataclasses import replace
 from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +29,8 @@ from joblib import Parallel, cpu_count, delayed
 
 from compressor.program import THREAD_VARIABLES, CompsimError
 from compressor.reasons import Reason
-from compressor.sweep.worker import ENDING, End, Store, Workers, WorkersFailed
+from compressor.store import StoreError
+from compressor.sweep.worker import ENDING, End, Store, Workers, WorkersFailed, open_socket
 
 Input = tuple[Hashable, Any, float]  # id, payload, wall time that the job may take (s)
 
@@ -34,10 +38,11 @@ TICK = 0.1  # s between two looks at a worker that is silent
 MAX_BATCH = 200  # jobs
 MAX_JOBS_IN_MEAN = 50  # jobs that a mean of their seconds rests on
 MAX_SILENCE = 600.0  # s in which a worker begins (compiling, maybe), or stores a batch
-MAX_FRUITLESS = 10  # workers in a row that may die before any job begins
+MAX_FRUITLESS = 10  # processes in a row that may die before any job begins
+END_SECONDS = 1.0  # s in which processes that are not at work end
 MEMORY_SHARE = 0.75  # of the machine's memory, for all workers together
 MEMORY_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
-START = (  # a worker's program, which has our path and not our main module
+START = (  # the loader's program, which has our path and not our main module
     "import sys; from multiprocessing.connection import Connection; "
     "pipe = Connection(int(sys.argv[1])); sys.path[:] = pipe.recv(); "
     "from compressor.sweep.worker import serve; serve(pipe)"
@@ -142,10 +147,10 @@ class Pool:
         self.rules = replace(rules, memory=rules.memory or memory_share(width))
         self.batches = Batches(jobs, rules.target_seconds, width)
         self.setup = pickle.dumps((os.getpid(), work, store, self.rules))
-        self.fruitless = 0  # workers in a row that have died before any job began
+        self.fruitless = 0  # times in a row that processes have died before any job began
         self.lock, self.stopped = threading.Lock(), False
-        self.workers: set[Worker] = set()
-        self.idle: list[Worker] = []  # of these
+        self.loader: Loader | None = None
+        self.idle: list[Worker] = []
 
     def next_batch(self) -> list[Job]:
         """Return the next batch, [] where none is left or no more are to be run."""
@@ -156,14 +161,12 @@ class Pool:
 
         Raises StoreError, and WorkersFailed.
         """
-        worker = self.take_worker(batch[0].again)
-        if not worker:
-            return []
-        answer = worker.ask(batch, self.rules.grace)
-        if isinstance(answer, Death):
-            self.workers.discard(worker)
-            return [] if self.stopped else self.lose(batch, answer)
-        if isinstance(answer, CompsimError):
+        try:
+            worker = self.take_worker(batch[0].again)
+            answer = worker.ask(batch, self.rules.grace)
+        except Death as death:
+            return [] if self.stopped else self.lose(batch, death)
+        if isinstance(answer, StoreError):
             raise answer
         self.idle.append(worker)
         self.fruitless = 0
@@ -171,22 +174,25 @@ class Pool:
             self.batches.waiting.appendleft(rest)
         return [self.settle(job, end) for job, end in zip(batch, answer, strict=False)]
 
-    def take_worker(self, anew: bool) -> "Worker | None":
-        """Return a worker that is idle, or a new one; None where no more are to be run."""
+    def take_worker(self, anew: bool) -> "Worker":
+        """Return a worker that is idle, or a new one. Raises Death, also when the pool is stopped.
+
+        Raises WorkersFailed.
+        """
         with self.lock:
             if self.stopped:
-                return None
-            if self.idle and not anew:
-                return self.idle.pop()
-            if self.idle:
-                self.idle[-1].end()
-                self.workers.discard(self.idle.pop())
-            try:
-                worker = Worker(self.setup)
-            except OSError as error:
-                raise WorkersFailed(f"no worker process can be started: {error}") from error
-            self.workers.add(worker)
-            return worker
+                raise Death("the pool's end")
+            spare = self.idle.pop() if self.idle else None
+            if spare and not anew:
+                return spare
+            if not self.loader or self.loader.process.poll() is not None:
+                try:
+                    self.loader = Loader(self.setup)
+                except OSError as error:
+                    raise WorkersFailed(f"no worker process can be started: {error}") from error
+        if spare:
+            spare.end()
+        return self.loader.start_worker()
 
     def settle(self, job: Job, end: End) -> End:
         """Return the end of a job with its id."""
@@ -229,23 +235,28 @@ class Pool:
         """End all workers, and start no more."""
         with self.lock:
             self.stopped = True
-        for worker in [*self.workers]:
-            worker.end()
+        if self.loader:
+            self.loader.end()
 
 
-class Death(NamedTuple):
-    """How a worker has ended amid a batch."""
+class Death(Exception):
+    """How a process has ended amid a batch.
 
-    place: int | None  # of the job at work, the number of all while they are stored, None before
-    how: str
-    late: bool  # the job took too long
+    place: of the job at work, the number of all while they are stored, None before; late: the job
+    took too long.
+    """
+
+    def __init__(self, how: str, place: int | None = None, late: bool = False):
+        super().__init__(how)
+        self.how, self.place, self.late = how, place, late
 
 
-class Worker:
-    """A worker process, from the outside; used by one thread at a time, but for `end`."""
+class Loader:
+    """The process of which workers are copies, from the outside; see `worker.serve`."""
 
     def __init__(self, setup: bytes):
-        self.pipe, theirs = Pipe()
+        self.calls, theirs = Pipe()
+        self.lock = threading.Lock()  # a call at a time
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)  # in it, too, until it settles
         try:
             self.process = subprocess.Popen(
@@ -255,32 +266,79 @@ class Worker:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
             theirs.close()
-        with contextlib.suppress(OSError):  # it has died, as `ask` will find
-            self.pipe.send(sys.path)
-            self.pipe.send_bytes(setup)
+        with contextlib.suppress(OSError):  # it has died, as a call will find
+            self.calls.send(sys.path)
+            self.calls.send_bytes(setup)
 
-    def ask(self, batch: list[Job], grace: float) -> Any:
-        """Return a worker's answer to a batch, or its Death."""
-        place, left = None, MAX_SILENCE
-        with contextlib.suppress(EOFError, OSError):
-            self.pipe.send([job.payload for job in batch])
-            while left > 0:
-                if not self.pipe.poll(TICK):
-                    # ticks are counted, since time goes on while all are stopped, as by Ctrl-Z
-                    left -= TICK
-                elif isinstance(answer := self.pipe.recv(), int):
-                    place = answer
-                    left = batch[place].timeout + grace if place < len(batch) else MAX_SILENCE
-                else:
-                    return answer
+    def start_worker(self) -> "Worker":
+        """Return a new worker, once all is loaded. Raises WorkersFailed, and Death."""
+        pipe, theirs = Pipe()
+        with theirs:
+            answer = self.call(0, theirs)
+        if isinstance(answer, WorkersFailed):
+            raise answer
+        return Worker(self, answer, pipe)
+
+    def call(self, pid: int, pipe: Connection | None = None) -> Any:
+        """Return the answer to a call (see `worker.serve`). Raises Death."""
+        with self.lock, contextlib.suppress(EOFError, OSError):
+            self.calls.send(pid)
+            if pipe:
+                with open_socket(self.calls) as carrier:
+                    socket.send_fds(carrier, [b"1"], [pipe.fileno()])
+            return receive(self.calls, MAX_SILENCE)
         self.end()
-        late = left <= 0 and place is not None and place < len(batch)
-        return Death(place, describe_ending(self.process.returncode), late)
+        raise Death(describe_ending(self.process.returncode))
 
     def end(self) -> None:
-        """Kill the process."""
-        self.process.kill()
-        self.process.wait()
+        """End the process, which ends its copies; where it is at work still, kill it."""
+        with contextlib.suppress(OSError), open_socket(self.calls) as carrier:
+            carrier.shutdown(socket.SHUT_RDWR)  # other threads may wait for an answer
+        try:
+            self.process.wait(END_SECONDS)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+class Worker:
+    """A worker process, from the outside; used by one thread at a time."""
+
+    def __init__(self, loader: Loader, pid: int, pipe: Connection):
+        self.loader, self.pid, self.pipe = loader, pid, pipe
+
+    def ask(self, batch: list[Job], grace: float) -> Any:
+        """Return a worker's answer to a batch. Raises Death."""
+        place, seconds, is_late = None, MAX_SILENCE, False
+        try:
+            self.pipe.send([job.payload for job in batch])
+            while isinstance(answer := receive(self.pipe, seconds), int):
+                place = answer
+                seconds = batch[place].timeout + grace if place < len(batch) else MAX_SILENCE
+            return answer
+        except TimeoutError:
+            is_late = place is not None and place < len(batch)
+        except (EOFError, OSError):
+            pass
+        raise Death(describe_ending(self.end()), place, is_late)
+
+    def end(self) -> int:
+        """Kill the process; return its exit code."""
+        try:
+            return int(self.loader.call(self.pid))
+        except Death:  # which took its copies along
+            return -signal.SIGKILL
+
+
+def receive(pipe: Connection, seconds: float) -> Any:
+    """Return what comes through a pipe. Raises TimeoutError, and EOFError or OSError at its end.
+
+    Ticks are counted, since time goes on while all processes are stopped, as by Ctrl-Z.
+    """
+    for _ in range(math.ceil(min(seconds, 1e9) / TICK)):
+        if pipe.poll(TICK):
+            return pipe.recv()
+    raise TimeoutError
 
 
 def describe_ending(code: int) -> str:

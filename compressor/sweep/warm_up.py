@@ -13,7 +13,7 @@ import os
 import signal
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from compressor.cases import Case
 from compressor.program import COMPILED, library_versions, machine_code_folder
@@ -35,7 +35,15 @@ KINDS: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
-Part = tuple[str, str]  # of the equations: one of `KINDS`, and a method of integration
+class Part(NamedTuple):
+    """A part of the equations: one of `KINDS`, a method of integration, with the body or without.
+
+    The body has no equations to compile, but it needs libraries that take long to load.
+    """
+
+    kind: str
+    method: str = "auto"
+    body: bool = False
 
 
 def needed_parts(cases: Iterable[Case]) -> tuple[Part, ...]:
@@ -44,7 +52,7 @@ def needed_parts(cases: Iterable[Case]) -> tuple[Part, ...]:
     for case in cases:  # which may be made one by one
         others = "laws" if case.chooses_forces else "plain"
         kind = "features" if case.needs_mechanism else others
-        found |= {(kind, "auto"), (kind, case.solve.method)}
+        found |= {Part(kind, method, bool(case.body)) for method in ("auto", case.solve.method)}
     return tuple(sorted(found))
 
 
@@ -69,8 +77,9 @@ def load(parts: Iterable[Part], beside: bool = False) -> None:
         Case.from_values(
             {"joint": "both", "clearance_mm": 0.1, "solve": {**solve, "method": method}}
             | KINDS[kind]
+            | ({"body": {"start": "rest"}} if body else {})
         )
-        for kind, method in parts
+        for kind, method, body in parts
     ]
     with parts_beside(cases[-1]) if beside else contextlib.nullcontext():
         for case in cases:
@@ -108,7 +117,8 @@ def compile_quietly(case: Case) -> None:
 
 def compile_seconds(parts: Iterable[Part], processes: int) -> int:
     """Return seconds of compiling that are ahead of a run that needs these parts, about."""
-    seconds = sum(SECONDS[kind] if method == "auto" else 1 for kind, method in uncompiled(parts))
+    ahead = {part._replace(body=False) for part in uncompiled(parts)}
+    seconds = sum(SECONDS[part.kind] if part.method == "auto" else 1 for part in ahead)
     return seconds if processes > 1 else round(1.5 * seconds)
 
 
@@ -117,7 +127,7 @@ def marker(part: Part) -> Path:
     # numba keeps machine code by the path of its sources: a copied folder brings none of use
     what = f"{library_versions(*LIBRARIES)} {COMPILED}"
     known = hashlib.sha256(what.encode()).hexdigest()[:8]
-    return machine_code_folder() / f"compiled-{known}-{'-'.join(part)}"
+    return machine_code_folder() / f"compiled-{known}-{part.kind}-{part.method}"
 
 
 def compile_once(parts: Iterable[Part], remark: Callable[[str], None], processes: int = 1) -> None:

@@ -1,10 +1,11 @@
-"""A worker process from the inside: its limits, and batches of jobs."""
+"""Worker processes from the inside: the loader that makes them, their limits, batches of jobs."""
 
 import contextlib
 import ctypes
 import gc
 import os
 import signal
+import socket
 import sys
 import time
 import traceback
@@ -62,33 +63,79 @@ class Workers:
     target_seconds: float = 0.5
 
 
-def serve(pipe: Connection) -> None:
-    """Run the batches that come through a pipe, until it is closed.
+def serve(calls: Connection) -> None:
+    """Load what jobs need, then make workers, which are copies of this process, and end them.
 
-    The place of each job goes home before it runs, and the number of all when they have run. An
-    answer is a list of ends, without the rest that is given back; StoreError; or WorkersFailed,
-    with what keeps this process from any job.
+    What is called for comes through `calls`: 0 with the pipe of a new worker, or the process id of
+    one that is to end. The answer is its process id, or its exit code; or WorkersFailed, with what
+    keeps this process from making any. At the end of `calls` all workers are ended.
     """
     settle()
     try:
-        parent, work, store, rules = pipe.recv()
+        parent, work, store, rules = calls.recv()
         if os.getppid() != parent:  # it died before `settle`
             return
-        gc.disable()  # until it is prepared: what is loaded is no garbage, and much to look at
+        gc.disable()  # until all is loaded: that is no garbage, and much to look at
         rules.prepare()
         gc.freeze()  # what is there stays: looking at it took a thirtieth of short jobs' time
         gc.enable()
-        limit(rules.memory)
     except BaseException as error:
-        pipe.send(WorkersFailed(f"jobs could not even begin: {describe_error(error)[0]}"))
+        calls.send(WorkersFailed(f"jobs could not even begin: {describe_error(error)[0]}"))
         return
+    loader, workers = os.getpid(), set[int]()
+    with contextlib.suppress(EOFError):
+        while True:
+            if pid := calls.recv():
+                workers.discard(pid)
+                calls.send(end_process(pid))
+                continue
+            with open_socket(calls) as carrier:
+                _, (file,), _, _ = socket.recv_fds(carrier, 1, 1)
+            try:
+                pid = os.fork()
+            except OSError as error:
+                calls.send(WorkersFailed(f"no worker process can be started: {error}"))
+                break
+            if not pid:
+                calls.close()
+                settle()
+                if os.getppid() == loader:  # it is there still
+                    limit(rules.memory)
+                    run_batches(Connection(file), work, store, rules.target_seconds)
+                return
+            os.close(file)
+            workers.add(pid)
+            calls.send(pid)
+    for pid in workers:
+        end_process(pid)
+
+
+def open_socket(pipe: Connection) -> socket.socket:
+    """Return the socket that a pipe is made of, to be closed."""
+    return socket.socket(fileno=os.dup(pipe.fileno()))
+
+
+def end_process(pid: int) -> int:
+    """Kill a child process; return its exit code, -N by signal N."""
+    os.kill(pid, signal.SIGKILL)
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
+def run_batches(
+    pipe: Connection, work: Callable[[Any], Any], store: Store | None, target_seconds: float
+) -> None:
+    """Run the batches that come through a pipe, until it is closed.
+
+    The place of each job goes home before it runs, and the number of all when they have run. An
+    answer is a list of ends, without the rest that is given back, or StoreError.
+    """
     with contextlib.suppress(EOFError):
         while True:
             payloads, ends, began = pipe.recv(), [], time.monotonic()
             for place, payload in enumerate(payloads):
                 pipe.send(place)
                 ends.append(attempt(work, payload))
-                if time.monotonic() - began > MAX_OVERRUN * rules.target_seconds:
+                if time.monotonic() - began > MAX_OVERRUN * target_seconds:
                     break
             pipe.send(len(payloads))
             try:

@@ -97,7 +97,8 @@ def prepare(folder, seconds):
 
 
 def is_prepared(folder, _):
-    return Path(folder, str(os.getpid())).exists()
+    """Whether the process of which this is a copy has taken its while."""
+    return Path(folder, str(os.getppid())).exists()
 
 
 def refuse():

@@ -9,6 +9,7 @@ from compressor.cases.load import load_studies
 from compressor.sweep import plan
 from compressor.sweep.plan import add_times, forecast
 from compressor.sweep.sweep import sweep
+from compressor.sweep.warm_up import Part
 
 SHORT = {"duration_rev": 0.25, "settle_rev": 0, "accuracy": "draft", "output_step_deg": 0.9}
 NINE = {"machine": {"rod_mass_kg": {"linspace": [3, 5, 9]}}}
@@ -86,7 +87,7 @@ def test_all_is_compiled_that_a_timed_job_needs(studies, monkeypatch):
     compiled = []
     monkeypatch.setattr(plan, "compile_once", lambda parts, *_: compiled.append(parts))
     timed(studies(one=NINE, two={"joint": "both", "clearance_mm": 0.1, "lubricant": True}), 1)
-    assert compiled == [(("laws", "auto"), ("plain", "auto"))]
+    assert compiled == [(Part("laws"), Part("plain"))]
 
 
 def test_a_job_that_is_timed_is_a_job_of_the_sweep(studies, monkeypatch):

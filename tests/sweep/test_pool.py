@@ -40,9 +40,9 @@ def is_running(pid):
     return stat.rpartition(")")[2].split()[0] != "Z"
 
 
-def children():
-    """Our own child processes, zombies too."""
-    tasks = Path("/proc/self/task").glob("*/children")
+def children(of="self"):
+    """The child processes of one, or our own, zombies too."""
+    tasks = Path(f"/proc/{of}/task").glob("*/children")
     return {int(pid) for path in tasks for pid in path.read_text().split()}
 
 
@@ -226,13 +226,26 @@ def test_a_disk_that_is_full_ends_the_call(tmp_path):
 
 
 def test_closing_ends_the_workers():
+    before = children()
     ends = run_batches(work, named([1, "hang", "stop"]), Workers(3, grace=60))
     assert next(ends).id == 1
-    assert len(children()) >= 2
+    (loader,) = children() - before
+    workers = children(loader)
+    assert len(workers) >= 2
     began = time.monotonic()
     ends.close()
     assert time.monotonic() - began < 5
+    assert not any(map(is_running, workers))
     assert list(ends) == []
+
+
+def test_workers_are_made_anew_where_their_loader_has_died():
+    """Its copies die with it; what they had begun runs again."""
+    before, ends = children(), run_batches(work, named(range(300)), Workers(2, target_seconds=0.01))
+    found = [next(ends)]
+    (loader,) = children() - before
+    os.kill(loader, signal.SIGKILL)
+    assert results([*found, *ends]) == {n: n for n in range(300)}
 
 
 @pytest.mark.parametrize("workers", [1, 2])

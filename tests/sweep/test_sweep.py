@@ -208,7 +208,7 @@ def test_only_what_cases_need_is_compiled(tmp_path, monkeypatch):
         (oiled | {"guide": True}, "features"),
     ):  # fmt: skip
         parts = warm_up.needed_parts([Case.from_values(values)])
-        assert warm_up.uncompiled(parts) == [(kind, "auto")]
+        assert warm_up.uncompiled(parts) == [warm_up.Part(kind)]
 
 
 def test_what_asks_the_program_to_end_is_no_failure_of_a_job():

@@ -67,8 +67,8 @@ class Run:
         return self.code is None
 
     def workers(self):
-        """Its child processes that run."""
-        return [pid for pid, parent in members(self.pid).items() if parent == self.pid]
+        """The processes that it has started and that run: workers, and what they are copies of."""
+        return [pid for pid in members(self.pid) if pid != self.pid]
 
     def send(self, number, whole=False):
         """Send a signal to itself alone, or to the whole session at once."""
@@ -136,12 +136,12 @@ def become(arguments, folder, terminal, real, prepare):
 
 
 def members(session):
-    """The processes of a session that are no zombies: number -> parent's number."""
-    found = {}
+    """The processes of a session that are no zombies."""
+    found = []
     for name in os.listdir("/proc"):
         if name.isdecimal():
             with contextlib.suppress(OSError):
                 fields = Path("/proc", name, "stat").read_text().rpartition(")")[2].split()
                 if int(fields[3]) == session and fields[0] not in "ZX":
-                    found[int(name)] = int(fields[1])
+                    found.append(int(name))
     return found
