@@ -33,7 +33,6 @@ from compressor.analysis.runs import (
     FAULT_LABELS,
     FAULTS,
     SPOKEN,
-    active_share,
     case_of,
     faulty_joints,
     force_relation,
