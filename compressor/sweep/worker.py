@@ -101,7 +101,7 @@ def serve(calls: Connection) -> None:
                 settle()
                 if os.getppid() == loader:  # it is there still
                     limit(rules.memory)
-                    run_batches(Connection(file), work, store, rules.target_seconds)
+                    serve_batches(Connection(file), work, store, rules.target_seconds)
                 return
             os.close(file)
             workers.add(pid)
@@ -121,7 +121,7 @@ def end_process(pid: int) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 
-def run_batches(
+def serve_batches(
     pipe: Connection, work: Callable[[Any], Any], store: Store | None, target_seconds: float
 ) -> None:
     """Run the batches that come through a pipe, until it is closed.
