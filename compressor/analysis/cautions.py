@@ -1,16 +1,17 @@
-"""Cautions about a case before it runs: natural scales, values that few machines have.
+"""Cautions about a case before it runs: natural scales, slips of units, laws left behind.
 
 Natural scales are closed formulas of a case's parameters alone. Forces are bounds; the deepest
 contact of random cases is 0.6 to 1.6 times as deep as they say in nine of ten
 (tests/analysis/test_scales.py).
 
-An oddity is reported once a study. What cannot be simulated at all is refused by
-`compressor.cases.conflicts`.
+A key looks as if it were given in another unit where every value that it has in a study lies
+outside its usual range, and that unit would bring all of them inside. An oddity is reported once a
+study. What cannot be simulated at all is refused by `compressor.cases.conflicts`.
 """
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -27,6 +28,7 @@ from compressor.cases import (
     paper_notes,
     reads,
     row_of,
+    stands_for,
     to_si,
     value_of,
 )
@@ -70,6 +72,40 @@ def contact_depths(case: Case) -> Iterator[tuple[float, float]]:
             yield clearance, float(contact.static_depth(greatest_force(p, joint)))
 
 
+METRES, MICROMETRES = {"m": 1e3}, {"µm": 1e-3}
+GRAMS, MILLI = {"g": 1e-3}, 1e-3
+PRESSURES = {"bar": 0.1, "kPa": 1e-3, "Pa": 1e-6}
+
+# key -> what is usual for it, lowest and highest, and the units it may be mistaken for, as factors.
+# Reciprocating compressors from model engines to large process machines, with a margin; a contact
+# is from plastic bushings to steel in a conforming bore (Hertz, K = 4/3 sqrt(R) E').
+USUAL_KEYS = {
+    "clearance_mm": (1e-3, 2.0, METRES | MICROMETRES),
+    "machine.crank_radius_mm": (5.0, 1e3, METRES),
+    "machine.rod_length_mm": (20.0, 1e4, METRES),
+    "machine.speed_rpm": (120.0, 6e3, {"rad/s": 30 / math.pi, "Hz": 60.0}),
+    "machine.rod_mass_kg": (0.02, 500.0, GRAMS),
+    "machine.rod_inertia_kg_m2": (1e-6, 1e3, {"kg mm2": 1e-6, "kg cm2": 1e-4}),
+    "machine.reciprocating_mass_kg": (0.05, 5e3, GRAMS),
+    "machine.pin_radius_mm": (1.0, 500.0, METRES),
+    "gas.piston_radius_mm": (5.0, 1e3, METRES),
+    "gas.head_clearance_mm": (0.1, 200.0, METRES),
+    "gas.suction_MPa": (1e-3, 50.0, PRESSURES),
+    "gas.discharge_MPa": (0.05, 200.0, PRESSURES),
+    "spring.stiffness_N_per_mm": (0.1, 5e3, {"N/m": MILLI, "kN/mm": 1e3}),
+    "spring.damping_N_s_per_mm": (1e-4, 10.0, {"N s/m": MILLI}),
+    "spring.preload_N": (5.0, 1e6, {"kN": 1e3}),
+    "spring.stroke_mm": (2.0, 2e3, METRES),
+    "contact.stiffness_N_per_mm15": (
+        1e4, 1e7, {"kN/mm^1.5": 1e3, "mN/mm^1.5": MILLI, "N/m^1.5": 1000.0**-1.5}
+    ),
+    "contact.damping_N_s_per_mm": (0.1, 1e5, {"N s/m": MILLI}),
+    "contact.full_damping_mm": (1e-3, 5.0, METRES),
+    "friction.stiction_velocity_mm_per_s": (0.1, 1e4, {"m/s": 1e3}),
+    "friction.friction_velocity_mm_per_s": (1.0, 1e5, {"m/s": 1e3}),
+}  # fmt: skip
+
+
 class Caution(NamedTuple):
     """What is odd about a study: the key it is about, the words for the first of `jobs` of `of`."""
 
@@ -77,6 +113,53 @@ class Caution(NamedTuple):
     message: str
     jobs: int
     of: int
+
+
+def is_usual(key: str, value: float) -> bool:
+    """Return whether a value is usual for a key; limits may come from a conversion, and count."""
+    low, high, _ = USUAL_KEYS[key]
+    return low * (1 - 1e-9) <= value <= high * (1 + 1e-9)
+
+
+def slips(cases: Sequence[Case]) -> list[Caution]:
+    """Return the keys of a study's cases whose values all look like another unit's."""
+    found = []
+    for key, (usual_low, usual_high, units) in USUAL_KEYS.items():
+        read = [values for case in cases if (values := values_of(case, key))]
+        values = sorted({value for several in read for value in several})
+        if not (other := other_unit(key, values)):
+            continue
+        row, ends = row_of(key), (values[0], values[-1])
+        unit = (row.unit if row else "").replace("^p", "^1.5")
+        given = " to ".join(dict.fromkeys(f"{one:g}" for one in ends))
+        meant = " to ".join(dict.fromkeys(f"{one * units[other]:.4g}" for one in ends))
+        text = f"{given} {unit}, where {usual_low:g} to {usual_high:g} is usual; read as {other}: "
+        found.append(Caution(key, f"{text}{meant} {unit}", len(read), len(cases)))
+    return found
+
+
+def values_of(case: Case, key: str) -> list[float]:
+    """Return the values of a key that a simulation reads; of clearances, those of worn joints."""
+    if not reads(case, key):
+        return []
+    if key == "contact.stiffness_N_per_mm15" and case.contact.exponent != 1.5:
+        return []  # its unit depends on the exponent
+    found = [value_of(case, part) for part in stands_for(key) or (key,)]
+    return [float(value) for value in dict.fromkeys(found) if value]
+
+
+def other_unit(key: str, values: Sequence[float]) -> str:
+    """Return the unit in which unusual values would all be usual, "" where there is none."""
+    if not values or any(value <= 0 or is_usual(key, value) for value in values):
+        return ""
+    low, high, units = USUAL_KEYS[key]
+    row, middle = row_of(key), sum(map(math.log, values)) / len(values)
+    default = float(row.default) if row and row.default else math.sqrt(low * high)
+    return min(
+        (name for name in units if all(is_usual(key, value * units[name]) for value in values)),
+        key=lambda name: abs(middle + math.log(units[name] / default)),
+        default="",
+    )
 
 
 SHALLOW_CLEARANCES = 2.0  # clearances: forces are bounds, and the paper's 0.1 mm is not meant
@@ -261,11 +344,22 @@ def remarks(case: Case) -> Iterator[tuple[Check, str, str]]:
 
 
 def cautions(study: Study) -> list[Caution]:
-    """Return what is odd about the selected jobs of a study, a `Caution` for each oddity."""
+    """Return what is odd about the selected jobs of a study, a `Caution` for each oddity.
+
+    A key whose values look like another unit's has that remark alone, and no forces are told then.
+    """
     cases = sample_cases(study, MAX_JOBS)
+    units = {one.key: one for one in slips(cases)}
     found: dict[tuple[Check, str], Caution] = {}
     for case in cases:
         for check, key, message in remarks(case):
             one = found.get((check, key), Caution(key, message, 0, len(cases)))
             found[check, key] = one._replace(jobs=one.jobs + 1)
-    return sorted(found.values(), key=lambda one: -one.jobs)
+    told = []
+    for (check, key), one in sorted(found.items(), key=lambda item: -item[1].jobs):
+        if key in units and check is check_judged:
+            message = f"{units[key].message}; {one.message}"
+            units[key] = units[key]._replace(message=message)
+        elif key not in units and not (units and check is check_depth):
+            told.append(one)
+    return [*units.values(), *told]
