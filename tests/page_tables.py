@@ -127,7 +127,7 @@ FINDINGS = (
     ("stress", "Extreme cases that are wrong without a warning", judge_extremes),
     ("chaotic", "Averages of chaotic motions agree between two integrators, within two standard "
                 "errors", count_averages),
-    ("chaos", "Kills, power cuts and full disks that lose or change a result", judge_faults),
+    ("chaos", "Kills, power cuts and damaged files that lose or change a result", judge_faults),
     ("mutants", "Planted bugs are caught by the tests", judge_mutants),
     ("claims", "Claims of the paper that hold", count_claims),
     ("identify", "`compsim identify` names the worn joint", count_identified),

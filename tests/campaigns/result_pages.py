@@ -419,7 +419,7 @@ CAMPAIGNS = {
     "alarms": ("Which alarm sees wear first?", alarms),
     "identify": ("Does `compsim identify` find the worn joint?", identify),
     "calibrate": ("Does `compsim calibrate` find a machine's parameters?", calibrate),
-    "chaos": ("Do results survive kills, power cuts and full disks?", chaos),
+    "chaos": ("Do results survive kills, power cuts and damage?", chaos),
     "mutants": ("Would the tests notice a bug?", mutants),
     "sweep": ("How many jobs a second, and does an interrupted sweep lose one?", sweep),
     "nameplate": ("What does the case file of `compsim init machine` give?", nameplate),
