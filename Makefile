@@ -59,10 +59,11 @@ accuracy: install  ## judge promises and error bars on 1,000 other random cases 
 claims: install  ## measure the paper's claims over machines, and what decides them (an hour, 5 GB)
 	$(CAMPAIGN)/measure_claims.py tests/results/claims.json
 
-page: install  ## test the report's page in a browser
+page: install  ## test the report's page in a browser, measure how it is written and opens (ten minutes)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check selenium
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps axe-playwright-python
 	$(BIN)/python -m pytest tests/report/test_browser.py
+	$(CAMPAIGN)/measure_page.py tests/results/page.json
 
 sweep-bench: install  ## measure start-up and 100,000 short jobs, killed three times and resumed (ten minutes or more)
 	$(CAMPAIGN)/measure_sweep.py tests/results/sweep.json

@@ -252,6 +252,20 @@ def tradeoff(found):
     return markdown(["change of the model", *heads], lines)
 
 
+def page(found):
+    rows = [{"name": f"{name}, {one['figures']} figures", **one}
+            for name, one in found["stores"].items()]  # fmt: skip
+
+    def size(row):
+        return f"{sum(value for key, value in row.items() if key.endswith('_bytes')) / 1e6:.1f}"
+
+    return table(rows, {
+        "report of": "name", "written in, s": "write_seconds:.1f",
+        "written again, s": "rewrite_seconds:.1f", "all files, MB": size,
+        "opens in, s": "open_seconds:.2f", "first figure live after, s": "first_figure_seconds:.2f",
+    })  # fmt: skip
+
+
 def sweep(found):
     numbers = {name: value for name, value in found.items()
                if isinstance(value, int | float) and not isinstance(value, bool)}  # fmt: skip
@@ -422,6 +436,7 @@ CAMPAIGNS = {
     "chaos": ("Do results survive kills, power cuts and damage?", chaos),
     "mutants": ("Would the tests notice a bug?", mutants),
     "sweep": ("How many jobs a second, and does an interrupted sweep lose one?", sweep),
+    "page": ("How fast is the report?", page),
     "nameplate": ("What does the case file of `compsim init machine` give?", nameplate),
 }  # fmt: skip
 
