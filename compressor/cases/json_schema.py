@@ -1,8 +1,8 @@
 """The JSON Schema of case files, so that editors complete their keys and mark mistakes.
 
 Pydantic writes that of one value, and the table of parameters has the rest: here a key may also be
-swept. What it does not check, such as what designs draw from and whether values fit each other,
-reading the file does (`compressor.cases.load`).
+swept. What it does not check, such as whether values fit each other, reading the file does
+(`compressor.cases.load`).
 """
 
 from collections.abc import Mapping
@@ -118,6 +118,5 @@ def _forms() -> Schema:
         numbers = {**_list(number), "minItems": count, "maxItems": count, "description": inside}
         forms.append(_mapping({word: numbers}, word))
         if word in SAMPLED:
-            drawn = {"anyOf": [numbers, {"type": "object", "maxProperties": 1}]}
-            forms[-1] = _mapping({word: drawn, "log": {"type": "boolean"}}, word)
+            forms[-1] = _mapping({word: numbers, "log": {"type": "boolean"}}, word)
     return {"anyOf": forms}

@@ -36,10 +36,6 @@ from compressor.cases.swept import FORMS, NoSweep, Sweep, design, design_size, s
 from compressor.cases.table import outside_identity
 from compressor.cases.yaml_reader import FileProblem, Place, Tree
 
-NO_ENDS = (
-    ": a normal distribution has no ends; give it a smaller sd, or draw from {triangular: [least, "
-    "likeliest, greatest]}"
-)
 RIVALS = dict(IN_PLACE_OF) | {other: one for one, other in IN_PLACE_OF}
 
 Factors = list[tuple[str, ...]]  # keys that advance together
@@ -181,8 +177,6 @@ class Block:
             if swept:
                 sweep, row = self.sweeps[swept], rows[swept]
                 place = self.tree.at(*sweep.path, *[row] * (sweep.kind == "list"))[1]
-                if not error.is_misfit and not sweep.has_ends:
-                    message = f"draw {row + 1} of {len(self.columns[swept])}: {message}{NO_ENDS}"
             else:
                 is_value = tuple(parts) in self.tree.places and not is_of_key(message)
                 place = self.tree.at(*parts)[is_value]

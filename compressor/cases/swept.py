@@ -10,11 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from fractions import Fraction
-from statistics import NormalDist
 from typing import Any
 
 from compressor.cases.yaml_reader import Path, is_number
-from compressor.program import did_you_mean, ignore_warnings
+from compressor.program import ignore_warnings
 
 # designs of samples, which draw several keys together
 SAMPLED = ("random", "lhs", "sobol", "saltelli")
@@ -24,12 +23,6 @@ FORMS = {
     "logspace": "[first, last, count]",
     "range": "[first, last, step]",
 } | dict.fromkeys(SAMPLED, "[least, greatest]")
-# of what designs draw, in place of [least, greatest] -> what stands behind the word
-DISTRIBUTIONS = {
-    "normal": "{mean: number, sd: number}",
-    "triangular": "[least, likeliest, greatest]",
-}
-LEAST_SHARE = 2.0**-54  # argument of a normal distribution's quantile: that of 0 is infinite
 
 Spread = Callable[[float], float]  # of a share in [0, 1)
 
@@ -44,17 +37,13 @@ class NoSweep(ValueError):
 
 @dataclass(frozen=True)
 class Sweep:
-    """How one value is swept; `spread` is that of a drawn one, whose `count` its design has.
-
-    has_ends: whether these values have a least and a greatest one, as all but normal ones have.
-    """
+    """How one value is swept; `spread` is that of a drawn one, whose `count` its design has."""
 
     path: Path
     kind: str  # list, or a word of FORMS
     count: int = 0
     make: Callable[[], list[Any]] = list
     spread: Spread = float
-    has_ends: bool = True
 
     @property
     def is_drawn(self) -> bool:
@@ -83,15 +72,12 @@ def sweep_of(path: Path, value: Any, is_whole: bool = False) -> Sweep:
     (word,) = words
     if log is not None and (word not in SAMPLED or not isinstance(log, bool)):
         raise NoSweep(f"log is true or false, and for {' '.join(SAMPLED)} alone", "log")
+    numbers = _numbers(FORMS[word], value[word], word)
     if word not in SAMPLED:
-        return _made_sweep(path, word, _numbers(FORMS[word], value[word], word))
-    if isinstance(value[word], dict):
-        spread, has_ends = _distribution(word, value[word], log), "normal" not in value[word]
-    else:
-        ends = _numbers(FORMS[word], value[word], word)
-        spread, has_ends = _range(word, ends[0], ends[1], bool(log)), True
+        return _made_sweep(path, word, numbers)
+    spread = _range(word, numbers, bool(log))
     drawn = (lambda share: round(spread(share))) if is_whole else spread
-    return Sweep(path, word, spread=drawn, has_ends=has_ends)
+    return Sweep(path, word, spread=drawn)
 
 
 def _numbers(form: str, values: Any, word: str) -> list[Fraction]:
@@ -135,64 +121,19 @@ def _made_sweep(path: Path, word: str, numbers: list[Fraction]) -> Sweep:
     return Sweep(path, word, count, geometric if word == "logspace" else even)
 
 
-def _range(word: str, least: Fraction, greatest: Fraction, log: bool) -> Spread:
+def _range(word: str, ends: list[Fraction], log: bool) -> Spread:
     """Return the function that takes [0, 1) to a range, evenly or with even ratios."""
-    low, high = float(least), float(greatest)
-    if least == greatest:
+    low, high = map(float, ends)
+    if low == high:
         raise NoSweep(f"{word} needs two different ends", word)
-    if least > greatest:
+    if low > high:
         raise NoSweep(f"{word} needs {FORMS[word]}: {low:g} exceeds {high:g}", word)
-    if log and least <= 0:
+    if log and low <= 0:
         raise NoSweep("log needs ends above 0", word)
 
     def spread(share: float) -> float:
         value = low * (high / low) ** share if log else low + (high - low) * share
         return min(max(round_made_value(value), low), high)
-
-    return spread
-
-
-def _distribution(word: str, body: dict[str, Any], log: bool | None) -> Spread:
-    """Return the quantiles of what a design draws from, such as {normal: {mean: 0.2, sd: 0.02}}."""
-    names = [*body]
-    if len(names) != 1 or names[0] not in DISTRIBUTIONS:
-        near = did_you_mean(names[0], DISTRIBUTIONS) if names else ""
-        known = " or ".join(f"{{{name}: {form}}}" for name, form in DISTRIBUTIONS.items())
-        raise NoSweep(f"{word} needs {FORMS[word]}, {known}" + (f"; {near}" if near else ""), word)
-    (name,), inside = names, body[names[0]]
-    if log is not None:
-        raise NoSweep(f"log is for {FORMS[word]}, not for {name}", "log")
-    if name == "normal":
-        is_whole = isinstance(inside, dict) and {*inside} == {"mean", "sd"}
-        if is_whole and all(map(is_finite, inside.values())) and inside["sd"] > 0:
-            return _normal(inside["mean"], inside["sd"])
-        needs = "sd above 0"
-    else:
-        is_whole = isinstance(inside, list) and len(inside) == 3 and all(map(is_finite, inside))
-        if is_whole and inside == sorted(inside) and inside[0] < inside[2]:
-            return _triangular(*inside)
-        needs = "in rising order, the ends different"
-    raise NoSweep(f"{name} needs {DISTRIBUTIONS[name]}, finite numbers, {needs}", word, name)
-
-
-def _normal(mean: float, sd: float) -> Spread:
-    """Return the function that takes [0, 1) to the quantiles of a normal distribution."""
-    quantile = NormalDist(mean, sd).inv_cdf
-    return lambda share: round_made_value(
-        quantile(min(max(share, LEAST_SHARE), 1.0 - 2.0 * LEAST_SHARE))
-    )
-
-
-def _triangular(low: float, middle: float, high: float) -> Spread:
-    """Return the function that takes [0, 1) to the quantiles of a triangular distribution."""
-    below = (middle - low) / (high - low)
-
-    def spread(share: float) -> float:
-        if share < below:
-            value = low + math.sqrt(share * (high - low) * (middle - low))
-        else:
-            value = high - math.sqrt((1.0 - share) * (high - low) * (high - middle))
-        return min(max(round_made_value(value), float(low)), float(high))
 
     return spread
 

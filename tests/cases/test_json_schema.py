@@ -24,8 +24,6 @@ OTHERS = [
     "joint: both\nclearance_mm: {random: [0.01, 1], log: true}\nsample: {n: 2, seed: 3}",
     "load: [none, spring]\nexclude: [load == none]\nfriction: false",
     "joint: both\nclearance_mm: 0.1\nmachine: {pin_radius_mm: {big_end: [50, 60], small_end: 35}}",
-    "machine: {rod_mass_kg: {sobol: {normal: {mean: 4, sd: 0.2}}}}\nsample: {n: 2}",
-    "machine: {rod_mass_kg: {lhs: {triangular: [3, 4, 6]}}}\nsample: {n: 2}",
 ]
 
 

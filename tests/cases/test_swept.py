@@ -1,6 +1,5 @@
 """The grammar of sweeps: how values are made, joined and left out, and what is refused."""
 
-import re
 import tracemalloc
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from conftest import refused
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scipy.stats import norm, triang
 
 from compressor.cases.load import CaseFileError
 from compressor.cases.study import points
@@ -130,47 +128,6 @@ def test_whole_numbers_are_drawn_as_such(read, kind):
     assert [case.sensor.seed for case in study.cases] == drawn
     assert len({*drawn}) > 4
     assert all(isinstance(case.sensor.seed, int) for case in study.cases)
-
-
-DRAWN = """
-joint: big_end
-clearance_mm: {%s: {normal: {mean: 0.2, sd: 0.02}}}
-machine: {speed_rpm: {%s: {triangular: [300, 500, 900]}}, rod_mass_kg: {%s: [3, 6]}}
-sample: {n: 64, seed: 5}
-"""
-
-
-@pytest.mark.parametrize("kind", ["random", "lhs", "sobol", "saltelli"])
-def test_distributions_are_drawn_by_their_quantiles(read, kind):
-    """The same shares as of ranges, by SciPy's quantile functions."""
-    shares = np.array(design(kind, 64, 3, 5))
-    found = np.array(rows(read(DRAWN % (kind, kind, kind))))
-    expected = (
-        norm.ppf(shares[:, 0], 0.2, 0.02),
-        triang.ppf(shares[:, 1], 200 / 600, 300, 600),
-        3 + 3 * shares[:, 2],
-    )
-    np.testing.assert_allclose(found, np.stack(expected, axis=1), rtol=1e-11)
-    ranges = re.sub(r"{normal.*?}}", "[0.1, 0.3]", DRAWN).replace(
-        "{triangular: [300, 500, 900]}", "[300, 900]"
-    )
-    even = np.array(rows(read(ranges % (kind, kind, kind))))
-    np.testing.assert_allclose((even[:, 0] - 0.1) / 0.2, shares[:, 0], atol=1e-9)
-    np.testing.assert_array_equal(even[:, 2], found[:, 2])
-
-
-def test_the_tail_of_a_normal_distribution_is_refused_with_its_draw(read):
-    """Of 64 draws the first beyond the key's range, counted as the design draws them."""
-    text = "machine: {rod_mass_kg: {lhs: {normal: {mean: 2, sd: 1}}}}\nsample: {n: 64, seed: 1}"
-    drawn = norm.ppf(np.array(design("lhs", 64, 1, 1))[:, 0], 2, 1)
-    first = int(np.flatnonzero(drawn <= 0)[0])
-    (message,) = refused(read, text)
-    assert message.endswith(
-        f"machine.rod_mass_kg: draw {first + 1} of 64: {drawn[first]:g} is outside (0, 1e+06] "
-        "kg: a normal distribution has no ends; give it a smaller sd, or draw from {triangular: "
-        "[least, likeliest, greatest]}"
-    )
-    assert "1:" in message
 
 
 def test_saltelli_exchanges_one_key_after_another(read):
