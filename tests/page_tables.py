@@ -200,9 +200,9 @@ def key_rows(rows):
 def needs_of(row, group):
     """The conditions under which a case reads a key, but for those of its group."""
     known = (CLEARANCE, group, *READ.get(group, ()))
-    mine = [
-        one for one in row.readers.split("; ") if one and not (one in known or CLEARANCE in one)
-    ]
+    # of "a" and "a or b" it is "a"
+    needed = [one for one in row.read if not any(o != one and o in one for o in row.read)]
+    mine = [one for one in dict.fromkeys(needed) if not (one in known or CLEARANCE in one)]
     return f"; needs `{' and '.join(mine)}`" if mine else ""
 
 
@@ -225,7 +225,7 @@ def parameter_table(rows, group):
     lines = []
     for name, (row, phrase) in key_rows(rows).items():
         needs = needs_of(row, group) if name == row.key and group else ""
-        tested = f"; tested {row.judged_on}" if row.judged else ""
+        tested = "; tested {:g} to {:g}".format(*row.judged) if row.judged else ""
         cells = (f"`{name}`", default_of(row), range_of(row) + tested, phrase + needs)
         lines.append([cell.replace("|", "\\|") for cell in cells])
     needed = " and ".join(READ.get(group, ())).replace(CLEARANCE, "a joint with clearance")

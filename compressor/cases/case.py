@@ -148,8 +148,8 @@ stroke, 240 mm
         """Return a case of nested values as in a case file, without sweeps.
 
         values: words, numbers (also those of numpy) and, by group, mappings, in the units that
-        stand in the keys. What is left out has its default; `help(compressor.Machine)` and the like
-        show defaults, ranges and sources.
+        stand in the keys. What is left out has its default; configs/README.md lists defaults,
+        ranges and sources.
 
         Raises CaseError with everything that is wrong at once: unknown keys, wrong types, ranges,
         and values that do not fit each other, in the same words as for a case file.

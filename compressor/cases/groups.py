@@ -153,14 +153,6 @@ class Gas:
     >>> gas = compressor.Case.from_values({"load": "gas", "gas": {"discharge_MPa": 0.5}}).gas
     >>> gas.switching, gas.back_pressure_MPa
     ('exact', 0.101325)
-
-    The gas presses on the piston from the cylinder's head alone, or, by `action`, from both ends or
-    from the crank end. Clearances and valve losses may differ by end and by valve:
-
-    >>> gas = {"action": "double", "rod_diameter_mm": 30, "clearance_percent": {"head": 12,
-    ...        "crank": 14}, "valve_loss_percent": 4}
-    >>> compressor.Case.from_values({"load": "gas", "gas": gas}).gas.switching
-    'exact'
     """
 
     piston_radius_mm: float = number(50.0, "(0, 1e4]", "piston radius", "Table 1")
@@ -329,16 +321,10 @@ class Contact:
     speed at which journal and bore met; the name of one and a coefficient of restitution choose it:
 
     >>> import compressor
-    >>> worn = {"joint": "big_end", "clearance_mm": 0.2}
-    >>> values = worn | {"contact": {"law": "flores", "restitution": 0.7}}
+    >>> contact = {"law": "flores", "restitution": 0.7}
+    >>> values = {"joint": "big_end", "clearance_mm": 0.2, "contact": contact}
     >>> compressor.Case.from_values(values).contact.least_approach_mm_per_s
     10.0
-
-    Two materials may stand in place of the stiffness K (Eq. 15, Table 2):
-
-    >>> values = worn | {"contact": {"materials": ["steel", "copper"]}}
-    >>> compressor.Case.from_values(values).contact.materials.big_end
-    ('steel', 'copper')
     """
 
     law: str = choice(
@@ -417,9 +403,6 @@ class Friction:
     `False` leaves it out:
 
     >>> import compressor
-    >>> values = {"joint": "big_end", "clearance_mm": 0.2, "friction": {"dynamic": 0.1}}
-    >>> compressor.Case.from_values(values).friction.dynamic
-    0.1
     >>> compressor.Case.from_values({"friction": False}).friction is None
     True
     """

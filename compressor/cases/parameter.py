@@ -14,7 +14,6 @@ import reprlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import lru_cache, partial, reduce
-from inspect import cleandoc
 from types import NoneType
 from typing import Annotated, Any, Generic, Literal, TypeVar, dataclass_transform, get_args
 
@@ -272,20 +271,6 @@ class Parameter:
             return f"a pair of materials, {words}, such as [steel, steel]"
         return ", or ".join(filter(None, [words, OTHERWISE.get(self.kind)]))
 
-    @property
-    def judged_on(self) -> str:
-        """Return the range that the program was judged on, "" without one."""
-        return "{:g} to {:g}".format(*self.judged) if self.judged else ""
-
-    @property
-    def readers(self) -> str:
-        """Return what a case file sets so that the key is read; "" where every job reads it.
-
-        Of "a" and "a or b" it is "a".
-        """
-        needed = [one for one in self.read if not any(o != one and o in one for o in self.read)]
-        return "; ".join(dict.fromkeys(needed))
-
     def choice_of(self, value: Any) -> Any:
         """Return the choice that an alias stands for, and any other value as it is."""
         return next((choice for alias, choice in self.aliases if alias == value), value)
@@ -514,8 +499,7 @@ def _value_under(value: Any, name: str) -> Any:
 def make_group(cls: type[Group]) -> type[Group]:
     """Return a group of keys as a frozen dataclass that pydantic checks as it is made.
 
-    A group of wrong values raises CaseError with everything that is wrong. Its docstring has
-    its fields.
+    A group of wrong values raises CaseError with everything that is wrong.
     """
     own = dict(cls.__annotations__)
     for name, item in vars(cls).items():
@@ -533,7 +517,6 @@ def make_group(cls: type[Group]) -> type[Group]:
 
     made.__init__ = __init__
     made.__annotations__ = own
-    made.__doc__ = describe_fields(made)
     return made
 
 
@@ -634,28 +617,6 @@ def _field(default: Any, phrase: str, source: str, row: dict[str, Any]) -> Any:
 
 def _all_of(read: str | Sequence[str]) -> tuple[str, ...]:
     return (read,) if isinstance(read, str) else tuple(read)
-
-
-def describe_fields(group: type) -> str:
-    """Return a group's docstring with its fields: range, unit, default and its source."""
-    lines = []
-    for item in fields(group):
-        names, rows = [*item.metadata.get("parts", ())], [*rows_of(item.name, item)]
-        if not rows:
-            continue
-        row = rows[0]
-        phrase = row.phrase.replace(f" {PART_WORDS[names[0]]}", "") if names else row.phrase
-        default = f"{row.default:g}" if isinstance(row.default, float) else repr(row.default)
-        needed = row.needed.replace("true or false", "True or False")
-        needed += f", or one for each: {', '.join(names)}" if names else ""
-        readers = dict.fromkeys(one.readers for one in rows if one.read)
-        notes = f" Judged on {row.judged_on}." if row.judged else ""
-        notes += f" Read with {'; or '.join(readers)}." if readers else ""
-        lines.append(
-            f"- `{item.name}`: {phrase}. Needs {needed}; default {default} ({row.source}).{notes}"
-        )
-    text = cleandoc(group.__doc__ or "")
-    return f"{text}\n\nFields, with the sources of their defaults:\n\n" + "\n".join(lines)
 
 
 @dataclass(frozen=True)
